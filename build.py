@@ -1,0 +1,197 @@
+#!/usr/bin/env python3
+"""The one entry: set up, run, test and measure percussion_model.
+
+Needs nothing but Python 3.11 or newer: it makes .venv beside this file,
+installs the package there, and works inside it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import importlib.util
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent
+VENV = ROOT / ".venv"
+STAMP = VENV / "percussion_model.stamp"
+OLDEST_PYTHON = (3, 11)
+INTERRUPTED = 130  # what shells report for Ctrl-C
+
+REFERENCE_RUN = [
+    "run", "scenarios/reference.toml", "--duration", "4", "--settle", "1", "--out", "out/reference",
+]  # fmt: skip
+
+
+def tool(name: str) -> Path:
+    """Return the path of a program in .venv, on Windows too."""
+    if os.name == "nt":
+        return VENV / "Scripts" / f"{name}.exe"
+    return VENV / "bin" / name
+
+
+def missing_requirement(version: tuple[int, ...], modules: dict[str, bool]) -> str:
+    """Say what this Python lacks to set up, nothing if it lacks nothing.
+
+    Parameters
+    ----------
+    version : tuple of int
+        Version of the running Python.
+    modules : dict
+        Whether each of the modules `venv` and `ensurepip` can be found.
+    """
+    shown = ".".join(str(part) for part in version[:2])
+    if version[:2] < OLDEST_PYTHON:
+        oldest = ".".join(str(part) for part in OLDEST_PYTHON)
+        return (
+            f"This is Python {shown}, but percussion_model needs {oldest} or newer. Install it and "
+            f"run build.py with it, for instance: python{oldest} build.py setup"
+        )
+    lacking = [name for name, found in modules.items() if not found]
+    if lacking:
+        return (
+            f"Python {shown} lacks the module {' and '.join(lacking)}, so no .venv can be made. "
+            f"On Debian and Ubuntu install it with: sudo apt install python{shown}-venv\n"
+            "Elsewhere install Python with its standard library complete."
+        )
+    return ""
+
+
+def wanted_stamp(pyproject: bytes, version: tuple[int, ...]) -> str:
+    """Return what the stamp of an up-to-date .venv says: Python version and hash."""
+    shown = ".".join(str(part) for part in version[:2])
+    return f"{shown} {hashlib.sha256(pyproject).hexdigest()}"
+
+
+def setup() -> int:
+    """Make .venv and install the package with all extras, unless that is done."""
+    lacking = missing_requirement(
+        sys.version_info[:3],
+        {name: importlib.util.find_spec(name) is not None for name in ("venv", "ensurepip")},
+    )
+    if lacking:
+        print(lacking, file=sys.stderr)
+        return 1
+    wanted = wanted_stamp((ROOT / "pyproject.toml").read_bytes(), sys.version_info[:3])
+    found = STAMP.read_text(encoding="utf-8") if STAMP.exists() else ""
+    if found == wanted and tool("python").exists():
+        return 0
+    made = make_venv(renew=bool(found) and found.split()[0] != wanted.split()[0])
+    if made != 0:
+        return made
+    print("Installing percussion_model and what it needs (a minute or two) ...", flush=True)
+    code = call([tool("python"), "-m", "pip", "--disable-pip-version-check", "install", "-q",
+                 "-e", ".[all]"])  # fmt: skip
+    if code != 0:
+        print("The installation failed, see above. Is the network up? Then run this again.",
+              file=sys.stderr)  # fmt: skip
+        return code
+    STAMP.write_text(wanted, encoding="utf-8")
+    print("Ready.", flush=True)
+    return 0
+
+
+def make_venv(renew: bool) -> int:
+    """Make .venv; `renew` throws away one of another Python version."""
+    has_pip = tool("python").exists() and (
+        subprocess.call(
+            [tool("python"), "-c", "import pip"], stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        ) == 0
+    )  # fmt: skip
+    if has_pip and not renew:
+        return 0
+    print("Making .venv ...", flush=True)
+    code = call([sys.executable, "-m", "venv", *(["--clear"] if renew else []), VENV])
+    if code != 0:
+        print(f"No .venv could be made in {ROOT}, see above.", file=sys.stderr)
+    return code
+
+
+def run(extra: list[str]) -> int:
+    """Run the reference scene."""
+    return setup() or call([tool("percussion"), *REFERENCE_RUN, *extra])
+
+
+def test(extra: list[str]) -> int:
+    """Run lint, type checks and tests, all of them; return the first failure."""
+    code = setup()
+    if code != 0:
+        return code
+    # pytest comes last, so that its closing line ends the output.
+    steps: list[tuple[str, list[str | Path]]] = [
+        ("ruff check", [tool("ruff"), "check"]),
+        ("ruff format", [tool("ruff"), "format", "--check"]),
+        ("mypy", [tool("mypy")]),
+        ("lint-imports", [tool("lint-imports")]),
+        ("pytest", [tool("pytest"), "-n", "2", *extra]),
+    ]
+    first_failure = 0
+    # numba's cache does not see edits in another file's callee, so start afresh.
+    with tempfile.TemporaryDirectory(prefix="percussion-numba-") as cache:
+        for name, command in steps:
+            print(f"== {name}", flush=True)
+            code = call(command, NUMBA_CACHE_DIR=cache, MPLBACKEND="Agg")
+            first_failure = first_failure or code
+    return first_failure
+
+
+def bench(extra: list[str]) -> int:
+    """Measure speed."""
+    code = setup()
+    if code != 0:
+        return code
+    with tempfile.TemporaryDirectory(prefix="percussion-numba-") as cache:
+        return call([tool("python"), "-m", "benchmarks", *extra], NUMBA_CACHE_DIR=cache)
+
+
+def call(command: list[str | Path], **variables: str) -> int:
+    """Run a program from the project's folder; return its code."""
+    words = [str(part) for part in command]
+    try:
+        child = subprocess.Popen(words, cwd=ROOT, env={**os.environ, **variables})
+    except FileNotFoundError:
+        print(f"{words[0]} is missing. Delete .venv and run this again.", file=sys.stderr)
+        return 1
+    try:
+        return child.wait()
+    except KeyboardInterrupt:
+        # The program was interrupted too: let it keep its finished work.
+        try:
+            child.wait()
+        except KeyboardInterrupt:
+            child.kill()
+        raise
+
+
+def main(arguments: list[str]) -> int:
+    """Run the sub-command that `arguments` name."""
+    parser = argparse.ArgumentParser(prog="build.py", description="Build percussion_model.")
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    commands.add_parser("setup", help="make .venv and install everything")
+    commands.add_parser("run", help="run the reference scene; more goes to `percussion run`")
+    commands.add_parser("test", help="lint, type checks and tests; more goes to pytest")
+    commands.add_parser("bench", help="measure speed; more goes to the benchmarks")
+    choice, extra = parser.parse_known_args(arguments)
+    started = time.monotonic()
+    try:
+        if choice.command == "setup":
+            if extra:
+                parser.error(f"setup takes no arguments, not {' '.join(extra)}")
+            code = setup()
+            print(f".venv is {'up to date' if code == 0 else 'not ready'} "
+                  f"({time.monotonic() - started:.1f} s).")  # fmt: skip
+            return code
+        return {"run": run, "test": test, "bench": bench}[choice.command](extra)
+    except KeyboardInterrupt:
+        print("\nInterrupted.", file=sys.stderr)
+        return INTERRUPTED
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

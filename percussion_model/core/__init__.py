@@ -1,0 +1,1 @@
+"""Kernels: numbers and records only."""

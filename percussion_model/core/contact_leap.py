@@ -1,0 +1,200 @@
+"""Leaps within a contact mode, after looking at every step beforehand.
+
+The velocity of the rock end and its compression at the start of each of the
+next steps are linear in the present waves. One product shows all of them, and
+with them the step in which the mode ends.
+"""
+
+from __future__ import annotations
+
+import math
+
+from percussion_model.core.bar import mean_velocity
+from percussion_model.core.kernel import kernel, merged
+from percussion_model.core.linear import load, multiply, pad, quadratic, store
+from percussion_model.core.records import Mode
+from percussion_model.core.rock import REST_VELOCITY, crush, origin, stiffness
+
+DFC, FC, BC, SS = int(Mode.DFC), int(Mode.FC), int(Mode.BC), int(Mode.SS)
+
+# Steps looked at in one go, a power of two.
+WATCHED = 64
+# Leaps end on multiples of this: the few steps more are cheaper than the
+# products that they would save.
+GRAIN = 4
+# Operators are kept for this many powers of two of a loading step.
+WATCH_LEVELS = 7
+
+
+@merged
+def can_watch(par, s):
+    """Whether operators exist for the rock law in force."""
+    if s.gamma * s.k_r != par.ss_stiffness or s.k_r != par.ss_loading:
+        return False
+    return s.c_r == par.ss_damping or s.mode == BC or s.mode == FC
+
+
+@kernel
+def load_contact(par, s, wb, cb, x):
+    """Deviation of bit and rock from rest under the present mode's stiffness.
+
+    Returns
+    -------
+    still : float
+        Penetration at rest [m].
+    """
+    a = par.gravity + s.feed / par.mass_b
+    still = origin(s) + par.mass_b * a / stiffness(s)
+    load(x, wb, cb, par.n_b, 2 * s.parity, 0.0, a)
+    x[2 * par.n_b] = s.p - still
+    pad(x, 2 * par.n_b + 1, par.size_r)
+    return still
+
+
+@merged
+def look_ahead(watch, mode, size, x, v):
+    """v[k] = velocity of the rock end at the start of step k [m/s]."""
+    for k in range(WATCHED):
+        v[k] = 0.0
+    for i in range(0, size, 4):
+        a, b, c, d = x[i], x[i + 1], x[i + 2], x[i + 3]
+        for k in range(WATCHED):
+            v[k] += (watch[mode, i, k] * a + watch[mode, i + 1, k] * b) + (
+                watch[mode, i + 2, k] * c + watch[mode, i + 3, k] * d
+            )
+
+
+@kernel
+def step_constants(par, s):
+    """Of one step in the present mode, for unit velocity at its start.
+
+    Returns
+    -------
+    K, C, z : float
+        Stiffness, damping, impedance of the end.
+    fade : float
+        1 - exp(-rate dt).
+    d, q : float
+        Integrals of velocity and of its square.
+    """
+    K = stiffness(s)
+    C = s.c_r if s.mode == DFC or s.mode == SS else 0.0
+    z = par.z_b * (1.0 + par.kappa_b)
+    rate = K / (z + C)
+    fade = -math.expm1(-rate * par.dt)
+    return K, C, z, fade, fade / rate, 0.5 * fade * (2.0 - fade) / rate
+
+
+@kernel
+def watch_contact(par, s, wb, cb, watch, x, v, most):
+    """Number of steps before the one in which the contact mode ends.
+
+    Parameters
+    ----------
+    watch : float array, shape (modes, size, WATCHED)
+    x, v : float array
+        Scratch; v receives the end velocity at the start of each step.
+    most : int
+        No more than this many, nor than WATCHED.
+    """
+    load_contact(par, s, wb, cb, x)
+    look_ahead(watch, s.mode - 1, par.size_r, x, v)
+    K, C, z, fade, d, q = step_constants(par, s)
+    y = s.p - origin(s)
+    most = min(most, WATCHED)
+    work = s.w
+    for k in range(most):
+        if s.mode == SS:
+            force = K * y + C * v[k]
+            if par.release == 1 and (force <= 0.0 or force + z * v[k] * fade <= 0.0):
+                return k
+        elif s.mode == BC:
+            if v[k] > REST_VELOCITY or y + v[k] * d <= 0.0:
+                return k
+        elif v[k] < -REST_VELOCITY:
+            return k
+        elif s.mode == DFC:
+            work += C * q * v[k] * v[k]
+            if work >= s.w_r:
+                return k
+        y += v[k] * d
+    return most
+
+
+@kernel
+def leap_contact(par, s, wb, cb, rest, loading, sums, steps, x, v, y):
+    """Carry the bit over `steps` steps within a contact mode.
+
+    Parameters
+    ----------
+    v : float array
+        End velocities that `watch_contact` found.
+
+    Returns
+    -------
+    path : float
+        Path of the bit's mean motion as its body forces see it [m].
+    """
+    still = load_contact(par, s, wb, cb, x)
+    K, C, z, fade, d, q = step_constants(par, s)
+    squares = 0.0
+    spring = K * (s.p - origin(s))
+    for k in range(steps):
+        squares += v[k] * v[k]
+        force = spring + C * v[k]
+        spring += K * v[k] * d
+        s.b_peak_bit = max(s.b_peak_bit, force, force + z * v[k] * fade)
+    path = 0.0
+    for level in range(WATCH_LEVELS):
+        if (steps >> level) & 1:
+            which = 0 if s.mode == SS else s.mode
+            for i in range(par.size_r):
+                path += sums[which, level, i] * x[i]
+            if s.mode == SS:
+                if par.loss > 0:
+                    s.e_loss += quadratic(rest, level, 1, x, y, par.size_r)
+                multiply(rest, level, 0, x, y, par.size_r)
+            else:
+                if par.loss > 0:
+                    s.e_loss += quadratic(loading[s.mode - 1], level, 1, x, y, par.size_r)
+                multiply(loading[s.mode - 1], level, 0, x, y, par.size_r)
+            for i in range(par.size_r):
+                x[i] = y[i]
+    a = par.gravity + s.feed / par.mass_b
+    store(x, wb, cb, par.n_b, 2 * s.parity, 0.0, a)
+    book_contact(par, s, wb, cb, K, C, still + x[2 * par.n_b], d, q, squares, steps)
+    return path
+
+
+@merged
+def book_contact(par, s, wb, cb, K, C, p, d, q, squares, steps):
+    """Penetration, impulse and ledger after a leap in contact.
+
+    Parameters
+    ----------
+    K, C : float
+        Of the mode.
+    p : float
+        Penetration at the end [m].
+    d, q : float
+        Integrals over a step of unit velocity at its start, and its square.
+    squares : float
+        Sum over the steps of the square of that velocity [m2/s2].
+    """
+    before = s.p
+    start = origin(s)
+    s.p = p
+    damped = C * q * squares
+    s.rock_work += 0.5 * K * (p - before) * (p + before - 2.0 * start) + damped
+    if s.mode == SS:
+        s.e_standstill += damped
+    elif s.mode == DFC:
+        s.e_barrier += damped
+        s.w += damped
+    if s.mode == DFC or s.mode == FC:
+        crush(s, before)
+    s.e_numerical += par.z_b * (q - d * d / par.dt) * squares
+    v0 = s.v_b
+    a = par.gravity + s.feed / par.mass_b
+    s.v_b = mean_velocity(wb, cb, par.n_b, 2 * s.parity, par.mass_b)
+    s.i_bit += par.mass_b * (a * steps * par.dt - (s.v_b - v0))

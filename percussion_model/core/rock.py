@@ -1,0 +1,352 @@
+"""The five-mode bit/rock law, followed exactly through one step.
+
+At the rock the bit end obeys F_R = z (v_free - v), the rock answers with
+F_R = K (p - P_R) + C v: a scalar linear equation with constant input over a
+step, so every crossing is a logarithm (docs/model.md, eqs 14-18, table 1).
+"""
+
+from __future__ import annotations
+
+import math
+
+from percussion_model.core.bar import kinetic_energy
+from percussion_model.core.blows import push_event
+from percussion_model.core.exponential import exponential_area
+from percussion_model.core.kernel import inlined, kernel, merged
+from percussion_model.core.records import Mode, RockKind
+
+FF, DFC, FC, BC, SS = (int(m) for m in Mode)
+NO_ROCK, BILINEAR = int(RockKind.NONE), int(RockKind.BILINEAR)
+SPRING, WALL = int(RockKind.SPRING), int(RockKind.WALL)
+
+# A velocity below this counts as zero: the ringing left after a long
+# standstill is of this size, its sign means nothing [m/s].
+REST_VELOCITY = 1e-9
+
+# Crossings that the law can make within one step: FF, SS, FF, DFC, FC, BC and
+# again; more would be a loop.
+MOST_CROSSINGS = 12
+
+# A drilling cycle counts when it crushed more than this share of W_R.
+COUNTED_CYCLE = 0.01
+
+
+@inlined
+def stiffness(s):
+    """K of the present mode [N/m], table 1 of docs/model.md."""
+    if s.mode == DFC or s.mode == FC:
+        return s.k_r
+    if s.mode == FF:
+        return 0.0
+    return s.gamma * s.k_r
+
+
+@inlined
+def recoverable(s):
+    """Energy that the rock would give back on unloading [J]."""
+    if s.mode == DFC or s.mode == FC:
+        return 0.5 * s.k_r * s.p * s.p / s.gamma
+    if s.mode == FF and s.p <= s.p_u:
+        return 0.0
+    y = s.p - s.p_u
+    return 0.5 * s.gamma * s.k_r * y * y
+
+
+@kernel
+def start_cycle(s, barrier, p):
+    """Begin a drilling cycle whose penetration starts at `p` (eqs 18-19 of the paper)."""
+    s.x_r += s.p - p
+    s.p = p
+    s.w = 0.0
+    s.crushed = 0.0
+    s.cycle_counted = 0
+    s.k_r = s.next_k_r
+    s.gamma = s.next_gamma
+    s.c_r = s.next_c_r
+    s.w_r = s.next_w_r
+    if barrier == 1 and s.c_r > 0.0 and s.w_r > 0.0:
+        s.mode = DFC
+    else:
+        s.mode = FC
+
+
+@kernel
+def resume_cycle(s, barrier):
+    """Begin a cycle from contact: the elastic part of the force stays the same."""
+    force = s.gamma * s.k_r * (s.p - s.p_u)
+    before = recoverable(s)
+    start_cycle(s, barrier, force / s.next_k_r)
+    # With other rock than before, what can be recovered changes at once.
+    s.e_crushing += before - recoverable(s)
+
+
+@inlined
+def barrier_off(par, s):
+    """Whether a blow of any energy starts a drilling cycle."""
+    return par.barrier == 0 or s.next_c_r == 0.0 or s.next_w_r == 0.0
+
+
+@merged
+def leave_by_velocity(par, s, v, energy):
+    """Change of mode that the sign of the end velocity asks for.
+
+    Parameters
+    ----------
+    v : float
+        Velocity of the bit end [m/s].
+    energy : float
+        Kinetic energy of the bit [J].
+
+    Returns
+    -------
+    int
+        1 where the mode changed.
+    """
+    if par.rock != BILINEAR:
+        return 0
+    if s.mode == DFC or s.mode == FC:
+        if v < -REST_VELOCITY:
+            s.p_u = s.p * (s.gamma - 1.0) / s.gamma
+            s.mode = BC
+            return 1
+    elif s.mode == BC and v > REST_VELOCITY:
+        if barrier_off(par, s) or energy > s.w_r:
+            resume_cycle(s, par.barrier)
+        else:
+            s.mode = SS
+        return 1
+    return 0
+
+
+@merged
+def close_interface(par, s, energy):
+    """Contact with the rock begins: a new cycle, standstill, spring or wall."""
+    if par.rock == SPRING:
+        s.mode = FC
+    elif par.rock == WALL:
+        s.mode = SS
+    elif barrier_off(par, s) or energy > s.w_r:
+        s.e_standstill += recoverable(s)
+        start_cycle(s, par.barrier, 0.0)
+    else:
+        s.mode = SS
+
+
+@merged
+def leave_standstill(par, s, v):
+    """Standstill ends because KE_b > W_R: a new cycle, or unloading."""
+    if v < -REST_VELOCITY:
+        s.mode = BC
+    else:
+        resume_cycle(s, par.barrier)
+
+
+@inlined
+def crush(s, p_before):
+    """Book the irrecoverable part of loading from `p_before` to s.p."""
+    work = 0.5 * s.k_r * (s.p - p_before) * (s.p + p_before) * (1.0 - 1.0 / s.gamma)
+    s.e_crushing += work
+    s.crushed += work
+    if s.cycle_counted == 0 and s.crushed > COUNTED_CYCLE * s.w_r:
+        s.cycle_counted = 1
+        s.b_cycles += 1
+
+
+@merged
+def time_in_mode(par, s, v_free, v, y, rate, y_end, rest):
+    """How long the present contact mode lasts within the rest of the step.
+
+    Returns
+    -------
+    time : float
+        At most `rest` [s].
+    next_mode : int
+        Mode that follows, -1 where none does.
+    """
+    if s.mode == DFC:
+        left = 1.0 - 2.0 * (s.w_r - s.w) * rate / (s.c_r * v * v)
+        if left > 0.0:
+            t = -0.5 * math.log(left) / rate
+            if t < rest:
+                return max(t, 0.0), FC
+    elif s.mode == BC or (s.mode == FC and par.rock == SPRING):
+        if v < 0.0 and y_end < 0.0:
+            t = -math.log(-y_end / (y - y_end)) / rate if y > 0.0 else 0.0
+            if t < rest:
+                return t, FF
+    elif s.mode == SS and par.release == 1:
+        if v < 0.0 and v_free < 0.0:
+            t = -math.log(v_free / v) / rate if v_free > v else 0.0
+            if t < rest:
+                return t, FF
+    return rest, -1
+
+
+@merged
+def contact_stretch(par, s, v_free, z, rest):
+    """Follow one contact mode until it ends or the step does.
+
+    Returns
+    -------
+    time, d, q, area : float
+        Duration [s], integral of velocity [m], of its square [m2/s] and of
+        the displacement [m s].
+    next_mode : int
+    """
+    K = stiffness(s)
+    C = s.c_r if s.mode == DFC or s.mode == SS else 0.0
+    origin = s.p_u if s.mode == BC or s.mode == SS else 0.0
+    y = s.p - origin
+    v = (z * v_free - K * y) / (z + C)
+    rate = K / (z + C)
+    t, next_mode = time_in_mode(par, s, v_free, v, y, rate, y + v / rate, rest)
+    fade = -math.expm1(-rate * t)
+    d = v * fade / rate
+    q = 0.5 * v * v * fade * (2.0 - fade) / rate
+    area = v * t * t * exponential_area(rate * t)
+    p_before = s.p
+    s.p += d
+    if s.mode == DFC:
+        s.e_barrier += C * q
+        s.w += C * q
+    elif s.mode == SS:
+        s.e_standstill += C * q
+    if (s.mode == DFC or s.mode == FC) and par.rock == BILINEAR:
+        crush(s, p_before)
+    if next_mode == FF and s.mode != SS:
+        s.p = origin  # exactly unloaded
+    s.b_peak_bit = max(s.b_peak_bit, K * y + C * v, z * (v_free - v * (1.0 - fade)))
+    return t, d, q, area, next_mode
+
+
+@merged
+def flight_stretch(par, s, v_free, rest):
+    """Follow free flight until the interface closes or the step ends.
+
+    Returns
+    -------
+    time : float
+        Duration [s].
+    closes : int
+        1 where it ends in contact.
+    """
+    before = recoverable(s)
+    t = rest
+    closes = 0
+    if par.rock != NO_ROCK and v_free > 0.0:
+        reach = (s.p_u - s.p) / v_free
+        if reach < rest:
+            t = max(reach, 0.0)
+            closes = 1
+    if closes == 1 and s.p < s.p_u:
+        s.p = s.p_u
+    else:
+        s.p += v_free * t
+    # A rock that was still springing back relaxes without doing work.
+    s.e_standstill += before - recoverable(s)
+    return t, closes
+
+
+@inlined
+def rock_step(par, s, w, c, v_free, z, tau, time, events):
+    """Advance the rock end of the bit by `tau`.
+
+    Parameters
+    ----------
+    par, s : record
+        Parameters and state.
+    w, c : float array
+        The bit, for its kinetic energy.
+    v_free : float
+        Velocity the end would have if it were free [m/s].
+    z : float
+        Its impedance, with the viscous share of the last cell [N s/m].
+    tau, time : float
+        Duration and start of the step [s].
+    events : EVENT array
+
+    Returns
+    -------
+    d, q, area : float
+        Integrals of velocity [m], of its square [m2/s], and of the
+        displacement since the step's start [m s].
+    """
+    r = 2 * s.parity
+    if s.mode == SS and par.rock == BILINEAR:
+        energy = kinetic_energy(w, c, par.n_b, r)
+        if barrier_off(par, s) or energy > s.w_r:
+            K = s.gamma * s.k_r
+            force = K * (s.p - s.p_u)
+            leave_standstill(par, s, (z * v_free - force) / (z + s.c_r))
+            push_event(s, events, time, s.mode, force)
+    rest = tau
+    d = 0.0
+    q = 0.0
+    area = 0.0
+    for _ in range(MOST_CROSSINGS):
+        now = time + (tau - rest)
+        if s.mode == FF:
+            t, closes = flight_stretch(par, s, v_free, rest)
+            step = v_free * t
+            area += (d + 0.5 * step) * t
+            d += step
+            q += v_free * v_free * t
+            rest -= t
+            if closes == 0:
+                return d, q, area
+            close_interface(par, s, kinetic_energy(w, c, par.n_b, r))
+            if s.mode == SS:
+                enter_standstill(s, now + t)
+            push_event(s, events, now + t, s.mode, 0.0)
+            continue
+        if par.rock == WALL:
+            if v_free > 0.0:
+                s.b_peak_bit = max(s.b_peak_bit, z * v_free)
+                return d, q, area + d * rest
+            s.mode = FF
+            s.p_u = s.p
+            push_event(s, events, now, s.mode, 0.0)
+            continue
+        if end_of_mode(par, s, w, c, v_free, z, r) == 1:
+            if s.mode == SS:
+                enter_standstill(s, now)
+            push_event(s, events, now, s.mode, stiffness(s) * (s.p - origin(s)))
+            continue
+        t, step, square, under, next_mode = contact_stretch(par, s, v_free, z, rest)
+        area += d * t + under
+        d += step
+        q += square
+        rest -= t
+        if next_mode < 0:
+            return d, q, area
+        s.mode = next_mode
+        push_event(s, events, now + t, s.mode, stiffness(s) * (s.p - origin(s)))
+    s.locked += 1
+    return d, q, area
+
+
+@inlined
+def origin(s):
+    """P_R of the present mode [m], table 1 of docs/model.md."""
+    if s.mode == BC or s.mode == SS:
+        return s.p_u
+    return 0.0
+
+
+@merged
+def end_of_mode(par, s, w, c, v_free, z, r):
+    """Whether the sign of the velocity ends the mode at once; sets the next."""
+    K = stiffness(s)
+    C = s.c_r if s.mode == DFC or s.mode == SS else 0.0
+    v = (z * v_free - K * (s.p - origin(s))) / (z + C)
+    energy = 0.0
+    if s.mode == BC and v > REST_VELOCITY:
+        energy = kinetic_energy(w, c, par.n_b, r)
+    return leave_by_velocity(par, s, v, energy)
+
+
+@inlined
+def enter_standstill(s, time):
+    """Start the record of the bit force in standstill."""
+    s.t_standstill = time
+    s.n_check = 0

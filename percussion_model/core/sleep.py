@@ -1,0 +1,146 @@
+"""A piston in free flight waits until it can next meet something.
+
+Between blows the piston only flies. It stays at an earlier step, and is
+carried to the present in one leap before contact or a switch of the drive can
+possibly come (docs/numerics.md, section 5).
+"""
+
+from __future__ import annotations
+
+import math
+
+from percussion_model.core.bar import (
+    deviation_energy,
+    elastic_energy,
+    kinetic_energy,
+    strain_offset,
+    time_to_cover,
+)
+from percussion_model.core.drive import PRESSURE, drive_force
+from percussion_model.core.kernel import kernel, merged
+from percussion_model.core.leap import (
+    FEWEST_STEPS,
+    drills_not,
+    leap_free_bar,
+    lifts_not,
+    standstill_energy,
+)
+from percussion_model.core.records import Mode, Piston
+from percussion_model.core.rock import recoverable
+from percussion_model.core.wave import resync
+from percussion_model.core.wave_records import Coef
+
+SS = int(Mode.SS)
+ELASTIC = int(Piston.ELASTIC)
+TOP, BOTTOM = int(Coef.TOP), int(Coef.BOTTOM)
+
+# How far ahead a moving bit's path is bounded at a time [s].
+HORIZON = 0.01
+
+
+@merged
+def bit_bounds(par, s, wb, cb):
+    """How far the bit can move while the piston sleeps.
+
+    Energy bounds velocity and strain: |V| <= sqrt(2 E / M) + |a| t, and the
+    offset of an end <= bound sqrt(2 E).
+
+    Returns
+    -------
+    speed, acceleration : float
+        Bounds of the mean motion [m/s, m/s2].
+    spread : float
+        Bound of the top end's motion about it [m].
+    horizon : float
+        Time over which they hold [s].
+    """
+    a = par.gravity + s.feed / par.mass_b
+    if s.mode == SS:
+        energy = standstill_energy(par, s, wb, cb)
+        if drills_not(par, s, energy) and lifts_not(par, s, energy):
+            spread = math.sqrt(2.0 * energy / (s.gamma * s.k_r))
+            spread += (par.bound_t + 2.0 * par.bound_b) * math.sqrt(2.0 * energy)
+            return 0.0, 0.0, spread, math.inf
+    r = 2 * s.parity
+    energy = kinetic_energy(wb, cb, par.n_b, r) + elastic_energy(wb, cb, par.n_b, r)
+    energy += recoverable(s)
+    speed = math.sqrt(2.0 * energy / par.mass_b)
+    fall = speed * HORIZON + 0.5 * abs(a) * HORIZON * HORIZON
+    energy += par.mass_b * abs(a) * fall
+    return speed, abs(a), par.bound_t * math.sqrt(2.0 * energy), HORIZON
+
+
+@merged
+def quiet_time(par, s, wp, cp, wb, cb):
+    """Time before which neither contact nor a switch of the drive can come [s]."""
+    speed, slack, spread, limit = bit_bounds(par, s, wb, cb)
+    v = s.v_p
+    a = par.gravity + drive_force(par, s) / par.mass_p
+    if par.piston == ELASTIC:
+        energy = deviation_energy(wp, cp, par.n_p, 2 * s.parity, v, 0.0)
+        spread += par.bound_p * math.sqrt(2.0 * energy)
+    margin = 2.0 * spread
+    limit = min(limit, time_to_cover(s.gap - margin, v + speed, a + slack))
+    if par.drive == PRESSURE:
+        if s.alpha > 0:
+            limit = min(limit, time_to_cover(-s.u_r - margin, v + speed, a + slack))
+        else:
+            room = s.reversal + s.u_r - margin
+            limit = min(limit, time_to_cover(room, speed - v, slack - a))
+        if v < 0.0 and a > 0.0 and -v / a > FEWEST_STEPS * par.dt:
+            limit = min(limit, -v / a)  # wake at the top: it is the stroke
+    return limit
+
+
+@merged
+def put_to_sleep(par, s, wp, cp, wb, cb):
+    """Let the piston wait where it cannot meet anything soon."""
+    if s.closed == 1 or s.gap <= 0.0:
+        s.no_sleep = s.step + 1
+        return
+    resync(par, s, wp, cp, wb, cb)
+    limit = quiet_time(par, s, wp, cp, wb, cb)
+    most = (1 << par.leaps) - 1
+    steps = most
+    if limit < most * par.dt:
+        steps = int(limit / par.dt) - 1
+    if steps < FEWEST_STEPS:
+        s.no_sleep = s.step + FEWEST_STEPS
+        return
+    s.asleep = 1
+    s.piston_step = s.step
+    s.piston_parity = s.parity
+    s.wake = s.step + steps
+    s.moved = -s.p - strain_offset(wb, cb, par.n_b, 2 * s.parity, BOTTOM)
+    s.x_sleep = s.x_r
+
+
+@kernel
+def wake_piston(par, s, wp, cp, wb, cb, operator, x, y):
+    """Carry the sleeping piston to the present step."""
+    steps = s.step - s.piston_step
+    time = steps * par.dt
+    r = 2 * s.parity
+    push = drive_force(par, s)
+    a = par.gravity + push / par.mass_p
+    v0 = s.v_p
+    path = (v0 + 0.5 * a * time) * time
+    s.v_p = v0 + a * time
+    s.asleep = 0
+    if par.piston == ELASTIC:
+        n = par.n_p
+        if s.piston_parity != s.parity:
+            for i in range(n):
+                wp[r, i] = wp[2 - r, i]
+                wp[r + 1, i] = wp[3 - r, i]
+        leap_free_bar(par, s, wp, cp, n, par.mass_p, v0, s.v_p, steps, operator, par.size_p, x, y)
+    here = s.moved + s.p + strain_offset(wb, cb, par.n_b, r, BOTTOM) + (s.x_r - s.x_sleep)
+    s.u_r += path - here
+    s.gap = strain_offset(wb, cb, par.n_b, r, TOP) - s.u_r
+    if par.piston == ELASTIC:
+        s.gap += strain_offset(wp, cp, par.n_p, r, BOTTOM)
+    s.e_drive += push * path
+    s.e_gravity += par.mass_p * par.gravity * path
+    s.i_drive += push * time
+    if -s.u_r > s.b_stroke:
+        s.b_stroke = -s.u_r

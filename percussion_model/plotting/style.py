@@ -1,0 +1,164 @@
+"""One look for all figures: colours, units, lines coloured by drilling mode, saving."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from percussion_model.core.records import Mode
+
+# Okabe and Ito's colours, told apart with any colour vision and in grey.
+MODE_COLOURS = {
+    Mode.FF: "#56B4E9",
+    Mode.DFC: "#E69F00",
+    Mode.FC: "#D55E00",
+    Mode.BC: "#009E73",
+    Mode.SS: "#222222",
+}
+MODE_NAMES = {
+    Mode.FF: "FF free flight",
+    Mode.DFC: "DFC dissipative forward contact",
+    Mode.FC: "FC forward contact",
+    Mode.BC: "BC backward contact",
+    Mode.SS: "SS standstill",
+}
+PISTON_COLOUR = "#CC79A7"
+BIT_COLOUR = "#0072B2"
+CONTACT_COLOUR = "#CC79A7"
+MEAN_COLOUR = "#D55E00"
+SHADE_COLOUR = "#D9D9D9"
+RULE_COLOUR = "#8C8C8C"
+
+# Legend entries that fit side by side.
+MOST_IN_A_ROW = 6
+
+# Factors from SI to what the axes say.
+MM = MS = 1e3
+US = 1e6
+# SI values are divided by these.
+KN = 1e3
+MPA = 1e6
+
+STYLE: Any = {
+    "font.family": "DejaVu Sans",
+    "font.size": 9.0,
+    "axes.titlesize": 9.5,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.labelsize": 9.0,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.xmargin": 0.02,
+    "grid.color": "#E6E6E6",
+    "grid.linewidth": 0.6,
+    "lines.linewidth": 1.3,
+    "lines.solid_capstyle": "round",
+    "legend.frameon": False,
+    "legend.fontsize": 8.5,
+    "figure.dpi": 100,
+    "savefig.dpi": 150,
+    "savefig.facecolor": "white",
+    "path.simplify": True,
+    "path.simplify_threshold": 0.2,
+    "svg.hashsalt": "percussion_model",
+    "image.interpolation": "nearest",
+}
+
+
+def label(ax: Axes, x: str, y: str, title: str = "") -> None:
+    """Name both axes, each with its unit, and the panel."""
+    ax.set_xlabel(x)
+    ax.set_ylabel(y)
+    if title:
+        ax.set_title(title)
+
+
+def draw_by_mode(ax: Axes, x: np.ndarray, y: np.ndarray, mode: np.ndarray) -> None:
+    """Draw a line whose colour is the drilling mode.
+
+    A piece from one sample to the next has the mode of the first. Each mode is
+    one line with gaps, so that matplotlib can thin it out.
+    """
+    for value, colour in MODE_COLOURS.items():
+        mine = mode == value
+        if not mine.any():
+            continue
+        # The sample after a run of this mode closes its last piece.
+        shown = mine.copy()
+        shown[1:] |= mine[:-1]
+        ax.plot(*_with_gaps(x, y, shown), color=colour, zorder=2 + 0.1 * _rank(value))
+
+
+def _rank(mode: Mode) -> int:
+    """Drawing order: the short modes on top."""
+    return (Mode.FF, Mode.SS, Mode.BC, Mode.FC, Mode.DFC).index(mode)
+
+
+def _with_gaps(x: np.ndarray, y: np.ndarray, shown: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Keep what is shown, with one NaN between its runs."""
+    index = np.flatnonzero(shown)
+    breaks = np.flatnonzero(np.diff(index) > 1) + 1
+    return (
+        np.insert(np.asarray(x, float)[index], breaks, np.nan),
+        np.insert(np.asarray(y, float)[index], breaks, np.nan),
+    )
+
+
+def mode_handles(modes: Sequence[int] | np.ndarray) -> list[Line2D]:
+    """Legend entries of the drilling modes that occur."""
+    present = {int(value) for value in modes}
+    return [
+        Line2D([], [], color=colour, linewidth=3, label=MODE_NAMES[mode])
+        for mode, colour in MODE_COLOURS.items()
+        if int(mode) in present
+    ]
+
+
+def contact_handle() -> Patch:
+    """Legend entry of the shading of closed piston/bit contacts."""
+    return Patch(facecolor=SHADE_COLOUR, label="piston on bit")
+
+
+def shade_contacts(ax: Axes, contacts: Sequence[tuple[float, float]], scale: float) -> None:
+    """Shade closed piston/bit contacts; those of no length become a line."""
+    for start, end in contacts:
+        if end > start:
+            ax.axvspan(start * scale, end * scale, color=SHADE_COLOUR, linewidth=0, zorder=0)
+        else:
+            ax.axvline(start * scale, color=SHADE_COLOUR, linewidth=2.5, zorder=0)
+
+
+def head(fig: Figure, title: str, handles: Sequence[Any] = ()) -> None:
+    """Write the figure's title and, below it, one legend for all panels."""
+    fig.suptitle(title, x=0.01, ha="left", fontsize=11.5, fontweight="bold")
+    if handles:
+        rows = math.ceil(len(handles) / MOST_IN_A_ROW)
+        ncols = math.ceil(len(handles) / rows)
+        fig.legend(handles=list(handles), loc="outside lower center", ncols=ncols)
+
+
+def save(fig: Figure, folder: Path, name: str) -> list[str]:
+    """Write a figure as PNG and SVG and return the names of the files."""
+    fig.draw_without_rendering()
+    fig.set_layout_engine("none")  # laid out once, not again for each file
+    names = [f"{name}.{kind}" for kind in _METADATA]
+    for file, metadata in zip(names, _METADATA.values(), strict=True):
+        fig.savefig(folder / file, metadata=metadata)
+    return names
+
+
+# Without a date the same result gives the same file.
+_METADATA: dict[str, dict[str, Any]] = {
+    "png": {"Software": "percussion_model"},
+    "svg": {"Date": None, "Creator": "percussion_model"},
+}

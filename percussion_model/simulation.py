@@ -1,0 +1,91 @@
+"""The one time loop above the kernels: `Simulation` and `simulate`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Literal
+
+from percussion_model.core.records import SAMPLE_FIELDS
+from percussion_model.inputs import SimulationError
+from percussion_model.result import Result
+from percussion_model.scene import Scene
+from percussion_model.stepping import Simulation, Snapshot
+from percussion_model.time_loop import run_in_chunks, sampling_times, stop_on_interrupt
+
+__all__ = ["Simulation", "SimulationError", "Snapshot", "simulate"]
+
+# Share of the duration that settles where the scene's settling time is too long.
+_SETTLING_SHARE = 0.25
+
+
+def simulate(
+    scene: Scene,
+    duration: float | None = None,
+    settle: float | None = None,
+    trace: float | None = None,
+    windows: Iterable[tuple[float, float]] = (),
+    record_events: bool = True,
+    progress: Callable[[float], None] | None = None,
+    on_interrupt: Literal["raise", "keep"] = "raise",
+) -> Result:
+    """Run a scene from its start.
+
+    Parameters
+    ----------
+    scene : Scene
+    duration, settle : float, optional
+        Simulated time, and the time before blows count [s]; default those of
+        the scene.
+    trace : float, optional
+        Sampling interval of a trace [s].
+    windows : iterable of (float, float)
+        Intervals in which the trace has every time step [s].
+    record_events : bool
+        Whether to keep the event list.
+    progress : callable, optional
+        Called now and then with the time reached [s].
+    on_interrupt : {"raise", "keep"}
+        What Ctrl-C does: raise KeyboardInterrupt, or return what is finished,
+        with a warning.
+
+    Returns
+    -------
+    Result
+
+    Raises
+    ------
+    SceneError, SimulationError
+        If the arguments make no sense or the run cannot go on.
+    """
+    scene, notes = _with_run_times(scene, duration, settle)
+    end = scene.run.duration
+    sampling_times(end, None, trace, windows)  # refuses before anything is compiled
+    simulation = Simulation(scene, record_events)
+    times = sampling_times(end, simulation.solver.time_step, trace, windows)
+    with stop_on_interrupt(on_interrupt == "keep") as stop:
+        rows = run_in_chunks(simulation, end, times, progress, stop)
+    if simulation.time < end:
+        notes.append(f"interrupted at t = {simulation.time:.6g} s")
+    columns = None
+    if len(times):
+        columns = {name: rows[:, k].copy() for k, name in enumerate(SAMPLE_FIELDS)}
+    result = simulation.result(trace=columns)
+    result.warnings.extend(notes)
+    return result
+
+
+def _with_run_times(
+    scene: Scene, duration: float | None, settle: float | None
+) -> tuple[Scene, list[str]]:
+    """Return the scene with its run times replaced, and what to warn of."""
+    changes = {"run.duration": duration, "run.settle": settle}
+    given = {key: value for key, value in changes.items() if value is not None}
+    notes = []
+    longest = scene.run.settle
+    if settle is None and isinstance(duration, (int, float)) and 0 < duration <= longest:
+        given["run.settle"] = _SETTLING_SHARE * duration
+        notes.append(
+            f"run.settle = {longest!r} s is not below the duration of {duration!r} s: "
+            f"blows count from {_SETTLING_SHARE * duration!r} s on"
+        )
+    return (scene.replace(**given) if given else scene), notes

@@ -1,0 +1,84 @@
+"""What every solver offers to the one time loop above it."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+import numpy as np
+
+from percussion_model.scene import Scene
+
+# A sample this close below the end of what can be read is left to the next
+# reading: there the forces are those of the first instant after [steps].
+
+
+class Solver(Protocol):
+    """Advances states of one scene; a state is plain data with a method `copy`.
+
+    Attributes
+    ----------
+    name : str
+    scene : Scene
+    time_step : float or None
+        Distance of grid points [s]; None where there are none.
+    cells : dict of int
+        Cells in each elastic bar.
+    wave_speed_error : float
+        Largest relative error of a section's wave speed.
+    """
+
+    name: str
+    scene: Scene
+    cells: dict[str, int]
+
+    @property
+    def time_step(self) -> float | None:
+        """Distance of grid points [s]."""
+
+    @property
+    def wave_speed_error(self) -> float:
+        """Largest relative error of a section's wave speed."""
+
+    def new_state(self) -> Any:
+        """State at time zero."""
+
+    def time(self, state: Any) -> float:
+        """Time up to which a state is committed [s]."""
+
+    def advance(
+        self, state: Any, t: float, blows: np.ndarray, events: np.ndarray, record_events: bool
+    ) -> tuple[int, int, int]:
+        """Commit as far as `t` allows; return `Status` and the rows filled."""
+
+    def sample(self, state: Any, times: np.ndarray, out: np.ndarray) -> None:
+        """Evaluate without touching the state."""
+
+    def commit(self, state: Any, t: float) -> None:
+        """Bring an advanced state to the first grid point at or after `t`."""
+
+    def set_inputs(self, state: Any, **inputs: float) -> None:
+        """Change inputs of a committed state."""
+
+    def grid_point_after(self, state: Any, t: float) -> float:
+        """First time at or after `t` at which inputs can change [s]."""
+
+    def readable_until(self, state: Any) -> float:
+        """Time up to which `sample` answers without advancing the state [s]."""
+
+    def energy(self, state: Any, t: float) -> dict[str, float]:
+        """Ledger [J] at the last grid point before `t`: LEDGER_FIELDS, start, stored."""
+
+    def statistics(self, state: Any) -> dict[str, int]:
+        """Counts of what the solver did."""
+
+
+def make_solver(scene: Scene) -> Solver:
+    """Make the solver that computes a scene."""
+    # Only the kernels that are needed are loaded: that is most of a start.
+    if scene.solver_name == "wave":
+        from percussion_model.solvers.wave import WaveSolver
+
+        return WaveSolver(scene)
+    from percussion_model.solvers.rigid import RigidSolver
+
+    return RigidSolver(scene)

@@ -1,0 +1,166 @@
+"""Cells of equal transit time for bars of any sections, and their coefficients."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from percussion_model.core.wave_records import Coef
+from percussion_model.parameters import Bar
+
+# Cells in the piston (or the only elastic bar) where the scene names none.
+DEFAULT_CELLS = 20
+# A section's transit time may be off by this much before finer grids are tried.
+WANTED_FIT = 2e-3
+# Finer grids are tried up to this multiple of the wanted number of cells.
+MOST_REFINED = 2.0
+# Share of the loss that acts between interfaces; the rest between cells.
+HALF_LOSS = 0.5
+# Explicit loss stays free of overshoot up to this viscous number a sub-step.
+MOST_VISCOUS = 0.5
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Cells of one bar.
+
+    Attributes
+    ----------
+    impedance, mass : ndarray, shape (n,)
+        Of each cell [N s/m], [kg].
+    time_step : float
+        Transit time of every cell [s].
+    fit : float
+        Largest relative error of a section's wave speed.
+    """
+
+    impedance: np.ndarray
+    mass: np.ndarray
+    time_step: float
+    fit: float
+
+    @property
+    def n(self) -> int:
+        """Number of cells."""
+        return len(self.mass)
+
+
+def cut(bar: Bar, time_step: float) -> Grid:
+    """Cut a bar into cells of one transit time.
+
+    Length and mass of each section stay as they are; where its transit time
+    is no whole number of steps, the wave speed takes the error.
+    """
+    impedance: list[float] = []
+    mass: list[float] = []
+    fit = 0.0
+    for section in bar.sections:
+        count = max(1, round(section.transit_time / time_step))
+        fit = max(fit, abs(section.transit_time / (count * time_step) - 1.0))
+        impedance += [section.mass / (count * time_step)] * count
+        mass += [section.mass / count] * count
+    return Grid(np.array(impedance), np.array(mass), time_step, fit)
+
+
+def choose_time_step(bars: list[Bar], cells: int | None) -> float:
+    """Transit time of a cell that suits all bars.
+
+    Parameters
+    ----------
+    bars : list of Bar
+        The elastic bars; `cells` counts those of the first.
+    cells : int or None
+        Wanted number. None means `DEFAULT_CELLS` or, where the lengths do not
+        fit it, the smallest number above that does better.
+    """
+    first = bars[0].transit_time
+    if cells is not None:
+        return first / cells
+    best, best_fit = DEFAULT_CELLS, np.inf
+    for count in range(DEFAULT_CELLS, int(MOST_REFINED * DEFAULT_CELLS) + 1):
+        fit = max(cut(bar, first / count).fit for bar in bars)
+        if fit < best_fit - 1e-12:
+            best, best_fit = count, fit
+        if best_fit < WANTED_FIT:
+            break
+    return first / best
+
+
+def substeps(loss_time: float, time_step: float) -> int:
+    """Sub-steps of the explicit loss operator; 0 without loss."""
+    if loss_time == 0.0:
+        return 0
+    return max(1, int(np.ceil(loss_time / time_step / MOST_VISCOUS - 1e-12)))
+
+
+def coefficients(grid: Grid, loss_time: float) -> np.ndarray:
+    """Rows of `Coef` for a bar.
+
+    Returns
+    -------
+    ndarray, shape (len(Coef), n + 1)
+    """
+    n = grid.n
+    z, m, dt = grid.impedance, grid.mass, grid.time_step
+    c = np.zeros((len(Coef), n + 1))
+    c[Coef.ALPHA, 1:n] = 2.0 * z[:-1] / (z[:-1] + z[1:])
+    c[Coef.BETA, 1:n] = 2.0 * z[1:] / (z[:-1] + z[1:])
+    c[Coef.INV_Z, 1:n] = 1.0 / (z[:-1] + z[1:])
+    parts = substeps(loss_time, dt)
+    if parts and n > 1:
+        part = HALF_LOSS * loss_time / dt / parts
+        c[Coef.VISCOUS, :n] = part * z
+        c[Coef.BETWEEN, : n - 1] = part * 2.0 * z[:-1] * z[1:] / (z[:-1] + z[1:])
+    c[Coef.INV_CELL_Z, :n] = 1.0 / z
+    c[Coef.MASS, :n] = m
+    above = np.concatenate([[0.0], np.cumsum(m)[:-1]]) + 0.5 * m
+    total = m.sum()
+    c[Coef.BOTTOM, :n] = above / total * dt
+    c[Coef.TOP, :n] = (total - above) / total * dt
+    c[Coef.STATIC, :n] = 0.5 * above / z
+    if parts > 1 and n > 1:
+        c[Coef.FROM_TOP], _ = _response(c, n, parts, 1)
+        c[Coef.FROM_BOTTOM], _ = _response(c, n, parts, n - 1)
+    return c
+
+
+def end_viscosity(c: np.ndarray, grid: Grid, loss_time: float) -> tuple[float, float]:
+    """Viscous numbers of the top and the bottom end cell.
+
+    With sub-steps the interface next to the end gives way while the end cell
+    pushes; its mean response lowers the number (docs/numerics.md, eq. 9).
+    """
+    parts = substeps(loss_time, grid.time_step)
+    if parts == 0 or grid.n < 2:
+        return 0.0, 0.0
+    kappa = HALF_LOSS * loss_time / grid.time_step
+    if parts == 1:
+        return kappa, kappa
+    _, top = _response(c, grid.n, parts, 1)
+    _, bottom = _response(c, grid.n, parts, grid.n - 1)
+    z = grid.impedance
+    return kappa / (1.0 + kappa * z[0] * top), kappa / (1.0 + kappa * z[-1] * bottom)
+
+
+def _response(c: np.ndarray, n: int, parts: int, where: int) -> tuple[np.ndarray, float]:
+    """Interface velocities after a unit force on one interface over a step.
+
+    Returns
+    -------
+    end : ndarray, shape (n + 1,)
+        Velocities after the last sub-step [m/(N s)].
+    mean : float
+        Mean of the loaded interface's velocity before each sub-step.
+    """
+    v = np.zeros(n + 1)
+    mean = 0.0
+    for _ in range(parts):
+        mean += v[where] / parts
+        flow = c[Coef.VISCOUS, 1 : n - 1] * np.diff(v[1:n])
+        force = np.zeros(n + 1)
+        force[1 : n - 1] += flow
+        force[2:n] -= flow
+        force[where] += 1.0 / parts
+        v[1:n] += 2.0 * c[Coef.INV_Z, 1:n] * force[1:n]
+    return v, mean

@@ -1,0 +1,324 @@
+"""Solver for scenes with a rigid (or absent) piston and a rigid bit."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from percussion_model.core import rigid as kernel
+from percussion_model.core.records import (
+    BLOW,
+    EVENT,
+    LEDGER_FIELDS,
+    SAMPLE_FIELDS,
+    DriveKind,
+    Mode,
+    Piston,
+    RockKind,
+    Status,
+)
+from percussion_model.core.rigid_records import RIGID, ROWS_AN_EVENT
+
+if TYPE_CHECKING:
+    from percussion_model.scene import Scene
+
+# Without a switching drive a blow ends when the gap was open for so many bar transits.
+BLOW_GAP_TRANSITS = 20
+
+_DRIVES = {"none": DriveKind.NONE, "pressure": DriveKind.PRESSURE, "external": DriveKind.EXTERNAL}
+_ROCKS = {
+    "none": RockKind.NONE,
+    "bilinear": RockKind.BILINEAR,
+    "spring": RockKind.SPRING,
+    "wall": RockKind.WALL,
+}
+
+# Input of `set_inputs`, the field it changes, and the scenes in which it has an effect.
+_INPUTS: Mapping[str, tuple[str, str]] = MappingProxyType(
+    {
+        "feed_force": ("F_S", "feed"),
+        "drive_force": ("F_0", "pressure"),
+        "reversal_distance": ("D_1", "pressure"),
+        "external_force": ("external", "external"),
+        "loading_stiffness": ("K_R", "rock"),
+        "unloading_ratio": ("gamma", "rock"),
+        "barrier_damping": ("C_R", "rock"),
+        "barrier_energy": ("W_R", "rock"),
+    }
+)
+
+
+def st_venant_restitution(
+    piston_mass: float, piston_transit: float, bit_mass: float, bit_transit: float
+) -> float:
+    """Restitution of two free elastic bars after their first contact (docs/model.md, sec. 9).
+
+    The shorter bar sends a rectangular wave of force Z_c v into the longer one for twice
+    its own transit time. With equal impedances this is the ratio of the lengths.
+
+    Parameters
+    ----------
+    piston_mass, bit_mass : float
+        Masses [kg].
+    piston_transit, bit_transit : float
+        Times that a wave takes from end to end [s].
+
+    Returns
+    -------
+    float
+        Between 0 and 1.
+    """
+    z_p = piston_mass / piston_transit
+    z_b = bit_mass / bit_transit
+    impulse = 2.0 * min(piston_transit, bit_transit) * z_p * z_b / (z_p + z_b)
+    e = impulse * (1.0 / piston_mass + 1.0 / bit_mass) - 1.0
+    return min(max(e, 0.0), 1.0)
+
+
+class RigidSolver:
+    """Advance rigid bodies from event to event, in closed form.
+
+    A state is one structured array (`new_state`); copying it saves a run.
+
+    Parameters
+    ----------
+    scene : Scene
+        With a rigid bit and a rigid or absent piston.
+    """
+
+    name = "rigid"
+    time_step: float | None = None
+    wave_speed_error = 0.0
+
+    def __init__(self, scene: Scene) -> None:
+        if scene.bit.model != "rigid" or scene.piston.model not in ("rigid", "absent"):
+            raise ValueError(
+                "the rigid solver needs bit.model = 'rigid' and piston.model = 'rigid' or "
+                f"'absent', not {scene.bit.model!r} and {scene.piston.model!r}"
+            )
+        self.scene = scene
+        self.cells: dict[str, int] = {}
+
+    @property
+    def restitution(self) -> float:
+        """Coefficient of restitution of piston and bit, NaN without a piston."""
+        scene = self.scene
+        if scene.piston.model == "absent":
+            return float("nan")
+        if scene.contact.restitution is not None:
+            return float(scene.contact.restitution)
+        return st_venant_restitution(
+            scene.piston.mass,
+            scene.piston.transit_time,
+            scene.bit.mass,
+            scene.bit.transit_time,
+        )
+
+    def new_state(self) -> np.ndarray:
+        """Return the state at time zero, inputs and parameters included."""
+        scene = self.scene
+        state = np.zeros(1, RIGID)
+        self._fill_parameters(state["par"][0])
+        has_piston = scene.piston.model != "absent"
+        spring_or_wall = scene.effects.rock in ("spring", "wall")
+        now = state["now"][0]
+        now["mode"] = Mode.FF
+        now["alpha"] = scene.start.drive_direction
+        now["armed"] = int(scene.start.drive_direction > 0)
+        now["p"] = -scene.start.rock_gap if spring_or_wall else 0.0
+        now["P_u"] = 0.0 if spring_or_wall else scene.start.rock_gap
+        now["v_b"] = scene.start.bit_velocity
+        if has_piston:
+            now["gap"] = now["first_gap"] = scene.start.gap
+            now["v_p"] = scene.start.piston_velocity
+        now["opened"] = -np.inf
+        for name in ("ss_force",):
+            now[name] = np.nan
+        kernel.begin(state["par"], state["now"])
+        return state
+
+    def _fill_parameters(self, par: Any) -> None:
+        scene = self.scene
+        effects = scene.effects
+        has_piston = scene.piston.model != "absent"
+        par["M_p"] = scene.piston.mass if has_piston else 0.0
+        par["M_b"] = scene.bit.mass
+        par["G"] = scene.gravity.acceleration if effects.gravity else 0.0
+        par["F_S"] = scene.feed.force if effects.feed else 0.0
+        par["F_0"] = scene.drive.force
+        par["D_1"] = scene.drive.reversal_distance
+        par["external"] = scene.drive.external_force
+        par["e"] = self.restitution
+        par["K_R"] = scene.rock.loading_stiffness
+        par["gamma"] = scene.rock.unloading_ratio if effects.rock == "bilinear" else 1.0
+        par["C_R"] = scene.rock.barrier_damping
+        par["W_R"] = scene.rock.barrier_energy if scene.barrier_on else 0.0
+        transit = scene.bit.transit_time
+        if has_piston:
+            transit = max(transit, scene.piston.transit_time)
+        par["blow_gap_time"] = BLOW_GAP_TRANSITS * transit
+        par["piston"] = Piston.RIGID if has_piston else Piston.ABSENT
+        par["drive"] = _DRIVES[effects.drive]
+        par["rock"] = _ROCKS[effects.rock]
+        par["barrier"] = int(effects.barrier and effects.rock == "bilinear")
+        par["release"] = int(effects.standstill_tension == "release")
+
+    def advance(
+        self,
+        state: np.ndarray,
+        t: float,
+        blows: np.ndarray,
+        events: np.ndarray,
+        record_events: bool = True,
+    ) -> tuple[int, int, int]:
+        """Let all events up to time t happen.
+
+        Parameters
+        ----------
+        state : ndarray
+            Changed in place; comes to rest at the last event.
+        t : float
+            Time [s].
+        blows, events : ndarray
+            Room for rows of BLOW and EVENT, filled from index 0; events at least 4 long.
+        record_events : bool
+            Whether to list events.
+
+        Returns
+        -------
+        status, n_blows, n_events : int
+            A `Status`, and the rows filled. After BLOWS_FULL or EVENTS_FULL call again.
+        """
+        if len(blows) < 1 or (record_events and len(events) < ROWS_AN_EVENT):
+            raise ValueError(f"room for 1 blow and {ROWS_AN_EVENT} events is needed at least")
+        n_blows = np.zeros(1, np.int64)
+        n_events = np.zeros(1, np.int64)
+        status = kernel.advance(
+            state["par"],
+            state["now"],
+            float(t),
+            blows,
+            n_blows,
+            events,
+            n_events,
+            bool(record_events),
+        )
+        return int(status), int(n_blows[0]), int(n_events[0])
+
+    def sample(self, state: np.ndarray, times: np.ndarray, out: np.ndarray) -> None:
+        """Evaluate the state without changing it.
+
+        Parameters
+        ----------
+        state : ndarray
+        times : ndarray
+            Not falling, not before the state's last event [s].
+        out : ndarray, shape (len(times), len(SAMPLE_FIELDS))
+        """
+        times = np.ascontiguousarray(times, dtype=float)
+        if out.shape != (len(times), len(SAMPLE_FIELDS)):
+            raise ValueError(f"out must have the shape {(len(times), len(SAMPLE_FIELDS))}")
+        if len(times) == 0:
+            return
+        if np.any(np.diff(times) < 0) or times[0] < self.time(state):
+            raise ValueError("times must not fall, nor lie before the last event of the state")
+        copy = state.copy()
+        room = self._room()
+        status = kernel.sample(copy["par"], copy["now"], times, out, *room)
+        self._require_done(status)
+
+    def grid_point_after(self, state: np.ndarray, t: float) -> float:
+        """First time at or after `t` at which inputs can change: `t` itself [s]."""
+        return t
+
+    def readable_until(self, state: np.ndarray) -> float:
+        """A state can be read at any time: its copy runs on."""
+        return float("inf")
+
+    def energy(self, state: np.ndarray, t: float) -> dict[str, float]:
+        """Energy ledger at time t [J], not before the state's last event.
+
+        Returns
+        -------
+        dict
+            Entries of LEDGER_FIELDS since the start, stored `kinetic`, `elastic` and
+            `recoverable`, `start`, and `residual`: what no entry explains.
+        """
+        copy = state.copy()
+        par, now = copy["par"], copy["now"]
+        self._require_done(kernel.run_to(par, now, float(t), *self._room()))
+        kernel.commit(par, now, float(t))
+        entries = {name: float(now[name][0]) for name in LEDGER_FIELDS}
+        kinetic, rock = kernel.stored_energy(par, now)
+        entries |= {"kinetic": float(kinetic), "elastic": 0.0, "recoverable": float(rock)}
+        entries["start"] = float(now["initial_energy"][0])
+        given = sum(entries[name] for name in ("start", "drive", "feed", "gravity"))
+        found = sum(
+            value
+            for name, value in entries.items()
+            if name not in ("start", "drive", "feed", "gravity")
+        )
+        entries["residual"] = given - found
+        return entries
+
+    def commit(self, state: np.ndarray, t: float) -> None:
+        """Bring a state that was advanced to time t there, so that inputs can change."""
+        now = state["now"]
+        if t < self.time(state) or (now["scheduled"][0] and now["next_time"][0] <= t):
+            raise ValueError(f"advance the state to {t} s before committing it")
+        kernel.commit(state["par"], now, float(t))
+
+    def set_inputs(self, state: np.ndarray, **inputs: float | None) -> None:
+        """Change inputs of a committed state.
+
+        Parameters
+        ----------
+        state : ndarray
+            Changed in place.
+        **inputs
+            feed_force, drive_force, external_force [N] and reversal_distance [m] act at
+            once; loading_stiffness [N/m], unloading_ratio, barrier_damping [N s/m] and
+            barrier_energy [J] from the next drilling cycle on. None leaves a value alone.
+        """
+        changes = {}
+        effects = self.scene.effects
+        for name, value in inputs.items():
+            if name not in _INPUTS:
+                raise ValueError(f"unknown input {name!r}; known: {', '.join(_INPUTS)}")
+            if value is None:
+                continue
+            field, needs = _INPUTS[name]
+            on = {
+                "feed": effects.feed,
+                "rock": effects.rock == "bilinear" or name == "loading_stiffness",
+            }.get(needs, effects.drive == needs)
+            if not on:
+                raise ValueError(f"{name} has no effect in this scene")
+            changes[field] = float(value)
+        for field, value in changes.items():
+            state["par"][field] = value
+
+    def time(self, state: np.ndarray) -> float:
+        """Time of the last event of a state [s]."""
+        return float(state["now"]["time"][0])
+
+    def statistics(self, state: np.ndarray) -> dict[str, int]:
+        """Counters of the run so far."""
+        now = state["now"]
+        return {
+            name: int(now[f"count_{name}"][0]) for name in ("events", "contacts", "blows", "cycles")
+        }
+
+    @staticmethod
+    def _room() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Room that a read-only run needs."""
+        count = np.zeros(1, np.int64)
+        return np.zeros(1, BLOW), count, np.zeros(1, EVENT), count.copy()
+
+    @staticmethod
+    def _require_done(status: int) -> None:
+        if status != Status.DONE:
+            raise RuntimeError(f"the rigid solver stopped: {Status(status).name}")

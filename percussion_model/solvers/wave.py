@@ -1,0 +1,323 @@
+"""The travelling-wave solver: sizes, packing, saving and reading a state."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from percussion_model.core.advance import GRID_ROUNDING, run
+from percussion_model.core.contact_leap import WATCHED
+from percussion_model.core.records import (
+    BLOW,
+    EVENT,
+    LEDGER_FIELDS,
+    SAMPLE_FIELDS,
+    DriveKind,
+    Mode,
+    Piston,
+    RockKind,
+)
+from percussion_model.core.wave import lost_in_faces, resync, stored_energy
+from percussion_model.core.wave_records import WAVE_PAR, WAVE_STATE, Coef, Row, Task
+from percussion_model.scene import Scene
+from percussion_model.solvers.grid import (
+    Grid,
+    choose_time_step,
+    coefficients,
+    cut,
+    end_viscosity,
+    substeps,
+)
+from percussion_model.solvers.operators import LEVELS, build_operators, padded
+from percussion_model.solvers.step_map import no_operators
+
+# An open gap of this many transits of the slower bar ends a blow where no
+# pressure law does (docs/model.md, section 7).
+REARM_TRANSITS = 20.0
+
+
+@dataclass
+class WaveState:
+    """State of a simulation: one record and one flat workspace."""
+
+    record: np.ndarray  # WAVE_STATE, shape (1,)
+    workspace: np.ndarray  # float64: rows of the piston, then of the bit
+
+    def copy(self) -> WaveState:
+        """An independent copy."""
+        return WaveState(self.record.copy(), self.workspace.copy())
+
+
+class WaveSolver:
+    """Method of characteristics for a scene with an elastic bit.
+
+    Parameters
+    ----------
+    scene : Scene
+
+    Attributes
+    ----------
+    time_step : float
+        Transit time of a cell [s].
+    cells : dict of int
+        Cells in each elastic bar.
+    wave_speed_error : float
+        Largest relative error of a section's wave speed, from lengths that
+        fit no common cell.
+    """
+
+    name = "wave"
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+        elastic_piston = scene.piston.model == "elastic"
+        bars = [scene.piston, scene.bit] if elastic_piston else [scene.bit]
+        self.time_step = choose_time_step(list(bars), scene.solver.cells)
+        loss_time = scene.loss.time if scene.loss_on else 0.0
+        self._bit = cut(scene.bit, self.time_step)
+        self._piston = cut(scene.piston, self.time_step) if elastic_piston else None
+        self._cb = coefficients(self._bit, loss_time)
+        if self._piston is not None:
+            self._cp = coefficients(self._piston, loss_time)
+        else:
+            self._cp = np.zeros((len(Coef), 1))
+        self.cells = {"bit": self._bit.n}
+        if self._piston is not None:
+            self.cells = {"piston": self._piston.n, **self.cells}
+        grids = [grid for grid in (self._piston, self._bit) if grid is not None]
+        self.wave_speed_error = max(grid.fit for grid in grids)
+        self._par = self._pack(loss_time)
+        self._operators = no_operators()
+        if scene.solver.leaps:
+            found = build_operators(self._par, self._piston, self._cp, self._bit, self._cb)
+            if found is not None:
+                self._operators = found.arrays
+                self._par["leaps"] = LEVELS
+        size = padded(2 * max(self._bit.n, self._piston.n if self._piston else 0) + 1)
+        self._scratch = np.zeros((3, max(size, WATCHED)))
+        self._no_row = np.zeros(len(SAMPLE_FIELDS))
+        self._no_blows = np.zeros(1, BLOW)
+        self._no_events = np.zeros(1, EVENT)
+
+    def _pack(self, loss_time: float) -> np.ndarray:
+        """Parameter record of the scene."""
+        scene = self.scene
+        par = np.zeros(1, WAVE_PAR)
+        p = par[0]
+        p["dt"] = self.time_step
+        p["gravity"] = scene.gravity.acceleration if scene.effects.gravity else 0.0
+        p["mass_b"] = scene.bit.mass
+        p["mass_p"] = scene.piston.mass
+        p["piston"] = Piston[scene.piston.model.upper()]
+        p["drive"] = DriveKind[scene.effects.drive.upper()]
+        p["rock"] = RockKind[scene.effects.rock.upper()]
+        p["barrier"] = scene.barrier_on
+        p["release"] = scene.effects.standstill_tension == "release"
+        p["loss"] = substeps(loss_time, self.time_step)
+        p["n_b"] = self._bit.n
+        p["z_t"], p["z_b"] = self._bit.impedance[[0, -1]]
+        p["kappa_t"], p["kappa_b"] = end_viscosity(self._cb, self._bit, loss_time)
+        p["bound_t"] = _offset_bound(self._cb, self._bit, Coef.TOP)
+        p["bound_b"] = _offset_bound(self._cb, self._bit, Coef.BOTTOM)
+        slowest = scene.bit.transit_time
+        if self._piston is not None:
+            p["n_p"] = self._piston.n
+            p["z_f"], p["z_p"] = self._piston.impedance[[0, -1]]
+            p["kappa_f"], p["kappa_p"] = end_viscosity(self._cp, self._piston, loss_time)
+            p["bound_p"] = _offset_bound(self._cp, self._piston, Coef.BOTTOM)
+            slowest = max(slowest, scene.piston.transit_time)
+        p["rearm_time"] = REARM_TRANSITS * slowest
+        rock = _rock(scene)
+        p["ss_stiffness"] = rock["gamma"] * rock["k_r"]
+        p["ss_loading"] = rock["k_r"]
+        p["ss_damping"] = rock["c_r"]
+        return par
+
+    def new_state(self) -> WaveState:
+        """State at time zero."""
+        scene, start = self.scene, self.scene.start
+        record = np.zeros(1, WAVE_STATE)
+        s = record[0]
+        s["leap_end"] = -1
+        s["live"] = 1
+        s["mode"] = Mode.FF
+        s["alpha"] = start.drive_direction
+        s["armed"] = scene.effects.drive != "pressure" or start.drive_direction > 0
+        s["feed"] = scene.feed.force if scene.effects.feed else 0.0
+        s["drive_force"] = scene.drive.force
+        s["reversal"] = scene.drive.reversal_distance
+        s["external"] = scene.drive.external_force
+        for key, value in _rock(scene).items():
+            s[key] = value
+            s[f"next_{key}"] = value
+        s["p"] = -start.rock_gap
+        s["x_r"] = start.rock_gap
+        s["t_open"] = -np.inf
+        s["b_rebound"] = np.nan
+        s["b_standstill"] = np.nan
+        has_piston = scene.piston.model != "absent"
+        s["gap"] = start.gap if has_piston else np.inf
+        n_p = self._piston.n if self._piston is not None else 0
+        state = WaveState(record, np.zeros(len(Row) * (n_p + self._bit.n + 2)))
+        wp, wb = self._bars(state)
+        wb[Row.DOWN : Row.UP + 1, : self._bit.n] = 0.5 * start.bit_velocity
+        if n_p:
+            wp[Row.DOWN : Row.UP + 1, :n_p] = 0.5 * start.piston_velocity
+        s["v_p"] = start.piston_velocity if has_piston else 0.0
+        s["v_b"] = start.bit_velocity
+        resync(self._par[0], s, wp, self._cp, wb, self._cb)
+        s["u_start"] = s["u_r"]
+        s["e_start"] = sum(self._stored(state))
+        return state
+
+    def _bars(self, state: WaveState) -> tuple[np.ndarray, np.ndarray]:
+        """Views of piston and bit in the workspace."""
+        n_p = self._piston.n if self._piston is not None else 0
+        rows = len(Row)
+        cut_at = rows * (n_p + 1)
+        wp = state.workspace[:cut_at].reshape(rows, n_p + 1)
+        return wp, state.workspace[cut_at:].reshape(rows, self._bit.n + 1)
+
+    def _stored(self, state: WaveState) -> tuple[float, float, float]:
+        wp, wb = self._bars(state)
+        return stored_energy(self._par[0], state.record[0], wp, self._cp, wb, self._cb)
+
+    def _run(
+        self,
+        task: Task,
+        state: WaveState,
+        time: float,
+        blows: np.ndarray | None = None,
+        events: np.ndarray | None = None,
+        row: np.ndarray | None = None,
+    ) -> int:
+        """Call the kernels; see `core.advance.run`."""
+        wp, wb = self._bars(state)
+        return run(
+            int(task),
+            self._par,
+            state.record,
+            wp,
+            self._cp,
+            wb,
+            self._cb,
+            self._operators,
+            *self._scratch,
+            time,
+            self._no_blows if blows is None else blows,
+            self._no_events if events is None else events,
+            self._no_row if row is None else row,
+        )
+
+    def time(self, state: WaveState) -> float:
+        """Time up to which the state is committed [s]."""
+        return self._time_of(state, int(state.record[0]["step"]))
+
+    def readable_until(self, state: WaveState) -> float:
+        """Time up to which `sample` answers without advancing the state [s]."""
+        record = state.record[0]
+        return self._time_of(state, max(int(record["leap_end"]), int(record["step"]) + 1))
+
+    def grid_point_after(self, state: WaveState, t: float) -> float:
+        """First grid point at or after `t` [s]."""
+        base = float(state.record[0]["t_base"])
+        return self._time_of(state, int(np.ceil((t - base) / self.time_step - GRID_ROUNDING)))
+
+    def _time_of(self, state: WaveState, step: int) -> float:
+        return float(state.record[0]["t_base"]) + step * self.time_step
+
+    def advance(
+        self,
+        state: WaveState,
+        t: float,
+        blows: np.ndarray,
+        events: np.ndarray,
+        record_events: bool = False,
+    ) -> tuple[int, int, int]:
+        """Commit the state up to `t`; see `core.advance.advance`.
+
+        Returns
+        -------
+        status, n_blows, n_events : int
+        """
+        s = state.record[0]
+        s["events_on"] = record_events
+        status = self._run(Task.ADVANCE, state, t, blows, events)
+        return status, int(s["n_blows"]), int(s["n_events"])
+
+    def sample(self, state: WaveState, times: np.ndarray, out: np.ndarray) -> None:
+        """Evaluate at `times` without touching the state (`SAMPLE_FIELDS`)."""
+        for k, time in enumerate(times):
+            here = state.copy()
+            self._run(Task.SAMPLE, here, float(time), row=out[k])
+
+    def commit(self, state: WaveState, t: float) -> None:
+        """Bring the state to the first grid point at or after `t`."""
+        self._run(Task.BRING, state, self.grid_point_after(state, t))
+
+    def set_inputs(self, state: WaveState, **inputs: float) -> None:
+        """Change inputs of a committed state; rock inputs wait for the next cycle."""
+        for key, value in inputs.items():
+            state.record[0][INPUT_FIELDS[key]] = value
+
+    def energy(self, state: WaveState, t: float) -> dict[str, float]:
+        """Ledger [J] at the last grid point before `t`."""
+        here = state.copy()
+        self._run(Task.BRING, here, t)
+        s = here.record[0]
+        wp, wb = self._bars(here)
+        entries = {name: float(s[f"e_{name}"]) for name in LEDGER_FIELDS}
+        entries["loss"] += lost_in_faces(self._par[0], wp, wb)
+        kinetic, elastic, rock = self._stored(here)
+        entries |= {"start": float(s["e_start"]), "kinetic": kinetic, "elastic": elastic}
+        entries["recoverable"] = rock
+        return entries
+
+    def fields(self, state: WaveState) -> dict[str, np.ndarray]:
+        """Force [N] and velocity [m/s] of each cell, top to bottom, by bar."""
+        wp, wb = self._bars(state)
+        r = 2 * int(state.record[0]["parity"])
+        out = {}
+        for name, w, grid in (("piston", wp, self._piston), ("bit", wb, self._bit)):
+            if grid is not None:
+                d, u = w[r, : grid.n], w[r + 1, : grid.n]
+                out[f"{name}_force"] = grid.impedance * (d - u)
+                out[f"{name}_velocity"] = d + u
+        return out
+
+    def statistics(self, state: WaveState) -> dict[str, int]:
+        """Counts of what the solver did."""
+        s = state.record[0]
+        names = ("steps", "leaps", "leap_steps", "wakes", "events", "blows")
+        return {name: int(s[f"count_{name}"]) for name in names} | {"locked": int(s["locked"])}
+
+
+INPUT_FIELDS = {
+    "feed_force": "feed",
+    "drive_force": "drive_force",
+    "reversal_distance": "reversal",
+    "external_force": "external",
+    "loading_stiffness": "next_k_r",
+    "unloading_ratio": "next_gamma",
+    "barrier_damping": "next_c_r",
+    "barrier_energy": "next_w_r",
+}
+
+
+def _rock(scene: Scene) -> dict[str, float]:
+    """Numbers of the rock law as the kernels take them."""
+    rock, kind = scene.rock, scene.effects.rock
+    barrier = scene.barrier_on
+    return {
+        "k_r": rock.loading_stiffness,
+        "gamma": rock.unloading_ratio if kind == "bilinear" else 1.0,
+        "c_r": rock.barrier_damping if barrier else 0.0,
+        "w_r": rock.barrier_energy if barrier else 0.0,
+    }
+
+
+def _offset_bound(c: np.ndarray, grid: Grid, row: Coef) -> float:
+    """Factor b in |offset| <= b sqrt(2 E) (docs/numerics.md, eq. 14)."""
+    n = grid.n
+    return float(np.sqrt(np.sum(c[row, :n] * c[row, :n] / c[Coef.MASS, :n])))

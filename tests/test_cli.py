@@ -1,0 +1,236 @@
+"""The command line: output, errors, Ctrl-C."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from percussion_model.cli import BAD_INPUT, INTERRUPTED, _guarded, app
+
+SCENARIOS = Path(__file__).parents[1] / "scenarios"
+RIGID = str(SCENARIOS / "rigid.toml")
+SHORT = ["--duration", "0.5", "--settle", "0.1"]
+
+
+@pytest.fixture
+def percussion(capsys):
+    """Run the command in this process; return its exit code, stdout and stderr."""
+
+    def call(*arguments):
+        words = [str(word) for word in arguments]
+        code = _guarded(lambda: app(words, standalone_mode=False))
+        shown = capsys.readouterr()
+        return code, shown.out, shown.err
+
+    return call
+
+
+# ---------------------------------------------------------------------------- run
+
+
+def test_json_on_stdout_is_one_object_and_nothing_else(percussion):
+    code, out, err = percussion("run", RIGID, *SHORT, "--json", "-")
+    assert (code, err) == (0, "")
+    summary = json.loads(out)
+    assert summary["solver"] == "rigid"
+    assert summary["duration"] == 0.5
+    assert summary["settle"] == 0.1
+    assert summary["warnings"] == []
+    assert summary["rate_of_penetration"] > 0.01
+
+
+def test_the_table_names_the_rate(percussion):
+    code, out, _ = percussion("run", RIGID, *SHORT)
+    assert code == 0
+    assert "Rate of penetration" in out
+
+
+def test_results_and_json_go_to_files(percussion, tmp_path):
+    out, summary = tmp_path / "results", tmp_path / "summary.json"
+    code, _, err = percussion(
+        "run", RIGID, *SHORT, "--trace", "1e-3", "--out", out, "--json", summary, "--no-figures"
+    )
+    assert (code, err) == (0, "")
+    names = {path.name for path in out.iterdir()}
+    assert names == {"summary.json", "blows.csv", "events.csv", "trace.csv", "scene.toml"}
+    assert json.loads(summary.read_text()) == json.loads((out / "summary.json").read_text())
+
+
+def test_settings_and_solver_change_the_scene(percussion):
+    reference = SCENARIOS / "reference.toml"
+    code, out, _ = percussion(
+        "run", reference, *SHORT, "--solver", "rigid", "--set", "feed.force=4000", "--json", "-"
+    )
+    summary = json.loads(out)
+    assert (code, summary["solver"]) == (0, "rigid")
+    faster = summary["rate_of_penetration"]
+    _, out, _ = percussion("run", RIGID, *SHORT, "--json", "-")
+    assert faster > 1.01 * json.loads(out)["rate_of_penetration"]
+
+
+def test_cells_are_passed_on(percussion):
+    code, out, _ = percussion(
+        "run", SCENARIOS / "reference.toml", "--duration", "0.01", "--settle", "0", "--cells",
+        "40", "--json", "-",
+    )  # fmt: skip
+    assert code == 0
+    assert json.loads(out)["cells"] == {"piston": 40, "bit": 46}
+
+
+# ------------------------------------------------------------------- other commands
+
+
+def test_explain(percussion):
+    code, out, _ = percussion(
+        "explain", SCENARIOS / "reference.toml", "--set", "effects.loss=false"
+    )
+    assert code == 0
+    for text in ("loss", "wave", "20 in the piston", "loss.time", "a blow"):
+        assert text in out
+
+
+def test_new_writes_a_scene_that_runs_and_keeps_existing_files(percussion, tmp_path):
+    path = tmp_path / "mine.toml"
+    assert percussion("new", path)[0] == 0
+    text = path.read_text()
+    assert percussion("run", path, "--solver", "rigid", *SHORT)[0] == 0
+    path.write_text(text + "# mine\n")
+    code, _, err = percussion("new", path)
+    assert code == BAD_INPUT
+    assert "exists already" in err
+    assert path.read_text().endswith("# mine\n")
+    assert percussion("new", path, "--force")[0] == 0
+    assert path.read_text() == text
+
+
+def test_version(percussion):
+    code, out, _ = percussion("--version")
+    assert code == 0
+    assert out.startswith("percussion ")
+
+
+# ------------------------------------------------------------------------ bad input
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("[rock", "not valid TOML"),
+        ("[rock]\nunloding_ratio = 5", "did you mean rock.unloading_ratio?"),
+        ('[feed]\nforce = "much"', "feed.force"),
+        ("[[bit.sections]]\nlength = -1.0\narea = 1e-3", "bit.sections.0.length = -1.0 m"),
+        ("[[bit.sections]]\nlength = 0.2\narea = 0.0", "bit.sections.0.area = 0.0 m^2"),
+        ("[rock]\nunloading_ratio = 1.0", "rock.unloading_ratio = 1.0: must be a number above 1"),
+        ("[feed]\nforce = nan", "feed.force = nan N"),
+        ("[run]\nduration = 0", "run.duration = 0 s"),
+        ('[piston]\nmodel = "absent"', "needs a piston"),
+    ],
+)
+def test_bad_scenes_are_one_message_on_stderr(percussion, tmp_path, text, message):
+    path = tmp_path / "scene.toml"
+    path.write_text(text)
+    code, out, err = percussion("run", path, "--json", "-", "--out", tmp_path / "out")
+    assert (code, out) == (BAD_INPUT, "")
+    assert message in err
+    assert "Traceback" not in err
+    assert err.count("\n") == 1
+    assert os.listdir(tmp_path) == ["scene.toml"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["run", "nowhere.toml"], "there is no such scene file"),
+        (["run", RIGID, "--duration", "0"], "run.duration"),
+        (["run", RIGID, "--duration", "nan"], "run.duration"),
+        (["run", RIGID, "--settle", "9"], "run.settle"),
+        (["run", RIGID, "--trace", "0"], "trace"),
+        (["run", RIGID, "--set", "feed.force"], "KEY=VALUE"),
+        (["run", RIGID, "--set", "feed.farce=1"], "did you mean feed.force?"),
+        (["run", RIGID, "--solver", "wave"], "bit.model"),
+        (["run", RIGID, "--solver", "fem"], "fem"),
+        (["run", RIGID, "--cells", "many"], "--cells"),
+        (["plot", "nowhere.toml"], "there is no such scene file"),
+        (["explain", "nowhere.toml"], "there is no such scene file"),
+        (["drill"], "drill"),
+    ],
+)
+def test_bad_arguments_are_refused(percussion, arguments, message, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    code, out, err = percussion(*arguments)
+    assert (code, out) == (BAD_INPUT, "")
+    assert message in err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_unwritable_folder_is_refused_before_the_run(percussion, tmp_path):
+    (tmp_path / "file").write_text("")
+    began = time.monotonic()
+    for option in (["--out", tmp_path / "file" / "out"], ["--json", tmp_path / "file" / "a.json"]):
+        code, out, err = percussion("run", RIGID, "--duration", "1e6", *option)
+        assert (code, out) == (BAD_INPUT, "")
+        assert "cannot be written" in err
+    assert time.monotonic() - began < 5
+    assert os.listdir(tmp_path) == ["file"]
+
+
+# ------------------------------------------------------------------ whole processes
+
+
+# The command itself, which tells on stderr when it has drilled for a second.
+TALKING = """
+import contextlib, sys
+import percussion_model.terminal as terminal
+told = []
+
+def report(t):
+    if t > 1.0 and not told:
+        told.append(t)
+        print("drilling", file=sys.stderr, flush=True)
+
+@contextlib.contextmanager
+def talk(end):
+    yield report
+
+terminal.progress_bar = talk
+from percussion_model.cli import main
+main()
+"""
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows sends no SIGINT to a child")
+def test_ctrl_c_keeps_finished_work(tmp_path):
+    words = ["run", RIGID, "--duration", "1e6", "--out", str(tmp_path / "out"), "--json", "-"]
+    child = subprocess.Popen(
+        [sys.executable, "-c", TALKING, *words],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert child.stderr.readline() == "drilling\n"
+    child.send_signal(signal.SIGINT)
+    out, err = child.communicate(timeout=120)
+    assert child.returncode == INTERRUPTED, err
+    assert err.startswith("percussion: interrupted at t = ")
+    summary = json.loads(out)
+    assert summary["warnings"][-1].startswith("interrupted at t = ")
+    assert summary["blows"] > 0
+    names = {path.name for path in (tmp_path / "out").iterdir()}
+    assert names == {"summary.json", "blows.csv", "events.csv", "scene.toml"}
+    assert os.listdir(tmp_path) == ["out"]
+
+
+def test_a_json_run_loads_no_pictures_and_no_pandas():
+    code = (
+        "import sys; from percussion_model.cli import _guarded, app\n"
+        f"assert _guarded(lambda: app(['run', {RIGID!r}, '--json', '-'], standalone_mode=False)) "
+        "== 0\nheavy = {'matplotlib', 'pandas', 'jinja2'} & set(sys.modules)\n"
+        "assert not heavy, heavy"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr

@@ -1,0 +1,148 @@
+"""Figures: what is drawn for which scene, and that a stranger can read the axes."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+
+import matplotlib
+import numpy as np
+import pytest
+from matplotlib.image import imread
+
+from percussion_model.core.records import EVENT, EventKind, Mode
+from percussion_model.plotting import CAPTIONS, draw_figures, figures
+from percussion_model.plotting.style import MODE_COLOURS, STYLE, draw_by_mode
+from percussion_model.plotting.window import closed_contacts, last_blow_window, stress_fields
+from percussion_model.result import Result
+from percussion_model.scene import Scene
+from percussion_model.simulation import simulate
+
+ELASTIC = Scene(run={"duration": 0.2, "settle": 0.0})
+RIGID = ELASTIC.replace(**{"piston.model": "rigid", "bit.model": "rigid"})
+DROP = Scene(
+    effects={"drive": "none"},
+    piston={"model": "absent"},
+    start={"bit_velocity": 5.25},
+    run={"duration": 0.06, "settle": 0.0},
+)
+SCENES = {
+    "elastic": (ELASTIC, ["overview", "bit_motion", "activation", "stress_waves"]),
+    "rigid": (RIGID, ["overview", "bit_motion", "activation"]),
+    "drop": (DROP, ["bit_motion", "stress_waves"]),
+    "rigid drop": (DROP.replace(**{"bit.model": "rigid"}), ["bit_motion"]),
+}
+
+
+@pytest.fixture(scope="module")
+def results() -> dict[str, Result]:
+    return {name: simulate(scene) for name, (scene, _) in SCENES.items()}
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_every_axis_has_a_name_and_a_unit(name, results):
+    drawn = []
+    with matplotlib.rc_context(STYLE):
+        for figure_name, fig in draw_figures(results[name]):
+            drawn.append(figure_name)
+            fig.canvas.draw()
+            for ax in fig.axes:
+                for axis in (ax.xaxis, ax.yaxis):
+                    shares = axis is ax.xaxis and not any(
+                        tick.get_visible() and tick.get_text() for tick in ax.get_xticklabels()
+                    )
+                    if shares or not axis.get_visible():
+                        continue
+                    if ax.get_label() == "<colorbar>" and axis is ax.xaxis:
+                        continue
+                    assert re.search(r"\[.+\]", axis.get_label_text()), (figure_name, ax)
+    assert drawn == SCENES[name][1]
+    assert set(drawn) <= set(CAPTIONS)
+
+
+def test_files_are_whole_and_not_empty(results, tmp_path):
+    paths = figures(results["drop"], tmp_path / "new" / "folder")
+    assert [path.name for path in paths] == [
+        f"{name}.{kind}" for name in SCENES["drop"][1] for kind in ("png", "svg")
+    ]
+    assert sorted(paths) == sorted((tmp_path / "new" / "folder").iterdir())
+    for path in paths:
+        assert 20_000 < path.stat().st_size < 600_000
+        if path.suffix == ".png":
+            assert np.ptp(imread(path)) > 0.5
+        else:
+            assert path.read_text(encoding="utf-8").rstrip().endswith("</svg>")
+
+
+def test_same_result_gives_same_files(results, tmp_path):
+    first = figures(results["rigid drop"], tmp_path / "a")
+    second = figures(results["rigid drop"], tmp_path / "b")
+    for a, b in zip(first, second, strict=True):
+        assert a.read_bytes() == b.read_bytes()
+
+
+def test_window_is_the_last_whole_blow(results):
+    result = results["elastic"]
+    window = last_blow_window(result)
+    blow = result.blows[-1]
+    assert window.is_blow
+    assert window.origin == blow["time"]
+    assert window.length == blow["period"]
+    assert len(window.contacts) == blow["contacts"]
+    assert window.contacts[0][0] == pytest.approx(0.0, abs=1e-9)
+    assert window.time[0] < 0.0 < window.activation_until < window.active_until < window.length
+    # One transit of the piston and back, the St Venant contact, and what the loss adds.
+    assert window.contacts[0][1] == pytest.approx(2.0 * ELASTIC.piston.transit_time, rel=0.15)
+
+
+def test_window_of_a_drop_test_starts_at_first_contact(results):
+    window = last_blow_window(results["drop"])
+    assert not window.is_blow
+    assert window.origin == pytest.approx(1.9047e-6, rel=1e-3)  # oracle 9 of the paper's notes
+    assert window.active_until < 1e-3  # the zoom shows the first contact with the rock
+
+
+def test_stress_after_impact_is_that_of_st_venant(results):
+    window = last_blow_window(results["elastic"])
+    fields = stress_fields(window)
+    assert list(fields) == ["piston", "bit"]
+    piston = fields["piston"]
+    assert piston.depth_edges[-1] == pytest.approx(ELASTIC.piston.length)
+    assert piston.stress.shape == (len(piston.depth_edges) - 1, len(piston.time_edges) - 1)
+    steel = ELASTIC.piston.sections[0]
+    expected = (
+        0.5 * steel.density * steel.wave_speed * results["elastic"].blows[-1]["impact_velocity"]
+    )
+    half_transit = np.searchsorted(piston.time_edges, 0.8 * ELASTIC.piston.transit_time)
+    assert piston.stress[-4, half_transit] == pytest.approx(expected, rel=0.03)
+    assert fields["bit"].stress[3, half_transit] == pytest.approx(expected, rel=0.03)
+
+
+def test_changed_inputs_give_no_figure_of_another_run(results, tmp_path):
+    result = results["elastic"]
+    blows = result.blows.copy()
+    blows["time"][1:] += 0.01
+    changed = dataclasses.replace(result, blows=blows)
+    with pytest.warns(UserWarning, match="other blows"):
+        paths = figures(changed, tmp_path)
+    assert {path.stem for path in paths} == {"overview"}
+
+
+def test_contacts_are_paired_and_cut_to_the_window():
+    events = np.zeros(5, EVENT)
+    events["time"] = [0.5, 1.0, 1.2, 2.0, 4.0]
+    closed, opened = EventKind.CONTACT_CLOSED, EventKind.CONTACT_OPENED
+    events["kind"] = [opened, closed, opened, closed, EventKind.DRIVE_DOWN]
+    found = np.array(closed_contacts(events, 1.0, 3.0))
+    np.testing.assert_allclose(found, [(0.0, 0.2), (1.0, 2.0)])
+
+
+def test_a_line_by_mode_leaves_no_gap():
+    from matplotlib.figure import Figure
+
+    ax = Figure().subplots()
+    mode = np.array([Mode.FF, Mode.FF, Mode.FC, Mode.FF])
+    draw_by_mode(ax, np.arange(4.0), np.arange(4.0), mode)
+    lines = {line.get_color(): line.get_xdata() for line in ax.lines}
+    np.testing.assert_array_equal(lines[MODE_COLOURS[Mode.FC]], [2.0, 3.0])
+    np.testing.assert_array_equal(lines[MODE_COLOURS[Mode.FF]], [0.0, 1.0, 2.0, 3.0])

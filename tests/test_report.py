@@ -1,0 +1,105 @@
+"""The report: one page, complete, and without any other file."""
+
+from __future__ import annotations
+
+import re
+from html.parser import HTMLParser
+
+import pytest
+
+from percussion_model.report import HEADLINES, headline_rows, ledger_rows, write_report
+from percussion_model.scene import Scene
+from percussion_model.simulation import simulate
+
+SHORT = Scene(title="A <short> run", run={"duration": 0.2, "settle": 0.0})
+SCENES = {
+    "elastic": SHORT,
+    "rigid": SHORT.replace(**{"piston.model": "rigid", "bit.model": "rigid"}),
+    "drop": Scene(
+        effects={"drive": "none"},
+        piston={"model": "absent"},
+        start={"bit_velocity": 5.25},
+        run={"duration": 0.06, "settle": 0.0},
+    ),
+}
+
+
+class Outline(HTMLParser):
+    """Collects what the tests look at."""
+
+    def __init__(self, page: str) -> None:
+        super().__init__()
+        self.ids: list[str] = []
+        self.targets: list[str] = []
+        self.tags: list[str] = []
+        self.feed(page)
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append(tag)
+        for name, value in attrs:
+            if name == "id":
+                self.ids.append(value)
+            if name in ("href", "xlink:href", "src"):
+                self.targets.append(value)
+
+
+@pytest.fixture(scope="module", params=SCENES)
+def case(request, tmp_path_factory):
+    result = simulate(SCENES[request.param])
+    path = write_report(result, tmp_path_factory.mktemp("report"))
+    return request.param, result, path.read_text(encoding="utf-8")
+
+
+def test_page_needs_nothing_else(case):
+    _, _, page = case
+    outline = Outline(page)
+    assert "://" not in page
+    assert "script" not in outline.tags
+    assert all(target.startswith(("#", "data:image/png;base64,")) for target in outline.targets)
+
+
+def test_parts_of_drawings_are_told_apart(case):
+    _, _, page = case
+    outline = Outline(page)
+    assert len(outline.ids) == len(set(outline.ids))
+    inside = {target[1:] for target in outline.targets if target.startswith("#")}
+    inside |= set(re.findall(r"url\(#([^)]+)\)", page))
+    assert inside <= set(outline.ids)
+
+
+def test_page_says_it_all(case):
+    name, result, page = case
+    outline = Outline(page)
+    assert outline.tags.count("svg") == {"elastic": 4, "rigid": 3, "drop": 2}[name]
+    assert ("Rate of penetration" in page) == (name != "drop")
+    for key in ("rock.loading_stiffness", "bit.sections.0.length", "run.duration"):
+        assert f"<code>{key}</code>" in page
+    assert ("piston.sections" in page) == (name != "drop")
+    for text in ("residual", "numba", "Parameter", "crushing of the rock"):
+        assert text in page
+    assert page.count('class="warning"') == len(result.warnings)
+    if result.scene.title:
+        assert "A &lt;short&gt; run" in page
+        assert "<short>" not in page
+
+
+def test_ledger_of_the_report_balances(case):
+    _, result, _ = case
+    parts = {part: sum(joule for _, joule, _ in rows) for part, rows in ledger_rows(result.energy)}
+    put_in = parts.pop("Put in")
+    assert sum(parts.values()) == pytest.approx(put_in, rel=1e-12)
+
+
+def test_headlines_are_in_both_units():
+    rows = headline_rows({key: None for key, *_ in HEADLINES} | {"rate_of_penetration": 0.0163934})
+    assert rows == [("Rate of penetration", "0.016393 m/s", "16.39 mm/s")]
+    rows = headline_rows({"peak_bit_force": 594760.6, "rebound_velocity": -3.38})
+    assert rows == [
+        ("Rebound velocity (mean of the piston)", "−3.38 m/s", ""),
+        ("Greatest bit force", "594761 N", "594.8 kN"),
+    ]
+
+
+def test_the_folder_holds_no_drafts(tmp_path):
+    write_report(simulate(SCENES["drop"]), tmp_path)
+    assert {path.suffix for path in tmp_path.iterdir()} == {".html", ".png", ".svg"}

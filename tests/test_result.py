@@ -1,0 +1,228 @@
+"""Result: means, rate, ledger, warnings, files."""
+
+import json
+import math
+import os
+
+import numpy as np
+import pytest
+
+from percussion_model import Result, ResultError, Scene, simulate
+from percussion_model.core.records import BLOW
+from percussion_model.result_files import check_writable, staged
+
+RIGID = Scene().replace(**{"piston.model": "rigid", "bit.model": "rigid"})
+KEYS = [
+    "rate_of_penetration",
+    "rate_of_penetration_standard_error",
+    "blow_period",
+    "blow_frequency",
+    "impact_velocity",
+    "rebound_velocity",
+    "stroke",
+    "blow_energy",
+    "rock_energy",
+    "transfer_efficiency",
+    "penetration_per_blow",
+    "contacts_per_blow",
+    "drilling_cycles_per_blow",
+    "peak_bit_force",
+    "peak_contact_force",
+    "standstill_bit_force",
+    "mean_bit_force",
+    "mean_contact_force",
+    "energy",
+    "blows",
+    "events",
+    "cells",
+    "time_step",
+    "wall_time",
+    "real_time_factor",
+    "solver",
+    "duration",
+    "settle",
+    "warnings",
+]
+
+
+@pytest.fixture(scope="module")
+def rigid():
+    return simulate(RIGID, 2.0, settle=1.0, trace=1e-3)
+
+
+@pytest.fixture(scope="module")
+def wave():
+    return simulate(Scene(), 0.5, settle=0.2)
+
+
+# ------------------------------------------------------------------------ numbers
+
+
+def test_the_summary_is_plain_and_complete(rigid, wave):
+    for result in (rigid, wave):
+        summary = json.loads(json.dumps(result.summary(), allow_nan=False))
+        assert set(KEYS) <= set(summary)
+        assert {"numerical", "residual", "numerical_relative", "input"} <= set(summary["energy"])
+    assert rigid.summary()["cells"] is None
+    assert wave.summary()["cells"] == {"piston": 20, "bit": 23}
+
+
+def test_the_reference_needs_no_warning(wave, rigid):
+    assert wave.warnings == []
+    assert rigid.warnings == []
+
+
+def test_the_rate_is_taken_between_blow_starts(rigid):
+    starts = rigid.blows[rigid.blows["time"] >= 1.0]
+    advance = starts["bit_position"][-1] - starts["bit_position"][0]
+    took = starts["time"][-1] - starts["time"][0]
+    assert rigid.rate_of_penetration == pytest.approx(advance / took, rel=1e-6)
+    assert rigid.rate_of_penetration == pytest.approx(
+        starts["penetration"].sum() / starts["period"].sum(), rel=1e-12
+    )
+
+
+def test_impulse_over_whole_periods(wave):
+    # Oracle 8: <F_R> = F_S + (M_p + M_b) G + <F_A>; <F_C> = M_p G + <F_A>.
+    rows, scene = wave.counted, wave.scene
+    drive = rows["drive_impulse"].sum() / rows["period"].sum()
+    weight = 10.0 * (scene.piston.mass + scene.bit.mass)
+    assert wave.mean_bit_force == pytest.approx(2500.0 + weight + drive, rel=2e-3)
+    assert wave.mean_contact_force == pytest.approx(10.0 * scene.piston.mass + drive, rel=5e-3)
+
+
+def test_the_ledger_adds_up(wave):
+    e = wave.energy
+    assert e["input"] == pytest.approx(e["drive"] + e["feed"] + e["gravity"])
+    rest = e["initial"] + e["input"] - e["stored"] - e["dissipated"] - e["numerical"]
+    assert e["residual"] == pytest.approx(rest, abs=1e-9)
+    assert abs(e["residual_relative"]) < 1e-9
+
+
+def test_standard_error_of_a_known_scatter(rigid):
+    blows = np.zeros(400, BLOW)
+    random = np.random.default_rng(3)
+    blows["period"] = 0.05
+    blows["time"] = 2.0 + 0.05 * np.arange(400)
+    blows["penetration"] = 1e-3 + 1e-4 * random.standard_normal(400)
+    blows["bit_position"] = np.concatenate([[0.0], np.cumsum(blows["penetration"])[:-1]])
+    fields = {name: getattr(rigid, name) for name in rigid.__dataclass_fields__}
+    result = Result(**{**fields, "blows": blows})
+    assert result.rate_of_penetration == pytest.approx(0.02, rel=0.02)
+    wanted = 1e-4 / math.sqrt(400) / 0.05
+    assert result.rate_of_penetration_standard_error == pytest.approx(wanted, rel=0.1)
+
+
+# ----------------------------------------------------------------------- warnings
+
+
+def test_few_blows_tell_no_rate():
+    result = simulate(RIGID, 0.12, settle=0.0)
+    assert result.summary()["rate_of_penetration"] is None
+    assert any("only 2 whole blows" in text for text in result.warnings)
+    none = simulate(RIGID, 0.01, settle=0.0)
+    assert none.summary()["blow_period"] is None
+    assert any("no whole blow" in text for text in none.warnings)
+
+
+def test_an_undamped_scene_warns_and_says_why():
+    result = simulate(Scene().replace(**{"effects.loss": False}), 0.05, settle=0.0)
+    assert all(math.isfinite(value) for value in result.energy.values())
+    assert any(
+        "structural loss is off" in text and "must not be trusted" in text
+        for text in result.warnings
+    )
+
+
+@pytest.mark.parametrize(
+    ("changes", "warning"),
+    [
+        ({"drive.external_force": 5.0}, "without effect in this scene: drive.external_force"),
+        ({"bit.sections.0.length": 0.2137, "solver.cells": 3}, "fit no common cell"),
+        ({"solver.cells": 1}, "is a single cell"),
+    ],
+)
+def test_warnings_about_the_scene(changes, warning):
+    result = simulate(Scene().replace(**changes), 0.01, settle=0.0)
+    assert any(warning in text for text in result.warnings)
+
+
+# -------------------------------------------------------------------------- files
+
+
+def test_a_saved_result_reads_back(rigid, tmp_path):
+    folder = tmp_path / "deep" / "run"
+    files = rigid.save(folder)
+    assert {path.name for path in files} == {
+        "summary.json", "blows.csv", "events.csv", "trace.csv", "scene.toml",
+    }  # fmt: skip
+    assert sorted(path.name for path in folder.iterdir()) == sorted(path.name for path in files)
+    assert os.listdir(folder.parent) == ["run"]
+    again = Result.load(folder)
+    assert again.scene == rigid.scene
+    for name in BLOW.names:
+        np.testing.assert_array_equal(again.blows[name], rigid.blows[name])
+    np.testing.assert_array_equal(again.events, rigid.events)
+    for name, values in rigid.trace.items():
+        np.testing.assert_array_equal(again.trace[name], values)
+    assert again.summary() == rigid.summary()
+
+
+def test_saving_again_replaces_and_leaves_other_files_alone(rigid, tmp_path):
+    rigid.save(tmp_path)
+    (tmp_path / "notes.txt").write_text("mine")
+    simulate(RIGID, 0.2, settle=0.0).save(tmp_path)
+    assert (tmp_path / "notes.txt").exists()
+    assert not (tmp_path / "trace.csv").exists()
+    assert len(Result.load(tmp_path).blows) == 4
+
+
+def test_nothing_half_written_stays(tmp_path):
+    def fail():
+        with staged(tmp_path / "run") as draft:
+            (draft / "half.csv").write_text("1,")
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        fail()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_long_trace_becomes_a_compressed_file(rigid, tmp_path, monkeypatch):
+    monkeypatch.setattr("percussion_model.result_files.LONGEST_CSV", 100)
+    rigid.save(tmp_path)
+    assert (tmp_path / "trace.npz").exists()
+    assert not (tmp_path / "trace.csv").exists()
+    np.testing.assert_array_equal(Result.load(tmp_path).trace["gap"], rigid.trace["gap"])
+
+
+def test_what_cannot_be_written_is_said_before(rigid, tmp_path):
+    (tmp_path / "file").write_text("")
+    check_writable(tmp_path / "new" / "folder")
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+    for folder in (tmp_path / "file", tmp_path / "file" / "below"):
+        with pytest.raises(ResultError, match="cannot be written"):
+            check_writable(folder)
+        with pytest.raises(ResultError, match="cannot be written"):
+            rigid.save(folder)
+
+
+def test_what_is_no_result_is_refused(tmp_path):
+    with pytest.raises(ResultError, match="no such result folder"):
+        Result.load(tmp_path / "none")
+    RIGID.to_toml(tmp_path / "scene.toml")
+    with pytest.raises(ResultError, match=r"summary\.json: cannot be read"):
+        Result.load(tmp_path)
+    (tmp_path / "summary.json").write_text("{}")
+    with pytest.raises(ResultError, match="not a complete result"):
+        Result.load(tmp_path)
+
+
+def test_tables_for_pandas(rigid):
+    pandas = pytest.importorskip("pandas")
+    blows, events = rigid.to_pandas(), rigid.events_to_pandas()
+    assert isinstance(blows, pandas.DataFrame)
+    assert list(blows.columns) == list(BLOW.names)
+    assert len(blows) == len(rigid.blows)
+    assert "contact_closed" in set(events["kind"])
+    assert events["time"].is_monotonic_increasing
