@@ -11,7 +11,7 @@ from percussion_model.core.leap import leap, plan_leap
 from percussion_model.core.records import Piston, Status
 from percussion_model.core.rock import MOST_CROSSINGS
 from percussion_model.core.sleep import put_to_sleep, wake_piston
-from percussion_model.core.wave import bit_position, meet, now, step
+from percussion_model.core.wave import bit_position, now, step
 from percussion_model.core.wave_records import Row, Task
 
 DONE, BLOWS_FULL, EVENTS_FULL = int(Status.DONE), int(Status.BLOWS_FULL), int(Status.EVENTS_FULL)
@@ -72,14 +72,14 @@ def go_on(par, s, wp, cp, wb, cb, ops, x, v, y, time, blows, events):
                 return DONE
             leap(par, s, wb, cb, ops, x, v, y, watched)
         else:
-            step(par, s, wp, cp, wb, cb, blows, events)
+            step(par, s, wp, cp, wb, cb, par.dt, blows, events)
     return DONE
 
 
 @merged
 def bring(par, s, wp, cp, wb, cb, ops, x, v, y, time):
     """Bring bit and piston up to `time` within a pending leap, or as far as it goes."""
-    stop = int(math.floor((time - s.t_base) / par.dt + GRID_ROUNDING))
+    stop = math.floor((time - s.t_base) / par.dt + GRID_ROUNDING)
     if s.leap_end >= 0 and stop > s.step:
         s.leap_end = min(stop, s.leap_end)
         leap(par, s, wb, cb, ops, x, v, y, False)
@@ -102,7 +102,7 @@ def fill_sample(par, s, wp, cp, wb, cb, time, tau, blows, events, row):
     v_before = s.v_b
     bit = s.i_bit
     contact = s.i_contact
-    meet(par, s, wp, cp, wb, cb, tau, blows, events)
+    step(par, s, wp, cp, wb, cb, tau, blows, events)
     here = before + 0.5 * (v_before + s.v_b) * tau
     row[0] = time
     row[1] = s.u_r - s.u_start + here
@@ -162,7 +162,7 @@ def run(task, par_, state, wp, cp, wb, cb, ops, x, v, y, time, blows, events, ro
     if task == ADVANCE:
         return go_on(par, s, wp, cp, wb, cb, ops, x, v, y, time, blows, events)
     if task == STEP:
-        step(par, s, wp, cp, wb, cb, blows, events)
+        step(par, s, wp, cp, wb, cb, par.dt, blows, events)
         return DONE
     bring(par, s, wp, cp, wb, cb, ops, x, v, y, time)
     if task == SAMPLE:

@@ -9,12 +9,14 @@ from __future__ import annotations
 
 import math
 
-from percussion_model.core.bar import mean_velocity
+from percussion_model.core.bar import mean_velocity, strain_offset
 from percussion_model.core.kernel import kernel, merged
 from percussion_model.core.linear import load, multiply, pad, quadratic, store
 from percussion_model.core.records import Mode
 from percussion_model.core.rock import REST_VELOCITY, crush, origin, stiffness
+from percussion_model.core.wave_records import Coef
 
+BOTTOM = int(Coef.BOTTOM)
 DFC, FC, BC, SS = int(Mode.DFC), int(Mode.FC), int(Mode.BC), int(Mode.SS)
 
 # Steps looked at in one go, a power of two.
@@ -98,7 +100,7 @@ def watch_contact(par, s, wb, cb, watch, x, v, most):
         No more than this many, nor than WATCHED.
     """
     load_contact(par, s, wb, cb, x)
-    look_ahead(watch, s.mode - 1, par.size_r, x, v)
+    look_ahead(watch, s.mode, par.size_r, x, v)
     K, C, z, fade, d, q = step_constants(par, s)
     y = s.p - origin(s)
     most = min(most, WATCHED)
@@ -118,6 +120,34 @@ def watch_contact(par, s, wb, cb, watch, x, v, most):
             if work >= s.w_r:
                 return k
         y += v[k] * d
+    return most
+
+
+@kernel
+def watch_flight(par, s, wb, cb, watch, x, v, most):
+    """Number of steps of free flight before the one in which the rock is met.
+
+    The mean motion is a parabola; what the vibration adds at the rock end is
+    watched.
+
+    Parameters
+    ----------
+    watch : float array, shape (modes, size, WATCHED)
+    x, v : float array
+        Scratch; v receives the strain offset at the end of each step.
+    most : int
+        No more than this many, nor than WATCHED.
+    """
+    load(x, wb, cb, par.n_b, 2 * s.parity, s.v_b, 0.0)
+    pad(x, 2 * par.n_b, par.size_r)
+    look_ahead(watch, 0, par.size_r, x, v)
+    a = par.gravity + s.feed / par.mass_b
+    mean = s.p + strain_offset(wb, cb, par.n_b, 2 * s.parity, BOTTOM)
+    most = min(most, WATCHED)
+    for k in range(most):
+        t = (k + 1) * par.dt
+        if mean + (s.v_b + 0.5 * a * t) * t - v[k] >= s.p_u:
+            return k
     return most
 
 

@@ -12,7 +12,14 @@ import math
 
 from percussion_model.core.bar import deviation_energy, mean_velocity, strain_offset, time_to_cover
 from percussion_model.core.blows import push_checkpoint
-from percussion_model.core.contact_leap import GRAIN, can_watch, leap_contact, watch_contact
+from percussion_model.core.contact_leap import (
+    GRAIN,
+    WATCHED,
+    can_watch,
+    leap_contact,
+    watch_contact,
+    watch_flight,
+)
 from percussion_model.core.kernel import kernel, merged
 from percussion_model.core.linear import load, multiply, pad, quadratic, remove_mean, store
 from percussion_model.core.records import Mode, RockKind
@@ -66,7 +73,7 @@ def lifts_not(par, s, energy):
 
 
 @merged
-def plan_flight(par, s, wb, cb, most):
+def plan_flight(par, s, wb, cb, watch, x, v, most):
     """Steps of free flight before the rock can be met, at most `most`."""
     if par.rock == NO_ROCK:
         return most
@@ -74,9 +81,13 @@ def plan_flight(par, s, wb, cb, most):
     a = par.gravity + s.feed / par.mass_b
     room = s.p_u - s.p - 2.0 * par.bound_b * math.sqrt(2.0 * energy)
     limit = time_to_cover(room, s.v_b, a)
-    if limit < most * par.dt:
-        return int(limit / par.dt) - 1
-    return most
+    if limit >= most * par.dt:
+        return most
+    steps = int(limit / par.dt) - 1
+    if steps < WATCHED and par.rock == BILINEAR:
+        # the bound is too coarse so close to the rock: look
+        steps = max(steps, watch_flight(par, s, wb, cb, watch, x, v, most))
+    return steps
 
 
 @merged
@@ -86,11 +97,13 @@ def plan_leap(par, s, wb, cb, watch, x, v):
     if s.asleep == 1:
         most = min(most, s.wake - s.step)
     steps = 0
+    looked = False
     s.v_b = mean_velocity(wb, cb, par.n_b, 2 * s.parity, par.mass_b)
     if s.mode == FF:
         s.leap_kind = FLIGHT
         if par.rock == NO_ROCK or s.p < s.p_u:
-            steps = plan_flight(par, s, wb, cb, most)
+            steps = plan_flight(par, s, wb, cb, watch, x, v, most)
+            looked = par.rock == BILINEAR
     elif par.rock == BILINEAR and can_watch(par, s):
         s.leap_kind = CONTACT
         if s.mode == SS:
@@ -102,11 +115,13 @@ def plan_leap(par, s, wb, cb, watch, x, v):
                 steps = most
         if s.leap_kind == CONTACT and most >= FEWEST_STEPS:
             steps = watch_contact(par, s, wb, cb, watch, x, v, most)
-            steps -= steps % GRAIN
-    if steps < FEWEST_STEPS:
+            looked = True
+    if steps >= FEWEST_STEPS:
+        s.leap_end = s.step + steps - steps % GRAIN
+    elif looked:
+        s.no_plan = s.step + steps + 1  # just past the event
+    else:
         s.no_plan = s.step + FEWEST_STEPS
-        return
-    s.leap_end = s.step + steps
 
 
 @kernel

@@ -8,7 +8,7 @@ no saw-tooth behind (docs/numerics.md, section 3).
 
 from __future__ import annotations
 
-from percussion_model.core.kernel import kernel
+from percussion_model.core.kernel import inlined, kernel
 from percussion_model.core.wave_records import Coef, Row
 
 FACE, LOSS, SCRATCH = int(Row.FACE), int(Row.LOSS), int(Row.SCRATCH)
@@ -80,15 +80,23 @@ def smooth_cells(w, c, n, q, parts):
     for _ in range(parts):
         for i in range(n):
             w[SCRATCH, i] = w[q, i] + w[q + 1, i]
-        above = 0.0
-        for i in range(n):
+        push_cell(w, c, q, 0, c[BETWEEN, 0] * (w[SCRATCH, 1] - w[SCRATCH, 0]))
+        for i in range(1, n - 1):
             v = w[SCRATCH, i]
-            below = 0.0
-            if i < n - 1:
-                below = c[BETWEEN, i] * (w[SCRATCH, i + 1] - v)
-            force = below - above
-            above = below
+            force = c[BETWEEN, i] * (w[SCRATCH, i + 1] - v)
+            force -= c[BETWEEN, i - 1] * (v - w[SCRATCH, i - 1])
             half = 0.5 * force * c[INV_CELL_Z, i]
             w[LOSS, i] -= force * (v + half)
             w[q, i] += half
             w[q + 1, i] += half
+        last = c[BETWEEN, n - 2] * (w[SCRATCH, n - 2] - w[SCRATCH, n - 1])
+        push_cell(w, c, q, n - 1, last)
+
+
+@inlined
+def push_cell(w, c, q, i, force):
+    """Let a viscous force [N] act on a cell over the step."""
+    half = 0.5 * force * c[INV_CELL_Z, i]
+    w[LOSS, i] -= force * (w[SCRATCH, i] + half)
+    w[q, i] += half
+    w[q + 1, i] += half

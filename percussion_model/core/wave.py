@@ -375,15 +375,20 @@ def shorten_step(par, s, wp, cp, wb, cb, tau, loss_before, push, dv_p, dv_b):
 
 
 @kernel
-def step(par, s, wp, cp, wb, cb, blows, events):
-    """Advance the state by one step of the transit time of a cell."""
+def step(par, s, wp, cp, wb, cb, dt, blows, events):
+    """Advance the state by one step of the transit time of a cell.
+
+    A copy that is only read (s.live = 0) moves on by `dt` of a step: what its
+    ends meet, not the waves in its bars.
+    """
     r = 2 * s.parity
     alpha = s.alpha
     v_p, v_b = s.v_p, s.v_b
     contact_before = s.i_contact
     push = drive_force(par, s)
-    dt = par.dt
     top, bottom, top_p, bottom_p, tau = meet(par, s, wp, cp, wb, cb, dt, blows, events)
+    if s.live == 0:
+        return
     short = tau < dt
     loss_before = 0.0
     if short:

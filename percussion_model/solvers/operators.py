@@ -9,6 +9,7 @@ import numpy as np
 from percussion_model.core.contact_leap import WATCH_LEVELS, WATCHED
 from percussion_model.core.linear import PADDING
 from percussion_model.core.records import DriveKind, Mode, Piston, RockKind
+from percussion_model.core.wave_records import Coef
 from percussion_model.solvers.grid import Grid
 from percussion_model.solvers.step_map import (
     Configuration,
@@ -43,8 +44,9 @@ class LeapOperators:
         Bit in standstill: map, forms of loss, dashpot and averaging.
     loading : ndarray, shape (3, WATCH_LEVELS, 2, size, size)
         Bit in DFC, FC and BC: map and form of loss.
-    watch : ndarray, shape (4, size, WATCHED)
-        End velocity at the start of the next steps in DFC, FC, BC and SS.
+    watch : ndarray, shape (5, size, WATCHED)
+        By mode: strain offset of the rock end at the end of the next steps in
+        FF, its velocity at their start in DFC, FC, BC and SS.
     sums : ndarray, shape (4, LEVELS, size)
         Path of the bit's mean motion over a leap in SS, DFC, FC and BC.
     """
@@ -94,6 +96,9 @@ def build_operators(
         found["piston"] = _powers(Configuration(of_piston, piston, cp), LEVELS, 2)[0]
     if par[0]["rock"] == RockKind.BILINEAR:
         found |= _on_rock(par, alone, bit, cb)
+        flight = found["free"][0, 0, : 2 * bit.n, : 2 * bit.n]
+        offset = np.concatenate([cb[Coef.BOTTOM, : bit.n], -cb[Coef.BOTTOM, : bit.n]])
+        found["watch"][Mode.FF] = _watch(flight, flight @ offset, padded(2 * bit.n + 1))
     return LeapOperators(
         **{
             name: found.get(name, stand_in)
@@ -133,13 +138,14 @@ def _on_rock(
     }
     size = padded(2 * bit.n + 1)
     loading = np.zeros((len(LOADING_MODES), WATCH_LEVELS, 2, size, size))
-    watch = np.zeros((len(loads), size, WATCHED))
+    watch = np.zeros((1 + len(loads), size, WATCHED))
     sums = np.zeros((len(loads), LEVELS, size))
     for mode, (stiffness, damping) in loads.items():
         configuration = Configuration(rock, bit, cb, float(stiffness), float(damping))
         levels, forms = (LEVELS, 4) if mode == Mode.SS else (WATCH_LEVELS, 2)
         powers, paths = _powers(configuration, levels, forms)
-        watch[mode - 1] = _watch(configuration, powers[0, 0])
+        by_column = powers[0, 0, : configuration.size, : configuration.size]
+        watch[mode] = _watch(by_column, end_row(configuration, by_column), size)
         if mode == Mode.SS:
             rest, sums[0] = powers, paths
         else:
@@ -147,14 +153,11 @@ def _on_rock(
     return {"rest": rest, "loading": loading, "watch": watch, "sums": sums}
 
 
-def _watch(configuration: Configuration, by_column: np.ndarray) -> np.ndarray:
-    """Rows that show the end velocity at the start of each step."""
-    out = np.zeros((len(by_column), WATCHED))
-    row = np.zeros(len(by_column))
-    size = configuration.size
-    row[:size] = end_row(configuration, by_column[:size, :size])
+def _watch(by_column: np.ndarray, row: np.ndarray, size: int) -> np.ndarray:
+    """Rows, padded to `size`, that show at the start of each step what `row` shows now."""
+    out = np.zeros((size, WATCHED))
     for k in range(WATCHED):
-        out[:, k] = row
+        out[: len(row), k] = row
         row = by_column @ row
     return out
 

@@ -135,8 +135,7 @@ class RigidSolver:
             now["gap"] = now["first_gap"] = scene.start.gap
             now["v_p"] = scene.start.piston_velocity
         now["opened"] = -np.inf
-        for name in ("ss_force",):
-            now[name] = np.nan
+        now["ss_force"] = np.nan
         kernel.begin(state["par"], state["now"])
         return state
 

@@ -56,6 +56,7 @@ def step_map(configuration: Configuration) -> np.ndarray:
     start = np.zeros(1, WAVE_STATE)
     start["mode"] = Mode.SS if configuration.stiffness else Mode.FF
     start["leap_end"] = -1
+    start["live"] = 1
     start["gamma"] = start["next_gamma"] = 1.0
     start["k_r"] = start["next_k_r"] = configuration.stiffness
     start["c_r"] = configuration.damping

@@ -1,0 +1,284 @@
+"""Measure speed on one thread, compilation excluded: table, and benchmarks/latest.json.
+
+`python3 build.py bench` runs this with a fresh numba cache. `--quick` takes fewer
+repetitions. Take figures for the record on an idle machine.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import platform
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parent
+LATEST = HERE / "latest.json"
+REFERENCE = ROOT / "scenarios" / "reference.toml"
+RIGID = ROOT / "scenarios" / "rigid.toml"
+
+# What linear algebra libraries and numba read when they are loaded.
+ONE_THREAD = (
+    "OMP_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "VECLIB_MAXIMUM_THREADS",
+    "NUMBA_NUM_THREADS",
+)
+
+# Both bodies in free flight for the whole measurement: a step that meets nothing.
+FLIGHT = {"start.gap": 0.5, "start.rock_gap": 5.0, "start.piston_velocity": 0.0}
+FLIGHT_DURATION = 0.06
+# Some five blows.
+MOTION_DURATION = 0.25
+
+# One change each against the reference scene.
+VARIANTS: dict[str, dict[str, Any]] = {
+    "all on (reference)": {},
+    "gravity off": {"effects.gravity": False},
+    "feed off": {"effects.feed": False},
+    "drive off": {"effects.drive": "none"},
+    "loss off": {"effects.loss": False},
+    "barrier off": {"effects.barrier": False},
+    "rock: linear spring": {"effects.rock": "spring"},
+    "rock: none": {"effects.rock": "none"},
+    "piston rigid": {"piston.model": "rigid"},
+    "piston absent": {"piston.model": "absent", "effects.drive": "none"},
+}
+
+# A step that costs this much more than the reference's is more than noise.
+NOISE = 1.05
+
+
+def measure(scene: Any, duration: float) -> dict[str, Any]:
+    """Run a scene once; compilation and set-up are not in `wall_time`."""
+    from percussion_model import Simulation
+
+    simulation = Simulation(scene)
+    simulation.advance(duration)
+    return {
+        "wall_time": simulation.wall_time,
+        "setup_time": simulation.setup_time,
+        **simulation.statistics(),
+    }
+
+
+def reference(repeats: int) -> list[dict[str, Any]]:
+    """Real-time factor of the reference scene, with and without leaps."""
+    from percussion_model import Scene, simulate
+
+    rows = []
+    for cells in (20, 40):
+        for leaps in (True, False):
+            scene = Scene.from_toml(REFERENCE).replace(
+                **{"solver.cells": cells, "solver.leaps": leaps}
+            )
+            results = [simulate(scene) for _ in range(repeats if leaps else max(3, repeats // 3))]
+            factors = [result.real_time_factor for result in results]
+            summary = results[0].summary()
+            rows.append(
+                {
+                    "cells": cells,
+                    "leaps": leaps,
+                    "real_time_factor": statistics.median(factors),
+                    "slowest": min(factors),
+                    "fastest": max(factors),
+                    "runs": len(factors),
+                    "rate_of_penetration": summary["rate_of_penetration"],
+                    "blow_period": summary["blow_period"],
+                    "numerical_relative": summary["energy"]["numerical_relative"],
+                    "steps": results[0].statistics["steps"],
+                    "leap_steps": results[0].statistics["leap_steps"],
+                }
+            )
+    return rows
+
+
+def effects(repeats: int) -> list[dict[str, Any]]:
+    """Cost of a wave step with one effect off, in flight and in the whole motion."""
+    from percussion_model import Scene
+
+    base = Scene.from_toml(REFERENCE).replace(**{"solver.cells": 20, "solver.leaps": False})
+    cases = []
+    for name, change in VARIANTS.items():
+        scene = base.replace(**change)
+        flight = scene.replace(
+            **{key: value for key, value in FLIGHT.items() if scene.matters(key)}
+        )
+        cases.append((name, scene, flight))
+    # Turn by turn, so that a machine that slows down slows all of them.
+    flights: dict[str, list[dict[str, Any]]] = {name: [] for name in VARIANTS}
+    motions: dict[str, list[dict[str, Any]]] = {name: [] for name in VARIANTS}
+    for _ in range(repeats):
+        for name, scene, flight in cases:
+            flights[name].append(measure(flight, FLIGHT_DURATION))
+            motions[name].append(measure(scene, MOTION_DURATION))
+    return [
+        {
+            "name": name,
+            "flight_step": best_step(flights[name]),
+            "motion_step": best_step(motions[name]),
+            "motion_wall_time": min(run["wall_time"] for run in motions[name]),
+            "motion_steps": motions[name][0]["steps"],
+            "motion_events": motions[name][0]["events"],
+        }
+        for name in VARIANTS
+    ]
+
+
+def best_step(runs: list[dict[str, Any]]) -> float:
+    """Cost of a step [s]: noise only adds, so the least is the measure."""
+    return float(min(run["wall_time"] / run["steps"] for run in runs))
+
+
+def rigid(repeats: int) -> dict[str, Any]:
+    """Cost of a blow of the rigid option."""
+    from percussion_model import Scene
+
+    scene = Scene.from_toml(RIGID)
+    runs = [measure(scene, 100.0) for _ in range(repeats)]
+    return {
+        "blow": statistics.median(run["wall_time"] / run["blows"] for run in runs),
+        "blows": runs[0]["blows"],
+        "events": runs[0]["events"],
+    }
+
+
+def command_line(repeats: int) -> dict[str, Any]:
+    """Time of a whole `percussion run` of a tenth of a second, once the cache is filled."""
+    command = [
+        *(sys.executable, "-c", "from percussion_model.cli import main; main()"),
+        *("run", str(REFERENCE), "--duration", "0.1", "--settle", "0", "--json", "-"),
+    ]
+    times = []
+    for _ in range(repeats + 1):
+        began = time.perf_counter()
+        subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+        times.append(time.perf_counter() - began)
+    return {"first": times[0], "second": statistics.median(times[1:])}
+
+
+def machine() -> dict[str, Any]:
+    """What the figures were taken on."""
+    from importlib.metadata import version
+
+    name = platform.processor() or platform.machine()
+    cpuinfo = Path("/proc/cpuinfo")
+    if cpuinfo.exists():
+        for line in cpuinfo.read_text(encoding="utf-8").splitlines():
+            if line.startswith("model name"):
+                name = line.split(":", 1)[1].strip()
+                break
+    load = os.getloadavg()[0] if hasattr(os, "getloadavg") else None
+    return {
+        "processor": name,
+        "cores": os.cpu_count(),
+        "load_before": load,
+        "system": platform.system(),
+        "python": platform.python_version(),
+        **{package: version(package) for package in ("numba", "numpy", "percussion_model")},
+    }
+
+
+def show(found: dict[str, Any]) -> None:
+    """Print the figures as tables."""
+    from rich.console import Console
+    from rich.table import Table
+
+    console = Console()
+    computer = found["machine"]
+    console.print(
+        f"{computer['processor']}, one thread; Python {computer['python']}, "
+        f"numba {computer['numba']}; compiled in {found['compilation']:.0f} s"
+    )
+    if (computer["load_before"] or 0.0) > 0.5:
+        console.print(f"[yellow]The machine was busy: load {computer['load_before']:.1f}.[/yellow]")
+
+    table = Table(title="Reference scene, 4 s simulated", title_justify="left")
+    for heading in ("cells", "leaps", "times real time", "range", "rate mm/s", "period ms"):
+        table.add_column(heading, justify="right")
+    for row in found["reference"]:
+        table.add_row(
+            f"{row['cells']}",
+            "on" if row["leaps"] else "off",
+            f"{row['real_time_factor']:.1f}",
+            f"{row['slowest']:.0f}-{row['fastest']:.0f} ({row['runs']} runs)",
+            f"{1e3 * row['rate_of_penetration']:.3f}",
+            f"{1e3 * row['blow_period']:.4f}",
+        )
+    console.print(table)
+
+    table = Table(title="A wave step, 20 cells, without leaps", title_justify="left")
+    table.add_column("scene")
+    for heading in ("in flight ns", "in motion ns", "0.25 s in ms", "steps", "events"):
+        table.add_column(heading, justify="right")
+    limit = NOISE * found["effects"][0]["flight_step"]
+    for row in found["effects"]:
+        mark = " [red]dearer[/red]" if row["flight_step"] > limit else ""
+        table.add_row(
+            row["name"] + mark,
+            f"{1e9 * row['flight_step']:.0f}",
+            f"{1e9 * row['motion_step']:.0f}",
+            f"{1e3 * row['motion_wall_time']:.1f}",
+            f"{row['motion_steps']}",
+            f"{row['motion_events']}",
+        )
+    console.print(table)
+
+    table = Table(show_header=False)
+    table.add_row("Rigid option, a blow", f"{1e6 * found['rigid']['blow']:.2f} µs")
+    start = found["command_line"]
+    table.add_row("Command line, 0.1 s simulated: first start", f"{start['first']:.2f} s")
+    table.add_row("Command line, 0.1 s simulated: later starts", f"{start['second']:.2f} s")
+    console.print(table)
+
+
+def compiled_in() -> float:
+    """Compile both solvers; the time it took [s]."""
+    from percussion_model import Scene, Simulation
+
+    began = time.perf_counter()
+    for path in (REFERENCE, RIGID):
+        Simulation(Scene.from_toml(path))
+    return time.perf_counter() - began
+
+
+def bench(quick: bool, say: Callable[[str], None]) -> dict[str, Any]:
+    """Take all measurements."""
+    found: dict[str, Any] = {"date": time.strftime("%Y-%m-%d"), "machine": machine()}
+    say("compiling")
+    found["compilation"] = compiled_in()
+    say("reference scene")
+    found["reference"] = reference(3 if quick else 9)
+    say("effects")
+    found["effects"] = effects(3 if quick else 15)
+    say("rigid option")
+    found["rigid"] = rigid(3 if quick else 7)
+    say("command line")
+    found["command_line"] = command_line(1 if quick else 5)
+    return found
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(prog="build.py bench", description="Measure speed.")
+    parser.add_argument("--quick", action="store_true", help="fewer repetitions")
+    quick = parser.parse_args().quick
+    with tempfile.TemporaryDirectory(prefix="percussion-numba-") as cache:
+        # Both are read when numba is imported, which nothing has done yet.
+        os.environ.setdefault("NUMBA_CACHE_DIR", cache)
+        os.environ.update(dict.fromkeys(ONE_THREAD, "1"))
+        found = bench(quick, lambda text: print(f"{text} ...", file=sys.stderr, flush=True))
+    LATEST.write_text(json.dumps(found, indent=2) + "\n", encoding="utf-8")
+    show(found)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,118 @@
+"""One blow computed by the kernels as plain Python, if wanted with a planted fault.
+
+Run with NUMBA_DISABLE_JIT=1; prints a line of JSON. Without the compiler a
+record must be `np.record` to have its fields as attributes.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+
+import numpy as np
+
+# One blow of a coarse reference drill, its leaps off so that every step is made.
+SCENE = {"solver.cells": 20, "solver.leaps": False, "run.settle": 0.0}
+DURATION = 0.004
+FAULT = 0.999
+
+
+def use_attribute_records() -> None:
+    """Let the fields of records be attributes, as they are in compiled kernels."""
+    from percussion_model.core import records, wave_records
+
+    for module, names in ((records, ("BLOW", "EVENT")), (wave_records, ("WAVE_PAR", "WAVE_STATE"))):
+        for name in names:
+            setattr(module, name, np.dtype((np.record, getattr(module, name))))
+
+
+def weaken_reflection(wave) -> None:
+    """Let the free top end of the piston return 0.999 of each wave."""
+    send = wave.outer_waves
+
+    def outer_waves(par, w, c, n, r, *ends):
+        send(par, w, c, n, r, *ends)
+        if n == par.n_p:
+            w[2 - r, 0] *= FAULT
+
+    wave.outer_waves = outer_waves
+
+
+def weaken_contact(wave) -> None:
+    """Let piston and bit push each other with 0.999 of the force."""
+    contact = wave.bar_contact
+
+    def bar_contact(closed, gap, v_p, v_t, z_p, z_t, tau):
+        out = list(contact(closed, gap, v_p, v_t, z_p, z_t, tau))
+        if out[0] == 1:
+            free = max(out[8], 0.0)
+            rest = tau - free
+            force = FAULT * z_p * z_t / (z_p + z_t) * (v_p - v_t)
+            v, u = v_p - force / z_p, v_t + force / z_t
+            out[2:6] = (
+                v_p * free + v * rest,
+                v_p * v_p * free + v * v * rest,
+                v_t * free + u * rest,
+                v_t * v_t * free + u * u * rest,
+            )
+            out[6:8] = force * rest, 0.5 * force * rest * rest
+        return tuple(out)
+
+    wave.bar_contact = bar_contact
+
+
+def lose_body_force(wave, at: int = 1000) -> None:
+    """Let the cells of the piston feel no body force in one step."""
+    faces = wave.face_velocities
+    inner = wave.inner_waves
+    count = 0
+
+    def face_velocities(w, c, n, r, kick):
+        nonlocal count
+        if n == 20:
+            count += 1
+            if count == at:
+                kick = 0.0
+        faces(w, c, n, r, kick)
+
+    assert inner.__globals__ is vars(wave)
+    wave.face_velocities = face_velocities
+
+
+FAULTS = {
+    "none": lambda wave: None,
+    "reflection": weaken_reflection,
+    "contact": weaken_contact,
+    "body_force": lose_body_force,
+}
+
+
+def run_scene():
+    """Run the scene to its end; a simulation."""
+    from percussion_model import Scene, Simulation
+
+    simulation = Simulation(Scene().replace(**SCENE))
+    simulation.advance(DURATION)
+    return simulation
+
+
+def main(fault: str) -> None:
+    """Plant a fault, run and print what came of it."""
+    if os.environ.get("NUMBA_DISABLE_JIT") != "1":
+        raise SystemExit("set NUMBA_DISABLE_JIT=1")
+    use_attribute_records()
+    from percussion_model.core import wave
+
+    FAULTS[fault](wave)
+    simulation = run_scene()
+    found = {
+        "energy": simulation.energy(),
+        "events": [list(map(float, row.item())) for row in simulation.events],
+        "workspace": simulation.save().state.workspace.tolist(),
+    }
+    print(json.dumps(found))
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])
