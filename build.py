@@ -91,6 +91,10 @@ def setup() -> int:
         print("The installation failed, see above. Is the network up? Then run this again.",
               file=sys.stderr)  # fmt: skip
         return code
+    print("Compiling the kernels (once, up to a minute) ...", flush=True)
+    code = call([tool("python"), "-m", "percussion_model.warm_up"])
+    if code != 0:
+        return code
     STAMP.write_text(wanted, encoding="utf-8")
     print("Ready.", flush=True)
     return 0
@@ -129,6 +133,7 @@ def test(extra: list[str]) -> int:
         ("ruff format", [tool("ruff"), "format", "--check"]),
         ("mypy", [tool("mypy")]),
         ("lint-imports", [tool("lint-imports")]),
+        ("kernels", [tool("python"), "-m", "percussion_model.warm_up"]),
         ("pytest", [tool("pytest"), "-n", "2", *extra]),
     ]
     first_failure = 0

@@ -48,8 +48,8 @@ VARIANTS: dict[str, dict[str, Any]] = {
     "drive off": {"effects.drive": "none"},
     "loss off": {"effects.loss": False},
     "barrier off": {"effects.barrier": False},
-    "rock: linear spring": {"effects.rock": "spring"},
-    "rock: none": {"effects.rock": "none"},
+    "rock: linear spring": {"effects.rock": "spring", "effects.barrier": False},
+    "rock: none": {"effects.rock": "none", "effects.barrier": False},
     "piston rigid": {"piston.model": "rigid"},
     "piston absent": {"piston.model": "absent", "effects.drive": "none"},
 }
@@ -110,9 +110,8 @@ def effects(repeats: int) -> list[dict[str, Any]]:
     cases = []
     for name, change in VARIANTS.items():
         scene = base.replace(**change)
-        flight = scene.replace(
-            **{key: value for key, value in FLIGHT.items() if scene.matters(key)}
-        )
+        start = {key: value for key, value in FLIGHT.items() if scene.matters(key)}
+        flight = scene.replace(**start)
         cases.append((name, scene, flight))
     # Turn by turn, so that a machine that slows down slows all of them.
     flights: dict[str, list[dict[str, Any]]] = {name: [] for name in VARIANTS}

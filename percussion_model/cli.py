@@ -210,8 +210,7 @@ def _draw(result: Result, folder: Path) -> None:
     except ImportError as error:
         _complain(_needs_plot_extra(error))
         return
-    figures(result, folder)
-    write_report(result, folder)
+    write_report(result, folder, figures(result, folder))
 
 
 def _needs_plot_extra(error: ImportError) -> str:

@@ -11,7 +11,8 @@ from percussion_model.core.leap import leap, plan_leap
 from percussion_model.core.records import Piston, Status
 from percussion_model.core.rock import MOST_CROSSINGS
 from percussion_model.core.sleep import put_to_sleep, wake_piston
-from percussion_model.core.wave import bit_position, now, step
+from percussion_model.core.totals import bit_position, now
+from percussion_model.core.wave import step
 from percussion_model.core.wave_records import Row, Task
 
 DONE, BLOWS_FULL, EVENTS_FULL = int(Status.DONE), int(Status.BLOWS_FULL), int(Status.EVENTS_FULL)

@@ -13,7 +13,7 @@ from percussion_model.core.bar import mean_velocity, strain_offset
 from percussion_model.core.kernel import kernel, merged
 from percussion_model.core.linear import load, multiply, pad, quadratic, store
 from percussion_model.core.records import Mode
-from percussion_model.core.rock import REST_VELOCITY, crush, origin, stiffness
+from percussion_model.core.rock_law import REST_VELOCITY, crush, origin, stiffness
 from percussion_model.core.wave_records import Coef
 
 BOTTOM = int(Coef.BOTTOM)

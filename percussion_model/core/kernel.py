@@ -2,7 +2,41 @@
 
 from __future__ import annotations
 
+import hashlib
+import os
+from pathlib import Path
+
 from numba import njit
+
+STAMP = "kernels.sha256"
+
+
+def drop_stale_kernels(folder: Path) -> None:
+    """Delete compiled kernels in `folder` that are older than their sources.
+
+    Numba's cache looks at the file of a function alone, not at those of the
+    functions that it calls; after an edit or an update it would go on with
+    old code. A cache that the user keeps elsewhere is left alone.
+    """
+    if os.environ.get("NUMBA_CACHE_DIR"):
+        return
+    digest = hashlib.sha256()
+    for source in sorted(folder.glob("*.py")):
+        digest.update(source.read_bytes())
+    cache = folder / "__pycache__"
+    stamp = cache / STAMP
+    try:
+        if stamp.is_file() and stamp.read_text() == digest.hexdigest():
+            return
+        for compiled in [*cache.glob("*.nbi"), *cache.glob("*.nbc")]:
+            compiled.unlink(missing_ok=True)
+        cache.mkdir(exist_ok=True)
+        stamp.write_text(digest.hexdigest())
+    except OSError:
+        return  # a folder that cannot be written holds no cache of ours
+
+
+drop_stale_kernels(Path(__file__).parent)
 
 # `_nrt=False` leaves out numba's runtime: arrays are passed without reference
 # counting (which took most of a step's time), and a kernel that allocates does

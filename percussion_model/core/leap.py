@@ -23,7 +23,7 @@ from percussion_model.core.contact_leap import (
 from percussion_model.core.kernel import kernel, merged
 from percussion_model.core.linear import load, multiply, pad, quadratic, remove_mean, store
 from percussion_model.core.records import Mode, RockKind
-from percussion_model.core.wave import now
+from percussion_model.core.totals import now
 from percussion_model.core.wave_records import Coef, LeapKind
 
 FF, SS = int(Mode.FF), int(Mode.SS)

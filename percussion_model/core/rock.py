@@ -1,6 +1,6 @@
-"""The five-mode bit/rock law, followed exactly through one step.
+"""The rock end of the bit, followed exactly through one step.
 
-At the rock the bit end obeys F_R = z (v_free - v), the rock answers with
+The bit end obeys F_R = z (v_free - v), the rock answers with
 F_R = K (p - P_R) + C v: a scalar linear equation with constant input over a
 step, so every crossing is a logarithm (docs/model.md, eqs 14-18, table 1).
 """
@@ -12,144 +12,28 @@ import math
 from percussion_model.core.bar import kinetic_energy
 from percussion_model.core.blows import push_event
 from percussion_model.core.exponential import exponential_area
-from percussion_model.core.kernel import inlined, kernel, merged
+from percussion_model.core.kernel import inlined, merged
 from percussion_model.core.records import Mode, RockKind
+from percussion_model.core.rock_law import (
+    REST_VELOCITY,
+    barrier_off,
+    close_interface,
+    crush,
+    enter_standstill,
+    leave_by_velocity,
+    leave_standstill,
+    origin,
+    recoverable,
+    stiffness,
+)
 
 FF, DFC, FC, BC, SS = (int(m) for m in Mode)
 NO_ROCK, BILINEAR = int(RockKind.NONE), int(RockKind.BILINEAR)
 SPRING, WALL = int(RockKind.SPRING), int(RockKind.WALL)
 
-# A velocity below this counts as zero: the ringing left after a long
-# standstill is of this size, its sign means nothing [m/s].
-REST_VELOCITY = 1e-9
-
 # Crossings that the law can make within one step: FF, SS, FF, DFC, FC, BC and
 # again; more would be a loop.
 MOST_CROSSINGS = 12
-
-# A drilling cycle counts when it crushed more than this share of W_R.
-COUNTED_CYCLE = 0.01
-
-
-@inlined
-def stiffness(s):
-    """K of the present mode [N/m], table 1 of docs/model.md."""
-    if s.mode == DFC or s.mode == FC:
-        return s.k_r
-    if s.mode == FF:
-        return 0.0
-    return s.gamma * s.k_r
-
-
-@inlined
-def recoverable(s):
-    """Energy that the rock would give back on unloading [J]."""
-    if s.mode == DFC or s.mode == FC:
-        return 0.5 * s.k_r * s.p * s.p / s.gamma
-    if s.mode == FF and s.p <= s.p_u:
-        return 0.0
-    y = s.p - s.p_u
-    return 0.5 * s.gamma * s.k_r * y * y
-
-
-@kernel
-def start_cycle(s, barrier, p):
-    """Begin a drilling cycle whose penetration starts at `p` (eqs 18-19 of the paper)."""
-    s.x_r += s.p - p
-    s.p = p
-    s.w = 0.0
-    s.crushed = 0.0
-    s.cycle_counted = 0
-    s.k_r = s.next_k_r
-    s.gamma = s.next_gamma
-    s.c_r = s.next_c_r
-    s.w_r = s.next_w_r
-    if barrier == 1 and s.c_r > 0.0 and s.w_r > 0.0:
-        s.mode = DFC
-    else:
-        s.mode = FC
-
-
-@kernel
-def resume_cycle(s, barrier):
-    """Begin a cycle from contact: the elastic part of the force stays the same."""
-    force = s.gamma * s.k_r * (s.p - s.p_u)
-    before = recoverable(s)
-    start_cycle(s, barrier, force / s.next_k_r)
-    # With other rock than before, what can be recovered changes at once.
-    s.e_crushing += before - recoverable(s)
-
-
-@inlined
-def barrier_off(par, s):
-    """Whether a blow of any energy starts a drilling cycle."""
-    return par.barrier == 0 or s.next_c_r == 0.0 or s.next_w_r == 0.0
-
-
-@merged
-def leave_by_velocity(par, s, v, energy):
-    """Change of mode that the sign of the end velocity asks for.
-
-    Parameters
-    ----------
-    v : float
-        Velocity of the bit end [m/s].
-    energy : float
-        Kinetic energy of the bit [J].
-
-    Returns
-    -------
-    int
-        1 where the mode changed.
-    """
-    if par.rock != BILINEAR:
-        return 0
-    if s.mode == DFC or s.mode == FC:
-        if v < -REST_VELOCITY:
-            s.p_u = s.p * (s.gamma - 1.0) / s.gamma
-            s.mode = BC
-            return 1
-    elif s.mode == BC and v > REST_VELOCITY:
-        if barrier_off(par, s) or energy > s.w_r:
-            resume_cycle(s, par.barrier)
-        else:
-            s.mode = SS
-        return 1
-    return 0
-
-
-@merged
-def close_interface(par, s, energy):
-    """Contact with the rock begins: a new cycle, standstill, spring or wall."""
-    if par.rock == SPRING:
-        s.mode = FC
-    elif par.rock == WALL:
-        s.mode = SS
-    elif barrier_off(par, s) or energy > s.w_r:
-        s.e_standstill += recoverable(s)
-        start_cycle(s, par.barrier, 0.0)
-    else:
-        s.mode = SS
-
-
-@merged
-def leave_standstill(par, s, v):
-    """Standstill ends because KE_b > W_R: a new cycle, or unloading."""
-    if v < -REST_VELOCITY:
-        s.mode = BC
-    else:
-        resume_cycle(s, par.barrier)
-
-
-@inlined
-def crush(s, p_before):
-    """Book the irrecoverable part of loading from `p_before` to s.p."""
-    work = 0.5 * s.k_r * (s.p - p_before) * (s.p + p_before) * (1.0 - 1.0 / s.gamma)
-    s.e_crushing += work
-    s.crushed += work
-    if s.cycle_counted == 0 and s.crushed > COUNTED_CYCLE * s.w_r:
-        s.cycle_counted = 1
-        s.b_cycles += 1
 
 
 @merged
@@ -325,14 +209,6 @@ def rock_step(par, s, w, c, v_free, z, tau, time, events):
     return d, q, area
 
 
-@inlined
-def origin(s):
-    """P_R of the present mode [m], table 1 of docs/model.md."""
-    if s.mode == BC or s.mode == SS:
-        return s.p_u
-    return 0.0
-
-
 @merged
 def end_of_mode(par, s, w, c, v_free, z, r):
     """Whether the sign of the velocity ends the mode at once; sets the next."""
@@ -343,10 +219,3 @@ def end_of_mode(par, s, w, c, v_free, z, r):
     if s.mode == BC and v > REST_VELOCITY:
         energy = kinetic_energy(w, c, par.n_b, r)
     return leave_by_velocity(par, s, v, energy)
-
-
-@inlined
-def enter_standstill(s, time):
-    """Start the record of the bit force in standstill."""
-    s.t_standstill = time
-    s.n_check = 0

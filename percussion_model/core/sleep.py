@@ -26,8 +26,8 @@ from percussion_model.core.leap import (
     standstill_energy,
 )
 from percussion_model.core.records import Mode, Piston
-from percussion_model.core.rock import recoverable
-from percussion_model.core.wave import resync
+from percussion_model.core.rock_law import recoverable
+from percussion_model.core.totals import resync
 from percussion_model.core.wave_records import Coef
 
 SS = int(Mode.SS)

@@ -18,7 +18,7 @@ from percussion_model.core.records import (
     Piston,
     RockKind,
 )
-from percussion_model.core.wave import lost_in_faces, resync, stored_energy
+from percussion_model.core.totals import lost_in_faces, resync, stored_energy
 from percussion_model.core.wave_records import WAVE_PAR, WAVE_STATE, Coef, Row, Task
 from percussion_model.scene import Scene
 from percussion_model.solvers.grid import (

@@ -89,9 +89,9 @@ def test_impact_of_equal_sections(cells, v, leaps):
 
 
 def test_impact_numbers_of_the_notes():
-    assert Z * 10 / 2 == pytest.approx(1116.547e3, rel=1e-6)
-    assert 2 * L_P / C0 == pytest.approx(67.6695e-6, rel=1e-6)
-    assert 10 * L_P / L_B == pytest.approx(8.69565, rel=1e-6)
+    assert pytest.approx(1116.547e3, rel=1e-6) == Z * 10 / 2
+    assert pytest.approx(67.6695e-6, rel=1e-6) == 2 * L_P / C0
+    assert pytest.approx(8.69565, rel=1e-6) == 10 * L_P / L_B
 
 
 # ------------------------------------------------------- oracle 2: first peak on a spring
@@ -105,7 +105,8 @@ def test_first_peak_on_linear_rock(cells, v):
     t = GAP / v + (L_B + 2 * L_P) / C0
     beta = 2 * K * L_P / (E * AREA)
     p = Z * v / K * -math.expm1(-beta)
-    seen = Simulation(scene).sample([t * (1 - 1e-4), t, t * (1 + 1e-4)])
+    # a hair later: a force that is read is the mean since the last grid point
+    seen = Simulation(scene).sample([t * (1 - 1e-4), t * (1 + 1e-9), t * (1 + 1e-4)])
     assert seen["bit_end_position"][1] == pytest.approx(p, rel=READING)
     assert seen["bit_force"][1] == pytest.approx(K * p, rel=READING)
     assert seen["bit_end_position"][1] > seen["bit_end_position"][[0, 2]].max()
@@ -170,7 +171,6 @@ def test_elastic_bar_dropped_on_a_spring():
         largest = Simulation(scene).sample(around)["bit_end_position"].max()
         errors.append([*(seen - [p(t) for t in times]), largest + peak.fun])
     errors = np.array(errors) / -peak.fun
-    print(errors)
     # up to T the end sees nothing but its own first wave: exact
     np.testing.assert_allclose(errors[:, 0], 0.0, atol=READING)
     for column in errors.T[1:]:
@@ -262,8 +262,6 @@ def test_drop_of_the_bit(leaps):
     assert contact["kind"] == EventKind.MODE_DFC
     assert contact["time"] == pytest.approx(fall, rel=1e-5)  # body forces act step by step
     assert contact["time"] == pytest.approx(1.9047e-6, rel=1e-4)
-    print(np.count_nonzero(events["kind"] == EventKind.MODE_DFC))
-    print(simulation.observe())
     assert np.count_nonzero(events["kind"] == EventKind.MODE_DFC) == 6
     assert simulation.observe()["bit_end_position"] == pytest.approx(0.8622e-3, rel=1e-3)
 
@@ -332,13 +330,13 @@ def test_pressure_law_over_a_bit_held_still():
     )
     m_p = scene.piston.mass
     simulation = Simulation(scene)
-    simulation.advance(0.047)
+    simulation.advance(0.15)
     mu = m_p * v_0**2 / (2 * f_0 * d_1)
-    closed = simulation.events[simulation.events["kind"] == EventKind.CONTACT_CLOSED][0]
+    blow = simulation.blows[0]
     v_3 = math.sqrt(f_0 * d_1 / m_p) * math.sqrt(4 + 2 * mu)
     factor = math.sqrt(4 + 2 * mu) + 2 * math.sqrt(2 * mu + 2) - math.sqrt(2 * mu)
     t_3 = math.sqrt(d_1 * m_p / f_0) * factor
-    assert closed["value"] == pytest.approx(v_3, rel=1e-6)
-    assert closed["time"] == pytest.approx(t_3, rel=1e-6)
+    assert blow["impact_velocity"] == pytest.approx(v_3, rel=1e-6)
+    assert blow["time"] == pytest.approx(t_3, rel=1e-6)
     assert v_3 == pytest.approx(8.51639, rel=1e-6)
     assert t_3 == pytest.approx(46.0535e-3, rel=1e-6)

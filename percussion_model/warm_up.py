@@ -1,0 +1,33 @@
+"""Compile all kernels once, so that later starts only load them.
+
+`python -m percussion_model.warm_up` is a part of the installation.
+"""
+
+from __future__ import annotations
+
+from concurrent.futures import ProcessPoolExecutor
+
+from percussion_model.scene import Scene
+from percussion_model.stepping import Simulation
+
+# Long enough for a contact, a change of mode and a reading [s].
+SHORT = 1e-4
+
+
+def compile_kernels(model: str) -> str:
+    """Run a moment of the reference scene with elastic or rigid bodies."""
+    simulation = Simulation(Scene().replace(**{"piston.model": model, "bit.model": model}))
+    simulation.advance(SHORT)
+    simulation.observe()
+    simulation.energy()
+    return model
+
+
+def main() -> None:
+    """Compile the kernels of all solvers, two at a time."""
+    with ProcessPoolExecutor(max_workers=2) as pool:
+        list(pool.map(compile_kernels, ("elastic", "rigid")))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,86 @@
+"""What the documents show is true: examples run, tables are current, citations lead somewhere."""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from percussion_model import Scene
+
+ROOT = Path(__file__).resolve().parent.parent
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+SOURCES = [
+    path for folder in ("percussion_model", "tests") for path in (ROOT / folder).rglob("*.py")
+]
+PAGES = ("docs/model.md", "docs/numerics.md", "docs/parameters.md", "README.md", "CONTRIBUTING.md")
+
+
+def blocks(language):
+    return re.findall(rf"```{language}\n(.*?)```", README, re.DOTALL)
+
+
+def cited(page, word):
+    """Numbers that the sources cite of a page, as {number: file}."""
+    found = {}
+    for path in SOURCES:
+        text = re.sub(r"\s+#?\s*", " ", path.read_text(encoding="utf-8"))
+        for match in re.finditer(rf"{page},? {word}s?\.? ([\d, and–-]+)", text):
+            numbers = [int(n) for n in re.findall(r"\d+", match[1])]
+            span = range(numbers[0], numbers[-1] + 1) if "-" in match[1] else numbers
+            found |= dict.fromkeys(span, path.name)
+    return found
+
+
+def test_python_example_runs(monkeypatch, capsys):
+    monkeypatch.chdir(ROOT)
+    (example,) = blocks("python")
+    assert len([line for line in example.splitlines() if line]) <= 12
+    exec(compile(example, "README.md", "exec"), {})
+    assert "mm/s" in capsys.readouterr().out
+
+
+def test_scene_excerpt_is_a_scene():
+    (excerpt,) = blocks("toml")
+    scene = Scene(**tomllib.loads(excerpt))
+    assert not scene.unused
+
+
+def test_parameter_page_is_current():
+    path = ROOT / "docs" / "make_parameters.py"
+    spec = importlib.util.spec_from_file_location("make_parameters", path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    written = path.with_name("parameters.md").read_text(encoding="utf-8")
+    assert module.page() == written, "run: python docs/make_parameters.py"
+
+
+@pytest.mark.parametrize("name", ["model", "numerics"])
+def test_equations_are_numbered_in_order(name):
+    text = (ROOT / "docs" / f"{name}.md").read_text(encoding="utf-8")
+    numbers = [int(n) for n in re.findall(r"\\tag\{(\d+)\}", text)]
+    assert numbers == list(range(1, len(numbers) + 1))
+
+
+@pytest.mark.parametrize("name", ["model", "numerics"])
+def test_citations_exist(name):
+    text = (ROOT / "docs" / f"{name}.md").read_text(encoding="utf-8")
+    for number, where in cited(rf"docs/{name}\.md", "eq").items():
+        assert f"\\tag{{{number}}}" in text, f"{where} cites equation {number}"
+    for number, where in cited(rf"docs/{name}\.md", "section").items():
+        assert f"\n## {number} " in text, f"{where} cites section {number}"
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_links_lead_somewhere(page):
+    path = ROOT / page
+    for target in re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", path.read_text(encoding="utf-8")):
+        assert (path.parent / target).exists(), f"{page} links to {target}"
+
+
+def test_pictures_are_small():
+    for path in (ROOT / "docs" / "images").iterdir():
+        assert path.stat().st_size < 300_000, path.name
