@@ -29,7 +29,7 @@ class DriveCalibration(NamedTuple):
 def piston_cycle(
     force: float, reversal_distance: float, piston_mass: float, rebound_velocity: float
 ) -> PistonCycle:
-    """Predict the cycle that a pressure law gives (docs/model.md, eq. 12 of the paper).
+    """Predict the cycle that a pressure law gives (eq. 12 of the paper; docs/model.md, section 5).
 
     Parameters
     ----------

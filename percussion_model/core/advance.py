@@ -10,7 +10,7 @@ from percussion_model.core.kernel import kernel, merged
 from percussion_model.core.leap import leap, plan_leap
 from percussion_model.core.records import Piston, Status
 from percussion_model.core.rock import MOST_CROSSINGS
-from percussion_model.core.sleep import put_to_sleep, wake_piston
+from percussion_model.core.sleep import put_to_sleep, sleep_on, wake_piston
 from percussion_model.core.totals import bit_position, now
 from percussion_model.core.wave import step
 from percussion_model.core.wave_records import Row, Task
@@ -33,7 +33,7 @@ GRID_ROUNDING = 1e-6
 @merged
 def plan(par, s, wp, cp, wb, cb, ops, x, v, y):
     """Wake the piston or put it to sleep, and plan the bit's next leap."""
-    if s.asleep == 1 and s.step >= s.wake:
+    if s.asleep == 1 and s.step >= s.wake and not sleep_on(par, s, wb, cb):
         wake_piston(par, s, wp, cp, wb, cb, ops[0], x, y)
         s.no_sleep = s.step
         s.count_wakes += 1

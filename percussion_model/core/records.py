@@ -56,7 +56,7 @@ class DriveKind(IntEnum):
     """What pushes the piston."""
 
     NONE = 0
-    PRESSURE = 1  # switching pressure law, docs/model.md eq. 5
+    PRESSURE = 1  # switching pressure law, docs/model.md eq. 13
     EXTERNAL = 2  # a force from outside
 
 

@@ -1,6 +1,6 @@
 """Forces on rigid piston and bit, the rock law, and what it keeps and loses.
 
-The rock law is table 1 of docs/model.md; the drive is its eq. 5.
+The rock law is table 1 of docs/model.md; the drive is its eq. 13.
 """
 
 from __future__ import annotations

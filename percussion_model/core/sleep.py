@@ -70,62 +70,99 @@ def bit_bounds(par, s, wb, cb):
     return speed, abs(a), par.bound_t * math.sqrt(2.0 * energy), HORIZON
 
 
-@merged
-def quiet_time(par, s, wp, cp, wb, cb):
-    """Time before which neither contact nor a switch of the drive can come [s]."""
+@kernel
+def quiet_steps(par, s, wb, cb, gap, u_r, v):
+    """Steps before which neither contact nor a switch of the drive can come.
+
+    Parameters
+    ----------
+    gap, u_r, v : float
+        Gap and relative displacement [m], and the piston's mean velocity
+        [m/s], at the present step.
+    """
     speed, slack, spread, limit = bit_bounds(par, s, wb, cb)
-    v = s.v_p
     a = par.gravity + drive_force(par, s) / par.mass_p
-    if par.piston == ELASTIC:
-        energy = deviation_energy(wp, cp, par.n_p, 2 * s.parity, v, 0.0)
-        spread += par.bound_p * math.sqrt(2.0 * energy)
-    margin = 2.0 * spread
-    limit = min(limit, time_to_cover(s.gap - margin, v + speed, a + slack))
+    margin = 2.0 * (spread + s.spread_p)
+    limit = min(limit, time_to_cover(gap - margin, v + speed, a + slack))
     if par.drive == PRESSURE:
         if s.alpha > 0:
-            limit = min(limit, time_to_cover(-s.u_r - margin, v + speed, a + slack))
+            limit = min(limit, time_to_cover(-u_r - margin, v + speed, a + slack))
         else:
-            room = s.reversal + s.u_r - margin
+            room = s.reversal + u_r - margin
             limit = min(limit, time_to_cover(room, speed - v, slack - a))
-        if v < 0.0 and a > 0.0 and -v / a > FEWEST_STEPS * par.dt:
-            limit = min(limit, -v / a)  # wake at the top: it is the stroke
-    return limit
+    if v < 0.0 and a > 0.0 and -v / a > FEWEST_STEPS * par.dt:
+        limit = min(limit, -v / a)  # look at the top: it is the stroke
+    most = (1 << par.leaps) - 1 - (s.step - s.piston_step)
+    if limit < most * par.dt:
+        return int(limit / par.dt) - 1
+    return most
 
 
-@merged
+@kernel
 def put_to_sleep(par, s, wp, cp, wb, cb):
     """Let the piston wait where it cannot meet anything soon."""
     if s.closed == 1 or s.gap <= 0.0:
         s.no_sleep = s.step + 1
         return
     resync(par, s, wp, cp, wb, cb)
-    limit = quiet_time(par, s, wp, cp, wb, cb)
-    most = (1 << par.leaps) - 1
-    steps = most
-    if limit < most * par.dt:
-        steps = int(limit / par.dt) - 1
+    r = 2 * s.parity
+    s.spread_p = 0.0
+    if par.piston == ELASTIC:
+        energy = deviation_energy(wp, cp, par.n_p, r, s.v_p, 0.0)
+        s.spread_p = par.bound_p * math.sqrt(2.0 * energy)
+    s.piston_step = s.step
+    steps = quiet_steps(par, s, wb, cb, s.gap, s.u_r, s.v_p)
     if steps < FEWEST_STEPS:
         s.no_sleep = s.step + FEWEST_STEPS
         return
     s.asleep = 1
-    s.piston_step = s.step
     s.piston_parity = s.parity
     s.wake = s.step + steps
-    s.moved = -s.p - strain_offset(wb, cb, par.n_b, 2 * s.parity, BOTTOM)
+    s.moved = -s.p - strain_offset(wb, cb, par.n_b, r, BOTTOM)
     s.x_sleep = s.x_r
+
+
+@kernel
+def mean_motion(par, s, wb, cb):
+    """Mean motion of a sleeping piston at the present step.
+
+    Returns
+    -------
+    u_r : float
+        Relative displacement [m].
+    v : float
+        Mean velocity of the piston [m/s].
+    path : float
+        Its mean displacement since it sleeps [m].
+    """
+    time = (s.step - s.piston_step) * par.dt
+    a = par.gravity + drive_force(par, s) / par.mass_p
+    path = (s.v_p + 0.5 * a * time) * time
+    here = s.moved + s.p + strain_offset(wb, cb, par.n_b, 2 * s.parity, BOTTOM)
+    return s.u_r + path - here - (s.x_r - s.x_sleep), s.v_p + a * time, path
+
+
+@kernel
+def sleep_on(par, s, wb, cb):
+    """Whether the piston can go on sleeping, as far as its mean motion tells."""
+    u_r, v, _ = mean_motion(par, s, wb, cb)
+    s.b_stroke = max(s.b_stroke, -u_r)
+    gap = strain_offset(wb, cb, par.n_b, 2 * s.parity, TOP) - u_r
+    steps = quiet_steps(par, s, wb, cb, gap, u_r, v)
+    if steps < FEWEST_STEPS:
+        return False
+    s.wake = s.step + steps
+    return True
 
 
 @kernel
 def wake_piston(par, s, wp, cp, wb, cb, operator, x, y):
     """Carry the sleeping piston to the present step."""
     steps = s.step - s.piston_step
-    time = steps * par.dt
     r = 2 * s.parity
     push = drive_force(par, s)
-    a = par.gravity + push / par.mass_p
     v0 = s.v_p
-    path = (v0 + 0.5 * a * time) * time
-    s.v_p = v0 + a * time
+    s.u_r, s.v_p, path = mean_motion(par, s, wb, cb)
     s.asleep = 0
     if par.piston == ELASTIC:
         n = par.n_p
@@ -134,13 +171,10 @@ def wake_piston(par, s, wp, cp, wb, cb, operator, x, y):
                 wp[r, i] = wp[2 - r, i]
                 wp[r + 1, i] = wp[3 - r, i]
         leap_free_bar(par, s, wp, cp, n, par.mass_p, v0, s.v_p, steps, operator, par.size_p, x, y)
-    here = s.moved + s.p + strain_offset(wb, cb, par.n_b, r, BOTTOM) + (s.x_r - s.x_sleep)
-    s.u_r += path - here
     s.gap = strain_offset(wb, cb, par.n_b, r, TOP) - s.u_r
     if par.piston == ELASTIC:
         s.gap += strain_offset(wp, cp, par.n_p, r, BOTTOM)
     s.e_drive += push * path
     s.e_gravity += par.mass_p * par.gravity * path
-    s.i_drive += push * time
-    if -s.u_r > s.b_stroke:
-        s.b_stroke = -s.u_r
+    s.i_drive += push * steps * par.dt
+    s.b_stroke = max(s.b_stroke, -s.u_r)

@@ -177,6 +177,7 @@ WAVE_STATE = np.dtype(
         ("v_b", "f8"),
         ("u_r", "f8"),  # relative mean displacement of the pressure law [m]
         ("moved", "f8"),  # what the bit's mean displacement counts from, piston asleep [m]
+        ("spread_p", "f8"),  # bound of the sleeping piston's strain offset [m]
         ("x_sleep", "f8"),  # datum of p when the piston went to sleep [m]
         ("u_start", "f8"),  # u_r - u_p + u_b at the start [m]
         ("offset_start", "f8"),  # (bottom end - mean) of the bit at the start [m]

@@ -8,9 +8,6 @@ import numpy as np
 
 from percussion_model.scene import Scene
 
-# A sample this close below the end of what can be read is left to the next
-# reading: there the forces are those of the first instant after [steps].
-
 
 class Solver(Protocol):
     """Advances states of one scene; a state is plain data with a method `copy`.

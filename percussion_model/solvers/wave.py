@@ -13,28 +13,19 @@ from percussion_model.core.records import (
     EVENT,
     LEDGER_FIELDS,
     SAMPLE_FIELDS,
-    DriveKind,
     Mode,
-    Piston,
-    RockKind,
 )
 from percussion_model.core.totals import lost_in_faces, resync, stored_energy
-from percussion_model.core.wave_records import WAVE_PAR, WAVE_STATE, Coef, Row, Task
+from percussion_model.core.wave_records import WAVE_STATE, Coef, Row, Task
 from percussion_model.scene import Scene
 from percussion_model.solvers.grid import (
-    Grid,
     choose_time_step,
     coefficients,
     cut,
-    end_viscosity,
-    substeps,
 )
 from percussion_model.solvers.operators import LEVELS, build_operators, padded
+from percussion_model.solvers.packing import INPUT_FIELDS, pack_parameters, rock_numbers
 from percussion_model.solvers.step_map import no_operators
-
-# An open gap of this many transits of the slower bar ends a blow where no
-# pressure law does (docs/model.md, section 7).
-REARM_TRANSITS = 20.0
 
 
 @dataclass
@@ -87,7 +78,7 @@ class WaveSolver:
             self.cells = {"piston": self._piston.n, **self.cells}
         grids = [grid for grid in (self._piston, self._bit) if grid is not None]
         self.wave_speed_error = max(grid.fit for grid in grids)
-        self._par = self._pack(loss_time)
+        self._par = pack_parameters(scene, self._piston, self._cp, self._bit, self._cb, loss_time)
         self._operators = no_operators()
         if scene.solver.leaps:
             found = build_operators(self._par, self._piston, self._cp, self._bit, self._cb)
@@ -99,40 +90,6 @@ class WaveSolver:
         self._no_row = np.zeros(len(SAMPLE_FIELDS))
         self._no_blows = np.zeros(1, BLOW)
         self._no_events = np.zeros(1, EVENT)
-
-    def _pack(self, loss_time: float) -> np.ndarray:
-        """Parameter record of the scene."""
-        scene = self.scene
-        par = np.zeros(1, WAVE_PAR)
-        p = par[0]
-        p["dt"] = self.time_step
-        p["gravity"] = scene.gravity.acceleration if scene.effects.gravity else 0.0
-        p["mass_b"] = scene.bit.mass
-        p["mass_p"] = scene.piston.mass
-        p["piston"] = Piston[scene.piston.model.upper()]
-        p["drive"] = DriveKind[scene.effects.drive.upper()]
-        p["rock"] = RockKind[scene.effects.rock.upper()]
-        p["barrier"] = scene.barrier_on
-        p["release"] = scene.effects.standstill_tension == "release"
-        p["loss"] = substeps(loss_time, self.time_step)
-        p["n_b"] = self._bit.n
-        p["z_t"], p["z_b"] = self._bit.impedance[[0, -1]]
-        p["kappa_t"], p["kappa_b"] = end_viscosity(self._cb, self._bit, loss_time)
-        p["bound_t"] = _offset_bound(self._cb, self._bit, Coef.TOP)
-        p["bound_b"] = _offset_bound(self._cb, self._bit, Coef.BOTTOM)
-        slowest = scene.bit.transit_time
-        if self._piston is not None:
-            p["n_p"] = self._piston.n
-            p["z_f"], p["z_p"] = self._piston.impedance[[0, -1]]
-            p["kappa_f"], p["kappa_p"] = end_viscosity(self._cp, self._piston, loss_time)
-            p["bound_p"] = _offset_bound(self._cp, self._piston, Coef.BOTTOM)
-            slowest = max(slowest, scene.piston.transit_time)
-        p["rearm_time"] = REARM_TRANSITS * slowest
-        rock = _rock(scene)
-        p["ss_stiffness"] = rock["gamma"] * rock["k_r"]
-        p["ss_loading"] = rock["k_r"]
-        p["ss_damping"] = rock["c_r"]
-        return par
 
     def new_state(self) -> WaveState:
         """State at time zero."""
@@ -148,7 +105,7 @@ class WaveSolver:
         s["drive_force"] = scene.drive.force
         s["reversal"] = scene.drive.reversal_distance
         s["external"] = scene.drive.external_force
-        for key, value in _rock(scene).items():
+        for key, value in rock_numbers(scene).items():
             s[key] = value
             s[f"next_{key}"] = value
         s["p"] = -start.rock_gap
@@ -291,33 +248,3 @@ class WaveSolver:
         s = state.record[0]
         names = ("steps", "leaps", "leap_steps", "wakes", "events", "blows")
         return {name: int(s[f"count_{name}"]) for name in names} | {"locked": int(s["locked"])}
-
-
-INPUT_FIELDS = {
-    "feed_force": "feed",
-    "drive_force": "drive_force",
-    "reversal_distance": "reversal",
-    "external_force": "external",
-    "loading_stiffness": "next_k_r",
-    "unloading_ratio": "next_gamma",
-    "barrier_damping": "next_c_r",
-    "barrier_energy": "next_w_r",
-}
-
-
-def _rock(scene: Scene) -> dict[str, float]:
-    """Numbers of the rock law as the kernels take them."""
-    rock, kind = scene.rock, scene.effects.rock
-    barrier = scene.barrier_on
-    return {
-        "k_r": rock.loading_stiffness,
-        "gamma": rock.unloading_ratio if kind == "bilinear" else 1.0,
-        "c_r": rock.barrier_damping if barrier else 0.0,
-        "w_r": rock.barrier_energy if barrier else 0.0,
-    }
-
-
-def _offset_bound(c: np.ndarray, grid: Grid, row: Coef) -> float:
-    """Factor b in |offset| <= b sqrt(2 E) (docs/numerics.md, eq. 14)."""
-    n = grid.n
-    return float(np.sqrt(np.sum(c[row, :n] * c[row, :n] / c[Coef.MASS, :n])))

@@ -138,9 +138,9 @@ def resting_bit(**changes):
 def test_static_load_never_creeps(changes):
     """A hundred seconds at rest move the bit by less than 1e-9 m."""
     # fine cells are stepped through one by one
-    end = 0.3 if "solver.cells" in changes else 100.0
+    end = 0.25 if "solver.cells" in changes else 100.0
     simulation = Simulation(resting_bit(**changes))
-    simulation.advance(0.2)
+    simulation.advance(0.15)
     early = simulation.observe()
     assert early["drilling_mode"] == Mode.SS
     simulation.advance(end)

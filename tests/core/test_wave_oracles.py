@@ -89,9 +89,8 @@ def test_impact_of_equal_sections(cells, v, leaps):
 
 
 def test_impact_numbers_of_the_notes():
-    assert pytest.approx(1116.547e3, rel=1e-6) == Z * 10 / 2
-    assert pytest.approx(67.6695e-6, rel=1e-6) == 2 * L_P / C0
-    assert pytest.approx(8.69565, rel=1e-6) == 10 * L_P / L_B
+    found = [10 * Z / 2, 2 * L_P / C0, 10 * L_P / L_B]
+    assert found == pytest.approx([1116.547e3, 67.6695e-6, 8.69565], rel=1e-6)
 
 
 # ------------------------------------------------------- oracle 2: first peak on a spring

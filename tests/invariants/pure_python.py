@@ -14,7 +14,7 @@ import numpy as np
 
 # One blow of a coarse reference drill, its leaps off so that every step is made.
 SCENE = {"solver.cells": 20, "solver.leaps": False, "run.settle": 0.0}
-DURATION = 0.004
+DURATION = 0.0025
 FAULT = 0.999
 
 

@@ -45,5 +45,4 @@ def test_plain_python_equals_compiled_code():
 @pytest.mark.parametrize("fault", sorted(set(pure_python.FAULTS) - {"none"}))
 def test_a_planted_fault_is_seen(fault):
     residual = run_uncompiled(fault)["energy"]["residual_relative"]
-    print(fault, residual)
     assert SEEN < abs(residual) < 0.5

@@ -9,7 +9,7 @@ from percussion_model import BLOW, Scene, Simulation
 
 # At the power of the reference, and as it is: the bit still rings at impact. There the
 # motion is aperiodic and rounding grows tenfold a blow: a start velocity off by its last
-# digit makes other events after 0.2 s, so that 0.06 s are compared.
+# digit makes other events after 0.2 s, so that a few blows are compared.
 SCENES = {
     "reference": {},
     "short stroke": {"drive.reversal_distance": 0.004},
@@ -18,7 +18,7 @@ SCENES = {
         "drive.force": 3000.0 * 10 ** (1 / 3),
     },
 }
-ENDS = {"reference": 0.3, "short stroke": 0.06, "short stroke, same power": 0.06}
+ENDS = {"reference": 0.3, "short stroke": 0.06, "short stroke, same power": 0.04}
 # Of the blow table's columns and of the stress in the bars, by the greatest of each.
 BOUND = 1e-6
 FORCE, SPEED = 1.1e6, 10.0  # of an impact at 10 m/s [N], [m/s]
@@ -61,7 +61,6 @@ def test_leaps_change_nothing_but_the_time_it_takes(name):
     for key in here[0]:
         a, b = (np.array([fields[key] for fields in run]) for run in (there, here))
         worst[key] = np.abs(a - b).max() / (FORCE if key.endswith("force") else SPEED)
-    print(name, len(leaping.blows), worst)
     # read between checkpoints of leaps or of steps, which ringing in a short one shows
     standstill = worst.pop("standstill_force")
     assert name != "reference" or standstill < 1e-4
@@ -134,7 +133,6 @@ def test_inputs_at_random_times_leave_the_ledger_closed(seed, leaps):
         simulation.set_inputs(**{name: float(rng.uniform(*LIMITS[name])) for name in names})
         assert abs(simulation.energy()["residual_relative"]) < 1e-9
     simulation.advance(end)
-    print(simulation.energy()["residual_relative"])
     assert abs(simulation.energy()["residual_relative"]) < 1e-9
     seen = simulation.observe()
     m_p, m_b = simulation.scene.piston.mass, simulation.scene.bit.mass

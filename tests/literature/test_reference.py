@@ -50,13 +50,11 @@ def test_finer_cells_do_not_change_the_answer(reference):
         assert result.rate_of_penetration == pytest.approx(compared, rel=2e-3)
         assert result.rate_of_penetration == pytest.approx(RATE, rel=3e-3)
         lost.append(result.energy["numerical_relative"])
-    print(lost)
     assert lost[0] > lost[1] > lost[2] > 0
 
 
 def test_rate_rises_with_feed():
     rates = [rate(**{"feed.force": force}) for force in (500.0, 1e3, 2.5e3, 5e3, 1e4, 2e4)]
-    print(rates)
     assert np.all(np.diff(rates) > 0)
 
 
@@ -70,7 +68,6 @@ def test_exponent_of_loading_stiffness(solver):
     values = np.array([1.0, 2.0, 4.0, 7.5, 12.0]) * 1e8
     base = Scene().replace(**RIGID) if solver == "rigid" else Scene()
     rates = [rate(base, **{"rock.loading_stiffness": float(k)}) for k in values]
-    print(solver, exponent(values, rates))
     assert exponent(values, rates) == pytest.approx(EXPONENT_K, abs=NEAR)
     assert np.all(np.diff(rates) < 0)
 
@@ -85,7 +82,6 @@ def test_exponent_of_reversal_distance_at_constant_power(solver):
         force = 3000.0 * (0.040 / d) ** (1 / 3)
         changes = {"drive.reversal_distance": float(d), "drive.force": force}
         rates.append(rate(base, **changes))
-    print(solver, exponent(values, rates))
     assert exponent(values, rates) == pytest.approx(EXPONENT_D, abs=NEAR)
 
 

@@ -1,0 +1,98 @@
+"""From a scene to the records of the travelling-wave kernels."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from percussion_model.core.records import DriveKind, Piston, RockKind
+from percussion_model.core.wave_records import WAVE_PAR, Coef
+from percussion_model.scene import Scene
+from percussion_model.solvers.grid import Grid, end_viscosity, substeps
+
+# An open gap of this many transits of the slower bar ends a blow where no
+# pressure law does (docs/model.md, section 7).
+REARM_TRANSITS = 20.0
+# Inputs that can change during a run, and the fields of the state that hold them.
+INPUT_FIELDS = {
+    "feed_force": "feed",
+    "drive_force": "drive_force",
+    "reversal_distance": "reversal",
+    "external_force": "external",
+    "loading_stiffness": "next_k_r",
+    "unloading_ratio": "next_gamma",
+    "barrier_damping": "next_c_r",
+    "barrier_energy": "next_w_r",
+}
+
+
+def pack_parameters(
+    scene: Scene,
+    piston: Grid | None,
+    cp: np.ndarray,
+    bit: Grid,
+    cb: np.ndarray,
+    loss_time: float,
+) -> np.ndarray:
+    """Parameter record of a scene.
+
+    Parameters
+    ----------
+    piston, bit : Grid
+        Cells; no piston where it is rigid or absent.
+    cp, cb : ndarray
+        Their coefficients.
+    loss_time : float
+        Kelvin-Voigt time [s], 0 without loss.
+
+    Returns
+    -------
+    WAVE_PAR array of length 1
+    """
+    par = np.zeros(1, WAVE_PAR)
+    p = par[0]
+    p["dt"] = bit.time_step
+    p["gravity"] = scene.gravity.acceleration if scene.effects.gravity else 0.0
+    p["mass_b"] = scene.bit.mass
+    p["mass_p"] = scene.piston.mass
+    p["piston"] = Piston[scene.piston.model.upper()]
+    p["drive"] = DriveKind[scene.effects.drive.upper()]
+    p["rock"] = RockKind[scene.effects.rock.upper()]
+    p["barrier"] = scene.barrier_on
+    p["release"] = scene.effects.standstill_tension == "release"
+    p["loss"] = substeps(loss_time, bit.time_step)
+    p["n_b"] = bit.n
+    p["z_t"], p["z_b"] = bit.impedance[[0, -1]]
+    p["kappa_t"], p["kappa_b"] = end_viscosity(cb, bit, loss_time)
+    p["bound_t"] = _offset_bound(cb, bit, Coef.TOP)
+    p["bound_b"] = _offset_bound(cb, bit, Coef.BOTTOM)
+    slowest = scene.bit.transit_time
+    if piston is not None:
+        p["n_p"] = piston.n
+        p["z_f"], p["z_p"] = piston.impedance[[0, -1]]
+        p["kappa_f"], p["kappa_p"] = end_viscosity(cp, piston, loss_time)
+        p["bound_p"] = _offset_bound(cp, piston, Coef.BOTTOM)
+        slowest = max(slowest, scene.piston.transit_time)
+    p["rearm_time"] = REARM_TRANSITS * slowest
+    rock = rock_numbers(scene)
+    p["ss_stiffness"] = rock["gamma"] * rock["k_r"]
+    p["ss_loading"] = rock["k_r"]
+    p["ss_damping"] = rock["c_r"]
+    return par
+
+
+def rock_numbers(scene: Scene) -> dict[str, float]:
+    """Numbers of the rock law as the kernels take them."""
+    rock, kind = scene.rock, scene.effects.rock
+    barrier = scene.barrier_on
+    return {
+        "k_r": rock.loading_stiffness,
+        "gamma": rock.unloading_ratio if kind == "bilinear" else 1.0,
+        "c_r": rock.barrier_damping if barrier else 0.0,
+        "w_r": rock.barrier_energy if barrier else 0.0,
+    }
+
+
+def _offset_bound(c: np.ndarray, grid: Grid, row: Coef) -> float:
+    """Factor b in |offset| <= b sqrt(2 E) (docs/numerics.md, eq. 14)."""
+    n = grid.n
+    return float(np.sqrt(np.sum(c[row, :n] * c[row, :n] / c[Coef.MASS, :n])))
