@@ -101,8 +101,10 @@ def fill_sample(par, s, wp, cp, wb, cb, time, tau, blows, events, row):
     energy = kinetic_energy(wb, cb, par.n_b, 2 * s.parity)
     before = bit_position(s, wb, cb, par.n_b, 2 * s.parity)
     v_before = s.v_b
-    bit = s.i_bit
-    contact = s.i_contact
+    # counted from zero, so that a short time keeps its digits in a long run
+    bit, contact = s.i_bit, s.i_contact
+    s.i_bit = 0.0
+    s.i_contact = 0.0
     step(par, s, wp, cp, wb, cb, tau, blows, events)
     here = before + 0.5 * (v_before + s.v_b) * tau
     row[0] = time
@@ -115,13 +117,13 @@ def fill_sample(par, s, wp, cp, wb, cb, time, tau, blows, events, row):
     row[7] = s.gap
     row[8] = s.u_r
     row[9] = s.p
-    row[10] = (s.i_bit - bit) / tau
-    row[11] = (s.i_contact - contact) / tau
+    row[10] = s.i_bit / tau
+    row[11] = s.i_contact / tau
     row[12] = drive_force(par, s)
     row[13] = s.mode
     row[14] = energy
-    row[15] = s.i_bit
-    row[16] = s.i_contact
+    row[15] = bit + s.i_bit
+    row[16] = contact + s.i_contact
     row[17] = s.i_drive
     if par.piston == ABSENT:
         for k in (1, 2, 7, 8):

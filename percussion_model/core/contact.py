@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 
-from percussion_model.core.exponential import exponential_area
 from percussion_model.core.kernel import inlined
 
 
@@ -28,8 +27,8 @@ def bar_contact(closed, gap, v_p, v_t, z_p, z_t, tau):
         At the end of the step [m].
     d_p, q_p, d_t, q_t : float
         Integrals of velocity [m] and of its square [m2/s], piston and bit.
-    impulse, moment : float
-        Integral of the force [N s] and of force times remaining time [N s2].
+    impulse : float
+        Integral of the force [N s].
     t_close : float
         When the gap closed within the step [s], or -1.
     opened : int
@@ -62,7 +61,6 @@ def bar_contact(closed, gap, v_p, v_t, z_p, z_t, tau):
             v_t * free + v * rest,
             v_t * v_t * free + v * v * rest,
             force * rest,
-            0.5 * force * rest * rest,
             t_close,
             opened,
         )
@@ -74,7 +72,6 @@ def bar_contact(closed, gap, v_p, v_t, z_p, z_t, tau):
         v_p * v_p * tau,
         v_t * tau,
         v_t * v_t * tau,
-        0.0,
         0.0,
         t_close,
         opened,
@@ -123,7 +120,6 @@ def mass_contact(closed, gap, v_p, v_t, mass, z_t, tau):
             v_t * tau,
             v_t * v_t * tau,
             0.0,
-            0.0,
             t_close,
             opened,
         )
@@ -141,7 +137,6 @@ def mass_contact(closed, gap, v_p, v_t, mass, z_t, tau):
         v_t * tau + moved,
         v_t * v_t * tau + 2.0 * v_t * moved + square,
         z_t * moved,
-        z_t * approach * exponential_area(rate * rest) * rest * rest,
         t_close,
         opened,
     )

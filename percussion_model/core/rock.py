@@ -11,7 +11,6 @@ import math
 
 from percussion_model.core.bar import kinetic_energy
 from percussion_model.core.blows import push_event
-from percussion_model.core.exponential import exponential_area
 from percussion_model.core.kernel import inlined, merged
 from percussion_model.core.records import Mode, RockKind
 from percussion_model.core.rock_law import (
@@ -72,9 +71,8 @@ def contact_stretch(par, s, v_free, z, rest):
 
     Returns
     -------
-    time, d, q, area : float
-        Duration [s], integral of velocity [m], of its square [m2/s] and of
-        the displacement [m s].
+    time, d, q : float
+        Duration [s], integral of velocity [m] and of its square [m2/s].
     next_mode : int
     """
     K = stiffness(s)
@@ -87,7 +85,6 @@ def contact_stretch(par, s, v_free, z, rest):
     fade = -math.expm1(-rate * t)
     d = v * fade / rate
     q = 0.5 * v * v * fade * (2.0 - fade) / rate
-    area = v * t * t * exponential_area(rate * t)
     p_before = s.p
     s.p += d
     if s.mode == DFC:
@@ -100,7 +97,7 @@ def contact_stretch(par, s, v_free, z, rest):
     if next_mode == FF and s.mode != SS:
         s.p = origin  # exactly unloaded
     s.b_peak_bit = max(s.b_peak_bit, K * y + C * v, z * (v_free - v * (1.0 - fade)))
-    return t, d, q, area, next_mode
+    return t, d, q, next_mode
 
 
 @merged
@@ -151,9 +148,8 @@ def rock_step(par, s, w, c, v_free, z, tau, time, events):
 
     Returns
     -------
-    d, q, area : float
-        Integrals of velocity [m], of its square [m2/s], and of the
-        displacement since the step's start [m s].
+    d, q : float
+        Integrals of velocity [m] and of its square [m2/s].
     """
     r = 2 * s.parity
     if s.mode == SS and par.rock == BILINEAR:
@@ -166,18 +162,16 @@ def rock_step(par, s, w, c, v_free, z, tau, time, events):
     rest = tau
     d = 0.0
     q = 0.0
-    area = 0.0
     for _ in range(MOST_CROSSINGS):
         now = time + (tau - rest)
         if s.mode == FF:
             t, closes = flight_stretch(par, s, v_free, rest)
             step = v_free * t
-            area += (d + 0.5 * step) * t
             d += step
             q += v_free * v_free * t
             rest -= t
             if closes == 0:
-                return d, q, area
+                return d, q
             close_interface(par, s, kinetic_energy(w, c, par.n_b, r))
             if s.mode == SS:
                 enter_standstill(s, now + t)
@@ -186,7 +180,7 @@ def rock_step(par, s, w, c, v_free, z, tau, time, events):
         if par.rock == WALL:
             if v_free > 0.0:
                 s.b_peak_bit = max(s.b_peak_bit, z * v_free)
-                return d, q, area + d * rest
+                return d, q
             s.mode = FF
             s.p_u = s.p
             push_event(s, events, now, s.mode, 0.0)
@@ -196,17 +190,16 @@ def rock_step(par, s, w, c, v_free, z, tau, time, events):
                 enter_standstill(s, now)
             push_event(s, events, now, s.mode, stiffness(s) * (s.p - origin(s)))
             continue
-        t, step, square, under, next_mode = contact_stretch(par, s, v_free, z, rest)
-        area += d * t + under
+        t, step, square, next_mode = contact_stretch(par, s, v_free, z, rest)
         d += step
         q += square
         rest -= t
         if next_mode < 0:
-            return d, q, area
+            return d, q
         s.mode = next_mode
         push_event(s, events, now + t, s.mode, stiffness(s) * (s.p - origin(s)))
     s.locked += 1
-    return d, q, area
+    return d, q
 
 
 @merged

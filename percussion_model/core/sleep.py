@@ -90,8 +90,13 @@ def quiet_steps(par, s, wb, cb, gap, u_r, v):
         else:
             room = s.reversal + u_r - margin
             limit = min(limit, time_to_cover(room, speed - v, slack - a))
-    if v < 0.0 and a > 0.0 and -v / a > FEWEST_STEPS * par.dt:
-        limit = min(limit, -v / a)  # look at the top: it is the stroke
+    if a > 0.0 and v < speed:
+        # look at the top, which is the stroke: where the bit moves, all along it
+        top = (-speed - v) / a
+        if top > FEWEST_STEPS * par.dt:
+            limit = min(limit, top)
+        elif speed > 0.0:
+            limit = 0.0
     most = (1 << par.leaps) - 1 - (s.step - s.piston_step)
     if limit < most * par.dt:
         return int(limit / par.dt) - 1

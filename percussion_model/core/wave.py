@@ -111,7 +111,7 @@ def step(par, s, wp, cp, wb, cb, dt, blows, events):
     s.parity = 1 - s.parity
     s.step += 1
     s.count_steps += 1
-    if s.step % RESYNC_STEPS == 0:
+    if short or s.step % RESYNC_STEPS == 0:
         resync(par, s, wp, cp, wb, cb)
     if s.mode == SS and (s.n_check == 0 or s.step % CHECKPOINT_STEPS == 0):
         push_checkpoint(s, now(par, s))

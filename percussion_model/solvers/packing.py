@@ -85,7 +85,7 @@ def rock_numbers(scene: Scene) -> dict[str, float]:
     rock, kind = scene.rock, scene.effects.rock
     barrier = scene.barrier_on
     return {
-        "k_r": rock.loading_stiffness,
+        "k_r": rock.loading_stiffness if kind != "none" else 0.0,
         "gamma": rock.unloading_ratio if kind == "bilinear" else 1.0,
         "c_r": rock.barrier_damping if barrier else 0.0,
         "w_r": rock.barrier_energy if barrier else 0.0,
