@@ -144,10 +144,13 @@ def watch_flight(par, s, wb, cb, watch, x, v, most):
     a = par.gravity + s.feed / par.mass_b
     mean = s.p + strain_offset(wb, cb, par.n_b, 2 * s.parity, BOTTOM)
     most = min(most, WATCHED)
+    before = s.p
     for k in range(most):
         t = (k + 1) * par.dt
-        if mean + (s.v_b + 0.5 * a * t) * t - v[k] >= s.p_u:
+        here = mean + (s.v_b + 0.5 * a * t) * t - v[k]
+        if here >= s.p_u and here > before:
             return k
+        before = here
     return most
 
 

@@ -23,6 +23,7 @@ from percussion_model.core.contact_leap import (
 from percussion_model.core.kernel import kernel, merged
 from percussion_model.core.linear import load, multiply, pad, quadratic, remove_mean, store
 from percussion_model.core.records import Mode, RockKind
+from percussion_model.core.rock_law import recoverable
 from percussion_model.core.totals import now
 from percussion_model.core.wave_records import Coef, LeapKind
 
@@ -35,6 +36,9 @@ FLIGHT, STANDSTILL, CONTACT = (int(kind) for kind in LeapKind)
 FEWEST_STEPS = 8
 # Standstill can end only above W_R; below this share of it the barrier is safe.
 QUIET_SHARE = 0.9
+
+# What a vibration of less than this dissipates is not booked [J].
+NEGLIGIBLE = 1e-13
 
 # Quadratic forms kept with each power of the step map.
 LOSS_FORM, DASHPOT_FORM, NUMERICAL_FORM = 1, 2, 3
@@ -77,6 +81,8 @@ def plan_flight(par, s, wb, cb, watch, x, v, most):
     """Steps of free flight before the rock can be met, at most `most`."""
     if par.rock == NO_ROCK:
         return most
+    if s.p >= s.p_u:  # let go while the rock still springs back
+        return watch_flight(par, s, wb, cb, watch, x, v, most)
     energy = deviation_energy(wb, cb, par.n_b, 2 * s.parity, s.v_b, 0.0)
     a = par.gravity + s.feed / par.mass_b
     room = s.p_u - s.p - 2.0 * par.bound_b * math.sqrt(2.0 * energy)
@@ -101,7 +107,7 @@ def plan_leap(par, s, wb, cb, watch, x, v):
     s.v_b = mean_velocity(wb, cb, par.n_b, 2 * s.parity, par.mass_b)
     if s.mode == FF:
         s.leap_kind = FLIGHT
-        if par.rock == NO_ROCK or s.p < s.p_u:
+        if par.rock == NO_ROCK or par.rock == BILINEAR or s.p < s.p_u:
             steps = plan_flight(par, s, wb, cb, watch, x, v, most)
             looked = par.rock == BILINEAR
     elif par.rock == BILINEAR and can_watch(par, s):
@@ -130,9 +136,10 @@ def leap_free_bar(par, s, w, c, n, mass, v0, v1, steps, operator, size, x, y):
     r = 2 * s.parity
     load(x, w, c, n, r, v0, 0.0)
     pad(x, 2 * n, size)
+    rings = par.loss > 0 and deviation_energy(w, c, n, r, v0, 0.0) > NEGLIGIBLE
     for level in range(par.leaps):
         if (steps >> level) & 1:
-            if par.loss > 0:
+            if rings:
                 s.e_loss += quadratic(operator, level, LOSS_FORM, x, y, size)
             multiply(operator, level, 0, x, y, size)
             for i in range(size):
@@ -148,11 +155,13 @@ def leap_flight(par, s, wb, cb, free, steps, x, y):
     a = par.gravity + s.feed / par.mass_b
     time = steps * par.dt
     offset = strain_offset(wb, cb, par.n_b, r, BOTTOM)
+    unloading = recoverable(s)
     v0 = s.v_b
     s.v_b = v0 + a * time
     path = (v0 + 0.5 * a * time) * time
     leap_free_bar(par, s, wb, cb, par.n_b, par.mass_b, v0, s.v_b, steps, free, par.size_b, x, y)
     s.p += path - (strain_offset(wb, cb, par.n_b, r, BOTTOM) - offset)
+    s.e_standstill += unloading - recoverable(s)
     return path
 
 
@@ -177,14 +186,16 @@ def leap_standstill(par, s, wb, cb, rest, sums, steps, x, y):
     x[2 * n] = s.p - still
     pad(x, 2 * n + 1, size)
     path = 0.0
+    rings = standstill_energy(par, s, wb, cb) > NEGLIGIBLE
     for level in range(par.leaps):
         if (steps >> level) & 1:
             for i in range(size):
                 path += sums[0, level, i] * x[i]
-            if par.loss > 0:
-                s.e_loss += quadratic(rest, level, LOSS_FORM, x, y, size)
-            s.e_standstill += quadratic(rest, level, DASHPOT_FORM, x, y, size)
-            s.e_numerical += quadratic(rest, level, NUMERICAL_FORM, x, y, size)
+            if rings:
+                if par.loss > 0:
+                    s.e_loss += quadratic(rest, level, LOSS_FORM, x, y, size)
+                s.e_standstill += quadratic(rest, level, DASHPOT_FORM, x, y, size)
+                s.e_numerical += quadratic(rest, level, NUMERICAL_FORM, x, y, size)
             multiply(rest, level, 0, x, y, size)
             for i in range(size):
                 x[i] = y[i]

@@ -11,8 +11,9 @@ from percussion_model.core.wave_records import Coef
 
 MASS, STATIC = int(Coef.MASS), int(Coef.STATIC)
 
-# Sizes are padded to a multiple of this.
-PADDING = 8
+# Sizes are padded to a multiple of this: four vectors of four numbers, which
+# is what a loop takes at a time.
+PADDING = 16
 
 
 @merged
@@ -62,12 +63,25 @@ def multiply(operator, level, form, x, y, size):
 
 @kernel
 def quadratic(operator, level, form, x, y, size):
-    """x' A x [J]."""
-    multiply(operator, level, form, x, y, size)
-    a = 0.0
+    """x' A x [J], with A stored as the upper triangle that gives the same."""
     for i in range(size):
+        y[i] = 0.0
+    for k in range(0, size, 4):
+        a, b, c, d = x[k], x[k + 1], x[k + 2], x[k + 3]
+        for i in range((k // PADDING + 1) * PADDING):
+            y[i] += (operator[level, form, k, i] * a + operator[level, form, k + 1, i] * b) + (
+                operator[level, form, k + 2, i] * c + operator[level, form, k + 3, i] * d
+            )
+    a = 0.0
+    b = 0.0
+    c = 0.0
+    d = 0.0
+    for i in range(0, size, 4):
         a += x[i] * y[i]
-    return a
+        b += x[i + 1] * y[i + 1]
+        c += x[i + 2] * y[i + 2]
+        d += x[i + 3] * y[i + 3]
+    return (a + b) + (c + d)
 
 
 @merged

@@ -33,7 +33,8 @@ LOADING_MODES = (Mode.DFC, Mode.FC, Mode.BC)
 class LeapOperators:
     """Powers of the step map by configuration, and their quadratic forms.
 
-    Maps are stored column by column and padded with zeros; `size` below is
+    Maps are stored column by column and padded with zeros, forms as
+    their upper triangles; `size` below is
     the padded 2 n or, on the rock, 2 n + 1.
 
     Attributes
@@ -195,3 +196,7 @@ def _double(powers: np.ndarray, paths: np.ndarray) -> None:
             carried = by_column @ last[form] @ by_column.T
             powers[level, form] = last[form] + 0.5 * (carried + carried.T)
         paths[level] = paths[level - 1] + by_column @ paths[level - 1]
+    for power in powers:
+        for form in range(1, powers.shape[1]):
+            # symmetric: column by column, the upper triangle says it all
+            power[form] = 2.0 * np.tril(power[form], -1) + np.diag(np.diag(power[form]))
