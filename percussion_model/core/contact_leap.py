@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import math
 
-from percussion_model.core.bar import mean_velocity, strain_offset
+from percussion_model.core.bar import deviation_energy, mean_velocity, strain_offset
 from percussion_model.core.kernel import kernel, merged
-from percussion_model.core.linear import load, multiply, pad, quadratic, store
+from percussion_model.core.linear import load, multiply, pad, store
 from percussion_model.core.records import Mode
 from percussion_model.core.rock_law import REST_VELOCITY, crush, origin, stiffness
 from percussion_model.core.wave_records import Coef
@@ -177,6 +177,7 @@ def leap_contact(par, s, wb, cb, rest, loading, sums, steps, x, v, y):
         force = spring + C * v[k]
         spring += K * v[k] * d
         s.b_peak_bit = max(s.b_peak_bit, force, force + z * v[k] * fade)
+    before = contact_energy(par, s, wb, cb, K, s.p - still)
     path = 0.0
     for level in range(WATCH_LEVELS):
         if (steps >> level) & 1:
@@ -184,19 +185,26 @@ def leap_contact(par, s, wb, cb, rest, loading, sums, steps, x, v, y):
             for i in range(par.size_r):
                 path += sums[which, level, i] * x[i]
             if s.mode == SS:
-                if par.loss > 0:
-                    s.e_loss += quadratic(rest, level, 1, x, y, par.size_r)
                 multiply(rest, level, 0, x, y, par.size_r)
             else:
-                if par.loss > 0:
-                    s.e_loss += quadratic(loading[s.mode - 1], level, 1, x, y, par.size_r)
                 multiply(loading[s.mode - 1], level, 0, x, y, par.size_r)
             for i in range(par.size_r):
                 x[i] = y[i]
     a = par.gravity + s.feed / par.mass_b
     store(x, wb, cb, par.n_b, 2 * s.parity, 0.0, a)
+    if par.loss > 0:
+        after = contact_energy(par, s, wb, cb, K, x[2 * par.n_b])
+        elsewhere = (C * q + par.z_b * (q - d * d / par.dt)) * squares
+        s.e_loss += before - after - elsewhere
     book_contact(par, s, wb, cb, K, C, still + x[2 * par.n_b], d, q, squares, steps)
     return path
+
+
+@kernel
+def contact_energy(par, s, wb, cb, K, y):
+    """Energy of bit and rock about rest, `y` away from it [J]."""
+    a = par.gravity + s.feed / par.mass_b
+    return deviation_energy(wb, cb, par.n_b, 2 * s.parity, 0.0, a) + 0.5 * K * y * y
 
 
 @merged

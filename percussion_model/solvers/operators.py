@@ -39,12 +39,12 @@ class LeapOperators:
 
     Attributes
     ----------
-    piston, free : ndarray, shape (LEVELS, 2, size, size)
-        Free piston, free bit: the map and the form of loss.
-    rest : ndarray, shape (LEVELS, 4, size, size)
-        Bit in standstill: map, forms of loss, dashpot and averaging.
-    loading : ndarray, shape (3, WATCH_LEVELS, 2, size, size)
-        Bit in DFC, FC and BC: map and form of loss.
+    piston, free : ndarray, shape (LEVELS, 1, size, size)
+        Map of the free piston and of the free bit.
+    rest : ndarray, shape (LEVELS, 3, size, size)
+        Bit in standstill: map, forms of dashpot and averaging.
+    loading : ndarray, shape (3, WATCH_LEVELS, 1, size, size)
+        Map of the bit in DFC, FC and BC.
     watch : ndarray, shape (5, size, WATCHED)
         By mode: strain offset of the rock end at the end of the next steps in
         FF, its velocity at their start in DFC, FC, BC and SS.
@@ -88,13 +88,13 @@ def build_operators(
     par["size_p"], par["size_b"] = padded(2 * n_p), padded(2 * bit.n)
     par["size_r"] = padded(2 * bit.n + 1)
     alone = _alone(par)
-    found = {"free": _powers(Configuration(alone, bit, cb), LEVELS, 2)[0]}
+    found = {"free": _powers(Configuration(alone, bit, cb), LEVELS, 1)[0]}
     if piston is not None:
         of_piston = alone.copy()
         of_piston["n_b"], of_piston["mass_b"] = piston.n, piston.mass.sum()
         of_piston["z_t"], of_piston["z_b"] = par["z_f"], par["z_p"]
         of_piston["kappa_t"], of_piston["kappa_b"] = par["kappa_f"], par["kappa_p"]
-        found["piston"] = _powers(Configuration(of_piston, piston, cp), LEVELS, 2)[0]
+        found["piston"] = _powers(Configuration(of_piston, piston, cp), LEVELS, 1)[0]
     if par[0]["rock"] == RockKind.BILINEAR:
         found |= _on_rock(par, alone, bit, cb)
         flight = found["free"][0, 0, : 2 * bit.n, : 2 * bit.n]
@@ -138,12 +138,12 @@ def _on_rock(
         Mode.SS: (p["ss_stiffness"], p["ss_damping"]),
     }
     size = padded(2 * bit.n + 1)
-    loading = np.zeros((len(LOADING_MODES), WATCH_LEVELS, 2, size, size))
+    loading = np.zeros((len(LOADING_MODES), WATCH_LEVELS, 1, size, size))
     watch = np.zeros((1 + len(loads), size, WATCHED))
     sums = np.zeros((len(loads), LEVELS, size))
     for mode, (stiffness, damping) in loads.items():
         configuration = Configuration(rock, bit, cb, float(stiffness), float(damping))
-        levels, forms = (LEVELS, 4) if mode == Mode.SS else (WATCH_LEVELS, 2)
+        levels, forms = (LEVELS, 3) if mode == Mode.SS else (WATCH_LEVELS, 1)
         powers, paths = _powers(configuration, levels, forms)
         by_column = powers[0, 0, : configuration.size, : configuration.size]
         watch[mode] = _watch(by_column, end_row(configuration, by_column), size)
@@ -176,7 +176,7 @@ def _powers(configuration: Configuration, levels: int, forms: int) -> tuple[np.n
     full = padded(size)
     powers, paths = np.zeros((levels, forms, full, full)), np.zeros((levels, full))
     powers[0, 0, :size, :size] = by_column
-    for form, matrix in enumerate(step_forms(configuration, by_column)[: forms - 1], start=1):
+    for form, matrix in enumerate(step_forms(configuration, by_column)[1:forms], start=1):
         powers[0, form, :size, :size] = 0.5 * (matrix + matrix.T)
     mass = np.zeros(size)
     n = configuration.grid.n
