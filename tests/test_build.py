@@ -76,9 +76,13 @@ def test_setup_installs_once(build, monkeypatch):
 
     monkeypatch.setattr(build, "call", pretend)
     assert build.setup() == 0
-    assert [words[-1] for words in calls] == [str(build.VENV), ".[all]"]
+    assert [words[-1] for words in calls] == [
+        str(build.VENV),
+        ".[all]",
+        "percussion_model.warm_up",
+    ]
     assert build.setup() == 0
-    assert len(calls) == 2
+    assert len(calls) == 3
 
 
 def test_a_failed_installation_is_tried_again(build, monkeypatch):
@@ -109,7 +113,7 @@ def test_test_runs_every_step_and_reports_the_first_failure(build, monkeypatch, 
     monkeypatch.setattr(build, "setup", lambda: 0)
     monkeypatch.setattr(build, "call", pretend)
     assert build.main(["test", "-k", "rock"]) == 7
-    assert names == ["ruff", "ruff", "mypy", "lint-imports", "pytest"]
+    assert names == ["ruff", "ruff", "mypy", "lint-imports", "python", "pytest"]
     assert "== pytest" in capsys.readouterr().out
 
 

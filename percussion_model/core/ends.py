@@ -6,6 +6,8 @@ ends (docs/numerics.md, section 1). Mean motion and the ledger move along.
 
 from __future__ import annotations
 
+import math
+
 from percussion_model.core.bar import face_velocities, send_waves, send_waves_with_loss
 from percussion_model.core.blows import push_event, start_blow
 from percussion_model.core.contact import bar_contact, mass_contact
@@ -219,7 +221,11 @@ def meet(par, s, wp, cp, wb, cb, tau, blows, events):
         else:
             v_p = s.v_p + kick
             elastic += v_p
-        tau = time_to_blow(par, s, v_p - v_t, tau, time)
+        reach = time_to_blow(par, s, v_p - v_t, tau, time)
+        if reach < tau:
+            # the blow starts with the next step, whatever rounding says
+            tau = reach
+            s.gap = math.inf
         if par.piston == ELASTIC:
             book_end(s, par.z_f, par.kappa_f, top_p, v_f * tau, v_f * v_f * tau, tau)
     else:

@@ -53,6 +53,8 @@ def bit_bounds(par, s, wb, cb):
         Bound of the top end's motion about it [m].
     horizon : float
         Time over which they hold [s].
+    pace : float
+        Bound of the mean velocity, though it may lead nowhere [m/s].
     """
     a = par.gravity + s.feed / par.mass_b
     if s.mode == SS:
@@ -60,14 +62,14 @@ def bit_bounds(par, s, wb, cb):
         if drills_not(par, s, energy) and lifts_not(par, s, energy):
             spread = math.sqrt(2.0 * energy / (s.gamma * s.k_r))
             spread += (par.bound_t + 2.0 * par.bound_b) * math.sqrt(2.0 * energy)
-            return 0.0, 0.0, spread, math.inf
+            return 0.0, 0.0, spread, math.inf, math.sqrt(2.0 * energy / par.mass_b)
     r = 2 * s.parity
     energy = kinetic_energy(wb, cb, par.n_b, r) + elastic_energy(wb, cb, par.n_b, r)
     energy += recoverable(s)
     speed = math.sqrt(2.0 * energy / par.mass_b)
     fall = speed * HORIZON + 0.5 * abs(a) * HORIZON * HORIZON
     energy += par.mass_b * abs(a) * fall
-    return speed, abs(a), par.bound_t * math.sqrt(2.0 * energy), HORIZON
+    return speed, abs(a), par.bound_t * math.sqrt(2.0 * energy), HORIZON, speed
 
 
 @kernel
@@ -80,7 +82,7 @@ def quiet_steps(par, s, wb, cb, gap, u_r, v):
         Gap and relative displacement [m], and the piston's mean velocity
         [m/s], at the present step.
     """
-    speed, slack, spread, limit = bit_bounds(par, s, wb, cb)
+    speed, slack, spread, limit, pace = bit_bounds(par, s, wb, cb)
     a = par.gravity + drive_force(par, s) / par.mass_p
     margin = 2.0 * (spread + s.spread_p)
     limit = min(limit, time_to_cover(gap - margin, v + speed, a + slack))
@@ -90,12 +92,12 @@ def quiet_steps(par, s, wb, cb, gap, u_r, v):
         else:
             room = s.reversal + u_r - margin
             limit = min(limit, time_to_cover(room, speed - v, slack - a))
-    if a > 0.0 and v < speed:
+    if a > 0.0 and v < pace:
         # look at the top, which is the stroke: where the bit moves, all along it
-        top = (-speed - v) / a
+        top = (-pace - v) / a
         if top > FEWEST_STEPS * par.dt:
             limit = min(limit, top)
-        elif speed > 0.0:
+        else:
             limit = 0.0
     most = (1 << par.leaps) - 1 - (s.step - s.piston_step)
     if limit < most * par.dt:
