@@ -94,7 +94,8 @@ def quiet_steps(par, s, wb, cb, gap, u_r, v):
             limit = min(limit, time_to_cover(room, speed - v, slack - a))
     if a > 0.0 and v < pace:
         # look at the top, which is the stroke: where the bit moves, all along it
-        top = (-pace - v) / a
+        fall = abs(par.gravity + s.feed / par.mass_b)  # by which the bit may gain pace
+        top = (-pace - v) / (a + fall)
         if top > FEWEST_STEPS * par.dt:
             limit = min(limit, top)
         else:
