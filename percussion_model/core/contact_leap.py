@@ -12,8 +12,10 @@ import math
 from percussion_model.core.bar import deviation_energy, mean_velocity, strain_offset
 from percussion_model.core.kernel import kernel, merged
 from percussion_model.core.linear import load, multiply, pad, store
+from percussion_model.core.peaks import note_peak
 from percussion_model.core.records import Mode
 from percussion_model.core.rock_law import REST_VELOCITY, crush, origin, stiffness
+from percussion_model.core.totals import now
 from percussion_model.core.wave_records import Coef
 
 BOTTOM = int(Coef.BOTTOM)
@@ -177,6 +179,9 @@ def leap_contact(par, s, wb, cb, rest, loading, sums, steps, x, v, y):
         force = spring + C * v[k]
         spring += K * v[k] * d
         s.b_peak_bit = max(s.b_peak_bit, force, force + z * v[k] * fade)
+        begin = now(par, s) + k * par.dt
+        if begin + par.dt > s.peak_from:
+            note_peak(s, begin, force, z * v[k], K / (z + C), force + z * v[k] * fade)
     before = contact_energy(par, s, wb, cb, K, s.p - still)
     path = 0.0
     for level in range(WATCH_LEVELS):
