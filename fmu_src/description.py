@@ -82,7 +82,8 @@ class Described(Fmi2Slave):  # type: ignore[misc]
         at = list(root).index(root.find("CoSimulation")) + 1
         used = {variable.unit for variable in self.variables if variable.unit}
         root.insert(at, write_units(used))
-        root.insert(at + 1, _type_definitions(self.variables))
+        if any(variable.enumeration for variable in self.variables):
+            root.insert(at + 1, _type_definitions(self.variables))
         _complete_structure(root, self.variables)
         return root
 
