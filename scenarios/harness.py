@@ -19,7 +19,8 @@ from fmpy.fmi2 import (
 
 # A constant, or a function of time.
 Signal = float | bool | Callable[[float], float | bool]
-FIGURES = Path(__file__).resolve().parents[1] / "out" / "scenarios"
+ROOT = Path(__file__).resolve().parents[1]
+FIGURES = ROOT / "out" / "scenarios"
 
 
 class Instance:
@@ -245,3 +246,19 @@ def plot(
     figure.savefig(path, dpi=110)
     plt.close(figure)
     return path
+
+
+def built(name: str = "PercussiveHammer") -> Path:
+    """An FMU of `dist`, built now if it is not there."""
+    path = ROOT / "dist" / f"{name}.fmu"
+    if not path.exists():
+        from fmu_src.__main__ import main
+
+        main(["--no-reference"] if name == "PercussiveHammer" else ["--pneumatics"])
+    return path
+
+
+def ramp(*points: tuple[float, float]) -> Callable[[float], float]:
+    """A signal that goes straight from point (time, value) to point."""
+    times, values = zip(*points, strict=True)
+    return lambda t: float(np.interp(t, times, values))
