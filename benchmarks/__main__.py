@@ -19,6 +19,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from benchmarks.fmu import fmu
+from benchmarks.fmu import rows as fmu_rows
+
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent
 LATEST = HERE / "latest.json"
@@ -236,6 +239,8 @@ def show(found: dict[str, Any]) -> None:
 
     table = Table(show_header=False)
     table.add_row("Rigid option, a blow", f"{1e6 * found['rigid']['blow']:.2f} µs")
+    for label, figure in fmu_rows(found["fmu"]):
+        table.add_row(label, figure)
     start = found["command_line"]
     table.add_row("Command line, 0.1 s simulated: first start", f"{start['first']:.2f} s")
     table.add_row("Command line, 0.1 s simulated: later starts", f"{start['second']:.2f} s")
@@ -263,6 +268,8 @@ def bench(quick: bool, say: Callable[[str], None]) -> dict[str, Any]:
     found["effects"] = effects(3 if quick else 11)
     say("rigid option")
     found["rigid"] = rigid(3 if quick else 7)
+    say("FMU")
+    found["fmu"] = fmu(1 if quick else 5)
     say("command line")
     found["command_line"] = command_line(1 if quick else 5)
     return found

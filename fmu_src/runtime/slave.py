@@ -85,7 +85,7 @@ def read_variables(folder: str) -> dict[int, Known]:
 class Slave(Fmi2Slave):
     """Base of the slaves: values by reference, phases, and errors that hosts see.
 
-    A slave gives `output(reference)` and overrides `check`, `begin` and `step`.
+    A slave gives `outputs(references)` and overrides `check`, `begin` and `step`.
     """
 
     def __init__(self, **arguments: Any) -> None:
@@ -100,6 +100,7 @@ class Slave(Fmi2Slave):
         self.values = {
             one.reference: one.start for one in self.known.values() if one.causality != "output"
         }
+        self._plans: dict[Any, Any] = {}
         self.phase = Phase.INSTANTIATED
         self.start_time = 0.0
         self.now = 0.0  # time of the host [s]
@@ -126,8 +127,8 @@ class Slave(Fmi2Slave):
         """Go on; `time` is the end of the step since the start [s]."""
         raise NotImplementedError
 
-    def output(self, reference: int) -> Any:
-        """Present value of an output."""
+    def outputs(self, references: list[int]) -> list[Any]:
+        """Present values of outputs."""
         raise NotImplementedError
 
     def changed(self, reference: int) -> None:
@@ -204,14 +205,27 @@ class Slave(Fmi2Slave):
 
     def read(self, references: list[int], types: tuple[str, ...]) -> list[Any]:
         """Present values."""
-        values = self.values
-        found = []
+        key = (tuple(references), types[0])
+        plan = self._plans.get(key)
+        if plan is None:
+            plan = self._plans[key] = self.plan(references, types)
+        if plan == "outputs":
+            return self.outputs(references)
+        return [
+            self.outputs([reference])[0] if reference in plan else self.values[reference]
+            for reference in references
+        ]
+
+    def plan(self, references: list[int], types: tuple[str, ...]) -> str | set[int]:
+        """Which of the variables are outputs; hosts ask for the same ones again and again."""
+        found = set()
         for reference in references:
             one = self.known.get(reference)
             if one is None or one.type not in types:
                 raise ValueError(f"there is no {types[0]} variable of reference {reference}")
-            found.append(self.output(reference) if one.causality == "output" else values[reference])
-        return found
+            if one.causality == "output":
+                found.add(reference)
+        return "outputs" if len(found) == len(set(references)) else found
 
     def write(self, references: list[int], values: list[Any], types: tuple[str, ...]) -> None:
         """Set parameters and inputs."""

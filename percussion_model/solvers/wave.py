@@ -298,6 +298,15 @@ class WaveSolver:
                 out[f"{name}_velocity"] = d + u
         return out
 
+    def force_in(self, state: WaveState, bar: str, cell: int) -> float:
+        """Force in one cell of "piston" or "bit" [N], as `fields` reads it."""
+        grid = self.grid_of(bar)
+        if grid is None:
+            return 0.0
+        w = state.bars[bar == "bit"]
+        r = 2 * int(state.words[WORD["parity"]])
+        return float(grid.impedance[cell] * (w[r, cell] - w[r + 1, cell]))
+
     def grid_of(self, bar: str) -> Grid | None:
         """Cells of "piston" or "bit", None where it has none."""
         return {"piston": self._piston, "bit": self._bit}[bar]
