@@ -14,7 +14,7 @@ from percussion_model.core.records import (
     STORED_FIELDS,
     Mode,
 )
-from percussion_model.ledger import complete_ledger
+from percussion_model.ledger import unexplained
 from percussion_model.runner import Runner
 from percussion_model.scene_rules import SceneRules
 from percussion_model.solvers import Solver
@@ -176,9 +176,8 @@ class Motion(Runner):
 
     def residual(self) -> float:
         """Share of the energy put in that the ledger leaves unexplained."""
-        entries = dict(zip(LEDGER, self.read()[-len(LEDGER) :], strict=True))
-        found = complete_ledger(entries)["residual_relative"]
-        return found if found == found else 0.0
+        residual, scale = unexplained(dict(zip(LEDGER, self.read()[-len(LEDGER) :], strict=True)))
+        return residual / scale if scale > 0.0 else 0.0
 
     def fading(self) -> float:
         """Share of the last blow's rate that holds now; falls when blows fail to come."""

@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import ctypes
 import functools
-import json
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass, fields
 from enum import IntEnum
-from pathlib import Path
 from typing import Any
 
 from pythonfmu import Fmi2Slave
 from pythonfmu.enums import Fmi2Status
 
-from percussion_model.parameter_rows import Row, refuse_value
+from fmu_src.runtime.folder import finalise_in_time, read_variables
+from percussion_model.parameter_rows import refuse_value
 
 # Communication points may differ from the present time by rounding: this share
 # of a step, and some units in the last place of the time.
@@ -36,20 +34,6 @@ class Phase(IntEnum):
     TERMINATED = 3
 
 
-@dataclass(frozen=True)
-class Known:
-    """What an instance must know of a variable; the rest is in the model description."""
-
-    name: str
-    reference: int
-    type: str  # Real, Integer, Boolean or Enumeration
-    causality: str  # parameter, input or output
-    start: Any
-    row: Row | None  # bounds of a parameter or an input
-    key: str | None  # of the scene
-    left_out: Any  # value that stands for "left out"
-
-
 def guarded(method: Callable) -> Callable:
     """Let an error end the call as a fatal one in the host, without a crash."""
 
@@ -61,25 +45,6 @@ def guarded(method: Callable) -> Callable:
             raise self.fatal(error) from None
 
     return call
-
-
-@functools.cache
-def read_variables(folder: str) -> dict[int, Known]:
-    """Variables of the FMU in a folder, by value reference."""
-    rows = json.loads((Path(folder) / "variables.json").read_text(encoding="utf-8"))
-    known = {}
-    for entry in rows:
-        row = entry.pop("row")
-        if row is not None:
-            row["choices"] = tuple(row["choices"])
-            row["needs"] = {key: tuple(values) for key, values in row["needs"].items()}
-        names = {field.name for field in fields(Known)} - {"row"}
-        variable = Known(
-            row=Row(**row) if row is not None else None,
-            **{name: value for name, value in entry.items() if name in names},
-        )
-        known[variable.reference] = variable
-    return known
 
 
 class Slave(Fmi2Slave):
@@ -318,20 +283,3 @@ class Slave(Fmi2Slave):
         text = str(error) if isinstance(error, ValueError) else f"{type(error).__name__}: {error}"
         self.log(f"{self.instance_name}: {text}", Fmi2Status.error, "logStatusError")
         return FmuError(text.replace("%", "%%"))
-
-
-@functools.cache
-def finalise_in_time(folder: str) -> None:
-    """Let the export library end before its own static variables do (Linux).
-
-    Left alone, it finalises the same pointer twice at the end of the process.
-    """
-    if not sys.platform.startswith("linux"):
-        return
-    libraries = sorted((Path(folder).parent / "binaries" / "linux64").glob("*.so"))
-    if not libraries:
-        return
-    library = ctypes.CDLL(str(libraries[0]))
-    # by getattr, since a class would mangle a name of two underscores
-    at_exit = getattr(ctypes.CDLL(None), "__cxa_atexit")
-    at_exit(ctypes.cast(library.finalizePythonInterpreter, ctypes.c_void_p), None, None)
