@@ -223,13 +223,14 @@ class Simulation:
         return complete_ledger(self.solver.energy(self._state, now))
 
     def fields(self) -> dict[str, np.ndarray]:
-        """Force [N] and velocity [m/s] in each cell of the elastic bars, top to bottom."""
+        """Force [N] and velocity [m/s] in each cell of the elastic bars, top to bottom.
+
+        At the last grid point up to the present; empty where no bar is elastic.
+        """
         read = getattr(self.solver, "fields", None)
         if read is None:
             return {}
-        here = self._state.copy()
-        self.solver.commit(here, self._time)
-        return dict(read(here))
+        return dict(read(self._state, max(self._time, self.solver.time(self._state))))
 
     def statistics(self) -> dict[str, int]:
         """Counts of what the solver did."""

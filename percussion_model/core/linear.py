@@ -6,7 +6,7 @@ A map is stored column by column and padded with zeros to a multiple of
 
 from __future__ import annotations
 
-from percussion_model.core.kernel import kernel, merged
+from percussion_model.core.kernel import inlined, kernel, merged
 from percussion_model.core.lanes import WIDTH, add_scaled, load_lanes, no_lanes, store_sum
 from percussion_model.core.wave_records import Coef
 
@@ -90,6 +90,21 @@ def carry(powers, steps, x, y, size):
         level += 1
 
 
+@inlined
+def dot(row, x, size):
+    """Sum of products of two rows, in four sums that need not wait for each other."""
+    a = 0.0
+    b = 0.0
+    c = 0.0
+    d = 0.0
+    for i in range(0, size, 4):
+        a += row[i] * x[i]
+        b += row[i + 1] * x[i + 1]
+        c += row[i + 2] * x[i + 2]
+        d += row[i + 3] * x[i + 3]
+    return (a + b) + (c + d)
+
+
 @kernel
 def quadratic(operator, x, y, size):
     """x' A x [J], with A stored as the upper triangle that gives the same."""
@@ -100,25 +115,7 @@ def quadratic(operator, x, y, size):
             even = add_scaled(even, operator, k, i, x[k])
             odd = add_scaled(odd, operator, k + 1, i, x[k + 1])
         store_sum(y, i, even, odd)
-    a = 0.0
-    b = 0.0
-    c = 0.0
-    d = 0.0
-    for i in range(0, size, 4):
-        a += x[i] * y[i]
-        b += x[i + 1] * y[i + 1]
-        c += x[i + 2] * y[i + 2]
-        d += x[i + 3] * y[i + 3]
-    return (a + b) + (c + d)
-
-
-@merged
-def dot(row, x, size):
-    """Sum of products of two rows."""
-    total = 0.0
-    for i in range(size):
-        total += row[i] * x[i]
-    return total
+    return dot(x, y, size)
 
 
 @merged

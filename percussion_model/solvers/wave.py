@@ -231,10 +231,12 @@ class WaveSolver:
         entries["recoverable"] = rock
         return entries
 
-    def fields(self, state: WaveState) -> dict[str, np.ndarray]:
-        """Force [N] and velocity [m/s] of each cell, top to bottom, by bar."""
-        wp, wb = self._bars(state)
-        r = 2 * int(state.record[0]["parity"])
+    def fields(self, state: WaveState, t: float) -> dict[str, np.ndarray]:
+        """Force [N] and velocity [m/s] of each cell at the last grid point up to `t`."""
+        here = state.copy()
+        self._run(Task.BRING, here, t)
+        wp, wb = self._bars(here)
+        r = 2 * int(here.record[0]["parity"])
         out = {}
         for name, w, grid in (("piston", wp, self._piston), ("bit", wb, self._bit)):
             if grid is not None:
