@@ -12,8 +12,10 @@ import math
 from percussion_model.core.bar import deviation_energy, mean_velocity, strain_offset
 from percussion_model.core.kernel import kernel, merged
 from percussion_model.core.linear import PADDING, carry, dot, load, multiply, pad, store
+from percussion_model.core.peaks import note_steps
 from percussion_model.core.records import Mode
 from percussion_model.core.rock_law import REST_VELOCITY, crush, origin, stiffness
+from percussion_model.core.totals import now
 from percussion_model.core.wave_records import Coef
 
 BOTTOM = int(Coef.BOTTOM)
@@ -180,6 +182,10 @@ def leap_contact(par, s, wb, cb, powers, sums, steps, x, v, y):
         spring += K * d * v[k]
         peak = max(peak, force + max(0.0, z * fade * v[k]))
     s.b_peak_bit = peak
+    begin = now(par, s)
+    if begin + steps * par.dt > s.peak_from:
+        first = K * (s.p - origin(s))
+        note_steps(s, begin, par.dt, first, v, steps, K, C, z, fade, d, 0.0)
     before = contact_energy(par, s, wb, cb, K, s.p - still)
     path = dot(sums[s.mode], x, par.size_r)
     carry(powers[s.mode], steps, x, y, par.size_r)

@@ -24,6 +24,7 @@ from percussion_model.core.kernel import kernel, merged
 from percussion_model.core.linear import carry, dot, load, pad, quadratic, remove_mean, store
 from percussion_model.core.records import Mode, RockKind
 from percussion_model.core.rock_law import recoverable
+from percussion_model.core.standstill_peak import watch_standstill
 from percussion_model.core.totals import now
 from percussion_model.core.wave_records import Coef, LeapKind
 
@@ -231,6 +232,8 @@ def leap(par, s, wb, cb, ops, x, v, y, watched):
     if s.leap_kind == FLIGHT:
         path = leap_flight(par, s, wb, cb, ops[1][FF], steps, x, y)
     elif s.leap_kind == STANDSTILL:
+        if now(par, s) + steps * par.dt > s.peak_from:
+            watch_standstill(par, s, wb, cb, ops[1], ops[2], steps, x, v, y)
         path = leap_standstill(par, s, wb, cb, ops[1], ops[3], ops[6], steps, x, y)
     else:
         if not watched:

@@ -192,6 +192,10 @@ WAVE_STATE = np.dtype(
         ("rock_work", "f8"),  # [J]
         *[(f"e_{name}", "f8") for name in LEDGER_FIELDS],
         ("e_start", "f8"),  # stored energy at the start [J]
+        # greatest forces since a time that the observer sets; infinite: nobody asks
+        ("peak_from", "f8"),  # [s]
+        ("peak_bit", "f8"),  # [N]
+        ("peak_contact", "f8"),
         *_BLOW_STATE,
     ],
     align=True,

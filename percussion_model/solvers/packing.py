@@ -6,7 +6,7 @@ import numpy as np
 
 from percussion_model.core.records import DriveKind, Piston, RockKind
 from percussion_model.core.wave_records import WAVE_PAR, Coef
-from percussion_model.scene import Scene
+from percussion_model.scene_rules import SceneRules
 from percussion_model.solvers.grid import Grid, end_viscosity, substeps
 
 # An open gap of this many transits of the slower bar ends a blow where no
@@ -26,7 +26,7 @@ INPUT_FIELDS = {
 
 
 def pack_parameters(
-    scene: Scene,
+    scene: SceneRules,
     piston: Grid | None,
     cp: np.ndarray,
     bit: Grid,
@@ -80,7 +80,7 @@ def pack_parameters(
     return par
 
 
-def rock_numbers(scene: Scene) -> dict[str, float]:
+def rock_numbers(scene: SceneRules) -> dict[str, float]:
     """Numbers of the rock law as the kernels take them."""
     rock, kind = scene.rock, scene.effects.rock
     barrier = scene.barrier_on
