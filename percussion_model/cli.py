@@ -31,10 +31,10 @@ app = typer.Typer(
 
 SceneFile = Annotated[Path, typer.Argument(metavar="SCENE", help="A scene file (TOML).")]
 SolverName = Annotated[
-    Literal["wave", "rigid"] | None,
+    Literal["wave", "fem", "rigid"] | None,
     typer.Option("--solver", help="Solver; rigid makes piston and bit rigid."),
 ]
-Cells = Annotated[int | None, typer.Option("--cells", help="Cells in the piston [solver.cells].")]
+Cells = Annotated[int | None, typer.Option("--cells", help="Cells or elements in the piston.")]
 Settings = Annotated[
     list[str] | None,
     typer.Option(
@@ -198,7 +198,8 @@ def _load(path: Path, solver: str | None, cells: int | None, settings: list[str]
         if changes.get("piston.model", scene.piston.model) == "elastic":
             changes["piston.model"] = "rigid"
     if cells is not None:
-        changes["solver.cells"] = cells
+        name = changes.get("solver.name", scene.solver.name)
+        changes["fem.elements" if name == "fem" else "solver.cells"] = cells
     return scene.replace(**changes) if changes else scene
 
 

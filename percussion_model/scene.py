@@ -20,8 +20,6 @@ from percussion_model.parameters import (
     Loss,
     PistonBar,
     RockLaw,
-    RunOptions,
-    SolverOptions,
     Start,
 )
 from percussion_model.scene_text import (
@@ -35,6 +33,7 @@ from percussion_model.scene_text import (
     unknown_key,
     write_text,
 )
+from percussion_model.solver_options import FemOptions, RunOptions, SolverOptions
 
 __all__ = ["Scene", "SceneError", "read_setting"]
 
@@ -60,6 +59,7 @@ class Scene(BaseModel):
     contact: Contact = Contact()
     start: Start = Start()
     solver: SolverOptions = SolverOptions()
+    fem: FemOptions = FemOptions()
     run: RunOptions = RunOptions()
 
     def __init__(self, **values: Any) -> None:
@@ -170,7 +170,7 @@ class Scene(BaseModel):
 
     @property
     def solver_name(self) -> str:
-        """Solver that computes the scene: "wave" or "rigid"."""
+        """Solver that computes the scene: "wave", "fem" or "rigid"."""
         if self.solver.name != "auto":
             return self.solver.name
         return "wave" if self.bit.model == "elastic" else "rigid"
@@ -247,15 +247,15 @@ def refuse_contradictions(scene: Scene) -> None:
             'piston.model = "elastic" with bit.model = "rigid": no solver computes this; '
             'set bit.model = "elastic" or piston.model = "rigid"'
         )
-    if scene.solver.name == "wave" and bit == "rigid":
+    if scene.solver.name in ("wave", "fem") and bit == "rigid":
         raise SceneError(
-            'solver.name = "wave" needs bit.model = "elastic": '
+            f'solver.name = "{scene.solver.name}" needs bit.model = "elastic": '
             'set that, or solver.name = "rigid" or "auto"'
         )
     if scene.solver.name == "rigid" and bit == "elastic":
         raise SceneError(
             'solver.name = "rigid" computes no elastic bars: set piston.model = "rigid" and '
-            'bit.model = "rigid", or solver.name = "wave" or "auto"'
+            'bit.model = "rigid", or solver.name = "wave", "fem" or "auto"'
         )
     if effects.barrier and effects.rock != "bilinear" and "effects.barrier" in scene.given:
         raise SceneError(

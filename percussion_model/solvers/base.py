@@ -72,6 +72,10 @@ class Solver(Protocol):
 def make_solver(scene: Scene) -> Solver:
     """Make the solver that computes a scene."""
     # Only the kernels that are needed are loaded: that is most of a start.
+    if scene.solver_name == "fem":
+        from percussion_model.solvers.fem import FemSolver
+
+        return FemSolver(scene)
     if scene.solver_name == "wave":
         from percussion_model.solvers.wave import WaveSolver
 
