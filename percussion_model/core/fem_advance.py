@@ -51,7 +51,7 @@ def go_on(par, s, w, c, f, x, q, time, whole, blows, events):
                 return BLOWS_FULL
             if s.events_on == 1 and s.n_events + EVENTS_A_STEP > events.shape[0]:
                 return EVENTS_FULL
-        if not math.isfinite(s.p + s.v_end + s.gap + s.u_r):
+        if not math.isfinite(s.p + s.v_end + s.gap_rate + s.u_r):
             return NOT_FINITE
         h = end_of_step(par, s, w, c, f, x, q, h)
         take_step(par, s, w, c, x, h)
