@@ -156,9 +156,14 @@ class FemSolver:
         if n_p:
             w[Node.U, :n_p] -= start.gap
             w[Node.V, :n_p] = start.piston_velocity
-        read_nodes(self._par[0], s, w, self._mesh)
-        s["e_start"] = sum(self._stored(state))
+        self.refresh(state)
         return state
+
+    def refresh(self, state: FemState) -> None:
+        """Derive everything from the nodes, as at the start of a run."""
+        s = state.record[0]
+        read_nodes(self._par[0], s, self._nodes(state), self._mesh)
+        s["e_start"] = sum(self._stored(state))
 
     def _nodes(self, state: FemState) -> np.ndarray:
         return state.workspace.reshape(len(Node), -1)
