@@ -138,6 +138,15 @@ class Scene(BaseModel):
             set_key(tree, key, value)
         return type(self)(**tree)
 
+    def computed_by(self, solver: str, **changes: Any) -> Self:
+        """Return the scene for a solver, with other changes; rigid makes piston and bit rigid."""
+        changes["solver.name"] = solver
+        if solver == "rigid":
+            changes["bit.model"] = "rigid"
+            if changes.get("piston.model", self.piston.model) == "elastic":
+                changes["piston.model"] = "rigid"
+        return self.replace(**changes)
+
     def __getitem__(self, key: str) -> Any:
         """Return the value of a dotted key."""
         value: Any = self

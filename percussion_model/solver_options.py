@@ -14,6 +14,8 @@ from percussion_model.parameter_fields import (
     quantity,
 )
 
+SolverName = Literal["auto", "wave", "fem", "rigid"]
+
 # Elements that the paper gives the piston.
 PAPER_PISTON_ELEMENTS = 50
 
@@ -21,9 +23,7 @@ PAPER_PISTON_ELEMENTS = 50
 class SolverOptions(Parameters):
     """How the scene is computed."""
 
-    name: Literal["auto", "wave", "fem", "rigid"] = choice(
-        "auto", "solver; auto: wave for an elastic bit, else rigid"
-    )
+    name: SolverName = choice("auto", "solver; auto: wave for an elastic bit, else rigid")
     cells: int | None = quantity(
         None,
         "-",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from percussion_model.core.fem_records import Mesh, Node
-from percussion_model.core.kernel import inlined, kernel
+from percussion_model.core.kernel import fused, inlined, kernel
 from percussion_model.core.records import Mode
 from percussion_model.core.rock_law import recoverable
 
@@ -14,7 +14,7 @@ MASS, COUPLING = int(Mesh.MASS), int(Mesh.COUPLING)
 STIFFNESS, SHARE = int(Mesh.STIFFNESS), int(Mesh.SHARE)
 
 
-@inlined
+@fused
 def moment(c, a, row, first, count):
     """Sum of mass times value over `count` nodes."""
     p = 0.0
@@ -35,7 +35,7 @@ def relative_motion(par, c, a, row):
     return moment(c, a, row, 0, par.n_p) / par.mass_p - bit
 
 
-@inlined
+@fused
 def kinetic_energy(c, a, first, count):
     """Kinetic energy of `count` nodes that a bar has, eq. 52 of the paper [J]."""
     p = 0.0
@@ -49,7 +49,7 @@ def kinetic_energy(c, a, first, count):
     return 0.5 * p + q
 
 
-@inlined
+@fused
 def elastic_energy(c, a, n):
     """Strain energy of all elements [J]."""
     total = 0.0

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from percussion_model.core.drive import drive_force
 from percussion_model.core.fem_records import Factor, Mesh, Node, Trial
-from percussion_model.core.kernel import inlined, kernel, merged
+from percussion_model.core.kernel import fused, inlined, kernel, merged
 from percussion_model.core.records import Mode
 from percussion_model.core.rock_law import origin, stiffness
 
@@ -76,7 +76,7 @@ def factorise(par, c, f, slot, h, closed):
     f[at + PIVOT_IM, n - 1] = im
 
 
-@inlined
+@fused
 def load(par, s, w, c, x, h):
     """Right-hand side of the stage equation into rows RE, IM."""
     n_p = par.n_p
@@ -121,7 +121,7 @@ def load(par, s, w, c, x, h):
     x[IM, n - 1] -= K * h_im * s.v_end
 
 
-@inlined
+@fused
 def substitute(par, s, f, slot, x, h):
     """Solve with a factorisation, rock included; the solution replaces rows RE, IM."""
     at = slot * ROWS

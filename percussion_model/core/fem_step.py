@@ -10,7 +10,7 @@ from percussion_model.core.drive import drive_force
 from percussion_model.core.fem_bars import moment, read_nodes
 from percussion_model.core.fem_records import Mesh, Node, Trial
 from percussion_model.core.fem_scheme import damping, rate_bend
-from percussion_model.core.kernel import inlined, kernel, merged
+from percussion_model.core.kernel import fused, inlined, kernel, merged
 from percussion_model.core.records import Mode, RockKind
 from percussion_model.core.rock_law import crush, origin, recoverable, stiffness
 
@@ -38,7 +38,7 @@ def dashpot_work(par, s, x, w, h):
     return C * h * (mean * mean + TWELFTH * bend * bend)
 
 
-@inlined
+@fused
 def book_bars(par, w, c, x, h):
     """Structural loss and dissipation of the scheme in each element."""
     n = par.n_p + par.n_b

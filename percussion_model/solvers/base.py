@@ -6,6 +6,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from percussion_model.parameters import Bar
 from percussion_model.scene import Scene
 
 
@@ -64,6 +65,9 @@ class Solver(Protocol):
 
     def energy(self, state: Any, t: float) -> dict[str, float]:
         """Ledger [J] at the last grid point before `t`: LEDGER_FIELDS, start, stored."""
+
+    def section_cells(self, bar: Bar) -> list[int]:
+        """Cells or elements in each section of an elastic bar."""
 
     def statistics(self, state: Any) -> dict[str, int]:
         """Counts of what the solver did."""

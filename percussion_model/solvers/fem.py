@@ -29,8 +29,15 @@ from percussion_model.core.records import (
     Piston,
     RockKind,
 )
+from percussion_model.parameters import Bar
 from percussion_model.scene import Scene
-from percussion_model.solvers.mesh import BarMesh, assemble, critical_frequency, cut_bar
+from percussion_model.solvers.mesh import (
+    BarMesh,
+    assemble,
+    critical_frequency,
+    cut_bar,
+    section_count,
+)
 from percussion_model.solvers.packing import (
     INPUT_FIELDS,
     REARM_TRANSITS,
@@ -76,7 +83,7 @@ class FemSolver:
         self.scene = scene
         elastic_piston = scene.piston.model == "elastic"
         first = scene.piston if elastic_piston else scene.bit
-        element = first.length / scene.fem.elements
+        element = self._element = first.length / scene.fem.elements
         self._bit = cut_bar(scene.bit, element)
         self._piston: BarMesh | None = None
         if scene.piston.model != "absent":
@@ -266,6 +273,10 @@ class FemSolver:
                 out[f"{name}_force"] = -stiffness * np.diff(nodes[Node.U])
                 out[f"{name}_velocity"] = 0.5 * (nodes[Node.V, :-1] + nodes[Node.V, 1:])
         return out
+
+    def section_cells(self, bar: Bar) -> list[int]:
+        """Elements in each section of an elastic bar."""
+        return [section_count(section, self._element) for section in bar.sections]
 
     def statistics(self, state: FemState) -> dict[str, int]:
         """Counts of what the solver did."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from percussion_model.core.wave_records import Coef
-from percussion_model.parameters import Bar
+from percussion_model.parameters import Bar, Section
 
 # Cells in the piston (or the only elastic bar) where the scene names none.
 DEFAULT_CELLS = 20
@@ -46,6 +46,11 @@ class Grid:
         return len(self.mass)
 
 
+def section_count(section: Section, time_step: float) -> int:
+    """Cells that a section gets."""
+    return max(1, round(section.transit_time / time_step))
+
+
 def cut(bar: Bar, time_step: float) -> Grid:
     """Cut a bar into cells of one transit time.
 
@@ -56,7 +61,7 @@ def cut(bar: Bar, time_step: float) -> Grid:
     mass: list[float] = []
     fit = 0.0
     for section in bar.sections:
-        count = max(1, round(section.transit_time / time_step))
+        count = section_count(section, time_step)
         fit = max(fit, abs(section.transit_time / (count * time_step) - 1.0))
         impedance += [section.mass / (count * time_step)] * count
         mass += [section.mass / count] * count

@@ -8,7 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from percussion_model.core.fem_records import Mesh
-from percussion_model.parameters import Bar
+from percussion_model.parameters import Bar, Section
+
+# A length this close to half an element is half an element.
+ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
@@ -35,6 +38,11 @@ class BarMesh:
         return len(self.mass)
 
 
+def section_count(section: Section, element: float) -> int:
+    """Elements of about the length `element` [m] that a section gets, half a one for one."""
+    return max(1, math.floor(section.length / element + 0.5 + ROUNDING))
+
+
 def cut_bar(bar: Bar, element: float) -> BarMesh:
     """Cut the sections of a bar into elements of about one length.
 
@@ -42,15 +50,14 @@ def cut_bar(bar: Bar, element: float) -> BarMesh:
     ----------
     bar : Bar
     element : float
-        Wanted length [m]; each section gets the nearest whole number of
-        elements, half a one counting as one, and at least one.
+        Wanted length [m].
     """
     if bar.model != "elastic":
         none = np.zeros(0)
         return BarMesh(none, none, none, none, bar.mass)
     rows = []
     for section in bar.sections:
-        count = max(1, math.floor(section.length / element + 0.5 + 1e-9))
+        count = section_count(section, element)
         length = section.length / count
         row = (
             length,

@@ -16,11 +16,13 @@ from percussion_model.core.records import (
 )
 from percussion_model.core.totals import lost_in_faces, resync, stored_energy
 from percussion_model.core.wave_records import WAVE_STATE, Coef, Row, Task
+from percussion_model.parameters import Bar
 from percussion_model.scene import Scene
 from percussion_model.solvers.grid import (
     choose_time_step,
     coefficients,
     cut,
+    section_count,
 )
 from percussion_model.solvers.operators import LEVELS, build_operators, padded
 from percussion_model.solvers.packing import (
@@ -230,6 +232,10 @@ class WaveSolver:
                 out[f"{name}_force"] = grid.impedance * (d - u)
                 out[f"{name}_velocity"] = d + u
         return out
+
+    def section_cells(self, bar: Bar) -> list[int]:
+        """Cells in each section of an elastic bar."""
+        return [section_count(section, self.time_step) for section in bar.sections]
 
     def statistics(self, state: WaveState) -> dict[str, int]:
         """Counts of what the solver did."""
