@@ -154,11 +154,12 @@ def fill_ledger(par, s, wp, cp, wb, cb, row):
     row[LEDGER + 6] = s.e_loss + lost_in_faces(par, wp, wb)
     row[LEDGER + 7] = s.e_contact
     row[LEDGER + 8] = s.e_numerical
+    row[LEDGER + 9] = s.e_overshoot
     kinetic, elastic, rock = stored_energy(par, s, wp, cp, wb, cb)
-    row[LEDGER + 9] = s.e_start
-    row[LEDGER + 10] = kinetic
-    row[LEDGER + 11] = elastic
-    row[LEDGER + 12] = rock
+    row[LEDGER + 10] = s.e_start
+    row[LEDGER + 11] = kinetic
+    row[LEDGER + 12] = elastic
+    row[LEDGER + 13] = rock
 
 
 @kernel
