@@ -52,7 +52,11 @@ PLACE_ROW = number_row(
 )
 
 # Numbers that may be left out, and what the FMU takes for "left out".
-LEFT_OUT = {"solver.cells": (0, "0: by the solver"), "contact.restitution": (-1.0, "-1: St Venant")}
+LEFT_OUT = {
+    "solver.cells": (0, "0: by the solver"),
+    "contact.restitution": (-1.0, "-1: St Venant"),
+    "fem.damping_ratio": (-1.0, "-1: by loss.time"),
+}
 
 
 def hammer_variables(scene: Scene) -> list[Variable]:
