@@ -57,6 +57,7 @@ LEFT_OUT = {
     "solver.cells": (0, "0: by the solver"),
     "contact.restitution": (-1.0, "-1: St Venant"),
     "gauge.position": (-1.0, "-1: the middle"),
+    "fem.damping_ratio": (-1.0, "-1: by loss.time"),
 }
 
 

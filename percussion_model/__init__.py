@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from percussion_model.calibration import calibrate_drive, piston_cycle
+    from percussion_model.comparison import Comparison, compare
     from percussion_model.core.records import (
         BLOW,
         EVENT,
@@ -39,7 +40,9 @@ _HOME = {
     "Simulation": "simulation",
     "SimulationError": "inputs",
     "Snapshot": "simulation",
+    "Comparison": "comparison",
     "calibrate_drive": "calibration",
+    "compare": "comparison",
     "piston_cycle": "calibration",
     "simulate": "simulation",
 }
@@ -49,6 +52,7 @@ __all__ = [
     "EVENT",
     "SAMPLE_FIELDS",
     "BitBar",
+    "Comparison",
     "EventKind",
     "Mode",
     "PistonBar",
@@ -62,6 +66,7 @@ __all__ = [
     "Snapshot",
     "__version__",
     "calibrate_drive",
+    "compare",
     "piston_cycle",
     "simulate",
 ]

@@ -1,4 +1,4 @@
-"""The command `percussion`: run, explain, plot, new."""
+"""The command `percussion`: run, explain, plot, compare, new."""
 
 from __future__ import annotations
 
@@ -9,7 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from percussion_model.quick_start import own_process
+
 if TYPE_CHECKING:
+    from percussion_model.comparison import Comparison
     from percussion_model.result import Result
     from percussion_model.scene import Scene
 
@@ -31,10 +34,10 @@ app = typer.Typer(
 
 SceneFile = Annotated[Path, typer.Argument(metavar="SCENE", help="A scene file (TOML).")]
 SolverName = Annotated[
-    Literal["wave", "rigid"] | None,
+    Literal["wave", "fem", "rigid"] | None,
     typer.Option("--solver", help="Solver; rigid makes piston and bit rigid."),
 ]
-Cells = Annotated[int | None, typer.Option("--cells", help="Cells in the piston [solver.cells].")]
+Cells = Annotated[int | None, typer.Option("--cells", help="Cells or elements in the piston.")]
 Settings = Annotated[
     list[str] | None,
     typer.Option(
@@ -45,6 +48,10 @@ Settings = Annotated[
 ]
 Duration = Annotated[float | None, typer.Option("--duration", help="Simulated time [s].")]
 Settle = Annotated[float | None, typer.Option("--settle", help="Time before blows count [s].")]
+JsonFile = Annotated[
+    str | None,
+    typer.Option("--json", metavar="FILE|-", help="Write the summary as JSON; - for stdout."),
+]
 Out = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder for results.")]
 
 
@@ -79,10 +86,7 @@ def run(
         typer.Option("--trace", metavar="DT", help="Keep a trace, sampled every DT [s]."),
     ] = None,
     out: Out = None,
-    json_file: Annotated[
-        str | None,
-        typer.Option("--json", metavar="FILE|-", help="Write the summary as JSON; - for stdout."),
-    ] = None,
+    json_file: JsonFile = None,
     figures: Annotated[
         bool, typer.Option(help="With --out, draw figures and write report.html.")
     ] = True,
@@ -172,6 +176,42 @@ def plot(
 
 
 @app.command()
+def compare(
+    scene: SceneFile,
+    solvers: Annotated[
+        str, typer.Option("--solvers", metavar="A,B", help="Solvers, the first to compare with.")
+    ] = "wave,fem,rigid",
+    duration: Duration = None,
+    settle: Settle = None,
+    settings: Settings = None,
+    out: Out = None,
+    json_file: JsonFile = None,
+    figures: Annotated[bool, typer.Option(help="Draw the last blow of all solvers.")] = True,
+) -> None:
+    """Run a scene with several solvers: a table and a figure side by side."""
+    from percussion_model.comparison import compare as run_all
+    from percussion_model.comparison import read_solvers
+    from percussion_model.result_files import check_writable, staged_text, to_json
+    from percussion_model.terminal import progress_bar, show_comparison
+
+    names = read_solvers(solvers)
+    chosen = _load(scene, None, None, settings)
+    folder = out or Path("out") / f"{scene.stem}-compared"
+    check_writable(folder)
+    end = chosen.run.duration if duration is None else duration
+    with progress_bar(end * len(names)) as progress:
+        found = run_all(chosen, names, duration, settle, progress)
+    if json_file == "-":
+        typer.echo(to_json(found.to_dict()))
+    elif json_file is not None:
+        staged_text(Path(json_file), to_json(found.to_dict()) + "\n")
+    if json_file != "-":
+        show_comparison(found)
+    if figures:
+        _draw_comparison(found, folder)
+
+
+@app.command()
 def new(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="The scene file to write.")],
     force: Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")] = False,
@@ -187,19 +227,20 @@ def new(
 
 def _load(path: Path, solver: str | None, cells: int | None, settings: list[str] | None) -> Scene:
     """Read a scene and apply what the command line changes."""
+    from percussion_model.quick_start import load_numba
     from percussion_model.scene import Scene, read_setting
 
+    load_numba()
     scene = Scene.from_toml(path)
     changes: dict[str, Any] = dict(read_setting(text) for text in settings or ())
     if solver is not None:
-        changes["solver.name"] = solver
-    if solver == "rigid":
-        changes["bit.model"] = "rigid"
-        if changes.get("piston.model", scene.piston.model) == "elastic":
-            changes["piston.model"] = "rigid"
+        scene = scene.computed_by(solver, **changes)
+    elif changes:
+        scene = scene.replace(**changes)
     if cells is not None:
-        changes["solver.cells"] = cells
-    return scene.replace(**changes) if changes else scene
+        key = "fem.elements" if scene.solver_name == "fem" else "solver.cells"
+        scene = scene.replace(**{key: cells})
+    return scene
 
 
 def _draw(result: Result, folder: Path) -> None:
@@ -211,6 +252,16 @@ def _draw(result: Result, folder: Path) -> None:
         _complain(_needs_plot_extra(error))
         return
     write_report(result, folder, figures(result, folder))
+
+
+def _draw_comparison(found: Comparison, folder: Path) -> None:
+    try:
+        from percussion_model.plotting.comparison import save_comparison
+    except ImportError as error:
+        _complain(_needs_plot_extra(error))
+        return
+    for path in save_comparison(found, folder):
+        print(path, file=sys.stderr)
 
 
 def _needs_plot_extra(error: ImportError) -> str:
@@ -226,6 +277,7 @@ def _complain(message: str, code: int = 0) -> int:
 
 def main() -> None:
     """Run the command line; errors are one message and an exit code."""
+    own_process()
     sys.exit(_guarded(lambda: app(standalone_mode=False)))
 
 

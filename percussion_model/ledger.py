@@ -6,17 +6,18 @@ import math
 
 WORKS = ("drive", "feed", "gravity")
 DISSIPATED = ("crushing", "barrier", "standstill", "loss", "contact")
+NUMERICAL = ("numerical", "overshoot")
 STORED = ("kinetic", "elastic", "recoverable")
 
 
 def complete_ledger(entries: dict[str, float]) -> dict[str, float]:
     """Add sums, residual and relative figures to the entries of a solver [J]."""
     ledger = {"initial": entries["start"]}
-    ledger |= {name: entries[name] for name in (*WORKS, *DISSIPATED, "numerical", *STORED)}
+    ledger |= {name: entries[name] for name in (*WORKS, *DISSIPATED, *NUMERICAL, *STORED)}
     for name, parts in (("input", WORKS), ("stored", STORED), ("dissipated", DISSIPATED)):
         ledger[name] = sum([entries[part] for part in parts])
     ledger["residual"], scale = unexplained(entries)
-    for name in ("numerical", "residual"):
+    for name in (*NUMERICAL, "residual"):
         ledger[f"{name}_relative"] = ledger[name] / scale if scale > 0 else math.nan
     return {name: float(value) for name, value in ledger.items()}
 
@@ -27,5 +28,6 @@ def unexplained(entries: dict[str, float]) -> tuple[float, float]:
     stored = sum([entries[name] for name in STORED])
     dissipated = sum([entries[name] for name in DISSIPATED])
     start = entries["start"]
-    residual = start + sum(works) - stored - dissipated - entries["numerical"]
+    apart = sum([entries[name] for name in NUMERICAL])
+    residual = start + sum(works) - stored - dissipated - apart
     return residual, abs(start) + sum(map(abs, works))

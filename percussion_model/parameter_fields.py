@@ -11,6 +11,8 @@ Needs = dict[str, tuple[object, ...]]
 # What must hold, key by key, for a parameter to have any influence.
 HAS_PISTON: Needs = {"piston.model": ("elastic", "rigid")}
 HAS_WAVES: Needs = {"bit.model": ("elastic",)}
+SOLVER_WAVE: Needs = {"solver.name": ("auto", "wave"), **HAS_WAVES}
+SOLVER_FEM: Needs = {"solver.name": ("fem",)}
 ALL_RIGID: Needs = {"piston.model": ("rigid",), "bit.model": ("rigid",)}
 GRAVITY_ON: Needs = {"effects.gravity": (True,)}
 FEED_ON: Needs = {"effects.feed": (True,)}

@@ -32,6 +32,7 @@ from percussion_model.parameter_fields import (
     quantity,
 )
 from percussion_model.scene_rules import BarNumbers, SectionNumbers
+from percussion_model.solver_options import FemOptions, RunOptions, SolverOptions
 
 # Table II of the paper as repaired in docs/model.md.
 STEEL_YOUNGS_MODULUS = 210e9
@@ -216,30 +217,6 @@ class Start(Parameters):
     )
 
 
-class SolverOptions(Parameters):
-    """How the scene is computed."""
-
-    name: Literal["auto", "wave", "rigid"] = choice("auto", "solver; auto: wave for an elastic bit")
-    cells: int | None = quantity(
-        None,
-        "-",
-        "cells in the piston, or in the bit where no piston is elastic; left out: by the solver",
-        HAS_WAVES,
-        ge=1,
-        le=100_000,
-    )
-    leaps: Flag = choice(True, "cross quiet phases in leaps", HAS_WAVES)
-
-
-class RunOptions(Parameters):
-    """How long the scene runs."""
-
-    duration: float = quantity(4.0, "s", "simulated time", gt=0, le=1e6)
-    settle: float = quantity(
-        1.0, "s", "time before blows count for the rate of penetration", ge=0, le=1e6
-    )
-
-
 # The groups of a scene, in the order in which they are written.
 GROUPS: dict[str, type[Parameters]] = {
     "effects": Effects,
@@ -253,5 +230,6 @@ GROUPS: dict[str, type[Parameters]] = {
     "contact": Contact,
     "start": Start,
     "solver": SolverOptions,
+    "fem": FemOptions,
     "run": RunOptions,
 }

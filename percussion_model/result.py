@@ -53,7 +53,8 @@ class Result:
         `gravity` work and their sum `input`; `crushing`, `barrier`,
         `standstill`, `loss` and `contact` and their sum `dissipated`;
         `kinetic`, `elastic` and `recoverable` and their sum `stored`;
-        `numerical`: what the discretisation dissipates; `residual`: what no
+        `numerical`: what the discretisation dissipates; `overshoot`: what
+        springs lose where an event is found just past it; `residual`: what no
         entry explains. Relative figures divide by `initial` and the absolute
         works of drive, feed and gravity.
     statistics : dict of int

@@ -21,8 +21,6 @@ from percussion_model.parameters import (
     Loss,
     PistonBar,
     RockLaw,
-    RunOptions,
-    SolverOptions,
     Start,
 )
 from percussion_model.scene_rules import SceneError, SceneRules, refuse_contradictions
@@ -36,6 +34,7 @@ from percussion_model.scene_text import (
     unknown_key,
     write_text,
 )
+from percussion_model.solver_options import FemOptions, RunOptions, SolverOptions
 
 __all__ = ["Scene", "SceneError", "read_setting"]
 
@@ -61,6 +60,7 @@ class Scene(SceneRules, BaseModel):
     contact: Contact = Contact()
     start: Start = Start()
     solver: SolverOptions = SolverOptions()
+    fem: FemOptions = FemOptions()
     run: RunOptions = RunOptions()
 
     def __init__(self, **values: Any) -> None:
@@ -138,6 +138,15 @@ class Scene(SceneRules, BaseModel):
             self._list_sections(tree, key)
             set_key(tree, key, value)
         return type(self)(**tree)
+
+    def computed_by(self, solver: str, **changes: Any) -> Self:
+        """Return the scene for a solver, with other changes; rigid makes piston and bit rigid."""
+        changes["solver.name"] = solver
+        if solver == "rigid":
+            changes["bit.model"] = "rigid"
+            if changes.get("piston.model", self.piston.model) == "elastic":
+                changes["piston.model"] = "rigid"
+        return self.replace(**changes)
 
     def __getitem__(self, key: str) -> Any:
         """Return the value of a dotted key."""

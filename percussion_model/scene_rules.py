@@ -52,6 +52,7 @@ class BarNumbers:
     """Numbers that follow from the sections of a bar."""
 
     if TYPE_CHECKING:
+        model: str
         sections: Sequence[SectionNumbers]
 
     @property
@@ -85,6 +86,7 @@ class SceneRules:
         contact: Any
         start: Any
         solver: Any
+        fem: Any
         run: Any
 
     def row_of(self, key: str) -> Row:
@@ -112,7 +114,7 @@ class SceneRules:
 
     @property
     def solver_name(self) -> str:
-        """Solver that computes the scene: "wave" or "rigid"."""
+        """Solver that computes the scene: "wave", "fem" or "rigid"."""
         if self.solver.name != "auto":
             return str(self.solver.name)
         return "wave" if self.bit.model == "elastic" else "rigid"
@@ -142,15 +144,15 @@ def refuse_contradictions(scene: SceneRules) -> None:
             'piston.model = "elastic" with bit.model = "rigid": no solver computes this; '
             'set bit.model = "elastic" or piston.model = "rigid"'
         )
-    if scene.solver.name == "wave" and bit == "rigid":
+    if scene.solver.name in ("wave", "fem") and bit == "rigid":
         raise SceneError(
-            'solver.name = "wave" needs bit.model = "elastic": '
+            f'solver.name = "{scene.solver.name}" needs bit.model = "elastic": '
             'set that, or solver.name = "rigid" or "auto"'
         )
     if scene.solver.name == "rigid" and bit == "elastic":
         raise SceneError(
             'solver.name = "rigid" computes no elastic bars: set piston.model = "rigid" and '
-            'bit.model = "rigid", or solver.name = "wave" or "auto"'
+            'bit.model = "rigid", or solver.name = "wave", "fem" or "auto"'
         )
     if effects.barrier and effects.rock != "bilinear" and "effects.barrier" in scene.given:
         raise SceneError(

@@ -110,10 +110,13 @@ class Simulation(Runner):
         return complete_ledger(self.solver.energy(self._state, now))
 
     def fields(self) -> dict[str, np.ndarray]:
-        """Force [N] and velocity [m/s] in each cell of the elastic bars, top to bottom."""
-        here = self._state.copy()
-        self.solver.commit(here, self._time)
-        return self.solver.fields(here)
+        """Force [N] and velocity [m/s] in each cell of the elastic bars, top to bottom.
+
+        At the last grid point up to the present; empty where no bar is elastic.
+        """
+        now = max(self._time, self.solver.time(self._state))
+        row = np.empty(len(SAMPLE_FIELDS))
+        return self.solver.fields(self.solver.look(self._state, now, row))
 
     def statistics(self) -> dict[str, int]:
         """Counts of what the solver did."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
@@ -13,10 +13,9 @@ from rich.markup import escape
 from rich.table import Table
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from rich.progress import Progress, TaskID
 
+    from percussion_model.comparison import Comparison
     from percussion_model.result import Result
     from percussion_model.scene import Scene
     from percussion_model.solvers import Solver
@@ -70,6 +69,51 @@ def show_warnings(console: Console, warnings: list[str]) -> None:
     """Print warnings, if there are any."""
     for text in warnings:
         console.print(f"[yellow]warning:[/yellow] {escape(text)}", highlight=False)
+
+
+def show_comparison(found: Comparison) -> None:
+    """Print the numbers of several solvers, each beside its difference to the first."""
+    summaries, differences = found.summaries(), found.differences()
+    title = found.results[found.first].scene.title
+    table = Table(title=escape(title) or None)
+    table.add_column("", min_width=22)
+    for name in summaries:
+        table.add_column(name, justify="right", no_wrap=True)
+        if name in differences:
+            table.add_column("off, %", justify="right", no_wrap=True)
+    for label, key, factor, unit in _SHOWN:
+        cells = []
+        for name, summary in summaries.items():
+            cells.append(_number(summary[key], factor))
+            if name in differences:
+                off = differences[name].get(key)
+                cells.append("-" if off is None else f"{100.0 * off:+.2f}")
+        table.add_row(f"{label}, {unit}" if unit else label, *cells)
+    table.add_section()
+    for label, value in _EFFORT.items():
+        cells = []
+        for name, summary in summaries.items():
+            found_here = value(summary)
+            cells.append("-" if found_here is None else f"{found_here:.2g}")
+            cells += [""] * (name in differences)
+        table.add_row(label, *cells)
+    console = Console()
+    console.print(table)
+    for name, result in found.results.items():
+        show_warnings(console, [f"{name}: {text}" for text in result.warnings])
+
+
+# How dear a run was and how true to its ledger: name, and where in a summary.
+_EFFORT: dict[str, Callable[[dict[str, Any]], float | None]] = {
+    "Computed in, s": lambda summary: summary["wall_time"],
+    "Times real time": lambda summary: summary["real_time_factor"],
+    "Ledger: numerical": lambda summary: summary["energy"]["numerical_relative"],
+    "Ledger: residual": lambda summary: summary["energy"]["residual_relative"],
+}
+
+
+def _number(value: float | None, factor: float) -> str:
+    return "-" if value is None else f"{factor * value:.5g}"
 
 
 def show_explanation(scene: Scene, solver: Solver, cost: dict[str, float]) -> None:

@@ -14,19 +14,21 @@ from percussion_model.stepping import Simulation
 SHORT = 1e-4
 
 
-def compile_kernels(model: str) -> str:
-    """Run a moment of the reference scene with elastic or rigid bodies."""
-    simulation = Simulation(Scene().replace(**{"piston.model": model, "bit.model": model}))
+def compile_kernels(solver: str) -> str:
+    """Run a moment of the reference scene with one of the solvers."""
+    model = "rigid" if solver == "rigid" else "elastic"
+    changes = {"solver.name": solver, "piston.model": model, "bit.model": model}
+    simulation = Simulation(Scene().replace(**changes))
     simulation.advance(SHORT)
     simulation.observe()
     simulation.energy()
-    return model
+    return solver
 
 
 def main() -> None:
     """Compile the kernels of all solvers, two at a time."""
     with ProcessPoolExecutor(max_workers=2) as pool:
-        list(pool.map(compile_kernels, ("elastic", "rigid")))
+        list(pool.map(compile_kernels, ("wave", "fem", "rigid")))
 
 
 if __name__ == "__main__":

@@ -191,10 +191,7 @@ class Motion(Runner):
 
 def copied(state: Any, spare: Any) -> Any:
     """Copy of a state, into an old copy where there is one."""
-    if spare is None:
+    if spare is None or isinstance(state, np.ndarray) or not hasattr(state, "take"):
         return state.copy()
-    if isinstance(state, np.ndarray):
-        spare[:] = state
-    else:
-        spare.take(state)
+    spare.take(state)
     return spare

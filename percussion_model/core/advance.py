@@ -7,7 +7,7 @@ import math
 from percussion_model.core.bar import kinetic_energy
 from percussion_model.core.drive import drive_force
 from percussion_model.core.kernel import kernel, merged
-from percussion_model.core.leap import leap, plan_leap
+from percussion_model.core.leap import FEWEST_STEPS, leap, longest_leap, plan_leap
 from percussion_model.core.records import PEAK_FIELDS, SAMPLE_FIELDS, Piston, Status
 from percussion_model.core.rock import MOST_CROSSINGS
 from percussion_model.core.sleep import put_to_sleep, sleep_on, wake_piston
@@ -37,18 +37,23 @@ GRID_ROUNDING = 1e-6
 @merged
 def plan(par, s, wp, cp, wb, cb, ops, x, v, y):
     """Wake the piston or put it to sleep, and plan the bit's next leap."""
-    if s.asleep == 1 and s.step >= s.wake and not sleep_on(par, s, wb, cb):
+    # a leap that ended just short of it is none to wait for
+    due = s.asleep == 1 and s.step + FEWEST_STEPS > s.wake and s.leap_end < 0
+    if due and not sleep_on(par, s, wb, cb):
         wake_piston(par, s, wp, cp, wb, cb, ops[0], x, y)
         s.no_sleep = s.step
         s.count_wakes += 1
     if par.piston != ABSENT and s.asleep == 0:
         if s.step < s.no_sleep:
             return
-        put_to_sleep(par, s, wp, cp, wb, cb)
+        put_to_sleep(par, s, wp, cp, wb, cb, ops, x, v, y)
         if s.asleep == 0:
             return
     if s.leap_end < 0 and s.step >= s.no_plan:
-        plan_leap(par, s, wb, cb, ops[4], x, v)
+        most = longest_leap(par)
+        if s.asleep == 1:
+            most = min(most, s.wake - s.step)
+        plan_leap(par, s, wb, cb, ops[2], x, v, most)
 
 
 @merged
@@ -149,11 +154,12 @@ def fill_ledger(par, s, wp, cp, wb, cb, row):
     row[LEDGER + 6] = s.e_loss + lost_in_faces(par, wp, wb)
     row[LEDGER + 7] = s.e_contact
     row[LEDGER + 8] = s.e_numerical
+    row[LEDGER + 9] = s.e_overshoot
     kinetic, elastic, rock = stored_energy(par, s, wp, cp, wb, cb)
-    row[LEDGER + 9] = s.e_start
-    row[LEDGER + 10] = kinetic
-    row[LEDGER + 11] = elastic
-    row[LEDGER + 12] = rock
+    row[LEDGER + 10] = s.e_start
+    row[LEDGER + 11] = kinetic
+    row[LEDGER + 12] = elastic
+    row[LEDGER + 13] = rock
 
 
 @kernel

@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import math
 
+from percussion_model.core.common_state import CHECKPOINTS
 from percussion_model.core.kernel import inlined, kernel, merged
-from percussion_model.core.records import EventKind, Mode
-from percussion_model.core.wave_records import CHECKPOINTS
+from percussion_model.core.records import DriveKind, EventKind, Mode
 
 SS = int(Mode.SS)
+PRESSURE = int(DriveKind.PRESSURE)
 CONTACT_CLOSED = int(EventKind.CONTACT_CLOSED)
 CONTACT_OPENED = int(EventKind.CONTACT_OPENED)
 
@@ -131,3 +132,9 @@ def start_blow(s, blows, time, piston_velocity, bit_position, impulse, mass_p):
     s.b_drive0 = s.i_drive
     s.b_contacts = 0
     s.b_cycles = 0
+
+
+@merged
+def starts_blow(par, s, time):
+    """Whether a closure of the gap at `time` starts a blow."""
+    return s.armed == 1 or (par.drive != PRESSURE and time - s.t_open >= par.rearm_time)

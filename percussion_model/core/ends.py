@@ -9,19 +9,18 @@ from __future__ import annotations
 import math
 
 from percussion_model.core.bar import face_velocities, send_waves, send_waves_with_loss
-from percussion_model.core.blows import push_event, start_blow
+from percussion_model.core.blows import push_event, start_blow, starts_blow
 from percussion_model.core.contact import bar_contact, mass_contact
 from percussion_model.core.drive import drive_force, switch_drive
 from percussion_model.core.kernel import inlined, kernel, merged
 from percussion_model.core.loss import finish_loss, loss_substeps, smooth_cells
-from percussion_model.core.records import DriveKind, EventKind, Piston
+from percussion_model.core.records import EventKind, Piston
 from percussion_model.core.rock import rock_step
 from percussion_model.core.totals import bit_position, now
 from percussion_model.core.wave_records import Row
 
 ABSENT, ELASTIC = int(Piston.ABSENT), int(Piston.ELASTIC)
 CONTACT_CLOSED, CONTACT_OPENED = int(EventKind.CONTACT_CLOSED), int(EventKind.CONTACT_OPENED)
-PRESSURE = int(DriveKind.PRESSURE)
 FACE = int(Row.FACE)
 
 # A part of a step shorter than this is not worth a step of its own.
@@ -84,12 +83,6 @@ def book_end(s, z, kappa, inner, d, q, tau):
     """
     s.e_loss += kappa * z * (q - inner * d)
     s.e_numerical += z * (q - d * d / tau)
-
-
-@merged
-def starts_blow(par, s, time):
-    """Whether a closure of the gap at `time` starts a blow."""
-    return s.armed == 1 or (par.drive != PRESSURE and time - s.t_open >= par.rearm_time)
 
 
 @kernel

@@ -62,5 +62,9 @@ kernel = njit(cache=True, error_model="numpy", _nrt=False)
 # For what runs in every step: arrays cost nine words an argument to pass.
 inlined = njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
 
+# For long recursions, whose latency counts: a product and a sum may be one operation
+# with one rounding. The bits are the same in every run of one build.
+fused = njit(cache=True, error_model="numpy", _nrt=False, forceinline=True, fastmath={"contract"})
+
 # For what is called from one place: compiled as part of its caller alone.
 merged = njit(cache=True, error_model="numpy", _nrt=False, inline="always")

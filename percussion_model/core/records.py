@@ -136,7 +136,8 @@ LEDGER_FIELDS = (
     "standstill",  # dashpot in SS
     "loss",  # structural loss in the bars
     "contact",  # restitution of rigid contact
-    "numerical",  # what averaging over cells dissipates
+    "numerical",  # what the discretisation dissipates
+    "overshoot",  # what springs lose where an event is found just past its place
 )
 
 # Stored energies [J] found by reading a state: at the start, and now.

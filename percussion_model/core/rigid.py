@@ -145,10 +145,11 @@ def fill_ledger(par, s, tau, row):
     row[LEDGER + 6] = s.loss
     row[LEDGER + 7] = s.contact
     row[LEDGER + 8] = s.numerical
-    row[LEDGER + 9] = s.initial_energy
-    row[LEDGER + 10] = kinetic_energy(par, s.v_p, s.v_b)
-    row[LEDGER + 11] = 0.0
-    row[LEDGER + 12] = recoverable(par, s, s.p)
+    row[LEDGER + 9] = s.overshoot
+    row[LEDGER + 10] = s.initial_energy
+    row[LEDGER + 11] = kinetic_energy(par, s.v_p, s.v_b)
+    row[LEDGER + 12] = 0.0
+    row[LEDGER + 13] = recoverable(par, s, s.p)
 
 
 @njit(cache=True, error_model="numpy")

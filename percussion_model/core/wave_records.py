@@ -11,7 +11,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from percussion_model.core.records import LEDGER_FIELDS
+from percussion_model.core.common_state import COMMON_STATE
 
 
 class Row(IntEnum):
@@ -95,38 +95,16 @@ WAVE_PAR = np.dtype(
         ("barrier", "i8"),  # 1: the energy barrier is on
         ("release", "i8"),  # 1: standstill leaves to free flight when F_R reaches 0
         ("loss", "i8"),  # sub-steps of the loss operator, 0: no loss
-        ("leaps", "i8"),  # dyadic levels of the leap operators, 0: no leaps
-        ("size_p", "i8"),  # padded size of the leap operators: piston, free bit
-        ("size_b", "i8"),
+        ("leaps", "i8"),  # levels of the leap operators, four to one: 0: no leaps
+        ("size_p", "i8"),  # padded size of the leap operators: piston
         ("size_r", "i8"),  # bit on the rock
     ],
     align=True,
 )
 
-_BLOW_STATE = [
-    ("b_time", "f8"),
-    ("b_impact", "f8"),
-    ("b_rebound", "f8"),
-    ("b_stroke", "f8"),
-    ("b_peak_contact", "f8"),
-    ("b_peak_bit", "f8"),
-    ("b_standstill", "f8"),
-    ("b_position", "f8"),
-    ("b_rock0", "f8"),
-    ("b_contact0", "f8"),
-    ("b_bit0", "f8"),
-    ("b_drive0", "f8"),
-    ("b_contacts", "i8"),
-    ("b_cycles", "i8"),
-    ("b_started", "i8"),
-    ("armed", "i8"),  # the next closure starts a blow
-]
-
-# Checkpoints of the running bit impulse during standstill.
-CHECKPOINTS = 32
-
 WAVE_STATE = np.dtype(
     [
+        *COMMON_STATE,
         ("step", "i8"),  # number of steps done
         ("leap_end", "i8"),  # step at which the pending leap ends, or -1
         ("leap_kind", "i8"),  # LeapKind of it
@@ -137,67 +115,15 @@ WAVE_STATE = np.dtype(
         ("wake", "i8"),  # step before which it can meet nothing
         ("no_sleep", "i8"),  # do not put it to sleep before this step
         ("parity", "i8"),  # which pair of wave rows is the present one (0 or 1)
-        ("mode", "i8"),  # Mode
-        ("alpha", "i8"),  # direction of the drive, +1 down
-        ("closed", "i8"),  # 1: piston and bit touch
-        ("live", "i8"),  # 0: a copy that is only read: writes no rows
-        ("events_on", "i8"),
-        ("n_blows", "i8"),  # rows written into the buffers of the present call
-        ("n_events", "i8"),
-        ("cycle_counted", "i8"),
-        ("locked", "i8"),  # steps in which the rock law did not settle
-        ("count_steps", "i8"),
         ("count_wakes", "i8"),
         ("count_leaps", "i8"),
         ("count_leap_steps", "i8"),
-        ("count_events", "i8"),
-        ("count_blows", "i8"),
-        # inputs, changed from outside at grid points
-        ("feed", "f8"),  # [N]
-        ("drive_force", "f8"),  # F_0 [N]
-        ("reversal", "f8"),  # D_1 [m]
-        ("external", "f8"),  # [N]
-        ("k_r", "f8"),  # rock law in force
-        ("gamma", "f8"),
-        ("c_r", "f8"),
-        ("w_r", "f8"),
-        ("next_k_r", "f8"),  # rock law from the next drilling cycle on
-        ("next_gamma", "f8"),
-        ("next_c_r", "f8"),
-        ("next_w_r", "f8"),
-        # motion
         ("t_base", "f8"),  # time = t_base + step * dt [s]
-        ("gap", "f8"),  # [m]
-        ("p", "f8"),  # penetration while drilling [m]
-        ("p_u", "f8"),  # P_u [m]
-        ("x_r", "f8"),  # position of the moving datum of p since the start [m]
-        ("w", "f8"),  # work of the barrier dashpot in this cycle [J]
-        ("crushed", "f8"),  # by this drilling cycle [J]
-        ("v_p", "f8"),  # mean velocities [m/s]
-        ("v_b", "f8"),
-        ("u_r", "f8"),  # relative mean displacement of the pressure law [m]
         ("moved", "f8"),  # what the bit's mean displacement counts from, piston asleep [m]
         ("spread_p", "f8"),  # bound of the sleeping piston's strain offset [m]
         ("x_sleep", "f8"),  # datum of p when the piston went to sleep [m]
         ("u_start", "f8"),  # u_r - u_p + u_b at the start [m]
         ("offset_start", "f8"),  # (bottom end - mean) of the bit at the start [m]
-        ("t_open", "f8"),  # when the gap opened last [s]
-        ("t_standstill", "f8"),  # when standstill began [s]
-        ("n_check", "i8"),
-        ("check_time", "f8", (CHECKPOINTS,)),
-        ("check_impulse", "f8", (CHECKPOINTS,)),
-        # running integrals
-        ("i_contact", "f8"),  # impulses [N s]
-        ("i_bit", "f8"),
-        ("i_drive", "f8"),
-        ("rock_work", "f8"),  # [J]
-        *[(f"e_{name}", "f8") for name in LEDGER_FIELDS],
-        ("e_start", "f8"),  # stored energy at the start [J]
-        # greatest forces since a time that the observer sets; infinite: nobody asks
-        ("peak_from", "f8"),  # [s]
-        ("peak_bit", "f8"),  # [N]
-        ("peak_contact", "f8"),
-        *_BLOW_STATE,
     ],
     align=True,
 )

@@ -269,15 +269,17 @@ def stress_fields(window: Window) -> dict[str, StressField]:
         for name, rows in forces.items():
             rows.append(fields[f"{name}_force"])
     edges = (first + np.arange(count + 1) - 0.5) * step - window.origin
-    return {name: _stress(bars[name], edges, np.array(forces[name]).T, step) for name in bars}
+    return {
+        name: _stress(bar, edges, np.array(forces[name]).T, simulation.solver.section_cells(bar))
+        for name, bar in bars.items()
+    }
 
 
-def _stress(bar: Bar, time_edges: np.ndarray, force: np.ndarray, step: float) -> StressField:
-    """Divide the force in each cell by its area; cells are cut as the solver cuts them."""
+def _stress(bar: Bar, time_edges: np.ndarray, force: np.ndarray, counts: list[int]) -> StressField:
+    """Divide the force in each cell by its area; `counts` are the cells of each section."""
     heights: list[float] = []
     areas: list[float] = []
-    for section in bar.sections:
-        cells = max(1, round(section.transit_time / step))
+    for section, cells in zip(bar.sections, counts, strict=True):
         heights += [section.length / cells] * cells
         areas += [section.area] * cells
     return StressField(

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from percussion_model.scene_rules import SceneRules
+from percussion_model.scene_rules import BarNumbers, SceneRules
 
 if TYPE_CHECKING:
-    from percussion_model.solvers.grid import Grid
+    from percussion_model.solvers.grid import Cells
 
 
 class Solver(Protocol):
@@ -62,7 +62,7 @@ class Solver(Protocol):
     def force_in(self, state: Any, bar: str, cell: int) -> float:
         """Force in one cell of "piston" or "bit" [N], as `fields` reads it."""
 
-    def grid_of(self, bar: str) -> Grid | None:
+    def grid_of(self, bar: str) -> Cells | None:
         """Cells of "piston" or "bit", None where it has none."""
 
     def watch_peaks(self, state: Any, t: float) -> None:
@@ -83,6 +83,9 @@ class Solver(Protocol):
     def energy(self, state: Any, t: float) -> dict[str, float]:
         """Ledger [J] at the last grid point before `t`: LEDGER_FIELDS, start, stored."""
 
+    def section_cells(self, bar: BarNumbers) -> list[int]:
+        """Cells or elements in each section of an elastic bar."""
+
     def statistics(self, state: Any) -> dict[str, int]:
         """Counts of what the solver did."""
 
@@ -90,6 +93,10 @@ class Solver(Protocol):
 def make_solver(scene: SceneRules) -> Solver:
     """Make the solver that computes a scene."""
     # Only the kernels that are needed are loaded: that is most of a start.
+    if scene.solver_name == "fem":
+        from percussion_model.solvers.fem import FemSolver
+
+        return FemSolver(scene)
     if scene.solver_name == "wave":
         from percussion_model.solvers.wave import WaveSolver
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
 from percussion_model.core.wave_records import Coef
-from percussion_model.scene_rules import BarNumbers
+from percussion_model.scene_rules import BarNumbers, SectionNumbers
 
 # Cells in the piston (or the only elastic bar) where the scene names none.
 DEFAULT_CELLS = 20
@@ -19,6 +20,18 @@ MOST_REFINED = 2.0
 HALF_LOSS = 0.5
 # Explicit loss stays free of overshoot up to this viscous number a sub-step.
 MOST_VISCOUS = 0.5
+
+
+class Cells(Protocol):
+    """Cells or elements of one bar."""
+
+    @property
+    def mass(self) -> np.ndarray:
+        """Mass of each, top to bottom [kg]."""
+
+    @property
+    def n(self) -> int:
+        """How many there are."""
 
 
 @dataclass(frozen=True)
@@ -46,6 +59,11 @@ class Grid:
         return len(self.mass)
 
 
+def section_count(section: SectionNumbers, time_step: float) -> int:
+    """Cells that a section gets."""
+    return max(1, round(section.transit_time / time_step))
+
+
 def cut(bar: BarNumbers, time_step: float) -> Grid:
     """Cut a bar into cells of one transit time.
 
@@ -56,14 +74,14 @@ def cut(bar: BarNumbers, time_step: float) -> Grid:
     mass: list[float] = []
     fit = 0.0
     for section in bar.sections:
-        count = max(1, round(section.transit_time / time_step))
+        count = section_count(section, time_step)
         fit = max(fit, abs(section.transit_time / (count * time_step) - 1.0))
         impedance += [section.mass / (count * time_step)] * count
         mass += [section.mass / count] * count
     return Grid(np.array(impedance), np.array(mass), time_step, fit)
 
 
-def cell_at(bar: BarNumbers, grid: Grid, place: float) -> tuple[int, float]:
+def cell_at(bar: BarNumbers, grid: Cells, place: float) -> tuple[int, float]:
     """Cell at a place along a bar.
 
     Parameters

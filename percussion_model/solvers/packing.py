@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
-from percussion_model.core.records import DriveKind, Piston, RockKind
+from percussion_model.core.records import DriveKind, Mode, Piston, RockKind
 from percussion_model.core.wave_records import WAVE_PAR, Coef
 from percussion_model.scene_rules import SceneRules
 from percussion_model.solvers.grid import Grid, end_viscosity, substeps
@@ -78,6 +80,37 @@ def pack_parameters(
     p["ss_loading"] = rock["k_r"]
     p["ss_damping"] = rock["c_r"]
     return par
+
+
+def begin_state(s: Any, scene: SceneRules, rock: dict[str, float]) -> None:
+    """Fill what states have in common (`COMMON_STATE`) at time zero.
+
+    Parameters
+    ----------
+    s : record
+        Changed in place.
+    rock : dict of float
+        From `rock_numbers`.
+    """
+    start = scene.start
+    s["live"] = 1
+    s["mode"] = Mode.FF
+    s["alpha"] = start.drive_direction
+    s["armed"] = scene.effects.drive != "pressure" or start.drive_direction > 0
+    s["feed"] = scene.feed.force if scene.effects.feed else 0.0
+    s["drive_force"] = scene.drive.force
+    s["reversal"] = scene.drive.reversal_distance
+    s["external"] = scene.drive.external_force
+    for key, value in rock.items():
+        s[key] = value
+        s[f"next_{key}"] = value
+    s["p"] = -start.rock_gap
+    s["x_r"] = start.rock_gap
+    s["t_open"] = -np.inf
+    s["peak_from"] = np.inf
+    s["b_rebound"] = np.nan
+    s["b_standstill"] = np.nan
+    s["gap"] = start.gap if scene.piston.model != "absent" else np.inf
 
 
 def rock_numbers(scene: SceneRules) -> dict[str, float]:

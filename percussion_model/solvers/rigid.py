@@ -23,7 +23,7 @@ from percussion_model.core.records import (
 from percussion_model.core.rigid_records import RIGID, ROWS_AN_EVENT
 
 if TYPE_CHECKING:
-    from percussion_model.scene_rules import SceneRules
+    from percussion_model.scene_rules import BarNumbers, SceneRules
 
 # Without a switching drive a blow ends when the gap was open for so many bar transits.
 BLOW_GAP_TRANSITS = 20
@@ -337,6 +337,10 @@ class RigidSolver:
     def time(self, state: np.ndarray) -> float:
         """Time of the last event of a state [s]."""
         return float(state["now"]["time"][0])
+
+    def section_cells(self, bar: BarNumbers) -> list[int]:
+        """Rigid bodies have no cells."""
+        return []
 
     def statistics(self, state: np.ndarray) -> dict[str, int]:
         """Counters of the run so far."""

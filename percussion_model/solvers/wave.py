@@ -14,19 +14,24 @@ from percussion_model.core.records import (
     EVENT,
     LEDGER_FIELDS,
     SAMPLE_FIELDS,
-    Mode,
 )
 from percussion_model.core.totals import lost_in_faces, resync, stored_energy
 from percussion_model.core.wave_records import WAVE_STATE, Coef, Row, Task
-from percussion_model.scene_rules import SceneRules
+from percussion_model.scene_rules import BarNumbers, SceneRules
 from percussion_model.solvers.grid import (
     Grid,
     choose_time_step,
     coefficients,
     cut,
+    section_count,
 )
 from percussion_model.solvers.operators import LEVELS, build_operators, padded
-from percussion_model.solvers.packing import INPUT_FIELDS, pack_parameters, rock_numbers
+from percussion_model.solvers.packing import (
+    INPUT_FIELDS,
+    begin_state,
+    pack_parameters,
+    rock_numbers,
+)
 from percussion_model.solvers.step_map import no_operators
 from percussion_model.solvers.wave_state import WORD, WaveState
 
@@ -89,25 +94,8 @@ class WaveSolver:
         record = np.zeros(1, WAVE_STATE)
         s = record[0]
         s["leap_end"] = -1
-        s["live"] = 1
-        s["mode"] = Mode.FF
-        s["alpha"] = start.drive_direction
-        s["armed"] = scene.effects.drive != "pressure" or start.drive_direction > 0
-        s["feed"] = scene.feed.force if scene.effects.feed else 0.0
-        s["drive_force"] = scene.drive.force
-        s["reversal"] = scene.drive.reversal_distance
-        s["external"] = scene.drive.external_force
-        for key, value in rock_numbers(scene).items():
-            s[key] = value
-            s[f"next_{key}"] = value
-        s["p"] = -start.rock_gap
-        s["x_r"] = start.rock_gap
-        s["t_open"] = -np.inf
-        s["peak_from"] = np.inf
-        s["b_rebound"] = np.nan
-        s["b_standstill"] = np.nan
+        begin_state(s, scene, rock_numbers(scene))
         has_piston = scene.piston.model != "absent"
-        s["gap"] = start.gap if has_piston else np.inf
         n_p = self._piston.n if self._piston is not None else 0
         rows = len(Row)
         state = WaveState(record, np.zeros(rows * (n_p + self._bit.n + 2)), rows * (n_p + 1))
@@ -272,6 +260,10 @@ class WaveSolver:
     def grid_of(self, bar: str) -> Grid | None:
         """Cells of "piston" or "bit", None where it has none."""
         return {"piston": self._piston, "bit": self._bit}[bar]
+
+    def section_cells(self, bar: BarNumbers) -> list[int]:
+        """Cells in each section of an elastic bar."""
+        return [section_count(section, self.time_step) for section in bar.sections]
 
     def statistics(self, state: WaveState) -> dict[str, int]:
         """Counts of what the solver did."""

@@ -1,0 +1,132 @@
+"""The loop of the finite-element solver, and reading a state without touching it."""
+
+from __future__ import annotations
+
+import math
+
+from percussion_model.core.blows import push_checkpoint
+from percussion_model.core.drive import drive_force
+from percussion_model.core.fem_bars import bit_position, kinetic_energy, moment, read_means
+from percussion_model.core.fem_events import end_of_step
+from percussion_model.core.fem_modes import MOST_CHANGES, change_modes
+from percussion_model.core.fem_records import FemTask, Node
+from percussion_model.core.fem_scheme import damping
+from percussion_model.core.fem_step import take_step
+from percussion_model.core.kernel import kernel, merged
+from percussion_model.core.records import Mode, Status
+from percussion_model.core.rock_law import origin, stiffness
+
+DONE, BLOWS_FULL, EVENTS_FULL = int(Status.DONE), int(Status.BLOWS_FULL), int(Status.EVENTS_FULL)
+NOT_FINITE = int(Status.NOT_FINITE)
+ADVANCE, SAMPLE = int(FemTask.ADVANCE), int(FemTask.SAMPLE)
+FF, SS = int(Mode.FF), int(Mode.SS)
+U = int(Node.U)
+
+# Events at one instant at the most: each change of contact, drive and rock.
+EVENTS_A_STEP = 3 * MOST_CHANGES
+# A time this close before the end of a step is that end [steps].
+GRID_ROUNDING = 1e-6
+# Spacing of the bit force's checkpoints while standing still [steps].
+CHECKPOINT_STEPS = 64
+
+
+@merged
+def go_on(par, s, w, c, f, x, q, time, whole, blows, events):
+    """Advance by whole steps, or up to `time` where `whole` is False; a `Status`."""
+    s.n_blows = 0
+    s.n_events = 0
+    grain = GRID_ROUNDING * par.dt
+    if s.fresh == 1:
+        s.fresh = 0
+        change_modes(par, s, w, c, blows, events)
+    while True:
+        rest = time - s.time
+        h = par.dt
+        if rest < par.dt - grain:
+            if whole or rest <= grain:
+                return DONE
+            h = rest
+        if s.live == 1:
+            if s.n_blows >= blows.shape[0]:
+                return BLOWS_FULL
+            if s.events_on == 1 and s.n_events + EVENTS_A_STEP > events.shape[0]:
+                return EVENTS_FULL
+        if not math.isfinite(s.p + s.v_end + s.gap_rate + s.u_r):
+            return NOT_FINITE
+        h = end_of_step(par, s, w, c, f, x, q, h)
+        take_step(par, s, w, c, x, h)
+        change_modes(par, s, w, c, blows, events)
+        if s.mode == SS and (s.n_check == 0 or s.count_steps % CHECKPOINT_STEPS == 0):
+            push_checkpoint(s, s.time)
+
+
+@merged
+def fill_sample(par, s, w, c, time, row):
+    """Write what is seen of a state (SAMPLE_FIELDS)."""
+    read_means(par, s, w, c)
+    row[0] = time
+    row[1] = math.nan
+    row[2] = s.v_p
+    row[3] = bit_position(par, s, w, c)
+    row[4] = s.v_b
+    row[5] = s.x_r + s.p
+    row[6] = s.v_end
+    row[7] = s.gap
+    row[8] = s.u_r
+    row[9] = s.p
+    row[10] = 0.0
+    if s.mode != FF:
+        row[10] = stiffness(s) * (s.p - origin(s)) + damping(s) * s.v_end
+    row[11] = -par.k_c * s.gap if s.closed == 1 else 0.0
+    row[12] = drive_force(par, s)
+    row[13] = s.mode
+    row[14] = kinetic_energy(c, w, par.n_p, par.n_b)
+    row[15] = s.i_bit
+    row[16] = s.i_contact
+    row[17] = s.i_drive
+    if par.n_p > 0:
+        row[1] = s.x_r + moment(c, w, U, 0, par.n_p) / par.mass_p + par.start_gap
+    else:
+        row[7] = math.nan
+        row[8] = math.nan
+
+
+@kernel
+def run(task, par_, state, w, c, f, x, q, time, blows, events, row):
+    """Do one `FemTask` with a state; the only entry into the finite-element kernels.
+
+    Parameters
+    ----------
+    task : int
+        ADVANCE: commit the whole steps up to `time`.
+        BRING: commit up to `time`, with a part of a step at the end.
+        SAMPLE: as BRING, then tell what is seen; spoils the state, so give a copy.
+    par_, state : FEM_PAR, FEM_STATE array of length 1
+    w : float array, shape (len(Node), n)
+        What changes at each node.
+    c : float array, shape (len(Mesh), n)
+    f : float array, shape (3 len(Factor), n)
+        Factorisations; those of the whole step must be there.
+    x : float array, shape (len(Trial), n)
+        Scratch.
+    q : float array, shape (len(Look), len(Column))
+        Scratch.
+    time : float
+        [s]
+    blows, events : BLOW, EVENT array
+        Filled from index 0; the state says how far.
+    row : float array, shape (len(SAMPLE_FIELDS),)
+
+    Returns
+    -------
+    int
+        A `Status`.
+    """
+    par = par_[0]
+    s = state[0]
+    if task == SAMPLE:
+        s.live = 0
+    status = go_on(par, s, w, c, f, x, q, time, task == ADVANCE, blows, events)
+    if task == SAMPLE:
+        fill_sample(par, s, w, c, time, row)
+    return status

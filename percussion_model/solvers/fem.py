@@ -1,0 +1,333 @@
+"""The finite-element solver: the paper's own computational model."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from percussion_model.core.fem_advance import run
+from percussion_model.core.fem_bars import dissipated_in_nodes, read_nodes, stored_energy
+from percussion_model.core.fem_records import (
+    FEM_PAR,
+    FEM_STATE,
+    Column,
+    Factor,
+    FemTask,
+    Look,
+    Mesh,
+    Node,
+    Trial,
+)
+from percussion_model.core.fem_scheme import CLOSED, OPEN, factorise
+from percussion_model.core.records import (
+    BLOW,
+    EVENT,
+    LEDGER_FIELDS,
+    LONG_SAMPLE_FIELDS,
+    SAMPLE_FIELDS,
+    STORED_FIELDS,
+    DriveKind,
+    Piston,
+    RockKind,
+)
+from percussion_model.scene_rules import BarNumbers, SceneRules
+from percussion_model.solvers.mesh import (
+    BarMesh,
+    assemble,
+    critical_frequency,
+    cut_bar,
+    section_count,
+)
+from percussion_model.solvers.packing import (
+    INPUT_FIELDS,
+    REARM_TRANSITS,
+    begin_state,
+    rock_numbers,
+)
+
+
+@dataclass
+class FemState:
+    """State of a simulation: one record and one flat workspace."""
+
+    record: np.ndarray  # FEM_STATE, shape (1,)
+    workspace: np.ndarray  # float64, shape (len(Node) * nodes,)
+
+    def copy(self) -> FemState:
+        """An independent copy."""
+        return FemState(self.record.copy(), self.workspace.copy())
+
+
+class FemSolver:
+    """Linear finite elements, penalty contact, event-driven third-order steps.
+
+    Parameters
+    ----------
+    scene : SceneRules
+        With an elastic bit.
+
+    Attributes
+    ----------
+    time_step : float
+        Longest step [s]; an event ends a step early.
+    cells : dict of int
+        Elements in each elastic bar.
+    loss_time : float
+        Kelvin-Voigt time in force [s].
+    """
+
+    name = "fem"
+    wave_speed_error = 0.0
+
+    def __init__(self, scene: SceneRules) -> None:
+        self.scene = scene
+        elastic_piston = scene.piston.model == "elastic"
+        first = scene.piston if elastic_piston else scene.bit
+        element = self._element = first.length / scene.fem.elements
+        self._bit = cut_bar(scene.bit, element)
+        self._piston: BarMesh | None = None
+        if scene.piston.model != "absent":
+            self._piston = cut_bar(scene.piston, element)
+        bars = [bar for bar in (self._piston, self._bit) if bar is not None]
+        self._mesh = assemble(bars)
+        elastic = [bar for bar in bars if bar.n]
+        shortest = min(float(bar.transit_time.min()) for bar in elastic)
+        self.time_step: float = scene.fem.courant * shortest
+        self.loss_time = self._loss_time()
+        self.cells = {"bit": self._bit.n}
+        if elastic_piston and self._piston is not None:
+            self.cells = {"piston": self._piston.n, **self.cells}
+        self._par = self._parameters()
+        n = self._mesh.shape[1]
+        self._factors = np.zeros((3 * len(Factor), n))
+        for slot, closed in ((OPEN, 0), (CLOSED, 1)):
+            factorise(self._par[0], self._mesh, self._factors, slot, self.time_step, closed)
+        self._trial = np.zeros((len(Trial), n))
+        self._looks = np.zeros((len(Look), len(Column)))
+        self._no_blows = np.zeros(1, BLOW)
+        self._no_events = np.zeros(1, EVENT)
+        self._no_row = np.zeros(len(SAMPLE_FIELDS))
+
+    def _loss_time(self) -> float:
+        """Kelvin-Voigt time: that of the scene, or 2 zeta_K / omega_cr (eq. 55 of the paper)."""
+        scene = self.scene
+        if not scene.effects.loss:
+            return 0.0
+        if scene.fem.damping_ratio is None:
+            return scene.loss.time
+        return 2.0 * scene.fem.damping_ratio / critical_frequency(self._bit)
+
+    def _parameters(self) -> np.ndarray:
+        scene, options = self.scene, self.scene.fem
+        par = np.zeros(1, FEM_PAR)
+        p = par[0]
+        p["dt"] = self.time_step
+        mu = eigenvalue(options.spectral_radius)
+        p["mu_re"], p["mu_im"] = mu.real, mu.imag
+        p["dissipation"] = defect(options.spectral_radius)
+        p["k_c"] = options.contact_stiffness
+        p["eta"] = self.loss_time
+        p["q_tol"], p["t_tol"] = options.event_tolerance, options.time_tolerance
+        p["gravity"] = scene.gravity.acceleration if scene.effects.gravity else 0.0
+        p["mass_p"], p["mass_b"] = scene.piston.mass, scene.bit.mass
+        slowest = scene.bit.transit_time
+        if scene.piston.model == "elastic":
+            slowest = max(slowest, scene.piston.transit_time)
+        p["rearm_time"] = REARM_TRANSITS * slowest
+        p["start_gap"] = scene.start.gap
+        p["n_p"] = 0 if self._piston is None else self._piston.n + 1
+        p["n_b"] = self._bit.n + 1
+        p["piston"] = Piston[scene.piston.model.upper()]
+        p["drive"] = DriveKind[scene.effects.drive.upper()]
+        kind = RockKind[scene.effects.rock.upper()]
+        # a wall is met like the piston: by a penalty
+        p["rock"] = RockKind.SPRING if kind == RockKind.WALL else kind
+        p["barrier"] = scene.barrier_on
+        p["release"] = scene.effects.standstill_tension == "release"
+        return par
+
+    def new_state(self) -> FemState:
+        """State at time zero."""
+        scene, start = self.scene, self.scene.start
+        record = np.zeros(1, FEM_STATE)
+        s = record[0]
+        rock = rock_numbers(scene)
+        if scene.effects.rock == "wall":
+            rock["k_r"] = scene.fem.contact_stiffness
+        begin_state(s, scene, rock)
+        s["fresh"] = 1
+        state = FemState(record, np.zeros(len(Node) * self._mesh.shape[1]))
+        w, n_p = self._nodes(state), int(self._par[0]["n_p"])
+        w[Node.U] = -start.rock_gap
+        w[Node.V, n_p:] = start.bit_velocity
+        if n_p:
+            w[Node.U, :n_p] -= start.gap
+            w[Node.V, :n_p] = start.piston_velocity
+        self.refresh(state)
+        return state
+
+    def refresh(self, state: FemState) -> None:
+        """Derive everything from the nodes, as at the start of a run."""
+        s = state.record[0]
+        read_nodes(self._par[0], s, self._nodes(state), self._mesh)
+        s["e_start"] = sum(self._stored(state))
+
+    def _nodes(self, state: FemState) -> np.ndarray:
+        return state.workspace.reshape(len(Node), -1)
+
+    def _stored(self, state: FemState) -> tuple[float, float, float]:
+        return stored_energy(self._par[0], state.record[0], self._nodes(state), self._mesh)
+
+    def _run(
+        self,
+        task: FemTask,
+        state: FemState,
+        time: float,
+        blows: np.ndarray | None = None,
+        events: np.ndarray | None = None,
+        row: np.ndarray | None = None,
+    ) -> int:
+        """Call the kernels; see `core.fem_advance.run`."""
+        return run(
+            int(task),
+            self._par,
+            state.record,
+            self._nodes(state),
+            self._mesh,
+            self._factors,
+            self._trial,
+            self._looks,
+            time,
+            self._no_blows if blows is None else blows,
+            self._no_events if events is None else events,
+            self._no_row if row is None else row,
+        )
+
+    def time(self, state: FemState) -> float:
+        """Time up to which the state is committed [s]."""
+        return float(state.record[0]["time"])
+
+    def readable_until(self, state: FemState) -> float:
+        """Time up to which `sample` answers without advancing the state [s]."""
+        return self.time(state) + self.time_step
+
+    def grid_point_after(self, state: FemState, t: float) -> float:
+        """First time at or after `t` at which inputs can change: `t` itself [s]."""
+        return max(t, self.time(state))
+
+    def advance(
+        self,
+        state: FemState,
+        t: float,
+        blows: np.ndarray,
+        events: np.ndarray,
+        record_events: bool = False,
+    ) -> tuple[int, int, int]:
+        """Commit the whole steps up to `t`.
+
+        Returns
+        -------
+        status, n_blows, n_events : int
+        """
+        s = state.record[0]
+        s["events_on"] = record_events
+        status = self._run(FemTask.ADVANCE, state, t, blows, events)
+        return status, int(s["n_blows"]), int(s["n_events"])
+
+    def sample(self, state: FemState, times: np.ndarray, out: np.ndarray) -> None:
+        """Evaluate at `times` without touching the state (`SAMPLE_FIELDS`)."""
+        for k, time in enumerate(times):
+            self._run(FemTask.SAMPLE, state.copy(), float(time), row=out[k])
+
+    def look(
+        self, state: FemState, t: float, row: np.ndarray, here: FemState | None = None
+    ) -> FemState:
+        """Evaluate at `t` into a row (`LONG_SAMPLE_FIELDS`, or their beginning).
+
+        Returns
+        -------
+        FemState
+            A copy, carried to `t`.
+        """
+        here = state.copy()
+        self._run(FemTask.SAMPLE, here, t, row=row)
+        if len(row) == len(LONG_SAMPLE_FIELDS):
+            s, entries = here.record[0], self.energy(here, t)
+            row[len(SAMPLE_FIELDS) :] = [
+                s["peak_bit"],
+                s["peak_contact"],
+                *(entries[name] for name in (*LEDGER_FIELDS, *STORED_FIELDS)),
+            ]
+        return here
+
+    def grid_of(self, bar: str) -> BarMesh | None:
+        """Elements of "piston" or "bit", None where it has none."""
+        mesh = {"piston": self._piston, "bit": self._bit}[bar]
+        return mesh if mesh is not None and mesh.n else None
+
+    def watch_peaks(self, state: FemState, t: float) -> None:
+        """Count the peak forces of `look` from `t` on [s]."""
+        s = state.record[0]
+        s["peak_from"], s["peak_bit"], s["peak_contact"] = t, 0.0, 0.0
+
+    def commit(self, state: FemState, t: float) -> None:
+        """Bring an advanced state to `t`, with a part of a step."""
+        state.record[0]["events_on"] = 0
+        self._run(FemTask.BRING, state, t)
+
+    def set_inputs(self, state: FemState, **inputs: float) -> None:
+        """Change inputs of a committed state; rock inputs wait for the next cycle."""
+        for key, value in inputs.items():
+            state.record[0][INPUT_FIELDS[key]] = value
+        state.record[0]["fresh"] = 1
+
+    def energy(self, state: FemState, t: float) -> dict[str, float]:
+        """Ledger [J] at the end of the last step before `t`."""
+        s = state.record[0]
+        entries = {name: float(s[f"e_{name}"]) for name in LEDGER_FIELDS}
+        loss, numerical = dissipated_in_nodes(self._par[0], self._nodes(state))
+        entries["loss"] += loss
+        entries["numerical"] += numerical
+        kinetic, elastic, rock = self._stored(state)
+        entries |= {"start": float(s["e_start"]), "kinetic": kinetic, "elastic": elastic}
+        entries["recoverable"] = rock
+        return entries
+
+    def fields(self, state: FemState) -> dict[str, np.ndarray]:
+        """Force [N] and velocity [m/s] of each element, top to bottom, by bar."""
+        w, n_p = self._nodes(state), int(self._par[0]["n_p"])
+        out = {}
+        for name, first, bar in (("piston", 0, self._piston), ("bit", n_p, self._bit)):
+            if bar is not None and bar.n:
+                nodes = w[:, first : first + bar.n + 1]
+                stiffness = self._mesh[Mesh.STIFFNESS, first : first + bar.n]
+                out[f"{name}_force"] = -stiffness * np.diff(nodes[Node.U])
+                out[f"{name}_velocity"] = 0.5 * (nodes[Node.V, :-1] + nodes[Node.V, 1:])
+        return out
+
+    def force_in(self, state: FemState, bar: str, cell: int) -> float:
+        """Force in one element of "piston" or "bit" [N], as `fields` reads it."""
+        return float(self.fields(state)[f"{bar}_force"][cell])
+
+    def section_cells(self, bar: BarNumbers) -> list[int]:
+        """Elements in each section of an elastic bar."""
+        return [section_count(section, self._element) for section in bar.sections]
+
+    def statistics(self, state: FemState) -> dict[str, int]:
+        """Counts of what the solver did."""
+        s = state.record[0]
+        names = ("steps", "trials", "events", "blows")
+        return {name: int(s[f"count_{name}"]) for name in names} | {"locked": int(s["locked"])}
+
+
+def eigenvalue(spectral_radius: float) -> complex:
+    """Complex eigenvalue of the scheme's matrix (docs/numerics.md, section 10)."""
+    p = (2.0 + spectral_radius) / (3.0 * (1.0 + spectral_radius))
+    q = 1.0 / (6.0 * (1.0 + spectral_radius))
+    return complex(0.5 * p, np.sqrt(q - 0.25 * p * p))
+
+
+def defect(spectral_radius: float) -> float:
+    """Defect of the scheme's energy identity (docs/numerics.md, section 10)."""
+    return (1.0 - spectral_radius) / (36.0 * (1.0 + spectral_radius))
