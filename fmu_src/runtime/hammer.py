@@ -192,7 +192,7 @@ class PercussiveHammer(Slave):
         if self.phase == Phase.INSTANTIATED or self.motion is None:
             raise ValueError("there is no state to save before the initialisation has ended")
         motion = self.motion
-        motion.read()
+        motion.peaks()
         numbers = NUMBERS.pack(
             self.phase, 1, self.start_time, self.now, motion.time,
             motion.blow_count, motion.step_size,

@@ -11,6 +11,7 @@ from percussion_model.core.records import (
     BLOW,
     LEDGER_FIELDS,
     LONG_SAMPLE_FIELDS,
+    PEAK_FIELDS,
     STORED_FIELDS,
     Mode,
 )
@@ -21,6 +22,7 @@ from percussion_model.solvers import Solver
 
 AT = {name: k for k, name in enumerate(LONG_SAMPLE_FIELDS)}
 LEDGER = (*LEDGER_FIELDS, *STORED_FIELDS)  # the last columns of a long row
+PEAKS = slice(AT[PEAK_FIELDS[0]], AT[PEAK_FIELDS[-1]] + 1)
 IMPULSES = ("bit_impulse", "contact_impulse", "drive_impulse")
 # An impulse below this in a communication step is no contact [N s].
 NO_CONTACT = 1e-9
@@ -57,7 +59,8 @@ class Motion(Runner):
         self.step_size = 0.0
         self.row = np.zeros(len(LONG_SAMPLE_FIELDS))
         self.numbers: list[float] = []  # the same as plain numbers
-        self._is_read = False
+        self._is_read = self._has_peaks = False
+        self._spare_look: Any = None  # an old copy to be used again
         self._here: Any = None  # copy of the state that belongs to `row`
         self._stress: float | None = None
         # impulses at the start of the last step, or the state from which they follow
@@ -120,23 +123,35 @@ class Motion(Runner):
         self.row[:] = row
         self._stress, self._before, self._left = float(last[0]), last[1:].copy(), None
         self._take_row()
+        self._has_peaks = True
 
     @staticmethod
     def _impulses(row: np.ndarray) -> np.ndarray:
         first = AT[IMPULSES[0]]  # they stand side by side
         return row[first : first + len(IMPULSES)].copy()
 
-    def _look(self, state: Any, t: float, row: np.ndarray, here: Any = None) -> Any:
+    def _look(self, state: Any, t: float, row: np.ndarray, here: Any, peaks: bool) -> Any:
         # After a change of inputs a state may lie a step ahead.
-        return self.solver.look(state, max(t, self.solver.time(state)), row, here)
+        return self.solver.look(state, max(t, self.solver.time(state)), row, here, peaks)
 
     def read(self) -> list[float]:
-        """What it is like now (`LONG_SAMPLE_FIELDS`); 0 where there is no such number."""
+        """What it is like now (`LONG_SAMPLE_FIELDS`) but for the peaks; 0 where undefined."""
         if not self._is_read:
-            self._here = self._look(self._state, self.time, self.row, self._here)
+            self._here = self._look(self._state, self.time, self.row, self._here, False)
             self._take_row()
-            self._stress = None
+            self._stress, self._has_peaks = None, False
         return self.numbers
+
+    def peaks(self) -> list[float]:
+        """Greatest bit and contact force in the last step [N]."""
+        self.read()
+        if not self._has_peaks:
+            row = np.zeros(len(LONG_SAMPLE_FIELDS))
+            self._spare_look = self._look(self._state, self.time, row, self._spare_look, True)
+            self.row[PEAKS] = row[PEAKS]
+            self.numbers[PEAKS] = row[PEAKS].tolist()
+            self._has_peaks = True
+        return self.numbers[PEAKS]
 
     def _take_row(self) -> None:
         # without a piston its numbers are undefined
@@ -147,7 +162,7 @@ class Motion(Runner):
         """Impulses at the start of the last step [N s]."""
         if self._left is not None:
             row = np.zeros(len(LONG_SAMPLE_FIELDS))
-            self._look(*self._left, row)
+            self._look(*self._left, row, None, False)
             self._before, self._left = self._impulses(row), None
         return self._before
 

@@ -53,8 +53,13 @@ class Solver(Protocol):
     def sample(self, state: Any, times: np.ndarray, out: np.ndarray) -> None:
         """Evaluate without touching the state."""
 
-    def look(self, state: Any, t: float, row: np.ndarray, here: Any = None) -> Any:
-        """Evaluate at `t` into a row (`LONG_SAMPLE_FIELDS`); return a copy for `fields`."""
+    def look(
+        self, state: Any, t: float, row: np.ndarray, here: Any = None, peaks: bool = True
+    ) -> Any:
+        """Evaluate at `t` into a row (`LONG_SAMPLE_FIELDS`); return a copy for `fields`.
+
+        `here` is an old copy to be used again; without `peaks` those need not be right.
+        """
 
     def fields(self, state: Any) -> dict[str, np.ndarray]:
         """Force [N] and velocity [m/s] in each cell of the elastic bars, top to bottom."""

@@ -241,7 +241,12 @@ class FemSolver:
             self._run(FemTask.SAMPLE, state.copy(), float(time), row=out[k])
 
     def look(
-        self, state: FemState, t: float, row: np.ndarray, here: FemState | None = None
+        self,
+        state: FemState,
+        t: float,
+        row: np.ndarray,
+        here: FemState | None = None,
+        peaks: bool = True,
     ) -> FemState:
         """Evaluate at `t` into a row (`LONG_SAMPLE_FIELDS`, or their beginning).
 

@@ -231,7 +231,12 @@ class RigidSolver:
         self._require_done(status)
 
     def look(
-        self, state: np.ndarray, t: float, row: np.ndarray, here: np.ndarray | None = None
+        self,
+        state: np.ndarray,
+        t: float,
+        row: np.ndarray,
+        here: np.ndarray | None = None,
+        peaks: bool = True,
     ) -> np.ndarray:
         """Evaluate at `t` into a row (`LONG_SAMPLE_FIELDS`, or their beginning).
 

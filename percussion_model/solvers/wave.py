@@ -186,7 +186,12 @@ class WaveSolver:
             self.look(state, float(time), out[k])
 
     def look(
-        self, state: WaveState, t: float, row: np.ndarray, here: WaveState | None = None
+        self,
+        state: WaveState,
+        t: float,
+        row: np.ndarray,
+        here: WaveState | None = None,
+        peaks: bool = True,
     ) -> WaveState:
         """Evaluate at `t` into a row (`LONG_SAMPLE_FIELDS`, or their beginning).
 
@@ -194,6 +199,8 @@ class WaveSolver:
         ----------
         here : WaveState, optional
             An old copy to be used again.
+        peaks : bool
+            Whether the peaks of a long row are wanted: in standstill they are dear.
 
         Returns
         -------
@@ -205,6 +212,8 @@ class WaveSolver:
             here = state.copy()
         else:
             here.take(state)
+        if not peaks:
+            here.numbers[WORD["peak_from"]] = np.inf
         self._run(Task.SAMPLE, here, t, row=row)
         return here
 
