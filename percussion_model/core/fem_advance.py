@@ -6,11 +6,11 @@ import math
 
 from percussion_model.core.blows import push_checkpoint
 from percussion_model.core.drive import drive_force
-from percussion_model.core.fem_bars import bit_position, kinetic_energy, moment, read_means
+from percussion_model.core.fem_bars import bit_position, kinetic_energy, read_means
 from percussion_model.core.fem_events import end_of_step
 from percussion_model.core.fem_modes import MOST_CHANGES, change_modes
 from percussion_model.core.fem_records import FemTask, Node
-from percussion_model.core.fem_scheme import damping
+from percussion_model.core.fem_solve import damping
 from percussion_model.core.fem_step import take_step
 from percussion_model.core.kernel import kernel, merged
 from percussion_model.core.records import Mode, Status
@@ -67,7 +67,7 @@ def fill_sample(par, s, w, c, time, row):
     row[0] = time
     row[1] = math.nan
     row[2] = s.v_p
-    row[3] = bit_position(par, s, w, c)
+    row[3] = bit_position(s)
     row[4] = s.v_b
     row[5] = s.x_r + s.p
     row[6] = s.v_end
@@ -85,7 +85,7 @@ def fill_sample(par, s, w, c, time, row):
     row[16] = s.i_contact
     row[17] = s.i_drive
     if par.n_p > 0:
-        row[1] = s.x_r + moment(c, w, U, 0, par.n_p) / par.mass_p + par.start_gap
+        row[1] = s.x_r + s.mean_p + par.start_gap
     else:
         row[7] = math.nan
         row[8] = math.nan
@@ -105,8 +105,8 @@ def run(task, par_, state, w, c, f, x, q, time, blows, events, row):
     w : float array, shape (len(Node), n)
         What changes at each node.
     c : float array, shape (len(Mesh), n)
-    f : float array, shape (3 len(Factor), n)
-        Factorisations; those of the whole step must be there.
+    f : float array, shape (2 len(Factor), at least n)
+        Factorisations, kept from call to call; zero at first.
     x : float array, shape (len(Trial), n)
         Scratch.
     q : float array, shape (len(Look), len(Column))

@@ -7,9 +7,10 @@ is one of a mean and a bend (docs/numerics.md, section 10).
 from __future__ import annotations
 
 from percussion_model.core.drive import drive_force
-from percussion_model.core.fem_bars import moment, read_nodes
+from percussion_model.core.fem_bars import read_nodes
 from percussion_model.core.fem_records import Mesh, Node, Trial
-from percussion_model.core.fem_scheme import damping, rate_bend
+from percussion_model.core.fem_scheme import rate_bend
+from percussion_model.core.fem_solve import damping
 from percussion_model.core.kernel import fused, inlined, kernel, merged
 from percussion_model.core.records import Mode, RockKind
 from percussion_model.core.rock_law import crush, origin, recoverable, stiffness
@@ -108,14 +109,14 @@ def take_step(par, s, w, c, x, h):
     if s.closed == 1:
         book_contact(par, s, x, w, h)
     book_bars(par, w, c, x, h)
-    path = moment(c, x, TARGET_RE, n_p, par.n_b) * h
-    s.e_gravity += par.gravity * path
-    s.e_feed += s.feed / par.mass_b * path
+    path = s.next_b - s.mean_b
+    s.e_gravity += par.mass_b * par.gravity * path
+    s.e_feed += s.feed * path
     if n_p > 0:
         push = drive_force(par, s)
-        path = moment(c, x, TARGET_RE, 0, n_p) * h
-        s.e_gravity += par.gravity * path
-        s.e_drive += push / par.mass_p * path
+        path = s.next_p - s.mean_p
+        s.e_gravity += par.mass_p * par.gravity * path
+        s.e_drive += push * path
         s.i_drive += push * h
     for i in range(n_p + par.n_b):
         w[U, i] = x[U, i]

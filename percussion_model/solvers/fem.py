@@ -7,19 +7,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from percussion_model.core.fem_advance import run
-from percussion_model.core.fem_bars import dissipated_in_nodes, read_nodes, stored_energy
+from percussion_model.core.fem_bars import dissipated_in_nodes, read_all, stored_energy
 from percussion_model.core.fem_records import (
     FEM_PAR,
     FEM_STATE,
     Column,
     Factor,
     FemTask,
+    Key,
     Look,
     Mesh,
     Node,
     Trial,
 )
-from percussion_model.core.fem_scheme import CLOSED, OPEN, factorise
 from percussion_model.core.records import (
     BLOW,
     EVENT,
@@ -99,9 +99,7 @@ class FemSolver:
             self.cells = {"piston": self._piston.n, **self.cells}
         self._par = self._parameters()
         n = self._mesh.shape[1]
-        self._factors = np.zeros((3 * len(Factor), n))
-        for slot, closed in ((OPEN, 0), (CLOSED, 1)):
-            factorise(self._par[0], self._mesh, self._factors, slot, self.time_step, closed)
+        self._factors = np.zeros((2 * len(Factor), max(n, len(Key))))
         self._trial = np.zeros((len(Trial), n))
         self._looks = np.zeros((len(Look), len(Column)))
         self._no_blows = np.zeros(1, BLOW)
@@ -169,7 +167,7 @@ class FemSolver:
     def refresh(self, state: FemState) -> None:
         """Derive everything from the nodes, as at the start of a run."""
         s = state.record[0]
-        read_nodes(self._par[0], s, self._nodes(state), self._mesh)
+        read_all(self._par[0], s, self._nodes(state), self._mesh)
         s["e_start"] = sum(self._stored(state))
 
     def _nodes(self, state: FemState) -> np.ndarray:
