@@ -153,6 +153,21 @@ def rigid(repeats: int) -> dict[str, Any]:
     }
 
 
+def elements(repeats: int) -> dict[str, Any]:
+    """Real-time factor of the finite elements with the paper's numerics, and cost of a step."""
+    from percussion_model import Scene
+
+    scene = Scene.from_toml(REFERENCE).computed_by("fem")
+    runs = [measure(scene, STEPPING_DURATION) for _ in range(repeats)]
+    return {
+        "real_time_factor": statistics.median(STEPPING_DURATION / run["cost"] for run in runs),
+        "step": best_step(runs),
+        "steps": runs[0]["steps"],
+        "trials": runs[0]["trials"],
+        "events": runs[0]["events"],
+    }
+
+
 def command_line(repeats: int) -> dict[str, Any]:
     """Time of a whole `percussion run` of a tenth of a second, once the cache is filled."""
     command = [
@@ -236,6 +251,9 @@ def show(found: dict[str, Any]) -> None:
 
     table = Table(show_header=False)
     table.add_row("Rigid option, a blow", f"{1e6 * found['rigid']['blow']:.2f} µs")
+    fem = found["elements"]
+    table.add_row("Finite elements", f"{fem['real_time_factor']:.2f} times real time")
+    table.add_row("Finite elements, a step", f"{1e6 * fem['step']:.2f} µs")
     start = found["command_line"]
     table.add_row("Command line, 0.1 s simulated: first start", f"{start['first']:.2f} s")
     table.add_row("Command line, 0.1 s simulated: later starts", f"{start['second']:.2f} s")
@@ -243,12 +261,12 @@ def show(found: dict[str, Any]) -> None:
 
 
 def compiled_in() -> float:
-    """Compile both solvers; the time it took [s]."""
+    """Compile all solvers; the time it took [s]."""
     from percussion_model import Scene, Simulation
 
     began = time.perf_counter()
-    for path in (REFERENCE, RIGID):
-        Simulation(Scene.from_toml(path))
+    for solver in ("wave", "fem", "rigid"):
+        Simulation(Scene.from_toml(REFERENCE).computed_by(solver))
     return time.perf_counter() - began
 
 
@@ -263,6 +281,8 @@ def bench(quick: bool, say: Callable[[str], None]) -> dict[str, Any]:
     found["effects"] = effects(3 if quick else 11)
     say("rigid option")
     found["rigid"] = rigid(3 if quick else 7)
+    say("finite elements")
+    found["elements"] = elements(3 if quick else 7)
     say("command line")
     found["command_line"] = command_line(1 if quick else 5)
     return found
