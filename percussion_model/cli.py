@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from percussion_model.quick_start import own_process
+
 if TYPE_CHECKING:
     from percussion_model.comparison import Comparison
     from percussion_model.result import Result
@@ -225,8 +227,10 @@ def new(
 
 def _load(path: Path, solver: str | None, cells: int | None, settings: list[str] | None) -> Scene:
     """Read a scene and apply what the command line changes."""
+    from percussion_model.quick_start import load_numba
     from percussion_model.scene import Scene, read_setting
 
+    load_numba()
     scene = Scene.from_toml(path)
     changes: dict[str, Any] = dict(read_setting(text) for text in settings or ())
     if solver is not None:
@@ -273,6 +277,7 @@ def _complain(message: str, code: int = 0) -> int:
 
 def main() -> None:
     """Run the command line; errors are one message and an exit code."""
+    own_process()
     sys.exit(_guarded(lambda: app(standalone_mode=False)))
 
 

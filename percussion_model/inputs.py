@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
-import numpy as np
-
-from percussion_model.parameter_table import Row, rows_by_key
-from percussion_model.scene import Scene
-from percussion_model.scene_text import refuse_value
+from percussion_model.parameter_rows import refuse_value
+from percussion_model.scene_rules import SceneRules
 
 # Each input and its row in the parameter table.
 INPUTS = {
@@ -28,7 +24,7 @@ class SimulationError(ValueError):
     """A run that cannot go on, or that was asked for what makes no sense."""
 
 
-def check_input(scene: Scene, name: str, value: Any) -> float:
+def check_input(scene: SceneRules, name: str, value: Any) -> float:
     """Return the value of an input as a number.
 
     Raises
@@ -39,7 +35,7 @@ def check_input(scene: Scene, name: str, value: Any) -> float:
     """
     if name not in INPUTS:
         raise SimulationError(f"unknown input {name}: there are {', '.join(INPUTS)}")
-    row = rows_by_key()[INPUTS[name]]
+    row = scene.row_of(INPUTS[name])
     if not scene.matters(row.key):
         raise SimulationError(f"{name} has no effect in this scene: needs {row.effect}")
     if name.startswith("barrier") and not scene.barrier_on:
@@ -47,20 +43,6 @@ def check_input(scene: Scene, name: str, value: Any) -> float:
             f"{name} has no effect in this scene: it began without a barrier, since "
             "rock.barrier_energy or rock.barrier_damping is 0"
         )
-    if not _allows(row, value):
+    if not row.allows(value):
         raise SimulationError(refuse_value(row, name, value))
     return float(value)
-
-
-def is_number(value: Any) -> bool:
-    """Whether a value is a finite real number, and no truth value."""
-    real = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
-    return real and math.isfinite(value)
-
-
-def _allows(row: Row, value: Any) -> bool:
-    if not is_number(value):
-        return False
-    low = row.lower is None or value > row.lower or (value == row.lower and not row.lower_open)
-    high = row.upper is None or value < row.upper or (value == row.upper and not row.upper_open)
-    return low and high

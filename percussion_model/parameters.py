@@ -31,6 +31,7 @@ from percussion_model.parameter_fields import (
     choice,
     quantity,
 )
+from percussion_model.scene_rules import BarNumbers, SectionNumbers
 from percussion_model.solver_options import FemOptions, RunOptions, SolverOptions
 
 # Table II of the paper as repaired in docs/model.md.
@@ -52,33 +53,13 @@ def _reference_loss_time() -> float:
     return 2.0 * _PAPER_DAMPING_RATIO / critical
 
 
-class Section(Parameters):
+class Section(SectionNumbers, Parameters):
     """A length of bar with one cross-section and one material."""
 
     length: float = quantity(..., "m", "length", gt=0, le=1000)
     area: float = quantity(..., "m^2", "cross-section", gt=0, le=10)
     youngs_modulus: float = quantity(STEEL_YOUNGS_MODULUS, "Pa", "Young's modulus E", gt=0, le=1e13)
     density: float = quantity(STEEL_DENSITY, "kg/m^3", "density rho", gt=0, le=1e5)
-
-    @property
-    def wave_speed(self) -> float:
-        """Speed of longitudinal waves, sqrt(E/rho) [m/s]."""
-        return math.sqrt(self.youngs_modulus / self.density)
-
-    @property
-    def impedance(self) -> float:
-        """Force per particle velocity of a wave, A sqrt(E rho) [N s/m]."""
-        return self.area * math.sqrt(self.youngs_modulus * self.density)
-
-    @property
-    def mass(self) -> float:
-        """Mass [kg]."""
-        return self.density * self.area * self.length
-
-    @property
-    def transit_time(self) -> float:
-        """Time a wave takes from end to end [s]."""
-        return self.length / self.wave_speed
 
 
 REFERENCE_PISTON = (Section(length=REFERENCE_PISTON_LENGTH, area=REFERENCE_AREA),)
@@ -87,26 +68,11 @@ REFERENCE_BIT = (Section(length=REFERENCE_BIT_LENGTH, area=REFERENCE_AREA),)
 _SECTIONS = "sections from top to bottom"
 
 
-class Bar(Parameters):
+class Bar(BarNumbers, Parameters):
     """Sections one below the other; base of piston and bit."""
 
     model: str
     sections: tuple[Section, ...]
-
-    @property
-    def mass(self) -> float:
-        """Mass [kg]."""
-        return math.fsum(section.mass for section in self.sections)
-
-    @property
-    def length(self) -> float:
-        """Length [m]."""
-        return math.fsum(section.length for section in self.sections)
-
-    @property
-    def transit_time(self) -> float:
-        """Time a wave takes from end to end [s]."""
-        return math.fsum(section.transit_time for section in self.sections)
 
 
 class PistonBar(Bar):

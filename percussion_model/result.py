@@ -19,15 +19,10 @@ if TYPE_CHECKING:
 
     from percussion_model.solvers import Solver
 
-__all__ = ["Result", "check_writable", "complete_ledger", "make_result"]
+__all__ = ["Result", "check_writable", "make_result"]
 
 # Fewer whole blows than this tell no rate.
 LEAST_BLOWS = 3
-
-WORKS = ("drive", "feed", "gravity")
-DISSIPATED = ("crushing", "barrier", "standstill", "loss", "contact")
-NUMERICAL = ("numerical", "overshoot")
-STORED = ("kinetic", "elastic", "recoverable")
 
 
 @dataclass(frozen=True)
@@ -251,22 +246,6 @@ def make_result(
     )
     result.warnings.extend(find_warnings(result))
     return result
-
-
-def complete_ledger(entries: dict[str, float]) -> dict[str, float]:
-    """Add sums, residual and relative figures to the entries of a solver [J]."""
-    ledger = {"initial": entries["start"]}
-    ledger |= {name: entries[name] for name in (*WORKS, *DISSIPATED, *NUMERICAL, *STORED)}
-    given = sum(ledger[name] for name in WORKS)
-    stored = sum(ledger[name] for name in STORED)
-    dissipated = sum(ledger[name] for name in DISSIPATED)
-    apart = sum(ledger[name] for name in NUMERICAL)
-    residual = ledger["initial"] + given - stored - dissipated - apart
-    scale = abs(ledger["initial"]) + sum(abs(ledger[name]) for name in WORKS)
-    ledger |= {"input": given, "stored": stored, "dissipated": dissipated, "residual": residual}
-    for name in (*NUMERICAL, "residual"):
-        ledger[f"{name}_relative"] = ledger[name] / scale if scale > 0 else math.nan
-    return {name: float(value) for name, value in ledger.items()}
 
 
 def _mean(values: np.ndarray) -> float:

@@ -8,7 +8,8 @@ from typing import Any, Self
 import tomli_w
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from percussion_model.parameter_table import Row, find_row, parameter_table
+from percussion_model.parameter_rows import Row
+from percussion_model.parameter_table import find_row, parameter_table
 from percussion_model.parameters import (
     GROUPS,
     BitBar,
@@ -22,8 +23,8 @@ from percussion_model.parameters import (
     RockLaw,
     Start,
 )
+from percussion_model.scene_rules import SceneError, SceneRules, refuse_contradictions
 from percussion_model.scene_text import (
-    SceneError,
     commented_scene,
     explain_validation,
     flat_keys,
@@ -38,7 +39,7 @@ from percussion_model.solver_options import FemOptions, RunOptions, SolverOption
 __all__ = ["Scene", "SceneError", "read_setting"]
 
 
-class Scene(BaseModel):
+class Scene(SceneRules, BaseModel):
     """Everything that a run needs to know; immutable.
 
     Without arguments it is the reference scene of the paper. Bad values raise
@@ -149,13 +150,10 @@ class Scene(BaseModel):
 
     def __getitem__(self, key: str) -> Any:
         """Return the value of a dotted key."""
-        value: Any = self
         try:
-            for part in key.split("."):
-                value = value[int(part)] if part.isdigit() else getattr(value, part)
-        except (AttributeError, IndexError):
+            return super().__getitem__(key)
+        except KeyError:
             raise KeyError(unknown_key(key)) from None
-        return value
 
     @property
     def given(self) -> frozenset[str]:
@@ -170,30 +168,12 @@ class Scene(BaseModel):
             row.key for row in _plain_rows() if row.key in given and not self.matters(row.key)
         )
 
-    def matters(self, key: str) -> bool:
-        """Tell whether a parameter has any influence on this scene."""
+    def row_of(self, key: str) -> Row:
+        """Row of a dotted key in the parameter table."""
         row = find_row(key)
         if row is None:
             raise SceneError(unknown_key(key))
-        return all(self[need] in values for need, values in row.needs.items())
-
-    @property
-    def solver_name(self) -> str:
-        """Solver that computes the scene: "wave", "fem" or "rigid"."""
-        if self.solver.name != "auto":
-            return self.solver.name
-        return "wave" if self.bit.model == "elastic" else "rigid"
-
-    @property
-    def loss_on(self) -> bool:
-        """Whether bars lose energy to structural loss."""
-        return self.effects.loss and self.bit.model == "elastic" and self.loss.time > 0
-
-    @property
-    def barrier_on(self) -> bool:
-        """Whether the rock law has an energy barrier (mode DFC)."""
-        wanted = self.effects.barrier and self.effects.rock == "bilinear"
-        return wanted and self.rock.barrier_energy > 0 and self.rock.barrier_damping > 0
+        return row
 
     @property
     def effects_on(self) -> tuple[str, ...]:
@@ -241,37 +221,3 @@ class Scene(BaseModel):
 def _plain_rows() -> tuple[Row, ...]:
     """Rows of the keys that stand in a group itself, sections as one."""
     return tuple(row for row in parameter_table() if "*" not in row.key)
-
-
-def refuse_contradictions(scene: Scene) -> None:
-    """Raise `SceneError` if parts of a scene contradict each other."""
-    effects, piston, bit, run = scene.effects, scene.piston.model, scene.bit.model, scene.run
-    if piston == "absent" and effects.drive != "none":
-        raise SceneError(
-            f'effects.drive = "{effects.drive}" needs a piston, but piston.model = "absent": '
-            'set effects.drive = "none" or give a piston'
-        )
-    if piston == "elastic" and bit == "rigid":
-        raise SceneError(
-            'piston.model = "elastic" with bit.model = "rigid": no solver computes this; '
-            'set bit.model = "elastic" or piston.model = "rigid"'
-        )
-    if scene.solver.name in ("wave", "fem") and bit == "rigid":
-        raise SceneError(
-            f'solver.name = "{scene.solver.name}" needs bit.model = "elastic": '
-            'set that, or solver.name = "rigid" or "auto"'
-        )
-    if scene.solver.name == "rigid" and bit == "elastic":
-        raise SceneError(
-            'solver.name = "rigid" computes no elastic bars: set piston.model = "rigid" and '
-            'bit.model = "rigid", or solver.name = "wave", "fem" or "auto"'
-        )
-    if effects.barrier and effects.rock != "bilinear" and "effects.barrier" in scene.given:
-        raise SceneError(
-            f'effects.barrier = true needs effects.rock = "bilinear", not "{effects.rock}": '
-            "set effects.barrier = false"
-        )
-    if run.settle >= run.duration:
-        raise SceneError(
-            f"run.settle = {run.settle!r} s: must be below run.duration = {run.duration!r} s"
-        )

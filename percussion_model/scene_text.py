@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import difflib
 import os
-import reprlib
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
@@ -13,16 +12,16 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from percussion_model.parameter_table import (
+from percussion_model.parameter_rows import (
     Row,
-    find_row,
     generic_key,
-    parameter_table,
-    rows_by_key,
+    refuse_value,
+    show_value,
     toml_value,
-    unit_suffix,
 )
+from percussion_model.parameter_table import find_row, parameter_table, rows_by_key
 from percussion_model.parameters import GROUPS
+from percussion_model.scene_rules import SceneError
 
 # Below this similarity a guess at a misspelt key misleads more than it helps.
 _SIMILAR_ENOUGH = 0.6
@@ -32,10 +31,6 @@ _HEADER = (
     "# forces on contact and rock are positive in compression. What is left out takes",
     "# its default, which is the value of the reference scene.",
 )
-
-
-class SceneError(ValueError):
-    """A scene that cannot be read or makes no sense; the message says what to do."""
 
 
 def read_toml(path: Path) -> dict[str, Any]:
@@ -190,17 +185,10 @@ def _explain(fault: Any) -> str:
     if row is not None:
         return refuse_value(row, key, value)
     if key == "title":
-        return f"title = {_show(value)}: must be text"
+        return f"title = {show_value(value)}: must be text"
     if generic_key(key).endswith(".*"):
-        return f"{key} = {_show(value)}: must be a table with length and area"
-    return f"{key} = {_show(value)}: must be a table, written [{key}]"
-
-
-def refuse_value(row: Row, key: str, value: Any) -> str:
-    """Say that a value is not allowed, and what is."""
-    number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    unit = unit_suffix(row.unit) if number else ""
-    return f"{key} = {_show(value)}{unit}: must be {row.allowed}"
+        return f"{key} = {show_value(value)}: must be a table with length and area"
+    return f"{key} = {show_value(value)}: must be a table, written [{key}]"
 
 
 def unknown_key(key: str) -> str:
@@ -221,12 +209,3 @@ def unknown_key(key: str) -> str:
     if siblings and parent:
         return f"unknown key {key}: [{parent}] has the keys {', '.join(siblings)}"
     return f"unknown key {key}: a scene has a title and the tables {', '.join(GROUPS)}"
-
-
-def _show(value: Any) -> str:
-    """Show a value as it stands in a scene file, shortened."""
-    try:
-        text = toml_value(value)
-    except TypeError:
-        text = repr(value)
-    return text if len(text) <= 60 and "\n" not in text else reprlib.repr(value)

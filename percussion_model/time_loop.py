@@ -13,7 +13,8 @@ from typing import Protocol
 import numpy as np
 
 from percussion_model.core.records import SAMPLE_FIELDS
-from percussion_model.inputs import SimulationError, is_number
+from percussion_model.inputs import SimulationError
+from percussion_model.parameter_rows import is_number
 
 # Between chunks a run reports progress and can be interrupted: short enough in
 # wall time [s] to react at once, and at most so long in simulated time [s].

@@ -7,11 +7,11 @@ import math
 from percussion_model.core.bar import kinetic_energy
 from percussion_model.core.drive import drive_force
 from percussion_model.core.kernel import kernel, merged
-from percussion_model.core.leap import leap, plan_leap
-from percussion_model.core.records import Piston, Status
+from percussion_model.core.leap import FEWEST_STEPS, leap, longest_leap, plan_leap
+from percussion_model.core.records import PEAK_FIELDS, SAMPLE_FIELDS, Piston, Status
 from percussion_model.core.rock import MOST_CROSSINGS
 from percussion_model.core.sleep import put_to_sleep, sleep_on, wake_piston
-from percussion_model.core.totals import bit_position, now
+from percussion_model.core.totals import bit_position, lost_in_faces, now, stored_energy
 from percussion_model.core.wave import step
 from percussion_model.core.wave_records import Row, Task
 
@@ -20,6 +20,10 @@ NOT_FINITE = int(Status.NOT_FINITE)
 ABSENT = int(Piston.ABSENT)
 ADVANCE, SAMPLE, STEP = int(Task.ADVANCE), int(Task.SAMPLE), int(Task.STEP)
 FACE = int(Row.FACE)
+
+# Where a longer row goes on.
+PEAKS = len(SAMPLE_FIELDS)
+LEDGER = PEAKS + len(PEAK_FIELDS)
 
 # Events that one step can make at the most: the rock's crossings, two of the
 # contact, one of the drive, one of the barrier.
@@ -33,18 +37,23 @@ GRID_ROUNDING = 1e-6
 @merged
 def plan(par, s, wp, cp, wb, cb, ops, x, v, y):
     """Wake the piston or put it to sleep, and plan the bit's next leap."""
-    if s.asleep == 1 and s.step >= s.wake and not sleep_on(par, s, wb, cb):
+    # a leap that ended just short of it is none to wait for
+    due = s.asleep == 1 and s.step + FEWEST_STEPS > s.wake and s.leap_end < 0
+    if due and not sleep_on(par, s, wb, cb):
         wake_piston(par, s, wp, cp, wb, cb, ops[0], x, y)
         s.no_sleep = s.step
         s.count_wakes += 1
     if par.piston != ABSENT and s.asleep == 0:
         if s.step < s.no_sleep:
             return
-        put_to_sleep(par, s, wp, cp, wb, cb)
+        put_to_sleep(par, s, wp, cp, wb, cb, ops, x, v, y)
         if s.asleep == 0:
             return
     if s.leap_end < 0 and s.step >= s.no_plan:
-        plan_leap(par, s, wb, cb, ops[4], x, v)
+        most = longest_leap(par)
+        if s.asleep == 1:
+            most = min(most, s.wake - s.step)
+        plan_leap(par, s, wb, cb, ops[2], x, v, most)
 
 
 @merged
@@ -125,9 +134,32 @@ def fill_sample(par, s, wp, cp, wb, cb, time, tau, blows, events, row):
     row[15] = bit + s.i_bit
     row[16] = contact + s.i_contact
     row[17] = s.i_drive
+    if row.shape[0] > LEDGER:
+        row[PEAKS] = s.peak_bit
+        row[PEAKS + 1] = s.peak_contact
     if par.piston == ABSENT:
         for k in (1, 2, 7, 8):
             row[k] = math.nan
+
+
+@kernel
+def fill_ledger(par, s, wp, cp, wb, cb, row):
+    """Write the energies at the grid point of the state (LONG_SAMPLE_FIELDS)."""
+    row[LEDGER] = s.e_drive
+    row[LEDGER + 1] = s.e_feed
+    row[LEDGER + 2] = s.e_gravity
+    row[LEDGER + 3] = s.e_crushing
+    row[LEDGER + 4] = s.e_barrier
+    row[LEDGER + 5] = s.e_standstill
+    row[LEDGER + 6] = s.e_loss + lost_in_faces(par, wp, wb)
+    row[LEDGER + 7] = s.e_contact
+    row[LEDGER + 8] = s.e_numerical
+    row[LEDGER + 9] = s.e_overshoot
+    kinetic, elastic, rock = stored_energy(par, s, wp, cp, wb, cb)
+    row[LEDGER + 10] = s.e_start
+    row[LEDGER + 11] = kinetic
+    row[LEDGER + 12] = elastic
+    row[LEDGER + 13] = rock
 
 
 @kernel
@@ -153,7 +185,8 @@ def run(task, par_, state, wp, cp, wb, cb, ops, x, v, y, time, blows, events, ro
         [s]
     blows, events : BLOW, EVENT array
         Filled from index 0; the state says how far.
-    row : float array, shape (len(SAMPLE_FIELDS),)
+    row : float array
+        Of the length of SAMPLE_FIELDS or of LONG_SAMPLE_FIELDS.
 
     Returns
     -------
@@ -170,6 +203,8 @@ def run(task, par_, state, wp, cp, wb, cb, ops, x, v, y, time, blows, events, ro
     bring(par, s, wp, cp, wb, cb, ops, x, v, y, time)
     if task == SAMPLE:
         s.live = 0
+        if row.shape[0] > LEDGER:
+            fill_ledger(par, s, wp, cp, wb, cb, row)
         tau = max(time - now(par, s), SHORTEST * par.dt)
         fill_sample(par, s, wp, cp, wb, cb, time, tau, blows, events, row)
     return DONE

@@ -171,6 +171,8 @@ def time_to_cover(distance, velocity, acceleration):
     """
     if distance <= 0.0:
         return 0.0
+    if distance == math.inf:
+        return math.inf
     disc = velocity * velocity + 2.0 * acceleration * distance
     if disc < 0.0:
         return math.inf

@@ -65,6 +65,10 @@ _SUMS = [
     ("rock_work", "f8"),  # [J]
     *[(f"e_{name}", "f8") for name in LEDGER_FIELDS],
     ("e_start", "f8"),  # stored energy at the start [J]
+    # greatest forces since a time that the observer sets; infinite: nobody asks
+    ("peak_from", "f8"),  # [s]
+    ("peak_bit", "f8"),  # [N]
+    ("peak_contact", "f8"),
 ]
 
 _BLOW = [

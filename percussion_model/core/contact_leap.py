@@ -11,21 +11,23 @@ import math
 
 from percussion_model.core.bar import deviation_energy, mean_velocity, strain_offset
 from percussion_model.core.kernel import kernel, merged
-from percussion_model.core.linear import load, multiply, pad, store
+from percussion_model.core.linear import PADDING, carry, dot, load, multiply, pad, store
+from percussion_model.core.peaks import note_steps
 from percussion_model.core.records import Mode
 from percussion_model.core.rock_law import REST_VELOCITY, crush, origin, stiffness
+from percussion_model.core.totals import now
 from percussion_model.core.wave_records import Coef
 
 BOTTOM = int(Coef.BOTTOM)
 DFC, FC, BC, SS = int(Mode.DFC), int(Mode.FC), int(Mode.BC), int(Mode.SS)
 
-# Steps looked at in one go, a power of two.
+# Steps looked at in one go, a power of four.
 WATCHED = 64
 # Leaps end on multiples of this: the few steps more are cheaper than the
 # products that they would save.
 GRAIN = 4
-# Operators are kept for this many powers of two of a loading step.
-WATCH_LEVELS = 7
+# A leap of so many steps needs this many powers of a step, one to four of each.
+WATCH_LEVELS = 4
 
 
 @merged
@@ -54,16 +56,17 @@ def load_contact(par, s, wb, cb, x):
 
 
 @merged
-def look_ahead(watch, mode, size, x, v):
-    """v[k] = velocity of the rock end at the start of step k [m/s]."""
-    for k in range(WATCHED):
-        v[k] = 0.0
-    for i in range(0, size, 4):
-        a, b, c, d = x[i], x[i + 1], x[i + 2], x[i + 3]
-        for k in range(WATCHED):
-            v[k] += (watch[mode, i, k] * a + watch[mode, i + 1, k] * b) + (
-                watch[mode, i + 2, k] * c + watch[mode, i + 3, k] * d
-            )
+def look_ahead(watch, size, x, v, steps, add):
+    """Put into v, or add to it, what `watch` shows of `x` over the next steps.
+
+    Parameters
+    ----------
+    watch : float array, shape (size, WATCHED)
+    steps : int
+        How many of them are asked for.
+    """
+    count = min(WATCHED, (steps + PADDING - 1) // PADDING * PADDING)
+    multiply(watch, x, v, size, count, add)
 
 
 @kernel
@@ -100,7 +103,7 @@ def watch_contact(par, s, wb, cb, watch, x, v, most):
         No more than this many, nor than WATCHED.
     """
     load_contact(par, s, wb, cb, x)
-    look_ahead(watch, s.mode, par.size_r, x, v)
+    look_ahead(watch[s.mode], par.size_r, x, v, most, False)
     K, C, z, fade, d, q = step_constants(par, s)
     y = s.p - origin(s)
     most = min(most, WATCHED)
@@ -140,7 +143,7 @@ def watch_flight(par, s, wb, cb, watch, x, v, most):
     """
     load(x, wb, cb, par.n_b, 2 * s.parity, s.v_b, 0.0)
     pad(x, 2 * par.n_b, par.size_r)
-    look_ahead(watch, 0, par.size_r, x, v)
+    look_ahead(watch[0], par.size_r, x, v, most, False)
     a = par.gravity + s.feed / par.mass_b
     mean = s.p + strain_offset(wb, cb, par.n_b, 2 * s.parity, BOTTOM)
     most = min(most, WATCHED)
@@ -155,7 +158,7 @@ def watch_flight(par, s, wb, cb, watch, x, v, most):
 
 
 @kernel
-def leap_contact(par, s, wb, cb, rest, loading, sums, steps, x, v, y):
+def leap_contact(par, s, wb, cb, powers, sums, steps, x, v, y):
     """Carry the bit over `steps` steps within a contact mode.
 
     Parameters
@@ -172,24 +175,21 @@ def leap_contact(par, s, wb, cb, rest, loading, sums, steps, x, v, y):
     K, C, z, fade, d, q = step_constants(par, s)
     squares = 0.0
     spring = K * (s.p - origin(s))
+    peak = s.b_peak_bit
     for k in range(steps):
         squares += v[k] * v[k]
         force = spring + C * v[k]
-        spring += K * v[k] * d
-        s.b_peak_bit = max(s.b_peak_bit, force, force + z * v[k] * fade)
+        spring += K * d * v[k]
+        peak = max(peak, force + max(0.0, z * fade * v[k]))
+    s.b_peak_bit = peak
+    begin = now(par, s)
+    if begin + steps * par.dt > s.peak_from:
+        first = K * (s.p - origin(s))
+        note_steps(s, begin, par.dt, first, v, steps, K, C, z, fade, d, 0.0)
     before = contact_energy(par, s, wb, cb, K, s.p - still)
-    path = 0.0
-    for level in range(WATCH_LEVELS):
-        if (steps >> level) & 1:
-            which = 0 if s.mode == SS else s.mode
-            for i in range(par.size_r):
-                path += sums[which, level, i] * x[i]
-            if s.mode == SS:
-                multiply(rest, level, 0, x, y, par.size_r)
-            else:
-                multiply(loading[s.mode - 1], level, 0, x, y, par.size_r)
-            for i in range(par.size_r):
-                x[i] = y[i]
+    path = dot(sums[s.mode], x, par.size_r)
+    carry(powers[s.mode], steps, x, y, par.size_r)
+    path -= dot(sums[s.mode], x, par.size_r)
     a = par.gravity + s.feed / par.mass_b
     store(x, wb, cb, par.n_b, 2 * s.parity, 0.0, a)
     if par.loss > 0:

@@ -86,7 +86,7 @@ def book_end(s, z, kappa, inner, d, q, tau):
 
 
 @kernel
-def record_contact(par, s, wb, cb, opened, t_close, approach, peak, time, blows, events):
+def record_contact(par, s, wb, cb, opened, t_close, approach, peak, time, tau, blows, events):
     """Book the opening and the closure of the piston/bit gap in this step."""
     if opened == 1:
         s.b_rebound = s.v_p
@@ -104,6 +104,8 @@ def record_contact(par, s, wb, cb, opened, t_close, approach, peak, time, blows,
         push_event(s, events, closure, CONTACT_CLOSED, approach)
     if s.closed == 1:
         s.b_peak_contact = max(s.b_peak_contact, peak)
+        if time + tau > s.peak_from:
+            s.peak_contact = max(s.peak_contact, peak)
 
 
 @inlined
@@ -150,7 +152,7 @@ def meet_piston(par, s, wp, wb, cb, v_p, v_t, in_p, in_t, elastic, tau, time, bl
     wb[FACE, 0] = d_t / tau
     if closed != s.closed or t_close >= 0.0 or closed == 1:
         s.closed = closed
-        record_contact(par, s, wb, cb, opened, t_close, v_p - v_t, peak, time, blows, events)
+        record_contact(par, s, wb, cb, opened, t_close, v_p - v_t, peak, time, tau, blows, events)
     s.gap = gap
     return impulse, d_p
 

@@ -98,6 +98,34 @@ def book_rock(par, s, x, w, h):
         s.e_standstill += dashpot
 
 
+@inlined
+def bit_force(s):
+    """Force of the bit on the rock, compression positive [N]."""
+    if s.mode == FF:
+        return 0.0
+    return stiffness(s) * (s.p - origin(s)) + damping(s) * s.v_end
+
+
+@inlined
+def contact_force(par, s):
+    """Force of the piston on the bit, compression positive [N]."""
+    if s.closed == 1:
+        return -par.k_c * s.gap
+    return 0.0
+
+
+@inlined
+def note_forces(par, s):
+    """Keep the greatest forces at the ends of steps: of the blow, and of an observer."""
+    bit = bit_force(s)
+    contact = contact_force(par, s)
+    s.b_peak_bit = max(s.b_peak_bit, bit)
+    s.b_peak_contact = max(s.b_peak_contact, contact)
+    if s.time >= s.peak_from:
+        s.peak_bit = max(s.peak_bit, bit)
+        s.peak_contact = max(s.peak_contact, contact)
+
+
 @kernel
 def take_step(par, s, w, c, x, h):
     """Make the tried step the state, and book it."""
@@ -129,10 +157,6 @@ def take_step(par, s, w, c, x, h):
         crush(s, p_before)
     if -s.u_r > s.b_stroke and n_p > 0:
         s.b_stroke = -s.u_r
-    if s.mode != FF:
-        force = stiffness(s) * (s.p - origin(s)) + damping(s) * s.v_end
-        s.b_peak_bit = max(s.b_peak_bit, force)
-    if s.closed == 1:
-        s.b_peak_contact = max(s.b_peak_contact, -par.k_c * s.gap)
     s.time += h
     s.count_steps += 1
+    note_forces(par, s)

@@ -21,9 +21,10 @@ from percussion_model.core.contact_leap import (
     watch_flight,
 )
 from percussion_model.core.kernel import kernel, merged
-from percussion_model.core.linear import load, multiply, pad, quadratic, remove_mean, store
+from percussion_model.core.linear import carry, dot, load, pad, quadratic, remove_mean, store
 from percussion_model.core.records import Mode, RockKind
 from percussion_model.core.rock_law import recoverable
+from percussion_model.core.standstill_peak import watch_standstill
 from percussion_model.core.totals import now
 from percussion_model.core.wave_records import Coef, LeapKind
 
@@ -40,10 +41,16 @@ QUIET_SHARE = 0.9
 # What a vibration of less than this gives to the rock is not booked [J].
 NEGLIGIBLE = 1e-13
 
-# Quadratic forms kept with each power of the step map in standstill. That of
-# the structural loss telescopes to the energy before less that after, less
-# these two (docs/numerics.md, section 5; tests hold it against every step's).
-DASHPOT_FORM, NUMERICAL_FORM = 1, 2
+# Quadratic forms of what a standstill will ever lose; a leap loses the
+# difference of before and after. So does the structural loss: the energy's,
+# less these two (docs/numerics.md, section 5; tests hold it against every step).
+DASHPOT_FORM, NUMERICAL_FORM = 0, 1
+
+
+@merged
+def longest_leap(par):
+    """Most steps that the powers at hand can carry a bar."""
+    return (1 << (2 * par.leaps)) - 1
 
 
 @kernel
@@ -98,12 +105,12 @@ def plan_flight(par, s, wb, cb, watch, x, v, most):
     return steps
 
 
-@merged
-def plan_leap(par, s, wb, cb, watch, x, v):
-    """Decide how far the bit may leap next; s.leap_end says so, or -1."""
-    most = (1 << par.leaps) - 1
-    if s.asleep == 1:
-        most = min(most, s.wake - s.step)
+@kernel
+def plan_leap(par, s, wb, cb, watch, x, v, most):
+    """Decide how far the bit may leap next, at most `most` steps.
+
+    s.leap_end says where to, or -1.
+    """
     steps = 0
     looked = False
     s.v_b = mean_velocity(wb, cb, par.n_b, 2 * s.parity, par.mass_b)
@@ -133,17 +140,13 @@ def plan_leap(par, s, wb, cb, watch, x, v):
 
 
 @kernel
-def leap_free_bar(par, s, w, c, n, mass, v0, v1, steps, operator, size, x, y):
+def leap_free_bar(par, s, w, c, n, mass, v0, v1, steps, powers, size, x, y):
     """Carry the vibration of a free bar over `steps` steps."""
     r = 2 * s.parity
     load(x, w, c, n, r, v0, 0.0)
     pad(x, 2 * n, size)
     before = deviation_energy(w, c, n, r, v0, 0.0)
-    for level in range(par.leaps):
-        if (steps >> level) & 1:
-            multiply(operator, level, 0, x, y, size)
-            for i in range(size):
-                x[i] = y[i]
+    carry(powers, steps, x, y, size)
     remove_mean(x, c, n, mass)
     store(x, w, c, n, r, v1, 0.0)
     if par.loss > 0:
@@ -151,7 +154,7 @@ def leap_free_bar(par, s, w, c, n, mass, v0, v1, steps, operator, size, x, y):
 
 
 @merged
-def leap_flight(par, s, wb, cb, free, steps, x, y):
+def leap_flight(par, s, wb, cb, powers, steps, x, y):
     """Carry the bit over `steps` steps of free flight."""
     r = 2 * s.parity
     a = par.gravity + s.feed / par.mass_b
@@ -161,14 +164,14 @@ def leap_flight(par, s, wb, cb, free, steps, x, y):
     v0 = s.v_b
     s.v_b = v0 + a * time
     path = (v0 + 0.5 * a * time) * time
-    leap_free_bar(par, s, wb, cb, par.n_b, par.mass_b, v0, s.v_b, steps, free, par.size_b, x, y)
+    leap_free_bar(par, s, wb, cb, par.n_b, par.mass_b, v0, s.v_b, steps, powers, par.size_r, x, y)
     s.p += path - (strain_offset(wb, cb, par.n_b, r, BOTTOM) - offset)
     s.e_standstill += unloading - recoverable(s)
     return path
 
 
 @merged
-def leap_standstill(par, s, wb, cb, rest, sums, steps, x, y):
+def leap_standstill(par, s, wb, cb, powers, sums, forms, steps, x, y):
     """Carry the bit over `steps` steps of standstill.
 
     Returns
@@ -186,20 +189,18 @@ def leap_standstill(par, s, wb, cb, rest, sums, steps, x, y):
     load(x, wb, cb, n, r, 0.0, a)
     x[2 * n] = s.p - still
     pad(x, 2 * n + 1, size)
-    path = 0.0
     before = standstill_energy(par, s, wb, cb)
-    lost = 0.0
+    path = dot(sums[SS], x, size)
     damped = 0.0
-    for level in range(par.leaps):
-        if (steps >> level) & 1:
-            for i in range(size):
-                path += sums[0, level, i] * x[i]
-            if before > NEGLIGIBLE:
-                damped += quadratic(rest, level, DASHPOT_FORM, x, y, size)
-                lost += quadratic(rest, level, NUMERICAL_FORM, x, y, size)
-            multiply(rest, level, 0, x, y, size)
-            for i in range(size):
-                x[i] = y[i]
+    lost = 0.0
+    if before > NEGLIGIBLE:
+        damped += quadratic(forms[DASHPOT_FORM], x, y, size)
+        lost += quadratic(forms[NUMERICAL_FORM], x, y, size)
+    carry(powers[SS], steps, x, y, size)
+    path -= dot(sums[SS], x, size)
+    if before > NEGLIGIBLE:
+        damped -= quadratic(forms[DASHPOT_FORM], x, y, size)
+        lost -= quadratic(forms[NUMERICAL_FORM], x, y, size)
     store(x, wb, cb, n, r, 0.0, a)
     s.p = still + x[2 * n]
     s.e_standstill += damped
@@ -221,7 +222,7 @@ def leap(par, s, wb, cb, ops, x, v, y, watched):
     watched : bool
         Whether `v` still holds what the plan of this leap saw.
     ops : tuple of float arrays
-        (piston, free, rest, loading, watch, sums), see `LeapOperators`.
+        (piston, bit, watch, sums, top, bottom, forms), see `LeapOperators`.
     x, v, y : float array
         Scratch.
     """
@@ -229,13 +230,15 @@ def leap(par, s, wb, cb, ops, x, v, y, watched):
     if s.mode == SS:
         push_checkpoint(s, now(par, s))
     if s.leap_kind == FLIGHT:
-        path = leap_flight(par, s, wb, cb, ops[1], steps, x, y)
+        path = leap_flight(par, s, wb, cb, ops[1][FF], steps, x, y)
     elif s.leap_kind == STANDSTILL:
-        path = leap_standstill(par, s, wb, cb, ops[2], ops[5], steps, x, y)
+        if now(par, s) + steps * par.dt > s.peak_from:
+            watch_standstill(par, s, wb, cb, ops[1], ops[2], steps, x, v, y)
+        path = leap_standstill(par, s, wb, cb, ops[1], ops[3], ops[6], steps, x, y)
     else:
         if not watched:
-            watch_contact(par, s, wb, cb, ops[4], x, v, steps)
-        path = leap_contact(par, s, wb, cb, ops[2], ops[3], ops[5], steps, x, v, y)
+            watch_contact(par, s, wb, cb, ops[2], x, v, steps)
+        path = leap_contact(par, s, wb, cb, ops[1], ops[3], steps, x, v, y)
     s.e_feed += s.feed * path
     s.e_gravity += par.mass_b * par.gravity * path
     s.step = s.leap_end

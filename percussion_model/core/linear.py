@@ -6,14 +6,14 @@ A map is stored column by column and padded with zeros to a multiple of
 
 from __future__ import annotations
 
-from percussion_model.core.kernel import kernel, merged
+from percussion_model.core.kernel import inlined, kernel, merged
+from percussion_model.core.lanes import WIDTH, add_scaled, load_lanes, no_lanes, store_sum
 from percussion_model.core.wave_records import Coef
 
 MASS, STATIC = int(Coef.MASS), int(Coef.STATIC)
 
-# Sizes are padded to a multiple of this: four vectors of four numbers, which
-# is what a loop takes at a time.
-PADDING = 16
+# Sizes are padded to a multiple of this, which is what a product takes at a time.
+PADDING = WIDTH
 
 
 @merged
@@ -49,39 +49,73 @@ def remove_mean(x, c, n, mass):
 
 
 @kernel
-def multiply(operator, level, form, x, y, size):
-    """y = A x, with A stored column by column."""
-    for i in range(size):
-        y[i] = 0.0
-    for k in range(0, size, 4):
-        a, b, c, d = x[k], x[k + 1], x[k + 2], x[k + 3]
-        for i in range(size):
-            y[i] += (operator[level, form, k, i] * a + operator[level, form, k + 1, i] * b) + (
-                operator[level, form, k + 2, i] * c + operator[level, form, k + 3, i] * d
-            )
+def multiply(operator, x, y, rows, columns, add):
+    """y = A x, or y += A x, with A stored column by column.
+
+    Parameters
+    ----------
+    operator : float array, shape (at least rows, at least columns)
+        Row k is the k-th column of A.
+    rows, columns : int
+        An even number, a multiple of `PADDING`.
+    """
+    for i in range(0, columns, PADDING):
+        even = load_lanes(y, i) if add else no_lanes()
+        odd = no_lanes()
+        for k in range(0, rows, 2):
+            even = add_scaled(even, operator, k, i, x[k])
+            odd = add_scaled(odd, operator, k + 1, i, x[k + 1])
+        store_sum(y, i, even, odd)
 
 
 @kernel
-def quadratic(operator, level, form, x, y, size):
-    """x' A x [J], with A stored as the upper triangle that gives the same."""
-    for i in range(size):
-        y[i] = 0.0
-    for k in range(0, size, 4):
-        a, b, c, d = x[k], x[k + 1], x[k + 2], x[k + 3]
-        for i in range((k // PADDING + 1) * PADDING):
-            y[i] += (operator[level, form, k, i] * a + operator[level, form, k + 1, i] * b) + (
-                operator[level, form, k + 2, i] * c + operator[level, form, k + 3, i] * d
-            )
+def carry(powers, steps, x, y, size):
+    """x = P^steps x from the powers 1, 4, 16, ... of a map.
+
+    Four to a level, not two: fewer matrices, which stay in the cache.
+
+    Parameters
+    ----------
+    powers : float array, shape (levels, size, size)
+    y : float array
+        Scratch.
+    """
+    level = 0
+    while steps > 0:
+        for _ in range(steps & 3):
+            multiply(powers[level], x, y, size, size, False)
+            for i in range(size):
+                x[i] = y[i]
+        steps >>= 2
+        level += 1
+
+
+@inlined
+def dot(row, x, size):
+    """Sum of products of two rows, in four sums that need not wait for each other."""
     a = 0.0
     b = 0.0
     c = 0.0
     d = 0.0
     for i in range(0, size, 4):
-        a += x[i] * y[i]
-        b += x[i + 1] * y[i + 1]
-        c += x[i + 2] * y[i + 2]
-        d += x[i + 3] * y[i + 3]
+        a += row[i] * x[i]
+        b += row[i + 1] * x[i + 1]
+        c += row[i + 2] * x[i + 2]
+        d += row[i + 3] * x[i + 3]
     return (a + b) + (c + d)
+
+
+@kernel
+def quadratic(operator, x, y, size):
+    """x' A x [J], with A stored as the upper triangle that gives the same."""
+    for i in range(0, size, PADDING):
+        even = no_lanes()
+        odd = no_lanes()
+        for k in range(i, size, 2):
+            even = add_scaled(even, operator, k, i, x[k])
+            odd = add_scaled(odd, operator, k + 1, i, x[k + 1])
+        store_sum(y, i, even, odd)
+    return dot(x, y, size)
 
 
 @merged

@@ -140,5 +140,13 @@ LEDGER_FIELDS = (
     "overshoot",  # what springs lose where an event is found just past its place
 )
 
-# Stored energies [J] found by reading a state.
-STORED_FIELDS = ("kinetic", "elastic", "rock")
+# Stored energies [J] found by reading a state: at the start, and now.
+STORED_FIELDS = ("start", "kinetic", "elastic", "recoverable")
+
+# Greatest forces since the time that a state carries as `peak_from` [N]. Contact: the
+# elastic part of the force; rigid bodies have none but where they rest on each other.
+PEAK_FIELDS = ("peak_bit_force", "peak_contact_force")
+
+# A row that is longer than a sample holds these besides; the ledger is that of
+# the last grid point before.
+LONG_SAMPLE_FIELDS = (*SAMPLE_FIELDS, *PEAK_FIELDS, *LEDGER_FIELDS, *STORED_FIELDS)

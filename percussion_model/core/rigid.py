@@ -6,7 +6,7 @@ import math
 
 from numba import njit
 
-from percussion_model.core.records import Piston, Status
+from percussion_model.core.records import PEAK_FIELDS, SAMPLE_FIELDS, Piston, Status
 from percussion_model.core.rigid_events import happen, starts_blow
 from percussion_model.core.rigid_law import (
     acceleration,
@@ -26,6 +26,10 @@ from percussion_model.core.rigid_schedule import CLOSE, NOTHING, schedule
 DONE, BLOWS_FULL, EVENTS_FULL = int(Status.DONE), int(Status.BLOWS_FULL), int(Status.EVENTS_FULL)
 NOT_FINITE, LOCKED = int(Status.NOT_FINITE), int(Status.LOCKED)
 ABSENT = int(Piston.ABSENT)
+
+# Where a longer row goes on.
+PEAKS = len(SAMPLE_FIELDS)
+LEDGER = PEAKS + len(PEAK_FIELDS)
 
 # Events at one instant that the model can make: impact, release, a round of all modes,
 # and as many bounces as RESTING_EVENTS allows. More would be a loop.
@@ -125,6 +129,30 @@ def begin(par_, state):
 
 
 @njit(cache=True, error_model="numpy")
+def fill_ledger(par, s, tau, row):
+    """Carry the state over `tau` and write peaks and energies (LONG_SAMPLE_FIELDS)."""
+    if tau > 0.0:
+        move(par, s, tau)
+        s.time += tau
+    row[PEAKS] = s.peak_bit
+    row[PEAKS + 1] = s.peak_contact
+    row[LEDGER] = s.drive
+    row[LEDGER + 1] = s.feed
+    row[LEDGER + 2] = s.gravity
+    row[LEDGER + 3] = s.crushing
+    row[LEDGER + 4] = s.barrier
+    row[LEDGER + 5] = s.standstill
+    row[LEDGER + 6] = s.loss
+    row[LEDGER + 7] = s.contact
+    row[LEDGER + 8] = s.numerical
+    row[LEDGER + 9] = s.overshoot
+    row[LEDGER + 10] = s.initial_energy
+    row[LEDGER + 11] = kinetic_energy(par, s.v_p, s.v_b)
+    row[LEDGER + 12] = 0.0
+    row[LEDGER + 13] = recoverable(par, s, s.p)
+
+
+@njit(cache=True, error_model="numpy")
 def fill_sample(par, s, t, row):
     """Write what is seen at time t, up to the next event (SAMPLE_FIELDS)."""
     tau = t - s.time
@@ -164,6 +192,8 @@ def fill_sample(par, s, t, row):
     else:
         row[12] = drive_force(par, s)
         row[17] += row[12] * tau
+    if row.shape[0] > LEDGER:
+        fill_ledger(par, s, tau, row)
 
 
 @njit(cache=True, error_model="numpy")

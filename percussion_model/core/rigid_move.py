@@ -14,7 +14,9 @@ from percussion_model.core.rigid_law import (
     DFC,
     FC,
     FF,
+    acceleration,
     bit_force,
+    contact_force,
     drive_force,
     free_acceleration,
     loads,
@@ -115,8 +117,11 @@ def greatest_gap(par, s, tau, v_b, v_p, gap):
 
 
 @njit(cache=True, error_model="numpy")
-def greatest_bit_force(par, s, tau, p, v):
-    """Greatest bit force within the stretch: at its ends or at its first maximum."""
+def greatest_bit_force(par, s, tau, p, v, known):
+    """Greatest bit force within the stretch: at its ends or at its first maximum.
+
+    Where nothing above the force `known` [N] can come, the ends alone are looked at.
+    """
     most = max(bit_force(par, s, s.p, s.v_b), bit_force(par, s, p, v))
     K, C, P = rock_terms(par, s)
     # In BC the force falls, in FC it rises with the penetration.
@@ -129,7 +134,7 @@ def greatest_bit_force(par, s, tau, p, v):
     # The force less its mean obeys the equation of motion too.
     f = K * (s.p - P) + C * s.v_b - F
     rate = K * s.v_b + C * acc
-    if F + math.sqrt(f * f + rate * rate / k) <= max(most, s.blow.peak_bit_force):
+    if F + math.sqrt(f * f + rate * rate / k) <= max(most, known):
         return most
     t = zero_time(rate, -2.0 * beta * rate - k * f, beta, k)
     if t < tau:
@@ -139,6 +144,29 @@ def greatest_bit_force(par, s, tau, p, v):
             if t < tau:
                 most = max(most, F + oscillate(f, rate, beta, k, t)[0])
     return most
+
+
+@njit(cache=True, error_model="numpy")
+def note_peaks(par, s, tau):
+    """Note the greatest forces of the stretch, from `peak_from` of the state on."""
+    p, v_b = s.p, s.v_b
+    early = max(s.peak_from - s.time, 0.0)
+    if early > 0.0:
+        d, s.v_b = bit_motion(par, s, early)
+        s.p += d
+    rest = tau - early
+    d, v = bit_motion(par, s, rest)
+    if s.mode != FF:
+        most = greatest_bit_force(par, s, rest, s.p + d, v, s.peak_bit)
+        s.peak_bit = max(s.peak_bit, most)
+    if s.held == 1:
+        # the free piston's acceleration less the common one, which the bit force changes
+        first = bit_force(par, s, s.p, s.v_b)
+        last = bit_force(par, s, s.p + d, v)
+        most = contact_force(par, s, acceleration(par, s))
+        share = par.M_p / (par.M_p + par.M_b)
+        s.peak_contact = max(s.peak_contact, most, most + share * (last - first))
+    s.p, s.v_b = p, v_b
 
 
 @njit(cache=True, error_model="numpy")
@@ -198,8 +226,10 @@ def move(par, s, tau):
     s.feed += par.F_S * d_b
     s.gravity += par.G * (par.M_p * d_p + par.M_b * d_b)
     if s.mode != FF:
-        most = greatest_bit_force(par, s, tau, s.p + d_b, v_b)
+        most = greatest_bit_force(par, s, tau, s.p + d_b, v_b, s.blow.peak_bit_force)
         s.blow.peak_bit_force = max(s.blow.peak_bit_force, most)
+    if s.time + tau > s.peak_from:
+        note_peaks(par, s, tau)
     if par.piston != ABSENT and s.held == 0:
         s.blow.stroke = max(s.blow.stroke, greatest_gap(par, s, tau, v_b, v_p, gap))
     s.blow.rock_energy += book_rock(par, s, d_b, taken)

@@ -93,6 +93,10 @@ RIGID_STATE = np.dtype(
         ("drive_impulse", "f8"),
         *[(name, "f8") for name in LEDGER_FIELDS],  # [J]
         ("initial_energy", "f8"),  # [J]
+        # greatest forces since a time that the observer sets; infinite: nobody asks
+        ("peak_from", "f8"),  # [s]
+        ("peak_bit", "f8"),  # [N]
+        ("peak_contact", "f8"),
         ("count_events", "i8"),
         ("count_contacts", "i8"),
         ("count_blows", "i8"),

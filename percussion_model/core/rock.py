@@ -12,6 +12,7 @@ import math
 from percussion_model.core.bar import kinetic_energy
 from percussion_model.core.blows import push_event
 from percussion_model.core.kernel import inlined, merged
+from percussion_model.core.peaks import note_peak
 from percussion_model.core.records import Mode, RockKind
 from percussion_model.core.rock_law import (
     REST_VELOCITY,
@@ -66,8 +67,8 @@ def time_in_mode(par, s, v_free, v, y, rate, y_end, rest):
 
 
 @merged
-def contact_stretch(par, s, v_free, z, rest):
-    """Follow one contact mode until it ends or the step does.
+def contact_stretch(par, s, v_free, z, rest, now):
+    """Follow one contact mode until it ends or the step does, from time `now`.
 
     Returns
     -------
@@ -96,7 +97,10 @@ def contact_stretch(par, s, v_free, z, rest):
         crush(s, p_before)
     if next_mode == FF and s.mode != SS:
         s.p = origin  # exactly unloaded
-    s.b_peak_bit = max(s.b_peak_bit, K * y + C * v, z * (v_free - v * (1.0 - fade)))
+    last = z * (v_free - v * (1.0 - fade))
+    s.b_peak_bit = max(s.b_peak_bit, K * y + C * v, last)
+    if now + t > s.peak_from:
+        note_peak(s, now, K * y + C * v, z * v, rate, last)
     return t, d, q, next_mode
 
 
@@ -180,6 +184,8 @@ def rock_step(par, s, w, c, v_free, z, tau, time, events):
         if par.rock == WALL:
             if v_free > 0.0:
                 s.b_peak_bit = max(s.b_peak_bit, z * v_free)
+                if now + rest > s.peak_from:
+                    s.peak_bit = max(s.peak_bit, z * v_free)
                 return d, q
             s.mode = FF
             s.p_u = s.p
@@ -190,7 +196,7 @@ def rock_step(par, s, w, c, v_free, z, tau, time, events):
                 enter_standstill(s, now)
             push_event(s, events, now, s.mode, stiffness(s) * (s.p - origin(s)))
             continue
-        t, step, square, next_mode = contact_stretch(par, s, v_free, z, rest)
+        t, step, square, next_mode = contact_stretch(par, s, v_free, z, rest, now)
         d += step
         q += square
         rest -= t

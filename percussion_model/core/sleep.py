@@ -16,13 +16,17 @@ from percussion_model.core.bar import (
     strain_offset,
     time_to_cover,
 )
+from percussion_model.core.contact_leap import GRAIN, WATCHED
 from percussion_model.core.drive import PRESSURE, drive_force
+from percussion_model.core.gap_watch import watch_gap
 from percussion_model.core.kernel import kernel, merged
 from percussion_model.core.leap import (
     FEWEST_STEPS,
     drills_not,
     leap_free_bar,
     lifts_not,
+    longest_leap,
+    plan_leap,
     standstill_energy,
 )
 from percussion_model.core.records import Mode, Piston
@@ -94,20 +98,19 @@ def quiet_steps(par, s, wb, cb, gap, u_r, v):
             limit = min(limit, time_to_cover(room, speed - v, slack - a))
     if a > 0.0 and v < pace:
         # look at the top, which is the stroke: where the bit moves, all along it
-        fall = abs(par.gravity + s.feed / par.mass_b)  # by which the bit may gain pace
-        top = (-pace - v) / (a + fall)
+        top = (-pace - v) / (a + slack)
         if top > FEWEST_STEPS * par.dt:
             limit = min(limit, top)
         else:
             limit = 0.0
-    most = (1 << par.leaps) - 1 - (s.step - s.piston_step)
+    most = longest_leap(par) - (s.step - s.piston_step)
     if limit < most * par.dt:
         return int(limit / par.dt) - 1
     return most
 
 
 @kernel
-def put_to_sleep(par, s, wp, cp, wb, cb):
+def put_to_sleep(par, s, wp, cp, wb, cb, ops, x, v, y):
     """Let the piston wait where it cannot meet anything soon."""
     if s.closed == 1 or s.gap <= 0.0:
         s.no_sleep = s.step + 1
@@ -121,13 +124,38 @@ def put_to_sleep(par, s, wp, cp, wb, cb):
     s.piston_step = s.step
     steps = quiet_steps(par, s, wb, cb, s.gap, s.u_r, s.v_p)
     if steps < FEWEST_STEPS:
-        s.no_sleep = s.step + FEWEST_STEPS
+        steps = watched_steps(par, s, wp, cp, wb, cb, ops, x, v, y)
+    if steps < FEWEST_STEPS:
         return
     s.asleep = 1
     s.piston_parity = s.parity
     s.wake = s.step + steps
     s.moved = -s.p - strain_offset(wb, cb, par.n_b, r, BOTTOM)
     s.x_sleep = s.x_r
+
+
+@kernel
+def watched_steps(par, s, wp, cp, wb, cb, ops, x, v, y):
+    """Steps over which the gap is seen to stay open while the bit leaps.
+
+    Plans the bit's leap along with it; where there is none, s.no_sleep says
+    when to look again.
+    """
+    s.no_sleep = s.step + FEWEST_STEPS
+    steps = min(quiet_steps(par, s, wb, cb, math.inf, s.u_r, s.v_p), WATCHED)
+    if steps < FEWEST_STEPS:
+        return 0
+    plan_leap(par, s, wb, cb, ops[2], x, v, steps)
+    if s.leap_end < 0:
+        s.no_sleep = s.no_plan
+        return 0
+    steps = watch_gap(par, s, wp, cp, wb, cb, ops[4], ops[5], x, y, s.leap_end - s.step)
+    if steps < FEWEST_STEPS:
+        s.no_sleep = s.step + steps + 1
+        s.leap_end = -1
+        return 0
+    s.leap_end = s.step + steps - steps % GRAIN
+    return s.leap_end - s.step
 
 
 @kernel
@@ -164,7 +192,7 @@ def sleep_on(par, s, wb, cb):
 
 
 @kernel
-def wake_piston(par, s, wp, cp, wb, cb, operator, x, y):
+def wake_piston(par, s, wp, cp, wb, cb, powers, x, y):
     """Carry the sleeping piston to the present step."""
     steps = s.step - s.piston_step
     r = 2 * s.parity
@@ -178,7 +206,7 @@ def wake_piston(par, s, wp, cp, wb, cb, operator, x, y):
             for i in range(n):
                 wp[r, i] = wp[2 - r, i]
                 wp[r + 1, i] = wp[3 - r, i]
-        leap_free_bar(par, s, wp, cp, n, par.mass_p, v0, s.v_p, steps, operator, par.size_p, x, y)
+        leap_free_bar(par, s, wp, cp, n, par.mass_p, v0, s.v_p, steps, powers, par.size_p, x, y)
     s.gap = strain_offset(wb, cb, par.n_b, r, TOP) - s.u_r
     if par.piston == ELASTIC:
         s.gap += strain_offset(wp, cp, par.n_p, r, BOTTOM)

@@ -95,9 +95,8 @@ WAVE_PAR = np.dtype(
         ("barrier", "i8"),  # 1: the energy barrier is on
         ("release", "i8"),  # 1: standstill leaves to free flight when F_R reaches 0
         ("loss", "i8"),  # sub-steps of the loss operator, 0: no loss
-        ("leaps", "i8"),  # dyadic levels of the leap operators, 0: no leaps
-        ("size_p", "i8"),  # padded size of the leap operators: piston, free bit
-        ("size_b", "i8"),
+        ("leaps", "i8"),  # levels of the leap operators, four to one: 0: no leaps
+        ("size_p", "i8"),  # padded size of the leap operators: piston
         ("size_r", "i8"),  # bit on the rock
     ],
     align=True,

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from percussion_model.parameters import Bar
-from percussion_model.scene import Scene
+from percussion_model.scene_rules import BarNumbers, SceneRules
+
+if TYPE_CHECKING:
+    from percussion_model.solvers.grid import Grid
 
 
 class Solver(Protocol):
@@ -16,7 +18,7 @@ class Solver(Protocol):
     Attributes
     ----------
     name : str
-    scene : Scene
+    scene : SceneRules
     time_step : float or None
         Distance of grid points [s]; None where there are none.
     cells : dict of int
@@ -26,7 +28,7 @@ class Solver(Protocol):
     """
 
     name: str
-    scene: Scene
+    scene: SceneRules
     cells: dict[str, int]
 
     @property
@@ -51,6 +53,18 @@ class Solver(Protocol):
     def sample(self, state: Any, times: np.ndarray, out: np.ndarray) -> None:
         """Evaluate without touching the state."""
 
+    def look(self, state: Any, t: float, row: np.ndarray, here: Any = None) -> Any:
+        """Evaluate at `t` into a row (`LONG_SAMPLE_FIELDS`); return a copy for `fields`."""
+
+    def fields(self, state: Any) -> dict[str, np.ndarray]:
+        """Force [N] and velocity [m/s] in each cell of the elastic bars, top to bottom."""
+
+    def grid_of(self, bar: str) -> Grid | None:
+        """Cells of "piston" or "bit", None where it has none."""
+
+    def watch_peaks(self, state: Any, t: float) -> None:
+        """Count the peak forces of `look` from `t` on [s]."""
+
     def commit(self, state: Any, t: float) -> None:
         """Bring an advanced state to the first grid point at or after `t`."""
 
@@ -66,14 +80,14 @@ class Solver(Protocol):
     def energy(self, state: Any, t: float) -> dict[str, float]:
         """Ledger [J] at the last grid point before `t`: LEDGER_FIELDS, start, stored."""
 
-    def section_cells(self, bar: Bar) -> list[int]:
+    def section_cells(self, bar: BarNumbers) -> list[int]:
         """Cells or elements in each section of an elastic bar."""
 
     def statistics(self, state: Any) -> dict[str, int]:
         """Counts of what the solver did."""
 
 
-def make_solver(scene: Scene) -> Solver:
+def make_solver(scene: SceneRules) -> Solver:
     """Make the solver that computes a scene."""
     # Only the kernels that are needed are loaded: that is most of a start.
     if scene.solver_name == "fem":

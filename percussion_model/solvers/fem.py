@@ -29,8 +29,8 @@ from percussion_model.core.records import (
     Piston,
     RockKind,
 )
-from percussion_model.parameters import Bar
-from percussion_model.scene import Scene
+from percussion_model.scene_rules import BarNumbers, SceneRules
+from percussion_model.solvers.grid import Grid
 from percussion_model.solvers.mesh import (
     BarMesh,
     assemble,
@@ -55,7 +55,13 @@ class FemState:
 
     def copy(self) -> FemState:
         """An independent copy."""
-        return FemState(self.record.copy(), self.workspace.copy())
+        words = self.record.view(np.int64).copy()  # a record of many fields copies slowly
+        return FemState(words.view(FEM_STATE), self.workspace.copy())
+
+    def take(self, other: FemState) -> None:
+        """Become a copy of another state of the same solver."""
+        self.record.view(np.int64)[:] = other.record.view(np.int64)
+        self.workspace[:] = other.workspace
 
 
 class FemSolver:
@@ -63,7 +69,7 @@ class FemSolver:
 
     Parameters
     ----------
-    scene : Scene
+    scene : SceneRules
         With an elastic bit.
 
     Attributes
@@ -79,7 +85,7 @@ class FemSolver:
     name = "fem"
     wave_speed_error = 0.0
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: SceneRules) -> None:
         self.scene = scene
         elastic_piston = scene.piston.model == "elastic"
         first = scene.piston if elastic_piston else scene.bit
@@ -87,7 +93,7 @@ class FemSolver:
         self._bit = cut_bar(scene.bit, element)
         self._piston: BarMesh | None = None
         if scene.piston.model != "absent":
-            self._piston = cut_bar(scene.piston, element)
+            self._piston = cut_bar(scene.piston, element, elastic_piston)
         bars = [bar for bar in (self._piston, self._bit) if bar is not None]
         self._mesh = assemble(bars)
         elastic = [bar for bar in bars if bar.n]
@@ -112,8 +118,8 @@ class FemSolver:
         if not scene.effects.loss:
             return 0.0
         if scene.fem.damping_ratio is None:
-            return scene.loss.time
-        return 2.0 * scene.fem.damping_ratio / critical_frequency(self._bit)
+            return float(scene.loss.time)
+        return 2.0 * float(scene.fem.damping_ratio) / critical_frequency(self._bit)
 
     def _parameters(self) -> np.ndarray:
         scene, options = self.scene, self.scene.fem
@@ -235,7 +241,41 @@ class FemSolver:
     def sample(self, state: FemState, times: np.ndarray, out: np.ndarray) -> None:
         """Evaluate at `times` without touching the state (`SAMPLE_FIELDS`)."""
         for k, time in enumerate(times):
-            self._run(FemTask.SAMPLE, state.copy(), float(time), row=out[k])
+            self.look(state, float(time), out[k])
+
+    def look(
+        self, state: FemState, t: float, row: np.ndarray, here: FemState | None = None
+    ) -> FemState:
+        """Evaluate at `t` into a row (`LONG_SAMPLE_FIELDS`, or their beginning).
+
+        Parameters
+        ----------
+        here : FemState, optional
+            What an earlier call returned; it becomes the copy.
+
+        Returns
+        -------
+        FemState
+            A copy at `t`.
+        """
+        if here is None:
+            here = state.copy()
+        else:
+            here.take(state)
+        self._run(FemTask.SAMPLE, here, t, row=row)
+        return here
+
+    def watch_peaks(self, state: FemState, t: float) -> None:
+        """Count the peak forces of `look` from `t` on [s]."""
+        s = state.record[0]
+        s["peak_from"], s["peak_bit"], s["peak_contact"] = t, 0.0, 0.0
+
+    def grid_of(self, bar: str) -> Grid | None:
+        """Elements of "piston" or "bit" as cells, None where it has none."""
+        mesh = {"piston": self._piston, "bit": self._bit}[bar]
+        if mesh is None or not mesh.n:
+            return None
+        return Grid(np.sqrt(mesh.stiffness * mesh.mass), mesh.mass, self.time_step, 0.0)
 
     def commit(self, state: FemState, t: float) -> None:
         """Bring an advanced state to `t`, with a part of a step."""
@@ -249,13 +289,15 @@ class FemSolver:
         state.record[0]["fresh"] = 1
 
     def energy(self, state: FemState, t: float) -> dict[str, float]:
-        """Ledger [J] at the end of the last step before `t`."""
-        s = state.record[0]
+        """Ledger [J] at `t`."""
+        here = state.copy()
+        self.commit(here, t)
+        s = here.record[0]
         entries = {name: float(s[f"e_{name}"]) for name in LEDGER_FIELDS}
-        loss, numerical = dissipated_in_nodes(self._par[0], self._nodes(state))
+        loss, numerical = dissipated_in_nodes(self._par[0], self._nodes(here))
         entries["loss"] += loss
         entries["numerical"] += numerical
-        kinetic, elastic, rock = self._stored(state)
+        kinetic, elastic, rock = self._stored(here)
         entries |= {"start": float(s["e_start"]), "kinetic": kinetic, "elastic": elastic}
         entries["recoverable"] = rock
         return entries
@@ -272,7 +314,7 @@ class FemSolver:
                 out[f"{name}_velocity"] = 0.5 * (nodes[Node.V, :-1] + nodes[Node.V, 1:])
         return out
 
-    def section_cells(self, bar: Bar) -> list[int]:
+    def section_cells(self, bar: BarNumbers) -> list[int]:
         """Elements in each section of an elastic bar."""
         return [section_count(section, self._element) for section in bar.sections]
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from percussion_model.core.wave_records import Coef
-from percussion_model.parameters import Bar, Section
+from percussion_model.scene_rules import BarNumbers, SectionNumbers
 
 # Cells in the piston (or the only elastic bar) where the scene names none.
 DEFAULT_CELLS = 20
@@ -46,12 +46,12 @@ class Grid:
         return len(self.mass)
 
 
-def section_count(section: Section, time_step: float) -> int:
+def section_count(section: SectionNumbers, time_step: float) -> int:
     """Cells that a section gets."""
     return max(1, round(section.transit_time / time_step))
 
 
-def cut(bar: Bar, time_step: float) -> Grid:
+def cut(bar: BarNumbers, time_step: float) -> Grid:
     """Cut a bar into cells of one transit time.
 
     Length and mass of each section stay as they are; where its transit time
@@ -68,7 +68,32 @@ def cut(bar: Bar, time_step: float) -> Grid:
     return Grid(np.array(impedance), np.array(mass), time_step, fit)
 
 
-def choose_time_step(bars: list[Bar], cells: int | None) -> float:
+def cell_at(bar: BarNumbers, grid: Grid, place: float) -> tuple[int, float]:
+    """Cell at a place along a bar.
+
+    Parameters
+    ----------
+    place : float
+        From the top of the bar [m].
+
+    Returns
+    -------
+    cell : int
+    area : float
+        Cross-section there [m2].
+    """
+    above = 0.0
+    for section in bar.sections:
+        if place <= section.length:
+            break
+        above += section.mass
+        place -= section.length
+    mass = above + section.mass * min(place / section.length, 1.0)
+    cell = int(np.searchsorted(np.cumsum(grid.mass), mass, side="right"))
+    return min(cell, grid.n - 1), section.area
+
+
+def choose_time_step(bars: list[BarNumbers], cells: int | None) -> float:
     """Transit time of a cell that suits all bars.
 
     Parameters

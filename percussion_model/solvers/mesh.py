@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from percussion_model.core.fem_records import Mesh
-from percussion_model.parameters import Bar, Section
+from percussion_model.scene_rules import BarNumbers, SectionNumbers
 
 # A length this close to half an element is half an element.
 ROUNDING = 1e-9
@@ -38,21 +38,23 @@ class BarMesh:
         return len(self.mass)
 
 
-def section_count(section: Section, element: float) -> int:
+def section_count(section: SectionNumbers, element: float) -> int:
     """Elements of about the length `element` [m] that a section gets, half a one for one."""
     return max(1, math.floor(section.length / element + 0.5 + ROUNDING))
 
 
-def cut_bar(bar: Bar, element: float) -> BarMesh:
+def cut_bar(bar: BarNumbers, element: float, elastic: bool = True) -> BarMesh:
     """Cut the sections of a bar into elements of about one length.
 
     Parameters
     ----------
-    bar : Bar
+    bar : BarNumbers
     element : float
         Wanted length [m].
+    elastic : bool
+        Whether the bar has elements at all.
     """
-    if bar.model != "elastic":
+    if not elastic:
         none = np.zeros(0)
         return BarMesh(none, none, none, none, bar.mass)
     rows = []

@@ -1,4 +1,4 @@
-"""Leap operators of a grid: powers of two of the step map (docs/numerics.md, section 5)."""
+"""Leap operators of a grid: powers of the step map, by mode (docs/numerics.md, section 5)."""
 
 from __future__ import annotations
 
@@ -19,45 +19,52 @@ from percussion_model.solvers.step_map import (
     step_map,
 )
 
-# Longest leap: 2^LEVELS - 1 steps, 0.1 s on the default grid of the reference.
-LEVELS = 16
+# Longest leap: 4^LEVELS - 1 steps, 0.1 s on the default grid of the reference.
+LEVELS = 8
 # Without their operators a scene is stepped through; beyond this size they
 # would cost more memory and set-up time than they save [numbers].
 MOST_NUMBERS = 40_000_000
 
-# Contact modes in the order of their operators.
-LOADING_MODES = (Mode.DFC, Mode.FC, Mode.BC)
+# What a standstill will ever lose is summed over at most 2^40 steps; what is
+# left then is lost too slowly to tell.
+MOST_DOUBLINGS = 40
 
 
 @dataclass(frozen=True)
 class LeapOperators:
-    """Powers of the step map by configuration, and their quadratic forms.
+    """Powers of the step map, and what can be seen of the next steps.
 
     Maps are stored column by column and padded with zeros, forms as
-    their upper triangles; `size` below is
-    the padded 2 n or, on the rock, 2 n + 1.
+    their upper triangles; `size` is the padded number of waves, with the
+    penetration for the bit.
 
     Attributes
     ----------
-    piston, free : ndarray, shape (LEVELS, 1, size, size)
-        Map of the free piston and of the free bit.
-    rest : ndarray, shape (LEVELS, 3, size, size)
-        Bit in standstill: map, forms of dashpot and averaging.
-    loading : ndarray, shape (3, WATCH_LEVELS, 1, size, size)
-        Map of the bit in DFC, FC and BC.
+    piston : ndarray, shape (LEVELS, size, size)
+        Powers 1, 4, 16, ... of the free piston's step map.
+    bit : ndarray, shape (5, LEVELS, size, size)
+        The same for the bit by `Mode`.
     watch : ndarray, shape (5, size, WATCHED)
         By mode: strain offset of the rock end at the end of the next steps in
         FF, its velocity at their start in DFC, FC, BC and SS.
-    sums : ndarray, shape (4, LEVELS, size)
-        Path of the bit's mean motion over a leap in SS, DFC, FC and BC.
+    sums : ndarray, shape (5, size)
+        By contact mode: path of the bit's mean motion until it rests.
+    top : ndarray, shape (5, size, WATCHED)
+        By mode: motion of the bit's top end by the end of the next steps, in
+        FF its strain offset.
+    bottom : ndarray, shape (size, WATCHED)
+        Strain offset of the piston's bottom end.
+    forms : ndarray, shape (2, size, size)
+        What a standstill will ever lose in the dashpot and by averaging [J].
     """
 
     piston: np.ndarray
-    free: np.ndarray
-    rest: np.ndarray
-    loading: np.ndarray
+    bit: np.ndarray
     watch: np.ndarray
     sums: np.ndarray
+    top: np.ndarray
+    bottom: np.ndarray
+    forms: np.ndarray
 
     @property
     def arrays(self) -> tuple[np.ndarray, ...]:
@@ -83,32 +90,43 @@ def build_operators(
         Coefficients of piston and bit.
     """
     n_p = piston.n if piston is not None else 0
-    if LEVELS * (8 * n_p * n_p + 24 * bit.n * bit.n) > MOST_NUMBERS:
+    size_p, size = padded(2 * n_p), padded(2 * bit.n + 1)
+    if LEVELS * (size_p * size_p + len(Mode) * size * size) > MOST_NUMBERS:
         return None
-    par["size_p"], par["size_b"] = padded(2 * n_p), padded(2 * bit.n)
-    par["size_r"] = padded(2 * bit.n + 1)
+    par["size_p"], par["size_r"] = size_p, size
     alone = _alone(par)
-    found = {"free": _powers(Configuration(alone, bit, cb), LEVELS, 1)[0]}
+    found = dict(zip(_NAMES, no_operators(), strict=True))
     if piston is not None:
         of_piston = alone.copy()
         of_piston["n_b"], of_piston["mass_b"] = piston.n, piston.mass.sum()
         of_piston["z_t"], of_piston["z_b"] = par["z_f"], par["z_p"]
         of_piston["kappa_t"], of_piston["kappa_b"] = par["kappa_f"], par["kappa_p"]
-        found["piston"] = _powers(Configuration(of_piston, piston, cp), LEVELS, 1)[0]
-    if par[0]["rock"] == RockKind.BILINEAR:
-        found |= _on_rock(par, alone, bit, cb)
-        flight = found["free"][0, 0, : 2 * bit.n, : 2 * bit.n]
-        offset = np.concatenate([cb[Coef.BOTTOM, : bit.n], -cb[Coef.BOTTOM, : bit.n]])
-        found["watch"][Mode.FF] = _watch(flight, flight @ offset, padded(2 * bit.n + 1))
-    return LeapOperators(
-        **{
-            name: found.get(name, stand_in)
-            for name, stand_in in zip(_NAMES, no_operators(), strict=True)
-        }
-    )
+        by_column = step_map(Configuration(of_piston, piston, cp))
+        found["piston"] = _powers(by_column, LEVELS, LEVELS, size_p)
+        found["bottom"] = _watch(by_column, by_column @ _offset(cp, n_p, Coef.BOTTOM), size_p)
+    found |= _of_bit(alone, bit, cb, size, loads=_loads(par))
+    return LeapOperators(**found)
 
 
 _NAMES = tuple(LeapOperators.__dataclass_fields__)
+
+
+def _loads(par: np.ndarray) -> dict[Mode, tuple[float, float]]:
+    """Stiffness and damping of the contact modes that leaps can cross."""
+    p = par[0]
+    if p["rock"] != RockKind.BILINEAR:
+        return {}
+    return {
+        Mode.DFC: (p["ss_loading"], p["ss_damping"]),
+        Mode.FC: (p["ss_loading"], 0.0),
+        Mode.BC: (p["ss_stiffness"], 0.0),
+        Mode.SS: (p["ss_stiffness"], p["ss_damping"]),
+    }
+
+
+def _offset(c: np.ndarray, n: int, row: Coef) -> np.ndarray:
+    """Strain offset of an end as a row over the waves, see `core.bar.strain_offset`."""
+    return np.concatenate([c[row, :n], -c[row, :n]])
 
 
 def _alone(par: np.ndarray) -> np.ndarray:
@@ -124,34 +142,37 @@ def _alone(par: np.ndarray) -> np.ndarray:
     return alone
 
 
-def _on_rock(
-    par: np.ndarray, alone: np.ndarray, bit: Grid, cb: np.ndarray
+def _of_bit(
+    alone: np.ndarray,
+    bit: Grid,
+    cb: np.ndarray,
+    size: int,
+    loads: dict[Mode, tuple[float, float]],
 ) -> dict[str, np.ndarray]:
-    """Operators of the contact modes."""
+    """Operators of the bit in free flight and in the contact modes."""
+    powers = np.zeros((len(Mode), LEVELS, size, size))
+    watch, top = np.zeros((2, len(Mode), size, WATCHED))
+    sums, forms = np.zeros((len(Mode), size)), np.zeros((2, size, size))
+    to_top, to_bottom = (_offset(cb, bit.n, row) for row in (Coef.TOP, Coef.BOTTOM))
+    by_column = step_map(Configuration(alone, bit, cb))
+    powers[Mode.FF] = _powers(by_column, LEVELS, LEVELS, size)
+    watch[Mode.FF] = _watch(by_column, by_column @ to_bottom, size)
+    top[Mode.FF] = _watch(by_column, by_column @ to_top, size)
     rock = alone.copy()
     rock["rock"] = RockKind.BILINEAR
-    p = par[0]
-    loads = {
-        Mode.DFC: (p["ss_loading"], p["ss_damping"]),
-        Mode.FC: (p["ss_loading"], 0.0),
-        Mode.BC: (p["ss_stiffness"], 0.0),
-        Mode.SS: (p["ss_stiffness"], p["ss_damping"]),
-    }
-    size = padded(2 * bit.n + 1)
-    loading = np.zeros((len(LOADING_MODES), WATCH_LEVELS, 1, size, size))
-    watch = np.zeros((1 + len(loads), size, WATCHED))
-    sums = np.zeros((len(loads), LEVELS, size))
+    way = np.append(to_top + to_bottom, 1.0)
     for mode, (stiffness, damping) in loads.items():
         configuration = Configuration(rock, bit, cb, float(stiffness), float(damping))
-        levels, forms = (LEVELS, 3) if mode == Mode.SS else (WATCH_LEVELS, 1)
-        powers, paths = _powers(configuration, levels, forms)
-        by_column = powers[0, 0, : configuration.size, : configuration.size]
+        by_column = step_map(configuration)
+        levels = LEVELS if mode == Mode.SS else WATCH_LEVELS
+        powers[mode] = _powers(by_column, levels, LEVELS, size)
         watch[mode] = _watch(by_column, end_row(configuration, by_column), size)
+        top[mode] = _watch(by_column, by_column @ way, size)
+        sums[mode, : len(by_column)] = _path_to_rest(configuration, by_column)
         if mode == Mode.SS:
-            rest, sums[0] = powers, paths
-        else:
-            loading[mode - 1], sums[mode, :levels] = powers, paths
-    return {"rest": rest, "loading": loading, "watch": watch, "sums": sums}
+            for k, form in enumerate(step_forms(configuration, by_column)[1:]):
+                forms[k] = _ever_lost(by_column, form, size)
+    return {"bit": powers, "watch": watch, "sums": sums, "top": top, "forms": forms}
 
 
 def _watch(by_column: np.ndarray, row: np.ndarray, size: int) -> np.ndarray:
@@ -163,40 +184,35 @@ def _watch(by_column: np.ndarray, row: np.ndarray, size: int) -> np.ndarray:
     return out
 
 
-def _powers(configuration: Configuration, levels: int, forms: int) -> tuple[np.ndarray, np.ndarray]:
-    """Dyadic powers of one configuration's step map, padded.
+def _powers(by_column: np.ndarray, levels: int, room: int, size: int) -> np.ndarray:
+    """Powers 1, 4, 16, ... of a step map, padded; `levels` of them in `room` places."""
+    out = np.zeros((room, size, size))
+    for level in range(levels):
+        out[level, : len(by_column), : len(by_column)] = by_column
+        by_column = by_column @ by_column
+        by_column = by_column @ by_column
+    return out
 
-    Returns
-    -------
-    powers : ndarray, shape (levels, forms, size, size)
-    paths : ndarray, shape (levels, size)
-    """
-    size = configuration.size
-    by_column = step_map(configuration)
-    full = padded(size)
-    powers, paths = np.zeros((levels, forms, full, full)), np.zeros((levels, full))
-    powers[0, 0, :size, :size] = by_column
-    for form, matrix in enumerate(step_forms(configuration, by_column)[1:forms], start=1):
-        powers[0, form, :size, :size] = 0.5 * (matrix + matrix.T)
-    mass = np.zeros(size)
+
+def _path_to_rest(configuration: Configuration, by_column: np.ndarray) -> np.ndarray:
+    """Row that shows the path of the bit's mean motion until it rests [m]."""
     n = configuration.grid.n
-    mass[:n] = mass[n : 2 * n] = configuration.grid.mass / configuration.grid.mass.sum()
-    paths[0, :size] = 0.5 * (mass + by_column @ mass) * configuration.par[0]["dt"]
-    _double(powers, paths)
-    return powers, paths
+    share = configuration.grid.mass / configuration.grid.mass.sum()
+    mean = np.zeros(len(by_column))
+    mean[:n] = mean[n : 2 * n] = share
+    a_step = 0.5 * (mean + by_column @ mean) * configuration.par[0]["dt"]
+    path: np.ndarray = np.linalg.solve(np.eye(len(by_column)) - by_column, a_step)
+    return path
 
 
-def _double(powers: np.ndarray, paths: np.ndarray) -> None:
-    """Square the map again and again, and sum its forms along, in place."""
-    for level in range(1, len(powers)):
-        last = powers[level - 1]
-        by_column = last[0]  # the transpose of the map
-        powers[level, 0] = by_column @ by_column
-        for form in range(1, powers.shape[1]):
-            carried = by_column @ last[form] @ by_column.T
-            powers[level, form] = last[form] + 0.5 * (carried + carried.T)
-        paths[level] = paths[level - 1] + by_column @ paths[level - 1]
-    for power in powers:
-        for form in range(1, powers.shape[1]):
-            # symmetric: column by column, the upper triangle says it all
-            power[form] = 2.0 * np.tril(power[form], -1) + np.diag(np.diag(power[form]))
+def _ever_lost(by_column: np.ndarray, form: np.ndarray, size: int) -> np.ndarray:
+    """Sum of a quadratic form over all steps to come, as a padded upper triangle."""
+    total = 0.5 * (form + form.T)
+    for _ in range(MOST_DOUBLINGS):
+        more = by_column @ total @ by_column.T
+        total += 0.5 * (more + more.T)
+        by_column = by_column @ by_column
+    out = np.zeros((size, size))
+    # symmetric: column by column, the upper triangle says it all
+    out[: len(total), : len(total)] = 2.0 * np.tril(total, -1) + np.diag(np.diag(total))
+    return out

@@ -8,7 +8,7 @@ import numpy as np
 
 from percussion_model.core.records import DriveKind, Mode, Piston, RockKind
 from percussion_model.core.wave_records import WAVE_PAR, Coef
-from percussion_model.scene import Scene
+from percussion_model.scene_rules import SceneRules
 from percussion_model.solvers.grid import Grid, end_viscosity, substeps
 
 # An open gap of this many transits of the slower bar ends a blow where no
@@ -28,7 +28,7 @@ INPUT_FIELDS = {
 
 
 def pack_parameters(
-    scene: Scene,
+    scene: SceneRules,
     piston: Grid | None,
     cp: np.ndarray,
     bit: Grid,
@@ -82,7 +82,7 @@ def pack_parameters(
     return par
 
 
-def begin_state(s: Any, scene: Scene, rock: dict[str, float]) -> None:
+def begin_state(s: Any, scene: SceneRules, rock: dict[str, float]) -> None:
     """Fill what states have in common (`COMMON_STATE`) at time zero.
 
     Parameters
@@ -107,12 +107,13 @@ def begin_state(s: Any, scene: Scene, rock: dict[str, float]) -> None:
     s["p"] = -start.rock_gap
     s["x_r"] = start.rock_gap
     s["t_open"] = -np.inf
+    s["peak_from"] = np.inf
     s["b_rebound"] = np.nan
     s["b_standstill"] = np.nan
     s["gap"] = start.gap if scene.piston.model != "absent" else np.inf
 
 
-def rock_numbers(scene: Scene) -> dict[str, float]:
+def rock_numbers(scene: SceneRules) -> dict[str, float]:
     """Numbers of the rock law as the kernels take them."""
     rock, kind = scene.rock, scene.effects.rock
     barrier = scene.barrier_on

@@ -23,8 +23,7 @@ from percussion_model.core.records import (
 from percussion_model.core.rigid_records import RIGID, ROWS_AN_EVENT
 
 if TYPE_CHECKING:
-    from percussion_model.parameters import Bar
-    from percussion_model.scene import Scene
+    from percussion_model.scene_rules import BarNumbers, SceneRules
 
 # Without a switching drive a blow ends when the gap was open for so many bar transits.
 BLOW_GAP_TRANSITS = 20
@@ -94,7 +93,7 @@ class RigidSolver:
     time_step: float | None = None
     wave_speed_error = 0.0
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: SceneRules) -> None:
         if scene.bit.model != "rigid" or scene.piston.model not in ("rigid", "absent"):
             raise ValueError(
                 "the rigid solver needs bit.model = 'rigid' and piston.model = 'rigid' or "
@@ -137,6 +136,7 @@ class RigidSolver:
             now["v_p"] = scene.start.piston_velocity
         now["opened"] = -np.inf
         now["ss_force"] = np.nan
+        now["peak_from"] = np.inf
         kernel.begin(state["par"], state["now"])
         return state
 
@@ -230,6 +230,35 @@ class RigidSolver:
         status = kernel.sample(copy["par"], copy["now"], times, out, *room)
         self._require_done(status)
 
+    def look(
+        self, state: np.ndarray, t: float, row: np.ndarray, here: np.ndarray | None = None
+    ) -> np.ndarray:
+        """Evaluate at `t` into a row (`LONG_SAMPLE_FIELDS`, or their beginning).
+
+        Returns
+        -------
+        ndarray
+            A copy, carried to `t` where the row is long.
+        """
+        copy = state.copy()
+        times = np.array([max(t, self.time(state))])
+        self._require_done(
+            kernel.sample(copy["par"], copy["now"], times, row[np.newaxis], *self._room())
+        )
+        return copy
+
+    def fields(self, state: np.ndarray) -> dict[str, np.ndarray]:
+        """Rigid bodies have no cells."""
+        return {}
+
+    def grid_of(self, bar: str) -> None:
+        """Rigid bodies have no cells."""
+
+    def watch_peaks(self, state: np.ndarray, t: float) -> None:
+        """Count the peak forces of `look` from `t` on [s]."""
+        now = state["now"]
+        now["peak_from"], now["peak_bit"], now["peak_contact"] = t, 0.0, 0.0
+
     def grid_point_after(self, state: np.ndarray, t: float) -> float:
         """First time at or after `t` at which inputs can change: `t` itself [s]."""
         return t
@@ -305,7 +334,7 @@ class RigidSolver:
         """Time of the last event of a state [s]."""
         return float(state["now"]["time"][0])
 
-    def section_cells(self, bar: Bar) -> list[int]:
+    def section_cells(self, bar: BarNumbers) -> list[int]:
         """Rigid bodies have no cells."""
         return []
 

@@ -40,7 +40,7 @@ class Configuration:
 
 def no_operators() -> tuple[np.ndarray, ...]:
     """Stand-ins for the leap operators where no leaps are made."""
-    return tuple(np.zeros((1,) * rank) for rank in (4, 4, 4, 5, 3, 3))
+    return tuple(np.zeros((1,) * rank) for rank in (3, 4, 3, 2, 3, 2, 3))
 
 
 def step_map(configuration: Configuration) -> np.ndarray:

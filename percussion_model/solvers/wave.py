@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from percussion_model.core.advance import GRID_ROUNDING, run
@@ -16,9 +14,9 @@ from percussion_model.core.records import (
 )
 from percussion_model.core.totals import lost_in_faces, resync, stored_energy
 from percussion_model.core.wave_records import WAVE_STATE, Coef, Row, Task
-from percussion_model.parameters import Bar
-from percussion_model.scene import Scene
+from percussion_model.scene_rules import BarNumbers, SceneRules
 from percussion_model.solvers.grid import (
+    Grid,
     choose_time_step,
     coefficients,
     cut,
@@ -33,17 +31,51 @@ from percussion_model.solvers.packing import (
 )
 from percussion_model.solvers.step_map import no_operators
 
+# Place of a field in a record, all of whose fields are words of eight bytes.
+WORD = {name: int(place[1]) // 8 for name, place in (WAVE_STATE.fields or {}).items()}
 
-@dataclass
+
 class WaveState:
-    """State of a simulation: one record and one flat workspace."""
+    """State of a simulation: one record and one flat workspace.
 
-    record: np.ndarray  # WAVE_STATE, shape (1,)
-    workspace: np.ndarray  # float64: rows of the piston, then of the bit
+    Parameters
+    ----------
+    record : WAVE_STATE array of length 1
+    workspace : float array
+        Rows of the piston, then of the bit.
+    cut_at : int
+        Numbers of the piston.
+
+    Attributes
+    ----------
+    words : int64 array
+        The record word by word: NumPy copies a record of many fields a hundred
+        times slower, and takes its time to read one of them.
+    numbers : float64 array
+        The same as numbers.
+    bars : tuple of float arrays, shape (len(Row), cells + 1)
+        Piston and bit in the workspace.
+    """
+
+    __slots__ = ("bars", "cut_at", "numbers", "record", "words", "workspace")
+
+    def __init__(self, record: np.ndarray, workspace: np.ndarray, cut_at: int) -> None:
+        self.record, self.workspace, self.cut_at = record, workspace, cut_at
+        self.words, self.numbers = record.view(np.int64), record.view(np.float64)
+        rows = len(Row)
+        self.bars = workspace[:cut_at].reshape(rows, -1), workspace[cut_at:].reshape(rows, -1)
 
     def copy(self) -> WaveState:
         """An independent copy."""
-        return WaveState(self.record.copy(), self.workspace.copy())
+        return WaveState(self.words.copy().view(WAVE_STATE), self.workspace.copy(), self.cut_at)
+
+    def take(self, other: WaveState) -> None:
+        """Become a copy of another state of the same solver."""
+        self.words[:] = other.words
+        self.workspace[:] = other.workspace
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return WaveState, (self.record, self.workspace, self.cut_at)
 
 
 class WaveSolver:
@@ -51,7 +83,7 @@ class WaveSolver:
 
     Parameters
     ----------
-    scene : Scene
+    scene : SceneRules
 
     Attributes
     ----------
@@ -66,7 +98,7 @@ class WaveSolver:
 
     name = "wave"
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: SceneRules) -> None:
         self.scene = scene
         elastic_piston = scene.piston.model == "elastic"
         bars = [scene.piston, scene.bit] if elastic_piston else [scene.bit]
@@ -106,8 +138,9 @@ class WaveSolver:
         begin_state(s, scene, rock_numbers(scene))
         has_piston = scene.piston.model != "absent"
         n_p = self._piston.n if self._piston is not None else 0
-        state = WaveState(record, np.zeros(len(Row) * (n_p + self._bit.n + 2)))
-        wp, wb = self._bars(state)
+        rows = len(Row)
+        state = WaveState(record, np.zeros(rows * (n_p + self._bit.n + 2)), rows * (n_p + 1))
+        wp, wb = state.bars
         wb[Row.DOWN : Row.UP + 1, : self._bit.n] = 0.5 * start.bit_velocity
         if n_p:
             wp[Row.DOWN : Row.UP + 1, :n_p] = 0.5 * start.piston_velocity
@@ -118,16 +151,8 @@ class WaveSolver:
         s["e_start"] = sum(self._stored(state))
         return state
 
-    def _bars(self, state: WaveState) -> tuple[np.ndarray, np.ndarray]:
-        """Views of piston and bit in the workspace."""
-        n_p = self._piston.n if self._piston is not None else 0
-        rows = len(Row)
-        cut_at = rows * (n_p + 1)
-        wp = state.workspace[:cut_at].reshape(rows, n_p + 1)
-        return wp, state.workspace[cut_at:].reshape(rows, self._bit.n + 1)
-
     def _stored(self, state: WaveState) -> tuple[float, float, float]:
-        wp, wb = self._bars(state)
+        wp, wb = state.bars
         return stored_energy(self._par[0], state.record[0], wp, self._cp, wb, self._cb)
 
     def _run(
@@ -140,7 +165,7 @@ class WaveSolver:
         row: np.ndarray | None = None,
     ) -> int:
         """Call the kernels; see `core.advance.run`."""
-        wp, wb = self._bars(state)
+        wp, wb = state.bars
         return run(
             int(task),
             self._par,
@@ -159,20 +184,20 @@ class WaveSolver:
 
     def time(self, state: WaveState) -> float:
         """Time up to which the state is committed [s]."""
-        return self._time_of(state, int(state.record[0]["step"]))
+        return self._time_of(state, int(state.words[WORD["step"]]))
 
     def readable_until(self, state: WaveState) -> float:
         """Time up to which `sample` answers without advancing the state [s]."""
-        record = state.record[0]
-        return self._time_of(state, max(int(record["leap_end"]), int(record["step"]) + 1))
+        words = state.words
+        return self._time_of(state, max(int(words[WORD["leap_end"]]), int(words[WORD["step"]]) + 1))
 
     def grid_point_after(self, state: WaveState, t: float) -> float:
         """First grid point at or after `t` [s]."""
-        base = float(state.record[0]["t_base"])
+        base = float(state.numbers[WORD["t_base"]])
         return self._time_of(state, int(np.ceil((t - base) / self.time_step - GRID_ROUNDING)))
 
     def _time_of(self, state: WaveState, step: int) -> float:
-        return float(state.record[0]["t_base"]) + step * self.time_step
+        return float(state.numbers[WORD["t_base"]]) + step * self.time_step
 
     def advance(
         self,
@@ -188,16 +213,44 @@ class WaveSolver:
         -------
         status, n_blows, n_events : int
         """
-        s = state.record[0]
-        s["events_on"] = record_events
+        words = state.words
+        words[WORD["events_on"]] = record_events
         status = self._run(Task.ADVANCE, state, t, blows, events)
-        return status, int(s["n_blows"]), int(s["n_events"])
+        return status, int(words[WORD["n_blows"]]), int(words[WORD["n_events"]])
 
     def sample(self, state: WaveState, times: np.ndarray, out: np.ndarray) -> None:
         """Evaluate at `times` without touching the state (`SAMPLE_FIELDS`)."""
         for k, time in enumerate(times):
+            self.look(state, float(time), out[k])
+
+    def look(
+        self, state: WaveState, t: float, row: np.ndarray, here: WaveState | None = None
+    ) -> WaveState:
+        """Evaluate at `t` into a row (`LONG_SAMPLE_FIELDS`, or their beginning).
+
+        Parameters
+        ----------
+        here : WaveState, optional
+            An old copy to be used again.
+
+        Returns
+        -------
+        WaveState
+            A copy whose waves are those of the last grid point up to `t`, as
+            `fields` reads them.
+        """
+        if here is None:
             here = state.copy()
-            self._run(Task.SAMPLE, here, float(time), row=out[k])
+        else:
+            here.take(state)
+        self._run(Task.SAMPLE, here, t, row=row)
+        return here
+
+    def watch_peaks(self, state: WaveState, t: float) -> None:
+        """Count the peak forces of `look` from `t` on [s]."""
+        numbers = state.numbers
+        numbers[WORD["peak_from"]] = t
+        numbers[WORD["peak_bit"]] = numbers[WORD["peak_contact"]] = 0.0
 
     def commit(self, state: WaveState, t: float) -> None:
         """Bring the state to the first grid point at or after `t`."""
@@ -213,7 +266,7 @@ class WaveSolver:
         here = state.copy()
         self._run(Task.BRING, here, t)
         s = here.record[0]
-        wp, wb = self._bars(here)
+        wp, wb = here.bars
         entries = {name: float(s[f"e_{name}"]) for name in LEDGER_FIELDS}
         entries["loss"] += lost_in_faces(self._par[0], wp, wb)
         kinetic, elastic, rock = self._stored(here)
@@ -223,7 +276,7 @@ class WaveSolver:
 
     def fields(self, state: WaveState) -> dict[str, np.ndarray]:
         """Force [N] and velocity [m/s] of each cell, top to bottom, by bar."""
-        wp, wb = self._bars(state)
+        wp, wb = state.bars
         r = 2 * int(state.record[0]["parity"])
         out = {}
         for name, w, grid in (("piston", wp, self._piston), ("bit", wb, self._bit)):
@@ -233,9 +286,13 @@ class WaveSolver:
                 out[f"{name}_velocity"] = d + u
         return out
 
-    def section_cells(self, bar: Bar) -> list[int]:
+    def section_cells(self, bar: BarNumbers) -> list[int]:
         """Cells in each section of an elastic bar."""
         return [section_count(section, self.time_step) for section in bar.sections]
+
+    def grid_of(self, bar: str) -> Grid | None:
+        """Cells of "piston" or "bit", None where it has none."""
+        return {"piston": self._piston, "bit": self._bit}[bar]
 
     def statistics(self, state: WaveState) -> dict[str, int]:
         """Counts of what the solver did."""

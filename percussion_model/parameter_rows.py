@@ -1,0 +1,126 @@
+"""What is known of a parameter, and the wording of what is allowed.
+
+Standard library only: a scene that is exported takes its rows along.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import numbers
+import reprlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+Kind = Literal["number", "whole number", "flag", "choice", "sections"]
+
+
+@dataclass(frozen=True)
+class Row:
+    """One parameter.
+
+    Keys of sections have a `*` for the number of the section, counted from 0.
+    """
+
+    key: str
+    kind: Kind
+    unit: str
+    lower: float | None
+    lower_open: bool  # the bound itself is not allowed
+    upper: float | None
+    upper_open: bool
+    default: Any
+    required: bool
+    choices: tuple[Any, ...]
+    description: str
+    needs: Mapping[str, tuple[Any, ...]]
+
+    @property
+    def allowed(self) -> str:
+        """Say what values are allowed, as in "a number above 0 and up to 10 m^2"."""
+        if self.kind == "flag":
+            return "true or false"
+        if self.kind == "choice":
+            return "one of " + ", ".join(toml_value(choice) for choice in self.choices)
+        if self.kind == "sections":
+            return "a list of at least one section, each with length and area"
+        return f"a {self.kind} {self._range()}{unit_suffix(self.unit)}".rstrip()
+
+    def _range(self) -> str:
+        if self.lower is None or self.upper is None:
+            return ""
+        if self.lower_open or self.upper_open:
+            start = "above" if self.lower_open else "from"
+            end = "below" if self.upper_open else "up to"
+            return f"{start} {_short(self.lower)} and {end} {_short(self.upper)}"
+        return f"from {_short(self.lower)} to {_short(self.upper)}"
+
+    @property
+    def effect(self) -> str:
+        """Say what must be on for this parameter to matter; empty if it always does."""
+        parts = []
+        for key, values in self.needs.items():
+            parts.append(f"{key} = " + " or ".join(toml_value(value) for value in values))
+        return ", ".join(parts)
+
+    def allows(self, value: Any) -> bool:
+        """Whether a number lies within the bounds."""
+        if not is_number(value):
+            return False
+        low = self.lower is None or value > self.lower
+        low = low or (value == self.lower and not self.lower_open)
+        high = self.upper is None or value < self.upper
+        high = high or (value == self.upper and not self.upper_open)
+        return low and high
+
+
+def is_number(value: Any) -> bool:
+    """Whether a value is a finite real number, and no truth value."""
+    return isinstance(value, numbers.Real) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _short(number: float) -> str:
+    """Write a bound without needless digits, as in 1e9."""
+    return f"{number:g}".replace("e+0", "e").replace("e+", "e").replace("e-0", "e-")
+
+
+def unit_suffix(unit: str) -> str:
+    """Return the unit as it follows a number, nothing for pure numbers."""
+    return f" {unit}" if unit not in ("", "-") else ""
+
+
+def toml_value(value: object) -> str:
+    """Write a flag, a number or a text as in a TOML file.
+
+    Raises
+    ------
+    TypeError
+        For anything else.
+    """
+    if isinstance(value, (bool, str)):
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    if type(value) in (int, float):
+        return repr(value)
+    raise TypeError(f"{type(value).__name__} is no simple value")
+
+
+def generic_key(key: str) -> str:
+    """Replace the numbers of sections in a dotted key by `*`."""
+    return ".".join("*" if part.isdigit() else part for part in key.split("."))
+
+
+def refuse_value(row: Row, key: str, value: Any) -> str:
+    """Say that a value is not allowed, and what is."""
+    number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    unit = unit_suffix(row.unit) if number else ""
+    return f"{key} = {show_value(value)}{unit}: must be {row.allowed}"
+
+
+def show_value(value: Any) -> str:
+    """Show a value as it stands in a scene file, shortened."""
+    try:
+        text = toml_value(value)
+    except TypeError:
+        text = repr(value)
+    return text if len(text) <= 60 and "\n" not in text else reprlib.repr(value)

@@ -1,0 +1,164 @@
+"""What follows from the values of a scene, however they are stored.
+
+Standard library only. `Scene` and its groups are made of these classes, and so
+is the plain scene that an exported simulation carries. Fields are declared to
+type checkers alone, so that pydantic does not take them for its own.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from percussion_model.parameter_rows import Row
+
+
+class SceneError(ValueError):
+    """A scene that cannot be read or makes no sense; the message says what to do."""
+
+
+class SectionNumbers:
+    """Numbers that follow from a section's length, area and material."""
+
+    if TYPE_CHECKING:
+        length: float
+        area: float
+        youngs_modulus: float
+        density: float
+
+    @property
+    def wave_speed(self) -> float:
+        """Speed of longitudinal waves, sqrt(E/rho) [m/s]."""
+        return math.sqrt(self.youngs_modulus / self.density)
+
+    @property
+    def impedance(self) -> float:
+        """Force per particle velocity of a wave, A sqrt(E rho) [N s/m]."""
+        return self.area * math.sqrt(self.youngs_modulus * self.density)
+
+    @property
+    def mass(self) -> float:
+        """Mass [kg]."""
+        return self.density * self.area * self.length
+
+    @property
+    def transit_time(self) -> float:
+        """Time a wave takes from end to end [s]."""
+        return self.length / self.wave_speed
+
+
+class BarNumbers:
+    """Numbers that follow from the sections of a bar."""
+
+    if TYPE_CHECKING:
+        sections: Sequence[SectionNumbers]
+
+    @property
+    def mass(self) -> float:
+        """Mass [kg]."""
+        return math.fsum(section.mass for section in self.sections)
+
+    @property
+    def length(self) -> float:
+        """Length [m]."""
+        return math.fsum(section.length for section in self.sections)
+
+    @property
+    def transit_time(self) -> float:
+        """Time a wave takes from end to end [s]."""
+        return math.fsum(section.transit_time for section in self.sections)
+
+
+class SceneRules:
+    """What follows from the groups of a scene."""
+
+    if TYPE_CHECKING:
+        effects: Any
+        piston: Any
+        bit: Any
+        gravity: Any
+        feed: Any
+        drive: Any
+        loss: Any
+        rock: Any
+        contact: Any
+        start: Any
+        solver: Any
+        fem: Any
+        run: Any
+
+    def row_of(self, key: str) -> Row:
+        """Row of a dotted key in the parameter table; `SceneError` where there is none."""
+        raise NotImplementedError
+
+    @property
+    def given(self) -> frozenset[str]:
+        """Dotted keys that were given, not left to their defaults."""
+        raise NotImplementedError
+
+    def __getitem__(self, key: str) -> Any:
+        """Return the value of a dotted key."""
+        value: Any = self
+        try:
+            for part in key.split("."):
+                value = value[int(part)] if part.isdigit() else getattr(value, part)
+        except (AttributeError, IndexError):
+            raise KeyError(f"unknown key {key}") from None
+        return value
+
+    def matters(self, key: str) -> bool:
+        """Tell whether a parameter has any influence on this scene."""
+        return all(self[need] in values for need, values in self.row_of(key).needs.items())
+
+    @property
+    def solver_name(self) -> str:
+        """Solver that computes the scene: "wave", "fem" or "rigid"."""
+        if self.solver.name != "auto":
+            return str(self.solver.name)
+        return "wave" if self.bit.model == "elastic" else "rigid"
+
+    @property
+    def loss_on(self) -> bool:
+        """Whether bars lose energy to structural loss."""
+        return bool(self.effects.loss and self.bit.model == "elastic" and self.loss.time > 0)
+
+    @property
+    def barrier_on(self) -> bool:
+        """Whether the rock law has an energy barrier (mode DFC)."""
+        wanted = self.effects.barrier and self.effects.rock == "bilinear"
+        return bool(wanted and self.rock.barrier_energy > 0 and self.rock.barrier_damping > 0)
+
+
+def refuse_contradictions(scene: SceneRules) -> None:
+    """Raise `SceneError` if parts of a scene contradict each other."""
+    effects, piston, bit, run = scene.effects, scene.piston.model, scene.bit.model, scene.run
+    if piston == "absent" and effects.drive != "none":
+        raise SceneError(
+            f'effects.drive = "{effects.drive}" needs a piston, but piston.model = "absent": '
+            'set effects.drive = "none" or give a piston'
+        )
+    if piston == "elastic" and bit == "rigid":
+        raise SceneError(
+            'piston.model = "elastic" with bit.model = "rigid": no solver computes this; '
+            'set bit.model = "elastic" or piston.model = "rigid"'
+        )
+    if scene.solver.name in ("wave", "fem") and bit == "rigid":
+        raise SceneError(
+            f'solver.name = "{scene.solver.name}" needs bit.model = "elastic": '
+            'set that, or solver.name = "rigid" or "auto"'
+        )
+    if scene.solver.name == "rigid" and bit == "elastic":
+        raise SceneError(
+            'solver.name = "rigid" computes no elastic bars: set piston.model = "rigid" and '
+            'bit.model = "rigid", or solver.name = "wave", "fem" or "auto"'
+        )
+    if effects.barrier and effects.rock != "bilinear" and "effects.barrier" in scene.given:
+        raise SceneError(
+            f'effects.barrier = true needs effects.rock = "bilinear", not "{effects.rock}": '
+            "set effects.barrier = false"
+        )
+    if run.settle >= run.duration:
+        raise SceneError(
+            f"run.settle = {run.settle!r} s: must be below run.duration = {run.duration!r} s"
+        )

@@ -1,0 +1,115 @@
+"""Greatest forces of an interval, against dense sampling of the same motion."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from percussion_model import SAMPLE_FIELDS, Scene, Simulation
+from percussion_model.core.records import LONG_SAMPLE_FIELDS, PEAK_FIELDS, Mode
+
+IMPULSE = SAMPLE_FIELDS.index("bit_impulse")
+PEAK = LONG_SAMPLE_FIELDS.index("peak_bit_force")
+CONTACT_PEAK = LONG_SAMPLE_FIELDS.index("peak_contact_force")
+
+RIGID = {"piston.model": "rigid", "bit.model": "rigid"}
+# Blow, rebound and the standstill that rings after it; then only standstill and flight.
+SPAN = 6e-3
+
+
+def peaks(scene, points):
+    """Peak of the bit and the contact force between the points, as an observer sees them."""
+    simulation = Simulation(scene)
+    row = np.zeros(len(LONG_SAMPLE_FIELDS))
+    found = []
+    for begin, end in pairwise(points):
+        simulation.advance(float(begin))
+        simulation.solver.watch_peaks(simulation._state, float(begin))
+        simulation.advance(float(end))
+        simulation.solver.look(simulation._state, float(end), row)
+        found.append((row[PEAK], row[CONTACT_PEAK]))
+    return np.array(found), simulation
+
+
+def dense(scene, points, parts):
+    """Greatest mean of the bit force over a part of each interval, leaps off.
+
+    Returns
+    -------
+    most, step : ndarray
+        And by how much means of neighbouring parts differ: the top is no further off.
+    """
+    simulation = Simulation(scene.replace(**{"solver.leaps": False}))
+    found = []
+    for begin, end in pairwise(points):
+        times = np.linspace(begin, end, parts + 1)
+        means = np.diff(simulation.sample_rows(times)[:, IMPULSE]) / np.diff(times)
+        found.append((means.max(), np.abs(np.diff(means)).max()))
+    return np.array(found).T
+
+
+@pytest.mark.parametrize("changes", [{}, RIGID], ids=["elastic", "rigid"])
+@pytest.mark.parametrize("step", [2.3e-6, 4.1e-5, 7e-4])
+def test_a_peak_is_the_greatest_force_of_its_interval(changes, step):
+    # without the barrier, whose dashpot acts for less than a dense sample
+    scene = Scene().replace(**changes, **{"effects.barrier": False})
+    points = np.arange(0.0, min(SPAN, 200 * step), step)
+    found, _ = peaks(scene, points)
+    sampled, change = dense(scene, points, max(10, round(step / 2e-7)))
+    scale = sampled.max()
+    assert scale > 1e5
+    assert np.all(found[:, 0] >= sampled - 1e-9 * scale)
+    # not more than there was: what came before the interval does not count
+    assert np.all(found[:, 0] <= sampled + 2.0 * change + 1e-9 * scale)
+    assert np.median(change) < 0.02 * scale
+
+
+def test_the_ringing_of_a_quiet_standstill_is_seen_within_its_leaps():
+    scene = Scene()
+    run = Simulation(scene)
+    run.advance(0.02)
+    events = run.events
+    begin = float(events["time"][events["kind"] == Mode.SS][-1]) + 5e-5
+    points = begin + np.arange(0.0, 8e-4, 1e-4)
+    found, simulation = peaks(scene, points)
+    assert simulation._state.record[0]["mode"] == Mode.SS
+    sampled, change = dense(scene, points, 300)
+    still = 2500.0 + scene.bit.mass * 10.0
+    assert sampled.max() > 1.02 * still  # it rings
+    assert np.all(found[:, 0] >= sampled - 1e-6 * still)
+    assert np.all(found[:, 0] <= sampled + 1.01 * change)
+    assert change.max() < 0.01 * still
+
+
+def test_watching_changes_no_bit():
+    plain = Simulation(Scene())
+    plain.advance(0.1)
+    _, watched = peaks(Scene(), np.arange(0.0, 0.1, 1.7e-3))
+    watched.advance(0.1)
+    for name in plain._state.record.dtype.names:
+        if not name.startswith("peak_") and name not in ("n_blows", "n_events"):
+            a, b = plain._state.record[name], watched._state.record[name]
+            np.testing.assert_array_equal(a, b, err_msg=name)
+    np.testing.assert_array_equal(plain._state.workspace, watched._state.workspace)
+
+
+def test_peaks_of_intervals_make_the_peak_of_the_blow():
+    found, simulation = peaks(Scene(), np.arange(0.0, 0.05, 1e-3))
+    first = simulation.blows[0]
+    assert found[:46, 0].max() == pytest.approx(first["peak_bit_force"], rel=1e-12)
+    assert found[:46, 1].max() == pytest.approx(first["peak_contact_force"], rel=1e-12)
+
+
+def test_a_long_row_carries_the_ledger():
+    for changes in ({}, {"solver.name": "fem"}, RIGID):
+        simulation = Simulation(Scene().replace(**changes))
+        t = 0.0123
+        simulation.advance(t)
+        row = np.zeros(len(LONG_SAMPLE_FIELDS))
+        simulation.solver.look(simulation._state, t, row)
+        entries = simulation.solver.energy(simulation._state, t)
+        for k, name in enumerate(LONG_SAMPLE_FIELDS[len(SAMPLE_FIELDS) + len(PEAK_FIELDS) :]):
+            value = row[len(SAMPLE_FIELDS) + len(PEAK_FIELDS) + k]
+            assert value == pytest.approx(entries[name], rel=1e-12, abs=1e-12), name
