@@ -23,6 +23,7 @@ STAMP = VENV / "percussion_model.stamp"
 OLDEST_PYTHON = (3, 11)
 INTERRUPTED = 130  # what shells report for Ctrl-C
 
+WARM_UPS = ("percussion_model.warm_up", "fmu_src.warm_up")
 REFERENCE_RUN = [
     "run", "scenarios/reference.toml", "--duration", "4", "--settle", "1", "--out", "out/reference",
 ]  # fmt: skip
@@ -91,10 +92,12 @@ def setup() -> int:
         print("The installation failed, see above. Is the network up? Then run this again.",
               file=sys.stderr)  # fmt: skip
         return code
-    print("Compiling the kernels (once, up to a minute) ...", flush=True)
-    code = call([tool("python"), "-m", "percussion_model.warm_up"])
-    if code != 0:
-        return code
+    print("Compiling the kernels, for Python and for the FMU (once, a minute or two) ...",
+          flush=True)  # fmt: skip
+    for module in WARM_UPS:
+        code = call([tool("python"), "-m", module])
+        if code != 0:
+            return code
     STAMP.write_text(wanted, encoding="utf-8")
     print("Ready.", flush=True)
     return 0
@@ -118,8 +121,17 @@ def make_venv(renew: bool) -> int:
 
 
 def run(extra: list[str]) -> int:
-    """Run the reference scene."""
-    return setup() or call([tool("percussion"), *REFERENCE_RUN, *extra])
+    """Run the reference scene: first as an FMU, unless `extra` changes it, then in full."""
+    code = setup()
+    if code == 0 and not extra:
+        code = call([tool("python"), "-m", "fmu_src.compare"])
+        print(flush=True)
+    return code or call([tool("percussion"), *REFERENCE_RUN, *extra])
+
+
+def fmu(extra: list[str]) -> int:
+    """Bake a scene into an FMU; paths count from the project's folder."""
+    return setup() or call([tool("python"), "-m", "fmu_src", *extra])
 
 
 def test(extra: list[str]) -> int:
@@ -133,7 +145,8 @@ def test(extra: list[str]) -> int:
         ("ruff format", [tool("ruff"), "format", "--check"]),
         ("mypy", [tool("mypy")]),
         ("lint-imports", [tool("lint-imports")]),
-        ("kernels", [tool("python"), "-m", "percussion_model.warm_up"]),
+        ("kernels", [tool("python"), "-m", WARM_UPS[0]]),
+        ("kernels of the FMU", [tool("python"), "-m", WARM_UPS[1]]),
         ("pytest", [tool("pytest"), "-n", "2", *extra]),
     ]
     first_failure = 0
@@ -141,7 +154,8 @@ def test(extra: list[str]) -> int:
     with tempfile.TemporaryDirectory(prefix="percussion-numba-") as cache:
         for name, command in steps:
             print(f"== {name}", flush=True)
-            code = call(command, NUMBA_CACHE_DIR=cache, MPLBACKEND="Agg")
+            code = call(command, NUMBA_CACHE_DIR=cache, MPLBACKEND="Agg",
+                        PERCUSSION_FMU_CACHE=str(Path(cache) / "percussion_fmu"))  # fmt: skip
             first_failure = first_failure or code
     return first_failure
 
@@ -181,6 +195,8 @@ def main(arguments: list[str]) -> int:
     commands.add_parser("setup", help="make .venv and install everything")
     commands.add_parser("run", help="run the reference scene; more goes to `percussion run`")
     commands.add_parser("test", help="lint, type checks and tests; more goes to pytest")
+    commands.add_parser("fmu", help="bake a scene into an FMU: --scene FILE, -o FILE.fmu",
+                        add_help=False)  # fmt: skip
     commands.add_parser("bench", help="measure speed; more goes to the benchmarks")
     choice, extra = parser.parse_known_args(arguments)
     started = time.monotonic()
@@ -192,7 +208,7 @@ def main(arguments: list[str]) -> int:
             print(f".venv is {'up to date' if code == 0 else 'not ready'} "
                   f"({time.monotonic() - started:.1f} s).")  # fmt: skip
             return code
-        return {"run": run, "test": test, "bench": bench}[choice.command](extra)
+        return {"run": run, "fmu": fmu, "test": test, "bench": bench}[choice.command](extra)
     except KeyboardInterrupt:
         print("\nInterrupted.", file=sys.stderr)
         return INTERRUPTED

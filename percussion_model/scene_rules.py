@@ -52,6 +52,7 @@ class BarNumbers:
     """Numbers that follow from the sections of a bar."""
 
     if TYPE_CHECKING:
+        model: str
         sections: Sequence[SectionNumbers]
 
     @property

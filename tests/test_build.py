@@ -32,7 +32,7 @@ def test_help_needs_nothing_but_python():
         text=True,
         check=True,
     )
-    for command in ("setup", "run", "test", "bench"):
+    for command in ("setup", "run", "fmu", "test", "bench"):
         assert command in done.stdout
 
 
@@ -80,9 +80,10 @@ def test_setup_installs_once(build, monkeypatch):
         str(build.VENV),
         ".[all]",
         "percussion_model.warm_up",
+        "fmu_src.warm_up",
     ]
     assert build.setup() == 0
-    assert len(calls) == 3
+    assert len(calls) == 4
 
 
 def test_a_failed_installation_is_tried_again(build, monkeypatch):
@@ -113,8 +114,25 @@ def test_test_runs_every_step_and_reports_the_first_failure(build, monkeypatch, 
     monkeypatch.setattr(build, "setup", lambda: 0)
     monkeypatch.setattr(build, "call", pretend)
     assert build.main(["test", "-k", "rock"]) == 7
-    assert names == ["ruff", "ruff", "mypy", "lint-imports", "python", "pytest"]
+    assert names == ["ruff", "ruff", "mypy", "lint-imports", "python", "python", "pytest"]
     assert "== pytest" in capsys.readouterr().out
+
+
+def test_run_begins_with_the_fmu_beside_the_library(build, monkeypatch):
+    commands = []
+    monkeypatch.setattr(build, "setup", lambda: 0)
+    monkeypatch.setattr(build, "call", lambda command, **variables: commands.append(command) or 0)
+    assert build.main(["run"]) == 0
+    assert [words[1:] for words in commands] == [["-m", "fmu_src.compare"], build.REFERENCE_RUN]
+
+
+def test_fmu_passes_its_arguments_on(build, monkeypatch):
+    commands = []
+    monkeypatch.setattr(build, "setup", lambda: 0)
+    monkeypatch.setattr(build, "call", lambda command, **variables: commands.append(command) or 0)
+    words = ["--scene", "scenarios/rigid.toml", "-o", "dist/Rigid.fmu"]
+    assert build.main(["fmu", *words]) == 0
+    assert commands[0][1:] == ["-m", "fmu_src", *words]
 
 
 def test_run_passes_extra_arguments_on(build, monkeypatch):

@@ -9,7 +9,7 @@ import numpy as np
 from percussion_model.scene_rules import BarNumbers, SceneRules
 
 if TYPE_CHECKING:
-    from percussion_model.solvers.grid import Grid
+    from percussion_model.solvers.grid import Cells
 
 
 class Solver(Protocol):
@@ -59,7 +59,7 @@ class Solver(Protocol):
     def fields(self, state: Any) -> dict[str, np.ndarray]:
         """Force [N] and velocity [m/s] in each cell of the elastic bars, top to bottom."""
 
-    def grid_of(self, bar: str) -> Grid | None:
+    def grid_of(self, bar: str) -> Cells | None:
         """Cells of "piston" or "bit", None where it has none."""
 
     def watch_peaks(self, state: Any, t: float) -> None:

@@ -9,7 +9,6 @@ import numpy as np
 from percussion_model.core.fem_advance import run
 from percussion_model.core.fem_bars import dissipated_in_nodes, read_all, stored_energy
 from percussion_model.core.fem_records import (
-    FEM_PAR,
     FEM_STATE,
     Column,
     Factor,
@@ -25,22 +24,17 @@ from percussion_model.core.records import (
     EVENT,
     LEDGER_FIELDS,
     SAMPLE_FIELDS,
-    DriveKind,
-    Piston,
-    RockKind,
 )
 from percussion_model.scene_rules import BarNumbers, SceneRules
-from percussion_model.solvers.grid import Grid
+from percussion_model.solvers.fem_packing import loss_time, pack_fem
 from percussion_model.solvers.mesh import (
     BarMesh,
     assemble,
-    critical_frequency,
     cut_bar,
     section_count,
 )
 from percussion_model.solvers.packing import (
     INPUT_FIELDS,
-    REARM_TRANSITS,
     begin_state,
     rock_numbers,
 )
@@ -99,11 +93,11 @@ class FemSolver:
         elastic = [bar for bar in bars if bar.n]
         shortest = min(float(bar.transit_time.min()) for bar in elastic)
         self.time_step: float = scene.fem.courant * shortest
-        self.loss_time = self._loss_time()
+        self.loss_time = loss_time(scene, self._bit)
         self.cells = {"bit": self._bit.n}
         if elastic_piston and self._piston is not None:
             self.cells = {"piston": self._piston.n, **self.cells}
-        self._par = self._parameters()
+        self._par = pack_fem(scene, self._piston, self._bit, self.time_step, self.loss_time)
         n = self._mesh.shape[1]
         self._factors = np.zeros((2 * len(Factor), max(n, len(Key))))
         self._trial = np.zeros((len(Trial), n))
@@ -111,44 +105,6 @@ class FemSolver:
         self._no_blows = np.zeros(1, BLOW)
         self._no_events = np.zeros(1, EVENT)
         self._no_row = np.zeros(len(SAMPLE_FIELDS))
-
-    def _loss_time(self) -> float:
-        """Kelvin-Voigt time: that of the scene, or 2 zeta_K / omega_cr (eq. 55 of the paper)."""
-        scene = self.scene
-        if not scene.effects.loss:
-            return 0.0
-        if scene.fem.damping_ratio is None:
-            return float(scene.loss.time)
-        return 2.0 * float(scene.fem.damping_ratio) / critical_frequency(self._bit)
-
-    def _parameters(self) -> np.ndarray:
-        scene, options = self.scene, self.scene.fem
-        par = np.zeros(1, FEM_PAR)
-        p = par[0]
-        p["dt"] = self.time_step
-        mu = eigenvalue(options.spectral_radius)
-        p["mu_re"], p["mu_im"] = mu.real, mu.imag
-        p["dissipation"] = defect(options.spectral_radius)
-        p["k_c"] = options.contact_stiffness
-        p["eta"] = self.loss_time
-        p["q_tol"], p["t_tol"] = options.event_tolerance, options.time_tolerance
-        p["gravity"] = scene.gravity.acceleration if scene.effects.gravity else 0.0
-        p["mass_p"], p["mass_b"] = scene.piston.mass, scene.bit.mass
-        slowest = scene.bit.transit_time
-        if scene.piston.model == "elastic":
-            slowest = max(slowest, scene.piston.transit_time)
-        p["rearm_time"] = REARM_TRANSITS * slowest
-        p["start_gap"] = scene.start.gap
-        p["n_p"] = 0 if self._piston is None else self._piston.n + 1
-        p["n_b"] = self._bit.n + 1
-        p["piston"] = Piston[scene.piston.model.upper()]
-        p["drive"] = DriveKind[scene.effects.drive.upper()]
-        kind = RockKind[scene.effects.rock.upper()]
-        # a wall is met like the piston: by a penalty
-        p["rock"] = RockKind.SPRING if kind == RockKind.WALL else kind
-        p["barrier"] = scene.barrier_on
-        p["release"] = scene.effects.standstill_tension == "release"
-        return par
 
     def new_state(self) -> FemState:
         """State at time zero."""
@@ -265,17 +221,15 @@ class FemSolver:
         self._run(FemTask.SAMPLE, here, t, row=row)
         return here
 
+    def grid_of(self, bar: str) -> BarMesh | None:
+        """Elements of "piston" or "bit", None where it has none."""
+        mesh = {"piston": self._piston, "bit": self._bit}[bar]
+        return mesh if mesh is not None and mesh.n else None
+
     def watch_peaks(self, state: FemState, t: float) -> None:
         """Count the peak forces of `look` from `t` on [s]."""
         s = state.record[0]
         s["peak_from"], s["peak_bit"], s["peak_contact"] = t, 0.0, 0.0
-
-    def grid_of(self, bar: str) -> Grid | None:
-        """Elements of "piston" or "bit" as cells, None where it has none."""
-        mesh = {"piston": self._piston, "bit": self._bit}[bar]
-        if mesh is None or not mesh.n:
-            return None
-        return Grid(np.sqrt(mesh.stiffness * mesh.mass), mesh.mass, self.time_step, 0.0)
 
     def commit(self, state: FemState, t: float) -> None:
         """Bring an advanced state to `t`, with a part of a step."""
@@ -323,15 +277,3 @@ class FemSolver:
         s = state.record[0]
         names = ("steps", "trials", "events", "blows")
         return {name: int(s[f"count_{name}"]) for name in names} | {"locked": int(s["locked"])}
-
-
-def eigenvalue(spectral_radius: float) -> complex:
-    """Complex eigenvalue of the scheme's matrix (docs/numerics.md, section 10)."""
-    p = (2.0 + spectral_radius) / (3.0 * (1.0 + spectral_radius))
-    q = 1.0 / (6.0 * (1.0 + spectral_radius))
-    return complex(0.5 * p, np.sqrt(q - 0.25 * p * p))
-
-
-def defect(spectral_radius: float) -> float:
-    """Defect of the scheme's energy identity (docs/numerics.md, section 10)."""
-    return (1.0 - spectral_radius) / (36.0 * (1.0 + spectral_radius))

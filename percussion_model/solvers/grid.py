@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -19,6 +20,18 @@ MOST_REFINED = 2.0
 HALF_LOSS = 0.5
 # Explicit loss stays free of overshoot up to this viscous number a sub-step.
 MOST_VISCOUS = 0.5
+
+
+class Cells(Protocol):
+    """Cells or elements of one bar."""
+
+    @property
+    def mass(self) -> np.ndarray:
+        """Mass of each, top to bottom [kg]."""
+
+    @property
+    def n(self) -> int:
+        """How many there are."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +81,7 @@ def cut(bar: BarNumbers, time_step: float) -> Grid:
     return Grid(np.array(impedance), np.array(mass), time_step, fit)
 
 
-def cell_at(bar: BarNumbers, grid: Grid, place: float) -> tuple[int, float]:
+def cell_at(bar: BarNumbers, grid: Cells, place: float) -> tuple[int, float]:
     """Cell at a place along a bar.
 
     Parameters

@@ -286,13 +286,13 @@ class WaveSolver:
                 out[f"{name}_velocity"] = d + u
         return out
 
-    def section_cells(self, bar: BarNumbers) -> list[int]:
-        """Cells in each section of an elastic bar."""
-        return [section_count(section, self.time_step) for section in bar.sections]
-
     def grid_of(self, bar: str) -> Grid | None:
         """Cells of "piston" or "bit", None where it has none."""
         return {"piston": self._piston, "bit": self._bit}[bar]
+
+    def section_cells(self, bar: BarNumbers) -> list[int]:
+        """Cells in each section of an elastic bar."""
+        return [section_count(section, self.time_step) for section in bar.sections]
 
     def statistics(self, state: WaveState) -> dict[str, int]:
         """Counts of what the solver did."""

@@ -1,0 +1,1 @@
+"""FMUs made of the package: variables, model description, bundled sources, archive."""

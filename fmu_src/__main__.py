@@ -1,0 +1,53 @@
+"""Command line: `python -m fmu_src [--scene FILE] [-o FILE.fmu]`."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from fmu_src.hammer import build_hammer
+from fmu_src.pneumatics import build_pneumatics
+from percussion_model.scene import Scene, SceneError
+
+ROOT = Path(__file__).resolve().parents[1]
+DEFAULT = ROOT / "dist" / "PercussiveHammer.fmu"
+
+DEFAULT_DRIVE = ROOT / "dist" / "PneumaticDrive.fmu"
+
+
+def main(arguments: list[str]) -> int:
+    """Build an FMU, with its reference signals beside it."""
+    parser = argparse.ArgumentParser(
+        prog="build.py fmu", description="Bake a scene into an FMU for co-simulation."
+    )
+    parser.add_argument("--scene", type=Path, help="a scene file; left out: the reference")
+    parser.add_argument("-o", "--output", type=Path, default=DEFAULT, help="the FMU to write")
+    parser.add_argument(
+        "--pneumatics", action="store_true", help="write the simple pneumatic drive instead"
+    )
+    parser.add_argument(
+        "--no-reference", action="store_true", help="do not run it for _in.csv and _ref.csv"
+    )
+    choice = parser.parse_args(arguments)
+    try:
+        if choice.pneumatics:
+            path = DEFAULT_DRIVE if choice.output == DEFAULT else choice.output
+            print(f"{path} {{{build_pneumatics(path)}}}")
+            return 0
+        scene = Scene.from_toml(choice.scene or ROOT / "scenarios" / "reference.toml")
+        guid = build_hammer(scene, choice.output)
+    except (SceneError, OSError) as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 1
+    print(f"{choice.output} {{{guid}}}")
+    if not choice.no_reference:
+        from fmu_src.reference import write_reference
+
+        for path in write_reference(choice.output):
+            print(path)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,79 @@
+"""Writes an FMU: the same inputs give the same bytes.
+
+pythonfmu's own builder stamps the hour into archive and description and brings its
+package along under its plain name; so its parts are put together here.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import zipfile
+from collections.abc import Sequence
+from pathlib import Path
+
+from fmu_src.description import About, write_description
+from fmu_src.staging import LIBRARY, Bundle, script
+from fmu_src.variables import Variable
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parent
+# The oldest date that a zip archive can hold.
+DATE = (1980, 1, 1, 0, 0, 0)
+PERMISSIONS = 0o644 << 16
+
+
+def write_fmu(
+    path: Path,
+    about: About,
+    variables: Sequence[Variable],
+    bundle: Bundle,
+    slave: tuple[str, str],
+    resources: dict[str, str],
+    page: str,
+) -> str:
+    """Write an FMU and return its GUID.
+
+    Parameters
+    ----------
+    slave : tuple of str
+        Module of `runtime` and class in it.
+    resources : dict of str
+        Further files for the folder `resources`.
+    page : str
+        Documentation, HTML.
+    """
+    module, text = script(bundle, *slave)
+    entries: dict[str, bytes] = {
+        f"resources/{name}": content.encode()
+        for name, content in {
+            **bundle.files, **resources, f"{module}.py": text, "slavemodule.txt": module,
+        }.items()
+    }  # fmt: skip
+    binaries = LIBRARY / "resources" / "binaries"
+    for source in sorted(binaries.rglob("*")):
+        if source.suffix not in (".so", ".dll", ".dylib"):
+            continue
+        platform = source.parent.relative_to(binaries).as_posix()
+        entries[f"binaries/{platform}/{about.model}{source.suffix}"] = source.read_bytes()
+    entries["documentation/index.html"] = page.encode()
+    entries["documentation/licenses/license.txt"] = (ROOT / "LICENSE").read_bytes()
+    entries["model.png"] = (HERE / "icon.png").read_bytes()
+    digest = hashlib.sha256()
+    for name, content in sorted(entries.items()):
+        digest.update(name.encode() + b"\0" + hashlib.sha256(content).digest())
+    guid, xml = write_description(about, variables, digest.digest())
+    path.parent.mkdir(parents=True, exist_ok=True)
+    draft = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        with zipfile.ZipFile(draft, "w") as archive:
+            # the description comes first, so that tools find it at once
+            for name, content in [("modelDescription.xml", xml), *sorted(entries.items())]:
+                info = zipfile.ZipInfo(name, DATE)
+                info.compress_type = zipfile.ZIP_DEFLATED
+                info.external_attr = PERMISSIONS
+                archive.writestr(info, content)
+        draft.replace(path)
+    finally:
+        draft.unlink(missing_ok=True)
+    return guid

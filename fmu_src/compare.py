@@ -1,0 +1,106 @@
+"""The reference scene through the FMU and through the library, side by side.
+
+`python -m fmu_src.compare` builds dist/PercussiveHammer.fmu, runs it in fmpy, and
+prints what both find and by how much they differ.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from fmpy import simulate_fmu
+
+from fmu_src.__main__ import DEFAULT, ROOT
+from fmu_src.hammer import build_hammer
+from percussion_model.scene import Scene
+from percussion_model.simulation import simulate
+
+STEP_SIZE = 0.01  # of the communication [s]
+
+# Label, factor and unit for print, output of the FMU, column of the blow table.
+ROWS = (
+    ("start of the last blow", 1.0, "s", "blow_time", "time"),
+    ("depth at its start", 1e3, "mm", "blow_position", "bit_position"),
+    ("penetration", 1e3, "mm", "penetration_per_blow", "penetration"),
+    ("impact velocity", 1.0, "m/s", "impact_velocity", "impact_velocity"),
+    ("blow energy", 1.0, "J", "blow_energy", "blow_energy"),
+    ("stroke", 1e3, "mm", "piston.stroke", "stroke"),
+)
+
+
+def run_both(scene: Scene, path: Path) -> dict[str, Any]:
+    """Run a scene through its FMU and through the library.
+
+    Returns
+    -------
+    dict
+        `fmu`: a row for each blow, outputs of the FMU; `library`: its blow table;
+        `seconds` that both took.
+    """
+    build_hammer(scene, path)
+    began = time.perf_counter()
+    found = simulate_fmu(
+        str(path), stop_time=scene.run.duration, step_size=STEP_SIZE, output_interval=STEP_SIZE
+    )
+    between = time.perf_counter()
+    result = simulate(scene)
+    ended = time.perf_counter()
+    _, first = np.unique(found["blow_count"], return_index=True)
+    return {
+        "fmu": found[first[1:]],
+        "library": result.blows,
+        "seconds": (between - began, ended - between),
+    }
+
+
+def describe(both: dict[str, Any], settle: float) -> str:
+    """Write the last blow, the rate after settling, and all differences as a table."""
+    fmu, library = both["fmu"], both["library"]
+    same = len(fmu) == len(library)
+    lines = [f"{'':24}{'FMU in fmpy':>16}{'library':>16}{'difference':>14}"]
+
+    def add(label: str, unit: str, a: float, b: float, difference: float) -> None:
+        lines.append(f"{f'{label} [{unit}]':24}{a:16.9g}{b:16.9g}{difference:14.2g}")
+
+    rates = [
+        _rate(table, time_name, position, settle)
+        for table, time_name, position in (
+            (fmu, "blow_time", "blow_position"),
+            (library, "time", "bit_position"),
+        )
+    ]
+    a, b = (1e3 * rate for rate in rates)
+    add("rate of penetration", "mm/s", a, b, a - b)
+    for label, factor, unit, output, column in ROWS:
+        a, b = fmu[output], library[column]
+        worst = float(np.max(np.abs(a - b))) if same else float("nan")
+        add(label, unit, factor * a[-1], factor * b[-1], factor * worst)
+    lines.append(
+        f"{len(fmu)} and {len(library)} whole blows; the difference is the greatest over all of "
+        f"them. FMU {both['seconds'][0]:.1f} s, library {both['seconds'][1]:.1f} s."
+    )
+    return "\n".join(lines)
+
+
+def _rate(table: Any, time_name: str, position: str, settle: float) -> float:
+    """Bit advance by time from the first to the last blow start after settling [m/s]."""
+    counted = table[table[time_name] >= settle]
+    advance = counted[position][-1] - counted[position][0]
+    return float(advance / (counted[time_name][-1] - counted[time_name][0]))
+
+
+def main() -> int:
+    """Compare on the reference scene."""
+    scene = Scene.from_toml(ROOT / "scenarios" / "reference.toml")
+    both = run_both(scene, DEFAULT)
+    print(f"The reference hammer for {scene.run.duration:g} s; the FMU is {DEFAULT}\n")
+    print(describe(both, scene.run.settle), flush=True)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,165 @@
+"""modelDescription.xml: what pythonfmu writes, and all that it leaves out."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+from uuid import UUID
+from xml.etree.ElementTree import Element, SubElement, indent, tostring
+
+from pythonfmu import Boolean, DefaultExperiment, Fmi2Causality, Fmi2Slave, Integer, Real
+from pythonfmu.enums import Fmi2Initial, Fmi2Variability
+
+from fmu_src.units import write_units
+from fmu_src.variables import Variable
+
+OPTIONS = {
+    "needsExecutionTool": "true",  # a Python with numpy and numba
+    "canHandleVariableCommunicationStepSize": "true",
+    "canGetAndSetFMUstate": "true",
+    "canSerializeFMUstate": "true",
+}
+
+
+@dataclass(frozen=True)
+class About:
+    """What the head of a model description says."""
+
+    model: str
+    description: str
+    author: str
+    version: str
+    license: str
+    stop_time: float
+    step_size: float
+
+
+class Described(Fmi2Slave):  # type: ignore[misc]
+    """A slave that only describes itself.
+
+    Parameters
+    ----------
+    about : About
+    variables : sequence of Variable
+    """
+
+    def __init__(self, about: About, variables: Sequence[Variable]) -> None:
+        super().__init__(instance_name="described")
+        self.about = about
+        self.variables = variables
+        self.modelName = about.model
+        self.description, self.author = about.description, about.author
+        self.version, self.license = about.version, about.license
+        self.default_experiment = DefaultExperiment(0.0, about.stop_time, about.step_size)
+        for variable in variables:
+            found = _PYTHONFMU[variable.type](
+                variable.name,
+                causality=Fmi2Causality[variable.causality],
+                variability=Fmi2Variability[variable.variability],
+                initial=None if variable.causality == "input" else _INITIAL[variable.causality],
+                description=variable.description,
+                getter=lambda value=variable.start: value,
+            )
+            found.value_reference = variable.reference
+            self.vars[variable.reference] = found
+
+    def do_step(self, current_time: float, step_size: float) -> bool:
+        """Never called: this class is not what runs."""
+        raise NotImplementedError
+
+    def to_xml(self, model_options: Any = OPTIONS) -> Element:
+        """Model description; its GUID is a hash of the rest."""
+        root = super().to_xml(model_options)
+        del root.attrib["generationDateAndTime"]  # the same inputs give the same bytes
+        root.set("guid", "")
+        by_name = {variable.name: variable for variable in self.variables}
+        nodes = root.find("ModelVariables")
+        assert nodes is not None
+        for node in nodes:
+            _complete(node, by_name[node.attrib["name"]])
+        at = list(root).index(root.find("CoSimulation")) + 1
+        used = {variable.unit for variable in self.variables if variable.unit}
+        root.insert(at, write_units(used))
+        if any(variable.enumeration for variable in self.variables):
+            root.insert(at + 1, _type_definitions(self.variables))
+        _complete_structure(root, self.variables)
+        return root
+
+
+_PYTHONFMU = {"Real": Real, "Integer": Integer, "Boolean": Boolean, "Enumeration": Integer}
+_INITIAL = {"parameter": Fmi2Initial.exact, "output": Fmi2Initial.calculated}
+
+
+def _complete(node: Element, variable: Variable) -> None:
+    """Give a variable its unit, bounds, nominal and full digits."""
+    inner = node[0]
+    inner.tag = variable.type
+    attributes: dict[str, Any] = {
+        "declaredType": variable.enumeration,
+        "unit": variable.unit,
+        "displayUnit": variable.display,
+        "min": variable.lower,
+        "max": variable.upper,
+        "nominal": variable.nominal,
+        "start": variable.start,
+    }
+    inner.attrib.clear()
+    for name, value in attributes.items():
+        if value is not None:
+            inner.set(name, value if isinstance(value, str) else _text(value, variable.type))
+
+
+def _text(value: Any, kind: str) -> str:
+    """Write a value as XML schema wants it; floats with all their digits."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if kind == "Real":
+        return repr(float(value))
+    return str(value)
+
+
+def _type_definitions(variables: Sequence[Variable]) -> Element:
+    root = Element("TypeDefinitions")
+    done = set()
+    for variable in variables:
+        if variable.enumeration is None or variable.enumeration in done:
+            continue
+        done.add(variable.enumeration)
+        simple = SubElement(root, "SimpleType", {"name": variable.enumeration})
+        inner = SubElement(simple, "Enumeration")
+        for name, value, text in variable.items:
+            item = SubElement(inner, "Item", {"name": name, "value": str(value)})
+            if text:
+                item.set("description", text)
+    return root
+
+
+def _complete_structure(root: Element, variables: Sequence[Variable]) -> None:
+    """No output depends on an input at once; all are unknown at the start."""
+    structure = root.find("ModelStructure")
+    assert structure is not None
+    for unknown in structure.iter("Unknown"):
+        unknown.set("dependencies", "")
+    unknowns = SubElement(structure, "InitialUnknowns")
+    for index, variable in enumerate(variables, start=1):
+        if variable.causality == "output":
+            SubElement(unknowns, "Unknown", {"index": str(index)})
+
+
+def write_description(
+    about: About, variables: Sequence[Variable], contents: bytes
+) -> tuple[str, bytes]:
+    """Return GUID and text of a model description.
+
+    Parameters
+    ----------
+    contents : bytes
+        Hash of what else is in the FMU, for the GUID.
+    """
+    root = Described(about, variables).to_xml()
+    guid = str(UUID(bytes=hashlib.sha256(tostring(root) + contents).digest()[:16]))
+    root.set("guid", f"{{{guid}}}")
+    indent(root, space="  ")
+    return guid, b'<?xml version="1.0" encoding="UTF-8"?>\n' + tostring(root, "utf-8") + b"\n"

@@ -1,0 +1,87 @@
+"""Makes the hammer's FMU from a scene."""
+
+from __future__ import annotations
+
+import json
+import re
+from importlib.metadata import version
+from pathlib import Path
+
+from fmu_src.archive import write_fmu
+from fmu_src.description import About
+from fmu_src.hammer_variables import hammer_variables
+from fmu_src.interface import VERSION
+from fmu_src.page import write_page
+from fmu_src.staging import stage
+from fmu_src.variables import Variable, plain_row
+from percussion_model.parameter_table import parameter_table
+from percussion_model.scene import Scene, SceneError
+
+RUNTIME = ("slave", "plain_scene", "motion", "outputs", "states", "hammer")
+STEP_SIZE = 1e-3  # of the default experiment [s]
+AUTHOR = "percussion_model developers"
+LICENSE = "BSD-3-Clause"
+
+
+def build_hammer(scene: Scene, path: Path) -> str:
+    """Write the FMU of a scene; return its GUID.
+
+    Parameters
+    ----------
+    path : Path
+        Ends with `.fmu`; the rest of its name is the model identifier.
+
+    Raises
+    ------
+    SceneError
+        If the name is no C identifier.
+    """
+    about = about_hammer(scene, path)
+    variables = hammer_variables(scene)
+    bundle = stage("percussive_hammer", RUNTIME, with_model=True)
+    resources = {
+        "variables.json": _json([variable.for_instance() for variable in variables]),
+        "scene.json": _json(_scene(scene, variables, bundle.name)),
+    }
+    page = write_page(about, variables, scene)
+    return write_fmu(
+        path, about, variables, bundle, ("hammer", "PercussiveHammer"), resources, page
+    )
+
+
+def about_hammer(scene: Scene, path: Path) -> About:
+    """Head of the model description."""
+    if path.suffix != ".fmu" or not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*", path.stem):
+        raise SceneError(
+            f"{path.name}: an FMU is named by letters, digits and underscores, and ends with .fmu"
+        )
+    title = f": {scene.title}" if scene.title else ""
+    return About(
+        model=path.stem,
+        description=f"Percussive drill with travelling waves{title}",
+        author=AUTHOR,
+        version=f"{version('percussion_model')}, interface {VERSION}",
+        license=LICENSE,
+        stop_time=scene.run.duration,
+        step_size=min(STEP_SIZE, scene.run.duration),
+    )
+
+
+def _scene(scene: Scene, variables: list[Variable], bundle: str) -> dict[str, object]:
+    """What an instance needs of the scene, besides its variables."""
+    rows = {row.key: plain_row(row) for row in parameter_table() if row.kind != "sections"}
+    values = {key: scene[key] for key in rows if "*" not in key}
+    for bar in ("piston", "bit"):
+        for i, section in enumerate(scene[f"{bar}.sections"]):
+            for field, value in section.model_dump().items():
+                values[f"{bar}.sections.{i}.{field}"] = value
+    return {
+        "values": values,
+        "given": sorted(scene.given),
+        "rows": rows,
+        "identity": [bundle, [variable.name for variable in variables]],
+    }
+
+
+def _json(value: object) -> str:
+    return json.dumps(value, indent=1, sort_keys=True, allow_nan=False) + "\n"

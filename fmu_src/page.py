@@ -1,0 +1,65 @@
+"""The documentation page inside an FMU."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+
+from fmu_src.description import About
+from fmu_src.variables import Variable
+from percussion_model.scene import Scene
+
+STYLE = (
+    "body{font:15px/1.5 sans-serif;max-width:70em;margin:2em auto;padding:0 1em;color:#222}"
+    "table{border-collapse:collapse}td,th{padding:.2em .8em .2em 0;text-align:left;"
+    "vertical-align:top;border-bottom:1px solid #ddd}code{white-space:nowrap}"
+)
+INTRODUCTION = """
+<p>A drive throws a piston against a bit; stress waves run through both, and the bit crushes rock.
+SI units; positions and velocities point down, forces on rock and contact are positive in
+compression. The solver takes its own steps: communication steps of any size, equal or not, give
+the same blows. Inputs are held over a communication step and must be finite and within their
+bounds. Outputs belong to the step just finished; none depends on an input at once.</p>
+<p>Needs a Python 3.11 or newer with numpy and numba in the process of the host. The kernels are
+compiled when they are used for the first time (about a minute) and kept in the user's cache
+folder; the environment variable <code>PERCUSSION_FMU_CACHE</code> names another one.</p>
+"""
+
+
+def write_page(about: About, variables: Sequence[Variable], scene: Scene | None = None) -> str:
+    """Return the page as HTML.
+
+    Parameters
+    ----------
+    scene : Scene, optional
+        The scene that is baked in, for its text.
+    """
+    parts = [
+        f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
+        f"<title>{escape(about.model)}</title><style>{STYLE}</style></head><body>",
+        f"<h1>{escape(about.model)}</h1><p>{escape(about.description)}. "
+        f"Version {escape(about.version)}, licence {escape(about.license)}.</p>",
+        INTRODUCTION if scene is not None else "",
+    ]
+    for causality in ("input", "output", "parameter"):
+        rows = [variable for variable in variables if variable.causality == causality]
+        if rows:
+            parts.append(f"<h2>{causality.capitalize()}s</h2>{_table(rows)}")
+    if scene is not None:
+        parts.append(f"<h2>Scene</h2><pre>{escape(scene.to_toml())}</pre>")
+    return "\n".join(parts) + "\n</body></html>\n"
+
+
+def _table(variables: Sequence[Variable]) -> str:
+    head = "<tr><th>name</th><th>unit</th><th>start</th><th>range</th><th>meaning</th></tr>"
+    lines = [head]
+    for one in variables:
+        start = "" if one.start is None else f"{one.start}"
+        span = "" if one.lower is None else f"{one.lower:g} … {one.upper:g}"
+        if one.items:
+            span = ", ".join(f"{value}: {name}" for name, value, _ in one.items)
+        lines.append(
+            f"<tr><td><code>{escape(one.name)}</code></td><td>{escape(one.unit or '')}</td>"
+            f"<td>{escape(start)}</td><td>{escape(span)}</td><td>{escape(one.description)}</td></tr>"
+        )
+    return f"<table>{''.join(lines)}</table>"

@@ -1,0 +1,190 @@
+"""The hammer in motion, as a communication step sees it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from percussion_model.core.records import (
+    BLOW,
+    LEDGER_FIELDS,
+    LONG_SAMPLE_FIELDS,
+    STORED_FIELDS,
+    Mode,
+)
+from percussion_model.ledger import complete_ledger
+from percussion_model.runner import Runner
+from percussion_model.scene_rules import SceneRules
+from percussion_model.solvers import Solver
+
+AT = {name: k for k, name in enumerate(LONG_SAMPLE_FIELDS)}
+IMPULSES = ("bit_impulse", "contact_impulse", "drive_impulse")
+# An impulse below this in a communication step is no contact [N s].
+NO_CONTACT = 1e-9
+# A rate holds for this many periods after the last blow, then falls towards 0.
+PERIODS_HELD = 2.0
+
+
+@dataclass(frozen=True)
+class Gauge:
+    """Where stress is read: a cell of a bar."""
+
+    bar: str
+    cell: int
+    area: float
+
+
+class Motion(Runner):
+    """A state with what the last communication step left behind.
+
+    Parameters
+    ----------
+    scene : SceneRules
+    solver : Solver or None
+        One that was made for an equal scene.
+    """
+
+    def __init__(self, scene: SceneRules, solver: Solver | None) -> None:
+        super().__init__(scene, record_events=False, solver=solver)
+        self.scene = scene
+        self.gauge: Gauge | None = None
+        self.row_of_blow = np.zeros(1, BLOW)  # the last whole one
+        self.blow = self._numbers_of_blow()
+        self.blow_count = 0
+        self.step_size = 0.0
+        self.row = np.zeros(len(LONG_SAMPLE_FIELDS))
+        self._is_read = False
+        self._here: Any = None  # copy of the state that belongs to `row`
+        self._stress: float | None = None
+        # impulses at the start of the last step, or the state from which they follow
+        self._before = np.zeros(len(IMPULSES))
+        self._left: tuple[Any, float] | None = None
+        self._spare: Any = None  # an old copy to be used again
+
+    def _keep(self, blows: np.ndarray, events: np.ndarray) -> None:
+        if len(blows):
+            self.row_of_blow[0] = blows[-1]
+            self.blow = self._numbers_of_blow()
+            self.blow_count += len(blows)
+
+    def _numbers_of_blow(self) -> dict[str, float]:
+        """Last row as plain numbers; what is undefined is 0."""
+        names = BLOW.names or ()
+        row = dict(zip(names, self.row_of_blow[0].item(), strict=True))
+        return {name: float(value) if value == value else 0.0 for name, value in row.items()}
+
+    def go_on(self, t: float, step_size: float, inputs: dict[str, float]) -> None:
+        """Change inputs and advance to `t` [s]."""
+        if self._is_read:
+            self._before, self._left = self._impulses(self.row), None
+        else:
+            self._spare = copied(self._state, self._spare)
+            self._left = (self._spare, self.time)
+        self.solver.watch_peaks(self._state, self.time)
+        self.set_inputs(**inputs)
+        self.advance(max(t, self.time))
+        self.step_size = step_size
+        self._is_read = False
+
+    def adopt(
+        self,
+        times: tuple[float, float],
+        blows: tuple[int, np.ndarray],
+        row: np.ndarray,
+        last: np.ndarray,
+    ) -> None:
+        """Take what a saved state holds beside that of the solver.
+
+        Parameters
+        ----------
+        times : tuple of float
+            Present time and size of the last step [s].
+        blows : tuple
+            Their number, and the bytes of the last row.
+        row : ndarray
+            Reading at the present time.
+        last : ndarray, shape (4,)
+            Stress at the gauge [Pa], impulses at the start of the last step [N s].
+        """
+        self._time, self.step_size = times
+        self.blow_count = blows[0]
+        self.row_of_blow.view(np.uint8)[:] = blows[1]
+        self.blow = self._numbers_of_blow()
+        self.row[:] = row
+        self._stress, self._before, self._left = float(last[0]), last[1:].copy(), None
+        self._is_read = True
+
+    @staticmethod
+    def _impulses(row: np.ndarray) -> np.ndarray:
+        return row[[AT[name] for name in IMPULSES]]
+
+    def _look(self, state: Any, t: float, row: np.ndarray, here: Any = None) -> Any:
+        # After a change of inputs a state may lie a step ahead.
+        return self.solver.look(state, max(t, self.solver.time(state)), row, here)
+
+    def read(self) -> np.ndarray:
+        """What it is like now (`LONG_SAMPLE_FIELDS`)."""
+        if not self._is_read:
+            self._here = self._look(self._state, self.time, self.row, self._here)
+            self._is_read = True
+            self._stress = None
+        return self.row
+
+    def before(self) -> np.ndarray:
+        """Impulses at the start of the last step [N s]."""
+        if self._left is not None:
+            row = np.zeros(len(LONG_SAMPLE_FIELDS))
+            self._look(*self._left, row)
+            self._before, self._left = self._impulses(row), None
+        return self._before
+
+    def mean_force(self, which: int) -> float:
+        """Mean over the last step of the force behind one of IMPULSES [N]."""
+        if self.step_size == 0.0:
+            return 0.0
+        now = self.read()[AT[IMPULSES[which]]]
+        return float(now - self.before()[which]) / self.step_size
+
+    def off_bottom(self) -> bool:
+        """Whether the bit met no rock in the last step."""
+        pushed = self.read()[AT["bit_impulse"]] - self.before()[0]
+        return bool(self.row[AT["drilling_mode"]] == Mode.FF and abs(pushed) < NO_CONTACT)
+
+    def stress(self) -> float:
+        """Stress at the gauge at the last grid point, positive in compression [Pa]."""
+        self.read()
+        if self._stress is None:
+            self._stress = 0.0
+            if self.gauge is not None:
+                force = self.solver.fields(self._here)[f"{self.gauge.bar}_force"]
+                self._stress = float(force[self.gauge.cell]) / self.gauge.area
+        return self._stress
+
+    def residual(self) -> float:
+        """Share of the energy put in that the ledger leaves unexplained."""
+        row = self.read()
+        entries = {name: float(row[AT[name]]) for name in (*LEDGER_FIELDS, *STORED_FIELDS)}
+        found = complete_ledger(entries)["residual_relative"]
+        return found if found == found else 0.0
+
+    def fading(self) -> float:
+        """Share of the last blow's rate that holds now; falls when blows fail to come."""
+        blow = self.blow
+        if self.blow_count == 0 or blow["period"] <= 0.0:
+            return 0.0
+        since = self.time - (blow["time"] + blow["period"])
+        late = since / blow["period"] - (PERIODS_HELD - 1.0)
+        return min(1.0, 1.0 / late) if late > 0.0 else 1.0
+
+
+def copied(state: Any, spare: Any) -> Any:
+    """Copy of a state, into an old copy where there is one."""
+    if spare is None:
+        return state.copy()
+    if isinstance(state, np.ndarray):
+        spare[:] = state
+    else:
+        spare.take(state)
+    return spare

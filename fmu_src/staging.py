@@ -1,0 +1,116 @@
+"""The sources that an FMU brings along, under names that hold a hash of their contents.
+
+Two FMUs in one process share `sys.modules`; with such names each runs its own code,
+and equal code is loaded and compiled once.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import pythonfmu
+
+import fmu_src
+import percussion_model
+
+PLACEHOLDER = "__BUNDLE__"
+MODEL = Path(percussion_model.__file__).parent
+ADAPTERS = Path(fmu_src.__file__).parent
+LIBRARY = Path(pythonfmu.__file__).parent
+
+# What computes, and nothing that plots, reads files or needs more than numpy and numba.
+MODEL_FILES = (
+    "__init__.py",
+    "inputs.py",
+    "ledger.py",
+    "parameter_rows.py",
+    "runner.py",
+    "scene_rules.py",
+    "core/*.py",
+    "solvers/*.py",
+)
+LIBRARY_FILES = (
+    "_version.py",
+    "default_experiment.py",
+    "enums.py",
+    "fmi2slave.py",
+    "logmsg.py",
+    "variables.py",
+)
+START = "runtime/start.py"
+
+_IMPORT = re.compile(
+    r"^(?P<before>\s*(?:from|import) )(?P<package>percussion_model|fmu_src|pythonfmu)\b",
+    re.MULTILINE,
+)
+
+
+@dataclass(frozen=True)
+class Bundle:
+    """Sources for an FMU.
+
+    Attributes
+    ----------
+    name : str
+        Package that holds them.
+    files : dict of str
+        Text by path within `resources`.
+    """
+
+    name: str
+    files: dict[str, str]
+
+
+def stage(prefix: str, runtime: tuple[str, ...], with_model: bool) -> Bundle:
+    """Collect sources and give them their names.
+
+    Parameters
+    ----------
+    prefix : str
+        Beginning of the package's name.
+    runtime : tuple of str
+        Files of `fmu_src/runtime` without their ending.
+    with_model : bool
+        Whether all of what computes is wanted, or the parameter rows alone.
+    """
+    inner = {"__init__.py": f'"""{prefix}: sources of an FMU."""\n'}
+    inner["fmu_src/__init__.py"] = inner["fmu_src/runtime/__init__.py"] = '"""Adapters."""\n'
+    for name in runtime:
+        inner[f"fmu_src/runtime/{name}.py"] = _read(ADAPTERS / "runtime" / f"{name}.py")
+    patterns = MODEL_FILES if with_model else ("__init__.py", "parameter_rows.py")
+    for pattern in patterns:
+        for source in sorted(MODEL.glob(pattern)):
+            inner[f"percussion_model/{source.relative_to(MODEL).as_posix()}"] = _read(source)
+    inner["pythonfmu/__init__.py"] = "from .fmi2slave import Fmi2Slave\n"
+    for name in LIBRARY_FILES:
+        inner[f"pythonfmu/{name}"] = _read(LIBRARY / name)
+    inner = {
+        path: _IMPORT.sub(rf"\g<before>{PLACEHOLDER}.\g<package>", text)
+        for path, text in inner.items()
+    }
+    start = _read(ADAPTERS / START)
+    digest = hashlib.sha256()
+    for path, text in sorted({**inner, START: start}.items()):
+        digest.update(f"{path}\0{text}\0".encode())
+    name = f"{prefix}_{digest.hexdigest()[:16]}"
+    files = {f"{name}/{path}": text for path, text in inner.items()}
+    files[f"{name}_start.py"] = start
+    return Bundle(name, {path: text.replace(PLACEHOLDER, name) for path, text in files.items()})
+
+
+def script(bundle: Bundle, module: str, class_name: str) -> tuple[str, str]:
+    """Name and text of the script that the export library runs for each instance."""
+    name = f"{bundle.name}_{class_name.lower()}"
+    return name, (
+        f'"""Loads {class_name}; run anew for each instance, and therefore short."""\n'
+        f"import {bundle.name}_start\n"
+        f"{class_name} = {bundle.name}_start.slave_class("
+        f'globals(), "fmu_src.runtime.{module}", "{class_name}")\n'
+    )
+
+
+def _read(path: Path) -> str:
+    return path.read_text(encoding="utf-8")

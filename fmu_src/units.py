@@ -1,0 +1,69 @@
+"""Units of the interface: SI on the wire, other ones for people to read."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from xml.etree.ElementTree import Element, SubElement
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit by its exponents of SI base units, and units to display it in.
+
+    `displays` gives factors: displayed number = factor * number in the unit.
+    """
+
+    base: dict[str, int]
+    displays: dict[str, float]
+
+
+UNITS: dict[str, Unit] = {
+    "1": Unit({}, {"%": 100.0}),
+    "m": Unit({"m": 1}, {"mm": 1e3}),
+    "m2": Unit({"m": 2}, {"mm2": 1e6}),
+    "s": Unit({"s": 1}, {"ms": 1e3, "us": 1e6}),
+    "Hz": Unit({"s": -1}, {"1/min": 60.0}),
+    "m/s": Unit({"m": 1, "s": -1}, {"mm/s": 1e3, "m/h": 3600.0}),
+    "m/s2": Unit({"m": 1, "s": -2}, {}),
+    "N": Unit({"kg": 1, "m": 1, "s": -2}, {"kN": 1e-3}),
+    "N.s": Unit({"kg": 1, "m": 1, "s": -1}, {}),
+    "N/m": Unit({"kg": 1, "s": -2}, {"kN/mm": 1e-6}),
+    "N.s/m": Unit({"kg": 1, "s": -1}, {}),
+    "J": Unit({"kg": 1, "m": 2, "s": -2}, {}),
+    "Pa": Unit({"kg": 1, "m": -1, "s": -2}, {"bar": 1e-5, "MPa": 1e-6}),
+    "kg/m3": Unit({"kg": 1, "m": -3}, {}),
+    "kg": Unit({"kg": 1}, {}),
+    "m.s": Unit({"m": 1, "s": 1}, {}),
+    "K": Unit({"K": 1}, {}),
+}
+
+# The parameter table writes units as people do.
+FROM_TABLE = {
+    "-": "1",
+    "": "1",
+    "m^2": "m2",
+    "m/s^2": "m/s2",
+    "kg/m^3": "kg/m3",
+    "N s/m": "N.s/m",
+    "m s": "m.s",
+}
+
+
+def fmi_unit(unit: str) -> str:
+    """Name of a unit of the parameter table in the interface."""
+    name = FROM_TABLE.get(unit, unit)
+    if name not in UNITS:
+        raise KeyError(f"the unit {unit!r} is not in fmu_src/units.py")
+    return name
+
+
+def write_units(names: set[str]) -> Element:
+    """UnitDefinitions with the units of these names, in the order of UNITS."""
+    root = Element("UnitDefinitions")
+    for name, unit in UNITS.items():
+        if name in names:
+            node = SubElement(root, "Unit", {"name": name})
+            SubElement(node, "BaseUnit", {base: str(power) for base, power in unit.base.items()})
+            for display, factor in unit.displays.items():
+                SubElement(node, "DisplayUnit", {"name": display, "factor": repr(factor)})
+    return root

@@ -1,0 +1,1 @@
+"""Scenes (TOML), and scripted scenarios that drive the FMU through fmpy."""

@@ -1,0 +1,54 @@
+"""Collaring: feed and pressure are low, then rise: `python -m scenarios.collaring_ramp`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from scenarios.harness import FIGURES, Instance, built, plot, ramp, run
+
+DURATION, STEP = 2.4, 5e-3  # [s]
+LOW, HIGH = 0.8, 1.6  # the ramp begins and ends [s]
+FEED = 500.0, 2500.0  # [N]
+PRESSURE = 5e5, 20e5  # [Pa]
+
+
+def signals() -> dict:
+    """Feed force and supply pressure over time."""
+    return {
+        "feed_force": ramp((LOW, FEED[0]), (HIGH, FEED[1])),
+        "supply_pressure": ramp((LOW, PRESSURE[0]), (HIGH, PRESSURE[1])),
+    }
+
+
+def simulate(hammer: Path) -> dict[str, np.ndarray]:
+    """Run the scenario; see `harness.run`. The inputs are in the table too."""
+    wanted = signals()
+    with Instance(hammer) as instance:
+        instance.start(**{name: signal(0.0) for name, signal in wanted.items()})
+        found = run(instance, DURATION, STEP, wanted)
+    for name, signal in wanted.items():
+        found[name] = np.array([signal(t) for t in found["time"]])
+    return found
+
+
+def draw(found: dict[str, np.ndarray], path: Path) -> Path:
+    """Draw the scenario."""
+    return plot(
+        path,
+        "Collaring: feed and supply pressure rise",
+        found,
+        [
+            ("pressure [bar]", 1e-5, "supply_pressure"),
+            ("feed [kN]", 1e-3, "feed_force"),
+            ("energy [J]", 1, "blow_energy"),
+            ("blows [1/s]", 1, "blow_frequency"),
+            ("rate [mm/s]", 1e3, "rate_of_penetration"),
+            ("bit [mm]", 1e3, "bit.position"),
+        ],
+    )
+
+
+if __name__ == "__main__":
+    print(draw(simulate(built()), FIGURES / "collaring_ramp.png"))

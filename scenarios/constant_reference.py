@@ -1,0 +1,37 @@
+"""The reference hammer, feed and pressure constant: `-m scenarios.constant_reference`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from scenarios.harness import FIGURES, Instance, built, plot, run
+
+DURATION, STEP = 1.0, 1e-3  # [s]
+
+
+def simulate(hammer: Path) -> dict[str, np.ndarray]:
+    """Run the scenario; see `harness.run`."""
+    with Instance(hammer) as instance:
+        return run(instance.start(), DURATION, STEP)
+
+
+def draw(found: dict[str, np.ndarray], path: Path) -> Path:
+    """Draw the scenario."""
+    return plot(
+        path,
+        "Reference: constant feed and supply pressure",
+        found,
+        [
+            ("position [mm]", 1e3, "bit.position", "piston.position"),
+            ("peak force [kN]", 1e-3, "contact.force_peak", "bit.force_peak"),
+            ("mean force [kN]", 1e-3, "bit.force_mean"),
+            ("rate [mm/s]", 1e3, "rate_of_penetration"),
+            ("blows [1/s]", 1, "blow_frequency"),
+        ],
+    )
+
+
+if __name__ == "__main__":
+    print(draw(simulate(built()), FIGURES / "constant_reference.png"))

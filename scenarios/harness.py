@@ -1,0 +1,264 @@
+"""Run FMUs with input signals, collect outputs, compare and plot: a thin layer on fmpy."""
+
+from __future__ import annotations
+
+import csv
+import shutil
+import tempfile
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from fmpy import extract, read_model_description
+from fmpy.fmi2 import (
+    FMU2Slave,
+    fmi2CallbackFunctions,
+    fmi2CallbackLoggerTYPE,
+)
+
+# A constant, or a function of time.
+Signal = float | bool | Callable[[float], float | bool]
+ROOT = Path(__file__).resolve().parents[1]
+FIGURES = ROOT / "out" / "scenarios"
+
+
+class Instance:
+    """One instance of an FMU, its variables by name.
+
+    Parameters
+    ----------
+    fmu : str or Path
+        An FMU, or the folder of an unpacked one.
+    name : str
+        Of the instance.
+
+    Attributes
+    ----------
+    time : float
+        [s]
+    messages : list of str
+        What came through the logger.
+    """
+
+    def __init__(self, fmu: str | Path, name: str = "instance") -> None:
+        self.folder = Path(fmu)
+        self._own = None
+        if self.folder.is_file():
+            self._own = tempfile.mkdtemp(prefix="fmu-")
+            self.folder = Path(extract(str(fmu), self._own))
+        self.description = read_model_description(str(self.folder))
+        self.variables = {one.name: one for one in self.description.modelVariables}
+        self.time = 0.0
+        self.messages: list[str] = []
+        self._logger = fmi2CallbackLoggerTYPE(self._note)
+        callbacks = fmi2CallbackFunctions()
+        callbacks.logger = self._logger
+        self._callbacks = callbacks
+        self.slave = FMU2Slave(
+            guid=self.description.guid,
+            unzipDirectory=str(self.folder),
+            modelIdentifier=self.description.coSimulation.modelIdentifier,
+            instanceName=name,
+        )
+        self.slave.instantiate(callbacks=callbacks, loggingOn=True)
+
+    def _note(
+        self, environment: Any, name: bytes, status: int, category: bytes, text: bytes
+    ) -> None:
+        self.messages.append(text.decode("utf-8", "replace"))
+
+    def start(self, time: float = 0.0, **values: Any) -> Instance:
+        """Set values by name (`__` for a dot, as in bit__force), then initialise."""
+        self.set({name.replace("__", "."): value for name, value in values.items()})
+        self.time = time
+        self.slave.setupExperiment(startTime=time)
+        self.slave.enterInitializationMode()
+        self.slave.exitInitializationMode()
+        return self
+
+    def set(self, values: Mapping[str, Any]) -> None:
+        """Set parameters or inputs; enumerations by number or by word."""
+        for name, value in values.items():
+            one = self.variables[name]
+            if one.type == "Real":
+                self.slave.setReal([one.valueReference], [float(value)])
+            elif one.type == "Boolean":
+                self.slave.setBoolean([one.valueReference], [bool(value)])
+            else:
+                if isinstance(value, str):
+                    items = {item.name: int(item.value) for item in one.declaredType.items}
+                    value = items[value]
+                self.slave.setInteger([one.valueReference], [int(value)])
+
+    def get(self, name: str) -> Any:
+        """Present value of a variable."""
+        one = self.variables[name]
+        read = {"Real": self.slave.getReal, "Boolean": self.slave.getBoolean}
+        value = read.get(one.type, self.slave.getInteger)([one.valueReference])[0]
+        return bool(value) if one.type == "Boolean" else value
+
+    def values(self, names: Iterable[str]) -> list[Any]:
+        """Present values of several variables."""
+        return [self.get(name) for name in names]
+
+    @property
+    def outputs(self) -> list[str]:
+        """Names of the outputs."""
+        return [name for name, one in self.variables.items() if one.causality == "output"]
+
+    def step(self, step_size: float) -> None:
+        """Do one communication step [s]."""
+        self.slave.doStep(self.time, step_size)
+        self.time += step_size
+
+    def save(self) -> bytes:
+        """State of the instance as bytes."""
+        state = self.slave.getFMUstate()
+        try:
+            return bytes(self.slave.serializeFMUstate(state))
+        finally:
+            self.slave.freeFMUstate(state)
+
+    def restore(self, saved: bytes, time: float) -> None:
+        """Go back to a saved state of time `time` [s]."""
+        state = self.slave.deSerializeFMUstate(saved)
+        try:
+            self.slave.setFMUstate(state)
+        finally:
+            self.slave.freeFMUstate(state)
+        self.time = time
+
+    def free(self) -> None:
+        """End the instance; does nothing the second time."""
+        if self.slave is not None:
+            self.slave.freeInstance()
+            self.slave = None
+        if self._own is not None:
+            shutil.rmtree(self._own, ignore_errors=True)
+            self._own = None
+
+    def __enter__(self) -> Instance:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.free()
+
+
+def run(
+    instance: Instance,
+    stop_time: float,
+    step_size: float,
+    inputs: Mapping[str, Signal] | None = None,
+    outputs: Sequence[str] | None = None,
+    before_step: Callable[[Instance], None] | None = None,
+) -> dict[str, np.ndarray]:
+    """Step an initialised instance and collect its outputs.
+
+    Parameters
+    ----------
+    stop_time, step_size : float
+        [s]
+    inputs : mapping, optional
+        Signals by name; a function is read at the start of each step.
+    outputs : sequence of str, optional
+        All if left out.
+    before_step : callable, optional
+        Called before each step, as for a coupling.
+
+    Returns
+    -------
+    dict of ndarray
+        "time" and the outputs, at the start and after each step.
+    """
+    names = list(outputs if outputs is not None else instance.outputs)
+    begin = instance.time
+    count = round((stop_time - begin) / step_size)
+    rows = [[begin, *instance.values(names)]]
+    held: dict[str, Any] = {}
+    for k in range(count):
+        instance.time = begin + k * step_size
+        for name, signal in (inputs or {}).items():
+            value = signal(instance.time) if callable(signal) else signal
+            if held.get(name) != value:
+                instance.set({name: value})
+                held[name] = value
+        if before_step is not None:
+            before_step(instance)
+        instance.step(step_size)
+        rows.append([instance.time, *instance.values(names)])
+    table = np.array(rows, dtype=float)
+    return {name: table[:, k] for k, name in enumerate(["time", *names])}
+
+
+def read_signals(path: str | Path) -> dict[str, Callable[[float], float]]:
+    """Signals of a CSV file with a column `time`; a value holds until the next row."""
+    with open(path, newline="", encoding="utf-8") as file:
+        head, *rows = list(csv.reader(file))
+    table = np.array(rows, dtype=float)
+    times = table[:, head.index("time")]
+
+    def held(column: np.ndarray) -> Callable[[float], float]:
+        return lambda t: float(column[max(0, np.searchsorted(times, t, side="right") - 1)])
+
+    return {name: held(table[:, k]) for k, name in enumerate(head) if name != "time"}
+
+
+def greatest_difference(
+    found: Mapping[str, np.ndarray], wanted: Mapping[str, np.ndarray]
+) -> dict[str, float]:
+    """Greatest difference of each common column, by the greatest number in it."""
+    return {
+        name: float(np.max(np.abs(found[name] - wanted[name])))
+        / (float(np.max(np.abs(wanted[name]))) or 1.0)
+        for name in wanted
+        if name in found
+    }
+
+
+def plot(
+    path: Path, title: str, found: Mapping[str, np.ndarray], panels: Sequence[tuple[str, ...]]
+) -> Path:
+    """Draw columns over time, a panel for each (label, factor, names...).
+
+    Returns
+    -------
+    Path
+        The PNG file.
+    """
+    import matplotlib.pyplot as plt
+
+    figure, axes = plt.subplots(
+        len(panels), 1, sharex=True, figsize=(8.0, 1.0 + 1.7 * len(panels)), squeeze=False
+    )
+    for ax, (label, factor, *names) in zip(axes[:, 0], panels, strict=True):
+        for name in names:
+            ax.plot(found["time"], float(factor) * found[name], linewidth=1.2, label=name)
+        ax.set_ylabel(label)
+        ax.grid(alpha=0.3)
+        if len(names) > 1:
+            ax.legend(fontsize="small", loc="upper right")
+    axes[-1, 0].set_xlabel("time [s]")
+    axes[0, 0].set_title(title)
+    figure.align_ylabels()
+    figure.tight_layout()
+    path.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(path, dpi=110)
+    plt.close(figure)
+    return path
+
+
+def built(name: str = "PercussiveHammer") -> Path:
+    """An FMU of `dist`, built now if it is not there."""
+    path = ROOT / "dist" / f"{name}.fmu"
+    if not path.exists():
+        from fmu_src.__main__ import main
+
+        main(["--no-reference"] if name == "PercussiveHammer" else ["--pneumatics"])
+    return path
+
+
+def ramp(*points: tuple[float, float]) -> Callable[[float], float]:
+    """A signal that goes straight from point (time, value) to point."""
+    times, values = zip(*points, strict=True)
+    return lambda t: float(np.interp(t, times, values))

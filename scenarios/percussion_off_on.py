@@ -1,0 +1,40 @@
+"""Percussion is switched off and on again: `python -m scenarios.percussion_off_on`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from scenarios.harness import FIGURES, Instance, built, plot, run
+
+DURATION, STEP = 2.4, 5e-3  # [s]
+# Switched off near the top of a stroke: in the ideal pressure law nothing but weight
+# would bring a piston back that is on its way up.
+OFF, ON = 0.62, 1.6  # [s]
+
+
+def simulate(hammer: Path) -> dict[str, np.ndarray]:
+    """Run the scenario; see `harness.run`."""
+    with Instance(hammer) as instance:
+        return run(instance.start(), DURATION, STEP, {"percussion_on": lambda t: not OFF <= t < ON})
+
+
+def draw(found: dict[str, np.ndarray], path: Path) -> Path:
+    """Draw the scenario."""
+    return plot(
+        path,
+        "Percussion off and on",
+        found,
+        [
+            ("casing force [kN]", 1e-3, "casing_force"),
+            ("position [mm]", 1e3, "piston.position", "bit.position"),
+            ("blows [1/s]", 1, "blow_frequency"),
+            ("rate [mm/s]", 1e3, "rate_of_penetration"),
+            ("mean force [kN]", 1e-3, "bit.force_mean", "contact.force_mean"),
+        ],
+    )
+
+
+if __name__ == "__main__":
+    print(draw(simulate(built()), FIGURES / "percussion_off_on.png"))

@@ -1,0 +1,42 @@
+"""The supply pressure breaks down and comes back: `python -m scenarios.pressure_loss`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from scenarios.harness import FIGURES, Instance, built, plot, ramp, run
+
+DURATION, STEP = 2.4, 5e-3  # [s]
+FULL, LEFT = 20e5, 8e5  # [Pa]
+LOST, BACK = (0.7, 0.75), (1.6, 1.65)  # [s]
+
+
+def simulate(hammer: Path) -> dict[str, np.ndarray]:
+    """Run the scenario; see `harness.run`. The pressure is in the table too."""
+    pressure = ramp((LOST[0], FULL), (LOST[1], LEFT), (BACK[0], LEFT), (BACK[1], FULL))
+    with Instance(hammer) as instance:
+        found = run(instance.start(), DURATION, STEP, {"supply_pressure": pressure})
+    found["supply_pressure"] = np.array([pressure(t) for t in found["time"]])
+    return found
+
+
+def draw(found: dict[str, np.ndarray], path: Path) -> Path:
+    """Draw the scenario."""
+    return plot(
+        path,
+        "Loss of supply pressure",
+        found,
+        [
+            ("pressure [bar]", 1e-5, "supply_pressure"),
+            ("impact [m/s]", 1, "impact_velocity"),
+            ("energy [J]", 1, "blow_energy"),
+            ("blows [1/s]", 1, "blow_frequency"),
+            ("rate [mm/s]", 1e3, "rate_of_penetration"),
+        ],
+    )
+
+
+if __name__ == "__main__":
+    print(draw(simulate(built()), FIGURES / "pressure_loss.png"))

@@ -1,0 +1,70 @@
+"""FMUs built once for all tests, and a cache of kernels that they share."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from pathlib import Path
+
+import pytest
+
+from fmu_src.hammer import build_hammer
+from fmu_src.pneumatics import build_pneumatics
+from percussion_model import Scene
+from scenarios.harness import Instance
+
+# Workers of one run of the tests share compiled kernels; NUMBA_CACHE_DIR is theirs too.
+os.environ.setdefault(
+    "PERCUSSION_FMU_CACHE",
+    str(Path(os.environ.get("NUMBA_CACHE_DIR") or tempfile.gettempdir()) / "percussion_fmu"),
+)
+
+RIGID = {"piston.model": "rigid", "bit.model": "rigid"}
+
+
+@pytest.fixture(scope="session")
+def fmus(tmp_path_factory):
+    """Folder with the reference's FMU, that of rigid bodies, and the pneumatic one."""
+    folder = tmp_path_factory.mktemp("fmus")
+    build_hammer(Scene(), folder / "PercussiveHammer.fmu")
+    build_hammer(Scene().replace(**RIGID), folder / "RigidHammer.fmu")
+    build_pneumatics(folder / "PneumaticDrive.fmu")
+    return folder
+
+
+@pytest.fixture(scope="session")
+def hammer(fmus):
+    """FMU of the reference scene."""
+    return fmus / "PercussiveHammer.fmu"
+
+
+@pytest.fixture(scope="session")
+def rigid(fmus):
+    """FMU of the rigid scene, which compiles sooner."""
+    return fmus / "RigidHammer.fmu"
+
+
+@pytest.fixture(scope="session")
+def unpacked(fmus, tmp_path_factory):
+    """Folders of the unpacked FMUs by name."""
+    from fmpy import extract
+
+    folder = tmp_path_factory.mktemp("unpacked")
+    return {path.stem: extract(str(path), str(folder / path.stem)) for path in fmus.glob("*.fmu")}
+
+
+@pytest.fixture
+def make(unpacked):
+    """Make initialised instances, freed at the end of the test."""
+    made = []
+
+    def one(name="RigidHammer", start=True, **values):
+        instance = Instance(unpacked[name], name=f"{name}{len(made)}")
+        made.append(instance)
+        if start:
+            instance.start(**values)
+        return instance
+
+    yield one
+    for instance in made:
+        instance.free()

@@ -1,0 +1,149 @@
+"""What goes wrong is said: in the log, with variable, value and bound, and to the host."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from fmpy import simulate_fmu
+from fmpy.fmi1 import FMICallException
+
+NAN, INFINITE = math.nan, math.inf
+
+
+def fails(instance, action, *words):
+    """Do what must fail; the log has all the words in one message."""
+    before = len(instance.messages)
+    with pytest.raises(FMICallException):
+        action()
+    said = instance.messages[before:]
+    assert any(all(word in text for word in words) for text in said), said
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "bound"),
+    [
+        ("loss.time", -1.0, "from 0 to 0.001 s"),
+        ("bit.sections[1].length", 0.0, "above 0"),
+        ("bit.sections[1].density", NAN, "above 0"),
+        ("start.gap", 101.0, "from 0 to 100 m"),
+        ("solver.cells", -3, "from 1 to 100000"),
+        ("effects.rock", 9, '"wall"'),
+        ("drive.effective_area", 11.0, "from 0 to 10 m^2"),
+        ("gauge.position", 7.0, "0.20125 m long"),
+        ("feed_force", INFINITE, "from -1e9 to 1e9 N"),
+        ("supply_pressure", -1.0, "from 0 to 1e9 Pa"),
+        ("rock.unloading_ratio", 1.0, "above 1"),
+        ("drive.reversal_distance", 0.0, "above 0"),
+    ],
+)
+def test_a_bad_start_fails_in_the_initialisation(make, name, value, bound):
+    instance = make(start=False)
+    instance.set({name: value})
+    shown = "nan" if value != value else f"{value}".rstrip("0").rstrip(".")
+    fails(instance, instance.start, name, shown, bound)
+
+
+def test_contradictions_fail_in_the_initialisation(make):
+    instance = make(start=False)
+    instance.set({"piston.model": "absent"})
+    fails(instance, instance.start, "effects.drive", "needs a piston")
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("feed_force", NAN),
+        ("feed_force", -INFINITE),
+        ("supply_pressure", NAN),
+        ("piston_force", NAN),  # though it has no effect here
+        ("rock.loading_stiffness", 0.0),
+        ("rock.barrier_energy", -1.0),
+    ],
+)
+def test_a_bad_input_ends_the_step_and_touches_nothing(make, name, value):
+    instance, twin = make(), make()
+    for one in (instance, twin):
+        for _ in range(9):
+            one.step(7e-3)
+    good = instance.get(name)
+    instance.set({name: value})
+    before = instance.save()
+    fails(instance, lambda: instance.slave.doStep(instance.time, 7e-3), name, "must be")
+    assert instance.save() == before
+    instance.set({name: good})
+    for one in (instance, twin):
+        one.step(7e-3)
+    assert instance.values(instance.outputs) == twin.values(twin.outputs)
+
+
+def test_a_host_sees_the_failure_of_a_step(rigid):
+    import numpy as np
+
+    signals = np.array([(0.0, 2500.0), (0.1, NAN), (0.2, NAN)],
+                       dtype=[("time", float), ("feed_force", float)])  # fmt: skip
+    with pytest.raises(FMICallException):
+        simulate_fmu(str(rigid), stop_time=0.2, step_size=0.01, input=signals)
+
+
+@pytest.mark.parametrize("step", [0.0, -1e-3, NAN, INFINITE])
+def test_a_step_of_no_length_is_refused(make, step):
+    instance = make()
+    fails(instance, lambda: instance.slave.doStep(0.0, step), "communicationStepSize")
+
+
+def test_stepping_backwards_is_refused(make):
+    instance = make()
+    instance.step(0.1)
+    fails(instance, lambda: instance.slave.doStep(0.05, 0.1), "0.05 s lies before", "0.1 s")
+    fails(instance, lambda: instance.slave.doStep(0.2, 0.1), "0.2 s lies after")
+    instance.step(0.1)  # and from where it was it goes on
+
+
+def test_points_that_differ_by_rounding_are_accepted(make):
+    instance = make()
+    step = 1e-3
+    for k in range(2000):  # one master multiplies, another one adds
+        instance.slave.doStep(k * step, step)
+    time = 2000 * step
+    for _ in range(2000):
+        instance.slave.doStep(time, step)
+        time += step
+    assert instance.get("blow_count") > 80
+
+
+def test_calls_out_of_order_are_refused(make):
+    instance = make(start=False)
+    fails(instance, lambda: instance.slave.doStep(0.0, 0.1), "out of order")
+    instance.start()
+    fails(instance, instance.slave.enterInitializationMode, "out of order")
+    instance.slave.terminate()
+    fails(instance, lambda: instance.slave.doStep(0.0, 0.1), "out of order", "terminated")
+
+
+def test_what_is_fixed_or_computed_cannot_be_set(make):
+    instance = make()
+    instance.step(0.01)
+    fails(instance, lambda: instance.set({"loss.time": 1e-7}), "loss.time is fixed")
+    fails(instance, lambda: instance.set({"bit.force": 1.0}), "bit.force is an output")
+    fails(instance, lambda: instance.slave.getReal([987654]), "987654")
+
+
+def test_percent_signs_reach_the_log_as_they_are(make):
+    instance = make("RigidHammer", start=False)
+    other = type(instance)(instance.folder, name="100%s%n of it")
+    other.set({"loss.time": -1.0})
+    with pytest.raises(FMICallException):
+        other.start()
+    other.free()
+    # as a printf format, which doubles none
+    assert any("100%%s%%n of it" in text for text in other.messages)
+
+
+def test_an_input_without_effect_is_noted_in_the_log(make):
+    instance = make()
+    instance.step(0.01)
+    assert not instance.messages
+    instance.set({"piston_force": 100.0})
+    instance.step(0.01)
+    assert any("no effect" in text for text in instance.messages)

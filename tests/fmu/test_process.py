@@ -1,0 +1,95 @@
+"""An FMU in a process of its own: what it needs, prints and leaves behind."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+
+# A host with nothing but fmpy, numpy and numba and what these bring along.
+HOST = """
+import importlib.abc, sys
+
+class Refuse(importlib.abc.MetaPathFinder):
+    def find_spec(self, name, path=None, target=None):
+        if name.split(".")[0] in sys.argv[2].split(","):
+            raise ModuleNotFoundError(f"{name} is not installed here")
+
+sys.meta_path.insert(0, Refuse())
+from fmpy import extract, read_model_description
+from fmpy.fmi2 import FMU2Slave
+folder = extract(sys.argv[1])
+model = read_model_description(folder)
+slaves = []
+for k in range(3):
+    slave = FMU2Slave(guid=model.guid, unzipDirectory=folder, instanceName=f"i{k}",
+                      modelIdentifier=model.coSimulation.modelIdentifier)
+    slave.instantiate()
+    slave.setupExperiment(startTime=0.0)
+    slave.enterInitializationMode()
+    slave.exitInitializationMode()
+    for i in range(20):
+        slave.doStep(0.01 * i, 0.01)
+    slaves.append(slave)
+refs = [one.valueReference for one in model.modelVariables if one.name == sys.argv[3]]
+values = {slave.getReal(refs)[0] for slave in slaves}
+slaves[0].terminate()
+slaves[0].freeInstance()
+assert len(values) == 1
+sys.stderr.write(repr(values.pop()))
+"""
+ABSENT = (
+    "percussion_model,fmu_src,pythonfmu,pydantic,pydantic_core,scipy,pandas,matplotlib,"
+    "typer,rich,tomli_w"
+)
+
+
+def host(fmu, cwd, output="blow_position", **environment):
+    return subprocess.run(
+        [sys.executable, "-c", HOST, str(fmu), ABSENT, output],
+        cwd=cwd, capture_output=True, text=True, check=False,
+        env={**os.environ, "PYTHONPATH": "", **environment},
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ["PercussiveHammer", "RigidHammer"])
+def test_numpy_and_numba_are_enough_and_nothing_is_printed(fmus, tmp_path, make, name):
+    done = host(fmus / f"{name}.fmu", tmp_path)
+    assert done.returncode == 0, done.stderr  # no crash at the end either
+    assert done.stdout == ""
+    instance = make(name)
+    for _ in range(20):
+        instance.step(0.01)
+    assert float(done.stderr) == instance.get("blow_position")
+
+
+def test_without_a_cache_folder_it_runs_from_a_temporary_one(fmus, tmp_path):
+    blocked = tmp_path / "file"
+    blocked.write_text("no folder")
+    cache = str(blocked / "in it")
+    fmu = fmus / "PneumaticDrive.fmu"
+    done = host(fmu, tmp_path, "upper.pressure", PERCUSSION_FMU_CACHE=cache, TMPDIR=str(tmp_path))
+    assert done.returncode == 0, done.stderr
+    assert float(done.stderr) < 20e5
+    assert not list(tmp_path.glob("pneumatic*"))  # and takes it away
+
+
+def test_processes_that_start_together_share_one_copy_of_the_sources(fmus, tmp_path):
+    cache = tmp_path / "cache"
+    fmu = str(fmus / "PneumaticDrive.fmu")
+    command = [sys.executable, "-c", HOST, fmu, ABSENT, "upper.pressure"]
+    environment = {**os.environ, "PYTHONPATH": "", "PERCUSSION_FMU_CACHE": str(cache)}
+    several = [
+        subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True, env=environment)
+        for _ in range(4)
+    ]
+    said = [process.communicate()[1] for process in several]
+    assert [process.returncode for process in several] == [0] * 4, said
+    assert len(set(said)) == 1
+    assert [path.name[:16] for path in cache.iterdir()] == ["pneumatic_drive_"]
+    assert len(list(cache.glob("*"))) + len(list(cache.glob(".*"))) == 1  # no drafts are left

@@ -1,0 +1,153 @@
+"""Scripted scenarios: each draws its figure, and shows the physics that it is about."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from percussion_model import Scene
+from scenarios import (
+    collaring_ramp,
+    constant_reference,
+    layered_rock,
+    percussion_off_on,
+    pneumatic_drive,
+    pressure_loss,
+)
+from scenarios.harness import greatest_difference, ramp, read_signals, run
+
+SCENE = Scene()
+MASS, GRAVITY = SCENE.piston.mass, SCENE.gravity.acceleration
+START = SCENE.start.piston_velocity
+
+
+def at(found, name, time):
+    """Value of a column at a time."""
+    return found[name][np.searchsorted(found["time"], time)]
+
+
+def draws(module, found, folder):
+    path = module.draw(found, folder / f"{module.__name__}.png")
+    assert path.read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
+    assert path.stat().st_size > 20_000
+
+
+def piston_momentum_balances(found):
+    """Contact impulse = drive and weight, less what the piston still has."""
+    wanted = -found["casing.impulse"] + MASS * GRAVITY * found["time"]
+    wanted -= MASS * (found["piston.velocity"] - START)
+    np.testing.assert_allclose(found["contact.impulse"], wanted, rtol=1e-9, atol=1e-6)
+
+
+def test_constant_reference(hammer, tmp_path):
+    found = constant_reference.simulate(hammer)
+    draws(constant_reference, found, tmp_path)
+    piston_momentum_balances(found)
+    # the bit: feed and both weights and the drive, less what moves still
+    bit = SCENE.bit.mass
+    wanted = (2500.0 + (MASS + bit) * GRAVITY) * found["time"] - found["casing.impulse"]
+    wanted -= MASS * (found["piston.velocity"] - START) + bit * found["bit.velocity"]
+    np.testing.assert_allclose(found["bit.impulse"], wanted, rtol=1e-9, atol=1e-6)
+    steady = found["time"] > 0.5
+    for name in ("rate_of_penetration", "blow_frequency", "blow_energy"):
+        np.testing.assert_allclose(found[name][steady], found[name][-1], rtol=1e-5)
+    assert found["contact.force_peak"][steady].max() == pytest.approx(963e3, rel=2e-3)
+    assert found["energy_residual"][-1] == pytest.approx(0.0, abs=1e-12)
+    assert not found["off_bottom"][steady].all()
+
+
+def test_collaring_ramp(hammer, tmp_path):
+    found = collaring_ramp.simulate(hammer)
+    draws(collaring_ramp, found, tmp_path)
+    piston_momentum_balances(found)
+    early, late = collaring_ramp.LOW, collaring_ramp.DURATION
+    # over a cycle the weight gives nothing and the drive 2 F_0 D_1
+    energy = np.array([at(found, "blow_energy", t) for t in (early, late)])
+    ratio = collaring_ramp.PRESSURE[1] / collaring_ramp.PRESSURE[0]
+    assert energy[1] / energy[0] == pytest.approx(ratio, rel=0.02)
+    rising = found["time"] > early
+    for name in ("blow_energy", "rate_of_penetration", "blow_frequency"):
+        column = found[name][rising]
+        assert np.all(np.diff(column) > -1e-3 * column[-1]), name
+    assert at(found, "rate_of_penetration", late) == pytest.approx(0.016369, rel=1e-3)
+    assert late > collaring_ramp.HIGH + 0.5
+
+
+def test_pressure_loss(hammer, tmp_path):
+    found = pressure_loss.simulate(hammer)
+    draws(pressure_loss, found, tmp_path)
+    piston_momentum_balances(found)
+    before, low, after = 0.69, 1.59, pressure_loss.DURATION
+    ratio = pressure_loss.LEFT / pressure_loss.FULL
+    frequency, energy, rate = (
+        np.array([at(found, name, t) for t in (before, low, after)])
+        for name in ("blow_frequency", "blow_energy", "rate_of_penetration")
+    )
+    assert energy[1] / energy[0] == pytest.approx(ratio, rel=0.03)
+    assert frequency[1] / frequency[0] == pytest.approx(np.sqrt(ratio), rel=0.06)
+    assert rate[1] < 0.5 * rate[0]
+    for column in (frequency, energy, rate):
+        assert column[2] == pytest.approx(column[0], rel=1e-4)
+
+
+def test_layered_rock(hammer, tmp_path):
+    found = layered_rock.simulate(hammer)
+    draws(layered_rock, found, tmp_path)
+    hard = found["rock.loading_stiffness"] == layered_rock.HARD
+    begin, end = found["time"][hard][[0, -1]]
+    rates = [at(found, "rate_of_penetration", t) for t in (begin, end, found["time"][-1])]
+    assert rates[0] == pytest.approx(rates[2], rel=1e-4)
+    exponent = np.log(rates[1] / rates[0]) / np.log(layered_rock.HARD / layered_rock.SOFT)
+    assert -0.56 < exponent < -0.49  # the paper: -0.55
+    piston_momentum_balances(found)
+
+
+def test_percussion_off_on(hammer, tmp_path):
+    found = percussion_off_on.simulate(hammer)
+    draws(percussion_off_on, found, tmp_path)
+    piston_momentum_balances(found)
+    times = found["time"]
+    off = (times > percussion_off_on.OFF + 1e-9) & (times <= percussion_off_on.ON + 1e-9)
+    assert np.all(found["casing_force"][off] == 0.0)
+    assert np.all(found["casing_force"][~off & (times > 0)] != 0.0)
+    assert np.ptp(found["casing.impulse"][off]) == 0.0
+    # feed and weight are all that is left on the rock in the end
+    still = (times > percussion_off_on.ON - 0.2) & off
+    weight = 2500.0 + (SCENE.bit.mass + MASS) * GRAVITY
+    mean = np.mean(found["bit.force_mean"][still])
+    assert mean == pytest.approx(weight, rel=0.01)
+    assert at(found, "rate_of_penetration", percussion_off_on.ON) < 2e-3
+    before = at(found, "rate_of_penetration", percussion_off_on.OFF)
+    assert found["rate_of_penetration"][-1] == pytest.approx(before, rel=1e-3)
+
+
+def test_pneumatic_drive(hammer, fmus, tmp_path):
+    found = pneumatic_drive.simulate(hammer, fmus / "PneumaticDrive.fmu")
+    draws(pneumatic_drive, found, tmp_path)
+    piston_momentum_balances(found)
+    # what the hammer's casing took is what the chambers gave, step by step
+    given = np.cumsum(found["piston_force"][1:]) * pneumatic_drive.STEP
+    np.testing.assert_allclose(found["casing.impulse"][1:], -given, atol=3e-2)
+    np.testing.assert_array_equal(found["casing_force"][2:], -found["piston_force"][2:])
+    steady = found["time"] > 0.3
+    assert np.all(found["upper.pressure"] > -101_325.0)
+    assert np.ptp(found["impact_velocity"][steady]) < 0.02
+    assert found["impact_velocity"][-1] == pytest.approx(8.5, abs=0.5)
+    # each chamber is filled and emptied once a blow
+    blows = found["blow_count"][-1]
+    full = 20e5 * 1.6e-3 * 0.15 / (287.0 * 293.0)
+    assert 0.1 * full * blows < found["air_used"][-1] < 5.0 * full * blows
+
+
+def test_signals_come_from_functions_and_from_files(make, tmp_path):
+    signal = ramp((0.0, 1000.0), (0.1, 3000.0))
+    table = tmp_path / "signals.csv"
+    rows = [f"{0.01 * k!r},{signal(0.01 * k)!r}" for k in range(20)]
+    table.write_text("\n".join(["time,feed_force", *rows]) + "\n")
+    read = read_signals(table)
+    assert read["feed_force"](0.015) == signal(0.01)
+    runs = []
+    for inputs in ({"feed_force": signal}, read):
+        instance = make(feed_force=1000.0)
+        runs.append(run(instance, 0.19, 0.01, inputs, ["bit.position", "blow_count"]))
+    assert max(greatest_difference(*runs).values()) == 0.0
