@@ -15,7 +15,7 @@ import numpy as np
 # One blow of a coarse reference drill, its leaps off so that every step is made.
 SCENES = {
     "wave": {"solver.cells": 20, "solver.leaps": False, "run.settle": 0.0},
-    "fem": {"solver.name": "fem", "fem.elements": 20, "run.settle": 0.0},
+    "fem": {"solver.name": "fem", "fem.elements": 10, "run.settle": 0.0},
 }
 DURATION = 0.0025
 FAULT = 0.999
@@ -108,7 +108,7 @@ def weaken_penalty() -> None:
     replace("meet_at_contact", meet_at_contact)
 
 
-def lose_load(at: int = 200) -> None:
+def lose_load(at: int = 100) -> None:
     """Let the piston feel neither gravity nor drive in one step."""
     from percussion_model.core.fem_scheme import RE, SHARE, drive_force
     from percussion_model.core.fem_scheme import load as full
