@@ -22,6 +22,7 @@ from percussion_model.scene import Scene
 SUPPLY_PRESSURE = 20e5
 # Displays that people expect, by unit of the interface.
 DISPLAYS = {"m": "mm", "N": "kN", "Pa": "bar", "m2": "mm2", "Hz": "1/min", "N/m": "kN/mm"}
+DISPLAYS_OF = {"youngs_modulus": "MPa"}
 
 # What an input of the FMU stands for in the table; the rest of a scene is a parameter.
 TABLE_INPUTS = {
@@ -55,6 +56,7 @@ PLACE_ROW = number_row(
 LEFT_OUT = {
     "solver.cells": (0, "0: by the solver"),
     "contact.restitution": (-1.0, "-1: St Venant"),
+    "gauge.position": (-1.0, "-1: the middle"),
     "fem.damping_ratio": (-1.0, "-1: by loss.time"),
 }
 
@@ -249,7 +251,7 @@ def _number(
         description=_described(row) + note + (f" ({meaning})" if meaning else ""),
         variability="continuous" if causality == "input" else "fixed",
         unit=None if whole else unit,
-        display=None if whole else DISPLAYS.get(unit),
+        display=None if whole else DISPLAYS_OF.get(row.key.split(".")[-1], DISPLAYS.get(unit)),
         lower=int(lower) if whole and lower is not None else lower,
         upper=int(row.upper) if whole and row.upper is not None else row.upper,
         nominal=None if whole else magnitude(start),

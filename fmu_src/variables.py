@@ -37,7 +37,7 @@ class Variable:
     items: tuple[tuple[str, int, str], ...] = ()  # name, value, description
 
     def for_instance(self) -> dict[str, Any]:
-        """What `runtime.slave.Known` holds, as plain values."""
+        """What `runtime.folder.Known` holds, as plain values."""
         return {
             "name": self.name,
             "reference": self.reference,

@@ -14,13 +14,20 @@ def complete_ledger(entries: dict[str, float]) -> dict[str, float]:
     """Add sums, residual and relative figures to the entries of a solver [J]."""
     ledger = {"initial": entries["start"]}
     ledger |= {name: entries[name] for name in (*WORKS, *DISSIPATED, *NUMERICAL, *STORED)}
-    given = sum(ledger[name] for name in WORKS)
-    stored = sum(ledger[name] for name in STORED)
-    dissipated = sum(ledger[name] for name in DISSIPATED)
-    apart = sum(ledger[name] for name in NUMERICAL)
-    residual = ledger["initial"] + given - stored - dissipated - apart
-    scale = abs(ledger["initial"]) + sum(abs(ledger[name]) for name in WORKS)
-    ledger |= {"input": given, "stored": stored, "dissipated": dissipated, "residual": residual}
+    for name, parts in (("input", WORKS), ("stored", STORED), ("dissipated", DISSIPATED)):
+        ledger[name] = sum([entries[part] for part in parts])
+    ledger["residual"], scale = unexplained(entries)
     for name in (*NUMERICAL, "residual"):
         ledger[f"{name}_relative"] = ledger[name] / scale if scale > 0 else math.nan
     return {name: float(value) for name, value in ledger.items()}
+
+
+def unexplained(entries: dict[str, float]) -> tuple[float, float]:
+    """What no entry explains, and the energy put in that it is to be compared with [J]."""
+    works = [entries[name] for name in WORKS]
+    stored = sum([entries[name] for name in STORED])
+    dissipated = sum([entries[name] for name in DISSIPATED])
+    start = entries["start"]
+    apart = sum([entries[name] for name in NUMERICAL])
+    residual = start + sum(works) - stored - dissipated - apart
+    return residual, abs(start) + sum(map(abs, works))

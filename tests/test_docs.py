@@ -16,7 +16,10 @@ README = (ROOT / "README.md").read_text(encoding="utf-8")
 SOURCES = [
     path for folder in ("percussion_model", "tests") for path in (ROOT / folder).rglob("*.py")
 ]
-PAGES = ("docs/model.md", "docs/numerics.md", "docs/parameters.md", "README.md", "CONTRIBUTING.md")
+PAGES = (
+    *("docs/model.md", "docs/numerics.md", "docs/parameters.md", "docs/fmu.md"),
+    *("README.md", "CONTRIBUTING.md"),
+)
 
 
 def blocks(language):

@@ -51,6 +51,7 @@ class PercussiveHammer(Slave):
         self.rows |= {key: _row(row) for key, row in scene["rows"].items()}
         self.identity = scene["identity"]
         self.inputs = [one for one in self.known.values() if one.causality == "input"]
+        self._readers = {self.by_name[name]: read for name, read in OUTPUTS.items()}
         self.motion: Motion | None = None
         self.given_inputs: list[Any] = []  # values of the inputs when the solver was made
         self.fingerprint = b""
@@ -142,6 +143,8 @@ class PercussiveHammer(Slave):
         """Cell at the place of the gauge, None in a bar without cells."""
         name = ("piston", "bit")[self.value("gauge.bar") - 1]
         bar, place = scene[name], self.value("gauge.position")
+        if place == self.known[self.by_name["gauge.position"]].left_out:
+            place = 0.5 * bar.length
         if place > bar.length:
             raise ValueError(
                 f"gauge.position = {place!r} m: lies below the {name}, "
@@ -175,11 +178,12 @@ class PercussiveHammer(Slave):
 
     # outputs
 
-    def output(self, reference: int) -> Any:
-        """Present value of an output; 0 before there is one."""
+    def outputs(self, references: list[int]) -> list[Any]:
+        """Present values of outputs; 0 before there are any."""
         if self.motion is None and self.phase != Phase.INITIALISING:
-            return 0
-        return OUTPUTS[self.known[reference].name](self.ready())
+            return [0] * len(references)
+        motion, readers = self.ready(), self._readers
+        return [readers[reference](motion) for reference in references]
 
     # states
 

@@ -14,12 +14,13 @@ from percussion_model.core.records import (
     STORED_FIELDS,
     Mode,
 )
-from percussion_model.ledger import complete_ledger
+from percussion_model.ledger import unexplained
 from percussion_model.runner import Runner
 from percussion_model.scene_rules import SceneRules
 from percussion_model.solvers import Solver
 
 AT = {name: k for k, name in enumerate(LONG_SAMPLE_FIELDS)}
+LEDGER = (*LEDGER_FIELDS, *STORED_FIELDS)  # the last columns of a long row
 IMPULSES = ("bit_impulse", "contact_impulse", "drive_impulse")
 # An impulse below this in a communication step is no contact [N s].
 NO_CONTACT = 1e-9
@@ -55,6 +56,7 @@ class Motion(Runner):
         self.blow_count = 0
         self.step_size = 0.0
         self.row = np.zeros(len(LONG_SAMPLE_FIELDS))
+        self.numbers: list[float] = []  # the same as plain numbers
         self._is_read = False
         self._here: Any = None  # copy of the state that belongs to `row`
         self._stress: float | None = None
@@ -83,8 +85,11 @@ class Motion(Runner):
             self._spare = copied(self._state, self._spare)
             self._left = (self._spare, self.time)
         self.solver.watch_peaks(self._state, self.time)
-        self.set_inputs(**inputs)
-        self.advance(max(t, self.time))
+        if inputs:
+            self.set_inputs(**inputs)
+        t = max(t, self.time)
+        self._commit_up_to(t)
+        self._time = t
         self.step_size = step_size
         self._is_read = False
 
@@ -114,23 +119,29 @@ class Motion(Runner):
         self.blow = self._numbers_of_blow()
         self.row[:] = row
         self._stress, self._before, self._left = float(last[0]), last[1:].copy(), None
-        self._is_read = True
+        self._take_row()
 
     @staticmethod
     def _impulses(row: np.ndarray) -> np.ndarray:
-        return row[[AT[name] for name in IMPULSES]]
+        first = AT[IMPULSES[0]]  # they stand side by side
+        return row[first : first + len(IMPULSES)].copy()
 
     def _look(self, state: Any, t: float, row: np.ndarray, here: Any = None) -> Any:
         # After a change of inputs a state may lie a step ahead.
         return self.solver.look(state, max(t, self.solver.time(state)), row, here)
 
-    def read(self) -> np.ndarray:
-        """What it is like now (`LONG_SAMPLE_FIELDS`)."""
+    def read(self) -> list[float]:
+        """What it is like now (`LONG_SAMPLE_FIELDS`); 0 where there is no such number."""
         if not self._is_read:
             self._here = self._look(self._state, self.time, self.row, self._here)
-            self._is_read = True
+            self._take_row()
             self._stress = None
-        return self.row
+        return self.numbers
+
+    def _take_row(self) -> None:
+        # without a piston its numbers are undefined
+        self.numbers = [value if value == value else 0.0 for value in self.row.tolist()]
+        self._is_read = True
 
     def before(self) -> np.ndarray:
         """Impulses at the start of the last step [N s]."""
@@ -145,12 +156,13 @@ class Motion(Runner):
         if self.step_size == 0.0:
             return 0.0
         now = self.read()[AT[IMPULSES[which]]]
-        return float(now - self.before()[which]) / self.step_size
+        return (now - float(self.before()[which])) / self.step_size
 
     def off_bottom(self) -> bool:
         """Whether the bit met no rock in the last step."""
-        pushed = self.read()[AT["bit_impulse"]] - self.before()[0]
-        return bool(self.row[AT["drilling_mode"]] == Mode.FF and abs(pushed) < NO_CONTACT)
+        now = self.read()
+        pushed = now[AT["bit_impulse"]] - self.before()[0]
+        return bool(now[AT["drilling_mode"]] == Mode.FF and abs(pushed) < NO_CONTACT)
 
     def stress(self) -> float:
         """Stress at the gauge at the last grid point, positive in compression [Pa]."""
@@ -158,16 +170,14 @@ class Motion(Runner):
         if self._stress is None:
             self._stress = 0.0
             if self.gauge is not None:
-                force = self.solver.fields(self._here)[f"{self.gauge.bar}_force"]
-                self._stress = float(force[self.gauge.cell]) / self.gauge.area
+                force = self.solver.force_in(self._here, self.gauge.bar, self.gauge.cell)
+                self._stress = force / self.gauge.area
         return self._stress
 
     def residual(self) -> float:
         """Share of the energy put in that the ledger leaves unexplained."""
-        row = self.read()
-        entries = {name: float(row[AT[name]]) for name in (*LEDGER_FIELDS, *STORED_FIELDS)}
-        found = complete_ledger(entries)["residual_relative"]
-        return found if found == found else 0.0
+        residual, scale = unexplained(dict(zip(LEDGER, self.read()[-len(LEDGER) :], strict=True)))
+        return residual / scale if scale > 0.0 else 0.0
 
     def fading(self) -> float:
         """Share of the last blow's rate that holds now; falls when blows fail to come."""
@@ -181,10 +191,7 @@ class Motion(Runner):
 
 def copied(state: Any, spare: Any) -> Any:
     """Copy of a state, into an old copy where there is one."""
-    if spare is None:
+    if spare is None or isinstance(state, np.ndarray) or not hasattr(state, "take"):
         return state.copy()
-    if isinstance(state, np.ndarray):
-        spare[:] = state
-    else:
-        spare.take(state)
+    spare.take(state)
     return spare

@@ -12,11 +12,9 @@ from fmu_src.runtime.motion import AT, Motion
 def _sample(name: str, sign: float = 1.0) -> Callable[[Motion], float]:
     column = AT[name]
 
-    def read(motion: Motion) -> float:
-        value = sign * float(motion.read()[column])
-        return value if value == value else 0.0  # without a piston there is no such number
-
-    return read
+    if sign == 1.0:
+        return lambda motion: motion.read()[column]
+    return lambda motion: sign * motion.read()[column]
 
 
 def _blow(name: str) -> Callable[[Motion], float]:

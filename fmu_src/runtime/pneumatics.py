@@ -82,16 +82,16 @@ class PneumaticDrive(Slave):
             found.append(new - AMBIENT)
         self.upper, self.lower = found
 
-    def output(self, reference: int) -> Any:
-        """Present value of an output."""
-        name = self.known[reference].name
-        if name == "piston_force":
-            return self.value("area") * (self.upper - self.lower)
-        if name == "valve_down":
-            return self.direction > 0.0
-        return {"upper.pressure": self.upper, "lower.pressure": self.lower, "air_used": self.used}[
-            name
-        ]
+    def outputs(self, references: list[int]) -> list[Any]:
+        """Present values of outputs."""
+        found = {
+            "piston_force": self.value("area") * (self.upper - self.lower),
+            "valve_down": self.direction > 0.0,
+            "upper.pressure": self.upper,
+            "lower.pressure": self.lower,
+            "air_used": self.used,
+        }
+        return [found[self.known[reference].name] for reference in references]
 
     def fingerprint(self) -> bytes:
         """Hash of the parameters."""

@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import ctypes
 import functools
-import json
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass, fields
 from enum import IntEnum
-from pathlib import Path
 from typing import Any
 
 from pythonfmu import Fmi2Slave
 from pythonfmu.enums import Fmi2Status
 
-from percussion_model.parameter_rows import Row, refuse_value
+from fmu_src.runtime.folder import finalise_in_time, read_variables
+from percussion_model.parameter_rows import refuse_value
 
 # Communication points may differ from the present time by rounding: this share
 # of a step, and some units in the last place of the time.
@@ -36,20 +34,6 @@ class Phase(IntEnum):
     TERMINATED = 3
 
 
-@dataclass(frozen=True)
-class Known:
-    """What an instance must know of a variable; the rest is in the model description."""
-
-    name: str
-    reference: int
-    type: str  # Real, Integer, Boolean or Enumeration
-    causality: str  # parameter, input or output
-    start: Any
-    row: Row | None  # bounds of a parameter or an input
-    key: str | None  # of the scene
-    left_out: Any  # value that stands for "left out"
-
-
 def guarded(method: Callable) -> Callable:
     """Let an error end the call as a fatal one in the host, without a crash."""
 
@@ -63,29 +47,10 @@ def guarded(method: Callable) -> Callable:
     return call
 
 
-@functools.cache
-def read_variables(folder: str) -> dict[int, Known]:
-    """Variables of the FMU in a folder, by value reference."""
-    rows = json.loads((Path(folder) / "variables.json").read_text(encoding="utf-8"))
-    known = {}
-    for entry in rows:
-        row = entry.pop("row")
-        if row is not None:
-            row["choices"] = tuple(row["choices"])
-            row["needs"] = {key: tuple(values) for key, values in row["needs"].items()}
-        names = {field.name for field in fields(Known)} - {"row"}
-        variable = Known(
-            row=Row(**row) if row is not None else None,
-            **{name: value for name, value in entry.items() if name in names},
-        )
-        known[variable.reference] = variable
-    return known
-
-
 class Slave(Fmi2Slave):
     """Base of the slaves: values by reference, phases, and errors that hosts see.
 
-    A slave gives `output(reference)` and overrides `check`, `begin` and `step`.
+    A slave gives `outputs(references)` and overrides `check`, `begin` and `step`.
     """
 
     def __init__(self, **arguments: Any) -> None:
@@ -100,6 +65,7 @@ class Slave(Fmi2Slave):
         self.values = {
             one.reference: one.start for one in self.known.values() if one.causality != "output"
         }
+        self._plans: dict[Any, Any] = {}
         self.phase = Phase.INSTANTIATED
         self.start_time = 0.0
         self.now = 0.0  # time of the host [s]
@@ -126,8 +92,8 @@ class Slave(Fmi2Slave):
         """Go on; `time` is the end of the step since the start [s]."""
         raise NotImplementedError
 
-    def output(self, reference: int) -> Any:
-        """Present value of an output."""
+    def outputs(self, references: list[int]) -> list[Any]:
+        """Present values of outputs."""
         raise NotImplementedError
 
     def changed(self, reference: int) -> None:
@@ -204,14 +170,27 @@ class Slave(Fmi2Slave):
 
     def read(self, references: list[int], types: tuple[str, ...]) -> list[Any]:
         """Present values."""
-        values = self.values
-        found = []
+        key = (tuple(references), types[0])
+        plan = self._plans.get(key)
+        if plan is None:
+            plan = self._plans[key] = self.plan(references, types)
+        if plan == "outputs":
+            return self.outputs(references)
+        return [
+            self.outputs([reference])[0] if reference in plan else self.values[reference]
+            for reference in references
+        ]
+
+    def plan(self, references: list[int], types: tuple[str, ...]) -> str | set[int]:
+        """Which of the variables are outputs; hosts ask for the same ones again and again."""
+        found = set()
         for reference in references:
             one = self.known.get(reference)
             if one is None or one.type not in types:
                 raise ValueError(f"there is no {types[0]} variable of reference {reference}")
-            found.append(self.output(reference) if one.causality == "output" else values[reference])
-        return found
+            if one.causality == "output":
+                found.add(reference)
+        return "outputs" if len(found) == len(set(references)) else found
 
     def write(self, references: list[int], values: list[Any], types: tuple[str, ...]) -> None:
         """Set parameters and inputs."""
@@ -304,20 +283,3 @@ class Slave(Fmi2Slave):
         text = str(error) if isinstance(error, ValueError) else f"{type(error).__name__}: {error}"
         self.log(f"{self.instance_name}: {text}", Fmi2Status.error, "logStatusError")
         return FmuError(text.replace("%", "%%"))
-
-
-@functools.cache
-def finalise_in_time(folder: str) -> None:
-    """Let the export library end before its own static variables do (Linux).
-
-    Left alone, it finalises the same pointer twice at the end of the process.
-    """
-    if not sys.platform.startswith("linux"):
-        return
-    libraries = sorted((Path(folder).parent / "binaries" / "linux64").glob("*.so"))
-    if not libraries:
-        return
-    library = ctypes.CDLL(str(libraries[0]))
-    # by getattr, since a class would mangle a name of two underscores
-    at_exit = getattr(ctypes.CDLL(None), "__cxa_atexit")
-    at_exit(ctypes.cast(library.finalizePythonInterpreter, ctypes.c_void_p), None, None)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+from collections.abc import Callable
 from pathlib import Path
 
 from numba import njit
@@ -37,6 +38,21 @@ def drop_stale_kernels(folder: Path) -> None:
 
 
 drop_stale_kernels(Path(__file__).parent)
+
+
+def entry_of(function: Callable) -> Callable:
+    """Where a call of a compiled function ends up, or the function itself.
+
+    Numba looks at the types of all arguments at every call, which takes longer than a
+    short kernel where they are records. For callers whose arguments never change their
+    types: nothing looks at them any more.
+    """
+    overloads = getattr(function, "overloads", {})
+    if len(overloads) != 1:
+        return function
+    (compiled,) = overloads.values()
+    return getattr(compiled, "entry_point", function)
+
 
 # `_nrt=False` leaves out numba's runtime: arrays are passed without reference
 # counting (which took most of a step's time), and a kernel that allocates does

@@ -59,6 +59,9 @@ class Solver(Protocol):
     def fields(self, state: Any) -> dict[str, np.ndarray]:
         """Force [N] and velocity [m/s] in each cell of the elastic bars, top to bottom."""
 
+    def force_in(self, state: Any, bar: str, cell: int) -> float:
+        """Force in one cell of "piston" or "bit" [N], as `fields` reads it."""
+
     def grid_of(self, bar: str) -> Cells | None:
         """Cells of "piston" or "bit", None where it has none."""
 

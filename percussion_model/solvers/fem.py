@@ -268,6 +268,10 @@ class FemSolver:
                 out[f"{name}_velocity"] = 0.5 * (nodes[Node.V, :-1] + nodes[Node.V, 1:])
         return out
 
+    def force_in(self, state: FemState, bar: str, cell: int) -> float:
+        """Force in one element of "piston" or "bit" [N], as `fields` reads it."""
+        return float(self.fields(state)[f"{bar}_force"][cell])
+
     def section_cells(self, bar: BarNumbers) -> list[int]:
         """Elements in each section of an elastic bar."""
         return [section_count(section, self._element) for section in bar.sections]

@@ -251,6 +251,10 @@ class RigidSolver:
         """Rigid bodies have no cells."""
         return {}
 
+    def force_in(self, state: np.ndarray, bar: str, cell: int) -> float:
+        """Rigid bodies have no cells, and no force in them."""
+        return 0.0
+
     def grid_of(self, bar: str) -> None:
         """Rigid bodies have no cells."""
 

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from percussion_model.core.advance import GRID_ROUNDING, run
 from percussion_model.core.contact_leap import WATCHED
+from percussion_model.core.kernel import entry_of
 from percussion_model.core.records import (
     BLOW,
     EVENT,
@@ -30,52 +33,7 @@ from percussion_model.solvers.packing import (
     rock_numbers,
 )
 from percussion_model.solvers.step_map import no_operators
-
-# Place of a field in a record, all of whose fields are words of eight bytes.
-WORD = {name: int(place[1]) // 8 for name, place in (WAVE_STATE.fields or {}).items()}
-
-
-class WaveState:
-    """State of a simulation: one record and one flat workspace.
-
-    Parameters
-    ----------
-    record : WAVE_STATE array of length 1
-    workspace : float array
-        Rows of the piston, then of the bit.
-    cut_at : int
-        Numbers of the piston.
-
-    Attributes
-    ----------
-    words : int64 array
-        The record word by word: NumPy copies a record of many fields a hundred
-        times slower, and takes its time to read one of them.
-    numbers : float64 array
-        The same as numbers.
-    bars : tuple of float arrays, shape (len(Row), cells + 1)
-        Piston and bit in the workspace.
-    """
-
-    __slots__ = ("bars", "cut_at", "numbers", "record", "words", "workspace")
-
-    def __init__(self, record: np.ndarray, workspace: np.ndarray, cut_at: int) -> None:
-        self.record, self.workspace, self.cut_at = record, workspace, cut_at
-        self.words, self.numbers = record.view(np.int64), record.view(np.float64)
-        rows = len(Row)
-        self.bars = workspace[:cut_at].reshape(rows, -1), workspace[cut_at:].reshape(rows, -1)
-
-    def copy(self) -> WaveState:
-        """An independent copy."""
-        return WaveState(self.words.copy().view(WAVE_STATE), self.workspace.copy(), self.cut_at)
-
-    def take(self, other: WaveState) -> None:
-        """Become a copy of another state of the same solver."""
-        self.words[:] = other.words
-        self.workspace[:] = other.workspace
-
-    def __reduce__(self) -> tuple[object, ...]:
-        return WaveState, (self.record, self.workspace, self.cut_at)
+from percussion_model.solvers.wave_state import WORD, WaveState
 
 
 class WaveSolver:
@@ -125,6 +83,7 @@ class WaveSolver:
                 self._par["leaps"] = LEVELS
         size = padded(2 * max(self._bit.n, self._piston.n if self._piston else 0) + 1)
         self._scratch = np.zeros((3, max(size, WATCHED)))
+        self._entry: Callable[..., int] = run
         self._no_row = np.zeros(len(SAMPLE_FIELDS))
         self._no_blows = np.zeros(1, BLOW)
         self._no_events = np.zeros(1, EVENT)
@@ -166,7 +125,7 @@ class WaveSolver:
     ) -> int:
         """Call the kernels; see `core.advance.run`."""
         wp, wb = state.bars
-        return run(
+        status = self._entry(
             int(task),
             self._par,
             state.record,
@@ -181,6 +140,9 @@ class WaveSolver:
             self._no_events if events is None else events,
             self._no_row if row is None else row,
         )
+        if self._entry is run:
+            self._entry = entry_of(run)  # the types of all these never change
+        return int(status)
 
     def time(self, state: WaveState) -> float:
         """Time up to which the state is committed [s]."""
@@ -285,6 +247,15 @@ class WaveSolver:
                 out[f"{name}_force"] = grid.impedance * (d - u)
                 out[f"{name}_velocity"] = d + u
         return out
+
+    def force_in(self, state: WaveState, bar: str, cell: int) -> float:
+        """Force in one cell of "piston" or "bit" [N], as `fields` reads it."""
+        grid = self.grid_of(bar)
+        if grid is None:
+            return 0.0
+        w = state.bars[bar == "bit"]
+        r = 2 * int(state.words[WORD["parity"]])
+        return float(grid.impedance[cell] * (w[r, cell] - w[r + 1, cell]))
 
     def grid_of(self, bar: str) -> Grid | None:
         """Cells of "piston" or "bit", None where it has none."""

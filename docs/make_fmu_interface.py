@@ -1,0 +1,62 @@
+"""Write the tables of docs/fmu.md from a model description: `python docs/make_fmu_interface.py`.
+
+The FMU of the reference scene is built for it, and read as any tool would.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from fmpy import read_model_description
+
+from fmu_src.hammer import build_hammer
+from percussion_model.scene import Scene
+
+PAGE = Path(__file__).with_name("fmu.md")
+BEGIN, END = "<!-- tables: begin -->", "<!-- tables: end -->"
+HEADS = {"input": "Inputs", "output": "Outputs", "parameter": "Parameters"}
+
+
+def tables() -> str:
+    """Tables of inputs, outputs and parameters, Markdown."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "PercussiveHammer.fmu"
+        build_hammer(Scene(), path)
+        variables = read_model_description(str(path)).modelVariables
+    parts = []
+    for causality, head in HEADS.items():
+        parts.append(f"### {head}\n")
+        parts.append("| name | unit | shown in | start | range | meaning | reference |")
+        parts.append("|---|---|---|---|---|---|---|")
+        for one in variables:
+            if one.causality == causality:
+                parts.append("| " + " | ".join(_cells(one)) + " |")
+        parts.append("")
+    return "\n".join(parts)
+
+
+def _cells(one: Any) -> tuple[str, ...]:
+    span = f"{float(one.min):.4g} … {float(one.max):.4g}" if one.min is not None else "true, false"
+    start = one.start or ""
+    if one.type == "Enumeration":
+        names = {int(item.value): item.name for item in one.declaredType.items}
+        span = ", ".join(f"{value} {name}" for value, name in names.items())
+        start = names[int(start)] if start else ""
+    elif start and one.type == "Real":
+        start = f"{float(start):.10g}"
+    text = one.description.replace("|", "\\|")
+    unit, display = one.unit or "", one.displayUnit or ""
+    return (f"`{one.name}`", unit, display, start, span, text, str(one.valueReference))
+
+
+def page() -> str:
+    """Text of the page with its tables renewed."""
+    before, _, rest = PAGE.read_text(encoding="utf-8").partition(BEGIN)
+    _, _, after = rest.partition(END)
+    return f"{before}{BEGIN}\n\n{tables()}\n{END}{after}"
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page(), encoding="utf-8")
