@@ -156,6 +156,16 @@ def rigid(repeats: int) -> dict[str, Any]:
     }
 
 
+def elements(repeats: int) -> dict[str, Any]:
+    """Real-time factor of the finite elements with the paper's numerics, and cost of a step."""
+    from percussion_model import Scene
+
+    scene = Scene.from_toml(REFERENCE).computed_by("fem")
+    runs = [measure(scene, STEPPING_DURATION) for _ in range(repeats)]
+    factor = statistics.median(STEPPING_DURATION / run["cost"] for run in runs)
+    return {"real_time_factor": factor, "step": best_step(runs)}
+
+
 def command_line(repeats: int) -> dict[str, Any]:
     """Time of a whole `percussion run` of a tenth of a second, once the cache is filled."""
     command = [
@@ -239,6 +249,9 @@ def show(found: dict[str, Any]) -> None:
 
     table = Table(show_header=False)
     table.add_row("Rigid option, a blow", f"{1e6 * found['rigid']['blow']:.2f} µs")
+    fem = found["elements"]
+    shown = f"{fem['real_time_factor']:.2f} times real time, {1e6 * fem['step']:.2f} µs a step"
+    table.add_row("Finite elements", shown)
     for label, figure in fmu_rows(found["fmu"]):
         table.add_row(label, figure)
     start = found["command_line"]
@@ -248,12 +261,12 @@ def show(found: dict[str, Any]) -> None:
 
 
 def compiled_in() -> float:
-    """Compile both solvers; the time it took [s]."""
+    """Compile all solvers; the time it took [s]."""
     from percussion_model import Scene, Simulation
 
     began = time.perf_counter()
-    for path in (REFERENCE, RIGID):
-        Simulation(Scene.from_toml(path))
+    for solver in ("wave", "fem", "rigid"):
+        Simulation(Scene.from_toml(REFERENCE).computed_by(solver))
     return time.perf_counter() - began
 
 
@@ -268,6 +281,8 @@ def bench(quick: bool, say: Callable[[str], None]) -> dict[str, Any]:
     found["effects"] = effects(3 if quick else 11)
     say("rigid option")
     found["rigid"] = rigid(3 if quick else 7)
+    say("finite elements")
+    found["elements"] = elements(3 if quick else 7)
     say("FMU")
     found["fmu"] = fmu(1 if quick else 5)
     say("command line")

@@ -24,7 +24,7 @@ from percussion_model.solvers.mesh import assemble, cut_bar
 
 METHODS = ("RK45", "RK23", "DOP853", "LSODA", "Radau", "BDF")
 BLOW = 0.0456  # from the first impact until just before the next [s]
-RELATIVE = 1e-5
+RELATIVE = 1e-4
 # Absolute tolerances of displacement [m], velocity [m/s] and work [J].
 ABSOLUTE = (1e-9, 1e-3, 1e-6)
 PATIENCE = 120.0  # [s]

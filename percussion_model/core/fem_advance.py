@@ -6,15 +6,19 @@ import math
 
 from percussion_model.core.blows import push_checkpoint
 from percussion_model.core.drive import drive_force
-from percussion_model.core.fem_bars import bit_position, kinetic_energy, moment, read_means
+from percussion_model.core.fem_bars import (
+    bit_position,
+    dissipated_in_nodes,
+    kinetic_energy,
+    read_means,
+    stored_energy,
+)
 from percussion_model.core.fem_events import end_of_step
 from percussion_model.core.fem_modes import MOST_CHANGES, change_modes
 from percussion_model.core.fem_records import FemTask, Node
-from percussion_model.core.fem_scheme import damping
-from percussion_model.core.fem_step import take_step
+from percussion_model.core.fem_step import bit_force, contact_force, note_forces, take_step
 from percussion_model.core.kernel import kernel, merged
-from percussion_model.core.records import Mode, Status
-from percussion_model.core.rock_law import origin, stiffness
+from percussion_model.core.records import PEAK_FIELDS, SAMPLE_FIELDS, Mode, Status
 
 DONE, BLOWS_FULL, EVENTS_FULL = int(Status.DONE), int(Status.BLOWS_FULL), int(Status.EVENTS_FULL)
 NOT_FINITE = int(Status.NOT_FINITE)
@@ -22,6 +26,9 @@ ADVANCE, SAMPLE = int(FemTask.ADVANCE), int(FemTask.SAMPLE)
 FF, SS = int(Mode.FF), int(Mode.SS)
 U = int(Node.U)
 
+# Where a longer row goes on.
+PEAKS = len(SAMPLE_FIELDS)
+LEDGER = PEAKS + len(PEAK_FIELDS)
 # Events at one instant at the most: each change of contact, drive and rock.
 EVENTS_A_STEP = 3 * MOST_CHANGES
 # A time this close before the end of a step is that end [steps].
@@ -56,6 +63,7 @@ def go_on(par, s, w, c, f, x, q, time, whole, blows, events):
         h = end_of_step(par, s, w, c, f, x, q, h)
         take_step(par, s, w, c, x, h)
         change_modes(par, s, w, c, blows, events)
+        note_forces(par, s)  # a dashpot may have come in
         if s.mode == SS and (s.n_check == 0 or s.count_steps % CHECKPOINT_STEPS == 0):
             push_checkpoint(s, s.time)
 
@@ -67,17 +75,15 @@ def fill_sample(par, s, w, c, time, row):
     row[0] = time
     row[1] = math.nan
     row[2] = s.v_p
-    row[3] = bit_position(par, s, w, c)
+    row[3] = bit_position(s)
     row[4] = s.v_b
     row[5] = s.x_r + s.p
     row[6] = s.v_end
     row[7] = s.gap
     row[8] = s.u_r
     row[9] = s.p
-    row[10] = 0.0
-    if s.mode != FF:
-        row[10] = stiffness(s) * (s.p - origin(s)) + damping(s) * s.v_end
-    row[11] = -par.k_c * s.gap if s.closed == 1 else 0.0
+    row[10] = bit_force(s)
+    row[11] = contact_force(par, s)
     row[12] = drive_force(par, s)
     row[13] = s.mode
     row[14] = kinetic_energy(c, w, par.n_p, par.n_b)
@@ -85,10 +91,35 @@ def fill_sample(par, s, w, c, time, row):
     row[16] = s.i_contact
     row[17] = s.i_drive
     if par.n_p > 0:
-        row[1] = s.x_r + moment(c, w, U, 0, par.n_p) / par.mass_p + par.start_gap
+        row[1] = s.x_r + s.mean_p + par.start_gap
     else:
         row[7] = math.nan
         row[8] = math.nan
+    if row.shape[0] > LEDGER:
+        fill_ledger(par, s, w, c, row)
+
+
+@kernel
+def fill_ledger(par, s, w, c, row):
+    """Write peaks and energies of a state (LONG_SAMPLE_FIELDS)."""
+    loss, numerical = dissipated_in_nodes(par, w)
+    kinetic, elastic, rock = stored_energy(par, s, w, c)
+    row[PEAKS] = s.peak_bit
+    row[PEAKS + 1] = s.peak_contact
+    row[LEDGER] = s.e_drive
+    row[LEDGER + 1] = s.e_feed
+    row[LEDGER + 2] = s.e_gravity
+    row[LEDGER + 3] = s.e_crushing
+    row[LEDGER + 4] = s.e_barrier
+    row[LEDGER + 5] = s.e_standstill
+    row[LEDGER + 6] = s.e_loss + loss
+    row[LEDGER + 7] = s.e_contact
+    row[LEDGER + 8] = s.e_numerical + numerical
+    row[LEDGER + 9] = s.e_overshoot
+    row[LEDGER + 10] = s.e_start
+    row[LEDGER + 11] = kinetic
+    row[LEDGER + 12] = elastic
+    row[LEDGER + 13] = rock
 
 
 @kernel
@@ -105,8 +136,8 @@ def run(task, par_, state, w, c, f, x, q, time, blows, events, row):
     w : float array, shape (len(Node), n)
         What changes at each node.
     c : float array, shape (len(Mesh), n)
-    f : float array, shape (3 len(Factor), n)
-        Factorisations; those of the whole step must be there.
+    f : float array, shape (2 len(Factor), at least n)
+        Factorisations, kept from call to call; zero at first.
     x : float array, shape (len(Trial), n)
         Scratch.
     q : float array, shape (len(Look), len(Column))
@@ -115,7 +146,8 @@ def run(task, par_, state, w, c, f, x, q, time, blows, events, row):
         [s]
     blows, events : BLOW, EVENT array
         Filled from index 0; the state says how far.
-    row : float array, shape (len(SAMPLE_FIELDS),)
+    row : float array
+        Of the length of SAMPLE_FIELDS or of LONG_SAMPLE_FIELDS.
 
     Returns
     -------

@@ -7,9 +7,10 @@ until its end lies past the event by no more than the tolerance.
 
 from __future__ import annotations
 
-from percussion_model.core.fem_bars import kinetic_energy, relative_motion
+from percussion_model.core.fem_bars import relative_motion
 from percussion_model.core.fem_records import Column, Look, Mesh, Node, Trial
-from percussion_model.core.fem_scheme import acceleration, damping, try_step
+from percussion_model.core.fem_scheme import acceleration, try_step
+from percussion_model.core.fem_solve import damping
 from percussion_model.core.fem_step import dashpot_work
 from percussion_model.core.hermite import first_root
 from percussion_model.core.kernel import inlined, kernel, merged
@@ -112,12 +113,10 @@ def fill_values(par, s, w, c, x, h, q, column):
     q[DRIVE, column] = NEVER
     if par.n_p > 0:
         q[CONTACT, column] = contact_value(par, s, x)
-        if par.drive == PRESSURE:
-            q[DRIVE, column] = drive_value(par, s, relative_motion(par, c, x, U))
+        q[DRIVE, column] = drive_value(par, s, s.next_p - s.next_b)
     work = dashpot_work(par, s, x, w, h) if s.mode == DFC else 0.0
-    energy = kinetic_energy(c, x, par.n_p, par.n_b) if s.mode == SS else 0.0
     q[ROCK, column] = rock_value(par, s, x[U, last], x[V, last], work)
-    q[TURN, column] = turn_value(par, s, x[V, last], energy)
+    q[TURN, column] = turn_value(par, s, x[V, last], s.next_kinetic)
 
 
 @merged

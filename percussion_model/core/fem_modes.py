@@ -10,7 +10,7 @@ from percussion_model.core.blows import push_event, start_blow, starts_blow
 from percussion_model.core.drive import switch_drive
 from percussion_model.core.fem_bars import bit_position, kinetic_energy, read_means
 from percussion_model.core.fem_records import Node
-from percussion_model.core.fem_scheme import damping
+from percussion_model.core.fem_solve import damping
 from percussion_model.core.kernel import kernel, merged
 from percussion_model.core.records import EventKind, Mode, RockKind
 from percussion_model.core.rock_law import (
@@ -41,7 +41,7 @@ def change_contact(par, s, w, c, blows, events):
             return 0
         read_means(par, s, w, c)
         if starts_blow(par, s, s.time):
-            here = bit_position(par, s, w, c)
+            here = bit_position(s)
             start_blow(s, blows, s.time, s.v_p, here, s.i_bit, par.mass_p)
         s.b_contacts += 1
         s.closed = 1
@@ -131,6 +131,8 @@ def move_datum(par, s, w):
         for i in range(last):
             w[U, i] += shift
         w[U, last] = s.p
+        s.mean_p += shift
+        s.mean_b += shift
 
 
 @kernel

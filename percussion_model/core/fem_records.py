@@ -45,12 +45,21 @@ class Trial(IntEnum):
 
 
 class Factor(IntEnum):
-    """Rows of a factorisation of the stage matrix."""
+    """Rows of a factorisation of the stage matrix, from both ends towards the contact."""
 
-    LOW_RE = 0  # lower factor, entry to the node before
+    LOW_RE = 0  # entry to the neighbour that was eliminated before
     LOW_IM = 1
-    PIVOT_RE = 2  # inverse pivot; of the last node the pivot, which the rock adds to
+    PIVOT_RE = 2  # inverse pivot; at the contact the pivot itself
     PIVOT_IM = 3
+    KEY = 4  # what it was made for: columns of `Key`
+
+
+class Key(IntEnum):
+    """Columns of the row KEY of a factorisation."""
+
+    STEP = 0  # length of the step, 0 where nothing was made [s]
+    STIFFNESS = 1  # of the rock [N/m]
+    DAMPING = 2  # [N s/m]
 
 
 class Look(IntEnum):
@@ -115,6 +124,11 @@ FEM_STATE = np.dtype(
         ("v_end", "f8"),  # velocity of the bit's rock end [m/s]
         ("gap_rate", "f8"),  # opening velocity of the gap [m/s]
         ("kinetic", "f8"),  # energy of the bit while it stands still [J]
+        ("mean_p", "f8"),  # mean displacements from the datum [m]
+        ("mean_b", "f8"),
+        ("next_kinetic", "f8"),  # the same three at the end of the step tried last
+        ("next_p", "f8"),
+        ("next_b", "f8"),
         ("springing", "i8"),  # 1: in flight, rock still pressed in
         ("fresh", "i8"),  # 1: inputs were changed, modes may have to follow
         ("stuck", "i8"),  # modes did not settle: no events in the next step

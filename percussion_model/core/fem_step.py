@@ -7,9 +7,10 @@ is one of a mean and a bend (docs/numerics.md, section 10).
 from __future__ import annotations
 
 from percussion_model.core.drive import drive_force
-from percussion_model.core.fem_bars import moment, read_nodes
+from percussion_model.core.fem_bars import read_nodes
 from percussion_model.core.fem_records import Mesh, Node, Trial
-from percussion_model.core.fem_scheme import damping, rate_bend
+from percussion_model.core.fem_scheme import rate_bend
+from percussion_model.core.fem_solve import damping
 from percussion_model.core.kernel import fused, inlined, kernel, merged
 from percussion_model.core.records import Mode, RockKind
 from percussion_model.core.rock_law import crush, origin, recoverable, stiffness
@@ -97,6 +98,34 @@ def book_rock(par, s, x, w, h):
         s.e_standstill += dashpot
 
 
+@inlined
+def bit_force(s):
+    """Force of the bit on the rock, compression positive [N]."""
+    if s.mode == FF:
+        return 0.0
+    return stiffness(s) * (s.p - origin(s)) + damping(s) * s.v_end
+
+
+@inlined
+def contact_force(par, s):
+    """Force of the piston on the bit, compression positive [N]."""
+    if s.closed == 1:
+        return -par.k_c * s.gap
+    return 0.0
+
+
+@inlined
+def note_forces(par, s):
+    """Keep the greatest forces at the ends of steps: of the blow, and of an observer."""
+    bit = bit_force(s)
+    contact = contact_force(par, s)
+    s.b_peak_bit = max(s.b_peak_bit, bit)
+    s.b_peak_contact = max(s.b_peak_contact, contact)
+    if s.time >= s.peak_from:
+        s.peak_bit = max(s.peak_bit, bit)
+        s.peak_contact = max(s.peak_contact, contact)
+
+
 @kernel
 def take_step(par, s, w, c, x, h):
     """Make the tried step the state, and book it."""
@@ -108,14 +137,14 @@ def take_step(par, s, w, c, x, h):
     if s.closed == 1:
         book_contact(par, s, x, w, h)
     book_bars(par, w, c, x, h)
-    path = moment(c, x, TARGET_RE, n_p, par.n_b) * h
-    s.e_gravity += par.gravity * path
-    s.e_feed += s.feed / par.mass_b * path
+    path = s.next_b - s.mean_b
+    s.e_gravity += par.mass_b * par.gravity * path
+    s.e_feed += s.feed * path
     if n_p > 0:
         push = drive_force(par, s)
-        path = moment(c, x, TARGET_RE, 0, n_p) * h
-        s.e_gravity += par.gravity * path
-        s.e_drive += push / par.mass_p * path
+        path = s.next_p - s.mean_p
+        s.e_gravity += par.mass_p * par.gravity * path
+        s.e_drive += push * path
         s.i_drive += push * h
     for i in range(n_p + par.n_b):
         w[U, i] = x[U, i]
@@ -128,15 +157,6 @@ def take_step(par, s, w, c, x, h):
         crush(s, p_before)
     if -s.u_r > s.b_stroke and n_p > 0:
         s.b_stroke = -s.u_r
-    if s.mode != FF:
-        force = stiffness(s) * (s.p - origin(s)) + damping(s) * s.v_end
-        s.b_peak_bit = max(s.b_peak_bit, force)
-        if s.time + h > s.peak_from:
-            s.peak_bit = max(s.peak_bit, force)
-    if s.closed == 1:
-        force = -par.k_c * s.gap
-        s.b_peak_contact = max(s.b_peak_contact, force)
-        if s.time + h > s.peak_from:
-            s.peak_contact = max(s.peak_contact, force)
     s.time += h
     s.count_steps += 1
+    note_forces(par, s)

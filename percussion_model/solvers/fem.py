@@ -7,41 +7,34 @@ from dataclasses import dataclass
 import numpy as np
 
 from percussion_model.core.fem_advance import run
-from percussion_model.core.fem_bars import dissipated_in_nodes, read_nodes, stored_energy
+from percussion_model.core.fem_bars import dissipated_in_nodes, read_all, stored_energy
 from percussion_model.core.fem_records import (
-    FEM_PAR,
     FEM_STATE,
     Column,
     Factor,
     FemTask,
+    Key,
     Look,
     Mesh,
     Node,
     Trial,
 )
-from percussion_model.core.fem_scheme import CLOSED, OPEN, factorise
 from percussion_model.core.records import (
     BLOW,
     EVENT,
     LEDGER_FIELDS,
-    LONG_SAMPLE_FIELDS,
     SAMPLE_FIELDS,
-    STORED_FIELDS,
-    DriveKind,
-    Piston,
-    RockKind,
 )
 from percussion_model.scene_rules import BarNumbers, SceneRules
+from percussion_model.solvers.fem_packing import loss_time, pack_fem
 from percussion_model.solvers.mesh import (
     BarMesh,
     assemble,
-    critical_frequency,
     cut_bar,
     section_count,
 )
 from percussion_model.solvers.packing import (
     INPUT_FIELDS,
-    REARM_TRANSITS,
     begin_state,
     rock_numbers,
 )
@@ -56,7 +49,13 @@ class FemState:
 
     def copy(self) -> FemState:
         """An independent copy."""
-        return FemState(self.record.copy(), self.workspace.copy())
+        words = self.record.view(np.int64).copy()  # a record of many fields copies slowly
+        return FemState(words.view(FEM_STATE), self.workspace.copy())
+
+    def take(self, other: FemState) -> None:
+        """Become a copy of another state of the same solver."""
+        self.record.view(np.int64)[:] = other.record.view(np.int64)
+        self.workspace[:] = other.workspace
 
 
 class FemSolver:
@@ -88,64 +87,24 @@ class FemSolver:
         self._bit = cut_bar(scene.bit, element)
         self._piston: BarMesh | None = None
         if scene.piston.model != "absent":
-            self._piston = cut_bar(scene.piston, element)
+            self._piston = cut_bar(scene.piston, element, elastic_piston)
         bars = [bar for bar in (self._piston, self._bit) if bar is not None]
         self._mesh = assemble(bars)
         elastic = [bar for bar in bars if bar.n]
         shortest = min(float(bar.transit_time.min()) for bar in elastic)
         self.time_step: float = scene.fem.courant * shortest
-        self.loss_time = self._loss_time()
+        self.loss_time = loss_time(scene, self._bit)
         self.cells = {"bit": self._bit.n}
         if elastic_piston and self._piston is not None:
             self.cells = {"piston": self._piston.n, **self.cells}
-        self._par = self._parameters()
+        self._par = pack_fem(scene, self._piston, self._bit, self.time_step, self.loss_time)
         n = self._mesh.shape[1]
-        self._factors = np.zeros((3 * len(Factor), n))
-        for slot, closed in ((OPEN, 0), (CLOSED, 1)):
-            factorise(self._par[0], self._mesh, self._factors, slot, self.time_step, closed)
+        self._factors = np.zeros((2 * len(Factor), max(n, len(Key))))
         self._trial = np.zeros((len(Trial), n))
         self._looks = np.zeros((len(Look), len(Column)))
         self._no_blows = np.zeros(1, BLOW)
         self._no_events = np.zeros(1, EVENT)
         self._no_row = np.zeros(len(SAMPLE_FIELDS))
-
-    def _loss_time(self) -> float:
-        """Kelvin-Voigt time: that of the scene, or 2 zeta_K / omega_cr (eq. 55 of the paper)."""
-        scene = self.scene
-        if not scene.effects.loss:
-            return 0.0
-        if scene.fem.damping_ratio is None:
-            return scene.loss.time
-        return 2.0 * scene.fem.damping_ratio / critical_frequency(self._bit)
-
-    def _parameters(self) -> np.ndarray:
-        scene, options = self.scene, self.scene.fem
-        par = np.zeros(1, FEM_PAR)
-        p = par[0]
-        p["dt"] = self.time_step
-        mu = eigenvalue(options.spectral_radius)
-        p["mu_re"], p["mu_im"] = mu.real, mu.imag
-        p["dissipation"] = defect(options.spectral_radius)
-        p["k_c"] = options.contact_stiffness
-        p["eta"] = self.loss_time
-        p["q_tol"], p["t_tol"] = options.event_tolerance, options.time_tolerance
-        p["gravity"] = scene.gravity.acceleration if scene.effects.gravity else 0.0
-        p["mass_p"], p["mass_b"] = scene.piston.mass, scene.bit.mass
-        slowest = scene.bit.transit_time
-        if scene.piston.model == "elastic":
-            slowest = max(slowest, scene.piston.transit_time)
-        p["rearm_time"] = REARM_TRANSITS * slowest
-        p["start_gap"] = scene.start.gap
-        p["n_p"] = 0 if self._piston is None else self._piston.n + 1
-        p["n_b"] = self._bit.n + 1
-        p["piston"] = Piston[scene.piston.model.upper()]
-        p["drive"] = DriveKind[scene.effects.drive.upper()]
-        kind = RockKind[scene.effects.rock.upper()]
-        # a wall is met like the piston: by a penalty
-        p["rock"] = RockKind.SPRING if kind == RockKind.WALL else kind
-        p["barrier"] = scene.barrier_on
-        p["release"] = scene.effects.standstill_tension == "release"
-        return par
 
     def new_state(self) -> FemState:
         """State at time zero."""
@@ -170,7 +129,7 @@ class FemSolver:
     def refresh(self, state: FemState) -> None:
         """Derive everything from the nodes, as at the start of a run."""
         s = state.record[0]
-        read_nodes(self._par[0], s, self._nodes(state), self._mesh)
+        read_all(self._par[0], s, self._nodes(state), self._mesh)
         s["e_start"] = sum(self._stored(state))
 
     def _nodes(self, state: FemState) -> np.ndarray:
@@ -238,7 +197,7 @@ class FemSolver:
     def sample(self, state: FemState, times: np.ndarray, out: np.ndarray) -> None:
         """Evaluate at `times` without touching the state (`SAMPLE_FIELDS`)."""
         for k, time in enumerate(times):
-            self._run(FemTask.SAMPLE, state.copy(), float(time), row=out[k])
+            self.look(state, float(time), out[k])
 
     def look(
         self,
@@ -250,20 +209,21 @@ class FemSolver:
     ) -> FemState:
         """Evaluate at `t` into a row (`LONG_SAMPLE_FIELDS`, or their beginning).
 
+        Parameters
+        ----------
+        here : FemState, optional
+            What an earlier call returned; it becomes the copy.
+
         Returns
         -------
         FemState
-            A copy, carried to `t`.
+            A copy at `t`.
         """
-        here = state.copy()
+        if here is None:
+            here = state.copy()
+        else:
+            here.take(state)
         self._run(FemTask.SAMPLE, here, t, row=row)
-        if len(row) == len(LONG_SAMPLE_FIELDS):
-            s, entries = here.record[0], self.energy(here, t)
-            row[len(SAMPLE_FIELDS) :] = [
-                s["peak_bit"],
-                s["peak_contact"],
-                *(entries[name] for name in (*LEDGER_FIELDS, *STORED_FIELDS)),
-            ]
         return here
 
     def grid_of(self, bar: str) -> BarMesh | None:
@@ -288,13 +248,15 @@ class FemSolver:
         state.record[0]["fresh"] = 1
 
     def energy(self, state: FemState, t: float) -> dict[str, float]:
-        """Ledger [J] at the end of the last step before `t`."""
-        s = state.record[0]
+        """Ledger [J] at `t`."""
+        here = state.copy()
+        self.commit(here, t)
+        s = here.record[0]
         entries = {name: float(s[f"e_{name}"]) for name in LEDGER_FIELDS}
-        loss, numerical = dissipated_in_nodes(self._par[0], self._nodes(state))
+        loss, numerical = dissipated_in_nodes(self._par[0], self._nodes(here))
         entries["loss"] += loss
         entries["numerical"] += numerical
-        kinetic, elastic, rock = self._stored(state)
+        kinetic, elastic, rock = self._stored(here)
         entries |= {"start": float(s["e_start"]), "kinetic": kinetic, "elastic": elastic}
         entries["recoverable"] = rock
         return entries
@@ -324,15 +286,3 @@ class FemSolver:
         s = state.record[0]
         names = ("steps", "trials", "events", "blows")
         return {name: int(s[f"count_{name}"]) for name in names} | {"locked": int(s["locked"])}
-
-
-def eigenvalue(spectral_radius: float) -> complex:
-    """Complex eigenvalue of the scheme's matrix (docs/numerics.md, section 10)."""
-    p = (2.0 + spectral_radius) / (3.0 * (1.0 + spectral_radius))
-    q = 1.0 / (6.0 * (1.0 + spectral_radius))
-    return complex(0.5 * p, np.sqrt(q - 0.25 * p * p))
-
-
-def defect(spectral_radius: float) -> float:
-    """Defect of the scheme's energy identity (docs/numerics.md, section 10)."""
-    return (1.0 - spectral_radius) / (36.0 * (1.0 + spectral_radius))

@@ -43,7 +43,7 @@ def section_count(section: SectionNumbers, element: float) -> int:
     return max(1, math.floor(section.length / element + 0.5 + ROUNDING))
 
 
-def cut_bar(bar: BarNumbers, element: float) -> BarMesh:
+def cut_bar(bar: BarNumbers, element: float, elastic: bool = True) -> BarMesh:
     """Cut the sections of a bar into elements of about one length.
 
     Parameters
@@ -51,8 +51,10 @@ def cut_bar(bar: BarNumbers, element: float) -> BarMesh:
     bar : BarNumbers
     element : float
         Wanted length [m].
+    elastic : bool
+        Whether the bar has elements at all.
     """
-    if bar.model != "elastic":
+    if not elastic:
         none = np.zeros(0)
         return BarMesh(none, none, none, none, bar.mass)
     rows = []

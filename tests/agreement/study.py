@@ -17,6 +17,8 @@ REFERENCE = Scene()
 # Finite elements: elements in the piston, CFL multiple, contact stiffness [N/m].
 LEVELS = ((50, 1.0, 1e13), (100, 1.0, 2e13), (200, 1.0, 4e13))
 CELLS = (40, 80)
+# How well the solvers must agree.
+RATE_WITHIN, PERIOD_WITHIN = 5e-3, 2e-3
 # A level whose rate is within this of the one before it is fine enough.
 OWN_CHANGE = 2e-3
 
@@ -34,13 +36,11 @@ class Answer:
 
 @dataclass(frozen=True)
 class Case:
-    """One parameter changed, and how well the solvers must agree."""
+    """One parameter changed."""
 
     group: str
     name: str
     changes: dict[str, Any]
-    rate_within: float = 5e-3
-    period_within: float = 2e-3
 
 
 def power_kept(reversal: float) -> dict[str, float]:
@@ -52,16 +52,12 @@ def power_kept(reversal: float) -> dict[str, float]:
 
 def cases() -> Iterator[Case]:
     """All cases with a promise of agreement."""
-    for value in (1e8, 2e8, 4e8, 7.5e8, 1e9):
+    for value in (1e8, 2e8, 4e8, 7.5e8, 1e9, 1.5e9, 2e9):
         yield Case("K_R", f"{value:g} N/m", {"rock.loading_stiffness": value})
-    for value in (1.5e9, 2e9):
-        yield Case("K_R", f"{value:g} N/m", {"rock.loading_stiffness": value}, 1.5e-2, 1e-2)
     for value in (2.0, 3.0, 5.0, 7.0, 10.0):
         yield Case("gamma", f"{value:g}", {"rock.unloading_ratio": value})
-    for value in (500.0, 1000.0, 2500.0, 5000.0):
+    for value in (500.0, 1000.0, 2500.0, 5000.0, 10000.0, 20000.0):
         yield Case("F_S", f"{value:g} N", {"feed.force": value})
-    for value in (10000.0, 20000.0):
-        yield Case("F_S", f"{value:g} N", {"feed.force": value}, 1.5e-2, 1e-2)
     for value in (4e-3, 8e-3, 0.02, 0.04, 0.08):
         yield Case("D_1", f"{1e3 * value:g} mm", power_kept(value))
 

@@ -13,16 +13,23 @@ import sys
 import numpy as np
 
 # One blow of a coarse reference drill, its leaps off so that every step is made.
-SCENE = {"solver.cells": 20, "solver.leaps": False, "run.settle": 0.0}
+SCENES = {
+    "wave": {"solver.cells": 20, "solver.leaps": False, "run.settle": 0.0},
+    "fem": {"solver.name": "fem", "fem.elements": 10, "run.settle": 0.0},
+}
 DURATION = 0.0025
 FAULT = 0.999
 
 
 def use_attribute_records() -> None:
     """Let the fields of records be attributes, as they are in compiled kernels."""
-    from percussion_model.core import records, wave_records
+    from percussion_model.core import fem_records, records, wave_records
 
-    for module, names in ((records, ("BLOW", "EVENT")), (wave_records, ("WAVE_PAR", "WAVE_STATE"))):
+    for module, names in (
+        (records, ("BLOW", "EVENT")),
+        (wave_records, ("WAVE_PAR", "WAVE_STATE")),
+        (fem_records, ("FEM_PAR", "FEM_STATE")),
+    ):
         for name in names:
             setattr(module, name, np.dtype((np.record, getattr(module, name))))
 
@@ -88,32 +95,82 @@ def lose_body_force(at: int = 1000) -> None:
     replace("face_velocities", face_velocities)
 
 
+def weaken_penalty() -> None:
+    """Let the bit feel 0.999 of what the penalty contact does to it."""
+    from percussion_model.core.fem_solve import RE
+    from percussion_model.core.fem_solve import meet_at_contact as meet
+
+    def meet_at_contact(par, s, f, at, x, h):
+        meet(par, s, f, at, x, h)
+        if s.closed == 1:
+            x[RE, par.n_p] *= FAULT
+
+    replace("meet_at_contact", meet_at_contact)
+
+
+def lose_load(at: int = 100) -> None:
+    """Let the piston feel neither gravity nor drive in one step."""
+    from percussion_model.core.fem_scheme import RE, SHARE, drive_force
+    from percussion_model.core.fem_scheme import load as full
+
+    count = 0
+
+    def load(par, s, w, c, x, h):
+        nonlocal count
+        full(par, s, w, c, x, h)
+        count += 1
+        if count == at:
+            a = par.gravity + drive_force(par, s) / par.mass_p
+            for i in range(par.n_p):
+                x[RE, i] -= a * c[SHARE, i]
+
+    replace("load", load)
+
+
+def shorten_path() -> None:
+    """Let displacements grow by 0.999 of what velocities ask for."""
+    from percussion_model.core.fem_scheme import U
+    from percussion_model.core.fem_scheme import try_step as whole
+
+    def try_step(par, s, w, c, f, x, h):
+        whole(par, s, w, c, f, x, h)
+        for i in range(par.n_p + par.n_b):
+            x[U, i] = w[U, i] + FAULT * (x[U, i] - w[U, i])
+
+    replace("try_step", try_step)
+
+
+# Each with the solver that it spoils; "none" is run with both.
 FAULTS = {
-    "none": lambda: None,
-    "reflection": weaken_reflection,
-    "contact": weaken_contact,
-    "body_force": lose_body_force,
+    "none": ("", lambda: None),
+    "reflection": ("wave", weaken_reflection),
+    "contact": ("wave", weaken_contact),
+    "body_force": ("wave", lose_body_force),
+    "penalty": ("fem", weaken_penalty),
+    "load": ("fem", lose_load),
+    "path": ("fem", shorten_path),
 }
 
 
-def run_scene():
-    """Run the scene to its end; a simulation."""
+def run_scene(solver):
+    """Run the scene of a solver to its end; a simulation."""
     from percussion_model import Scene, Simulation
 
-    simulation = Simulation(Scene().replace(**SCENE))
+    simulation = Simulation(Scene().replace(**SCENES[solver]))
     simulation.advance(DURATION)
     return simulation
 
 
-def main(fault: str) -> None:
+def main(solver: str, fault: str) -> None:
     """Plant a fault, run and print what came of it."""
     if os.environ.get("NUMBA_DISABLE_JIT") != "1":
         raise SystemExit("set NUMBA_DISABLE_JIT=1")
     use_attribute_records()
-    import percussion_model.core.advance  # noqa: F401
+    import percussion_model.core.advance
+    import percussion_model.core.fem_advance  # noqa: F401
 
-    FAULTS[fault]()
-    simulation = run_scene()
+    FAULTS[fault][1]()
+    simulation = run_scene(solver)
     found = {
         "energy": simulation.energy(),
         "events": [list(map(float, row.item())) for row in simulation.events],
@@ -123,4 +180,4 @@ def main(fault: str) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    main(*sys.argv[1:])

@@ -19,10 +19,10 @@ import pure_python  # noqa: E402
 SEEN = 1e-5
 
 
-def run_uncompiled(fault):
+def run_uncompiled(solver, fault):
     """What the scene gives in plain Python, with a fault."""
     done = subprocess.run(
-        [sys.executable, str(HERE / "pure_python.py"), fault],
+        [sys.executable, str(HERE / "pure_python.py"), solver, fault],
         env=os.environ | {"NUMBA_DISABLE_JIT": "1"},
         capture_output=True,
         text=True,
@@ -32,9 +32,10 @@ def run_uncompiled(fault):
     return json.loads(done.stdout)
 
 
-def test_plain_python_equals_compiled_code():
-    plain = run_uncompiled("none")
-    compiled = pure_python.run_scene()
+@pytest.mark.parametrize("solver", pure_python.SCENES)
+def test_plain_python_equals_compiled_code(solver):
+    plain = run_uncompiled(solver, "none")
+    compiled = pure_python.run_scene(solver)
     assert abs(plain["energy"]["residual_relative"]) < 1e-12
     events = np.array([list(map(float, row.item())) for row in compiled.events])
     np.testing.assert_allclose(np.array(plain["events"]), events, rtol=1e-9, atol=1e-9)
@@ -44,5 +45,6 @@ def test_plain_python_equals_compiled_code():
 
 @pytest.mark.parametrize("fault", sorted(set(pure_python.FAULTS) - {"none"}))
 def test_a_planted_fault_is_seen(fault):
-    residual = run_uncompiled(fault)["energy"]["residual_relative"]
+    solver, _ = pure_python.FAULTS[fault]
+    residual = run_uncompiled(solver, fault)["energy"]["residual_relative"]
     assert SEEN < abs(residual) < 0.5
