@@ -23,7 +23,7 @@ STAMP = VENV / "percussion_model.stamp"
 OLDEST_PYTHON = (3, 11)
 INTERRUPTED = 130  # what shells report for Ctrl-C
 
-WARM_UPS = ("percussion_model.warm_up", "fmu_src.warm_up")
+WARM_UP = "fmu_src.warm_up"
 REFERENCE_RUN = [
     "run", "scenarios/reference.toml", "--duration", "4", "--settle", "1", "--out", "out/reference",
 ]  # fmt: skip
@@ -94,10 +94,9 @@ def setup() -> int:
         return code
     print("Compiling the kernels, for Python and for the FMU (once, a minute or two) ...",
           flush=True)  # fmt: skip
-    for module in WARM_UPS:
-        code = call([tool("python"), "-m", module])
-        if code != 0:
-            return code
+    code = call([tool("python"), "-m", WARM_UP])
+    if code != 0:
+        return code
     STAMP.write_text(wanted, encoding="utf-8")
     print("Ready.", flush=True)
     return 0
@@ -145,8 +144,7 @@ def test(extra: list[str]) -> int:
         ("ruff format", [tool("ruff"), "format", "--check"]),
         ("mypy", [tool("mypy")]),
         ("lint-imports", [tool("lint-imports")]),
-        ("kernels", [tool("python"), "-m", WARM_UPS[0]]),
-        ("kernels of the FMU", [tool("python"), "-m", WARM_UPS[1]]),
+        ("kernels", [tool("python"), "-m", WARM_UP]),
         ("pytest", [tool("pytest"), "-n", "2", *extra]),
     ]
     first_failure = 0

@@ -1,4 +1,4 @@
-"""Write the tables of docs/fmu.md from a model description: `python docs/make_fmu_interface.py`.
+"""Write the tables of docs/fmu.md from a model description: `python -m docs.make_fmu_interface`.
 
 The FMU of the reference scene is built for it, and read as any tool would.
 """

@@ -1,7 +1,7 @@
-"""Compile the kernels of the FMU once, so that later instances only load them.
+"""Compile the kernels of the package and of its FMU once, so that later starts only load them.
 
-`python -m fmu_src.warm_up` is a part of the installation, beside that of the package:
-the FMU brings its own copy of the sources along.
+`python -m fmu_src.warm_up` is a part of the installation from a clone. The FMU brings
+its own copy of the sources along, so its kernels are compiled for themselves.
 """
 
 from __future__ import annotations
@@ -14,12 +14,13 @@ from fmpy import simulate_fmu
 
 from fmu_src.hammer import build_hammer
 from percussion_model.scene import Scene
+from percussion_model.warm_up import SOLVERS, compile_kernels
 
 # Long enough for a contact, a change of mode and a reading [s].
 SHORT = 1e-3
 
 
-def compile_kernels(model: str) -> str:
+def compile_fmu(model: str) -> str:
     """Run a moment of an FMU with elastic or rigid bodies."""
     scene = Scene().replace(**{"piston.model": model, "bit.model": model})
     with tempfile.TemporaryDirectory() as folder:
@@ -30,9 +31,12 @@ def compile_kernels(model: str) -> str:
 
 
 def main() -> None:
-    """Compile the kernels of all solvers, two at a time."""
+    """Compile the kernels of all solvers, two at a time, the longest first."""
     with ProcessPoolExecutor(max_workers=2) as pool:
-        list(pool.map(compile_kernels, ("elastic", "rigid")))
+        of_fmu = [pool.submit(compile_fmu, model) for model in ("elastic", "rigid")]
+        of_package = [pool.submit(compile_kernels, solver) for solver in SOLVERS]
+        for job in [*of_fmu, *of_package]:
+            job.result()
 
 
 if __name__ == "__main__":

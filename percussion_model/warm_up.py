@@ -12,6 +12,7 @@ from percussion_model.stepping import Simulation
 
 # Long enough for a contact, a change of mode and a reading [s].
 SHORT = 1e-4
+SOLVERS = ("wave", "fem", "rigid")
 
 
 def compile_kernels(solver: str) -> str:
@@ -28,7 +29,7 @@ def compile_kernels(solver: str) -> str:
 def main() -> None:
     """Compile the kernels of all solvers, two at a time."""
     with ProcessPoolExecutor(max_workers=2) as pool:
-        list(pool.map(compile_kernels, ("wave", "fem", "rigid")))
+        list(pool.map(compile_kernels, SOLVERS))
 
 
 if __name__ == "__main__":
