@@ -16,6 +16,8 @@ from percussion_model.solvers import Solver, make_solver
 _BLOW_ROOM = 64
 _EVENT_ROOM = 4096
 
+_DONE, _FULL = int(Status.DONE), (int(Status.BLOWS_FULL), int(Status.EVENTS_FULL))
+
 
 class Runner:
     """A state of a scene that is advanced from time to time.
@@ -87,15 +89,16 @@ class Runner:
             raise SimulationError(f"t = {t!r} s: lies before the present time {self._time!r} s")
 
     def _commit_up_to(self, t: float) -> None:
-        status = int(Status.BLOWS_FULL)
-        while status in (Status.BLOWS_FULL, Status.EVENTS_FULL):
+        while True:
             status, n_blows, n_events = self.solver.advance(
                 self._state, t, self._blow_room, self._event_room, self.record_events
             )
             if n_blows or n_events:
                 self._keep(self._blow_room[:n_blows], self._event_room[:n_events])
-        if status == Status.DONE:
-            return
+            if status == _DONE:
+                return
+            if status not in _FULL:
+                break
         where = f"at t = {self.solver.time(self._state)!r} s"
         if status == Status.NOT_FINITE:
             raise SimulationError(f"{where} the state is no longer finite: check the scene")
