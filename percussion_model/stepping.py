@@ -43,7 +43,7 @@ class Simulation(Runner):
     def __init__(self, scene: Scene, record_events: bool = True) -> None:
         super().__init__(scene, record_events)
         self.scene = scene
-        self._blows: tuple[np.ndarray, ...] = ()
+        self._blows: tuple[np.ndarray, ...] = ()  # bytes of the rows
         self._events: tuple[np.ndarray, ...] = ()
 
     def _keep(self, blows: np.ndarray, events: np.ndarray) -> None:
@@ -56,7 +56,7 @@ class Simulation(Runner):
     def blows(self) -> np.ndarray:
         """Blows finished so far, rows of `BLOW`."""
         self._blows = _joined(self._blows)
-        return self._blows[0].copy() if self._blows else np.zeros(0, BLOW)
+        return self._blows[0].copy().view(BLOW) if self._blows else np.zeros(0, BLOW)
 
     @property
     def events(self) -> np.ndarray:
@@ -64,7 +64,7 @@ class Simulation(Runner):
         self._events = _joined(self._events)
         if not self._events:
             return np.zeros(0, EVENT)
-        rows = self._events[0]
+        rows = self._events[0].view(EVENT)
         return rows[np.argsort(rows["time"], kind="stable")]
 
     def sample(self, times: Any) -> dict[str, np.ndarray]:
@@ -141,8 +141,11 @@ class Simulation(Runner):
 
 
 def _with(parts: tuple[np.ndarray, ...], rows: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Add a copy of rows; parts halve in size from one to the next, so this stays cheap."""
-    kept = [*parts, rows.copy()]
+    """Add a copy of rows, as bytes; parts halve in size from one to the next.
+
+    NumPy copies records field by field, which took a fifth of a whole run.
+    """
+    kept = [*parts, rows.view(np.uint8).copy()]
     while len(kept) > 1 and len(kept[-2]) <= len(kept[-1]):
         kept[-2:] = [np.concatenate(kept[-2:])]
     return tuple(kept)
