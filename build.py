@@ -129,8 +129,9 @@ def run(extra: list[str]) -> int:
 
 
 def fmu(extra: list[str]) -> int:
-    """Bake a scene into an FMU; paths count from the project's folder."""
-    return setup() or call([tool("python"), "-m", "fmu_src", *extra])
+    """Bake a scene into an FMU; paths count from where the user is."""
+    return setup() or call([tool("python"), "-m", "fmu_src", *extra], folder=Path.cwd(),
+                           PYTHONPATH=str(ROOT))  # fmt: skip
 
 
 def test(extra: list[str]) -> int:
@@ -167,11 +168,11 @@ def bench(extra: list[str]) -> int:
         return call([tool("python"), "-m", "benchmarks", *extra], NUMBA_CACHE_DIR=cache)
 
 
-def call(command: list[str | Path], **variables: str) -> int:
-    """Run a program from the project's folder; return its code."""
+def call(command: list[str | Path], folder: Path = ROOT, **variables: str) -> int:
+    """Run a program, from the project's folder unless told otherwise; return its code."""
     words = [str(part) for part in command]
     try:
-        child = subprocess.Popen(words, cwd=ROOT, env={**os.environ, **variables})
+        child = subprocess.Popen(words, cwd=folder, env={**os.environ, **variables})
     except FileNotFoundError:
         print(f"{words[0]} is missing. Delete .venv and run this again.", file=sys.stderr)
         return 1

@@ -46,8 +46,8 @@ Settings = Annotated[
         help="Set any parameter, as in rock.unloading_ratio=10; may be repeated.",
     ),
 ]
-Duration = Annotated[float | None, typer.Option("--duration", help="Simulated time [s].")]
-Settle = Annotated[float | None, typer.Option("--settle", help="Time before blows count [s].")]
+Duration = Annotated[float | None, typer.Option("--duration", help="Simulated time, in s.")]
+Settle = Annotated[float | None, typer.Option("--settle", help="Time before blows count, in s.")]
 JsonFile = Annotated[
     str | None,
     typer.Option("--json", metavar="FILE|-", help="Write the summary as JSON; - for stdout."),
@@ -83,7 +83,7 @@ def run(
     settings: Settings = None,
     trace: Annotated[
         float | None,
-        typer.Option("--trace", metavar="DT", help="Keep a trace, sampled every DT [s]."),
+        typer.Option("--trace", metavar="DT", help="Keep a trace, sampled every DT, in s."),
     ] = None,
     out: Out = None,
     json_file: JsonFile = None,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import difflib
 import shutil
 import tempfile
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -80,6 +81,10 @@ class Instance:
     def set(self, values: Mapping[str, Any]) -> None:
         """Set parameters or inputs; enumerations by number or by word."""
         for name, value in values.items():
+            if name not in self.variables:
+                near = difflib.get_close_matches(name, self.variables, 1)
+                hint = f"; did you mean {near[0]}?" if near else ""
+                raise ValueError(f"the FMU has no variable {name}{hint}")
             one = self.variables[name]
             if one.type == "Real":
                 self.slave.setReal([one.valueReference], [float(value)])

@@ -34,6 +34,12 @@ PLAIN_INPUTS = {
     "drive.reversal_distance": "reversal_distance",
 }
 
+# The solver's inputs as hosts know them.
+NAMES_OUTSIDE = {inner: name for name, inner in PLAIN_INPUTS.items()} | {
+    "drive_force": "supply_pressure",
+    "external_force": "piston_force",
+}
+
 # Numbers of an instance in a saved state.
 NUMBERS = struct.Struct("<BBdddQd")  # phase, moving, start, now, time, blows, step size
 
@@ -173,7 +179,8 @@ class PercussiveHammer(Slave):
         if name.startswith("barrier"):
             acts = acts and scene.barrier_on
         if not acts:
-            self.warn(f"{self.instance_name}: a new {name} has no effect in this scene")
+            outside = NAMES_OUTSIDE.get(name, name)
+            self.warn(f"{self.instance_name}: a new {outside} has no effect in this scene")
         return acts
 
     # outputs
