@@ -40,7 +40,9 @@ def draw_activation(window: Window) -> Figure:
     _relative_motion(over, window)
     _near_zero(near, window, early)
     handles: list[object] = list(style.mode_handles(window.samples["drilling_mode"]))
-    touching = Line2D([], [], color=style.CONTACT_COLOUR, linewidth=3.0, label="the same, at right")
+    touching = Line2D(
+        [], [], color=style.CONTACT_COLOUR, linewidth=3.0, label="piston on bit, at right"
+    )
     style.head(
         fig,
         f"Piston and bit after percussive activation — {window.name}",
