@@ -1,0 +1,87 @@
+"""What the commands share: options, reading a scene, messages."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+if TYPE_CHECKING:
+    from percussion_model.scene import Scene
+
+BAD_INPUT = 2
+INTERRUPTED = 130  # what shells report for Ctrl-C
+
+SceneFile = Annotated[Path, typer.Argument(metavar="SCENE", help="A scene file (TOML).")]
+SolverName = Annotated[
+    Literal["wave", "fem", "rigid"] | None,
+    typer.Option("--solver", help="Solver; rigid makes piston and bit rigid."),
+]
+Cells = Annotated[int | None, typer.Option("--cells", help="Cells or elements in the piston.")]
+Settings = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="KEY=VALUE",
+        help="Set any parameter, as in rock.unloading_ratio=10; may be repeated.",
+    ),
+]
+Duration = Annotated[float | None, typer.Option("--duration", help="Simulated time, in s.")]
+Settle = Annotated[float | None, typer.Option("--settle", help="Time before blows count, in s.")]
+JsonFile = Annotated[
+    str | None,
+    typer.Option("--json", metavar="FILE|-", help="Write the summary as JSON; - for stdout."),
+]
+Out = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder for results.")]
+
+
+def load_scene(
+    path: Path, solver: str | None, cells: int | None, settings: list[str] | None
+) -> Scene:
+    """Read a scene and apply what the command line changes."""
+    from percussion_model.quick_start import load_numba
+    from percussion_model.scene import Scene, read_setting
+
+    load_numba()
+    scene = Scene.from_toml(path)
+    changes: dict[str, Any] = dict(read_setting(text) for text in settings or ())
+    if solver is not None:
+        scene = scene.computed_by(solver, **changes)
+    elif changes:
+        scene = scene.replace(**changes)
+    if cells is not None:
+        key = "fem.elements" if scene.solver_name == "fem" else "solver.cells"
+        scene = scene.replace(**{key: cells})
+    return scene
+
+
+def check_json(json_file: str | None) -> None:
+    """Refuse a file that could not be written, before anything is computed."""
+    from percussion_model.result_files import check_writable
+
+    if json_file not in (None, "-"):
+        check_writable(Path(json_file).absolute().parent)
+
+
+def write_json(json_file: str | None, values: dict[str, Any]) -> None:
+    """Write plain values as JSON to a file, to stdout (-), or nowhere (None)."""
+    from percussion_model.result_files import staged_text, to_json
+
+    if json_file == "-":
+        typer.echo(to_json(values))
+    elif json_file is not None:
+        staged_text(Path(json_file), to_json(values) + "\n")
+
+
+def needs_plot_extra(error: ImportError) -> str:
+    """Say which package the figures lack and how to get it."""
+    name = error.name or str(error)
+    return f"no figures, since {name} is missing: pip install 'percussion_model[plot]'"
+
+
+def complain(message: str, code: int = 0) -> int:
+    """Print one message on stderr; return the exit code."""
+    print(f"percussion: {message}", file=sys.stderr)
+    return code

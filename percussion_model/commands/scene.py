@@ -1,0 +1,154 @@
+"""Run a scene, draw it, tell about it, write a new one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from percussion_model.commands.common import (
+    BAD_INPUT,
+    INTERRUPTED,
+    Cells,
+    Duration,
+    JsonFile,
+    Out,
+    SceneFile,
+    Settings,
+    Settle,
+    SolverName,
+    check_json,
+    complain,
+    load_scene,
+    needs_plot_extra,
+    write_json,
+)
+
+if TYPE_CHECKING:
+    from percussion_model.result import Result
+
+# `explain` measures for about so long [s], or for so much simulated time [s].
+_MEASURE_WALL = 1.0
+_MEASURE_DURATION = 0.5
+
+_NEW_TITLE = "A down-the-hole hammer"
+
+
+def run(
+    scene: SceneFile,
+    duration: Duration = None,
+    settle: Settle = None,
+    solver: SolverName = None,
+    cells: Cells = None,
+    settings: Settings = None,
+    trace: Annotated[
+        float | None,
+        typer.Option("--trace", metavar="DT", help="Keep a trace, sampled every DT, in s."),
+    ] = None,
+    out: Out = None,
+    json_file: JsonFile = None,
+    figures: Annotated[
+        bool, typer.Option(help="With --out, draw figures and write report.html.")
+    ] = True,
+) -> None:
+    """Run a scene; print a short table, write results with --out."""
+    from percussion_model.result_files import check_writable
+    from percussion_model.simulation import simulate
+    from percussion_model.terminal import progress_bar, show_summary
+
+    chosen = load_scene(scene, solver, cells, settings)
+    if out is not None:
+        check_writable(out)
+    check_json(json_file)
+    with progress_bar(chosen.run.duration if duration is None else duration) as progress:
+        result = simulate(chosen, duration, settle, trace, progress=progress, on_interrupt="keep")
+    interrupted = result.cut_short
+    if out is not None:
+        result.save(out)
+        if figures and not interrupted:
+            _draw(result, out)
+    write_json(json_file, result.summary())
+    if json_file != "-":
+        show_summary(result)
+    if interrupted:
+        complain(result.warnings[-1])
+        raise typer.Exit(INTERRUPTED)
+
+
+def explain(
+    scene: SceneFile,
+    solver: SolverName = None,
+    cells: Cells = None,
+    settings: Settings = None,
+) -> None:
+    """Tell what a scene computes, how, and what a blow costs."""
+    from percussion_model.simulation import Simulation
+    from percussion_model.terminal import show_explanation
+
+    chosen = load_scene(scene, solver, cells, settings)
+    simulation = Simulation(chosen)
+    step = 1e-6
+    end = min(_MEASURE_DURATION, chosen.run.duration)
+    while simulation.wall_time < _MEASURE_WALL and simulation.time < end:
+        simulation.advance(min(simulation.time + step, end))
+        step = min(2.0 * step, 0.1 * end)
+    cost = {
+        "wall_time": simulation.wall_time,
+        "duration": simulation.time,
+        "blows": simulation.statistics()["blows"],
+    }
+    show_explanation(chosen, simulation.solver, cost)
+
+
+def plot(
+    source: Annotated[
+        Path, typer.Argument(metavar="RESULT_DIR|SCENE", help="A result folder, or a scene to run.")
+    ],
+    out: Out = None,
+) -> None:
+    """Draw the figures of a result, or run a scene and draw them."""
+    from percussion_model.result import Result
+    from percussion_model.result_files import check_writable
+    from percussion_model.scene import Scene
+    from percussion_model.simulation import simulate
+    from percussion_model.terminal import progress_bar
+
+    folder = out or (source if source.is_dir() else Path("out") / source.stem)
+    check_writable(folder)
+    if source.is_dir():
+        result = Result.load(source)
+    else:
+        scene = Scene.from_toml(source)
+        with progress_bar(scene.run.duration) as progress:
+            result = simulate(scene, progress=progress)
+    try:
+        from percussion_model.plotting import figures
+    except ImportError as error:
+        raise typer.Exit(complain(needs_plot_extra(error), BAD_INPUT)) from None
+    for path in figures(result, folder):
+        typer.echo(str(path))
+
+
+def new(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="The scene file to write.")],
+    force: Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")] = False,
+) -> None:
+    """Write a commented scene to start from: the reference hammer."""
+    from percussion_model.scene import Scene
+
+    if file.exists() and not force:
+        raise typer.Exit(complain(f"{file}: exists already; --force overwrites it", BAD_INPUT))
+    Scene(title=_NEW_TITLE).to_toml(file, comments=True)
+    typer.echo(f"wrote {file}")
+
+
+def _draw(result: Result, folder: Path) -> None:
+    """Write figures and report; the results are safe already."""
+    try:
+        from percussion_model.plotting import figures
+        from percussion_model.report import write_report
+    except ImportError as error:
+        complain(needs_plot_extra(error))
+        return
+    write_report(result, folder, figures(result, folder))
