@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import difflib
 import os
 import tomllib
@@ -55,10 +56,12 @@ def write_text(path: Path, text: str) -> None:
     """Write a file in one go: whatever happens, no half-written file stays."""
     draft = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
+        path.parent.mkdir(parents=True, exist_ok=True)
         draft.write_text(text, encoding="utf-8")
         draft.replace(path)
     except OSError as error:
-        draft.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):
+            draft.unlink()
         raise SceneError(f"{path}: cannot be written: {error.strerror}") from None
 
 
@@ -202,6 +205,9 @@ def unknown_key(key: str) -> str:
     near += difflib.get_close_matches(name, siblings, 1, _SIMILAR_ENOUGH)
     if near and parent:
         return f"unknown key {key}: did you mean {parent}.{near[0]}?"
+    underlined = {one.replace(".", "_"): one for one in keys}
+    if key in underlined:  # as keyword arguments of Python are written
+        return f"unknown key {key}: did you mean {underlined[key]}?"
     known = list(keys) if parent else ["title", *GROUPS]
     near = difflib.get_close_matches(generic_key(key), known, 1, _SIMILAR_ENOUGH)
     if near:

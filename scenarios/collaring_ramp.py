@@ -40,12 +40,12 @@ def draw(found: dict[str, np.ndarray], path: Path) -> Path:
         "Collaring: feed and supply pressure rise",
         found,
         [
-            ("pressure [bar]", 1e-5, "supply_pressure"),
-            ("feed [kN]", 1e-3, "feed_force"),
-            ("energy [J]", 1, "blow_energy"),
-            ("blows [1/s]", 1, "blow_frequency"),
-            ("rate [mm/s]", 1e3, "rate_of_penetration"),
-            ("bit [mm]", 1e3, "bit.position"),
+            ("supply pressure [bar]", 1e-5, "supply_pressure"),
+            ("feed force [kN]", 1e-3, "feed_force"),
+            ("blow energy [J]", 1, "blow_energy"),
+            ("blow frequency [1/s]", 1, "blow_frequency"),
+            ("rate of penetration, last blow [mm/s]", 1e3, "rate_of_penetration"),
+            ("depth of the bit [mm]", 1e3, "bit.position"),
         ],
     )
 

@@ -27,8 +27,8 @@ def draw(found: dict[str, np.ndarray], path: Path) -> Path:
             ("position [mm]", 1e3, "bit.position", "piston.position"),
             ("peak force [kN]", 1e-3, "contact.force_peak", "bit.force_peak"),
             ("mean force [kN]", 1e-3, "bit.force_mean"),
-            ("rate [mm/s]", 1e3, "rate_of_penetration"),
-            ("blows [1/s]", 1, "blow_frequency"),
+            ("rate of penetration, last blow [mm/s]", 1e3, "rate_of_penetration"),
+            ("blow frequency [1/s]", 1, "blow_frequency"),
         ],
     )
 

@@ -224,7 +224,7 @@ def greatest_difference(
 def plot(
     path: Path, title: str, found: Mapping[str, np.ndarray], panels: Sequence[tuple[str, ...]]
 ) -> Path:
-    """Draw columns over time, a panel for each (label, factor, names...).
+    """Draw columns over time, a panel for each ("quantity [unit]", factor, names...).
 
     Returns
     -------
@@ -234,17 +234,19 @@ def plot(
     import matplotlib.pyplot as plt
 
     figure, axes = plt.subplots(
-        len(panels), 1, sharex=True, figsize=(8.0, 1.0 + 1.7 * len(panels)), squeeze=False
+        len(panels), 1, sharex=True, figsize=(8.0, 1.0 + 1.8 * len(panels)), squeeze=False
     )
     for ax, (label, factor, *names) in zip(axes[:, 0], panels, strict=True):
         for name in names:
             ax.plot(found["time"], float(factor) * found[name], linewidth=1.2, label=name)
-        ax.set_ylabel(label)
+        quantity, _, unit = label.partition(" [")
+        ax.set_title(quantity, loc="left", fontsize="medium")
+        ax.set_ylabel(f"[{unit}" if unit else "")
         ax.grid(alpha=0.3)
         if len(names) > 1:
             ax.legend(fontsize="small", loc="upper right")
     axes[-1, 0].set_xlabel("time [s]")
-    axes[0, 0].set_title(title)
+    figure.suptitle(title, fontweight="bold")
     figure.align_ylabels()
     figure.tight_layout()
     path.parent.mkdir(parents=True, exist_ok=True)

@@ -29,8 +29,8 @@ def draw(found: dict[str, np.ndarray], path: Path) -> Path:
         [
             ("casing force [kN]", 1e-3, "casing_force"),
             ("position [mm]", 1e3, "piston.position", "bit.position"),
-            ("blows [1/s]", 1, "blow_frequency"),
-            ("rate [mm/s]", 1e3, "rate_of_penetration"),
+            ("blow frequency [1/s]", 1, "blow_frequency"),
+            ("rate of penetration, last blow [mm/s]", 1e3, "rate_of_penetration"),
             ("mean force [kN]", 1e-3, "bit.force_mean", "contact.force_mean"),
         ],
     )

@@ -46,8 +46,8 @@ def draw(found: dict[str, np.ndarray], path: Path) -> Path:
             ("pressure [bar]", 1e-5, "upper.pressure", "lower.pressure"),
             ("piston force [kN]", 1e-3, "piston_force"),
             ("position [mm]", 1e3, "piston.position", "bit.position"),
-            ("impact [m/s]", 1, "impact_velocity"),
-            ("rate [mm/s]", 1e3, "rate_of_penetration"),
+            ("impact velocity [m/s]", 1, "impact_velocity"),
+            ("rate of penetration, last blow [mm/s]", 1e3, "rate_of_penetration"),
         ],
     )
 

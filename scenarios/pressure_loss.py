@@ -29,11 +29,11 @@ def draw(found: dict[str, np.ndarray], path: Path) -> Path:
         "Loss of supply pressure",
         found,
         [
-            ("pressure [bar]", 1e-5, "supply_pressure"),
-            ("impact [m/s]", 1, "impact_velocity"),
-            ("energy [J]", 1, "blow_energy"),
-            ("blows [1/s]", 1, "blow_frequency"),
-            ("rate [mm/s]", 1e3, "rate_of_penetration"),
+            ("supply pressure [bar]", 1e-5, "supply_pressure"),
+            ("impact velocity [m/s]", 1, "impact_velocity"),
+            ("blow energy [J]", 1, "blow_energy"),
+            ("blow frequency [1/s]", 1, "blow_frequency"),
+            ("rate of penetration, last blow [mm/s]", 1e3, "rate_of_penetration"),
         ],
     )
 

@@ -155,7 +155,7 @@ def test_bad_scenes_are_one_message_on_stderr(percussion, tmp_path, text, messag
         (["run", RIGID, "--solver", "wave"], "bit.model"),
         (["run", RIGID, "--solver", "fem"], "fem"),
         (["run", RIGID, "--cells", "many"], "--cells"),
-        (["plot", "nowhere.toml"], "there is no such scene file"),
+        (["plot", "nowhere.toml"], "there is no such folder or scene file"),
         (["explain", "nowhere.toml"], "there is no such scene file"),
         (["drill"], "drill"),
     ],

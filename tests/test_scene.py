@@ -170,8 +170,19 @@ def test_a_file_that_cannot_be_written_leaves_nothing(tmp_path):
     with pytest.raises(SceneError, match="cannot be written"):
         Scene().to_toml(target)
     assert [path.name for path in tmp_path.iterdir()] == ["scene.toml"]
+    (tmp_path / "file").write_text("")
     with pytest.raises(SceneError, match="cannot be written"):
-        Scene().to_toml(tmp_path / "missing" / "scene.toml")
+        Scene().to_toml(tmp_path / "file" / "scene.toml")
+
+
+def test_a_key_with_an_underline_for_its_point_is_understood():
+    with pytest.raises(SceneError, match=r"feed_force: did you mean feed\.force\?"):
+        Scene().replace(feed_force=3.0)
+
+
+def test_a_folder_that_is_missing_is_made(tmp_path):
+    Scene().to_toml(tmp_path / "missing" / "scene.toml")
+    assert Scene.from_toml(tmp_path / "missing" / "scene.toml") == Scene()
 
 
 def test_bad_arguments_get_the_same_errors():

@@ -105,6 +105,8 @@ def plot(
     source: Annotated[
         Path, typer.Argument(metavar="RESULT_DIR|SCENE", help="A result folder, or a scene to run.")
     ],
+    duration: Duration = None,
+    settle: Settle = None,
     out: Out = None,
 ) -> None:
     """Draw the figures of a result, or run a scene and draw them."""
@@ -114,14 +116,18 @@ def plot(
     from percussion_model.simulation import simulate
     from percussion_model.terminal import progress_bar
 
+    if not source.exists():
+        raise typer.Exit(complain(f"{source}: there is no such folder or scene file", BAD_INPUT))
     folder = out or (source if source.is_dir() else Path("out") / source.stem)
     check_writable(folder)
     if source.is_dir():
+        if duration is not None or settle is not None:
+            raise typer.Exit(complain(f"{source}: has been run; give its scene file", BAD_INPUT))
         result = Result.load(source)
     else:
         scene = Scene.from_toml(source)
-        with progress_bar(scene.run.duration) as progress:
-            result = simulate(scene, progress=progress)
+        with progress_bar(scene.run.duration if duration is None else duration) as progress:
+            result = simulate(scene, duration, settle, progress=progress)
     try:
         from percussion_model.plotting import figures
     except ImportError as error:

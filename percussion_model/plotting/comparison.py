@@ -46,7 +46,7 @@ def draw_comparison(comparison: Comparison) -> Figure:
         style.label(axes[0, column], "", "bit force [kN]", f"{span}: force on the rock")
         style.label(axes[1, column], "", "displacement [mm]", f"{span}: mean bit motion")
         title = f"{span}: piston relative to bit"
-        style.label(axes[2, column], "time since impact [ms]", "$u_r$ [mm]", title)
+        style.label(axes[2, column], "time since impact [ms]", "piston − bit, $u_r$ [mm]", title)
     handles = [
         Line2D([], [], color=colour, linestyle=dashes, linewidth=2.0, label=name)
         for name, (colour, dashes, _) in LINES.items()

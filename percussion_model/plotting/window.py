@@ -35,7 +35,7 @@ MOST_ACTIVE = 0.5
 # Room after what matters, as a factor on its duration.
 ROOM_AFTER = 1.3
 # The range after percussive activation, by the end of the last contact.
-CONTACTS_SHARE = 1.0 / 6.0
+CONTACTS_SHARE = 0.55
 # A blow is repeated from so many periods before its start.
 RESTART = 0.1
 # A repeated blow may start off by this share of its period: another machine rounds otherwise.
