@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from percussion_model.result_files import ResultError
     from percussion_model.scene import Scene, SceneError
     from percussion_model.simulation import Simulation, Snapshot, simulate
+    from percussion_model.stationary import Settled, settled
 
 # Where each name lives. Nothing is imported before it is used, so that starting
 # costs only what is needed.
@@ -35,6 +36,7 @@ _HOME = {
     "Result": "result",
     "ResultError": "result_files",
     "Scene": "scene",
+    "Settled": "stationary",
     "SceneError": "scene",
     "Section": "parameters",
     "Simulation": "simulation",
@@ -44,6 +46,7 @@ _HOME = {
     "calibrate_drive": "calibration",
     "compare": "comparison",
     "piston_cycle": "calibration",
+    "settled": "stationary",
     "simulate": "simulation",
 }
 
@@ -61,6 +64,7 @@ __all__ = [
     "Scene",
     "SceneError",
     "Section",
+    "Settled",
     "Simulation",
     "SimulationError",
     "Snapshot",
@@ -68,6 +72,7 @@ __all__ = [
     "calibrate_drive",
     "compare",
     "piston_cycle",
+    "settled",
     "simulate",
 ]
 

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from percussion_model.result import Result
     from percussion_model.scene import Scene
     from percussion_model.solvers import Solver
+    from percussion_model.stationary import Settled
 
 # A run that ends sooner shows no bar [s].
 _PATIENCE = 2.0
@@ -63,6 +64,23 @@ def show_summary(result: Result) -> None:
     console = Console()
     console.print(table)
     show_warnings(console, result.warnings)
+
+
+def show_settled(found: Settled) -> None:
+    """Print the stationary response of a scene."""
+    summary = found.summary()
+    table = Table(show_header=False)
+    order = {0: "", 1: ", every blow alike"}.get(found.order, f", {found.order} blows a cycle")
+    table.add_row("Motion", f"{found.kind}{order}")
+    for name, key, factor, unit in (
+        _SHOWN[0],
+        ("  error of it", "rate_of_penetration_error", 1e3, "mm/s"),
+        _SHOWN[1],
+        ("Multiplier of the cycle", "multiplier", 1.0, ""),
+    ):
+        table.add_row(name, f"{_number(summary[key], factor)} {unit}".rstrip())
+    table.add_row("Blows run", f"{len(found.blows)} in {found.duration:.4g} s")
+    Console().print(table)
 
 
 def show_warnings(console: Console, warnings: list[str]) -> None:

@@ -1,0 +1,39 @@
+"""The stationary response of a scene."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from percussion_model.commands.common import (
+    Cells,
+    JsonFile,
+    SceneFile,
+    Settings,
+    SolverName,
+    check_json,
+    load_scene,
+    write_json,
+)
+
+
+def settled(
+    scene: SceneFile,
+    solver: SolverName = None,
+    cells: Cells = None,
+    settings: Settings = None,
+    tolerance: Annotated[
+        float, typer.Option("--tolerance", help="Relative change of a blow that is no change.")
+    ] = 1e-4,
+    json_file: JsonFile = None,
+) -> None:
+    """Run until the blows repeat: rate, period, order and stability of the cycle."""
+    from percussion_model.stationary import settled as settle
+    from percussion_model.terminal import show_settled
+
+    check_json(json_file)
+    found = settle(load_scene(scene, solver, cells, settings), tolerance)
+    write_json(json_file, found.summary())
+    if json_file != "-":
+        show_settled(found)

@@ -1,0 +1,144 @@
+"""The stationary response: cycles made by hand, and scenes against long runs."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from percussion_model import Scene, SceneError, settled, simulate
+from percussion_model.cli import app
+from percussion_model.core.records import BLOW
+from percussion_model.stationary import _batch_means, _cycle
+
+TOLERANCE = 1e-4
+# Drive force that keeps the power of the reference at another reversal distance.
+REFERENCE_FORCE, REFERENCE_DISTANCE = 3000.0, 0.040
+
+
+def blows(velocity):
+    """Blows of which one follows from another by the impact velocity alone."""
+    velocity = np.asarray(velocity, dtype=float)
+    rows = np.zeros(len(velocity), BLOW)
+    rows["impact_velocity"] = velocity
+    rows["period"] = 0.05 + 1e-3 * (velocity - 8.0)
+    rows["penetration"] = 1e-3 * velocity / 8.0
+    return rows
+
+
+def rate_of(velocity):
+    row = blows([velocity])[0]
+    return row["penetration"] / row["period"]
+
+
+@pytest.mark.parametrize("multiplier", [0.16, -0.5, 0.7])
+def test_a_converging_sequence_is_extrapolated_to_its_limit(multiplier):
+    for count in range(3, 80):
+        rows = blows(8.0 + 0.5 * multiplier ** np.arange(count))
+        found = _cycle(rows, 1, TOLERANCE)
+        if found is not None:
+            break
+    rate, error, ratio = found
+    assert ratio == pytest.approx(multiplier, rel=1e-6)
+    assert abs(rate / rate_of(8.0) - 1.0) < TOLERANCE
+    assert abs(rate - rate_of(8.0)) <= error
+
+
+def test_slow_convergence_is_not_taken_for_a_cycle():
+    """Each change is within the tolerance; all those to come are not."""
+    rows = blows(8.0 + 0.05 * 0.99 ** np.arange(40))
+    assert np.max(np.abs(np.diff(rows["impact_velocity"])) / 8.0) < TOLERANCE
+    assert _cycle(rows, 1, TOLERANCE) is None
+
+
+@pytest.mark.parametrize("order", [2, 3, 5])
+def test_a_cycle_of_several_blows_is_found_by_its_order(order):
+    rows = blows(np.tile(8.0 + 0.3 * np.arange(order), 4))
+    found = [n for n in range(1, 9) if _cycle(rows, n, TOLERANCE) is not None]
+    assert found[0] == order
+
+
+def test_scatter_is_no_cycle_and_its_error_covers_correlated_blows():
+    generator = np.random.default_rng(7)
+    errors, off = [], []
+    for _ in range(200):
+        drift = np.zeros(400)
+        for k in range(1, 400):
+            drift[k] = 0.8 * drift[k - 1] + generator.normal(scale=0.1)
+        rows = blows(8.0 + drift)
+        assert all(_cycle(rows, n, TOLERANCE) is None for n in range(1, 9))
+        rate, error = _batch_means(rows)
+        errors.append(error)
+        off.append(rate - rate_of(8.0))
+    assert 0.7 < np.std(off) / np.mean(errors) < 1.4
+
+
+def test_reference_agrees_with_a_long_run():
+    long = simulate(Scene(), 4.0, 1.0)
+    short = settled(Scene())
+    assert (short.kind, short.order) == ("periodic", 1)
+    assert short.rate_of_penetration == pytest.approx(long.rate_of_penetration, rel=5e-4)
+    assert short.blow_period == pytest.approx(long.summary()["blow_period"], rel=5e-4)
+    assert abs(short.rate_of_penetration - long.rate_of_penetration) < (
+        short.rate_of_penetration_error
+    )
+    assert 0.0 < short.multiplier < 0.3
+    assert len(short.blows) < len(long.blows) / 10
+
+
+CASES = [
+    *({"rock.loading_stiffness": value} for value in (1e8, 3e8, 1.5e9, 2e9)),
+    *({"rock.unloading_ratio": value} for value in (2.0, 10.0, 20.0, 30.0)),
+    *({"feed.force": value} for value in (500.0, 1000.0, 5000.0, 1e4, 2e4)),
+    *(
+        {"drive.reversal_distance": value}
+        for value in (0.08, 0.06, 0.03, 0.02, 0.006, 0.004, 0.003)
+    ),
+]
+
+
+@pytest.mark.parametrize("changes", CASES, ids=str)
+def test_motion_is_classified_as_by_long_runs(changes):
+    changes = dict(changes)
+    if "drive.reversal_distance" in changes:
+        ratio = REFERENCE_DISTANCE / changes["drive.reversal_distance"]
+        changes["drive.force"] = REFERENCE_FORCE * ratio ** (1.0 / 3.0)
+    scene = Scene().replace(**changes)
+    long = simulate(scene, 4.0, 1.0)
+    velocity = long.counted["impact_velocity"]
+    repeats = np.ptp(velocity) < 10 * TOLERANCE * np.mean(velocity)
+    found = settled(scene)
+    assert found.kind == ("periodic" if repeats else "aperiodic")
+    spread = math.hypot(found.rate_of_penetration_error, long.rate_of_penetration_standard_error)
+    assert abs(found.rate_of_penetration - long.rate_of_penetration) < 4 * spread
+
+
+def test_a_drill_that_stops_is_said_to_have_stalled():
+    found = settled(Scene().replace(**{"effects.drive": "none"}))
+    assert found.kind == "stalled"
+    assert math.isnan(found.rate_of_penetration)
+    assert found.summary()["rate_of_penetration"] is None
+
+
+def test_senseless_requests_are_refused():
+    with pytest.raises(SceneError, match=r"piston\.model"):
+        settled(Scene().replace(**{"piston.model": "absent"}))
+    with pytest.raises(SceneError, match=r"tolerance = 0\.0: must be"):
+        settled(Scene(), tolerance=0.0)
+    with pytest.raises(SceneError, match="most_blows = 5: must be"):
+        settled(Scene(), most_blows=5)
+
+
+def test_command_tells_the_cycle(tmp_path):
+    scene = tmp_path / "scene.toml"
+    Scene().to_toml(scene)
+    answer = CliRunner().invoke(app, ["settled", str(scene), "--json", "-"])
+    assert answer.exit_code == 0
+    found = json.loads(answer.stdout)
+    assert found["kind"] == "periodic"
+    assert found["rate_of_penetration"] == settled(Scene()).rate_of_penetration
+    shown = CliRunner().invoke(app, ["settled", str(scene)])
+    assert "periodic" in shown.stdout
