@@ -30,6 +30,11 @@ MOST_NUMBERS = 40_000_000
 MOST_DOUBLINGS = 40
 
 
+# Operators of so many scenes are kept [a few MB each on the default grid].
+MOST_KEPT = 4
+_kept: dict[bytes, LeapOperators] = {}
+
+
 @dataclass(frozen=True)
 class LeapOperators:
     """Powers of the step map, and what can be seen of the next steps.
@@ -77,10 +82,13 @@ def padded(size: int) -> int:
     return -(-size // PADDING) * PADDING
 
 
-def build_operators(
+def leap_operators(
     par: np.ndarray, piston: Grid | None, cp: np.ndarray, bit: Grid, cb: np.ndarray
 ) -> LeapOperators | None:
     """Leap operators of a scene, or None where they would be too large.
+
+    They do not depend on feed, drive, barrier energy or start, so that scenes which differ
+    in those alone share them: making them costs as much as tens of blows.
 
     Parameters
     ----------
@@ -94,6 +102,21 @@ def build_operators(
     if LEVELS * (size_p * size_p + len(Mode) * size * size) > MOST_NUMBERS:
         return None
     par["size_p"], par["size_r"] = size_p, size
+    masses = [grid.mass for grid in (piston, bit) if grid is not None]
+    key = b"|".join(part.tobytes() for part in (par, cp, cb, *masses))
+    if key not in _kept:
+        while len(_kept) >= MOST_KEPT:
+            del _kept[next(iter(_kept))]
+        _kept[key] = _build(par, piston, cp, bit, cb)
+    return _kept[key]
+
+
+def _build(
+    par: np.ndarray, piston: Grid | None, cp: np.ndarray, bit: Grid, cb: np.ndarray
+) -> LeapOperators:
+    """Operators of piston and bit; arguments as in `leap_operators`."""
+    n_p = piston.n if piston is not None else 0
+    size_p, size = int(par["size_p"][0]), int(par["size_r"][0])
     alone = _alone(par)
     found = dict(zip(_NAMES, no_operators(), strict=True))
     if piston is not None:

@@ -26,7 +26,7 @@ from percussion_model.solvers.grid import (
     cut,
     section_count,
 )
-from percussion_model.solvers.operators import LEVELS, build_operators, padded
+from percussion_model.solvers.operators import LEVELS, leap_operators, padded
 from percussion_model.solvers.packing import (
     INPUT_FIELDS,
     begin_state,
@@ -82,7 +82,7 @@ class WaveSolver:
         self._par = pack_parameters(scene, self._piston, self._cp, self._bit, self._cb, loss_time)
         self._operators = no_operators()
         if scene.solver.leaps:
-            found = build_operators(self._par, self._piston, self._cp, self._bit, self._cb)
+            found = leap_operators(self._par, self._piston, self._cp, self._bit, self._cb)
             if found is not None:
                 self._operators = found.arrays
                 self._par["leaps"] = LEVELS

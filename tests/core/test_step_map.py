@@ -34,3 +34,24 @@ def test_forms_of_a_step_are_the_energy_it_takes(load, cells, loss):
     lost = sum(step_forms(bar, by_column))
     scale = np.sqrt(np.outer(np.diag(energy), np.diag(energy)))
     np.testing.assert_allclose(0.5 * (lost + lost.T) / scale, taken / scale, atol=1e-11)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "shared"),
+    [
+        ("feed.force", 3e3, True),
+        ("drive.reversal_distance", 0.02, True),
+        ("rock.barrier_energy", 0.1, True),
+        ("rock.loading_stiffness", 7e8, False),
+        ("rock.unloading_ratio", 6.0, False),
+        ("rock.barrier_damping", 2e4, False),
+        ("loss.time", 2e-7, False),
+        ("bit.sections.0.area", 5e-3, False),
+        ("piston.sections.0.density", 7800.0, False),
+        ("solver.cells", 10, False),
+    ],
+)
+def test_scenes_share_the_operators_that_they_have_in_common(key, value, shared):
+    scene = Scene().replace(**{"solver.cells": 5})
+    one, other = WaveSolver(scene), WaveSolver(scene.replace(**{key: value}))
+    assert (one._operators[1] is other._operators[1]) == shared
