@@ -12,6 +12,7 @@ from percussion_model.commands.common import BAD_INPUT, INTERRUPTED, complain
 from percussion_model.commands.compare import compare
 from percussion_model.commands.scene import explain, new, plot, run
 from percussion_model.commands.settled import settled
+from percussion_model.commands.study import study
 from percussion_model.quick_start import own_process
 
 app = typer.Typer(
@@ -40,7 +41,7 @@ def _options(
     """Percussive drilling with travelling waves: piston, bit and rock, blow by blow."""
 
 
-for _command in (run, settled, explain, plot, compare, new):
+for _command in (run, settled, study, explain, plot, compare, new):
     app.command()(_command)
 
 

@@ -44,8 +44,6 @@ class Settled:
     rate_of_penetration_error : float
         Periodic: bound of what convergence would still change, or the scatter
         of the cycles. Aperiodic: the standard error, from batches [m/s].
-    blow_period : float
-        Mean time from blow to blow [s].
     multiplier : float
         What is left of a deviation after one cycle, from the ratio of the last
         two changes; negative where it alternates. The cycle is stable below 1
@@ -62,12 +60,21 @@ class Settled:
     order: int
     rate_of_penetration: float
     rate_of_penetration_error: float
-    blow_period: float
     multiplier: float
     cycle: np.ndarray = field(repr=False)
     blows: np.ndarray = field(repr=False)
     duration: float
     wall_time: float
+
+    @property
+    def counted(self) -> np.ndarray:
+        """Blows that means are taken of: the last cycle, or all after settling."""
+        return self.cycle if self.order else self.blows[int(SETTLING_SHARE * len(self.blows)) :]
+
+    @property
+    def blow_period(self) -> float:
+        """Mean time from blow to blow [s]."""
+        return float(np.mean(self.counted["period"])) if len(self.counted) else math.nan
 
     def summary(self) -> dict[str, Any]:
         """Return the numbers as plain values for JSON; None is what is not defined."""
@@ -238,13 +245,11 @@ def _made(
     simulation: Simulation,
 ) -> Settled:
     cycle = blows[len(blows) - order :]
-    counted = cycle if order else blows[int(SETTLING_SHARE * len(blows)) :]
     return Settled(
         kind=kind,
         order=order,
         rate_of_penetration=rate,
         rate_of_penetration_error=error,
-        blow_period=float(np.mean(counted["period"])) if len(counted) else math.nan,
         multiplier=multiplier,
         cycle=cycle,
         blows=blows,

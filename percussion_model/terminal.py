@@ -6,8 +6,10 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
@@ -20,6 +22,7 @@ if TYPE_CHECKING:
     from percussion_model.scene import Scene
     from percussion_model.solvers import Solver
     from percussion_model.stationary import Settled
+    from percussion_model.study import Study
 
 # A run that ends sooner shows no bar [s].
 _PATIENCE = 2.0
@@ -81,6 +84,29 @@ def show_settled(found: Settled) -> None:
         table.add_row(name, f"{_number(summary[key], factor)} {unit}".rstrip())
     table.add_row("Blows run", f"{len(found.blows)} in {found.duration:.4g} s")
     Console().print(table)
+
+
+def show_study(found: Study, files: list[Path]) -> None:
+    """Print what a study found, in short, and where it is."""
+    kinds, counts = np.unique(found.to_pandas()["kind"], return_counts=True)
+    table = Table(show_header=False)
+    motions = ", ".join(f"{count} {kind}" for kind, count in zip(kinds, counts, strict=True))
+    table.add_row("Points", f"{len(found.points)}: {motions}")
+    rate = found.rows["rate_of_penetration"]
+    if np.isfinite(rate).any():
+        for name, k in (("Lowest rate", np.nanargmin(rate)), ("Highest rate", np.nanargmax(rate))):
+            at = ", ".join(
+                f"{key} = {value:.5g}" for key, value in found.points.changes(int(k)).items()
+            )
+            table.add_row(name, f"{1e3 * rate[k]:.5g} mm/s at {at}")
+    table.add_row("Computed in", f"{found.rows['wall_time'].sum():.3g} s of one core")
+    table.add_row("Written", ", ".join(str(path) for path in files))
+    console = Console()
+    console.print(table)
+    failed = [k for k, text in enumerate(found.failures) if text]
+    if failed:
+        first = f"{found.points.changes(failed[0])}: {found.failures[failed[0]]}"
+        show_warnings(console, [f"{len(failed)} points failed, the first at {first}"])
 
 
 def show_warnings(console: Console, warnings: list[str]) -> None:
@@ -190,6 +216,26 @@ def progress_bar(end: float) -> Iterator[Callable[[float], None] | None]:
         starter.cancel()
         starter.join()
         bar.stop()
+
+
+@contextmanager
+def count_bar(what: str) -> Iterator[Callable[[int, int], None] | None]:
+    """Show on stderr how many of a number of things are done, in a terminal.
+
+    Yields
+    ------
+    callable or None
+        To be called with the number done and that of all.
+    """
+    if not sys.stderr.isatty():
+        yield None
+        return
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemainingColumn
+
+    columns: list[Any] = [BarColumn(), MofNCompleteColumn(), what, TimeRemainingColumn()]
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("", total=None)
+        yield lambda done, total: bar.update(task, completed=done, total=total)
 
 
 def _reporter(bar: Progress, task: TaskID, end: float) -> Callable[[float], None]:

@@ -1,0 +1,87 @@
+"""The stationary response over a grid or a sample of parameters."""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from percussion_model.commands.common import (
+    BAD_INPUT,
+    Cells,
+    SceneFile,
+    Settings,
+    SolverName,
+    complain,
+    load_scene,
+)
+
+# What writes tables and grids; asked for before hours of work, not after.
+NEEDED = ("pandas", "pyarrow", "xarray", "h5netcdf", "h5py")
+
+
+def study(
+    scene: SceneFile,
+    over: Annotated[
+        list[str],
+        typer.Option(
+            "--over",
+            metavar="KEY=FIRST:LAST:COUNT",
+            help="Values of a parameter; COUNTlog for even steps of its logarithm, or KEY=A,B,C. "
+            "May be repeated: the study runs all combinations.",
+        ),
+    ],
+    out: Annotated[
+        Path, typer.Option("--out", metavar="DIR", help="Folder; an interrupted study goes on.")
+    ],
+    samples: Annotated[
+        int | None,
+        typer.Option("--samples", help="So many points of a Latin hypercube instead of the grid."),
+    ] = None,
+    seed: Annotated[int, typer.Option("--seed", help="Of the Latin hypercube.")] = 0,
+    solver: SolverName = None,
+    cells: Cells = None,
+    settings: Settings = None,
+    tolerance: Annotated[
+        float, typer.Option("--tolerance", help="Relative change of a blow that is no change.")
+    ] = 1e-4,
+    processes: Annotated[
+        int | None, typer.Option("--processes", help="On this machine; default: its cores.")
+    ] = None,
+    cluster: Annotated[
+        str | None,
+        typer.Option("--cluster", metavar="ADDRESS", help="Dask scheduler, as tcp://host:8786."),
+    ] = None,
+) -> None:
+    """Map the stationary response over parameters: points.parquet and points.nc."""
+    from percussion_model.study import grid, latin_hypercube, read_axis
+    from percussion_model.study import study as run_study
+    from percussion_model.terminal import count_bar, show_study
+
+    missing = [name for name in NEEDED if importlib.util.find_spec(name) is None]
+    if missing:
+        words = f"a study needs {', '.join(missing)}: pip install 'percussion_model[study]'"
+        raise typer.Exit(complain(words, BAD_INPUT))
+    axes = dict(read_axis(text) for text in over)
+    if len(axes) < len(over):
+        raise typer.Exit(complain("--over: a key stands there twice", BAD_INPUT))
+    if samples is None:
+        points = grid(axes)
+    else:
+        logarithmic = [text.partition("=")[0] for text in over if text.endswith("log")]
+        ends = {key: (float(min(values)), float(max(values))) for key, values in axes.items()}
+        points = latin_hypercube(ends, samples, seed, logarithmic)
+    chosen = load_scene(scene, solver, cells, settings)
+    with count_bar("points") as progress:
+        found = run_study(
+            chosen,
+            points,
+            out,
+            tolerance,
+            processes=processes,
+            cluster=cluster,
+            progress=progress,
+        )
+    show_study(found, found.save(out))

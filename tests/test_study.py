@@ -1,0 +1,221 @@
+"""Studies: points, what is kept of them, and the processes and clusters that run them."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import threading
+import time
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from percussion_model import Scene, SceneError, settled
+from percussion_model.cli import app
+from percussion_model.result_files import ResultError
+from percussion_model.study import grid, latin_hypercube, read_axis, study, table, workers
+from percussion_model.study.store import PARTS
+from percussion_model.study.work import KINDS, run_points
+
+SCENE = Scene(title="rigid bodies").computed_by("rigid")
+AXES = {"feed.force": [1500.0, 2500.0, 4000.0], "rock.loading_stiffness": [3e8, 7.5e8]}
+
+
+def test_a_grid_has_all_combinations():
+    points = grid(AXES)
+    assert (len(points), points.shape, points.is_grid) == (6, (3, 2), True)
+    assert points.changes(3) == {"feed.force": 2500.0, "rock.loading_stiffness": 7.5e8}
+
+
+def test_points_dear_to_set_up_come_together():
+    points = grid(AXES)
+    stiffness = points.values[points.in_cheap_order(), 1]
+    assert np.count_nonzero(np.diff(stiffness)) == 1
+
+
+def test_samples_fill_every_slice_and_repeat_with_their_seed():
+    ranges = {"feed.force": (500.0, 5e3), "rock.loading_stiffness": (1e8, 1e10)}
+    points = latin_hypercube(ranges, 50, seed=3, logarithmic=["rock.loading_stiffness"])
+    slices = np.log(points.values[:, 1] / 1e8) / np.log(100.0) * 50
+    assert sorted(slices.astype(int)) == list(range(50))
+    again = latin_hypercube(ranges, 50, seed=3, logarithmic=["rock.loading_stiffness"])
+    assert again.digest() == points.digest()
+    assert latin_hypercube(ranges, 50, seed=4).digest() != points.digest()
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: grid({}), "at least one parameter"),
+        (lambda: grid({"feed.force": []}), "feed.force: values of a study must be finite"),
+        (lambda: grid({"feed.force": ["much"]}), "feed.force: values of a study must be numbers"),
+        (lambda: table({"feed.force": [1.0], "loss.time": [0, 1]}), "of one length"),
+        (lambda: latin_hypercube({"feed.force": (2.0, 1.0)}, 3), "two rising numbers"),
+        (lambda: latin_hypercube({"feed.force": (0, 1)}, 3, 0, ["feed.force"]), "above 0"),
+        (lambda: latin_hypercube({"feed.force": (0, 1)}, 0), "count = 0"),
+        (lambda: read_axis("feed.force"), "--over feed.force: must be"),
+        (lambda: read_axis("feed.force=1:2"), "must be KEY=FIRST:LAST:COUNT"),
+    ],
+)
+def test_senseless_points_are_refused(make, words):
+    with pytest.raises(SceneError, match=words):
+        make()
+
+
+@pytest.mark.parametrize("key", ["feed.strength", "solver.name", "piston.sections"])
+def test_keys_that_no_study_can_vary_are_refused_at_once(key, tmp_path):
+    with pytest.raises(SceneError, match=key):
+        study(SCENE, grid({key: [1.0]}), tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_axes_of_the_command_line():
+    key, values = read_axis("rock.loading_stiffness=1e8:1e10:3log")
+    assert key == "rock.loading_stiffness"
+    assert values == pytest.approx([1e8, 1e9, 1e10])
+    assert read_axis("feed.force=0:10:3")[1].tolist() == [0.0, 5.0, 10.0]
+    assert read_axis("feed.force=3,7")[1].tolist() == [3.0, 7.0]
+
+
+def test_a_point_has_the_numbers_of_settled_and_whole_numbers_stay_whole():
+    scene = Scene()
+    rows, failures = run_points(scene, ("solver.cells",), np.array([[10.0]]), 1e-4, 400)
+    found = settled(scene.replace(**{"solver.cells": 10}))
+    assert failures == [""]
+    assert rows["rate_of_penetration"][0] == found.rate_of_penetration
+    assert rows["blow_period"][0] == found.blow_period
+    assert KINDS[rows["kind"][0]] == "periodic"
+
+
+def test_what_goes_wrong_at_a_point_is_recorded_and_stops_nothing():
+    rows, failures = run_points(
+        SCENE, ("rock.unloading_ratio",), np.array([[5.0], [0.5], [6.0]]), 1e-4, 400
+    )
+    assert [KINDS[kind] for kind in rows["kind"]][1] == "failed"
+    assert "rock.unloading_ratio = 0.5: must be a number above 1" in failures[1]
+    assert np.isnan(rows["rate_of_penetration"][1])
+    assert np.isfinite(rows["rate_of_penetration"][[0, 2]]).all()
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """A study in two processes."""
+    return study(SCENE, grid(AXES), tmp_path_factory.mktemp("study"), processes=2)
+
+
+def test_processes_find_what_one_finds(whole):
+    points = grid(AXES)
+    rows, _ = run_points(SCENE, points.keys, points.values, 1e-4, 400)
+    for name in set(rows.dtype.names) - {"wall_time"}:
+        np.testing.assert_array_equal(whole.rows[name], rows[name])
+
+
+def test_a_study_becomes_tables_and_grids(whole, tmp_path):
+    import pandas
+    import xarray
+
+    parquet, netcdf = sorted(whole.save(tmp_path / "out"), key=lambda path: path.suffix)[::-1]
+    frame = pandas.read_parquet(parquet)
+    assert frame.equals(whole.to_pandas())
+    with xarray.open_dataset(netcdf) as data:
+        assert data.rate_of_penetration.dims == ("feed.force", "rock.loading_stiffness")
+        assert data.rate_of_penetration.attrs["units"] == "m/s"
+        here = data.rate_of_penetration.sel({"feed.force": 4000.0, "rock.loading_stiffness": 3e8})
+        k = int(np.argmax(np.all(whole.points.values == [4000.0, 3e8], axis=1)))
+        assert float(here) == whole.rows["rate_of_penetration"][k]
+        (tmp_path / "scene.toml").write_text(data.attrs["scene"])
+    assert Scene.from_toml(tmp_path / "scene.toml") == SCENE
+
+
+def test_an_interrupted_study_goes_on_where_it_was(whole, tmp_path):
+    """Ctrl-C after two parts; what was finished is not run again."""
+
+    def interrupt(done, count):
+        if done >= 2:
+            raise KeyboardInterrupt
+
+    folder = tmp_path / "out"
+    with pytest.raises(KeyboardInterrupt):
+        study(SCENE, grid(AXES), folder, processes=1, progress=interrupt)
+    finished = {path.name: path.stat().st_mtime_ns for path in (folder / PARTS).iterdir()}
+    assert 0 < len(finished) < 6
+    seen = []
+    again = study(SCENE, grid(AXES), folder, processes=1, progress=lambda *at: seen.append(at))
+    assert seen[0] == (len(finished), 6)
+    assert seen[-1] == (6, 6)
+    for name, written in finished.items():
+        assert (folder / PARTS / name).stat().st_mtime_ns == written
+    np.testing.assert_array_equal(
+        again.rows["rate_of_penetration"], whole.rows["rate_of_penetration"]
+    )
+
+
+def test_another_study_is_not_mixed_in(tmp_path):
+    folder = tmp_path / "out"
+    with pytest.raises(KeyboardInterrupt):
+        study(
+            SCENE, grid(AXES), folder, progress=lambda *_: (_ for _ in ()).throw(KeyboardInterrupt)
+        )
+    with pytest.raises(ResultError, match="holds another study"):
+        study(SCENE.replace(**{"loss.time": 0.0}), grid(AXES), folder)
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full" / "letter.txt").write_text("dear")
+    with pytest.raises(ResultError, match="is not empty"):
+        study(SCENE, grid(AXES), tmp_path / "full")
+
+
+def test_a_part_that_was_damaged_is_named(whole, tmp_path):
+    study(SCENE, table({"feed.force": [2500.0]}), tmp_path / "out", processes=1)
+    part = next((tmp_path / "out" / PARTS).glob("*.npz"))
+    part.write_bytes(part.read_bytes()[:100])
+    with pytest.raises(ResultError, match=f"{part.name}: cannot be read"):
+        study(SCENE, table({"feed.force": [2500.0]}), tmp_path / "out", processes=1)
+
+
+def die_once(flag, number):
+    """A task whose first worker is killed."""
+    if number == 1 and not os.path.exists(flag):
+        with open(flag, "w"):
+            pass
+        os.kill(os.getpid(), signal.SIGKILL)
+    return number * number
+
+
+@pytest.mark.skipif(os.name == "nt", reason="no SIGKILL there")
+def test_a_worker_that_is_killed_loses_nothing(tmp_path):
+    tasks = [(str(tmp_path / "flag"), number) for number in range(6)]
+    found = dict(workers.on_this_machine(die_once, tasks, 2))
+    assert found == {number: number**2 for number in range(6)}
+
+
+def test_a_cluster_finds_the_same_and_survives_a_worker(whole, tmp_path):
+    distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, dashboard_address=None, silence_logs=50
+    ) as cluster:
+
+        def kill_one():
+            time.sleep(2.0)
+            os.kill(next(iter(cluster.workers.values())).pid, signal.SIGKILL)
+
+        if os.name != "nt":
+            threading.Thread(target=kill_one, daemon=True).start()
+        found = study(SCENE, grid(AXES), tmp_path / "out", cluster=cluster.scheduler_address)
+    for name in set(found.rows.dtype.names) - {"wall_time"}:
+        np.testing.assert_array_equal(found.rows[name], whole.rows[name])
+
+
+def test_the_command_writes_tables_and_tells_what_it_found(tmp_path):
+    scene = tmp_path / "scene.toml"
+    SCENE.to_toml(scene)
+    over = ["--over", "feed.force=1500:2500:2", "--processes", "1"]
+    answer = CliRunner().invoke(app, ["study", str(scene), *over, "--out", str(tmp_path / "out")])
+    assert answer.exit_code == 0
+    assert "2 periodic" in answer.stdout
+    assert {"points.parquet", "points.nc", "study.json"} <= set(os.listdir(tmp_path / "out"))
+    plan = json.loads((tmp_path / "out" / "study.json").read_text())
+    assert plan["keys"] == ["feed.force"]
+    twice = CliRunner().invoke(app, ["study", str(scene), *over, *over, "--out", str(tmp_path)])
+    assert twice.exit_code == 2
