@@ -10,6 +10,7 @@ import typer
 
 from percussion_model.commands.common import BAD_INPUT, INTERRUPTED, complain
 from percussion_model.commands.compare import compare
+from percussion_model.commands.paper import paper
 from percussion_model.commands.scene import explain, new, plot, run
 from percussion_model.commands.settled import settled
 from percussion_model.commands.study import study
@@ -41,7 +42,7 @@ def _options(
     """Percussive drilling with travelling waves: piston, bit and rock, blow by blow."""
 
 
-for _command in (run, settled, study, explain, plot, compare, new):
+for _command in (run, settled, study, explain, plot, compare, paper, new):
     app.command()(_command)
 
 

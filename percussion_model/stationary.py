@@ -206,7 +206,7 @@ def _limit(blows: np.ndarray, order: int) -> tuple[float, float, float]:
     shift = change * ratio / (1.0 - ratio) if abs(ratio) < 1.0 else 0.0
     # Extrapolating by more than the last change would trust the ratio too far.
     shift = float(np.clip(shift, -abs(change), abs(change)))
-    return float(third + shift), abs(change) + abs(shift), ratio
+    return float(third + shift), float(abs(change) + abs(shift)), ratio
 
 
 def _multiplier(blows: np.ndarray, order: int) -> float:

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
 
     from percussion_model.comparison import Comparison
+    from percussion_model.paper.statements import Statement
     from percussion_model.result import Result
     from percussion_model.scene import Scene
     from percussion_model.solvers import Solver
@@ -107,6 +108,21 @@ def show_study(found: Study, files: list[Path]) -> None:
     if failed:
         first = f"{found.points.changes(failed[0])}: {found.failures[failed[0]]}"
         show_warnings(console, [f"{len(failed)} points failed, the first at {first}"])
+
+
+def show_statements(said: list[Statement]) -> None:
+    """Print what the paper says beside what was found."""
+    table = Table(show_lines=True)
+    for heading in ("section", "the paper says", "found here", ""):
+        table.add_column(heading)
+    for one in said:
+        verdict = "[green]agrees[/green]" if one.agrees else "[yellow]differs[/yellow]"
+        table.add_row(one.place, escape(one.says), escape(one.found), verdict)
+    console = Console()
+    console.print(table)
+    for one in said:
+        if one.why and not one.agrees:
+            console.print(f"{one.place}: {escape(one.why)}", highlight=False)
 
 
 def show_warnings(console: Console, warnings: list[str]) -> None:

@@ -1,0 +1,67 @@
+"""Section 4 of the paper, as `percussion paper` checks it: the cheap part of it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from percussion_model import simulate
+from percussion_model.paper import paper_scene
+from percussion_model.paper.drop import run_drops
+from percussion_model.paper.statements import SAME_EXPONENT, about_cycle, about_drops
+from percussion_model.paper.sweeps import (
+    Sweep,
+    along,
+    force_at_constant_power,
+    maxima,
+    power_law,
+    run_sweep,
+    straight_line,
+)
+from percussion_model.plotting.window import last_blow_window
+
+
+def test_fits_find_what_was_put_in():
+    x = np.geomspace(1.0, 100.0, 9)
+    exponent, factor = power_law(x, 3.0 * x**-0.55)
+    assert (exponent, factor) == pytest.approx((-0.55, 3.0))
+    slope, intercept, explained = straight_line(x, 2.0 * x + 1.0)
+    assert (slope, intercept, explained) == pytest.approx((2.0, 1.0, 1.0))
+    assert straight_line(x, np.sin(40.0 * x))[2] < 0.5
+    assert maxima(np.arange(6.0), np.array([0.0, 2.0, 1.0, 1.5, 1.0, 3.0])).tolist() == [1.0, 3.0]
+
+
+def test_power_is_kept():
+    """Eq. 14 of the paper: F_0^3 D_1 does not change."""
+    distance = np.array([0.001, 0.04, 0.1])
+    force = force_at_constant_power(paper_scene(), distance)
+    assert force**3 * distance == pytest.approx(np.full(3, 3000.0**3 * 0.04))
+
+
+def test_drop_tests_show_what_section_4_2_says():
+    said = list(about_drops(run_drops(paper_scene())))
+    assert len(said) == 4
+    for one in said:
+        assert one.agrees, f"{one.says}: {one.found}"
+
+
+def test_the_stationary_blow_is_that_of_section_4_3():
+    result = simulate(paper_scene(), 2.0, 1.0)
+    window = last_blow_window(result)
+    said = list(about_cycle(result, window.samples, window.origin))
+    assert len(said) == 7
+    for one in said:
+        assert one.agrees, f"{one.says}: {one.found}"
+
+
+@pytest.mark.parametrize(
+    ("key", "values", "exponent"),
+    [
+        ("rock.loading_stiffness", np.geomspace(1e8, 1e10, 9), -0.55),
+        ("drive.reversal_distance", np.geomspace(8e-3, 0.1, 7), -0.36),
+    ],
+)
+def test_exponents_of_section_4_4(key, values, exponent, tmp_path):
+    found = run_sweep(paper_scene(), Sweep("x", key, values), tmp_path / "x", processes=1)
+    x, rate, _periodic = along(found)
+    assert power_law(x, rate)[0] == pytest.approx(exponent, abs=SAME_EXPONENT)
