@@ -8,6 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
+from percussion_model.commands.blow_map import blow_map
 from percussion_model.commands.common import BAD_INPUT, INTERRUPTED, complain
 from percussion_model.commands.compare import compare
 from percussion_model.commands.scene import explain, new, plot, run
@@ -41,6 +42,7 @@ def _options(
 
 for _command in (run, explain, plot, compare, new):
     app.command()(_command)
+app.command("blow-map")(blow_map)
 
 
 def main() -> None:

@@ -174,6 +174,25 @@ def progress_bar(end: float) -> Iterator[Callable[[float], None] | None]:
         bar.stop()
 
 
+@contextmanager
+def part_bar(title: str) -> Iterator[Callable[[int, int], None] | None]:
+    """Show a bar on stderr, in a terminal, for a job of many parts.
+
+    Yields
+    ------
+    callable or None
+        To be called with the parts done and their number.
+    """
+    if not sys.stderr.isatty():
+        yield None
+        return
+    from rich.progress import Progress
+
+    with Progress(console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(title, total=None)
+        yield lambda done, total: bar.update(task, completed=done, total=total)
+
+
 def _reporter(bar: Progress, task: TaskID, end: float) -> Callable[[float], None]:
     def report(t: float) -> None:
         bar.update(task, completed=t, total=end, description=f"{t:.4g} s of {end:g} s")

@@ -10,6 +10,7 @@ from weakref import WeakValueDictionary
 
 import numpy as np
 
+from fmu_src.runtime.folder import read_blow_map
 from fmu_src.runtime.motion import Gauge, Motion
 from fmu_src.runtime.outputs import OUTPUTS
 from fmu_src.runtime.plain_scene import PlainScene, make_scene
@@ -19,6 +20,7 @@ from percussion_model.inputs import INPUTS
 from percussion_model.parameter_rows import Row, refuse_value
 from percussion_model.scene_rules import SceneRules
 from percussion_model.solvers import Solver
+from percussion_model.solvers.blow_map import BlowMapSolver
 from percussion_model.solvers.grid import cell_at
 
 # Solvers hold no state: instances of equal parameters share one.
@@ -49,7 +51,8 @@ class PercussiveHammer(Slave):
 
     def __init__(self, **arguments: Any) -> None:
         super().__init__(**arguments)
-        text = (Path(arguments["resources"]) / "scene.json").read_text(encoding="utf-8")
+        self.folder = str(arguments["resources"])
+        text = (Path(self.folder) / "scene.json").read_text(encoding="utf-8")
         scene = json.loads(text)
         self.baked: dict[str, Any] = scene["values"]
         self.given: set[str] = set(scene["given"])
@@ -130,12 +133,18 @@ class PercussiveHammer(Slave):
             self.given_inputs = [self.values[one.reference] for one in self.inputs]
             self.fingerprint = fingerprint(self.identity, self.parameters())
             key = fingerprint(self.identity, self.parameters(), self.given_inputs)
-            self.motion = Motion(scene, _SOLVERS.get(key))
+            self.motion = Motion(scene, _SOLVERS.get(key) or self.map_solver(scene))
             _SOLVERS[key] = self.motion.solver
             self.motion.gauge = self.find_gauge(scene, self.motion.solver)
             self._acting = self.solver_inputs()
             self._dirty = False
         return self.motion
+
+    def map_solver(self, scene: PlainScene) -> Solver | None:
+        """Solver on the table that the FMU brings along, if the scene wants that."""
+        if scene.solver_name != "blow-map":
+            return None
+        return BlowMapSolver(scene, read_blow_map(self.folder))
 
     def parameters(self) -> list[Any]:
         """Values of all parameters, in the order of their references."""

@@ -93,6 +93,26 @@ class WaveSolver:
         self._no_blows = np.zeros(1, BLOW)
         self._no_events = np.zeros(1, EVENT)
 
+    @property
+    def parameters(self) -> np.void:
+        """Parameter record of the kernels."""
+        return self._par[0]
+
+    @property
+    def piston_coefficients(self) -> np.ndarray:
+        """Rows of `Coef` of the piston, empty where it has no cells."""
+        return self._cp
+
+    @property
+    def bit_coefficients(self) -> np.ndarray:
+        """Rows of `Coef` of the bit."""
+        return self._cb
+
+    @property
+    def static_wave(self) -> np.ndarray:
+        """Down-going wave of a bit at rest under unit body acceleration, by cell [s]."""
+        return self._cb[Coef.STATIC, : self._bit.n]
+
     def new_state(self) -> WaveState:
         """State at time zero."""
         scene, start = self.scene, self.scene.start
