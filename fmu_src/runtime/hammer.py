@@ -66,6 +66,8 @@ class PercussiveHammer(Slave):
         self.fingerprint = b""
         self._acting: dict[str, float] = {}  # inputs as the solver has them
         self._dirty = False
+        self._new: set[int] = set()  # inputs to be checked
+        self._acts: dict[str, bool] = {}
 
     # parameters and inputs
 
@@ -78,6 +80,8 @@ class PercussiveHammer(Slave):
         self._dirty = True
         if self.phase < Phase.STEPPING:
             self.motion = None
+        else:
+            self._new.add(reference)
 
     def check(self, references: Any) -> None:
         """Check bounds, the drive force, and contradictions between parameters."""
@@ -137,6 +141,7 @@ class PercussiveHammer(Slave):
             _SOLVERS[key] = self.motion.solver
             self.motion.gauge = self.find_gauge(scene, self.motion.solver)
             self._acting = self.solver_inputs()
+            self._acts = {}
             self._dirty = False
         return self.motion
 
@@ -173,7 +178,8 @@ class PercussiveHammer(Slave):
         motion = self.ready()
         changes: dict[str, float] = {}
         if self._dirty:
-            self.check([one.reference for one in self.inputs])
+            self.check(self._new)
+            self._new.clear()
             wanted = self.solver_inputs()
             for name, value in wanted.items():
                 if value != self._acting[name] and self.acts(motion.scene, name):
@@ -184,9 +190,12 @@ class PercussiveHammer(Slave):
 
     def acts(self, scene: SceneRules, name: str) -> bool:
         """Whether an input has an effect in the scene; says so in the log where not."""
-        acts = scene.matters(INPUTS[name])
-        if name.startswith("barrier"):
-            acts = acts and scene.barrier_on
+        acts = self._acts.get(name)
+        if acts is None:
+            acts = scene.matters(INPUTS[name])
+            if name.startswith("barrier"):
+                acts = acts and scene.barrier_on
+            self._acts[name] = acts
         if not acts:
             outside = NAMES_OUTSIDE.get(name, name)
             self.warn(f"{self.instance_name}: a new {outside} has no effect in this scene")

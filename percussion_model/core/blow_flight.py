@@ -158,3 +158,15 @@ def move(par, s, t):
     s.y += way
     s.v += a * since
     s.t = t
+
+
+@kernel
+def commit(pars, states, t):
+    """Start a new piece of flight at `t`, for arrays of one record."""
+    move(pars[0], states[0], t)
+
+
+@kernel
+def plan_next(pars, states):
+    """Plan the present piece of flight, for arrays of one record."""
+    plan(pars[0], states[0])

@@ -259,8 +259,15 @@ def happen(par, s, table, found, blows, n_blows, events, n_events, events_on):
 
 
 @kernel
-def advance(par, s, table, found, t, blows, events, events_on, counts):
-    """Let all that happens up to `t` happen; `counts` gets the rows filled."""
+def advance(pars, states, table, found, t, blows, events, events_on, counts):
+    """Let all that happens up to `t` happen; `counts` gets the rows filled.
+
+    Parameters
+    ----------
+    pars, states : arrays of BLOW_PAR and BLOW_STATE of length 1
+    """
+    par = pars[0]
+    s = states[0]
     n_blows = 0
     n_events = 0
     status = DONE

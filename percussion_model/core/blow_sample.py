@@ -11,12 +11,19 @@ SHORT = len(SAMPLE_FIELDS)
 
 
 @kernel
-def read(par, s, t, row):
+def read(pars, states, t, row):
     """Fill a row (`SAMPLE_FIELDS`, or `LONG_SAMPLE_FIELDS` where it is long) at `t`.
 
     The bit is a rigid body on the path of the table. Its force is the static one, and
     what a blow gives to bodies and ledger is theirs from the start of the blow on.
+
+    Parameters
+    ----------
+    pars, states : arrays of BLOW_PAR and BLOW_STATE of length 1
+        A record by itself takes Python longer to pass than all of this.
     """
+    par = pars[0]
+    s = states[0]
     since = t - s.t
     a = acceleration(par, s)
     drive = s.alpha * s.drive_force

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from percussion_model.core import blow_map as kernel
-from percussion_model.core.blow_flight import move, plan
+from percussion_model.core.blow_flight import commit, plan_next
 from percussion_model.core.blow_records import BLOW_PAR, BLOW_STATE, ENTRIES, Axis, Refusal
 from percussion_model.core.blow_sample import read
 from percussion_model.core.kernel import entry_of
@@ -113,6 +113,8 @@ class BlowMapSolver:
         self._counts = np.zeros(2, np.int64)
         self._advance: Callable[..., int] = kernel.advance
         self._read: Callable[..., None] = read
+        self._move: Callable[..., None] = commit
+        self._plan_next: Callable[..., None] = plan_next
         self._load_kernels()
 
     def _load_kernels(self) -> None:
@@ -120,8 +122,10 @@ class BlowMapSolver:
         state = self.new_state()
         state.numbers[T_NEXT] = np.inf
         self._call(state, 0.0, np.zeros(1, BLOW), np.zeros(1, EVENT), False)
-        self._read(self._par[0], state.record[0], 0.0, np.zeros(len(LONG_SAMPLE_FIELDS)))
+        self._read(self._par, state.record, 0.0, np.zeros(len(LONG_SAMPLE_FIELDS)))
+        self.commit(state, 0.0)
         self._advance, self._read = entry_of(kernel.advance), entry_of(read)
+        self._move, self._plan_next = entry_of(commit), entry_of(plan_next)
 
     def _parameters(self) -> np.ndarray:
         par = np.zeros(1, BLOW_PAR)
@@ -158,7 +162,7 @@ class BlowMapSolver:
         return state
 
     def _plan(self, state: MapState) -> None:
-        plan(self._par[0], state.record[0])
+        self._plan_next(self._par, state.record)
 
     def time(self, state: MapState) -> float:
         """Start of the present piece of flight [s]."""
@@ -188,8 +192,8 @@ class BlowMapSolver:
     ) -> int:
         return int(
             self._advance(
-                self._par[0],
-                state.record[0],
+                self._par,
+                state.record,
                 self._values,
                 self._found,
                 float(t),
@@ -244,7 +248,7 @@ class BlowMapSolver:
         MapState
             The state itself: reading moves nothing.
         """
-        self._read(self._par[0], state.record[0], t, row)
+        self._read(self._par, state.record, t, row)
         return state
 
     def fields(self, state: MapState) -> dict[str, np.ndarray]:
@@ -266,7 +270,7 @@ class BlowMapSolver:
 
     def commit(self, state: MapState, t: float) -> None:
         """Start a new piece of flight at `t`, so that inputs can change."""
-        move(self._par[0], state.record[0], float(t))
+        self._move(self._par, state.record, float(t))
 
     def set_inputs(self, state: MapState, **inputs: float) -> None:
         """Change inputs of a committed state.
