@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import itertools
+import json
 import math
 import os
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ from blow_map_scenes import RANGES, mapped
 
 from percussion_model import Scene, SceneError, Simulation, SimulationError, piston_cycle, simulate
 from percussion_model.blow_maps import kept_map, make_map, map_file, node_count
+from percussion_model.cli import _guarded, app
 from percussion_model.core.blow_records import ENTRIES, Axis, Entry
 from percussion_model.solvers.blow_builder import build_table, get_table
 from percussion_model.solvers.blow_map import BlowMapSolver
@@ -464,3 +467,42 @@ def test_nodes_cover_the_ranges():
         ]
         for corner in np.ndindex(2, 2, 2):
             assert tuple(int(c + d) for c, d in zip(cell, corner, strict=True)) in wanted
+
+
+# ------------------------------------------------------------------- ladder, command
+
+
+def test_the_rigid_rung_is_the_rigid_scene():
+    """An elastic scene on the rigid rung gives the bits of one whose bodies are rigid."""
+    rung = simulate(Scene().replace(**{"solver.fidelity": "rigid"}), 1.0, settle=0.2)
+    rigid = simulate(Scene().computed_by("rigid"), 1.0, settle=0.2)
+    assert rung.solver == rigid.solver == "rigid"
+    assert rung.blows.tobytes() == rigid.blows.tobytes()
+    assert not rung.warnings
+
+
+def test_a_name_says_how_waves_are_computed_and_nothing_else():
+    with pytest.raises(SceneError, match=r"solver\.fidelity = \"rigid\" and solver\.name"):
+        Scene().replace(**{"solver.fidelity": "rigid", "solver.name": "fem"})
+    assert Scene().computed_by("blow-map").solver_name == "blow-map"
+    assert Scene().computed_by("blow-map").computed_by("fem").solver_name == "fem"
+
+
+def test_the_command_makes_shows_and_finds_a_table(cache, tmp_path, capsys):
+    path = tmp_path / "scene.toml"
+    mapped(**TINY).to_toml(path)
+
+    def call(*words):
+        assert not _guarded(lambda: app(["blow-map", str(path), *words], standalone_mode=False))
+        return capsys.readouterr().out
+
+    file = Path(call("where").strip())
+    assert file.parent == cache
+    assert "not made yet" in call("show")
+    assert not file.exists()
+    assert "kept" in call("--workers", "1")
+    assert file.exists()
+    told = json.loads(call("show", "--json", "-"))
+    assert told["made"]
+    assert told["restless_nodes"] == 0
+    assert told["range"]["feed_force"] == list(RANGES["feed"])
