@@ -145,11 +145,11 @@ def test_a_blow_scales_with_its_velocity_without_a_barrier():
 # -------------------------------------------------------------------------- table
 
 
-def points(ranges, count, seed):
+def points(ranges, seed):
     """Scenes at random places of a table's range; the impact velocity follows from D_1."""
     rng = np.random.default_rng(seed)
     piston = Scene().piston.mass
-    for _ in range(count):
+    while True:
         force = rng.uniform(*ranges["force"])
         slow, fast = ranges["velocity"]
         v = rng.uniform(slow + 0.5, fast - 0.5)
@@ -164,15 +164,21 @@ def points(ranges, count, seed):
 
 
 def check_points(scene_of, ranges, count, seed):
-    worst = 0.0
-    for changes in points(ranges, count, seed):
+    left = count
+    for changes in points(ranges, seed):
         scene = scene_of(**changes)
-        fast = simulate(scene, 2.5, settle=0.5, record_events=False)
+        try:
+            fast = simulate(scene, 2.5, settle=0.5, record_events=False)
+        except SimulationError as error:  # not a point inside the table
+            if "the bit stands still" not in str(error):
+                raise
+            continue
         wave = simulate(scene.computed_by("wave"), 2.5, settle=0.5, record_events=False)
         off = fast.rate_of_penetration / wave.rate_of_penetration - 1
         assert abs(off) < 0.02, changes
-        worst = max(worst, abs(off))
-    return worst
+        left -= 1
+        if left == 0:
+            return
 
 
 def test_the_rate_is_that_of_the_waves_at_random_points(table):
