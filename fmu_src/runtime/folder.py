@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 from percussion_model.parameter_rows import Row
-from percussion_model.solvers.blow_table import BlowTable
 
 
 @dataclass(frozen=True)
@@ -45,23 +44,6 @@ def read_variables(folder: str) -> dict[int, Known]:
         )
         known[variable.reference] = variable
     return known
-
-
-@functools.cache
-def read_blow_map(folder: str) -> BlowTable:
-    """Table of blows that the FMU in a folder brings along.
-
-    Raises
-    ------
-    ValueError
-        If there is none.
-    """
-    path = Path(folder) / "blow_map.npz"
-    if not path.is_file():
-        raise ValueError(
-            'solver.fidelity = "blow-map": this FMU brings no blow map; build it with --blow-map'
-        )
-    return BlowTable.from_bytes(path.read_bytes())
 
 
 @functools.cache

@@ -10,7 +10,7 @@ from weakref import WeakValueDictionary
 
 import numpy as np
 
-from fmu_src.runtime.folder import read_blow_map
+from fmu_src.runtime.blow_map import read_blow_map
 from fmu_src.runtime.motion import Gauge, Motion
 from fmu_src.runtime.outputs import OUTPUTS
 from fmu_src.runtime.plain_scene import PlainScene, make_scene

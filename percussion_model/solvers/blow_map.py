@@ -9,7 +9,7 @@ import numpy as np
 
 from percussion_model.core import blow_map as kernel
 from percussion_model.core.blow_flight import commit, plan_next
-from percussion_model.core.blow_records import BLOW_PAR, BLOW_STATE, ENTRIES, Axis, Refusal
+from percussion_model.core.blow_records import BLOW_PAR, BLOW_STATE, ENTRIES
 from percussion_model.core.blow_sample import read
 from percussion_model.core.kernel import entry_of
 from percussion_model.core.records import (
@@ -21,6 +21,7 @@ from percussion_model.core.records import (
     Status,
 )
 from percussion_model.scene_rules import SceneError
+from percussion_model.solvers.blow_refusals import explain_refusal
 from percussion_model.solvers.blow_table import BlowTable, fixed_values
 
 if TYPE_CHECKING:
@@ -43,12 +44,6 @@ _FIXED = {
     "unloading_ratio": "rock.unloading_ratio",
     "barrier_damping": "rock.barrier_damping",
     "barrier_energy": "rock.barrier_energy",
-}
-_NAMES = {
-    Refusal.STIFFNESS: (Axis.STIFFNESS, "rock.loading_stiffness", "N/m"),
-    Refusal.VELOCITY: (Axis.VELOCITY, "the impact velocity", "m/s"),
-    Refusal.FEED: (Axis.LOAD, "feed.force", "N"),
-    Refusal.DRIVE: (Axis.DRIVE, "drive.force", "N"),
 }
 # A bit that hangs further above the rock at the start does not stand on it [m].
 MOST_ROCK_GAP = 1e-3
@@ -206,32 +201,7 @@ class BlowMapSolver:
 
     def refusal(self, state: MapState) -> str:
         """Say why the map did not answer."""
-        s = state.record[0]
-        reason, value = Refusal(int(s["refusal"])), float(s["refused_value"])
-        if reason in _NAMES:
-            axis, name, unit = _NAMES[reason]
-            low, high = self.table.lowest[axis], self.table.highest[axis]
-            return (
-                f"{name} = {value:.6g} {unit}: the blow map covers {low:.6g} to {high:.6g} {unit}"
-            )
-        if reason == Refusal.MOVING:
-            rest = float(s["rest"])
-            until = f"after {1e3 * rest:.3g} ms" if np.isfinite(rest) else "in no time of the table"
-            return (
-                f"the piston strikes {1e3 * value:.3g} ms after the last blow, but at "
-                f"feed.force = {float(s['feed']):.6g} N the bit stands still {until}: "
-                "the blow map holds for a bit at rest alone; take solver.fidelity = 'wave'"
-            )
-        if reason == Refusal.TURNED:
-            return (
-                f"drive.reversal_distance = {value:.6g} m: the drive turns before the last "
-                "contact of the blow has opened, which the blow map does not know; "
-                "take solver.fidelity = 'wave'"
-            )
-        return (
-            f"drive.force = {value:.6g} N: the piston falls back on the bit before "
-            "drive.reversal_distance; the blow map does not know such contacts"
-        )
+        return explain_refusal(self.table, state.record[0])
 
     def sample(self, state: MapState, times: np.ndarray, out: np.ndarray) -> None:
         """Evaluate at `times` without touching the state (`SAMPLE_FIELDS`)."""

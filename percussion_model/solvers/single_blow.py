@@ -17,7 +17,6 @@ from percussion_model.core.records import (
     Mode,
     Status,
 )
-from percussion_model.core.totals import resync
 from percussion_model.core.wave_records import Row
 from percussion_model.parameter_rows import Row as ParameterRow
 from percussion_model.scene_rules import SceneRules
@@ -128,7 +127,7 @@ class SingleBlow:
         s["mode"], s["p"] = Mode.SS, load / s["k_r"]
         s["p_u"] = s["p"] - load / (s["gamma"] * s["k_r"])
         s["x_r"] = 0.0
-        resync(solver.parameters, s, wp, solver.piston_coefficients, wb, solver.bit_coefficients)
+        solver.derive(state)
         return state
 
     def entries(self, velocity: float, load: float, drive: float) -> np.ndarray:

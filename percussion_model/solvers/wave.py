@@ -93,20 +93,10 @@ class WaveSolver:
         self._no_blows = np.zeros(1, BLOW)
         self._no_events = np.zeros(1, EVENT)
 
-    @property
-    def parameters(self) -> np.void:
-        """Parameter record of the kernels."""
-        return self._par[0]
-
-    @property
-    def piston_coefficients(self) -> np.ndarray:
-        """Rows of `Coef` of the piston, empty where it has no cells."""
-        return self._cp
-
-    @property
-    def bit_coefficients(self) -> np.ndarray:
-        """Rows of `Coef` of the bit."""
-        return self._cb
+    def derive(self, state: WaveState) -> None:
+        """Derive the mean velocities and u_r of a state whose gap and waves were set."""
+        wp, wb = state.bars
+        resync(self._par[0], state.record[0], wp, self._cp, wb, self._cb)
 
     @property
     def static_wave(self) -> np.ndarray:
@@ -130,7 +120,7 @@ class WaveSolver:
             wp[Row.DOWN : Row.UP + 1, :n_p] = 0.5 * start.piston_velocity
         s["v_p"] = start.piston_velocity if has_piston else 0.0
         s["v_b"] = start.bit_velocity
-        resync(self._par[0], s, wp, self._cp, wb, self._cb)
+        self.derive(state)
         s["u_start"] = s["u_r"]
         s["e_start"] = sum(self._stored(state))
         return state
