@@ -29,6 +29,9 @@ def main(arguments: list[str]) -> int:
     parser.add_argument(
         "--no-reference", action="store_true", help="do not run it for _in.csv and _ref.csv"
     )
+    parser.add_argument(
+        "--blow-map", action="store_true", help="bring the table that solver.fidelity needs along"
+    )
     choice = parser.parse_args(arguments)
     try:
         if choice.pneumatics:
@@ -36,7 +39,12 @@ def main(arguments: list[str]) -> int:
             print(f"{path} {{{build_pneumatics(path)}}}")
             return 0
         scene = Scene.from_toml(choice.scene or ROOT / "scenarios" / "reference.toml")
-        guid = build_hammer(scene, choice.output)
+        table = None
+        if choice.blow_map or scene.solver_name == "blow-map":
+            from percussion_model.blow_maps import make_map
+
+            table = make_map(scene)
+        guid = build_hammer(scene, choice.output, table)
     except (SceneError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 1

@@ -29,7 +29,7 @@ def write_fmu(
     variables: Sequence[Variable],
     bundle: Bundle,
     slave: tuple[str, str],
-    resources: dict[str, str],
+    resources: dict[str, str | bytes],
     page: str,
 ) -> str:
     """Write an FMU and return its GUID.
@@ -45,7 +45,7 @@ def write_fmu(
     """
     module, text = script(bundle, *slave)
     entries: dict[str, bytes] = {
-        f"resources/{name}": content.encode()
+        f"resources/{name}": content if isinstance(content, bytes) else content.encode()
         for name, content in {
             **bundle.files, **resources, f"{module}.py": text, "slavemodule.txt": module,
         }.items()

@@ -16,18 +16,21 @@ from fmu_src.staging import stage
 from fmu_src.variables import Variable, plain_row
 from percussion_model.parameter_table import parameter_table
 from percussion_model.scene import Scene, SceneError
+from percussion_model.solvers.blow_table import BlowTable, fixed_values
 
-RUNTIME = ("folder", "slave", "plain_scene", "motion", "outputs", "states", "hammer")
+RUNTIME = ("folder", "slave", "plain_scene", "motion", "outputs", "states", "blow_map", "hammer")
 STEP_SIZE = 1e-3  # of the default experiment [s]
 AUTHOR = "percussion_model developers"
 LICENSE = "BSD-3-Clause"
 
 
-def build_hammer(scene: Scene, path: Path) -> str:
+def build_hammer(scene: Scene, path: Path, blow_map: BlowTable | None = None) -> str:
     """Write the FMU of a scene; return its GUID.
 
     Parameters
     ----------
+    blow_map : BlowTable, optional
+        What `solver.fidelity = "blow-map"` needs; the FMU runs without it otherwise.
     path : Path
         Ends with `.fmu`; the rest of its name is the model identifier.
 
@@ -39,10 +42,13 @@ def build_hammer(scene: Scene, path: Path) -> str:
     about = about_hammer(scene, path)
     variables = hammer_variables(scene)
     bundle = stage("percussive_hammer", RUNTIME, with_model=True)
-    resources = {
+    resources: dict[str, str | bytes] = {
         "variables.json": _json([variable.for_instance() for variable in variables]),
         "scene.json": _json(_scene(scene, variables, bundle.name)),
     }
+    if blow_map is not None:
+        blow_map.refuse_other(fixed_values(scene))
+        resources["blow_map.npz"] = blow_map.to_bytes()
     page = write_page(about, variables, scene)
     return write_fmu(
         path, about, variables, bundle, ("hammer", "PercussiveHammer"), resources, page

@@ -154,7 +154,7 @@ def _parameters(scene: Scene) -> Iterator[Variable]:
         group = row.key.partition(".")[0]
         if row.kind == "sections":
             yield from _sections(scene, group)
-        if row.kind == "sections" or "*" in row.key or group == "run":
+        if row.kind == "sections" or "*" in row.key or group in ("blow_map", "run"):
             continue
         if row.key not in replaced:
             yield _parameter(row.key, row, scene[row.key])

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
+from percussion_model.commands.blow_map import blow_map
 from percussion_model.commands.common import BAD_INPUT, INTERRUPTED, complain
 from percussion_model.commands.compare import compare
 from percussion_model.commands.paper import paper
@@ -44,6 +45,7 @@ def _options(
 
 for _command in (run, settled, study, explain, plot, compare, paper, new):
     app.command()(_command)
+app.command("blow-map")(blow_map)
 
 
 def main() -> None:

@@ -120,7 +120,7 @@ def read_solvers(text: str) -> tuple[str, ...]:
         If there is none, or one that is not known or stands there twice.
     """
     names = tuple(name.strip() for name in text.split(","))
-    known = [name for name in get_args(SolverName) if name != "auto"]
+    known = [name for name in get_args(SolverName) if name != "auto"] + ["blow-map"]
     for name in names:
         if name not in known:
             raise SceneError(f"--solvers {text}: {name!r} is no solver: {', '.join(known)}")

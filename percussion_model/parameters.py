@@ -32,7 +32,12 @@ from percussion_model.parameter_fields import (
     quantity,
 )
 from percussion_model.scene_rules import BarNumbers, SectionNumbers
-from percussion_model.solver_options import FemOptions, RunOptions, SolverOptions
+from percussion_model.solver_options import (
+    BlowMapOptions,
+    FemOptions,
+    RunOptions,
+    SolverOptions,
+)
 
 # Table II of the paper as repaired in docs/model.md.
 STEEL_YOUNGS_MODULUS = 210e9
@@ -231,5 +236,6 @@ GROUPS: dict[str, type[Parameters]] = {
     "start": Start,
     "solver": SolverOptions,
     "fem": FemOptions,
+    "blow_map": BlowMapOptions,
     "run": RunOptions,
 }

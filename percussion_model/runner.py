@@ -100,6 +100,9 @@ class Runner:
             if status not in _FULL:
                 break
         where = f"at t = {self.solver.time(self._state)!r} s"
+        refusal = getattr(self.solver, "refusal", None)
+        if refusal is not None and status == Status.REFUSED:
+            raise SimulationError(f"after t = {self._time!r} s {refusal(self._state)}")
         if status == Status.NOT_FINITE:
             raise SimulationError(f"{where} the state is no longer finite: check the scene")
         raise SimulationError(f"{where} the solver found no way on ({Status(status).name.lower()})")

@@ -34,7 +34,12 @@ from percussion_model.scene_text import (
     unknown_key,
     write_text,
 )
-from percussion_model.solver_options import FemOptions, RunOptions, SolverOptions
+from percussion_model.solver_options import (
+    BlowMapOptions,
+    FemOptions,
+    RunOptions,
+    SolverOptions,
+)
 
 __all__ = ["Scene", "SceneError", "read_setting"]
 
@@ -61,6 +66,7 @@ class Scene(SceneRules, BaseModel):
     start: Start = Start()
     solver: SolverOptions = SolverOptions()
     fem: FemOptions = FemOptions()
+    blow_map: BlowMapOptions = BlowMapOptions()
     run: RunOptions = RunOptions()
 
     def __init__(self, **values: Any) -> None:
@@ -141,7 +147,8 @@ class Scene(SceneRules, BaseModel):
 
     def computed_by(self, solver: str, **changes: Any) -> Self:
         """Return the scene for a solver, with other changes; rigid makes piston and bit rigid."""
-        changes["solver.name"] = solver
+        changes["solver.fidelity"] = "blow-map" if solver == "blow-map" else None
+        changes["solver.name"] = "auto" if solver == "blow-map" else solver
         if solver == "rigid":
             changes["bit.model"] = "rigid"
             if changes.get("piston.model", self.piston.model) == "elastic":

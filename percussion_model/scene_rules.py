@@ -87,6 +87,7 @@ class SceneRules:
         start: Any
         solver: Any
         fem: Any
+        blow_map: Any
         run: Any
 
     def row_of(self, key: str) -> Row:
@@ -114,7 +115,9 @@ class SceneRules:
 
     @property
     def solver_name(self) -> str:
-        """Solver that computes the scene: "wave", "fem" or "rigid"."""
+        """Solver that computes the scene: "wave", "fem", "rigid" or "blow-map"."""
+        if self.bit.model == "elastic" and self.solver.fidelity != "wave":
+            return str(self.solver.fidelity)
         if self.solver.name != "auto":
             return str(self.solver.name)
         return "wave" if self.bit.model == "elastic" else "rigid"
@@ -122,7 +125,7 @@ class SceneRules:
     @property
     def loss_on(self) -> bool:
         """Whether bars lose energy to structural loss."""
-        return bool(self.effects.loss and self.bit.model == "elastic" and self.loss.time > 0)
+        return bool(self.effects.loss and self.solver_name != "rigid" and self.loss.time > 0)
 
     @property
     def barrier_on(self) -> bool:
@@ -154,6 +157,7 @@ def refuse_contradictions(scene: SceneRules) -> None:
             'solver.name = "rigid" computes no elastic bars: set piston.model = "rigid" and '
             'bit.model = "rigid", or solver.name = "wave", "fem" or "auto"'
         )
+    _refuse_fidelity(scene)
     if effects.barrier and effects.rock != "bilinear" and "effects.barrier" in scene.given:
         raise SceneError(
             f'effects.barrier = true needs effects.rock = "bilinear", not "{effects.rock}": '
@@ -163,3 +167,33 @@ def refuse_contradictions(scene: SceneRules) -> None:
         raise SceneError(
             f"run.settle = {run.settle!r} s: must be below run.duration = {run.duration!r} s"
         )
+
+
+# What the blow map is a table of, and the ranges that must rise.
+_MAPPED = {"effects.drive": "pressure", "effects.rock": "bilinear", "bit.model": "elastic"}
+_RANGES = ("velocity", "feed", "force", "stiffness")
+
+
+def _refuse_fidelity(scene: SceneRules) -> None:
+    """Raise `SceneError` if a scene asks for a fidelity that it cannot have."""
+    fidelity = scene.solver.fidelity
+    if fidelity == "wave":
+        return
+    if scene.solver.name != "auto":
+        raise SceneError(
+            f'solver.fidelity = "{fidelity}" and solver.name = "{scene.solver.name}": a name '
+            'says how elastic waves are computed; leave it "auto"'
+        )
+    if fidelity != "blow-map":
+        return
+    for key, wanted in _MAPPED.items():
+        if scene[key] != wanted:
+            raise SceneError(
+                f'solver.fidelity = "blow-map" needs {key} = "{wanted}", not "{scene[key]}"'
+            )
+    for name in _RANGES:
+        low, high = scene[f"blow_map.{name}_from"], scene[f"blow_map.{name}_to"]
+        if not low < high:
+            raise SceneError(
+                f"blow_map.{name}_from = {low!r}: must be below blow_map.{name}_to = {high!r}"
+            )

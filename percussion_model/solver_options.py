@@ -5,6 +5,8 @@ from __future__ import annotations
 from typing import Literal
 
 from percussion_model.parameter_fields import (
+    BLOW_MAP,
+    HAS_WAVES,
     LOSS_ON,
     SOLVER_FEM,
     SOLVER_WAVE,
@@ -15,6 +17,7 @@ from percussion_model.parameter_fields import (
 )
 
 SolverName = Literal["auto", "wave", "fem", "rigid"]
+Fidelity = Literal["wave", "rigid", "blow-map"]
 
 # Elements that the paper gives the piston.
 PAPER_PISTON_ELEMENTS = 50
@@ -24,6 +27,11 @@ class SolverOptions(Parameters):
     """How the scene is computed."""
 
     name: SolverName = choice("auto", "solver; auto: wave for an elastic bit, else rigid")
+    fidelity: Fidelity = choice(
+        "wave",
+        "elastic waves, rigid bodies in place of elastic ones, or a table of blows",
+        HAS_WAVES,
+    )
     cells: int | None = quantity(
         None,
         "-",
@@ -93,6 +101,28 @@ class FemOptions(Parameters):
         SOLVER_FEM,
         gt=0,
         le=1,
+    )
+
+
+def _edge(default: float, unit: str, description: str) -> float:
+    """Declare an edge of the blow map."""
+    found: float = quantity(default, unit, description, BLOW_MAP, gt=0, le=1e13)
+    return found
+
+
+class BlowMapOptions(Parameters):
+    """What the table of blows covers."""
+
+    velocity_from: float = _edge(4.0, "m/s", "least impact velocity")
+    velocity_to: float = _edge(12.0, "m/s", "greatest impact velocity")
+    feed_from: float = _edge(1000.0, "N", "least feed force")
+    feed_to: float = _edge(8000.0, "N", "greatest feed force")
+    force_from: float = _edge(1500.0, "N", "least drive force")
+    force_to: float = _edge(5000.0, "N", "greatest drive force")
+    stiffness_from: float = _edge(3e8, "N/m", "least loading stiffness of the rock")
+    stiffness_to: float = _edge(2e9, "N/m", "greatest loading stiffness of the rock")
+    density: float = quantity(
+        1.0, "-", "nodes along each axis, by the usual number", BLOW_MAP, gt=0, le=10
     )
 
 

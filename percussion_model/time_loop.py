@@ -19,7 +19,7 @@ from percussion_model.parameter_rows import is_number
 # Between chunks a run reports progress and can be interrupted: short enough in
 # wall time [s] to react at once, and at most so long in simulated time [s].
 _WANTED_CHUNK_TIME = 0.05
-_LONGEST_CHUNK = 2.0
+_LONGEST_CHUNK = 50.0
 # The first is so short that even a very fine grid comes back soon [s].
 _FIRST_CHUNK = 1e-6
 _GROWTH = 4.0

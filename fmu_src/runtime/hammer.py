@@ -10,6 +10,7 @@ from weakref import WeakValueDictionary
 
 import numpy as np
 
+from fmu_src.runtime.blow_map import read_blow_map
 from fmu_src.runtime.motion import Gauge, Motion
 from fmu_src.runtime.outputs import OUTPUTS
 from fmu_src.runtime.plain_scene import PlainScene, make_scene
@@ -19,6 +20,7 @@ from percussion_model.inputs import INPUTS
 from percussion_model.parameter_rows import Row, refuse_value
 from percussion_model.scene_rules import SceneRules
 from percussion_model.solvers import Solver
+from percussion_model.solvers.blow_map import BlowMapSolver
 from percussion_model.solvers.grid import cell_at
 
 # Solvers hold no state: instances of equal parameters share one.
@@ -49,7 +51,8 @@ class PercussiveHammer(Slave):
 
     def __init__(self, **arguments: Any) -> None:
         super().__init__(**arguments)
-        text = (Path(arguments["resources"]) / "scene.json").read_text(encoding="utf-8")
+        self.folder = str(arguments["resources"])
+        text = (Path(self.folder) / "scene.json").read_text(encoding="utf-8")
         scene = json.loads(text)
         self.baked: dict[str, Any] = scene["values"]
         self.given: set[str] = set(scene["given"])
@@ -63,6 +66,8 @@ class PercussiveHammer(Slave):
         self.fingerprint = b""
         self._acting: dict[str, float] = {}  # inputs as the solver has them
         self._dirty = False
+        self._new: set[int] = set()  # inputs to be checked
+        self._acts: dict[str, bool] = {}
 
     # parameters and inputs
 
@@ -75,6 +80,8 @@ class PercussiveHammer(Slave):
         self._dirty = True
         if self.phase < Phase.STEPPING:
             self.motion = None
+        else:
+            self._new.add(reference)
 
     def check(self, references: Any) -> None:
         """Check bounds, the drive force, and contradictions between parameters."""
@@ -130,12 +137,19 @@ class PercussiveHammer(Slave):
             self.given_inputs = [self.values[one.reference] for one in self.inputs]
             self.fingerprint = fingerprint(self.identity, self.parameters())
             key = fingerprint(self.identity, self.parameters(), self.given_inputs)
-            self.motion = Motion(scene, _SOLVERS.get(key))
+            self.motion = Motion(scene, _SOLVERS.get(key) or self.map_solver(scene))
             _SOLVERS[key] = self.motion.solver
             self.motion.gauge = self.find_gauge(scene, self.motion.solver)
             self._acting = self.solver_inputs()
+            self._acts = {}
             self._dirty = False
         return self.motion
+
+    def map_solver(self, scene: PlainScene) -> Solver | None:
+        """Solver on the table that the FMU brings along, if the scene wants that."""
+        if scene.solver_name != "blow-map":
+            return None
+        return BlowMapSolver(scene, read_blow_map(self.folder))
 
     def parameters(self) -> list[Any]:
         """Values of all parameters, in the order of their references."""
@@ -164,7 +178,8 @@ class PercussiveHammer(Slave):
         motion = self.ready()
         changes: dict[str, float] = {}
         if self._dirty:
-            self.check([one.reference for one in self.inputs])
+            self.check(self._new)
+            self._new.clear()
             wanted = self.solver_inputs()
             for name, value in wanted.items():
                 if value != self._acting[name] and self.acts(motion.scene, name):
@@ -175,9 +190,12 @@ class PercussiveHammer(Slave):
 
     def acts(self, scene: SceneRules, name: str) -> bool:
         """Whether an input has an effect in the scene; says so in the log where not."""
-        acts = scene.matters(INPUTS[name])
-        if name.startswith("barrier"):
-            acts = acts and scene.barrier_on
+        acts = self._acts.get(name)
+        if acts is None:
+            acts = scene.matters(INPUTS[name])
+            if name.startswith("barrier"):
+                acts = acts and scene.barrier_on
+            self._acts[name] = acts
         if not acts:
             outside = NAMES_OUTSIDE.get(name, name)
             self.warn(f"{self.instance_name}: a new {outside} has no effect in this scene")

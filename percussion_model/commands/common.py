@@ -16,7 +16,7 @@ INTERRUPTED = 130  # what shells report for Ctrl-C
 
 SceneFile = Annotated[Path, typer.Argument(metavar="SCENE", help="A scene file (TOML).")]
 SolverName = Annotated[
-    Literal["wave", "fem", "rigid"] | None,
+    Literal["wave", "fem", "rigid", "blow-map"] | None,
     typer.Option("--solver", help="Solver; rigid makes piston and bit rigid."),
 ]
 Cells = Annotated[int | None, typer.Option("--cells", help="Cells or elements in the piston.")]

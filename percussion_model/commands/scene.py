@@ -61,6 +61,10 @@ def run(
     if out is not None:
         check_writable(out)
     check_json(json_file)
+    if chosen.solver_name == "blow-map":
+        from percussion_model.commands.blow_map import ready_map
+
+        ready_map(chosen)
     with progress_bar(chosen.run.duration if duration is None else duration) as progress:
         result = simulate(chosen, duration, settle, trace, progress=progress, on_interrupt="keep")
     interrupted = result.cut_short

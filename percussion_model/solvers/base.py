@@ -106,6 +106,11 @@ def make_solver(scene: SceneRules) -> Solver:
         from percussion_model.solvers.wave import WaveSolver
 
         return WaveSolver(scene)
+    if scene.solver_name == "blow-map":
+        from percussion_model.solvers.blow_builder import get_table
+        from percussion_model.solvers.blow_map import BlowMapSolver
+
+        return BlowMapSolver(scene, get_table(scene))
     from percussion_model.solvers.rigid import RigidSolver
 
     return RigidSolver(scene)

@@ -94,7 +94,8 @@ class RigidSolver:
     wave_speed_error = 0.0
 
     def __init__(self, scene: SceneRules) -> None:
-        if scene.bit.model != "rigid" or scene.piston.model not in ("rigid", "absent"):
+        rigid = scene.bit.model == "rigid" and scene.piston.model != "elastic"
+        if not (rigid or scene.solver_name == "rigid"):
             raise ValueError(
                 "the rigid solver needs bit.model = 'rigid' and piston.model = 'rigid' or "
                 f"'absent', not {scene.bit.model!r} and {scene.piston.model!r}"
@@ -108,7 +109,7 @@ class RigidSolver:
         scene = self.scene
         if scene.piston.model == "absent":
             return float("nan")
-        if scene.contact.restitution is not None:
+        if scene.bit.model == "rigid" and scene.contact.restitution is not None:
             return float(scene.contact.restitution)
         return st_venant_restitution(
             scene.piston.mass,

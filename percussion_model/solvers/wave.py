@@ -93,6 +93,16 @@ class WaveSolver:
         self._no_blows = np.zeros(1, BLOW)
         self._no_events = np.zeros(1, EVENT)
 
+    def derive(self, state: WaveState) -> None:
+        """Derive the mean velocities and u_r of a state whose gap and waves were set."""
+        wp, wb = state.bars
+        resync(self._par[0], state.record[0], wp, self._cp, wb, self._cb)
+
+    @property
+    def static_wave(self) -> np.ndarray:
+        """Down-going wave of a bit at rest under unit body acceleration, by cell [s]."""
+        return self._cb[Coef.STATIC, : self._bit.n]
+
     def new_state(self) -> WaveState:
         """State at time zero."""
         scene, start = self.scene, self.scene.start
@@ -110,7 +120,7 @@ class WaveSolver:
             wp[Row.DOWN : Row.UP + 1, :n_p] = 0.5 * start.piston_velocity
         s["v_p"] = start.piston_velocity if has_piston else 0.0
         s["v_b"] = start.bit_velocity
-        resync(self._par[0], s, wp, self._cp, wb, self._cb)
+        self.derive(state)
         s["u_start"] = s["u_r"]
         s["e_start"] = sum(self._stored(state))
         return state

@@ -1,0 +1,51 @@
+"""What is said where the blow map does not answer."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from percussion_model.core.blow_records import Axis, Refusal
+from percussion_model.solvers.blow_table import BlowTable
+
+_NAMES = {
+    Refusal.STIFFNESS: (Axis.STIFFNESS, "rock.loading_stiffness", "N/m"),
+    Refusal.VELOCITY: (Axis.VELOCITY, "the impact velocity", "m/s"),
+    Refusal.FEED: (Axis.LOAD, "feed.force", "N"),
+    Refusal.DRIVE: (Axis.DRIVE, "drive.force", "N"),
+}
+
+
+def explain_refusal(table: BlowTable, s: Any) -> str:
+    """Say why a blow map did not answer.
+
+    Parameters
+    ----------
+    table : BlowTable
+    s : record
+        State, of BLOW_STATE.
+    """
+    reason, value = Refusal(int(s["refusal"])), float(s["refused_value"])
+    if reason in _NAMES:
+        axis, name, unit = _NAMES[reason]
+        low, high = table.lowest[axis], table.highest[axis]
+        return f"{name} = {value:.6g} {unit}: the blow map covers {low:.6g} to {high:.6g} {unit}"
+    if reason == Refusal.MOVING:
+        rest = float(s["rest"])
+        until = f"after {1e3 * rest:.3g} ms" if np.isfinite(rest) else "in no time of the table"
+        return (
+            f"the piston strikes {1e3 * value:.3g} ms after the last blow, but at "
+            f"feed.force = {float(s['feed']):.6g} N the bit stands still {until}: "
+            "the blow map holds for a bit at rest alone; take solver.fidelity = 'wave'"
+        )
+    if reason == Refusal.TURNED:
+        return (
+            f"drive.reversal_distance = {value:.6g} m: the drive turns before the last "
+            "contact of the blow has opened, which the blow map does not know; "
+            "take solver.fidelity = 'wave'"
+        )
+    return (
+        f"drive.force = {value:.6g} N: the piston falls back on the bit before "
+        "drive.reversal_distance; the blow map does not know such contacts"
+    )

@@ -1,0 +1,514 @@
+"""The blow map: its table against the waves, flight against closed forms, refusals, its cache."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import math
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+from blow_map_scenes import RANGES, mapped
+
+from percussion_model import Scene, SceneError, Simulation, SimulationError, piston_cycle, simulate
+from percussion_model.blow_maps import kept_map, make_map, map_file, node_count
+from percussion_model.cli import _guarded, app
+from percussion_model.core.blow_records import ENTRIES, Axis, Entry
+from percussion_model.solvers.blow_builder import build_table, get_table
+from percussion_model.solvers.blow_map import BlowMapSolver
+from percussion_model.solvers.blow_table import BlowTable, Nodes, TableError, fixed_values
+from percussion_model.solvers.single_blow import SingleBlow
+
+LONG = bool(os.environ.get("PERCUSSION_LONG"))
+TINY = {"blow_map__density": 0.1}
+
+
+def bits(simulation):
+    """State, blow table and events as bytes."""
+    state = simulation.save().state
+    return state.numbers.tobytes(), simulation.blows.tobytes(), simulation.events.tobytes()
+
+
+@pytest.fixture(scope="module")
+def table():
+    return make_map(mapped(), workers=1)
+
+
+def by_hand(scene, **entries):
+    """A table whose every node holds the same entries."""
+    nodes = Nodes.of(scene)
+    values = np.zeros((*nodes.counts, ENTRIES))
+    for name, value in entries.items():
+        values[..., Entry[name.upper()]] = value
+    return BlowTable(nodes, values, fixed_values(scene), {}, 0.0)
+
+
+def run_by_hand(scene, end, **entries):
+    """Run a scene on such a table."""
+    simulation = Simulation.__new__(Simulation)
+    Simulation.__bases__[0].__init__(
+        simulation, scene, True, BlowMapSolver(scene, by_hand(scene, **entries))
+    )
+    simulation.scene, simulation._blows, simulation._events = scene, (), ()
+    simulation.advance(end)
+    return simulation
+
+
+# ------------------------------------------------------------------------- flight
+
+
+def test_flight_is_the_closed_form_of_the_paper():
+    """With a constant restitution, a bit that stays and no weight: eq. 12 of the paper."""
+    scene = mapped(effects__gravity=False)
+    simulation = run_by_hand(scene, 3.0, rebound=-0.37)
+    blows = simulation.blows
+    assert len(blows) > 50
+    for blow, following in itertools.pairwise(blows):
+        expected = piston_cycle(
+            scene.drive.force,
+            scene.drive.reversal_distance,
+            scene.piston.mass,
+            -0.37 * blow["impact_velocity"],
+        )
+        assert following["impact_velocity"] == pytest.approx(expected.impact_velocity, rel=1e-12)
+        assert blow["period"] == pytest.approx(expected.flight_time, rel=1e-12)
+        assert blow["stroke"] == pytest.approx(expected.stroke, rel=1e-12)
+
+
+def test_a_bit_that_sinks_lengthens_the_flight_by_its_way():
+    """The drive turns by the bit's place of that time, the piston falls to its last one."""
+    scene = mapped(effects__gravity=False)
+    sunk = 1e-4
+    entries = {"rebound": -0.37, "penetration": sunk}
+    simulation = run_by_hand(scene, 1.0, **entries)
+    blow, following = simulation.blows[-2:]
+    m, f, v = scene.piston.mass, scene.drive.force, blow["impact_velocity"]
+    down = v * sunk
+    # the path of the table is zero until its last time, and the drive turns before that
+    turn = scene.drive.reversal_distance
+    square = (0.37 * v) ** 2 + 2 * f / m * (turn + turn + down)
+    assert following["impact_velocity"] == pytest.approx(math.sqrt(square), rel=1e-9)
+    assert blow["penetration"] == pytest.approx(down, rel=1e-12)
+
+
+# -------------------------------------------------------------------- single blows
+
+
+def test_a_single_blow_is_that_of_a_run(reference):
+    """A blow of the settled reference run, and one on a bit set at rest by hand."""
+    scene = mapped()
+    blow = reference.blows[-1]
+    load = scene.feed.force + scene.bit.mass * scene.gravity.acceleration
+    v = float(blow["impact_velocity"])
+    single = SingleBlow(scene, scene.rock.loading_stiffness)
+    found = single.entries(v, load, scene.drive.force)
+    assert v * found[Entry.PENETRATION] == pytest.approx(blow["penetration"], rel=1e-4)
+    assert v * found[Entry.PEAK_BIT] == pytest.approx(blow["peak_bit_force"], rel=1e-4)
+    assert v * found[Entry.PEAK_CONTACT] == pytest.approx(blow["peak_contact_force"], rel=1e-4)
+    a = scene.gravity.acceleration - scene.drive.force / scene.piston.mass
+    rebound = v * found[Entry.REBOUND] + a * found[Entry.OPENED]
+    assert rebound == pytest.approx(blow["rebound_velocity"], rel=1e-3)
+    rock = sum(found[e] for e in (Entry.CRUSHING, Entry.BARRIER, Entry.STANDSTILL))
+    assert v * v * rock == pytest.approx(blow["rock_energy"], rel=1e-3)
+    assert (found[Entry.CONTACTS], found[Entry.CYCLES]) == (2, 5)
+
+
+def test_a_single_blow_keeps_energy_and_momentum():
+    scene = mapped()
+    v, load, drive = 8.0, 3000.0, 2800.0
+    found = SingleBlow(scene, 7e8).entries(v, load, drive)
+    m, g = scene.piston.mass, scene.gravity.acceleration
+    feed = load - scene.bit.mass * g
+    start, offset = v * found[Entry.REBOUND], v * found[Entry.OFFSET]
+    down = v * found[Entry.PENETRATION]
+    # the flight begins with `start` at `offset`: what has been put in until then
+    put_in = 0.5 * m * v**2 + (m * g - drive) * offset + load * down
+    gone = v * v * found[[Entry.CRUSHING, Entry.BARRIER, Entry.STANDSTILL]].sum()
+    gone += v * v * (found[Entry.LOSS] + found[Entry.NUMERICAL])
+    assert feed > 0
+    assert put_in - gone == pytest.approx(0.5 * m * start**2, abs=1e-4 * put_in)
+
+
+def test_a_blow_scales_with_its_velocity_without_a_barrier():
+    """Elastic bars on bilinear rock know no scale: forces, lengths and speeds go together."""
+    scene = mapped(effects__barrier=False, effects__gravity=False)
+    single = SingleBlow(scene, 7.5e8)
+    one, two = single.entries(4.0, 1000.0, 1500.0), single.entries(8.0, 2000.0, 3000.0)
+    assert two[Entry.PENETRATION] == pytest.approx(one[Entry.PENETRATION], rel=1e-3)
+    # the dead band of the rock law, 1e-9 m/s, does not scale
+    assert two[Entry.REBOUND] == pytest.approx(one[Entry.REBOUND], rel=1e-8)
+    assert two[Entry.PEAK_BIT] == pytest.approx(one[Entry.PEAK_BIT], rel=1e-8)
+
+
+# -------------------------------------------------------------------------- table
+
+
+def points(ranges, seed):
+    """Scenes at random places of a table's range; the impact velocity follows from D_1."""
+    rng = np.random.default_rng(seed)
+    piston = Scene().piston.mass
+    while True:
+        force = rng.uniform(*ranges["force"])
+        slow, fast = ranges["velocity"]
+        v = rng.uniform(slow + 0.5, fast - 0.5)
+        yield {
+            "rock__loading_stiffness": math.exp(rng.uniform(*np.log(ranges["stiffness"]))),
+            "feed__force": rng.uniform(*ranges["feed"]),
+            "drive__force": force,
+            # eq. 12 with the reference's restitution of a third
+            "drive__reversal_distance": piston * v**2 * (1 - 0.36**2) / (4 * force),
+            "start__piston_velocity": v,
+        }
+
+
+def check_points(scene_of, ranges, count, seed):
+    left = count
+    for changes in points(ranges, seed):
+        scene = scene_of(**changes)
+        try:
+            fast = simulate(scene, 2.5, settle=0.5, record_events=False)
+        except SimulationError as error:  # not a point inside the table
+            if "the bit stands still" not in str(error):
+                raise
+            continue
+        wave = simulate(scene.computed_by("wave"), 2.5, settle=0.5, record_events=False)
+        off = fast.rate_of_penetration / wave.rate_of_penetration - 1
+        assert abs(off) < 0.02, changes
+        left -= 1
+        if left == 0:
+            return
+
+
+def test_the_rate_is_that_of_the_waves_at_random_points(table):
+    assert table.restless == 0
+    check_points(mapped, RANGES, 30 if LONG else 10, seed=5)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not LONG, reason="a table of 28 000 blows: PERCUSSION_LONG=1")
+def test_the_rate_is_that_of_the_waves_all_over_the_usual_table():
+    scene = Scene().replace(**{"solver.fidelity": "blow-map"})
+    make_map(scene)
+    ranges = {
+        name: tuple(scene[f"blow_map.{name}_{end}"] for end in ("from", "to")) for name in RANGES
+    }
+
+    def scene_of(**changes):
+        return scene.replace(**{key.replace("__", "."): v for key, v in changes.items()})
+
+    check_points(scene_of, ranges, 30, seed=1)
+
+
+def test_a_node_answers_with_its_own_blow(table):
+    """At a node nothing is interpolated: the first blow of a run is the entry."""
+    at = [n // 2 - (n == 2) for n in table.nodes.counts]
+    k_r, v, load, drive = (table.nodes.values(axis)[i] for axis, i in zip(Axis, at, strict=True))
+    v *= 1 + 1e-9  # the edge of the range itself is lost to rounding
+    scene = mapped(
+        rock__loading_stiffness=float(k_r),
+        start__piston_velocity=float(v),
+        start__gap=0.0,
+        feed__force=float(load * v - table.nodes.weight),
+        drive__force=float(drive * v),
+    )
+    simulation = Simulation(scene)
+    simulation.advance(0.1)
+    blow = simulation.blows[0]
+    entry = table.values[tuple(at)]
+    assert blow["impact_velocity"] == pytest.approx(v, rel=1e-12)
+    assert blow["penetration"] == pytest.approx(v * entry[Entry.PENETRATION], rel=1e-7)
+    assert blow["peak_bit_force"] == pytest.approx(v * entry[Entry.PEAK_BIT], rel=1e-7)
+    assert blow["contacts"] == entry[Entry.CONTACTS]
+
+
+def test_ledger_and_impulses(table):
+    """Momentum to rounding; energy to what is lost between nodes."""
+    result = simulate(mapped(), 2.0)
+    scene = result.scene
+    weight = (scene.piston.mass + scene.bit.mass) * scene.gravity.acceleration
+    rows = result.counted[5:]
+    total = rows["bit_impulse"] - rows["drive_impulse"]
+    expected = (scene.feed.force + weight) * rows["period"]
+    momentum = scene.piston.mass * rows["impact_velocity"]
+    drift = np.append(np.diff(momentum), 0.0)
+    np.testing.assert_allclose((total - expected + drift)[:-1], 0.0, atol=1e-9 * momentum[0])
+    assert abs(result.energy["residual_relative"]) < 2e-3
+    assert result.energy["crushing"] > 0.5 * result.energy["drive"]
+    assert not result.warnings
+
+
+# ----------------------------------------------------------------- bits and states
+
+
+def test_calls_and_readings_change_no_bit(table):
+    whole, divided = Simulation(mapped()), Simulation(mapped())
+    whole.advance(1.0)
+    rng = np.random.default_rng(3)
+    for k, t in enumerate(np.sort(rng.uniform(0.0, 1.0, 5000))):
+        divided.advance(float(t))
+        if k % 50 == 0:
+            divided.observe()
+            divided.energy()
+            divided.fields()
+    divided.advance(1.0)
+    assert bits(divided) == bits(whole)
+
+
+def test_restored_runs_repeat_with_inputs_changed(table):
+    simulation = Simulation(mapped())
+
+    def go_on():
+        simulation.set_inputs(feed_force=3000.0, drive_force=3300.0, loading_stiffness=8e8)
+        simulation.advance(1.5)
+        return bits(simulation)
+
+    simulation.advance(0.73)
+    saved = simulation.save()
+    first = go_on()
+    simulation.restore(saved)
+    assert go_on() == first
+    assert simulation.blows["standstill_force"][-1] == pytest.approx(3000.0 + table.nodes.weight)
+
+
+def test_the_drive_acts_at_once_and_the_rock_at_the_next_blow(table):
+    simulation, other = Simulation(mapped()), Simulation(mapped())
+    for one in (simulation, other):
+        one.advance(0.52)
+    other.set_inputs(loading_stiffness=8e8, feed_force=3000.0)
+    start = simulation.observe()
+    for one in (simulation, other):
+        one.advance(0.525)
+    assert simulation.observe()["piston_position"] == other.observe()["piston_position"]
+    simulation.set_inputs(drive_force=2600.0)
+    assert abs(simulation.observe()["drive_force"]) == 2600.0
+    assert abs(start["drive_force"]) == 3000.0
+    simulation.advance(0.6)
+    other.advance(0.6)
+    assert len(simulation.blows) == len(other.blows)
+
+
+# ----------------------------------------------------------------------- refusals
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"feed_force": 100.0}, "feed.force = 100 N: the blow map covers 2000 to 3500 N"),
+        ({"loading_stiffness": 2e9}, "rock.loading_stiffness = 2e+09 N/m: the blow map covers"),
+        ({"drive_force": 2000.0}, "drive.force = 2000 N: the blow map covers 2500 to 3500 N"),
+        ({"reversal_distance": 0.08}, "the impact velocity = 1[0-9.]+ m/s: the blow map covers"),
+    ],
+)
+def test_outside_there_is_one_clear_error(table, change, words):
+    simulation = Simulation(mapped())
+    simulation.advance(0.51)
+    simulation.set_inputs(**change)
+    count = len(simulation.blows)
+    with pytest.raises(SimulationError, match=words.replace("+", r"\+").replace(r"]\+", "]+")):
+        simulation.advance(3.0)
+    assert simulation.time == 0.51
+    assert np.isfinite(simulation.observe()["piston_position"])
+    assert len(simulation.blows) <= count + 2
+
+
+def test_a_piston_that_falls_back_is_refused(table):
+    simulation = Simulation(mapped())
+    simulation.advance(0.502)
+    assert simulation.observe()["drive_force"] < 0  # on its way up
+    simulation.set_inputs(drive_force=0.0, reversal_distance=0.9)
+    with pytest.raises(SimulationError, match=r"drive\.force = 0 N: the piston falls back"):
+        simulation.advance(3.0)
+
+
+def test_after_a_refusal_a_good_input_goes_on(table):
+    simulation = Simulation(mapped())
+    simulation.advance(0.51)
+    simulation.set_inputs(feed_force=100.0)
+    with pytest.raises(SimulationError):
+        simulation.advance(0.6)
+    simulation.set_inputs(feed_force=2500.0)
+    simulation.advance(1.0)
+    untouched = Simulation(mapped())
+    untouched.advance(1.0)
+    assert simulation.blows["penetration"][-1] == pytest.approx(
+        untouched.blows["penetration"][-1], rel=1e-9
+    )
+
+
+def test_a_bit_that_moves_at_impact_is_refused():
+    with pytest.raises(SimulationError, match="the bit stands still after 500 ms"):
+        run_by_hand(mapped(effects__gravity=False), 3.0, rebound=-0.37, rest=0.5)
+
+
+def test_a_drive_that_turns_within_the_contacts_is_refused():
+    with pytest.raises(SimulationError, match=r"drive\.reversal_distance = 0\.04 m"):
+        run_by_hand(mapped(effects__gravity=False), 3.0, rebound=-0.37, opened=0.02)
+
+
+def test_what_is_fixed_in_the_table_is_refused_by_name(table):
+    simulation = Simulation(mapped())
+    with pytest.raises(SceneError, match=r"rock\.unloading_ratio = 7\.0: .* made for 5\.0"):
+        simulation.set_inputs(unloading_ratio=7.0)
+    simulation.set_inputs(unloading_ratio=5.0)
+    with pytest.raises(SceneError, match=r"loss\.time = 1e-07: the blow map was made for"):
+        BlowMapSolver(mapped(loss__time=1e-7), table)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"effects__drive": "none"}, 'needs effects.drive = "pressure"'),
+        ({"effects__rock": "spring"}, 'needs effects.rock = "bilinear"'),
+        ({"solver__name": "fem"}, 'solver.name = "fem"'),
+        ({"blow_map__feed_to": 1500.0}, "blow_map.feed_from = 2000.0: must be below"),
+    ],
+)
+def test_scenes_without_a_map_are_refused(changes, words):
+    with pytest.raises(SceneError, match=words):
+        mapped(**changes)
+
+
+def test_a_bit_off_the_rock_is_refused(table):
+    with pytest.raises(SceneError, match="stands on"):
+        Simulation(mapped(start__rock_gap=0.1))
+
+
+# -------------------------------------------------------------------------- cache
+
+
+@pytest.fixture
+def cache(tmp_path, monkeypatch):
+    monkeypatch.setenv("PERCUSSION_CACHE", str(tmp_path))
+    return tmp_path
+
+
+def test_a_damaged_file_is_made_again(cache):
+    scene = mapped(**TINY)
+    made = make_map(scene, workers=1)
+    path = map_file(scene)
+    whole = path.read_bytes()
+    for damaged in (b"", b"nonsense", whole[: len(whole) // 2], _flipped(whole)):
+        path.write_bytes(damaged)
+        assert kept_map(scene) is None
+    again = make_map(scene, workers=1)
+    assert path.read_bytes() == whole
+    np.testing.assert_array_equal(again.values.astype(np.float32), made.values.astype(np.float32))
+    assert {one.name for one in cache.iterdir()} == {path.name}
+
+
+def _flipped(data):
+    at = len(data) // 2
+    return data[:at] + bytes([data[at] ^ 1]) + data[at + 1 :]
+
+
+def test_an_interrupted_build_goes_on_where_it_was(cache):
+    scene = mapped(**TINY)
+    seen = []
+
+    def stop(done, total):
+        seen.append((done, total))
+        if done == 1:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        get_table(scene, stop)
+    assert kept_map(scene) is None
+    get_table(scene, lambda done, total: seen.append((done, total)))
+    total = seen[0][1]
+    assert [done for done, _ in seen] == [0, 1, *range(1, total + 1)]
+
+
+def test_builders_side_by_side_do_no_harm(cache):
+    """A second builder that takes the same drafts away while the first is at it."""
+    scene = mapped(**TINY)
+    drafts = map_file(scene).with_suffix(".part")
+    others = []
+
+    def meddle(done, total):
+        if done == 1 and not others:
+            others.append(build_table(scene, drafts))
+
+    table = build_table(scene, drafts, meddle)
+    np.testing.assert_array_equal(table.values, others[0].values)
+
+
+def test_the_file_depends_on_what_the_table_depends_on(cache):
+    base = map_file(mapped())
+    same = {"feed__force": 2200.0, "rock__loading_stiffness": 7e8, "drive__force": 2600.0}
+    same |= {"drive__reversal_distance": 0.05, "start__piston_velocity": 8.0, "title": "other"}
+    for key, value in same.items():
+        assert map_file(mapped(**{key: value})) == base, key
+    for change in (
+        {"rock__unloading_ratio": 6.0},
+        {"loss__time": 1e-7},
+        {"solver__cells": 10},
+        {"bit__sections": [{"length": 0.2, "area": 0.0055}]},
+        {"blow_map__density": 2.0},
+        {"blow_map__feed_to": 4000.0},
+    ):
+        assert map_file(mapped(**change)) != base, change
+
+
+def test_bytes_that_are_no_table_are_refused():
+    with pytest.raises(TableError):
+        BlowTable.from_bytes(b"PK\x03\x04 no archive")
+
+
+def test_nodes_cover_the_ranges():
+    nodes = Nodes.of(Scene().replace(**{"solver.fidelity": "blow-map"}))
+    assert node_count(Scene()) == len(nodes.wanted()) * nodes.counts[0]
+    wanted = set(nodes.wanted())
+    rng = np.random.default_rng(2)
+    for _ in range(2000):
+        v, feed, force = (
+            rng.uniform(nodes.lowest[axis], nodes.highest[axis])
+            for axis in (Axis.VELOCITY, Axis.LOAD, Axis.DRIVE)
+        )
+        place = (v, (feed + nodes.weight) / v, force / v)
+        cell = [
+            int((math.log(value) - nodes.origin[axis]) / nodes.step[axis])
+            for value, axis in zip(place, (Axis.VELOCITY, Axis.LOAD, Axis.DRIVE), strict=True)
+        ]
+        for corner in np.ndindex(2, 2, 2):
+            assert tuple(int(c + d) for c, d in zip(cell, corner, strict=True)) in wanted
+
+
+# ------------------------------------------------------------------- ladder, command
+
+
+def test_the_rigid_rung_is_the_rigid_scene():
+    """An elastic scene on the rigid rung gives the bits of one whose bodies are rigid."""
+    rung = simulate(Scene().replace(**{"solver.fidelity": "rigid"}), 1.0, settle=0.2)
+    rigid = simulate(Scene().computed_by("rigid"), 1.0, settle=0.2)
+    assert rung.solver == rigid.solver == "rigid"
+    assert rung.blows.tobytes() == rigid.blows.tobytes()
+    assert not rung.warnings
+
+
+def test_a_name_says_how_waves_are_computed_and_nothing_else():
+    with pytest.raises(SceneError, match=r"solver\.fidelity = \"rigid\" and solver\.name"):
+        Scene().replace(**{"solver.fidelity": "rigid", "solver.name": "fem"})
+    assert Scene().computed_by("blow-map").solver_name == "blow-map"
+    assert Scene().computed_by("blow-map").computed_by("fem").solver_name == "fem"
+
+
+def test_the_command_makes_shows_and_finds_a_table(cache, tmp_path, capsys):
+    path = tmp_path / "scene.toml"
+    mapped(**TINY).to_toml(path)
+
+    def call(*words):
+        assert not _guarded(lambda: app(["blow-map", str(path), *words], standalone_mode=False))
+        return capsys.readouterr().out
+
+    file = Path(call("where").strip())
+    assert file.parent == cache
+    assert "not made yet" in call("show")
+    assert not file.exists()
+    assert "kept" in call("--workers", "1")
+    assert file.exists()
+    told = json.loads(call("show", "--json", "-"))
+    assert told["made"]
+    assert told["restless_nodes"] == 0
+    assert told["range"]["feed_force"] == list(RANGES["feed"])
