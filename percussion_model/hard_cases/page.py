@@ -59,7 +59,8 @@ def page(found: Collection, picture: str | None) -> str:
     if picture:
         parts.append(f"![Residual, events, momentum and speed of every case]({picture})\n")
     parts.append(_disagreements(found))
-    parts.append(_unresolved(found))
+    if any("refined_converged" in row for row in found.rows):
+        parts.append(_unresolved(found))
     parts.append("## All runs\n\n" + _COLUMNS)
     parts += [text for group in GROUPS if (text := _group(found, group))]
     return "\n".join(parts)

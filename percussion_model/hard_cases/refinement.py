@@ -77,7 +77,7 @@ def compare(case: HardCase, coarse: Measures, fine: Measures) -> Refinement:
     sigmas = abs(change) / error if error > 0.0 else math.nan
     chance = math.nan
     if min(len(coarse.periods), len(fine.periods)) > 2:
-        chance = float(ks_2samp(coarse.periods, fine.periods).pvalue)
+        chance = float(ks_2samp(coarse.periods, fine.periods, method="asymp").pvalue)
     converged = None
     if not math.isnan(change):
         converged = relative <= RATE_WITHIN or sigmas <= SIGMAS or change == 0.0

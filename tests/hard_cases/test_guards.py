@@ -20,6 +20,8 @@ RANGES = {
 }
 DURATION = {"wave": 0.2, "fem": 0.05, "rigid": 0.4}
 GUARDS = ("locked", "storms")
+# A drive that turns at once, on bodies that do not rebound.
+STORM = {"drive.reversal_distance": 5e-324, "contact.restitution": 0.0}
 VALIDITY = ("beyond", "off bottom", "no drilling", "negative", "storm", "ledger", "modes")
 
 
@@ -82,34 +84,34 @@ def test_the_thresholds_of_the_test_above_are_those_of_the_kernels():
 
 
 def test_a_storm_of_blows_is_put_off_counted_and_said():
-    changes = {"drive.reversal_distance": 5e-324, "contact.restitution": 0.0}
-    scene = REFERENCE.computed_by("rigid", **changes)
+    scene = REFERENCE.computed_by("rigid", **STORM)
     result = simulate(scene, 0.02, settle=0.0)
     assert result.statistics["storms"] > 0
     transit = max(scene.bit.transit_time, scene.piston.transit_time)
-    assert result.statistics["events"] < 0.02 / transit * 2 * 200 + 400
+    # 200 come unhindered, as many put off; each of them lists four events at the most
+    assert result.statistics["events"] < 4 * (2 * 200 * 0.02 / transit + 200)
     assert abs(result.energy["residual_relative"]) < 1e-9
     assert np.all(np.isfinite(result.blows["period"]))
     assert any("storm" in text for text in result.warnings)
 
 
 def test_a_storm_does_not_depend_on_the_calls():
-    scene = REFERENCE.computed_by("rigid", **{"drive.reversal_distance": 1e-18})
+    scene = REFERENCE.computed_by("rigid", **STORM)
     whole, divided = Simulation(scene), Simulation(scene)
     whole.advance(0.02)
     for t in np.linspace(0.0, 0.02, 777):
         divided.advance(float(t))
         divided.observe()
+    assert whole.statistics()["storms"] > 0
     assert whole._state.tobytes() == divided._state.tobytes()
 
 
 def test_inputs_that_change_in_a_storm_do_not_hold_events_up():
-    scene = REFERENCE.computed_by("rigid", **{"drive.reversal_distance": 1e-18})
-    simulation = Simulation(scene)
-    simulation.advance(0.01)
+    simulation = Simulation(REFERENCE.computed_by("rigid", **STORM))
+    simulation.advance(0.02)
     before = simulation.statistics()["events"]
     for k in range(2000):  # far more often than events are put off by
-        simulation.advance(0.01 + 1e-8 * (k + 1))
+        simulation.advance(0.02 + 1e-8 * (k + 1))
         simulation.set_inputs(feed_force=2500.0 + k % 2)
     assert simulation.statistics()["events"] > before
     assert simulation.observe()["gap"] > -1e-9
@@ -140,7 +142,7 @@ def test_the_limits_lie_beyond_the_references():
     result = simulate(REFERENCE.computed_by("rigid"), 0.5, settle=0.1)
     depth = result.blows["peak_bit_force"].max() / REFERENCE.rock.loading_stiffness
     assert depth < 0.2 * BUTTON_LENGTH
-    assert result.rate_of_penetration < 0.1 * MOST_RATE
+    assert result.rate_of_penetration < 0.05 * MOST_RATE
 
 
 def test_an_early_end_of_contact_is_no_flight():
