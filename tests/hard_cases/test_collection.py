@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from pathlib import Path
 
 import pytest
 
@@ -13,6 +14,7 @@ from percussion_model.hard_cases import SOLVERS, hard_cases, measure, run_collec
 from percussion_model.hard_cases.collection import Collection, wrong
 from percussion_model.hard_cases.refinement import refine
 
+PAGE = Path(__file__).parents[2] / "docs" / "stability.md"
 LONG = os.environ.get("PERCUSSION_LONG") == "1"
 # Share of each case's duration: enough for a blow or two, and for the first storm.
 SHARES = {"wave": 0.25, "fem": 0.1, "rigid": 0.15}
@@ -136,3 +138,13 @@ def test_an_unknown_case_is_refused(capsys):
 
 def test_the_reference_is_no_hard_case():
     assert all(case.scene != Scene() for case in hard_cases().values())
+
+
+def test_the_page_tells_of_every_case_and_knows_every_reason():
+    text = PAGE.read_text(encoding="utf-8")
+    for name, case in hard_cases().items():
+        for solver in case.solvers:
+            assert f"| {name} | {solver} |" in text, "run: percussion stability --out docs"
+        assert case.hard in text, "run: percussion stability --out docs"
+    assert "all of this holds for all of them" in text
+    assert "not known" not in text
