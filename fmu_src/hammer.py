@@ -18,7 +18,17 @@ from percussion_model.parameter_table import parameter_table
 from percussion_model.scene import Scene, SceneError
 from percussion_model.solvers.blow_table import BlowTable, fixed_values
 
-RUNTIME = ("folder", "slave", "plain_scene", "motion", "outputs", "states", "blow_map", "hammer")
+RUNTIME = (
+    "folder",
+    "slave",
+    "plain_scene",
+    "motion",
+    "outputs",
+    "states",
+    "blow_map",
+    "watch",
+    "hammer",
+)
 STEP_SIZE = 1e-3  # of the default experiment [s]
 AUTHOR = "percussion_model developers"
 LICENSE = "BSD-3-Clause"

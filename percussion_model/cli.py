@@ -14,6 +14,7 @@ from percussion_model.commands.compare import compare
 from percussion_model.commands.paper import paper
 from percussion_model.commands.scene import explain, new, plot, run
 from percussion_model.commands.settled import settled
+from percussion_model.commands.stability import stability
 from percussion_model.commands.study import study
 from percussion_model.quick_start import own_process
 
@@ -43,7 +44,7 @@ def _options(
     """Percussive drilling with travelling waves: piston, bit and rock, blow by blow."""
 
 
-for _command in (run, settled, study, explain, plot, compare, paper, new):
+for _command in (run, settled, study, explain, plot, compare, paper, stability, new):
     app.command()(_command)
 app.command("blow-map")(blow_map)
 

@@ -16,6 +16,7 @@ from fmu_src.runtime.outputs import OUTPUTS
 from fmu_src.runtime.plain_scene import PlainScene, make_scene
 from fmu_src.runtime.slave import Phase, Slave, guarded
 from fmu_src.runtime.states import fill_solver, fingerprint, pack, solver_bytes, unpack
+from fmu_src.runtime.watch import Watch
 from percussion_model.inputs import INPUTS
 from percussion_model.parameter_rows import Row, refuse_value
 from percussion_model.scene_rules import SceneRules
@@ -68,6 +69,7 @@ class PercussiveHammer(Slave):
         self._dirty = False
         self._new: set[int] = set()  # inputs to be checked
         self._acts: dict[str, bool] = {}
+        self._watch = Watch()
 
     # parameters and inputs
 
@@ -187,6 +189,8 @@ class PercussiveHammer(Slave):
             self._acting = wanted
             self._dirty = False
         motion.go_on(time, step_size, changes)
+        for text in self._watch.look(motion, self._acting["loading_stiffness"]):
+            self.warn(f"{self.instance_name}: at t = {time:.6g} s: {text}")
 
     def acts(self, scene: SceneRules, name: str) -> bool:
         """Whether an input has an effect in the scene; says so in the log where not."""

@@ -32,7 +32,7 @@ MOST_DOUBLINGS = 40
 
 # Operators of so many scenes are kept [a few MB each on the default grid].
 MOST_KEPT = 4
-_kept: dict[bytes, LeapOperators] = {}
+_kept: dict[bytes, LeapOperators | None] = {}
 
 
 @dataclass(frozen=True)
@@ -89,6 +89,8 @@ def leap_operators(
 
     They do not depend on feed, drive, barrier energy or start, so that scenes which differ
     in those alone share them: making them costs as much as tens of blows.
+    None as well where a loaded bit does not come to rest within the digits of a
+    number, as with a loss that freezes its stress: then there is no path to rest.
 
     Parameters
     ----------
@@ -113,7 +115,7 @@ def leap_operators(
 
 def _build(
     par: np.ndarray, piston: Grid | None, cp: np.ndarray, bit: Grid, cb: np.ndarray
-) -> LeapOperators:
+) -> LeapOperators | None:
     """Operators of piston and bit; arguments as in `leap_operators`."""
     n_p = piston.n if piston is not None else 0
     size_p, size = int(par["size_p"][0]), int(par["size_r"][0])
@@ -127,7 +129,10 @@ def _build(
         by_column = step_map(Configuration(of_piston, piston, cp))
         found["piston"] = _powers(by_column, LEVELS, LEVELS, size_p)
         found["bottom"] = _watch(by_column, by_column @ _offset(cp, n_p, Coef.BOTTOM), size_p)
-    found |= _of_bit(alone, bit, cb, size, loads=_loads(par))
+    try:
+        found |= _of_bit(alone, bit, cb, size, loads=_loads(par))
+    except np.linalg.LinAlgError:
+        return None
     return LeapOperators(**found)
 
 
