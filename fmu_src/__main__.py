@@ -41,9 +41,9 @@ def main(arguments: list[str]) -> int:
         scene = Scene.from_toml(choice.scene or ROOT / "scenarios" / "reference.toml")
         table = None
         if choice.blow_map or scene.solver_name == "blow-map":
-            from percussion_model.blow_maps import make_map
+            from percussion_model.commands.blow_map import ready_map
 
-            table = make_map(scene)
+            table = ready_map(scene)
         guid = build_hammer(scene, choice.output, table)
     except (SceneError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)

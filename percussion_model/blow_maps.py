@@ -38,7 +38,8 @@ def make_map(
     progress : callable, optional
         Called with the parts done and their number.
     workers : int, optional
-        Processes; as many as there are processors if left out.
+        Processes; as many as there are processors if left out. Where processes are
+        spawned, more than one wants the guard `if __name__ == "__main__"` in a script.
 
     Returns
     -------

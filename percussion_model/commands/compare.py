@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from percussion_model.commands.blow_map import ready_map
 from percussion_model.commands.common import (
     Duration,
     JsonFile,
@@ -49,6 +50,8 @@ def compare(
     folder = out or Path("out") / f"{scene.stem}-compared"
     check_writable(folder)
     check_json(json_file)
+    if "blow-map" in names:
+        ready_map(chosen)
     end = chosen.run.duration if duration is None else duration
     with progress_bar(end * len(names)) as progress:
         found = run_all(chosen, names, duration, settle, progress)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from percussion_model.commands.blow_map import ready_map
 from percussion_model.commands.common import (
     BAD_INPUT,
     INTERRUPTED,
@@ -62,8 +63,6 @@ def run(
         check_writable(out)
     check_json(json_file)
     if chosen.solver_name == "blow-map":
-        from percussion_model.commands.blow_map import ready_map
-
         ready_map(chosen)
     with progress_bar(chosen.run.duration if duration is None else duration) as progress:
         result = simulate(chosen, duration, settle, trace, progress=progress, on_interrupt="keep")
@@ -91,6 +90,8 @@ def explain(
     from percussion_model.terminal import show_explanation
 
     chosen = load_scene(scene, solver, cells, settings)
+    if chosen.solver_name == "blow-map":
+        ready_map(chosen)
     simulation = Simulation(chosen)
     step = 1e-6
     end = min(_MEASURE_DURATION, chosen.run.duration)
