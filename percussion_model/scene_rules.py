@@ -154,6 +154,7 @@ def refuse_contradictions(scene: SceneRules) -> None:
             'solver.name = "rigid" computes no elastic bars: set piston.model = "rigid" and '
             'bit.model = "rigid", or solver.name = "wave", "fem" or "auto"'
         )
+    _refuse_requests(scene)
     if effects.barrier and effects.rock != "bilinear" and "effects.barrier" in scene.given:
         raise SceneError(
             f'effects.barrier = true needs effects.rock = "bilinear", not "{effects.rock}": '
@@ -162,4 +163,22 @@ def refuse_contradictions(scene: SceneRules) -> None:
     if run.settle >= run.duration:
         raise SceneError(
             f"run.settle = {run.settle!r} s: must be below run.duration = {run.duration!r} s"
+        )
+
+
+def _refuse_requests(scene: SceneRules) -> None:
+    """Refuse an accuracy that is said in two ways, or that no rule picks a mesh for."""
+    accuracy, cells = scene.solver.accuracy, scene.solver.cells
+    if accuracy is None:
+        return
+    if cells is not None:
+        raise SceneError(
+            f"solver.accuracy = {accuracy!r} and solver.cells = {cells!r} both choose the "
+            "resolution: give one of them"
+        )
+    if scene.solver.name == "fem":
+        raise SceneError(
+            f"solver.accuracy = {accuracy!r} picks the cells of waves, no finite elements: set "
+            "fem.elements, fem.courant and fem.contact_stiffness, or solver.name = "
+            '"wave" or "auto"'
         )

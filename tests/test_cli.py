@@ -90,7 +90,7 @@ def test_explain(percussion):
         "explain", SCENARIOS / "reference.toml", "--set", "effects.loss=false"
     )
     assert code == 0
-    for text in ("loss", "wave", "20 in the piston", "loss.time", "a blow"):
+    for text in ("loss", "wave", "20 in the piston", "loss.time", "A blow", "Predicted cost"):
         assert text in out
 
 

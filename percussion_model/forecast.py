@@ -1,0 +1,190 @@
+"""What a run will cost: measured on its first blows, before the whole of it is run."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any, Protocol
+
+from percussion_model.request import planned_cells, with_cells
+from percussion_model.scene import Scene
+from percussion_model.solvers import Solver
+from percussion_model.stepping import Simulation
+
+# A probe ends after so many blows once it took so long [s] ...
+PROBE_BLOWS, PROBE_WALL = 4, 1.0
+# ... without blows or where they are dear after so long [s] ...
+LONGEST_PROBE = 8.0
+# ... and never reaches further than this share of the run.
+LARGEST_SHARE = 0.5
+# The first piece of it [s]. Pieces double while they take less than this [s], so that
+# calling costs little beside what is measured, up to a share of the probe.
+FIRST_PIECE, QUICK, LARGEST_PIECE = 1e-6, 3e-3, 0.05
+
+COUNTED = ("steps", "leaps", "events")
+
+
+class Probed(Protocol):
+    """What a probe needs of a `Simulation`."""
+
+    wall_time: float
+
+    @property
+    def time(self) -> float:
+        """Present time [s]."""
+
+    def advance(self, t: float) -> None:
+        """Run up to `t`."""
+
+    def statistics(self) -> dict[str, int]:
+        """Counts of what the solver did."""
+
+
+@dataclass(frozen=True)
+class Mark:
+    """How far a probe was at some time."""
+
+    time: float
+    wall: float
+    counts: dict[str, int]
+
+
+@dataclass(frozen=True)
+class Forecast:
+    """What a run is going to cost.
+
+    Attributes
+    ----------
+    solver : Solver
+    setup_time : float
+        Time to make the solver, compilation included [s].
+    wall_time : float
+        Predicted time of the whole run without set-up [s].
+    duration : float
+        Simulated time of that run [s].
+    per_second : float
+        Time for a simulated second, once blows follow each other [s].
+    per_blow : float or None
+        Time for a blow [s]; None where there were fewer than two.
+    counts : dict of float
+        Steps, leaps and events a blow, as far as the solver has them.
+    probed : float
+        Simulated time that it rests on [s].
+    runs : int
+        Runs that `setup_time` and `wall_time` are the sum of.
+    """
+
+    solver: Solver
+    setup_time: float
+    wall_time: float
+    duration: float
+    per_second: float
+    per_blow: float | None
+    counts: dict[str, float]
+    probed: float
+    runs: int = 1
+
+
+def forecast(scene: Scene) -> Forecast:
+    """Run the first blows of a scene and tell what the whole run will cost.
+
+    A wanted accuracy takes several runs: times are those of all, the rest is
+    that of the finest. What aperiodic motion or a doubt adds is not foreseen.
+    """
+    scenes = [scene]
+    if scene.solver.accuracy is not None and scene.solver_name == "wave":
+        scenes = [with_cells(scene, cells) for cells in planned_cells(scene)]
+    found = []
+    for chosen in scenes:
+        simulation = Simulation(chosen)
+        marks = probe(simulation, LARGEST_SHARE * chosen.run.duration)
+        found.append(predict(simulation.solver, simulation.setup_time, marks, chosen.run.duration))
+    return replace(
+        found[-1],
+        setup_time=sum(one.setup_time for one in found),
+        wall_time=sum(one.wall_time for one in found),
+        runs=len(found),
+    )
+
+
+def probe(simulation: Probed, end: float) -> list[Mark]:
+    """Advance piece by piece, up to `end` at the most; a mark after each piece."""
+    marks = [_mark(simulation)]
+    piece = FIRST_PIECE
+    while simulation.time < end:
+        simulation.advance(min(simulation.time + piece, end))
+        marks.append(_mark(simulation))
+        wall, blows = marks[-1].wall, marks[-1].counts.get("blows", 0)
+        if wall - marks[-2].wall < QUICK:
+            piece = min(2.0 * piece, LARGEST_PIECE * end)
+        elif piece > FIRST_PIECE:
+            piece *= 0.5
+        if wall > LONGEST_PROBE or (wall > PROBE_WALL and blows >= PROBE_BLOWS):
+            break
+    return marks
+
+
+def _mark(simulation: Probed) -> Mark:
+    return Mark(simulation.time, simulation.wall_time, simulation.statistics())
+
+
+def predict(solver: Solver, setup_time: float, marks: list[Mark], duration: float) -> Forecast:
+    """Predict a whole run from the marks of a probe.
+
+    What follows the probe costs what whole blows in it did, the first left out:
+    it begins in its own way. Without two blows it costs what the probe did.
+    """
+    start, end = _whole_blows(marks)
+    last = marks[-1]
+    span = end.time - start.time
+    per_second = (end.wall - start.wall) / span if span > 0 else 0.0
+    blows = end.counts.get("blows", 0) - start.counts.get("blows", 0)
+    return Forecast(
+        solver=solver,
+        setup_time=setup_time,
+        wall_time=last.wall + max(duration - last.time, 0.0) * per_second,
+        duration=duration,
+        per_second=per_second,
+        per_blow=(end.wall - start.wall) / blows if blows > 0 else None,
+        counts={
+            name: (end.counts[name] - start.counts[name]) / blows
+            for name in COUNTED
+            if blows > 0 and name in end.counts
+        },
+        probed=last.time,
+    )
+
+
+def _whole_blows(marks: list[Mark]) -> tuple[Mark, Mark]:
+    """Marks between which there were only whole blows, or the first and the last."""
+    rises = [
+        mark
+        for before, mark in pairwise(marks)
+        if mark.counts.get("blows", 0) > before.counts.get("blows", 0)
+    ]
+    if len(rises) < 2:
+        return marks[0], marks[-1]
+    return rises[0], rises[-1]
+
+
+def explained(scene: Scene, found: Forecast) -> dict[str, Any]:
+    """What `percussion explain` tells, as plain values for JSON, SI units."""
+    return {
+        "title": scene.title,
+        "effects_on": list(scene.effects_on),
+        "effects_off": list(scene.effects_off),
+        "without_effect": list(scene.unused),
+        "solver": found.solver.name,
+        "cells": found.solver.cells or None,
+        "time_step": found.solver.time_step,
+        "wave_speed_error": found.solver.wave_speed_error,
+        "accuracy": scene.solver.accuracy,
+        "setup_time": found.setup_time,
+        "predicted_wall_time": found.wall_time,
+        "duration": found.duration,
+        "wall_time_per_second": found.per_second,
+        "wall_time_per_blow": found.per_blow,
+        "per_blow": found.counts,
+        "probed": found.probed,
+        "runs": found.runs,
+    }
