@@ -1,7 +1,8 @@
 """Predicted and measured cost of runs over twenty scenes: `python -m benchmarks.forecast`.
 
-`percussion explain` predicts what a run costs from its first blows. Each scene is forecast,
-then run as `percussion run` does, and the two are compared. Compiled kernels are made before.
+`percussion explain` predicts what a run costs from its first blows; one that takes less than a
+second is measured. Each scene is forecast, then run as `percussion run` does, and the two are
+compared.
 """
 
 from __future__ import annotations
@@ -19,10 +20,12 @@ LATEST = HERE / "latest_forecast.json"
 REFERENCE = HERE.parent / "scenarios" / "reference.toml"
 # What a prediction promises.
 FACTOR = 2.0
+# The middle one of so many is shown.
+REPEATS = 3
 
 SCENES: dict[str, dict[str, Any]] = {
     "reference": {},
-    "20 s": {"run.duration": 20.0},
+    "60 s": {"run.duration": 60.0},
     "40 cells": {"solver.cells": 40},
     "60 cells": {"solver.cells": 60},
     "accuracy 1e-2": {"solver.accuracy": 1e-2},
@@ -31,17 +34,17 @@ SCENES: dict[str, dict[str, Any]] = {
     "no leaps, 60 cells": {"solver.leaps": False, "solver.cells": 60, "run.duration": 1.1},
     "loss off": {"effects.loss": False, "run.duration": 3.0},
     "barrier off": {"effects.barrier": False},
-    "feed 500 N": {"feed.force": 500.0},
+    "feed 500 N, 60 s": {"feed.force": 500.0, "run.duration": 60.0},
     "feed 200 N": {"feed.force": 200.0},
     "feed 20 kN": {"feed.force": 20000.0},
-    "soft rock": {"rock.loading_stiffness": 1e8},
-    "stiff rock": {"rock.loading_stiffness": 5e9},
-    "gamma 40": {"rock.unloading_ratio": 40.0},
+    "soft rock, 60 s": {"rock.loading_stiffness": 1e8, "run.duration": 60.0},
+    "stiff rock, 30 s": {"rock.loading_stiffness": 5e9, "run.duration": 30.0},
+    "gamma 40, 30 s": {"rock.unloading_ratio": 40.0, "run.duration": 30.0},
     "D_1 = 4 mm": {"drive.reversal_distance": 0.004},
-    "D_1 = 80 mm": {"drive.reversal_distance": 0.08},
+    "D_1 = 80 mm, 60 s": {"drive.reversal_distance": 0.08, "run.duration": 60.0},
     "bit of 1 m": {"bit.sections.0.length": 1.05},
-    "rigid piston": {"piston.model": "rigid"},
-    "drive off": {"effects.drive": "none", "run.duration": 2.0},
+    "rigid piston, 20 s": {"piston.model": "rigid", "run.duration": 20.0},
+    "drive off": {"effects.drive": "none", "run.duration": 3.0},
     "rigid": {"solver.name": "rigid", "run.duration": 200.0},
     "fem": {"solver.name": "fem", "run.duration": 2.0},
 }
@@ -55,8 +58,9 @@ def main() -> None:
         solver = changes.get("solver.name")
         base = Scene.from_toml(REFERENCE)
         scene = base.computed_by(solver, **others) if solver else base.replace(**others)
-        predicted = forecast(scene).wall_time
-        measured = simulate(scene).wall_time
+        # in turn: a machine that slows down slows both
+        pairs = [(forecast(scene).wall_time, simulate(scene).wall_time) for _ in range(REPEATS)]
+        predicted, measured = sorted(pairs, key=lambda pair: pair[0] / pair[1])[REPEATS // 2]
         ratio = predicted / measured
         rows.append({"scene": name, "predicted": predicted, "measured": measured, "ratio": ratio})
         mark = "" if 1.0 / FACTOR <= ratio <= FACTOR else "  off"

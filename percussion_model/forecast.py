@@ -11,15 +11,14 @@ from percussion_model.scene import Scene
 from percussion_model.solvers import Solver
 from percussion_model.stepping import Simulation
 
-# A probe ends after so many blows once it took so long [s] ...
+# A probe ends after so many blows once it took so long [s]; a run that is over sooner is
+# measured, not predicted.
 PROBE_BLOWS, PROBE_WALL = 4, 1.0
-# ... without blows or where they are dear after so long [s] ...
+# Without blows, or where they are dear, it ends after so long [s].
 LONGEST_PROBE = 8.0
-# ... and never reaches further than this share of the run.
-LARGEST_SHARE = 0.5
 # The first piece of it [s]. Pieces double while they take less than this [s], so that
-# calling costs little beside what is measured, up to a share of the probe.
-FIRST_PIECE, QUICK, LARGEST_PIECE = 1e-6, 3e-3, 0.05
+# calling costs little beside what is measured, up to a share of the run.
+FIRST_PIECE, QUICK, LARGEST_PIECE = 1e-6, 3e-3, 0.025
 
 COUNTED = ("steps", "leaps", "events")
 
@@ -97,7 +96,7 @@ def forecast(scene: Scene) -> Forecast:
     found = []
     for chosen in scenes:
         simulation = Simulation(chosen)
-        marks = probe(simulation, LARGEST_SHARE * chosen.run.duration)
+        marks = probe(simulation, chosen.run.duration)
         found.append(predict(simulation.solver, simulation.setup_time, marks, chosen.run.duration))
     return replace(
         found[-1],
@@ -107,16 +106,16 @@ def forecast(scene: Scene) -> Forecast:
     )
 
 
-def probe(simulation: Probed, end: float) -> list[Mark]:
-    """Advance piece by piece, up to `end` at the most; a mark after each piece."""
+def probe(simulation: Probed, duration: float) -> list[Mark]:
+    """Advance piece by piece through the first blows of a run; a mark after each piece."""
     marks = [_mark(simulation)]
     piece = FIRST_PIECE
-    while simulation.time < end:
-        simulation.advance(min(simulation.time + piece, end))
+    while simulation.time < duration:
+        simulation.advance(min(simulation.time + piece, duration))
         marks.append(_mark(simulation))
         wall, blows = marks[-1].wall, marks[-1].counts.get("blows", 0)
         if wall - marks[-2].wall < QUICK:
-            piece = min(2.0 * piece, LARGEST_PIECE * end)
+            piece = min(2.0 * piece, LARGEST_PIECE * duration)
         elif piece > FIRST_PIECE:
             piece *= 0.5
         if wall > LONGEST_PROBE or (wall > PROBE_WALL and blows >= PROBE_BLOWS):
