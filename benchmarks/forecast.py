@@ -51,9 +51,11 @@ SCENES: dict[str, dict[str, Any]] = {
 
 
 def main() -> None:
-    """Print a table of ratios and keep them."""
+    """Print a table of ratios and keep them; names after the module choose scenes."""
     rows = []
     for name, changes in SCENES.items():
+        if sys.argv[1:] and name not in sys.argv[1:]:
+            continue
         others = {key: value for key, value in changes.items() if key != "solver.name"}
         solver = changes.get("solver.name")
         base = Scene.from_toml(REFERENCE)

@@ -32,8 +32,8 @@ FLIGHT_STEPS = 4_000
 # Measurements of a step; noise only adds, so the least is taken.
 ROUNDS = 40
 # A run shorter than this is timed again, so often at most [s].
-SHORT_RUN = 0.5
-MOST_RUNS = 5
+SHORT_RUN = 1.5
+MOST_RUNS = 7
 
 # A rate whose standard error is a larger share of it than this tells no change.
 UNDECIDED = 0.25

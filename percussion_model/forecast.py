@@ -16,6 +16,8 @@ from percussion_model.stepping import Simulation
 PROBE_BLOWS, PROBE_WALL = 4, 1.0
 # Without blows, or where they are dear, it ends after so long [s].
 LONGEST_PROBE = 8.0
+# Blows have ceased where none came for so many mean periods.
+CEASED = 4.0
 # The first piece of it [s]. Pieces double while they take less than this [s], so that
 # calling costs little beside what is measured, up to a share of the run.
 FIRST_PIECE, QUICK, LARGEST_PIECE = 1e-6, 3e-3, 0.025
@@ -133,8 +135,8 @@ def predict(solver: Solver, setup_time: float, marks: list[Mark], duration: floa
     What follows the probe costs what whole blows in it did, the first left out:
     it begins in its own way. Without two blows it costs what the probe did.
     """
-    start, end = _whole_blows(marks)
     last = marks[-1]
+    start, end = _what_goes_on(marks)
     span = end.time - start.time
     per_second = (end.wall - start.wall) / span if span > 0 else 0.0
     blows = end.counts.get("blows", 0) - start.counts.get("blows", 0)
@@ -154,16 +156,24 @@ def predict(solver: Solver, setup_time: float, marks: list[Mark], duration: floa
     )
 
 
-def _whole_blows(marks: list[Mark]) -> tuple[Mark, Mark]:
-    """Marks between which there were only whole blows, or the first and the last."""
-    rises = [
-        mark
-        for before, mark in pairwise(marks)
-        if mark.counts.get("blows", 0) > before.counts.get("blows", 0)
-    ]
+def _what_goes_on(marks: list[Mark]) -> tuple[Mark, Mark]:
+    """Marks between which there is what goes on: whole blows, or else all of the probe.
+
+    Where blows have ceased, it is what took the later half of the time since then.
+    """
+    rises = [mark for before, mark in pairwise(marks) if _blows(mark) > _blows(before)]
     if len(rises) < 2:
         return marks[0], marks[-1]
-    return rises[0], rises[-1]
+    first, last, end = rises[0], rises[-1], marks[-1]
+    period = (last.time - first.time) / (_blows(last) - _blows(first))
+    if end.time - last.time < CEASED * period:
+        return first, last
+    half = 0.5 * (last.wall + end.wall)
+    return next((mark for mark in marks[:-1] if mark.wall >= half), last), end
+
+
+def _blows(mark: Mark) -> int:
+    return mark.counts.get("blows", 0)
 
 
 def explained(scene: Scene, found: Forecast) -> dict[str, Any]:

@@ -93,6 +93,17 @@ def test_a_whole_run_that_was_probed_is_not_extrapolated():
     assert predict(SOLVER, 0.0, marks, 2.0).wall_time == 5.0
 
 
+def test_where_blows_have_ceased_the_rest_counts():
+    """Three quick blows, a cheap flight, then a dear rest."""
+    blows = [Mark(0.01 * k, 0.001 * k, {"blows": k}) for k in range(4)]
+    flight = [Mark(0.1 * k, 0.003, {"blows": 3}) for k in range(1, 11)]
+    rest = [Mark(1.0 + 0.01 * k, 0.003 + 0.1 * k, {"blows": 3}) for k in range(1, 11)]
+    found = predict(SOLVER, 0.0, [*blows, *flight, *rest], 3.0)
+    assert found.per_second == pytest.approx(10.0)
+    assert found.wall_time == pytest.approx(1.003 + 1.9 * 10.0)
+    assert found.per_blow is None
+
+
 def test_a_scene_is_forecast_and_explained():
     scene = Scene().replace(
         **RIGID, **{"effects.barrier": False, "run.duration": 1.0, "run.settle": 0.1}

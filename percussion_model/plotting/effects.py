@@ -61,7 +61,7 @@ def _costs(ax: Axes, values: list[float | None]) -> None:
     known = [value for value in values if value is not None]
     least, most = min([0.5, *known]), max([2.0, *known])
     ax.set_xscale("log")
-    ax.set_xlim(least / 9.0, most * 7.0)
+    ax.set_xlim(least / 20.0, most * 9.0)
     for y, value in enumerate(values):
         if value is None:
             ax.text(1.0, y, " –", va="center")
