@@ -40,28 +40,11 @@ ONE_THREAD = (
 # Simulated times of the reference scene with and without leaps.
 LEAPING_DURATION, STEPPING_DURATION = 4.0, 2.0
 
-# Both bodies in free flight for the whole measurement: a step that meets nothing.
-FLIGHT = {"start.gap": 0.5, "start.rock_gap": 5.0, "start.piston_velocity": 0.0}
-FLIGHT_DURATION = 0.06
 # Some five blows.
 MOTION_DURATION = 0.25
 
-# One change each against the reference scene.
-VARIANTS: dict[str, dict[str, Any]] = {
-    "all on (reference)": {},
-    "gravity off": {"effects.gravity": False},
-    "feed off": {"effects.feed": False},
-    "drive off": {"effects.drive": "none"},
-    "loss off": {"effects.loss": False},
-    "barrier off": {"effects.barrier": False},
-    "rock: linear spring": {"effects.rock": "spring", "effects.barrier": False},
-    "rock: none": {"effects.rock": "none", "effects.barrier": False},
-    "piston rigid": {"piston.model": "rigid"},
-    "piston absent": {"piston.model": "absent", "effects.drive": "none"},
-}
-
-# A step that costs this much more than the reference's is more than noise.
-NOISE = 1.05
+# Rounds of short stretches in which a step in flight is measured, a repetition.
+FLIGHT_ROUNDS = 5
 
 
 def measure(scene: Any, duration: float) -> dict[str, Any]:
@@ -110,31 +93,33 @@ def reference(repeats: int) -> list[dict[str, Any]]:
 def effects(repeats: int) -> list[dict[str, Any]]:
     """Cost of a wave step with one effect off, in flight and in the whole motion."""
     from percussion_model import Scene
+    from percussion_model.effect_turns import turns
+    from percussion_model.effects import NOISE, step_costs
 
     base = Scene.from_toml(REFERENCE).replace(**{"solver.cells": 20, "solver.leaps": False})
-    cases = []
-    for name, change in VARIANTS.items():
-        scene = base.replace(**change)
-        start = {key: value for key, value in FLIGHT.items() if scene.matters(key)}
-        flight = scene.replace(**start)
-        cases.append((name, scene, flight))
+    cases = {}
+    for turn in turns(base):
+        scene = turn.apply(base)
+        if scene.solver_name == "wave" and turn.effect != "leaps":
+            cases[f"{turn.effect} {turn.turned}".strip()] = (turn, scene)
+    scenes = [scene for _, scene in cases.values()]
+    flights = step_costs(scenes, FLIGHT_ROUNDS * repeats)
     # Turn by turn, so that a machine that slows down slows all of them.
-    flights: dict[str, list[dict[str, Any]]] = {name: [] for name in VARIANTS}
-    motions: dict[str, list[dict[str, Any]]] = {name: [] for name in VARIANTS}
+    motions: dict[str, list[dict[str, Any]]] = {name: [] for name in cases}
     for _ in range(repeats):
-        for name, scene, flight in cases:
-            flights[name].append(measure(flight, FLIGHT_DURATION))
+        for name, (_, scene) in cases.items():
             motions[name].append(measure(scene, MOTION_DURATION))
     return [
         {
             "name": name,
-            "flight_step": best_step(flights[name]),
+            "flight_step": flight,
+            "dearer": bool(turn.off and flight > NOISE * flights[0]),
             "motion_step": best_step(motions[name]),
             "motion_cost": min(run["cost"] for run in motions[name]),
             "motion_steps": motions[name][0]["steps"],
             "motion_events": motions[name][0]["events"],
         }
-        for name in VARIANTS
+        for (name, (turn, _)), flight in zip(cases.items(), flights, strict=True)
     ]
 
 
@@ -234,9 +219,8 @@ def show(found: dict[str, Any]) -> None:
     table.add_column("scene")
     for heading in ("in flight ns", "in motion ns", "0.25 s in ms", "steps", "events"):
         table.add_column(heading, justify="right")
-    limit = NOISE * found["effects"][0]["flight_step"]
     for row in found["effects"]:
-        mark = " [red]dearer[/red]" if row["flight_step"] > limit else ""
+        mark = " [red]dearer[/red]" if row["dearer"] else ""
         table.add_row(
             row["name"] + mark,
             f"{1e9 * row['flight_step']:.0f}",

@@ -55,6 +55,7 @@ PLACE_ROW = number_row(
 # Numbers that may be left out, and what the FMU takes for "left out".
 LEFT_OUT = {
     "solver.cells": (0, "0: by the solver"),
+    "solver.accuracy": (0.0, "0: none is asked for"),
     "contact.restitution": (-1.0, "-1: St Venant"),
     "gauge.position": (-1.0, "-1: the middle"),
     "fem.damping_ratio": (-1.0, "-1: by loss.time"),

@@ -11,6 +11,7 @@ import typer
 from percussion_model.commands.blow_map import blow_map
 from percussion_model.commands.common import BAD_INPUT, INTERRUPTED, complain
 from percussion_model.commands.compare import compare
+from percussion_model.commands.effects import effects
 from percussion_model.commands.paper import paper
 from percussion_model.commands.scene import explain, new, plot, run
 from percussion_model.commands.settled import settled
@@ -44,7 +45,7 @@ def _options(
     """Percussive drilling with travelling waves: piston, bit and rock, blow by blow."""
 
 
-for _command in (run, settled, study, explain, plot, compare, paper, stability, new):
+for _command in (run, settled, study, explain, plot, compare, effects, paper, stability, new):
     app.command()(_command)
 app.command("blow-map")(blow_map)
 

@@ -64,6 +64,9 @@ class Result:
     setup_time : float
         Time to make the solver, compilation included [s].
     warnings : list of str
+    rate_of_penetration_relative_error : float
+        Estimated error of the rate, relative to it, where `solver.accuracy` is
+        asked for; NaN where it is not.
     """
 
     scene: Scene
@@ -81,6 +84,7 @@ class Result:
     wall_time: float
     setup_time: float
     warnings: list[str]
+    rate_of_penetration_relative_error: float = math.nan
 
     @property
     def counted(self) -> np.ndarray:
@@ -144,6 +148,7 @@ class Result:
         numbers = {
             "rate_of_penetration": self.rate_of_penetration,
             "rate_of_penetration_standard_error": self.rate_of_penetration_standard_error,
+            "rate_of_penetration_relative_error": self.rate_of_penetration_relative_error,
             "blow_period": period,
             "blow_frequency": 1.0 / period,
             **{name: _mean(rows[name]) for name in _MEANS},

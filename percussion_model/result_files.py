@@ -146,6 +146,8 @@ def read_result(folder: Path) -> dict[str, Any]:
         fields["cells"] = fields["cells"] or {}
         for name, value in fields["energy"].items():
             fields["energy"][name] = math.nan if value is None else value
+        error = summary.get(_ERROR)  # unknown to older files
+        fields[_ERROR] = math.nan if error is None else error
         blows = _read_csv(folder / "blows.csv", float)
         events = _read_csv(folder / "events.csv", _number_or_kind)
         tables = {"blows": _rows(blows, BLOW), "events": _rows(events, EVENT)}
@@ -169,6 +171,9 @@ _FROM_SUMMARY = (
     "setup_time",
     "warnings",
 )
+
+
+_ERROR = "rate_of_penetration_relative_error"
 
 
 def _number_or_kind(text: str) -> float:

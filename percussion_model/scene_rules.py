@@ -158,6 +158,7 @@ def refuse_contradictions(scene: SceneRules) -> None:
             'bit.model = "rigid", or solver.name = "wave", "fem" or "auto"'
         )
     _refuse_fidelity(scene)
+    _refuse_requests(scene)
     if effects.barrier and effects.rock != "bilinear" and "effects.barrier" in scene.given:
         raise SceneError(
             f'effects.barrier = true needs effects.rock = "bilinear", not "{effects.rock}": '
@@ -197,3 +198,26 @@ def _refuse_fidelity(scene: SceneRules) -> None:
             raise SceneError(
                 f"blow_map.{name}_from = {low!r}: must be below blow_map.{name}_to = {high!r}"
             )
+
+
+def _refuse_requests(scene: SceneRules) -> None:
+    """Refuse an accuracy that is said in two ways, or that no rule picks a mesh for."""
+    accuracy, cells = scene.solver.accuracy, scene.solver.cells
+    if accuracy is None:
+        return
+    if cells is not None:
+        raise SceneError(
+            f"solver.accuracy = {accuracy!r} and solver.cells = {cells!r} both choose the "
+            "resolution: give one of them"
+        )
+    if scene.solver.name == "fem":
+        raise SceneError(
+            f"solver.accuracy = {accuracy!r} picks the cells of waves, no finite elements: set "
+            "fem.elements, fem.courant and fem.contact_stiffness, or solver.name = "
+            '"wave" or "auto"'
+        )
+    if scene.solver_name == "blow-map":
+        raise SceneError(
+            f"solver.accuracy = {accuracy!r}: a blow map is as accurate as its table "
+            '(docs/fidelity.md); set blow_map.density, or solver.fidelity = "wave"'
+        )

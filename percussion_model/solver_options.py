@@ -41,6 +41,14 @@ class SolverOptions(Parameters):
         le=100_000,
     )
     leaps: Flag = choice(True, "cross quiet phases in leaps", SOLVER_WAVE)
+    accuracy: float | None = quantity(
+        None,
+        "-",
+        "wanted relative error of the rate of penetration, in place of cells; "
+        "left out: none is asked for",
+        ge=1e-4,
+        le=0.1,
+    )
 
 
 class FemOptions(Parameters):
@@ -133,3 +141,4 @@ class RunOptions(Parameters):
     settle: float = quantity(
         1.0, "s", "time before blows count for the rate of penetration", ge=0, le=1e6
     )
+    check: Flag = choice(False, "verify solver.accuracy by runs at half the step")

@@ -18,11 +18,11 @@ if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
 
     from percussion_model.comparison import Comparison
+    from percussion_model.forecast import Forecast
     from percussion_model.hard_cases import Collection
     from percussion_model.paper.statements import Statement
     from percussion_model.result import Result
     from percussion_model.scene import Scene
-    from percussion_model.solvers import Solver
     from percussion_model.stationary import Settled
     from percussion_model.study import Study
 
@@ -32,6 +32,7 @@ _PATIENCE = 2.0
 # Rows of the table: name, key of the summary, factor, unit.
 _SHOWN = (
     ("Rate of penetration", "rate_of_penetration", 1e3, "mm/s"),
+    ("Rate: estimated error", "rate_of_penetration_relative_error", 100.0, "%"),
     ("Blow period", "blow_period", 1e3, "ms"),
     ("Blow frequency", "blow_frequency", 1.0, "Hz"),
     ("Impact velocity", "impact_velocity", 1.0, "m/s"),
@@ -45,6 +46,8 @@ _SHOWN = (
     ("Standstill bit force", "standstill_bit_force", 1e-3, "kN"),
 )
 
+_ONLY_WHERE_KNOWN = ("rate_of_penetration_relative_error",)
+
 
 def show_summary(result: Result) -> None:
     """Print the short table of a run, and its warnings."""
@@ -55,6 +58,8 @@ def show_summary(result: Result) -> None:
     table.add_column(justify="left")
     for name, key, factor, unit in _SHOWN:
         value = summary[key]
+        if key in _ONLY_WHERE_KNOWN and value is None:
+            continue
         table.add_row(name, "-" if value is None else f"{factor * value:.5g}", unit)
     energy = summary["energy"]
     for key in ("numerical", "residual"):
@@ -143,6 +148,8 @@ def show_comparison(found: Comparison) -> None:
         if name in differences:
             table.add_column("off, %", justify="right", no_wrap=True)
     for label, key, factor, unit in _SHOWN:
+        if key in _ONLY_WHERE_KNOWN:
+            continue
         cells = []
         for name, summary in summaries.items():
             cells.append(_number(summary[key], factor))
@@ -204,8 +211,9 @@ def show_stability(found: Collection) -> None:
     )
 
 
-def show_explanation(scene: Scene, solver: Solver, cost: dict[str, float]) -> None:
-    """Print what would be computed and what it costs."""
+def show_explanation(scene: Scene, found: Forecast) -> None:
+    """Print what would be computed and what it will cost."""
+    solver = found.solver
     table = Table(title=escape(scene.title) or None, show_header=False)
     table.add_row("Effects on", ", ".join(scene.effects_on) or "none")
     table.add_row("Effects off", ", ".join(scene.effects_off) or "none")
@@ -214,6 +222,8 @@ def show_explanation(scene: Scene, solver: Solver, cost: dict[str, float]) -> No
     table.add_row("Drive, rock", f"{effects.drive}, {effects.rock}")
     table.add_row("Piston, bit", f"{scene.piston.model}, {scene.bit.model}")
     table.add_row("Solver", solver.name)
+    if scene.solver.accuracy is not None:
+        table.add_row("Wanted accuracy of the rate", f"{scene.solver.accuracy:g}")
     if solver.time_step is not None:
         cells = ", ".join(f"{count} in the {bar}" for bar, count in solver.cells.items())
         table.add_row("Cells", cells)
@@ -221,17 +231,15 @@ def show_explanation(scene: Scene, solver: Solver, cost: dict[str, float]) -> No
         table.add_row("Wave speed error", f"{100.0 * solver.wave_speed_error:.2g} %")
     else:
         table.add_row("Steps", "from event to event, in closed form")
-    table.add_row("Measured cost", _cost(cost))
-    whole = cost["wall_time"] / cost["duration"] * scene.run.duration
-    table.add_row("Whole run", f"about {whole:.2g} s for {scene.run.duration:g} s simulated")
+    if found.per_blow is not None:
+        counts = ", ".join(f"{value:.3g} {name}" for name, value in found.counts.items())
+        table.add_row("A blow", f"{1e3 * found.per_blow:.3g} ms; {counts}")
+    table.add_row("A simulated second", f"{found.per_second:.3g} s")
+    runs = f", {found.runs} runs to compare" if found.runs > 1 else ""
+    whole = f"about {found.wall_time:.2g} s for {found.duration:g} s simulated{runs}"
+    table.add_row("Predicted cost of the run", whole)
+    table.add_row("To prepare", f"{found.setup_time:.2g} s")
     Console().print(table)
-
-
-def _cost(cost: dict[str, float]) -> str:
-    text = f"{cost['wall_time'] / cost['duration']:.3g} s a simulated second"
-    if cost["blows"]:
-        text += f", {1e6 * cost['wall_time'] / cost['blows']:.3g} µs a blow"
-    return text
 
 
 @contextmanager
@@ -284,6 +292,6 @@ def count_bar(what: str) -> Iterator[Callable[[int, int], None] | None]:
 
 def _reporter(bar: Progress, task: TaskID, end: float) -> Callable[[float], None]:
     def report(t: float) -> None:
-        bar.update(task, completed=t, total=end, description=f"{t:.4g} s of {end:g} s")
+        bar.update(task, completed=t, total=max(t, end), description=f"{t:.4g} s of {end:g} s")
 
     return report

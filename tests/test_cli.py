@@ -82,6 +82,19 @@ def test_cells_are_passed_on(percussion):
     assert json.loads(out)["cells"] == {"piston": 40, "bit": 46}
 
 
+def test_an_accuracy_is_asked_for(percussion):
+    code, out, _ = percussion("run", RIGID, *SHORT, "--accuracy", "1e-2", "--json", "-")
+    summary = json.loads(out)
+    assert code == 0
+    assert summary["rate_of_penetration_relative_error"] <= 1e-2
+    code, _, err = percussion("run", RIGID, *SHORT, "--accuracy", "1e-2", "--cells", "40")
+    assert code == BAD_INPUT
+    assert "both choose the resolution" in err
+    code, _, err = percussion("run", RIGID, *SHORT, "--check")
+    assert code == BAD_INPUT
+    assert "solver.accuracy" in err
+
+
 # ------------------------------------------------------------------- other commands
 
 
@@ -90,7 +103,7 @@ def test_explain(percussion):
         "explain", SCENARIOS / "reference.toml", "--set", "effects.loss=false"
     )
     assert code == 0
-    for text in ("loss", "wave", "20 in the piston", "loss.time", "a blow"):
+    for text in ("loss", "wave", "20 in the piston", "loss.time", "A blow", "Predicted cost"):
         assert text in out
 
 

@@ -20,6 +20,7 @@ PAGES = (
     *("docs/model.md", "docs/numerics.md", "docs/parameters.md", "docs/fmu.md"),
     "docs/fidelity.md",
     "docs/stability.md",
+    *("docs/requested_accuracy.md", "docs/effects.md"),
     *("README.md", "CONTRIBUTING.md"),
 )
 

@@ -28,6 +28,13 @@ Settings = Annotated[
         help="Set any parameter, as in rock.unloading_ratio=10; may be repeated.",
     ),
 ]
+Accuracy = Annotated[
+    float | None,
+    typer.Option("--accuracy", help="Wanted relative error of the rate, in place of cells."),
+]
+Check = Annotated[
+    bool | None, typer.Option("--check/--no-check", help="Verify --accuracy at half the step.")
+]
 Duration = Annotated[float | None, typer.Option("--duration", help="Simulated time, in s.")]
 Settle = Annotated[float | None, typer.Option("--settle", help="Time before blows count, in s.")]
 JsonFile = Annotated[
@@ -38,7 +45,12 @@ Out = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder f
 
 
 def load_scene(
-    path: Path, solver: str | None, cells: int | None, settings: list[str] | None
+    path: Path,
+    solver: str | None,
+    cells: int | None,
+    settings: list[str] | None,
+    accuracy: float | None = None,
+    check: bool | None = None,
 ) -> Scene:
     """Read a scene and apply what the command line changes."""
     from percussion_model.quick_start import load_numba
@@ -51,6 +63,8 @@ def load_scene(
         scene = scene.computed_by(solver, **changes)
     elif changes:
         scene = scene.replace(**changes)
+    asked = {"solver.accuracy": accuracy, "run.check": check}
+    scene = scene.replace(**{key: value for key, value in asked.items() if value is not None})
     if cells is not None:
         key = "fem.elements" if scene.solver_name == "fem" else "solver.cells"
         scene = scene.replace(**{key: cells})

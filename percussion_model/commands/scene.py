@@ -11,7 +11,9 @@ from percussion_model.commands.blow_map import ready_map
 from percussion_model.commands.common import (
     BAD_INPUT,
     INTERRUPTED,
+    Accuracy,
     Cells,
+    Check,
     Duration,
     JsonFile,
     Out,
@@ -29,10 +31,6 @@ from percussion_model.commands.common import (
 if TYPE_CHECKING:
     from percussion_model.result import Result
 
-# `explain` measures for about so long [s], or for so much simulated time [s].
-_MEASURE_WALL = 1.0
-_MEASURE_DURATION = 0.5
-
 _NEW_TITLE = "A down-the-hole hammer"
 
 
@@ -42,6 +40,8 @@ def run(
     settle: Settle = None,
     solver: SolverName = None,
     cells: Cells = None,
+    accuracy: Accuracy = None,
+    check: Check = None,
     settings: Settings = None,
     trace: Annotated[
         float | None,
@@ -58,7 +58,7 @@ def run(
     from percussion_model.simulation import simulate
     from percussion_model.terminal import progress_bar, show_summary
 
-    chosen = load_scene(scene, solver, cells, settings)
+    chosen = load_scene(scene, solver, cells, settings, accuracy, check)
     if out is not None:
         check_writable(out)
     check_json(json_file)
@@ -83,27 +83,23 @@ def explain(
     scene: SceneFile,
     solver: SolverName = None,
     cells: Cells = None,
+    accuracy: Accuracy = None,
+    check: Check = None,
     settings: Settings = None,
+    json_file: JsonFile = None,
 ) -> None:
-    """Tell what a scene computes, how, and what a blow costs."""
-    from percussion_model.simulation import Simulation
+    """Tell what a scene computes, how, and what the run will cost."""
+    from percussion_model.forecast import explained, forecast
     from percussion_model.terminal import show_explanation
 
-    chosen = load_scene(scene, solver, cells, settings)
+    chosen = load_scene(scene, solver, cells, settings, accuracy, check)
+    check_json(json_file)
     if chosen.solver_name == "blow-map":
         ready_map(chosen)
-    simulation = Simulation(chosen)
-    step = 1e-6
-    end = min(_MEASURE_DURATION, chosen.run.duration)
-    while simulation.wall_time < _MEASURE_WALL and simulation.time < end:
-        simulation.advance(min(simulation.time + step, end))
-        step = min(2.0 * step, 0.1 * end)
-    cost = {
-        "wall_time": simulation.wall_time,
-        "duration": simulation.time,
-        "blows": simulation.statistics()["blows"],
-    }
-    show_explanation(chosen, simulation.solver, cost)
+    found = forecast(chosen)
+    write_json(json_file, explained(chosen, found))
+    if json_file != "-":
+        show_explanation(chosen, found)
 
 
 def plot(

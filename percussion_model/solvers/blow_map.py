@@ -238,9 +238,17 @@ class BlowMapSolver:
         numbers[PEAK_FROM] = t
         numbers[PEAK_BIT] = numbers[PEAK_CONTACT] = 0.0
 
-    def commit(self, state: MapState, t: float) -> None:
+    def commit(
+        self,
+        state: MapState,
+        t: float,
+        blows: np.ndarray | None = None,
+        events: np.ndarray | None = None,
+        record_events: bool = False,
+    ) -> tuple[int, int, int]:
         """Start a new piece of flight at `t`, so that inputs can change."""
         self._move(self._par, state.record, float(t))
+        return DONE, 0, 0
 
     def set_inputs(self, state: MapState, **inputs: float) -> None:
         """Change inputs of a committed state.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -122,14 +123,40 @@ def choose_time_step(bars: list[BarNumbers], cells: int | None) -> float:
     first = bars[0].transit_time
     if cells is not None:
         return first / cells
-    best, best_fit = DEFAULT_CELLS, np.inf
-    for count in range(DEFAULT_CELLS, int(MOST_REFINED * DEFAULT_CELLS) + 1):
+    most = int(MOST_REFINED * DEFAULT_CELLS)
+    return first / fitting_cells(bars, DEFAULT_CELLS, most, WANTED_FIT)[0]
+
+
+def fitting_cells(
+    bars: Sequence[BarNumbers], fewest: int, most: int, wanted: float
+) -> tuple[int, float]:
+    """Cells in the first bar that suit the lengths of all.
+
+    Parameters
+    ----------
+    bars : sequence of Bar
+        The elastic bars.
+    fewest, most : int
+        Numbers to choose from.
+    wanted : float
+        Relative error of the wave speed that is small enough.
+
+    Returns
+    -------
+    cells : int
+        The smallest number that is below `wanted`; failing that, the best.
+    fit : float
+        Its error.
+    """
+    first = bars[0].transit_time
+    best, best_fit = fewest, np.inf
+    for count in range(fewest, most + 1):
         fit = max(cut(bar, first / count).fit for bar in bars)
         if fit < best_fit - 1e-12:
             best, best_fit = count, fit
-        if best_fit < WANTED_FIT:
+        if best_fit < wanted:
             break
-    return first / best
+    return best, best_fit
 
 
 def substeps(loss_time: float, time_step: float) -> int:

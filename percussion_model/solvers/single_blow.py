@@ -61,7 +61,7 @@ class SceneAt(SceneRules):
             barrier_energy=rock.barrier_energy,
         )
         self.solver = SimpleNamespace(
-            name="wave", fidelity="wave", cells=solver.cells, leaps=solver.leaps
+            name="wave", fidelity="wave", cells=solver.cells, accuracy=None, leaps=solver.leaps
         )
         self.start = SimpleNamespace(
             piston_velocity=start.piston_velocity,

@@ -33,6 +33,7 @@ from percussion_model.solvers.packing import (
     pack_parameters,
     rock_numbers,
 )
+from percussion_model.solvers.resolution import asked_cells, elastic_bars
 from percussion_model.solvers.step_map import no_operators
 from percussion_model.solvers.wave_state import WORD, WaveState
 
@@ -64,8 +65,8 @@ class WaveSolver:
     def __init__(self, scene: SceneRules) -> None:
         self.scene = scene
         elastic_piston = scene.piston.model == "elastic"
-        bars = [scene.piston, scene.bit] if elastic_piston else [scene.bit]
-        self.time_step = choose_time_step(list(bars), scene.solver.cells)
+        bars = elastic_bars(scene)
+        self.time_step = choose_time_step(bars, scene.solver.cells or asked_cells(scene))
         loss_time = scene.loss.time if scene.loss_on else 0.0
         self._bit = cut(scene.bit, self.time_step)
         self._piston = cut(scene.piston, self.time_step) if elastic_piston else None

@@ -28,6 +28,7 @@ def fails(instance, action, *words):
         ("bit.sections[1].density", NAN, "above 0"),
         ("start.gap", 101.0, "from 0 to 100 m"),
         ("solver.cells", -3, "from 1 to 100000"),
+        ("solver.accuracy", 0.5, "from 0.0001 to 0.1"),
         ("effects.rock", 9, '"wall"'),
         ("drive.effective_area", 11.0, "from 0 to 10 m^2"),
         ("gauge.position", 7.0, "0.20125 m long"),
@@ -48,6 +49,9 @@ def test_contradictions_fail_in_the_initialisation(make):
     instance = make(start=False)
     instance.set({"piston.model": "absent"})
     fails(instance, instance.start, "effects.drive", "needs a piston")
+    instance = make(start=False)
+    instance.set({"solver.accuracy": 1e-3, "solver.cells": 40})
+    fails(instance, instance.start, "solver.accuracy = 0.001", "solver.cells = 40", "one of them")
 
 
 @pytest.mark.parametrize(

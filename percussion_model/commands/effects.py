@@ -1,0 +1,150 @@
+"""What each effect of a scene costs and changes."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from percussion_model.commands.common import (
+    Cells,
+    Duration,
+    JsonFile,
+    Out,
+    SceneFile,
+    Settings,
+    Settle,
+    SolverName,
+    check_json,
+    complain,
+    load_scene,
+    needs_plot_extra,
+    write_json,
+)
+
+if TYPE_CHECKING:
+    from percussion_model.effects import EffectsStudy, Trial
+
+
+def effects(
+    scene: SceneFile,
+    duration: Duration = None,
+    settle: Settle = None,
+    solver: SolverName = None,
+    cells: Cells = None,
+    settings: Settings = None,
+    out: Out = None,
+    json_file: JsonFile = None,
+    figures: Annotated[bool, typer.Option(help="Draw cost and change as bars.")] = True,
+) -> None:
+    """Turn each effect off, or on, in turn: what it costs and what it changes."""
+    from percussion_model.effects import study_effects
+    from percussion_model.result_files import check_writable
+
+    chosen = load_scene(scene, solver, cells, settings)
+    folder = out or Path("out") / f"{scene.stem}-effects"
+    if figures:
+        check_writable(folder)
+    check_json(json_file)
+    found = study_effects(chosen, duration, settle, _report)
+    write_json(json_file, found.to_dict())
+    if json_file != "-":
+        show_effects(found)
+    if figures:
+        _draw(found, folder)
+
+
+def _report(what: str, share: float) -> None:
+    """Say on a terminal what is done next."""
+    if sys.stderr.isatty():
+        print(f"\r\033[K{share:4.0%} {what}", end="" if share < 1.0 else "\n", file=sys.stderr)
+
+
+# Columns: heading, and what stands in it.
+_COLUMNS: dict[str, Callable[[EffectsStudy, Trial, dict[str, Any]], str]] = {
+    "step\nns": lambda study, trial, row: (
+        _number(row["step_time"], 1e9, ".0f") + (" dearer" if study.dearer(trial) else "")
+    ),
+    "run\ns": lambda study, trial, row: _number(row["wall_time"], 1.0, ".2g"),
+    "blow\nms": lambda study, trial, row: _number(row["blow_time"], 1e3, ".3g"),
+    "events": lambda study, trial, row: f"{row['events']}",
+    "rate\nmm/s": lambda study, trial, row: rate(row),
+    "rate\n%": lambda study, trial, row: _change(study, trial, "rate_of_penetration"),
+    "period\n%": lambda study, trial, row: _change(study, trial, "blow_period"),
+    "peak\n%": lambda study, trial, row: _change(study, trial, "peak_bit_force"),
+}
+
+
+def table_of(found: EffectsStudy) -> tuple[list[str], list[list[str]], dict[str, str]]:
+    """Headings, rows and the reasons of what is not shown, as text."""
+    rows, reasons = [], {}
+    for trial in (found.base, *found.trials):
+        numbers = trial.numbers()
+        name = f"{trial.turn.effect} {trial.turn.turned}".strip()
+        rows.append([name, *(show(found, trial, numbers) for show in _COLUMNS.values())])
+        if trial.reason:
+            reasons[name] = trial.reason
+    return ["", *_COLUMNS], rows, reasons | found.refused
+
+
+def show_effects(found: EffectsStudy) -> None:
+    """Print the table, and why something is missing from it."""
+    from rich.box import SIMPLE_HEAD
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.table import Table
+
+    headings, rows, reasons = table_of(found)
+    table = Table(
+        title=escape(found.scene.title) or None,
+        title_justify="left",
+        box=SIMPLE_HEAD,
+        pad_edge=False,
+        padding=(0, 1, 0, 0),
+    )
+    for k, heading in enumerate(headings):
+        table.add_column(heading, justify="right" if k else "left", no_wrap=k > 0)
+    for row in rows:
+        table.add_row(*row)
+    console = Console()
+    console.print(table)
+    for name, reason in reasons.items():
+        console.print(f"[yellow]{escape(name)}:[/yellow] {escape(reason)}", highlight=False)
+
+
+def rate(row: dict[str, Any]) -> str:
+    """Rate of penetration [mm/s], with its standard error where it matters."""
+    value, error = row["rate_of_penetration"], row["rate_of_penetration_standard_error"]
+    if value is None:
+        return "-"
+    shown = f"{1e3 * value:.4g}"
+    if error <= 1e-3 * abs(value):
+        return shown
+    return f"{1e3 * value:.3g} ± {1e3 * error:.1g}" if error < abs(value) else "undecided"
+
+
+def _number(value: float | None, factor: float, form: str) -> str:
+    return "-" if value is None else format(factor * value, form)
+
+
+def _change(found: EffectsStudy, trial: Trial, name: str) -> str:
+    if trial is found.base:
+        return ""
+    change = found.changes(trial)[name]
+    if change is None:
+        return "-"
+    shown = f"{100.0 * change:+.2f}"
+    return "0.00" if float(shown) == 0.0 else shown
+
+
+def _draw(found: EffectsStudy, folder: Path) -> None:
+    try:
+        from percussion_model.plotting.effects import save_effects
+    except ImportError as error:
+        complain(needs_plot_extra(error))
+        return
+    for path in save_effects(found, folder):
+        print(path, file=sys.stderr)

@@ -1,0 +1,176 @@
+"""What each effect costs and changes: what is turned, what is told, what is not."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+
+import pytest
+from typer.testing import CliRunner
+
+from percussion_model import Scene, simulate
+from percussion_model.cli import app
+from percussion_model.effect_turns import turns
+from percussion_model.effects import NOISE, EffectsStudy, step_costs, study_effects
+
+RIGID = {"piston.model": "rigid", "bit.model": "rigid"}
+SHORT = {"run.duration": 0.6, "run.settle": 0.1}
+
+
+def turn_of(scene, effect):
+    return next(turn for turn in turns(scene) if turn.effect == effect)
+
+
+def names(scene):
+    return {turn.effect: turn.turned for turn in turns(scene)}
+
+
+# ---------------------------------------------------------------------------- turns
+
+
+def test_every_effect_of_the_reference_is_turned():
+    found = names(Scene())
+    assert found == {
+        "": "as it is",
+        "gravity": "off",
+        "feed": "off",
+        "drive": "off",
+        "barrier": "off",
+        "standstill tension": "paper",
+        "bilinear law": "spring",
+        "rock": "off",
+        "loss": "off",
+        "elastic piston": "rigid",
+        "elastic bars": "rigid",
+        "leaps": "off",
+    }
+    # whatever a scene calls an effect has a turn
+    assert set(Scene().effects_on) <= set(found)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        {"effects.barrier": True},
+        {"effects.gravity": False, "effects.feed": False, "effects.drive": "none"},
+        {"effects.loss": False, "effects.barrier": False, "solver.leaps": False},
+        {"effects.rock": "none"},
+        {"effects.rock": "spring"},
+        {"effects.rock": "wall"},
+        {"piston.model": "rigid"},
+        {"piston.model": "absent", "effects.drive": "none"},
+        {"solver.name": "fem"},
+        {"loss.time": 0.0, "rock.barrier_energy": 0.0},
+        RIGID,
+    ],
+)
+def test_each_turn_makes_a_scene_that_differs_in_it(changes):
+    scene = Scene().replace(**changes)
+    base, *rest = turns(scene)
+    assert base.apply(scene) == scene
+    assert len({turn.effect for turn in rest}) == len(rest)
+    for turn in rest:
+        changed = turn.apply(scene)
+        assert changed != scene
+        gone = set(scene.effects_on) - set(changed.effects_on)
+        new = set(changed.effects_on) - set(scene.effects_on)
+        if turn.effect in ("gravity", "feed", "drive", "barrier", "rock", "loss"):
+            assert turn.effect in (gone if turn.turned == "off" else new)
+            assert turn.off == (turn.turned == "off")
+
+
+# ---------------------------------------------------------------------------- study
+
+
+@pytest.fixture(scope="module")
+def rigid():
+    """A study that compiles no waves; rate and period as two runs by hand give them."""
+    return study_effects(Scene().replace(**RIGID, **SHORT))
+
+
+def test_changes_are_those_of_two_runs(rigid):
+    scene = rigid.scene
+    trial = next(trial for trial in rigid.trials if trial.turn.effect == "barrier")
+    with_it = simulate(scene)
+    without = simulate(scene.replace(**{"effects.barrier": False}))
+    expected = without.rate_of_penetration / with_it.rate_of_penetration - 1.0
+    assert abs(expected) > 1e-3
+    assert rigid.changes(trial)["rate_of_penetration"] == pytest.approx(expected, rel=1e-12)
+    assert trial.numbers()["events"] == without.statistics["events"]
+    assert trial.numbers()["blow_time"] == pytest.approx(trial.wall_time / len(without.blows))
+    assert rigid.base.numbers()["events"] == with_it.statistics["events"]
+
+
+def test_what_an_effect_makes_something_else_is_not_compared(rigid):
+    by_name = {trial.turn.effect: trial for trial in rigid.trials}
+    for effect, word in (("drive", "nothing throws"), ("rock", "no rock"), ("bilinear law", "sp")):
+        trial = by_name[effect]
+        assert trial.numbers()["rate_of_penetration"] is None
+        assert rigid.changes(trial)["rate_of_penetration"] is None
+        assert word in trial.reason
+    assert by_name["drive"].numbers()["blow_time"] is None
+    assert by_name["bilinear law"].numbers()["blow_period"] is not None
+    assert by_name["gravity"].reason == ""
+
+
+def test_a_rate_that_scatter_hides_is_no_change(rigid):
+    blows = rigid.base.result.blows.copy()
+    blows["penetration"] *= 1.0 + 40.0 * (-1.0) ** (blows["time"] * 1e6).astype(int)
+    hidden = replace(rigid.trials[0], result=replace(rigid.base.result, blows=blows))
+    assert hidden.undecided
+    assert rigid.changes(hidden)["rate_of_penetration"] is None
+    assert "aperiodic" in hidden.reason
+
+
+def test_a_dearer_step_is_marked_where_something_was_turned_off(rigid):
+    scene = Scene()
+    base = replace(rigid.base, step=1e-7)
+    off, tension = turn_of(scene, "feed"), turn_of(scene, "standstill tension")
+    trial = replace(rigid.trials[0], turn=off, step=1.01 * NOISE * 1e-7)
+    study = EffectsStudy(scene, base, [trial], {})
+    assert study.dearer(trial)
+    assert study.to_dict()["effects"][0]["step_dearer"]
+    assert not study.dearer(replace(trial, step=0.99 * NOISE * 1e-7))
+    assert not study.dearer(replace(trial, turn=tension))
+    assert not study.dearer(replace(trial, step=None))
+
+
+def test_a_step_is_measured_in_free_flight():
+    waves = Scene().replace(**{"solver.cells": 4})
+    cost, none = step_costs([waves, Scene().replace(**RIGID)], rounds=1)
+    assert none is None
+    assert 0.0 < cost < 1.0
+
+
+def test_numbers_are_plain(rigid):
+    plain = json.loads(json.dumps(rigid.to_dict(), allow_nan=False))
+    assert plain["scene"]["blows"] > 5
+    assert {row["effect"] for row in plain["effects"]} >= {"gravity", "feed", "elastic bars"}
+    assert all(math.isfinite(row["wall_time"]) for row in plain["effects"])
+
+
+def test_figure_has_a_bar_for_each_known_number(rigid):
+    pytest.importorskip("matplotlib")
+    from percussion_model.plotting.effects import draw_effects
+
+    axes = draw_effects(rigid).axes
+    assert len(axes) == 5
+    rates = [rigid.changes(trial)["rate_of_penetration"] for trial in rigid.trials]
+    assert len(axes[2].patches) == sum(rate is not None for rate in rates)
+    labels = [text.get_text() for text in axes[0].get_yticklabels()]
+    assert "barrier: off" in labels
+
+
+def test_command_prints_a_table_and_reasons(tmp_path):
+    file = tmp_path / "scene.toml"
+    Scene(title="Which are needed").replace(**RIGID, **SHORT).to_toml(file)
+    out = tmp_path / "out"
+    words = ["effects", str(file), "--out", str(out), "--json", str(tmp_path / "found.json")]
+    shown = CliRunner().invoke(app, words)
+    assert shown.exit_code == 0, shown.output
+    for text in ("Which are needed", "barrier off", "period", "events", "nothing throws"):
+        assert text in shown.output
+    assert sorted(path.name for path in out.iterdir()) == ["effects.png", "effects.svg"]
+    assert json.loads((tmp_path / "found.json").read_text())["solver"] == "rigid"
