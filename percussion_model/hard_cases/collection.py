@@ -37,9 +37,12 @@ class Collection:
     ----------
     rows : list of dict
         A row for each case and solver: `Measures` and `Refinement` as plain values.
+    share : float
+        Share of each case's duration that was run.
     """
 
     rows: list[dict[str, Any]]
+    share: float = 1.0
 
     def failures(self) -> list[str]:
         """What does not hold, a line each; empty where all is well."""
@@ -70,6 +73,7 @@ class Collection:
         return {
             "cases": len({row["case"] for row in self.rows}),
             "runs": len(self.rows),
+            "share": self.share,
             "failures": self.failures(),
             "disagreements": self.disagreements(),
             "rows": self.rows,
@@ -173,7 +177,7 @@ def run_collection(
         if progress is not None:
             progress(len(rows), len(jobs))
     rows.sort(key=lambda row: order[row["case"], row["solver"]])
-    return Collection(rows)
+    return Collection(rows, share)
 
 
 def _case(name: str) -> HardCase:

@@ -41,7 +41,8 @@ class Measures:
         the greatest push.
     interpenetration : float
         Of piston and bit, or of bit and wall, by what is allowed: all energy put in
-        held by the penalty (finite elements), or rounding (others).
+        held by the penalty (finite elements), or rounding (others; in a storm of
+        rigid bodies the passing of events that were put off).
     events_per_second, ceiling : float
         [1/s]
     guards : int
@@ -128,7 +129,7 @@ def measure(
     taken = time.perf_counter() - began
     result = run.result(settle=share * scene.run.settle)
     energy, counts, blows = result.energy, result.statistics, result.counted
-    figures = mechanics(scene, seen, energy) if seen is not None else {}
+    figures = mechanics(scene, seen, energy, counts.get("storms", 0)) if seen is not None else {}
     close = seen["bit_position"][:CLOSE_READINGS].tolist() if seen is not None else []
     # where nothing ever moves there is no energy to divide by
     idle = energy["residual"] == 0.0

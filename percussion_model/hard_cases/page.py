@@ -59,11 +59,15 @@ def page(found: Collection, picture: str | None) -> str:
     if picture:
         parts.append(f"![Residual, events, momentum and speed of every case]({picture})\n")
     parts.append(_disagreements(found))
-    if any("refined_converged" in row for row in found.rows):
+    if _is_refined(found):
         parts.append(_unresolved(found))
     parts.append("## All runs\n\n" + _COLUMNS)
     parts += [text for group in GROUPS if (text := _group(found, group))]
     return "\n".join(parts)
+
+
+def _is_refined(found: Collection) -> bool:
+    return any("refined_converged" in row for row in found.rows)
 
 
 def _verdict(found: Collection) -> str:
@@ -76,7 +80,9 @@ def _verdict(found: Collection) -> str:
         + ("all of this holds for all of them." if not failures else "this does not hold:"),
         *(f"- {text}" for text in failures),
         "",
-        f"The greatest residual is {abs(worst['residual'] or 0.0):.1e} ({worst['case']}, "
+        f"Each case ran for {found.share:.0%} of its duration"
+        + (", and on a finer grid as well. " if _is_refined(found) else ". ")
+        + f"The greatest residual is {abs(worst['residual'] or 0.0):.1e} ({worst['case']}, "
         f"{worst['solver']}), the most events {busiest['events_per_second']:.3g} a second "
         f"({busiest['case']}, {busiest['solver']}). Guards acted in "
         + (", ".join(f"{row['case']} ({row['solver']})" for row in guarded) or "none")
