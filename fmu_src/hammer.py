@@ -17,7 +17,7 @@ from fmu_src.variables import Variable, plain_row
 from percussion_model.parameter_table import parameter_table
 from percussion_model.scene import Scene, SceneError
 
-RUNTIME = ("folder", "slave", "plain_scene", "motion", "outputs", "states", "hammer")
+RUNTIME = ("folder", "slave", "plain_scene", "motion", "outputs", "states", "watch", "hammer")
 STEP_SIZE = 1e-3  # of the default experiment [s]
 AUTHOR = "percussion_model developers"
 LICENSE = "BSD-3-Clause"

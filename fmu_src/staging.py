@@ -29,6 +29,7 @@ MODEL_FILES = (
     "parameter_rows.py",
     "runner.py",
     "scene_rules.py",
+    "validity.py",
     "core/*.py",
     "solvers/*.py",
 )

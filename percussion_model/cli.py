@@ -11,6 +11,7 @@ import typer
 from percussion_model.commands.common import BAD_INPUT, INTERRUPTED, complain
 from percussion_model.commands.compare import compare
 from percussion_model.commands.scene import explain, new, plot, run
+from percussion_model.commands.stability import stability
 from percussion_model.quick_start import own_process
 
 app = typer.Typer(
@@ -39,7 +40,7 @@ def _options(
     """Percussive drilling with travelling waves: piston, bit and rock, blow by blow."""
 
 
-for _command in (run, explain, plot, compare, new):
+for _command in (run, explain, plot, compare, new, stability):
     app.command()(_command)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 
 import numpy as np
 
@@ -89,8 +90,12 @@ class Runner:
             raise SimulationError(f"t = {t!r} s: lies before the present time {self._time!r} s")
 
     def _commit_up_to(self, t: float) -> None:
+        self._let(self.solver.advance, t)
+
+    def _let(self, solver_goes: Callable[..., tuple[int, int, int]], t: float) -> None:
+        """Let the solver go on to `t`, and read its rows out whenever they are full."""
         while True:
-            status, n_blows, n_events = self.solver.advance(
+            status, n_blows, n_events = solver_goes(
                 self._state, t, self._blow_room, self._event_room, self.record_events
             )
             if n_blows or n_events:
@@ -162,6 +167,6 @@ class Runner:
         began = time.perf_counter()
         t = self.solver.grid_point_after(self._state, self._time)
         self._commit_up_to(t)
-        self.solver.commit(self._state, t)
+        self._let(self.solver.commit, t)
         self.solver.set_inputs(self._state, **values)
         self.wall_time += time.perf_counter() - began

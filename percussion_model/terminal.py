@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
 
     from percussion_model.comparison import Comparison
+    from percussion_model.hard_cases import Collection
     from percussion_model.result import Result
     from percussion_model.scene import Scene
     from percussion_model.solvers import Solver
@@ -114,6 +115,33 @@ _EFFORT: dict[str, Callable[[dict[str, Any]], float | None]] = {
 
 def _number(value: float | None, factor: float) -> str:
     return "-" if value is None else f"{factor * value:.5g}"
+
+
+def show_stability(found: Collection) -> None:
+    """Print what each solver made of each hard case, and what does not hold."""
+    table = Table()
+    for name in ("case", "solver"):
+        table.add_column(name, no_wrap=True)
+    for name in ("rate, mm/s", "residual", "momentum", "events/s", "guards", "computed in, s"):
+        table.add_column(name, justify="right", no_wrap=True)
+    for row in found.rows:
+        table.add_row(
+            row["case"],
+            row["solver"],
+            _number(row["rate"], 1e3),
+            *(_number(row[key], 1.0) for key in ("residual", "momentum", "events_per_second")),
+            str(row["guards"] or ""),
+            f"{row['wall_time']:.2g}",
+        )
+    console = Console()
+    console.print(table)
+    show_warnings(console, found.failures())
+    cases = len({row["case"] for row in found.rows})
+    failed = len(found.failures())
+    console.print(
+        f"{cases} cases, {len(found.rows)} runs, {failed} failures, "
+        f"{len(found.disagreements())} rates more than 2 % off the first solver's"
+    )
 
 
 def show_explanation(scene: Scene, solver: Solver, cost: dict[str, float]) -> None:

@@ -6,11 +6,20 @@ import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from percussion_model.core.records import EventKind
+from percussion_model.validity import (
+    button_note,
+    flight_note,
+    guard_notes,
+    ledger_note,
+    rate_note,
+)
+
 if TYPE_CHECKING:
     from percussion_model.result import Result
 
-# The ledger closes to rounding; more than this is an error of the solver.
-MOST_RESIDUAL = 1e-6
 # A larger error of the wave speed shows in the answers.
 MOST_WAVE_SPEED_ERROR = 1e-3
 
@@ -21,6 +30,7 @@ def find_warnings(result: Result) -> Iterator[str]:
     yield from _about_grid(result)
     yield from _about_blows(result)
     yield from _about_trust(result)
+    yield from _about_validity(result)
 
 
 def _about_scene(result: Result) -> Iterator[str]:
@@ -95,18 +105,38 @@ def _about_blows(result: Result) -> Iterator[str]:
 
 
 def _about_trust(result: Result) -> Iterator[str]:
-    residual = result.energy["residual_relative"]
-    if not abs(residual) <= MOST_RESIDUAL and any(result.energy[name] for name in _FLOWS):
+    if any(result.energy[name] for name in _FLOWS):
+        yield from ledger_note(result.energy["residual_relative"])
+    yield from guard_notes(result.statistics)
+
+
+def _about_validity(result: Result) -> Iterator[str]:
+    scene = result.scene
+    if scene.effects.rock == "none":
+        return
+    if scene.effects.rock != "wall" and len(result.blows):
+        peak = float(result.blows["peak_bit_force"].max())
+        yield from button_note(peak, scene.rock.loading_stiffness)
+    yield from flight_note(longest_flight(result))
+    rate = result.rate_of_penetration
+    yield from rate_note(rate, result.rate_of_penetration_standard_error)
+    if scene.loss_on and scene.loss.time > scene.bit.transit_time:
         yield (
-            f"the energy ledger does not close: {residual:.2g} of the energy put in is "
-            "unexplained; this is an error of the solver"
+            f"loss.time = {scene.loss.time:.3g} s is longer than a wave takes through the bit: "
+            "that is no structural loss, and waves do not travel"
         )
-    locked = result.statistics.get("locked", 0)
-    if locked:
-        yield (
-            f"in {locked} time step{'s' if locked != 1 else ''} the rock law crossed more modes "
-            "than it can: check the result with more solver.cells"
-        )
+
+
+def longest_flight(result: Result) -> float:
+    """Longest time without contact of bit and rock [s]; by whole blows without an event list."""
+    events = result.events
+    modes = events[events["kind"] <= EventKind.MODE_SS]
+    if not len(events) and result.statistics.get("events", 0):
+        off = result.blows["bit_impulse"] == 0.0
+        return float(result.blows["period"][off].max()) if off.any() else 0.0
+    times = np.concatenate([[0.0], modes["time"], [result.duration]])
+    flying = np.concatenate([[True], modes["kind"] == EventKind.MODE_FF])
+    return float(np.max(np.diff(times)[flying], initial=0.0))
 
 
 _FLOWS = ("initial", "drive", "feed", "gravity")

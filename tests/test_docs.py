@@ -18,6 +18,7 @@ SOURCES = [
 ]
 PAGES = (
     *("docs/model.md", "docs/numerics.md", "docs/parameters.md", "docs/fmu.md"),
+    "docs/stability.md",
     *("README.md", "CONTRIBUTING.md"),
 )
 

@@ -15,6 +15,7 @@ from fmu_src.runtime.outputs import OUTPUTS
 from fmu_src.runtime.plain_scene import PlainScene, make_scene
 from fmu_src.runtime.slave import Phase, Slave, guarded
 from fmu_src.runtime.states import fill_solver, fingerprint, pack, solver_bytes, unpack
+from fmu_src.runtime.watch import Watch
 from percussion_model.inputs import INPUTS
 from percussion_model.parameter_rows import Row, refuse_value
 from percussion_model.scene_rules import SceneRules
@@ -63,6 +64,7 @@ class PercussiveHammer(Slave):
         self.fingerprint = b""
         self._acting: dict[str, float] = {}  # inputs as the solver has them
         self._dirty = False
+        self._watch = Watch()
 
     # parameters and inputs
 
@@ -172,6 +174,8 @@ class PercussiveHammer(Slave):
             self._acting = wanted
             self._dirty = False
         motion.go_on(time, step_size, changes)
+        for text in self._watch.look(motion, self._acting["loading_stiffness"]):
+            self.warn(f"{self.instance_name}: at t = {time:.6g} s: {text}")
 
     def acts(self, scene: SceneRules, name: str) -> bool:
         """Whether an input has an effect in the scene; says so in the log where not."""

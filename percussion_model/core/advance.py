@@ -9,7 +9,6 @@ from percussion_model.core.drive import drive_force
 from percussion_model.core.kernel import kernel, merged
 from percussion_model.core.leap import FEWEST_STEPS, leap, longest_leap, plan_leap
 from percussion_model.core.records import PEAK_FIELDS, SAMPLE_FIELDS, Piston, Status
-from percussion_model.core.rock import MOST_CROSSINGS
 from percussion_model.core.sleep import put_to_sleep, sleep_on, wake_piston
 from percussion_model.core.totals import bit_position, lost_in_faces, now, stored_energy
 from percussion_model.core.wave import step
@@ -25,10 +24,9 @@ FACE = int(Row.FACE)
 PEAKS = len(SAMPLE_FIELDS)
 LEDGER = PEAKS + len(PEAK_FIELDS)
 
-# Events that one step can make at the most: the rock's crossings, two of the
-# contact, one of the drive, one of the barrier.
-EVENTS_A_STEP = MOST_CROSSINGS + 4
-
+# Events that one step can make besides the rock's crossings: two of the contact, one of
+# the drive, one of the barrier.
+OTHER_EVENTS = 4
 
 # A time this close below a grid point is that grid point [steps].
 GRID_ROUNDING = 1e-6
@@ -70,7 +68,7 @@ def go_on(par, s, wp, cp, wb, cb, ops, x, v, y, time, blows, events):
     while in_reach(par, s, s.step + 1, time):
         if s.n_blows >= blows.shape[0]:
             return BLOWS_FULL
-        if s.events_on == 1 and s.n_events + EVENTS_A_STEP > events.shape[0]:
+        if s.events_on == 1 and s.n_events + par.most_crossings + OTHER_EVENTS > events.shape[0]:
             return EVENTS_FULL
         if not math.isfinite(s.p + s.v_b + s.v_p + s.u_r):
             return NOT_FINITE

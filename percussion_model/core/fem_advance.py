@@ -14,7 +14,7 @@ from percussion_model.core.fem_bars import (
     stored_energy,
 )
 from percussion_model.core.fem_events import end_of_step
-from percussion_model.core.fem_modes import MOST_CHANGES, change_modes
+from percussion_model.core.fem_modes import change_modes
 from percussion_model.core.fem_records import FemTask, Node
 from percussion_model.core.fem_step import bit_force, contact_force, note_forces, take_step
 from percussion_model.core.kernel import kernel, merged
@@ -29,12 +29,23 @@ U = int(Node.U)
 # Where a longer row goes on.
 PEAKS = len(SAMPLE_FIELDS)
 LEDGER = PEAKS + len(PEAK_FIELDS)
-# Events at one instant at the most: each change of contact, drive and rock.
-EVENTS_A_STEP = 3 * MOST_CHANGES
 # A time this close before the end of a step is that end [steps].
 GRID_ROUNDING = 1e-6
 # Spacing of the bit force's checkpoints while standing still [steps].
 CHECKPOINT_STEPS = 64
+
+
+@merged
+def watch_crowd(par, s):
+    """Count a step cut short by an event; after too many the next looks for none."""
+    if s.time - s.crowd_from > par.dt:
+        s.crowd_from = s.time
+        s.crowd = 0
+    s.crowd += 1
+    if s.crowd >= par.most_events:
+        s.crowd = 0
+        s.stuck = 1
+        s.count_storms += 1
 
 
 @merged
@@ -56,13 +67,17 @@ def go_on(par, s, w, c, f, x, q, time, whole, blows, events):
         if s.live == 1:
             if s.n_blows >= blows.shape[0]:
                 return BLOWS_FULL
-            if s.events_on == 1 and s.n_events + EVENTS_A_STEP > events.shape[0]:
+            # each change of contact, drive and rock is an event
+            if s.events_on == 1 and s.n_events + 3 * par.most_changes > events.shape[0]:
                 return EVENTS_FULL
         if not math.isfinite(s.p + s.v_end + s.gap_rate + s.u_r):
             return NOT_FINITE
+        tried = h
         h = end_of_step(par, s, w, c, f, x, q, h)
         take_step(par, s, w, c, x, h)
         change_modes(par, s, w, c, blows, events)
+        if h < tried:
+            watch_crowd(par, s)
         note_forces(par, s)  # a dashpot may have come in
         if s.mode == SS and (s.n_check == 0 or s.count_steps % CHECKPOINT_STEPS == 0):
             push_checkpoint(s, s.time)

@@ -29,9 +29,6 @@ NO_ROCK, BILINEAR, SPRING = int(RockKind.NONE), int(RockKind.BILINEAR), int(Rock
 CONTACT_CLOSED, CONTACT_OPENED = int(EventKind.CONTACT_CLOSED), int(EventKind.CONTACT_OPENED)
 U = int(Node.U)
 
-# Changes that can follow each other at one instant; more would be a loop.
-MOST_CHANGES = 12
-
 
 @merged
 def change_contact(par, s, w, c, blows, events):
@@ -63,11 +60,11 @@ def change_contact(par, s, w, c, blows, events):
 def close_on_rock(par, s, energy):
     """The flying bit meets the rock."""
     springing = s.springing
-    standstill = s.e_standstill
+    standstill = s.e_standstill + recoverable(s)
     close_interface(par, s, energy)
     s.springing = 0
     if springing == 0:
-        # what the law takes for rock still pressed in is overshoot
+        # what flight and law take for rock still pressed in is overshoot
         s.e_standstill = standstill
         s.e_overshoot -= recoverable(s)
 
@@ -138,7 +135,7 @@ def move_datum(par, s, w):
 @kernel
 def change_modes(par, s, w, c, blows, events):
     """Make all changes that the present state asks for."""
-    for _ in range(MOST_CHANGES):
+    for _ in range(par.most_changes):
         changed = 0
         if par.n_p > 0:
             changed = change_contact(par, s, w, c, blows, events)

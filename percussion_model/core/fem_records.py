@@ -113,6 +113,8 @@ FEM_PAR = np.dtype(
         ("rock", "i8"),  # RockKind
         ("barrier", "i8"),  # 1: the energy barrier is on
         ("release", "i8"),  # 1: standstill leaves to free flight when F_R reaches 0
+        ("most_changes", "i8"),  # changes of mode at one instant; more are a loop
+        ("most_events", "i8"),  # steps cut short by events within a whole one; more are a storm
     ],
     align=True,
 )
@@ -133,6 +135,9 @@ FEM_STATE = np.dtype(
         ("fresh", "i8"),  # 1: inputs were changed, modes may have to follow
         ("stuck", "i8"),  # modes did not settle: no events in the next step
         ("count_trials", "i8"),
+        ("crowd", "i8"),  # steps cut short by events since `crowd_from`
+        ("crowd_from", "f8"),  # [s]
+        ("count_storms", "i8"),
     ],
     align=True,
 )

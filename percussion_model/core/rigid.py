@@ -24,16 +24,24 @@ from percussion_model.core.rigid_records import ROWS_AN_EVENT
 from percussion_model.core.rigid_schedule import CLOSE, NOTHING, schedule
 
 DONE, BLOWS_FULL, EVENTS_FULL = int(Status.DONE), int(Status.BLOWS_FULL), int(Status.EVENTS_FULL)
-NOT_FINITE, LOCKED = int(Status.NOT_FINITE), int(Status.LOCKED)
+NOT_FINITE = int(Status.NOT_FINITE)
 ABSENT = int(Piston.ABSENT)
 
 # Where a longer row goes on.
 PEAKS = len(SAMPLE_FIELDS)
 LEDGER = PEAKS + len(PEAK_FIELDS)
 
-# Events at one instant that the model can make: impact, release, a round of all modes,
-# and as many bounces as RESTING_EVENTS allows. More would be a loop.
-MOST_STANDING_EVENTS = 64
+
+@njit(cache=True, error_model="numpy")
+def count_event(par, s):
+    """Count the event that is about to happen; too many within a window are a storm."""
+    s.last_event = s.time
+    if s.time - s.window > par.storm_window:
+        s.window = s.time
+        s.window_events = 0
+    s.window_events += 1
+    if s.window_events == par.most_events:
+        s.count_storms += 1
 
 
 @njit(cache=True, error_model="numpy")
@@ -83,6 +91,7 @@ def advance(par_, state, t, blows, n_blows, events, n_events, record):
             s.blow.period = s.time - s.blow.time
             blows[n_blows[0]] = s.blow
             n_blows[0] += 1
+        count_event(par, s)
         happen(par, s)
         if record:
             for i in range(s.n_rows):
@@ -95,8 +104,6 @@ def advance(par_, state, t, blows, n_blows, events, n_events, record):
         s.scheduled = 0
         if not is_finite(s):
             return NOT_FINITE
-        if s.standing_events > MOST_STANDING_EVENTS:
-            return LOCKED
 
 
 @njit(cache=True, error_model="numpy")

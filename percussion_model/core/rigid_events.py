@@ -23,6 +23,7 @@ from percussion_model.core.rigid_law import (
     lift_off,
     note_standstill_force,
     overcomes_barrier,
+    recoverable,
     resume_cycle,
     set_down,
     start_cycle,
@@ -167,6 +168,9 @@ def impact(par, s):
 def touch_rock(par, s, inside):
     """The bit meets the rock."""
     if not inside:
+        if s.late == 1:
+            # the flight took rock pressed in for rock that springs back
+            s.standstill += recoverable(par, s, s.p)
         s.p = s.P_u
     if par.rock == BILINEAR:
         if overcomes_barrier(par, s):
@@ -204,8 +208,8 @@ def change_mode(par, s, kind, moved):
     elif kind == PEAK:
         end_loading(s)
     elif kind == LIFT:
-        if s.mode == BC or par.rock == SPRING:
-            s.p = s.P_u
+        if moved and (s.mode == BC or par.rock == SPRING):
+            s.p = s.P_u  # exactly unloaded; else it already was in tension
         lift_off(par, s)
     elif kind == TURN:
         if overcomes_barrier(par, s):
@@ -233,8 +237,9 @@ def happen(par, s):
         part(par, s)
         watch_standstill(s)
     elif kind == SWITCH:
-        s.alpha = 1
-        s.armed = 1
-        push_event(s, DOWN, -s.gap)
+        s.alpha = -s.alpha
+        if s.alpha > 0:
+            s.armed = 1
+        push_event(s, DOWN if s.alpha > 0 else UP, -s.gap)
     else:
-        change_mode(par, s, kind, s.next_tau > 0.0)
+        change_mode(par, s, kind, s.next_tau > 0.0 and s.late == 0)

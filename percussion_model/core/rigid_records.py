@@ -45,6 +45,8 @@ RIGID_PAR = np.dtype(
         ("C_R", "f8"),  # [N s/m]
         ("W_R", "f8"),  # [J]
         ("blow_gap_time", "f8"),  # without a switching drive a gap open this long ends a blow [s]
+        ("storm_window", "f8"),  # events are counted over this time [s]
+        ("most_events", "i8"),  # more within it are a storm
         ("piston", "i8"),  # Piston
         ("drive", "i8"),  # DriveKind
         ("rock", "i8"),  # RockKind
@@ -68,6 +70,10 @@ RIGID_STATE = np.dtype(
         ("armed", "i8"),  # 1: the next closure starts a blow
         ("in_blow", "i8"),
         ("standing_events", "i8"),  # events since time last moved on
+        ("window", "f8"),  # when the present count of events began [s]
+        ("window_events", "i8"),  # events since then
+        ("last_event", "f8"),  # [s]
+        ("late", "i8"),  # 1: the next event has been put off
         ("counted", "i8"),  # 1: the present drilling cycle has been counted
         ("p", "f8"),  # penetration of the present drilling cycle [m]
         ("P_u", "f8"),  # [m]
@@ -101,6 +107,7 @@ RIGID_STATE = np.dtype(
         ("count_contacts", "i8"),
         ("count_blows", "i8"),
         ("count_cycles", "i8"),
+        ("count_storms", "i8"),
         ("n_rows", "i8"),  # rows that the last event adds to the event list
         ("row_kind", "i8", (ROWS_AN_EVENT,)),
         ("row_value", "f8", (ROWS_AN_EVENT,)),

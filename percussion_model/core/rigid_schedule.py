@@ -166,6 +166,8 @@ def piston_event(par, s, y, acc, beta, k, tau, kind):
     a_p = free_acceleration(par, s)
     jerk = -2.0 * beta * acc - k * s.v_b
     doubt = acceleration_doubt(par, s, acc)
+    if s.held == 1 and par.drive == PRESSURE and s.alpha > 0:
+        return 0.0, SWITCH  # a start in contact: u_r = 0 is reached
     if s.held == 1:
         let_go = release_time(a_p, acc, jerk, doubt, beta, k)
         if let_go < tau:
@@ -199,6 +201,29 @@ def piston_event(par, s, y, acc, beta, k, tau, kind):
 
 
 @njit(cache=True, error_model="numpy")
+def put_off(par, s, tau, kind):
+    """In a storm of events, let the next one wait (docs/numerics.md, section 8).
+
+    Returns
+    -------
+    float
+        Time until it [s]. That of a state depends on its last event alone, so that
+        commits in between do not put it off again and again.
+    """
+    s.late = 0
+    if kind == NOTHING or s.window_events < par.most_events:
+        return tau
+    since = s.time - s.last_event
+    if since + tau >= par.storm_window:
+        return tau
+    wait = par.storm_window / par.most_events - since
+    if tau >= wait:
+        return tau
+    s.late = 1
+    return wait
+
+
+@njit(cache=True, error_model="numpy")
 def schedule(par, s):
     """Find the next event and note it in the state. Depends on the state alone."""
     F, M = loads(par, s)
@@ -224,6 +249,7 @@ def schedule(par, s):
             tau, kind = standstill_event(par, s, y, acc, beta, k, F, M)
     if par.piston != ABSENT:
         tau, kind = piston_event(par, s, y, acc, beta, k, tau, kind)
+    tau = put_off(par, s, tau, kind)
     s.next_tau = tau
     s.next_time = s.time + tau
     s.next_kind = kind

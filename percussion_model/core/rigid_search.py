@@ -83,7 +83,7 @@ def approach_time(h, sign, y, v, beta, k, v_p, a_p, doubt, end):
     y1 = y
     v1 = v
     for _ in range(APPROACH_LIMIT):
-        if tau > end:
+        if tau > end or tau == NEVER:
             return NEVER
         if tau > 0.0:
             y1, v1 = oscillate(y, v, beta, k, tau)

@@ -31,10 +31,6 @@ FF, DFC, FC, BC, SS = (int(m) for m in Mode)
 NO_ROCK, BILINEAR = int(RockKind.NONE), int(RockKind.BILINEAR)
 SPRING, WALL = int(RockKind.SPRING), int(RockKind.WALL)
 
-# Crossings that the law can make within one step: FF, SS, FF, DFC, FC, BC and
-# again; more would be a loop.
-MOST_CROSSINGS = 12
-
 
 @merged
 def time_in_mode(par, s, v_free, v, y, rate, y_end, rest):
@@ -95,7 +91,10 @@ def contact_stretch(par, s, v_free, z, rest, now):
         s.e_standstill += C * q
     if (s.mode == DFC or s.mode == FC) and par.rock == BILINEAR:
         crush(s, p_before)
-    if next_mode == FF and s.mode != SS:
+    if next_mode == FF and y < 0.0:
+        # standstill had pulled the bit when its unloading began: the rock lets go
+        s.e_standstill += recoverable(s)
+    elif next_mode == FF and s.mode != SS:
         s.p = origin  # exactly unloaded
     last = z * (v_free - v * (1.0 - fade))
     s.b_peak_bit = max(s.b_peak_bit, K * y + C * v, last)
@@ -166,7 +165,7 @@ def rock_step(par, s, w, c, v_free, z, tau, time, events):
     rest = tau
     d = 0.0
     q = 0.0
-    for _ in range(MOST_CROSSINGS):
+    for _ in range(par.most_crossings):
         now = time + (tau - rest)
         if s.mode == FF:
             t, closes = flight_stretch(par, s, v_free, rest)

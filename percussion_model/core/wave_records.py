@@ -96,6 +96,7 @@ WAVE_PAR = np.dtype(
         ("release", "i8"),  # 1: standstill leaves to free flight when F_R reaches 0
         ("loss", "i8"),  # sub-steps of the loss operator, 0: no loss
         ("leaps", "i8"),  # levels of the leap operators, four to one: 0: no leaps
+        ("most_crossings", "i8"),  # of the rock law within a step; more are a loop
         ("size_p", "i8"),  # padded size of the leap operators: piston
         ("size_r", "i8"),  # bit on the rock
     ],

@@ -147,13 +147,13 @@ def head(fig: Figure, title: str, handles: Sequence[Any] = ()) -> None:
         fig.legend(handles=list(handles), loc="outside lower center", ncols=ncols)
 
 
-def save(fig: Figure, folder: Path, name: str) -> list[str]:
+def save(fig: Figure, folder: Path, name: str, kinds: Sequence[str] = ("png", "svg")) -> list[str]:
     """Write a figure as PNG and SVG and return the names of the files."""
     fig.draw_without_rendering()
     fig.set_layout_engine("none")  # laid out once, not again for each file
-    names = [f"{name}.{kind}" for kind in _METADATA]
-    for file, metadata in zip(names, _METADATA.values(), strict=True):
-        fig.savefig(folder / file, metadata=metadata)
+    names = [f"{name}.{kind}" for kind in kinds]
+    for file, kind in zip(names, kinds, strict=True):
+        fig.savefig(folder / file, metadata=_METADATA[kind])
     return names
 
 

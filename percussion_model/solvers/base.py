@@ -73,8 +73,10 @@ class Solver(Protocol):
     def watch_peaks(self, state: Any, t: float) -> None:
         """Count the peak forces of `look` from `t` on [s]."""
 
-    def commit(self, state: Any, t: float) -> None:
-        """Bring an advanced state to the first grid point at or after `t`."""
+    def commit(
+        self, state: Any, t: float, blows: np.ndarray, events: np.ndarray, record_events: bool
+    ) -> tuple[int, int, int]:
+        """Bring an advanced state to the first grid point at or after `t`; as `advance`."""
 
     def set_inputs(self, state: Any, **inputs: float) -> None:
         """Change inputs of a committed state."""

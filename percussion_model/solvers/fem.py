@@ -236,10 +236,24 @@ class FemSolver:
         s = state.record[0]
         s["peak_from"], s["peak_bit"], s["peak_contact"] = t, 0.0, 0.0
 
-    def commit(self, state: FemState, t: float) -> None:
-        """Bring an advanced state to `t`, with a part of a step."""
-        state.record[0]["events_on"] = 0
-        self._run(FemTask.BRING, state, t)
+    def commit(
+        self,
+        state: FemState,
+        t: float,
+        blows: np.ndarray | None = None,
+        events: np.ndarray | None = None,
+        record_events: bool = False,
+    ) -> tuple[int, int, int]:
+        """Bring an advanced state to `t`, with a part of a step.
+
+        Returns
+        -------
+        status, n_blows, n_events : int
+        """
+        s = state.record[0]
+        s["events_on"] = record_events
+        status = self._run(FemTask.BRING, state, t, blows, events)
+        return status, int(s["n_blows"]), int(s["n_events"])
 
     def set_inputs(self, state: FemState, **inputs: float) -> None:
         """Change inputs of a committed state; rock inputs wait for the next cycle."""
@@ -250,8 +264,9 @@ class FemSolver:
     def energy(self, state: FemState, t: float) -> dict[str, float]:
         """Ledger [J] at `t`."""
         here = state.copy()
-        self.commit(here, t)
         s = here.record[0]
+        s["live"] = 0
+        self._run(FemTask.BRING, here, t)
         entries = {name: float(s[f"e_{name}"]) for name in LEDGER_FIELDS}
         loss, numerical = dissipated_in_nodes(self._par[0], self._nodes(here))
         entries["loss"] += loss
@@ -284,5 +299,5 @@ class FemSolver:
     def statistics(self, state: FemState) -> dict[str, int]:
         """Counts of what the solver did."""
         s = state.record[0]
-        names = ("steps", "trials", "events", "blows")
+        names = ("steps", "trials", "events", "blows", "storms")
         return {name: int(s[f"count_{name}"]) for name in names} | {"locked": int(s["locked"])}

@@ -12,6 +12,12 @@ from percussion_model.scene_rules import SceneRules
 from percussion_model.solvers.mesh import BarMesh, critical_frequency
 from percussion_model.solvers.packing import REARM_TRANSITS
 
+# Changes of mode that can follow each other at one instant; more would be a loop.
+MOST_CHANGES = 12
+# Steps cut short by events within the length of a whole one; more are a storm. The
+# reference has no more than 5.
+MOST_EVENTS = 64
+
 
 def loss_time(scene: SceneRules, bit: BarMesh) -> float:
     """Kelvin-Voigt time [s]: that of the scene, or 2 zeta_K / omega_cr (eq. 55 of the paper)."""
@@ -65,6 +71,7 @@ def pack_fem(
     # a wall is met like the piston: by a penalty
     p["rock"] = RockKind.SPRING if kind == RockKind.WALL else kind
     p["barrier"] = scene.barrier_on
+    p["most_changes"], p["most_events"] = MOST_CHANGES, MOST_EVENTS
     p["release"] = scene.effects.standstill_tension == "release"
     return par
 

@@ -18,6 +18,8 @@ WANTED_FIT = 2e-3
 MOST_REFINED = 2.0
 # Share of the loss that acts between interfaces; the rest between cells.
 HALF_LOSS = 0.5
+# Terms of a series that halves each time: thirty make nine digits.
+HALVINGS = 30
 # Explicit loss stays free of overshoot up to this viscous number a sub-step.
 MOST_VISCOUS = 0.5
 
@@ -172,7 +174,9 @@ def end_viscosity(c: np.ndarray, grid: Grid, loss_time: float) -> tuple[float, f
     """Viscous numbers of the top and the bottom end cell.
 
     With sub-steps the interface next to the end gives way while the end cell
-    pushes; its mean response lowers the number (docs/numerics.md, eq. 9).
+    pushes; its mean response lowers the number (docs/numerics.md, eq. 9). Where
+    one end's force reaches the other end within the step, of which that knows
+    nothing, it is lowered further, so that the two never give energy.
     """
     parts = substeps(loss_time, grid.time_step)
     if parts == 0 or grid.n < 2:
@@ -180,10 +184,49 @@ def end_viscosity(c: np.ndarray, grid: Grid, loss_time: float) -> tuple[float, f
     kappa = HALF_LOSS * loss_time / grid.time_step
     if parts == 1:
         return kappa, kappa
-    _, top = _response(c, grid.n, parts, 1)
-    _, bottom = _response(c, grid.n, parts, grid.n - 1)
+    top, mean_top = _response(c, grid.n, parts, 1)
+    bottom, mean_bottom = _response(c, grid.n, parts, grid.n - 1)
     z = grid.impedance
-    return kappa / (1.0 + kappa * z[0] * top), kappa / (1.0 + kappa * z[-1] * bottom)
+    if top[-2] > 0.0:
+        # reached: the form of the step's loss in both forces must not be negative
+        later = _half_later(c, grid.n, parts, bottom)
+        cross = abs(_pairing(c, grid.n, top, later))
+        spare = 1.0 / (kappa * z[-1]) + mean_bottom - _pairing(c, grid.n, bottom, later)
+        mean_bottom += max(cross - spare, 0.0)
+        later = _half_later(c, grid.n, parts, top)
+        spare = 1.0 / (kappa * z[0]) + mean_top - _pairing(c, grid.n, top, later)
+        mean_top += max(cross - spare, 0.0)
+    return kappa / (1.0 + kappa * z[0] * mean_top), kappa / (1.0 + kappa * z[-1] * mean_bottom)
+
+
+def _pairing(c: np.ndarray, n: int, one: np.ndarray, other: np.ndarray) -> float:
+    """Product of two rows of interface velocities, weighted by mass."""
+    return float(np.sum(one[1:n] * other[1:n] / (2.0 * c[Coef.INV_Z, 1:n])))
+
+
+def _half_later(c: np.ndarray, n: int, parts: int, v: np.ndarray) -> np.ndarray:
+    """Solve x + S x = v, where S is a step's sub-steps of diffusion.
+
+    By the series in (1 - S)/2, whose terms fall by half at least.
+    """
+    total = np.zeros_like(v)
+    term = 0.5 * v
+    for _ in range(HALVINGS):
+        total += term
+        after = term.copy()
+        for _ in range(parts):
+            _diffuse(c, n, after)
+        term = 0.5 * (term - after)
+    return total
+
+
+def _diffuse(c: np.ndarray, n: int, v: np.ndarray) -> None:
+    """One explicit sub-step of the loss between interfaces, end cells left out."""
+    flow = c[Coef.VISCOUS, 1 : n - 1] * np.diff(v[1:n])
+    force = np.zeros(n + 1)
+    force[1 : n - 1] += flow
+    force[2:n] -= flow
+    v[1:n] += 2.0 * c[Coef.INV_Z, 1:n] * force[1:n]
 
 
 def _response(c: np.ndarray, n: int, parts: int, where: int) -> tuple[np.ndarray, float]:
@@ -200,10 +243,6 @@ def _response(c: np.ndarray, n: int, parts: int, where: int) -> tuple[np.ndarray
     mean = 0.0
     for _ in range(parts):
         mean += v[where] / parts
-        flow = c[Coef.VISCOUS, 1 : n - 1] * np.diff(v[1:n])
-        force = np.zeros(n + 1)
-        force[1 : n - 1] += flow
-        force[2:n] -= flow
-        force[where] += 1.0 / parts
-        v[1:n] += 2.0 * c[Coef.INV_Z, 1:n] * force[1:n]
+        _diffuse(c, n, v)
+        v[where] += 2.0 * c[Coef.INV_Z, where] / parts
     return v, mean

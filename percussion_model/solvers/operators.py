@@ -82,6 +82,9 @@ def build_operators(
 ) -> LeapOperators | None:
     """Leap operators of a scene, or None where they would be too large.
 
+    None as well where a loaded bit does not come to rest within the digits of a
+    number, as with a loss that freezes its stress: then there is no path to rest.
+
     Parameters
     ----------
     par : WAVE_PAR array of length 1
@@ -104,7 +107,10 @@ def build_operators(
         by_column = step_map(Configuration(of_piston, piston, cp))
         found["piston"] = _powers(by_column, LEVELS, LEVELS, size_p)
         found["bottom"] = _watch(by_column, by_column @ _offset(cp, n_p, Coef.BOTTOM), size_p)
-    found |= _of_bit(alone, bit, cb, size, loads=_loads(par))
+    try:
+        found |= _of_bit(alone, bit, cb, size, loads=_loads(par))
+    except np.linalg.LinAlgError:
+        return None
     return LeapOperators(**found)
 
 

@@ -14,6 +14,9 @@ from percussion_model.solvers.grid import Grid, end_viscosity, substeps
 # An open gap of this many transits of the slower bar ends a blow where no
 # pressure law does (docs/model.md, section 7).
 REARM_TRANSITS = 20.0
+# Crossings that the rock law can make within one step: FF, SS, FF, DFC, FC, BC and again;
+# more would be a loop.
+MOST_CROSSINGS = 12
 # Inputs that can change during a run, and the fields of the state that hold them.
 INPUT_FIELDS = {
     "feed_force": "feed",
@@ -60,6 +63,7 @@ def pack_parameters(
     p["drive"] = DriveKind[scene.effects.drive.upper()]
     p["rock"] = RockKind[scene.effects.rock.upper()]
     p["barrier"] = scene.barrier_on
+    p["most_crossings"] = MOST_CROSSINGS
     p["release"] = scene.effects.standstill_tension == "release"
     p["loss"] = substeps(loss_time, bit.time_step)
     p["n_b"] = bit.n

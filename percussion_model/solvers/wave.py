@@ -235,9 +235,16 @@ class WaveSolver:
         numbers[WORD["peak_from"]] = t
         numbers[WORD["peak_bit"]] = numbers[WORD["peak_contact"]] = 0.0
 
-    def commit(self, state: WaveState, t: float) -> None:
-        """Bring the state to the first grid point at or after `t`."""
-        self._run(Task.BRING, state, self.grid_point_after(state, t))
+    def commit(
+        self,
+        state: WaveState,
+        t: float,
+        blows: np.ndarray | None = None,
+        events: np.ndarray | None = None,
+        record_events: bool = False,
+    ) -> tuple[int, int, int]:
+        """Bring the state to the first grid point at or after `t`; nothing happens meanwhile."""
+        return self._run(Task.BRING, state, self.grid_point_after(state, t)), 0, 0
 
     def set_inputs(self, state: WaveState, **inputs: float) -> None:
         """Change inputs of a committed state; rock inputs wait for the next cycle."""

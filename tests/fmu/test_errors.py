@@ -147,3 +147,28 @@ def test_an_input_without_effect_is_noted_in_the_log(make):
     instance.set({"piston_force": 100.0})
     instance.step(0.01)
     assert any("no effect" in text for text in instance.messages)
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ({"feed_force": -5000.0}, "off bottom"),
+        ({"rock.loading_stiffness": 1e6}, "deeper than the buttons"),
+        ({"drive.reversal_distance": 1e-18}, "storm"),
+    ],
+)
+def test_the_log_says_once_where_the_motion_leaves_the_model(make, values, words):
+    instance = make()
+    instance.set(values)
+    for _ in range(8):
+        instance.step(0.05)
+    said = [text for text in instance.messages if words in text]
+    assert len(said) == 1, instance.messages
+    assert "at t = " in said[0]
+
+
+def test_the_log_of_the_reference_is_silent(make):
+    instance = make()
+    for _ in range(40):
+        instance.step(0.05)
+    assert instance.messages == []

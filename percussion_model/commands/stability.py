@@ -1,0 +1,77 @@
+"""The hard cases by every solver."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from percussion_model.commands.common import JsonFile, Out, check_json, needs_plot_extra, write_json
+from percussion_model.commands.common import complain as say
+
+if TYPE_CHECKING:
+    from percussion_model.hard_cases import Collection
+
+FAILED = 1
+
+
+def stability(
+    cases: Annotated[
+        list[str] | None, typer.Argument(metavar="[CASE]...", help="Cases; all if left out.")
+    ] = None,
+    solvers: Annotated[
+        str, typer.Option("--solvers", metavar="A,B", help="Solvers that run them.")
+    ] = "wave,fem,rigid",
+    share: Annotated[
+        float, typer.Option("--share", min=0.01, max=1.0, help="Share of each case's duration.")
+    ] = 1.0,
+    refined: Annotated[
+        bool, typer.Option("--refine/--no-refine", help="Run each on a finer grid as well.")
+    ] = True,
+    workers: Annotated[
+        int | None, typer.Option("--workers", min=0, help="Processes; 0: none but this one.")
+    ] = None,
+    out: Out = None,
+    json_file: JsonFile = None,
+) -> None:
+    """Run the hard cases by every solver: what must hold, and where solvers disagree."""
+    from percussion_model.hard_cases import run_collection
+    from percussion_model.result_files import check_writable
+    from percussion_model.terminal import progress_bar, show_stability
+
+    if out is not None:
+        check_writable(out)
+    check_json(json_file)
+    with progress_bar(1.0) as progress:
+
+        def report(done: int, count: int) -> None:
+            if progress is not None:
+                progress(done / count)
+
+        names = [name.strip() for name in solvers.split(",")]
+        found = run_collection(cases or None, names, share, refined, workers, report)
+    write_json(json_file, found.to_dict())
+    if json_file != "-":
+        show_stability(found)
+    if out is not None:
+        _write(found, out)
+    if found.failures():
+        raise typer.Exit(FAILED)
+
+
+def _write(found: Collection, folder: Path) -> None:
+    """Write the page and its figure into a folder."""
+    from percussion_model.hard_cases.page import page
+    from percussion_model.result_files import staged_text
+
+    picture = None
+    try:
+        from percussion_model.plotting.stability import save_stability
+
+        picture = save_stability(found, folder / "images").relative_to(folder).as_posix()
+    except ImportError as error:
+        say(needs_plot_extra(error))
+    staged_text(folder / "stability.md", page(found, picture))
+    print(folder / "stability.md", file=sys.stderr)

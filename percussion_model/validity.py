@@ -1,0 +1,84 @@
+"""Where a run leaves what the model can tell, and what its guards had to do.
+
+Standard library only: an exported simulation asks the same questions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+# The ledger closes to rounding; more than this is an error of the solver.
+MOST_RESIDUAL = 1e-6
+# Buttons of a percussive bit stand out by 5 to 15 mm; deeper in, its face meets the rock,
+# which the model does not have [m].
+BUTTON_LENGTH = 0.010
+# The fastest percussive drills make 0.1 m/s in the softest rock, and the softest corner of
+# the paper's ranges 0.22 m/s: a rate far beyond is no drilling [m/s].
+MOST_RATE = 0.5
+# A bit that meets no rock for so long, five blows of the reference, is off bottom [s].
+LONGEST_FLIGHT = 0.25
+
+
+def ledger_note(residual: float) -> Iterator[str]:
+    """Say that a share of the energy put in is unexplained, where it is."""
+    if not abs(residual) <= MOST_RESIDUAL:
+        yield (
+            f"the energy ledger does not close: {residual:.2g} of the energy put in is "
+            "unexplained; this is an error of the solver"
+        )
+
+
+def guard_notes(statistics: Mapping[str, int]) -> Iterator[str]:
+    """Say what the guards of a solver had to do (docs/numerics.md, section 12)."""
+    locked, storms = statistics.get("locked", 0), statistics.get("storms", 0)
+    if locked:
+        yield (
+            f"in {locked} time step{'s' if locked != 1 else ''} the rock law crossed more modes "
+            "than it can: check the result with more solver.cells"
+        )
+    if storms:
+        yield (
+            f"{storms} storm{'s' if storms != 1 else ''} of events: more within a moment than can "
+            "mean anything; some were put off, so the motion is bounded but not exact"
+        )
+
+
+def button_note(peak_bit_force: float, loading_stiffness: float) -> Iterator[str]:
+    """Say that the rock is pressed in deeper than buttons stand out, where it is.
+
+    Parameters
+    ----------
+    peak_bit_force : float
+        [N]
+    loading_stiffness : float
+        [N/m]
+    """
+    depth = peak_bit_force / loading_stiffness
+    if depth > BUTTON_LENGTH:
+        yield (
+            f"the rock is pressed in by {1e3 * depth:.3g} mm, deeper than the buttons of a bit "
+            f"stand out ({1e3 * BUTTON_LENGTH:g} mm): beyond that the model does not hold"
+        )
+
+
+def flight_note(flight: float) -> Iterator[str]:
+    """Say that the bit met no rock for long, where it did not; flight in s."""
+    if flight > LONGEST_FLIGHT:
+        yield (
+            f"the bit is off bottom: it met no rock for {flight:.3g} s, more than "
+            f"{LONGEST_FLIGHT:g} s; feed or start do not hold it on the rock"
+        )
+
+
+def rate_note(rate: float, standard_error: float) -> Iterator[str]:
+    """Say that a rate of penetration [m/s] means nothing, where it does not."""
+    if rate > MOST_RATE:
+        yield (
+            f"a rate of penetration of {rate:.3g} m/s is no drilling: above {MOST_RATE:g} m/s "
+            "the model does not hold"
+        )
+    elif rate < -3.0 * standard_error and rate < -1e-9:
+        yield (
+            f"the rate of penetration is negative ({rate:.3g} m/s): the bit is lifted off the "
+            "hole's bottom and does not drill"
+        )

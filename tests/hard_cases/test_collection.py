@@ -1,0 +1,138 @@
+"""Every hard case by every solver that supports it: what must hold of all runs."""
+
+from __future__ import annotations
+
+import json
+import os
+
+import pytest
+
+from percussion_model import Scene
+from percussion_model.cli import _guarded, app
+from percussion_model.hard_cases import SOLVERS, hard_cases, measure, run_collection
+from percussion_model.hard_cases.collection import Collection, wrong
+from percussion_model.hard_cases.refinement import refine
+
+LONG = os.environ.get("PERCUSSION_LONG") == "1"
+# Share of each case's duration: enough for a blow or two, and for the first storm.
+SHARES = {"wave": 0.25, "fem": 0.1, "rigid": 0.15}
+# Too dear for every run of the suite, at any length.
+DEAR = {("ratio_50", "fem"), ("fine", "fem"), ("fine", "wave")}
+RUNS = [(name, solver) for name, case in hard_cases().items() for solver in case.solvers]
+
+
+def test_there_are_enough_cases_and_each_says_why():
+    assert len(hard_cases()) >= 40
+    for case in hard_cases().values():
+        assert case.hard
+        assert case.holds
+        assert set(case.solvers) <= set(SOLVERS)
+        assert case.scene.title == case.name
+        assert not case.scene.unused or case.group in ("bars", "rock", "contact", "drive")
+        assert set(case.differs) <= set(SOLVERS)
+
+
+def test_scripts_change_inputs_in_order_and_in_turn():
+    changes = hard_cases()["everything_changes"].changes(0.01)
+    times = [t for t, _ in changes]
+    assert times == sorted(set(times))
+    seen = [inputs["drive_force"] for _, inputs in changes if "drive_force" in inputs]
+    assert seen[:4] == [0.0, 1e4, 3000.0, 0.0]
+
+
+@pytest.mark.parametrize(("name", "solver"), RUNS, ids=[f"{n}-{s}" for n, s in RUNS])
+def test_what_must_hold_of_every_run(name, solver):
+    if (name, solver) in DEAR and not LONG:
+        pytest.skip("takes seconds: PERCUSSION_LONG=1 runs it")
+    found = measure(hard_cases()[name], solver, 1.0 if LONG else SHARES[solver])
+    assert wrong(found.to_dict()) == []
+    assert found.duration > 0.0
+
+
+@pytest.mark.skipif(not LONG, reason="PERCUSSION_LONG=1 runs every case on a finer grid")
+def test_rates_of_periodic_cases_stay_on_a_finer_grid_of_waves():
+    left = set()
+    for name, case in hard_cases().items():
+        if "wave" in case.solvers and not case.aperiodic:
+            found = refine(case, measure(case, "wave", again=False))
+            if found.converged is False:
+                left.add(name)
+    assert left <= {"one_cell", "no_loss", "no_loss_no_barrier", "spring", "gamma_1"}
+
+
+def test_a_finer_grid_leaves_the_first_contact_as_it_is():
+    case = hard_cases()["gap_0"]
+    found = refine(case, measure(case, "wave", again=False))
+    assert found.path_change < 5e-3
+    assert found.rate_change < 2e-3
+    assert found.converged
+
+
+ROW = {
+    "case": "gap_0", "solver": "wave", "error": "", "residual": 0.0, "momentum": 0.0,
+    "contact_tension": 0.0, "rock_tension": None, "interpenetration": 0.0,
+    "events_per_second": 10.0, "ceiling": 20.0, "guards": 0, "same_bits": True,
+    "rate": 0.016, "rate_error": 0.0,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"residual": 2e-6}, "residual = 2e-06"),
+        ({"residual": None}, "residual is no number"),
+        ({"momentum": -1e-3}, "momentum"),
+        ({"contact_tension": 0.1}, "contact_tension"),
+        ({"interpenetration": 1.5}, "interpenetration"),
+        ({"events_per_second": 21.0}, "events_per_second = 21"),
+        ({"same_bits": False}, "other bits"),
+        ({"error": "gone"}, "gone"),
+    ],
+)
+def test_what_does_not_hold_is_found(change, words):
+    assert wrong(ROW) == []
+    (text,) = wrong(ROW | change)
+    assert words in text
+
+
+def test_disagreements_have_a_reason_or_say_that_none_is_known():
+    other = ROW | {"solver": "fem", "rate": 0.018}
+    (entry,) = Collection([ROW, other]).disagreements()
+    assert entry["difference"] == pytest.approx(0.125)
+    assert entry["reason"] == ""
+    (entry,) = Collection([ROW, other | {"rate_error": 0.002}]).disagreements()
+    assert "1.0 standard errors" in entry["reason"]
+    (entry,) = Collection([ROW, other | {"solver": "rigid"}]).disagreements()
+    assert "rigid bodies" in entry["reason"]
+    assert Collection([ROW, other | {"rate": 0.0162}]).disagreements() == []
+
+
+def test_processes_give_the_same_rows_as_this_one():
+    choice = {"names": ["grazing", "reversal_1"], "solvers": ["rigid"], "share": 0.1}
+    here, there = (run_collection(**choice, workers=n).rows for n in (0, 1))
+    for row in (*here, *there):
+        del row["wall_time"]
+    assert here == there
+
+
+def test_the_command_writes_json_page_and_figure(tmp_path, capsys):
+    words = ["stability", "grazing", "bounce_dead", "--solvers", "rigid", "--share", "0.2"]
+    words += ["--workers", "0", "--out", str(tmp_path), "--json", "-"]
+    assert _guarded(lambda: app(words, standalone_mode=False)) == 0
+    values = json.loads(capsys.readouterr().out)
+    assert values["cases"] == values["runs"] == 2
+    assert values["failures"] == []
+    assert {row["case"] for row in values["rows"]} == {"grazing", "bounce_dead"}
+    text = (tmp_path / "stability.md").read_text(encoding="utf-8")
+    assert "bounce_dead" in text
+    assert "](images/stability.png)" in text
+    assert (tmp_path / "images" / "stability.png").stat().st_size > 10_000
+
+
+def test_an_unknown_case_is_refused(capsys):
+    assert _guarded(lambda: app(["stability", "grazin"], standalone_mode=False)) == 2
+    assert "unknown case grazin" in capsys.readouterr().err
+
+
+def test_the_reference_is_no_hard_case():
+    assert all(case.scene != Scene() for case in hard_cases().values())

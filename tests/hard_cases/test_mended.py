@@ -1,0 +1,104 @@
+"""Scenes of faults that were mended: one for each."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from percussion_model import EventKind, Scene, Simulation, simulate
+from percussion_model.solvers.wave import WaveSolver
+
+
+def residual(scene, duration):
+    simulation = Simulation(scene)
+    simulation.advance(duration)
+    return abs(simulation.energy()["residual_relative"])
+
+
+@pytest.mark.parametrize("rock", ["bilinear", "spring", "wall"])
+def test_a_bit_found_below_the_surface_is_booked_once(rock):
+    """Finite elements booked a step past the surface as relaxation and as overshoot."""
+    changes = {"fem.event_tolerance": 1.0, "fem.time_tolerance": 1.0, "effects.rock": rock}
+    changes["effects.barrier"] = rock == "bilinear"
+    scene = Scene().replace(**changes, **{"solver.name": "fem"})
+    simulation = Simulation(scene)
+    for t in np.arange(1, 9) * 1.3e-3:
+        simulation.advance(float(t))
+        assert abs(simulation.energy()["residual_relative"]) < 1e-9
+
+
+PULLED = {
+    "wave": {
+        "drive.force": 63706.97854276974,
+        "drive.reversal_distance": 0.0003816839540449649,
+        "rock.barrier_energy": 0.6548442985902965,
+        "rock.loading_stiffness": 828287815.1559093,
+        "rock.unloading_ratio": 239.00239722477622,
+        "start.piston_velocity": 0.1338341165499877,
+    },
+    "rigid": {"feed.force": 0.0, "rock.barrier_energy": 0.5, "rock.unloading_ratio": 50.0},
+}
+
+
+@pytest.mark.parametrize("solver", PULLED)
+def test_a_rock_that_lets_go_of_a_pulled_bit_keeps_the_ledger(solver):
+    """Unloading that began in tension moved the bit to P_u and lost the spring's energy."""
+    scene = Scene().computed_by(solver, **PULLED[solver], **{"effects.standstill_tension": "paper"})
+    assert residual(scene, 0.0021 if solver == "wave" else 0.2) < 1e-9
+
+
+def test_what_happens_before_a_change_of_inputs_is_listed():
+    """Finite elements dropped events and blows of the part of a step before a change."""
+    scene = Scene().replace(**{"solver.name": "fem", "run.settle": 0.0})
+    simulation = Simulation(scene)
+    for k in range(1, 12_000):
+        simulation.advance(5e-6 * k)
+        simulation.set_inputs(feed_force=2500.0)
+    kinds = simulation.events["kind"]
+    contact = kinds[(kinds == EventKind.CONTACT_CLOSED) | (kinds == EventKind.CONTACT_OPENED)]
+    assert len(contact) >= 6
+    assert np.all(np.diff(contact) != 0)
+    drive = kinds[kinds >= EventKind.DRIVE_UP]
+    assert np.all(np.diff(drive) != 0)
+    assert len(simulation.events) == simulation.statistics()["events"]
+    assert len(simulation.blows) == 1  # the second is under way
+
+
+@pytest.mark.parametrize(
+    ("cells", "loss_time"), [(2, 1e-4), (2, 8e-4), (3, 5e-4), (5, 3e-4), (10, 5e-4), (20, 8e-4)]
+)
+def test_loss_never_gives_energy(cells, loss_time):
+    """Both ends of a bar at once gave energy where each reaches the other within a step."""
+    solver = WaveSolver(Scene().replace(**{"loss.time": loss_time, "solver.cells": cells}))
+    for operator in (solver._operators[0][0], solver._operators[1][0, 0]):
+        assert np.abs(np.linalg.eigvals(operator)).max() < 1.0 + 1e-9
+
+
+def test_a_drive_turns_upward_where_a_rigid_piston_starts_on_the_bit():
+    """u_r = 0 is reached from the start; the drive held the piston down for ever."""
+    together = {"start.gap": 0.0, "start.rock_gap": 0.0, "start.piston_velocity": 0.0}
+    scene = Scene().computed_by("rigid", **together)
+    result = simulate(scene, 0.3, settle=0.0)
+    assert result.events["kind"][0] == EventKind.DRIVE_UP
+    assert len(result.blows) > 3
+
+
+def test_a_drive_that_turns_at_once_ends_in_bounded_time():
+    """A storm of switches never came back."""
+    scene = Scene().computed_by(
+        "rigid",
+        **{
+            "contact.restitution": 0.0,
+            "drive.force": 42.161526616354244,
+            "drive.reversal_distance": 5e-324,
+            "effects.barrier": False,
+            "effects.rock": "none",
+            "effects.gravity": False,
+            "feed.force": 0.9538580375123871,
+            "start.bit_velocity": -0.0006665547808832718,
+            "start.drive_direction": -1,
+            "start.gap": 5.091815966110749e-06,
+            "start.piston_velocity": 13.508630873000056,
+        },
+    )
+    assert residual(scene, 0.01) < 1e-9
