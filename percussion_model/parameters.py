@@ -174,7 +174,7 @@ class RockLaw(Parameters):
     """The rock under the bit (docs/model.md, table 1)."""
 
     loading_stiffness: float = quantity(
-        7.5e8, "N/m", "loading stiffness K_R", ROCK_SPRINGY, gt=0, le=1e13
+        7.5e8, "N/m", "loading stiffness K_R", ROCK_SPRINGY, ge=1, le=1e13
     )
     unloading_ratio: float = quantity(
         5.0, "-", "gamma: unloading by loading stiffness", ROCK_BILINEAR, gt=1, le=1e4

@@ -26,6 +26,10 @@ from percussion_model.scene_rules import SceneError
 
 # Below this similarity a guess at a misspelt key misleads more than it helps.
 _SIMILAR_ENOUGH = 0.6
+# Of a key or of a parser's words, no more than this is repeated in a message.
+_LONGEST_WORDS = 200
+# More faults of one file than this are counted, not told.
+_MOST_FAULTS = 30
 
 _HEADER = (
     "# A scene for `percussion run`. SI units; positions and velocities point down,",
@@ -48,8 +52,14 @@ def read_toml(path: Path) -> dict[str, Any]:
         raise SceneError(f"{path}: cannot be read: {error.strerror}") from None
     try:
         return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise SceneError(f"{path}: not valid TOML: {error}") from None
+    except RecursionError:
+        raise SceneError(f"{path}: tables or lists are nested too deep") from None
+    except ValueError as error:  # of TOML, or a number of too many digits
+        raise SceneError(f"{path}: not valid TOML: {_shortened(str(error))}") from None
+
+
+def _shortened(text: str) -> str:
+    return text if len(text) <= _LONGEST_WORDS else text[:_LONGEST_WORDS] + "..."
 
 
 def write_text(path: Path, text: str) -> None:
@@ -167,11 +177,12 @@ def _commented_sections(row: Row, sections: Iterable[Any], hidden: bool) -> list
 def explain_validation(error: ValidationError) -> str:
     """Turn pydantic's report into one line for each fault."""
     faults = {tuple(fault["loc"]): fault for fault in error.errors()}
-    lines = []
-    for place, fault in faults.items():
-        # A fault inside a list makes the list itself a fault too: say it once.
-        if not any(other[: len(place)] == place and other != place for other in faults):
-            lines.append(_explain(fault))
+    # A fault inside a list makes the list itself a fault too: say it once.
+    above = {place[:k] for place in faults for k in range(len(place))}
+    deepest = [fault for place, fault in faults.items() if place not in above]
+    lines = [_explain(fault) for fault in deepest[:_MOST_FAULTS]]
+    if len(deepest) > _MOST_FAULTS:
+        lines.append(f"and {len(deepest) - _MOST_FAULTS} more faults")
     return "\n".join(lines)
 
 
@@ -196,6 +207,7 @@ def _explain(fault: Any) -> str:
 
 def unknown_key(key: str) -> str:
     """Say that a key is not known, and which known one is nearest."""
+    key = _shortened(key)
     parent, _, name = key.rpartition(".")
     prefix = generic_key(parent) + "." if parent else ""
     keys = rows_by_key()

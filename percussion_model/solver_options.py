@@ -67,7 +67,7 @@ class FemOptions(Parameters):
         "-",
         "time step, in transit times of the smallest element (CFL number)",
         SOLVER_FEM,
-        gt=0,
+        ge=1e-3,
         le=1e4,
     )
     contact_stiffness: float = quantity(
@@ -75,7 +75,7 @@ class FemOptions(Parameters):
         "N/m",
         "K_C of the penalty contact of piston and bit, and of the bit with a wall",
         SOLVER_FEM,
-        gt=0,
+        ge=1,
         le=1e18,
     )
     damping_ratio: float | None = quantity(

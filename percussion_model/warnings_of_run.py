@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
@@ -48,6 +49,30 @@ def _about_scene(result: Result) -> Iterator[str]:
                 "structural loss is off: vibration trapped in the bars never decays, so the "
                 "rate of penetration depends on the cells and must not be trusted"
             )
+    least = least_loss_time(result)
+    if scene.loss_on and scene.solver_name == "wave" and scene.loss.time < least:
+        yield (
+            f"structural loss is small: at loss.time = {scene.loss.time:.3g} s the bit still "
+            "vibrates above the energy barrier when the next blow comes; the rate of penetration "
+            f"depends on the cells, and on the loss itself, up to some {least:.2g} s"
+        )
+
+
+def least_loss_time(result: Result) -> float:
+    """Loss time that lets a blow's vibration fall below the energy barrier by the next [s].
+
+    The energy of a mode of frequency w falls as exp(-eta w^2 t). The lowest mode of a
+    free bit has w = pi / (transit time); what a blow can leave in it is at the most the
+    blow energy E. So eta = ln(E / W_R) / (w^2 T), T the period of the blows
+    (docs/undamped.md). Zero where there is no barrier, or no blow to tell.
+    """
+    scene, blows = result.scene, result.counted
+    if not (scene.barrier_on and scene.bit.model == "elastic" and len(blows)):
+        return 0.0
+    above = float(blows["blow_energy"].mean()) / scene.rock.barrier_energy
+    frequency = math.pi / scene.bit.transit_time
+    period = float(blows["period"].mean())
+    return math.log(above) / (frequency * frequency * period) if above > 1.0 else 0.0
 
 
 def _about_grid(result: Result) -> Iterator[str]:

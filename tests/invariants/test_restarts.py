@@ -103,3 +103,21 @@ def test_inputs_at_random_times_leave_the_ledger_closed(seed, solver):
     given = m_p * 10.0 * end + seen["drive_impulse"] - seen["contact_impulse"]
     assert piston == pytest.approx(given, abs=1e-9 * seen["contact_impulse"])
     assert np.isfinite(m_b * seen["bit_velocity"])
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_a_changed_input_loses_no_blow_and_no_event(solver):
+    """Not even where the part of a step up to the change holds the event."""
+    scene = Scene().replace(**SOLVERS[solver], **SCENES["short stroke"])
+    plain = Simulation(scene)
+    plain.advance(0.1)
+    step = plain.solver.time_step or 1e-6
+    simulation = Simulation(scene)
+    for time in np.unique(plain.events["time"]):
+        if (t := float(time) + 0.1 * step) > simulation.time:
+            simulation.advance(t)
+            simulation.set_inputs(feed_force=scene.feed.force)
+    counts, blows = simulation.statistics(), simulation.blows
+    assert len(simulation.events) == counts["events"]
+    assert len(blows) == counts["blows"] - 1  # the last one is under way
+    np.testing.assert_allclose((blows["time"] + blows["period"])[:-1], blows["time"][1:])

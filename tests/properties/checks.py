@@ -1,0 +1,280 @@
+"""What must hold of any scene under any calls; raises AssertionError with the reason."""
+
+from __future__ import annotations
+
+import pickle
+from collections import Counter
+from typing import Any
+
+import numpy as np
+
+from percussion_model import Simulation
+from percussion_model.core.records import SAMPLE_FIELDS, EventKind, Mode
+from tests.properties.scenes import Case
+
+# Of the ledger's denominator, for every solver.
+MOST_RESIDUAL = 1e-6
+# Of the greatest force or travel that occurs: rounding.
+ROUNDING = 1e-9
+# Of the greatest momentum or impulse: rounding of thousands of steps, each with the
+# digits that a stiff penalty leaves to a small gap.
+MOST_MOMENTUM = 1e-8
+# What is read at a grid point is that of so little of a step later, with room for rounding.
+SHORTEST = 1e-5
+# A penalty that gives way more than this is none [m/N].
+MOST_GIVE = 1e100
+# Events of one step: crossings of the rock, two of the contact, one of the drive, one
+# of the barrier (`percussion_model.core.advance.EVENTS_A_STEP`).
+EVENTS_A_STEP = 36
+# Events of a run of rigid bodies, which has no steps: by second of simulated time.
+RIGID_EVENTS_A_SECOND = 1e6
+# What may be undefined, and where.
+WITHOUT_PISTON = ("piston_position", "piston_velocity", "gap", "relative_displacement")
+UNDEFINED_IN_BLOWS = ("standstill_force", "rebound_velocity")
+
+
+class Watch:
+    """A simulation under calls, with all that was seen of it."""
+
+    def __init__(self, case: Case) -> None:
+        self.case = case
+        self.simulation = Simulation(case.scene)
+        self.start = self.simulation.save()
+        self.rows: list[np.ndarray] = []
+        self.residual = 0.0
+        self.given: list[tuple[float, dict[str, float]]] = []
+
+    def run(self) -> None:
+        """Make the calls, then see that the end is sound."""
+        self.look()
+        for share, what, argument in self.case.calls:
+            self.simulation.advance(self.time_of(share))
+            getattr(self, what)(argument)
+        self.simulation.advance(self.case.length)
+        self.look()
+        self.balance()
+
+    def time_of(self, share: float) -> float:
+        return max(share * self.case.length, self.simulation.time)
+
+    # calls
+
+    def advance(self, _: Any) -> None:
+        """Nothing besides the advance."""
+
+    def sample(self, shares: list[float]) -> None:
+        """Read at several times, which advances as well."""
+        seen = self.simulation.sample([self.time_of(share) for share in shares])
+        self.rows += list(np.column_stack([seen[name] for name in SAMPLE_FIELDS]))
+
+    def read(self, what: str) -> None:
+        """Read something; it must be finite and change nothing."""
+        simulation = self.simulation
+        if what == "observe":
+            self.look()
+        elif what == "energy":
+            self.balance()
+        elif what == "fields":
+            for name, values in simulation.fields().items():
+                assert np.all(np.isfinite(values)), f"{name} not finite"
+        elif what == "result":
+            simulation.result().summary()
+        elif what == "statistics":
+            simulation.statistics()
+        else:
+            getattr(simulation, what)
+
+    def inputs(self, values: dict[str, float]) -> None:
+        """Change inputs."""
+        self.given.append((self.simulation.time, values))
+        self.simulation.set_inputs(**values)
+
+    def detour(self, argument: tuple[float, dict[str, float]]) -> None:
+        """Go on with other inputs, and come back."""
+        share, values = argument
+        here = self.simulation.save()
+        self.simulation.set_inputs(**values)
+        self.simulation.advance(self.time_of(share))
+        self.look()
+        self.balance()
+        self.simulation.restore(here)
+
+    def pickle(self, _: Any) -> None:
+        """Save, send and restore."""
+        self.simulation.restore(pickle.loads(pickle.dumps(self.simulation.save())))
+
+    # what is seen
+
+    def look(self) -> None:
+        seen = self.simulation.observe()
+        self.rows.append(np.array([seen[name] for name in SAMPLE_FIELDS]))
+
+    def balance(self) -> None:
+        """Check the ledger."""
+        ledger = self.simulation.energy()
+        for name, value in ledger.items():
+            if not name.endswith("_relative"):
+                assert np.isfinite(value), f"ledger: {name} = {value}"
+        scale = ledger["initial"] + sum(abs(ledger[name]) for name in ("drive", "feed", "gravity"))
+        if scale > 0.0:
+            residual = abs(ledger["residual"]) / scale
+            assert residual < MOST_RESIDUAL, f"ledger: residual {residual:.3g}"
+            self.residual = max(self.residual, residual)
+
+    def repeat(self) -> None:
+        """Go back to the start and take another way: the bits must be the same."""
+        simulation = self.simulation
+        last = bits_of(simulation)
+        simulation.restore(self.start)
+        for time, values in self.given:
+            simulation.advance(0.5 * (simulation.time + time))
+            simulation.advance(time)
+            simulation.set_inputs(**values)
+        simulation.advance(self.case.length)
+        assert bits_of(simulation) == last, "other calls gave other bits"
+
+
+def bits_of(simulation: Simulation) -> tuple[bytes, ...]:
+    """State, blow table and events as bytes."""
+    state = simulation.save().state
+    if isinstance(state, np.ndarray):
+        plain = state.tobytes()
+    else:
+        record = state.record.copy()
+        record["n_blows"] = record["n_events"] = 0  # rows filled in the last call
+        plain = record.tobytes() + state.workspace.tobytes()
+    return plain, simulation.blows.tobytes(), simulation.events.tobytes()
+
+
+def check_case(case: Case) -> dict[str, Any]:
+    """Run a case and check all that must hold.
+
+    Returns
+    -------
+    dict
+        Counts that tell what kind of run it was.
+    """
+    watch = Watch(case)
+    watch.run()
+    simulation, scene = watch.simulation, case.scene
+    seen = dict(zip(SAMPLE_FIELDS, np.array(watch.rows).T, strict=True))
+    check_numbers(seen, scene)
+    check_forces(seen, scene)
+    check_momentum(watch, seen)
+    check_blows(simulation.blows, scene)
+    check_events(simulation.events, scene)
+    counts = simulation.statistics()
+    check_effort(counts, simulation, case)
+    found = Counter(Mode(int(mode)).name for mode in seen["drilling_mode"])
+    blows, events = len(simulation.blows), len(simulation.events)
+    watch.repeat()
+    return {
+        "solver": scene.solver_name,
+        "blows": blows,
+        "events": events,
+        "locked": counts.get("locked", 0),
+        "residual": watch.residual,
+        "modes": dict(found),
+    }
+
+
+def check_numbers(seen: dict[str, np.ndarray], scene: Any) -> None:
+    """All that is defined is finite."""
+    for name, values in seen.items():
+        if name in WITHOUT_PISTON and scene.piston.model == "absent":
+            continue
+        if name == "contact_force" and scene.solver_name == "rigid":
+            continue
+        assert np.all(np.isfinite(values)), f"{name} is {values[~np.isfinite(values)][0]}"
+
+
+def check_forces(seen: dict[str, np.ndarray], scene: Any) -> None:
+    """No tension where contact is unilateral, and nothing interpenetrates."""
+    give = 1.0 / scene.fem.contact_stiffness if scene.solver_name == "fem" else 0.0
+    if give > MOST_GIVE:
+        return
+    reach = np.abs(seen["bit_end_position"]).max() + np.abs(seen["bit_position"]).max()
+    if scene.piston.model != "absent":
+        force = np.nan_to_num(seen["contact_force"])
+        assert force.min() >= -ROUNDING * max(1.0, force.max()), f"pull: {force.min()} N"
+        travel = max(1e-5, np.abs(seen["gap"]).max(), reach)
+        inside = (seen["gap"] + give * force).min()
+        assert inside >= -ROUNDING * travel - 1e-15, f"gap: {inside} m"
+    force = seen["bit_force"]
+    if scene.effects.standstill_tension == "release" or scene.effects.rock != "bilinear":
+        lowest = force.min()
+        assert lowest >= -ROUNDING * max(1.0, force.max()), f"rock pulls: {lowest} N"
+    if scene.effects.rock == "wall":
+        into = (seen["bit_end_position"] - scene.start.rock_gap - give * force).max()
+        assert into <= ROUNDING * max(1e-5, reach), f"in the wall: {into} m"
+
+
+def check_momentum(watch: Watch, seen: dict[str, np.ndarray]) -> None:
+    """Momentum is what impulses gave."""
+    case, scene = watch.case, watch.case.scene
+    t = seen["time"]
+    weight = scene.gravity.acceleration if scene.effects.gravity else 0.0
+    feed = scene.feed.force if scene.effects.feed else 0.0
+    impulses = (seen[f"{name}_impulse"] for name in ("contact", "bit", "drive"))
+    contact, rock, drive = (impulse - impulse[0] for impulse in impulses)
+    m_b, m_p = scene.bit.mass, scene.piston.mass
+    # at a grid point one reads the first instant after it, or the point where inputs change
+    late = (watch.simulation.solver.time_step or 0.0) * (1.0 if case.changes else SHORTEST)
+    if "feed_force" not in case.changes:
+        push = feed + m_b * weight
+        parts = (m_b * (seen["bit_velocity"] - seen["bit_velocity"][0]), -push * t, -contact, rock)
+        check_sum(parts, m_b * np.abs(seen["bit_velocity"]).max(), abs(push) * late, "bit")
+    if scene.piston.model != "absent":
+        push = m_p * weight
+        parts = (m_p * (seen["piston_velocity"] - seen["piston_velocity"][0]), -push * t)
+        parts += (contact, -drive)
+        check_sum(parts, m_p * np.abs(seen["piston_velocity"]).max(), abs(push) * late, "piston")
+
+
+def check_sum(parts: tuple[np.ndarray, ...], scale: float, slack: float, what: str) -> None:
+    """Parts add up to nothing but rounding."""
+    scale = scale + sum(np.abs(part).max() for part in parts)
+    if scale > 0.0:
+        off = max(np.abs(sum(parts)).max() - slack, 0.0) / scale
+        assert off < MOST_MOMENTUM, f"momentum of the {what}: off by {off:.3g}"
+
+
+def check_blows(blows: np.ndarray, scene: Any) -> None:
+    """Blows follow each other, and their numbers are defined."""
+    times, periods = blows["time"], blows["period"]
+    assert np.all(np.diff(times) > 0), "blow times do not rise"
+    assert np.all(periods > 0), "a blow of no length"
+    np.testing.assert_allclose(times[:-1] + periods[:-1], times[1:], rtol=1e-9)
+    assert np.all(blows["contacts"] >= 1), "a blow without contact"
+    for name in blows.dtype.names or ():
+        rigid = name == "peak_contact_force" and scene.solver_name == "rigid"
+        if name not in UNDEFINED_IN_BLOWS and not rigid:
+            assert np.all(np.isfinite(blows[name])), f"blows: {name} not finite"
+
+
+def check_events(events: np.ndarray, scene: Any) -> None:
+    """Events are sound, and closures and openings take turns."""
+    for name in ("time", "value", "bit_position"):
+        assert np.all(np.isfinite(events[name])), f"events: {name} not finite"
+    kinds = events["kind"]
+    assert set(kinds) <= {int(kind) for kind in EventKind}, "unknown kind of event"
+    drive = kinds[kinds >= EventKind.DRIVE_UP]
+    assert np.all(np.diff(drive) != 0), "the drive switched twice the same way"
+    contact = kinds[(kinds == EventKind.CONTACT_CLOSED) | (kinds == EventKind.CONTACT_OPENED)]
+    if scene.bit.model == "elastic":
+        assert np.all(np.diff(contact) != 0), "contact closed or opened twice"
+
+
+def check_effort(counts: dict[str, int], simulation: Simulation, case: Case) -> None:
+    """Steps and events stay below their ceilings."""
+    length = case.length
+    if simulation.solver.time_step is None:
+        assert counts["events"] <= 1000 + RIGID_EVENTS_A_SECOND * length, "storm of events"
+        return
+    changes = len(case.calls)
+    steps = counts["steps"] + counts.get("leap_steps", 0)
+    most = length / simulation.solver.time_step + len(simulation.blows) + changes + 3
+    if case.scene.solver_name == "fem":
+        most += counts["events"]  # a step ends at each
+    assert steps <= most, f"{steps} steps, at most {most:.0f} are needed"
+    assert counts["events"] <= EVENTS_A_STEP * (most + 1), "storm of events"

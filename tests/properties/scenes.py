@@ -1,0 +1,304 @@
+"""Random scenes and random calls, drawn from any source of choices.
+
+A source is hypothesis, which can shrink what fails, or a generator of numbers, which
+needs no memory of what came before: case 12345 of a seed is made without the others.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from percussion_model import Scene
+from percussion_model.inputs import INPUTS
+from percussion_model.parameter_table import find_row
+from percussion_model.solvers.grid import choose_time_step, section_count
+
+
+class Source(Protocol):
+    """What cases are drawn from."""
+
+    def pick(self, options: Any) -> Any:
+        """One of several."""
+
+    def between(self, low: float, high: float) -> float:
+        """A number, evenly spread."""
+
+    def count(self, low: int, high: int) -> int:
+        """A whole number, both ends included."""
+
+
+class Generator:
+    """A source for case `index` of a seed."""
+
+    def __init__(self, seed: int, index: int) -> None:
+        self._random = np.random.default_rng([seed, index])
+
+    def pick(self, options: Any) -> Any:
+        return options[int(self._random.integers(len(options)))]
+
+    def between(self, low: float, high: float) -> float:
+        return float(self._random.uniform(low, high))
+
+    def count(self, low: int, high: int) -> int:
+        return int(self._random.integers(low, high + 1))
+
+
+def decades(source: Source, low: float, high: float) -> float:
+    """A number above zero, evenly spread over its decades."""
+    return min(max(10.0 ** source.between(math.log10(low), math.log10(high)), low), high)
+
+
+def chance(source: Source, percent: int) -> bool:
+    """Whether something that happens so often happens; unlikely ones shrink away."""
+    return source.count(0, 99) >= 100 - percent
+
+
+# Bounds of "wide": low and high of the amount, by decades, and what else may come.
+BOTH_SIGNS, ZERO = "both signs", "zero"
+WIDE: dict[str, tuple[Any, ...]] = {
+    "gravity.acceleration": (1e-3, 100.0, BOTH_SIGNS, ZERO),
+    "feed.force": (1.0, 1e5, BOTH_SIGNS, ZERO),
+    "drive.force": (10.0, 1e5, ZERO),
+    "drive.reversal_distance": (1e-4, 1.0),
+    "drive.external_force": (1.0, 1e5, BOTH_SIGNS, ZERO),
+    "loss.time": (1e-10, 1e-5, ZERO),
+    "rock.loading_stiffness": (1e4, 1e11),
+    "rock.unloading_ratio": (1.0 + 1e-9, 1000.0),
+    "rock.barrier_damping": (1.0, 1e7, ZERO),
+    "rock.barrier_energy": (1e-9, 100.0, ZERO),
+    "contact.restitution": (1e-6, 1.0, ZERO),
+    "start.piston_velocity": (1e-12, 30.0, BOTH_SIGNS, ZERO),
+    "start.bit_velocity": (1e-12, 30.0, BOTH_SIGNS, ZERO),
+    "start.gap": (1e-15, 0.1, ZERO),
+    "start.rock_gap": (1e-15, 0.1, ZERO),
+    "start.depth": (1e-3, 1e4, ZERO),
+    "fem.courant": (0.1, 50.0),
+    "fem.contact_stiffness": (1e9, 1e15),
+    "fem.damping_ratio": (1e-3, 10.0, ZERO),
+    "fem.spectral_radius": (1e-3, 1.0, ZERO),
+    "fem.event_tolerance": (1e-12, 0.1),
+    "fem.time_tolerance": (1e-9, 0.1),
+}
+# These need what is drawn before them.
+BY_SOLVER = {"wave": "solver", "fem": "fem", "rigid": "contact"}
+SECTION = {
+    "length": (0.005, 5.0),
+    "area": (1e-5, 0.1),
+    "youngs_modulus": (1e8, 1e12),
+    "density": (300.0, 3e4),
+}
+NEAR = 2.0  # "near" is the default by or over this
+
+
+def number(source: Source, key: str, reach: str) -> float | None:
+    """A value for a key: its default, near it, wide, or anything that the table allows."""
+    row = find_row(key)
+    assert row is not None
+    kind = source.pick(("default", "near", "wide", "wide", "bound" if reach == "any" else "near"))
+    if kind == "default":
+        return row.default
+    low, high, *more = WIDE[key]
+    if kind == "near" and row.default:
+        value = row.default * NEAR ** source.between(-1.0, 1.0)
+        return value if row.allows(value) else row.default
+    if kind == "bound":
+        value = any_allowed(source, row)
+    elif ZERO in more and chance(source, 15):
+        return 0.0
+    else:
+        value = decades(source, low, high)
+        if BOTH_SIGNS in more and source.pick((False, True)):
+            value = -value
+    return value if row.allows(value) else row.default
+
+
+def any_allowed(source: Source, row: Any) -> float:
+    """A bound, the smallest number above it, a denormal, or anything up to the bound."""
+    smallest = np.nextafter(row.lower, math.inf) if row.lower_open else row.lower
+    top = max(abs(row.upper), 1e-6)
+    tiny = 5e-324 if smallest <= 0.0 else float(smallest)
+    options = (float(smallest), float(row.upper), tiny, decades(source, 1e-12 * top, top))
+    return float(source.pick(options))
+
+
+def sections(source: Source, reach: str, base: float) -> list[dict[str, float]]:
+    """One to four sections."""
+    found = []
+    for _ in range(source.pick((1, 1, 1, 2, 3, 4))):
+        section = {"length": base, "area": 5.5e-3}
+        for name, (low, high) in SECTION.items():
+            kind = source.pick(
+                ("default", "default", "near", "wide" if reach != "near" else "near")
+            )
+            start = section.get(name, find_row(f"bit.sections.*.{name}").default)
+            if kind == "near":
+                section[name] = start * NEAR ** source.between(-1.0, 1.0)
+            elif kind == "wide":
+                section[name] = decades(source, low, high)
+        found.append(section)
+    return found
+
+
+# Most cells and steps of a case, so that it takes some ten milliseconds.
+MOST_CELLS = 48
+MOST_CELL_STEPS = 2e5
+MOST_STEPS = 20_000
+MOST_SUBSTEPS = 20
+
+
+@dataclass
+class Case:
+    """A scene and the calls that are made on it.
+
+    Attributes
+    ----------
+    scene : Scene
+    length : float
+        Simulated time [s].
+    calls : list
+        (share of the length, what, argument), in the order of time.
+    reach : str
+        How far from the reference scene its numbers lie: "near", "wide" or "any".
+    """
+
+    scene: Scene
+    length: float
+    calls: list[tuple[float, str, Any]]
+    reach: str
+
+    @property
+    def changes(self) -> set[str]:
+        """Inputs that change at some time."""
+        found: set[str] = set()
+        for _, what, argument in self.calls:
+            if what == "inputs":
+                found |= set(argument)
+            elif what == "detour":
+                found |= set(argument[1])
+        return found
+
+
+def draw_case(source: Source) -> Case:
+    """A scene with calls; `SceneError` where the parts contradict each other."""
+    reach = source.pick(("near", "wide", "wide", "wide", "any"))
+    scene = draw_scene(source, reach)
+    length = draw_length(source, scene)
+    # no run of this kind looks at these, but they must fit each other
+    scene = scene.replace(**{"run.duration": min(max(length, 1e-300), 1e6), "run.settle": 0.0})
+    return Case(scene, length, draw_calls(source, scene, reach), reach)
+
+
+def draw_scene(source: Source, reach: str) -> Scene:
+    """Any scene whose parts fit each other."""
+    solver = source.pick(("wave", "wave", "fem", "rigid"))
+    changes: dict[str, Any] = {"solver.name": source.pick((solver, solver, "auto"))}
+    if solver == "fem":
+        changes["solver.name"] = "fem"
+    elastic = ("elastic",) * 4 if solver != "rigid" else ("rigid",) * 4
+    piston = source.pick((*elastic, "rigid", "absent"))
+    changes["piston.model"] = piston
+    changes["bit.model"] = "rigid" if solver == "rigid" else "elastic"
+    drives = ("none",) if piston == "absent" else ("pressure",) * 4 + ("external", "none")
+    changes["effects.drive"] = source.pick(drives)
+    changes["effects.rock"] = source.pick(("bilinear",) * 5 + ("spring", "wall", "none"))
+    for name in ("gravity", "feed", "loss", "barrier"):
+        changes[f"effects.{name}"] = not chance(source, 15)
+    if changes["effects.rock"] != "bilinear":
+        changes["effects.barrier"] = False
+    changes["effects.standstill_tension"] = source.pick(("release", "paper"))
+    changes["start.drive_direction"] = source.pick((1, -1))
+    for key in WIDE:
+        group = key.split(".")[0]
+        if group in ("fem", "contact") and group != BY_SOLVER[solver]:
+            continue
+        if key == "contact.restitution" and piston == "absent":
+            continue
+        value = number(source, key, reach)
+        if value is not None:
+            changes[key] = value
+    if not chance(source, 40):
+        changes["bit.sections"] = sections(source, reach, 0.20125)
+        changes["piston.sections"] = sections(source, reach, 0.175)
+    changes["solver.leaps"] = not chance(source, 25)
+    return with_cells(source, Scene().replace(**changes), solver)
+
+
+def with_cells(source: Source, scene: Scene, solver: str) -> Scene:
+    """Give the scene few cells or elements, so that it stays cheap."""
+    if solver == "rigid":
+        return scene
+    key = "solver.cells" if solver == "wave" else "fem.elements"
+    wanted = source.pick((1, 2, 3, 4, 5, 5, 8, 10, 20))
+    while wanted > 1 and cells_of(scene, wanted) > MOST_CELLS:
+        wanted = max(1, wanted // 2)
+    while scene.loss.time > MOST_SUBSTEPS * step_of(scene, wanted) and solver == "wave":
+        scene = scene.replace(**{"loss.time": 0.1 * scene.loss.time})
+    return scene.replace(**{key: wanted})
+
+
+def bars_of(scene: Scene) -> list[Any]:
+    return [scene.piston, scene.bit] if scene.piston.model == "elastic" else [scene.bit]
+
+
+def step_of(scene: Scene, wanted: int) -> float:
+    return choose_time_step(bars_of(scene), wanted)
+
+
+def cells_of(scene: Scene, wanted: int) -> int:
+    step = step_of(scene, wanted)
+    return sum(section_count(one, step) for bar in bars_of(scene) for one in bar.sections)
+
+
+def draw_length(source: Source, scene: Scene) -> float:
+    """Simulated time, bounded by steps [s]."""
+    if scene.solver_name == "rigid":
+        return decades(source, 1e-4, 0.5)
+    if scene.solver_name == "fem":
+        wanted = scene.fem.elements
+        step = scene.fem.courant * step_of(scene, wanted)
+        dear = 8.0
+    else:
+        wanted = scene.solver.cells or 20
+        step = step_of(scene, wanted)
+        dear = 1.0
+    steps = min(MOST_STEPS, MOST_CELL_STEPS / cells_of(scene, wanted)) / dear
+    return step * decades(source, 3.0, max(steps, 10.0))
+
+
+READS = ("observe", "energy", "fields", "statistics", "result", "blows", "events")
+
+
+def draw_calls(source: Source, scene: Scene, reach: str) -> list[tuple[float, str, Any]]:
+    """What is called and when, as shares of the length."""
+    inputs = [name for name, key in INPUTS.items() if scene.matters(key)]
+    if not scene.barrier_on:
+        inputs = [name for name in inputs if not name.startswith("barrier")]
+    calls: list[tuple[float, str, Any]] = []
+    for _ in range(source.count(1, 8)):
+        share = source.between(0.0, 1.0)
+        what = source.pick(("advance", "sample", "read", "detour", "pickle", "inputs"))
+        argument: Any = None
+        if what == "sample":
+            argument = sorted(source.between(share, 1.0) for _ in range(source.count(1, 5)))
+            share = argument[0]
+        elif what == "read":
+            argument = source.pick(READS)
+        elif what == "detour":
+            argument = (source.between(share, 1.0), draw_inputs(source, inputs, reach))
+        elif what == "inputs":
+            argument = draw_inputs(source, inputs, reach)
+        calls.append((share, what, argument))
+    return sorted(calls, key=lambda call: call[0])
+
+
+def draw_inputs(source: Source, inputs: list[str], reach: str) -> dict[str, float]:
+    """New values of up to three inputs."""
+    if not inputs:
+        return {}
+    names = [source.pick(inputs) for _ in range(source.count(1, 3))]
+    values = {name: number(source, INPUTS[name], reach) for name in names}
+    return {name: value for name, value in values.items() if value is not None}
