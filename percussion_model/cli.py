@@ -8,6 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
+from percussion_model.commands.accuracy import accuracy
 from percussion_model.commands.common import BAD_INPUT, INTERRUPTED, complain
 from percussion_model.commands.compare import compare
 from percussion_model.commands.scene import explain, new, plot, run
@@ -39,7 +40,7 @@ def _options(
     """Percussive drilling with travelling waves: piston, bit and rock, blow by blow."""
 
 
-for _command in (run, explain, plot, compare, new):
+for _command in (run, explain, plot, compare, accuracy, new):
     app.command()(_command)
 
 
