@@ -6,15 +6,15 @@ elements with their mesh, it is said in the ladder's note.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from percussion_model.accuracy.problems import APERIODIC, Problem
 from percussion_model.accuracy.semidiscrete import refuse
-from percussion_model.scene import Scene
+from percussion_model.scene import Scene, SceneError
 
-__all__ = ["LADDERS", "Ladder", "Rung", "fem_scene", "ladders"]
+__all__ = ["LADDERS", "Ladder", "Rung", "chosen_ladders", "fem_scene", "ladders"]
 
 # K_C that goes with ten elements in the piston [N/m]; it rises with the square of their
 # number, so that the error of the penalty falls like that of the mesh.
@@ -123,6 +123,26 @@ class Rung:
     integrator: str = ""
     relative: float = 0.0
     duration: float | None = None
+
+
+def chosen_ladders(words: Sequence[str] | None) -> tuple[str, ...]:
+    """Names of ladders from words; "scipy" stands for all general integrators.
+
+    Raises
+    ------
+    SceneError
+        If one is not known.
+    """
+    if words is None:
+        return tuple(LADDERS)
+    general = tuple(name for name in LADDERS if LADDERS[name].title.startswith("scipy"))
+    chosen: list[str] = []
+    for word in words:
+        if word != "scipy" and word not in LADDERS:
+            known = ", ".join([*LADDERS, "scipy"])
+            raise SceneError(f"--methods: {word!r} is no method: {known}")
+        chosen += general if word == "scipy" else [word]
+    return tuple(chosen)
 
 
 def fem_scene(

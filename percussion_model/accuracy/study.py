@@ -3,26 +3,23 @@
 from __future__ import annotations
 
 import math
-import os
-import platform
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
-from importlib.metadata import version
-from pathlib import Path
 from typing import Any
 
 from percussion_model.accuracy.integrators import GeneralRun
-from percussion_model.accuracy.ladders import LADDERS, Rung, ladders
+from percussion_model.accuracy.ladders import LADDERS, Rung, chosen_ladders, ladders
+from percussion_model.accuracy.machine import machine
 from percussion_model.accuracy.orders import Order, cost_at, fitted_order
 from percussion_model.accuracy.problems import APERIODIC, Problem, Run, pose
 from percussion_model.accuracy.quantities import Answer, relative_error
-from percussion_model.accuracy.references import Reference, find_reference
+from percussion_model.accuracy.reference_store import Reference
+from percussion_model.accuracy.references import find_reference
 from percussion_model.accuracy.semidiscrete import OutOfTime
 from percussion_model.accuracy.timing import interleaved
-from percussion_model.scene import Scene, SceneError
+from percussion_model.scene import Scene
 
-__all__ = ["WANTED", "Point", "Study", "machine", "study"]
+__all__ = ["WANTED", "Point", "Study", "study"]
 
 # Accuracies that are asked for in the last lines.
 WANTED = (1e-2, 1e-3)
@@ -175,26 +172,6 @@ class Study:
         )
 
 
-def chosen_ladders(words: Sequence[str] | None) -> tuple[str, ...]:
-    """Names of ladders from words; "scipy" stands for all general integrators.
-
-    Raises
-    ------
-    SceneError
-        If one is not known.
-    """
-    if words is None:
-        return tuple(LADDERS)
-    general = tuple(name for name in LADDERS if LADDERS[name].title.startswith("scipy"))
-    chosen: list[str] = []
-    for word in words:
-        if word != "scipy" and word not in LADDERS:
-            known = ", ".join([*LADDERS, "scipy"])
-            raise SceneError(f"--methods: {word!r} is no method: {known}")
-        chosen += general if word == "scipy" else [word]
-    return tuple(chosen)
-
-
 def study(
     scene: Scene,
     full: bool = False,
@@ -295,27 +272,6 @@ def _errors(answer: Answer, problem: Problem, reference: Reference) -> dict[str,
     values = reference.values
     history = reference.history if reference.bars.get("bit_force_history") else None
     return {key: relative_error(answer, values, history, key) for key in problem.quantities}
-
-
-def machine() -> dict[str, Any]:
-    """What the figures were taken on."""
-    name = platform.processor() or platform.machine()
-    cpuinfo = Path("/proc/cpuinfo")
-    if cpuinfo.exists():
-        for line in cpuinfo.read_text(encoding="utf-8").splitlines():
-            if line.startswith("model name"):
-                name = line.split(":", 1)[1].strip()
-                break
-    packages = ("numba", "numpy", "scipy", "percussion_model")
-    return {
-        "processor": name,
-        "cores": os.cpu_count(),
-        "load": os.getloadavg()[0] if hasattr(os, "getloadavg") else None,
-        "system": platform.system(),
-        "python": platform.python_version(),
-        "date": time.strftime("%Y-%m-%d"),
-        **{package: version(package) for package in packages},
-    }
 
 
 def _plain(value: Any) -> Any:

@@ -51,7 +51,7 @@ def accuracy(
     figures: Annotated[bool, typer.Option(help="Draw error against time.")] = True,
 ) -> None:
     """Measure error against time: waves, finite elements, rigid bars, general integrators."""
-    from percussion_model.accuracy.study import chosen_ladders
+    from percussion_model.accuracy.ladders import chosen_ladders
     from percussion_model.commands.accuracy_tables import show_bars, show_study
     from percussion_model.result_files import check_writable
     from percussion_model.scene import Scene
@@ -95,13 +95,13 @@ def _studied(scene: Scene, full: bool, methods: list[str] | None) -> Study:
 def _referenced(scene: Scene) -> Any:
     """Make the reference of a scene and keep it with the package."""
     from percussion_model.accuracy.problems import pose
-    from percussion_model.accuracy.references import (
+    from percussion_model.accuracy.reference_store import (
         fingerprint,
-        make_reference,
         package_store,
         store,
         stored,
     )
+    from percussion_model.accuracy.references import make_reference
 
     with _shares() as report:
         made = make_reference(pose(scene), scene, say=lambda text: report(0.0, text))

@@ -13,7 +13,7 @@ from rich.table import Table
 from percussion_model.accuracy.ladders import LADDERS
 from percussion_model.accuracy.problems import APERIODIC
 from percussion_model.accuracy.quantities import HISTORY, QUANTITIES
-from percussion_model.accuracy.references import Reference
+from percussion_model.accuracy.reference_store import Reference
 from percussion_model.accuracy.study import FITS, WANTED, Point, Study
 
 _SHORT = {

@@ -13,14 +13,14 @@ from percussion_model import Scene
 from percussion_model.accuracy.closed_forms import closed_forms, found_by
 from percussion_model.accuracy.problems import DROP, PERIODIC, Run, pose
 from percussion_model.accuracy.quantities import HISTORY, QUANTITIES, RATE, relative_error
-from percussion_model.accuracy.references import (
-    CLOSE,
+from percussion_model.accuracy.reference_store import (
     Reference,
     fingerprint,
     package_store,
     store,
     stored,
 )
+from percussion_model.accuracy.references import CLOSE
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 SCENES = ("reference", "drop_test", "stiff_rock", "chatter", "top_hammer", "aperiodic")

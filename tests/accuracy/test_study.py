@@ -90,14 +90,17 @@ def test_json_has_what_it_promises(found):
 
 
 def test_table_and_figures(found, tmp_path, capsys):
-    from percussion_model.plotting.accuracy import save_accuracy
+    from percussion_model.plotting.accuracy import draw_accuracy, draw_quantities
 
     show_study(found)
     shown = capsys.readouterr().out
     assert "Measured orders" in shown
     assert max(len(line.rstrip()) for line in shown.splitlines()) <= 100
-    for path in save_accuracy(found, tmp_path):
-        assert path.stat().st_size > 10_000
+    path = tmp_path / "accuracy.png"
+    draw_accuracy(found).savefig(path)
+    assert path.stat().st_size > 10_000
+    titles = [ax.get_title(loc="left") for ax in draw_quantities(found).axes]
+    assert "Rate of penetration" in titles
 
 
 def test_every_ladder_is_described_and_some_are_for_full_runs_only():
