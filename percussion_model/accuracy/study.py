@@ -101,13 +101,14 @@ class Study:
     def fitted(self, name: str, key: str) -> list[Point]:
         """Points that an order is fitted to: resolved, and with lengths that fit the cells.
 
-        Where lengths fit at fewer than three rungs, the others count too.
+        Where lengths fit at no rung, all count.
         """
         floor = self.reference.floor(key)
         limit = 0.0 if math.isnan(floor) else RESOLVED * floor
         resolved = [point for point in self.ladder(name) if point.errors.get(key, math.nan) > limit]
-        fitting = [point for point in resolved if point.fit < FITS]
-        return fitting if len(fitting) > 2 else resolved
+        if all(point.fit >= FITS for point in self.ladder(name)):
+            return resolved
+        return [point for point in resolved if point.fit < FITS]
 
     def order(self, name: str, key: str) -> Order | None:
         """Measured order of a ladder in a quantity."""

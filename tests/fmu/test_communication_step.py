@@ -8,7 +8,7 @@ import pytest
 
 from scenarios import communication_step
 
-STEPS = (1.25e-3, 5e-3)
+STEPS = (2.0**-13, 2.0**-11)  # [s]
 
 
 @pytest.fixture(scope="module")
