@@ -9,14 +9,17 @@ from __future__ import annotations
 import json
 import math
 import re
-import shutil
 import sys
-import tempfile
 from pathlib import Path
 from typing import Any
 
+import matplotlib
+
+from percussion_model.accuracy import Study
 from percussion_model.accuracy.ladders import LADDERS
 from percussion_model.accuracy.quantities import HISTORY, QUANTITIES
+from percussion_model.plotting import style
+from percussion_model.plotting.accuracy import draw_accuracy, draw_quantities
 
 HERE = Path(__file__).resolve().parent
 PAGE, DATA, IMAGES = HERE / "accuracy.md", HERE / "accuracy", HERE / "images"
@@ -40,6 +43,7 @@ SHORT = {
     "resting_place": "resting place",
     HISTORY: "force, L1",
 }
+DPI = 110
 CLOSED_WAVE, CLOSED_FEM = (5, 20, 40), (20, 40, 80)
 
 
@@ -47,15 +51,19 @@ def measure(name: str) -> None:
     """Study a scene; keep its numbers and its figures."""
     from percussion_model import Scene
     from percussion_model.accuracy import study
-    from percussion_model.plotting.accuracy import save_accuracy
 
     scene = Scene.from_toml(SCENARIOS / f"{name}.toml")
     found = study(scene, False, SCENES[name], lambda share, text: say(f"{name}: {text}"))
     keep(name, found.to_dict())
-    with tempfile.TemporaryDirectory() as folder:
-        for path in save_accuracy(found, folder):
-            if path.suffix == ".png" and (path.stem == "accuracy" or name == "reference"):
-                shutil.copy(path, IMAGES / f"{path.stem}_{name}.png")
+    draw(name, found)
+
+
+def draw(name: str, found: Study) -> None:
+    """Draw a study, small enough for a page."""
+    with matplotlib.rc_context(style.STYLE):
+        draw_accuracy(found).savefig(IMAGES / f"accuracy_{name}.png", dpi=DPI)
+        if name == "reference":
+            draw_quantities(found).savefig(IMAGES / f"accuracy_quantities_{name}.png", dpi=DPI)
 
 
 def measure_closed_forms() -> None:
@@ -122,6 +130,8 @@ def power(value: float | None) -> str:
     """Two digits, as 1.2·10⁻³."""
     if value is None or not math.isfinite(value):
         return "–"
+    if value == 0.0:
+        return "0"
     digits, exponent = f"{value:.1e}".split("e")
     raised = str(int(exponent)).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
     return f"{digits}·10{raised}"
