@@ -24,6 +24,7 @@ PAPER_STIFFNESS = 1e12
 WAVE_CELLS = (3, 4, 5, 7, 10, 13, 20, 40, 60, 80, 120)
 WAVE_CELLS_FULL = (*WAVE_CELLS, 160, 200)
 MESHES, MESHES_FULL = (10, 20, 30, 50, 70), (10, 20, 30, 50, 70, 100)
+FEW = (3, 5, 10, 20)  # of a bar so long that no four of the others are affordable
 STEPS = (20.0, 10.0, 5.0, 3.0, 2.0, 1.0)
 COURANT = 2.0
 # A bar has at most so many elements in a ladder; a long rod gets coarser ones.
@@ -192,7 +193,7 @@ def reach(scene: Scene) -> float:
 def _affordable(scene: Scene, counts: tuple[int, ...], most: float) -> list[int]:
     """Numbers of cells that do not make more than `most` in all bars."""
     chosen = [count for count in counts if count * reach(scene) <= most]
-    return chosen if len(chosen) > 3 else [2, 3, 5, 10]
+    return chosen if len(chosen) > 3 else list(FEW)
 
 
 def _waves(problem: Problem, full: bool) -> Iterator[Rung]:
