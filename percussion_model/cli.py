@@ -8,6 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
+from percussion_model.commands.accuracy import accuracy
 from percussion_model.commands.blow_map import blow_map
 from percussion_model.commands.common import BAD_INPUT, INTERRUPTED, complain
 from percussion_model.commands.compare import compare
@@ -45,7 +46,19 @@ def _options(
     """Percussive drilling with travelling waves: piston, bit and rock, blow by blow."""
 
 
-for _command in (run, settled, study, explain, plot, compare, effects, paper, stability, new):
+for _command in (
+    run,
+    settled,
+    study,
+    explain,
+    plot,
+    compare,
+    accuracy,
+    effects,
+    paper,
+    stability,
+    new,
+):
     app.command()(_command)
 app.command("blow-map")(blow_map)
 

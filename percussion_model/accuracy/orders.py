@@ -1,0 +1,92 @@
+"""Orders that are measured, and what a wanted accuracy costs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+__all__ = ["Order", "cost_at", "fitted_order"]
+
+# Fewer points make no order.
+LEAST_POINTS = 3
+
+
+@dataclass(frozen=True)
+class Order:
+    """A power law through errors.
+
+    Attributes
+    ----------
+    value : float
+        Exponent.
+    error : float
+        Its standard error; NaN with two degrees of freedom or less left.
+    scale : float
+        Error at size one.
+    points : int
+    """
+
+    value: float
+    error: float
+    scale: float
+    points: int
+
+
+def fitted_order(sizes: Sequence[float], errors: Sequence[float]) -> Order | None:
+    """Fit error = scale * size**value by least squares of logarithms.
+
+    Parameters
+    ----------
+    sizes, errors : sequence of float
+        Those not positive or not finite are left out.
+
+    Returns
+    -------
+    Order or None
+        None with fewer than three points.
+    """
+    pairs = [
+        (size, error)
+        for size, error in zip(sizes, errors, strict=True)
+        if size > 0 and error > 0 and math.isfinite(size) and math.isfinite(error)
+    ]
+    if len({size for size, _ in pairs}) < LEAST_POINTS:
+        return None
+    x, y = np.log(np.array(pairs)).T
+    slope, offset = np.polyfit(x, y, 1)
+    rest = y - (slope * x + offset)
+    spread = float(np.sum((x - x.mean()) ** 2))
+    error = math.sqrt(float(rest @ rest) / (len(x) - 2) / spread)
+    return Order(float(slope), error, math.exp(float(offset)), len(x))
+
+
+def cost_at(costs: Sequence[float], errors: Sequence[float], wanted: float) -> float:
+    """Cost at which a ladder meets an error for good.
+
+    The dearest point that misses it and the next dearer one bracket the cost; between them
+    both logarithms are taken as straight. A cheap point that happens to be good does not
+    count while a dearer one is bad.
+
+    Returns
+    -------
+    float
+        NaN where no point meets it, or the dearest does not.
+    """
+    pairs = sorted(
+        (cost, error)
+        for cost, error in zip(costs, errors, strict=True)
+        if math.isfinite(error) and cost > 0
+    )
+    if not pairs or pairs[-1][1] > wanted:
+        return math.nan
+    missed = [k for k, (_, error) in enumerate(pairs) if error > wanted]
+    if not missed:
+        return pairs[0][0]
+    (low, bad), (high, good) = pairs[missed[-1]], pairs[missed[-1] + 1]
+    if good <= 0:
+        return high
+    share = math.log(bad / wanted) / math.log(bad / good)
+    return low * (high / low) ** share

@@ -1,0 +1,74 @@
+"""Orders, costs and errors, on numbers whose answer is known."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from percussion_model.accuracy.orders import cost_at, fitted_order
+from percussion_model.accuracy.quantities import HISTORY, Answer, batch_means, relative_error
+
+
+@pytest.mark.parametrize("power", [0.5, 1.0, 3.0])
+def test_a_power_law_is_found(power):
+    sizes = [0.1, 0.05, 0.02, 0.01]
+    order = fitted_order(sizes, [7.0 * size**power for size in sizes])
+    assert order is not None
+    assert order.value == pytest.approx(power, abs=1e-12)
+    assert order.scale == pytest.approx(7.0)
+    assert order.error == pytest.approx(0.0, abs=1e-9)
+
+
+def test_scatter_shows_in_the_error_of_the_order():
+    sizes = np.geomspace(1.0, 1e-3, 8)
+    noise = np.array([2.0, 0.5] * 4)
+    clean, rough = fitted_order(sizes, sizes), fitted_order(sizes, sizes * noise)
+    assert clean is not None
+    assert rough is not None
+    assert rough.error > 100.0 * clean.error
+    assert abs(rough.value - 1.0) < 3.0 * rough.error
+
+
+@pytest.mark.parametrize("errors", [[1e-1, 1e-2], [1e-1, 1e-2, math.nan], [1e-1, 1e-2, 0.0]])
+def test_two_points_are_no_order(errors):
+    assert fitted_order([1.0, 0.1, 0.01][: len(errors)], errors) is None
+
+
+def test_cost_lies_between_the_points_that_bracket_it():
+    assert cost_at([1.0, 100.0], [1e-1, 1e-3], 1e-2) == pytest.approx(10.0)
+
+
+def test_a_lucky_cheap_point_does_not_count():
+    assert cost_at([1.0, 2.0, 4.0], [1e-9, 1e-1, 1e-3], 1e-2) > 2.0
+
+
+def test_cost_of_what_is_never_or_always_met():
+    assert math.isnan(cost_at([1.0, 2.0], [1e-1, 1e-2], 1e-3))
+    assert math.isnan(cost_at([], [], 1e-3))
+    assert cost_at([1.0, 2.0], [1e-5, 1e-6], 1e-3) == 1.0
+
+
+def test_batches_of_independent_numbers_have_the_usual_standard_error():
+    values = np.random.default_rng(3).normal(5.0, 2.0, 16_000)
+    mean, error = batch_means(values)
+    assert mean == pytest.approx(5.0, abs=0.1)
+    assert error == pytest.approx(2.0 / math.sqrt(16_000), rel=0.5)
+
+
+def test_what_the_next_blow_takes_back_is_no_scatter():
+    """Each leap of the bit returns in the blow after it: the advance is certain all the same."""
+    leaps = np.random.default_rng(4).normal(0.0, 10.0, 3201)
+    advance = 1.0 + np.diff(leaps)
+    _, error = batch_means(advance)
+    as_if_independent = np.std(advance) / math.sqrt(len(advance))
+    assert error < 0.3 * as_if_independent
+
+
+def test_error_of_a_history_is_l1_by_l1():
+    wanted = np.array([0.0, 2.0, 4.0, 2.0])
+    found = Answer({}, history=np.array([0.0, 2.0, 3.0, 3.0]))
+    assert relative_error(found, {}, wanted, HISTORY) == pytest.approx(2.0 / 8.0)
+    assert math.isnan(relative_error(found, {}, wanted[:3], HISTORY))
+    assert math.isnan(relative_error(Answer({}), {"blow_period": 1.0}, None, "blow_period"))

@@ -1,0 +1,104 @@
+"""Stored references: of the shipped scenes, and backed by two solvers or a closed form."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from percussion_model import Scene
+from percussion_model.accuracy.closed_forms import closed_forms, found_by
+from percussion_model.accuracy.problems import DROP, PERIODIC, Run, pose
+from percussion_model.accuracy.quantities import HISTORY, QUANTITIES, RATE, relative_error
+from percussion_model.accuracy.reference_store import (
+    Reference,
+    fingerprint,
+    package_store,
+    store,
+    stored,
+)
+from percussion_model.accuracy.references import CLOSE
+
+SCENARIOS = Path(__file__).parents[2] / "scenarios"
+SCENES = ("reference", "drop_test", "stiff_rock", "chatter", "top_hammer", "aperiodic")
+STORED = stored()
+CLOSED = {case.name: case for case in closed_forms()}
+
+
+def reference(name: str) -> Reference:
+    return STORED[fingerprint(Scene.from_toml(SCENARIOS / f"{name}.toml"))]
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_each_scene_has_a_reference_that_says_how_it_was_made(name):
+    found = reference(name)
+    assert {"wave", "fem", "date", "version"} <= set(found.made)
+    assert not found.made["quick"]
+    for key, bar in found.bars.items():
+        assert key in QUANTITIES
+        assert bar.error > 0
+        off = abs(bar.wave - bar.fem)
+        close = off <= bar.wave_error + bar.fem_error or off <= CLOSE * abs(bar.value)
+        if key != HISTORY:
+            assert bar.agreed == close
+    if found.history is not None:
+        assert np.all(np.isfinite(found.history))
+
+
+@pytest.mark.parametrize("name", SCENES[:-1])
+def test_periodic_scenes_have_a_reference_in_what_matters_most(name):
+    found = reference(name)
+    main = "resting_place" if found.kind == DROP else RATE
+    assert found.bars[main].agreed
+    assert found.floor(main) < 5e-4
+
+
+def test_no_reference_is_taken_where_the_solvers_disagree():
+    found = reference("reference")
+    bars = dict(found.bars)
+    bar = bars[RATE]
+    bars[RATE] = type(bar)(**{**bar.__dict__, "agreed": False})
+    other = Reference(found.title, found.kind, bars, None)
+    assert RATE not in other.values
+    assert math.isnan(other.floor(RATE))
+
+
+def test_the_reference_scene_is_known_by_what_it_says_not_by_how_it_is_written():
+    written = Scene.from_toml(SCENARIOS / "reference.toml")
+    assert fingerprint(written) == fingerprint(Scene(title="another name"))
+    assert fingerprint(written) == fingerprint(written.computed_by("fem"))
+    assert fingerprint(written) != fingerprint(written.replace(**{"feed.force": 2501.0}))
+
+
+def test_references_survive_their_file(tmp_path):
+    path = tmp_path / "references.json"
+    store(path, STORED)
+    assert json.loads(path.read_text()) == json.loads(package_store().read_text())
+    assert stored(path).keys() == STORED.keys()
+    assert stored(tmp_path / "none.json") == {}
+
+
+def test_the_waves_find_the_reference_scene():
+    """40 cells, from a start near the periodic motion; docs/numerics.md says 0.01 %."""
+    scene = Scene.from_toml(SCENARIOS / "reference.toml")
+    problem, found = pose(scene), reference("reference")
+    assert problem.kind == PERIODIC
+    answer = Run(problem, problem.scene.replace(**{"solver.cells": 40})).answer()
+    assert relative_error(answer, found.values, found.history, RATE) < 3e-4
+    assert relative_error(answer, found.values, found.history, HISTORY) < 5e-3
+
+
+@pytest.mark.parametrize("name", CLOSED)
+def test_waves_meet_closed_forms(name):
+    """No loss, one section: nothing but the start of the front is averaged."""
+    assert found_by(CLOSED[name], "wave", 20) < 1e-7
+
+
+@pytest.mark.parametrize("name", CLOSED)
+def test_elements_come_closer_to_closed_forms_with_the_mesh(name):
+    errors = [found_by(CLOSED[name], "fem", count) for count in (20, 80)]
+    assert errors[1] < 0.75 * errors[0]
+    assert errors[1] < 1e-2
