@@ -10,6 +10,7 @@ import typer
 
 from percussion_model.commands.common import BAD_INPUT, INTERRUPTED, complain
 from percussion_model.commands.compare import compare
+from percussion_model.commands.couple import couple
 from percussion_model.commands.scene import explain, new, plot, run
 from percussion_model.quick_start import own_process
 
@@ -39,7 +40,7 @@ def _options(
     """Percussive drilling with travelling waves: piston, bit and rock, blow by blow."""
 
 
-for _command in (run, explain, plot, compare, new):
+for _command in (run, explain, plot, compare, couple, new):
     app.command()(_command)
 
 

@@ -1,0 +1,166 @@
+"""Controller of a drill rig: feed, pressure and percussion from what a rig measures.
+
+Blocks that can be switched off, asked in this order: retract where the rotation jams, cut
+percussion back in a void, seek the feed of the best rate, keep the feed force by a PI, and
+let the pressure follow the feed.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from fmu_src.runtime.system.part import Model
+
+DRILLING, VOID, RETRACT = 0, 1, 2
+
+
+class DrillController(Model):
+    """All blocks, with their state."""
+
+    time: float
+    mode: int
+    since: float
+    wanted: float
+    integral: float
+    command: float
+    pressure: float
+    jammed_for: float
+    speed: float
+    centre: float
+    phase: float
+    sum_rate: float
+    sum_swing: float
+    gradient: float
+    STATE = tuple(__annotations__)
+
+    def __init__(self, parameters: dict[str, Any]) -> None:
+        super().__init__(parameters)
+        for name in self.STATE:
+            setattr(self, name, 0.0)
+        self.mode = DRILLING
+
+    def begin(self, inputs: dict[str, Any]) -> None:
+        """Start with the force that the rig has."""
+        self.wanted = self.centre = inputs["feed_setpoint"]
+        self.integral = self.command = self.parameters["start.force"]
+        self.pressure = inputs["pressure_setpoint"]
+
+    def step(self, inputs: dict[str, Any], step_size: float) -> None:
+        """One sample of the controller."""
+        p, h = self.parameters, step_size
+        self.time += h
+        self.speed += (1.0 - math.exp(-h / p["speed_filter"])) * (
+            inputs["head_velocity"] - self.speed
+        )
+        self._choose_mode(inputs, h)
+        goal = inputs["feed_setpoint"]
+        if p["seek.on"]:
+            goal = self._seek(inputs, h)
+        if self.mode == DRILLING:
+            self._go_towards(goal, h)
+            self._keep_feed(inputs["feed_force"], h)
+            self._set_pressure(inputs, inputs["pressure_setpoint"], h)
+        elif self.mode == VOID:
+            self.wanted = min(self.wanted, p["cutback.feed"])
+            self._command(p["cutback.force"], h)
+            self._set_pressure(inputs, p["cutback.pressure"], h)
+        else:
+            self.wanted = min(self.wanted, p["cutback.feed"])
+            self._command(p["retract.force"], h)
+            self._set_pressure(inputs, inputs["pressure_setpoint"], h)
+
+    def _choose_mode(self, inputs: dict[str, Any], h: float) -> None:
+        p = self.parameters
+        self.since += h
+        torque = inputs["rotation_torque"]
+        self.jammed_for = self.jammed_for + h if torque > p["retract.torque"] else 0.0
+        settled = self.since >= p["mode_time"]
+        mode = self.mode
+        if p["retract.on"] and mode != RETRACT and self.jammed_for >= p["retract.delay"]:
+            mode = RETRACT
+        elif mode == RETRACT and settled and torque < p["retract.share"] * p["retract.torque"]:
+            mode = DRILLING
+        elif p["cutback.on"] and mode == DRILLING and self.speed > p["cutback.velocity"]:
+            mode = VOID
+        elif (
+            mode == VOID
+            and settled
+            and self.speed < 0.5 * p["cutback.velocity"]
+            and inputs["feed_force"] > 0.5 * p["cutback.feed"]
+        ):
+            mode = DRILLING
+        if mode != self.mode:
+            self.mode, self.since = mode, 0.0
+            self.integral = self.command  # no bump
+
+    def _go_towards(self, goal: float, h: float) -> None:
+        """The wanted feed moves at a limited rate."""
+        most = self.parameters["feed_rate"] * h
+        self.wanted += min(max(goal - self.wanted, -most), most)
+
+    def _keep_feed(self, feed: float, h: float) -> None:
+        """PI whose integral stops where the command is at its limit."""
+        p = self.parameters
+        error = self.wanted - feed if p["pi.on"] else 0.0
+        raised = self.integral + h * p["pi.gain"] / p["pi.time"] * error
+        command = p["pi.gain"] * error + raised
+        if abs(command) <= p["force_limit"] or error * command < 0.0:
+            self.integral = raised
+        self._command(command, 0.0)
+
+    def _command(self, force: float, h: float) -> None:
+        """Send a force; at a limited rate where `h` [s] is given."""
+        limit = self.parameters["force_limit"]
+        force = min(max(force, -limit), limit)
+        if h > 0.0:
+            most = self.parameters["force_rate"] * h
+            force = self.command + min(max(force - self.command, -most), most)
+        self.command = force
+
+    def _set_pressure(self, inputs: dict[str, Any], goal: float, h: float) -> None:
+        """Pressure follows the feed, at a limited rate."""
+        p = self.parameters
+        if p["ratio.on"]:
+            goal = min(goal, max(p["ratio.lowest"], p["ratio.slope"] * inputs["feed_force"]))
+        most = p["pressure_rate"] * h
+        self.pressure += min(max(goal - self.pressure, -most), most)
+
+    def _seek(self, inputs: dict[str, Any], h: float) -> float:
+        """Climb towards the feed of the best rate; return the feed to be kept.
+
+        The feed swings about its centre, F = F_0 (1 + a sin w t). Over whole periods the
+        rate's part in step with the swing, by the mean rate, is a/2 d ln R / d ln F; it moves
+        ln F_0, by a limited amount. The first period after a start is for settling.
+        """
+        p = self.parameters
+        swing = p["seek.swing"]
+        angle = 2.0 * math.pi * (self.phase - p["seek.lag"]) / p["seek.period"]
+        rate = inputs["rate_of_penetration"]
+        if self.time > p["seek.wait"]:
+            self.sum_rate += h * rate
+            self.sum_swing += h * rate * math.sin(angle)
+        self.phase += h
+        if self.phase >= p["seek.period"] - 1e-9:
+            if self.sum_rate > 0.0:
+                self.gradient = 2.0 * self.sum_swing / (swing * self.sum_rate)
+                most = p["seek.largest_move"]
+                move = min(max(p["seek.gain"] * self.gradient, -most), most)
+                self.centre = min(
+                    max(self.centre * math.exp(move), p["seek.lowest"]), p["seek.highest"]
+                )
+            self.phase = self.sum_rate = self.sum_swing = 0.0
+        return self.centre * (1.0 + swing * math.sin(2.0 * math.pi * self.phase / p["seek.period"]))
+
+    def outputs(self) -> dict[str, Any]:
+        """Present values by name."""
+        percussion = self.mode != VOID or self.parameters["cutback.pressure"] > 0.0
+        return {
+            "force_command": self.command,
+            "pressure_command": self.pressure,
+            "percussion_on": bool(percussion),
+            "mode": int(self.mode),
+            "feed_wanted": self.wanted,
+            "seek.centre": self.centre,
+            "seek.gradient": self.gradient,
+        }
