@@ -97,7 +97,8 @@ class Component:
         except Exception as error:
             # the line of the FMU itself comes first, that of its export library after it
             said = [text for text in self.messages if text.strip()]
-            raise CouplingError(f"{self.name}: {said[0] if said else error}") from error
+            text = said[0].removeprefix(f"{self.name}: ") if said else str(error)
+            raise CouplingError(f"{self.name}: {text}") from error
 
     def free(self) -> None:
         """End the instance."""

@@ -1,10 +1,10 @@
-"""Rock by depth: layers, voids, random variation, and stiffness that grows with feed.
+"""Rock by depth: layers, voids, random variation, and stiffness that depends on feed.
 
-    K = K_layer exp(s n(z) - s^2/2) (1 + a max(F/F_a - 1, 0)^2)
+    K = K_layer exp(s n(z) - s^2/2) (1 + a (F/F_a - 1)^2)
 
 n(z) is a normal variable, straight between knots a correlation length apart, the same for
-the same seed. The last factor stands for cuttings that are pressed on again: above the
-feed force F_a the hole is no longer cleaned. The torque on the rotation is r f F.
+the same seed. The last factor makes a feed force F_a the best one: it stands for a bit that
+rides on cuttings above it, and sits badly below it. The torque on the rotation is r f F.
 """
 
 from __future__ import annotations
@@ -78,8 +78,8 @@ class RockProfile(Model):
         p = self.parameters
         number = max(0, bisect_right(self.tops, self.depth) - 1)
         _, stiffness, ratio, torque, which = self.layers[number]
-        over = max(self.feed / p["overfeed.force"] - 1.0, 0.0)
-        factor = self.variation(self.depth) * (1.0 + p["overfeed.factor"] * over * over)
+        off = self.feed / p["best_feed.force"] - 1.0
+        factor = self.variation(self.depth) * (1.0 + p["best_feed.factor"] * off * off)
         return {
             "loading_stiffness": stiffness * factor,
             "unloading_ratio": ratio,
