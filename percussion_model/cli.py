@@ -8,6 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
+from percussion_model.commands.bench_controller import bench_controller
 from percussion_model.commands.common import BAD_INPUT, INTERRUPTED, complain
 from percussion_model.commands.compare import compare
 from percussion_model.commands.couple import couple
@@ -40,7 +41,7 @@ def _options(
     """Percussive drilling with travelling waves: piston, bit and rock, blow by blow."""
 
 
-for _command in (run, explain, plot, compare, couple, new):
+for _command in (run, explain, plot, compare, couple, bench_controller, new):
     app.command()(_command)
 
 

@@ -17,7 +17,7 @@ SOURCES = [
     path for folder in ("percussion_model", "tests") for path in (ROOT / folder).rglob("*.py")
 ]
 PAGES = (
-    *("docs/model.md", "docs/numerics.md", "docs/parameters.md", "docs/fmu.md"),
+    *("docs/model.md", "docs/numerics.md", "docs/parameters.md", "docs/fmu.md", "docs/system.md"),
     *("README.md", "CONTRIBUTING.md"),
 )
 

@@ -255,7 +255,6 @@ CONTROLLER = PartTable(
         "seek.on": ("", 0, 1, False, "seek the feed of the best rate"),
         "seek.swing": ("1", 1e-4, 0.5, 0.06, "swing of the feed by its mean"),
         "seek.period": ("s", 0.01, 1e3, 2.0, "period of the swing"),
-        "seek.lag": ("s", 0.0, 10.0, 0.25, "time by which the rate follows the feed"),
         "seek.wait": ("s", 0.0, 1e4, 2.0, "time before the first period counts"),
         "seek.gain": ("1", 0.0, 100.0, 0.25, "move of ln feed by the gradient found"),
         "seek.largest_move": ("1", 0.0, 1.0, 0.12, "largest move of ln feed in a period"),

@@ -146,7 +146,11 @@ class Coupling:
             folder = tempfile.mkdtemp(prefix=f"{name}-", dir=self._folder)
             extract(str(source), folder)
             self.parts[name] = Component(name, folder)
-            self._parameters[name] = {} if name in replaced else _archived(component)
+            values = _archived(component)
+            if name in replaced:  # another FMU takes what it has
+                known = self.parts[name].variables
+                values = {key: value for key, value in values.items() if key in known}
+            self._parameters[name] = values
         for signal, value in given.items():
             name, _, variable = signal.partition(".")
             if name not in self._parameters:

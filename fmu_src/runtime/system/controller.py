@@ -29,8 +29,11 @@ class DrillController(Model):
     speed: float
     centre: float
     phase: float
+    samples: int
+    sum_feed: float
     sum_rate: float
-    sum_swing: float
+    sum_square: float
+    sum_product: float
     gradient: float
     STATE = tuple(__annotations__)
 
@@ -38,7 +41,7 @@ class DrillController(Model):
         super().__init__(parameters)
         for name in self.STATE:
             setattr(self, name, 0.0)
-        self.mode = DRILLING
+        self.mode, self.samples = DRILLING, 0
 
     def begin(self, inputs: dict[str, Any]) -> None:
         """Start with the force that the rig has."""
@@ -129,28 +132,38 @@ class DrillController(Model):
     def _seek(self, inputs: dict[str, Any], h: float) -> float:
         """Climb towards the feed of the best rate; return the feed to be kept.
 
-        The feed swings about its centre, F = F_0 (1 + a sin w t). Over whole periods the
-        rate's part in step with the swing, by the mean rate, is a/2 d ln R / d ln F; it moves
-        ln F_0, by a limited amount. The first period after a start is for settling.
+        The feed swings about its centre, F = F_0 (1 + a sin w t). The slope of the rate over
+        the measured feed in a whole period, by the mean of both, is d ln R / d ln F, whatever
+        the rig makes of the swing; it moves ln F_0 by a limited amount.
         """
         p = self.parameters
-        swing = p["seek.swing"]
-        angle = 2.0 * math.pi * (self.phase - p["seek.lag"]) / p["seek.period"]
-        rate = inputs["rate_of_penetration"]
+        swing, period = p["seek.swing"], p["seek.period"]
+        feed, rate = inputs["feed_force"], inputs["rate_of_penetration"]
         if self.time > p["seek.wait"]:
-            self.sum_rate += h * rate
-            self.sum_swing += h * rate * math.sin(angle)
+            self.samples += 1
+            self.sum_feed += feed
+            self.sum_rate += rate
+            self.sum_square += feed * feed
+            self.sum_product += feed * rate
         self.phase += h
-        if self.phase >= p["seek.period"] - 1e-9:
-            if self.sum_rate > 0.0:
-                self.gradient = 2.0 * self.sum_swing / (swing * self.sum_rate)
-                most = p["seek.largest_move"]
-                move = min(max(p["seek.gain"] * self.gradient, -most), most)
-                self.centre = min(
-                    max(self.centre * math.exp(move), p["seek.lowest"]), p["seek.highest"]
-                )
-            self.phase = self.sum_rate = self.sum_swing = 0.0
-        return self.centre * (1.0 + swing * math.sin(2.0 * math.pi * self.phase / p["seek.period"]))
+        if self.phase >= period - 0.5 * h:
+            self._climb()
+            self.phase = 0.0
+            self.samples = 0
+            self.sum_feed = self.sum_rate = self.sum_square = self.sum_product = 0.0
+        return self.centre * (1.0 + swing * math.sin(2.0 * math.pi * self.phase / period))
+
+    def _climb(self) -> None:
+        """Move the centre by the slope of the period that has ended."""
+        p, n = self.parameters, self.samples
+        spread = n * self.sum_square - self.sum_feed**2
+        if n < 2 or self.sum_rate <= 0.0 or spread <= 0.0:
+            return
+        slope = (n * self.sum_product - self.sum_feed * self.sum_rate) / spread
+        self.gradient = slope * self.sum_feed / self.sum_rate
+        most = p["seek.largest_move"]
+        move = min(max(p["seek.gain"] * self.gradient, -most), most)
+        self.centre = min(max(self.centre * math.exp(move), p["seek.lowest"]), p["seek.highest"])
 
     def outputs(self) -> dict[str, Any]:
         """Present values by name."""
