@@ -245,7 +245,7 @@ CONTROLLER = PartTable(
         "cutback.on": ("", 0, 1, True, "cut percussion back in a void"),
         "cutback.velocity": ("m/s", 0.0, 100.0, 0.06, "velocity of the head that tells a void"),
         "cutback.pressure": ("Pa", 0.0, 1e9, 4e5, "pressure in a void; 0 shuts the drive"),
-        "cutback.force": ("N", -1e6, 1e6, 0.0, "force command in a void"),
+        "cutback.force": ("N", -1e6, 1e6, 0.0, "force in a void, beside that of the weights"),
         "cutback.feed": ("N", 0.0, 1e6, 800.0, "feed from which drilling begins again"),
         "retract.on": ("", 0, 1, True, "retract where the rotation jams"),
         "retract.torque": ("N m", 0.0, 1e9, 250.0, "torque that tells a jam"),

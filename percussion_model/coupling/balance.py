@@ -69,7 +69,7 @@ def _energies(columns: dict[str, np.ndarray]) -> dict[str, float]:
     e = {name: columns[f"string.energy.{name}"] for name in STRING_ENERGIES}
     put_in = e["head"] + e["reaction"] + e["weight"]
     gone = e["bit"] + e["shoulder"] + e["wall"] + e["stored"] - e["stored"][0]
-    # at the start the shoulder is loaded: its energy was not put in
+    # what is stored at the start was not put in
     residual = put_in - gone - (put_in - gone)[0]
     scale = sum(float(np.max(np.abs(e[name]))) for name in ("head", "reaction", "weight"))
     blows = columns.get("hammer.blow_energy")

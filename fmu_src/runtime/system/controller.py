@@ -46,7 +46,8 @@ class DrillController(Model):
     def begin(self, inputs: dict[str, Any]) -> None:
         """Start with the force that the rig has."""
         self.wanted = self.centre = inputs["feed_setpoint"]
-        self.integral = self.command = self.parameters["start.force"]
+        self.command = self.parameters["start.force"]
+        self.integral = self.command - self.wanted
         self.pressure = inputs["pressure_setpoint"]
 
     def step(self, inputs: dict[str, Any], step_size: float) -> None:
@@ -66,7 +67,7 @@ class DrillController(Model):
             self._set_pressure(inputs, inputs["pressure_setpoint"], h)
         elif self.mode == VOID:
             self.wanted = min(self.wanted, p["cutback.feed"])
-            self._command(p["cutback.force"], h)
+            self._command(self.integral + p["cutback.force"], h)
             self._set_pressure(inputs, p["cutback.pressure"], h)
         else:
             self.wanted = min(self.wanted, p["cutback.feed"])
@@ -95,7 +96,6 @@ class DrillController(Model):
             mode = DRILLING
         if mode != self.mode:
             self.mode, self.since = mode, 0.0
-            self.integral = self.command  # no bump
 
     def _go_towards(self, goal: float, h: float) -> None:
         """The wanted feed moves at a limited rate."""
@@ -103,11 +103,14 @@ class DrillController(Model):
         self.wanted += min(max(goal - self.wanted, -most), most)
 
     def _keep_feed(self, feed: float, h: float) -> None:
-        """PI whose integral stops where the command is at its limit."""
+        """PI beside the wanted feed itself; the integral stops where the command is limited.
+
+        So the integral is what weights and reaction bring, which a void does not change much.
+        """
         p = self.parameters
         error = self.wanted - feed if p["pi.on"] else 0.0
         raised = self.integral + h * p["pi.gain"] / p["pi.time"] * error
-        command = p["pi.gain"] * error + raised
+        command = self.wanted + p["pi.gain"] * error + raised
         if abs(command) <= p["force_limit"] or error * command < 0.0:
             self.integral = raised
         self._command(command, 0.0)

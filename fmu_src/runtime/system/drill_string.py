@@ -91,6 +91,7 @@ class DrillString(Model):
     shoulder_work: float
     head_impulse: float
     bit_impulse: float
+    loaded: float
     time: float
     STATE = tuple(__annotations__)
 
@@ -109,6 +110,7 @@ class DrillString(Model):
         self.force_before = 0.0
         self.stiffness = self.shoulder.stiffness
         self.gap = self.force / self.stiffness  # compression at equal displacements [m]
+        self.loaded = 0.5 * self.force**2 / self.stiffness  # energy that is there already [J]
         self.bit = inputs["bit_position"]
         self.casing_impulse = inputs["casing_impulse"]
         casing_weight = self.body.gravity * self.body.casing_mass
@@ -212,7 +214,9 @@ class DrillString(Model):
             "energy.reaction": self.reaction_work,
             "energy.weight": body.weight_work,
             "energy.bit": self.bit_work,
-            "energy.shoulder": self.shoulder_work - self.bit_work - stored_in_shoulder,
+            "energy.shoulder": self.shoulder_work
+            - self.bit_work
+            - (stored_in_shoulder - self.loaded),
             "energy.wall": body.friction_loss,
             "energy.stored": body.stored + stored_in_shoulder - self.brought_energy,
             "rod_count": int(body.count),
