@@ -218,11 +218,12 @@ def test_a_void_cuts_percussion_back_until_there_is_rock():
 
 
 def test_a_jam_is_answered_by_a_retract():
-    control = make_model("DrillController")
+    control = make_model("DrillController", retract__force=-1500.0)
     assert run(control, "DrillController", 50, rotation_torque=400.0)["mode"] == 0
     found = run(control, "DrillController", 400, rotation_torque=400.0)
     assert found["mode"] == 2
-    assert found["force_command"] == control.parameters["retract.force"]
+    # at the start nothing was wanted of the rig beside 2.5 kN of feed
+    assert found["force_command"] == pytest.approx(-2500.0 - 1500.0)
     assert run(control, "DrillController", 400, rotation_torque=20.0)["mode"] == 0
 
 

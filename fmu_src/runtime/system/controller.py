@@ -71,7 +71,7 @@ class DrillController(Model):
             self._set_pressure(inputs, p["cutback.pressure"], h)
         else:
             self.wanted = min(self.wanted, p["cutback.feed"])
-            self._command(p["retract.force"], h)
+            self._command(self.integral + p["retract.force"], h)
             self._set_pressure(inputs, inputs["pressure_setpoint"], h)
 
     def _choose_mode(self, inputs: dict[str, Any], h: float) -> None:

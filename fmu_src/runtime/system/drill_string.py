@@ -170,7 +170,9 @@ class DrillString(Model):
         k, c = self.shoulder.constants(h)
         if k != self.stiffness:
             # another step size: the same force at another stiffness
-            self.gap += self.force * (1.0 / k - 1.0 / self.stiffness)
+            softer = 1.0 / k - 1.0 / self.stiffness
+            self.gap += self.force * softer
+            self.loaded += 0.5 * self.force**2 * softer
             self.stiffness = k
         compression = self.gap + self.casing_place() - bit
         if compression <= 0.0:
