@@ -134,6 +134,12 @@ def fmu(extra: list[str]) -> int:
                            PYTHONPATH=str(ROOT))  # fmt: skip
 
 
+def system(extra: list[str]) -> int:
+    """Build the systems of FMUs and their archives; paths count from where the user is."""
+    return setup() or call([tool("python"), "-m", "fmu_src.system", *extra], folder=Path.cwd(),
+                           PYTHONPATH=str(ROOT))  # fmt: skip
+
+
 def test(extra: list[str]) -> int:
     """Run lint, type checks and tests, all of them; return the first failure."""
     code = setup()
@@ -196,6 +202,8 @@ def main(arguments: list[str]) -> int:
     commands.add_parser("test", help="lint, type checks and tests; more goes to pytest")
     commands.add_parser("fmu", help="bake a scene into an FMU: --scene FILE, -o FILE.fmu",
                         add_help=False)  # fmt: skip
+    commands.add_parser("system", help="build drilling systems of FMUs as SSP: -o FOLDER",
+                        add_help=False)  # fmt: skip
     commands.add_parser("bench", help="measure speed; more goes to the benchmarks")
     choice, extra = parser.parse_known_args(arguments)
     started = time.monotonic()
@@ -207,7 +215,8 @@ def main(arguments: list[str]) -> int:
             print(f".venv is {'up to date' if code == 0 else 'not ready'} "
                   f"({time.monotonic() - started:.1f} s).")  # fmt: skip
             return code
-        return {"run": run, "fmu": fmu, "test": test, "bench": bench}[choice.command](extra)
+        work = {"run": run, "fmu": fmu, "system": system, "test": test, "bench": bench}
+        return work[choice.command](extra)
     except KeyboardInterrupt:
         print("\nInterrupted.", file=sys.stderr)
         return INTERRUPTED

@@ -35,6 +35,15 @@ UNITS: dict[str, Unit] = {
     "kg": Unit({"kg": 1}, {}),
     "m.s": Unit({"m": 1, "s": 1}, {}),
     "K": Unit({"K": 1}, {}),
+    "N.m": Unit({"kg": 1, "m": 2, "s": -2}, {}),
+    "N/s": Unit({"kg": 1, "m": 1, "s": -3}, {}),
+    "N.s/m2": Unit({"kg": 1, "m": -1, "s": -1}, {}),
+    "Pa/s": Unit({"kg": 1, "m": -1, "s": -3}, {}),
+    "Pa/N": Unit({"m": -2}, {}),
+    "Pa.s/m3": Unit({"kg": 1, "m": -4, "s": -1}, {}),
+    "m3": Unit({"m": 3}, {}),
+    "m3/s": Unit({"m": 3, "s": -1}, {}),
+    "m3/(s.Pa)": Unit({"kg": -1, "m": 4, "s": 1}, {}),
 }
 
 # The parameter table writes units as people do.
@@ -46,6 +55,13 @@ FROM_TABLE = {
     "kg/m^3": "kg/m3",
     "N s/m": "N.s/m",
     "m s": "m.s",
+    "N s": "N.s",
+    "N m": "N.m",
+    "N s/m^2": "N.s/m2",
+    "m^3": "m3",
+    "m^3/s": "m3/s",
+    "Pa s/m^3": "Pa.s/m3",
+    "m^3/(s Pa)": "m3/(s.Pa)",
 }
 
 

@@ -9,9 +9,11 @@ from typing import Annotated, Any
 import typer
 
 from percussion_model.commands.accuracy import accuracy
+from percussion_model.commands.bench_controller import bench_controller
 from percussion_model.commands.blow_map import blow_map
 from percussion_model.commands.common import BAD_INPUT, INTERRUPTED, complain
 from percussion_model.commands.compare import compare
+from percussion_model.commands.couple import couple
 from percussion_model.commands.effects import effects
 from percussion_model.commands.paper import paper
 from percussion_model.commands.scene import explain, new, plot, run
@@ -57,6 +59,8 @@ for _command in (
     effects,
     paper,
     stability,
+    couple,
+    bench_controller,
     new,
 ):
     app.command()(_command)

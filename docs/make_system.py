@@ -1,0 +1,70 @@
+"""Write the tables of docs/system.md from the parts' tables: `python -m docs.make_system`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from fmu_src.system.archive import SYSTEMS, read_plan
+from fmu_src.system.parts import part_variables
+from fmu_src.system.tables import PARTS
+from fmu_src.variables import Variable
+
+PAGE = Path(__file__).with_name("system.md")
+BEGIN, END = "<!-- tables: begin -->", "<!-- tables: end -->"
+SYSTEM = SYSTEMS / "feed_control.toml"
+
+
+def tables() -> str:
+    """Signals of the feed-controlled system, then the variables of each part."""
+    plan = read_plan(SYSTEM)
+    variables = {name: {v.name: v for v in part_variables(part)} for name, part in PARTS.items()}
+    lines = ["### Signals\n", "| from | to | unit | meaning |", "|---|---|---|---|"]
+    for sink, source in plan.connections.items():
+        one = _find(plan.components, variables, source) or _find(plan.components, variables, sink)
+        unit = (one.unit or "") if one else ""
+        lines.append(f"| `{source}` | `{sink}` | {unit} | {one.description if one else ''} |")
+    for name in PARTS:
+        lines.append(f"\n### {name}\n")
+        lines.append("| name | kind | unit | start | range | meaning |")
+        lines.append("|---|---|---|---|---|---|")
+        lines += [_line(one) for one in variables[name].values() if not _repeated(one.name)]
+    return "\n".join(lines) + "\n"
+
+
+def _find(
+    components: dict[str, str], variables: dict[str, dict[str, Variable]], signal: str
+) -> Variable | None:
+    component, _, name = signal.partition(".")
+    return variables.get(components[component], {}).get(name)
+
+
+def _repeated(name: str) -> bool:
+    """Whether it is a parameter of a layer after the first, which reads like the first."""
+    return name.startswith("layers[") and not name.startswith("layers[1]")
+
+
+def _line(one: Variable) -> str:
+    start: Any = "" if one.start is None else one.start
+    span = ""
+    if one.items:
+        start, span = one.items[0][0], ", ".join(word for word, _, _ in one.items)
+    elif one.type == "Boolean" and one.start is not None:
+        start = str(one.start).lower()
+    elif one.lower is not None:
+        start, span = f"{one.start:g}", f"{one.lower:g} … {one.upper:g}"
+    return (
+        f"| `{one.name}` | {one.causality} | {one.unit or ''} | {start} | {span} "
+        f"| {one.description} |"
+    )
+
+
+def page() -> str:
+    """Text of the page with its tables renewed."""
+    before, _, rest = PAGE.read_text(encoding="utf-8").partition(BEGIN)
+    _, _, after = rest.partition(END)
+    return f"{before}{BEGIN}\n\n{tables()}\n{END}{after}"
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page(), encoding="utf-8")

@@ -1,0 +1,239 @@
+"""Drill string: head, rods, casing, and the shoulder that pushes the bit.
+
+The shoulder is a spring with a damper, in compression only,
+
+    F = k (x_c - x_b) + c (v_c - v_b)  >= 0,
+
+and F is held over a communication step on both sides: the casing feels what the bit
+feels, so momentum passes the interface exactly. A force that is held for a step h, and
+known to the bit a step late, brings energy into the pair unless the damper takes it:
+c > k h / 2 for the hold, 3 k h / 2 with the delay. A damper that is sampled needs
+c h well below the mass that it brakes. `Shoulder` keeps both, by less stiffness if need
+be: then a free bit comes to rest at any step. No sampled force is passive for every
+partner; one that swings within a few steps has to lose a few percent a cycle, as rock does.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from fmu_src.runtime.system.part import Model
+from fmu_src.runtime.system.string_body import Lumps, Waves
+
+# Damping by stiffness and step: 3/2 is the limit, the rest is margin.
+DAMPING_OF_DELAY = 2.0
+# Damping by mass and step: stable below 1/2 with a delay of one step, the rest is margin
+# for bits that swing on rock.
+SHARE_OF_MASS = 0.1
+# A step that misses the end of a cell by rounding ends there.
+ROUNDING = 1e-9
+# Implicit midpoint is stable at any step, but blind to what is faster [s].
+LONGEST_LUMPED_STEP = 2e-3
+
+
+class Shoulder:
+    """Spring and damper between casing and bit.
+
+    Parameters
+    ----------
+    parameters : dict
+        Of the drill string.
+    """
+
+    def __init__(self, parameters: dict[str, Any]) -> None:
+        self.stiffness = parameters["shoulder.stiffness"]
+        self.damping = parameters["shoulder.damping"]
+        self.mass = parameters["shoulder.bit_mass"]
+        self.passive = parameters["shoulder.passive"]
+
+    def constants(self, h: float) -> tuple[float, float]:
+        """Stiffness [N/m] and damping [N s/m] that a communication step `h` [s] allows."""
+        if not self.passive:
+            return self.stiffness, self.damping
+        most = SHARE_OF_MASS * self.mass / h
+        k = min(self.stiffness, most / (DAMPING_OF_DELAY * h))
+        c = min(max(self.damping, DAMPING_OF_DELAY * k * h), most)
+        return k, c
+
+
+class DrillString(Model):
+    """String with shoulder.
+
+    Attributes
+    ----------
+    force : float
+        Of the shoulder, on the bit and on the casing, until the next step ends [N].
+    lag : float
+        Time by which the waves stay behind the communication point [s].
+    """
+
+    force: float
+    force_before: float
+    lag: float
+    gap: float
+    bit: float
+    casing_impulse: float
+    head_impulse_due: float
+    casing_impulse_due: float
+    mean_force: float
+    added: int
+    next_rod: float
+    was_asked: bool
+    stiffness: float
+    brought_energy: float
+    brought_momentum: float
+    head_work: float
+    reaction_work: float
+    bit_work: float
+    shoulder_work: float
+    head_impulse: float
+    bit_impulse: float
+    loaded: float
+    time: float
+    STATE = tuple(__annotations__)
+
+    def __init__(self, parameters: dict[str, Any]) -> None:
+        super().__init__(parameters)
+        kind = {"waves": Waves, "lumped": Lumps}[parameters["model"]]
+        self.body: Any = kind(parameters, int(parameters["start.rods"]))
+        self.shoulder = Shoulder(parameters)
+        for name in self.STATE:
+            setattr(self, name, 0.0)
+        self.was_asked = False
+
+    def begin(self, inputs: dict[str, Any]) -> None:
+        """Stand still in balance, the shoulder loaded by `start.feed_force`."""
+        self.force = self.mean_force = self.parameters["start.feed_force"]
+        self.force_before = 0.0
+        self.stiffness = self.shoulder.stiffness
+        self.gap = self.force / self.stiffness  # compression at equal displacements [m]
+        self.loaded = 0.5 * self.force**2 / self.stiffness  # energy that is there already [J]
+        self.bit = inputs["bit_position"]
+        self.casing_impulse = inputs["casing_impulse"]
+        casing_weight = self.body.gravity * self.body.casing_mass
+        self.body.rest(self.force - casing_weight)
+        self.next_rod = self.parameters["start.rod_left"]
+
+    def step(self, inputs: dict[str, Any], step_size: float) -> None:
+        """Forces act, waves travel, the shoulder finds its new force."""
+        h, body = step_size, self.body
+        reaction = (inputs["casing_impulse"] - self.casing_impulse) / h
+        self.casing_impulse = inputs["casing_impulse"]
+        before = body.head, self.casing_place()
+        self._travel(inputs["head_force"], reaction - self.force, h)
+        self.head_work += inputs["head_force"] * (body.head - before[0])
+        self.head_impulse += inputs["head_force"] * h
+        self.time += h
+        moved = self.casing_place() - before[1]
+        self.reaction_work += reaction * moved
+        self.shoulder_work += self.force * moved
+        self.bit_impulse += self.force * h
+        bit = inputs["bit_position"]
+        # what the bit did is known a step late, as it is in a master that goes by Jacobi
+        self.bit_work += self.force_before * (bit - self.bit)
+        self.force_before = self.force
+        self._push((bit - self.bit) / h, bit, h)
+        self.bit = bit
+        share = 1.0 - math.exp(-h / self.parameters["feed_filter"])
+        self.mean_force += share * (self.force - self.mean_force)
+        self._rods(inputs["add_rod"])
+
+    def _travel(self, head_force: float, casing_force: float, h: float) -> None:
+        """Bring the body up to the communication point, or within a cell of it."""
+        body = self.body
+        if isinstance(body, Lumps):
+            count = max(1, math.ceil(h / LONGEST_LUMPED_STEP - ROUNDING))
+            for _ in range(count):
+                body.go_on(head_force, casing_force, h / count)
+            return
+        left = h
+        while self.lag + left >= body.step * (1.0 - ROUNDING):
+            part = min(body.step - self.lag, left)
+            self.head_impulse_due += head_force * part
+            self.casing_impulse_due += casing_force * part
+            body.advance(self.head_impulse_due / body.step, self.casing_impulse_due / body.step)
+            self.head_impulse_due = self.casing_impulse_due = self.lag = 0.0
+            left = max(0.0, left - part)
+        self.head_impulse_due += head_force * left
+        self.casing_impulse_due += casing_force * left
+        self.lag += left
+
+    def casing_place(self) -> float:
+        """Displacement of the casing at the communication point [m]."""
+        return self.body.casing + self.body.casing_velocity * self.lag
+
+    def _push(self, bit_velocity: float, bit: float, h: float) -> None:
+        """Force of the shoulder for the step to come."""
+        k, c = self.shoulder.constants(h)
+        if k != self.stiffness:
+            # another step size: the same force at another stiffness
+            softer = 1.0 / k - 1.0 / self.stiffness
+            self.gap += self.force * softer
+            self.loaded += 0.5 * self.force**2 * softer
+            self.stiffness = k
+        compression = self.gap + self.casing_place() - bit
+        if compression <= 0.0:
+            self.force = 0.0
+            return
+        self.force = max(0.0, k * compression + c * (self.body.casing_velocity - bit_velocity))
+
+    def _rods(self, asked: bool) -> None:
+        """Add a rod on the rising edge of `add_rod`, or by itself where the head is down."""
+        wanted = self.body.head >= self.next_rod
+        if wanted and (self.parameters["rod.automatic"] or (asked and not self.was_asked)):
+            before = self.body.stored, self.body.momentum
+            self.body.add_rod()
+            self.added += 1
+            self.next_rod += self.parameters["rod.length"]
+            self.brought_energy += self.body.stored - before[0]
+            self.brought_momentum += self.body.momentum - before[1]
+        self.was_asked = bool(asked)
+
+    def outputs(self) -> dict[str, Any]:
+        """Present values by name."""
+        body = self.body
+        stored_in_shoulder = 0.5 * self.force**2 / self.stiffness
+        return {
+            "feed_force": self.force,
+            "feed_force_mean": self.mean_force,
+            "head_position": body.head + body.head_velocity * self.lag,
+            "head_velocity": body.head_velocity,
+            "casing_position": self.casing_place(),
+            "casing_velocity": body.casing_velocity,
+            "length": body.count * body.length_of_rod,
+            "weight": body.weight,
+            "rod_wanted": bool(body.head >= self.next_rod),
+            "lifted": self.force == 0.0,
+            "shoulder_stiffness": self.stiffness,
+            "head_impulse": self.head_impulse,
+            "bit_impulse": self.bit_impulse,
+            "momentum": body.momentum - self.brought_momentum,
+            "wall_momentum": body.lost_momentum,
+            "energy.head": self.head_work,
+            "energy.reaction": self.reaction_work,
+            "energy.weight": body.weight_work,
+            "energy.bit": self.bit_work,
+            "energy.shoulder": self.shoulder_work
+            - self.bit_work
+            - (stored_in_shoulder - self.loaded),
+            "energy.wall": body.friction_loss,
+            "energy.stored": body.stored + stored_in_shoulder - self.brought_energy,
+            "rod_count": int(body.count),
+        }
+
+    def save(self) -> dict[str, Any]:
+        """State of shoulder and body."""
+        body = {name: getattr(self.body, name) for name in self.body.STATE}
+        body = {k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in body.items()}
+        return super().save() | {"body": body}
+
+    def restore(self, saved: dict[str, Any]) -> None:
+        """Go back to a state."""
+        super().restore(saved)
+        for name, value in saved["body"].items():
+            setattr(self.body, name, np.array(value) if isinstance(value, list) else value)
+        if isinstance(self.body, Lumps):
+            self.body._assemble()

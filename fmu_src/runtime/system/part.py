@@ -1,0 +1,182 @@
+"""A part of a drilling system: a plain model, and the slave around it."""
+
+from __future__ import annotations
+
+import importlib
+import json
+from typing import Any, ClassVar
+
+from fmu_src.runtime.slave import Phase, Slave, guarded
+from fmu_src.runtime.states import StateError, fingerprint, pack, unpack
+
+
+class Model:
+    """What a part computes, without FMI.
+
+    Parameters
+    ----------
+    parameters : dict
+        Values by name; words for enumerations.
+
+    Attributes
+    ----------
+    STATE : tuple of str
+        Attributes that change in a step: numbers, flags, or lists of numbers.
+    """
+
+    STATE: ClassVar[tuple[str, ...]] = ()
+
+    def __init__(self, parameters: dict[str, Any]) -> None:
+        self.parameters = parameters
+
+    def begin(self, inputs: dict[str, Any]) -> None:
+        """Take the state at time zero."""
+
+    def step(self, inputs: dict[str, Any], step_size: float) -> None:
+        """Go on by a communication step [s], the inputs held."""
+        raise NotImplementedError
+
+    def outputs(self) -> dict[str, Any]:
+        """Present values by name."""
+        raise NotImplementedError
+
+    def save(self) -> dict[str, Any]:
+        """State as plain values; `restore` takes them back."""
+        return {name: _plain(getattr(self, name)) for name in self.STATE}
+
+    def restore(self, saved: dict[str, Any]) -> None:
+        """Go back to a state."""
+        for name in self.STATE:
+            setattr(self, name, saved[name])
+
+
+def _plain(value: Any) -> Any:
+    return value.tolist() if hasattr(value, "tolist") else value
+
+
+class Part(Slave):
+    """Slave around the model that the class attributes name."""
+
+    MODEL: ClassVar[tuple[str, str]] = ("", "")  # module beside this one, and class in it
+
+    def __init__(self, **arguments: Any) -> None:
+        super().__init__(**arguments)
+        package = __name__.rpartition(".")[0]
+        module = importlib.import_module(f"{package}.{self.MODEL[0]}")
+        self._model_class = getattr(module, self.MODEL[1])
+        known = self.known.values()
+        self._inputs = [(one.name, one.reference) for one in known if one.causality == "input"]
+        self._fixed = [one for one in known if one.causality == "parameter"]
+        self._input_references = [reference for _, reference in self._inputs]
+        self._names = {one.reference: one.name for one in known}
+        self._model: Model | None = None
+        self._found: dict[str, Any] | None = None
+        self._dirty = False
+
+    def changed(self, reference: int) -> None:
+        """Check inputs before the next step; before the first one, make the model anew."""
+        self._dirty = True
+        if self.phase < Phase.STEPPING:
+            self._model = self._found = None
+
+    def inputs(self) -> dict[str, Any]:
+        """Present inputs by name."""
+        values = self.values
+        return {name: values[reference] for name, reference in self._inputs}
+
+    def parameters(self) -> dict[str, Any]:
+        """Parameters by name, words for enumerations."""
+        return {
+            one.name: self.choice(one.reference)
+            if one.type == "Enumeration"
+            else self.values[one.reference]
+            for one in self._fixed
+        }
+
+    def ready(self) -> Model:
+        """The model, made where there is none."""
+        if self._model is None:
+            self._model = self._model_class(self.parameters())
+            self._model.begin(self.inputs())
+            self._found = None
+        return self._model
+
+    def begin(self) -> None:
+        """Make the model, unless reading an output has made it already."""
+        self.ready()
+
+    def step(self, time: float, step_size: float) -> None:
+        """Check the inputs, then go on."""
+        if self._dirty:
+            self.check(self._input_references)
+            self._dirty = False
+        self.ready().step(self.inputs(), step_size)
+        self._found = None
+
+    def outputs(self, references: list[int]) -> list[Any]:
+        """Present values of outputs; 0 before there are any."""
+        if self._model is None and self.phase != Phase.INITIALISING:
+            return [0] * len(references)
+        if self._found is None:
+            self._found = self.ready().outputs()
+        found, names = self._found, self._names
+        return [found[names[reference]] for reference in references]
+
+    def fingerprint(self) -> bytes:
+        """Hash of the kind of part and its parameters."""
+        return fingerprint(*self.MODEL, self.parameters())
+
+    @guarded
+    def _get_fmu_state(self) -> bytes:
+        if self._model is None:
+            raise ValueError("there is no state to save before the initialisation has ended")
+        body = {
+            "phase": int(self.phase),
+            "times": [self.start_time, self.now],
+            "inputs": self.inputs(),
+            "model": self._model.save(),
+        }
+        return pack(self.fingerprint(), json.dumps(body).encode())
+
+    @guarded
+    def _set_fmu_state(self, state: bytes) -> None:
+        try:
+            body = json.loads(unpack(self.fingerprint(), state))
+        except json.JSONDecodeError as error:
+            raise StateError(f"the saved state cannot be read: {error}") from None
+        for name, value in body["inputs"].items():
+            self.values[self.by_name[name]] = value
+        self.ready().restore(body["model"])
+        self.phase = Phase(body["phase"])
+        self.start_time, self.now = body["times"]
+        self._dirty, self._found = True, None
+
+
+class DrillStringPart(Part):
+    """Drill string with head, casing and shoulder."""
+
+    MODEL = ("drill_string", "DrillString")
+
+
+class RigFeedPart(Part):
+    """Hydraulic cylinder that pushes the head."""
+
+    MODEL = ("rig_feed", "RigFeed")
+
+
+class SupplyPart(Part):
+    """Source, hose and relief valve of the drive's fluid."""
+
+    MODEL = ("supply", "Supply")
+
+
+class RockProfilePart(Part):
+    """Rock by depth."""
+
+    MODEL = ("rock_profile", "RockProfile")
+
+
+class DrillControllerPart(Part):
+    """Controller of feed, pressure and percussion."""
+
+    MODEL = ("controller", "DrillController")

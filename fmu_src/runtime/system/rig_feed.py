@@ -1,0 +1,72 @@
+"""Rig feed: a hydraulic cylinder whose pressure a servo valve drives, pushing the head.
+
+    V/B p' = q - A v - leak p,   q = clip(K (p_wanted - p), -q_max, q_max),   F = A p
+
+with the pressure difference p of both sides, clipped by the relief valves. K follows
+from the servo's time constant. Friction of the slide brakes the head: -c v.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from fmu_src.runtime.system.part import Model
+
+LONGEST_STEP = 1e-3  # of the integration, short against the servo [s]
+
+
+class RigFeed(Model):
+    """Cylinder with servo valve."""
+
+    STATE = ("pressure", "relief_volume", "energy", "speed", "limited")
+
+    def __init__(self, parameters: dict[str, Any]) -> None:
+        super().__init__(parameters)
+        p = parameters
+        self.area = p["cylinder.area"]
+        self.capacity = p["cylinder.volume"] / p["cylinder.bulk_modulus"]
+        self.gain = self.capacity / p["servo.time"]
+        self.flow_limit = p["servo.velocity"] * self.area
+        self.highest = p["force_limit"] / self.area
+        self.pressure = self.relief_volume = self.energy = self.speed = 0.0
+        self.limited = False
+
+    def begin(self, inputs: dict[str, Any]) -> None:
+        """Start with the force that is wanted."""
+        self.pressure = self.parameters["start.force"] / self.area
+        self.speed = inputs["head_velocity"]
+
+    def step(self, inputs: dict[str, Any], step_size: float) -> None:
+        """Integrate the pressure, implicit in the flow of the valve."""
+        wanted = inputs["force_command"] / self.area
+        wanted = min(max(wanted, -self.highest), self.highest)
+        self.speed = inputs["head_velocity"]
+        count = max(1, math.ceil(step_size / LONGEST_STEP))
+        h = step_size / count
+        leak = self.parameters["cylinder.leakage"]
+        for _ in range(count):
+            held = self.pressure - h / self.capacity * self.area * self.speed
+            new = (held + h / self.capacity * self.gain * wanted) / (
+                1.0 + h / self.capacity * (self.gain + leak)
+            )
+            flow = self.gain * (wanted - new)
+            self.limited = abs(flow) > self.flow_limit
+            if self.limited:
+                flow = math.copysign(self.flow_limit, flow)
+                new = (held + h / self.capacity * flow) / (1.0 + h / self.capacity * leak)
+            clipped = min(max(new, -self.highest), self.highest)
+            self.relief_volume += self.capacity * abs(new - clipped)
+            self.energy += h * flow * clipped
+            self.pressure = clipped
+
+    def outputs(self) -> dict[str, Any]:
+        """Present values by name."""
+        force = self.area * self.pressure
+        return {
+            "force": force - self.parameters["slide.friction"] * self.speed,
+            "pressure": self.pressure,
+            "energy": self.energy,
+            "relief_volume": self.relief_volume,
+            "limited": self.limited,
+        }

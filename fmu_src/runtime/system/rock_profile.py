@@ -1,0 +1,90 @@
+"""Rock by depth: layers, voids, random variation, and stiffness that depends on feed.
+
+    K = K_layer exp(s n(z) - s^2/2) (1 + a (F/F_a - 1)^2)
+
+n(z) is a normal variable, straight between knots a correlation length apart, the same for
+the same seed. The last factor makes a feed force F_a the best one: it stands for a bit that
+rides on cuttings above it, and sits badly below it. The torque on the rotation is r f F.
+"""
+
+from __future__ import annotations
+
+import math
+import random
+from bisect import bisect_right
+from typing import Any
+
+from fmu_src.runtime.system.part import Model
+
+LAYERS = 6
+# Knots of the variation that are kept, by number.
+KEPT = 64
+
+
+class RockProfile(Model):
+    """What the bit meets at its depth."""
+
+    STATE = ("depth", "feed")
+
+    def __init__(self, parameters: dict[str, Any]) -> None:
+        super().__init__(parameters)
+        p = parameters
+        layers = sorted(
+            (p[f"layers[{i}].top"], p[f"layers[{i}].loading_stiffness"],
+             p[f"layers[{i}].unloading_ratio"], p[f"layers[{i}].torque_factor"], i)
+            for i in range(1, LAYERS + 1) if p[f"layers[{i}].top"] >= 0.0
+        )  # fmt: skip
+        self.layers = layers or [(0.0, p["layers[1].loading_stiffness"],
+                                  p["layers[1].unloading_ratio"], 1.0, 1)]  # fmt: skip
+        self.tops = [layer[0] for layer in self.layers]
+        self.depth = self.feed = 0.0
+        self._knots: dict[int, float] = {}
+
+    def begin(self, inputs: dict[str, Any]) -> None:
+        """Look at the rock below the bit."""
+        self.depth = self.parameters["start.depth"] + inputs["bit_position"]
+        self.feed = inputs["feed_force"]
+
+    def step(self, inputs: dict[str, Any], step_size: float) -> None:
+        """Follow the bit; rock that was drilled does not come back."""
+        here = self.parameters["start.depth"] + inputs["bit_position"]
+        self.depth = max(self.depth, here)
+        self.feed = inputs["feed_force"]
+
+    def variation(self, depth: float) -> float:
+        """The factor exp(s n - s^2/2) at a depth [m]."""
+        p = self.parameters
+        s = p["variation.spread"]
+        if s == 0.0:
+            return 1.0
+        place = depth / p["variation.length"]
+        below = math.floor(place)
+        share = place - below
+        low, high = self._knot(below), self._knot(below + 1)
+        # straight between knots, with the spread kept
+        n = ((1.0 - share) * low + share * high) / math.hypot(1.0 - share, share)
+        return math.exp(s * n - 0.5 * s * s)
+
+    def _knot(self, number: int) -> float:
+        if number not in self._knots:
+            if len(self._knots) > KEPT:
+                self._knots.clear()
+            seed = f"{int(self.parameters['variation.seed'])}:{number}"
+            self._knots[number] = random.Random(seed).gauss(0.0, 1.0)
+        return self._knots[number]
+
+    def outputs(self) -> dict[str, Any]:
+        """Present values by name."""
+        p = self.parameters
+        number = max(0, bisect_right(self.tops, self.depth) - 1)
+        _, stiffness, ratio, torque, which = self.layers[number]
+        off = self.feed / p["best_feed.force"] - 1.0
+        factor = self.variation(self.depth) * (1.0 + p["best_feed.factor"] * off * off)
+        return {
+            "loading_stiffness": stiffness * factor,
+            "unloading_ratio": ratio,
+            "depth": self.depth,
+            "rotation_torque": p["torque_arm"] * torque * self.feed,
+            "in_void": stiffness <= p["void_stiffness"],
+            "layer": which,
+        }

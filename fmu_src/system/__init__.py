@@ -1,0 +1,1 @@
+"""Makes the FMUs that surround the hammer, and archives of whole systems."""

@@ -1,0 +1,50 @@
+"""Command line: `python -m fmu_src.system [-o FOLDER] [SYSTEM.toml ...]`."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from fmpy.validation import validate_fmu
+
+from fmu_src.system.archive import (
+    ROOT,
+    SystemPlanError,
+    build_fmus,
+    plans,
+    read_plan,
+    write_system,
+)
+from percussion_model.scene import SceneError
+
+
+def main(arguments: list[str]) -> int:
+    """Build the FMUs and archives of systems, and validate each FMU."""
+    parser = argparse.ArgumentParser(
+        prog="build.py system", description="Build systems of FMUs as SSP archives."
+    )
+    parser.add_argument("systems", nargs="*", type=Path, help="files; left out: all that ship")
+    parser.add_argument("-o", "--output", type=Path, default=ROOT / "dist", help="folder")
+    choice = parser.parse_args(arguments)
+    problems = 0
+    checked = set()
+    try:
+        for plan in [read_plan(path) for path in choice.systems] or plans():
+            fmus = build_fmus(plan, choice.output)
+            for fmu in fmus.values():
+                if fmu in checked:
+                    continue
+                checked.add(fmu)
+                found = validate_fmu(str(fmu))
+                print(f"{fmu}: {'valid' if not found else '; '.join(found)}", flush=True)
+                problems += len(found)
+            print(write_system(plan, fmus, choice.output / f"{plan.name}.ssp"), flush=True)
+    except (SystemPlanError, SceneError, OSError) as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 1
+    return 1 if problems else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

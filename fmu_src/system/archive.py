@@ -1,0 +1,276 @@
+"""Writes a system as an SSP 1.0 archive: FMUs, their connections, their parameters."""
+
+from __future__ import annotations
+
+import tomllib
+import zipfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from xml.etree.ElementTree import Element, SubElement, indent, register_namespace, tostring
+
+from fmpy import read_model_description
+
+from fmu_src.archive import DATE, PERMISSIONS
+from fmu_src.hammer import build_hammer
+from fmu_src.system.parts import build_part
+from fmu_src.system.tables import PARTS
+from fmu_src.units import UNITS
+from percussion_model.scene import Scene
+
+ROOT = Path(__file__).resolve().parents[2]
+SYSTEMS = ROOT / "scenarios" / "systems"
+HAMMER = "PercussiveHammer"
+# Masters find the parameters of all components under one name.
+PARAMETER_SET = "initialValues"
+
+_SPACES = {
+    "ssc": "http://ssp-standard.org/SSP1/SystemStructureCommon",
+    "ssd": "http://ssp-standard.org/SSP1/SystemStructureDescription",
+    "ssv": "http://ssp-standard.org/SSP1/SystemStructureParameterValues",
+    "oms": "https://raw.githubusercontent.com/OpenModelica/OMSimulator/master/schema/oms.xsd",
+}
+_TYPES = {"Real": "Real", "Integer": "Integer", "Boolean": "Boolean", "Enumeration": "Integer"}
+
+
+class SystemPlanError(ValueError):
+    """A system that contradicts its FMUs; names the connection or the parameter."""
+
+
+@dataclass(frozen=True)
+class SystemPlan:
+    """A system as its file says.
+
+    Attributes
+    ----------
+    components : dict of str
+        Name of the FMU by name of the component.
+    connections : dict of str
+        Output by input, each `component.variable`.
+    parameters : dict of dict
+        Values of parameters and inputs by component.
+    """
+
+    name: str
+    description: str
+    hammer: Path
+    duration: float
+    step: float
+    components: dict[str, str]
+    connections: dict[str, str]
+    parameters: dict[str, dict[str, Any]]
+
+
+def read_plan(path: Path, **changes: Any) -> SystemPlan:
+    """Read a system's file; one with `base` changes that of another file.
+
+    Parameters
+    ----------
+    changes : dict
+        Entries that replace those of the file, as `name` or `hammer`.
+    """
+    found = _merged(path) | changes
+    return SystemPlan(
+        name=found["name"],
+        description=found["description"],
+        hammer=ROOT / found["hammer"],
+        duration=float(found["duration"]),
+        step=float(found["step"]),
+        components=found["components"],
+        connections=found["connections"],
+        parameters=found["parameters"],
+    )
+
+
+def _merged(path: Path) -> dict[str, Any]:
+    found = tomllib.loads(path.read_text(encoding="utf-8"))
+    base = found.pop("base", None)
+    if base is None:
+        return found
+    below = _merged(path.parent / base)
+    for key, value in found.items():
+        if key == "parameters":
+            both = {**below.get(key, {})}
+            for name, values in value.items():
+                both[name] = {**both.get(name, {}), **values}
+            below[key] = both
+        elif isinstance(value, dict):
+            below[key] = {**below.get(key, {}), **value}
+        else:
+            below[key] = value
+    return below
+
+
+def build_fmus(plan: SystemPlan, folder: Path) -> dict[str, Path]:
+    """Write the FMUs of a system into a folder; return their paths by component."""
+    found = {}
+    for component, name in plan.components.items():
+        path = folder / f"{name}.fmu"
+        if name in PARTS:
+            build_part(name, path)
+        elif name == HAMMER:
+            # a hammer of another scene is another FMU
+            scene = Scene.from_toml(plan.hammer)
+            if plan.hammer.stem != "reference":
+                path = folder / f"{plan.hammer.stem.title().replace('_', '')}Hammer.fmu"
+            build_hammer(scene, path)
+        else:
+            known = ", ".join([HAMMER, *PARTS])
+            raise SystemPlanError(f"{component} = {name!r}: must be one of {known}")
+        found[component] = path
+    return found
+
+
+def write_system(plan: SystemPlan, fmus: dict[str, Path], path: Path) -> Path:
+    """Write the archive; the same inputs give the same bytes."""
+    variables = {
+        component: {one.name: one for one in read_model_description(str(fmu)).modelVariables}
+        for component, fmu in fmus.items()
+    }
+    _check(plan, variables)
+    entries = {"SystemStructure.ssd": _structure(plan, fmus, variables)}
+    for component, values in plan.parameters.items():
+        entries[f"resources/{component}.ssv"] = _values(values, variables[component])
+    for fmu in sorted(set(fmus.values())):
+        entries[f"resources/{fmu.name}"] = fmu.read_bytes()
+    path.parent.mkdir(parents=True, exist_ok=True)
+    draft = path.with_name(f".{path.name}.part")
+    try:
+        with zipfile.ZipFile(draft, "w", zipfile.ZIP_DEFLATED) as archive:
+            for name, content in entries.items():
+                info = zipfile.ZipInfo(name, DATE)
+                info.compress_type = zipfile.ZIP_DEFLATED
+                info.external_attr = PERMISSIONS
+                archive.writestr(info, content)
+        draft.replace(path)
+    finally:
+        draft.unlink(missing_ok=True)
+    return path
+
+
+def split(signal: str) -> tuple[str, str]:
+    """Component and variable of `component.variable`."""
+    component, _, variable = signal.partition(".")
+    return component, variable
+
+
+def _check(plan: SystemPlan, variables: dict[str, dict[str, Any]]) -> None:
+    for sink, source in plan.connections.items():
+        kinds = []
+        for signal, causality in ((sink, "input"), (source, "output")):
+            component, name = split(signal)
+            one = variables.get(component, {}).get(name)
+            if one is None or one.causality != causality:
+                raise SystemPlanError(f"connection {sink} = {source}: {signal} is no {causality}")
+            kinds.append((one.type, one.unit))
+        if kinds[0] != kinds[1]:
+            raise SystemPlanError(
+                f"connection {sink} = {source}: {kinds[0]} does not fit {kinds[1]}"
+            )
+    for component, values in plan.parameters.items():
+        for name in values:
+            one = variables.get(component, {}).get(name)
+            if one is None or one.causality == "output":
+                raise SystemPlanError(f"parameter {component}.{name}: there is no such variable")
+
+
+def _tag(space: str, name: str) -> str:
+    return f"{{{_SPACES[space]}}}{name}"
+
+
+def _text(root: Element) -> bytes:
+    for prefix, address in _SPACES.items():
+        register_namespace(prefix, address)
+    indent(root, space="  ")
+    return b'<?xml version="1.0" encoding="UTF-8"?>\n' + tostring(root, "utf-8") + b"\n"
+
+
+def _structure(
+    plan: SystemPlan, fmus: dict[str, Path], variables: dict[str, dict[str, Any]]
+) -> bytes:
+    root = Element(
+        _tag("ssd", "SystemStructureDescription"),
+        {"version": "1.0", "name": plan.name, "description": plan.description},
+    )
+    system = SubElement(root, _tag("ssd", "System"), {"name": plan.name})
+    elements = SubElement(system, _tag("ssd", "Elements"))
+    used = [*plan.connections, *plan.connections.values()]
+    units: set[str] = set()
+    for component, fmu in fmus.items():
+        node = SubElement(
+            elements, _tag("ssd", "Component"),
+            {"name": component, "type": "application/x-fmu-sharedlibrary",
+             "source": f"resources/{fmu.name}"},
+        )  # fmt: skip
+        connectors = SubElement(node, _tag("ssd", "Connectors"))
+        for name, one in variables[component].items():
+            if f"{component}.{name}" not in used:
+                continue
+            connector = SubElement(
+                connectors, _tag("ssd", "Connector"), {"name": name, "kind": one.causality}
+            )
+            unit = {"unit": one.unit} if one.type == "Real" else {}
+            SubElement(connector, _tag("ssc", _TYPES[one.type]), unit)
+            units.update(unit.values())
+        if component in plan.parameters:
+            bindings = SubElement(node, _tag("ssd", "ParameterBindings"))
+            SubElement(bindings, _tag("ssd", "ParameterBinding"),
+                       {"source": f"resources/{component}.ssv"})  # fmt: skip
+    connections = SubElement(system, _tag("ssd", "Connections"))
+    for sink, source in plan.connections.items():
+        (a, x), (b, y) = split(source), split(sink)
+        SubElement(
+            connections, _tag("ssd", "Connection"),
+            {"startElement": a, "startConnector": x, "endElement": b, "endConnector": y},
+        )  # fmt: skip
+    _annotate(system, plan.step)
+    _units(root, units)
+    SubElement(root, _tag("ssd", "DefaultExperiment"),
+               {"startTime": "0.0", "stopTime": repr(plan.duration)})  # fmt: skip
+    return _text(root)
+
+
+def _annotate(system: Element, step: float) -> None:
+    """The step size, in the place where OMSimulator looks for it; others pass it over."""
+    annotations = SubElement(system, _tag("ssd", "Annotations"))
+    one = SubElement(annotations, _tag("ssc", "Annotation"), {"type": "org.openmodelica"})
+    inner = SubElement(SubElement(one, _tag("oms", "Annotations")),
+                       _tag("oms", "SimulationInformation"))  # fmt: skip
+    SubElement(
+        inner, _tag("oms", "FixedStepMaster"),
+        {"description": "oms-ma", "stepSize": repr(step), "absoluteTolerance": "0.000100",
+         "relativeTolerance": "0.000100"},
+    )  # fmt: skip
+
+
+def _units(root: Element, names: set[str]) -> None:
+    node = SubElement(root, _tag("ssd", "Units"))
+    for name in sorted(names):
+        unit = SubElement(node, _tag("ssc", "Unit"), {"name": name})
+        base = {key: str(power) for key, power in UNITS[name].base.items()}
+        SubElement(unit, _tag("ssc", "BaseUnit"), base)
+
+
+def _values(values: dict[str, Any], variables: dict[str, Any]) -> bytes:
+    root = Element(_tag("ssv", "ParameterSet"), {"version": "1.0", "name": PARAMETER_SET})
+    parameters = SubElement(root, _tag("ssv", "Parameters"))
+    for name, value in values.items():
+        kind = variables[name].type
+        node = SubElement(parameters, _tag("ssv", "Parameter"), {"name": name})
+        if kind == "Boolean":
+            SubElement(node, _tag("ssv", "Boolean"), {"value": str(bool(value)).lower()})
+        elif kind == "Real":
+            SubElement(node, _tag("ssv", "Real"), {"value": repr(float(value))})
+        else:
+            SubElement(node, _tag("ssv", "Integer"), {"value": str(int(value))})
+    return _text(root)
+
+
+def plans() -> list[SystemPlan]:
+    """All systems of `scenarios/systems`, and each with a hammer of rigid bodies."""
+    found = []
+    for path in sorted(SYSTEMS.glob("*.toml")):
+        plan = read_plan(path)
+        found.append(plan)
+        found.append(read_plan(path, name=f"{plan.name}Rigid", hammer="scenarios/rigid.toml"))
+    return found

@@ -1,0 +1,108 @@
+"""A controller on the standard runs."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from percussion_model.commands.common import (
+    BAD_INPUT,
+    JsonFile,
+    Out,
+    check_json,
+    complain,
+    needs_plot_extra,
+    write_json,
+)
+
+if TYPE_CHECKING:
+    from percussion_model.coupling.bench import Score
+
+COLUMNS = (
+    ("depth", "depth [mm]", 1e3), ("energy_per_metre", "energy [MJ/m]", 1e-6),
+    ("overshoot", "overshoot [%]", 100.0), ("time_off_bottom", "off bottom [s]", 1.0),
+    ("dry_blows", "dry blows", 1.0), ("peak_force", "peak force [kN]", 1e-3),
+    ("violations", "violations [s]", 1.0), ("feed_error", "feed error [%]", 100.0),
+)  # fmt: skip
+
+
+def bench_controller(
+    controller: Annotated[
+        str | None,
+        typer.Argument(metavar="[FMU|FILE.py:FUNCTION]", help="Left out: that of the archive."),
+    ] = None,
+    system: Annotated[
+        Path, typer.Option("--system", help="Archive of the feed-controlled system.")
+    ] = Path("dist/FeedControlRigid.ssp"),
+    trials: Annotated[
+        list[str] | None, typer.Option("--trial", help="One of the runs; may be repeated.")
+    ] = None,
+    settings: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="VARIABLE=VALUE", help="Set a variable of the controller."),
+    ] = None,
+    out: Out = None,
+    json_file: JsonFile = None,
+) -> int:
+    """Put a controller of feed and pressure through standard runs: scores, figures, a page."""
+    try:
+        from percussion_model.coupling.bench import bench, total
+        from percussion_model.coupling.files import read_value
+    except ImportError as error:
+        name = error.name or str(error)
+        return complain(f"{name} is missing: pip install 'percussion_model[fmu]'", BAD_INPUT)
+    from percussion_model.result_files import check_writable
+
+    folder = out or Path("out") / "bench-controller"
+    check_writable(folder)
+    check_json(json_file)
+    values = dict(read_value(f"controller.{text}") for text in settings or ())
+    scores = bench(system, _load(controller), values, trials or (), _show)
+    points = total(scores)
+    listed = [{"trial": s.trial, "points": s.points, "error": s.error, **s.numbers} for s in scores]
+    write_json(json_file, {"points": points, "trials": listed})
+    print(f"{'total':10s} {points:6.1f}", file=sys.stderr)
+    try:
+        from percussion_model.plotting.bench import save_bench
+    except ImportError as error:
+        complain(needs_plot_extra(error))
+    else:
+        title = controller or system.stem
+        print(save_bench(scores, points, COLUMNS, folder, title), file=sys.stderr)
+    return 1 if any(score.error for score in scores) else 0
+
+
+def _show(score: Score) -> None:
+    """One line for a run, and why it ended early."""
+    numbers = "  ".join(f"{text} {factor * score.numbers[name]:.4g}"
+                        for name, text, factor in COLUMNS)  # fmt: skip
+    print(f"{score.trial:10s} {score.points:6.1f}  {numbers}", file=sys.stderr)
+    if score.error:
+        complain(f"{score.trial} ended early, {score.error}")
+
+
+def _load(controller: str | None) -> Any:
+    """Path of an FMU, or the function of FILE.py:FUNCTION."""
+    from percussion_model.coupling import CouplingError
+
+    if controller is None:
+        return None
+    file, colon, name = controller.rpartition(":")
+    if not colon or not file.endswith(".py"):
+        if not Path(controller).is_file():
+            raise CouplingError(f"{controller}: no such file")
+        return Path(controller)
+    spec = importlib.util.spec_from_file_location("bench_controller_of_user", file)
+    if spec is None or spec.loader is None or not Path(file).is_file():
+        raise CouplingError(f"{file}: no such file")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    work: Callable[..., Any] | None = getattr(module, name, None)
+    if not callable(work):
+        raise CouplingError(f"{file} has no function {name}")
+    return work

@@ -1,0 +1,6 @@
+"""Runs systems of FMUs that an SSP archive describes, with fmpy."""
+
+from percussion_model.coupling.component import CouplingError
+from percussion_model.coupling.master import CoupledRun, Coupling, PythonPart
+
+__all__ = ["CoupledRun", "Coupling", "CouplingError", "PythonPart"]

@@ -1,0 +1,198 @@
+"""Standard runs for a controller of feed and pressure, and what they are worth."""
+
+from __future__ import annotations
+
+import random
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from percussion_model.coupling.component import CouplingError
+from percussion_model.coupling.master import CoupledRun, Coupling, PythonPart
+
+STEP = 1e-3  # [s]
+ROWS_EVERY = 5e-3  # [s]
+FEED = 3000.0  # what is wanted [N]
+# Limits of the rig: beyond them a second counts as a violation.
+HIGHEST_FEED, HIGHEST_TORQUE = 6000.0, 250.0  # [N], [N m]
+# Time before the feed is judged: the drill string has to come to rest [s].
+SETTLING = 0.5
+NOISE, DELAY = 0.05, 0.03  # of the sensors: share of the value, time [s]
+
+OnWay = Callable[[str, float, Any], Any]
+SIGNALS = (
+    "string.lifted", "string.bit_impulse", "hammer.bit.force_peak", "hammer.blow_count",
+    "hammer.off_bottom", "rig.energy", "supply.energy", "controller.force_command",
+    "rock.in_void",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A standard run: parameters of the system, and what happens to signals on the way."""
+
+    name: str
+    text: str
+    duration: float
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+    on_way: Callable[[], OnWay] | None = None
+
+
+def _pressure_loss() -> OnWay:
+    def change(signal: str, time: float, value: Any) -> Any:
+        lost = signal == "hammer.supply_pressure" and 1.5 <= time < 3.0
+        return 0.5 * value if lost else value
+
+    return change
+
+
+def _bad_sensors() -> OnWay:
+    chance = random.Random(1)
+    waiting: dict[str, deque[Any]] = {}
+
+    def change(signal: str, time: float, value: Any) -> Any:
+        if not signal.startswith("controller.") or isinstance(value, bool):
+            return value
+        queue = waiting.setdefault(signal, deque())
+        queue.append(value)
+        late = queue.popleft() if len(queue) > round(DELAY / STEP) else queue[0]
+        return late * (1.0 + NOISE * chance.gauss(0.0, 1.0))
+
+    return change
+
+
+def _layer(number: int, top: float, **values: float) -> dict[str, float]:
+    return {f"rock.layers[{number}].{name}": value for name, value in values.items()} | {
+        f"rock.layers[{number}].top": top
+    }
+
+
+_ONE_ROCK = {**_layer(1, 0.0, loading_stiffness=7.5e8), **_layer(2, -1.0), **_layer(3, -1.0)}
+TRIALS = (
+    Trial(
+        "collaring", "the feed begins at a third", 3.0,
+        {**_ONE_ROCK, "string.start.feed_force": 1000.0},
+    ),
+    Trial(
+        "hard", "rock three times as stiff", 4.0,
+        {**_ONE_ROCK, **_layer(1, 0.0, loading_stiffness=4e8),
+         **_layer(2, 0.035, loading_stiffness=1.2e9)},
+    ),
+    Trial(
+        "soft", "rock a third as stiff", 4.0,
+        {**_ONE_ROCK, **_layer(1, 0.0, loading_stiffness=1.2e9),
+         **_layer(2, 0.02, loading_stiffness=4e8)},
+    ),
+    Trial(
+        "void", "filling of 1 kN/mm, five centimetres", 4.0,
+        {**_ONE_ROCK, **_layer(2, 0.03, loading_stiffness=1e6),
+         **_layer(3, 0.08, loading_stiffness=7.5e8)},
+    ),
+    Trial("pressure", "half of the pressure is lost for 1.5 s", 4.0, _ONE_ROCK, _pressure_loss),
+    Trial("rod", "a rod is added", 4.0, {**_ONE_ROCK, "string.start.rod_left": 0.03}),
+    Trial("sensors", "5 % of noise, 30 ms late", 4.0, _ONE_ROCK, _bad_sensors),
+    Trial(
+        "jam", "a centimetre of rock that holds the bit", 4.0,
+        {**_ONE_ROCK, **_layer(2, 0.03, torque_factor=3.0), **_layer(3, 0.04)},
+    ),
+)  # fmt: skip
+
+
+@dataclass
+class Score:
+    """What a run was worth.
+
+    Attributes
+    ----------
+    points : float
+        0 to 100: the share of the wanted feed that the feed differs from it, on average, is
+        lost, and so is the share of the time in violation; 0 where the run ended early.
+    numbers : dict
+        depth [m], energy_per_metre [J/m], overshoot [1], time_off_bottom [s], dry_blows,
+        peak_force [N], violations [s], feed_error [1].
+    """
+
+    trial: str
+    points: float
+    numbers: dict[str, float]
+    error: str
+    run: CoupledRun = field(repr=False)
+
+
+def judge(trial: Trial, run: CoupledRun) -> Score:
+    """Score of a run."""
+    time = run["time"]
+    steps = np.diff(time, prepend=0.0)
+    feed = run["string.feed_force_mean"]
+    torque = run["rock.rotation_torque"]
+    late = time >= SETTLING
+    error = float(np.mean(np.abs(feed[late] / FEED - 1.0))) if late.any() else 1.0
+    off = (run["string.lifted"] > 0.0) | (run["hammer.off_bottom"] > 0.0)
+    wrong = (feed > HIGHEST_FEED) | (torque > HIGHEST_TORQUE)
+    depth = float(run["hammer.bit.position"][-1])
+    blows = np.diff(run["hammer.blow_count"], prepend=0.0)
+    numbers = {
+        "depth": depth,
+        "energy_per_metre": float(run["rig.energy"][-1] + run["supply.energy"][-1])
+        / max(depth, 1e-6),
+        "overshoot": max(0.0, float(np.max(feed) / FEED - 1.0)),
+        "time_off_bottom": float(np.sum(steps[run["string.lifted"] > 0.0])),
+        "dry_blows": float(np.sum(blows[off & (run["rock.in_void"] > 0.0)])),
+        "peak_force": float(np.max(run["hammer.bit.force_peak"])),
+        "violations": float(np.sum(steps[wrong])),
+        "feed_error": error,
+    }
+    points = 100.0 * max(0.0, 1.0 - error) * (1.0 - numbers["violations"] / time[-1])
+    return Score(trial.name, 0.0 if run.error else points, numbers, run.error, run)
+
+
+def bench(
+    system: str | Path,
+    controller: str | Path | PythonPart | None = None,
+    parameters: Mapping[str, Any] | None = None,
+    trials: Sequence[str] = (),
+    watch: Callable[[Score], None] | None = None,
+) -> list[Score]:
+    """Put a controller through the standard runs.
+
+    Parameters
+    ----------
+    system : str or Path
+        Archive of the feed-controlled system.
+    controller : optional
+        An FMU, or a callable; the controller of the archive if left out.
+    parameters : mapping, optional
+        Values of the controller, by `controller.variable`.
+    trials : sequence of str, optional
+        Names of runs; all if left out.
+    watch : callable, optional
+        Called with each score.
+    """
+    names = [trial.name for trial in TRIALS]
+    for name in trials:
+        if name not in names:
+            raise CouplingError(f"there is no run {name}: there are {', '.join(names)}")
+    found = []
+    for trial in TRIALS:
+        if trials and trial.name not in trials:
+            continue
+        coupling = Coupling(
+            system,
+            {**trial.parameters, **(parameters or {})},
+            replaced=None if controller is None else {"controller": controller},
+            on_way=None if trial.on_way is None else trial.on_way(),
+        )
+        run = coupling.run(trial.duration, STEP, SIGNALS, ROWS_EVERY)
+        found.append(judge(trial, run))
+        if watch is not None:
+            watch(found[-1])
+    return found
+
+
+def total(scores: Sequence[Score]) -> float:
+    """Mean of the points."""
+    return float(np.mean([score.points for score in scores])) if scores else 0.0

@@ -1,0 +1,41 @@
+"""Systems built once for all tests, with a hammer of rigid bodies that compiles sooner."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from pathlib import Path
+
+import pytest
+
+from fmu_src.system.archive import SYSTEMS, build_fmus, read_plan, write_system
+
+# Workers of one run of the tests share compiled kernels; NUMBA_CACHE_DIR is theirs too.
+os.environ.setdefault(
+    "PERCUSSION_FMU_CACHE",
+    str(Path(os.environ.get("NUMBA_CACHE_DIR") or tempfile.gettempdir()) / "percussion_fmu"),
+)
+
+
+def plan_of(name, **changes):
+    return read_plan(SYSTEMS / f"{name}.toml", hammer="scenarios/rigid.toml", **changes)
+
+
+@pytest.fixture(scope="session")
+def fmus(tmp_path_factory):
+    """FMUs by component."""
+    return build_fmus(plan_of("feed_control"), tmp_path_factory.mktemp("parts"))
+
+
+@pytest.fixture(scope="session")
+def feed_control(fmus, tmp_path_factory):
+    """Archive of the feed-controlled system."""
+    folder = tmp_path_factory.mktemp("systems")
+    return write_system(plan_of("feed_control"), fmus, folder / "FeedControl.ssp")
+
+
+@pytest.fixture(scope="session")
+def extremum_seeking(fmus, tmp_path_factory):
+    """Archive of the system that seeks the best feed."""
+    folder = tmp_path_factory.mktemp("systems")
+    return write_system(plan_of("extremum_seeking"), fmus, folder / "ExtremumSeeking.ssp")

@@ -1,0 +1,97 @@
+"""The bench tells controllers apart, and says what is wrong with one that fails."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from percussion_model.cli import main
+from percussion_model.coupling import CouplingError
+from percussion_model.coupling.bench import TRIALS, bench, judge, total
+from percussion_model.coupling.master import CoupledRun
+
+
+def nothing(inputs, time, step):
+    return {"force_command": -800.0, "pressure_command": 2e6, "percussion_on": True}
+
+
+def test_the_bench_ranks_nothing_below_a_bad_pi_below_a_good_one(feed_control):
+    """A new rod brings half a kilonewton, which nobody but a controller takes away."""
+    bad = {"controller.pi.gain": 0.05, "controller.pi.time": 0.5}
+    points = [
+        total(bench(feed_control, controller, values, ["rod"]))
+        for controller, values in ((nothing, {}), (None, bad), (None, {}))
+    ]
+    assert points[0] + 1.0 < points[1]
+    assert points[1] + 1.0 < points[2] <= 100.0
+
+
+def test_a_crash_has_no_points_and_a_page(feed_control, tmp_path, monkeypatch, capsys):
+    source = tmp_path / "mine.py"
+    source.write_text(
+        "def fly(inputs, time, step):\n"
+        "    if time > 0.05:\n"
+        "        raise RuntimeError('no idea what to do')\n"
+        "    return {'force_command': -800.0, 'pressure_command': 2e6, 'percussion_on': True}\n"
+    )
+    out = tmp_path / "out"
+    words = ["percussion", "bench-controller", f"{source}:fly", "--system", str(feed_control)]
+    monkeypatch.setattr("sys.argv", [*words, "--trial", "rod", "--out", str(out)])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code == 1
+    said = capsys.readouterr().err
+    assert "rod ended early, at 0.051 s controller: RuntimeError: no idea what to do" in said
+    page = (out / "index.html").read_text(encoding="utf-8")
+    assert "no idea what to do" in page
+    assert "<td>rod</td><td>0.0</td>" in page
+
+
+def made_up(feed, torque=100.0, error=""):
+    """A run of 4 s with a constant feed, and a torque in its last quarter."""
+    time = np.linspace(0.0, 4.0, 801)
+    still = np.zeros_like(time)
+    columns = {
+        "time": time,
+        "string.feed_force_mean": still + feed,
+        "rock.rotation_torque": np.where(time > 3.0, torque, 0.0),
+        "hammer.bit.position": 0.02 * time,
+        "rig.energy": 10.0 * time,
+        "supply.energy": 990.0 * time,
+        "hammer.blow_count": np.floor(20.0 * time),
+        "hammer.bit.force_peak": still + 5e5,
+    }
+    for name in ("string.lifted", "hammer.off_bottom", "rock.in_void"):
+        columns[name] = still
+    return CoupledRun(columns, 1e-3, 4000, error)
+
+
+def test_points_are_what_they_are_said_to_be():
+    trial = TRIALS[0]
+    assert judge(trial, made_up(3000.0)).points == pytest.approx(100.0)
+    assert judge(trial, made_up(2400.0)).points == pytest.approx(80.0)
+    jammed = judge(trial, made_up(3000.0, torque=300.0))
+    assert jammed.numbers["violations"] == pytest.approx(1.0, abs=0.01)
+    assert jammed.points == pytest.approx(75.0, abs=0.3)
+    assert jammed.numbers["energy_per_metre"] == pytest.approx(50e3)
+    assert judge(trial, made_up(3600.0)).numbers["overshoot"] == pytest.approx(0.2)
+    assert judge(trial, made_up(3000.0, error="at 1 s it fell")).points == 0.0
+
+
+@pytest.mark.parametrize("name", ["nothing", "rods"])
+def test_an_unknown_run_is_named(feed_control, name):
+    with pytest.raises(CouplingError, match=f"no run {name}: there are collaring, hard"):
+        bench(feed_control, nothing, trials=[name])
+
+
+def test_sensors_are_late_and_noisy_with_a_seed():
+    (trial,) = (one for one in TRIALS if one.name == "sensors")
+    ways = [trial.on_way(), trial.on_way()]
+    values = [[way("controller.feed_force", 1e-3 * k, float(k)) for k in range(200)]
+              for way in ways]  # fmt: skip
+    assert values[0] == values[1]
+    lag = np.arange(100, 200) - np.array(values[0][100:])
+    assert np.mean(lag) == pytest.approx(30.0, abs=4.0)
+    assert math.isclose(ways[0]("hammer.feed_force", 0.0, 7.0), 7.0)

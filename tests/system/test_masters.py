@@ -1,0 +1,82 @@
+"""The same archive in two masters that are not ours: the same depth."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from percussion_model.coupling import Coupling
+
+STEP, COUNT = 1e-3, 1500
+
+# ecospy's library wants tbb, which the wheel of that name brings along.
+ECOS = """
+import ctypes, json, sys
+from pathlib import Path
+for library in sorted(Path(sys.prefix, "lib").glob("libtbb.so.*")):
+    ctypes.CDLL(str(library), mode=ctypes.RTLD_GLOBAL)
+    break
+from ecospy import EcosSimulation
+with EcosSimulation(float(sys.argv[2]), ssp_path=sys.argv[1]) as simulation:
+    simulation.init(parameter_set="initialValues")
+    simulation.step(int(sys.argv[3]))
+    print("FOUND", json.dumps([
+        simulation.get_real("hammer::bit.position"),
+        simulation.get_real("string::feed_force_mean"),
+        simulation.get_real("controller::feed_wanted"),
+    ]))
+    simulation.terminate()
+"""
+
+COSIM = """
+import json, sys
+from libcosimpy.CosimExecution import CosimExecution
+from libcosimpy.CosimObserver import CosimObserver
+execution = CosimExecution.from_ssp_file(sys.argv[1], step_size=round(float(sys.argv[2]) * 1e9))
+observer = CosimObserver.create_last_value()
+execution.add_observer(observer=observer)
+execution.step(step_count=int(sys.argv[3]))
+found = []
+for part, name in (("hammer", "bit.position"), ("string", "feed_force_mean"),
+                   ("controller", "feed_wanted")):
+    index = execution.slave_index_from_instance_name(part)
+    known = {v.name.decode(): v.reference for v in execution.slave_variables(slave_index=index)}
+    found += observer.last_real_values(index, [known[name]])
+print("FOUND", json.dumps(found))
+"""
+
+
+@pytest.fixture(scope="module")
+def ours(feed_control):
+    run = Coupling(feed_control).run(
+        STEP * COUNT, STEP, ["controller.feed_wanted"], interval=STEP * COUNT
+    )
+    assert run.error == ""
+    names = ("hammer.bit.position", "string.feed_force_mean", "controller.feed_wanted")
+    return [run[name][-1] for name in names]
+
+
+@pytest.mark.parametrize(
+    ("package", "script"), [("ecospy", ECOS), ("libcosimpy", COSIM)], ids=["ecospy", "libcosimpy"]
+)
+def test_another_master_drills_as_deep(feed_control, ours, package, script, tmp_path):
+    if importlib.util.find_spec(package) is None:
+        pytest.skip(f"{package} is not installed (the extra `hosts` has it on Linux, x86-64)")
+    if package == "ecospy" and not list(Path(sys.prefix, "lib").glob("libtbb.so.*")):
+        pytest.skip("ecospy needs libtbb.so, which the package tbb brings along")
+    done = subprocess.run(
+        [sys.executable, "-c", script, str(feed_control), repr(STEP), str(COUNT)],
+        capture_output=True, text=True, check=False, cwd=tmp_path,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+    (said,) = [line for line in done.stdout.splitlines() if line.startswith("FOUND")]
+    found = json.loads(said.removeprefix("FOUND"))
+    # the archive's parameters have arrived
+    assert found[2] == ours[2] == 3000.0
+    assert found[0] == pytest.approx(ours[0], rel=5e-3)
+    assert found[1] == pytest.approx(ours[1], rel=5e-2)

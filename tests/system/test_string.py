@@ -1,0 +1,265 @@
+"""The drill string is a string: waves, stretch, weight, friction, rods; and a passive shoulder."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+from fmu_src.runtime.system.string_body import Lumps, Waves
+from fmu_src.system.parts import make_model, start_inputs
+from fmu_src.system.tables import STRING
+
+RODS = 6
+VALUES = {name: entry[3] for name, entry in STRING.parameters.items()}
+FREE = {**VALUES, "gravity": 0.0, "friction.viscosity": 0.0}
+# Ends so light that they are open: their time constant is short against a cell.
+OPEN = {**FREE, "head.mass": 1e-3, "casing.mass": 1e-3, "rod.cells": 10}
+# Ends that hardly move.
+CLAMPED = {**OPEN, "casing.mass": 1e9}
+STEP_FORCE = 1e4
+
+
+def body(kind, values, rods=RODS, rest=0.0):
+    made = kind(values, rods)
+    made.rest(rest)
+    return made
+
+
+def struck(values, cells_travelled):
+    """Waves after a constant force on the head for a number of cells."""
+    made = body(Waves, values)
+    velocities, forces = [], []
+    for _ in range(cells_travelled):
+        made.advance(STEP_FORCE, 0.0)
+        velocities.append(made.down + made.up)
+        forces.append(made.impedance * (made.down - made.up))
+    return made, np.array(velocities), np.array(forces)
+
+
+def test_a_step_arrives_after_length_by_speed_of_sound():
+    made, velocities, forces = struck(OPEN, 60)
+    length = RODS * VALUES["rod.length"]
+    speed = math.sqrt(VALUES["rod.youngs_modulus"] / VALUES["rod.density"])
+    reached = np.argmax(velocities[:, -1] > 0.0) + 1  # steps until the last cell moves
+    assert reached * made.step == pytest.approx(length / speed, rel=1e-12)
+    # behind the front: F = Z v, the whole step, no overshoot; the end mass rounds the front
+    impedance = VALUES["rod.area"] * math.sqrt(VALUES["rod.youngs_modulus"] * VALUES["rod.density"])
+    assert forces[40, :30] == pytest.approx(STEP_FORCE, rel=1e-2)
+    assert velocities[40, :30] == pytest.approx(STEP_FORCE / impedance, rel=1e-2)
+    assert forces.max() <= STEP_FORCE * (1.0 + 1e-12)
+    assert np.all(forces[40, 41:] == 0.0)
+
+
+@pytest.mark.parametrize(("values", "sign"), [(OPEN, -1.0), (CLAMPED, 1.0)], ids=["open", "clamp"])
+def test_a_step_reflects_with_the_right_sign(values, sign):
+    """An open end turns compression into tension, a clamped one doubles it."""
+    _, velocities, forces = struck(values, 90)
+    behind = slice(35, 60)  # where the reflected front has passed and has not yet met the head
+    assert forces[-1, behind] == pytest.approx((1.0 + sign) * STEP_FORCE, abs=0.02 * STEP_FORCE)
+    impedance = Waves(values, RODS).impedance
+    assert velocities[-1, behind] == pytest.approx(
+        (1.0 - sign) * STEP_FORCE / impedance, abs=0.02 * STEP_FORCE / impedance
+    )
+
+
+def settle(made, head_force, casing_force, duration):
+    if isinstance(made, Waves):
+        for _ in range(round(duration / made.step)):
+            made.advance(head_force, casing_force)
+    else:
+        for _ in range(round(duration / 1e-3)):
+            made.go_on(head_force, casing_force, 1e-3)
+    return made
+
+
+@pytest.mark.parametrize("kind", [Waves, Lumps])
+def test_the_static_stretch_is_that_of_hooke(kind):
+    """F L / (E A), taken up by wall friction that damps."""
+    damped = {**FREE, "friction.viscosity": 2000.0}
+    made = settle(body(kind, damped), STEP_FORCE, -STEP_FORCE, 3.0)
+    stretch = (
+        STEP_FORCE
+        * RODS
+        * VALUES["rod.length"]
+        / (VALUES["rod.youngs_modulus"] * VALUES["rod.area"])
+    )
+    assert made.head - made.casing == pytest.approx(stretch, rel=1e-6)
+    assert made.momentum == pytest.approx(0.0, abs=1e-6)
+
+
+@pytest.mark.parametrize("kind", [Waves, Lumps])
+@pytest.mark.parametrize("fluid", [0.0, 1000.0])
+def test_a_string_in_balance_stays_where_it_is(kind, fluid):
+    """Weight less buoyancy is carried by the two forces: nothing moves."""
+    values = {**VALUES, "fluid_density": fluid}
+    made = body(kind, values, rest=2000.0)
+    rods = values["rod.density"] * values["rod.area"] * values["rod.length"] * RODS
+    buoyant = 1.0 - fluid / values["rod.density"]
+    weight = values["gravity"] * (values["head.mass"] + buoyant * (rods + values["casing.mass"]))
+    assert made.weight == pytest.approx(weight, rel=1e-12)
+    bottom = 2000.0 + values["gravity"] * buoyant * values["casing.mass"]
+    settle(made, bottom - weight, -bottom, 1.0)
+    assert abs(made.head) < 1e-9
+    assert abs(made.casing) < 1e-9
+
+
+@pytest.mark.parametrize("kind", [Waves, Lumps])
+def test_momentum_and_energy_balance_without_friction(kind):
+    made = body(kind, {**VALUES, "friction.viscosity": 0.0})
+    at_rest = made.stored
+    made = settle(made, 5000.0, -1000.0, 0.05)
+    t = round(0.05 / made.step) * made.step if kind is Waves else 0.05
+    assert made.momentum == pytest.approx((4000.0 + made.weight) * t, rel=1e-9)
+    created = made.stored - at_rest - made.weight_work
+    created -= 5000.0 * made.head - 1000.0 * made.casing
+    scale = made.stored
+    # averaging a front over a cell may take a little, and never gives
+    assert -0.02 * scale < created <= 1e-9 * scale
+
+
+@pytest.mark.parametrize("kind", [Waves, Lumps])
+def test_the_wall_takes_what_it_should(kind):
+    """Coulomb friction brings a coasting string to a stop after m v / (s L)."""
+    values = {**FREE, "friction.force": 50.0, "head.mass": 1.0, "casing.mass": 0.1}
+    made = body(kind, values)
+    if kind is Waves:
+        made.down[:] = made.up[:] = 0.05
+        mass = made.cell_mass * len(made.down) + 1.1
+    else:
+        made.velocities[:] = 0.1
+        mass = float(made.masses.sum())
+    made.head_velocity = made.casing_velocity = 0.1
+    energy = made.stored
+    length = RODS * VALUES["rod.length"]
+    stop = mass * 0.1 / (50.0 * length)
+    settle(made, 0.0, 0.0, 0.5 * stop)
+    assert made.momentum == pytest.approx(0.5 * mass * 0.1, rel=0.02)
+    settle(made, 0.0, 0.0, 2.0 * stop)
+    assert made.momentum == pytest.approx(0.0, abs=1e-3 * mass * 0.1)
+    assert made.friction_loss == pytest.approx(energy, rel=0.02)
+    assert made.lost_momentum == pytest.approx(mass * 0.1, rel=1e-3)
+
+
+def test_waves_and_lumps_agree_where_motion_is_slow():
+    """A force that rises within many travel times: the same way of the head."""
+    ways = []
+    for kind in (Waves, Lumps):
+        made = body(kind, {**VALUES, "rod.cells": 4}, rest=2000.0)
+        bottom = 2000.0 + made.gravity * made.casing_mass
+        times = np.arange(0.0, 1.0, made.step if kind is Waves else 1e-4)
+        for t in times:
+            push = bottom - made.weight + 2000.0 * math.sin(2.0 * math.pi * 2.0 * t)
+            if kind is Waves:
+                made.advance(push, -bottom)
+            else:
+                made.go_on(push, -bottom, 1e-4)
+        ways.append(made.head)
+    assert ways[0] == pytest.approx(ways[1], rel=2e-3)
+
+
+@pytest.mark.parametrize("model", ["waves", "lumped"])
+def test_a_rod_changes_length_and_weight_and_no_force(model):
+    string = make_model("DrillString", model=model, start__rod_left=0.0)
+    inputs = start_inputs("DrillString")
+    weight = string.body.weight
+    inputs["head_force"] = 2500.0 - weight
+    before = string.body.count
+    string.step(inputs, 1e-3)
+    assert string.body.count == before + 1
+    assert string.outputs()["length"] == pytest.approx((before + 1) * VALUES["rod.length"])
+    rod = VALUES["rod.density"] * VALUES["rod.area"] * VALUES["rod.length"] * VALUES["gravity"]
+    assert string.body.weight - weight == pytest.approx(rod)
+    inputs["head_force"] = 2500.0 - string.body.weight
+    for _ in range(300):
+        string.step(inputs, 1e-3)
+    assert string.force == pytest.approx(2500.0, rel=0.05)
+    assert string.body.count == before + 1
+
+
+def test_a_rod_that_is_asked_for_comes_once():
+    string = make_model("DrillString", rod__automatic=False, start__rod_left=0.0)
+    inputs = start_inputs("DrillString")
+    inputs["head_force"] = 2500.0 - string.body.weight
+    counts = []
+    for asked in (False, True, True, False, True):
+        inputs["add_rod"] = asked
+        string.step(inputs, 1e-3)
+        counts.append(string.body.count)
+    # the second one would be wanted after another rod's length only
+    assert counts == [4, 5, 5, 5, 5]
+
+
+# The shoulder, coupled by Jacobi to a struck bit: free, or on rock that loses little.
+MASS, SPEED, PUSH = 8.69, 0.5, 2500.0
+
+
+def struck_bit(step, rock, damping_ratio, **values):
+    """Energies of the bit after each step [J], and the string."""
+    string = make_model("DrillString", friction__viscosity=0.0, **values)
+    inputs = start_inputs("DrillString")
+    inputs["head_force"] = PUSH - string.body.weight
+    turn = 2.0 * damping_ratio * math.sqrt(rock / MASS)
+    push = expm(step * np.array([[0, 1, 0], [-rock / MASS, -turn, 1 / MASS], [0, 0, 0]]))
+    # without rock a constant force holds against the feed
+    rest, against = (PUSH / rock, 0.0) if rock else (0.0, PUSH)
+    state, energies = np.array([rest, SPEED]), []
+    force = string.force
+    # a long step makes a soft shoulder, which swings slowly
+    for _ in range(round(0.4 / step) + 250):
+        moved = push @ [*state, force - against]
+        inputs["bit_position"] = state[0]
+        string.step(inputs, step)
+        state, force = moved[:2], string.force
+        energies.append(0.5 * MASS * state[1] ** 2 + 0.5 * rock * (state[0] - rest) ** 2)
+    return np.array(energies), string
+
+
+@pytest.mark.parametrize("step", [1e-3, 2e-3, 5e-3, 1e-2])
+@pytest.mark.parametrize("rock", [0.0, 1e7, 7.5e8])
+def test_a_struck_bit_comes_to_rest_at_any_step(step, rock):
+    energies, string = struck_bit(step, rock, 0.05)
+    at_first = 0.5 * MASS * SPEED**2
+    assert energies.max() < 1.5 * at_first
+    last = round(0.1 / step)
+    assert energies[-last:].max() < 0.2 * at_first
+    assert string.mean_force == pytest.approx(PUSH, rel=0.02)
+
+
+def test_it_is_the_limit_that_brings_the_bit_to_rest():
+    """The same stiffness held over 10 ms with a delay throws a free bit about."""
+    given = {"shoulder__damping": 200.0, "shoulder__passive": False}
+    energies, string = struck_bit(1e-2, 0.0, 0.0, **given)
+    assert energies[-10:].mean() > 100.0 * 0.5 * MASS * SPEED**2
+    assert string.outputs()["energy.shoulder"] < -100.0
+
+
+def test_a_short_step_leaves_the_shoulder_as_it_is():
+    string = make_model("DrillString")
+    inputs = start_inputs("DrillString")
+    for step, as_given in ((1e-4, True), (1e-3, True), (1e-2, False)):
+        string.step(inputs, step)
+        found = string.outputs()["shoulder_stiffness"]
+        assert (found == VALUES["shoulder.stiffness"]) == as_given
+        assert found <= VALUES["shoulder.stiffness"]
+
+
+@pytest.mark.parametrize("model", ["waves", "lumped"])
+@pytest.mark.parametrize("step", [1e-5, 1e-4, 1e-3])
+def test_momentum_of_the_string_is_its_impulses(model, step):
+    """Head, bit, weight, wall: to the last digits, at any step, with the drive's reaction."""
+    string = make_model("DrillString", model=model, friction__force=20.0)
+    inputs = start_inputs("DrillString")
+    inputs["head_force"] = 2500.0 - string.body.weight
+    impulse = 0.0
+    for k in range(round(0.1 / step)):
+        inputs["casing_impulse"] = impulse
+        string.step(inputs, step)
+        impulse += 3000.0 * math.sin(2.0 * math.pi * 22.0 * k * step) * step
+    found = string.outputs()
+    due = string.head_impulse_due + string.casing_impulse_due
+    weight = string.body.weight * (string.time - string.lag)
+    wanted = found["head_impulse"] - found["bit_impulse"] + inputs["casing_impulse"] + weight - due
+    assert found["momentum"] + found["wall_momentum"] == pytest.approx(wanted, abs=1e-6)
