@@ -183,7 +183,8 @@ def orders(tree: dict[str, Any]) -> str:
         for key in keys:
             one = found.get(key)
             cells.append("–" if one is None else f"{one['value']:.1f} ± {one['error']:.1f}")
-        rows.append([LADDERS[name].title, LADDERS[name].knob or "–", *cells])
+        knob = "simulated time" if tree["kind"] == "aperiodic" else LADDERS[name].knob or "–"
+        rows.append([LADDERS[name].title, knob, *cells])
     return table(["method", "against", *(SHORT[key] for key in keys)], rows)
 
 

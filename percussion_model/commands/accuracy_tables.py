@@ -26,13 +26,15 @@ _SHORT = {
     "resting_place": "rest",
     HISTORY: "force L1",
 }
+# Narrower, and numbers would be cut short.
+LEAST_WIDTH = 98
 _GENERAL = ("lsoda", "lsoda-tol", "radau", "rk45", "dop853", "bdf")
 _ELEMENTS = ("fem", "fem-time", "fem-paper", "fem-gauss")
 
 
 def show_study(found: Study) -> None:
     """Print reference, points, orders, what accuracies cost, and advice."""
-    console = Console()
+    console = _wide_console()
     show_bars(found.reference, console)
     _show_points(found, console)
     _show_orders(found, console)
@@ -67,6 +69,11 @@ def show_bars(reference: Reference, console: Console | None = None) -> None:
             "" if bar.agreed else "no reference: the limits disagree",
         )
     (console or Console()).print(table)
+
+
+def _wide_console() -> Console:
+    """A console with room for all columns, however narrow the terminal."""
+    return Console(width=max(Console().width, LEAST_WIDTH))
 
 
 def _table(title: str, first: str) -> Table:

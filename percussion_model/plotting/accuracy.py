@@ -16,7 +16,7 @@ from matplotlib.ticker import LogLocator, NullLocator
 from percussion_model.accuracy.ladders import LADDERS
 from percussion_model.accuracy.problems import APERIODIC
 from percussion_model.accuracy.quantities import HISTORY, QUANTITIES
-from percussion_model.accuracy.study import Study
+from percussion_model.accuracy.study import Point, Study
 from percussion_model.plotting import style
 from percussion_model.result_files import staged
 
@@ -98,12 +98,21 @@ def _panel(ax: Axes, found: Study, key: str, by: str) -> None:
     unit = {"second": "a simulated second", "blow": "a blow"}[by]
     if by == "blow" and found.problem.kind == "drop":
         unit = "the whole drop"
+    if found.problem.kind == APERIODIC:
+        unit = "the run"
     quantity = QUANTITIES[key]
     kind = "L1, relative" if key == HISTORY else "relative"
     if not names:
         ax.text(0.5, 0.5, "no reference: see the table", ha="center", transform=ax.transAxes)
     title = quantity.label[0].upper() + quantity.label[1:]
     style.label(ax, f"time to compute {unit} [s]", f"error, {kind}", title)
+
+
+def _cost(found: Study, point: Point, by: str) -> float:
+    """Time of a point; of aperiodic motion that of the whole run, for its length is the effort."""
+    if found.problem.kind == APERIODIC:
+        return point.second * point.size
+    return float(getattr(point, by))
 
 
 def _points(found: Study, name: str, key: str, by: str) -> list[tuple[float, float]]:
@@ -119,7 +128,7 @@ def _ladder(ax: Axes, found: Study, name: str, key: str, by: str) -> None:
     full: list[tuple[float, float]] = []
     hollow: list[tuple[float, float]] = []
     for point in found.ladder(name):
-        error, cost = point.errors.get(key, math.nan), getattr(point, by)
+        error, cost = point.errors.get(key, math.nan), _cost(found, point, by)
         if cost > 0 and math.isfinite(error):
             (full if point.label in fitted else hollow).append((cost, max(error, LEAST)))
     if full:

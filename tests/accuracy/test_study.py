@@ -99,7 +99,7 @@ def test_table_and_figures(found, tmp_path, capsys):
     path = tmp_path / "accuracy.png"
     draw_accuracy(found).savefig(path)
     assert path.stat().st_size > 10_000
-    titles = [ax.get_title(loc="left") for ax in draw_quantities(found).axes]
+    titles = [ax.get_title() for ax in draw_quantities(found).axes]
     assert "Rate of penetration" in titles
 
 
