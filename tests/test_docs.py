@@ -18,7 +18,7 @@ SOURCES = [
 ]
 PAGES = (
     *("docs/model.md", "docs/numerics.md", "docs/parameters.md", "docs/fmu.md"),
-    "docs/stability.md",
+    *("docs/stability.md", "docs/stability_record.md", "docs/undamped.md"),
     *("README.md", "CONTRIBUTING.md"),
 )
 
