@@ -32,14 +32,18 @@ CHUNK = 100
 PACKAGES = ("numpy", "numba", "llvmlite", "scipy", "pydantic")
 
 
-def run_case(seed: int, index: int) -> dict[str, Any]:
+# How far the numbers of cases reach: bounds of WIDE, or all that the parameter table allows.
+REACHES = {"wide": ("near", "wide", "wide", "wide"), "any": ("any",)}
+
+
+def run_case(seed: int, index: int, reach: str = "wide") -> dict[str, Any]:
     """Draw and check one case; what went wrong stands under `fault`."""
     from percussion_model import SceneError, SimulationError
     from tests.properties.checks import check_case
     from tests.properties.scenes import Generator, draw_case
 
     try:
-        case = draw_case(Generator(seed, index))
+        case = draw_case(Generator(seed, index), REACHES[reach])
     except SceneError as error:
         return {"refused": str(error)}
     try:
@@ -50,32 +54,32 @@ def run_case(seed: int, index: int) -> dict[str, Any]:
         fault = f"stopped: {error}"
     except Exception as error:  # anything else is a crash
         fault = f"{type(error).__name__}: {error}"
-    return {"fault": fault[:500]} | story_of(seed, index)
+    return {"fault": fault[:500]} | story_of(seed, index, reach)
 
 
-def story_of(seed: int, index: int) -> dict[str, Any]:
+def story_of(seed: int, index: int, reach: str) -> dict[str, Any]:
     """What a case is, so that it can be found again by later versions."""
     from tests.properties.scenes import Generator, draw_case
 
-    case = draw_case(Generator(seed, index))
+    case = draw_case(Generator(seed, index), REACHES[reach])
     calls = [[share, what, argument] for share, what, argument in case.calls]
     story = {"reach": case.reach, "scene": case.scene.to_toml(), "length": case.length}
     return {"solver": case.scene.solver_name, **story, "calls": calls}
 
 
-def work(pipe: Connection, seed: int) -> None:
+def work(pipe: Connection, seed: int, reach: str) -> None:
     """Run the cases that are asked for, until None is."""
     while (index := pipe.recv()) is not None:
         began = time.perf_counter()
-        outcome = run_case(seed, index)
+        outcome = run_case(seed, index, reach)
         pipe.send(outcome | {"wall_time": time.perf_counter() - began})
 
 
 class Worker:
     """A process that runs cases, replaced where one does not come back."""
 
-    def __init__(self, seed: int) -> None:
-        self._seed = seed
+    def __init__(self, seed: int, reach: str = "wide") -> None:
+        self._seed, self._reach = seed, reach
         self._process: Any = None
         self._kinds: set[str] = set()
 
@@ -94,12 +98,14 @@ class Worker:
         except EOFError:
             fault = "crash: the process ended"
         self.stop()
-        return {"fault": fault, "wall_time": patience} | story_of(self._seed, index)
+        return {"fault": fault, "wall_time": patience} | story_of(self._seed, index, self._reach)
 
     def _start(self) -> None:
         context = multiprocessing.get_context("spawn")
         self._pipe, theirs = context.Pipe()
-        self._process = context.Process(target=work, args=(theirs, self._seed), daemon=True)
+        self._process = context.Process(
+            target=work, args=(theirs, self._seed, self._reach), daemon=True
+        )
         self._process.start()
         theirs.close()
         self._kinds = set()
@@ -112,10 +118,11 @@ class Worker:
             self._process = None
 
 
-def new_record(seed: int) -> dict[str, Any]:
+def new_record(seed: int, reach: str) -> dict[str, Any]:
     """A record of nothing yet."""
     return {
         "seed": seed,
+        "reach": reach,
         "drawn": 0,
         "run": 0,
         "refused": 0,
@@ -162,7 +169,9 @@ def versions() -> dict[str, str]:
     return found | {"commit": asked.stdout.strip()}
 
 
-def campaign(count: int, seed: int, path: Path | None, report: Any = None) -> dict[str, Any]:
+def campaign(
+    count: int, seed: int, path: Path | None, reach: str = "wide", report: Any = None
+) -> dict[str, Any]:
     """Run cases until `count` of them were run, with those in the record at `path`.
 
     Returns
@@ -170,13 +179,14 @@ def campaign(count: int, seed: int, path: Path | None, report: Any = None) -> di
     dict
         The record.
     """
-    record = new_record(seed)
+    record = new_record(seed, reach)
     if path is not None and path.exists():
         record = json.loads(path.read_text(encoding="utf-8"))
-        if record["seed"] != seed:
-            raise SystemExit(f"{path} is the record of seed {record['seed']}: give another file")
+        if (record["seed"], record["reach"]) != (seed, reach):
+            kind = f"seed {record['seed']} and reach {record['reach']}"
+            raise SystemExit(f"{path} is the record of {kind}: give another file")
     record["versions"] = versions()
-    worker = Worker(seed)
+    worker = Worker(seed, reach)
     try:
         while record["run"] < count:
             take(record, record["drawn"], worker.run(record["drawn"]))
@@ -189,10 +199,10 @@ def campaign(count: int, seed: int, path: Path | None, report: Any = None) -> di
     return record
 
 
-def again(seed: int, path: Path) -> dict[str, Any]:
+def again(path: Path) -> dict[str, Any]:
     """Run the failed cases of a record once more, after a repair, and update it."""
     record = json.loads(path.read_text(encoding="utf-8"))
-    worker = Worker(seed)
+    worker = Worker(record["seed"], record["reach"])
     mended = record.setdefault("mended", {})
     for key in list(record["failures"]):
         outcome = worker.run(int(key))
@@ -222,22 +232,45 @@ def tell(record: dict[str, Any], count: int) -> str:
     )
 
 
+def table(record: dict[str, Any]) -> str:
+    """A record as the table of docs/stability_record.md."""
+    count = {name: f"{number:,}" for name, number in sorted(record["solvers"].items())}
+    rows = {
+        "seed; reach": f"{record['seed']}; {record['reach']}",
+        "scenes run": f"{record['run']:,}",
+        "of which": ", ".join(f"{name} {number}" for name, number in count.items()),
+        "refused as contradictions": record["refused"],
+        "failed": len(record["failures"]),
+        "blows; events": f"{record['blows']:,}; {record['events']:,}",
+        "samples in each mode": ", ".join(f"{k} {n:,}" for k, n in record["modes"].items()),
+        "greatest residual": f"{record['greatest_residual']:.1e}",
+        "longest case; all, s": f"{record['longest_case']:.1f}; {record['wall_time']:.0f}",
+        "with": ", ".join(f"{name} {text}" for name, text in record["versions"].items()),
+    }
+    return "\n".join(["| | |", "|---|---|", *(f"| {name} | {rows[name]} |" for name in rows)])
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--count", type=int, default=20_000, help="scenes to run in all")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--reach", choices=REACHES, default="wide", help="how far numbers reach")
     parser.add_argument("--record", type=Path, help="JSON file; default campaign_SEED.json")
     parser.add_argument("--again", action="store_true", help="run the failed ones again")
+    parser.add_argument("--table", action="store_true", help="show a record as a table")
     parser.add_argument("--case", type=int, help="run this one case here, and show what it gives")
     options = parser.parse_args()
     # a request to end ends the worker as well
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
     path = options.record or Path(f"campaign_{options.seed}.json")
     if options.case is not None:
-        print(json.dumps(run_case(options.seed, options.case), indent=1))
+        print(json.dumps(run_case(options.seed, options.case, options.reach), indent=1))
         return
-    record = again(options.seed, path) if options.again else None
-    record = record or campaign(options.count, options.seed, path)
+    if options.table:
+        print(table(json.loads(path.read_text(encoding="utf-8"))))
+        return
+    record = again(path) if options.again else None
+    record = record or campaign(options.count, options.seed, path, options.reach)
     for index, outcome in record["failures"].items():
         print(index, outcome["solver"], outcome["fault"].splitlines()[0])
 

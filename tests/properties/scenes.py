@@ -83,7 +83,6 @@ WIDE: dict[str, tuple[Any, ...]] = {
     "fem.event_tolerance": (1e-12, 0.1),
     "fem.time_tolerance": (1e-9, 0.1),
 }
-# These need what is drawn before them.
 BY_SOLVER = {"wave": "solver", "fem": "fem", "rigid": "contact"}
 SECTION = {
     "length": (0.005, 5.0),
@@ -182,9 +181,9 @@ class Case:
         return found
 
 
-def draw_case(source: Source) -> Case:
+def draw_case(source: Source, reaches: tuple[str, ...] = ("near", "wide", "wide", "wide")) -> Case:
     """A scene with calls; `SceneError` where the parts contradict each other."""
-    reach = source.pick(("near", "wide", "wide", "wide", "any"))
+    reach = source.pick(reaches)
     scene = draw_scene(source, reach)
     length = draw_length(source, scene)
     # no run of this kind looks at these, but they must fit each other
@@ -195,11 +194,11 @@ def draw_case(source: Source) -> Case:
 def draw_scene(source: Source, reach: str) -> Scene:
     """Any scene whose parts fit each other."""
     solver = source.pick(("wave", "wave", "fem", "rigid"))
-    changes: dict[str, Any] = {"solver.name": source.pick((solver, solver, "auto"))}
-    if solver == "fem":
-        changes["solver.name"] = "fem"
-    elastic = ("elastic",) * 4 if solver != "rigid" else ("rigid",) * 4
-    piston = source.pick((*elastic, "rigid", "absent"))
+    changes: dict[str, Any] = {
+        "solver.name": source.pick((solver, solver, "fem" if solver == "fem" else "auto"))
+    }
+    usual = "rigid" if solver == "rigid" else "elastic"
+    piston = source.pick((usual, usual, usual, usual, "rigid", "absent"))
     changes["piston.model"] = piston
     changes["bit.model"] = "rigid" if solver == "rigid" else "elastic"
     drives = ("none",) if piston == "absent" else ("pressure",) * 4 + ("external", "none")

@@ -54,7 +54,7 @@ def test_random_scenes_stay_finite_and_close_their_ledger(case):
 @pytest.mark.slow
 @pytest.mark.skipif("PERCUSSION_LONG" not in os.environ, reason="set PERCUSSION_LONG=1")
 def test_twenty_thousand_random_scenes(tmp_path):
-    record = campaign(LONG_COUNT, LONG_SEED, tmp_path / "record.json")
+    record = campaign(LONG_COUNT, LONG_SEED, tmp_path / "record.json", "wide")
     assert record["run"] == LONG_COUNT
     assert set(record["solvers"]) == {"wave", "fem", "rigid"}
     assert not record["failures"], record["failures"]
@@ -170,8 +170,8 @@ def silent(*_, **__):
 class StandIn:
     """A worker that only says what a case could give."""
 
-    def __init__(self, seed):
-        self.seed = seed
+    def __init__(self, seed, reach):
+        self.seed, self.reach = seed, reach
 
     def run(self, index):
         told = {"solver": "wave", "blows": 1, "events": 2, "locked": 0, "residual": 1e-12}
