@@ -19,7 +19,7 @@ def nothing(inputs, time, step):
 
 def test_the_bench_ranks_nothing_below_a_bad_pi_below_a_good_one(feed_control):
     """A new rod brings half a kilonewton, which nobody but a controller takes away."""
-    bad = {"controller.pi.gain": 0.05, "controller.pi.time": 0.5}
+    bad = {"controller.pi.gain": 0.1, "controller.pi.time": 0.4}
     points = [
         total(bench(feed_control, controller, values, ["rod"]))
         for controller, values in ((nothing, {}), (None, bad), (None, {}))
