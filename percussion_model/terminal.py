@@ -83,9 +83,9 @@ def show_settled(found: Settled) -> None:
     order = {0: "", 1: ", every blow alike"}.get(found.order, f", {found.order} blows a cycle")
     table.add_row("Motion", f"{found.kind}{order}")
     for name, key, factor, unit in (
-        _SHOWN[0],
+        ("Rate of penetration", "rate_of_penetration", 1e3, "mm/s"),
         ("  error of it", "rate_of_penetration_error", 1e3, "mm/s"),
-        _SHOWN[1],
+        ("Blow period", "blow_period", 1e3, "ms"),
         ("Multiplier of the cycle", "multiplier", 1.0, ""),
     ):
         table.add_row(name, f"{_number(summary[key], factor)} {unit}".rstrip())

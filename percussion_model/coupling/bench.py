@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from percussion_model.coupling.component import CouplingError
-from percussion_model.coupling.master import CoupledRun, Coupling, PythonPart
+from percussion_model.coupling.master import CoupledRun, Coupling
+from percussion_model.coupling.python_part import Work
 
 STEP = 1e-3  # [s]
 ROWS_EVERY = 5e-3  # [s]
@@ -152,7 +153,7 @@ def judge(trial: Trial, run: CoupledRun) -> Score:
 
 def bench(
     system: str | Path,
-    controller: str | Path | PythonPart | None = None,
+    controller: str | Path | Work | None = None,
     parameters: Mapping[str, Any] | None = None,
     trials: Sequence[str] = (),
     watch: Callable[[Score], None] | None = None,

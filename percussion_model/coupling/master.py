@@ -20,15 +20,13 @@ from fmpy import extract
 from fmpy.ssp.ssd import find_components, read_ssd
 
 from percussion_model.coupling.component import Component, CouplingError
+from percussion_model.coupling.python_part import PythonPart, Work
 
 Order = Literal["jacobi", "gauss-seidel"]
 # Passes over the outputs while all parts are initialised: as many as the longest chain.
 INITIAL_PASSES = 4
 # A number of steps is whole if it misses by no more than this.
 ROUNDING = 1e-9
-
-# Reads inputs by name and a time and a step [s], gives outputs by name.
-PythonPart = Callable[[dict[str, Any], float, float], Mapping[str, Any]]
 
 
 @dataclass
@@ -57,40 +55,6 @@ class CoupledRun:
         return self.columns[signal]
 
 
-class _Python:
-    """A Python callable in the place of an FMU."""
-
-    def __init__(self, name: str, work: PythonPart) -> None:
-        self.name, self.work = name, work
-        self.inputs: dict[str, Any] = {}
-        self.outputs: dict[str, Any] = {}
-
-    def step(self, time: float, step: float) -> None:
-        try:
-            self.outputs = dict(self.work(dict(self.inputs), time, step))
-        except Exception as error:
-            raise CouplingError(f"{self.name}: {type(error).__name__}: {error}") from error
-
-    def getter(self, names: list[str]) -> Callable[[], list[Any]]:
-        """What reads outputs."""
-
-        def read() -> list[Any]:
-            lacking = [name for name in names if name not in self.outputs]
-            if lacking:
-                raise CouplingError(f"{self.name} gave no {', '.join(lacking)}")
-            return [self.outputs[name] for name in names]
-
-        return read
-
-    def setter(self, names: list[str]) -> Callable[[list[Any]], None]:
-        """What sets inputs."""
-
-        def write(values: list[Any]) -> None:
-            self.inputs = dict(zip(names, values, strict=True))
-
-        return write
-
-
 class Coupling:
     """A system of FMUs, ready to be run once.
 
@@ -112,7 +76,7 @@ class Coupling:
         self,
         path: str | Path,
         parameters: Mapping[str, Any] | None = None,
-        replaced: Mapping[str, str | Path | PythonPart] | None = None,
+        replaced: Mapping[str, str | Path | Work] | None = None,
         order: Order = "jacobi",
         on_way: Callable[[str, float, Any], Any] | None = None,
     ) -> None:
@@ -141,7 +105,7 @@ class Coupling:
         for name, component in components.items():
             source = replaced.get(name, Path(self._folder) / component.source)
             if callable(source):
-                self.parts[name] = _Python(name, source)
+                self.parts[name] = PythonPart(name, source)
                 continue
             folder = tempfile.mkdtemp(prefix=f"{name}-", dir=self._folder)
             extract(str(source), folder)
@@ -249,13 +213,13 @@ class Coupling:
 
     def _initialise(self) -> None:
         for name, part in self.parts.items():
-            if isinstance(part, _Python):
+            if isinstance(part, PythonPart):
                 continue
             part.set(self._parameters[name])
             part.begin(0.0)
         for _ in range(INITIAL_PASSES):
             for name, part in self.parts.items():
-                if isinstance(part, _Python):
+                if isinstance(part, PythonPart):
                     if all(source in self._values[s] for _, s, source in self._links[name]):
                         self._give(name, 0.0)
                         part.step(0.0, 0.0)

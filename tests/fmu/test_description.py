@@ -83,7 +83,7 @@ def test_units_are_what_they_are_made_of():
         above, _, below = name.partition("/")
         total = [0, 0, 0]
         for part, sign in [(above, 1), (below, -1)]:
-            for factor in filter(None, part.split(".")):
+            for factor in filter(None, part.strip("()").split(".")):
                 total = [t + sign * d for t, d in zip(total, dimension[factor], strict=True)]
         assert total == [unit.base.get(base, 0) for base in ("m", "kg", "s")], name
     factors = {

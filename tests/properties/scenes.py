@@ -201,6 +201,8 @@ def draw_scene(source: Source, reach: str) -> Scene:
     piston = source.pick((usual, usual, usual, usual, "rigid", "absent"))
     changes["piston.model"] = piston
     changes["bit.model"] = "rigid" if solver == "rigid" else "elastic"
+    if solver == "rigid" and chance(source, 25):  # rigid bodies in place of elastic ones
+        changes |= {"solver.name": "auto", "solver.fidelity": "rigid", "bit.model": "elastic"}
     drives = ("none",) if piston == "absent" else ("pressure",) * 4 + ("external", "none")
     changes["effects.drive"] = source.pick(drives)
     changes["effects.rock"] = source.pick(("bilinear",) * 5 + ("spring", "wall", "none"))

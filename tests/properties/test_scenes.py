@@ -79,10 +79,11 @@ def test_cases_cover_solvers_effects_and_parameters():
     scenes = [case.scene for case in drawn]
     assert {scene.solver_name for scene in scenes} == {"wave", "fem", "rigid"}
     for key, row in rows_by_key().items():
-        if row.kind in ("flag", "choice") and key != "solver.name":
+        if row.kind in ("flag", "choice") and key not in ("solver.name", "run.check"):
             found = {scene[key] for scene in scenes}
             allowed = set(row.choices) if row.kind == "choice" else {True, False}
-            assert found == allowed, key
+            # a blow map takes a minute to make: tests/test_blow_map.py has its random points
+            assert found == allowed - {"blow-map"}, key
     for key, (low, high, *more) in WIDE.items():
         values = np.array([scene[key] for scene in scenes if scene[key] is not None])
         sizes = np.abs(values[values != 0.0])
