@@ -44,7 +44,7 @@ class Statement:
 
     def to_dict(self) -> dict[str, object]:
         """Plain values for JSON."""
-        return asdict(self)
+        return asdict(self) | {"agrees": bool(self.agrees)}
 
 
 def about_drops(drops: list[Drop]) -> Iterator[Statement]:
@@ -170,7 +170,7 @@ def _about_ratio(found: Study, how: str) -> Iterator[Statement]:
     place = f"4.4 b, {how}"
     x, rate, _periodic = along(found)
     onset = chatter_onset(x, rate)
-    before = x < onset
+    before = x < onset if onset > x[0] else x <= PAPER_CHATTER
     peak, greatest = float(x[before][np.argmax(rate[before])]), float(np.max(rate[before]))
     least = float(rate[x == onset][0])
     yield Statement(

@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
+import json
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from percussion_model import simulate
 from percussion_model.paper import paper_scene
 from percussion_model.paper.drop import run_drops
-from percussion_model.paper.statements import SAME_EXPONENT, about_cycle, about_drops
+from percussion_model.paper.statements import (
+    SAME_EXPONENT,
+    about_cycle,
+    about_drops,
+    about_sweeps,
+)
 from percussion_model.paper.sweeps import (
+    SWEEPS,
     Sweep,
     along,
     force_at_constant_power,
@@ -38,20 +47,34 @@ def test_power_is_kept():
     assert force**3 * distance == pytest.approx(np.full(3, 3000.0**3 * 0.04))
 
 
-def test_drop_tests_show_what_section_4_2_says():
-    said = list(about_drops(run_drops(paper_scene())))
-    assert len(said) == 4
+def agree(said, count):
+    """All of so many statements agree, and are plain values."""
+    assert len(said) == count
     for one in said:
         assert one.agrees, f"{one.says}: {one.found}"
+    json.dumps([one.to_dict() for one in said])
+
+
+def test_statements_about_sweeps_are_plain_values(tmp_path):
+    """Of short sweeps: whether the paper agrees takes long ones, `percussion paper`."""
+    found = {}
+    for sweep in SWEEPS:
+        few = replace(sweep, values=sweep.values[:: len(sweep.values) // 6], solver="rigid")
+        few = replace(few, changes={})
+        found[sweep.name] = run_sweep(paper_scene(), few, tmp_path / sweep.name, processes=1)
+    said = list(about_sweeps(found))
+    assert len(said) == 2 + 3 * 3 + 3 + 3
+    json.dumps([one.to_dict() for one in said])
+
+
+def test_drop_tests_show_what_section_4_2_says():
+    agree(list(about_drops(run_drops(paper_scene()))), 4)
 
 
 def test_the_stationary_blow_is_that_of_section_4_3():
     result = simulate(paper_scene(), 2.0, 1.0)
     window = last_blow_window(result)
-    said = list(about_cycle(result, window.samples, window.origin))
-    assert len(said) == 7
-    for one in said:
-        assert one.agrees, f"{one.says}: {one.found}"
+    agree(list(about_cycle(result, window.samples, window.origin)), 7)
 
 
 @pytest.mark.parametrize(
