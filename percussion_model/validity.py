@@ -43,7 +43,7 @@ def guard_notes(statistics: Mapping[str, int]) -> Iterator[str]:
     if storms:
         yield (
             f"{storms} storm{'s' if storms != 1 else ''} of events: more within a moment than can "
-            "mean anything; some were put off, so the motion is bounded but not exact"
+            "mean anything; rebounds were left out or events put off: bounded but not exact"
         )
 
 

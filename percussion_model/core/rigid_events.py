@@ -20,10 +20,11 @@ from percussion_model.core.rigid_law import (
     bit_force,
     contact_force,
     end_loading,
+    in_storm,
+    in_worst_storm,
     lift_off,
     note_standstill_force,
     overcomes_barrier,
-    recoverable,
     resume_cycle,
     set_down,
     start_cycle,
@@ -65,7 +66,9 @@ def push_event(s, kind, value):
 
 @njit(cache=True, error_model="numpy")
 def starts_blow(par, s, time):
-    """Whether a closure of the gap at `time` starts a blow."""
+    """Whether a closure of the gap at `time` starts a blow; no two start at one instant."""
+    if s.in_blow == 1 and time <= s.blow.time:
+        return False
     if par.drive == PRESSURE:
         return s.armed == 1
     return time - s.opened >= par.blow_gap_time
@@ -137,7 +140,8 @@ def impact(par, s):
     # A bit at the wall stays there, even if its feed pulls and it is about to leave.
     rests = par.rock == WALL and s.p >= s.P_u and s.v_b == 0.0
     mass = par.M_p if rests else par.M_p * par.M_b / (par.M_p + par.M_b)
-    e = par.e
+    # In a storm they do not rebound; in the worst they stay together, pressed or not.
+    e = 0.0 if in_storm(par, s) else par.e
     v_p = s.v_p
     v_b = s.v_b
     if e * w < HELD_REBOUND:
@@ -150,7 +154,7 @@ def impact(par, s):
         pressed = contact_force(par, s, acc) > par.M_p * acceleration_doubt(par, s, acc)
         s.v_p = v_p
         s.v_b = v_b
-        if pressed or s.standing_events > RESTING_EVENTS:
+        if pressed or s.standing_events > RESTING_EVENTS or in_worst_storm(par, s):
             give_impulse(par, s, mass * w, rests)
             s.v_b = common
             s.v_p = common
@@ -168,9 +172,6 @@ def impact(par, s):
 def touch_rock(par, s, inside):
     """The bit meets the rock."""
     if not inside:
-        if s.late == 1:
-            # the flight took rock pressed in for rock that springs back
-            s.standstill += recoverable(par, s, s.p)
         s.p = s.P_u
     if par.rock == BILINEAR:
         if overcomes_barrier(par, s):

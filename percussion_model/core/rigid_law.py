@@ -24,6 +24,9 @@ LAST_PLACES = 1e-15
 # A drilling cycle counts when it crushed more than this share of W_R.
 COUNTED_CYCLE = 0.01
 
+# So many times the events of a storm, and no way of moving is left to end it.
+WORST_STORM = 10
+
 # The standstill force is the mean over this last share of the standstill.
 LAST_SHARE = 0.1
 
@@ -228,6 +231,18 @@ def kinetic_energy(par, v_p, v_b):
     if par.piston != ABSENT:
         energy += 0.5 * par.M_p * v_p * v_p
     return energy
+
+
+@njit(cache=True, error_model="numpy")
+def in_storm(par, s):
+    """Whether more events came within a window than rigid bodies can tell."""
+    return s.window_events >= par.most_events
+
+
+@njit(cache=True, error_model="numpy")
+def in_worst_storm(par, s):
+    """Whether the storm went on although impacts no longer rebound."""
+    return s.window_events >= WORST_STORM * par.most_events
 
 
 @njit(cache=True, error_model="numpy")

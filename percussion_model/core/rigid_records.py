@@ -73,7 +73,7 @@ RIGID_STATE = np.dtype(
         ("window", "f8"),  # when the present count of events began [s]
         ("window_events", "i8"),  # events since then
         ("last_event", "f8"),  # [s]
-        ("late", "i8"),  # 1: the next event has been put off
+        ("late", "i8"),  # 1: the next change of mode is put off
         ("counted", "i8"),  # 1: the present drilling cycle has been counted
         ("p", "f8"),  # penetration of the present drilling cycle [m]
         ("P_u", "f8"),  # [m]

@@ -20,6 +20,8 @@ from percussion_model.core.rigid_law import (
     acceleration_doubt,
     barrier_on,
     free_acceleration,
+    in_storm,
+    in_worst_storm,
     loads,
     on_wall,
     rock_terms,
@@ -161,6 +163,26 @@ def close_time_flight(gap, dv, acc, a_p, doubt):
 
 
 @njit(cache=True, error_model="numpy")
+def put_off(par, s, tau, kind):
+    """In a storm of events, the earliest that one may come (docs/numerics.md, section 12).
+
+    Bodies that meet never wait: they would pass through each other. Of the rest the
+    drive waits in any storm, all in the worst.
+
+    Returns
+    -------
+    float
+        Time until it [s]. That of a state depends on its last event alone, so that
+        commits in between do not put it off again and again.
+    """
+    if not in_storm(par, s) or kind == TOUCH or kind == TOUCH_INSIDE or kind == NOTHING:
+        return tau
+    if kind != SWITCH and not in_worst_storm(par, s):
+        return tau
+    return max(tau, par.storm_window / par.most_events - (s.time - s.last_event))
+
+
+@njit(cache=True, error_model="numpy")
 def piston_event(par, s, y, acc, beta, k, tau, kind):
     """Earlier of (tau, kind) and what comes next between piston, bit and drive."""
     a_p = free_acceleration(par, s)
@@ -170,6 +192,7 @@ def piston_event(par, s, y, acc, beta, k, tau, kind):
         return 0.0, SWITCH  # a start in contact: u_r = 0 is reached
     if s.held == 1:
         let_go = release_time(a_p, acc, jerk, doubt, beta, k)
+        let_go = put_off(par, s, let_go, RELEASE)
         if let_go < tau:
             return let_go, RELEASE
         return tau, kind
@@ -188,39 +211,19 @@ def piston_event(par, s, y, acc, beta, k, tau, kind):
         kind = CLOSE
     if lift:
         h = par.D_1 - s.gap
-        if h <= 0.0:
+        if h <= 0.0 and put_off(par, s, 0.0, SWITCH) == 0.0:
             return 0.0, SWITCH
-        if k > 0.0:
+        if h <= 0.0:
+            turn = 0.0
+        elif k > 0.0:
             turn = approach_time(h, -1.0, y, s.v_b, beta, k, s.v_p, a_p, doubt, tau)
         else:
             turn = fall_time_parabola(h, s.v_p - s.v_b, a_p - acc)
+        turn = put_off(par, s, turn, SWITCH)
         if turn < tau:
             tau = turn
             kind = SWITCH
     return tau, kind
-
-
-@njit(cache=True, error_model="numpy")
-def put_off(par, s, tau, kind):
-    """In a storm of events, let the next one wait (docs/numerics.md, section 8).
-
-    Returns
-    -------
-    float
-        Time until it [s]. That of a state depends on its last event alone, so that
-        commits in between do not put it off again and again.
-    """
-    s.late = 0
-    if kind == NOTHING or s.window_events < par.most_events:
-        return tau
-    since = s.time - s.last_event
-    if since + tau >= par.storm_window:
-        return tau
-    wait = par.storm_window / par.most_events - since
-    if tau >= wait:
-        return tau
-    s.late = 1
-    return wait
 
 
 @njit(cache=True, error_model="numpy")
@@ -247,9 +250,11 @@ def schedule(par, s):
             tau, kind = unloading_event(s, y, acc, k, -F / K)
         else:
             tau, kind = standstill_event(par, s, y, acc, beta, k, F, M)
+    later = put_off(par, s, tau, kind)
+    s.late = 1 if later > tau else 0
+    tau = later
     if par.piston != ABSENT:
         tau, kind = piston_event(par, s, y, acc, beta, k, tau, kind)
-    tau = put_off(par, s, tau, kind)
     s.next_tau = tau
     s.next_time = s.time + tau
     s.next_kind = kind

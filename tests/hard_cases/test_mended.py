@@ -102,3 +102,61 @@ def test_a_drive_that_turns_at_once_ends_in_bounded_time():
         },
     )
     assert residual(scene, 0.01) < 1e-9
+
+
+LIGHT_BITS = {
+    "spring": {
+        "bit.sections": [
+            {"length": 0.0072, "area": 1.555e-4, "youngs_modulus": 2.1e11, "density": 390.6}
+        ],
+        "piston.sections": [
+            {"length": 1.505, "area": 9.85e-3, "youngs_modulus": 5.014e9, "density": 7850.0}
+        ],
+        "drive.force": 2187.8,
+        "effects.barrier": False,
+        "effects.feed": False,
+        "effects.rock": "spring",
+        "rock.loading_stiffness": 9.23e8,
+        "start.piston_velocity": 16.94,
+        "start.gap": 2.695e-9,
+        "start.rock_gap": 3.926e-4,
+    },
+    "bilinear": {
+        "bit.sections": [
+            {"length": 0.20125, "area": 1.584e-5, "youngs_modulus": 7.3e9, "density": 7850.0}
+        ],
+        "piston.sections": [
+            {"length": 0.7, "area": 4.3e-3, "youngs_modulus": 1.6e10, "density": 7200.0}
+        ],
+        "drive.force": 22782.9,
+        "rock.loading_stiffness": 9.49e8,
+        "rock.unloading_ratio": 197.3,
+        "start.gap": 0.0267,
+        "start.piston_velocity": 5.0,
+    },
+}
+
+
+@pytest.mark.parametrize("most_events", [200, 1])
+@pytest.mark.parametrize("rock", LIGHT_BITS)
+def test_a_light_bit_between_piston_and_rock_stays_between_them(rock, most_events):
+    """In a storm of rebounds closures waited: bodies met too late, or lost energy unbooked."""
+    simulation = Simulation(Scene().computed_by("rigid", **LIGHT_BITS[rock]))
+    # with one event unhindered, the rule of the worst storm acts as well
+    simulation._state["par"]["most_events"] = most_events
+    for t in np.linspace(0.0, 0.02, 500):
+        simulation.advance(float(t))
+        assert simulation.observe()["gap"] >= -1e-12
+        assert abs(simulation.energy()["residual_relative"]) < 1e-9
+    assert simulation.statistics()["storms"] > 0
+    assert any("storm" in text for text in simulation.result().warnings)
+
+
+def test_no_two_blows_start_at_one_instant():
+    """A drive that turns at once armed the next blow at the instant of the last."""
+    changes = {"drive.reversal_distance": 5e-324, "feed.force": -10673.8, "drive.force": 85072.0}
+    changes |= {"start.rock_gap": 0.0, "start.gap": 7.127e-6, "start.piston_velocity": 0.0}
+    changes |= {"contact.restitution": 0.083, "effects.gravity": False}
+    result = simulate(Scene().computed_by("rigid", **changes), 0.002, settle=0.0)
+    assert len(result.blows) > 3
+    assert np.all(np.diff(result.blows["time"]) > 0.0)
