@@ -26,9 +26,10 @@ MOST_GIVE = 1e100
 # Events of one step: crossings of the rock, two of the contact, one of the drive, one
 # of the barrier (`percussion_model.core.advance.EVENTS_A_STEP`).
 EVENTS_A_STEP = 36
-# Events of a run of rigid bodies, which has no steps: in the transit time of a bar, before
-# the guard against storms puts further ones off (`percussion_model.core.rigid_schedule`).
-RIGID_EVENTS_A_TRANSIT = 200
+# Events of a run of rigid bodies, which has no steps, in the transit time of a bar: 2000 before
+# the guard against storms makes all but closures wait, a 200th of the time each, and four rows
+# a wait (docs/numerics.md, section 12; `percussion_model.core.rigid_schedule`).
+RIGID_EVENTS_A_TRANSIT = 2000 + 4 * 200
 # What may be undefined, and where.
 WITHOUT_PISTON = ("piston_position", "piston_velocity", "gap", "relative_displacement")
 UNDEFINED_IN_BLOWS = ("standstill_force", "rebound_velocity")
