@@ -223,7 +223,7 @@ def unknown_key(key: str) -> str:
     known = list(keys) if parent else ["title", *GROUPS]
     near = difflib.get_close_matches(generic_key(key), known, 1, _SIMILAR_ENOUGH)
     if near:
-        return f"unknown key {key}: did you mean {near[0]}?"
+        return f"unknown key {key}: did you mean {near[0].replace('.*', '.0')}?"
     if siblings and parent:
         return f"unknown key {key}: [{parent}] has the keys {', '.join(siblings)}"
     return f"unknown key {key}: a scene has a title and the tables {', '.join(GROUPS)}"

@@ -184,19 +184,23 @@ def _number(value: float | None, factor: float) -> str:
     return "-" if value is None else f"{factor * value:.5g}"
 
 
+def _short(value: float | None, factor: float, digits: int) -> str:
+    return "-" if value is None else f"{factor * value:.{digits}g}"
+
+
 def show_stability(found: Collection) -> None:
     """Print what each solver made of each hard case, and what does not hold."""
     table = Table()
     for name in ("case", "solver"):
         table.add_column(name, no_wrap=True)
-    for name in ("rate, mm/s", "residual", "momentum", "events/s", "guards", "computed in, s"):
+    for name in ("mm/s", "residual", "momentum", "events/s", "guards", "s"):
         table.add_column(name, justify="right", no_wrap=True)
     for row in found.rows:
         table.add_row(
             row["case"],
             row["solver"],
-            _number(row["rate"], 1e3),
-            *(_number(row[key], 1.0) for key in ("residual", "momentum", "events_per_second")),
+            _short(row["rate"], 1e3, 4),
+            *(_short(row[key], 1.0, 2) for key in ("residual", "momentum", "events_per_second")),
             str(row["guards"] or ""),
             f"{row['wall_time']:.2g}",
         )

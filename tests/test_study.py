@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import os
 import signal
+import subprocess
+import sys
 import threading
 import time
 
@@ -57,6 +59,8 @@ def test_samples_fill_every_slice_and_repeat_with_their_seed():
         (lambda: latin_hypercube({"feed.force": (0, 1)}, 0), "count = 0"),
         (lambda: read_axis("feed.force"), "--over feed.force: must be"),
         (lambda: read_axis("feed.force=1:2"), "must be KEY=FIRST:LAST:COUNT"),
+        (lambda: read_axis("feed.force=1:2:0"), "COUNT must be a whole number from 1 on"),
+        (lambda: read_axis("feed.force=-1:2:3log"), "both ends must be above 0"),
     ],
 )
 def test_senseless_points_are_refused(make, words):
@@ -190,6 +194,30 @@ def test_a_worker_that_is_killed_loses_nothing(tmp_path):
     assert found == {number: number**2 for number in range(6)}
 
 
+@pytest.mark.skipif(os.name == "nt", reason="Ctrl-C is sent to a group of processes")
+def test_ctrl_c_ends_a_study_at_once_and_says_what_is_kept(tmp_path):
+    """While workers start, and while they work."""
+    scene = tmp_path / "scene.toml"
+    SCENE.to_toml(scene)
+    words = [sys.executable, "-c", "from percussion_model.cli import main; main()", "study"]
+    words += [str(scene), "--over", "feed.force=1:9000:20000", "--processes", "2"]
+    for number, wait in enumerate((2.0, 6.0)):
+        out = ["--out", str(tmp_path / f"out{number}")]
+        child = subprocess.Popen(
+            [*words, *out], stderr=subprocess.PIPE, text=True, start_new_session=True
+        )
+        time.sleep(wait)
+        os.killpg(child.pid, signal.SIGINT)
+        try:
+            _, errors = child.communicate(timeout=30)
+        finally:
+            child.kill()
+        assert child.returncode == 130
+        assert "Traceback" not in errors
+        if (tmp_path / f"out{number}" / PARTS).is_dir():
+            assert "the same command goes on" in errors
+
+
 def test_a_cluster_finds_the_same_and_survives_a_worker(whole, tmp_path):
     distributed = pytest.importorskip("distributed")
     with distributed.LocalCluster(
@@ -217,5 +245,8 @@ def test_the_command_writes_tables_and_tells_what_it_found(tmp_path):
     assert {"points.parquet", "points.nc", "study.json"} <= set(os.listdir(tmp_path / "out"))
     plan = json.loads((tmp_path / "out" / "study.json").read_text())
     assert plan["keys"] == ["feed.force"]
+    said = ["--set", "feed.force=3"]
+    again = CliRunner().invoke(app, ["study", str(scene), *over, *said, "--out", str(tmp_path)])
+    assert again.exit_code == 2
     twice = CliRunner().invoke(app, ["study", str(scene), *over, *over, "--out", str(tmp_path)])
     assert twice.exit_code == 2

@@ -10,6 +10,7 @@ import typer
 
 from percussion_model.commands.common import (
     BAD_INPUT,
+    INTERRUPTED,
     Cells,
     SceneFile,
     Settings,
@@ -67,6 +68,9 @@ def study(
     axes = dict(read_axis(text) for text in over)
     if len(axes) < len(over):
         raise typer.Exit(complain("--over: a key stands there twice", BAD_INPUT))
+    for text in settings or ():
+        if text.partition("=")[0] in axes:
+            raise typer.Exit(complain(f"--set {text}: --over varies this key", BAD_INPUT))
     if samples is None:
         points = grid(axes)
     else:
@@ -74,14 +78,18 @@ def study(
         ends = {key: (float(min(values)), float(max(values))) for key, values in axes.items()}
         points = latin_hypercube(ends, samples, seed, logarithmic)
     chosen = load_scene(scene, solver, cells, settings)
-    with count_bar("points") as progress:
-        found = run_study(
-            chosen,
-            points,
-            out,
-            tolerance,
-            processes=processes,
-            cluster=cluster,
-            progress=progress,
-        )
+    try:
+        with count_bar("points") as progress:
+            found = run_study(
+                chosen,
+                points,
+                out,
+                tolerance,
+                processes=processes,
+                cluster=cluster,
+                progress=progress,
+            )
+    except KeyboardInterrupt:
+        words = f"interrupted; finished points are kept in {out}, the same command goes on"
+        raise typer.Exit(complain(words, INTERRUPTED)) from None
     show_study(found, found.save(out))

@@ -83,9 +83,14 @@ class Coupling:
         self.path = Path(path)
         self.order, self.on_way = order, on_way
         if not self.path.is_file():
-            raise CouplingError(f"{self.path}: no such file")
+            raise CouplingError(
+                f"{self.path}: no such file; `python3 build.py system` makes the archives of dist"
+            )
         try:
             system = read_ssd(str(self.path)).system
+        except KeyError:
+            words = "no SSP archive: it holds no SystemStructure.ssd"
+            raise CouplingError(f"{self.path}: {words}") from None
         except Exception as error:
             raise CouplingError(f"{self.path}: no SSP archive: {error}") from error
         self._folder = tempfile.mkdtemp(prefix="ssp-")

@@ -15,6 +15,13 @@ _NAMES = {
     Refusal.FEED: (Axis.LOAD, "feed.force", "N"),
     Refusal.DRIVE: (Axis.DRIVE, "drive.force", "N"),
 }
+# Names of their ranges among the parameters of the map.
+_RANGES = {
+    Refusal.STIFFNESS: "stiffness",
+    Refusal.VELOCITY: "velocity",
+    Refusal.FEED: "feed",
+    Refusal.DRIVE: "force",
+}
 
 
 def explain_refusal(table: BlowTable, s: Any) -> str:
@@ -30,7 +37,11 @@ def explain_refusal(table: BlowTable, s: Any) -> str:
     if reason in _NAMES:
         axis, name, unit = _NAMES[reason]
         low, high = table.lowest[axis], table.highest[axis]
-        return f"{name} = {value:.6g} {unit}: the blow map covers {low:.6g} to {high:.6g} {unit}"
+        key = f"blow_map.{_RANGES[reason]}_{'from' if value < low else 'to'}"
+        return (
+            f"{name} = {value:.6g} {unit}: the blow map covers {low:.6g} to {high:.6g} {unit}; "
+            f"{key} widens it"
+        )
     if reason == Refusal.MOVING:
         rest = float(s["rest"])
         until = f"after {1e3 * rest:.3g} ms" if np.isfinite(rest) else "in no time of the table"

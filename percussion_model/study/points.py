@@ -157,12 +157,25 @@ def read_axis(text: str) -> tuple[str, np.ndarray]:
         if ":" not in right:
             return key, np.array([float(part) for part in right.split(",")])
         first, last, count = right.split(":")
-        spread = np.geomspace if count.endswith("log") else np.linspace
-        return key, spread(float(first), float(last), int(count.removesuffix("log")))
+        return key, _spread(text, float(first), float(last), count)
+    except SceneError:
+        raise
     except ValueError:
         raise SceneError(
             f"--over {text}: must be KEY=FIRST:LAST:COUNT, KEY=FIRST:LAST:COUNTlog or KEY=A,B,C"
         ) from None
+
+
+def _spread(text: str, first: float, last: float, count: str) -> np.ndarray:
+    """Values at even steps, of the logarithm where `count` says so."""
+    number = int(count.removesuffix("log"))
+    if number < 1:
+        raise SceneError(f"--over {text}: COUNT must be a whole number from 1 on")
+    if not count.endswith("log"):
+        return np.linspace(first, last, number)
+    if not min(first, last) > 0:
+        raise SceneError(f"--over {text}: both ends must be above 0 for steps of the logarithm")
+    return np.geomspace(first, last, number)
 
 
 def refuse_unknown(scene: Scene, points: Points) -> None:

@@ -8,7 +8,8 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from multiprocessing import get_context
+from multiprocessing import active_children, get_context
+from threading import current_thread, main_thread
 from typing import Any
 
 from percussion_model.inputs import SimulationError
@@ -51,10 +52,9 @@ def on_this_machine(
 def _in_a_pool(
     work: Callable[..., Any], tasks: dict[int, Task], processes: int
 ) -> Iterator[tuple[int, Any]]:
-    with _one_thread_each():
-        pool = ProcessPoolExecutor(
-            processes, mp_context=get_context("spawn"), initializer=_leave_interrupts_to_the_parent
-        )
+    others = set(active_children())
+    with _one_thread_each(), _interrupts_left_to_this_process():
+        pool = ProcessPoolExecutor(processes, mp_context=get_context("spawn"))
         running = {pool.submit(work, *task): number for number, task in tasks.items()}
     try:
         while running:
@@ -62,11 +62,23 @@ def _in_a_pool(
             for future in ended:
                 yield running.pop(future), future.result()
     finally:
+        if running:  # interrupted: what workers have begun is not waited for
+            for worker in set(active_children()) - others:
+                worker.terminate()
         pool.shutdown(wait=False, cancel_futures=True)
 
 
-def _leave_interrupts_to_the_parent() -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+@contextmanager
+def _interrupts_left_to_this_process() -> Iterator[None]:
+    """Let processes that are started meanwhile ignore Ctrl-C from their first line on."""
+    if current_thread() is not main_thread():  # others may not touch signals
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 @contextmanager
