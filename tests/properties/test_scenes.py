@@ -127,7 +127,7 @@ def test_a_sound_case_passes(rigid_case):
         ("observe", lambda seen: seen | {"bit_force": -1e3}, "rock pulls"),
         ("observe", lambda seen: seen | {"gap": -1e-9}, "gap"),
         ("observe", lambda seen: seen | {"bit_impulse": 1.01 * seen["bit_impulse"]}, "momentum"),
-        ("statistics", lambda counts: counts | {"events": 1_000_000}, "storm"),
+        ("statistics", lambda counts: counts | {"events": 10_000_000}, "storm"),
     ],
 )
 def test_a_fault_is_seen(rigid_case, monkeypatch, method, change, words):
