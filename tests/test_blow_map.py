@@ -1,28 +1,23 @@
-"""The blow map: its table against the waves, flight against closed forms, refusals, its cache."""
+"""The blow map: its table against the waves, flight against closed forms, refusals."""
 
 from __future__ import annotations
 
 import itertools
-import json
 import math
 import os
-from pathlib import Path
 
 import numpy as np
 import pytest
 from blow_map_scenes import RANGES, mapped
 
 from percussion_model import Scene, SceneError, Simulation, SimulationError, piston_cycle, simulate
-from percussion_model.blow_maps import kept_map, make_map, map_file, node_count
-from percussion_model.cli import _guarded, app
+from percussion_model.blow_maps import make_map
 from percussion_model.core.blow_records import ENTRIES, Axis, Entry
-from percussion_model.solvers.blow_builder import build_table, get_table
 from percussion_model.solvers.blow_map import BlowMapSolver
-from percussion_model.solvers.blow_table import BlowTable, Nodes, TableError, fixed_values
+from percussion_model.solvers.blow_table import BlowTable, Nodes, fixed_values
 from percussion_model.solvers.single_blow import SingleBlow
 
 LONG = bool(os.environ.get("PERCUSSION_LONG"))
-TINY = {"blow_map__density": 0.1}
 
 
 def bits(simulation):
@@ -373,142 +368,3 @@ def test_scenes_without_a_map_are_refused(changes, words):
 def test_a_bit_off_the_rock_is_refused(table):
     with pytest.raises(SceneError, match="stands on"):
         Simulation(mapped(start__rock_gap=0.1))
-
-
-# -------------------------------------------------------------------------- cache
-
-
-@pytest.fixture
-def cache(tmp_path, monkeypatch):
-    monkeypatch.setenv("PERCUSSION_CACHE", str(tmp_path))
-    return tmp_path
-
-
-def test_a_damaged_file_is_made_again(cache):
-    scene = mapped(**TINY)
-    made = make_map(scene, workers=1)
-    path = map_file(scene)
-    whole = path.read_bytes()
-    for damaged in (b"", b"nonsense", whole[: len(whole) // 2], _flipped(whole)):
-        path.write_bytes(damaged)
-        assert kept_map(scene) is None
-    again = make_map(scene, workers=1)
-    assert path.read_bytes() == whole
-    np.testing.assert_array_equal(again.values.astype(np.float32), made.values.astype(np.float32))
-    assert {one.name for one in cache.iterdir()} == {path.name}
-
-
-def _flipped(data):
-    at = len(data) // 2
-    return data[:at] + bytes([data[at] ^ 1]) + data[at + 1 :]
-
-
-def test_an_interrupted_build_goes_on_where_it_was(cache):
-    scene = mapped(**TINY)
-    seen = []
-
-    def stop(done, total):
-        seen.append((done, total))
-        if done == 1:
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        get_table(scene, stop)
-    assert kept_map(scene) is None
-    get_table(scene, lambda done, total: seen.append((done, total)))
-    total = seen[0][1]
-    assert [done for done, _ in seen] == [0, 1, *range(1, total + 1)]
-
-
-def test_builders_side_by_side_do_no_harm(cache):
-    """A second builder that takes the same drafts away while the first is at it."""
-    scene = mapped(**TINY)
-    drafts = map_file(scene).with_suffix(".part")
-    others = []
-
-    def meddle(done, total):
-        if done == 1 and not others:
-            others.append(build_table(scene, drafts))
-
-    table = build_table(scene, drafts, meddle)
-    np.testing.assert_array_equal(table.values, others[0].values)
-
-
-def test_the_file_depends_on_what_the_table_depends_on(cache):
-    base = map_file(mapped())
-    same = {"feed__force": 2200.0, "rock__loading_stiffness": 7e8, "drive__force": 2600.0}
-    same |= {"drive__reversal_distance": 0.05, "start__piston_velocity": 8.0, "title": "other"}
-    for key, value in same.items():
-        assert map_file(mapped(**{key: value})) == base, key
-    for change in (
-        {"rock__unloading_ratio": 6.0},
-        {"loss__time": 1e-7},
-        {"solver__cells": 10},
-        {"bit__sections": [{"length": 0.2, "area": 0.0055}]},
-        {"blow_map__density": 2.0},
-        {"blow_map__feed_to": 4000.0},
-    ):
-        assert map_file(mapped(**change)) != base, change
-
-
-def test_bytes_that_are_no_table_are_refused():
-    with pytest.raises(TableError):
-        BlowTable.from_bytes(b"PK\x03\x04 no archive")
-
-
-def test_nodes_cover_the_ranges():
-    nodes = Nodes.of(Scene().replace(**{"solver.fidelity": "blow-map"}))
-    assert node_count(Scene()) == len(nodes.wanted()) * nodes.counts[0]
-    wanted = set(nodes.wanted())
-    rng = np.random.default_rng(2)
-    for _ in range(2000):
-        v, feed, force = (
-            rng.uniform(nodes.lowest[axis], nodes.highest[axis])
-            for axis in (Axis.VELOCITY, Axis.LOAD, Axis.DRIVE)
-        )
-        place = (v, (feed + nodes.weight) / v, force / v)
-        cell = [
-            int((math.log(value) - nodes.origin[axis]) / nodes.step[axis])
-            for value, axis in zip(place, (Axis.VELOCITY, Axis.LOAD, Axis.DRIVE), strict=True)
-        ]
-        for corner in np.ndindex(2, 2, 2):
-            assert tuple(int(c + d) for c, d in zip(cell, corner, strict=True)) in wanted
-
-
-# ------------------------------------------------------------------- ladder, command
-
-
-def test_the_rigid_rung_is_the_rigid_scene():
-    """An elastic scene on the rigid rung gives the bits of one whose bodies are rigid."""
-    rung = simulate(Scene().replace(**{"solver.fidelity": "rigid"}), 1.0, settle=0.2)
-    rigid = simulate(Scene().computed_by("rigid"), 1.0, settle=0.2)
-    assert rung.solver == rigid.solver == "rigid"
-    assert rung.blows.tobytes() == rigid.blows.tobytes()
-    assert not rung.warnings
-
-
-def test_a_name_says_how_waves_are_computed_and_nothing_else():
-    with pytest.raises(SceneError, match=r"solver\.fidelity = \"rigid\" and solver\.name"):
-        Scene().replace(**{"solver.fidelity": "rigid", "solver.name": "fem"})
-    assert Scene().computed_by("blow-map").solver_name == "blow-map"
-    assert Scene().computed_by("blow-map").computed_by("fem").solver_name == "fem"
-
-
-def test_the_command_makes_shows_and_finds_a_table(cache, tmp_path, capsys):
-    path = tmp_path / "scene.toml"
-    mapped(**TINY).to_toml(path)
-
-    def call(*words):
-        assert not _guarded(lambda: app(["blow-map", str(path), *words], standalone_mode=False))
-        return capsys.readouterr().out
-
-    file = Path(call("where").strip())
-    assert file.parent == cache
-    assert "not made yet" in call("show")
-    assert not file.exists()
-    assert "kept" in call("--workers", "1")
-    assert file.exists()
-    told = json.loads(call("show", "--json", "-"))
-    assert told["made"]
-    assert told["restless_nodes"] == 0
-    assert told["range"]["feed_force"] == list(RANGES["feed"])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import matplotlib
@@ -16,6 +17,8 @@ NAME = "effects"
 COST_COLOUR, MORE_COLOUR, LESS_COLOUR = "#0072B2", "#D55E00", "#009E73"
 # Changes beyond this are cut off, and their number says so [%].
 WIDEST = 60.0
+# Room beside the longest bar for its number, as a factor on its length.
+ROOM = 1.75
 # Changes below this are none [%].
 NOTHING = 5e-3
 
@@ -41,7 +44,7 @@ def draw_effects(found: EffectsStudy) -> Figure:
         (axes[4], "peak_bit_force", "Peak bit force"),
     ):
         _changes(ax, [found.changes(trial)[key] for trial in trials])
-        style.label(ax, "change [%], hatched: cut", "", title)
+        style.label(ax, "change [%], hatched: beyond", "", title)
     axes[0].set_yticks(range(len(trials)), names)
     axes[0].invert_yaxis()
     for ax in axes:
@@ -78,19 +81,23 @@ def _changes(ax: Axes, values: list[float | None]) -> None:
     shares = [None if value is None else 100.0 * value for value in values]
     known = [abs(share) for share in shares if share is not None]
     end = min(max([1.0, *known]), WIDEST)
-    ax.set_xlim(-1.75 * end, 1.75 * end)
+    ax.set_xlim(-ROOM * end, ROOM * end)
     for y, share in enumerate(shares):
         if share is None:
             ax.text(0.0, y, " –", va="center")
             continue
-        shown = max(-end, min(end, share))
         cut = abs(share) > end
+        # a cut bar leaves the picture, and says so within it
+        shown = math.copysign(ROOM * end, share) if cut else share
         colour = MORE_COLOUR if share >= 0.0 else LESS_COLOUR
         ax.barh(y, shown, height=0.62, color=colour, hatch="///" if cut else None, edgecolor="w")
         align = "left" if share >= 0.0 else "right"
         text = f" {share:+.2g} " if abs(share) < 100.0 else f" {share:+.0f} "
         text = " 0 " if abs(share) < NOTHING else text
-        ax.text(shown, y, text, va="center", ha=align, fontsize=8.0)
+        if cut:
+            align = "right" if share >= 0.0 else "left"
+        box = {"facecolor": "white", "edgecolor": "none", "pad": 0.8} if cut else None
+        ax.text(shown, y, text, va="center", ha=align, fontsize=8.0, bbox=box)
     ax.axvline(0.0, color=style.RULE_COLOUR, linewidth=0.8)
 
 
