@@ -150,6 +150,13 @@ def meet_piston(par, s, wp, wb, cb, v_p, v_t, in_p, in_t, elastic, tau, time, bl
         )
     book_end(s, par.z_t, par.kappa_t, in_t, d_t, q_t, tau)
     wb[FACE, 0] = d_t / tau
+    if t_close >= 0.0 and par.front > 0.0:
+        # what averaging takes from a front is what loss would have taken
+        taken = par.z_t * (q_t - d_t * d_t / tau)
+        if par.piston == ELASTIC:
+            taken += par.z_p * (q_p - d_p * d_p / tau)
+        s.e_numerical -= taken
+        s.e_loss += taken
     if closed != s.closed or t_close >= 0.0 or closed == 1:
         s.closed = closed
         record_contact(par, s, wb, cb, opened, t_close, v_p - v_t, peak, time, tau, blows, events)
@@ -158,14 +165,15 @@ def meet_piston(par, s, wp, wb, cb, v_p, v_t, in_p, in_t, elastic, tau, time, bl
 
 
 @merged
-def time_to_blow(par, s, approach, tau, time):
-    """Time until a blow starts within the step, `tau` where none does [s]."""
+def time_to_cut(par, s, approach, tau):
+    """Time at which to end the step for a closure to come, `tau` for the whole [s].
+
+    The next step then has the closure at `par.front` of its time.
+    """
     if s.live == 0 or s.closed == 1 or approach <= 0.0:
         return tau
-    reach = s.gap / approach
+    reach = s.gap / approach - par.front * tau
     if reach < SHORTEST_PART * tau or reach > (1.0 - SHORTEST_PART) * tau:
-        return tau
-    if not starts_blow(par, s, time + reach):
         return tau
     return reach
 
@@ -177,8 +185,8 @@ def meet(par, s, wp, cp, wb, cb, tau, blows, events):
     Mean motion, gap, penetration, modes, impulses and the ledger move on; the
     waves in the bars do not.
 
-    A closure of the gap that starts a blow ends the time early, so that the
-    front of the blow begins with a step and is not averaged over a cell.
+    Where the gap is about to close the time ends early, so that the closure comes
+    in a step at the place that gives its front the right width.
 
     Returns
     -------
@@ -216,11 +224,7 @@ def meet(par, s, wp, cp, wb, cb, tau, blows, events):
         else:
             v_p = s.v_p + kick
             elastic += v_p
-        reach = time_to_blow(par, s, v_p - v_t, tau, time)
-        if reach < tau:
-            # the blow starts with the next step, whatever rounding says
-            tau = reach
-            s.gap = math.inf
+        tau = time_to_cut(par, s, v_p - v_t, tau)
         if par.piston == ELASTIC:
             book_end(s, par.z_f, par.kappa_f, top_p, v_f * tau, v_f * v_f * tau, tau)
     else:

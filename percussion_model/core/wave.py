@@ -73,7 +73,6 @@ def shorten_step(par, s, wp, cp, wb, cb, tau, loss_before, push, dv_p, dv_b):
         s.e_numerical += part_of_step(wp, cp, par.n_p, r, share)
         a = par.gravity + push / par.mass_p
         s.e_numerical -= 0.5 * par.mass_p * a * par.dt * rest * dv_p
-    s.gap = 0.0
     s.t_base -= par.dt - tau
 
 

@@ -80,6 +80,7 @@ WAVE_PAR = np.dtype(
         ("kappa_t", "f8"),
         ("kappa_b", "f8"),
         ("kappa_f", "f8"),
+        ("front", "f8"),  # share of a step before its closure, docs/numerics.md, eq. 14b
         ("ss_stiffness", "f8"),  # gamma K_R for which standstill leaps were made [N/m]
         ("ss_loading", "f8"),  # K_R for which loading leaps were made
         ("ss_damping", "f8"),  # C_R for the same

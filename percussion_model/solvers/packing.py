@@ -9,7 +9,7 @@ import numpy as np
 from percussion_model.core.records import DriveKind, Mode, Piston, RockKind
 from percussion_model.core.wave_records import WAVE_PAR, Coef
 from percussion_model.scene_rules import SceneRules
-from percussion_model.solvers.grid import Grid, end_viscosity, substeps
+from percussion_model.solvers.grid import Grid, end_viscosity, place_of_closure, substeps
 
 # An open gap of this many transits of the slower bar ends a blow where no
 # pressure law does (docs/model.md, section 7).
@@ -78,6 +78,8 @@ def pack_parameters(
         p["kappa_f"], p["kappa_p"] = end_viscosity(cp, piston, loss_time)
         p["bound_p"] = _offset_bound(cp, piston, Coef.BOTTOM)
         slowest = max(slowest, scene.piston.transit_time)
+    shortest = bit.n if piston is None else min(bit.n, piston.n)
+    p["front"] = place_of_closure(loss_time / bit.time_step * shortest)
     p["rearm_time"] = REARM_TRANSITS * slowest
     rock = rock_numbers(scene)
     p["ss_stiffness"] = rock["gamma"] * rock["k_r"]
