@@ -6,8 +6,6 @@ ends (docs/numerics.md, section 1). Mean motion and the ledger move along.
 
 from __future__ import annotations
 
-import math
-
 from percussion_model.core.bar import face_velocities, send_waves, send_waves_with_loss
 from percussion_model.core.blows import push_event, start_blow, starts_blow
 from percussion_model.core.contact import bar_contact, mass_contact

@@ -34,7 +34,10 @@ def top_at_rest(c, n, a):
 
 @kernel
 def watch_gap(par, s, wp, cp, wb, cb, of_bit, of_piston, x, y, steps):
-    """Number of steps, at most `steps`, at whose end the gap is still open.
+    """Number of steps, at most `steps`, before which no gap closes.
+
+    Nor within half a step after, so that a closure finds its step uncut
+    (docs/numerics.md, section 6).
 
     Parameters
     ----------
@@ -69,8 +72,11 @@ def watch_gap(par, s, wp, cp, wb, cb, of_bit, of_piston, x, y, steps):
     base += s.gap
     v = v_b - s.v_p
     a = a_b - par.gravity - drive_force(par, s) / par.mass_p
+    before = s.gap
     for k in range(steps):
         t = (k + 1) * par.dt
-        if base + y[k] + (v + 0.5 * a * t) * t <= 0.0:
+        gap = base + y[k] + (v + 0.5 * a * t) * t
+        if gap + 0.5 * min(gap - before, 0.0) <= 0.0:
             return k
+        before = gap
     return steps

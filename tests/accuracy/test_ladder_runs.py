@@ -14,7 +14,7 @@ from percussion_model.accuracy import study
 from percussion_model.accuracy.integrators import GeneralRun
 from percussion_model.accuracy.ladders import LADDERS, fem_scene, ladders
 from percussion_model.accuracy.problems import APERIODIC, Run, pose
-from percussion_model.accuracy.quantities import RATE
+from percussion_model.accuracy.quantities import HISTORY, RATE
 from percussion_model.accuracy.timing import interleaved
 from percussion_model.cli import app
 from percussion_model.commands.accuracy_tables import show_study
@@ -53,9 +53,11 @@ def test_finer_waves_are_better_and_dearer(found):
     points = [point for point in found.ladder("wave") if point.fit < 1e-6]
     errors = [point.errors[RATE] for point in points]
     assert [point.label for point in points] == ["20 cells", "40 cells", "60 cells"]
-    assert errors[0] > 5.0 * errors[1] > 0
-    assert errors[0] < 2e-3
-    order = found.order("wave", RATE)
+    assert max(errors) < 2e-4
+    # the rate passes thresholds and converges by leaps; the force of a blow does not
+    shapes = [point.errors[HISTORY] for point in points]
+    assert shapes[0] > 1.5 * shapes[1] > 2.0 * shapes[2] > 0
+    order = found.order("wave", HISTORY)
     assert order is not None
     assert order.value > 1.0
 
@@ -73,7 +75,7 @@ def test_a_rigid_hammer_has_an_error_and_no_order(found):
 
 def test_advice_names_a_method_that_keeps_the_word(found):
     text = found.advice(1e-3)
-    assert text.startswith("For 0.1 % take wave, 40 cells")
+    assert text.startswith("For 0.1 % take wave, 20 cells")
     assert "no method" in found.advice(1e-9)
 
 
