@@ -9,52 +9,38 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from percussion_model.commands.common import (
-    Cells,
-    Duration,
-    JsonFile,
-    Out,
-    SceneFile,
-    Settings,
-    Settle,
-    SolverName,
-    check_json,
-    complain,
-    load_scene,
-    needs_plot_extra,
-    write_json,
-)
+from percussion_model.commands import common
 
 if TYPE_CHECKING:
     from percussion_model.effects import EffectsStudy, Trial
 
 
 def effects(
-    scene: SceneFile,
-    duration: Duration = None,
-    settle: Settle = None,
-    solver: SolverName = None,
-    cells: Cells = None,
-    settings: Settings = None,
-    out: Out = None,
-    json_file: JsonFile = None,
+    scene: common.SceneFile,
+    duration: common.Duration = None,
+    settle: common.Settle = None,
+    solver: common.SolverName = None,
+    cells: common.Cells = None,
+    settings: common.Settings = None,
+    out: common.Out = None,
+    json_file: common.JsonFile = None,
     figures: Annotated[bool, typer.Option(help="Draw cost and change as bars.")] = True,
 ) -> None:
     """Turn each effect off, or on, in turn: what it costs and what it changes."""
     from percussion_model.effects import study_effects
-    from percussion_model.result_files import check_writable
 
-    chosen = load_scene(scene, solver, cells, settings)
+    chosen = common.load_scene(scene, solver, cells, settings)
     folder = out or Path("out") / f"{scene.stem}-effects"
-    if figures:
-        check_writable(folder)
-    check_json(json_file)
+    common.check_outputs(folder if figures else None, json_file)
     found = study_effects(chosen, duration, settle, _report)
-    write_json(json_file, found.to_dict())
+    common.write_json(json_file, found.to_dict())
     if json_file != "-":
         show_effects(found)
     if figures:
-        _draw(found, folder)
+        with common.if_drawable():
+            from percussion_model.plotting.effects import save_effects
+
+            common.tell_files(save_effects(found, folder))
 
 
 def _report(what: str, share: float) -> None:
@@ -138,13 +124,3 @@ def _change(found: EffectsStudy, trial: Trial, name: str) -> str:
         return "-"
     shown = f"{100.0 * change:+.2f}"
     return "0.00" if float(shown) == 0.0 else shown
-
-
-def _draw(found: EffectsStudy, folder: Path) -> None:
-    try:
-        from percussion_model.plotting.effects import save_effects
-    except ImportError as error:
-        complain(needs_plot_extra(error))
-        return
-    for path in save_effects(found, folder):
-        print(path, file=sys.stderr)

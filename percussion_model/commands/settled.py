@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
-import typer
-
 from percussion_model.commands.common import (
     Cells,
     JsonFile,
     SceneFile,
     Settings,
     SolverName,
+    Tolerance,
     check_json,
     load_scene,
     write_json,
@@ -23,9 +20,7 @@ def settled(
     solver: SolverName = None,
     cells: Cells = None,
     settings: Settings = None,
-    tolerance: Annotated[
-        float, typer.Option("--tolerance", help="Relative change of a blow that is no change.")
-    ] = 1e-4,
+    tolerance: Tolerance = 1e-4,
     json_file: JsonFile = None,
 ) -> None:
     """Run until the blows repeat: rate, period, order and stability of the cycle."""

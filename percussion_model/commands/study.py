@@ -15,6 +15,7 @@ from percussion_model.commands.common import (
     SceneFile,
     Settings,
     SolverName,
+    Tolerance,
     complain,
     load_scene,
 )
@@ -45,9 +46,7 @@ def study(
     solver: SolverName = None,
     cells: Cells = None,
     settings: Settings = None,
-    tolerance: Annotated[
-        float, typer.Option("--tolerance", help="Relative change of a blow that is no change.")
-    ] = 1e-4,
+    tolerance: Tolerance = 1e-4,
     processes: Annotated[
         int | None, typer.Option("--processes", help="On this machine; default: its cores.")
     ] = None,
