@@ -36,11 +36,14 @@ def accuracy(
         typer.Option("--make-references", help="Make the stored references of the scenes anew."),
     ] = False,
     settings: common.Settings = None,
-    out: common.Out = None,
+    out: common.OutOrDefault = None,
     json_file: common.JsonFile = None,
     figures: Annotated[bool, typer.Option(help="Draw error against time.")] = True,
 ) -> None:
-    """Measure error against time: waves, finite elements, rigid bars, general integrators."""
+    """Measure error against time: waves, finite elements, rigid bars, general integrators.
+
+    Prints tables; figures, and the numbers as JSON unless --json is given, go to out/accuracy.
+    """
     from percussion_model.accuracy.ladders import chosen_ladders
     from percussion_model.commands.accuracy_tables import show_bars, show_study
     from percussion_model.scene import Scene

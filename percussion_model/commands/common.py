@@ -44,6 +44,11 @@ JsonFile = Annotated[
     typer.Option("--json", metavar="FILE|-", help="Write the summary as JSON; - for stdout."),
 ]
 Out = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder for results.")]
+# Of commands that write without being told where; each says which folder that is.
+OutOrDefault = Annotated[
+    Path | None,
+    typer.Option("--out", metavar="DIR", help="Folder for what is written, in place of that."),
+]
 Tolerance = Annotated[
     float, typer.Option("--tolerance", help="Relative change of a blow that is no change.")
 ]
@@ -115,7 +120,7 @@ def if_drawable() -> Iterator[None]:
 def tell_files(paths: Iterable[Path]) -> None:
     """Name on stderr the files that were written."""
     for path in paths:
-        print(path, file=sys.stderr)
+        print(f"wrote {path}", file=sys.stderr)
 
 
 def needs_plot_extra(error: ImportError) -> str:

@@ -19,11 +19,11 @@ def compare(
     duration: common.Duration = None,
     settle: common.Settle = None,
     settings: common.Settings = None,
-    out: common.Out = None,
+    out: common.OutOrDefault = None,
     json_file: common.JsonFile = None,
     figures: Annotated[bool, typer.Option(help="Draw the last blow of all solvers.")] = True,
 ) -> None:
-    """Run a scene with several solvers: a table and a figure side by side."""
+    """Run a scene with several solvers: a table, and a figure in out/SCENE-compared."""
     from percussion_model.commands.tables import show_comparison
     from percussion_model.comparison import compare as run_all
     from percussion_model.comparison import read_solvers

@@ -32,11 +32,14 @@ def couple(
         list[str] | None,
         typer.Option("--signal", metavar="COMPONENT.VARIABLE", help="Keep this output too."),
     ] = None,
-    out: common.Out = None,
+    out: common.OutOrDefault = None,
     json_file: common.JsonFile = None,
     figures: Annotated[bool, typer.Option(help="Draw the signals.")] = True,
 ) -> int:
-    """Run a system of FMUs, an SSP archive: signals as CSV, balances, a figure."""
+    """Run a system of FMUs, an SSP archive: signals as CSV, balances, a figure.
+
+    Files go to out/SYSTEM.
+    """
     try:
         from percussion_model.coupling import Coupling
         from percussion_model.coupling.balance import known_signals, summary

@@ -69,13 +69,14 @@ def explain(
 ) -> None:
     """Tell what a scene computes, how, and what the run will cost."""
     from percussion_model.forecast import explained, forecast
-    from percussion_model.terminal import show_explanation
+    from percussion_model.terminal import show_explanation, waiting_bar
 
     chosen = common.load_scene(scene, solver, cells, settings, accuracy, check)
     common.check_json(json_file)
     if chosen.solver_name == "blow-map":
         ready_map(chosen)
-    found = forecast(chosen)
+    with waiting_bar():
+        found = forecast(chosen)
     common.write_json(json_file, explained(chosen, found))
     if json_file != "-":
         show_explanation(chosen, found)

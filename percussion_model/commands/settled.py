@@ -25,10 +25,12 @@ def settled(
 ) -> None:
     """Run until the blows repeat: rate, period, order and stability of the cycle."""
     from percussion_model.stationary import settled as settle
-    from percussion_model.terminal import show_settled
+    from percussion_model.terminal import show_settled, waiting_bar
 
     check_json(json_file)
-    found = settle(load_scene(scene, solver, cells, settings), tolerance)
+    chosen = load_scene(scene, solver, cells, settings)
+    with waiting_bar():
+        found = settle(chosen, tolerance)
     write_json(json_file, found.summary())
     if json_file != "-":
         show_settled(found)

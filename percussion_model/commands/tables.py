@@ -47,8 +47,7 @@ def show_comparison(found: Comparison) -> None:
         table.add_row(label, *cells)
     console = Console()
     console.print(table)
-    for name, result in found.results.items():
-        show_warnings(console, [f"{name}: {text}" for text in result.warnings])
+    show_warnings(console, found.warnings())
 
 
 # How dear a run was and how true to its ledger: name, and where in a summary.
