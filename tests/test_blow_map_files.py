@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from blow_map_scenes import RANGES, mapped
 
+from fmu_src.runtime.blow_map import read_blow_map
 from percussion_model import Scene, SceneError, simulate
 from percussion_model.blow_maps import kept_map, make_map, map_file, node_count, outside_map
 from percussion_model.cli import _guarded, app
@@ -92,6 +93,18 @@ def test_the_file_depends_on_what_the_table_depends_on(cache):
         {"blow_map__feed_to": 4000.0},
     ):
         assert map_file(mapped(**change)) != base, change
+
+
+def test_an_fmu_unpacked_over_another_brings_its_own_table(cache, tmp_path):
+    folder = tmp_path / "resources"
+    folder.mkdir()
+    found = []
+    for feed_to in (3000.0, 3500.0):
+        scene = mapped(**TINY, blow_map__feed_to=feed_to)
+        (folder / "blow_map.npz").write_bytes(make_map(scene, workers=1).to_bytes())
+        found.append(read_blow_map(str(folder)))
+        assert read_blow_map(str(folder)) is found[-1]
+    assert [table.highest[Axis.LOAD] for table in found] == [3000.0, 3500.0]
 
 
 def test_bytes_that_are_no_table_are_refused():

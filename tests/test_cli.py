@@ -188,6 +188,9 @@ def test_bad_scenes_are_one_message_on_stderr(percussion, tmp_path, text, messag
         (["run", RIGID, "--cells", "many"], "--cells"),
         (["plot", "nowhere.toml"], "there is no such folder or scene file"),
         (["plot", str(SCENARIOS)], "no result folder, it has no summary.json"),
+        (["run", RIGID, "--json", str(SCENARIOS)], "is a folder; give the file to write"),
+        (["study", RIGID, "--over", "feed.force=1:2:3", "--out", RIGID], "cannot be written"),
+        (["accuracy", RIGID, RIGID, "--json", "-"], "must differ"),
         (["explain", "nowhere.toml"], "there is no such scene file"),
         (["drill"], "drill"),
     ],
@@ -209,6 +212,22 @@ def test_an_unwritable_folder_is_refused_before_the_run(percussion, tmp_path):
         assert "cannot be written" in err
     assert time.monotonic() - began < 5
     assert os.listdir(tmp_path) == ["file"]
+
+
+def test_ctrl_c_is_told_whatever_the_command(percussion, monkeypatch):
+    def interrupted(*words, **options):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(
+        importlib.import_module("percussion_model.comparison"), "compare", interrupted
+    )
+    monkeypatch.setattr(
+        importlib.import_module("percussion_model.forecast"), "forecast", interrupted
+    )
+    for words in (["compare", RIGID, "--solvers", "rigid", "--no-figures"], ["explain", RIGID]):
+        code, out, err = percussion(*words)
+        assert (code, out) == (INTERRUPTED, "")
+        assert err == "percussion: interrupted before there was a result\n"
 
 
 # ------------------------------------------------------------------ whole processes

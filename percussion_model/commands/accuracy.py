@@ -54,6 +54,11 @@ def accuracy(
         chosen = [("reference", Scene(title=title))]
         if settings:
             raise common.refusal("--set needs a SCENE to change")
+    names = [name for name, _ in chosen]
+    if len(set(names)) < len(names):
+        raise common.refusal(
+            f"{', '.join(names)}: results take the names of the scene files, which must differ"
+        )
     words = None if methods is None else [word.strip() for word in methods.split(",")]
     chosen_ladders(words)  # refuses before anything is computed
     folder = out or Path("out") / "accuracy"

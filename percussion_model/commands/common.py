@@ -94,8 +94,11 @@ def check_json(json_file: str | None) -> None:
     """Refuse a file that could not be written, before anything is computed."""
     from percussion_model.result_files import check_writable
 
-    if json_file not in (None, "-"):
-        check_writable(Path(json_file).absolute().parent)
+    if json_file in (None, "-"):
+        return
+    if Path(json_file).is_dir():
+        raise refusal(f"--json {json_file!r}: is a folder; give the file to write, or - for stdout")
+    check_writable(Path(json_file).absolute().parent)
 
 
 def write_json(json_file: str | None, values: dict[str, Any]) -> None:

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 def paper(
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the results.")],
     processes: Annotated[
-        int | None, typer.Option("--processes", help="For the sweeps; default: all cores.")
+        int | None, typer.Option("--processes", min=1, help="For the sweeps; default: all cores.")
     ] = None,
     json_file: JsonFile = None,
 ) -> None:

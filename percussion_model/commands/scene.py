@@ -92,15 +92,18 @@ def plot(
 ) -> None:
     """Draw the figures of a result, or run a scene and draw them."""
     from percussion_model.result import Result
-    from percussion_model.result_files import check_writable
     from percussion_model.scene import Scene
     from percussion_model.simulation import simulate
     from percussion_model.terminal import progress_bar
 
+    try:
+        from percussion_model.plotting import figures
+    except ImportError as error:
+        raise common.refusal(common.needs_plot_extra(error)) from None
     if not source.exists():
         raise common.refusal(f"{source}: there is no such folder or scene file")
     folder = out or (source if source.is_dir() else Path("out") / source.stem)
-    check_writable(folder)
+    common.check_outputs(folder, None)
     if source.is_dir():
         if duration is not None or settle is not None:
             raise common.refusal(f"{source}: has been run; give its scene file")
@@ -109,10 +112,6 @@ def plot(
         scene = Scene.from_toml(source)
         with progress_bar(scene.run.duration if duration is None else duration) as progress:
             result = simulate(scene, duration, settle, progress=progress)
-    try:
-        from percussion_model.plotting import figures
-    except ImportError as error:
-        raise common.refusal(common.needs_plot_extra(error)) from None
     for path in figures(result, folder):
         typer.echo(str(path))
 
