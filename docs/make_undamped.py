@@ -105,7 +105,8 @@ def draw(rows: list[dict[str, Any]]) -> Figure:
     above.annotate("warned of", (2e-10, 15.2), fontstyle="italic")
     above.legend(loc="upper right")
     style.label(above, "", "rate of penetration [mm/s]")
-    style.label(below, "structural loss, Kelvin–Voigt time $\\eta$ [s]", "coarse to fine [%]")
+    finest = f"greatest difference\nto {CELLS[-1]} cells [%]"
+    style.label(below, "structural loss, Kelvin–Voigt time $\\eta$ [s]", finest)
     style.head(fig, "Without enough loss the answer is another one, and depends on the cells")
     return fig
 

@@ -8,9 +8,10 @@ from pathlib import Path
 
 from percussion_model.scene import Scene
 from percussion_model.solvers.blow_builder import cache_folder, get_table, kept_table, table_file
+from percussion_model.solvers.blow_refusals import notes_outside
 from percussion_model.solvers.blow_table import BlowTable, Nodes
 
-__all__ = ["cache_folder", "kept_map", "make_map", "map_file", "node_count"]
+__all__ = ["cache_folder", "kept_map", "make_map", "map_file", "node_count", "outside_map"]
 
 
 def mapped(scene: Scene) -> Scene:
@@ -61,6 +62,11 @@ def kept_map(scene: Scene) -> BlowTable | None:
 def map_file(scene: Scene) -> Path:
     """File that keeps the table of a scene, whether it is there or not."""
     return table_file(mapped(scene))
+
+
+def outside_map(scene: Scene) -> list[str]:
+    """What of a scene itself its table would not answer: a text for each such parameter."""
+    return notes_outside(mapped(scene))
 
 
 def node_count(scene: Scene) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import sys
 from collections.abc import Callable
 from typing import Annotated, Any
@@ -48,6 +49,19 @@ def _options(
     """Percussive drilling with travelling waves: piston, bit and rock, blow by blow."""
 
 
+def _interruptible(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Let `_guarded` know of Ctrl-C, after which typer would end without a word."""
+
+    @functools.wraps(command)
+    def call(*words: Any, **options: Any) -> Any:
+        try:
+            return command(*words, **options)
+        except KeyboardInterrupt:
+            raise typer.Abort from None
+
+    return call
+
+
 for _command in (
     run,
     settled,
@@ -63,8 +77,8 @@ for _command in (
     bench_controller,
     new,
 ):
-    app.command()(_command)
-app.command("blow-map")(blow_map)
+    app.command()(_interruptible(_command))
+app.command("blow-map")(_interruptible(blow_map))
 
 
 def main() -> None:

@@ -11,6 +11,7 @@ from percussion_model.result import Result
 from percussion_model.scene import Scene, SceneError
 from percussion_model.simulation import simulate
 from percussion_model.solver_options import SolverName
+from percussion_model.warnings_of_run import unused_note
 
 __all__ = ["COMPARED", "Comparison", "compare", "read_solvers"]
 
@@ -66,6 +67,22 @@ class Comparison:
             for name, summary in summaries.items()
             if name != self.first
         }
+
+    def warnings(self) -> list[str]:
+        """Warnings of all results, each after the name of its solver.
+
+        A parameter that one of the solvers needs was given for it, not in vain: only those
+        that no solver needs are told, once.
+        """
+        scenes = [result.scene for result in self.results.values()]
+        in_vain = [
+            key for key in scenes[0].unused if all(key in scene.unused for scene in scenes[1:])
+        ]
+        told = [unused_note(in_vain)] if in_vain else []
+        for name, result in self.results.items():
+            own = unused_note(result.scene.unused)
+            told += [f"{name}: {text}" for text in result.warnings if text != own]
+        return told
 
     def to_dict(self) -> dict[str, Any]:
         """Summaries and differences as plain values for JSON."""

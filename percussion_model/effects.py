@@ -71,11 +71,14 @@ class Trial:
         """Why there is no rate of penetration, or why it must not be trusted; may be empty."""
         if self.turn.no_blows or self.turn.no_penetration:
             return self.turn.no_blows or self.turn.no_penetration
+        reasons = [text for text in self.result.warnings if "trusted" in text]
         if len(self.result.counted) < LEAST_BLOWS:
-            return next((text for text in self.result.warnings if "blow" in text), "")
-        if self.undecided:
-            return "the motion is aperiodic, and the run too short to tell its rate of penetration"
-        return next((text for text in self.result.warnings if "trusted" in text), "")
+            reasons += [text for text in self.result.warnings if "whole blow" in text][:1]
+        elif self.undecided:
+            reasons += [
+                "the motion is aperiodic, and the run too short to tell its rate of penetration"
+            ]
+        return "; ".join(reasons)
 
     @property
     def undecided(self) -> bool:

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 # A longer trace goes into a compressed NumPy file.
 LONGEST_CSV = 100_000
 
+# What tells a result from any other folder.
+_MARKS = ("summary.json", "scene.toml")
 _TRACES = ("trace.csv", "trace.npz")
 
 
@@ -139,6 +141,12 @@ def read_result(folder: Path) -> dict[str, Any]:
     """Read the fields of a `Result` that was saved in a folder."""
     if not folder.is_dir():
         raise ResultError(f"{folder}: there is no such result folder")
+    missing = [name for name in _MARKS if not (folder / name).is_file()]
+    if missing:
+        raise ResultError(
+            f"{folder}: no result folder, it has no {' and no '.join(missing)}; "
+            "percussion run SCENE --out DIR writes one"
+        )
     scene = Scene.from_toml(folder / "scene.toml")
     try:
         summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))

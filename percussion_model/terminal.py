@@ -17,10 +17,7 @@ from rich.table import Table
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
 
-    from percussion_model.comparison import Comparison
     from percussion_model.forecast import Forecast
-    from percussion_model.hard_cases import Collection
-    from percussion_model.paper.statements import Statement
     from percussion_model.result import Result
     from percussion_model.scene import Scene
     from percussion_model.stationary import Settled
@@ -30,7 +27,7 @@ if TYPE_CHECKING:
 _PATIENCE = 2.0
 
 # Rows of the table: name, key of the summary, factor, unit.
-_SHOWN = (
+SHOWN = (
     ("Rate of penetration", "rate_of_penetration", 1e3, "mm/s"),
     ("Rate: estimated error", "rate_of_penetration_relative_error", 100.0, "%"),
     ("Blow period", "blow_period", 1e3, "ms"),
@@ -46,7 +43,7 @@ _SHOWN = (
     ("Standstill bit force", "standstill_bit_force", 1e-3, "kN"),
 )
 
-_ONLY_WHERE_KNOWN = ("rate_of_penetration_relative_error",)
+ONLY_WHERE_KNOWN = ("rate_of_penetration_relative_error",)
 
 
 def show_summary(result: Result) -> None:
@@ -56,9 +53,9 @@ def show_summary(result: Result) -> None:
     table.add_column(justify="left")
     table.add_column(justify="right")
     table.add_column(justify="left")
-    for name, key, factor, unit in _SHOWN:
+    for name, key, factor, unit in SHOWN:
         value = summary[key]
-        if key in _ONLY_WHERE_KNOWN and value is None:
+        if key in ONLY_WHERE_KNOWN and value is None:
             continue
         table.add_row(name, "-" if value is None else f"{factor * value:.5g}", unit)
     energy = summary["energy"]
@@ -88,7 +85,7 @@ def show_settled(found: Settled) -> None:
         ("Blow period", "blow_period", 1e3, "ms"),
         ("Multiplier of the cycle", "multiplier", 1.0, ""),
     ):
-        table.add_row(name, f"{_number(summary[key], factor)} {unit}".rstrip())
+        table.add_row(name, f"{number(summary[key], factor)} {unit}".rstrip())
     table.add_row("Blows run", f"{len(found.blows)} in {found.duration:.4g} s")
     Console().print(table)
 
@@ -116,103 +113,15 @@ def show_study(found: Study, files: list[Path]) -> None:
         show_warnings(console, [f"{len(failed)} points failed, the first at {first}"])
 
 
-def show_statements(said: list[Statement]) -> None:
-    """Print what the paper says beside what was found."""
-    table = Table(show_lines=True)
-    for heading in ("section", "the paper says", "found here", ""):
-        table.add_column(heading)
-    for one in said:
-        verdict = "[green]agrees[/green]" if one.agrees else "[yellow]differs[/yellow]"
-        table.add_row(one.place, escape(one.says), escape(one.found), verdict)
-    console = Console()
-    console.print(table)
-    for one in said:
-        if one.why and not one.agrees:
-            console.print(f"{one.place}: {escape(one.why)}", highlight=False)
-
-
 def show_warnings(console: Console, warnings: list[str]) -> None:
     """Print warnings, if there are any."""
     for text in warnings:
         console.print(f"[yellow]warning:[/yellow] {escape(text)}", highlight=False)
 
 
-def show_comparison(found: Comparison) -> None:
-    """Print the numbers of several solvers, each beside its difference to the first."""
-    summaries, differences = found.summaries(), found.differences()
-    title = found.results[found.first].scene.title
-    table = Table(title=escape(title) or None)
-    table.add_column("", min_width=22)
-    for name in summaries:
-        table.add_column(name, justify="right", no_wrap=True)
-        if name in differences:
-            table.add_column("off, %", justify="right", no_wrap=True)
-    for label, key, factor, unit in _SHOWN:
-        if key in _ONLY_WHERE_KNOWN:
-            continue
-        cells = []
-        for name, summary in summaries.items():
-            cells.append(_number(summary[key], factor))
-            if name in differences:
-                off = differences[name].get(key)
-                cells.append("-" if off is None else f"{100.0 * off:+.2f}")
-        table.add_row(f"{label}, {unit}" if unit else label, *cells)
-    table.add_section()
-    for label, value in _EFFORT.items():
-        cells = []
-        for name, summary in summaries.items():
-            found_here = value(summary)
-            cells.append("-" if found_here is None else f"{found_here:.2g}")
-            cells += [""] * (name in differences)
-        table.add_row(label, *cells)
-    console = Console()
-    console.print(table)
-    for name, result in found.results.items():
-        show_warnings(console, [f"{name}: {text}" for text in result.warnings])
-
-
-# How dear a run was and how true to its ledger: name, and where in a summary.
-_EFFORT: dict[str, Callable[[dict[str, Any]], float | None]] = {
-    "Computed in, s": lambda summary: summary["wall_time"],
-    "Times real time": lambda summary: summary["real_time_factor"],
-    "Ledger: numerical": lambda summary: summary["energy"]["numerical_relative"],
-    "Ledger: residual": lambda summary: summary["energy"]["residual_relative"],
-}
-
-
-def _number(value: float | None, factor: float) -> str:
-    return "-" if value is None else f"{factor * value:.5g}"
-
-
-def _short(value: float | None, factor: float, digits: int) -> str:
+def number(value: float | None, factor: float, digits: int = 5) -> str:
+    """Show a number in other units, `digits` of it, or a dash where there is none."""
     return "-" if value is None else f"{factor * value:.{digits}g}"
-
-
-def show_stability(found: Collection) -> None:
-    """Print what each solver made of each hard case, and what does not hold."""
-    table = Table()
-    for name in ("case", "solver"):
-        table.add_column(name, no_wrap=True)
-    for name in ("mm/s", "residual", "momentum", "events/s", "guards", "s"):
-        table.add_column(name, justify="right", no_wrap=True)
-    for row in found.rows:
-        table.add_row(
-            row["case"],
-            row["solver"],
-            _short(row["rate"], 1e3, 4),
-            *(_short(row[key], 1.0, 2) for key in ("residual", "momentum", "events_per_second")),
-            str(row["guards"] or ""),
-            f"{row['wall_time']:.2g}",
-        )
-    console = Console()
-    console.print(table)
-    show_warnings(console, found.failures())
-    cases = len({row["case"] for row in found.rows})
-    failed = len(found.failures())
-    console.print(
-        f"{cases} cases, {len(found.rows)} runs, {failed} failures, "
-        f"{len(found.disagreements())} rates more than 2 % off the first solver's"
-    )
 
 
 def show_explanation(scene: Scene, found: Forecast) -> None:
@@ -272,6 +181,13 @@ def progress_bar(end: float) -> Iterator[Callable[[float], None] | None]:
         starter.cancel()
         starter.join()
         bar.stop()
+
+
+@contextmanager
+def waiting_bar() -> Iterator[None]:
+    """Say on stderr that a long preparation goes on, in a terminal."""
+    with progress_bar(0.0):
+        yield
 
 
 @contextmanager

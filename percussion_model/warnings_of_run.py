@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -36,7 +36,7 @@ def find_warnings(result: Result) -> Iterator[str]:
 def _about_scene(result: Result) -> Iterator[str]:
     scene = result.scene
     if scene.unused:
-        yield f"given, but without effect in this scene: {', '.join(scene.unused)}"
+        yield unused_note(scene.unused)
     if scene.solver_name != "rigid" and not scene.loss_on:
         if scene.barrier_on:
             yield (
@@ -56,6 +56,11 @@ def _about_scene(result: Result) -> Iterator[str]:
             "vibrates above the energy barrier when the next blow comes; the rate of penetration "
             f"depends on the cells, and on the loss itself, up to some {least:.2g} s"
         )
+
+
+def unused_note(keys: Iterable[str]) -> str:
+    """Say that parameters were given that nothing of the scene needs."""
+    return f"given, but without effect in this scene: {', '.join(keys)}"
 
 
 def least_loss_time(result: Result) -> float:

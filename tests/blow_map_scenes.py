@@ -1,8 +1,13 @@
-"""Scenes on blow maps that are small enough to be made within a test run."""
+"""Scenes on blow maps that are small enough to be made within a test run, or by hand."""
 
 from __future__ import annotations
 
-from percussion_model import Scene
+import numpy as np
+
+from percussion_model import Scene, Simulation
+from percussion_model.core.blow_records import ENTRIES, Entry
+from percussion_model.solvers.blow_map import BlowMapSolver
+from percussion_model.solvers.blow_table import BlowTable, Nodes, fixed_values
 
 # Around the reference: a few hundred blows, as dense as the usual table.
 RANGES = {
@@ -23,3 +28,23 @@ def mapped(**changes):
     given = {key.replace("__", "."): value for key, value in changes.items()}
     start = {"solver.fidelity": "blow-map", "start.piston_velocity": 9.0}
     return Scene().replace(**{**start, **edges, **given})
+
+
+def by_hand(scene, **entries):
+    """A table whose every node holds the same entries."""
+    nodes = Nodes.of(scene)
+    values = np.zeros((*nodes.counts, ENTRIES))
+    for name, value in entries.items():
+        values[..., Entry[name.upper()]] = value
+    return BlowTable(nodes, values, fixed_values(scene), {}, 0.0)
+
+
+def run_by_hand(scene, end, **entries):
+    """Run a scene on such a table."""
+    simulation = Simulation.__new__(Simulation)
+    Simulation.__bases__[0].__init__(
+        simulation, scene, True, BlowMapSolver(scene, by_hand(scene, **entries))
+    )
+    simulation.scene, simulation._blows, simulation._events = scene, (), ()
+    simulation.advance(end)
+    return simulation

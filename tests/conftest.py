@@ -26,3 +26,15 @@ os.environ.setdefault(
 def reference() -> Result:
     """Four seconds of the reference drill, one of them to settle."""
     return simulate(Scene(), 4.0, settle=1.0)
+
+
+@pytest.fixture
+def scene_from_text(tmp_path):
+    """Read a scene from text."""
+
+    def from_text(text):
+        path = tmp_path / "scene.toml"
+        path.write_text(text, encoding="utf-8")
+        return Scene.from_toml(path)
+
+    return from_text

@@ -1,21 +1,18 @@
-"""The blow map: its table against the waves, flight against closed forms, refusals."""
+"""The blow map: its table against the waves, bits and states, refusals."""
 
 from __future__ import annotations
 
-import itertools
 import math
 import os
 
 import numpy as np
 import pytest
-from blow_map_scenes import RANGES, mapped
+from blow_map_scenes import RANGES, mapped, run_by_hand
 
-from percussion_model import Scene, SceneError, Simulation, SimulationError, piston_cycle, simulate
+from percussion_model import Scene, SceneError, Simulation, SimulationError, simulate
 from percussion_model.blow_maps import make_map
-from percussion_model.core.blow_records import ENTRIES, Axis, Entry
+from percussion_model.core.blow_records import Axis, Entry
 from percussion_model.solvers.blow_map import BlowMapSolver
-from percussion_model.solvers.blow_table import BlowTable, Nodes, fixed_values
-from percussion_model.solvers.single_blow import SingleBlow
 
 LONG = bool(os.environ.get("PERCUSSION_LONG"))
 
@@ -29,112 +26,6 @@ def bits(simulation):
 @pytest.fixture(scope="module")
 def table():
     return make_map(mapped(), workers=1)
-
-
-def by_hand(scene, **entries):
-    """A table whose every node holds the same entries."""
-    nodes = Nodes.of(scene)
-    values = np.zeros((*nodes.counts, ENTRIES))
-    for name, value in entries.items():
-        values[..., Entry[name.upper()]] = value
-    return BlowTable(nodes, values, fixed_values(scene), {}, 0.0)
-
-
-def run_by_hand(scene, end, **entries):
-    """Run a scene on such a table."""
-    simulation = Simulation.__new__(Simulation)
-    Simulation.__bases__[0].__init__(
-        simulation, scene, True, BlowMapSolver(scene, by_hand(scene, **entries))
-    )
-    simulation.scene, simulation._blows, simulation._events = scene, (), ()
-    simulation.advance(end)
-    return simulation
-
-
-# ------------------------------------------------------------------------- flight
-
-
-def test_flight_is_the_closed_form_of_the_paper():
-    """With a constant restitution, a bit that stays and no weight: eq. 12 of the paper."""
-    scene = mapped(effects__gravity=False)
-    simulation = run_by_hand(scene, 3.0, rebound=-0.37)
-    blows = simulation.blows
-    assert len(blows) > 50
-    for blow, following in itertools.pairwise(blows):
-        expected = piston_cycle(
-            scene.drive.force,
-            scene.drive.reversal_distance,
-            scene.piston.mass,
-            -0.37 * blow["impact_velocity"],
-        )
-        assert following["impact_velocity"] == pytest.approx(expected.impact_velocity, rel=1e-12)
-        assert blow["period"] == pytest.approx(expected.flight_time, rel=1e-12)
-        assert blow["stroke"] == pytest.approx(expected.stroke, rel=1e-12)
-
-
-def test_a_bit_that_sinks_lengthens_the_flight_by_its_way():
-    """The drive turns by the bit's place of that time, the piston falls to its last one."""
-    scene = mapped(effects__gravity=False)
-    sunk = 1e-4
-    entries = {"rebound": -0.37, "penetration": sunk}
-    simulation = run_by_hand(scene, 1.0, **entries)
-    blow, following = simulation.blows[-2:]
-    m, f, v = scene.piston.mass, scene.drive.force, blow["impact_velocity"]
-    down = v * sunk
-    # the path of the table is zero until its last time, and the drive turns before that
-    turn = scene.drive.reversal_distance
-    square = (0.37 * v) ** 2 + 2 * f / m * (turn + turn + down)
-    assert following["impact_velocity"] == pytest.approx(math.sqrt(square), rel=1e-9)
-    assert blow["penetration"] == pytest.approx(down, rel=1e-12)
-
-
-# -------------------------------------------------------------------- single blows
-
-
-def test_a_single_blow_is_that_of_a_run(reference):
-    """A blow of the settled reference run, and one on a bit set at rest by hand."""
-    scene = mapped()
-    blow = reference.blows[-1]
-    load = scene.feed.force + scene.bit.mass * scene.gravity.acceleration
-    v = float(blow["impact_velocity"])
-    single = SingleBlow(scene, scene.rock.loading_stiffness)
-    found = single.entries(v, load, scene.drive.force)
-    assert v * found[Entry.PENETRATION] == pytest.approx(blow["penetration"], rel=1e-4)
-    assert v * found[Entry.PEAK_BIT] == pytest.approx(blow["peak_bit_force"], rel=1e-4)
-    assert v * found[Entry.PEAK_CONTACT] == pytest.approx(blow["peak_contact_force"], rel=1e-4)
-    a = scene.gravity.acceleration - scene.drive.force / scene.piston.mass
-    rebound = v * found[Entry.REBOUND] + a * found[Entry.OPENED]
-    assert rebound == pytest.approx(blow["rebound_velocity"], rel=1e-3)
-    rock = sum(found[e] for e in (Entry.CRUSHING, Entry.BARRIER, Entry.STANDSTILL))
-    assert v * v * rock == pytest.approx(blow["rock_energy"], rel=1e-3)
-    assert (found[Entry.CONTACTS], found[Entry.CYCLES]) == (2, 5)
-
-
-def test_a_single_blow_keeps_energy_and_momentum():
-    scene = mapped()
-    v, load, drive = 8.0, 3000.0, 2800.0
-    found = SingleBlow(scene, 7e8).entries(v, load, drive)
-    m, g = scene.piston.mass, scene.gravity.acceleration
-    feed = load - scene.bit.mass * g
-    start, offset = v * found[Entry.REBOUND], v * found[Entry.OFFSET]
-    down = v * found[Entry.PENETRATION]
-    # the flight begins with `start` at `offset`: what has been put in until then
-    put_in = 0.5 * m * v**2 + (m * g - drive) * offset + load * down
-    gone = v * v * found[[Entry.CRUSHING, Entry.BARRIER, Entry.STANDSTILL]].sum()
-    gone += v * v * (found[Entry.LOSS] + found[Entry.NUMERICAL])
-    assert feed > 0
-    assert put_in - gone == pytest.approx(0.5 * m * start**2, abs=1e-4 * put_in)
-
-
-def test_a_blow_scales_with_its_velocity_without_a_barrier():
-    """Elastic bars on bilinear rock know no scale: forces, lengths and speeds go together."""
-    scene = mapped(effects__barrier=False, effects__gravity=False)
-    single = SingleBlow(scene, 7.5e8)
-    one, two = single.entries(4.0, 1000.0, 1500.0), single.entries(8.0, 2000.0, 3000.0)
-    assert two[Entry.PENETRATION] == pytest.approx(one[Entry.PENETRATION], rel=1e-3)
-    # the dead band of the rock law, 1e-9 m/s, does not scale
-    assert two[Entry.REBOUND] == pytest.approx(one[Entry.REBOUND], rel=1e-8)
-    assert two[Entry.PEAK_BIT] == pytest.approx(one[Entry.PEAK_BIT], rel=1e-8)
 
 
 # -------------------------------------------------------------------------- table

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 from blow_map_scenes import RANGES, mapped
 
+from fmu_src.runtime.blow_map import read_blow_map
 from percussion_model import Scene, SceneError, simulate
-from percussion_model.blow_maps import kept_map, make_map, map_file, node_count
+from percussion_model.blow_maps import kept_map, make_map, map_file, node_count, outside_map
 from percussion_model.cli import _guarded, app
 from percussion_model.core.blow_records import Axis
 from percussion_model.solvers.blow_builder import build_table, get_table
@@ -94,6 +95,18 @@ def test_the_file_depends_on_what_the_table_depends_on(cache):
         assert map_file(mapped(**change)) != base, change
 
 
+def test_an_fmu_unpacked_over_another_brings_its_own_table(cache, tmp_path):
+    folder = tmp_path / "resources"
+    folder.mkdir()
+    found = []
+    for feed_to in (3000.0, 3500.0):
+        scene = mapped(**TINY, blow_map__feed_to=feed_to)
+        (folder / "blow_map.npz").write_bytes(make_map(scene, workers=1).to_bytes())
+        found.append(read_blow_map(str(folder)))
+        assert read_blow_map(str(folder)) is found[-1]
+    assert [table.highest[Axis.LOAD] for table in found] == [3000.0, 3500.0]
+
+
 def test_bytes_that_are_no_table_are_refused():
     with pytest.raises(TableError):
         BlowTable.from_bytes(b"PK\x03\x04 no archive")
@@ -155,3 +168,23 @@ def test_the_command_makes_shows_and_finds_a_table(cache, tmp_path, capsys):
     assert told["made"]
     assert told["restless_nodes"] == 0
     assert told["range"]["feed_force"] == list(RANGES["feed"])
+    assert told["outside"] == []
+
+
+def test_a_scene_outside_its_own_table_is_told_before_the_table_is_made(cache, tmp_path, capsys):
+    low, high = RANGES["stiffness"]
+    rocks = {0.99 * low: "stiffness_from", low: "", high: "", 1.01 * high: "stiffness_to"}
+    for stiffness, key in rocks.items():
+        told = outside_map(mapped(rock__loading_stiffness=stiffness))
+        assert len(told) == bool(key)
+        for text in told:
+            assert f"{stiffness:.6g} N/m" in text
+            assert f"blow_map.{key} widens it" in text
+    words = outside_map(mapped(feed__force=100.0, drive__force=9000.0))
+    assert [text.split(" = ")[0] for text in words] == ["feed.force", "drive.force"]
+
+    path = tmp_path / "scene.toml"
+    mapped(**TINY, feed__force=100.0).to_toml(path)
+    arguments = ["blow-map", str(path), "--workers", "1"]
+    assert not _guarded(lambda: app(arguments, standalone_mode=False))
+    assert capsys.readouterr().err.startswith("percussion: warning: feed.force = 100 N: the blow")

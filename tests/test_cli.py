@@ -1,5 +1,6 @@
 """The command line: output, errors, Ctrl-C."""
 
+import importlib
 import json
 import os
 import signal
@@ -10,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from percussion_model import terminal
 from percussion_model.cli import BAD_INPUT, INTERRUPTED, _guarded, app
 
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
@@ -107,6 +109,22 @@ def test_explain(percussion):
         assert text in out
 
 
+@pytest.mark.parametrize("command", ["explain", "settled"])
+def test_who_waits_for_the_compiler_is_told_so(percussion, command, monkeypatch):
+    monkeypatch.setattr(terminal, "_PATIENCE", 0.0)
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    monkeypatch.setenv("TTY_COMPATIBLE", "1")
+    module = importlib.import_module("percussion_model.forecast")
+    work = module.forecast
+    monkeypatch.setattr(module, "forecast", lambda scene: time.sleep(0.3) or work(scene))
+    module = importlib.import_module("percussion_model.stationary")
+    settle = module.settled
+    monkeypatch.setattr(module, "settled", lambda *words: time.sleep(0.3) or settle(*words))
+    code, _, err = percussion(command, RIGID)
+    assert code == 0
+    assert "Preparing (the first run compiles" in err
+
+
 def test_new_writes_a_scene_that_runs_and_keeps_existing_files(percussion, tmp_path):
     path = tmp_path / "mine.toml"
     assert percussion("new", path)[0] == 0
@@ -169,6 +187,10 @@ def test_bad_scenes_are_one_message_on_stderr(percussion, tmp_path, text, messag
         (["run", RIGID, "--solver", "fem"], "fem"),
         (["run", RIGID, "--cells", "many"], "--cells"),
         (["plot", "nowhere.toml"], "there is no such folder or scene file"),
+        (["plot", str(SCENARIOS)], "no result folder, it has no summary.json"),
+        (["run", RIGID, "--json", str(SCENARIOS)], "is a folder; give the file to write"),
+        (["study", RIGID, "--over", "feed.force=1:2:3", "--out", RIGID], "cannot be written"),
+        (["accuracy", RIGID, RIGID, "--json", "-"], "must differ"),
         (["explain", "nowhere.toml"], "there is no such scene file"),
         (["drill"], "drill"),
     ],
@@ -190,6 +212,22 @@ def test_an_unwritable_folder_is_refused_before_the_run(percussion, tmp_path):
         assert "cannot be written" in err
     assert time.monotonic() - began < 5
     assert os.listdir(tmp_path) == ["file"]
+
+
+def test_ctrl_c_is_told_whatever_the_command(percussion, monkeypatch):
+    def interrupted(*words, **options):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(
+        importlib.import_module("percussion_model.comparison"), "compare", interrupted
+    )
+    monkeypatch.setattr(
+        importlib.import_module("percussion_model.forecast"), "forecast", interrupted
+    )
+    for words in (["compare", RIGID, "--solvers", "rigid", "--no-figures"], ["explain", RIGID]):
+        code, out, err = percussion(*words)
+        assert (code, out) == (INTERRUPTED, "")
+        assert err == "percussion: interrupted before there was a result\n"
 
 
 # ------------------------------------------------------------------ whole processes

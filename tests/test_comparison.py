@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import pytest
 from typer.testing import CliRunner
 
 from percussion_model import Scene, SceneError, compare
 from percussion_model.cli import app
-from percussion_model.comparison import COMPARED, read_solvers
+from percussion_model.comparison import COMPARED, Comparison, read_solvers
+from percussion_model.warnings_of_run import find_warnings
 
 SHORT = {"run.duration": 0.3, "run.settle": 0.05, "fem.elements": 20}
 
@@ -42,6 +44,26 @@ def test_differences_are_relative_to_the_first(found):
     assert abs(off["fem"]["rate_of_penetration"]) < 0.02
 
 
+def test_what_another_solver_needs_was_not_given_in_vain(found):
+    given = {"loss.time": 2e-7, "fem.courant": 1.0, "contact.restitution": 0.5}
+    scenes = {name: found.results[name].scene.replace(**given) for name in ("wave", "fem", "rigid")}
+    assert "loss.time" in scenes["rigid"].unused
+    results = {
+        name: replace(found.results[name], scene=scene, warnings=[])
+        for name, scene in scenes.items()
+    }
+    for result in results.values():
+        result.warnings.extend(find_warnings(result))
+    told = Comparison(results).warnings()
+    assert not any("loss.time" in text or "fem.courant" in text for text in told)
+
+    first_two = Comparison({name: results[name] for name in ("wave", "fem")}).warnings()
+    vain = [text for text in first_two if "without effect" in text]
+    assert vain == ["given, but without effect in this scene: contact.restitution"]
+    results["fem"].warnings.append("something else")
+    assert Comparison(results).warnings()[-1] == "fem: something else"
+
+
 def test_figure_has_a_line_for_each_solver(found):
     pytest.importorskip("matplotlib")
     from percussion_model.plotting.comparison import draw_comparison
@@ -68,6 +90,7 @@ def test_command_prints_a_table_and_writes_the_figure(tmp_path):
     assert "Two ways" in shown.output
     assert "Rate of penetration" in shown.output
     assert sorted(path.name for path in out.iterdir()) == ["comparison.png", "comparison.svg"]
+    assert f"wrote {out / 'comparison.png'}" in shown.output
 
 
 def test_command_gives_json_alone(tmp_path):

@@ -11,8 +11,14 @@ from typer.testing import CliRunner
 
 from percussion_model import Scene, simulate
 from percussion_model.cli import app
+from percussion_model.commands.effects import (
+    LONGEST_NAME,
+    show_effects,
+    table_of,
+    with_error,
+)
 from percussion_model.effect_turns import turns
-from percussion_model.effects import NOISE, EffectsStudy, step_costs, study_effects
+from percussion_model.effects import NOISE, EffectsStudy, Trial, step_costs, study_effects
 
 RIGID = {"piston.model": "rigid", "bit.model": "rigid"}
 SHORT = {"run.duration": 0.6, "run.settle": 0.1}
@@ -122,6 +128,43 @@ def test_a_rate_that_scatter_hides_is_no_change(rigid):
     assert hidden.undecided
     assert rigid.changes(hidden)["rate_of_penetration"] is None
     assert "aperiodic" in hidden.reason
+
+
+def test_a_short_run_does_not_hide_that_the_rate_cannot_be_trusted():
+    scene = Scene().replace(**{"effects.loss": False, "solver.cells": 4})
+    result = simulate(scene, 0.05, settle=0.0)
+    reason = Trial(turn_of(Scene(), "loss"), result, result.wall_time, None).reason
+    assert "structural loss is off" in reason
+    assert "whole blow" in reason
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "shown"),
+    [
+        (17.53, 0.412, "17.5 ± 0.4"),
+        (44.8, 30.0, "40 ± 30"),
+        (9.31, 0.96, "9 ± 1"),
+        (16.3691, 0.0096, "16.37 ± 0.01"),
+        (-3.21, 1.4, "-3 ± 1"),
+    ],
+)
+def test_a_value_has_the_digits_that_its_error_leaves(value, error, shown):
+    assert with_error(value, error) == shown
+
+
+def test_the_table_fits_a_terminal_and_cuts_no_number(rigid, monkeypatch, capsys):
+    rows = table_of(rigid)[1]
+    for columns in (80, 40):
+        monkeypatch.setenv("COLUMNS", str(columns))
+        show_effects(rigid)
+        shown = capsys.readouterr().out
+        assert "…" not in shown
+        for name, *cells in rows:
+            line = next(text for text in shown.splitlines() if text.startswith(name.split()[0]))
+            for cell in cells:
+                assert cell in line if len(name) <= LONGEST_NAME else cell in shown
+        if columns == 80:
+            assert max(len(line) for line in shown.splitlines()) <= columns
 
 
 def test_a_dearer_step_is_marked_where_something_was_turned_off(rigid):

@@ -210,8 +210,10 @@ def test_what_cannot_be_written_is_said_before(rigid, tmp_path):
 def test_what_is_no_result_is_refused(tmp_path):
     with pytest.raises(ResultError, match="no such result folder"):
         Result.load(tmp_path / "none")
+    with pytest.raises(ResultError, match=r"no summary\.json and no scene\.toml"):
+        Result.load(tmp_path)
     RIGID.to_toml(tmp_path / "scene.toml")
-    with pytest.raises(ResultError, match=r"summary\.json: cannot be read"):
+    with pytest.raises(ResultError, match=r"no result folder, it has no summary\.json; "):
         Result.load(tmp_path)
     (tmp_path / "summary.json").write_text("{}")
     with pytest.raises(ResultError, match="not a complete result"):

@@ -8,9 +8,8 @@ from pathlib import Path
 from percussion_model.solvers.blow_table import BlowTable
 
 
-@functools.cache
 def read_blow_map(folder: str) -> BlowTable:
-    """Table of blows that the FMU in a folder brings along.
+    """Table of blows that the FMU in a folder brings along; instances share one.
 
     Raises
     ------
@@ -22,4 +21,11 @@ def read_blow_map(folder: str) -> BlowTable:
         raise ValueError(
             'solver.fidelity = "blow-map": this FMU brings no blow map; build it with --blow-map'
         )
+    stamp = path.stat()
+    return _read(path, stamp.st_mtime_ns, stamp.st_size)
+
+
+@functools.lru_cache(maxsize=8)
+def _read(path: Path, changed: int, size: int) -> BlowTable:
+    """Table in a file as it was at a time: hosts may unpack another FMU into the same folder."""
     return BlowTable.from_bytes(path.read_bytes())

@@ -10,17 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from percussion_model.commands.common import (
-    BAD_INPUT,
-    JsonFile,
-    Out,
-    Settings,
-    check_json,
-    complain,
-    load_scene,
-    needs_plot_extra,
-    write_json,
-)
+from percussion_model.commands import common
 
 if TYPE_CHECKING:
     from percussion_model.accuracy import Study
@@ -45,33 +35,40 @@ def accuracy(
         bool,
         typer.Option("--make-references", help="Make the stored references of the scenes anew."),
     ] = False,
-    settings: Settings = None,
-    out: Out = None,
-    json_file: JsonFile = None,
+    settings: common.Settings = None,
+    out: common.OutOrDefault = None,
+    json_file: common.JsonFile = None,
     figures: Annotated[bool, typer.Option(help="Draw error against time.")] = True,
 ) -> None:
-    """Measure error against time: waves, finite elements, rigid bars, general integrators."""
+    """Measure error against time: waves, finite elements, rigid bars, general integrators.
+
+    Prints tables; figures, and the numbers as JSON unless --json is given, go to out/accuracy.
+    """
     from percussion_model.accuracy.ladders import chosen_ladders
     from percussion_model.commands.accuracy_tables import show_bars, show_study
-    from percussion_model.result_files import check_writable
     from percussion_model.scene import Scene
 
-    chosen = [(path.stem, load_scene(path, None, None, settings)) for path in scenes or ()]
+    chosen = [(path.stem, common.load_scene(path, settings=settings)) for path in scenes or ()]
     if not chosen:
         title = "The reference scene"
         chosen = [("reference", Scene(title=title))]
         if settings:
-            raise typer.Exit(complain("--set needs a SCENE to change", BAD_INPUT))
+            raise common.refusal("--set needs a SCENE to change")
+    names = [name for name, _ in chosen]
+    if len(set(names)) < len(names):
+        raise common.refusal(
+            f"{', '.join(names)}: results take the names of the scene files, which must differ"
+        )
     words = None if methods is None else [word.strip() for word in methods.split(",")]
     chosen_ladders(words)  # refuses before anything is computed
     folder = out or Path("out") / "accuracy"
-    check_json(json_file)
+    common.check_json(json_file)
     if make_references:
         for _, scene in chosen:
             show_bars(_referenced(scene))
         return
     if figures or json_file is None:
-        check_writable(folder)
+        common.check_outputs(folder, None)
     found: dict[str, dict[str, Any]] = {}
     for name, scene in chosen:
         result = _studied(scene, full, words)
@@ -79,10 +76,13 @@ def accuracy(
         if json_file != "-":
             show_study(result)
         if json_file is None:
-            write_json(str(folder / f"{name}.json"), found[name])
+            common.write_json(str(folder / f"{name}.json"), found[name])
         if figures:
-            _draw(result, folder / name)
-    write_json(json_file, found)
+            with common.if_drawable():
+                from percussion_model.plotting.accuracy import save_accuracy
+
+                common.tell_files(save_accuracy(result, folder / name))
+    common.write_json(json_file, found)
 
 
 def _studied(scene: Scene, full: bool, methods: list[str] | None) -> Study:
@@ -129,13 +129,3 @@ def _shares() -> Iterator[Report]:
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("", total=1.0)
         yield lambda share, text: bar.update(task, completed=share, description=text)
-
-
-def _draw(found: Study, folder: Path) -> None:
-    try:
-        from percussion_model.plotting.accuracy import save_accuracy
-    except ImportError as error:
-        complain(needs_plot_extra(error))
-        return
-    for path in save_accuracy(found, folder):
-        print(path, file=sys.stderr)

@@ -16,6 +16,7 @@ from percussion_model.commands.common import (
     Out,
     check_json,
     complain,
+    needs_fmu_extra,
     needs_plot_extra,
     write_json,
 )
@@ -54,8 +55,7 @@ def bench_controller(
         from percussion_model.coupling.bench import bench, total
         from percussion_model.coupling.files import read_value
     except ImportError as error:
-        name = error.name or str(error)
-        return complain(f"{name} is missing: pip install 'percussion_model[fmu]'", BAD_INPUT)
+        return complain(needs_fmu_extra(error), BAD_INPUT)
     from percussion_model.result_files import check_writable
 
     folder = out or Path("out") / "bench-controller"

@@ -11,6 +11,7 @@ from percussion_model.commands.common import (
     SceneFile,
     Settings,
     check_json,
+    complain,
     load_scene,
     write_json,
 )
@@ -36,7 +37,7 @@ def blow_map(
     from percussion_model.blow_maps import kept_map, map_file
 
     check_json(json_file)
-    chosen = load_scene(scene, None, None, settings)
+    chosen = load_scene(scene, settings=settings)
     if action == "where":
         typer.echo(str(map_file(chosen)))
         return
@@ -47,10 +48,15 @@ def blow_map(
 
 
 def ready_map(scene: Scene, workers: int | None = None) -> BlowTable:
-    """Table of a scene, made with a bar if it is not there yet."""
-    from percussion_model.blow_maps import kept_map, make_map
+    """Table of a scene, made with a bar if it is not there yet.
+
+    Whatever of the scene lies outside is told first: making a table takes minutes.
+    """
+    from percussion_model.blow_maps import kept_map, make_map, outside_map
     from percussion_model.terminal import count_bar
 
+    for text in outside_map(scene):
+        complain(f"warning: {text}")
     kept = kept_map(scene)
     if kept is not None:
         return kept
@@ -60,12 +66,13 @@ def ready_map(scene: Scene, workers: int | None = None) -> BlowTable:
 
 def _numbers(scene: Scene, table: BlowTable | None) -> dict[str, Any]:
     """What there is to tell of a table, plain values."""
-    from percussion_model.blow_maps import map_file, node_count
+    from percussion_model.blow_maps import map_file, node_count, outside_map
 
     found: dict[str, Any] = {
         "file": str(map_file(scene)),
         "nodes": node_count(scene),
         "made": table is not None,
+        "outside": outside_map(scene),
     }
     if table is not None:
         names = ("loading_stiffness", "impact_velocity", "feed_force", "drive_force")

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -42,13 +44,21 @@ JsonFile = Annotated[
     typer.Option("--json", metavar="FILE|-", help="Write the summary as JSON; - for stdout."),
 ]
 Out = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder for results.")]
+# Of commands that write without being told where; each says which folder that is.
+OutOrDefault = Annotated[
+    Path | None,
+    typer.Option("--out", metavar="DIR", help="Folder for what is written, in place of that."),
+]
+Tolerance = Annotated[
+    float, typer.Option("--tolerance", help="Relative change of a blow that is no change.")
+]
 
 
 def load_scene(
     path: Path,
-    solver: str | None,
-    cells: int | None,
-    settings: list[str] | None,
+    solver: str | None = None,
+    cells: int | None = None,
+    settings: list[str] | None = None,
     accuracy: float | None = None,
     check: bool | None = None,
 ) -> Scene:
@@ -71,12 +81,24 @@ def load_scene(
     return scene
 
 
+def check_outputs(folder: Path | None, json_file: str | None) -> None:
+    """Refuse a folder or a file that could not be written, before anything is computed."""
+    from percussion_model.result_files import check_writable
+
+    if folder is not None:
+        check_writable(folder)
+    check_json(json_file)
+
+
 def check_json(json_file: str | None) -> None:
     """Refuse a file that could not be written, before anything is computed."""
     from percussion_model.result_files import check_writable
 
-    if json_file not in (None, "-"):
-        check_writable(Path(json_file).absolute().parent)
+    if json_file in (None, "-"):
+        return
+    if Path(json_file).is_dir():
+        raise refusal(f"--json {json_file!r}: is a folder; give the file to write, or - for stdout")
+    check_writable(Path(json_file).absolute().parent)
 
 
 def write_json(json_file: str | None, values: dict[str, Any]) -> None:
@@ -89,10 +111,38 @@ def write_json(json_file: str | None, values: dict[str, Any]) -> None:
         staged_text(Path(json_file), to_json(values) + "\n")
 
 
+@contextmanager
+def if_drawable() -> Iterator[None]:
+    """Draw figures, or say on stderr which package they lack: results count without them."""
+    try:
+        yield
+    except ImportError as error:
+        complain(needs_plot_extra(error))
+
+
+def tell_files(paths: Iterable[Path]) -> None:
+    """Name on stderr the files that were written."""
+    for path in paths:
+        print(f"wrote {path}", file=sys.stderr)
+
+
 def needs_plot_extra(error: ImportError) -> str:
     """Say which package the figures lack and how to get it."""
-    name = error.name or str(error)
-    return f"no figures, since {name} is missing: pip install 'percussion_model[plot]'"
+    return f"no figures, since {_needs_extra(error, 'plot')}"
+
+
+def needs_fmu_extra(error: ImportError) -> str:
+    """Say which package the coupling lacks and how to get it."""
+    return _needs_extra(error, "fmu")
+
+
+def _needs_extra(error: ImportError, extra: str) -> str:
+    return f"{error.name or error} is missing: pip install 'percussion_model[{extra}]'"
+
+
+def refusal(message: str) -> typer.Exit:
+    """Print one message on stderr; return what ends the command as bad input."""
+    return typer.Exit(complain(message, BAD_INPUT))
 
 
 def complain(message: str, code: int = 0) -> int:

@@ -2,21 +2,12 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
 
-from percussion_model.commands.common import (
-    BAD_INPUT,
-    JsonFile,
-    Out,
-    check_json,
-    complain,
-    needs_plot_extra,
-    write_json,
-)
+from percussion_model.commands import common
 
 SystemFile = Annotated[Path, typer.Argument(metavar="SYSTEM.ssp", help="A system (SSP 1.0).")]
 # Rows of a run that is not told otherwise.
@@ -41,38 +32,35 @@ def couple(
         list[str] | None,
         typer.Option("--signal", metavar="COMPONENT.VARIABLE", help="Keep this output too."),
     ] = None,
-    out: Out = None,
-    json_file: JsonFile = None,
+    out: common.OutOrDefault = None,
+    json_file: common.JsonFile = None,
     figures: Annotated[bool, typer.Option(help="Draw the signals.")] = True,
 ) -> int:
-    """Run a system of FMUs, an SSP archive: signals as CSV, balances, a figure."""
+    """Run a system of FMUs, an SSP archive: signals as CSV, balances, a figure.
+
+    Files go to out/SYSTEM.
+    """
     try:
         from percussion_model.coupling import Coupling
         from percussion_model.coupling.balance import known_signals, summary
         from percussion_model.coupling.files import read_value, write_columns
     except ImportError as error:
-        name = error.name or str(error)
-        return complain(f"{name} is missing: pip install 'percussion_model[fmu]'", BAD_INPUT)
-    from percussion_model.result_files import check_writable
-
+        return common.complain(common.needs_fmu_extra(error), common.BAD_INPUT)
     folder = out or Path("out") / system.stem
-    check_writable(folder)
-    check_json(json_file)
+    common.check_outputs(folder, json_file)
     coupling = Coupling(system, dict(read_value(text) for text in settings or ()), order=order)
     wanted = [*known_signals(coupling.outputs), *(signals or ())]
     run = coupling.run(duration, step, wanted, interval or max(step, duration / ROWS))
     found = summary(run)
     path = write_columns(run, folder / "signals.csv")
-    write_json(json_file, found)
+    common.write_json(json_file, found)
     if json_file != "-":
         for name, value in found.items():
             typer.echo(f"{name:26s} {value}")
-    print(path, file=sys.stderr)
+    common.tell_files([path])
     if figures:
-        try:
+        with common.if_drawable():
             from percussion_model.plotting.coupled import save_coupled
-        except ImportError as error:
-            complain(needs_plot_extra(error))
-        else:
-            print(save_coupled(run, folder / "signals.png", system.stem), file=sys.stderr)
-    return complain(f"the run ended early, {run.error}", 1) if run.error else 0
+
+            common.tell_files([save_coupled(run, folder / "signals.png", system.stem)])
+    return common.complain(f"the run ended early, {run.error}", 1) if run.error else 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -9,52 +10,41 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from percussion_model.commands.common import (
-    Cells,
-    Duration,
-    JsonFile,
-    Out,
-    SceneFile,
-    Settings,
-    Settle,
-    SolverName,
-    check_json,
-    complain,
-    load_scene,
-    needs_plot_extra,
-    write_json,
-)
+from percussion_model.commands import common
 
 if TYPE_CHECKING:
     from percussion_model.effects import EffectsStudy, Trial
 
 
 def effects(
-    scene: SceneFile,
-    duration: Duration = None,
-    settle: Settle = None,
-    solver: SolverName = None,
-    cells: Cells = None,
-    settings: Settings = None,
-    out: Out = None,
-    json_file: JsonFile = None,
+    scene: common.SceneFile,
+    duration: common.Duration = None,
+    settle: common.Settle = None,
+    solver: common.SolverName = None,
+    cells: common.Cells = None,
+    settings: common.Settings = None,
+    out: common.OutOrDefault = None,
+    json_file: common.JsonFile = None,
     figures: Annotated[bool, typer.Option(help="Draw cost and change as bars.")] = True,
 ) -> None:
-    """Turn each effect off, or on, in turn: what it costs and what it changes."""
-    from percussion_model.effects import study_effects
-    from percussion_model.result_files import check_writable
+    """Turn each effect off, or on, in turn: what it costs and what it changes.
 
-    chosen = load_scene(scene, solver, cells, settings)
+    Prints a table, and draws a figure in out/SCENE-effects.
+    """
+    from percussion_model.effects import study_effects
+
+    chosen = common.load_scene(scene, solver, cells, settings)
     folder = out or Path("out") / f"{scene.stem}-effects"
-    if figures:
-        check_writable(folder)
-    check_json(json_file)
+    common.check_outputs(folder if figures else None, json_file)
     found = study_effects(chosen, duration, settle, _report)
-    write_json(json_file, found.to_dict())
+    common.write_json(json_file, found.to_dict())
     if json_file != "-":
         show_effects(found)
     if figures:
-        _draw(found, folder)
+        with common.if_drawable():
+            from percussion_model.plotting.effects import save_effects
+
+            common.tell_files(save_effects(found, folder))
 
 
 def _report(what: str, share: float) -> None:
@@ -63,13 +53,18 @@ def _report(what: str, share: float) -> None:
         print(f"\r\033[K{share:4.0%} {what}", end="" if share < 1.0 else "\n", file=sys.stderr)
 
 
+# A longer name of an effect takes two lines.
+LONGEST_NAME = 15
+# More characters than any table has.
+ENDLESS = 1000
+
 # Columns: heading, and what stands in it.
 _COLUMNS: dict[str, Callable[[EffectsStudy, Trial, dict[str, Any]], str]] = {
     "step\nns": lambda study, trial, row: (
-        _number(row["step_time"], 1e9, ".0f") + (" dearer" if study.dearer(trial) else "")
+        _number(row["step_time"], 1e9, 3) + (" dearer" if study.dearer(trial) else "")
     ),
-    "run\ns": lambda study, trial, row: _number(row["wall_time"], 1.0, ".2g"),
-    "blow\nms": lambda study, trial, row: _number(row["blow_time"], 1e3, ".3g"),
+    "run\ns": lambda study, trial, row: _number(row["wall_time"], 1.0, 2),
+    "blow\nms": lambda study, trial, row: _number(row["blow_time"], 1e3, 2),
     "events": lambda study, trial, row: f"{row['events']}",
     "rate\nmm/s": lambda study, trial, row: rate(row),
     "rate\n%": lambda study, trial, row: _change(study, trial, "rate_of_penetration"),
@@ -102,17 +97,20 @@ def show_effects(found: EffectsStudy) -> None:
         title=escape(found.scene.title) or None,
         title_justify="left",
         box=SIMPLE_HEAD,
-        pad_edge=False,
+        show_edge=False,
         padding=(0, 1, 0, 0),
     )
     for k, heading in enumerate(headings):
-        table.add_column(heading, justify="right" if k else "left", no_wrap=k > 0)
-    for row in rows:
-        table.add_row(*row)
+        table.add_column(heading, justify="right" if k else "left", no_wrap=True)
+    for name, *cells in rows:
+        table.add_row(_broken(name), *cells)
     console = Console()
-    console.print(table)
-    for name, reason in reasons.items():
-        console.print(f"[yellow]{escape(name)}:[/yellow] {escape(reason)}", highlight=False)
+    # In a narrow terminal lines are broken rather than numbers cut short.
+    whole = Console(width=ENDLESS).measure(table).maximum
+    Console(width=max(console.width, whole)).print(table)
+    for reason in dict.fromkeys(reasons.values()):
+        names = ", ".join(name for name, given in reasons.items() if given == reason)
+        console.print(f"[yellow]{escape(names)}:[/yellow] {escape(reason)}", highlight=False)
 
 
 def rate(row: dict[str, Any]) -> str:
@@ -123,11 +121,25 @@ def rate(row: dict[str, Any]) -> str:
     shown = f"{1e3 * value:.4g}"
     if error <= 1e-3 * abs(value):
         return shown
-    return f"{1e3 * value:.3g} ± {1e3 * error:.1g}" if error < abs(value) else "undecided"
+    return with_error(1e3 * value, 1e3 * error) if error < abs(value) else "undecided"
 
 
-def _number(value: float | None, factor: float, form: str) -> str:
-    return "-" if value is None else format(factor * value, form)
+def with_error(value: float, error: float) -> str:
+    """Show a value to the one digit that its error is known to: 17.5 ± 0.4, or 40 ± 30."""
+    place = math.floor(math.log10(float(f"{error:.0e}")))
+    digits = max(-place, 0)
+    return f"{round(value, -place):.{digits}f} ± {round(error, -place):.{digits}f}"
+
+
+def _broken(name: str) -> str:
+    """Two lines of a long name."""
+    first, _, last = name.partition(" ")
+    return f"{first}\n  {last}" if len(name) > LONGEST_NAME else name
+
+
+def _number(value: float | None, factor: float, digits: int) -> str:
+    """So many digits, without an exponent where the number is large."""
+    return "-" if value is None else f"{float(f'{factor * value:.{digits}g}'):g}"
 
 
 def _change(found: EffectsStudy, trial: Trial, name: str) -> str:
@@ -136,15 +148,6 @@ def _change(found: EffectsStudy, trial: Trial, name: str) -> str:
     change = found.changes(trial)[name]
     if change is None:
         return "-"
-    shown = f"{100.0 * change:+.2f}"
+    decimals = 2 if abs(change) < 0.1 else 1 if abs(change) < 1.0 else 0
+    shown = f"{100.0 * change:+.{decimals}f}"
     return "0.00" if float(shown) == 0.0 else shown
-
-
-def _draw(found: EffectsStudy, folder: Path) -> None:
-    try:
-        from percussion_model.plotting.effects import save_effects
-    except ImportError as error:
-        complain(needs_plot_extra(error))
-        return
-    for path in save_effects(found, folder):
-        print(path, file=sys.stderr)

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
-import typer
-
 from percussion_model.commands.common import (
     Cells,
     JsonFile,
     SceneFile,
     Settings,
     SolverName,
+    Tolerance,
     check_json,
     load_scene,
     write_json,
@@ -23,17 +20,17 @@ def settled(
     solver: SolverName = None,
     cells: Cells = None,
     settings: Settings = None,
-    tolerance: Annotated[
-        float, typer.Option("--tolerance", help="Relative change of a blow that is no change.")
-    ] = 1e-4,
+    tolerance: Tolerance = 1e-4,
     json_file: JsonFile = None,
 ) -> None:
     """Run until the blows repeat: rate, period, order and stability of the cycle."""
     from percussion_model.stationary import settled as settle
-    from percussion_model.terminal import show_settled
+    from percussion_model.terminal import show_settled, waiting_bar
 
     check_json(json_file)
-    found = settle(load_scene(scene, solver, cells, settings), tolerance)
+    chosen = load_scene(scene, solver, cells, settings)
+    with waiting_bar():
+        found = settle(chosen, tolerance)
     write_json(json_file, found.summary())
     if json_file != "-":
         show_settled(found)

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from percussion_model.commands.common import JsonFile, Out, check_json, needs_plot_extra, write_json
-from percussion_model.commands.common import complain as say
+from percussion_model.commands.common import (
+    JsonFile,
+    Out,
+    check_outputs,
+    if_drawable,
+    tell_files,
+    write_json,
+)
 
 if TYPE_CHECKING:
     from percussion_model.hard_cases import Collection
@@ -37,21 +42,14 @@ def stability(
     json_file: JsonFile = None,
 ) -> None:
     """Run the hard cases by every solver: what must hold, and where solvers disagree."""
+    from percussion_model.commands.tables import show_stability
     from percussion_model.hard_cases import run_collection
-    from percussion_model.result_files import check_writable
-    from percussion_model.terminal import progress_bar, show_stability
+    from percussion_model.terminal import count_bar
 
-    if out is not None:
-        check_writable(out)
-    check_json(json_file)
-    with progress_bar(1.0) as progress:
-
-        def report(done: int, count: int) -> None:
-            if progress is not None:
-                progress(done / count)
-
-        names = [name.strip() for name in solvers.split(",")]
-        found = run_collection(cases or None, names, share, refined, workers, report)
+    check_outputs(out, json_file)
+    names = [name.strip() for name in solvers.split(",")]
+    with count_bar("runs of hard cases") as progress:
+        found = run_collection(cases or None, names, share, refined, workers, progress)
     write_json(json_file, found.to_dict())
     if json_file != "-":
         show_stability(found)
@@ -67,11 +65,9 @@ def _write(found: Collection, folder: Path) -> None:
     from percussion_model.result_files import staged_text
 
     picture = None
-    try:
+    with if_drawable():
         from percussion_model.plotting.stability import save_stability
 
         picture = save_stability(found, folder / "images").relative_to(folder).as_posix()
-    except ImportError as error:
-        say(needs_plot_extra(error))
     staged_text(folder / "stability.md", page(found, picture))
-    print(folder / "stability.md", file=sys.stderr)
+    tell_files([folder / "stability.md"])

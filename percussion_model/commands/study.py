@@ -15,6 +15,8 @@ from percussion_model.commands.common import (
     SceneFile,
     Settings,
     SolverName,
+    Tolerance,
+    check_outputs,
     complain,
     load_scene,
 )
@@ -45,11 +47,9 @@ def study(
     solver: SolverName = None,
     cells: Cells = None,
     settings: Settings = None,
-    tolerance: Annotated[
-        float, typer.Option("--tolerance", help="Relative change of a blow that is no change.")
-    ] = 1e-4,
+    tolerance: Tolerance = 1e-4,
     processes: Annotated[
-        int | None, typer.Option("--processes", help="On this machine; default: its cores.")
+        int | None, typer.Option("--processes", min=1, help="On this machine; default: its cores.")
     ] = None,
     cluster: Annotated[
         str | None,
@@ -77,6 +77,7 @@ def study(
         logarithmic = [text.partition("=")[0] for text in over if text.endswith("log")]
         ends = {key: (float(min(values)), float(max(values))) for key, values in axes.items()}
         points = latin_hypercube(ends, samples, seed, logarithmic)
+    check_outputs(out, None)
     chosen = load_scene(scene, solver, cells, settings)
     try:
         with count_bar("points") as progress:

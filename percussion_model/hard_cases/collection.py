@@ -5,15 +5,14 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable, Iterable
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
-from multiprocessing import get_context
 from typing import Any
 
 from percussion_model.hard_cases.cases import SOLVERS, HardCase, hard_cases
 from percussion_model.hard_cases.measures import measure
 from percussion_model.hard_cases.refinement import SIGMAS, refine
 from percussion_model.inputs import SimulationError
+from percussion_model.study.workers import on_this_machine
 
 # Solvers disagree where their mean rates are further apart than this.
 DISAGREE = 0.02
@@ -151,14 +150,14 @@ def run_collection(
     refined : bool
         Whether to run each on a finer grid as well.
     workers : int, optional
-        Processes; as many as there are processors if left out, 0: this process.
+        Processes; as many as there are processors if left out, 0 or 1: this process.
     progress : callable, optional
         Called with the number of runs done and of all.
 
     Raises
     ------
     SimulationError
-        If there is no such case or solver.
+        If there is no such case or solver, or nothing to run.
     """
     wanted = list(solvers)
     jobs = [
@@ -170,6 +169,8 @@ def run_collection(
     for solver in wanted:
         if solver not in SOLVERS:
             raise SimulationError(f"unknown solver {solver}: there are {', '.join(SOLVERS)}")
+    if not jobs:
+        raise SimulationError(f"none of these cases is computed by {', '.join(wanted)}")
     order = {(job[0], job[1]): k for k, job in enumerate(jobs)}
     rows = []
     for row in _rows(jobs, workers):
@@ -188,20 +189,15 @@ def _case(name: str) -> HardCase:
 
 def _rows(jobs: list[tuple[str, str, float, bool]], workers: int | None) -> Iterable[dict]:
     """Rows as they become ready."""
-    count = (os.cpu_count() or 1) if workers is None else workers
-    if count == 0:
-        yield from map(_row, jobs)
-        return
+    count = (os.cpu_count() or 1) if workers is None else max(workers, 1)
     # the dearest first, so that no long run is left at the end
     jobs = sorted(jobs, key=lambda job: job[1] != "fem")
-    with ProcessPoolExecutor(count, mp_context=get_context("spawn")) as pool:
-        for done in as_completed([pool.submit(_row, job) for job in jobs]):
-            yield done.result()
+    for _, row in on_this_machine(_row, jobs, count):
+        yield row
 
 
-def _row(job: tuple[str, str, float, bool]) -> dict[str, Any]:
+def _row(name: str, solver: str, share: float, refined: bool) -> dict[str, Any]:
     """Measures of one case by one solver."""
-    name, solver, share, refined = job
     case = hard_cases()[name]
     found = measure(case, solver, share)
     row = found.to_dict()

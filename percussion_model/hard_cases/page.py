@@ -83,7 +83,7 @@ def _verdict(found: Collection) -> str:
         f"Each case ran for {found.share:.0%} of its duration"
         + (", and on a finer grid as well. " if _is_refined(found) else ". ")
         + f"The greatest residual is {abs(worst['residual'] or 0.0):.1e} ({worst['case']}, "
-        f"{worst['solver']}), the most events {busiest['events_per_second']:.3g} a second "
+        f"{worst['solver']}), the most events {_plain(busiest['events_per_second'], 3)} a second "
         f"({busiest['case']}, {busiest['solver']}). Guards acted in "
         + (", ".join(f"{row['case']} ({row['solver']})" for row in guarded) or "none")
         + ".\n",
@@ -164,7 +164,8 @@ def _row(row: dict[str, Any], aperiodic: bool) -> str:
     return (
         f"| {row['case']} | {row['solver']} | {rate} | {_small(row['residual'])} "
         f"| {_small(row['numerical'])} | {_small(row['momentum'])} "
-        f"| {row['events_per_second']:.3g} | {row['guards'] or ''} | {refined} | {_plain(speed)} |"
+        f"| {_plain(row['events_per_second'], 3)} | {row['guards'] or ''} | {refined} "
+        f"| {_plain(speed)} |"
     )
 
 
@@ -172,8 +173,8 @@ def _small(value: float | None) -> str:
     return "-" if value is None else "0" if value == 0.0 else f"{value:.0e}"
 
 
-def _plain(value: float | None) -> str:
-    return "-" if value is None else f"{value:.2g}"
+def _plain(value: float | None, digits: int = 2) -> str:
+    return "-" if value is None else f"{value:.{digits}g}"
 
 
 def _percent(value: float | None) -> str:

@@ -102,16 +102,24 @@ def along(found: Study) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def power_law(x: np.ndarray, y: np.ndarray) -> tuple[float, float]:
     """Exponent and factor of y = factor x^exponent, by least squares of the logarithms."""
+    x, y = _known(x, y)
     exponent, intercept = np.polyfit(np.log(x), np.log(y), 1)
     return float(exponent), float(np.exp(intercept))
 
 
 def straight_line(x: np.ndarray, y: np.ndarray) -> tuple[float, float, float]:
     """Slope, intercept, and share of the scatter that the line explains."""
+    x, y = _known(x, y)
     slope, intercept = np.polyfit(x, y, 1)
     off = y - (slope * x + intercept)
     explained = 1.0 - float(np.sum(off * off) / np.sum((y - np.mean(y)) ** 2))
     return float(slope), float(intercept), explained
+
+
+def _known(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Leave out points that failed: one of them must not cost the fit, and all that follows."""
+    known = np.isfinite(y)
+    return x[known], y[known]
 
 
 def maxima(x: np.ndarray, y: np.ndarray) -> np.ndarray:

@@ -6,17 +6,15 @@ import warnings
 from collections.abc import Iterator
 from pathlib import Path
 
-import matplotlib
 from matplotlib.figure import Figure
 
 from percussion_model.plotting.activation import draw_activation
 from percussion_model.plotting.motion import draw_motion
 from percussion_model.plotting.overview import draw_overview
 from percussion_model.plotting.stress import draw_stress
-from percussion_model.plotting.style import STYLE, save
+from percussion_model.plotting.style import save_figures
 from percussion_model.plotting.window import NotRepeatable, last_blow_window, stress_fields
 from percussion_model.result import Result
-from percussion_model.result_files import staged
 
 __all__ = ["CAPTIONS", "draw_figures", "figures"]
 
@@ -60,12 +58,7 @@ def figures(result: Result, folder: str | Path) -> list[Path]:
     list of Path
         The files, in the order of `CAPTIONS`, PNG before SVG.
     """
-    folder = Path(folder)
-    names: list[str] = []
-    with staged(folder) as draft, matplotlib.rc_context(STYLE):
-        for name, fig in draw_figures(result):
-            names += save(fig, draft, name)
-    return [folder / name for name in names]
+    return save_figures(lambda: draw_figures(result), folder)
 
 
 def draw_figures(result: Result) -> Iterator[tuple[str, Figure]]:

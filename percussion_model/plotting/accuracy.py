@@ -6,7 +6,6 @@ import math
 from pathlib import Path
 from typing import Any
 
-import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -18,7 +17,6 @@ from percussion_model.accuracy.problems import APERIODIC
 from percussion_model.accuracy.quantities import HISTORY, QUANTITIES
 from percussion_model.accuracy.study import Point, Study
 from percussion_model.plotting import style
-from percussion_model.result_files import staged
 
 NAME, MORE_NAME = "accuracy", "accuracy_quantities"
 # Colour, dashes and marker of each ladder; families share a colour.
@@ -172,8 +170,6 @@ def save_accuracy(found: Study, folder: str | Path) -> list[Path]:
     list of Path
         The files.
     """
-    folder = Path(folder)
-    with staged(folder) as draft, matplotlib.rc_context(style.STYLE):
-        names = style.save(draw_accuracy(found), draft, NAME)
-        names += style.save(draw_quantities(found), draft, MORE_NAME)
-    return [folder / name for name in names]
+    return style.save_figures(
+        lambda: [(NAME, draw_accuracy(found)), (MORE_NAME, draw_quantities(found))], folder
+    )

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -15,7 +14,6 @@ from percussion_model.comparison import Comparison
 from percussion_model.plotting import style
 from percussion_model.plotting.style import KN, MM, MS
 from percussion_model.plotting.window import CONTACTS_SHARE, Window, last_blow_window
-from percussion_model.result_files import staged
 
 NAME = "comparison"
 # The close view ends at this multiple of the last early contact.
@@ -86,7 +84,4 @@ def save_comparison(comparison: Comparison, folder: str | Path) -> list[Path]:
     list of Path
         The files.
     """
-    folder = Path(folder)
-    with staged(folder) as draft, matplotlib.rc_context(style.STYLE):
-        names = style.save(draw_comparison(comparison), draft, NAME)
-    return [folder / name for name in names]
+    return style.save_figures(lambda: [(NAME, draw_comparison(comparison))], folder)

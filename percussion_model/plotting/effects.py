@@ -5,13 +5,11 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-import matplotlib
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from percussion_model.effects import EffectsStudy
 from percussion_model.plotting import style
-from percussion_model.result_files import staged
 
 NAME = "effects"
 COST_COLOUR, MORE_COLOUR, LESS_COLOUR = "#0072B2", "#D55E00", "#009E73"
@@ -109,7 +107,4 @@ def save_effects(found: EffectsStudy, folder: str | Path) -> list[Path]:
     list of Path
         The files.
     """
-    folder = Path(folder)
-    with staged(folder) as draft, matplotlib.rc_context(style.STYLE):
-        names = style.save(draw_effects(found), draft, NAME)
-    return [folder / name for name in names]
+    return style.save_figures(lambda: [(NAME, draw_effects(found))], folder)

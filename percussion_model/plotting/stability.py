@@ -11,7 +11,6 @@ from matplotlib.figure import Figure
 
 from percussion_model.hard_cases import SOLVERS, Collection
 from percussion_model.plotting import style
-from percussion_model.result_files import staged
 
 NAME = "stability"
 # What lies below this is rounding of one number: it gets the colour of it.
@@ -74,7 +73,5 @@ def save_stability(found: Collection, folder: str | Path) -> Path:
     Path
         The file.
     """
-    folder = Path(folder)
-    with staged(folder) as draft, matplotlib.rc_context(style.STYLE):
-        style.save(draw_stability(found), draft, NAME, kinds=("png",))
-    return folder / f"{NAME}.png"
+    (file,) = style.save_figures(lambda: [(NAME, draw_stability(found))], folder, kinds=("png",))
+    return file

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from percussion_model.core.records import Mode
+from percussion_model.result_files import staged
 
 # Okabe and Ito's colours, told apart with any colour vision and in grey.
 MODE_COLOURS = {
@@ -145,6 +147,40 @@ def head(fig: Figure, title: str, handles: Sequence[Any] = ()) -> None:
         rows = math.ceil(len(handles) / MOST_IN_A_ROW)
         ncols = math.ceil(len(handles) / rows)
         fig.legend(handles=list(handles), loc="outside lower center", ncols=ncols)
+
+
+def save_figures(
+    draw: Callable[[], Iterable[tuple[str, Figure]]],
+    folder: str | Path,
+    kinds: Sequence[str] = ("png", "svg"),
+) -> list[Path]:
+    """Draw figures in this style and write all of them into a folder, or none.
+
+    Parameters
+    ----------
+    draw : callable
+        Returns or yields name and figure; it is called, and gone through, in this style.
+    folder : str or Path
+        Made if it is not there.
+    kinds : sequence of str
+        Endings of the files that are written of each figure.
+
+    Returns
+    -------
+    list of Path
+        The files.
+
+    Raises
+    ------
+    ResultError
+        If the folder cannot be written.
+    """
+    folder = Path(folder)
+    names: list[str] = []
+    with staged(folder) as draft, rc_context(STYLE):
+        for name, fig in draw():
+            names += save(fig, draft, name, kinds)
+    return [folder / name for name in names]
 
 
 def save(fig: Figure, folder: Path, name: str, kinds: Sequence[str] = ("png", "svg")) -> list[str]:

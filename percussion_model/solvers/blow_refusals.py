@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from percussion_model.core.blow_records import Axis, Refusal
-from percussion_model.solvers.blow_table import BlowTable
+from percussion_model.scene_rules import SceneRules
+from percussion_model.solvers.blow_table import BlowTable, Nodes
 
 _NAMES = {
     Refusal.STIFFNESS: (Axis.STIFFNESS, "rock.loading_stiffness", "N/m"),
@@ -24,6 +25,28 @@ _RANGES = {
 }
 
 
+def notes_outside(scene: SceneRules) -> list[str]:
+    """Say which parameters of a scene lie outside the ranges of its blow map."""
+    nodes = Nodes.of(scene)
+    found = []
+    for reason, (axis, name, _) in _NAMES.items():
+        if reason != Refusal.VELOCITY:  # which the run finds
+            value = float(scene[name])
+            if not nodes.lowest[axis] <= value <= nodes.highest[axis]:
+                found.append(_range_note(reason, value, nodes))
+    return found
+
+
+def _range_note(reason: Refusal, value: float, nodes: Nodes) -> str:
+    axis, name, unit = _NAMES[reason]
+    low, high = nodes.lowest[axis], nodes.highest[axis]
+    key = f"blow_map.{_RANGES[reason]}_{'from' if value < low else 'to'}"
+    return (
+        f"{name} = {value:.6g} {unit}: the blow map covers {low:.6g} to {high:.6g} {unit}; "
+        f"{key} widens it"
+    )
+
+
 def explain_refusal(table: BlowTable, s: Any) -> str:
     """Say why a blow map did not answer.
 
@@ -35,13 +58,7 @@ def explain_refusal(table: BlowTable, s: Any) -> str:
     """
     reason, value = Refusal(int(s["refusal"])), float(s["refused_value"])
     if reason in _NAMES:
-        axis, name, unit = _NAMES[reason]
-        low, high = table.lowest[axis], table.highest[axis]
-        key = f"blow_map.{_RANGES[reason]}_{'from' if value < low else 'to'}"
-        return (
-            f"{name} = {value:.6g} {unit}: the blow map covers {low:.6g} to {high:.6g} {unit}; "
-            f"{key} widens it"
-        )
+        return _range_note(reason, value, table.nodes)
     if reason == Refusal.MOVING:
         rest = float(s["rest"])
         until = f"after {1e3 * rest:.3g} ms" if np.isfinite(rest) else "in no time of the table"

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from percussion_model.core.fem_advance import run
@@ -27,6 +25,7 @@ from percussion_model.core.records import (
 )
 from percussion_model.scene_rules import BarNumbers, SceneRules
 from percussion_model.solvers.fem_packing import loss_time, pack_fem
+from percussion_model.solvers.fem_state import FemState
 from percussion_model.solvers.mesh import (
     BarMesh,
     assemble,
@@ -38,24 +37,6 @@ from percussion_model.solvers.packing import (
     begin_state,
     rock_numbers,
 )
-
-
-@dataclass
-class FemState:
-    """State of a simulation: one record and one flat workspace."""
-
-    record: np.ndarray  # FEM_STATE, shape (1,)
-    workspace: np.ndarray  # float64, shape (len(Node) * nodes,)
-
-    def copy(self) -> FemState:
-        """An independent copy."""
-        words = self.record.view(np.int64).copy()  # a record of many fields copies slowly
-        return FemState(words.view(FEM_STATE), self.workspace.copy())
-
-    def take(self, other: FemState) -> None:
-        """Become a copy of another state of the same solver."""
-        self.record.view(np.int64)[:] = other.record.view(np.int64)
-        self.workspace[:] = other.workspace
 
 
 class FemSolver:
@@ -163,6 +144,19 @@ class FemSolver:
             self._no_row if row is None else row,
         )
 
+    def _counted(
+        self,
+        task: FemTask,
+        state: FemState,
+        time: float,
+        blows: np.ndarray | None,
+        events: np.ndarray | None,
+    ) -> tuple[int, int, int]:
+        """Call the kernels; status, and the rows of blows and events that were filled."""
+        status = self._run(task, state, time, blows, events)
+        s = state.record[0]
+        return status, int(s["n_blows"]), int(s["n_events"])
+
     def time(self, state: FemState) -> float:
         """Time up to which the state is committed [s]."""
         return float(state.record[0]["time"])
@@ -189,10 +183,8 @@ class FemSolver:
         -------
         status, n_blows, n_events : int
         """
-        s = state.record[0]
-        s["events_on"] = record_events
-        status = self._run(FemTask.ADVANCE, state, t, blows, events)
-        return status, int(s["n_blows"]), int(s["n_events"])
+        state.record[0]["events_on"] = record_events
+        return self._counted(FemTask.ADVANCE, state, t, blows, events)
 
     def sample(self, state: FemState, times: np.ndarray, out: np.ndarray) -> None:
         """Evaluate at `times` without touching the state (`SAMPLE_FIELDS`)."""
@@ -250,10 +242,8 @@ class FemSolver:
         -------
         status, n_blows, n_events : int
         """
-        s = state.record[0]
-        s["events_on"] = record_events
-        status = self._run(FemTask.BRING, state, t, blows, events)
-        return status, int(s["n_blows"]), int(s["n_events"])
+        state.record[0]["events_on"] = record_events
+        return self._counted(FemTask.BRING, state, t, blows, events)
 
     def set_inputs(self, state: FemState, **inputs: float) -> None:
         """Change inputs of a committed state; rock inputs wait for the next cycle."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,32 +14,13 @@ from percussion_model.core.records import (
     EVENT,
     LEDGER_FIELDS,
     SAMPLE_FIELDS,
-    DriveKind,
-    Mode,
-    Piston,
-    RockKind,
     Status,
 )
-from percussion_model.core.rigid_records import RIGID, ROWS_AN_EVENT
+from percussion_model.core.rigid_records import ROWS_AN_EVENT
+from percussion_model.solvers.rigid_packing import pack_rigid, restitution
 
 if TYPE_CHECKING:
     from percussion_model.scene_rules import BarNumbers, SceneRules
-
-# Without a switching drive a blow ends when the gap was open for so many bar transits.
-BLOW_GAP_TRANSITS = 20
-
-# More events than this within a transit of the longer bar are a storm: the reference has
-# no more than 13. What rigid bodies do within a transit is not theirs to tell anyway.
-MOST_EVENTS = 200
-SHORTEST_WINDOW = 1e-6  # of a very short bar [s]
-
-_DRIVES = {"none": DriveKind.NONE, "pressure": DriveKind.PRESSURE, "external": DriveKind.EXTERNAL}
-_ROCKS = {
-    "none": RockKind.NONE,
-    "bilinear": RockKind.BILINEAR,
-    "spring": RockKind.SPRING,
-    "wall": RockKind.WALL,
-}
 
 # Input of `set_inputs`, the field it changes, and the scenes in which it has an effect.
 _INPUTS: Mapping[str, tuple[str, str]] = MappingProxyType(
@@ -54,33 +35,6 @@ _INPUTS: Mapping[str, tuple[str, str]] = MappingProxyType(
         "barrier_energy": ("W_R", "rock"),
     }
 )
-
-
-def st_venant_restitution(
-    piston_mass: float, piston_transit: float, bit_mass: float, bit_transit: float
-) -> float:
-    """Restitution of two free elastic bars after their first contact (docs/model.md, sec. 9).
-
-    The shorter bar sends a rectangular wave of force Z_c v into the longer one for twice
-    its own transit time. With equal impedances this is the ratio of the lengths.
-
-    Parameters
-    ----------
-    piston_mass, bit_mass : float
-        Masses [kg].
-    piston_transit, bit_transit : float
-        Times that a wave takes from end to end [s].
-
-    Returns
-    -------
-    float
-        Between 0 and 1.
-    """
-    z_p = piston_mass / piston_transit
-    z_b = bit_mass / bit_transit
-    impulse = 2.0 * min(piston_transit, bit_transit) * z_p * z_b / (z_p + z_b)
-    e = impulse * (1.0 / piston_mass + 1.0 / bit_mass) - 1.0
-    return min(max(e, 0.0), 1.0)
 
 
 class RigidSolver:
@@ -111,68 +65,13 @@ class RigidSolver:
     @property
     def restitution(self) -> float:
         """Coefficient of restitution of piston and bit, NaN without a piston."""
-        scene = self.scene
-        if scene.piston.model == "absent":
-            return float("nan")
-        if scene.bit.model == "rigid" and scene.contact.restitution is not None:
-            return float(scene.contact.restitution)
-        return st_venant_restitution(
-            scene.piston.mass,
-            scene.piston.transit_time,
-            scene.bit.mass,
-            scene.bit.transit_time,
-        )
+        return restitution(self.scene)
 
     def new_state(self) -> np.ndarray:
         """Return the state at time zero, inputs and parameters included."""
-        scene = self.scene
-        state = np.zeros(1, RIGID)
-        self._fill_parameters(state["par"][0])
-        has_piston = scene.piston.model != "absent"
-        spring_or_wall = scene.effects.rock in ("spring", "wall")
-        now = state["now"][0]
-        now["mode"] = Mode.FF
-        now["alpha"] = scene.start.drive_direction
-        now["armed"] = int(scene.start.drive_direction > 0)
-        now["p"] = -scene.start.rock_gap if spring_or_wall else 0.0
-        now["P_u"] = 0.0 if spring_or_wall else scene.start.rock_gap
-        now["v_b"] = scene.start.bit_velocity
-        if has_piston:
-            now["gap"] = now["first_gap"] = scene.start.gap
-            now["v_p"] = scene.start.piston_velocity
-        now["opened"] = -np.inf
-        now["ss_force"] = np.nan
-        now["peak_from"] = np.inf
+        state = pack_rigid(self.scene)
         kernel.begin(state["par"], state["now"])
         return state
-
-    def _fill_parameters(self, par: Any) -> None:
-        scene = self.scene
-        effects = scene.effects
-        has_piston = scene.piston.model != "absent"
-        par["M_p"] = scene.piston.mass if has_piston else 0.0
-        par["M_b"] = scene.bit.mass
-        par["G"] = scene.gravity.acceleration if effects.gravity else 0.0
-        par["F_S"] = scene.feed.force if effects.feed else 0.0
-        par["F_0"] = scene.drive.force
-        par["D_1"] = scene.drive.reversal_distance
-        par["external"] = scene.drive.external_force
-        par["e"] = self.restitution
-        par["K_R"] = scene.rock.loading_stiffness
-        par["gamma"] = scene.rock.unloading_ratio if effects.rock == "bilinear" else 1.0
-        par["C_R"] = scene.rock.barrier_damping
-        par["W_R"] = scene.rock.barrier_energy if scene.barrier_on else 0.0
-        transit = scene.bit.transit_time
-        if has_piston:
-            transit = max(transit, scene.piston.transit_time)
-        par["blow_gap_time"] = BLOW_GAP_TRANSITS * transit
-        par["storm_window"] = max(transit, SHORTEST_WINDOW)
-        par["most_events"] = MOST_EVENTS
-        par["piston"] = Piston.RIGID if has_piston else Piston.ABSENT
-        par["drive"] = _DRIVES[effects.drive]
-        par["rock"] = _ROCKS[effects.rock]
-        par["barrier"] = int(effects.barrier and effects.rock == "bilinear")
-        par["release"] = int(effects.standstill_tension == "release")
 
     def advance(
         self,

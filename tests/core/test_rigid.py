@@ -11,7 +11,8 @@ from scipy.integrate import solve_ivp
 from percussion_model.core.records import BLOW, EVENT, SAMPLE_FIELDS, EventKind, Status
 from percussion_model.core.rigid_motion import fall_time, oscillate, oscillate_with_loss
 from percussion_model.scene import Scene
-from percussion_model.solvers.rigid import RigidSolver, st_venant_restitution
+from percussion_model.solvers.rigid import RigidSolver
+from percussion_model.solvers.rigid_packing import st_venant_restitution
 
 RIGID = {"piston": {"model": "rigid"}, "bit": {"model": "rigid"}}
 BIT_ONLY = {

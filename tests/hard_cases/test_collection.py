@@ -4,15 +4,20 @@ from __future__ import annotations
 
 import json
 import os
+import signal
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
 from percussion_model import Scene
-from percussion_model.cli import _guarded, app
+from percussion_model.cli import INTERRUPTED, _guarded, app
 from percussion_model.hard_cases import SOLVERS, hard_cases, measure, run_collection
 from percussion_model.hard_cases.collection import Collection, wrong
+from percussion_model.hard_cases.page import page
 from percussion_model.hard_cases.refinement import refine
+from percussion_model.inputs import SimulationError
 
 PAGE = Path(__file__).parents[2] / "docs" / "stability.md"
 LONG = os.environ.get("PERCUSSION_LONG") == "1"
@@ -20,6 +25,20 @@ LONG = os.environ.get("PERCUSSION_LONG") == "1"
 SHARES = {"wave": 0.15, "fem": 0.08, "rigid": 0.12}
 # Too dear for every run of the suite, at any length.
 DEAR = {("ratio_50", "fem"), ("fine", "fem"), ("fine", "wave")}
+# The command itself, which says when the first of its runs has ended.
+TALKING = """
+import contextlib, sys
+import percussion_model.terminal as terminal
+
+@contextlib.contextmanager
+def talk(what):
+    yield lambda done, total: done == 1 and print("begun", file=sys.stderr, flush=True)
+
+terminal.count_bar = talk
+from percussion_model.cli import main
+if __name__ == "__main__":
+    main()
+"""
 RUNS = [(name, solver) for name, case in hard_cases().items() for solver in case.solvers]
 
 
@@ -111,7 +130,7 @@ def test_disagreements_have_a_reason_or_say_that_none_is_known():
 
 def test_processes_give_the_same_rows_as_this_one():
     choice = {"names": ["grazing", "reversal_1"], "solvers": ["rigid"], "share": 0.1}
-    here, there = (run_collection(**choice, workers=n).rows for n in (0, 1))
+    here, there = (run_collection(**choice, workers=n).rows for n in (0, 2))
     for row in (*here, *there):
         del row["wall_time"]
     assert here == there
@@ -134,6 +153,39 @@ def test_the_command_writes_json_page_and_figure(tmp_path, capsys):
 def test_an_unknown_case_is_refused(capsys):
     assert _guarded(lambda: app(["stability", "grazin"], standalone_mode=False)) == 2
     assert "unknown case grazin" in capsys.readouterr().err
+
+
+def test_cases_that_no_solver_asked_for_computes_are_refused():
+    (name, solvers), *_ = ((n, c.solvers) for n, c in hard_cases().items() if len(c.solvers) < 3)
+    other = next(solver for solver in SOLVERS if solver not in solvers)
+    with pytest.raises(SimulationError, match=f"none of these cases is computed by {other}"):
+        run_collection([name], [other], workers=0)
+
+
+def test_a_run_that_failed_at_once_has_its_row_on_the_page():
+    undefined = ("rate", "rate_error", "residual", "numerical", "momentum", "events_per_second")
+    row = ROW | dict.fromkeys(undefined) | {"error": "gone", "duration": 0.0, "wall_time": 0.1}
+    text = page(Collection([row]), None)
+    assert "gap_0, wave: gone" in text
+    assert "| gap_0 | wave | - | - | - | - | - |" in text
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows sends no SIGINT to a child")
+def test_ctrl_c_ends_all_processes_at_once(tmp_path):
+    words = ["stability", "--solvers", "rigid", "--workers", "2", "--json", str(tmp_path / "a")]
+    child = subprocess.Popen(
+        [sys.executable, "-c", TALKING, *words],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    assert child.stderr.readline() == "begun\n"
+    os.killpg(child.pid, signal.SIGINT)  # as a terminal does
+    _, err = child.communicate(timeout=30)
+    assert child.returncode == INTERRUPTED
+    assert err == "percussion: interrupted before there was a result\n"
+    assert os.listdir(tmp_path) == []
 
 
 def test_the_reference_is_no_hard_case():

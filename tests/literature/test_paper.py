@@ -37,6 +37,9 @@ def test_fits_find_what_was_put_in():
     slope, intercept, explained = straight_line(x, 2.0 * x + 1.0)
     assert (slope, intercept, explained) == pytest.approx((2.0, 1.0, 1.0))
     assert straight_line(x, np.sin(40.0 * x))[2] < 0.5
+    failed = np.where(x == x[3], np.nan, 1.0)
+    assert power_law(x, failed * 3.0 * x**-0.55) == pytest.approx((-0.55, 3.0))
+    assert straight_line(x, failed * (2.0 * x + 1.0)) == pytest.approx((2.0, 1.0, 1.0))
     assert maxima(np.arange(6.0), np.array([0.0, 2.0, 1.0, 1.5, 1.0, 3.0])).tolist() == [1.0, 3.0]
 
 

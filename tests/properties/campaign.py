@@ -40,7 +40,8 @@ def run_case(seed: int, index: int, reach: str = "wide") -> dict[str, Any]:
     """Draw and check one case; what went wrong stands under `fault`."""
     from percussion_model import SceneError, SimulationError
     from tests.properties.checks import check_case
-    from tests.properties.scenes import Generator, draw_case
+    from tests.properties.scenes import draw_case
+    from tests.properties.source import Generator
 
     try:
         case = draw_case(Generator(seed, index), REACHES[reach])
@@ -59,7 +60,8 @@ def run_case(seed: int, index: int, reach: str = "wide") -> dict[str, Any]:
 
 def story_of(seed: int, index: int, reach: str) -> dict[str, Any]:
     """What a case is, so that it can be found again by later versions."""
-    from tests.properties.scenes import Generator, draw_case
+    from tests.properties.scenes import draw_case
+    from tests.properties.source import Generator
 
     case = draw_case(Generator(seed, index), REACHES[reach])
     calls = [[share, what, argument] for share, what, argument in case.calls]

@@ -1,14 +1,10 @@
-"""Random scenes and random calls, drawn from any source of choices.
-
-A source is hypothesis, which can shrink what fails, or a generator of numbers, which
-needs no memory of what came before: case 12345 of a seed is made without the others.
-"""
+"""Random scenes and random calls, drawn from any source of choices."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -16,46 +12,7 @@ from percussion_model import Scene
 from percussion_model.inputs import INPUTS
 from percussion_model.parameter_table import find_row
 from percussion_model.solvers.grid import choose_time_step, section_count
-
-
-class Source(Protocol):
-    """What cases are drawn from."""
-
-    def pick(self, options: Any) -> Any:
-        """One of several."""
-
-    def between(self, low: float, high: float) -> float:
-        """A number, evenly spread."""
-
-    def count(self, low: int, high: int) -> int:
-        """A whole number, both ends included."""
-
-
-class Generator:
-    """A source for case `index` of a seed."""
-
-    def __init__(self, seed: int, index: int) -> None:
-        self._random = np.random.default_rng([seed, index])
-
-    def pick(self, options: Any) -> Any:
-        return options[int(self._random.integers(len(options)))]
-
-    def between(self, low: float, high: float) -> float:
-        return float(self._random.uniform(low, high))
-
-    def count(self, low: int, high: int) -> int:
-        return int(self._random.integers(low, high + 1))
-
-
-def decades(source: Source, low: float, high: float) -> float:
-    """A number above zero, evenly spread over its decades."""
-    return min(max(10.0 ** source.between(math.log10(low), math.log10(high)), low), high)
-
-
-def chance(source: Source, percent: int) -> bool:
-    """Whether something that happens so often happens; unlikely ones shrink away."""
-    return source.count(0, 99) >= 100 - percent
-
+from tests.properties.source import Source, chance, decades
 
 # Bounds of "wide": low and high of the amount, by decades, and what else may come.
 BOTH_SIGNS, ZERO = "both signs", "zero"

@@ -13,7 +13,8 @@ from percussion_model import Scene, SceneError, Simulation
 from percussion_model.parameter_table import rows_by_key
 from tests.properties import checks
 from tests.properties.campaign import campaign, run_case
-from tests.properties.scenes import BOTH_SIGNS, WIDE, ZERO, Case, Generator, draw_case
+from tests.properties.scenes import BOTH_SIGNS, WIDE, ZERO, Case, draw_case
+from tests.properties.source import Generator
 
 LONG_COUNT, LONG_SEED = 20_000, 2026
 

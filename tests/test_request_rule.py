@@ -1,0 +1,207 @@
+"""A wanted accuracy: its rule, its refusals, and when runs grow."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from percussion_model import Scene, SceneError, simulate
+from percussion_model.core.records import BLOW
+from percussion_model.request import GROWTH, Grid, estimated_error, meet, time_needed
+from percussion_model.result import Result
+from percussion_model.solvers.grid import cut
+from percussion_model.solvers.resolution import (
+    CALIBRATED,
+    FIT_SHARE,
+    cells_by_rule,
+    cells_for,
+    coarser_cells,
+)
+
+RIGID = {"piston.model": "rigid", "bit.model": "rigid"}
+
+
+# --------------------------------------------------------------------------- the rule
+
+
+def test_rule_passes_through_its_calibration_and_rises():
+    for accuracy, cells in CALIBRATED:
+        assert cells_by_rule(accuracy) == pytest.approx(cells, rel=1e-12)
+    found = [cells_by_rule(accuracy) for accuracy in np.geomspace(0.1, 1e-4, 40)]
+    assert np.all(np.diff(found) > 0)
+
+
+def test_rule_finds_cells_that_fit_the_lengths():
+    scene = Scene()
+    for accuracy in (1e-2, 1e-3, 1e-4):
+        cells, fit = cells_for(scene, accuracy)
+        assert cells % 20 == 0  # L_b/L_p = 23/20: nothing else fits
+        assert fit < 1e-12
+        assert cells_by_rule(accuracy) <= cells <= 2 * cells_by_rule(accuracy) + 1
+    assert coarser_cells(scene, 60) == 40
+
+
+def test_rule_counts_the_cells_of_the_shorter_bar():
+    long_bit = Scene().replace(**{"bit.sections.0.length": 1.75})
+    short_bit = Scene().replace(**{"bit.sections.0.length": 0.0875})
+    assert cells_for(long_bit, 1e-3)[0] == 56
+    assert cells_for(short_bit, 1e-3)[0] == 112
+    rigid_piston = Scene().replace(**{"piston.model": "rigid"})
+    assert cells_for(rigid_piston, 1e-3)[0] == 56
+
+
+def test_rule_says_how_well_lengths_fit():
+    odd = Scene().replace(**{"bit.sections.0.length": 0.175 * 0.996})
+    cells, fit = cells_for(odd, 1e-3)
+    time_step = odd.piston.transit_time / cells
+    assert fit == pytest.approx(cut(odd.bit, time_step).fit)
+    assert fit > FIT_SHARE * 1e-3
+
+
+def test_solver_takes_the_cells_of_the_rule_in_library_and_fmu():
+    from fmu_src.hammer_variables import hammer_variables
+    from fmu_src.runtime.plain_scene import make_scene
+    from percussion_model.parameter_table import rows_by_key
+    from percussion_model.solvers.wave import WaveSolver
+
+    scene = Scene().replace(**{"solver.accuracy": 1e-3})
+    assert WaveSolver(scene).cells == {"piston": 60, "bit": 69}
+    variable = next(v for v in hammer_variables(scene) if v.name == "solver.accuracy")
+    assert (variable.causality, variable.variability) == ("parameter", "fixed")
+    assert (variable.start, variable.left_out) == (1e-3, 0.0)
+    values = {
+        key: scene[key]
+        for key, row in rows_by_key().items()
+        if row.kind != "sections" and "*" not in key
+    }
+    for bar in ("piston", "bit"):
+        for name, value in scene[f"{bar}.sections"][0].model_dump().items():
+            values[f"{bar}.sections.0.{name}"] = value
+    plain = make_scene(values, scene.given, rows_by_key())
+    assert WaveSolver(plain).cells == {"piston": 60, "bit": 69}
+
+
+# ------------------------------------------------------------------------- refusals
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"solver.accuracy": 1e-3, "solver.cells": 40}, "both choose the resolution"),
+        ({"solver.accuracy": 1e-3, "solver.name": "fem"}, "no finite elements: set fem.elements"),
+        ({"solver.accuracy": 1e-7}, "from 0.0001 to 0.1"),
+        ({"solver.accuracy": 0.5}, "from 0.0001 to 0.1"),
+        ({"solver.accuracy": True}, "from 0.0001 to 0.1"),
+    ],
+)
+def test_contradictions_are_refused(changes, message):
+    with pytest.raises(SceneError, match=message):
+        Scene().replace(**changes)
+
+
+def test_check_without_an_accuracy_is_refused():
+    with pytest.raises(SceneError, match=r"run\.check = true verifies solver\.accuracy"):
+        simulate(Scene().replace(**RIGID), 1.0, check=True)
+    with pytest.raises(SceneError, match="both choose the resolution"):
+        simulate(Scene().replace(**{"solver.cells": 20}), 1.0, accuracy=1e-3)
+
+
+# ------------------------------------------------------------- runs that grow, invented
+
+
+def invented(rate, scatter=0.0, blows=50, cells=20, misfit=0.0, duration=4.0):
+    """A result whose blows have a given rate and a given scatter of it."""
+    rows = np.zeros(blows, BLOW)
+    rows["period"] = 0.05
+    rows["time"] = 1.0 + 0.05 * np.arange(blows)
+    off = np.where(np.arange(blows) % 2, 1.0, -1.0) * scatter
+    off -= off.mean()
+    rows["penetration"] = 0.05 * (rate + off)
+    rows["bit_position"] = np.concatenate([[0.0], np.cumsum(rows["penetration"])[:-1]])
+    return Result(
+        scene=Scene(),
+        solver="wave",
+        cells={"piston": cells, "bit": cells},
+        time_step=1e-6,
+        wave_speed_error=misfit,
+        duration=duration,
+        settle=1.0,
+        blows=rows,
+        events=np.zeros(0),
+        trace=None,
+        energy={},
+        statistics={},
+        wall_time=1.0,
+        setup_time=0.5,
+        warnings=[],
+    )
+
+
+def test_periodic_motion_needs_no_longer_run():
+    assert time_needed(invented(0.02), 1e-3) == 4.0
+    assert time_needed(invented(0.02, blows=2), 1e-3) == 4.0  # tells no rate
+
+
+def test_aperiodic_motion_needs_the_square_of_its_excess():
+    result = invented(0.02, scatter=2e-4)
+    error = result.rate_of_penetration_standard_error
+    assert error == pytest.approx(2e-4 / math.sqrt(50), rel=0.02)
+    wanted = error / 0.02 / 1.5
+    expected = 1.0 + 1.1 * 1.5**2 * 3.0
+    assert time_needed(result, wanted) == pytest.approx(expected, rel=1e-9)
+    assert time_needed(result, error / 0.02 / 100.0) == 1.0 + GROWTH * 3.0
+    assert time_needed(result, 1.01 * error / 0.02) == 4.0
+
+
+def test_the_scatter_of_few_blows_is_not_believed():
+    few = invented(0.02, scatter=1e-5, blows=4)
+    excess = few.rate_of_penetration_standard_error / 0.02
+    assert time_needed(few, 2.0 * excess) == 1.0 + GROWTH * 3.0
+    assert time_needed(few, 20.0 * excess) == 4.0
+
+
+# Rates by cells, and the cells at which a scene with an accuracy of 1e-3 ends.
+CONVERGED = {40: 1.0004, 60: 1.0, 120: 1.0, 240: 1.0}
+LATE = {40: 1.01, 60: 1.0009, 120: 1.0, 240: 1.0}
+NEVER = {40: 1.0, 60: 1.01, 120: 0.99, 240: 1.02}
+
+
+@pytest.mark.parametrize(
+    ("rates", "check", "cells", "warned"),
+    [
+        (CONVERGED, False, 60, False),
+        (CONVERGED, True, 120, False),
+        (LATE, False, 240, False),
+        (NEVER, False, 240, True),
+    ],
+)
+def test_doubt_leads_to_finer_runs(rates, check, cells, warned):
+    scene = Scene().replace(**{"solver.accuracy": 1e-3, "run.check": check})
+    asked = []
+
+    def once(chosen, longer):
+        assert chosen.solver.accuracy is None
+        asked.append((chosen.solver.cells, longer))
+        return invented(0.02 * rates[chosen.solver.cells], cells=chosen.solver.cells)
+
+    result = meet(scene, once)
+    assert result.scene == scene
+    assert result.cells["piston"] == cells == asked[-1][0]
+    assert [longer for _, longer in asked] == [False] + [True] * (len(asked) - 1)
+    assert (result.wall_time, result.setup_time) == (len(asked), 0.5 * len(asked))
+    assert bool([text for text in result.warnings if "was not reached" in text]) == warned
+    last, before = (rates[n] for n, _ in asked[:-3:-1])
+    expected = 0.03 / 1.02 if warned else abs(last - before) / last
+    assert result.rate_of_penetration_relative_error == pytest.approx(expected, abs=1e-12)
+    assert (result.rate_of_penetration_relative_error <= 1e-3) != warned
+
+
+def test_an_estimate_adds_misfit_and_knows_scatter():
+    coarse, fine = (Grid(invented(rate), 0.0) for rate in (1.002, 1.0))
+    assert estimated_error([coarse, fine]) == pytest.approx(0.002, rel=1e-6)
+    assert estimated_error([coarse, replace(fine, fit_error=0.01)]) == pytest.approx(0.012)
+    noisy = Grid(invented(1.0, scatter=0.01), 0.0)
+    assert estimated_error([coarse, noisy]) == pytest.approx(noisy.scatter / noisy.rate)
