@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 from percussion_model import Scene, SceneError, settled, simulate
 from percussion_model.cli import app
 from percussion_model.core.records import BLOW
-from percussion_model.stationary import _batch_means, _cycle
+from percussion_model.cycles import batch_means, cycle
 
 TOLERANCE = 1e-4
 # Drive force that keeps the power of the reference at another reversal distance.
@@ -38,7 +38,7 @@ def rate_of(velocity):
 def test_a_converging_sequence_is_extrapolated_to_its_limit(multiplier):
     for count in range(3, 80):
         rows = blows(8.0 + 0.5 * multiplier ** np.arange(count))
-        found = _cycle(rows, 1, TOLERANCE)
+        found = cycle(rows, 1, TOLERANCE)
         if found is not None:
             break
     rate, error, ratio = found
@@ -51,13 +51,13 @@ def test_slow_convergence_is_not_taken_for_a_cycle():
     """Each change is within the tolerance; all those to come are not."""
     rows = blows(8.0 + 0.05 * 0.99 ** np.arange(40))
     assert np.max(np.abs(np.diff(rows["impact_velocity"])) / 8.0) < TOLERANCE
-    assert _cycle(rows, 1, TOLERANCE) is None
+    assert cycle(rows, 1, TOLERANCE) is None
 
 
 @pytest.mark.parametrize("order", [2, 3, 5])
 def test_a_cycle_of_several_blows_is_found_by_its_order(order):
     rows = blows(np.tile(8.0 + 0.3 * np.arange(order), 4))
-    found = [n for n in range(1, 9) if _cycle(rows, n, TOLERANCE) is not None]
+    found = [n for n in range(1, 9) if cycle(rows, n, TOLERANCE) is not None]
     assert found[0] == order
 
 
@@ -69,8 +69,8 @@ def test_scatter_is_no_cycle_and_its_error_covers_correlated_blows():
         for k in range(1, 400):
             drift[k] = 0.8 * drift[k - 1] + generator.normal(scale=0.1)
         rows = blows(8.0 + drift)
-        assert all(_cycle(rows, n, TOLERANCE) is None for n in range(1, 9))
-        rate, error = _batch_means(rows)
+        assert all(cycle(rows, n, TOLERANCE) is None for n in range(1, 9))
+        rate, error = batch_means(rows)
         errors.append(error)
         off.append(rate - rate_of(8.0))
     assert 0.7 < np.std(off) / np.mean(errors) < 1.4

@@ -85,7 +85,7 @@ def test_axes_of_the_command_line():
 
 def test_a_point_has_the_numbers_of_settled_and_whole_numbers_stay_whole():
     scene = Scene()
-    rows, failures = run_points(scene, ("solver.cells",), np.array([[10.0]]), 1e-4, 400)
+    rows, failures = run_points(scene, ("solver.cells",), np.array([[10.0]]), 1e-4, 400, 1e-3)
     found = settled(scene.replace(**{"solver.cells": 10}))
     assert failures == [""]
     assert rows["rate_of_penetration"][0] == found.rate_of_penetration
@@ -95,7 +95,7 @@ def test_a_point_has_the_numbers_of_settled_and_whole_numbers_stay_whole():
 
 def test_what_goes_wrong_at_a_point_is_recorded_and_stops_nothing():
     rows, failures = run_points(
-        SCENE, ("rock.unloading_ratio",), np.array([[5.0], [0.5], [6.0]]), 1e-4, 400
+        SCENE, ("rock.unloading_ratio",), np.array([[5.0], [0.5], [6.0]]), 1e-4, 400, 1e-3
     )
     assert [KINDS[kind] for kind in rows["kind"]][1] == "failed"
     assert "rock.unloading_ratio = 0.5: must be a number above 1" in failures[1]
@@ -111,7 +111,7 @@ def whole(tmp_path_factory):
 
 def test_processes_find_what_one_finds(whole):
     points = grid(AXES)
-    rows, _ = run_points(SCENE, points.keys, points.values, 1e-4, 400)
+    rows, _ = run_points(SCENE, points.keys, points.values, 1e-4, 400, 1e-3)
     for name in set(rows.dtype.names) - {"wall_time"}:
         np.testing.assert_array_equal(whole.rows[name], rows[name])
 

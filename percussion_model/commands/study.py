@@ -48,6 +48,10 @@ def study(
     tolerance: Annotated[
         float, typer.Option("--tolerance", help="Relative change of a blow that is no change.")
     ] = 1e-4,
+    scatter: Annotated[
+        float,
+        typer.Option("--scatter", help="Relative standard error that will do for aperiodic rates."),
+    ] = 1e-3,
     processes: Annotated[
         int | None, typer.Option("--processes", help="On this machine; default: its cores.")
     ] = None,
@@ -85,6 +89,7 @@ def study(
                 points,
                 out,
                 tolerance,
+                scatter=scatter,
                 processes=processes,
                 cluster=cluster,
                 progress=progress,
