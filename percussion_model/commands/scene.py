@@ -153,9 +153,12 @@ def new(
 def _draw(result: Result, folder: Path) -> None:
     """Write figures and report; the results are safe already."""
     try:
+        from percussion_model.page import without_zoom
         from percussion_model.plotting import figures
         from percussion_model.report import write_report
     except ImportError as error:
         complain(needs_plot_extra(error))
         return
+    if remark := without_zoom():
+        complain(remark)
     write_report(result, folder, figures(result, folder))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -17,10 +17,14 @@ from percussion_model.commands.common import (
     SolverName,
     complain,
     load_scene,
+    needs_plot_extra,
 )
 
+if TYPE_CHECKING:
+    from percussion_model.study import Study
+
 # What writes tables and grids; asked for before hours of work, not after.
-NEEDED = ("pandas", "pyarrow", "xarray", "h5netcdf", "h5py")
+NEEDED = ("pandas", "pyarrow", "xarray", "h5netcdf", "h5py", "threadpoolctl")
 
 
 def study(
@@ -52,6 +56,7 @@ def study(
         float,
         typer.Option("--scatter", help="Relative standard error that will do for aperiodic rates."),
     ] = 1e-3,
+    report: Annotated[bool, typer.Option(help="Write report.html as well.")] = True,
     processes: Annotated[
         int | None, typer.Option("--processes", help="On this machine; default: its cores.")
     ] = None,
@@ -97,4 +102,17 @@ def study(
     except KeyboardInterrupt:
         words = f"interrupted; finished points are kept in {out}, the same command goes on"
         raise typer.Exit(complain(words, INTERRUPTED)) from None
-    show_study(found, found.save(out))
+    show_study(found, [*found.save(out), *(_report(found, out) if report else ())])
+
+
+def _report(found: Study, folder: Path) -> list[Path]:
+    """Write the report; the results are safe already."""
+    try:
+        from percussion_model.page import without_zoom
+        from percussion_model.study_report import write_study_report
+    except ImportError as error:
+        complain(needs_plot_extra(error))
+        return []
+    if remark := without_zoom():
+        complain(remark)
+    return [write_study_report(found, folder)]

@@ -32,8 +32,8 @@ def headlines(found: Study) -> list[tuple[str, str]]:
         error = found.relative_error[rows["kind"] == KINDS.index(kind)]
         if np.isfinite(error).any():
             count = int(np.count_nonzero(error > BEYOND))
-            words = f"{count} of them above {BEYOND:.1%}" if count else ""
-            largest = f"at most {np.nanmax(error):.1e} of the rate"
+            words = f"{count} of them above {100 * BEYOND:g} %" if count else ""
+            largest = f"at most {100 * np.nanmax(error):.2g} % of the rate"
             lines.append((f"Error, {kind}", ", ".join(filter(None, (largest, words)))))
     lines.append(("Computed in", f"{rows['wall_time'].sum():.3g} s of one core"))
     return lines

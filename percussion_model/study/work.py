@@ -6,7 +6,6 @@ import math
 from typing import Any
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from percussion_model.scene import Scene
 from percussion_model.stationary import Settled, settled
@@ -72,6 +71,8 @@ def run_points(
     failures : list of str
         What went wrong at each point, empty where nothing did.
     """
+    from threadpoolctl import threadpool_limits
+
     with threadpool_limits(1):
         return _run_points(scene, keys, values, tolerance, most_blows, scatter)
 
