@@ -85,7 +85,12 @@ def _limit(blows: np.ndarray, order: int) -> tuple[float, float, float]:
     shift = change * ratio / (1.0 - ratio) if abs(ratio) < 1.0 else 0.0
     # Extrapolating by more than the last change would trust the ratio too far.
     shift = float(np.clip(shift, -abs(change), abs(change)))
-    return float(third + shift), float(abs(change) + abs(shift)), ratio
+    # Between cycles that agree to rounding the ratio of changes says nothing.
+    return (
+        float(third + shift),
+        float(abs(change) + abs(shift)),
+        ratio if abs(ratio) < 1 else math.nan,
+    )
 
 
 def _multiplier(blows: np.ndarray, order: int) -> float:

@@ -30,6 +30,24 @@ def find_browser() -> str | None:
     return next(filter(None, map(shutil.which, NAMES)), None)
 
 
+@dataclass(frozen=True)
+class Drag:
+    """A drag of the mouse within a part of the page, by shares of its width and height."""
+
+    number: int  # of the figure, from 0
+    start: tuple[float, float]
+    end: tuple[float, float]
+
+    @property
+    def place(self) -> str:
+        """JavaScript that scrolls there and returns left, top, width and height."""
+        return (
+            f"(() => {{const f = document.querySelectorAll('figure')[{self.number}];"
+            "f.scrollIntoView({block: 'start'}); const r = f.getBoundingClientRect();"
+            "return [r.left, r.top, r.width, r.height];})()"
+        )
+
+
 @dataclass
 class Visit:
     """What happened on a page."""
@@ -43,19 +61,19 @@ class Visit:
 def visit(
     page: Path,
     folder: Path,
-    questions: tuple[str, ...] = (),
+    steps: tuple[str | Drag, ...] = (),
     picture: Path | None = None,
     width: int = 1280,
 ) -> Visit:
-    """Open a page, ask it some JavaScript, and take a picture of all of it.
+    """Open a page, ask it some JavaScript, drag the mouse, and take a picture of all of it.
 
     Parameters
     ----------
     page : Path
     folder : Path
         For the profile of the browser.
-    questions : tuple of str
-        Expressions; promises are waited for.
+    steps : tuple of str or Drag
+        Expressions to answer, whose promises are waited for, and drags.
     picture : Path, optional
         PNG to write.
     width : int
@@ -69,7 +87,7 @@ def visit(
     )
     try:
         address = _address(folder / "DevToolsActivePort")
-        return asyncio.run(_look(address, page, questions, picture, width))
+        return asyncio.run(_look(address, page, steps, picture, width))
     finally:
         process.kill()
         process.wait()
@@ -90,7 +108,7 @@ def _address(file: Path) -> str:
 
 
 async def _look(
-    address: str, page: Path, questions: tuple[str, ...], picture: Path | None, width: int
+    address: str, page: Path, steps: tuple[str | Drag, ...], picture: Path | None, width: int
 ) -> Visit:
     from tornado.websocket import websocket_connect
 
@@ -121,6 +139,20 @@ async def _look(
         assert "exceptionDetails" not in answer, answer
         return answer["result"].get("value")
 
+    async def drag(what: Drag) -> None:
+        left, top, wide, high = await ask(what.place)
+        for kind, (x, y) in (
+            ("mouseMoved", what.start),
+            ("mousePressed", what.start),
+            ("mouseMoved", what.end),
+            ("mouseReleased", what.end),
+        ):
+            button = {} if kind == "mouseMoved" else {"button": "left", "clickCount": 1}
+            at = {"x": left + x * wide, "y": top + y * high}
+            pressed = int(kind != "mouseReleased" and (x, y) == what.end)
+            await call("Input.dispatchMouseEvent", type=kind, **at, **button, buttons=pressed)
+        await ask("new Promise(done => setTimeout(done, 300))")
+
     for domain in ("Page", "Runtime", "Log", "Network"):
         await call(f"{domain}.enable")
     size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": False}
@@ -129,11 +161,16 @@ async def _look(
     while (await receive()).get("method") != "Page.loadEventFired":
         pass
     await ask("new Promise(done => setTimeout(done, 1500))")  # figures draw after loading
-    found.answers = [await ask(question) for question in questions]
+    for step in steps:
+        if isinstance(step, str):
+            found.answers.append(await ask(step))
+        else:
+            await drag(step)
     found.height = await ask("document.documentElement.scrollHeight")
     if picture is not None:
-        whole = {"x": 0, "y": 0, "width": width, "height": found.height, "scale": 1}
-        shot = await call("Page.captureScreenshot", clip=whole, captureBeyondViewport=True)
+        await call("Emulation.setDeviceMetricsOverride", **(size | {"height": found.height}))
+        await ask("new Promise(done => setTimeout(done, 500))")
+        shot = await call("Page.captureScreenshot")
         picture.write_bytes(base64.b64decode(shot["data"]))
     socket.close()
     return found

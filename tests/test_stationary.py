@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 from percussion_model import Scene, SceneError, settled, simulate
 from percussion_model.cli import app
 from percussion_model.core.records import BLOW
-from percussion_model.cycles import batch_means, cycle
+from percussion_model.cycles import batch_means, cycle, cycles_in
 
 TOLERANCE = 1e-4
 # Drive force that keeps the power of the reference at another reversal distance.
@@ -130,6 +130,8 @@ def test_senseless_requests_are_refused():
         settled(Scene(), tolerance=0.0)
     with pytest.raises(SceneError, match="most_blows = 5: must be"):
         settled(Scene(), most_blows=5)
+    with pytest.raises(SceneError, match=r"scatter = 1\.0: must be"):
+        settled(Scene(), scatter=1.0)
 
 
 def test_command_tells_the_cycle(tmp_path):
@@ -142,3 +144,32 @@ def test_command_tells_the_cycle(tmp_path):
     assert found["rate_of_penetration"] == settled(Scene()).rate_of_penetration
     shown = CliRunner().invoke(app, ["settled", str(scene)])
     assert "periodic" in shown.stdout
+
+
+def test_chance_repetitions_of_an_aperiodic_motion_are_no_cycle():
+    """This motion repeats by chance within the tolerance before it goes on."""
+    changes = {"feed.force": 1746.2, "rock.loading_stiffness": 1.9525e9}
+    scene = Scene().replace(**changes, **{"drive.reversal_distance": 0.014772})
+    found = settled(scene, most_blows=200)
+    early = [n for n in range(3, len(found.blows)) if cycles_in(found.blows[:n], TOLERANCE)]
+    assert early
+    assert found.kind == "aperiodic"
+
+
+def test_blows_that_alternate_while_they_converge_are_one_cycle():
+    rows = blows(8.0 + 0.01 * (-0.8) ** np.arange(60))
+    orders = [next(iter(cycles_in(rows[:n], TOLERANCE)), 0) for n in range(3, 60)]
+    assert set(orders) == {0, 1}
+    both = blows(8.0 + 0.01 * (-0.8) ** np.arange(60) + 0.02 * (-1.0) ** np.arange(60))
+    orders = [next(iter(cycles_in(both[:n], TOLERANCE)), 0) for n in range(3, 60)]
+    assert set(orders) == {0, 2}
+
+
+def test_an_aperiodic_motion_ends_at_the_wanted_standard_error():
+    scene = Scene().replace(**{"feed.force": 500.0})
+    long, short = settled(scene), settled(scene, scatter=1e-3)
+    assert (long.kind, short.kind) == ("aperiodic", "aperiodic")
+    assert len(short.blows) < len(long.blows)
+    assert short.rate_of_penetration_error <= 1e-3 * short.rate_of_penetration
+    spread = math.hypot(short.rate_of_penetration_error, long.rate_of_penetration_error)
+    assert abs(short.rate_of_penetration - long.rate_of_penetration) < 3 * spread

@@ -30,7 +30,7 @@ TOOLS = "pan,box_zoom,wheel_zoom,save,reset"
 
 def panel(title: str, x: str, y: str, **more: Any) -> Any:
     """Return an empty panel with named axes; drag a box to zoom, double-click to go back."""
-    more = {"height": HEIGHT, "sizing_mode": "stretch_width", "tools": TOOLS, **more}
+    more = {"name": title, "height": HEIGHT, "sizing_mode": "stretch_width", "tools": TOOLS, **more}
     if "box_zoom" in str(more["tools"]):
         more["active_drag"] = "box_zoom"
     made = figure(title=title, x_axis_label=x, y_axis_label=y, **more)

@@ -16,7 +16,6 @@ from bokeh.models import (
     HoverTool,
     LayoutDOM,
     LinearColorMapper,
-    PrintfTickFormatter,
     Range1d,
     Slider,
 )
@@ -109,7 +108,7 @@ def draw_map(found: Study, columns: dict[str, np.ndarray]) -> LayoutDOM:
     )  # fmt: skip
     mapper = LinearColorMapper(Viridis256, nan_color="#DDDDDD", **_limits(cells.data["value"]))
     left = panel("", x.label, y.label, height=400, x_axis_type=x.scale, y_axis_type=y.scale,
-                 x_range=_over(x), y_range=_over(y))  # fmt: skip
+                 x_range=_over(x), y_range=_over(y), name="map")  # fmt: skip
     right = panel("", x.label, "", height=400, x_axis_type=x.scale)
     quads = left.quad("left", "right", "bottom", "top", source=cells, line_width=0.6,
                       color={"field": "value", "transform": mapper})  # fmt: skip
@@ -119,7 +118,7 @@ def draw_map(found: Study, columns: dict[str, np.ndarray]) -> LayoutDOM:
     ]))  # fmt: skip
     for made, axis in ((left.xaxis, x), (left.yaxis, y), (right.xaxis, x)):
         if axis.scale == "log":
-            made.ticker, made.formatter = axis.ticks, PrintfTickFormatter(format="%.3g")
+            made.ticker, made.formatter = axis.ticks, CustomJSTickFormatter(code=SHORT)
     left.add_layout(ColorBar(color_mapper=mapper, width=12), "right")
     left.grid.visible = False
     drawn = right.multi_line("xs", "ys", source=lines, color="colour", line_width=2)
@@ -150,6 +149,11 @@ def draw_map(found: Study, columns: dict[str, np.ndarray]) -> LayoutDOM:
     )  # fmt: skip
 
 
+# A number without its zeros.
+SHORT = """
+const plain = Number(tick.toPrecision(3));
+return 1e-3 <= plain && plain < 1e5 ? String(plain) : plain.toExponential();
+"""
 # Takes the chosen slice of the chosen column out of all points.
 UPDATE_MAP = """
 const from = all.data[choice.value], kind = all.data.kind;
@@ -187,7 +191,8 @@ def _cells(
             "x": np.tile(x.values, up), "y": np.repeat(y.values, across),
             "offset": offset.ravel().astype(np.int32), "value": values[at],
             "mark": np.where(kinds[at] == KINDS.index("periodic"), 0.0, 6.0),
-        }
+        },
+        name="cells",
     )  # fmt: skip
 
 
@@ -216,4 +221,4 @@ def _slider(axis: Axis) -> Slider:
         code="return String(Number(values[tick].toPrecision(5)))",
     )
     return Slider(start=0, end=len(axis.values) - 1, value=axis.here, step=1, title=axis.label,
-                  format=shown, sizing_mode="stretch_width")  # fmt: skip
+                  format=shown, name=axis.key, sizing_mode="stretch_width")  # fmt: skip

@@ -48,4 +48,6 @@ def titles() -> dict[str, str]:
 
 def choice() -> Select:
     """A list to choose a quantity from."""
-    return Select(title="Show", value="rate", options=list(titles().items()), width=280)
+    return Select(
+        title="Show", name="shown", value="rate", options=list(titles().items()), width=280
+    )

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 from bokeh.layouts import column, gridplot
-from bokeh.models import ColorBar, LayoutDOM, LinearColorMapper, Range1d, RangeTool
+from bokeh.models import BasicTicker, ColorBar, LayoutDOM, LinearColorMapper, Range1d, RangeTool
 from bokeh.palettes import interp_palette
 
 from percussion_model.core.records import Mode
@@ -122,6 +122,7 @@ def motion(window: Window) -> LayoutDOM:
     whole = panel("The whole stretch: move or stretch the window", "time [ms]", "force [kN]",
                   height=130, tools="", x_range=Range1d(time[0], time[-1]))  # fmt: skip
     _by_mode(whole, time, force, modes)
+    whole.yaxis.ticker = BasicTicker(desired_num_ticks=2)
     whole.add_tools(RangeTool(x_range=shared))
     for one in (upper, lower):
         shade(one, contacts, style.SHADE_COLOUR)
@@ -162,11 +163,15 @@ def stress(window: Window, fields: dict[str, StressField]) -> LayoutDOM:
     names = " and ".join(fields)
     upper = panel(f"Axial stress in {names} — {window.name}", "", "depth below the top [mm]",
                   x_range=shared, y_range=Range1d(depth, 0.0), height=380)  # fmt: skip
+    contacts = [(start * US, min(stop * US, end)) for start, stop in window.contacts
+                if start * US < end]  # fmt: skip
     top = 0.0
     for field in fields.values():
         top = _image(upper, field, top, mapper)
         if top < depth * (1.0 - 1e-9):
             rule(upper, top, "black")
+            for stretch in contacts:
+                upper.line(stretch, (top, top), color="black", line_width=3)
     upper.add_layout(
         ColorBar(color_mapper=mapper, title="MPa, compression positive", width=12), "right"
     )
@@ -180,8 +185,7 @@ def stress(window: Window, fields: dict[str, StressField]) -> LayoutDOM:
         if len(fields) == 2 or sampled == "bit_force":
             force = window.samples[sampled][shown] / KN
             line(lower, time, force, colour, legend_label=name)
-    shade(lower, [(start * US, stop * US) for start, stop in window.contacts
-                  if start * US < end], style.SHADE_COLOUR)  # fmt: skip
+    shade(lower, contacts, style.SHADE_COLOUR)
     legend(lower)
     return column(upper, lower, sizing_mode="stretch_width")
 

@@ -33,7 +33,7 @@ def headlines(found: Study) -> list[tuple[str, str]]:
         if np.isfinite(error).any():
             count = int(np.count_nonzero(error > BEYOND))
             words = f"{count} of them above {100 * BEYOND:g} %" if count else ""
-            largest = f"at most {100 * np.nanmax(error):.2g} % of the rate"
+            largest = f"at most {100 * np.nanmax(error):.3g} % of the rate"
             lines.append((f"Error, {kind}", ", ".join(filter(None, (largest, words)))))
     lines.append(("Computed in", f"{rows['wall_time'].sum():.3g} s of one core"))
     return lines
