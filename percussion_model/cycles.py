@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 
 # Longest cycle that is looked for [blows].
 MOST_BLOWS_A_CYCLE = 8
-# A cycle that only scatters, without converging any more, is believed after so many repetitions.
-REPETITIONS = 5
+# Blows converge if their changes fall from so many tolerances on, each by this factor at
+# least, and the factors are alike within that one.
+FAR, FALLING, ALIKE = 10.0, 0.9, 3.0
+# Where changes are below this share of the tolerance, no scatter is left to hide anything.
+STILL = 1e-4
+# A cycle of several blows, or one that only scatters without converging any more, is believed
+# after so many repetitions and blows: near a threshold one blow in twenty may be quite another.
+REPETITIONS, LASTING = 5, 60
 # Numbers of a blow by which two blows are the same.
 COMPARED = ("impact_velocity", "period", "penetration")
 # Differences within a cycle that fall by less than this from one cycle to the next will stay.
@@ -37,20 +44,44 @@ def cycle(blows: np.ndarray, order: int, tolerance: float) -> tuple[float, float
     """Rate, its error and the multiplier of a cycle of `order` blows, None if it is none."""
     if len(blows) < 3 * order:
         return None
-    deviation = _changes(blows[-3 * order :], order)
-    older, newer = (float(np.max(np.abs(part))) for part in np.split(deviation, 2))
-    if newer <= tolerance:
-        shrinking = newer / older if older > 0 else 0.0
-        if shrinking < 1.0 and newer * shrinking / (1.0 - shrinking) <= tolerance:
-            return _limit(blows, order)
-    if len(blows) < REPETITIONS * order:
+    changes = _by_cycle(blows, order)
+    newer, older = changes[0], changes[1]
+    if max(newer, older) <= STILL * tolerance:
+        return _limit(blows, order)
+    if newer > tolerance:
         return None
-    rows = blows[-REPETITIONS * order :]
-    changes = _changes(rows, order)
-    largest = np.max(np.abs(changes))
+    ratio = newer / older if older > 0 else 1.0
+    to_come = newer * ratio / (1.0 - ratio) if ratio < 1.0 else math.inf
+    if order == 1 and to_come <= tolerance and _converges(changes, tolerance):
+        return _limit(blows, order)
+    repetitions = max(REPETITIONS, math.ceil(LASTING / order))
+    if len(blows) < repetitions * order:
+        return None
+    rows = blows[-repetitions * order :]
+    steps = _changes(rows, order)
+    largest = np.max(np.abs(steps))
     # What still drifts one way, however slowly, has not arrived.
-    drift = np.max(np.abs(changes.reshape(REPETITIONS - 1, -1).sum(axis=0)))
+    drift = np.max(np.abs(steps.reshape(repetitions - 1, -1).sum(axis=0)))
     return _scattering(rows, order) if drift <= largest <= tolerance else None
+
+
+def _by_cycle(blows: np.ndarray, order: int) -> list[float]:
+    """Largest relative change from cycle to cycle, the newest first."""
+    count = len(blows) // order
+    changes = np.abs(_changes(blows[-count * order :], order))
+    return [float(value) for value in changes.reshape(count - 1, -1).max(axis=1)[::-1]]
+
+
+def _converges(changes: list[float], tolerance: float) -> bool:
+    """Whether changes from cycle to cycle, the newest first, fall evenly from afar."""
+    factors: list[float] = []
+    for newer, older in pairwise(changes):
+        factor = newer / older
+        alike = not factors or factor / ALIKE <= factors[-1] <= factor * ALIKE
+        if factor > FALLING or not alike:
+            break
+        factors.append(factor)
+    return len(factors) >= 2 and changes[len(factors)] >= FAR * tolerance
 
 
 def _still_shrinking(blows: np.ndarray, order: int) -> bool:

@@ -19,9 +19,6 @@ __all__ = ["Settled", "settled"]
 STALLED_AFTER = 2.0
 # When a run is first looked at [s].
 _FIRST_LOOK = 0.02
-# A cycle found late must last for this share of the blows before: among many blows of an
-# aperiodic motion some are alike by chance.
-PROOF_SHARE = 0.1
 # The standard error is first believed after so many blows, and looked at again
 # when there are so many times more.
 FEWEST_SCATTERED, NEXT_LOOK = 100, 1.25
@@ -104,9 +101,8 @@ def settled(
     Blows are compared at the section that starts them. A cycle of n blows is
     believed when the change over one more cycle and all changes still to come,
     were they to shrink as the last two did, stay within the tolerance; or when
-    the last cycles only scatter within it. One that is found late must last for
-    a while to be believed. The rate is then extrapolated to the limit (Aitken).
-    A motion that does neither within `most_blows` is aperiodic.
+    the blows only scatter within it for long. The rate is then extrapolated to the
+    limit (Aitken). A motion that does neither within `most_blows` is aperiodic.
 
     Parameters
     ----------
@@ -138,7 +134,6 @@ def settled(
     simulation = Simulation(scene, record_events=False)
     blows = simulation.blows
     wait, next_look = _FIRST_LOOK, float(FEWEST_SCATTERED)
-    seen: dict[int, int] = {}  # since how many blows a cycle of so many is there
     while len(blows) < most_blows:
         last = blows[-1] if len(blows) else None
         wait = 1.05 * float(last["period"]) if last is not None else wait
@@ -151,11 +146,8 @@ def settled(
             continue
         if progress is not None:
             progress(len(blows))
-        cycles = cycles_in(blows, tolerance)
-        seen = {order: seen.get(order, len(blows)) for order in cycles}
-        for order, since in seen.items():
-            if len(blows) >= since + int(PROOF_SHARE * since):
-                return _made("periodic", order, *cycles[order], blows, simulation)
+        for order, found in cycles_in(blows, tolerance).items():
+            return _made("periodic", order, *found, blows, simulation)
         if scatter and len(blows) >= next_look:
             next_look = NEXT_LOOK * len(blows)
             rate, error = batch_means(blows)
