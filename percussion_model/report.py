@@ -2,24 +2,15 @@
 
 from __future__ import annotations
 
-import platform
-import re
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from percussion_model.parameter_table import find_row, parameter_table
+from percussion_model.page import FigureBlock, inline_svg, render, without_zoom, write_page
 from percussion_model.plotting import CAPTIONS, figures
 from percussion_model.result import Result
-from percussion_model.result_files import staged
-from percussion_model.scene import Scene
-
-REPORT = "report.html"
 
 # Numbers at the head of the report: key of the summary, what it is called, its
 # SI unit, the unit that people use and SI units in one of those.
@@ -80,21 +71,13 @@ LEDGER: tuple[tuple[str, tuple[tuple[str, str], ...]], ...] = (
     ("Unexplained", (("residual", "residual"),)),
 )
 
-PACKAGES = ("percussion_model", "numpy", "numba", "scipy", "matplotlib")
-
-
-@dataclass(frozen=True)
-class FigureBlock:
-    """A drawing and what it shows."""
-
-    svg: Markup
-    caption: str
-
 
 def write_report(
     result: Result, folder: str | Path, figure_files: Iterable[Path] | None = None
 ) -> Path:
     """Write `report.html`, which needs no other file and no network.
+
+    Figures can be zoomed; without bokeh they are the drawings.
 
     Parameters
     ----------
@@ -114,37 +97,45 @@ def write_report(
     if figure_files is None:
         figure_files = figures(result, folder)
     page = render_report(result, [path for path in figure_files if path.suffix == ".svg"])
-    with staged(folder) as draft:
-        (draft / REPORT).write_text(page, encoding="utf-8")
-    return folder / REPORT
+    return write_page(folder, page)
 
 
 def render_report(result: Result, drawings: Sequence[Path]) -> str:
-    """Return the page as text, with the given SVG files in it."""
-    environment = Environment(
-        loader=PackageLoader("percussion_model", "templates"),
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        undefined=StrictUndefined,
-    )
+    """Return the page as text.
+
+    Parameters
+    ----------
+    result : Result
+    drawings : sequence of Path
+        SVG files, for figures that cannot be zoomed.
+    """
+    blocks = {path.stem: inline_svg(path, CAPTIONS[path.stem]) for path in drawings}
+    remark, scripts = without_zoom(), ""
+    if not remark:
+        from percussion_model.plotting.zoom import embedded
+        from percussion_model.plotting.zoom_run import zoomable
+
+        made = zoomable(result)
+        places, scripts = embedded(list(made.values()))
+        blocks |= {name: Markup(place) for name, place in zip(made, places, strict=True)}
     summary = result.summary()
     scene = result.scene
-    return environment.get_template("report.html.j2").render(
-        title=scene.title or "Percussive drilling",
+    # The run may have been asked for another length than the scene's.
+    ran = {"run.duration": result.duration, "run.settle": result.settle}
+    return render(
+        "report.html.j2",
+        scene,
+        ran,
         summary=summary,
         headlines=headline_rows(summary),
-        figures=[
-            FigureBlock(inline_svg(path), CAPTIONS.get(path.stem, path.stem)) for path in drawings
-        ],
-        parameters=parameter_rows(result),
-        effects_on=scene.effects_on,
-        effects_off=scene.effects_off,
-        unused=scene.unused,
+        figures=[FigureBlock(blocks[name], text) for name, text in CAPTIONS.items()
+                 if name in blocks],
+        zoomable=not remark,
+        remark=remark,
+        scripts=Markup(scripts),
         ledger=ledger_rows(result.energy),
-        versions=versions(),
         computing=computing_rows(result),
-    )
+    )  # fmt: skip
 
 
 def headline_rows(summary: dict[str, Any]) -> list[tuple[str, str, str]]:
@@ -182,46 +173,6 @@ def ledger_rows(energy: dict[str, float]) -> list[tuple[str, list[tuple[str, flo
     ]
 
 
-def parameter_rows(result: Result) -> list[tuple[str, str, str, str]]:
-    """Key, value, unit and description of each parameter that has an influence."""
-    scene = result.scene
-    # The run may have been asked for another length than the scene's.
-    ran = {"run.duration": result.duration, "run.settle": result.settle}
-    rows = []
-    for row in parameter_table():
-        if "*" in row.key or not scene.matters(row.key):
-            continue
-        if row.kind == "sections":
-            rows += _section_rows(scene, row.key)
-            continue
-        value = ran.get(row.key, scene[row.key])
-        rows.append((row.key, _written(value), _unit(row.unit), row.description))
-    return rows
-
-
-def _section_rows(scene: Scene, sections: str) -> list[tuple[str, str, str, str]]:
-    rows = []
-    for k, section in enumerate(scene[sections]):
-        for name in type(section).model_fields:
-            row = find_row(f"{sections}.{k}.{name}")
-            assert row is not None
-            value = _written(getattr(section, name))
-            rows.append((f"{sections}.{k}.{name}", value, _unit(row.unit), row.description))
-    return rows
-
-
-def _written(value: Any) -> str:
-    if value is None:
-        return "by default"
-    if isinstance(value, bool):
-        return "on" if value else "off"
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
-
-
-def _unit(unit: str) -> str:
-    return {"-": "–"}.get(unit, unit).replace("^2", "²").replace("^3", "³")
-
-
 def computing_rows(result: Result) -> list[tuple[str, str]]:
     """What was computed with, and how fast."""
     rows = [("solver", result.solver)]
@@ -234,36 +185,3 @@ def computing_rows(result: Result) -> list[tuple[str, str]]:
     if result.wall_time > 0:
         rows.append(("times real time", f"{result.real_time_factor:.3g}"))
     return rows
-
-
-def versions() -> list[tuple[str, str]]:
-    """Versions of what the numbers were made with."""
-    found = [("Python", platform.python_version())]
-    for name in PACKAGES:
-        try:
-            found.append((name, version(name)))
-        except PackageNotFoundError:
-            continue
-    return found
-
-
-def inline_svg(path: Path) -> Markup:
-    """Read an SVG file for use inside a page.
-
-    The page knows the name spaces; names of parts get the file's name in
-    front, since several drawings share the page.
-    """
-    text = path.read_text(encoding="utf-8")
-    text = text[text.index("<svg") :]
-    text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
-    text = re.sub(r'\sxmlns(:\w+)?="[^"]*"', "", text)
-    text = re.sub(r'\sid="', f' id="{path.stem}-', text)
-    text = re.sub(r'href="#', f'href="#{path.stem}-', text)
-    text = text.replace("*{stroke", "svg *{stroke")  # its style sheet is for drawings only
-    text = text.replace("url(#", f"url(#{path.stem}-")
-    name = CAPTIONS.get(path.stem, path.stem).split(".")[0]
-    # Only the page decides how wide a drawing is.
-    text = re.sub(r'(<svg\b[^>]*?)\swidth="[^"]*"', r"\1", text, count=1)
-    text = re.sub(r'(<svg\b[^>]*?)\sheight="[^"]*"', r"\1", text, count=1)
-    label = Markup.escape(name)
-    return Markup(text.replace("<svg", f'<svg role="img" aria-label="{label}"', 1))

@@ -17,6 +17,9 @@ from percussion_model.solvers import Solver, make_solver
 _BLOW_ROOM = 64
 _EVENT_ROOM = 4096
 
+# Solvers whose kernels are compiled in this process; a scene does not change them.
+_compiled: set[str] = set()
+
 _DONE, _FULL = int(Status.DONE), (int(Status.BLOWS_FULL), int(Status.EVENTS_FULL))
 
 
@@ -49,8 +52,9 @@ class Runner:
         self._blow_room = np.zeros(_BLOW_ROOM, BLOW)
         self._event_room = np.zeros(_EVENT_ROOM if record_events else 1, EVENT)
         self._can_sample = False
-        if solver is None:
+        if solver is None and self.solver.name not in _compiled:
             self._compile()
+            _compiled.add(self.solver.name)
         self.setup_time = time.perf_counter() - began
 
     def _compile(self) -> None:

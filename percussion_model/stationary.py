@@ -9,25 +9,19 @@ from typing import Any
 
 import numpy as np
 
+from percussion_model.cycles import BATCHES, SETTLING_SHARE, batch_means, cycles_in
 from percussion_model.scene import Scene, SceneError
 from percussion_model.stepping import Simulation
 
 __all__ = ["Settled", "settled"]
 
-# Longest cycle that is looked for [blows].
-MOST_BLOWS_A_CYCLE = 8
-# A cycle that only scatters, without converging any more, is believed after so many repetitions.
-REPETITIONS = 5
-# Numbers of a blow by which two blows are the same.
-COMPARED = ("impact_velocity", "period", "penetration")
 # A run in which no blow ends for so long has come to a stop [s].
 STALLED_AFTER = 2.0
 # When a run is first looked at [s].
 _FIRST_LOOK = 0.02
-# The means of an aperiodic motion are taken over this many batches of blows.
-BATCHES = 16
-# Share of the blows of an aperiodic motion that is left out as settling.
-SETTLING_SHARE = 0.2
+# The standard error is first believed after so many blows, and looked at again
+# when there are so many times more.
+FEWEST_SCATTERED, NEXT_LOOK = 100, 1.25
 
 
 @dataclass(frozen=True)
@@ -100,13 +94,14 @@ def settled(
     tolerance: float = 1e-4,
     most_blows: int = 400,
     progress: Callable[[float], None] | None = None,
+    scatter: float = 0.0,
 ) -> Settled:
     """Run a scene until its blows repeat, or until it is clear that they do not.
 
     Blows are compared at the section that starts them. A cycle of n blows is
     believed when the change over one more cycle and all changes still to come,
     were they to shrink as the last two did, stay within the tolerance; or when
-    the last cycles only scatter within it. The rate is then extrapolated to the
+    the blows only scatter within it for long. The rate is then extrapolated to the
     limit (Aitken). A motion that does neither within `most_blows` is aperiodic.
 
     Parameters
@@ -119,6 +114,10 @@ def settled(
         Blows after which a motion that has not settled is called aperiodic.
     progress : callable, optional
         Called with the blows done.
+    scatter : float
+        Relative standard error of the rate with which a motion that has not
+        settled is known well enough, and called aperiodic before `most_blows`.
+        By 0 it never is.
 
     Returns
     -------
@@ -131,10 +130,10 @@ def settled(
     SimulationError
         If the run cannot go on.
     """
-    _check(scene, tolerance, most_blows)
+    _check(scene, tolerance, most_blows, scatter)
     simulation = Simulation(scene, record_events=False)
     blows = simulation.blows
-    wait = _FIRST_LOOK
+    wait, next_look = _FIRST_LOOK, float(FEWEST_SCATTERED)
     while len(blows) < most_blows:
         last = blows[-1] if len(blows) else None
         wait = 1.05 * float(last["period"]) if last is not None else wait
@@ -147,92 +146,26 @@ def settled(
             continue
         if progress is not None:
             progress(len(blows))
-        for order in range(1, MOST_BLOWS_A_CYCLE + 1):
-            found = _cycle(blows, order, tolerance)
-            if found is not None:
-                return _made("periodic", order, *found, blows, simulation)
-    return _made("aperiodic", 0, *_batch_means(blows), math.nan, blows, simulation)
+        for order, found in cycles_in(blows, tolerance).items():
+            return _made("periodic", order, *found, blows, simulation)
+        if scatter and len(blows) >= next_look:
+            next_look = NEXT_LOOK * len(blows)
+            rate, error = batch_means(blows)
+            if error <= scatter * abs(rate):
+                break
+    return _made("aperiodic", 0, *batch_means(blows), math.nan, blows, simulation)
 
 
-def _check(scene: Scene, tolerance: float, most_blows: int) -> None:
+def _check(scene: Scene, tolerance: float, most_blows: int, scatter: float) -> None:
     if scene.piston.model == "absent":
         raise SceneError('piston.model = "absent": a bit alone has no blows that could settle')
     if not 0 < tolerance < 1:
         raise SceneError(f"tolerance = {tolerance!r}: must be a number above 0 and below 1")
+    if not 0 <= scatter < 1:
+        raise SceneError(f"scatter = {scatter!r}: must be a number from 0 on and below 1")
     least = 2 * BATCHES
     if most_blows < least:
         raise SceneError(f"most_blows = {most_blows!r}: must be a whole number from {least} on")
-
-
-def _cycle(blows: np.ndarray, order: int, tolerance: float) -> tuple[float, float, float] | None:
-    """Rate, its error and the multiplier of a cycle of `order` blows, None if it is none."""
-    if len(blows) < 3 * order:
-        return None
-    deviation = _changes(blows[-3 * order :], order)
-    older, newer = (float(np.max(np.abs(part))) for part in np.split(deviation, 2))
-    if newer <= tolerance:
-        shrinking = newer / older if older > 0 else 0.0
-        if shrinking < 1.0 and newer * shrinking / (1.0 - shrinking) <= tolerance:
-            return _limit(blows, order)
-    if len(blows) < REPETITIONS * order:
-        return None
-    rows = blows[-REPETITIONS * order :]
-    changes = _changes(rows, order)
-    largest = np.max(np.abs(changes))
-    # What still drifts one way, however slowly, has not arrived.
-    drift = np.max(np.abs(changes.reshape(REPETITIONS - 1, -1).sum(axis=0)))
-    return _scattering(rows, order) if drift <= largest <= tolerance else None
-
-
-def _changes(blows: np.ndarray, order: int) -> np.ndarray:
-    """Relative change of each number of `COMPARED` over a cycle, a row for each blow."""
-    values = np.stack([blows[name] for name in COMPARED], axis=1)
-    scale = np.mean(np.abs(values[-order:]), axis=0)
-    return (values[order:] - values[:-order]) / np.where(scale > 0, scale, 1.0)
-
-
-def _rates(blows: np.ndarray, order: int) -> np.ndarray:
-    """Mean rate over each run of `order` blows, one after the other [m/s]."""
-    whole = len(blows) // order * order
-    advance = blows["penetration"][-whole:].reshape(-1, order).sum(axis=1)
-    return np.asarray(advance / blows["period"][-whole:].reshape(-1, order).sum(axis=1))
-
-
-def _limit(blows: np.ndarray, order: int) -> tuple[float, float, float]:
-    """Limit of a converging cycle: rate, error and multiplier."""
-    second, third = _rates(blows[-2 * order :], order)
-    change = third - second
-    ratio = _multiplier(blows, order)
-    shift = change * ratio / (1.0 - ratio) if abs(ratio) < 1.0 else 0.0
-    # Extrapolating by more than the last change would trust the ratio too far.
-    shift = float(np.clip(shift, -abs(change), abs(change)))
-    return float(third + shift), float(abs(change) + abs(shift)), ratio
-
-
-def _multiplier(blows: np.ndarray, order: int) -> float:
-    """Ratio of the last two changes of the impact velocity over a cycle."""
-    velocity = blows["impact_velocity"]
-    newer = velocity[-1] - velocity[-1 - order]
-    older = velocity[-1 - order] - velocity[-1 - 2 * order]
-    return float(newer / older) if older != 0.0 else 0.0
-
-
-def _scattering(blows: np.ndarray, order: int) -> tuple[float, float, float]:
-    """Mean of cycles that only scatter: rate, scatter; the multiplier cannot be told."""
-    rates = _rates(blows, order)
-    return float(np.mean(rates)), float(np.ptp(rates)), math.nan
-
-
-def _batch_means(blows: np.ndarray) -> tuple[float, float]:
-    """Mean rate of an aperiodic motion and its standard error [m/s].
-
-    Blows follow from each other, so that their scatter alone would tell too
-    small an error; means over long batches are nearly independent.
-    """
-    rows = blows[int(SETTLING_SHARE * len(blows)) :]
-    rates = _rates(rows, len(rows) // BATCHES)
-    rate = float(np.sum(rows["penetration"]) / np.sum(rows["period"]))
-    return rate, float(np.std(rates, ddof=1) / math.sqrt(len(rates)))
 
 
 def _made(

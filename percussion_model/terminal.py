@@ -9,7 +9,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
@@ -92,18 +91,11 @@ def show_settled(found: Settled) -> None:
 
 def show_study(found: Study, files: list[Path]) -> None:
     """Print what a study found, in short, and where it is."""
-    kinds, counts = np.unique(found.to_pandas()["kind"], return_counts=True)
+    from percussion_model.study import headlines
+
     table = Table(show_header=False)
-    motions = ", ".join(f"{count} {kind}" for kind, count in zip(kinds, counts, strict=True))
-    table.add_row("Points", f"{len(found.points)}: {motions}")
-    rate = found.rows["rate_of_penetration"]
-    if np.isfinite(rate).any():
-        for name, k in (("Lowest rate", np.nanargmin(rate)), ("Highest rate", np.nanargmax(rate))):
-            at = ", ".join(
-                f"{key} = {value:.5g}" for key, value in found.points.changes(int(k)).items()
-            )
-            table.add_row(name, f"{1e3 * rate[k]:.5g} mm/s at {at}")
-    table.add_row("Computed in", f"{found.rows['wall_time'].sum():.3g} s of one core")
+    for name, text in headlines(found):
+        table.add_row(name, text)
     table.add_row("Written", ", ".join(str(path) for path in files))
     console = Console()
     console.print(table)

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import re
+import sys
 from html.parser import HTMLParser
 
 import pytest
 
+from percussion_model import page, report
 from percussion_model.report import HEADLINES, headline_rows, ledger_rows, write_report
 from percussion_model.scene import Scene
 from percussion_model.simulation import simulate
@@ -45,8 +47,11 @@ class Outline(HTMLParser):
 
 @pytest.fixture(scope="module", params=SCENES)
 def case(request, tmp_path_factory):
+    """A scene and its page with still pictures."""
     result = simulate(SCENES[request.param])
-    path = write_report(result, tmp_path_factory.mktemp("report"))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(report, "without_zoom", lambda: "zoom is missing")
+        path = write_report(result, tmp_path_factory.mktemp("report"))
     return request.param, result, path.read_text(encoding="utf-8")
 
 
@@ -56,6 +61,13 @@ def test_page_needs_nothing_else(case):
     assert "://" not in page
     assert "script" not in outline.tags
     assert all(target.startswith(("#", "data:image/png;base64,")) for target in outline.targets)
+    assert "Still pictures: zoom is missing" in page
+
+
+def test_what_is_missing_for_zoom_is_said(monkeypatch):
+    assert page.without_zoom() == ""
+    monkeypatch.setitem(sys.modules, "percussion_model.plotting.zoom", None)
+    assert "pip install 'percussion_model[report]'" in page.without_zoom()
 
 
 def test_parts_of_drawings_are_told_apart(case):

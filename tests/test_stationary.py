@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 from percussion_model import Scene, SceneError, settled, simulate
 from percussion_model.cli import app
 from percussion_model.core.records import BLOW
-from percussion_model.stationary import _batch_means, _cycle
+from percussion_model.cycles import COMPARED, batch_means, cycle, cycles_in
 
 TOLERANCE = 1e-4
 # Drive force that keeps the power of the reference at another reversal distance.
@@ -38,7 +38,7 @@ def rate_of(velocity):
 def test_a_converging_sequence_is_extrapolated_to_its_limit(multiplier):
     for count in range(3, 80):
         rows = blows(8.0 + 0.5 * multiplier ** np.arange(count))
-        found = _cycle(rows, 1, TOLERANCE)
+        found = cycle(rows, 1, TOLERANCE)
         if found is not None:
             break
     rate, error, ratio = found
@@ -51,13 +51,13 @@ def test_slow_convergence_is_not_taken_for_a_cycle():
     """Each change is within the tolerance; all those to come are not."""
     rows = blows(8.0 + 0.05 * 0.99 ** np.arange(40))
     assert np.max(np.abs(np.diff(rows["impact_velocity"])) / 8.0) < TOLERANCE
-    assert _cycle(rows, 1, TOLERANCE) is None
+    assert cycle(rows, 1, TOLERANCE) is None
 
 
 @pytest.mark.parametrize("order", [2, 3, 5])
 def test_a_cycle_of_several_blows_is_found_by_its_order(order):
     rows = blows(np.tile(8.0 + 0.3 * np.arange(order), 4))
-    found = [n for n in range(1, 9) if _cycle(rows, n, TOLERANCE) is not None]
+    found = [n for n in range(1, 9) if cycle(rows, n, TOLERANCE) is not None]
     assert found[0] == order
 
 
@@ -69,8 +69,8 @@ def test_scatter_is_no_cycle_and_its_error_covers_correlated_blows():
         for k in range(1, 400):
             drift[k] = 0.8 * drift[k - 1] + generator.normal(scale=0.1)
         rows = blows(8.0 + drift)
-        assert all(_cycle(rows, n, TOLERANCE) is None for n in range(1, 9))
-        rate, error = _batch_means(rows)
+        assert all(cycle(rows, n, TOLERANCE) is None for n in range(1, 9))
+        rate, error = batch_means(rows)
         errors.append(error)
         off.append(rate - rate_of(8.0))
     assert 0.7 < np.std(off) / np.mean(errors) < 1.4
@@ -130,6 +130,8 @@ def test_senseless_requests_are_refused():
         settled(Scene(), tolerance=0.0)
     with pytest.raises(SceneError, match="most_blows = 5: must be"):
         settled(Scene(), most_blows=5)
+    with pytest.raises(SceneError, match=r"scatter = 1\.0: must be"):
+        settled(Scene(), scatter=1.0)
 
 
 def test_command_tells_the_cycle(tmp_path):
@@ -142,3 +144,55 @@ def test_command_tells_the_cycle(tmp_path):
     assert found["rate_of_penetration"] == settled(Scene()).rate_of_penetration
     shown = CliRunner().invoke(app, ["settled", str(scene)])
     assert "periodic" in shown.stdout
+
+
+def test_chance_repetitions_of_an_aperiodic_motion_are_no_cycle():
+    """Blows of this motion agree by chance within the tolerance before it goes on."""
+    changes = {"feed.force": 1746.2, "rock.loading_stiffness": 1.9525e9}
+    scene = Scene().replace(**changes, **{"drive.reversal_distance": 0.014772})
+    found = settled(scene, most_blows=200)
+    alike = np.all(
+        [
+            np.abs(np.diff(found.blows[name])) < TOLERANCE * found.blows[name][1:]
+            for name in COMPARED
+        ],
+        axis=0,
+    )
+    assert np.any(alike[1:] & alike[:-1])
+    assert found.kind == "aperiodic"
+
+
+def test_a_rare_blow_that_is_different_is_not_missed():
+    """All is within the tolerance for tens of blows, then one gains two per cent more."""
+    changes = {"feed.force": 6437.5, "rock.loading_stiffness": 2e9}
+    scene = Scene().replace(**changes, **{"drive.reversal_distance": 0.08 / 3.8})
+    found = settled(scene)
+    long = simulate(scene, 20.0, 2.0)
+    spread = math.hypot(found.rate_of_penetration_error, long.rate_of_penetration_standard_error)
+    assert abs(found.rate_of_penetration - long.rate_of_penetration) < 3 * spread
+
+
+def test_scatter_within_the_tolerance_must_last():
+    rows = blows(8.0 + 2e-5 * np.random.default_rng(3).standard_normal(100))
+    found = [n for n in range(3, 100) if 1 in cycles_in(rows[:n], TOLERANCE)]
+    assert found[0] == 60
+    assert len(found) > 30
+
+
+def test_blows_that_alternate_while_they_converge_are_one_cycle():
+    rows = blows(8.0 + 0.01 * (-0.8) ** np.arange(60))
+    orders = [next(iter(cycles_in(rows[:n], TOLERANCE)), 0) for n in range(3, 60)]
+    assert set(orders) == {0, 1}
+    both = blows(8.0 + 0.01 * (-0.8) ** np.arange(60) + 0.02 * (-1.0) ** np.arange(60))
+    orders = [next(iter(cycles_in(both[:n], TOLERANCE)), 0) for n in range(3, 60)]
+    assert set(orders) == {0, 2}
+
+
+def test_an_aperiodic_motion_ends_at_the_wanted_standard_error():
+    scene = Scene().replace(**{"feed.force": 500.0})
+    long, short = settled(scene), settled(scene, scatter=1e-3)
+    assert (long.kind, short.kind) == ("aperiodic", "aperiodic")
+    assert len(short.blows) < len(long.blows)
+    assert short.rate_of_penetration_error <= 1e-3 * short.rate_of_penetration
+    spread = math.hypot(short.rate_of_penetration_error, long.rate_of_penetration_error)
+    assert abs(short.rate_of_penetration - long.rate_of_penetration) < 3 * spread

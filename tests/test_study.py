@@ -17,6 +17,7 @@ from typer.testing import CliRunner
 from percussion_model import Scene, SceneError, settled
 from percussion_model.cli import app
 from percussion_model.result_files import ResultError
+from percussion_model.solvers import operators
 from percussion_model.study import grid, latin_hypercube, read_axis, study, table, workers
 from percussion_model.study.store import PARTS
 from percussion_model.study.work import KINDS, run_points
@@ -85,7 +86,7 @@ def test_axes_of_the_command_line():
 
 def test_a_point_has_the_numbers_of_settled_and_whole_numbers_stay_whole():
     scene = Scene()
-    rows, failures = run_points(scene, ("solver.cells",), np.array([[10.0]]), 1e-4, 400)
+    rows, failures = run_points(scene, ("solver.cells",), np.array([[10.0]]), 1e-4, 400, 1e-3)
     found = settled(scene.replace(**{"solver.cells": 10}))
     assert failures == [""]
     assert rows["rate_of_penetration"][0] == found.rate_of_penetration
@@ -93,9 +94,22 @@ def test_a_point_has_the_numbers_of_settled_and_whole_numbers_stay_whole():
     assert KINDS[rows["kind"][0]] == "periodic"
 
 
+def test_bits_do_not_depend_on_the_threads_of_linear_algebra():
+    threadpoolctl = pytest.importorskip("threadpoolctl")
+    found = []
+    for threads in (1, 2):
+        operators._kept.clear()
+        operators._kept_free.clear()
+        with threadpoolctl.threadpool_limits(threads):
+            rows, _ = run_points(Scene(), ("solver.cells",), np.array([[40.0]]), 1e-4, 400, 1e-3)
+        found.append(rows)
+    for name in set(found[0].dtype.names) - {"wall_time"}:
+        np.testing.assert_array_equal(found[0][name], found[1][name])
+
+
 def test_what_goes_wrong_at_a_point_is_recorded_and_stops_nothing():
     rows, failures = run_points(
-        SCENE, ("rock.unloading_ratio",), np.array([[5.0], [0.5], [6.0]]), 1e-4, 400
+        SCENE, ("rock.unloading_ratio",), np.array([[5.0], [0.5], [6.0]]), 1e-4, 400, 1e-3
     )
     assert [KINDS[kind] for kind in rows["kind"]][1] == "failed"
     assert "rock.unloading_ratio = 0.5: must be a number above 1" in failures[1]
@@ -111,7 +125,7 @@ def whole(tmp_path_factory):
 
 def test_processes_find_what_one_finds(whole):
     points = grid(AXES)
-    rows, _ = run_points(SCENE, points.keys, points.values, 1e-4, 400)
+    rows, _ = run_points(SCENE, points.keys, points.values, 1e-4, 400, 1e-3)
     for name in set(rows.dtype.names) - {"wall_time"}:
         np.testing.assert_array_equal(whole.rows[name], rows[name])
 
@@ -242,7 +256,8 @@ def test_the_command_writes_tables_and_tells_what_it_found(tmp_path):
     answer = CliRunner().invoke(app, ["study", str(scene), *over, "--out", str(tmp_path / "out")])
     assert answer.exit_code == 0
     assert "2 periodic" in answer.stdout
-    assert {"points.parquet", "points.nc", "study.json"} <= set(os.listdir(tmp_path / "out"))
+    written = {"points.parquet", "points.nc", "study.json", "report.html"}
+    assert written <= set(os.listdir(tmp_path / "out"))
     plan = json.loads((tmp_path / "out" / "study.json").read_text())
     assert plan["keys"] == ["feed.force"]
     said = ["--set", "feed.force=3"]

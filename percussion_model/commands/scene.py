@@ -132,7 +132,10 @@ def new(
 def _draw(result: Result, folder: Path) -> None:
     """Write figures and report; the results are safe already."""
     with common.if_drawable():
+        from percussion_model.page import without_zoom
         from percussion_model.plotting import figures
         from percussion_model.report import write_report
 
+        if remark := without_zoom():
+            common.complain(remark)
         write_report(result, folder, figures(result, folder))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -19,10 +19,14 @@ from percussion_model.commands.common import (
     check_outputs,
     complain,
     load_scene,
+    needs_plot_extra,
 )
 
+if TYPE_CHECKING:
+    from percussion_model.study import Study
+
 # What writes tables and grids; asked for before hours of work, not after.
-NEEDED = ("pandas", "pyarrow", "xarray", "h5netcdf", "h5py")
+NEEDED = ("pandas", "pyarrow", "xarray", "h5netcdf", "h5py", "threadpoolctl")
 
 
 def study(
@@ -48,6 +52,11 @@ def study(
     cells: Cells = None,
     settings: Settings = None,
     tolerance: Tolerance = 1e-4,
+    scatter: Annotated[
+        float,
+        typer.Option("--scatter", help="Relative standard error that will do for aperiodic rates."),
+    ] = 1e-3,
+    report: Annotated[bool, typer.Option(help="Write report.html as well.")] = True,
     processes: Annotated[
         int | None, typer.Option("--processes", min=1, help="On this machine; default: its cores.")
     ] = None,
@@ -86,6 +95,7 @@ def study(
                 points,
                 out,
                 tolerance,
+                scatter=scatter,
                 processes=processes,
                 cluster=cluster,
                 progress=progress,
@@ -93,4 +103,17 @@ def study(
     except KeyboardInterrupt:
         words = f"interrupted; finished points are kept in {out}, the same command goes on"
         raise typer.Exit(complain(words, INTERRUPTED)) from None
-    show_study(found, found.save(out))
+    show_study(found, [*found.save(out), *(_report(found, out) if report else ())])
+
+
+def _report(found: Study, folder: Path) -> list[Path]:
+    """Write the report; the results are safe already."""
+    try:
+        from percussion_model.page import without_zoom
+        from percussion_model.study_report import write_study_report
+    except ImportError as error:
+        complain(needs_plot_extra(error))
+        return []
+    if remark := without_zoom():
+        complain(remark)
+    return [write_study_report(found, folder)]

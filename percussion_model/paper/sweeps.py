@@ -89,6 +89,7 @@ def run_sweep(
         table(columns),
         folder,
         most_blows=MOST_BLOWS,
+        scatter=0.0,
         processes=processes,
         progress=progress,
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -91,14 +91,21 @@ def draw_by_mode(ax: Axes, x: np.ndarray, y: np.ndarray, mode: np.ndarray) -> No
     A piece from one sample to the next has the mode of the first. Each mode is
     one line with gaps, so that matplotlib can thin it out.
     """
-    for value, colour in MODE_COLOURS.items():
-        mine = mode == value
-        if not mine.any():
-            continue
-        # The sample after a run of this mode closes its last piece.
-        shown = mine.copy()
-        shown[1:] |= mine[:-1]
-        ax.plot(*_with_gaps(x, y, shown), color=colour, zorder=2 + 0.1 * _rank(value))
+    for value, xs, ys in by_mode(x, y, mode):
+        ax.plot(xs, ys, color=MODE_COLOURS[value], zorder=2 + 0.1 * _rank(value))
+
+
+def by_mode(
+    x: np.ndarray, y: np.ndarray, modes: np.ndarray
+) -> Iterator[tuple[Mode, np.ndarray, np.ndarray]]:
+    """Divide a line by drilling mode: each mode that occurs, and its line with gaps of NaN."""
+    for mode in MODE_COLOURS:
+        mine = modes == mode
+        if mine.any():
+            # The sample after a run of this mode closes its last piece.
+            shown = mine.copy()
+            shown[1:] |= mine[:-1]
+            yield mode, *_with_gaps(x, y, shown)
 
 
 def _rank(mode: Mode) -> int:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -30,9 +32,14 @@ MOST_NUMBERS = 40_000_000
 MOST_DOUBLINGS = 40
 
 
+# What a standstill loses in later steps changes no digit of the sum below this share.
+NEGLIGIBLE = 1e-20
+
 # Operators of so many scenes are kept [a few MB each on the default grid].
 MOST_KEPT = 4
 _kept: dict[bytes, LeapOperators | None] = {}
+# Those of free bars, which scenes on other rock share, are kept apart.
+_kept_free: dict[bytes, dict[str, np.ndarray]] = {}
 
 
 @dataclass(frozen=True)
@@ -104,36 +111,65 @@ def leap_operators(
     if LEVELS * (size_p * size_p + len(Mode) * size * size) > MOST_NUMBERS:
         return None
     par["size_p"], par["size_r"] = size_p, size
-    masses = [grid.mass for grid in (piston, bit) if grid is not None]
-    key = b"|".join(part.tobytes() for part in (par, cp, cb, *masses))
+    key = _key(par, cp, cb, piston, bit)
     if key not in _kept:
-        while len(_kept) >= MOST_KEPT:
-            del _kept[next(iter(_kept))]
+        _make_room(_kept)
         _kept[key] = _build(par, piston, cp, bit, cb)
     return _kept[key]
+
+
+def _key(par: np.ndarray, cp: np.ndarray, cb: np.ndarray, piston: Grid | None, bit: Grid) -> bytes:
+    """Return all that operators depend on."""
+    masses = [grid.mass for grid in (piston, bit) if grid is not None]
+    return b"|".join(part.tobytes() for part in (par, cp, cb, *masses))
+
+
+def _make_room(kept: dict[bytes, Any]) -> None:
+    while len(kept) >= MOST_KEPT:
+        del kept[next(iter(kept))]
 
 
 def _build(
     par: np.ndarray, piston: Grid | None, cp: np.ndarray, bit: Grid, cb: np.ndarray
 ) -> LeapOperators | None:
     """Operators of piston and bit; arguments as in `leap_operators`."""
-    n_p = piston.n if piston is not None else 0
-    size_p, size = int(par["size_p"][0]), int(par["size_r"][0])
     alone = _alone(par)
+    key = _key(alone, cp, cb, piston, bit)
+    if key not in _kept_free:
+        _make_room(_kept_free)
+        _kept_free[key] = _free(alone, piston, cp, bit, cb)
+    free = _kept_free[key]
+    try:
+        loaded = _of_loaded_bit(alone, bit, cb, free, _loads(par))
+    except np.linalg.LinAlgError:
+        return None
+    return LeapOperators(**{name: loaded.get(name, free[name]) for name in _NAMES})
+
+
+def _free(
+    alone: np.ndarray, piston: Grid | None, cp: np.ndarray, bit: Grid, cb: np.ndarray
+) -> dict[str, np.ndarray]:
+    """Operators of the free piston and of the bit in free flight.
+
+    The contact modes have room in them.
+    """
     found = dict(zip(_NAMES, no_operators(), strict=True))
     if piston is not None:
         of_piston = alone.copy()
         of_piston["n_b"], of_piston["mass_b"] = piston.n, piston.mass.sum()
-        of_piston["z_t"], of_piston["z_b"] = par["z_f"], par["z_p"]
-        of_piston["kappa_t"], of_piston["kappa_b"] = par["kappa_f"], par["kappa_p"]
+        for end in ("z", "kappa"):
+            of_piston[f"{end}_t"], of_piston[f"{end}_b"] = alone[f"{end}_f"], alone[f"{end}_p"]
         by_column = step_map(Configuration(of_piston, piston, cp))
-        found["piston"] = _powers(by_column, LEVELS, LEVELS, size_p)
-        found["bottom"] = _watch(by_column, by_column @ _offset(cp, n_p, Coef.BOTTOM), size_p)
-    try:
-        found |= _of_bit(alone, bit, cb, size, loads=_loads(par))
-    except np.linalg.LinAlgError:
-        return None
-    return LeapOperators(**found)
+        found["piston"] = _powers(by_column, LEVELS, int(alone["size_p"][0]))
+        found["bottom"] = _watch(found["piston"], by_column @ _offset(cp, piston.n, Coef.BOTTOM))
+    size = int(alone["size_r"][0])
+    powers = np.zeros((len(Mode), LEVELS, size, size))
+    watch, top = np.zeros((2, len(Mode), size, WATCHED))
+    by_column = step_map(Configuration(alone, bit, cb))
+    powers[Mode.FF] = _powers(by_column, LEVELS, size)
+    for rows, row in ((watch, Coef.BOTTOM), (top, Coef.TOP)):
+        rows[Mode.FF] = _watch(powers[Mode.FF], by_column @ _offset(cb, bit.n, row))
+    return found | {"bit": powers, "watch": watch, "top": top}
 
 
 _NAMES = tuple(LeapOperators.__dataclass_fields__)
@@ -158,67 +194,76 @@ def _offset(c: np.ndarray, n: int, row: Coef) -> np.ndarray:
 
 
 def _alone(par: np.ndarray) -> np.ndarray:
-    """Parameters of the bit by itself, without forces."""
+    """Parameters of the bit by itself, without forces and rock."""
     alone = par.copy()
-    alone["gravity"] = 0.0
+    for name in ("gravity", "ss_stiffness", "ss_loading", "ss_damping", "release"):
+        alone[name] = 0.0
     alone["piston"] = Piston.ABSENT
     alone["n_p"] = 0
     alone["drive"] = DriveKind.NONE
     alone["rock"] = RockKind.NONE
     alone["barrier"] = 1
-    alone["release"] = 0
     return alone
 
 
-def _of_bit(
+def _of_loaded_bit(
     alone: np.ndarray,
     bit: Grid,
     cb: np.ndarray,
-    size: int,
+    free: dict[str, np.ndarray],
     loads: dict[Mode, tuple[float, float]],
 ) -> dict[str, np.ndarray]:
-    """Operators of the bit in free flight and in the contact modes."""
-    powers = np.zeros((len(Mode), LEVELS, size, size))
-    watch, top = np.zeros((2, len(Mode), size, WATCHED))
+    """Operators of the bit, those of `free` among them, in all modes."""
+    powers, watch, top = (free[name].copy() for name in ("bit", "watch", "top"))
+    size = powers.shape[-1]
     sums, forms = np.zeros((len(Mode), size)), np.zeros((2, size, size))
-    to_top, to_bottom = (_offset(cb, bit.n, row) for row in (Coef.TOP, Coef.BOTTOM))
-    by_column = step_map(Configuration(alone, bit, cb))
-    powers[Mode.FF] = _powers(by_column, LEVELS, LEVELS, size)
-    watch[Mode.FF] = _watch(by_column, by_column @ to_bottom, size)
-    top[Mode.FF] = _watch(by_column, by_column @ to_top, size)
     rock = alone.copy()
     rock["rock"] = RockKind.BILINEAR
-    way = np.append(to_top + to_bottom, 1.0)
+    way = np.append(_offset(cb, bit.n, Coef.TOP) + _offset(cb, bit.n, Coef.BOTTOM), 1.0)
     for mode, (stiffness, damping) in loads.items():
         configuration = Configuration(rock, bit, cb, float(stiffness), float(damping))
         by_column = step_map(configuration)
         levels = LEVELS if mode == Mode.SS else WATCH_LEVELS
-        powers[mode] = _powers(by_column, levels, LEVELS, size)
-        watch[mode] = _watch(by_column, end_row(configuration, by_column), size)
-        top[mode] = _watch(by_column, by_column @ way, size)
+        powers[mode, :levels] = _powers(by_column, levels, size)
+        watch[mode] = _watch(powers[mode], end_row(configuration, by_column))
+        top[mode] = _watch(powers[mode], by_column @ way)
         sums[mode, : len(by_column)] = _path_to_rest(configuration, by_column)
         if mode == Mode.SS:
-            for k, form in enumerate(step_forms(configuration, by_column)[1:]):
-                forms[k] = _ever_lost(by_column, form, size)
+            forms = _ever_lost(by_column, step_forms(configuration, by_column)[1:], size)
     return {"bit": powers, "watch": watch, "sums": sums, "top": top, "forms": forms}
 
 
-def _watch(by_column: np.ndarray, row: np.ndarray, size: int) -> np.ndarray:
-    """Rows, padded to `size`, that show at the start of each step what `row` shows now."""
-    out = np.zeros((size, WATCHED))
-    for k in range(WATCHED):
-        out[: len(row), k] = row
-        row = by_column @ row
-    return out
+def _watch(powers: np.ndarray, row: np.ndarray) -> np.ndarray:
+    """Rows that show at the start of each of the next steps what `row` shows now.
+
+    Parameters
+    ----------
+    powers : ndarray, shape (levels, size, size)
+        Powers 1, 4, 16, ... of the step map.
+    row : ndarray
+        Filled up with zeros to `size`.
+
+    Returns
+    -------
+    ndarray, shape (size, WATCHED)
+    """
+    shown = np.zeros((powers.shape[-1], 1))
+    shown[: len(row), 0] = row
+    for power in powers[: WATCH_LEVELS - 1]:  # one to four of each
+        later = [shown]
+        for _ in range(3):
+            later.append(power @ later[-1])
+        shown = np.hstack(later)
+    return shown
 
 
-def _powers(by_column: np.ndarray, levels: int, room: int, size: int) -> np.ndarray:
-    """Powers 1, 4, 16, ... of a step map, padded; `levels` of them in `room` places."""
-    out = np.zeros((room, size, size))
-    for level in range(levels):
-        out[level, : len(by_column), : len(by_column)] = by_column
-        by_column = by_column @ by_column
-        by_column = by_column @ by_column
+def _powers(by_column: np.ndarray, levels: int, size: int) -> np.ndarray:
+    """Powers 1, 4, 16, ... of a step map, padded."""
+    out = np.zeros((levels, size, size))
+    out[0, : len(by_column), : len(by_column)] = by_column
+    for level in range(1, levels):
+        squared = out[level - 1] @ out[level - 1]
+        out[level] = squared @ squared
     return out
 
 
@@ -233,14 +278,18 @@ def _path_to_rest(configuration: Configuration, by_column: np.ndarray) -> np.nda
     return path
 
 
-def _ever_lost(by_column: np.ndarray, form: np.ndarray, size: int) -> np.ndarray:
-    """Sum of a quadratic form over all steps to come, as a padded upper triangle."""
-    total = 0.5 * (form + form.T)
+def _ever_lost(by_column: np.ndarray, of_a_step: Sequence[np.ndarray], size: int) -> np.ndarray:
+    """Sums of quadratic forms over all steps to come, as padded upper triangles."""
+    n = len(by_column)
+    totals = np.array([0.5 * (form + form.T) for form in of_a_step])
     for _ in range(MOST_DOUBLINGS):
-        more = by_column @ total @ by_column.T
-        total += 0.5 * (more + more.T)
+        more = by_column @ totals @ by_column.T
+        totals += 0.5 * (more + more.swapaxes(1, 2))
+        if np.all(np.abs(more).max(axis=(1, 2)) <= NEGLIGIBLE * np.abs(totals).max(axis=(1, 2))):
+            break
         by_column = by_column @ by_column
-    out = np.zeros((size, size))
-    # symmetric: column by column, the upper triangle says it all
-    out[: len(total), : len(total)] = 2.0 * np.tril(total, -1) + np.diag(np.diag(total))
+    out = np.zeros((len(totals), size, size))
+    for k, total in enumerate(totals):
+        # symmetric: column by column, the upper triangle says it all
+        out[k, :n, :n] = 2.0 * np.tril(total, -1) + np.diag(np.diag(total))
     return out

@@ -66,12 +66,12 @@ def step_map(configuration: Configuration) -> np.ndarray:
     none, row = np.zeros(1), np.zeros(len(SAMPLE_FIELDS))
     blows, events, operators = np.zeros(1, BLOW), np.zeros(1, EVENT), no_operators()
     by_column = np.zeros((size, size))
-    state = start.copy()
+    state, w = start.copy(), np.zeros((len(Row), n + 1))
     # As bytes, since NumPy copies records field by field.
     to, origin = state.view(np.uint8), start.view(np.uint8)
     for k in range(size):
         to[:] = origin
-        w = np.zeros((len(Row), n + 1))
+        w[:] = 0.0
         if k < n:
             w[Row.DOWN, k] = 1.0
         elif k < 2 * n:

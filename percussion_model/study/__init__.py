@@ -22,6 +22,7 @@ from percussion_model.study.points import (
     table,
 )
 from percussion_model.study.store import Store
+from percussion_model.study.summary import headlines
 from percussion_model.study.work import FOUND, KINDS, run_points
 from percussion_model.study.workers import on_a_cluster, on_this_machine
 
@@ -29,7 +30,16 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-__all__ = ["Points", "Study", "grid", "latin_hypercube", "read_axis", "study", "table"]
+__all__ = [
+    "Points",
+    "Study",
+    "grid",
+    "headlines",
+    "latin_hypercube",
+    "read_axis",
+    "study",
+    "table",
+]
 
 # Points are handed out in parts of at most so many, and so many parts a process at least.
 MOST_A_PART = 100
@@ -54,6 +64,13 @@ class Study:
     points: Points
     rows: np.ndarray
     failures: list[str]
+
+    @property
+    def relative_error(self) -> np.ndarray:
+        """Error of the rate of penetration by the rate, for each point; NaN where it has none."""
+        rate = np.abs(self.rows["rate_of_penetration"])
+        error = self.rows["rate_of_penetration_error"]
+        return np.divide(error, rate, out=np.full(len(rate), np.nan), where=rate > 0)
 
     def save(self, folder: str | Path) -> list[Path]:
         """Write `points.parquet` and `points.nc` (NetCDF) to a folder, both or none."""
@@ -113,6 +130,7 @@ def study(
     folder: str | Path,
     tolerance: float = 1e-4,
     most_blows: int = 400,
+    scatter: float = 1e-3,
     processes: int | None = None,
     cluster: str | None = None,
     progress: Callable[[int, int], None] | None = None,
@@ -131,8 +149,9 @@ def study(
         From `grid`, `latin_hypercube` or `table`.
     folder : str or Path
         New, or that of the same study before.
-    tolerance, most_blows
-        As in `settled`.
+    tolerance, most_blows, scatter
+        As in `settled`; aperiodic motion is run until the standard error of its
+        rate is within `scatter`, a relative one, or for `most_blows`.
     processes : int, optional
         On this machine; default as many as it has cores.
     cluster : str, optional
@@ -154,14 +173,15 @@ def study(
         If workers keep dying, or no scheduler answers.
     """
     refuse_unknown(scene, points)
-    store = Store(Path(folder), _plan(scene, points, tolerance, most_blows))
+    store = Store(Path(folder), _plan(scene, points, tolerance, most_blows, scatter))
     _rows, _failures, done = store.read(len(points))
     order = points.in_cheap_order()
     order = order[~done[order]]
     processes = processes or os.cpu_count() or 1
     size = max(1, min(MOST_A_PART, len(order) // (PARTS_A_PROCESS * processes)))
     parts = [order[k : k + size] for k in range(0, len(order), size)]
-    tasks = [(scene, points.keys, points.values[part], tolerance, most_blows) for part in parts]
+    asked = tolerance, most_blows, scatter
+    tasks = [(scene, points.keys, points.values[part], *asked) for part in parts]
     count = int(done.sum())
     if progress is not None:
         progress(count, len(points))
@@ -182,7 +202,9 @@ def study(
     return Study(scene, points, rows, failures)
 
 
-def _plan(scene: Scene, points: Points, tolerance: float, most_blows: int) -> dict[str, Any]:
+def _plan(
+    scene: Scene, points: Points, tolerance: float, most_blows: int, scatter: float
+) -> dict[str, Any]:
     return {
         "scene": scene.to_toml(),
         "keys": list(points.keys),
@@ -190,5 +212,6 @@ def _plan(scene: Scene, points: Points, tolerance: float, most_blows: int) -> di
         "points": points.digest(),
         "tolerance": tolerance,
         "most_blows": most_blows,
+        "scatter": scatter,
         "version": version("percussion_model"),
     }

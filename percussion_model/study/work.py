@@ -58,8 +58,12 @@ def run_points(
     values: np.ndarray,
     tolerance: float,
     most_blows: int,
+    scatter: float,
 ) -> tuple[np.ndarray, list[str]]:
     """Find the stationary response at some points.
+
+    Linear algebra gets one thread: with more it would round otherwise, and the bits
+    would depend on where a point is computed.
 
     Returns
     -------
@@ -67,11 +71,20 @@ def run_points(
     failures : list of str
         What went wrong at each point, empty where nothing did.
     """
+    from threadpoolctl import threadpool_limits
+
+    with threadpool_limits(1):
+        return _run_points(scene, keys, values, tolerance, most_blows, scatter)
+
+
+def _run_points(
+    scene: Scene, keys: tuple[str, ...], values: np.ndarray, *asked: Any
+) -> tuple[np.ndarray, list[str]]:
     rows, failures = np.zeros(len(values), ROW), []
     for row, point in zip(rows, values.tolist(), strict=True):
         changes = {key: whole_number(key, value) for key, value in zip(keys, point, strict=True)}
         try:
-            _fill(row, settled(scene.replace(**changes), tolerance, most_blows))
+            _fill(row, _settled(scene.replace(**changes), *asked))
             failures.append("")
         except Exception as error:
             for name in FOUND:
@@ -79,6 +92,10 @@ def run_points(
             row["kind"] = KINDS.index("failed")
             failures.append(f"{type(error).__name__}: {error}")
     return rows, failures
+
+
+def _settled(scene: Scene, tolerance: float, most_blows: int, scatter: float) -> Settled:
+    return settled(scene, tolerance, most_blows, scatter=scatter)
 
 
 def _fill(row: Any, found: Settled) -> None:

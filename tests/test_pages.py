@@ -1,0 +1,137 @@
+"""Pages in a real browser: they draw, zoom and choose, without errors and without a network."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from percussion_model.report import write_report
+from percussion_model.scene import Scene
+from percussion_model.simulation import simulate
+from percussion_model.study import Study, grid, study, table
+from percussion_model.study_report import CAPTIONS, render_study_report, write_study_report
+from tests.browser import Drag, find_browser, visit
+from tests.test_report import Outline
+
+pytest.importorskip("bokeh", reason="figures that can be zoomed need bokeh")
+needs_browser = pytest.mark.skipif(
+    find_browser() is None, reason="no Chromium is installed to open pages with"
+)
+LARGEST = 4_000_000  # [bytes]
+MODEL = "Bokeh.documents[0].get_model_by_name"
+SCENE = Scene(title="rigid <bodies>").computed_by("rigid")
+AXES = {
+    "feed.force": np.linspace(1500.0, 6000.0, 4),
+    "rock.loading_stiffness": np.geomspace(3e8, 3e9, 3),
+    "drive.reversal_distance": np.array([0.02, 0.04]),
+}
+
+
+def opened(path, folder, *steps):
+    """Answers of a page that is opened without a fault."""
+    assert path.stat().st_size < LARGEST
+    found = visit(path, folder / "profile", steps, folder / "page.png")
+    assert found.errors == []
+    own = path.resolve().as_uri()
+    assert [at for at in found.requests if at != own and not at.startswith("data:")] == []
+    assert found.requests.count(own) == 1
+    assert found.height > 1500
+    assert (folder / "page.png").stat().st_size > 50_000
+    return found.answers
+
+
+def self_contained(path):
+    outline = Outline(path.read_text(encoding="utf-8"))
+    assert "link" not in outline.tags
+    return all(target.startswith(("#", "data:")) for target in outline.targets)
+
+
+@pytest.fixture(scope="module")
+def run_page(tmp_path_factory):
+    scene = Scene(title="A <short> run", run={"duration": 0.3, "settle": 0.1})
+    return write_report(simulate(scene), tmp_path_factory.mktemp("run"))
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory):
+    return study(SCENE, grid(AXES), tmp_path_factory.mktemp("study"), processes=1)
+
+
+def test_a_run_page_is_self_contained(run_page):
+    assert self_contained(run_page)
+    text = run_page.read_text(encoding="utf-8")
+    assert "<short>" not in text
+    assert text.count("<figcaption>") == 4
+
+
+@needs_browser
+def test_a_dragged_box_zooms_the_figures_of_a_run(run_page, tmp_path):
+    ask = f"{MODEL}('Rate of penetration of each blow').x_range.end"
+    before, after, other = opened(
+        run_page,
+        tmp_path,
+        ask,
+        Drag(0, (0.15, 0.06), (0.3, 0.14)),
+        ask,
+        f"{MODEL}('Period of each blow').x_range.end",
+    )
+    assert before == pytest.approx(0.3)
+    assert 0.02 < after < 0.25
+    assert other == after
+
+
+@needs_browser
+def test_a_map_shows_the_slice_and_the_quantity_that_are_chosen(found, tmp_path):
+    path = write_study_report(found, tmp_path)
+    assert self_contained(path)
+    shown = f"[...{MODEL}('cells').data.value]"
+    choose = (
+        f"{MODEL}('drive.reversal_distance').value = 0; {MODEL}('shown').value = 'impact';"
+        "new Promise(done => setTimeout(done, 300))"
+    )
+    rates, _, impacts, title = opened(
+        path, tmp_path, shown, choose, shown, f"{MODEL}('map').title.text"
+    )
+    rows = found.rows.reshape(found.points.shape)
+    # row by row from the softest rock on, as the map is drawn
+    assert rates == pytest.approx(1e3 * rows["rate_of_penetration"][:, :, 1].T.ravel(), rel=1e-6)
+    assert impacts == pytest.approx(rows["impact_velocity"][:, :, 0].T.ravel(), rel=1e-6)
+    assert title == "Impact velocity [m/s]"
+
+
+@needs_browser
+def test_samples_are_scattered_over_each_parameter(tmp_path):
+    """One of them fails, and the page says so."""
+    points = table({"feed.force": [1e3, 2e3, 4e3], "rock.unloading_ratio": [5.0, 0.5, 8.0]})
+    found = study(SCENE, points, tmp_path / "out", processes=1)
+    path = write_study_report(found, tmp_path)
+    text = path.read_text(encoding="utf-8")
+    assert "rock.unloading_ratio = 0.5: must be a number above 1" in text
+    assert CAPTIONS["scatter"] in text
+    (count,) = opened(path, tmp_path, f"{MODEL}('shown').options.length")
+    assert count > 10
+
+
+def test_a_page_without_zoom_has_tables_and_says_what_is_missing(found, monkeypatch):
+    monkeypatch.setattr("percussion_model.study_report.without_zoom", lambda: "zoom is missing")
+    text = render_study_report(found)
+    assert "zoom is missing" in text
+    assert "<script" not in text
+    assert "<td>24: " in text
+    assert "rigid &lt;bodies&gt;" in text
+
+
+def test_a_large_study_makes_a_page_of_some_megabytes():
+    axes = {key: np.linspace(1.0, 2.0, 22) for key in AXES}
+    points = grid(axes)
+    rows = np.zeros(len(points), dtype=study_rows())
+    for name in rows.dtype.names:
+        rows[name] = np.random.default_rng(1).random(len(points))
+    page = render_study_report(Study(SCENE, points, rows, [""] * len(points)))
+    assert len(page.encode()) < LARGEST
+
+
+def study_rows():
+    from percussion_model.study.work import ROW
+
+    return ROW
