@@ -149,7 +149,8 @@ def draw(ones: Sequence[OneBlow], exact: OneBlow, eights: Sequence[EightBlows], 
     axes[2].set_title("eight blows", fontsize="medium")
     axes[2].set_ylabel("[%]")
     axes[2].axhline(0.0, color="k", linewidth=0.6)
-    axes[2].legend(fontsize="x-small")
+    axes[2].set_ylim(top=2.6)  # room for the legend
+    axes[2].legend(fontsize="x-small", loc="upper left")
     for ax in axes:
         ax.set_xlabel("communication step [ms]")
         ax.axvline(1e3 * UNCHANGED, color="0.6", linewidth=0.8)

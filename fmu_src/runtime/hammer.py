@@ -69,6 +69,7 @@ class PercussiveHammer(Slave):
         self._readers = {self.by_name[name]: read for name, read in OUTPUTS.items()}
         self._plain = {inner: self.by_name[name] for name, inner in PLAIN_INPUTS.items()}
         self._forced = [self.by_name[name] for name in DRIVE_INPUTS]
+        self._forces = frozenset(self._forced)
         self.motion: Motion | None = None
         self.given_inputs: list[Any] = []  # values of the inputs when the solver was made
         self.fingerprint = b""
@@ -95,6 +96,8 @@ class PercussiveHammer(Slave):
     def check(self, references: Any) -> None:
         """Check bounds, the drive force, and contradictions between parameters."""
         super().check(references)
+        if self.phase is STEPPING and self._forces.isdisjoint(references):
+            return
         force = self.drive_force()
         if not self.rows["drive.force"].allows(force):
             name = "supply_pressure * drive.effective_area"
@@ -186,19 +189,24 @@ class PercussiveHammer(Slave):
     def step(self, time: float, step_size: float) -> None:
         """Pass on changed inputs, then advance."""
         motion = self.motion or self.ready()
-        changes: dict[str, float] = {}
-        if self._dirty:
-            self.check(self._new)
-            self._new.clear()
-            wanted = self.solver_inputs()
-            for name, value in wanted.items():
-                if value != self._acting[name] and self.acts(motion.scene, name):
-                    changes[name] = value
-            self._acting = wanted
-            self._dirty = False
+        changes = self.take_inputs(motion) if self._dirty else {}
         motion.go_on(time, step_size, changes)
         for text in self._watch.look(motion, self._acting["loading_stiffness"]):
             self.warn(f"{self.instance_name}: at t = {time:.6g} s: {text}")
+
+    def take_inputs(self, motion: Motion) -> dict[str, float]:
+        """Inputs of the solver that have changed, checked."""
+        self.check(self._new)
+        self._new.clear()
+        acting, wanted = self._acting, self.solver_inputs()
+        self._acting, self._dirty = wanted, False
+        if wanted == acting:
+            return {}
+        return {
+            name: value
+            for name, value in wanted.items()
+            if value != acting[name] and self.acts(motion.scene, name)
+        }
 
     def acts(self, scene: SceneRules, name: str) -> bool:
         """Whether an input has an effect in the scene; says so in the log where not."""

@@ -167,7 +167,11 @@ class Motion(Runner):
 
     def _take_row(self) -> None:
         # without a piston its numbers are undefined
-        self.numbers = [value if value == value else 0.0 for value in self.row.tolist()]
+        numbers = self.row.tolist()
+        total = sum(numbers)
+        if total != total:
+            numbers = [value if value == value else 0.0 for value in numbers]
+        self.numbers = numbers
         self._is_read = True
 
     def before(self) -> np.ndarray:

@@ -40,34 +40,28 @@ class Waves(Rods):
         self.ring = np.zeros(2 * count * self.cells_of_rod)
         # share of a velocity that viscous friction leaves in a step
         self._left_by_wall = 1.0 / (1.0 + self.viscous * self.cell / self.cell_mass * self.step)
-        # shares of an end's velocity that are left after a step, and in its mean
-        self._left, self._mean = {}, {}
-        for mass in (self.head_mass, self.casing_mass):
-            x = self.impedance * self.step / mass
-            self._left[mass] = math.exp(-x)
-            self._mean[mass] = -math.expm1(-x) / x
+        self._head, self._casing = self._shares(self.head_mass), self._shares(self.casing_mass)
+        self._change = 0.25 * self.gravity * self.step
+        self._head_weight = self.head_mass * self.head_gravity
+        self._casing_weight = self.casing_mass * self.gravity
+
+    def _shares(self, mass: float) -> tuple[float, float]:
+        """Shares of an end's velocity that count in the mean of a step, and at its end."""
+        x = self.impedance * self.step / mass
+        return -math.expm1(-x) / x, math.exp(-x)
 
     @property
     def ring(self) -> np.ndarray:
         """All waves."""
-        return self._ring
+        return self._now[0]
 
     @ring.setter
     def ring(self, waves: np.ndarray) -> None:
         # two rings, from one to the other at each shift, and what is seen of them
-        self._ring, self._other = waves, np.empty_like(waves)
-        self._before, self._other_before = waves[:-1], self._other[:-1]
-        self._after, self._other_after = waves[1:], self._other[1:]
-        self._back, self._other_back = waves[::-1], self._other[::-1]
+        self._now, self._next = (
+            (ring, ring[:-1], ring[1:], ring[::-1]) for ring in (waves, np.empty_like(waves))
+        )
         self._room, self._ones = np.empty_like(waves), np.ones_like(waves)
-
-    def _shift(self, change: float) -> None:
-        """Move all waves by a cell, and add a change."""
-        np.add(self._before, change, out=self._other_after)
-        self._ring, self._other = self._other, self._ring
-        self._before, self._other_before = self._other_before, self._before
-        self._after, self._other_after = self._other_after, self._after
-        self._back, self._other_back = self._other_back, self._back
 
     @property
     def down(self) -> np.ndarray:
@@ -91,56 +85,62 @@ class Waves(Rods):
 
     def advance(self, head_force: float, casing_force: float) -> None:
         """Go on by a transit time under forces on head and casing [N], without weights."""
-        h, cells = self.step, len(self._ring) // 2
+        h, now, other = self.step, self._now, self._next
+        cells = len(now[0]) // 2
         # half of the weight's effect before the waves travel, half of it after
-        change = 0.25 * self.gravity * h
-        arriving_down = float(self._ring[cells - 1]) + change
-        arriving_up = float(self._ring[-1]) + change
-        head_weight = self.head_mass * self.head_gravity
-        casing_weight = self.casing_mass * self.gravity
+        change, head_weight, casing_weight = self._change, self._head_weight, self._casing_weight
+        arriving_down = float(now[0][cells - 1]) + change
+        arriving_up = float(now[0][-1]) + change
         top, self.head_velocity = self._end(
-            self.head_velocity, head_force + head_weight, arriving_up, self.head_mass
+            self.head_velocity, head_force + head_weight, arriving_up, self._head
         )
         bottom, self.casing_velocity = self._end(
-            self.casing_velocity, casing_force + casing_weight, arriving_down, self.casing_mass
+            self.casing_velocity, casing_force + casing_weight, arriving_down, self._casing
         )
-        self._shift(2.0 * change)
-        ring = self._ring
+        np.add(now[1], 2.0 * change, other[2])
+        ring = other[0]
         ring[0], ring[cells] = top - arriving_up + change, bottom - arriving_down + change
+        self._now, self._next = other, now
         self.head += top * h
         self.casing += bottom * h
         entered = top + bottom - 2.0 * (arriving_down + arriving_up)
-        self.weight_work += h * (head_weight * top + casing_weight * bottom)
         # the sum of the waves in the middle of each half
         fallen = 2.0 * self.total + entered + 4.0 * cells * change
+        self.weight_work += h * (head_weight * top + casing_weight * bottom)
         self.weight_work += 2.0 * self.cell_mass * change * fallen
         self.total += entered + 4.0 * cells * change
-        if self.rubs:
-            self._rub()
-
-    def _rub(self) -> None:
-        """Wall friction on all cells; both waves of a cell lose the same."""
-        ring, room = self._ring, self._room
-        np.add(ring, self._back, out=room)  # velocities, each cell twice
         if self.sticking > 0.0:
-            half = room[: len(ring) // 2]
-            half = 0.5 * (self.rubbed(half, self.cell_mass, self.cell, self.step) - half)
-            ring += np.concatenate([half, half[::-1]])
-            self.total = float(ring.sum())
-            return
-        left = self._left_by_wall
-        total = 0.5 * float(room.dot(self._ones))
-        self.friction_loss += 0.25 * self.cell_mass * (1.0 - left * left) * float(room.dot(room))
+            self._stick(ring)
+        elif self.viscous > 0.0:
+            self._rub(ring, other[3])
+
+    def _stick(self, ring: np.ndarray) -> None:
+        """Coulomb and viscous friction on all cells; both waves of a cell lose the same."""
+        cells = len(ring) // 2
+        v = self.down + self.up
+        change = 0.5 * (self.rubbed(v, self.cell_mass, self.cell, self.step) - v)
+        ring[:cells] += change
+        ring[cells:] += change[::-1]
+        self.total = float(ring.sum())
+
+    def _rub(self, ring: np.ndarray, back: np.ndarray) -> None:
+        """Viscous friction alone: each velocity loses the same share."""
+        v, left = self._room, self._left_by_wall
+        np.add(ring, back, v)  # each cell twice
+        total = 0.5 * float(v.dot(self._ones))
+        self.friction_loss += 0.25 * self.cell_mass * (1.0 - left * left) * float(v.dot(v))
         self.lost_momentum += self.cell_mass * (1.0 - left) * total
         self.total = left * total
-        room *= 0.5 * (left - 1.0)
-        ring += room
+        v *= 0.5 * (left - 1.0)
+        ring += v
 
-    def _end(self, v: float, force: float, arriving: float, mass: float) -> tuple[float, float]:
+    def _end(
+        self, v: float, force: float, arriving: float, shares: tuple[float, float]
+    ) -> tuple[float, float]:
         """Mean velocity of an end over a step, and that at its end [m/s]."""
         settled = force / self.impedance + 2.0 * arriving
         off = v - settled
-        return settled + off * self._mean[mass], settled + off * self._left[mass]
+        return settled + off * shares[0], settled + off * shares[1]
 
     def add_rod(self) -> None:
         """Put a rod below the head, in the state of the place where it joins."""
@@ -154,12 +154,12 @@ class Waves(Rods):
     @property
     def stored(self) -> float:
         """Kinetic and elastic energy [J]."""
-        waves = self.cell_mass * float(self._ring @ self._ring)
+        waves = self.cell_mass * float(self.ring @ self.ring)
         ends = self.head_mass * self.head_velocity**2 + self.casing_mass * self.casing_velocity**2
         return waves + 0.5 * ends
 
     @property
     def momentum(self) -> float:
         """Of head, rods and casing [N s]."""
-        waves = self.cell_mass * float(self._ring.sum())
+        waves = self.cell_mass * float(self.ring.sum())
         return waves + self.head_mass * self.head_velocity + self.casing_mass * self.casing_velocity
