@@ -20,6 +20,7 @@ from percussion_model.solvers.blow_table import BlowTable, fixed_values
 
 RUNTIME = (
     "folder",
+    "calls",
     "slave",
     "plain_scene",
     "motion",

@@ -155,6 +155,10 @@ class Runner:
             self._read(np.array([self._time]), np.empty((1, len(SAMPLE_FIELDS))))
             self._can_sample = True
 
+    def _checked(self, inputs: dict[str, float]) -> dict[str, float]:
+        """The inputs as numbers; raises `SimulationError` if one is not allowed."""
+        return {name: check_input(self._scene_rules, name, value) for name, value in inputs.items()}
+
     def set_inputs(self, **inputs: float) -> None:
         """Change inputs at the first grid point from now on.
 
@@ -166,9 +170,7 @@ class Runner:
             barrier_damping [N s/m] and barrier_energy [J] from the next
             drilling cycle on. Bounds are those of the parameter table.
         """
-        values = {
-            name: check_input(self._scene_rules, name, value) for name, value in inputs.items()
-        }
+        values = self._checked(inputs)
         if not values:
             return
         began = time.perf_counter()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import struct
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 from weakref import WeakValueDictionary
@@ -11,10 +12,11 @@ from weakref import WeakValueDictionary
 import numpy as np
 
 from fmu_src.runtime.blow_map import read_blow_map
+from fmu_src.runtime.calls import STEPPING, Phase, guarded
 from fmu_src.runtime.motion import Gauge, Motion
 from fmu_src.runtime.outputs import OUTPUTS
 from fmu_src.runtime.plain_scene import PlainScene, make_scene
-from fmu_src.runtime.slave import Phase, Slave, guarded
+from fmu_src.runtime.slave import Slave
 from fmu_src.runtime.states import fill_solver, fingerprint, pack, solver_bytes, unpack
 from fmu_src.runtime.watch import Watch
 from percussion_model.inputs import INPUTS
@@ -36,6 +38,9 @@ PLAIN_INPUTS = {
     "rock.barrier_energy": "barrier_energy",
     "drive.reversal_distance": "reversal_distance",
 }
+
+# What the drive's forces follow from.
+DRIVE_INPUTS = ("percussion_on", "supply_pressure", "drive.effective_area", "piston_force")
 
 # The solver's inputs as hosts know them.
 NAMES_OUTSIDE = {inner: name for name, inner in PLAIN_INPUTS.items()} | {
@@ -62,6 +67,9 @@ class PercussiveHammer(Slave):
         self.identity = scene["identity"]
         self.inputs = [one for one in self.known.values() if one.causality == "input"]
         self._readers = {self.by_name[name]: read for name, read in OUTPUTS.items()}
+        self._plain = {inner: self.by_name[name] for name, inner in PLAIN_INPUTS.items()}
+        self._forced = [self.by_name[name] for name in DRIVE_INPUTS]
+        self._forces = frozenset(self._forced)
         self.motion: Motion | None = None
         self.given_inputs: list[Any] = []  # values of the inputs when the solver was made
         self.fingerprint = b""
@@ -77,35 +85,38 @@ class PercussiveHammer(Slave):
         """Value of a parameter or an input."""
         return self.values[self.by_name[name]]
 
-    def changed(self, reference: int) -> None:
-        """Note that an input is new, or that the solver has to be made anew."""
+    def changed(self, references: list[int]) -> None:
+        """Note that inputs are new, or that the solver has to be made anew."""
         self._dirty = True
-        if self.phase < Phase.STEPPING:
+        if self.phase < STEPPING:
             self.motion = None
         else:
-            self._new.add(reference)
+            self._new.update(references)
 
     def check(self, references: Any) -> None:
         """Check bounds, the drive force, and contradictions between parameters."""
         super().check(references)
+        if self.phase is STEPPING and self._forces.isdisjoint(references):
+            return
         force = self.drive_force()
         if not self.rows["drive.force"].allows(force):
             name = "supply_pressure * drive.effective_area"
             raise ValueError(refuse_value(self.rows["drive.force"], name, force))
-        if self.phase < Phase.STEPPING:
+        if self.phase < STEPPING:
             self.make_scene()
 
     def drive_force(self) -> float:
         """F_0 of the pressure law [N]."""
-        on = 1.0 if self.value("percussion_on") else 0.0
-        return on * self.value("supply_pressure") * self.value("drive.effective_area")
+        on, pressure, area, _ = (self.values[reference] for reference in self._forced)
+        return pressure * area if on else 0.0
 
     def solver_inputs(self) -> dict[str, float]:
         """Inputs as the solver takes them."""
-        found = {inner: self.value(name) for name, inner in PLAIN_INPUTS.items()}
-        found["drive_force"] = self.drive_force()
-        on = 1.0 if self.value("percussion_on") else 0.0
-        found["external_force"] = on * self.value("piston_force")
+        values = self.values
+        found = {inner: values[reference] for inner, reference in self._plain.items()}
+        on, pressure, area, force = (values[reference] for reference in self._forced)
+        found["drive_force"] = pressure * area if on else 0.0
+        found["external_force"] = force if on else 0.0
         return found
 
     def make_scene(self) -> PlainScene:
@@ -177,20 +188,25 @@ class PercussiveHammer(Slave):
 
     def step(self, time: float, step_size: float) -> None:
         """Pass on changed inputs, then advance."""
-        motion = self.ready()
-        changes: dict[str, float] = {}
-        if self._dirty:
-            self.check(self._new)
-            self._new.clear()
-            wanted = self.solver_inputs()
-            for name, value in wanted.items():
-                if value != self._acting[name] and self.acts(motion.scene, name):
-                    changes[name] = value
-            self._acting = wanted
-            self._dirty = False
+        motion = self.motion or self.ready()
+        changes = self.take_inputs(motion) if self._dirty else {}
         motion.go_on(time, step_size, changes)
         for text in self._watch.look(motion, self._acting["loading_stiffness"]):
             self.warn(f"{self.instance_name}: at t = {time:.6g} s: {text}")
+
+    def take_inputs(self, motion: Motion) -> dict[str, float]:
+        """Inputs of the solver that have changed, checked."""
+        self.check(self._new)
+        self._new.clear()
+        acting, wanted = self._acting, self.solver_inputs()
+        self._acting, self._dirty = wanted, False
+        if wanted == acting:
+            return {}
+        return {
+            name: value
+            for name, value in wanted.items()
+            if value != acting[name] and self.acts(motion.scene, name)
+        }
 
     def acts(self, scene: SceneRules, name: str) -> bool:
         """Whether an input has an effect in the scene; says so in the log where not."""
@@ -207,12 +223,16 @@ class PercussiveHammer(Slave):
 
     # outputs
 
-    def outputs(self, references: list[int]) -> list[Any]:
+    def asked(self, references: list[int]) -> list[Callable[[Motion], Any]]:
+        """What reads these outputs."""
+        return [self._readers[reference] for reference in references]
+
+    def outputs(self, asked: list[Callable[[Motion], Any]]) -> list[Any]:
         """Present values of outputs; 0 before there are any."""
         if self.motion is None and self.phase != Phase.INITIALISING:
-            return [0] * len(references)
-        motion, readers = self.ready(), self._readers
-        return [readers[reference](motion) for reference in references]
+            return [0] * len(asked)
+        motion = self.motion or self.ready()
+        return [read(motion) for read in asked]
 
     # states
 

@@ -15,7 +15,9 @@ from percussion_model.core.records import (
     STORED_FIELDS,
     Mode,
 )
+from percussion_model.inputs import INPUTS, check_input
 from percussion_model.ledger import unexplained
+from percussion_model.parameter_rows import Row
 from percussion_model.runner import Runner
 from percussion_model.scene_rules import SceneRules
 from percussion_model.solvers import Solver
@@ -53,6 +55,7 @@ class Motion(Runner):
         super().__init__(scene, record_events=False, solver=solver)
         self.scene = scene
         self.gauge: Gauge | None = None
+        self._rows: dict[str, Row] = {}  # of the inputs that have changed once
         self.row_of_blow = np.zeros(1, BLOW)  # the last whole one
         self.blow = self._numbers_of_blow()
         self.blow_count = 0
@@ -73,6 +76,15 @@ class Motion(Runner):
             self.row_of_blow[0] = blows[-1]
             self.blow = self._numbers_of_blow()
             self.blow_count += len(blows)
+
+    def _checked(self, inputs: dict[str, float]) -> dict[str, float]:
+        # whether an input acts is the same in all steps, and so are its bounds
+        for name, value in inputs.items():
+            row = self._rows.get(name)
+            if row is None or not row.allows(value):
+                check_input(self.scene, name, value)
+                self._rows[name] = self.scene.row_of(INPUTS[name])
+        return inputs
 
     def _numbers_of_blow(self) -> dict[str, float]:
         """Last row as plain numbers; what is undefined is 0."""
@@ -155,7 +167,11 @@ class Motion(Runner):
 
     def _take_row(self) -> None:
         # without a piston its numbers are undefined
-        self.numbers = [value if value == value else 0.0 for value in self.row.tolist()]
+        numbers = self.row.tolist()
+        total = sum(numbers)
+        if total != total:
+            numbers = [value if value == value else 0.0 for value in numbers]
+        self.numbers = numbers
         self._is_read = True
 
     def before(self) -> np.ndarray:

@@ -12,7 +12,8 @@ import math
 import struct
 from typing import Any
 
-from fmu_src.runtime.slave import Phase, Slave, guarded
+from fmu_src.runtime.calls import Phase, guarded
+from fmu_src.runtime.slave import Slave
 from fmu_src.runtime.states import fingerprint, pack, unpack
 
 GAS_CONSTANT = 287.0  # of air [J/(kg K)]
@@ -82,7 +83,7 @@ class PneumaticDrive(Slave):
             found.append(new - AMBIENT)
         self.upper, self.lower = found
 
-    def outputs(self, references: list[int]) -> list[Any]:
+    def outputs(self, asked: list[int]) -> list[Any]:
         """Present values of outputs."""
         found = {
             "piston_force": self.value("area") * (self.upper - self.lower),
@@ -91,7 +92,7 @@ class PneumaticDrive(Slave):
             "lower.pressure": self.lower,
             "air_used": self.used,
         }
-        return [found[self.known[reference].name] for reference in references]
+        return [found[self.known[reference].name] for reference in asked]
 
     def fingerprint(self) -> bytes:
         """Hash of the parameters."""

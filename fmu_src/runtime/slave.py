@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import ctypes
-import functools
 import sys
-from collections.abc import Callable
-from enum import IntEnum
 from typing import Any
 
 from pythonfmu import Fmi2Slave
 from pythonfmu.enums import Fmi2Status
 
+from fmu_src.runtime.calls import INFINITE, STEPPING, FmuError, Phase, guarded, plain_bounds
 from fmu_src.runtime.folder import finalise_in_time, read_variables
 from percussion_model.parameter_rows import refuse_value
 
@@ -20,31 +18,9 @@ from percussion_model.parameter_rows import refuse_value
 SHARE_OF_STEP = 1e-3
 LAST_PLACES = 8 * sys.float_info.epsilon
 
-
-class FmuError(ValueError):
-    """An error that the host must see; the text has its percent signs doubled."""
-
-
-class Phase(IntEnum):
-    """Where an instance is in the calling sequence of FMI 2.0."""
-
-    INSTANTIATED = 0
-    INITIALISING = 1
-    STEPPING = 2
-    TERMINATED = 3
-
-
-def guarded(method: Callable) -> Callable:
-    """Let an error end the call as a fatal one in the host, without a crash."""
-
-    @functools.wraps(method)
-    def call(self: Slave, *arguments: Any) -> Any:
-        try:
-            return method(self, *arguments)
-        except Exception as error:
-            raise self.fatal(error) from None
-
-    return call
+# Types that share a getter and a setter.
+NOT_YET = None, {}  # planned, as `plan` says
+REAL, INTEGER, BOOLEAN = ("Real",), ("Integer", "Enumeration"), ("Boolean",)
 
 
 class Slave(Fmi2Slave):
@@ -65,7 +41,10 @@ class Slave(Fmi2Slave):
         self.values = {
             one.reference: one.start for one in self.known.values() if one.causality != "output"
         }
-        self._plans: dict[Any, Any] = {}
+        self._plain_bounds = {one.reference: plain_bounds(one) for one in self.known.values()}
+        # what hosts ask for and set again and again, looked at once
+        self._reads: dict[Any, Any] = {}
+        self._writes: dict[Any, bool] = {}
         self.phase = Phase.INSTANTIATED
         self.start_time = 0.0
         self.now = 0.0  # time of the host [s]
@@ -75,8 +54,11 @@ class Slave(Fmi2Slave):
     def check(self, references: Any) -> None:
         """Raise ValueError if a value is not allowed; names variable, value, bounds."""
         for reference in references:
-            one = self.known[reference]
             value = self.values[reference]
+            low, high = self._plain_bounds[reference]
+            if low <= value <= high:
+                continue
+            one = self.known[reference]
             if one.row is None or one.type == "Boolean" or value == one.left_out:
                 continue
             allowed = value in one.row.choices if one.row.choices else one.row.allows(value)
@@ -92,12 +74,16 @@ class Slave(Fmi2Slave):
         """Go on; `time` is the end of the step since the start [s]."""
         raise NotImplementedError
 
-    def outputs(self, references: list[int]) -> list[Any]:
+    def asked(self, references: list[int]) -> Any:
+        """What `outputs` is to be given for these outputs; asked for once."""
+        return list(references)
+
+    def outputs(self, asked: Any) -> list[Any]:
         """Present values of outputs."""
         raise NotImplementedError
 
-    def changed(self, reference: int) -> None:
-        """Take note of a value that the host has set."""
+    def changed(self, references: list[int]) -> None:
+        """Take note of values that the host has set."""
 
     def choice(self, reference: int) -> Any:
         """Word behind the number of an enumeration, None where there is none."""
@@ -135,23 +121,27 @@ class Slave(Fmi2Slave):
         self.begin()
         self.phase = Phase.STEPPING
 
-    @guarded
     def do_step(self, current_time: float, step_size: float) -> bool:
         """Go on by a communication step."""
-        self.require(Phase.STEPPING)
-        if not 0.0 < step_size < float("inf"):
-            raise ValueError(f"communicationStepSize = {step_size!r}: must be above 0 s")
-        slack = SHARE_OF_STEP * step_size + LAST_PLACES * abs(self.now)
-        if not abs(current_time - self.now) <= slack:
-            where = "before" if current_time < self.now else "after"
-            raise ValueError(
-                f"currentCommunicationPoint = {current_time!r} s lies {where} the present "
-                f"time of {self.now!r} s: steps must follow each other; to go back, restore a state"
-            )
-        end = current_time + step_size
-        self.step(end - self.start_time, step_size)
-        self.now = end
-        return True
+        # as `guarded`, without a call more: this and what reads and sets is called often
+        try:
+            if self.phase is not STEPPING:
+                self.require(STEPPING)
+            if not 0.0 < step_size < INFINITE:
+                raise ValueError(f"communicationStepSize = {step_size!r}: must be above 0 s")
+            slack = SHARE_OF_STEP * step_size + LAST_PLACES * abs(self.now)
+            if not abs(current_time - self.now) <= slack:
+                where = "before" if current_time < self.now else "after"
+                raise ValueError(
+                    f"currentCommunicationPoint = {current_time!r} s lies {where} the present time "
+                    f"of {self.now!r} s: steps must follow each other; to go back, restore a state"
+                )
+            end = current_time + step_size
+            self.step(end - self.start_time, step_size)
+            self.now = end
+            return True
+        except Exception as error:
+            raise self.fatal(error) from None
 
     @guarded
     def terminate(self) -> None:
@@ -170,19 +160,28 @@ class Slave(Fmi2Slave):
 
     def read(self, references: list[int], types: tuple[str, ...]) -> list[Any]:
         """Present values."""
-        key = (tuple(references), types[0])
-        plan = self._plans.get(key)
+        plan = self._reads.get((types, *references))
         if plan is None:
-            plan = self._plans[key] = self.plan(references, types)
-        if plan == "outputs":
-            return self.outputs(references)
+            plan = self._reads[(types, *references)] = self.plan(references, types)
+        outputs, lists_of_one = plan
+        if lists_of_one is None:
+            return self.outputs(outputs)
         return [
-            self.outputs([reference])[0] if reference in plan else self.values[reference]
+            self.outputs(lists_of_one[reference])[0]
+            if reference in lists_of_one
+            else self.values[reference]
             for reference in references
         ]
 
-    def plan(self, references: list[int], types: tuple[str, ...]) -> str | set[int]:
-        """Which of the variables are outputs; hosts ask for the same ones again and again."""
+    def plan(self, references: list[int], types: tuple[str, ...]) -> tuple[Any, Any]:
+        """What `outputs` is to give; hosts ask for the same variables again and again.
+
+        Returns
+        -------
+        tuple
+            What is asked for, where all are outputs; or None, and what is asked for by each
+            output among the variables.
+        """
         found = set()
         for reference in references:
             one = self.known.get(reference)
@@ -190,10 +189,19 @@ class Slave(Fmi2Slave):
                 raise ValueError(f"there is no {types[0]} variable of reference {reference}")
             if one.causality == "output":
                 found.add(reference)
-        return "outputs" if len(found) == len(set(references)) else found
+        if len(found) == len(set(references)):
+            return self.asked(references), None
+        return None, {reference: self.asked([reference]) for reference in found}
 
     def write(self, references: list[int], values: list[Any], types: tuple[str, ...]) -> None:
         """Set parameters and inputs."""
+        held = self.values
+        if (types, *references) in self._writes and len(values) == len(references):
+            new = [r for r, value in zip(references, values, strict=False) if held[r] != value]
+            if new:
+                held.update(zip(references, values, strict=False))
+                self.changed(new)
+            return
         for reference, value in zip(references, values, strict=True):
             one = self.known.get(reference)
             if one is None or one.type not in types:
@@ -202,44 +210,51 @@ class Slave(Fmi2Slave):
                 raise ValueError(f"{one.name} is an output: it cannot be set")
             if one.causality == "parameter" and self.phase > Phase.INITIALISING:
                 raise ValueError(f"{one.name} is fixed: it can be set before the first step only")
-            if self.values[reference] != value:
-                self.values[reference] = value
-                self.changed(reference)
+            if held[reference] != value:
+                held[reference] = value
+                self.changed([reference])
+        if all(self.known[reference].causality == "input" for reference in references):
+            self._writes[(types, *references)] = True
 
-    @guarded
     def get_real(self, vrs: list[int]) -> list[float]:
         """Values of Real variables."""
-        return self.read(vrs, ("Real",))
+        try:
+            outputs, rest = self._reads.get((REAL, *vrs), NOT_YET)
+            return self.outputs(outputs) if rest is None else self.read(vrs, REAL)
+        except Exception as error:
+            raise self.fatal(error) from None
 
     @guarded
     def get_integer(self, vrs: list[int]) -> list[int]:
         """Values of Integer variables and enumerations."""
-        return self.read(vrs, ("Integer", "Enumeration"))
+        return self.read(vrs, INTEGER)
 
     @guarded
     def get_boolean(self, vrs: list[int]) -> list[bool]:
         """Values of Boolean variables."""
-        return self.read(vrs, ("Boolean",))
+        return self.read(vrs, BOOLEAN)
 
     @guarded
     def get_string(self, vrs: list[int]) -> list[str]:
         """Values of String variables: there are none."""
         return self.read(vrs, ("String",))
 
-    @guarded
     def set_real(self, vrs: list[int], values: list[float]) -> None:
         """Set Real variables."""
-        self.write(vrs, values, ("Real",))
+        try:
+            self.write(vrs, values, REAL)
+        except Exception as error:
+            raise self.fatal(error) from None
 
     @guarded
     def set_integer(self, vrs: list[int], values: list[int]) -> None:
         """Set Integer variables and enumerations."""
-        self.write(vrs, values, ("Integer", "Enumeration"))
+        self.write(vrs, values, INTEGER)
 
     @guarded
     def set_boolean(self, vrs: list[int], values: list[bool]) -> None:
         """Set Boolean variables."""
-        self.write(vrs, [bool(value) for value in values], ("Boolean",))
+        self.write(vrs, [bool(value) for value in values], BOOLEAN)
 
     @guarded
     def set_string(self, vrs: list[int], values: list[str]) -> None:

@@ -16,6 +16,7 @@ from fmu_src.hammer import build_hammer
 from fmu_src.system.parts import build_part
 from fmu_src.system.tables import PARTS
 from fmu_src.units import UNITS
+from percussion_model.commands.blow_map import ready_map
 from percussion_model.scene import Scene
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -45,6 +46,9 @@ class SystemPlan:
     ----------
     components : dict of str
         Name of the FMU by name of the component.
+    fidelity : str
+        Rung of docs/fidelity.md by which the hammer is computed; a scene of rigid bodies
+        keeps "wave".
     connections : dict of str
         Output by input, each `component.variable`.
     parameters : dict of dict
@@ -54,6 +58,7 @@ class SystemPlan:
     name: str
     description: str
     hammer: Path
+    fidelity: str
     duration: float
     step: float
     components: dict[str, str]
@@ -74,6 +79,7 @@ def read_plan(path: Path, **changes: Any) -> SystemPlan:
         name=found["name"],
         description=found["description"],
         hammer=ROOT / found["hammer"],
+        fidelity=found.get("fidelity", "wave"),
         duration=float(found["duration"]),
         step=float(found["step"]),
         components=found["components"],
@@ -109,16 +115,26 @@ def build_fmus(plan: SystemPlan, folder: Path) -> dict[str, Path]:
         if name in PARTS:
             build_part(name, path)
         elif name == HAMMER:
-            # a hammer of another scene is another FMU
-            scene = Scene.from_toml(plan.hammer)
-            if plan.hammer.stem != "reference":
-                path = folder / f"{plan.hammer.stem.title().replace('_', '')}Hammer.fmu"
-            build_hammer(scene, path)
+            path = _hammer(plan, folder)
         else:
             known = ", ".join([HAMMER, *PARTS])
             raise SystemPlanError(f"{component} = {name!r}: must be one of {known}")
         found[component] = path
     return found
+
+
+def _hammer(plan: SystemPlan, folder: Path) -> Path:
+    """Write the FMU of the hammer; one of another scene or rung has another name."""
+    scene, table = Scene.from_toml(plan.hammer), None
+    stem = plan.hammer.stem.title().replace("_", "")
+    if plan.fidelity == "blow-map":
+        scene, stem = scene.computed_by("blow-map"), f"{stem}Map"
+        table = ready_map(scene)
+    elif plan.fidelity != "wave":
+        raise SystemPlanError(f'fidelity = {plan.fidelity!r}: must be "wave" or "blow-map"')
+    path = folder / (f"{HAMMER}.fmu" if stem == "Reference" else f"{stem}Hammer.fmu")
+    build_hammer(scene, path, table)
+    return path
 
 
 def write_system(plan: SystemPlan, fmus: dict[str, Path], path: Path) -> Path:
@@ -267,10 +283,11 @@ def _values(values: dict[str, Any], variables: dict[str, Any]) -> bytes:
 
 
 def plans() -> list[SystemPlan]:
-    """All systems of `scenarios/systems`, and each with a hammer of rigid bodies."""
+    """All systems of `scenarios/systems`, each with the three hammers of docs/fidelity.md."""
     found = []
     for path in sorted(SYSTEMS.glob("*.toml")):
         plan = read_plan(path)
         found.append(plan)
         found.append(read_plan(path, name=f"{plan.name}Rigid", hammer="scenarios/rigid.toml"))
+        found.append(read_plan(path, name=f"{plan.name}Map", fidelity="blow-map"))
     return found

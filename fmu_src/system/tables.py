@@ -29,7 +29,7 @@ class PartTable:
 STRING = PartTable(
     name="DrillString",
     slave="DrillStringPart",
-    modules=("string_body", "drill_string"),
+    modules=("string_body", "string_waves", "drill_string"),
     description="Axial drill string with head, casing and the shoulder that pushes the bit",
     inputs={
         "head_force": ("N", -1e9, 1e9, 0.0, "force of the rig on the head"),

@@ -24,6 +24,10 @@ def couple(
     order: Annotated[
         Literal["jacobi", "gauss-seidel"], typer.Option(help="Who sees what in a step.")
     ] = "jacobi",
+    tolerance: Annotated[
+        float | None,
+        typer.Option("--tolerance", help="Take steps back whose error is larger, by the signals."),
+    ] = None,
     settings: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="COMPONENT.VARIABLE=VALUE", help="Set any parameter."),
@@ -50,7 +54,7 @@ def couple(
     common.check_outputs(folder, json_file)
     coupling = Coupling(system, dict(read_value(text) for text in settings or ()), order=order)
     wanted = [*known_signals(coupling.outputs), *(signals or ())]
-    run = coupling.run(duration, step, wanted, interval or max(step, duration / ROWS))
+    run = coupling.run(duration, step, wanted, interval or max(step, duration / ROWS), tolerance)
     found = summary(run)
     path = write_columns(run, folder / "signals.csv")
     common.write_json(json_file, found)

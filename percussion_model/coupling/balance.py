@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from percussion_model.coupling.master import CoupledRun
+from percussion_model.coupling.coupled_run import CoupledRun
 
 # What the balances read, by what it is.
 STRING_ENERGIES = ("head", "reaction", "weight", "bit", "shoulder", "wall", "stored")

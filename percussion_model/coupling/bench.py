@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from percussion_model.coupling.component import CouplingError
-from percussion_model.coupling.master import CoupledRun, Coupling
+from percussion_model.coupling.coupled_run import CoupledRun
+from percussion_model.coupling.master import Coupling
 from percussion_model.coupling.python_part import Work
 
 STEP = 1e-3  # [s]

@@ -1,16 +1,18 @@
-"""One FMU in a coupled run: variables by name, read and set many at once."""
+"""One FMU in a coupled run: its instance, and what its log says of an error."""
 
 from __future__ import annotations
 
+import ctypes
 import difflib
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from fmpy import read_model_description
 from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
 
-# What fmpy calls the types that share a getter.
-FAMILIES = {"Real": "Real", "Integer": "Integer", "Enumeration": "Integer", "Boolean": "Boolean"}
+from percussion_model.coupling.exchange import FAMILIES, WARNING, Reader, Writer
+
+_STATUS = {2: "discard", 3: "error", 4: "fatal", 5: "pending"}
 
 
 class CouplingError(ValueError):
@@ -47,6 +49,16 @@ class Component:
             instanceName=name,
         )
         self._slave.instantiate(callbacks=self._callbacks, loggingOn=True)
+        self.pointer = ctypes.c_void_p(self._slave.component)
+        self._do_step = self.function(
+            "fmi2DoStep", ctypes.c_void_p, ctypes.c_double, ctypes.c_double, ctypes.c_int
+        )
+        self._goes_forward = 1  # to the FMU: it will not be told to go back
+
+    def function(self, name: str, *types: Any) -> Any:
+        """A function of the library that returns a status; without types, by those of ctypes."""
+        # an object of its own, since fmpy gives types to that of the library
+        return ctypes.cast(getattr(self._slave.dll, name), ctypes.CFUNCTYPE(ctypes.c_int, *types))
 
     def _note(
         self, environment: Any, name: bytes, status: int, category: bytes, text: bytes
@@ -62,20 +74,32 @@ class Component:
         return self.variables[name]
 
     def set(self, values: Mapping[str, Any]) -> None:
-        """Set variables by name."""
+        """Set variables by name; enumerations by number or by word."""
         for name, value in values.items():
-            family = FAMILIES[self.find(name).type]
+            one = self.find(name)
+            family = FAMILIES[one.type]
+            if isinstance(value, str):
+                value = self._number_of(one, value)
             converted = {"Real": float, "Integer": int, "Boolean": bool}[family](value)
             setter = getattr(self._slave, f"set{family}")
-            self._guarded(setter, [self.variables[name].valueReference], [converted])
+            self._guarded(setter, [one.valueReference], [converted])
 
-    def getter(self, names: Iterable[str]) -> Getter:
+    def _number_of(self, one: Any, word: str) -> int:
+        """Number of a word of an enumeration."""
+        items = one.declaredType.items if one.type == "Enumeration" else []
+        found = {item.name: int(item.value) for item in items or []}
+        if word not in found:
+            allowed = ", ".join(found) or {"Boolean": "true or false"}.get(one.type, "a number")
+            raise CouplingError(f"{self.name}.{one.name} = {word}: must be {allowed}")
+        return found[word]
+
+    def reader(self, names: Sequence[str]) -> Reader:
         """What reads these variables, all at once."""
-        return Getter(self, list(names))
+        return Reader(self, names)
 
-    def setter(self, names: Iterable[str]) -> Setter:
+    def writer(self, names: Sequence[str]) -> Writer:
         """What sets these variables, all at once."""
-        return Setter(self, list(names))
+        return Writer(self, names)
 
     def begin(self, time: float) -> None:
         """Enter the initialisation."""
@@ -88,60 +112,42 @@ class Component:
 
     def step(self, time: float, step: float) -> None:
         """One communication step [s]."""
-        self._guarded(self._slave.doStep, time, step)
+        status = self._do_step(self.pointer, time, step, self._goes_forward)
+        if status > WARNING:
+            self.fail("fmi2DoStep", status)
+
+    def save(self) -> Any:
+        """State of the instance, to be given back by `drop`."""
+        self._goes_forward = 0
+        return self._guarded(self._slave.getFMUstate)
+
+    def restore(self, state: Any) -> None:
+        """Go back to a state."""
+        self._guarded(self._slave.setFMUstate, state)
+
+    def drop(self, state: Any) -> None:
+        """Give the memory of a state back."""
+        self._guarded(self._slave.freeFMUstate, state)
 
     def _guarded(self, call: Any, *arguments: Any, **named: Any) -> Any:
         """Call, and put what the FMU logged into the error."""
         try:
             return call(*arguments, **named)
         except Exception as error:
-            # the line of the FMU itself comes first, that of its export library after it
-            said = [text for text in self.messages if text.strip()]
-            text = said[0].removeprefix(f"{self.name}: ") if said else str(error)
-            raise CouplingError(f"{self.name}: {text}") from error
+            raise self._error(str(error)) from error
+
+    def fail(self, function: str, status: int) -> None:
+        """Raise the error of a call that ended with this status."""
+        raise self._error(f"{function} failed with status {status} ({_STATUS.get(status, '?')})")
+
+    def _error(self, text: str) -> CouplingError:
+        # the line of the FMU itself comes first, that of its export library after it
+        said = [message for message in self.messages if message.strip()]
+        text = said[0].removeprefix(f"{self.name}: ") if said else text
+        return CouplingError(f"{self.name}: {text}")
 
     def free(self) -> None:
         """End the instance."""
         if self._slave is not None:
             self._slave.freeInstance()
             self._slave = None
-
-
-class _Many:
-    """References of several variables by family, with their places."""
-
-    def __init__(self, component: Component, names: list[str]) -> None:
-        self.component = component
-        self.names = names
-        found: dict[str, tuple[list[int], list[int]]] = {}
-        for place, name in enumerate(names):
-            one = component.find(name)
-            references, places = found.setdefault(FAMILIES[one.type], ([], []))
-            references.append(one.valueReference)
-            places.append(place)
-        self.families = [(family, *both) for family, both in found.items()]
-
-
-class Getter(_Many):
-    """Reads variables."""
-
-    def __call__(self) -> list[Any]:
-        """Values in the order of the names."""
-        values: list[Any] = [None] * len(self.names)
-        slave = self.component._slave
-        for family, references, places in self.families:
-            read = self.component._guarded(getattr(slave, f"get{family}"), references)
-            for place, value in zip(places, read, strict=True):
-                values[place] = bool(value) if family == "Boolean" else value
-        return values
-
-
-class Setter(_Many):
-    """Sets variables."""
-
-    def __call__(self, values: list[Any]) -> None:
-        """Set values in the order of the names."""
-        slave = self.component._slave
-        for family, references, places in self.families:
-            chosen = [values[place] for place in places]
-            self.component._guarded(getattr(slave, f"set{family}"), references, chosen)

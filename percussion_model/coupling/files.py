@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from percussion_model.coupling.component import CouplingError
-from percussion_model.coupling.master import CoupledRun
+from percussion_model.coupling.coupled_run import CoupledRun
 from percussion_model.result_files import staged_text
 
 
@@ -20,14 +20,14 @@ def write_columns(run: CoupledRun, path: Path) -> Path:
     return path
 
 
-def read_value(text: str) -> tuple[str, float | bool]:
-    """Signal and value of `component.variable=value`."""
+def read_value(text: str) -> tuple[str, float | bool | str]:
+    """Signal and value of `component.variable=value`; words are for enumerations."""
     signal, equals, value = text.partition("=")
-    if not equals or "." not in signal:
+    if not equals or "." not in signal or not value:
         raise CouplingError(f"--set {text}: must be COMPONENT.VARIABLE=VALUE")
     if value in ("true", "false"):
         return signal, value == "true"
     try:
         return signal, float(value)
     except ValueError:
-        raise CouplingError(f"--set {text}: {value} is neither number, true nor false") from None
+        return signal, value

@@ -7,52 +7,30 @@ the first error; so the loop is here, with the same meaning of a step.
 
 from __future__ import annotations
 
+import gc
 import math
 import shutil
 import tempfile
+import time as clock
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 from fmpy import extract
-from fmpy.ssp.ssd import find_components, read_ssd
 
+from percussion_model.coupling.archive import choose_values, unpack
 from percussion_model.coupling.component import Component, CouplingError
+from percussion_model.coupling.coupled_run import CoupledRun
+from percussion_model.coupling.port import OnWay, Port
 from percussion_model.coupling.python_part import PythonPart, Work
+from percussion_model.coupling.rejection import StepControl
 
 Order = Literal["jacobi", "gauss-seidel"]
 # Passes over the outputs while all parts are initialised: as many as the longest chain.
 INITIAL_PASSES = 4
 # A number of steps is whole if it misses by no more than this.
 ROUNDING = 1e-9
-
-
-@dataclass
-class CoupledRun:
-    """Signals of a coupled run.
-
-    Attributes
-    ----------
-    columns : dict of ndarray
-        "time" [s] and the signals, each `component.variable`.
-    step : float
-        Communication step [s].
-    steps : int
-        Steps that were done.
-    error : str
-        Why it ended before its time; empty if it did not.
-    """
-
-    columns: dict[str, np.ndarray]
-    step: float
-    steps: int
-    error: str = ""
-    wall_time: float = field(default=0.0, compare=False)
-
-    def __getitem__(self, signal: str) -> np.ndarray:
-        return self.columns[signal]
 
 
 class Coupling:
@@ -63,7 +41,8 @@ class Coupling:
     path : str or Path
         SSP archive.
     parameters : mapping, optional
-        Values that go before those of the archive, by `component.variable`.
+        Values that go before those of the archive, by `component.variable`; enumerations
+        by number or by word.
     replaced : mapping, optional
         Paths of other FMUs, or Python callables, by component.
     order : {"jacobi", "gauss-seidel"}
@@ -78,61 +57,37 @@ class Coupling:
         parameters: Mapping[str, Any] | None = None,
         replaced: Mapping[str, str | Path | Work] | None = None,
         order: Order = "jacobi",
-        on_way: Callable[[str, float, Any], Any] | None = None,
+        on_way: OnWay | None = None,
     ) -> None:
         self.path = Path(path)
         self.order, self.on_way = order, on_way
-        if not self.path.is_file():
-            raise CouplingError(
-                f"{self.path}: no such file; `python3 build.py system` makes the archives of dist"
-            )
-        try:
-            system = read_ssd(str(self.path)).system
-        except KeyError:
-            words = "no SSP archive: it holds no SystemStructure.ssd"
-            raise CouplingError(f"{self.path}: {words}") from None
-        except Exception as error:
-            raise CouplingError(f"{self.path}: no SSP archive: {error}") from error
         self._folder = tempfile.mkdtemp(prefix="ssp-")
         self.parts: dict[str, Any] = {}
-        self._parameters: dict[str, dict[str, Any]] = {}
         try:
-            self._set_up(system, dict(parameters or {}), dict(replaced or {}))
+            self._set_up(dict(parameters or {}), dict(replaced or {}))
         except BaseException:
             self.free()
             raise
 
-    def _set_up(self, system: Any, given: dict[str, Any], replaced: dict[str, Any]) -> None:
-        extract(str(self.path), self._folder)
-        components = {one.name: one for one in find_components(system)}
-        for name in replaced.keys() - components.keys():
+    def _set_up(self, given: dict[str, Any], replaced: dict[str, Any]) -> None:
+        archive = unpack(self.path, self._folder)
+        for name in replaced.keys() - archive.sources.keys():
             raise CouplingError(f"{self.path.name} has no component {name}")
-        for name, component in components.items():
-            source = replaced.get(name, Path(self._folder) / component.source)
-            if callable(source):
-                self.parts[name] = PythonPart(name, source)
+        self._links = archive.links
+        for name, source in archive.sources.items():
+            chosen = replaced.get(name, source)
+            if callable(chosen):
+                self.parts[name] = PythonPart(name, chosen)
+                del archive.values[name]
                 continue
             folder = tempfile.mkdtemp(prefix=f"{name}-", dir=self._folder)
-            extract(str(source), folder)
+            extract(str(chosen), folder)
             self.parts[name] = Component(name, folder)
-            values = _archived(component)
             if name in replaced:  # another FMU takes what it has
                 known = self.parts[name].variables
-                values = {key: value for key, value in values.items() if key in known}
-            self._parameters[name] = values
-        for signal, value in given.items():
-            name, _, variable = signal.partition(".")
-            if name not in self._parameters:
-                raise CouplingError(f"{signal}: there is no FMU {name} in {self.path.name}")
-            self._parameters[name][variable] = value
-        links: dict[str, list[tuple[str, str, str]]] = {name: [] for name in self.parts}
-        for one in system.connections:
-            links[one.endElement].append((one.endConnector, one.startElement, one.startConnector))
-        self._links = links
-        self._outputs: dict[str, list[str]] = {
-            name: sorted({o for found in links.values() for _, s, o in found if s == name})
-            for name in self.parts
-        }
+                values = archive.values[name]
+                archive.values[name] = {key: values[key] for key in values if key in known}
+        self._parameters = choose_values(archive, given, self.path.name)
 
     @property
     def outputs(self) -> dict[str, list[str]]:
@@ -150,6 +105,8 @@ class Coupling:
         step: float = 1e-3,
         signals: Sequence[str] = (),
         interval: float | None = None,
+        tolerance: float | None = None,
+        progress: Callable[[float], None] | None = None,
     ) -> CoupledRun:
         """Run the system from time zero, and end all its parts.
 
@@ -161,6 +118,11 @@ class Coupling:
             To be kept beside those that are connected.
         interval : float, optional
             Time between rows [s]; each step if left out.
+        tolerance : float, optional
+            Greatest error of a step, by the size of each signal [1]: steps are shortened,
+            and taken back, to keep to it. `step` is the longest one then.
+        progress : callable, optional
+            Called with the time at each row [s].
 
         Returns
         -------
@@ -169,112 +131,113 @@ class Coupling:
         """
         count, every = _steps(duration, step, interval)
         try:
-            return self._loop(count, step, every, list(signals))
+            self._connect(list(signals))
+            self._initialise()
+            control = None if tolerance is None else StepControl(self.ports, step, tolerance)
+            # what is there now stays: no need to look for garbage in it again and again
+            gc.freeze()
+            return self._loop(count, step, every, control, progress)
         finally:
+            gc.unfreeze()
             self.free()
 
-    def _loop(self, count: int, step: float, every: int, signals: list[str]) -> CoupledRun:
-        self._connect(signals)
-        self._initialise()
-        names = [f"{name}.{output}" for name in self.parts for output in self._outputs[name]]
-        rows = [[0.0, *self._row(names)]]
-        error, done = "", 0
+    def _loop(
+        self,
+        count: int,
+        step: float,
+        every: int,
+        control: StepControl | None,
+        progress: Callable[[float], None] | None,
+    ) -> CoupledRun:
+        names = [f"{port.name}.{name}" for port in self.ports for name in port.taken + port.kept]
+        rows = [[0.0, *self._row()]]
+        error, done, began = "", 0, clock.perf_counter()
+        go = self.step if control is None else control.stepping(self.step)
         for k in range(count):
-            time = k * step
             try:
-                self._step(time, step)
+                go(k * step, step)
             except CouplingError as failure:
-                error = f"at {time:.6g} s {failure}"
+                error = f"at {k * step:.6g} s {failure}"
                 break
             done = k + 1
             if done % every == 0:
-                rows.append([done * step, *self._row(names)])
+                rows.append([done * step, *self._row()])
+                if progress is not None:
+                    progress(done * step)
+        wall_time = clock.perf_counter() - began
         table = np.array(rows, dtype=float)
         columns = {name: table[:, k] for k, name in enumerate(["time", *names])}
-        return CoupledRun(columns, step, done, error)
+        if control is None:
+            return CoupledRun(columns, step, done, error, wall_time=wall_time)
+        return CoupledRun(
+            columns, step, control.done, error, control.tried, control.rejected, wall_time
+        )
 
     def _connect(self, signals: list[str]) -> None:
         """Make what reads and sets; everything that is kept is read."""
+        taken: dict[str, list[str]] = {name: [] for name in self.parts}
+        kept: dict[str, list[str]] = {name: [] for name in self.parts}
+        for links in self._links.values():
+            for _, source, output in links:
+                if output not in taken[source]:
+                    taken[source].append(output)
         for signal in signals:
             name, _, output = signal.partition(".")
             if name not in self.parts:
                 raise CouplingError(f"{signal}: there is no component {name}")
-            if output not in self._outputs[name]:
-                self._outputs[name].append(output)
-        self._values: dict[str, dict[str, Any]] = {name: {} for name in self.parts}
-        self._readers: dict[str, tuple[list[str], Callable[[], list[Any]]]] = {}
-        self._late: dict[str, tuple[list[str], Callable[[], list[Any]]]] = {}
-        self._setters: dict[str, Callable[[list[Any]], None]] = {}
-        needed = {name: {o for found in self._links.values() for _, s, o in found if s == name}
-                  for name in self.parts}  # fmt: skip
-        for name, part in self.parts.items():
-            outputs = self._outputs[name]
-            now = [output for output in outputs if output in needed[name]]
-            rest = [output for output in outputs if output not in needed[name]]
-            self._outputs[name] = [*now, *rest]  # as `_row` gives them
-            self._readers[name] = (now, part.getter(now))
-            self._late[name] = (rest, part.getter(rest))
-            self._setters[name] = part.setter([link[0] for link in self._links[name]])
+            if output not in taken[name] + kept[name]:
+                kept[name].append(output)
+        self.ports = [
+            Port(part, self._links[name], taken[name], kept[name], self.on_way)
+            for name, part in self.parts.items()
+        ]
+        places: dict[tuple[str, str], int] = {}
+        for port in self.ports:
+            for output in port.taken:
+                places[port.name, output] = len(places)
+        values: list[Any] = [None] * len(places)
+        for port in self.ports:
+            port.connect(values, places)
 
     def _initialise(self) -> None:
         for name, part in self.parts.items():
-            if isinstance(part, PythonPart):
-                continue
-            part.set(self._parameters[name])
-            part.begin(0.0)
+            if isinstance(part, Component):
+                part.set(self._parameters[name])
+                part.begin(0.0)
         for _ in range(INITIAL_PASSES):
-            for name, part in self.parts.items():
-                if isinstance(part, PythonPart):
-                    if all(source in self._values[s] for _, s, source in self._links[name]):
-                        self._give(name, 0.0)
-                        part.step(0.0, 0.0)
-                        self._take(name, 0.0)
-                    continue
-                self._take(name, 0.0)
-            for name in self.parts:
-                self._give(name, 0.0)
+            for port in self.ports:
+                if isinstance(port.part, Component):
+                    port.take()
+                elif port.is_fed:
+                    port.give(0.0)
+                    port.step(0.0, 0.0)
+                    port.take()
+            for port in self.ports:
+                if port.is_fed:
+                    port.give(0.0)
         for part in self.parts.values():
             if isinstance(part, Component):
                 part.end_initialisation()
-        for name in self.parts:
-            self._take(name, 0.0)
+        for port in self.ports:
+            port.take()
 
-    def _step(self, time: float, step: float) -> None:
-        for name, part in self.parts.items():
-            self._give(name, time)
-            part.step(time, step)
-            if self.order == "gauss-seidel":
-                self._take(name, time + step)
-        if self.order == "jacobi":
-            for name in self.parts:
-                self._take(name, time + step)
+    def step(self, time: float, step: float) -> None:
+        """Let all parts do a communication step [s]."""
+        ports = self.ports
+        if self.order == "gauss-seidel":
+            for port in ports:
+                port.give(time)
+                port.step(time, step)
+                port.take()
+            return
+        for port in ports:
+            port.give(time)
+            port.step(time, step)
+        for port in ports:
+            port.take()
 
-    def _take(self, name: str, time: float) -> None:
-        """Read the outputs that others need."""
-        names, read = self._readers[name]
-        for output, value in zip(names, read(), strict=True):
-            if not math.isfinite(value):
-                raise CouplingError(f"{name}: {output} = {value!r} is no number")
-            self._values[name][output] = value
-
-    def _give(self, name: str, time: float) -> None:
-        """Set the inputs; those whose source has no value yet stay as they are."""
-        values = []
-        for sink, source, output in self._links[name]:
-            if output not in self._values[source]:
-                return
-            value = self._values[source][output]
-            if self.on_way is not None:
-                value = self.on_way(f"{name}.{sink}", time, value)
-            values.append(value)
-        self._setters[name](values)
-
-    def _row(self, names: list[str]) -> list[Any]:
-        row: list[Any] = []
-        for name in self.parts:
-            row += [self._values[name][output] for output in self._readers[name][0]]
-            row += self._late[name][1]() if self._late[name][0] else []
-        return row
+    def _row(self) -> list[Any]:
+        return [value for port in self.ports for value in port.row()]
 
     def free(self) -> None:
         """End all instances and remove the unpacked archive."""
@@ -282,17 +245,6 @@ class Coupling:
             if isinstance(part, Component):
                 part.free()
         shutil.rmtree(self._folder, ignore_errors=True)
-
-
-def _archived(component: Any) -> dict[str, Any]:
-    """Values that the archive binds to a component."""
-    found = {}
-    for binding in component.parameterBindings:
-        for values in binding.parameterValues:
-            for one in values.parameters:
-                is_flag = one.type == "Boolean"
-                found[one.name] = one.value in ("true", "1") if is_flag else float(one.value)
-    return found
 
 
 def _steps(duration: float, step: float, interval: float | None) -> tuple[int, int]:
@@ -305,3 +257,6 @@ def _steps(duration: float, step: float, interval: float | None) -> tuple[int, i
         raise CouplingError(f"step = {step!r} s: is longer than the duration of {duration!r} s")
     every = 1 if interval is None else max(1, round(interval / step))
     return count, every
+
+
+__all__ = ["CoupledRun", "Coupling", "Order"]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from percussion_model.coupling.component import CouplingError
@@ -21,6 +21,8 @@ class PythonPart:
         Reads inputs by name, a time and a step [s]; gives outputs by name.
     """
 
+    can_save = False
+
     def __init__(self, name: str, work: Work) -> None:
         self.name, self.work = name, work
         self.inputs: dict[str, Any] = {}
@@ -33,21 +35,36 @@ class PythonPart:
         except Exception as error:
             raise CouplingError(f"{self.name}: {type(error).__name__}: {error}") from error
 
-    def getter(self, names: list[str]) -> Callable[[], list[Any]]:
+    def reader(self, names: Sequence[str]) -> PythonReader:
         """What reads outputs."""
+        return PythonReader(self, names)
 
-        def read() -> list[Any]:
-            lacking = [name for name in names if name not in self.outputs]
-            if lacking:
-                raise CouplingError(f"{self.name} gave no {', '.join(lacking)}")
-            return [self.outputs[name] for name in names]
-
-        return read
-
-    def setter(self, names: list[str]) -> Callable[[list[Any]], None]:
+    def writer(self, names: Sequence[str]) -> PythonWriter:
         """What sets inputs."""
+        return PythonWriter(self, names)
 
-        def write(values: list[Any]) -> None:
-            self.inputs = dict(zip(names, values, strict=True))
 
-        return write
+class PythonReader:
+    """Reads outputs of a Python callable."""
+
+    def __init__(self, part: PythonPart, names: Sequence[str]) -> None:
+        self.part, self.names = part, list(names)
+
+    def read(self) -> list[Any]:
+        """Present values."""
+        found = self.part.outputs
+        lacking = sorted(name for name in self.names if name not in found)
+        if lacking:
+            raise CouplingError(f"{self.part.name} gave no {', '.join(lacking)}")
+        return [found[name] for name in self.names]
+
+
+class PythonWriter:
+    """Sets inputs of a Python callable."""
+
+    def __init__(self, part: PythonPart, names: Sequence[str]) -> None:
+        self.part, self.names = part, list(names)
+
+    def write(self, values: Sequence[Any]) -> None:
+        """Set values, in the order of the names."""
+        self.part.inputs = dict(zip(self.names, values, strict=True))

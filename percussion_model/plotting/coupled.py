@@ -6,7 +6,7 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 
-from percussion_model.coupling.master import CoupledRun
+from percussion_model.coupling.coupled_run import CoupledRun
 
 # Label, factor, signals; a panel is drawn where the run has one of its signals.
 PANELS = (

@@ -35,10 +35,10 @@ DONE = int(Status.DONE)
 
 # Inputs and the fields that hold them; the rest of the rock law is fixed in the table.
 _INPUTS = {
-    "feed_force": "feed",
-    "drive_force": "drive_force",
-    "reversal_distance": "reversal",
-    "loading_stiffness": "k_r",
+    "feed_force": WORD["feed"],
+    "drive_force": WORD["drive_force"],
+    "reversal_distance": WORD["reversal"],
+    "loading_stiffness": WORD["k_r"],
 }
 _FIXED = {
     "unloading_ratio": "rock.unloading_ratio",
@@ -264,7 +264,7 @@ class BlowMapSolver:
                 )
         for name, value in inputs.items():
             if name in _INPUTS:
-                state.record[0][_INPUTS[name]] = value
+                state.numbers[_INPUTS[name]] = value
         self._plan(state)
 
     def grid_point_after(self, state: MapState, t: float) -> float:

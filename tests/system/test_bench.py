@@ -10,7 +10,7 @@ import pytest
 from percussion_model.cli import main
 from percussion_model.coupling import CouplingError
 from percussion_model.coupling.bench import TRIALS, bench, judge, total
-from percussion_model.coupling.master import CoupledRun
+from percussion_model.coupling.coupled_run import CoupledRun
 
 
 def nothing(inputs, time, step):

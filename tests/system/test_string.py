@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from fmu_src.runtime.system.string_body import Lumps, Waves
+from fmu_src.runtime.system.string_body import Lumps
+from fmu_src.runtime.system.string_waves import Waves
 from fmu_src.system.parts import make_model, start_inputs
 from fmu_src.system.tables import STRING
 

@@ -21,7 +21,8 @@ from typing import Any
 import numpy as np
 
 from fmu_src.runtime.system.part import Model
-from fmu_src.runtime.system.string_body import Lumps, Waves
+from fmu_src.runtime.system.string_body import Lumps
+from fmu_src.runtime.system.string_waves import Waves
 
 # Damping by stiffness and step: 3/2 is the limit, the rest is margin.
 DAMPING_OF_DELAY = 2.0
@@ -149,17 +150,21 @@ class DrillString(Model):
             for _ in range(count):
                 body.go_on(head_force, casing_force, h / count)
             return
-        left = h
-        while self.lag + left >= body.step * (1.0 - ROUNDING):
-            part = min(body.step - self.lag, left)
-            self.head_impulse_due += head_force * part
-            self.casing_impulse_due += casing_force * part
-            body.advance(self.head_impulse_due / body.step, self.casing_impulse_due / body.step)
-            self.head_impulse_due = self.casing_impulse_due = self.lag = 0.0
+        left, lag, cell = h, self.lag, body.step
+        while lag + left >= cell * (1.0 - ROUNDING):
+            if lag > 0.0:
+                part = min(cell - lag, left)
+                self.head_impulse_due += head_force * part
+                self.casing_impulse_due += casing_force * part
+                body.advance(self.head_impulse_due / cell, self.casing_impulse_due / cell)
+                self.head_impulse_due = self.casing_impulse_due = lag = 0.0
+            else:
+                part = min(cell, left)
+                body.advance(head_force * part / cell, casing_force * part / cell)
             left = max(0.0, left - part)
         self.head_impulse_due += head_force * left
         self.casing_impulse_due += casing_force * left
-        self.lag += left
+        self.lag = lag + left
 
     def casing_place(self) -> float:
         """Displacement of the casing at the communication point [m]."""
@@ -192,15 +197,20 @@ class DrillString(Model):
             self.brought_momentum += self.body.momentum - before[1]
         self.was_asked = bool(asked)
 
+    def signals(self) -> dict[str, Any]:
+        """What rig, rock, hammer and controller take."""
+        return {
+            "feed_force": self.force,
+            "feed_force_mean": self.mean_force,
+            "head_velocity": self.body.head_velocity,
+        }
+
     def outputs(self) -> dict[str, Any]:
         """Present values by name."""
         body = self.body
         stored_in_shoulder = 0.5 * self.force**2 / self.stiffness
-        return {
-            "feed_force": self.force,
-            "feed_force_mean": self.mean_force,
+        return self.signals() | {
             "head_position": body.head + body.head_velocity * self.lag,
-            "head_velocity": body.head_velocity,
             "casing_position": self.casing_place(),
             "casing_velocity": body.casing_velocity,
             "length": body.count * body.length_of_rod,

@@ -6,7 +6,8 @@ import importlib
 import json
 from typing import Any, ClassVar
 
-from fmu_src.runtime.slave import Phase, Slave, guarded
+from fmu_src.runtime.calls import STEPPING, Phase, guarded
+from fmu_src.runtime.slave import Slave
 from fmu_src.runtime.states import StateError, fingerprint, pack, unpack
 
 
@@ -40,6 +41,10 @@ class Model:
         """Present values by name."""
         raise NotImplementedError
 
+    def signals(self) -> dict[str, Any]:
+        """Those outputs that other parts take; to be cheaper than all."""
+        return self.outputs()
+
     def save(self) -> dict[str, Any]:
         """State as plain values; `restore` takes them back."""
         return {name: _plain(getattr(self, name)) for name in self.STATE}
@@ -71,13 +76,16 @@ class Part(Slave):
         self._names = {one.reference: one.name for one in known}
         self._model: Model | None = None
         self._found: dict[str, Any] | None = None
-        self._dirty = False
+        self._fingerprint: bytes | None = None
+        self._given = self.inputs()  # as `inputs` gives them
+        self._new: list[int] = []  # inputs to be checked
 
-    def changed(self, reference: int) -> None:
+    def changed(self, references: list[int]) -> None:
         """Check inputs before the next step; before the first one, make the model anew."""
-        self._dirty = True
-        if self.phase < Phase.STEPPING:
-            self._model = self._found = None
+        if self.phase < STEPPING:
+            self._model = self._found = self._fingerprint = None
+            return
+        self._new += references
 
     def inputs(self) -> dict[str, Any]:
         """Present inputs by name."""
@@ -97,7 +105,8 @@ class Part(Slave):
         """The model, made where there is none."""
         if self._model is None:
             self._model = self._model_class(self.parameters())
-            self._model.begin(self.inputs())
+            self._given = self.inputs()
+            self._model.begin(self._given)
             self._found = None
         return self._model
 
@@ -107,24 +116,40 @@ class Part(Slave):
 
     def step(self, time: float, step_size: float) -> None:
         """Check the inputs, then go on."""
-        if self._dirty:
-            self.check(self._input_references)
-            self._dirty = False
-        self.ready().step(self.inputs(), step_size)
+        if self._new:
+            values, names, given = self.values, self._names, self._given
+            for reference in self._new:
+                value = values[reference]
+                low, high = self._plain_bounds[reference]
+                if not low <= value <= high:
+                    self.check([reference])
+                given[names[reference]] = value
+            self._new.clear()
+        (self._model or self.ready()).step(self._given, step_size)
         self._found = None
 
-    def outputs(self, references: list[int]) -> list[Any]:
+    def asked(self, references: list[int]) -> list[str]:
+        """Names of outputs."""
+        return [self._names[reference] for reference in references]
+
+    def outputs(self, asked: list[str]) -> list[Any]:
         """Present values of outputs; 0 before there are any."""
-        if self._model is None and self.phase != Phase.INITIALISING:
-            return [0] * len(references)
-        if self._found is None:
-            self._found = self.ready().outputs()
-        found, names = self._found, self._names
-        return [found[names[reference]] for reference in references]
+        found = self._found
+        if found is None:
+            if self._model is None and self.phase != Phase.INITIALISING:
+                return [0] * len(asked)
+            found = self._found = self.ready().signals()
+        try:
+            return [found[name] for name in asked]
+        except KeyError:  # one that no other part takes
+            found = self._found = self.ready().outputs()
+        return [found[name] for name in asked]
 
     def fingerprint(self) -> bytes:
         """Hash of the kind of part and its parameters."""
-        return fingerprint(*self.MODEL, self.parameters())
+        if self._fingerprint is None:
+            self._fingerprint = fingerprint(*self.MODEL, self.parameters())
+        return self._fingerprint
 
     @guarded
     def _get_fmu_state(self) -> bytes:
@@ -149,7 +174,8 @@ class Part(Slave):
         self.ready().restore(body["model"])
         self.phase = Phase(body["phase"])
         self.start_time, self.now = body["times"]
-        self._dirty, self._found = True, None
+        self._given, self._found = self.inputs(), None
+        self._new = list(self._input_references)
 
 
 class DrillStringPart(Part):

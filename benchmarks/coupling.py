@@ -1,0 +1,155 @@
+"""Where the time of a coupled run goes: `python -m benchmarks.coupling [SYSTEM.ssp ...]`.
+
+Each system of the drilling loop runs at 1 kHz, its rows thinned. For each part the processor
+time of setting its inputs, of its step and of reading its outputs is taken, in a run of its
+own: a clock around each call costs as much as the cheaper ones.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from percussion_model.coupling import CoupledRun, Coupling
+from scenarios.harness import ROOT
+
+STEP = 1e-3  # [s]
+ROWS_EVERY = 1.0  # [s]
+DURATION, CLOCKED = 20.0, 5.0  # simulated [s]
+SYSTEMS = ("FeedControl", "FeedControlRigid", "FeedControlMap")
+HOUR = 3600.0  # [s]
+# An hour drills some 70 m: one kind of rock with a variation that a blow map covers.
+LONG_HOLE = {
+    "rock.layers[1].loading_stiffness": 7.5e8,
+    "rock.layers[2].top": 20.0, "rock.layers[2].loading_stiffness": 1.2e9,
+    "rock.layers[3].top": 35.0, "rock.layers[3].loading_stiffness": 5e8,
+    "rock.variation.spread": 0.06,
+}  # fmt: skip
+CALLS = ("write", "step", "read")
+WINDOW = 100  # steps: two blows
+
+
+class Clocked(Coupling):
+    """A system whose calls are timed: `spent` is processor time [s] by part and call."""
+
+    def _initialise(self) -> None:
+        super()._initialise()
+        self.spent: dict[tuple[str, str], float] = {}
+        for port in self.ports:
+            for call in CALLS:
+                self.spent[port.name, call] = 0.0
+                setattr(port, call, self._clocked(getattr(port, call), (port.name, call)))
+
+    def _clocked(self, call: Callable[..., Any], key: tuple[str, str]) -> Callable[..., Any]:
+        spent, clock = self.spent, time.process_time
+
+        def clocked(*arguments: Any) -> Any:
+            began = clock()
+            found = call(*arguments)
+            spent[key] += clock() - began
+            return found
+
+        return clocked
+
+
+class Timed(Coupling):
+    """A system whose stepping is timed.
+
+    `cost` is processor time [s]; `least` that of a step in the quickest stretch of WINDOW
+    steps: what others do on a shared core makes all of them slower, some more than others.
+    """
+
+    def _loop(self, *arguments: Any) -> CoupledRun:
+        self._left, self.least = WINDOW, float("inf")
+        began = self._began = time.process_time()
+        run = super()._loop(*arguments)
+        self.cost = time.process_time() - began
+        return run
+
+    def step(self, time_: float, step: float) -> None:
+        super().step(time_, step)
+        self._left -= 1
+        if self._left == 0:
+            now = time.process_time()
+            self.least = min(self.least, (now - self._began) / WINDOW)
+            self._left, self._began = WINDOW, now
+
+
+def measure(
+    system: Path,
+    duration: float,
+    parameters: dict[str, Any],
+    progress: Callable[[float], None] | None = None,
+) -> tuple[CoupledRun, float, float]:
+    """Run a system; return the run, the processor time of its stepping, and the least [s]."""
+    coupling = Timed(system, parameters)
+    run = coupling.run(duration, STEP, interval=ROWS_EVERY, progress=progress)
+    return run, coupling.cost, coupling.least
+
+
+def minutes() -> Callable[[float], None]:
+    """Tells of each simulated minute."""
+    began, used = time.perf_counter(), time.process_time()
+
+    def tell(at: float) -> None:
+        if at % 60.0 < 0.5 * ROWS_EVERY:
+            wall, cost = time.perf_counter() - began, time.process_time() - used
+            print(f"{at:6.0f} s in {wall:.0f} s ({cost:.0f} s of the processor)", file=sys.stderr)
+
+    return tell
+
+
+def by_part(system: Path, parameters: dict[str, Any]) -> dict[tuple[str, str], float]:
+    """Processor time of a step [s], by part and call."""
+    coupling = Clocked(system, parameters)
+    run = coupling.run(CLOCKED, STEP, interval=ROWS_EVERY)
+    return {key: spent / run.steps for key, spent in coupling.spent.items()}
+
+
+def table(spent: dict[tuple[str, str], float]) -> str:
+    """Markdown: microseconds a step."""
+    parts = list(dict.fromkeys(part for part, _ in spent))
+    lines = ["| part | set inputs | step | read outputs | all |", "|---|---|---|---|---|"]
+    rows = [(part, [1e6 * spent[part, call] for call in CALLS]) for part in parts]
+    rows.append(("together", [sum(values) for values in zip(*(r for _, r in rows), strict=True)]))
+    for part, values in rows:
+        shown = " | ".join(f"{value:.1f}" for value in [*values, sum(values)])
+        lines.append(f"| {part} | {shown} |")
+    return "\n".join(lines)
+
+
+def line(system: Path, run: CoupledRun, cost: float, least: float) -> str:
+    """What a run took."""
+    simulated = run.steps * run.step
+    load = os.getloadavg()[0] if hasattr(os, "getloadavg") else float("nan")
+    return (
+        f"{system.stem}: {simulated:g} s in {run.wall_time:.1f} s ({cost:.1f} s of the processor), "
+        f"{simulated / run.wall_time:.2f} ({simulated / cost:.2f}) times real time, "
+        f"{1e6 * cost / run.steps:.0f} us a step, at best {1e6 * least:.0f}; load {load:.1f}; "
+        f"depth {run['hammer.bit.position'][-1]:.4f} m {run.error}"
+    )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.coupling", description=__doc__)
+    parser.add_argument("systems", nargs="*", type=Path, help="archives; left out: those of dist")
+    parser.add_argument("--duration", type=float, default=DURATION, help="simulated time [s]")
+    parser.add_argument("--hour", action="store_true", help="one hour of the blow map alone")
+    choice = parser.parse_args()
+    dist = [ROOT / "dist" / f"{name}.ssp" for name in SYSTEMS]
+    if choice.hour:
+        system = choice.systems[0] if choice.systems else dist[-1]
+        print(line(system, *measure(system, HOUR, LONG_HOLE, minutes())))
+        return
+    for system in choice.systems or dist:
+        print(line(system, *measure(system, choice.duration, LONG_HOLE)), flush=True)
+        print(table(by_part(system, LONG_HOLE)), flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,91 @@
+"""A system as its SSP archive has it, unpacked."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from fmpy import extract
+from fmpy.ssp.ssd import find_components, read_ssd
+
+from percussion_model.coupling.component import CouplingError
+
+# An input of a component, the component it comes from, and the output there.
+Link = tuple[str, str, str]
+
+
+@dataclass(frozen=True)
+class Archive:
+    """An unpacked archive.
+
+    Attributes
+    ----------
+    sources : dict of Path
+        FMU by component, in the order of the archive.
+    values : dict of dict
+        What the archive sets, by component.
+    links : dict of list
+        Inputs of each component.
+    """
+
+    sources: dict[str, Path]
+    values: dict[str, dict[str, Any]]
+    links: dict[str, list[Link]]
+
+
+def unpack(path: Path, folder: str) -> Archive:
+    """Read an archive and unpack it into a folder."""
+    if not path.is_file():
+        raise CouplingError(
+            f"{path}: no such file; `python3 build.py system` makes the archives of dist"
+        )
+    try:
+        system = read_ssd(str(path)).system
+    except KeyError:
+        raise CouplingError(f"{path}: no SSP archive: it holds no SystemStructure.ssd") from None
+    except Exception as error:
+        raise CouplingError(f"{path}: no SSP archive: {error}") from error
+    extract(str(path), folder)
+    components = find_components(system)
+    links: dict[str, list[Link]] = {one.name: [] for one in components}
+    for one in system.connections:
+        links[one.endElement].append((one.endConnector, one.startElement, one.startConnector))
+    return Archive(
+        {one.name: Path(folder) / one.source for one in components},
+        {one.name: _bound(one) for one in components},
+        links,
+    )
+
+
+def _bound(component: Any) -> dict[str, Any]:
+    """Values that the archive binds to a component."""
+    found = {}
+    for binding in component.parameterBindings:
+        for values in binding.parameterValues:
+            for one in values.parameters:
+                is_flag = one.type == "Boolean"
+                found[one.name] = one.value in ("true", "1") if is_flag else float(one.value)
+    return found
+
+
+def choose_values(
+    archive: Archive, given: Mapping[str, Any], name: str
+) -> dict[str, dict[str, Any]]:
+    """Values of the archive, and those that go before them.
+
+    Parameters
+    ----------
+    given : mapping
+        By `component.variable`.
+    name : str
+        Of the archive, for the error.
+    """
+    found = {component: dict(values) for component, values in archive.values.items()}
+    for signal, value in given.items():
+        component, _, variable = signal.partition(".")
+        if component not in found:
+            raise CouplingError(f"{signal}: there is no FMU {component} in {name}")
+        found[component][variable] = value
+    return found

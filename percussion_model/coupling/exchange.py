@@ -1,0 +1,118 @@
+"""What reads outputs and sets inputs of one FMU, many at once, in as few calls as there are types.
+
+fmpy makes new arrays for each call. In a run the same variables are asked for again and
+again, so arrays are made once here and the functions of the library called with them.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+import itertools
+import struct
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from percussion_model.coupling.component import Component
+
+# What fmpy calls the types that share a getter, and what their values are in C.
+FAMILIES = {"Real": "Real", "Integer": "Integer", "Enumeration": "Integer", "Boolean": "Boolean"}
+ORDER = ("Real", "Integer", "Boolean")
+_IN_C: dict[str, tuple[Any, str]] = {
+    "Real": (ctypes.c_double, "d"), "Integer": (ctypes.c_int, "i"), "Boolean": (ctypes.c_int, "i"),
+}  # fmt: skip
+# The highest status of a call that did what it should.
+WARNING = 1
+
+
+class _Group:
+    """Variables of one family with the arrays of their calls."""
+
+    def __init__(self, component: Component, family: str, names: Sequence[str], kind: str) -> None:
+        references = [component.find(name).valueReference for name in names]
+        self.family = family
+        self.begin, self.end = 0, len(names)  # places among all values
+        kind_in_c, letter = _IN_C[family]
+        values = (kind_in_c * len(names))()
+        packed = struct.Struct(f"{len(names)}{letter}")
+        self.fill = functools.partial(packed.pack_into, values, 0)
+        self.found = functools.partial(packed.unpack_from, values)
+        self.name = f"fmi2{kind}{family}"
+        self.call = component.function(self.name)
+        self.arguments = (
+            component.pointer,
+            (ctypes.c_uint * len(names))(*references),
+            ctypes.c_size_t(len(names)),
+            values,
+        )
+
+
+def _grouped(
+    component: Component, names: Sequence[str], kind: str
+) -> tuple[list[str], list[_Group]]:
+    """The names family by family, and what calls them."""
+    found: dict[str, list[str]] = {}
+    for name in names:
+        found.setdefault(FAMILIES[component.find(name).type], []).append(name)
+    families = [family for family in ORDER if family in found]
+    ordered = [name for family in families for name in found[family]]
+    return ordered, [_Group(component, family, found[family], kind) for family in families]
+
+
+class Reader:
+    """Reads variables of an FMU.
+
+    Attributes
+    ----------
+    names : list of str
+        In the order of the values.
+    """
+
+    def __init__(self, component: Component, names: Sequence[str]) -> None:
+        self.component = component
+        self.names, self._groups = _grouped(component, names, "Get")
+
+    def read(self) -> list[Any]:
+        """Present values."""
+        found: list[Any] = []
+        for group in self._groups:
+            status = group.call(*group.arguments)
+            if status > WARNING:
+                self.component.fail(group.name, status)
+            found += map(bool, group.found()) if group.family == "Boolean" else group.found()
+        return found
+
+
+class Writer:
+    """Sets variables of an FMU; a family whose values are as before is left alone.
+
+    Attributes
+    ----------
+    names : list of str
+        In the order of the values.
+    """
+
+    def __init__(self, component: Component, names: Sequence[str]) -> None:
+        self.component = component
+        self.names, self._groups = _grouped(component, names, "Set")
+        for before, group in itertools.pairwise(self._groups):
+            group.begin, group.end = before.end, before.end + group.end
+        self._last: list[Any] = []
+        self.forget()
+
+    def forget(self) -> None:
+        """Set all values the next time: the FMU may have others than were set last."""
+        self._last = [None for _ in self._groups]
+
+    def write(self, values: Sequence[Any]) -> None:
+        """Set values, in the order of the names."""
+        for k, group in enumerate(self._groups):
+            chosen = values[group.begin : group.end]
+            if chosen == self._last[k]:
+                continue
+            group.fill(*chosen)
+            status = group.call(*group.arguments)
+            if status > WARNING:
+                self.component.fail(group.name, status)
+            self._last[k] = chosen

@@ -1,0 +1,99 @@
+"""Whether taking steps back pays: `python -m scenarios.step_rejection`.
+
+One blow of the feed-controlled system with the rigid hammer, with the usual shoulder and with
+one a hundred times as stiff; fixed steps against steps that are shortened where the forces
+between the parts ask for it. Compared by error and by processor time.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from percussion_model.coupling import CoupledRun, Coupling
+from scenarios.coupling_step import ONE_BLOW
+from scenarios.harness import ROOT
+
+SHOULDERS: Mapping[str, Mapping[str, Any]] = {
+    "usual": {},
+    # the damper too: by critical damping of the bit on the shoulder
+    "stiff": {"string.shoulder.stiffness": 1e7, "string.shoulder.damping": 2e3},
+}
+REFERENCE = 5e-6  # [s]
+FIXED = (1e-3, 5e-4, 2e-4, 1e-4, 5e-5, 2e-5)  # [s]
+LONGEST = 1e-3  # [s]
+TOLERANCES = (0.1, 0.03, 0.01, 0.003)
+QUANTITIES = {
+    "string.bit_impulse": "impulse of the feed",
+    "string.casing_position": "way of the casing",
+    "hammer.bit.position": "penetration",
+}
+
+
+@dataclass(frozen=True)
+class Try:
+    """A way through the blow: what it took, and where it led."""
+
+    shoulder: str
+    way: str
+    run: CoupledRun
+    cost: float
+
+
+def attempt(system: Path, shoulder: str, step: float, tolerance: float | None = None) -> Try:
+    """Run one blow; the cost is processor time after the start [s]."""
+    coupling = Coupling(system, SHOULDERS[shoulder])
+    began: list[float] = []
+
+    def note(at: float) -> None:
+        began.append(time.process_time())
+
+    # rows of the longest step, so that the first one tells when the start was over
+    run = coupling.run(ONE_BLOW, step, list(QUANTITIES), max(step, LONGEST), tolerance, note)
+    if run.error:
+        raise RuntimeError(run.error)
+    way = f"{1e3 * step:g} ms" if tolerance is None else f"tolerance {tolerance:g}"
+    share = len(began) / max(len(began) - 1, 1)
+    return Try(shoulder, way, run, share * (began[-1] - began[0]))
+
+
+def table(exact: Mapping[str, CoupledRun], tries: Sequence[Try]) -> str:
+    """Markdown: errors at the end of the blow."""
+    words = " | ".join(QUANTITIES.values())
+    lines = [
+        f"| shoulder | steps | done | computed | taken back | time [s] | {words} |",
+        "|---|---|---|---|---|---|" + "---|" * len(QUANTITIES),
+    ]
+    for one in tries:
+        errors = [one.run[q][-1] / exact[one.shoulder][q][-1] - 1.0 for q in QUANTITIES]
+        shown = " | ".join(f"{100.0 * error:+.3f} %" for error in errors)
+        run = one.run
+        lines.append(
+            f"| {one.shoulder} | {one.way} | {run.steps} | {run.steps + run.tried} "
+            f"| {run.rejected} | {one.cost:.2f} | {shown} |"
+        )
+    return "\n".join(lines)
+
+
+def measure(
+    system: Path,
+    fixed: Sequence[float] = FIXED,
+    tolerances: Sequence[float] = TOLERANCES,
+    reference: float = REFERENCE,
+) -> tuple[dict[str, CoupledRun], list[Try]]:
+    """All ways with all shoulders, and the reference of each shoulder."""
+    exact = {name: attempt(system, name, reference).run for name in SHOULDERS}
+    tries = []
+    for name in SHOULDERS:
+        tries += [attempt(system, name, step) for step in fixed]
+        tries += [attempt(system, name, LONGEST, tolerance) for tolerance in tolerances]
+    return exact, tries
+
+
+if __name__ == "__main__":
+    archive = Path(sys.argv[1]) if sys.argv[1:] else ROOT / "dist" / "FeedControlRigid.ssp"
+    print(table(*measure(archive)))
