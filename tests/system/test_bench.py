@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import json
 import math
 
 import numpy as np
 import pytest
 
 from percussion_model.cli import main
+from percussion_model.commands.bench_controller import COLUMNS
 from percussion_model.coupling import CouplingError
 from percussion_model.coupling.bench import TRIALS, bench, judge, total
 from percussion_model.coupling.master import CoupledRun
+from percussion_model.plotting.bench import save_bench
 
 
 def nothing(inputs, time, step):
@@ -46,7 +49,40 @@ def test_a_crash_has_no_points_and_a_page(feed_control, tmp_path, monkeypatch, c
     assert "rod ended early, at 0.051 s controller: RuntimeError: no idea what to do" in said
     page = (out / "index.html").read_text(encoding="utf-8")
     assert "no idea what to do" in page
-    assert "<td>rod</td><td>0.0</td>" in page
+    assert '<tr class="bad"><td><a href="#rod">rod</a></td><td>a rod is added</td>' in page
+    assert "1 of 1 runs failed: rod" in page
+
+
+def nonsense(inputs, time, step):
+    return nothing(inputs, time, step) | ({"force_command": math.nan} if time > 0.05 else {})
+
+
+def test_no_number_ends_the_run_with_what_there_is(feed_control):
+    (score,) = bench(feed_control, nonsense, trials=["rod"])
+    assert score.points == 0.0
+    assert score.faults == ["ended early, at 0.051 s controller: force_command = nan is no number"]
+    assert score.numbers["depth"] > 0.0
+    assert score.run["time"][-1] == pytest.approx(0.05)
+
+
+def test_a_bad_controller_fails_visibly(feed_control, tmp_path, monkeypatch, capsys):
+    """A PI that swings up: the command says so and ends with 1, row and run are red."""
+    out, numbers = tmp_path / "out", tmp_path / "numbers.json"
+    words = ["percussion", "bench-controller", "--system", str(feed_control), "--trial", "rod",
+             "--set", "pi.gain=4", "--set", "pi.time=0.05", "--set", "cutback.on=false",
+             "--set", "retract.on=false"]  # fmt: skip
+    monkeypatch.setattr("sys.argv", [*words, "--out", str(out), "--json", str(numbers)])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code == 1
+    assert "rod failed: " in capsys.readouterr().err
+    (found,) = json.loads(numbers.read_text(encoding="utf-8"))["trials"]
+    assert found["swing"] > 0.3
+    assert found["violations"] > 0.4
+    assert "s beyond the limits of feed or torque" in found["faults"][0]
+    page = (out / "index.html").read_text(encoding="utf-8")
+    assert '<tr class="bad">' in page
+    assert f'<p class="bad">{found["faults"][0]}</p>' in page
 
 
 def made_up(feed, torque=100.0, error=""):
@@ -58,6 +94,7 @@ def made_up(feed, torque=100.0, error=""):
         "string.feed_force_mean": still + feed,
         "rock.rotation_torque": np.where(time > 3.0, torque, 0.0),
         "hammer.bit.position": 0.02 * time,
+        "controller.force_command": still - 800.0,
         "rig.energy": 10.0 * time,
         "supply.energy": 990.0 * time,
         "hammer.blow_count": np.floor(20.0 * time),
@@ -78,6 +115,33 @@ def test_points_are_what_they_are_said_to_be():
     assert jammed.numbers["energy_per_metre"] == pytest.approx(50e3)
     assert judge(trial, made_up(3600.0)).numbers["overshoot"] == pytest.approx(0.2)
     assert judge(trial, made_up(3000.0, error="at 1 s it fell")).points == 0.0
+
+
+@pytest.mark.parametrize(
+    ("changes", "faults"),
+    [
+        ({"feed": 2500.0}, []),
+        ({"feed": 2000.0}, ["the feed is off by 33 % on average"]),
+        ({"feed": 3000.0, "torque": 300.0}, ["1 s beyond the limits of feed or torque"]),
+        ({"feed": 3000.0, "error": "at 1 s it fell"}, ["ended early, at 1 s it fell"]),
+    ],
+)
+def test_a_run_fails_for_a_reason(changes, faults):
+    assert judge(TRIALS[0], made_up(**changes)).faults == faults
+
+
+def test_the_page_says_what_a_stranger_needs(tmp_path):
+    scores = [judge(TRIALS[0], made_up(3000.0)), judge(TRIALS[3], made_up(2000.0))]
+    page = save_bench(scores, total(scores), COLUMNS, tmp_path, "<mine>").read_text("utf-8")
+    assert "Controller bench: &lt;mine&gt;" in page
+    assert "1 of 2 runs failed: void" in page
+    assert page.count("<img alt=") == 2
+    for name, head, _, text in COLUMNS:
+        assert name in scores[0].numbers
+        assert page.count(head) == 2
+        assert text in page
+    assert TRIALS[0].text in page
+    assert (tmp_path / "void.png").stat().st_size > 15_000
 
 
 @pytest.mark.parametrize("name", ["nothing", "rods"])
