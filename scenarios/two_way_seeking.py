@@ -120,7 +120,12 @@ def draw(hill: np.ndarray, runs: Sequence[CoupledRun], path: Path) -> Path:
     grid = figure.add_gridspec(2, 2, width_ratios=(1.25, 1.0))
     above = figure.add_subplot(grid[:, 0])
     filled = above.contourf(
-        1e-3 * feeds, 1e-5 * pressures, 1e3 * surface(hill, feeds, pressures).T, 12, cmap="Greys"
+        1e-3 * feeds,
+        1e-5 * pressures,
+        1e3 * surface(hill, feeds, pressures).T,
+        12,
+        cmap="YlGn",
+        alpha=0.8,
     )
     figure.colorbar(filled, ax=above, label="rate of penetration, held (open loop) [mm/s]")
     above.plot(1e-3 * hill[:, 0], 1e-5 * hill[:, 1], "k.", markersize=3, label="sweep")
@@ -149,9 +154,10 @@ def draw(hill: np.ndarray, runs: Sequence[CoupledRun], path: Path) -> Path:
                     fontsize="medium")  # fmt: skip
     above.set_xlabel("feed force [kN]")
     above.set_ylabel("supply pressure that is asked for [bar]")
-    above.legend(fontsize="small", loc="upper left")
     figure.suptitle("Extremum seeking on feed and pressure at once", fontweight="bold")
-    figure.tight_layout()
+    figure.tight_layout(rect=(0.0, 0.06, 1.0, 1.0))
+    handles, labels = above.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="lower center", ncols=5, fontsize="small", frameon=False)
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path, dpi=110)
     plt.close(figure)

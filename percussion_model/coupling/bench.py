@@ -114,8 +114,9 @@ class Score:
     Attributes
     ----------
     points : float
-        0 to 100: the share of the wanted feed that the feed differs from it, on average, is
-        lost, and so is the share of the time in violation; 0 where the run ended early.
+        0 to 100: the share of the wanted feed that the feed differs from it, on average and
+        outside of voids, is lost, and so is the share of the time in violation; 0 where the run
+        has failed.
     numbers : dict
         depth [m], energy_per_metre [J/m], overshoot [1], time_off_bottom [s], dry_blows,
         peak_force [N], violations [s], feed_error [1], swing [1].
@@ -137,8 +138,9 @@ def judge(trial: Trial, run: CoupledRun) -> Score:
     steps = np.diff(time, prepend=0.0)
     feed = run["string.feed_force_mean"]
     torque = run["rock.rotation_torque"]
-    late = time >= SETTLING
-    error = float(np.mean(np.abs(feed[late] / FEED - 1.0))) if late.any() else 1.0
+    # nobody can keep a feed against nothing
+    judged = (time >= SETTLING) & (run["rock.in_void"] == 0.0)
+    error = float(np.mean(np.abs(feed[judged] / FEED - 1.0))) if judged.any() else 1.0
     off = (run["string.lifted"] > 0.0) | (run["hammer.off_bottom"] > 0.0)
     wrong = (feed > HIGHEST_FEED) | (torque > HIGHEST_TORQUE)
     depth = float(run["hammer.bit.position"][-1])
@@ -156,8 +158,9 @@ def judge(trial: Trial, run: CoupledRun) -> Score:
         "swing": float(0.5 * np.ptp(feed[time >= time[-1] - LATE]) / FEED),
     }
     share = numbers["violations"] / max(float(time[-1]), LATE)
-    points = 0.0 if run.error else float(100.0 * max(0.0, 1.0 - error) * (1.0 - share))
-    return Score(trial.name, points, numbers, run.error, run, _faults(numbers, share, run.error))
+    faults = _faults(numbers, share, run.error)
+    points = 0.0 if faults else float(100.0 * (1.0 - error) * (1.0 - share))
+    return Score(trial.name, points, numbers, run.error, run, faults)
 
 
 def _faults(numbers: Mapping[str, float], share: float, error: str) -> list[str]:

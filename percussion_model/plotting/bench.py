@@ -82,11 +82,12 @@ def _rules() -> str:
     return (
         "<p>Each run drills with the same rig, string and hammer; the controller has to keep a "
         f"feed of {1e-3 * FEED:g} kN whatever happens. A run is worth 100 points, less the mean "
-        f"distance of the feed from that (after the first {SETTLING:g} s) in per cent, times the "
-        f"share of its time within the limits: {1e-3 * HIGHEST_FEED:g} kN of feed and "
-        f"{HIGHEST_TORQUE:g} N m of torque. It fails, and the row is red, where it ends early, is "
-        f"beyond the limits for more than {100 * MOST_VIOLATION:g} % of its time, or the feed is "
-        f"off by more than {100 * MOST_ERROR:g} %. A run that ends early has no points.</p>"
+        f"distance of the feed from that in per cent (after the first {SETTLING:g} s, and not in "
+        "a void), times the share of its time within the limits: "
+        f"{1e-3 * HIGHEST_FEED:g} kN of feed and {HIGHEST_TORQUE:g} N m of torque. It fails, and "
+        "the row is red, where it ends early, is beyond the limits for more than "
+        f"{100 * MOST_VIOLATION:g} % of its time, or the feed is "
+        f"off by more than {100 * MOST_ERROR:g} %. A run that fails has no points.</p>"
     )
 
 
@@ -117,6 +118,7 @@ def _figure(score: Score, path: Path) -> Path:
     wanted = feed.axhline(1e-3 * FEED, color="k", linewidth=0.9, linestyle="--")
     for ax, level in ((feed, 1e-3 * HIGHEST_FEED), (torque, HIGHEST_TORQUE)):
         limit = ax.axhline(level, color=LIMIT_COLOUR, linewidth=0.9, linestyle=":")
+        ax.set_ylim(bottom=0.0)
     handles: list[Artist] = [wanted, limit]
     labels = ["wanted", "limit"]
     if np.any(run["rock.in_void"] > 0.0):

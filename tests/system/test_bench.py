@@ -27,8 +27,19 @@ def test_the_bench_ranks_nothing_below_a_bad_pi_below_a_good_one(feed_control):
         total(bench(feed_control, controller, values, ["rod"]))
         for controller, values in ((nothing, {}), (None, bad), (None, {}))
     ]
+    assert points[0] > 0.0
     assert points[0] + 1.0 < points[1]
     assert points[1] + 1.0 < points[2] <= 100.0
+
+
+def test_nothing_fails_where_the_bit_is_held(feed_control):
+    """Something has to be done about a jam; what ships does it in time."""
+    (idle,) = bench(feed_control, nothing, trials=["jam"])
+    assert idle.points == 0.0
+    assert "beyond the limits of feed or torque" in idle.faults[0]
+    (retracting,) = bench(feed_control, trials=["jam"])
+    assert retracting.faults == []
+    assert retracting.numbers["violations"] < 0.6 * idle.numbers["violations"]
 
 
 def test_a_crash_has_no_points_and_a_page(feed_control, tmp_path, monkeypatch, capsys):
@@ -85,14 +96,14 @@ def test_a_bad_controller_fails_visibly(feed_control, tmp_path, monkeypatch, cap
     assert f'<p class="bad">{found["faults"][0]}</p>' in page
 
 
-def made_up(feed, torque=100.0, error=""):
-    """A run of 4 s with a constant feed, and a torque in its last quarter."""
+def made_up(feed, torque=100.0, error="", since=3.7):
+    """A run of 4 s with a constant feed, and a torque in its last part."""
     time = np.linspace(0.0, 4.0, 801)
     still = np.zeros_like(time)
     columns = {
         "time": time,
         "string.feed_force_mean": still + feed,
-        "rock.rotation_torque": np.where(time > 3.0, torque, 0.0),
+        "rock.rotation_torque": np.where(time > since, torque, 0.0),
         "hammer.bit.position": 0.02 * time,
         "controller.force_command": still - 800.0,
         "rig.energy": 10.0 * time,
@@ -110,9 +121,15 @@ def test_points_are_what_they_are_said_to_be():
     assert judge(trial, made_up(3000.0)).points == pytest.approx(100.0)
     assert judge(trial, made_up(2400.0)).points == pytest.approx(80.0)
     jammed = judge(trial, made_up(3000.0, torque=300.0))
-    assert jammed.numbers["violations"] == pytest.approx(1.0, abs=0.01)
-    assert jammed.points == pytest.approx(75.0, abs=0.3)
+    assert jammed.numbers["violations"] == pytest.approx(0.3, abs=0.01)
+    assert jammed.points == pytest.approx(92.5, abs=0.3)
     assert jammed.numbers["energy_per_metre"] == pytest.approx(50e3)
+    falling = made_up(3000.0)
+    void = (falling["time"] > 2.0) & (falling["time"] < 2.5)
+    falling.columns["string.feed_force_mean"] = np.where(void, 0.0, 3000.0)
+    assert judge(trial, falling).points == pytest.approx(85.7, abs=0.3)
+    falling.columns["rock.in_void"] = void.astype(float)
+    assert judge(trial, falling).points == pytest.approx(100.0)
     assert judge(trial, made_up(3600.0)).numbers["overshoot"] == pytest.approx(0.2)
     assert judge(trial, made_up(3000.0, error="at 1 s it fell")).points == 0.0
 
@@ -122,12 +139,17 @@ def test_points_are_what_they_are_said_to_be():
     [
         ({"feed": 2500.0}, []),
         ({"feed": 2000.0}, ["the feed is off by 33 % on average"]),
-        ({"feed": 3000.0, "torque": 300.0}, ["1 s beyond the limits of feed or torque"]),
+        (
+            {"feed": 3000.0, "torque": 300.0, "since": 3.0},
+            ["1 s beyond the limits of feed or torque"],
+        ),
         ({"feed": 3000.0, "error": "at 1 s it fell"}, ["ended early, at 1 s it fell"]),
     ],
 )
 def test_a_run_fails_for_a_reason(changes, faults):
-    assert judge(TRIALS[0], made_up(**changes)).faults == faults
+    score = judge(TRIALS[0], made_up(**changes))
+    assert score.faults == faults
+    assert (score.points == 0.0) == bool(faults)
 
 
 def test_the_page_says_what_a_stranger_needs(tmp_path):
