@@ -3,24 +3,47 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import cycle
 from pathlib import Path
 
 import numpy as np
 
 from percussion_model.coupling import CoupledRun, Coupling
-from scenarios.harness import FIGURES, ROOT
+from scenarios.coupled import archive, save_runs, save_table
+from scenarios.harness import FIGURES
 
-STEP = 2e-3  # [s]: the longest at which the shoulder is as stiff as it is
+NAME = "extremum_seeking"
+STEP = 2e-3  # the longest at which the shoulder is as stiff as it is [s]
+INTERVAL = 0.02  # of the rows that are kept [s]
 DURATION = 40.0  # [s]
-STARTS = (1700.0, 2500.0, 4200.0)  # [N]
+STARTS = (1700.0, 2500.0, 4200.0)  # low, near and high [N]
 # Feeds of the open-loop sweep [N], each held for so long, the first part for settling [s].
-SWEEP = (1700.0, 2100.0, 2400.0, 2600.0, 2700.0, 2800.0, 2900.0, 3000.0, 3200.0, 3600.0, 4200.0)
-HELD, SETTLING = 4.0, 2.0
+SWEEP = (
+    1700.0, 2000.0, 2200.0, 2400.0, 2500.0, 2600.0, 2700.0, 2800.0, 2900.0, 3000.0, 3100.0,
+    3200.0, 3300.0, 3400.0, 3600.0, 3900.0, 4200.0,
+)  # fmt: skip
+HELD, SETTLING = 6.0, 2.0
 LAST = 8.0  # the seeker's rate is that of its last seconds: four swings [s]
+BOUND = 0.03  # the seeker ends this near to the best rate
+# The top is that of a quartic through the logarithms of the rates this near to the greatest.
+NEAR, DEGREE = 0.2, 4
+SIGNALS = ("hammer.blow_position", "hammer.blow_time", "controller.seek.centre",
+           "controller.feed_wanted", "controller.seek.gradient")  # fmt: skip
 
 
-def _values(feed: float) -> dict[str, float]:
+@dataclass(frozen=True)
+class Top:
+    """Top of a hill, with standard errors: feed [N] and rate [m/s]."""
+
+    feed: float
+    rate: float
+    feed_error: float
+    rate_error: float
+
+
+def values(feed: float) -> dict[str, float]:
     """Setpoint and start of a run; the rig's force without drilling is feed less weights."""
     return {
         "controller.feed_setpoint": feed,
@@ -31,14 +54,20 @@ def _values(feed: float) -> dict[str, float]:
 
 
 def rate_over(run: CoupledRun, since: float) -> float:
-    """Mean rate of penetration after a time, by a straight line [m/s]."""
+    """Rate of penetration over whole blows after a time [m/s]."""
     if run.error:
         raise RuntimeError(run.error)
     late = run["time"] >= since
-    return float(np.polyfit(run["time"][late], run["hammer.bit.position"][late], 1)[0])
+    places, times = run["hammer.blow_position"][late], run["hammer.blow_time"][late]
+    return float((places[-1] - places[0]) / (times[-1] - times[0]))
 
 
-def sweep(system: Path, feeds: Sequence[float] = SWEEP) -> np.ndarray:
+def sweep(
+    system: Path,
+    feeds: Sequence[float] = SWEEP,
+    held: float = HELD,
+    settings: Mapping[str, float | bool] | None = None,
+) -> np.ndarray:
     """Rates at constant feeds.
 
     Returns
@@ -48,40 +77,82 @@ def sweep(system: Path, feeds: Sequence[float] = SWEEP) -> np.ndarray:
     """
     rows = []
     for feed in feeds:
-        values = {**_values(feed), "controller.seek.on": False}
-        run = Coupling(system, values).run(HELD, STEP, interval=2 * STEP)
+        chosen = {**values(feed), "controller.seek.on": False, **(settings or {})}
+        run = Coupling(system, chosen).run(held, STEP, SIGNALS, INTERVAL)
         mean = float(np.mean(run["string.feed_force_mean"][run["time"] >= SETTLING]))
         rows.append((mean, rate_over(run, SETTLING)))
     return np.array(rows)
 
 
-def seek(system: Path, start: float, duration: float = DURATION) -> CoupledRun:
+def top_of(hill: np.ndarray) -> Top:
+    """Top of a hill, between the feeds of the sweep.
+
+    The errors are those of the jackknife: how much the top moves when one feed is left out.
+
+    Parameters
+    ----------
+    hill : ndarray, shape (feeds, 2)
+        See `sweep`.
+    """
+    greatest = hill[np.argmax(hill[:, 1]), 0]
+    near = hill[np.abs(np.log(hill[:, 0] / greatest)) <= NEAR]
+    tops = np.array([_fitted(np.delete(near, k, axis=0)) for k in range(len(near))])
+    count = len(tops)
+    errors = np.sqrt((count - 1) / count * np.sum((tops - tops.mean(axis=0)) ** 2, axis=0))
+    return Top(*_fitted(near), *(float(error) for error in errors))
+
+
+def _fitted(hill: np.ndarray) -> tuple[float, float]:
+    """Feed [N] and rate [m/s] at the top of the curve through the points."""
+    x = np.log(hill[:, 0])
+    middle = x.mean()
+    curve = np.polyfit(x - middle, np.log(hill[:, 1]), DEGREE)
+    fine = np.linspace(x.min(), x.max(), 20_001) - middle
+    heights = np.polyval(curve, fine)
+    best = int(np.argmax(heights))
+    return float(np.exp(fine[best] + middle)), float(np.exp(heights[best]))
+
+
+def seek(
+    system: Path,
+    start: float,
+    duration: float = DURATION,
+    settings: Mapping[str, float | bool] | None = None,
+) -> CoupledRun:
     """One run of the seeker from a feed [N]."""
-    signals = ["controller.seek.centre", "controller.feed_wanted"]
-    return Coupling(system, _values(start)).run(duration, STEP, signals, interval=0.02)
+    chosen = {**values(start), **(settings or {})}
+    return Coupling(system, chosen).run(duration, STEP, SIGNALS, INTERVAL)
 
 
-def draw(found: np.ndarray, runs: Sequence[CoupledRun], path: Path) -> Path:
+def draw(hill: np.ndarray, runs: Sequence[CoupledRun], path: Path) -> Path:
     """Draw the hill and the ways up."""
     import matplotlib.pyplot as plt
 
-    figure, axes = plt.subplots(1, 2, figsize=(10.0, 4.2))
-    axes[0].plot(1e-3 * found[:, 0], 1e3 * found[:, 1], "o-", label="constant feed")
-    for run in runs:
+    top = top_of(hill)
+    figure, axes = plt.subplots(1, 2, figsize=(11.0, 4.6))
+    axes[0].plot(1e-3 * hill[:, 0], 1e3 * hill[:, 1], "o-", color="0.4", markersize=4,
+                 label="feed held (open loop)")  # fmt: skip
+    axes[0].axhspan((1.0 - BOUND) * 1e3 * top.rate, 1e3 * top.rate, color="#cfe8cf", zorder=0,
+                    label=f"within {100 * BOUND:.0f} % of the best rate")  # fmt: skip
+    for run, marker in zip(runs, cycle("s^o"), strict=False):
         centre = run["controller.seek.centre"]
-        label = f"from {1e-3 * centre[0]:.1f} kN"
-        axes[1].plot(run["time"], 1e-3 * centre, label=label)
         rate = rate_over(run, run["time"][-1] - LAST)
-        axes[0].plot(1e-3 * centre[-1], 1e3 * rate, "s", label=label)
-    best = found[np.argmax(found[:, 1]), 0]
-    axes[1].axhline(1e-3 * best, color="k", linewidth=0.7, linestyle="--")
-    axes[0].set_xlabel("feed [kN]")
-    axes[0].set_ylabel("rate [mm/s]")
+        label = f"from {1e-3 * centre[0]:.1f} kN: {100 * (rate / top.rate - 1.0):+.1f} %"
+        (line,) = axes[1].plot(run["time"], 1e-3 * centre, label=f"from {1e-3 * centre[0]:.1f} kN")
+        axes[0].plot(1e-3 * centre[-1], 1e3 * rate, marker, color=line.get_color(), label=label,
+                     fillstyle="none", markersize=9)  # fmt: skip
+    axes[1].axhline(1e-3 * top.feed, color="k", linewidth=0.9, linestyle="--",
+                    label=f"best feed of the sweep, {1e-3 * top.feed:.2f} kN")  # fmt: skip
+    axes[0].set_title("Where the seeker ends, its swing included", loc="left", fontsize="medium")
+    axes[1].set_title("The way of the seeker", loc="left", fontsize="medium")
+    axes[0].set_xlabel("feed force [kN]")
+    axes[0].set_ylabel("rate of penetration [mm/s]")
     axes[1].set_xlabel("time [s]")
-    axes[1].set_ylabel("centre of the swing [kN]")
+    axes[1].set_ylabel("feed about which the seeker swings [kN]")
     for ax in axes:
         ax.grid(alpha=0.3)
         ax.legend(fontsize="small")
+    figure.suptitle("Extremum seeking on the feed force", fontweight="bold")
     figure.tight_layout()
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path, dpi=110)
@@ -89,12 +160,23 @@ def draw(found: np.ndarray, runs: Sequence[CoupledRun], path: Path) -> Path:
     return path
 
 
+def main() -> None:
+    """Write figure and data, and print where the top is and where the seeker ends."""
+    system = archive("ExtremumSeekingRigid", sys.argv[1:])
+    hill = sweep(system)
+    runs = {f"from {start:.0f} N": seek(system, start) for start in STARTS}
+    top = top_of(hill)
+    print(f"best feed {top.feed:.0f} +- {top.feed_error:.0f} N, "
+          f"rate {1e3 * top.rate:.3f} +- {1e3 * top.rate_error:.3f} mm/s")  # fmt: skip
+    for name, run in runs.items():
+        rate = rate_over(run, DURATION - LAST)
+        print(f"{name}: {run['controller.seek.centre'][-1]:.0f} N, {1e3 * rate:.3f} mm/s, "
+              f"{100 * (rate / top.rate - 1.0):+.2f} %")  # fmt: skip
+    print(draw(hill, list(runs.values()), FIGURES / f"{NAME}.png"))
+    table = {"feed_force": hill[:, 0], "rate_of_penetration": hill[:, 1]}
+    for path in (save_table(table, FIGURES / f"{NAME}_sweep.csv"), *save_runs(runs, NAME)):
+        print(path)
+
+
 if __name__ == "__main__":
-    archive = Path(sys.argv[1]) if sys.argv[1:] else ROOT / "dist" / "ExtremumSeekingRigid.ssp"
-    hill = sweep(archive)
-    ways = [seek(archive, start) for start in STARTS]
-    print(np.round(hill * [1.0, 1e3], 3))
-    for way in ways:
-        rate = rate_over(way, DURATION - LAST)
-        print(f"{way['controller.seek.centre'][-1]:.0f} N {1e3 * rate:.3f} mm/s")
-    print(draw(hill, ways, FIGURES / "extremum_seeking.png"))
+    main()

@@ -143,6 +143,7 @@ SUPPLY = PartTable(
         "source.pressure_limit": ("Pa", 0.0, 1e9, 3e6, "highest pressure of the source"),
         "source.flow_limit": ("m^3/s", 0.0, 100.0, 2e-2, "highest flow of the source"),
         "source.time": ("s", 1e-4, 100.0, 0.02, "time constant of the source"),
+        "vent.flow_limit": ("m^3/s", 0.0, 100.0, 0.1, "flow of the vent above what is wanted"),
         "hose.volume": ("m^3", 1e-6, 100.0, 2e-2, "volume of the hose"),
         "hose.bulk_modulus": ("Pa", 1e4, 1e10, 2.1e6, "stiffness of oil and hose, or of gas"),
         "hose.resistance": ("Pa s/m^3", 0.0, 1e12, 2e7, "pressure drop by flow"),
@@ -182,6 +183,7 @@ ROCK = PartTable(
     inputs={
         "bit_position": ("m", -1e6, 1e6, 0.0, "displacement of the bit"),
         "feed_force": ("N", -1e9, 1e9, 2500.0, "feed force on the bit"),
+        "supply_pressure": ("Pa", 0.0, 1e9, 2e6, "gauge pressure at the hammer"),
     },
     outputs={
         "loading_stiffness": ("N/m", "loading stiffness K_R at the bit"),
@@ -199,6 +201,8 @@ ROCK = PartTable(
         "variation.seed": ("count", 0, 1_000_000, 1, "seed of the variation"),
         "best_feed.force": ("N", 1.0, 1e9, 2500.0, "feed force at which K_R is lowest"),
         "best_feed.factor": ("1", 0.0, 1e6, 0.0, "growth of K_R by the square of the distance"),
+        "best_pressure.pressure": ("Pa", 1.0, 1e9, 2e6, "supply pressure at which K_R is lowest"),
+        "best_pressure.factor": ("1", 0.0, 1e6, 0.0, "growth of K_R by the square of the distance"),
         "torque_arm": ("m", 0.0, 10.0, 0.04, "torque by feed force in sound rock"),
         "void_stiffness": ("N/m", 0.0, 1e13, 1e7, "K_R up to which a layer counts as a void"),
     },
@@ -207,7 +211,7 @@ ROCK = PartTable(
 CONTROLLER = PartTable(
     name="DrillController",
     slave="DrillControllerPart",
-    modules=("controller",),
+    modules=("controller", "seeker"),
     description="Feed PI, pressure by feed, cut-back in voids, retract from jams, rate seeking",
     inputs={
         "feed_setpoint": ("N", 0.0, 1e9, 2500.0, "feed force that is wanted"),
@@ -227,6 +231,8 @@ CONTROLLER = PartTable(
         "feed_wanted": ("N", "feed force that the PI keeps"),
         "seek.centre": ("N", "feed force about which the seeker swings"),
         "seek.gradient": ("1", "d ln rate / d ln feed, as the seeker found it last"),
+        "seek.pressure_centre": ("Pa", "pressure about which the seeker swings"),
+        "seek.pressure_gradient": ("1", "d ln rate / d ln pressure, as it was found last"),
     },
     parameters={
         "pi.on": ("", 0, 1, True, "PI on the feed force; off: the force at the start stays"),
@@ -256,10 +262,16 @@ CONTROLLER = PartTable(
         "seek.swing": ("1", 1e-4, 0.5, 0.06, "swing of the feed by its mean"),
         "seek.period": ("s", 0.01, 1e3, 2.0, "period of the swing"),
         "seek.wait": ("s", 0.0, 1e4, 2.0, "time before the first period counts"),
-        "seek.gain": ("1", 0.0, 100.0, 0.25, "move of ln feed by the gradient found"),
+        "seek.gain": ("1", 0.0, 100.0, 0.15, "move of ln feed by the gradient found"),
         "seek.largest_move": ("1", 0.0, 1.0, 0.12, "largest move of ln feed in a period"),
         "seek.lowest": ("N", 1.0, 1e9, 500.0, "lowest feed of the seeker"),
         "seek.highest": ("N", 1.0, 1e9, 2e4, "highest feed of the seeker"),
+        "seek.pressure_on": ("", 0, 1, False, "seek the pressure too, by a second swing"),
+        "seek.pressure_swing": ("1", 1e-4, 0.5, 0.06, "swing of the pressure by its mean"),
+        "seek.pressure_cycles": ("count", 2, 50, 3, "swings of the pressure in a period"),
+        "seek.pressure_gain": ("1", 0.0, 100.0, 0.15, "move of ln pressure by its gradient"),
+        "seek.pressure_lowest": ("Pa", 1.0, 1e9, 8e5, "lowest pressure of the seeker"),
+        "seek.pressure_highest": ("Pa", 1.0, 1e9, 3e6, "highest pressure of the seeker"),
     },
 )  # fmt: skip
 

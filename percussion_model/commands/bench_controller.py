@@ -24,12 +24,18 @@ from percussion_model.commands.common import (
 if TYPE_CHECKING:
     from percussion_model.coupling.bench import Score
 
+# Name, head, factor, and what it is.
 COLUMNS = (
-    ("depth", "depth [mm]", 1e3), ("energy_per_metre", "energy [MJ/m]", 1e-6),
-    ("overshoot", "overshoot [%]", 100.0), ("time_off_bottom", "off bottom [s]", 1.0),
-    ("dry_blows", "dry blows", 1.0), ("peak_force", "peak force [kN]", 1e-3),
-    ("violations", "violations [s]", 1.0), ("feed_error", "feed error [%]", 100.0),
-)  # fmt: skip
+    ("depth", "depth [mm]", 1e3, "of the bit at the end"),
+    ("energy_per_metre", "energy [MJ/m]", 1e-6, "work of supply and rig by the depth"),
+    ("feed_error", "feed error [%]", 100.0, "mean distance of the feed from what is wanted"),
+    ("overshoot", "overshoot [%]", 100.0, "greatest feed above what is wanted"),
+    ("swing", "swing [%]", 100.0, "half the range of the feed in the last second"),
+    ("time_off_bottom", "off bottom [s]", 1.0, "time in which the shoulder is off the bit"),
+    ("dry_blows", "dry blows", 1.0, "blows in a void with the bit or the shoulder off"),
+    ("peak_force", "peak force [kN]", 1e-3, "greatest force of the rock on the bit"),
+    ("violations", "violations [s]", 1.0, "time beyond the limits of feed and torque"),
+)
 
 
 def bench_controller(
@@ -64,7 +70,10 @@ def bench_controller(
     values = dict(read_value(f"controller.{text}") for text in settings or ())
     scores = bench(system, _load(controller), values, trials or (), _show)
     points = total(scores)
-    listed = [{"trial": s.trial, "points": s.points, "error": s.error, **s.numbers} for s in scores]
+    listed = [
+        {"trial": s.trial, "points": s.points, "error": s.error, "faults": s.faults, **s.numbers}
+        for s in scores
+    ]
     write_json(json_file, {"points": points, "trials": listed})
     print(f"{'total':10s} {points:6.1f}", file=sys.stderr)
     try:
@@ -74,16 +83,16 @@ def bench_controller(
     else:
         title = controller or system.stem
         print(save_bench(scores, points, COLUMNS, folder, title), file=sys.stderr)
-    return 1 if any(score.error for score in scores) else 0
+    return 1 if any(score.faults for score in scores) else 0
 
 
 def _show(score: Score) -> None:
-    """One line for a run, and why it ended early."""
+    """One line for a run, and why it has failed."""
     numbers = "  ".join(f"{text} {factor * score.numbers[name]:.4g}"
-                        for name, text, factor in COLUMNS)  # fmt: skip
+                        for name, text, factor, _ in COLUMNS)  # fmt: skip
     print(f"{score.trial:10s} {score.points:6.1f}  {numbers}", file=sys.stderr)
-    if score.error:
-        complain(f"{score.trial} ended early, {score.error}")
+    for fault in score.faults:
+        complain(f"{score.trial} {'' if score.error else 'failed: '}{fault}")
 
 
 def _load(controller: str | None) -> Any:

@@ -20,9 +20,13 @@ STEP = 1e-3  # [s]
 ROWS_EVERY = 5e-3  # [s]
 FEED = 3000.0  # what is wanted [N]
 # Limits of the rig: beyond them a second counts as a violation.
-HIGHEST_FEED, HIGHEST_TORQUE = 6000.0, 250.0  # [N], [N m]
+HIGHEST_FEED, HIGHEST_TORQUE = 4000.0, 250.0  # [N], [N m]
+# A run fails where it ends early, or has more of these than so: share of its time in
+# violation, mean distance of the feed from what is wanted.
+MOST_VIOLATION, MOST_ERROR = 0.1, 0.25
 # Time before the feed is judged: the drill string has to come to rest [s].
 SETTLING = 0.5
+LATE = 1.0  # the last part of a run, in which the swing of the feed is measured [s]
 NOISE, DELAY = 0.05, 0.03  # of the sensors: share of the value, time [s]
 
 OnWay = Callable[[str, float, Any], Any]
@@ -90,9 +94,9 @@ TRIALS = (
          **_layer(2, 0.02, loading_stiffness=4e8)},
     ),
     Trial(
-        "void", "filling of 1 kN/mm, five centimetres", 4.0,
-        {**_ONE_ROCK, **_layer(2, 0.03, loading_stiffness=1e6),
-         **_layer(3, 0.08, loading_stiffness=7.5e8)},
+        "void", "twenty centimetres of filling with 1 kN/mm", 4.0,
+        {**_ONE_ROCK, **_layer(2, 0.02, loading_stiffness=1e6),
+         **_layer(3, 0.22, loading_stiffness=7.5e8)},
     ),
     Trial("pressure", "half of the pressure is lost for 1.5 s", 4.0, _ONE_ROCK, _pressure_loss),
     Trial("rod", "a rod is added", 4.0, {**_ONE_ROCK, "string.start.rod_left": 0.03}),
@@ -111,11 +115,14 @@ class Score:
     Attributes
     ----------
     points : float
-        0 to 100: the share of the wanted feed that the feed differs from it, on average, is
-        lost, and so is the share of the time in violation; 0 where the run ended early.
+        0 to 100: the share of the wanted feed that the feed differs from it, on average and
+        outside of voids, is lost, and so is the share of the time in violation; 0 where the run
+        has failed.
     numbers : dict
         depth [m], energy_per_metre [J/m], overshoot [1], time_off_bottom [s], dry_blows,
-        peak_force [N], violations [s], feed_error [1].
+        peak_force [N], violations [s], feed_error [1], swing [1].
+    faults : list of str
+        Why the run has failed; empty if it has not.
     """
 
     trial: str
@@ -123,6 +130,7 @@ class Score:
     numbers: dict[str, float]
     error: str
     run: CoupledRun = field(repr=False)
+    faults: list[str] = field(default_factory=list)
 
 
 def judge(trial: Trial, run: CoupledRun) -> Score:
@@ -131,8 +139,9 @@ def judge(trial: Trial, run: CoupledRun) -> Score:
     steps = np.diff(time, prepend=0.0)
     feed = run["string.feed_force_mean"]
     torque = run["rock.rotation_torque"]
-    late = time >= SETTLING
-    error = float(np.mean(np.abs(feed[late] / FEED - 1.0))) if late.any() else 1.0
+    # nobody can keep a feed against nothing
+    judged = (time >= SETTLING) & (run["rock.in_void"] == 0.0)
+    error = float(np.mean(np.abs(feed[judged] / FEED - 1.0))) if judged.any() else 1.0
     off = (run["string.lifted"] > 0.0) | (run["hammer.off_bottom"] > 0.0)
     wrong = (feed > HIGHEST_FEED) | (torque > HIGHEST_TORQUE)
     depth = float(run["hammer.bit.position"][-1])
@@ -147,9 +156,24 @@ def judge(trial: Trial, run: CoupledRun) -> Score:
         "peak_force": float(np.max(run["hammer.bit.force_peak"])),
         "violations": float(np.sum(steps[wrong])),
         "feed_error": error,
+        "swing": float(0.5 * np.ptp(feed[time >= time[-1] - LATE]) / FEED),
     }
-    points = 100.0 * max(0.0, 1.0 - error) * (1.0 - numbers["violations"] / time[-1])
-    return Score(trial.name, 0.0 if run.error else points, numbers, run.error, run)
+    share = numbers["violations"] / max(float(time[-1]), LATE)
+    faults = _faults(numbers, share, run.error)
+    points = 0.0 if faults else float(100.0 * (1.0 - error) * (1.0 - share))
+    return Score(trial.name, points, numbers, run.error, run, faults)
+
+
+def _faults(numbers: Mapping[str, float], share: float, error: str) -> list[str]:
+    """Why a run has failed, with the share of its time in violation."""
+    if error:
+        return [f"ended early, {error}"]
+    found = []
+    if share > MOST_VIOLATION:
+        found.append(f"{numbers['violations']:.2g} s beyond the limits of feed or torque")
+    if numbers["feed_error"] > MOST_ERROR:
+        found.append(f"the feed is off by {100.0 * numbers['feed_error']:.0f} % on average")
+    return found
 
 
 def bench(

@@ -39,3 +39,10 @@ def extremum_seeking(fmus, tmp_path_factory):
     """Archive of the system that seeks the best feed."""
     folder = tmp_path_factory.mktemp("systems")
     return write_system(plan_of("extremum_seeking"), fmus, folder / "ExtremumSeeking.ssp")
+
+
+@pytest.fixture(scope="session")
+def two_way(fmus, tmp_path_factory):
+    """Archive of the system that seeks the best feed and pressure."""
+    folder = tmp_path_factory.mktemp("systems")
+    return write_system(plan_of("two_way_seeking"), fmus, folder / "TwoWaySeeking.ssp")

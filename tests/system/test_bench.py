@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import json
 import math
 
 import numpy as np
 import pytest
 
 from percussion_model.cli import main
+from percussion_model.commands.bench_controller import COLUMNS
 from percussion_model.coupling import CouplingError
 from percussion_model.coupling.bench import TRIALS, bench, judge, total
 from percussion_model.coupling.coupled_run import CoupledRun
+from percussion_model.plotting.bench import save_bench
 
 
 def nothing(inputs, time, step):
@@ -24,8 +27,19 @@ def test_the_bench_ranks_nothing_below_a_bad_pi_below_a_good_one(feed_control):
         total(bench(feed_control, controller, values, ["rod"]))
         for controller, values in ((nothing, {}), (None, bad), (None, {}))
     ]
+    assert points[0] > 0.0
     assert points[0] + 1.0 < points[1]
     assert points[1] + 1.0 < points[2] <= 100.0
+
+
+def test_nothing_fails_where_the_bit_is_held(feed_control):
+    """Something has to be done about a jam; what ships does it in time."""
+    (idle,) = bench(feed_control, nothing, trials=["jam"])
+    assert idle.points == 0.0
+    assert "beyond the limits of feed or torque" in idle.faults[0]
+    (retracting,) = bench(feed_control, trials=["jam"])
+    assert retracting.faults == []
+    assert retracting.numbers["violations"] < 0.6 * idle.numbers["violations"]
 
 
 def test_a_crash_has_no_points_and_a_page(feed_control, tmp_path, monkeypatch, capsys):
@@ -46,18 +60,52 @@ def test_a_crash_has_no_points_and_a_page(feed_control, tmp_path, monkeypatch, c
     assert "rod ended early, at 0.051 s controller: RuntimeError: no idea what to do" in said
     page = (out / "index.html").read_text(encoding="utf-8")
     assert "no idea what to do" in page
-    assert "<td>rod</td><td>0.0</td>" in page
+    assert '<tr class="bad"><td><a href="#rod">rod</a></td><td>a rod is added</td>' in page
+    assert "1 of 1 runs failed: rod" in page
 
 
-def made_up(feed, torque=100.0, error=""):
-    """A run of 4 s with a constant feed, and a torque in its last quarter."""
+def nonsense(inputs, time, step):
+    return nothing(inputs, time, step) | ({"force_command": math.nan} if time > 0.05 else {})
+
+
+def test_no_number_ends_the_run_with_what_there_is(feed_control):
+    (score,) = bench(feed_control, nonsense, trials=["rod"])
+    assert score.points == 0.0
+    assert score.faults == ["ended early, at 0.051 s controller: force_command = nan is no number"]
+    assert score.numbers["depth"] > 0.0
+    assert score.run["time"][-1] == pytest.approx(0.05)
+
+
+def test_a_bad_controller_fails_visibly(feed_control, tmp_path, monkeypatch, capsys):
+    """A PI that swings up: the command says so and ends with 1, row and run are red."""
+    out, numbers = tmp_path / "out", tmp_path / "numbers.json"
+    words = ["percussion", "bench-controller", "--system", str(feed_control), "--trial", "rod",
+             "--set", "pi.gain=4", "--set", "pi.time=0.05", "--set", "cutback.on=false",
+             "--set", "retract.on=false"]  # fmt: skip
+    monkeypatch.setattr("sys.argv", [*words, "--out", str(out), "--json", str(numbers)])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code == 1
+    assert "rod failed: " in capsys.readouterr().err
+    (found,) = json.loads(numbers.read_text(encoding="utf-8"))["trials"]
+    assert found["swing"] > 0.3
+    assert found["violations"] > 0.4
+    assert "s beyond the limits of feed or torque" in found["faults"][0]
+    page = (out / "index.html").read_text(encoding="utf-8")
+    assert '<tr class="bad">' in page
+    assert f'<p class="bad">{found["faults"][0]}</p>' in page
+
+
+def made_up(feed, torque=100.0, error="", since=3.7):
+    """A run of 4 s with a constant feed, and a torque in its last part."""
     time = np.linspace(0.0, 4.0, 801)
     still = np.zeros_like(time)
     columns = {
         "time": time,
         "string.feed_force_mean": still + feed,
-        "rock.rotation_torque": np.where(time > 3.0, torque, 0.0),
+        "rock.rotation_torque": np.where(time > since, torque, 0.0),
         "hammer.bit.position": 0.02 * time,
+        "controller.force_command": still - 800.0,
         "rig.energy": 10.0 * time,
         "supply.energy": 990.0 * time,
         "hammer.blow_count": np.floor(20.0 * time),
@@ -73,11 +121,49 @@ def test_points_are_what_they_are_said_to_be():
     assert judge(trial, made_up(3000.0)).points == pytest.approx(100.0)
     assert judge(trial, made_up(2400.0)).points == pytest.approx(80.0)
     jammed = judge(trial, made_up(3000.0, torque=300.0))
-    assert jammed.numbers["violations"] == pytest.approx(1.0, abs=0.01)
-    assert jammed.points == pytest.approx(75.0, abs=0.3)
+    assert jammed.numbers["violations"] == pytest.approx(0.3, abs=0.01)
+    assert jammed.points == pytest.approx(92.5, abs=0.3)
     assert jammed.numbers["energy_per_metre"] == pytest.approx(50e3)
+    falling = made_up(3000.0)
+    void = (falling["time"] > 2.0) & (falling["time"] < 2.5)
+    falling.columns["string.feed_force_mean"] = np.where(void, 0.0, 3000.0)
+    assert judge(trial, falling).points == pytest.approx(85.7, abs=0.3)
+    falling.columns["rock.in_void"] = void.astype(float)
+    assert judge(trial, falling).points == pytest.approx(100.0)
     assert judge(trial, made_up(3600.0)).numbers["overshoot"] == pytest.approx(0.2)
     assert judge(trial, made_up(3000.0, error="at 1 s it fell")).points == 0.0
+
+
+@pytest.mark.parametrize(
+    ("changes", "faults"),
+    [
+        ({"feed": 2500.0}, []),
+        ({"feed": 2000.0}, ["the feed is off by 33 % on average"]),
+        (
+            {"feed": 3000.0, "torque": 300.0, "since": 3.0},
+            ["1 s beyond the limits of feed or torque"],
+        ),
+        ({"feed": 3000.0, "error": "at 1 s it fell"}, ["ended early, at 1 s it fell"]),
+    ],
+)
+def test_a_run_fails_for_a_reason(changes, faults):
+    score = judge(TRIALS[0], made_up(**changes))
+    assert score.faults == faults
+    assert (score.points == 0.0) == bool(faults)
+
+
+def test_the_page_says_what_a_stranger_needs(tmp_path):
+    scores = [judge(TRIALS[0], made_up(3000.0)), judge(TRIALS[3], made_up(2000.0))]
+    page = save_bench(scores, total(scores), COLUMNS, tmp_path, "<mine>").read_text("utf-8")
+    assert "Controller bench: &lt;mine&gt;" in page
+    assert "1 of 2 runs failed: void" in page
+    assert page.count("<img alt=") == 2
+    for name, head, _, text in COLUMNS:
+        assert name in scores[0].numbers
+        assert page.count(head) == 2
+        assert text in page
+    assert TRIALS[0].text in page
+    assert (tmp_path / "void.png").stat().st_size > 15_000
 
 
 @pytest.mark.parametrize("name", ["nothing", "rods"])

@@ -8,9 +8,11 @@ let the pressure follow the feed.
 from __future__ import annotations
 
 import math
+from copy import copy
 from typing import Any
 
 from fmu_src.runtime.system.part import Model
+from fmu_src.runtime.system.seeker import FEED, PRESSURE, Seeker
 
 DRILLING, VOID, RETRACT = 0, 1, 2
 
@@ -27,28 +29,22 @@ class DrillController(Model):
     pressure: float
     jammed_for: float
     speed: float
-    centre: float
-    phase: float
-    samples: int
-    sum_feed: float
-    sum_rate: float
-    sum_square: float
-    sum_product: float
-    gradient: float
     STATE = tuple(__annotations__)
 
     def __init__(self, parameters: dict[str, Any]) -> None:
         super().__init__(parameters)
         for name in self.STATE:
             setattr(self, name, 0.0)
-        self.mode, self.samples = DRILLING, 0
+        self.mode = DRILLING
+        self.seeker = Seeker(parameters)
 
     def begin(self, inputs: dict[str, Any]) -> None:
         """Start with the force that the rig has."""
-        self.wanted = self.centre = inputs["feed_setpoint"]
+        self.wanted = inputs["feed_setpoint"]
         self.command = self.parameters["start.force"]
         self.integral = self.command - self.wanted
         self.pressure = inputs["pressure_setpoint"]
+        self.seeker.centres = [self.wanted, self.pressure]
 
     def step(self, inputs: dict[str, Any], step_size: float) -> None:
         """One sample of the controller."""
@@ -58,21 +54,27 @@ class DrillController(Model):
             inputs["head_velocity"] - self.speed
         )
         self._choose_mode(inputs, h)
-        goal = inputs["feed_setpoint"]
+        goal, pressure = inputs["feed_setpoint"], inputs["pressure_setpoint"]
         if p["seek.on"]:
-            goal = self._seek(inputs, h)
+            if self.mode == DRILLING:
+                sought = self.seeker.go_on(inputs, self.time, h)
+                goal, pressure = sought if p["seek.pressure_on"] else (sought[0], pressure)
+            else:
+                self.seeker.pause(self.time)
+                pressure = self.seeker.centres[PRESSURE]
         if self.mode == DRILLING:
             self._go_towards(goal, h)
             self._keep_feed(inputs["feed_force"], h)
-            self._set_pressure(inputs, inputs["pressure_setpoint"], h)
+            self._set_pressure(inputs, pressure, h)
         elif self.mode == VOID:
             self.wanted = min(self.wanted, p["cutback.feed"])
             self._command(self.integral + p["cutback.force"], h)
             self._set_pressure(inputs, p["cutback.pressure"], h)
         else:
             self.wanted = min(self.wanted, p["cutback.feed"])
+            self._give_way(inputs["feed_force"], h)
             self._command(self.integral + p["retract.force"], h)
-            self._set_pressure(inputs, inputs["pressure_setpoint"], h)
+            self._set_pressure(inputs, pressure, h)
 
     def _choose_mode(self, inputs: dict[str, Any], h: float) -> None:
         p = self.parameters
@@ -115,6 +117,13 @@ class DrillController(Model):
             self.integral = raised
         self._command(command, 0.0)
 
+    def _give_way(self, feed: float, h: float) -> None:
+        """A retract that does not help in its time takes too much for the weights: less of it."""
+        p = self.parameters
+        if self.since > p["mode_time"]:
+            excess = max(0.0, feed - self.wanted)
+            self.integral -= h * p["pi.gain"] / p["pi.time"] * excess
+
     def _command(self, force: float, h: float) -> None:
         """Send a force; at a limited rate where `h` [s] is given."""
         limit = self.parameters["force_limit"]
@@ -132,42 +141,6 @@ class DrillController(Model):
         most = p["pressure_rate"] * h
         self.pressure += min(max(goal - self.pressure, -most), most)
 
-    def _seek(self, inputs: dict[str, Any], h: float) -> float:
-        """Climb towards the feed of the best rate; return the feed to be kept.
-
-        The feed swings about its centre, F = F_0 (1 + a sin w t). The slope of the rate over
-        the measured feed in a whole period, by the mean of both, is d ln R / d ln F, whatever
-        the rig makes of the swing; it moves ln F_0 by a limited amount.
-        """
-        p = self.parameters
-        swing, period = p["seek.swing"], p["seek.period"]
-        feed, rate = inputs["feed_force"], inputs["rate_of_penetration"]
-        if self.time > p["seek.wait"]:
-            self.samples += 1
-            self.sum_feed += feed
-            self.sum_rate += rate
-            self.sum_square += feed * feed
-            self.sum_product += feed * rate
-        self.phase += h
-        if self.phase >= period - 0.5 * h:
-            self._climb()
-            self.phase = 0.0
-            self.samples = 0
-            self.sum_feed = self.sum_rate = self.sum_square = self.sum_product = 0.0
-        return self.centre * (1.0 + swing * math.sin(2.0 * math.pi * self.phase / period))
-
-    def _climb(self) -> None:
-        """Move the centre by the slope of the period that has ended."""
-        p, n = self.parameters, self.samples
-        spread = n * self.sum_square - self.sum_feed**2
-        if n < 2 or self.sum_rate <= 0.0 or spread <= 0.0:
-            return
-        slope = (n * self.sum_product - self.sum_feed * self.sum_rate) / spread
-        self.gradient = slope * self.sum_feed / self.sum_rate
-        most = p["seek.largest_move"]
-        move = min(max(p["seek.gain"] * self.gradient, -most), most)
-        self.centre = min(max(self.centre * math.exp(move), p["seek.lowest"]), p["seek.highest"])
-
     def outputs(self) -> dict[str, Any]:
         """Present values by name."""
         percussion = self.mode != VOID or self.parameters["cutback.pressure"] > 0.0
@@ -177,6 +150,19 @@ class DrillController(Model):
             "percussion_on": bool(percussion),
             "mode": int(self.mode),
             "feed_wanted": self.wanted,
-            "seek.centre": self.centre,
-            "seek.gradient": self.gradient,
+            "seek.centre": self.seeker.centres[FEED],
+            "seek.gradient": self.seeker.gradients[FEED],
+            "seek.pressure_centre": self.seeker.centres[PRESSURE],
+            "seek.pressure_gradient": self.seeker.gradients[PRESSURE],
         }
+
+    def save(self) -> dict[str, Any]:
+        """State of controller and seeker."""
+        seeker = {name: copy(getattr(self.seeker, name)) for name in Seeker.STATE}
+        return super().save() | {"seeker": seeker}
+
+    def restore(self, saved: dict[str, Any]) -> None:
+        """Go back to a state."""
+        super().restore(saved)
+        for name, value in saved["seeker"].items():
+            setattr(self.seeker, name, copy(value))

@@ -1,10 +1,12 @@
 """Rock by depth: layers, voids, random variation, and stiffness that depends on feed.
 
-    K = K_layer exp(s n(z) - s^2/2) (1 + a (F/F_a - 1)^2)
+    K = K_layer exp(s n(z) - s^2/2) (1 + a (F/F_a - 1)^2) (1 + b (p/p_b - 1)^2)
 
 n(z) is a normal variable, straight between knots a correlation length apart, the same for
-the same seed. The last factor makes a feed force F_a the best one: it stands for a bit that
-rides on cuttings above it, and sits badly below it. The torque on the rotation is r f F.
+the same seed. The third factor makes a feed force F_a the best one: it stands for a bit that
+rides on cuttings above it, and sits badly below it. The last one does so for the supply pressure
+p, of which too little flushes badly. Both are assumptions to try seekers on, off by default.
+The torque on the rotation is r f F.
 """
 
 from __future__ import annotations
@@ -24,7 +26,7 @@ KEPT = 64
 class RockProfile(Model):
     """What the bit meets at its depth."""
 
-    STATE = ("depth", "feed")
+    STATE = ("depth", "feed", "pressure")
 
     def __init__(self, parameters: dict[str, Any]) -> None:
         super().__init__(parameters)
@@ -37,19 +39,19 @@ class RockProfile(Model):
         self.layers = layers or [(0.0, p["layers[1].loading_stiffness"],
                                   p["layers[1].unloading_ratio"], 1.0, 1)]  # fmt: skip
         self.tops = [layer[0] for layer in self.layers]
-        self.depth = self.feed = 0.0
+        self.depth = self.feed = self.pressure = 0.0
         self._knots: dict[int, float] = {}
 
     def begin(self, inputs: dict[str, Any]) -> None:
         """Look at the rock below the bit."""
         self.depth = self.parameters["start.depth"] + inputs["bit_position"]
-        self.feed = inputs["feed_force"]
+        self.feed, self.pressure = inputs["feed_force"], inputs["supply_pressure"]
 
     def step(self, inputs: dict[str, Any], step_size: float) -> None:
         """Follow the bit; rock that was drilled does not come back."""
         here = self.parameters["start.depth"] + inputs["bit_position"]
         self.depth = max(self.depth, here)
-        self.feed = inputs["feed_force"]
+        self.feed, self.pressure = inputs["feed_force"], inputs["supply_pressure"]
 
     def variation(self, depth: float) -> float:
         """The factor exp(s n - s^2/2) at a depth [m]."""
@@ -78,8 +80,11 @@ class RockProfile(Model):
         p = self.parameters
         number = max(0, bisect_right(self.tops, self.depth) - 1)
         _, stiffness, ratio, torque, which = self.layers[number]
-        off = self.feed / p["best_feed.force"] - 1.0
-        factor = self.variation(self.depth) * (1.0 + p["best_feed.factor"] * off * off)
+        factor = self.variation(self.depth)
+        for value, name, best in ((self.feed, "best_feed", "force"),
+                                  (self.pressure, "best_pressure", "pressure")):  # fmt: skip
+            off = value / p[f"{name}.{best}"] - 1.0
+            factor *= 1.0 + p[f"{name}.factor"] * off * off
         return {
             "loading_stiffness": stiffness * factor,
             "unloading_ratio": ratio,

@@ -2,8 +2,9 @@
 
     C p' = q_source - q_drive - q_relief,   p_drive = p - R q_drive
 
-The source follows the wanted pressure by q = clip(K (p_wanted - p), 0, q_max); the drive
-takes a volume for each blow at its pressure, and leaks. All pressures are gauge.
+The source follows the wanted pressure by q = clip(K (p_wanted - p), -q_vent, q_max), where what
+is below 0 leaves by a vent and its energy is lost; the drive takes a volume for each blow at its
+pressure, and leaks. All pressures are gauge.
 """
 
 from __future__ import annotations
@@ -48,15 +49,15 @@ class Supply(Model):
             held = self.pressure - h / capacity * taken
             new = (held + h / capacity * gain * wanted) / (1.0 + h / capacity * (gain + lost))
             flow = gain * (wanted - new)
-            if not 0.0 <= flow <= p["source.flow_limit"]:
-                flow = min(max(flow, 0.0), p["source.flow_limit"])
+            if not -p["vent.flow_limit"] <= flow <= p["source.flow_limit"]:
+                flow = min(max(flow, -p["vent.flow_limit"]), p["source.flow_limit"])
                 new = (held + h / capacity * flow) / (1.0 + h / capacity * lost)
             new = max(new, 0.0)
             if new > p["relief_pressure"]:
                 self.relief_volume += capacity * (new - p["relief_pressure"])
                 new = p["relief_pressure"]
-            self.flow, self.pressure = flow, new
-            self.energy += h * flow * new
+            self.flow, self.pressure = max(flow, 0.0), new
+            self.energy += h * self.flow * new
         drawn = taken + leak * self.pressure
         self.drive_pressure = max(
             0.0, (self.pressure - p["hose.resistance"] * drawn)

@@ -1,0 +1,130 @@
+"""What scripted runs of coupled systems share: several runs in one figure, and their data."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from percussion_model.coupling import CoupledRun, Coupling
+from percussion_model.coupling.files import write_columns
+from scenarios.harness import FIGURES, ROOT
+
+STEP = 2e-3  # the longest at which the shoulder is as stiff as it is [s]
+INTERVAL = 4e-3  # of the rows that are kept [s]
+FEED = 3000.0  # the feed that FeedControl asks for [N]
+SIGNALS = (
+    "string.lifted", "string.weight", "string.rod_count", "string.bit_impulse",
+    "hammer.bit.force_peak", "hammer.blow_count", "hammer.blow_energy", "hammer.off_bottom",
+    "rig.energy", "supply.energy", "controller.force_command", "controller.mode",
+    "rock.in_void",
+    "rig.limited",
+)  # fmt: skip
+ONE_ROCK = {
+    "rock.layers[1].loading_stiffness": 7.5e8, "rock.layers[2].top": -1.0,
+    "rock.layers[3].top": -1.0,
+}  # fmt: skip
+
+Panel = tuple[str, float, str]
+
+
+def archive(name: str = "FeedControlRigid", words: Sequence[str] = ()) -> Path:
+    """The archive that the words of a command line name, or one of `dist`."""
+    return Path(words[0]) if words else ROOT / "dist" / f"{name}.ssp"
+
+
+def run(
+    system: Path, duration: float, values: Mapping[str, float | bool] | None = None
+) -> CoupledRun:
+    """Run the feed-controlled system, its usual signals kept; an early end is an error."""
+    found = Coupling(system, {**ONE_ROCK, **(values or {})}).run(duration, STEP, SIGNALS, INTERVAL)
+    if found.error:
+        raise RuntimeError(found.error)
+    return found
+
+
+def held_since(time: np.ndarray, held: np.ndarray) -> float:
+    """Time from which a condition holds to the end [s]; not a number if it does not."""
+    broken = np.flatnonzero(~held)
+    if len(broken) == 0:
+        return float(time[0])
+    return float(time[broken[-1] + 1]) if broken[-1] + 1 < len(time) else float("nan")
+
+
+def draw_runs(
+    path: Path,
+    title: str,
+    runs: Mapping[str, CoupledRun],
+    panels: Sequence[Panel],
+    marks: Mapping[str, Sequence[tuple[float, str]]] | None = None,
+    spans: Sequence[tuple[float, float, str]] = (),
+) -> Path:
+    """Draw several runs over time, a panel for each quantity.
+
+    Parameters
+    ----------
+    runs : mapping
+        Runs by what the legend calls them.
+    panels : sequence of tuple
+        Label with unit, factor, signal.
+    marks : mapping, optional
+        Dashed lines by signal: value in the unit of the panel, and what it is.
+    spans : sequence of tuple, optional
+        Shaded intervals: begin and end [s], and what they are.
+
+    Returns
+    -------
+    Path
+        The PNG file.
+    """
+    import matplotlib.pyplot as plt
+    from matplotlib.patches import Patch
+
+    figure, axes = plt.subplots(
+        len(panels), 1, sharex=True, figsize=(8.5, 1.6 + 1.5 * len(panels)), squeeze=False
+    )
+    for ax, (label, factor, signal) in zip(axes[:, 0], panels, strict=True):
+        for name, one in runs.items():
+            ax.plot(one["time"], factor * one[signal], linewidth=1.2, label=name)
+        for begin, end, _ in spans:
+            ax.axvspan(begin, end, color="#dddddd", linewidth=0, zorder=0)
+        for level, text in (marks or {}).get(signal, ()):
+            ax.axhline(level, color="k", linewidth=0.8, linestyle="--")
+            ax.annotate(text, (1.01, level), xycoords=("axes fraction", "data"), fontsize="small",
+                        va="center")  # fmt: skip
+        ax.margins(x=0.01, y=0.12)
+        quantity, _, unit = label.partition(" [")
+        ax.set_title(quantity, loc="left", fontsize="medium")
+        ax.set_ylabel(f"[{unit}" if unit else "")
+        ax.grid(alpha=0.3)
+    handles, labels = axes[0, 0].get_legend_handles_labels()
+    for _, _, text in spans[:1]:
+        handles.append(Patch(color="#dddddd"))
+        labels.append(text)
+    axes[-1, 0].set_xlabel("time [s]")
+    figure.suptitle(title, fontweight="bold")
+    figure.align_ylabels()
+    figure.tight_layout(rect=(0.0, 0.045, 1.0, 1.0))
+    figure.legend(handles, labels, loc="lower center", ncols=4, fontsize="small", frameon=False)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(path, dpi=110)
+    plt.close(figure)
+    return path
+
+
+def save_runs(runs: Mapping[str, CoupledRun], name: str, folder: Path = FIGURES) -> list[Path]:
+    """Write the signals of each run as `NAME_RUN.csv` into the folder of the figures."""
+    return [
+        write_columns(one, folder / f"{name}_{re.sub('[^a-z0-9]+', '_', label.lower())}.csv")
+        for label, one in runs.items()
+    ]
+
+
+def save_table(columns: Mapping[str, np.ndarray], path: Path) -> Path:
+    """Write columns as CSV."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    np.savetxt(path, np.column_stack(list(columns.values())), delimiter=",",
+               header=",".join(columns), comments="")  # fmt: skip
+    return path

@@ -1,0 +1,189 @@
+"""A seeker finds the best feed and pressure at once: `python -m scenarios.two_way_seeking`.
+
+Two swings at different frequencies, one on the feed and one on the supply pressure, each told
+from the other by its frequency. The top is known from an open-loop sweep over both.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+
+from percussion_model.coupling import CoupledRun, Coupling
+from scenarios.coupled import archive, save_runs, save_table
+from scenarios.extremum_seeking import BOUND, INTERVAL, SETTLING, SIGNALS, STEP, rate_over
+from scenarios.harness import FIGURES
+
+NAME = "two_way_seeking"
+DURATION = 45.0  # [s]
+LAST = 9.0  # the seeker's rate is that of its last seconds: three periods [s]
+STARTS = ((2000.0, 1.3e6), (3800.0, 2.4e6), (3800.0, 1.3e6))  # [N], [Pa]
+FEEDS = (2400.0, 2600.0, 2800.0, 3000.0, 3200.0)  # of the sweep [N]
+PRESSURES = (1.6e6, 1.75e6, 1.9e6, 2.05e6, 2.2e6)  # of the sweep [Pa]
+HELD = 4.0  # [s]
+DEGREE = 3  # of the surface through the logarithms of the rates
+# The drive's reaction on the casing by the pressure at the reference [m^2], weights [N].
+REACTION, WEIGHTS = 0.93e-3, 5660.0
+
+
+def values(feed: float, pressure: float) -> dict[str, float]:
+    """Setpoints and start of a run, in balance."""
+    force = feed + REACTION * pressure - WEIGHTS
+    return {
+        "controller.feed_setpoint": feed, "string.start.feed_force": feed,
+        "controller.pressure_setpoint": pressure, "supply.start.pressure": pressure,
+        "controller.start.force": force, "rig.start.force": force,
+    }  # fmt: skip
+
+
+def sweep(
+    system: Path, feeds: Sequence[float] = FEEDS, pressures: Sequence[float] = PRESSURES
+) -> np.ndarray:
+    """Rates at constant feeds and pressures.
+
+    Returns
+    -------
+    ndarray, shape (feeds x pressures, 3)
+        Feed [N], pressure that is asked for [Pa], rate of penetration [m/s].
+    """
+    rows = []
+    for feed, pressure in product(feeds, pressures):
+        chosen = {**values(feed, pressure), "controller.seek.on": False}
+        run = Coupling(system, chosen).run(HELD, STEP, SIGNALS, INTERVAL)
+        rows.append((feed, pressure, rate_over(run, SETTLING)))
+    return np.array(rows)
+
+
+def seek(system: Path, start: tuple[float, float], duration: float = DURATION) -> CoupledRun:
+    """One run of the seeker from a feed [N] and a pressure [Pa]."""
+    signals = [*SIGNALS, "controller.seek.pressure_centre", "controller.seek.pressure_gradient"]
+    return Coupling(system, values(*start)).run(duration, STEP, signals, INTERVAL)
+
+
+def surface(hill: np.ndarray, feeds: np.ndarray, pressures: np.ndarray) -> np.ndarray:
+    """Smooth rates through those of a sweep.
+
+    Returns
+    -------
+    ndarray, shape (feeds, pressures)
+        [m/s]
+    """
+    middle = np.log(hill[:, :2]).mean(axis=0)
+    powers = [(i, j) for i in range(DEGREE + 1) for j in range(DEGREE + 1 - i)]
+
+    def columns(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return np.stack([x**i * y**j for i, j in powers], axis=-1)
+
+    x, y = (np.log(hill[:, :2]) - middle).T
+    found = np.linalg.lstsq(columns(x, y), np.log(hill[:, 2]), rcond=None)[0]
+    x, y = np.meshgrid(np.log(feeds) - middle[0], np.log(pressures) - middle[1], indexing="ij")
+    return np.exp(columns(x, y) @ found)
+
+
+def top_of(hill: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Top of a hill within its sweep, and standard errors of the jackknife.
+
+    Returns
+    -------
+    top, errors : ndarray, shape (3,)
+        Feed [N], pressure [Pa], rate [m/s].
+    """
+    tops = np.array([_top(np.delete(hill, k, axis=0)) for k in range(len(hill))])
+    count = len(tops)
+    errors = np.sqrt((count - 1) / count * np.sum((tops - tops.mean(axis=0)) ** 2, axis=0))
+    return np.array(_top(hill)), errors
+
+
+def _axes(hill: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    low, high = hill[:, :2].min(axis=0), hill[:, :2].max(axis=0)
+    return np.linspace(low[0], high[0], 201), np.linspace(low[1], high[1], 201)
+
+
+def _top(hill: np.ndarray) -> tuple[float, float, float]:
+    feeds, pressures = _axes(hill)
+    rates = surface(hill, feeds, pressures)
+    i, j = np.unravel_index(np.argmax(rates), rates.shape)
+    return float(feeds[i]), float(pressures[j]), float(rates[i, j])
+
+
+def draw(hill: np.ndarray, runs: Sequence[CoupledRun], path: Path) -> Path:
+    """Draw the hill from above with the ways up, and both centres over time."""
+    import matplotlib.pyplot as plt
+
+    top, _ = top_of(hill)
+    feeds, pressures = _axes(hill)
+    figure = plt.figure(figsize=(11.0, 5.0))
+    grid = figure.add_gridspec(2, 2, width_ratios=(1.25, 1.0))
+    above = figure.add_subplot(grid[:, 0])
+    filled = above.contourf(
+        1e-3 * feeds,
+        1e-5 * pressures,
+        1e3 * surface(hill, feeds, pressures).T,
+        12,
+        cmap="YlGn",
+        alpha=0.8,
+    )
+    figure.colorbar(filled, ax=above, label="rate of penetration, held (open loop) [mm/s]")
+    above.plot(1e-3 * hill[:, 0], 1e-5 * hill[:, 1], "k.", markersize=3, label="sweep")
+    over_time = [figure.add_subplot(grid[k, 1]) for k in range(2)]
+    for run in runs:
+        centres = run["controller.seek.centre"], run["controller.seek.pressure_centre"]
+        rate = rate_over(run, run["time"][-1] - LAST)
+        label = (f"from {1e-3 * centres[0][0]:.1f} kN, {1e-5 * centres[1][0]:.0f} bar: "
+                 f"{100 * (rate / top[2] - 1.0):+.1f} %")  # fmt: skip
+        (line,) = above.plot(1e-3 * centres[0], 1e-5 * centres[1], label=label, linewidth=1.4)
+        above.plot(1e-3 * centres[0][-1], 1e-5 * centres[1][-1], "D", color=line.get_color())
+        for ax, factor, centre in zip(over_time, (1e-3, 1e-5), centres, strict=True):
+            ax.plot(run["time"], factor * centre, color=line.get_color())
+    above.plot(1e-3 * top[0], 1e-5 * top[1], "r*", markersize=13, label="top of the sweep")
+    for ax, level, text in (
+        (over_time[0], 1e-3 * top[0], "feed [kN]"),
+        (over_time[1], 1e-5 * top[1], "pressure [bar]"),
+    ):
+        ax.axhline(level, color="k", linewidth=0.9, linestyle="--")
+        ax.set_ylabel(text)
+        ax.grid(alpha=0.3)
+    over_time[0].set_title("Centres of the swings; dashed: top of the sweep", loc="left",
+                           fontsize="medium")  # fmt: skip
+    over_time[1].set_xlabel("time [s]")
+    above.set_title("Ways over the hill; rate at the end by the best one", loc="left",
+                    fontsize="medium")  # fmt: skip
+    above.set_xlabel("feed force [kN]")
+    above.set_ylabel("supply pressure that is asked for [bar]")
+    figure.suptitle("Extremum seeking on feed and pressure at once", fontweight="bold")
+    figure.tight_layout(rect=(0.0, 0.06, 1.0, 1.0))
+    handles, labels = above.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="lower center", ncols=5, fontsize="small", frameon=False)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(path, dpi=110)
+    plt.close(figure)
+    return path
+
+
+def main() -> None:
+    """Write figure and data, and print where the top is and where the seeker ends."""
+    system = archive("TwoWaySeekingRigid", sys.argv[1:])
+    hill = sweep(system)
+    runs = {f"from {feed:.0f} N {1e-5 * p:.0f} bar": seek(system, (feed, p)) for feed, p in STARTS}
+    top, errors = top_of(hill)
+    print(f"best feed {top[0]:.0f} +- {errors[0]:.0f} N, pressure {1e-5 * top[1]:.2f} +- "
+          f"{1e-5 * errors[1]:.2f} bar, rate {1e3 * top[2]:.3f} +- {1e3 * errors[2]:.3f} mm/s; "
+          f"the seeker is to be within {100 * BOUND:.0f} %")  # fmt: skip
+    for name, run in runs.items():
+        rate = rate_over(run, DURATION - LAST)
+        print(f"{name}: {run['controller.seek.centre'][-1]:.0f} N, "
+              f"{1e-5 * run['controller.seek.pressure_centre'][-1]:.2f} bar, "
+              f"{1e3 * rate:.3f} mm/s, {100 * (rate / top[2] - 1.0):+.2f} %")  # fmt: skip
+    print(draw(hill, list(runs.values()), FIGURES / f"{NAME}.png"))
+    names = ("feed_force", "supply_pressure", "rate_of_penetration")
+    table = dict(zip(names, hill.T, strict=True))
+    for path in (save_table(table, FIGURES / f"{NAME}_sweep.csv"), *save_runs(runs, NAME)):
+        print(path)
+
+
+if __name__ == "__main__":
+    main()
