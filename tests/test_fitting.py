@@ -117,6 +117,12 @@ def test_the_whole_law_is_found_from_a_far_guess():
         assert found.high - found.low < 0.2 * truth[key]
 
 
+def test_data_without_noise_that_the_guess_explains_give_it_back():
+    fit = fit_drop_tests(bit(), drops(bit(), 0, noise=0.0, step=2e-3), span=1.0)
+    for key, found in fit.estimates.items():
+        assert found == pytest.approx((BARRIER[key], 0.0, BARRIER[key], BARRIER[key]), abs=1e-9)
+
+
 def test_an_elastic_bit_is_fitted_as_well():
     scene = bit().replace(**{"bit.model": "elastic", "solver.name": "wave", "solver.cells": 8})
     tests = drops(scene, 1, noise=5e-6, step=5e-4)

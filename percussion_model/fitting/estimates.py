@@ -166,6 +166,9 @@ def look_around(
     errors = np.sqrt(np.diag(spread))
     ends = np.empty((len(at), 2))
     for k, error in enumerate(errors):
+        if error == 0.0:  # data without noise
+            ends[k] = at[k]
+            continue
         for side, sign in enumerate((-1.0, 1.0)):
             reach = width
             for factor, beyond in zip(LOOKED_AT, (*LOOKED_AT[1:], math.inf), strict=True):
