@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 
 import numpy as np
@@ -29,6 +30,7 @@ BARRIER = {"rock.barrier_damping": 1e4, "rock.barrier_energy": 0.5}
 CONFIDENCE = 0.95
 # Of that many trials so many cover, but for one chance in a thousand on either side.
 CHANCE = 1e-3
+LONG, WHY = "PERCUSSION_LONG" in os.environ, "takes minutes: PERCUSSION_LONG=1 runs it"
 
 
 def plausible(covered, trials):
@@ -48,10 +50,11 @@ def noisy_curve(seed, noise=6e3):
     return p, force + np.random.default_rng(seed).normal(0.0, noise, len(p))
 
 
-def bit(**changes):
-    """Scene of a rigid bit alone, which is quick to drop."""
+def bit(solver="rigid", **changes):
+    """Scene of a bit alone; a rigid one is quick to drop."""
     scene = Scene().replace(**{"piston.model": "absent", "effects.drive": "none"})
-    return scene.computed_by("rigid", **{"piston.model": "absent"}, **BARRIER, **changes)
+    scene = scene.computed_by(solver, **{"piston.model": "absent"}, **BARRIER)
+    return scene.replace(**{"solver.cells": 8}, **changes)
 
 
 def drops(scene, seed, noise=1e-5, speeds=(3.0, 5.25), step=4e-4):
@@ -95,12 +98,16 @@ def test_intervals_of_a_curve_cover_as_often_as_they_say():
     assert not plausible(halved, trials)  # intervals half as wide are found out
 
 
-def test_intervals_of_drop_tests_cover_as_often_as_they_say():
+@pytest.mark.parametrize(
+    "solver", ["rigid", pytest.param("wave", marks=pytest.mark.skipif(not LONG, reason=WHY))]
+)
+def test_intervals_of_drop_tests_cover_as_often_as_they_say(solver):
     trials = 30
     counts = dict.fromkeys(BARRIER, 0)
-    guess = bit().replace(**{"rock.barrier_damping": 8.5e3, "rock.barrier_energy": 0.55})
+    scene = bit(solver)
+    guess = scene.replace(**{"rock.barrier_damping": 8.5e3, "rock.barrier_energy": 0.55})
     for seed in range(trials):
-        fit = fit_drop_tests(guess, drops(bit(), seed), span=1.5, steps=5, confidence=CONFIDENCE)
+        fit = fit_drop_tests(guess, drops(scene, seed), span=1.5, steps=5, confidence=CONFIDENCE)
         for key, covered in covers(fit, BARRIER).items():
             counts[key] += covered
         assert fit.noise == pytest.approx(1e-5, rel=0.2)
@@ -124,7 +131,7 @@ def test_data_without_noise_that_the_guess_explains_give_it_back():
 
 
 def test_an_elastic_bit_is_fitted_as_well():
-    scene = bit().replace(**{"bit.model": "elastic", "solver.name": "wave", "solver.cells": 8})
+    scene = bit("wave")
     tests = drops(scene, 1, noise=5e-6, step=5e-4)
     guess = scene.replace(**{"rock.barrier_damping": 1.03e4, "rock.barrier_energy": 0.48})
     fit = fit_drop_tests(guess, tests, span=1.0)
