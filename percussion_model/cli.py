@@ -12,6 +12,7 @@ import typer
 from percussion_model.commands.accuracy import accuracy
 from percussion_model.commands.bench_controller import bench_controller
 from percussion_model.commands.blow_map import blow_map
+from percussion_model.commands.calibrate import calibrate
 from percussion_model.commands.common import BAD_INPUT, INTERRUPTED, complain
 from percussion_model.commands.compare import compare
 from percussion_model.commands.couple import couple
@@ -72,6 +73,7 @@ for _command in (
     accuracy,
     effects,
     paper,
+    calibrate,
     stability,
     couple,
     bench_controller,

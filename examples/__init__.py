@@ -1,0 +1,1 @@
+"""Examples, one question each: `python -m examples.NAME`; docs/gallery.md shows them."""

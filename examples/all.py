@@ -1,0 +1,28 @@
+"""Run every example: `python -m examples.all [--out DIR] [--quick]`."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from examples import bifurcation, calibration, drill_design, rate_map, sensitivity
+from percussion_model.result_files import staged_text, to_json
+
+EXAMPLES = (bifurcation, rate_map, sensitivity, calibration, drill_design)
+
+
+def main(out: Path, quick: bool = False) -> None:
+    """Run every example; each gets a folder with its figure and what it found."""
+    for example in EXAMPLES:
+        print(example.NAME, file=sys.stderr)
+        folder = Path(out) / example.NAME
+        staged_text(folder / "found.json", to_json(example.main(folder, quick)) + "\n")
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(prog="python -m examples.all", description=main.__doc__)
+    parser.add_argument("--out", type=Path, default=Path("out/examples"), metavar="DIR")
+    parser.add_argument("--quick", action="store_true", help="few points: seconds, not minutes")
+    words = parser.parse_args()
+    main(words.out, words.quick)

@@ -1,0 +1,39 @@
+"""What the examples share: the command line, and where figures go."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+from matplotlib.figure import Figure
+
+from percussion_model.plotting import style
+from percussion_model.result_files import staged, to_json
+
+# Energies and rates are drawn in these, and told apart with any colour vision.
+BLUE, ORANGE, GREEN, BLACK, GREY = "#0072B2", "#D55E00", "#009E73", "#222222", "#8C8C8C"
+
+
+@contextmanager
+def figure_of(name: str, out: Path, size: tuple[float, float]) -> Iterator[Figure]:
+    """Give an empty figure; what is drawn on it ends up in `out/name.png`."""
+    with matplotlib.rc_context(style.STYLE):
+        fig = Figure(figsize=size, layout="constrained")
+        yield fig
+        with staged(out) as draft:
+            style.save(fig, draft, name, ("png",))
+
+
+def command_line(main: Callable[..., dict[str, Any]], name: str) -> None:
+    """Run an example with the words of the command line, and print what it found."""
+    parser = argparse.ArgumentParser(prog=f"python -m examples.{name}", description=main.__doc__)
+    parser.add_argument("--out", type=Path, default=Path("out/examples") / name, metavar="DIR")
+    parser.add_argument("--quick", action="store_true", help="few points: seconds, not minutes")
+    words = parser.parse_args()
+    print(to_json(main(words.out, words.quick)))
+    print(words.out / f"{name}.png", file=sys.stderr)

@@ -1,0 +1,293 @@
+"""Fits to measurements: known parameters come back, within intervals that tell the truth."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+
+import numpy as np
+import pytest
+from scipy.stats import binom
+from typer.testing import CliRunner
+
+from percussion_model import Scene
+from percussion_model.cli import app
+from percussion_model.fitting import (
+    ROCK,
+    DropTest,
+    FitError,
+    bilinear_force,
+    drop_test_signal,
+    fit_drop_tests,
+    fit_force_penetration,
+)
+from percussion_model.fitting.estimates import Counted, look_around
+
+STIFFNESS, RATIO, DATUM = 7.5e8, 5.0, 5e-5
+CURVE = {"rock.loading_stiffness": STIFFNESS, "rock.unloading_ratio": RATIO, "datum": DATUM}
+BARRIER = {"rock.barrier_damping": 1e4, "rock.barrier_energy": 0.5}
+CONFIDENCE = 0.95
+# Of that many trials so many cover, but for one chance in a thousand on either side.
+CHANCE = 1e-3
+LONG, WHY = "PERCUSSION_LONG" in os.environ, "takes minutes: PERCUSSION_LONG=1 runs it"
+
+
+def plausible(covered, trials):
+    """Whether intervals of the stated confidence cover so often by chance."""
+    low, high = binom.ppf([CHANCE, 1.0 - CHANCE], trials, CONFIDENCE)
+    return low <= covered <= high
+
+
+def way():
+    """Gauge readings of a slow test; the peak lies between two of them."""
+    return np.concatenate([np.linspace(0.0, 8.47e-4, 60), np.linspace(8.49e-4, 6.7e-4, 40)])
+
+
+def noisy_curve(seed, noise=6e3):
+    p = way()
+    force = bilinear_force(p, STIFFNESS, RATIO, DATUM, peak=8.5e-4)
+    return p, force + np.random.default_rng(seed).normal(0.0, noise, len(p))
+
+
+def bit(solver="rigid", **changes):
+    """Scene of a bit alone; a rigid one is quick to drop."""
+    scene = Scene().replace(**{"piston.model": "absent", "effects.drive": "none"})
+    scene = scene.computed_by(solver, **{"piston.model": "absent"}, **BARRIER)
+    return scene.replace(**{"solver.cells": 8}, **changes)
+
+
+def drops(scene, seed, noise=1e-5, speeds=(3.0, 5.25), step=4e-4):
+    rng, times = np.random.default_rng(seed), np.arange(0.0, 45e-3, step)
+    return [
+        DropTest(times, y + rng.normal(0.0, noise, len(times)), v)
+        for v in speeds
+        for y in [drop_test_signal(scene, times, v, "bit_position")]
+    ]
+
+
+def covers(fit, truth):
+    found = fit.estimates
+    return {key: found[key].low <= value <= found[key].high for key, value in truth.items()}
+
+
+def test_force_rises_with_one_slope_and_falls_with_another():
+    p = np.array([0.0, 1e-4, 4e-4, 5e-4, 4.5e-4, 3e-4])
+    force = bilinear_force(p, 1e9, 4.0, datum=1e-4)
+    assert force == pytest.approx([0.0, 0.0, 3e5, 4e5, 2e5, 0.0])
+
+
+def test_a_curve_without_noise_gives_its_parameters_back():
+    p = way()
+    fit = fit_force_penetration(p, bilinear_force(p, STIFFNESS, RATIO, DATUM, peak=8.5e-4))
+    assert {key: fit.estimates[key].value for key in CURVE} == pytest.approx(CURVE, rel=1e-7)
+    assert fit.estimates["peak"].value == pytest.approx(8.5e-4, rel=1e-7)
+    assert fit.changes() == {key: fit.estimates[key].value for key in list(CURVE)[:2]}
+
+
+def test_intervals_of_a_curve_cover_as_often_as_they_say():
+    trials = 200
+    counts, halved = dict.fromkeys(CURVE, 0), 0
+    for seed in range(trials):
+        fit = fit_force_penetration(*noisy_curve(seed), CONFIDENCE)
+        for key, covered in covers(fit, CURVE).items():
+            counts[key] += covered
+        value, _error, low, high = fit.estimates["rock.loading_stiffness"]
+        halved += low + value <= 2.0 * STIFFNESS <= high + value
+    assert all(plausible(count, trials) for count in counts.values()), counts
+    assert not plausible(halved, trials)  # intervals half as wide are found out
+
+
+@pytest.mark.parametrize(
+    "solver", ["rigid", pytest.param("wave", marks=pytest.mark.skipif(not LONG, reason=WHY))]
+)
+def test_intervals_of_drop_tests_cover_as_often_as_they_say(solver):
+    trials = 30
+    counts = dict.fromkeys(BARRIER, 0)
+    scene = bit(solver)
+    guess = scene.replace(**{"rock.barrier_damping": 8.5e3, "rock.barrier_energy": 0.55})
+    for seed in range(trials):
+        fit = fit_drop_tests(guess, drops(scene, seed), span=1.5, steps=5, confidence=CONFIDENCE)
+        for key, covered in covers(fit, BARRIER).items():
+            counts[key] += covered
+        assert fit.noise == pytest.approx(1e-5, rel=0.2)
+    assert all(plausible(count, trials) for count in counts.values()), counts
+
+
+def test_the_whole_law_is_found_from_a_far_guess():
+    guess = {"rock.barrier_damping": 3e4, "rock.barrier_energy": 0.2}
+    guess |= {"rock.loading_stiffness": 7.47e8, "rock.unloading_ratio": 5.03}
+    fit = fit_drop_tests(bit().replace(**guess), drops(bit(), 0), ROCK, span=4.0, steps=5)
+    truth = BARRIER | {"rock.loading_stiffness": STIFFNESS, "rock.unloading_ratio": RATIO}
+    assert all(covers(fit, truth).values()), fit.estimates
+    for key, found in fit.estimates.items():
+        assert found.high - found.low < 0.2 * truth[key]
+
+
+def test_data_without_noise_that_the_guess_explains_give_it_back():
+    fit = fit_drop_tests(bit(), drops(bit(), 0, noise=0.0, step=2e-3), span=1.0)
+    for key, found in fit.estimates.items():
+        assert found == pytest.approx((BARRIER[key], 0.0, BARRIER[key], BARRIER[key]), abs=1e-9)
+
+
+def test_an_elastic_bit_is_fitted_as_well():
+    scene = bit("wave")
+    tests = drops(scene, 1, noise=5e-6, step=5e-4)
+    guess = scene.replace(**{"rock.barrier_damping": 1.03e4, "rock.barrier_energy": 0.48})
+    fit = fit_drop_tests(guess, tests, span=1.0)
+    for key, found in fit.estimates.items():
+        assert abs(found.value - BARRIER[key]) < 4.0 * found.standard_error
+
+
+def test_an_interval_reaches_to_where_the_misfit_has_grown():
+    """Above 1 the model is as steep as its Jacobian says, below 1 a fifth of it."""
+    x = np.linspace(1.0, 2.0, 20)
+    noise = np.resize([0.05, -0.05], len(x))
+    noise -= x * (noise @ x) / (x @ x)  # so that the minimum is at 1
+    model = Counted(lambda at: x * (at[0] if at[0] > 1.0 else 1.0 - 0.2 * (1.0 - at[0])))
+    at, data = np.array([1.0]), x + noise
+    error = np.sqrt(model.misfit(data, at) / (len(x) - 1) / (x @ x))
+    ends, best = look_around(model, data, at, np.array([[error**2]]), 2.0)
+    assert best is at
+    assert ends[0, 1] == pytest.approx(1.0 + 2.0 * error)
+    assert 9.4 * error < 1.0 - ends[0, 0] < 12.0 * error
+
+
+def test_residuals_that_follow_from_each_other_are_warned_of():
+    p, force = noisy_curve(3)
+    assert fit_force_penetration(p, force).warnings == []
+    drifting = force + 2e4 * np.sin(np.linspace(0.0, 12.0, len(p)))
+    (note,) = fit_force_penetration(p, drifting).warnings
+    assert "neighbouring residuals are alike" in note
+
+
+P, F = noisy_curve(0)
+
+
+@pytest.mark.parametrize(
+    ("penetration", "force", "words"),
+    [
+        (P[:5], F[:5], "5 data, at least 10"),
+        (P, F[:-1], "of one length: penetration 100, force 99"),
+        (P, np.where(np.arange(100) == 7, np.nan, F), "force: number 7 of the row"),
+        (P, ["much"] * 100, "force: must be numbers"),
+        (P.reshape(2, 50), F, "penetration: must be one row"),
+        (P[:60], F[:60], "data of unloading under force, at least 3"),
+        (P[60:], F[60:], "data of loading under force, at least 3"),
+        (np.full(100, 1e-3), F, "penetration: does not change"),
+        (P, -np.abs(F), "force: never positive"),
+        (P[::-1], F[::-1], "the rows must be in the order of time"),
+    ],
+)
+def test_bad_curves_are_refused(penetration, force, words):
+    with pytest.raises(FitError, match=words):
+        fit_force_penetration(penetration, force)
+
+
+TIMES = np.linspace(0.0, 0.04, 20)
+
+
+@pytest.mark.parametrize(
+    ("scene", "test", "arguments", "words"),
+    [
+        (Scene(), None, {}, "a drop test is of a bit alone"),
+        ({"effects.barrier": False}, None, {}, "no energy barrier"),
+        ({}, None, {"signal": "gap"}, "signal = 'gap': must be one of bit_position"),
+        ({}, None, {"span": 0.5}, "span = 0.5: must be a factor"),
+        ({}, None, {"steps": 2}, "steps = 2"),
+        ({}, None, {"confidence": 95}, "confidence = 95"),
+        ({}, None, {"parameters": ["loss.time"]}, "parameters: loss.time must be one of"),
+        ({}, None, {"parameters": []}, "parameters: at least one"),
+        ({}, DropTest(TIMES[::-1], TIMES, 5.0), {}, "time of test 0: must rise"),
+        ({}, DropTest(TIMES, TIMES[1:], 5.0), {}, "of one length"),
+        ({}, DropTest(TIMES, TIMES, -5.0), {}, "speed of test 0 = -5.0 m/s"),
+    ],
+)
+def test_senseless_drop_tests_are_refused(scene, test, arguments, words):
+    scene = bit(**scene) if isinstance(scene, dict) else scene
+    with pytest.raises(FitError, match=words):
+        fit_drop_tests(scene, [test or DropTest(TIMES, TIMES, 5.0)], **arguments)
+
+
+def test_no_drop_test_is_refused():
+    with pytest.raises(FitError, match="at least one drop test"):
+        fit_drop_tests(bit(), [])
+
+
+def test_data_that_tell_nothing_are_refused():
+    """Before it touches the rock the bit falls alike on every rock."""
+    times = np.linspace(0.0, 1e-3, 20)
+    scene = bit(**{"start.rock_gap": 0.1})
+    with pytest.raises(FitError, match=r"rock\.barrier_damping cannot be told from these data"):
+        fit_drop_tests(scene, [DropTest(times, 5.0 * times, 5.0)], span=1.0)
+
+
+# ------------------------------------------------------------------------ command line
+
+
+def written(path, heading, *columns):
+    rows = zip(*(column.tolist() for column in columns), strict=True)
+    lines = [heading, *(",".join(map(repr, row)) for row in rows)]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return str(path)
+
+
+def test_the_command_writes_a_calibrated_scene(tmp_path):
+    curve = written(tmp_path / "slow.csv", "penetration, force", *noisy_curve(2))
+    drops_of = [
+        written(tmp_path / f"{k}.csv", "time,bit_position", test.time, test.values)
+        + f"@{test.speed}"
+        for k, test in enumerate(drops(bit(), 2, step=1e-3))
+    ]
+    guess = bit().replace(**{"rock.barrier_damping": 9.5e3, "rock.loading_stiffness": 5e8})
+    guess.to_toml(tmp_path / "guess.toml")
+    words = ["calibrate", str(tmp_path / "guess.toml"), "--curve", curve]
+    words += [word for drop in drops_of for word in ("--drop", drop)]
+    out = tmp_path / "found.toml"
+    ended = CliRunner().invoke(app, [*words, "--span", "1", "--out", str(out), "--json", "-"])
+    assert ended.exit_code == 0, ended.output
+    found = json.loads(ended.stdout)
+    estimates = found["drop tests"]["estimates"]
+    assert list(estimates) == list(ROCK)
+    scene = Scene.from_toml(out)
+    assert {key: scene[key] for key in ROCK} == {k: v["value"] for k, v in estimates.items()}
+    assert found["curve"]["estimates"]["rock.loading_stiffness"]["low"] < STIFFNESS
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["--curve", "none.csv"], "none.csv: cannot be read"),
+        (["--curve", "{swapped}"], "the columns must be penetration, force"),
+        (["--curve", "{ragged}"], "row 2 has 1 columns, the heading 2"),
+        (["--curve", "{words}"], "could not convert string to float: 'much'"),
+        (["--curve", "{empty}"], "is empty"),
+        (["--drop", "drop.csv"], "--drop drop.csv: must be CSV@SPEED"),
+        (["--drop", "{swapped}@5"], "the columns must be time and one signal"),
+        (["--drop", "{gap}@5"], "signal = 'gap': must be one of"),
+    ],
+)
+def test_the_command_refuses_bad_files(words, says, tmp_path):
+    texts = {
+        "swapped": "force,penetration\n1,2\n",
+        "ragged": "penetration,force\n1,2\n3\n",
+        "words": "penetration,force\n1,much\n",
+        "gap": "time,gap\n" + "\n".join(f"{k}e-3,0" for k in range(20)),
+        "empty": "",
+    }
+    files = {name: tmp_path / f"{name}.csv" for name in texts}
+    for name, text in texts.items():
+        files[name].write_text(text, encoding="utf-8")
+    bit().to_toml(tmp_path / "scene.toml")
+    words = [word.format(**files) for word in words]
+    with pytest.raises(FitError, match=re.escape(says)):
+        CliRunner().invoke(
+            app, ["calibrate", str(tmp_path / "scene.toml"), *words], catch_exceptions=False
+        )
+
+
+def test_the_command_wants_something_to_fit(tmp_path):
+    bit().to_toml(tmp_path / "scene.toml")
+    ended = CliRunner().invoke(app, ["calibrate", str(tmp_path / "scene.toml")])
+    assert ended.exit_code == 2
+    assert "nothing to fit" in ended.output
