@@ -48,14 +48,14 @@ def swings(found: CoupledRun, window: float = WINDOW) -> np.ndarray:
 
 
 def growth(sizes: np.ndarray, window: float = WINDOW) -> float:
-    """Rate at which a swing grows, up to its greatest; over all of it where it only falls [1/s].
+    """Rate at which a swing grows up to half of its greatest size, or falls over all of it [1/s].
 
     Parameters
     ----------
     sizes : ndarray, shape (windows,)
         Of the swing in successive windows.
     """
-    top = int(np.argmax(sizes))
+    top = int(np.argmax(sizes >= 0.5 * sizes.max()))
     rising = sizes[: top + 1] if top >= 2 else sizes
     return float(np.polyfit(window * np.arange(len(rising)), np.log(rising), 1)[0])
 
