@@ -75,6 +75,7 @@ def compare(found, count: int) -> None:
     """Tell how far a random sample is off long runs, and off a grid of twice the cells."""
     from percussion_model import Simulation, settled
 
+    count = min(count, len(found.points))
     chosen = np.random.default_rng(8).choice(len(found.points), count, replace=False)
     off, finer = [], []
     for k in chosen.tolist():

@@ -76,6 +76,8 @@ def _converges(changes: list[float], tolerance: float) -> bool:
     """Whether changes from cycle to cycle, the newest first, fall evenly from afar."""
     factors: list[float] = []
     for newer, older in pairwise(changes):
+        if older == 0.0:
+            break
         factor = newer / older
         alike = not factors or factor / ALIKE <= factors[-1] <= factor * ALIKE
         if factor > FALLING or not alike:

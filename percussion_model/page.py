@@ -76,21 +76,24 @@ def parameter_rows(scene: Scene, changed: dict[str, Any]) -> list[tuple[str, str
         if "*" in row.key or not scene.matters(row.key):
             continue
         if row.kind == "sections":
-            rows += _section_rows(scene, row.key)
+            rows += _section_rows(scene, row.key, changed)
             continue
         value = changed.get(row.key, scene[row.key])
         rows.append((row.key, written(value), shown_unit(row.unit), row.description))
     return rows
 
 
-def _section_rows(scene: Scene, sections: str) -> list[tuple[str, str, str, str]]:
+def _section_rows(
+    scene: Scene, sections: str, changed: dict[str, Any]
+) -> list[tuple[str, str, str, str]]:
     rows = []
     for k, section in enumerate(scene[sections]):
         for name in type(section).model_fields:
-            row = find_row(f"{sections}.{k}.{name}")
+            key = f"{sections}.{k}.{name}"
+            row = find_row(key)
             assert row is not None
-            value = written(getattr(section, name))
-            rows.append((f"{sections}.{k}.{name}", value, shown_unit(row.unit), row.description))
+            value = written(changed.get(key, getattr(section, name)))
+            rows.append((key, value, shown_unit(row.unit), row.description))
     return rows
 
 

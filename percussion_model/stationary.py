@@ -98,11 +98,11 @@ def settled(
 ) -> Settled:
     """Run a scene until its blows repeat, or until it is clear that they do not.
 
-    Blows are compared at the section that starts them. A cycle of n blows is
-    believed when the change over one more cycle and all changes still to come,
-    were they to shrink as the last two did, stay within the tolerance; or when
-    the blows only scatter within it for long. The rate is then extrapolated to the
-    limit (Aitken). A motion that does neither within `most_blows` is aperiodic.
+    Blows are compared at the section that starts them. One blow is believed to
+    repeat when changes fall evenly from afar and all still to come stay within the
+    tolerance; its rate is extrapolated to the limit (Aitken). A cycle of several,
+    or one that only scatters within the tolerance, is believed after sixty blows.
+    A motion that does neither within `most_blows` is aperiodic.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ def settled(
     SimulationError
         If the run cannot go on.
     """
-    _check(scene, tolerance, most_blows, scatter)
+    check_request(scene, tolerance, most_blows, scatter)
     simulation = Simulation(scene, record_events=False)
     blows = simulation.blows
     wait, next_look = _FIRST_LOOK, float(FEWEST_SCATTERED)
@@ -156,7 +156,7 @@ def settled(
     return _made("aperiodic", 0, *batch_means(blows), math.nan, blows, simulation)
 
 
-def _check(scene: Scene, tolerance: float, most_blows: int, scatter: float) -> None:
+def check_request(scene: Scene, tolerance: float, most_blows: int, scatter: float) -> None:
     if scene.piston.model == "absent":
         raise SceneError('piston.model = "absent": a bit alone has no blows that could settle')
     if not 0 < tolerance < 1:

@@ -8,7 +8,7 @@ import math
 import pytest
 from blow_map_scenes import mapped, run_by_hand
 
-from percussion_model import piston_cycle
+from percussion_model import Simulation, piston_cycle
 from percussion_model.core.blow_records import Entry
 from percussion_model.solvers.single_blow import SingleBlow
 
@@ -53,14 +53,14 @@ def test_a_bit_that_sinks_lengthens_the_flight_by_its_way():
 
 
 def test_a_single_blow_is_that_of_a_run(reference):
-    """A blow of the settled reference run, and one on a bit set at rest by hand."""
+    """A blow of the settled reference run, whose bit rings by some 1e-7 m before and after."""
     scene = mapped()
     blow = reference.blows[-1]
     load = scene.feed.force + scene.bit.mass * scene.gravity.acceleration
     v = float(blow["impact_velocity"])
     single = SingleBlow(scene, scene.rock.loading_stiffness)
     found = single.entries(v, load, scene.drive.force)
-    assert v * found[Entry.PENETRATION] == pytest.approx(blow["penetration"], rel=1e-4)
+    assert v * found[Entry.PENETRATION] == pytest.approx(blow["penetration"], rel=1e-3)
     assert v * found[Entry.PEAK_BIT] == pytest.approx(blow["peak_bit_force"], rel=1e-4)
     assert v * found[Entry.PEAK_CONTACT] == pytest.approx(blow["peak_contact_force"], rel=1e-4)
     a = scene.gravity.acceleration - scene.drive.force / scene.piston.mass
@@ -69,6 +69,21 @@ def test_a_single_blow_is_that_of_a_run(reference):
     rock = sum(found[e] for e in (Entry.CRUSHING, Entry.BARRIER, Entry.STANDSTILL))
     assert v * v * rock == pytest.approx(blow["rock_energy"], rel=1e-3)
     assert (found[Entry.CONTACTS], found[Entry.CYCLES]) == (2, 5)
+
+
+def test_a_single_blow_is_that_of_a_run_whose_bit_has_come_to_rest():
+    """Half a second of flight lets the vibration die that the feed makes at the start."""
+    scene = mapped(effects__gravity=False)
+    v, way = 8.6, 5.0
+    start = {"start.piston_velocity": v, "start.gap": way, "start.rock_gap": 0.0}
+    elastic = scene.replace(**start, **{"effects.drive": "none", "solver.fidelity": "wave"})
+    at = Simulation(elastic).sample([way / v - 1e-5, way / v + 0.1])
+    advance = at["bit_position"][1] - at["bit_position"][0]
+    single = SingleBlow(scene, scene.rock.loading_stiffness)
+    found = single.entries(v, scene.feed.force, 0.0)
+    # the bit still rings by some 1e-7 m when its place is read
+    assert v * found[Entry.PENETRATION] == pytest.approx(advance, rel=1e-3)
+    assert v * found[Entry.REBOUND] == pytest.approx(at["piston_velocity"][1], rel=1e-9)
 
 
 def test_a_single_blow_keeps_energy_and_momentum():

@@ -59,6 +59,9 @@ def calibrate(
         raise typer.Exit(complain("nothing to fit: give --curve, --drop or both", BAD_INPUT))
     check_json(json_file)
     if out is not None:
+        if out.is_dir():
+            text = f"--out {str(out)!r}: is a folder; give the file to write"
+            raise typer.Exit(complain(text, BAD_INPUT))
         check_writable(out.absolute().parent)
     chosen = load_scene(scene, solver, cells, settings)
     found: dict[str, Fit] = {}

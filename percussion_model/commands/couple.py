@@ -54,7 +54,8 @@ def couple(
     common.check_outputs(folder, json_file)
     coupling = Coupling(system, dict(read_value(text) for text in settings or ()), order=order)
     wanted = [*known_signals(coupling.outputs), *(signals or ())]
-    run = coupling.run(duration, step, wanted, interval or max(step, duration / ROWS), tolerance)
+    rows_every = max(step, duration / ROWS) if interval is None else interval
+    run = coupling.run(duration, step, wanted, rows_every, tolerance)
     found = summary(run)
     path = write_columns(run, folder / "signals.csv")
     common.write_json(json_file, found)

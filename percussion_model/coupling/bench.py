@@ -17,7 +17,7 @@ from percussion_model.coupling.master import Coupling
 from percussion_model.coupling.python_part import Work
 
 STEP = 1e-3  # [s]
-ROWS_EVERY = 5e-3  # [s]
+ROWS_EVERY = STEP  # peaks are those of a step
 FEED = 3000.0  # what is wanted [N]
 # Limits of the rig: beyond them a second counts as a violation.
 HIGHEST_FEED, HIGHEST_TORQUE = 4000.0, 250.0  # [N], [N m]

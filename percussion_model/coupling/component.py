@@ -7,6 +7,7 @@ import difflib
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
 from fmpy import read_model_description
 from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
 
@@ -37,7 +38,8 @@ class Component:
             raise CouplingError(f"{name}: this FMU has no co-simulation")
         self.variables = {one.name: one for one in description.modelVariables}
         self.can_save = bool(description.coSimulation.canGetAndSetFMUstate)
-        self.messages: list[str] = []
+        self.can_vary = bool(description.coSimulation.canHandleVariableCommunicationStepSize)
+        self.messages: list[tuple[int, str]] = []
         # both have to live as long as the instance
         self._logger = fmi2CallbackLoggerTYPE(self._note)
         self._callbacks = fmi2CallbackFunctions()
@@ -63,7 +65,7 @@ class Component:
     def _note(
         self, environment: Any, name: bytes, status: int, category: bytes, text: bytes
     ) -> None:
-        self.messages.append(text.decode("utf-8", "replace"))
+        self.messages.append((status, text.decode("utf-8", "replace")))
 
     def find(self, name: str) -> Any:
         """A variable by name; the error suggests another one."""
@@ -80,9 +82,21 @@ class Component:
             family = FAMILIES[one.type]
             if isinstance(value, str):
                 value = self._number_of(one, value)
-            converted = {"Real": float, "Integer": int, "Boolean": bool}[family](value)
+            converted = self._converted(one, family, value)
             setter = getattr(self._slave, f"set{family}")
             self._guarded(setter, [one.valueReference], [converted])
+
+    def _converted(self, one: Any, family: str, value: Any) -> Any:
+        """A value as its type; nothing is rounded, no number is taken for a truth."""
+        kind = {"Real": float, "Integer": int, "Boolean": bool}[family]
+        try:
+            converted = kind(value)
+        except (ValueError, OverflowError, TypeError):
+            converted = None
+        truth = isinstance(value, bool | np.bool_)
+        if converted is None or truth != (kind is bool) or (kind is int and converted != value):
+            raise CouplingError(f"{self.name}.{one.name} = {value!r}: must be of type {one.type}")
+        return converted
 
     def _number_of(self, one: Any, word: str) -> int:
         """Number of a word of an enumeration."""
@@ -142,7 +156,7 @@ class Component:
 
     def _error(self, text: str) -> CouplingError:
         # the line of the FMU itself comes first, that of its export library after it
-        said = [message for message in self.messages if message.strip()]
+        said = [text for status, text in self.messages if status > WARNING and text.strip()]
         text = said[0].removeprefix(f"{self.name}: ") if said else text
         return CouplingError(f"{self.name}: {text}")
 

@@ -111,7 +111,7 @@ class Writer:
             chosen = values[group.begin : group.end]
             if chosen == self._last[k]:
                 continue
-            group.fill(*chosen)
+            group.fill(*(chosen if group.family == "Real" else map(int, chosen)))
             status = group.call(*group.arguments)
             if status > WARNING:
                 self.component.fail(group.name, status)

@@ -130,6 +130,8 @@ class Coupling:
             With what there is, and the reason, where a part failed on the way.
         """
         count, every = _steps(duration, step, interval)
+        if tolerance is not None and self.on_way is not None:
+            raise CouplingError("on_way cannot be taken back with a step: leave the tolerance out")
         try:
             self._connect(list(signals))
             self._initialise()
@@ -160,7 +162,7 @@ class Coupling:
                 error = f"at {k * step:.6g} s {failure}"
                 break
             done = k + 1
-            if done % every == 0:
+            if done % every == 0 or done == count:
                 rows.append([done * step, *self._row()])
                 if progress is not None:
                     progress(done * step)
@@ -249,7 +251,10 @@ class Coupling:
 
 def _steps(duration: float, step: float, interval: float | None) -> tuple[int, int]:
     """Number of steps, and of steps between rows."""
-    for name, value in (("duration", duration), ("step", step)):
+    given = {"duration": duration, "step": step}
+    if interval is not None:
+        given["interval"] = interval
+    for name, value in given.items():
         if not 0.0 < value < math.inf:
             raise CouplingError(f"{name} = {value!r} s: must be above 0 s")
     count = math.floor(duration / step + ROUNDING)

@@ -83,7 +83,12 @@ class Port:
     def take(self) -> None:
         """Read the outputs that others take; they have to be numbers."""
         found = self.read()
-        if not math.isfinite(sum(found)):
+        try:
+            sound = math.isfinite(sum(found))
+        except TypeError:
+            said = dict(zip(self.taken, found, strict=False))
+            raise CouplingError(f"{self.name}: {said} are not all numbers") from None
+        if not sound:
             for output, value in zip(self.taken, found, strict=True):
                 if not math.isfinite(value):
                     raise CouplingError(f"{self.name}: {output} = {value!r} is no number")

@@ -52,6 +52,11 @@ class StepControl:
                 f"{', '.join(unable)}: cannot save and restore a state, which steps that are "
                 "taken back need; leave the tolerance out"
             )
+        fixed = [port.name for port in ports if not port.part.can_vary]
+        if fixed:
+            raise CouplingError(
+                f"{', '.join(fixed)}: takes no steps of varying size; leave the tolerance out"
+            )
         self.ports, self.longest, self.tolerance = list(ports), longest, tolerance
         self.done = self.tried = self.rejected = 0
         self._level = 0  # of the present step: longest / 2**level
@@ -78,26 +83,24 @@ class StepControl:
         tick = length / 2**HALVINGS
         saved = [port.part.save() for port in self.ports]
         before = list(self._values)
-        try:
-            while True:
-                ticks = 2**HALVINGS >> self._level
-                size, begin = ticks * tick, time + at * tick
-                step(begin, size)
-                self.tried += 1
-                whole = list(self._values)
-                self._go_back(saved, before)
-                step(begin, 0.5 * size)
-                step(begin + 0.5 * size, 0.5 * size)
-                error = self._error(whole)
-                if error <= self.tolerance or self._level == HALVINGS:
-                    break
-                self.tried += 2
-                self.rejected += 1
-                self._level += 1
-                self._go_back(saved, before)
-        finally:
-            for port, state in zip(self.ports, saved, strict=True):
-                port.part.drop(state)
+        while True:
+            ticks = 2**HALVINGS >> self._level
+            size, begin = ticks * tick, time + at * tick
+            step(begin, size)
+            self.tried += 1
+            whole = list(self._values)
+            self._go_back(saved, before)
+            step(begin, 0.5 * size)
+            step(begin + 0.5 * size, 0.5 * size)
+            error = self._error(whole)
+            if error <= self.tolerance or self._level == HALVINGS:
+                break
+            self.tried += 2
+            self.rejected += 1
+            self._level += 1
+            self._go_back(saved, before)
+        for port, state in zip(self.ports, saved, strict=True):
+            port.part.drop(state)
         self.done += 2
         for place in self._watched:
             self._sizes[place] = max(self._sizes[place], abs(self._values[place]))
@@ -117,7 +120,7 @@ class StepControl:
         error = 0.0
         for place in self._watched:
             now = self._values[place]
-            size = greatest or max(self._sizes[place], abs(now))
+            size = greatest or max(self._sizes[place], abs(now), abs(whole[place]))
             if whole[place] != now:
                 error = max(error, abs(whole[place] - now) / size)
         return error

@@ -144,10 +144,11 @@ def fit_drop_tests(
     reach = np.where(np.isin(names, BARRIER), np.log(span), 0.0)
     width = student_width(confidence, len(data) - len(names))
     at = search(model, data, guess, reach, steps)
-    for _ in range(MOST_STARTS):
+    for left in reversed(range(MOST_STARTS)):
         at, jacobian, spread = descend(model, data, at, names)
         ends, best = look_around(model, data, at, spread, width)
-        if best is at:
+        # the last intervals stay with the point that they were found at
+        if best is at or left == 0:
             break
         at = best
     return make_fit(model, data, at, jacobian, ends, names, (True,) * len(names), confidence)

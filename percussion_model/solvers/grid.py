@@ -21,8 +21,6 @@ MOST_REFINED = 2.0
 HALF_LOSS = 0.5
 # Terms of a series that halves each time: thirty make nine digits.
 HALVINGS = 30
-# Terms of the series of a front's variance; the largest is a tenth.
-HARMONICS = 200
 # Explicit loss stays free of overshoot up to this viscous number a sub-step.
 MOST_VISCOUS = 0.5
 
@@ -226,31 +224,6 @@ def end_viscosity(c: np.ndarray, grid: Grid, loss_time: float) -> tuple[float, f
         spare = 1.0 / (kappa * z[0]) + mean_top - _pairing(c, grid.n, top, later)
         mean_top += max(cross - spare, 0.0)
     return kappa / (1.0 + kappa * z[0] * mean_top), kappa / (1.0 + kappa * z[-1] * mean_bottom)
-
-
-def place_of_closure(variance: float) -> float:
-    """Where in a step a closure has to come for its front to get the right width.
-
-    Loss spreads a sharp front to a Gaussian; the means over cells then have a larger
-    variance than the Gaussian, by the mean of f (1 - f) of what its places leave over
-    whole cells. Smoothing from cell to cell, exact for smooth waves, misses that while
-    the front is narrower than a cell. A front that begins at the share f of a step
-    is averaged over a cell and has f (1 - f) (docs/numerics.md, eqs 14a and 14b).
-
-    Parameters
-    ----------
-    variance : float
-        Of the Gaussian after one transit of the bar [cells squared].
-
-    Returns
-    -------
-    float
-        Share of the step, from 0 without loss to 0.211.
-    """
-    order = np.arange(1, HARMONICS + 1)
-    missing = np.exp(-2.0 * np.pi**2 * order**2 * variance) / (np.pi * order) ** 2
-    width = max(1.0 / 6.0 - missing.sum(), 0.0)
-    return 0.0 if variance == 0.0 else float(0.5 * (1.0 - np.sqrt(1.0 - 4.0 * width)))
 
 
 def _pairing(c: np.ndarray, n: int, one: np.ndarray, other: np.ndarray) -> float:

@@ -9,7 +9,8 @@ import numpy as np
 from percussion_model.core.records import DriveKind, Mode, Piston, RockKind
 from percussion_model.core.wave_records import WAVE_PAR, Coef
 from percussion_model.scene_rules import SceneRules
-from percussion_model.solvers.grid import Grid, end_viscosity, place_of_closure, substeps
+from percussion_model.solvers.fronts import place_of_closure
+from percussion_model.solvers.grid import Grid, end_viscosity, substeps
 
 # An open gap of this many transits of the slower bar ends a blow where no
 # pressure law does (docs/model.md, section 7).

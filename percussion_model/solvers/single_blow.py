@@ -97,6 +97,7 @@ class SingleBlow:
         self.scene = SceneAt(scene, stiffness)
         self.solver = WaveSolver(self.scene)
         self._base = self.solver.new_state()
+        self.impact = self.solver.place_of_closure * self.solver.time_step
         self._blows = np.zeros(_BLOWS, BLOW)
         self._events = np.zeros(_EVENTS, EVENT)
         gravity = scene.gravity.acceleration if scene.effects.gravity else 0.0
@@ -104,12 +105,12 @@ class SingleBlow:
         self.weight = gravity * scene.bit.mass
 
     def start(self, velocity: float, load: float, drive: float) -> WaveState:
-        """State at the moment of impact.
+        """State shortly before the impact, which comes at `self.impact`.
 
         Parameters
         ----------
         velocity : float
-            Of the whole piston [m/s].
+            Of the whole piston at the impact [m/s].
         load : float
             Static force of the bit on the rock [N].
         drive : float
@@ -121,8 +122,11 @@ class SingleBlow:
         n = solver.cells["bit"]
         standing = load / self.scene.bit.mass * solver.static_wave
         wb[Row.DOWN, :n], wb[Row.UP, :n] = standing, -standing
-        wp[Row.DOWN : Row.UP + 1, : solver.cells.get("piston", 0)] = 0.5 * velocity
-        s["v_p"], s["v_b"] = velocity, 0.0
+        # the impact comes where in a step its front gets the right width
+        before = velocity - (self.gravity + drive / self.scene.piston.mass) * self.impact
+        wp[Row.DOWN : Row.UP + 1, : solver.cells.get("piston", 0)] = 0.5 * before
+        s["v_p"], s["v_b"] = before, 0.0
+        s["gap"] = max(0.5 * (velocity + before) * self.impact, CLOSE)
         s["feed"], s["drive_force"], s["reversal"] = load - self.weight, drive, FAR
         s["mode"], s["p"] = Mode.SS, load / s["k_r"]
         s["p_u"] = s["p"] - load / (s["gamma"] * s["k_r"])
@@ -147,13 +151,13 @@ class SingleBlow:
         state = self.start(velocity, load, drive)
         energy = 0.5 * scene.piston.mass * velocity * velocity
         rows: list[np.ndarray] = [np.zeros(len(LONG_SAMPLE_FIELDS))]
-        solver.look(state, 0.0, rows[0])
+        solver.look(state, self.impact, rows[0])
         opened = 0.0
         times = (*PATH_TIMES, *LATER)
         for k, t in enumerate(times):
-            opened = max(opened, self._advance(state, t))
+            opened = max(opened, self._advance(state, self.impact + t) - self.impact)
             row = np.zeros(len(LONG_SAMPLE_FIELDS))
-            solver.look(state, t, row, peaks=False)
+            solver.look(state, self.impact + t, row, peaks=False)
             rows.append(row)
             if k + 1 >= len(PATH_TIMES) and row[AT["bit_kinetic_energy"]] < SILENT * energy:
                 above = row[AT["bit_position"]] - rows[-2][AT["bit_position"]]
@@ -190,7 +194,7 @@ class SingleBlow:
     def _found(self, rows: np.ndarray, velocity: float, drive: float) -> np.ndarray:
         """Entries that follow from the readings at the start, on the way and at the end."""
         first, last = rows[0], rows[-1]
-        t = last[AT["time"]]
+        t = last[AT["time"]] - first[AT["time"]]
         a = self.gravity - drive / self.scene.piston.mass
         found = np.zeros(ENTRIES)
         advance = rows[:, AT["bit_position"]] - first[AT["bit_position"]]

@@ -100,6 +100,11 @@ class WaveSolver:
         resync(self._par[0], state.record[0], wp, self._cp, wb, self._cb)
 
     @property
+    def place_of_closure(self) -> float:
+        """Share of a step after which a closure comes best (docs/numerics.md, eq. 14b)."""
+        return float(self._par[0]["front"])
+
+    @property
     def static_wave(self) -> np.ndarray:
         """Down-going wave of a bit at rest under unit body acceleration, by cell [s]."""
         return self._cb[Coef.STATIC, : self._bit.n]

@@ -13,6 +13,7 @@ import numpy as np
 
 from percussion_model.result_files import ResultError, staged
 from percussion_model.scene import Scene
+from percussion_model.stationary import check_request
 from percussion_model.study.points import (
     Points,
     grid,
@@ -173,6 +174,7 @@ def study(
         If workers keep dying, or no scheduler answers.
     """
     refuse_unknown(scene, points)
+    check_request(scene, tolerance, most_blows, scatter)
     store = Store(Path(folder), _plan(scene, points, tolerance, most_blows, scatter))
     _rows, _failures, done = store.read(len(points))
     order = points.in_cheap_order()

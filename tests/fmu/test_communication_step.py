@@ -8,7 +8,7 @@ import pytest
 
 from scenarios import communication_step
 
-STEPS = (2.0**-13, 2.0**-11)  # [s]
+STEPS = (2.0**-13, 2.0**-9)  # [s]
 
 
 @pytest.fixture(scope="module")

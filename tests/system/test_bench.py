@@ -73,7 +73,7 @@ def test_no_number_ends_the_run_with_what_there_is(feed_control):
     assert score.points == 0.0
     assert score.faults == ["ended early, at 0.051 s controller: force_command = nan is no number"]
     assert score.numbers["depth"] > 0.0
-    assert score.run["time"][-1] == pytest.approx(0.05)
+    assert score.run["time"][-1] == pytest.approx(0.051)
 
 
 def test_a_bad_controller_fails_visibly(feed_control, tmp_path, monkeypatch, capsys):

@@ -61,7 +61,8 @@ class DrillController(Model):
                 goal, pressure = sought if p["seek.pressure_on"] else (sought[0], pressure)
             else:
                 self.seeker.pause(self.time)
-                pressure = self.seeker.centres[PRESSURE]
+                if p["seek.pressure_on"]:
+                    pressure = self.seeker.centres[PRESSURE]
         if self.mode == DRILLING:
             self._go_towards(goal, h)
             self._keep_feed(inputs["feed_force"], h)
@@ -120,7 +121,7 @@ class DrillController(Model):
     def _give_way(self, feed: float, h: float) -> None:
         """A retract that does not help in its time takes too much for the weights: less of it."""
         p = self.parameters
-        if self.since > p["mode_time"]:
+        if self.since > p["mode_time"] and self.command > -p["force_limit"]:
             excess = max(0.0, feed - self.wanted)
             self.integral -= h * p["pi.gain"] / p["pi.time"] * excess
 
