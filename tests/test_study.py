@@ -218,7 +218,12 @@ def test_ctrl_c_ends_a_study_at_once_and_says_what_is_kept(tmp_path):
     for number, wait in enumerate((2.0, 6.0)):
         out = ["--out", str(tmp_path / f"out{number}")]
         child = subprocess.Popen(
-            [*words, *out], stderr=subprocess.PIPE, text=True, start_new_session=True
+            [*words, *out],
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+            # a shell may have started the tests with the signal ignored
+            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
         )
         time.sleep(wait)
         os.killpg(child.pid, signal.SIGINT)

@@ -13,8 +13,10 @@ from percussion_model.plotting import style
 
 NAME = "effects"
 COST_COLOUR, MORE_COLOUR, LESS_COLOUR = "#0072B2", "#D55E00", "#009E73"
-# Changes beyond this are cut off, and their number says so [%].
+# Axes are made for changes up to this [%].
 WIDEST = 60.0
+# Bars beyond this multiple of it have no room for their number, and are cut off.
+UNCUT = 1.4
 # Room beside the longest bar for its number, as a factor on its length.
 ROOM = 1.75
 # Changes below this are none [%].
@@ -84,7 +86,7 @@ def _changes(ax: Axes, values: list[float | None]) -> None:
         if share is None:
             ax.text(0.0, y, " –", va="center")
             continue
-        cut = abs(share) > end
+        cut = abs(share) > UNCUT * end
         # a cut bar leaves the picture, and says so within it
         shown = math.copysign(ROOM * end, share) if cut else share
         colour = MORE_COLOUR if share >= 0.0 else LESS_COLOUR

@@ -179,6 +179,8 @@ def test_ctrl_c_ends_all_processes_at_once(tmp_path):
         stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,
+        # a shell may have started the tests with the signal ignored
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
     assert child.stderr.readline() == "begun\n"
     os.killpg(child.pid, signal.SIGINT)  # as a terminal does
