@@ -19,7 +19,7 @@ SHARE_OF_STEP = 1e-3
 LAST_PLACES = 8 * sys.float_info.epsilon
 
 # Types that share a getter and a setter.
-NOT_YET = None, {}  # planned, as `plan` says
+NOT_YET: tuple[None, dict[str, Any]] = (None, {})  # planned, as `plan` says
 REAL, INTEGER, BOOLEAN = ("Real",), ("Integer", "Enumeration"), ("Boolean",)
 
 
