@@ -18,18 +18,7 @@ from percussion_model.parameter_table import parameter_table
 from percussion_model.scene import Scene, SceneError
 from percussion_model.solvers.blow_table import BlowTable, fixed_values
 
-RUNTIME = (
-    "folder",
-    "calls",
-    "slave",
-    "plain_scene",
-    "motion",
-    "outputs",
-    "states",
-    "blow_map",
-    "watch",
-    "hammer",
-)
+RUNTIME = ("plain_scene", "motion", "outputs", "blow_map", "watch", "hammer_states", "hammer")
 STEP_SIZE = 1e-3  # of the default experiment [s]
 AUTHOR = "percussion_model developers"
 LICENSE = "BSD-3-Clause"

@@ -41,6 +41,8 @@ LIBRARY_FILES = (
     "logmsg.py",
     "variables.py",
 )
+# Files of `runtime` that every slave needs.
+SLAVE_FILES = ("folder", "calls", "values", "slave", "states")
 START = "runtime/start.py"
 
 _IMPORT = re.compile(
@@ -73,13 +75,13 @@ def stage(prefix: str, runtime: tuple[str, ...], with_model: bool) -> Bundle:
     prefix : str
         Beginning of the package's name.
     runtime : tuple of str
-        Files of `fmu_src/runtime` without their ending.
+        Files of `fmu_src/runtime` without their ending, besides those of every slave.
     with_model : bool
         Whether all of what computes is wanted, or the parameter rows alone.
     """
     inner = {"__init__.py": f'"""{prefix}: sources of an FMU."""\n'}
     inner["fmu_src/__init__.py"] = inner["fmu_src/runtime/__init__.py"] = '"""Adapters."""\n'
-    for name in runtime:
+    for name in (*SLAVE_FILES, *runtime):
         inner[f"fmu_src/runtime/{name}.py"] = _read(ADAPTERS / "runtime" / f"{name}.py")
     patterns = MODEL_FILES if with_model else ("__init__.py", "parameter_rows.py")
     for pattern in patterns:

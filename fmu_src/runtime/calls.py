@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import functools
+import math
+import sys
 from collections.abc import Callable
 from enum import IntEnum
 from typing import TYPE_CHECKING, Any
 
-from fmu_src.runtime.folder import Known
+from percussion_model.parameter_rows import Row
 
 if TYPE_CHECKING:
     from fmu_src.runtime.slave import Slave
 
 INFINITE = float("inf")
 NOWHERE = (INFINITE, -INFINITE)
+LARGEST = sys.float_info.max
 
 
 class FmuError(ValueError):
@@ -33,12 +36,16 @@ class Phase(IntEnum):
 STEPPING = Phase.STEPPING
 
 
-def plain_bounds(one: Known) -> tuple[float, float]:
-    """Between these, both of them allowed, a Real is right without a closer look."""
-    row = one.row
-    if one.type != "Real" or row is None or row.lower is None or row.upper is None:
+def plain_bounds(row: Row | None) -> tuple[float, float]:
+    """Between these, both of them allowed, a number is right without a closer look."""
+    if row is None or row.kind != "number" or row.choices:
         return NOWHERE
-    return NOWHERE if row.choices or row.lower_open or row.upper_open else (row.lower, row.upper)
+    low = -LARGEST if row.lower is None else row.lower
+    high = LARGEST if row.upper is None else row.upper
+    return (
+        math.nextafter(low, INFINITE) if row.lower_open else low,
+        math.nextafter(high, -INFINITE) if row.upper_open else high,
+    )
 
 
 def guarded(method: Callable) -> Callable:

@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 import json
-import struct
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 from weakref import WeakValueDictionary
 
-import numpy as np
-
+from fmu_src.runtime import hammer_states
 from fmu_src.runtime.blow_map import read_blow_map
-from fmu_src.runtime.calls import STEPPING, Phase, guarded
+from fmu_src.runtime.calls import STEPPING, Phase, guarded, plain_bounds
 from fmu_src.runtime.motion import Gauge, Motion
 from fmu_src.runtime.outputs import OUTPUTS
 from fmu_src.runtime.plain_scene import PlainScene, make_scene
 from fmu_src.runtime.slave import Slave
-from fmu_src.runtime.states import fill_solver, fingerprint, pack, solver_bytes, unpack
+from fmu_src.runtime.states import fingerprint
+from fmu_src.runtime.values import Read
 from fmu_src.runtime.watch import Watch
 from percussion_model.inputs import INPUTS
 from percussion_model.parameter_rows import Row, refuse_value
@@ -48,9 +46,6 @@ NAMES_OUTSIDE = {inner: name for name, inner in PLAIN_INPUTS.items()} | {
     "external_force": "piston_force",
 }
 
-# Numbers of an instance in a saved state.
-NUMBERS = struct.Struct("<BBdddQd")  # phase, moving, start, now, time, blows, step size
-
 
 class PercussiveHammer(Slave):
     """Percussive drill: drive, piston, bit and rock."""
@@ -64,6 +59,7 @@ class PercussiveHammer(Slave):
         self.given: set[str] = set(scene["given"])
         self.rows = {one.row.key: one.row for one in self.known.values() if one.row is not None}
         self.rows |= {key: _row(row) for key, row in scene["rows"].items()}
+        self._drive_bounds = plain_bounds(self.rows["drive.force"])
         self.identity = scene["identity"]
         self.inputs = [one for one in self.known.values() if one.causality == "input"]
         self._readers = {self.by_name[name]: read for name, read in OUTPUTS.items()}
@@ -73,9 +69,10 @@ class PercussiveHammer(Slave):
         self.motion: Motion | None = None
         self.given_inputs: list[Any] = []  # values of the inputs when the solver was made
         self.fingerprint = b""
-        self._acting: dict[str, float] = {}  # inputs as the solver has them
-        self._dirty = False
-        self._new: set[int] = set()  # inputs to be checked
+        self.acting: dict[str, float] = {}  # inputs as the solver has them
+        self._inner = {reference: inner for inner, reference in self._plain.items()}
+        self._new: set[int] = set()  # inputs that were set, perhaps to what they were
+        self._doubtful: list[int] = []  # inputs to be checked
         self._acts: dict[str, bool] = {}
         self._watch = Watch()
 
@@ -87,11 +84,29 @@ class PercussiveHammer(Slave):
 
     def changed(self, references: list[int]) -> None:
         """Note that inputs are new, or that the solver has to be made anew."""
-        self._dirty = True
         if self.phase < STEPPING:
             self.motion = None
         else:
             self._new.update(references)
+            self._doubtful += references
+
+    def take_late(self) -> None:
+        """Take inputs that were set and not yet looked at."""
+        held = self.values
+        for references, values in self.late.items():
+            plan = self._inputs_alone[references]
+            for (reference, _, low, high), value in zip(plan, values, strict=True):
+                if held[reference] != value:
+                    held[reference] = value
+                    self._new.add(reference)
+                    if not low <= value <= high:
+                        self._doubtful.append(reference)
+        self.late.clear()
+
+    def look_at_inputs(self) -> None:
+        """Look at all inputs in the next step."""
+        self._new.update(one.reference for one in self.inputs)
+        self._doubtful = list(self._new)
 
     def check(self, references: Any) -> None:
         """Check bounds, the drive force, and contradictions between parameters."""
@@ -114,10 +129,15 @@ class PercussiveHammer(Slave):
         """Inputs as the solver takes them."""
         values = self.values
         found = {inner: values[reference] for inner, reference in self._plain.items()}
-        on, pressure, area, force = (values[reference] for reference in self._forced)
-        found["drive_force"] = pressure * area if on else 0.0
-        found["external_force"] = force if on else 0.0
-        return found
+        return found | self.drive_inputs()
+
+    def drive_inputs(self) -> dict[str, float]:
+        """Forces of the drive as the solver takes them [N]."""
+        on, pressure, area, force = (self.values[reference] for reference in self._forced)
+        return {
+            "drive_force": pressure * area if on else 0.0,
+            "external_force": force if on else 0.0,
+        }
 
     def make_scene(self) -> PlainScene:
         """Scene of the present values; raises `SceneError` if they contradict each other."""
@@ -153,9 +173,9 @@ class PercussiveHammer(Slave):
             self.motion = Motion(scene, _SOLVERS.get(key) or self.map_solver(scene))
             _SOLVERS[key] = self.motion.solver
             self.motion.gauge = self.find_gauge(scene, self.motion.solver)
-            self._acting = self.solver_inputs()
+            self.acting = self.solver_inputs()
             self._acts = {}
-            self._dirty = False
+            self._new.clear()
         return self.motion
 
     def map_solver(self, scene: PlainScene) -> Solver | None:
@@ -189,24 +209,29 @@ class PercussiveHammer(Slave):
     def step(self, time: float, step_size: float) -> None:
         """Pass on changed inputs, then advance."""
         motion = self.motion or self.ready()
-        changes = self.take_inputs(motion) if self._dirty else {}
+        if self.late:
+            self.take_late()
+        changes = self.take_inputs(motion) if self._new else {}
         motion.go_on(time, step_size, changes)
-        for text in self._watch.look(motion, self._acting["loading_stiffness"]):
+        for text in self._watch.look(motion, self.acting["loading_stiffness"]):
             self.warn(f"{self.instance_name}: at t = {time:.6g} s: {text}")
 
     def take_inputs(self, motion: Motion) -> dict[str, float]:
         """Inputs of the solver that have changed, checked."""
-        self.check(self._new)
-        self._new.clear()
-        acting, wanted = self._acting, self.solver_inputs()
-        self._acting, self._dirty = wanted, False
-        if wanted == acting:
-            return {}
-        return {
-            name: value
-            for name, value in wanted.items()
-            if value != acting[name] and self.acts(motion.scene, name)
-        }
+        values, acting, new = self.values, self.acting, self._new
+        if self._doubtful:
+            self.check(self._doubtful)
+            self._doubtful.clear()
+        wanted = {self._inner[r]: values[r] for r in new if r in self._inner}
+        if not self._forces.isdisjoint(new):
+            drive = self.drive_inputs()
+            if not self._drive_bounds[0] <= drive["drive_force"] <= self._drive_bounds[1]:
+                self.check(self._forced)
+            wanted |= drive
+        new.clear()
+        changed = {name: value for name, value in wanted.items() if value != acting[name]}
+        acting |= changed
+        return {name: value for name, value in changed.items() if self.acts(motion.scene, name)}
 
     def acts(self, scene: SceneRules, name: str) -> bool:
         """Whether an input has an effect in the scene; says so in the log where not."""
@@ -223,68 +248,29 @@ class PercussiveHammer(Slave):
 
     # outputs
 
-    def asked(self, references: list[int]) -> list[Callable[[Motion], Any]]:
-        """What reads these outputs."""
-        return [self._readers[reference] for reference in references]
+    def reader(self, references: list[int]) -> Read:
+        """What gives the present values of these outputs; 0 before there are any."""
+        reads = [self._readers[reference] for reference in references]
 
-    def outputs(self, asked: list[Callable[[Motion], Any]]) -> list[Any]:
-        """Present values of outputs; 0 before there are any."""
-        if self.motion is None and self.phase != Phase.INITIALISING:
-            return [0] * len(asked)
-        motion = self.motion or self.ready()
-        return [read(motion) for read in asked]
+        def read(hammer: PercussiveHammer) -> list[Any]:
+            motion = hammer.motion
+            if motion is None:
+                if hammer.phase != Phase.INITIALISING:
+                    return [0] * len(reads)
+                motion = hammer.ready()
+            return [one(motion) for one in reads]
+
+        return read
 
     # states
 
     @guarded
     def _get_fmu_state(self) -> bytes:
-        if self.phase == Phase.INSTANTIATED or self.motion is None:
-            raise ValueError("there is no state to save before the initialisation has ended")
-        motion = self.motion
-        motion.peaks()
-        numbers = NUMBERS.pack(
-            self.phase, 1, self.start_time, self.now, motion.time,
-            motion.blow_count, motion.step_size,
-        )  # fmt: skip
-        inputs = [self.values[one.reference] for one in self.inputs]
-        acting = [self._acting[name] for name in INPUTS]
-        floats = np.array(
-            [*self.given_inputs, *inputs, *acting, motion.stress(), *motion.before()], float
-        )
-        body = numbers + floats.tobytes() + motion.row.tobytes()
-        body += motion.row_of_blow.view(np.uint8).tobytes() + solver_bytes(motion._state)
-        return pack(self.fingerprint, body)
+        return hammer_states.save(self)
 
     @guarded
     def _set_fmu_state(self, state: bytes) -> None:
-        if self.motion is None:
-            self.check(self.values)
-            self.ready()
-        body = unpack(self.fingerprint, state)
-        phase, _, start, now, time, blows, step_size = NUMBERS.unpack_from(body)
-        at = NUMBERS.size
-        count = len(self.inputs)
-        floats = np.frombuffer(body, np.float64, 2 * count + len(INPUTS) + 4, at)
-        at += floats.nbytes
-        self._set_inputs(floats[:count])
-        if [self.values[one.reference] for one in self.inputs] != self.given_inputs:
-            self.motion = None  # the solver was made with other inputs
-        motion = self.ready()
-        self._set_inputs(floats[count : 2 * count])
-        acting = floats[2 * count :][: len(INPUTS)]
-        row = np.frombuffer(body, np.float64, len(motion.row), at)
-        at += row.nbytes
-        blow = np.frombuffer(body, np.uint8, motion.row_of_blow.nbytes, at)
-        at += blow.nbytes
-        fill_solver(motion._state, body[at:])
-        motion.adopt((time, step_size), (blows, blow), row, floats[-4:])
-        self._acting = dict(zip(INPUTS, acting.tolist(), strict=True))
-        self.phase, self.start_time, self.now = Phase(phase), start, now
-        self._dirty = True
-
-    def _set_inputs(self, values: np.ndarray) -> None:
-        for one, value in zip(self.inputs, values, strict=True):
-            self.values[one.reference] = bool(value) if one.type == "Boolean" else float(value)
+        hammer_states.restore(self, state)
 
 
 def _row(entry: dict[str, Any]) -> Row:

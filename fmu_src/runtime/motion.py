@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from fmu_src.runtime.calls import NOWHERE, plain_bounds
 from percussion_model.core.records import (
     BLOW,
     LEDGER_FIELDS,
@@ -17,7 +18,6 @@ from percussion_model.core.records import (
 )
 from percussion_model.inputs import INPUTS, check_input
 from percussion_model.ledger import unexplained
-from percussion_model.parameter_rows import Row
 from percussion_model.runner import Runner
 from percussion_model.scene_rules import SceneRules
 from percussion_model.solvers import Solver
@@ -55,7 +55,7 @@ class Motion(Runner):
         super().__init__(scene, record_events=False, solver=solver)
         self.scene = scene
         self.gauge: Gauge | None = None
-        self._rows: dict[str, Row] = {}  # of the inputs that have changed once
+        self._bounds: dict[str, tuple[float, float]] = {}  # of inputs that have changed once
         self.row_of_blow = np.zeros(1, BLOW)  # the last whole one
         self.blow = self._numbers_of_blow()
         self.blow_count = 0
@@ -80,10 +80,10 @@ class Motion(Runner):
     def _checked(self, inputs: dict[str, float]) -> dict[str, float]:
         # whether an input acts is the same in all steps, and so are its bounds
         for name, value in inputs.items():
-            row = self._rows.get(name)
-            if row is None or not row.allows(value):
+            low, high = self._bounds.get(name, NOWHERE)
+            if not low <= value <= high:
                 check_input(self.scene, name, value)
-                self._rows[name] = self.scene.row_of(INPUTS[name])
+                self._bounds[name] = plain_bounds(self.scene.row_of(INPUTS[name]))
         return inputs
 
     def _numbers_of_blow(self) -> dict[str, float]:

@@ -15,6 +15,7 @@ from typing import Any
 from fmu_src.runtime.calls import Phase, guarded
 from fmu_src.runtime.slave import Slave
 from fmu_src.runtime.states import fingerprint, pack, unpack
+from fmu_src.runtime.values import Read
 
 GAS_CONSTANT = 287.0  # of air [J/(kg K)]
 AMBIENT = 101_325.0  # [Pa], absolute; pressures in the chambers are gauge
@@ -44,6 +45,7 @@ class PneumaticDrive(Slave):
 
     def step(self, time: float, step_size: float) -> None:
         """Integrate the pressures, the piston moving on with its velocity."""
+        self.take_late()
         self.check([one.reference for one in self.known.values() if one.causality == "input"])
         count = max(1, math.ceil(step_size / LONGEST_STEP))
         h = step_size / count
@@ -83,16 +85,25 @@ class PneumaticDrive(Slave):
             found.append(new - AMBIENT)
         self.upper, self.lower = found
 
-    def outputs(self, asked: list[int]) -> list[Any]:
+    def reader(self, references: list[int]) -> Read:
+        """What gives the present values of these outputs."""
+        names = [self.known[reference].name for reference in references]
+
+        def read(drive: PneumaticDrive) -> list[Any]:
+            found = drive.outputs()
+            return [found[name] for name in names]
+
+        return read
+
+    def outputs(self) -> dict[str, Any]:
         """Present values of outputs."""
-        found = {
+        return {
             "piston_force": self.value("area") * (self.upper - self.lower),
             "valve_down": self.direction > 0.0,
             "upper.pressure": self.upper,
             "lower.pressure": self.lower,
             "air_used": self.used,
         }
-        return [found[self.known[reference].name] for reference in asked]
 
     def fingerprint(self) -> bytes:
         """Hash of the parameters."""
@@ -104,6 +115,7 @@ class PneumaticDrive(Slave):
 
     @guarded
     def _get_fmu_state(self) -> bytes:
+        self.take_late()
         inputs = (self.value("supply_pressure"), self.value("displacement"), self.value("velocity"))
         chambers = (self.direction, self.upper, self.lower, self.used)
         body = NUMBERS.pack(self.phase, self.start_time, self.now, *inputs, *chambers)
@@ -114,6 +126,7 @@ class PneumaticDrive(Slave):
         body = unpack(self.fingerprint(), state)
         phase, self.start_time, self.now, *numbers = NUMBERS.unpack(body)
         self.phase = Phase(phase)
+        self.late.clear()
         for name, value in zip(("supply_pressure", "displacement", "velocity"), numbers[:3],
                                strict=True):  # fmt: skip
             self.values[self.by_name[name]] = value

@@ -111,8 +111,9 @@ def build_part(name: str, path: Path) -> str:
         step_size=STEP_SIZE,
     )
     modules = ("__init__", "part", *part.modules)
-    runtime = ("folder", "calls", "slave", "states", *(f"system/{module}" for module in modules))
-    bundle = stage("drilling_system", runtime, with_model=False)
+    bundle = stage(
+        "drilling_system", tuple(f"system/{module}" for module in modules), with_model=False
+    )
     text = json.dumps([variable.for_instance() for variable in variables], indent=1)
     return write_fmu(
         path, about, variables, bundle, ("system.part", part.slave),

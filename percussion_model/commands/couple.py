@@ -28,6 +28,10 @@ def couple(
         float | None,
         typer.Option("--tolerance", help="Take steps back whose error is larger, by the signals."),
     ] = None,
+    every: Annotated[
+        list[str] | None,
+        typer.Option("--every", metavar="COMPONENT=STEPS", help="A slow part: steps as one."),
+    ] = None,
     settings: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="COMPONENT.VARIABLE=VALUE", help="Set any parameter."),
@@ -47,12 +51,17 @@ def couple(
     try:
         from percussion_model.coupling import Coupling
         from percussion_model.coupling.balance import known_signals, summary
-        from percussion_model.coupling.files import read_value, write_columns
+        from percussion_model.coupling.files import read_pace, read_value, write_columns
     except ImportError as error:
         return common.complain(common.needs_fmu_extra(error), common.BAD_INPUT)
     folder = out or Path("out") / system.stem
     common.check_outputs(folder, json_file)
-    coupling = Coupling(system, dict(read_value(text) for text in settings or ()), order=order)
+    coupling = Coupling(
+        system,
+        dict(read_value(text) for text in settings or ()),
+        order=order,
+        every=dict(read_pace(text) for text in every or ()),
+    )
     wanted = [*known_signals(coupling.outputs), *(signals or ())]
     rows_every = max(step, duration / ROWS) if interval is None else interval
     run = coupling.run(duration, step, wanted, rows_every, tolerance)

@@ -52,7 +52,7 @@ class Component:
         )
         self._slave.instantiate(callbacks=self._callbacks, loggingOn=True)
         self.pointer = ctypes.c_void_p(self._slave.component)
-        self._do_step = self.function(
+        self.stepper = self.function(
             "fmi2DoStep", ctypes.c_void_p, ctypes.c_double, ctypes.c_double, ctypes.c_int
         )
         self._goes_forward = 1  # to the FMU: it will not be told to go back
@@ -126,7 +126,7 @@ class Component:
 
     def step(self, time: float, step: float) -> None:
         """One communication step [s]."""
-        status = self._do_step(self.pointer, time, step, self._goes_forward)
+        status = self.stepper(self.pointer, time, step, self._goes_forward)
         if status > WARNING:
             self.fail("fmi2DoStep", status)
 

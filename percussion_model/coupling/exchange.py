@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import ctypes
 import functools
-import itertools
 import struct
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
@@ -26,13 +25,15 @@ _IN_C: dict[str, tuple[Any, str]] = {
 WARNING = 1
 
 
-class _Group:
+class Group:
     """Variables of one family with the arrays of their calls."""
 
-    def __init__(self, component: Component, family: str, names: Sequence[str], kind: str) -> None:
+    def __init__(
+        self, component: Component, family: str, names: Sequence[str], kind: str, begin: int
+    ) -> None:
         references = [component.find(name).valueReference for name in names]
         self.family = family
-        self.begin, self.end = 0, len(names)  # places among all values
+        self.begin, self.end = begin, begin + len(names)  # places among all values
         kind_in_c, letter = _IN_C[family]
         values = (kind_in_c * len(names))()
         packed = struct.Struct(f"{len(names)}{letter}")
@@ -48,35 +49,47 @@ class _Group:
         )
 
 
-def _grouped(
-    component: Component, names: Sequence[str], kind: str
-) -> tuple[list[str], list[_Group]]:
-    """The names family by family, and what calls them."""
-    found: dict[str, list[str]] = {}
-    for name in names:
-        found.setdefault(FAMILIES[component.find(name).type], []).append(name)
-    families = [family for family in ORDER if family in found]
-    ordered = [name for family in families for name in found[family]]
-    return ordered, [_Group(component, family, found[family], kind) for family in families]
+class Exchange:
+    """Variables of an FMU that are read, or set, all at once.
 
-
-class Reader:
-    """Reads variables of an FMU.
+    Parameters
+    ----------
+    component : Component
+    names : sequence of str
+    kind : {"Get", "Set"}
 
     Attributes
     ----------
     names : list of str
-        In the order of the values.
+        In the order of the values: family by family.
+    groups : list of Group
+        Families with what calls them.
     """
 
-    def __init__(self, component: Component, names: Sequence[str]) -> None:
+    def __init__(self, component: Component, names: Sequence[str], kind: str) -> None:
+        found: dict[str, list[str]] = {}
+        for name in names:
+            found.setdefault(FAMILIES[component.find(name).type], []).append(name)
         self.component = component
-        self.names, self._groups = _grouped(component, names, "Get")
+        self.names: list[str] = []
+        self.groups: list[Group] = []
+        for family in ORDER:
+            if family in found:
+                group = Group(component, family, found[family], kind, len(self.names))
+                self.groups.append(group)
+                self.names += found[family]
+
+
+class Reader(Exchange):
+    """Reads variables of an FMU."""
+
+    def __init__(self, component: Component, names: Sequence[str]) -> None:
+        super().__init__(component, names, "Get")
 
     def read(self) -> list[Any]:
         """Present values."""
         found: list[Any] = []
-        for group in self._groups:
+        for group in self.groups:
             status = group.call(*group.arguments)
             if status > WARNING:
                 self.component.fail(group.name, status)
@@ -84,30 +97,21 @@ class Reader:
         return found
 
 
-class Writer:
-    """Sets variables of an FMU; a family whose values are as before is left alone.
-
-    Attributes
-    ----------
-    names : list of str
-        In the order of the values.
-    """
+class Writer(Exchange):
+    """Sets variables of an FMU; a family whose values are as before is left alone."""
 
     def __init__(self, component: Component, names: Sequence[str]) -> None:
-        self.component = component
-        self.names, self._groups = _grouped(component, names, "Set")
-        for before, group in itertools.pairwise(self._groups):
-            group.begin, group.end = before.end, before.end + group.end
+        super().__init__(component, names, "Set")
         self._last: list[Any] = []
         self.forget()
 
     def forget(self) -> None:
         """Set all values the next time: the FMU may have others than were set last."""
-        self._last = [None for _ in self._groups]
+        self._last = [None for _ in self.groups]
 
     def write(self, values: Sequence[Any]) -> None:
         """Set values, in the order of the names."""
-        for k, group in enumerate(self._groups):
+        for k, group in enumerate(self.groups):
             chosen = values[group.begin : group.end]
             if chosen == self._last[k]:
                 continue

@@ -31,3 +31,11 @@ def read_value(text: str) -> tuple[str, float | bool | str]:
         return signal, float(value)
     except ValueError:
         return signal, value
+
+
+def read_pace(text: str) -> tuple[str, int]:
+    """Component and steps of `component=steps`."""
+    name, _, steps = text.partition("=")
+    if not name or not steps.isdecimal():
+        raise CouplingError(f"--every {text}: must be COMPONENT=STEPS, a whole number from 1")
+    return name, int(steps)

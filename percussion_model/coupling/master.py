@@ -7,8 +7,6 @@ the first error; so the loop is here, with the same meaning of a step.
 
 from __future__ import annotations
 
-import gc
-import math
 import shutil
 import tempfile
 import time as clock
@@ -20,17 +18,19 @@ import numpy as np
 from fmpy import extract
 
 from percussion_model.coupling.archive import choose_values, unpack
+from percussion_model.coupling.compiled import CompiledStep, can_compile
 from percussion_model.coupling.component import Component, CouplingError
 from percussion_model.coupling.coupled_run import CoupledRun
+from percussion_model.coupling.pace import PacedPort, check_pace
 from percussion_model.coupling.port import OnWay, Port
 from percussion_model.coupling.python_part import PythonPart, Work
 from percussion_model.coupling.rejection import StepControl
+from percussion_model.coupling.stepping import little_collection, whole_steps
+from percussion_model.time_loop import stop_on_interrupt
 
 Order = Literal["jacobi", "gauss-seidel"]
 # Passes over the outputs while all parts are initialised: as many as the longest chain.
 INITIAL_PASSES = 4
-# A number of steps is whole if it misses by no more than this.
-ROUNDING = 1e-9
 
 
 class Coupling:
@@ -49,6 +49,10 @@ class Coupling:
         Whether a part sees what parts before it in the archive gave in the same step.
     on_way : callable, optional
         Changes what an input receives: takes signal of the input, time [s], value.
+    every : mapping, optional
+        Steps of the loop that a part does as one, by component: for parts that change slowly.
+    compiled : bool
+        Whether compiled code makes the calls where all parts are FMUs; the bits are the same.
     """
 
     def __init__(
@@ -58,13 +62,17 @@ class Coupling:
         replaced: Mapping[str, str | Path | Work] | None = None,
         order: Order = "jacobi",
         on_way: OnWay | None = None,
+        every: Mapping[str, int] | None = None,
+        compiled: bool = True,
     ) -> None:
         self.path = Path(path)
-        self.order, self.on_way = order, on_way
+        self.order, self.on_way, self.compiled = order, on_way, compiled
+        self._compiled_step: CompiledStep | None = None
         self._folder = tempfile.mkdtemp(prefix="ssp-")
         self.parts: dict[str, Any] = {}
         try:
             self._set_up(dict(parameters or {}), dict(replaced or {}))
+            self.every = check_pace(every or {}, list(self.parts))
         except BaseException:
             self.free()
             raise
@@ -129,18 +137,18 @@ class Coupling:
         CoupledRun
             With what there is, and the reason, where a part failed on the way.
         """
-        count, every = _steps(duration, step, interval)
+        count, every = whole_steps(duration, step, interval)
         if tolerance is not None and self.on_way is not None:
             raise CouplingError("on_way cannot be taken back with a step: leave the tolerance out")
+        if tolerance is not None and self.every:
+            raise CouplingError(f"every {self.every} and a tolerance do not go together")
         try:
             self._connect(list(signals))
             self._initialise()
             control = None if tolerance is None else StepControl(self.ports, step, tolerance)
-            # what is there now stays: no need to look for garbage in it again and again
-            gc.freeze()
-            return self._loop(count, step, every, control, progress)
+            with little_collection():
+                return self._loop(count, step, every, control, progress)
         finally:
-            gc.unfreeze()
             self.free()
 
     def _loop(
@@ -153,19 +161,23 @@ class Coupling:
     ) -> CoupledRun:
         names = [f"{port.name}.{name}" for port in self.ports for name in port.taken + port.kept]
         rows = [[0.0, *self._row()]]
-        error, done, began = "", 0, clock.perf_counter()
-        go = self.step if control is None else control.stepping(self.step)
-        for k in range(count):
-            try:
-                go(k * step, step)
-            except CouplingError as failure:
-                error = f"at {k * step:.6g} s {failure}"
-                break
-            done = k + 1
-            if done % every == 0 or done == count:
-                rows.append([done * step, *self._row()])
-                if progress is not None:
-                    progress(done * step)
+        go, error, done = self._stepping(count, control), "", 0
+        began = clock.perf_counter()
+        with stop_on_interrupt(keep=True) as asked_to_stop:
+            for k in range(count):
+                try:
+                    go(k * step, step)
+                except CouplingError as failure:
+                    error = f"at {k * step:.6g} s {failure}"
+                    break
+                done = k + 1
+                if done % every == 0 or done == count:
+                    rows.append([done * step, *self._row()])
+                    if progress is not None:
+                        progress(done * step)
+                if asked_to_stop():
+                    error = f"at {done * step:.6g} s it was interrupted"
+                    break
         wall_time = clock.perf_counter() - began
         table = np.array(rows, dtype=float)
         columns = {name: table[:, k] for k, name in enumerate(["time", *names])}
@@ -174,6 +186,18 @@ class Coupling:
         return CoupledRun(
             columns, step, control.done, error, control.tried, control.rejected, wall_time
         )
+
+    def _stepping(self, count: int, control: StepControl | None) -> Callable[[float, float], None]:
+        """What does a step: by Python, or by compiled code where that is possible."""
+        if control is not None:
+            return control.stepping(self.step)
+        if self.compiled and can_compile(self.ports):
+            self._compiled_step = CompiledStep(self.ports, self.order, count, self.every)
+            return self._compiled_step
+        for port in self.ports:
+            if isinstance(port, PacedPort):
+                port.start(self.every[port.name], count)
+        return self.step
 
     def _connect(self, signals: list[str]) -> None:
         """Make what reads and sets; everything that is kept is read."""
@@ -189,8 +213,9 @@ class Coupling:
                 raise CouplingError(f"{signal}: there is no component {name}")
             if output not in taken[name] + kept[name]:
                 kept[name].append(output)
+        kinds = {False: Port, True: PacedPort}
         self.ports = [
-            Port(part, self._links[name], taken[name], kept[name], self.on_way)
+            kinds[name in self.every](part, self._links[name], taken[name], kept[name], self.on_way)
             for name, part in self.parts.items()
         ]
         places: dict[tuple[str, str], int] = {}
@@ -239,6 +264,8 @@ class Coupling:
             port.take()
 
     def _row(self) -> list[Any]:
+        if self._compiled_step is not None:
+            self._compiled_step.publish()
         return [value for port in self.ports for value in port.row()]
 
     def free(self) -> None:
@@ -247,21 +274,6 @@ class Coupling:
             if isinstance(part, Component):
                 part.free()
         shutil.rmtree(self._folder, ignore_errors=True)
-
-
-def _steps(duration: float, step: float, interval: float | None) -> tuple[int, int]:
-    """Number of steps, and of steps between rows."""
-    given = {"duration": duration, "step": step}
-    if interval is not None:
-        given["interval"] = interval
-    for name, value in given.items():
-        if not 0.0 < value < math.inf:
-            raise CouplingError(f"{name} = {value!r} s: must be above 0 s")
-    count = math.floor(duration / step + ROUNDING)
-    if count < 1:
-        raise CouplingError(f"step = {step!r} s: is longer than the duration of {duration!r} s")
-    every = 1 if interval is None else max(1, round(interval / step))
-    return count, every
 
 
 __all__ = ["CoupledRun", "Coupling", "Order"]

@@ -40,11 +40,11 @@ class Port:
     ) -> None:
         self.part, self.name, self.on_way = part, part.name, on_way
         self.step: Callable[[float, float], None] = part.step
-        reader, late = part.reader(taken), part.reader(kept)
-        self.taken: list[str] = reader.names
+        self.reader, late = part.reader(taken), part.reader(kept)
+        self.taken: list[str] = self.reader.names
         self.kept: list[str] = late.names
         self.writer = part.writer([sink for sink, _, _ in links])
-        self.read: Callable[[], list[Any]] = reader.read
+        self.read: Callable[[], list[Any]] = self.reader.read
         self.read_kept: Callable[[], list[Any]] = late.read
         self.write: Callable[[Sequence[Any]], None] = self.writer.write
         self.begin = self.end = 0
@@ -57,9 +57,9 @@ class Port:
             self.begin = places[self.name, self.taken[0]]
             self.end = self.begin + len(self.taken)
         sinks = self.writer.names
-        self._places = [places[self._links[sink]] for sink in sinks]
+        self.places = [places[self._links[sink]] for sink in sinks]
         self._signals = [f"{self.name}.{sink}" for sink in sinks]
-        places_of_mine = self._places
+        places_of_mine = self.places
         self._chosen: Callable[[list[Any]], tuple[Any, ...]] = (
             itemgetter(*places_of_mine)
             if len(places_of_mine) > 1
@@ -69,7 +69,7 @@ class Port:
     @property
     def is_fed(self) -> bool:
         """Whether all inputs have a value."""
-        return None not in [self.values[place] for place in self._places]
+        return None not in [self.values[place] for place in self.places]
 
     def give(self, time: float) -> None:
         """Set the inputs."""
@@ -89,10 +89,14 @@ class Port:
             said = dict(zip(self.taken, found, strict=False))
             raise CouplingError(f"{self.name}: {said} are not all numbers") from None
         if not sound:
-            for output, value in zip(self.taken, found, strict=True):
-                if not math.isfinite(value):
-                    raise CouplingError(f"{self.name}: {output} = {value!r} is no number")
+            self.refuse(found)
         self.values[self.begin : self.end] = found
+
+    def refuse(self, found: Sequence[Any]) -> None:
+        """Raise the error of outputs of which one is no number."""
+        for output, value in zip(self.taken, found, strict=True):
+            if not math.isfinite(value):
+                raise CouplingError(f"{self.name}: {output} = {value!r} is no number")
 
     def row(self) -> list[Any]:
         """Values of all outputs that are kept."""

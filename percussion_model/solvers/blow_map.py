@@ -40,6 +40,8 @@ _INPUTS = {
     "reversal_distance": WORD["reversal"],
     "loading_stiffness": WORD["k_r"],
 }
+# Those that the flight follows; the others count at the next blow.
+_FLIGHT = frozenset({"drive_force", "reversal_distance"})
 _FIXED = {
     "unloading_ratio": "rock.unloading_ratio",
     "barrier_damping": "rock.barrier_damping",
@@ -265,7 +267,8 @@ class BlowMapSolver:
         for name, value in inputs.items():
             if name in _INPUTS:
                 state.numbers[_INPUTS[name]] = value
-        self._plan(state)
+        if not _FLIGHT.isdisjoint(inputs):
+            self._plan(state)
 
     def grid_point_after(self, state: MapState, t: float) -> float:
         """First time at or after `t` at which inputs can change: `t` itself [s]."""

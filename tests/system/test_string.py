@@ -34,7 +34,7 @@ def struck(values, cells_travelled):
     made = body(Waves, values)
     velocities, forces = [], []
     for _ in range(cells_travelled):
-        made.advance(STEP_FORCE, 0.0)
+        made.advance([(STEP_FORCE, 0.0)])
         velocities.append(made.down + made.up)
         forces.append(made.impedance * (made.down - made.up))
     return made, np.array(velocities), np.array(forces)
@@ -66,10 +66,46 @@ def test_a_step_reflects_with_the_right_sign(values, sign):
     )
 
 
+FORCES = [(STEP_FORCE * math.sin(k), 3e3 * math.cos(0.3 * k)) for k in range(60)]
+
+
+def moved(values, at_once):
+    made = body(Waves, values, rest=2e3)
+    for begin in range(0, len(FORCES), at_once):
+        made.advance(FORCES[begin : begin + at_once])
+    return made
+
+
+@pytest.mark.parametrize("at_once", [2, 5, 12])  # of twelve cells
+def test_several_transit_times_at_once_are_those_one_by_one(at_once):
+    values = {**VALUES, "friction.viscosity": 0.0}
+    slow, quick = moved(values, 1), moved(values, at_once)
+    assert quick.ring == pytest.approx(slow.ring, rel=1e-11, abs=1e-12)
+    for name in ("head", "casing", "head_velocity", "casing_velocity", "weight_work", "total"):
+        assert getattr(quick, name) == pytest.approx(getattr(slow, name), rel=1e-11), name
+
+
+@pytest.mark.parametrize("friction", ["friction.viscosity", "friction.force"])
+def test_friction_that_acts_after_several_transit_times_balances(friction):
+    """It acts in turn with the waves: a small error beside its effect, and no momentum is lost."""
+    free = {**VALUES, "friction.viscosity": 0.0}
+    values = {**free, friction: 200.0}
+    slow = moved(values, 1).ring
+    effect = np.linalg.norm(slow - moved(free, 1).ring)
+    assert np.linalg.norm(moved(values, 3).ring - slow) < 0.1 * effect
+    for count in (1, 12):
+        made = body(Waves, values, rest=2e3)
+        for begin in range(0, len(FORCES), count):
+            made.advance(FORCES[begin : begin + count])
+        pushed = made.step * (sum(map(sum, FORCES)) + len(FORCES) * made.weight)
+        assert made.lost_momentum != 0.0
+        assert made.momentum + made.lost_momentum == pytest.approx(pushed, rel=1e-11)
+
+
 def settle(made, head_force, casing_force, duration):
     if isinstance(made, Waves):
         for _ in range(round(duration / made.step)):
-            made.advance(head_force, casing_force)
+            made.advance([(head_force, casing_force)])
     else:
         for _ in range(round(duration / 1e-3)):
             made.go_on(head_force, casing_force, 1e-3)
@@ -154,7 +190,7 @@ def test_waves_and_lumps_agree_where_motion_is_slow():
         for t in times:
             push = bottom - made.weight + 2000.0 * math.sin(2.0 * math.pi * 2.0 * t)
             if kind is Waves:
-                made.advance(push, -bottom)
+                made.advance([(push, -bottom)])
             else:
                 made.go_on(push, -bottom, 1e-4)
         ways.append(made.head)

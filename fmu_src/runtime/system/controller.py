@@ -37,6 +37,7 @@ class DrillController(Model):
             setattr(self, name, 0.0)
         self.mode = DRILLING
         self.seeker = Seeker(parameters)
+        self._share = 0.0, 0.0  # of a step that the filter of the speed lets through
 
     def begin(self, inputs: dict[str, Any]) -> None:
         """Start with the force that the rig has."""
@@ -50,9 +51,9 @@ class DrillController(Model):
         """One sample of the controller."""
         p, h = self.parameters, step_size
         self.time += h
-        self.speed += (1.0 - math.exp(-h / p["speed_filter"])) * (
-            inputs["head_velocity"] - self.speed
-        )
+        if h != self._share[0]:
+            self._share = h, 1.0 - math.exp(-h / p["speed_filter"])
+        self.speed += self._share[1] * (inputs["head_velocity"] - self.speed)
         self._choose_mode(inputs, h)
         goal, pressure = inputs["feed_setpoint"], inputs["pressure_setpoint"]
         if p["seek.on"]:
@@ -142,13 +143,18 @@ class DrillController(Model):
         most = p["pressure_rate"] * h
         self.pressure += min(max(goal - self.pressure, -most), most)
 
-    def outputs(self) -> dict[str, Any]:
-        """Present values by name."""
+    def signals(self) -> dict[str, Any]:
+        """What rig, supply and hammer take."""
         percussion = self.mode != VOID or self.parameters["cutback.pressure"] > 0.0
         return {
             "force_command": self.command,
             "pressure_command": self.pressure,
-            "percussion_on": bool(percussion),
+            "percussion_on": percussion,
+        }
+
+    def outputs(self) -> dict[str, Any]:
+        """Present values by name."""
+        return self.signals() | {
             "mode": int(self.mode),
             "feed_wanted": self.wanted,
             "seek.centre": self.seeker.centres[FEED],

@@ -49,9 +49,15 @@ class Shoulder:
         self.damping = parameters["shoulder.damping"]
         self.mass = parameters["shoulder.bit_mass"]
         self.passive = parameters["shoulder.passive"]
+        self._allowed = 0.0, (self.stiffness, self.damping)  # for a step [s]
 
     def constants(self, h: float) -> tuple[float, float]:
         """Stiffness [N/m] and damping [N s/m] that a communication step `h` [s] allows."""
+        if h != self._allowed[0]:
+            self._allowed = h, self._limited(h)
+        return self._allowed[1]
+
+    def _limited(self, h: float) -> tuple[float, float]:
         if not self.passive:
             return self.stiffness, self.damping
         most = SHARE_OF_MASS * self.mass / h
@@ -104,6 +110,7 @@ class DrillString(Model):
         for name in self.STATE:
             setattr(self, name, 0.0)
         self.was_asked = False
+        self._share = 0.0, 0.0  # of a step that the filter of the feed lets through
 
     def begin(self, inputs: dict[str, Any]) -> None:
         """Stand still in balance, the shoulder loaded by `start.feed_force`."""
@@ -138,8 +145,9 @@ class DrillString(Model):
         self.force_before = self.force
         self._push((bit - self.bit) / h, bit, h)
         self.bit = bit
-        share = 1.0 - math.exp(-h / self.parameters["feed_filter"])
-        self.mean_force += share * (self.force - self.mean_force)
+        if h != self._share[0]:
+            self._share = h, 1.0 - math.exp(-h / self.parameters["feed_filter"])
+        self.mean_force += self._share[1] * (self.force - self.mean_force)
         self._rods(inputs["add_rod"])
 
     def _travel(self, head_force: float, casing_force: float, h: float) -> None:
@@ -150,21 +158,27 @@ class DrillString(Model):
             for _ in range(count):
                 body.go_on(head_force, casing_force, h / count)
             return
-        left, lag, cell = h, self.lag, body.step
-        while lag + left >= cell * (1.0 - ROUNDING):
-            if lag > 0.0:
-                part = min(cell - lag, left)
-                self.head_impulse_due += head_force * part
-                self.casing_impulse_due += casing_force * part
-                body.advance(self.head_impulse_due / cell, self.casing_impulse_due / cell)
-                self.head_impulse_due = self.casing_impulse_due = lag = 0.0
-            else:
-                part = min(cell, left)
-                body.advance(head_force * part / cell, casing_force * part / cell)
-            left = max(0.0, left - part)
-        self.head_impulse_due += head_force * left
-        self.casing_impulse_due += casing_force * left
-        self.lag = lag + left
+        cell, enough = body.step, body.step * (1.0 - ROUNDING)
+        if self.lag + h < enough:
+            self.head_impulse_due += head_force * h
+            self.casing_impulse_due += casing_force * h
+            self.lag += h
+            return
+        # what has acted since the last transit time ended counts in the first one
+        first = cell - self.lag
+        forces = [
+            (
+                (self.head_impulse_due + head_force * first) / cell,
+                (self.casing_impulse_due + casing_force * first) / cell,
+            )
+        ]
+        whole = max(0, math.floor((h - first) / cell + ROUNDING))
+        forces += [(head_force, casing_force)] * whole
+        for begin in range(0, len(forces), body.cells):
+            body.advance(forces[begin : begin + body.cells])
+        self.lag = max(0.0, h - first - whole * cell)
+        self.head_impulse_due = head_force * self.lag
+        self.casing_impulse_due = casing_force * self.lag
 
     def casing_place(self) -> float:
         """Displacement of the casing at the communication point [m]."""
@@ -246,4 +260,4 @@ class DrillString(Model):
         for name, value in saved["body"].items():
             setattr(self.body, name, np.array(value) if isinstance(value, list) else value)
         if isinstance(self.body, Lumps):
-            self.body._assemble()
+            self.body.assemble()

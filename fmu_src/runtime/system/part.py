@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import importlib
 import json
+from collections.abc import Mapping
+from operator import itemgetter
 from typing import Any, ClassVar
 
 from fmu_src.runtime.calls import STEPPING, Phase, guarded
 from fmu_src.runtime.slave import Slave
 from fmu_src.runtime.states import StateError, fingerprint, pack, unpack
+from fmu_src.runtime.values import Read
 
 
 class Model:
@@ -75,17 +78,30 @@ class Part(Slave):
         self._input_references = [reference for _, reference in self._inputs]
         self._names = {one.reference: one.name for one in known}
         self._model: Model | None = None
-        self._found: dict[str, Any] | None = None
+        self._found: Mapping[str, Any] | None = None  # outputs that were asked for
         self._fingerprint: bytes | None = None
         self._given = self.inputs()  # as `inputs` gives them
-        self._new: list[int] = []  # inputs to be checked
+        self._doubtful: list[int] = []  # inputs to be checked
 
     def changed(self, references: list[int]) -> None:
         """Check inputs before the next step; before the first one, make the model anew."""
         if self.phase < STEPPING:
             self._model = self._found = self._fingerprint = None
             return
-        self._new += references
+        for reference in references:
+            self._given[self._names[reference]] = self.values[reference]
+        self._doubtful += references
+
+    def take_late(self) -> None:
+        """Take inputs that were set and not yet looked at."""
+        held, given = self.values, self._given
+        for references, values in self.late.items():
+            plan = self._inputs_alone[references]
+            for (reference, name, low, high), value in zip(plan, values, strict=True):
+                held[reference] = given[name] = value
+                if not low <= value <= high:
+                    self._doubtful.append(reference)
+        self.late.clear()
 
     def inputs(self) -> dict[str, Any]:
         """Present inputs by name."""
@@ -115,35 +131,33 @@ class Part(Slave):
         self.ready()
 
     def step(self, time: float, step_size: float) -> None:
-        """Check the inputs, then go on."""
-        if self._new:
-            values, names, given = self.values, self._names, self._given
-            for reference in self._new:
-                value = values[reference]
-                low, high = self._plain_bounds[reference]
-                if not low <= value <= high:
-                    self.check([reference])
-                given[names[reference]] = value
-            self._new.clear()
+        """Pass on changed inputs, then go on."""
+        if self.late:
+            self.take_late()
+        if self._doubtful:
+            self.check(self._doubtful)
+            self._doubtful.clear()
         (self._model or self.ready()).step(self._given, step_size)
         self._found = None
 
-    def asked(self, references: list[int]) -> list[str]:
-        """Names of outputs."""
-        return [self._names[reference] for reference in references]
+    def reader(self, references: list[int]) -> Read:
+        """What gives the present values of these outputs; 0 before there are any."""
+        names = [self._names[reference] for reference in references]
+        pick = itemgetter(*names) if len(names) > 1 else lambda found: [found[n] for n in names]
 
-    def outputs(self, asked: list[str]) -> list[Any]:
-        """Present values of outputs; 0 before there are any."""
-        found = self._found
-        if found is None:
-            if self._model is None and self.phase != Phase.INITIALISING:
-                return [0] * len(asked)
-            found = self._found = self.ready().signals()
-        try:
-            return [found[name] for name in asked]
-        except KeyError:  # one that no other part takes
-            found = self._found = self.ready().outputs()
-        return [found[name] for name in asked]
+        def read(part: Part) -> list[Any]:
+            found = part._found
+            if found is None:
+                if part._model is None and part.phase != Phase.INITIALISING:
+                    return [0] * len(names)
+                found = part._found = part.ready().signals()
+            try:
+                return list(pick(found))
+            except KeyError:  # one that no other part takes
+                found = part._found = part.ready().outputs()
+            return list(pick(found))
+
+        return read
 
     def fingerprint(self) -> bytes:
         """Hash of the kind of part and its parameters."""
@@ -155,6 +169,7 @@ class Part(Slave):
     def _get_fmu_state(self) -> bytes:
         if self._model is None:
             raise ValueError("there is no state to save before the initialisation has ended")
+        self.take_late()
         body = {
             "phase": int(self.phase),
             "times": [self.start_time, self.now],
@@ -169,13 +184,14 @@ class Part(Slave):
             body = json.loads(unpack(self.fingerprint(), state))
         except json.JSONDecodeError as error:
             raise StateError(f"the saved state cannot be read: {error}") from None
+        self.late.clear()
         for name, value in body["inputs"].items():
             self.values[self.by_name[name]] = value
         self.ready().restore(body["model"])
         self.phase = Phase(body["phase"])
         self.start_time, self.now = body["times"]
         self._given, self._found = self.inputs(), None
-        self._new = list(self._input_references)
+        self._doubtful = list(self._input_references)
 
 
 class DrillStringPart(Part):

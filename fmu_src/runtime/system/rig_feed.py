@@ -29,6 +29,7 @@ class RigFeed(Model):
         self.gain = self.capacity / p["servo.time"]
         self.flow_limit = p["servo.velocity"] * self.area
         self.highest = p["force_limit"] / self.area
+        self.leak, self.friction = p["cylinder.leakage"], p["slide.friction"]
         self.pressure = self.relief_volume = self.energy = self.speed = 0.0
         self.limited = False
 
@@ -39,32 +40,32 @@ class RigFeed(Model):
 
     def step(self, inputs: dict[str, Any], step_size: float) -> None:
         """Integrate the pressure, implicit in the flow of the valve."""
-        wanted = inputs["force_command"] / self.area
-        wanted = min(max(wanted, -self.highest), self.highest)
-        self.speed = inputs["head_velocity"]
+        highest, speed = self.highest, inputs["head_velocity"]
+        wanted = min(max(inputs["force_command"] / self.area, -highest), highest)
+        self.speed = speed
         count = max(1, math.ceil(step_size / LONGEST_STEP))
         h = step_size / count
-        leak = self.parameters["cylinder.leakage"]
+        share = h / self.capacity  # pressure for a flow
         for _ in range(count):
-            held = self.pressure - h / self.capacity * self.area * self.speed
-            new = (held + h / self.capacity * self.gain * wanted) / (
-                1.0 + h / self.capacity * (self.gain + leak)
-            )
+            held = self.pressure - share * self.area * speed
+            new = (held + share * self.gain * wanted) / (1.0 + share * (self.gain + self.leak))
             flow = self.gain * (wanted - new)
             self.limited = abs(flow) > self.flow_limit
             if self.limited:
                 flow = math.copysign(self.flow_limit, flow)
-                new = (held + h / self.capacity * flow) / (1.0 + h / self.capacity * leak)
-            clipped = min(max(new, -self.highest), self.highest)
+                new = (held + share * flow) / (1.0 + share * self.leak)
+            clipped = min(max(new, -highest), highest)
             self.relief_volume += self.capacity * abs(new - clipped)
             self.energy += h * flow * clipped
             self.pressure = clipped
 
+    def signals(self) -> dict[str, Any]:
+        """What the string takes."""
+        return {"force": self.area * self.pressure - self.friction * self.speed}
+
     def outputs(self) -> dict[str, Any]:
         """Present values by name."""
-        force = self.area * self.pressure
-        return {
-            "force": force - self.parameters["slide.friction"] * self.speed,
+        return self.signals() | {
             "pressure": self.pressure,
             "energy": self.energy,
             "relief_volume": self.relief_volume,

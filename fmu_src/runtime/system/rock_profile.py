@@ -41,6 +41,9 @@ class RockProfile(Model):
         self.tops = [layer[0] for layer in self.layers]
         self.depth = self.feed = self.pressure = 0.0
         self._knots: dict[int, float] = {}
+        self._spread, self._length = p["variation.spread"], p["variation.length"]
+        self._between = (-1, 0.0, 0.0)  # number of the knot above the bit, and two of them
+        self._arm = p["torque_arm"]
 
     def begin(self, inputs: dict[str, Any]) -> None:
         """Look at the rock below the bit."""
@@ -55,14 +58,15 @@ class RockProfile(Model):
 
     def variation(self, depth: float) -> float:
         """The factor exp(s n - s^2/2) at a depth [m]."""
-        p = self.parameters
-        s = p["variation.spread"]
+        s = self._spread
         if s == 0.0:
             return 1.0
-        place = depth / p["variation.length"]
-        below = math.floor(place)
-        share = place - below
-        low, high = self._knot(below), self._knot(below + 1)
+        place = depth / self._length
+        above = math.floor(place)
+        if above != self._between[0]:
+            self._between = above, self._knot(above), self._knot(above + 1)
+        share = place - above
+        _, low, high = self._between
         # straight between knots, with the spread kept
         n = ((1.0 - share) * low + share * high) / math.hypot(1.0 - share, share)
         return math.exp(s * n - 0.5 * s * s)
@@ -75,21 +79,34 @@ class RockProfile(Model):
             self._knots[number] = random.Random(seed).gauss(0.0, 1.0)
         return self._knots[number]
 
-    def outputs(self) -> dict[str, Any]:
-        """Present values by name."""
-        p = self.parameters
-        number = max(0, bisect_right(self.tops, self.depth) - 1)
-        _, stiffness, ratio, torque, which = self.layers[number]
+    def _layer(self) -> tuple[float, float, float, float, int]:
+        return self.layers[max(0, bisect_right(self.tops, self.depth) - 1)]
+
+    def _ridden(self, value: float, name: str, best: str) -> float:
+        """Factor on the stiffness that is least at the best feed, or pressure."""
+        factor = self.parameters[f"{name}.factor"]
+        if factor == 0.0:
+            return 1.0
+        off = value / self.parameters[f"{name}.{best}"] - 1.0
+        return 1.0 + factor * off * off
+
+    def signals(self) -> dict[str, Any]:
+        """What hammer and controller take."""
+        _, stiffness, ratio, torque, _ = self._layer()
         factor = self.variation(self.depth)
-        for value, name, best in ((self.feed, "best_feed", "force"),
-                                  (self.pressure, "best_pressure", "pressure")):  # fmt: skip
-            off = value / p[f"{name}.{best}"] - 1.0
-            factor *= 1.0 + p[f"{name}.factor"] * off * off
+        factor *= self._ridden(self.feed, "best_feed", "force")
+        factor *= self._ridden(self.pressure, "best_pressure", "pressure")
         return {
             "loading_stiffness": stiffness * factor,
             "unloading_ratio": ratio,
+            "rotation_torque": self._arm * torque * self.feed,
+        }
+
+    def outputs(self) -> dict[str, Any]:
+        """Present values by name."""
+        _, stiffness, _, _, which = self._layer()
+        return self.signals() | {
             "depth": self.depth,
-            "rotation_torque": p["torque_arm"] * torque * self.feed,
-            "in_void": stiffness <= p["void_stiffness"],
+            "in_void": stiffness <= self.parameters["void_stiffness"],
             "layer": which,
         }

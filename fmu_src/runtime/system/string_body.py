@@ -68,11 +68,6 @@ class Rods:
         return after
 
     @property
-    def rubs(self) -> bool:
-        """Whether there is wall friction at all."""
-        return self.sticking > 0.0 or self.viscous > 0.0
-
-    @property
     def weight(self) -> float:
         """Weight of head, rods and casing, less buoyancy [N]."""
         rods = self.density * self.area * self.length_of_rod * self.count
@@ -81,6 +76,8 @@ class Rods:
 
 class Lumps(Rods):
     """A mass for each rod between springs; the implicit midpoint rule, any step.
+
+    Without Coulomb friction a step is a matrix, which is kept: one product moves the string.
 
     Attributes
     ----------
@@ -95,10 +92,9 @@ class Lumps(Rods):
         super().__init__(parameters, count)
         self.places = np.zeros(count + 2)
         self.velocities = np.zeros(count + 2)
-        self._made: tuple[int, float] = (0, 0.0)
-        self._assemble()
+        self.assemble()
 
-    def _assemble(self) -> None:
+    def assemble(self) -> None:
         """Masses, weights, and springs: half a rod's length beside an end."""
         n = self.count
         rod = self.density * self.area * self.length_of_rod
@@ -114,14 +110,33 @@ class Lumps(Rods):
             self.stiffness[i + 1, i + 1] += k
             self.stiffness[i, i + 1] -= k
             self.stiffness[i + 1, i] -= k
-        self._made = (0, 0.0)
+        self._made_for = 0.0  # step of the operators [s]
+        self._ones = np.ones(n)
+        # places, velocities, forces on head and casing, and 1 for the weights; now and next
+        self._buffers = [np.zeros(2 * n + 7), np.zeros(2 * n + 7)]
+        for buffer in self._buffers:
+            buffer[-1] = 1.0
+        now = self._buffers[0]
+        now[: n + 2], now[n + 2 : -3] = self.places, self.velocities
+        self._see(now)
 
-    def _operator(self, h: float) -> np.ndarray:
-        if self._made != (self.count, h):
-            # (M + h^2/4 K) v_mean = M v + h/2 (f - K x)
-            self._inverse = np.linalg.inv(np.diag(self.masses) + 0.25 * h * h * self.stiffness)
-            self._made = (self.count, h)
-        return self._inverse
+    def _see(self, buffer: np.ndarray) -> None:
+        n = self.count
+        self.places, self.velocities = buffer[: n + 2], buffer[n + 2 : -3]
+
+    def _make(self, h: float) -> None:
+        """Operators of a step `h` [s]."""
+        n, m = self.count + 2, np.diag(self.masses)
+        # (M + h^2/4 K) v_mean = M v + h/2 (f - K x)
+        self._inverse = np.linalg.inv(m + 0.25 * h * h * self.stiffness)
+        half = 0.5 * h * self._inverse
+        mean = np.column_stack([-half @ self.stiffness, self._inverse @ m,
+                                half[:, 0], half[:, -1], half @ self.weights])  # fmt: skip
+        stay = np.eye(2 * n, 2 * n + 3)
+        self._left = 1.0 / (1.0 + self.viscous * self.length_of_rod / self.masses[1] * h)
+        kept = np.array([1.0, *[self._left] * self.count, 1.0])[:, None]
+        self._moves = np.vstack([stay[:n] + h * mean, kept * (2.0 * mean - stay[n:])])
+        self._made_for = h
 
     def rest(self, bottom_force: float) -> None:
         """Stand still, with this compression at the casing's upper side [N]."""
@@ -133,19 +148,40 @@ class Lumps(Rods):
 
     def go_on(self, head_force: float, casing_force: float, h: float) -> None:
         """Go on by a step `h` [s] under forces on head and casing [N], without weights."""
+        if h != self._made_for:
+            self._make(h)
+        if self.sticking > 0.0:
+            self._rub_and_go_on(head_force, casing_force, h)
+            return
+        now, after = self._buffers
+        before, last = self.places, self.count + 1
+        now[-3], now[-2] = head_force, casing_force
+        np.dot(self._moves, now, after[:-3])
+        self._buffers = [after, now]
+        self._see(after)
+        self.head += after.item(0) - now.item(0)
+        self.casing += after.item(last) - now.item(last)
+        self.weight_work += float(self.weights.dot(self.places - before))
+        self.head_velocity, self.casing_velocity = after.item(last + 1), after.item(-4)
+        if self.viscous > 0.0:
+            rods, left, mass = self.velocities[1:-1], self._left, self.masses.item(1)
+            self.friction_loss += 0.5 * mass * (1.0 / left**2 - 1.0) * float(rods.dot(rods))
+            self.lost_momentum += mass * (1.0 / left - 1.0) * float(rods.dot(self._ones))
+
+    def _rub_and_go_on(self, head_force: float, casing_force: float, h: float) -> None:
+        """The same with Coulomb friction."""
         force = self.weights - self.stiffness @ self.places
         force[0] += head_force
         force[-1] += casing_force
         before = self.velocities
-        mean = self._operator(h) @ (self.masses * before + 0.5 * h * force)
-        self.velocities = 2.0 * mean - before
+        mean = self._inverse @ (self.masses * before + 0.5 * h * force)
+        self.velocities[:] = 2.0 * mean - before
         self.weight_work += h * float(self.weights @ mean)
-        self.places = self.places + h * mean
+        self.places += h * mean
         self.head += h * float(mean[0])
         self.casing += h * float(mean[-1])
-        if self.rubs:
-            rods = self.velocities[1:-1]
-            self.velocities[1:-1] = self.rubbed(rods, float(self.masses[1]), self.length_of_rod, h)
+        rods = self.velocities[1:-1]
+        rods[:] = self.rubbed(rods.copy(), float(self.masses[1]), self.length_of_rod, h)
         self.head_velocity = float(self.velocities[0])
         self.casing_velocity = float(self.velocities[-1])
 
@@ -153,12 +189,13 @@ class Lumps(Rods):
         """Put a rod below the head, at rest in the compression of the place."""
         force = self.springs[0] * float(self.places[0] - self.places[1])
         v = float(self.velocities[0])
+        places, velocities, weight = self.places, self.velocities, float(self.weights[1])
         self.count += 1
-        self._assemble()
-        rod = float(self.places[1]) + force / self.springs[1]
-        head = rod + (force - self.weights[1]) / self.springs[0]
-        self.places = np.concatenate([[head, rod], self.places[1:]])
-        self.velocities = np.concatenate([[v, v], self.velocities[1:]])
+        rod = float(places[1]) + force / (0.5 * float(self.springs[0]))
+        head = rod + (force - weight) / float(self.springs[0])
+        self.places = np.concatenate([[head, rod], places[1:]])
+        self.velocities = np.concatenate([[v, v], velocities[1:]])
+        self.assemble()
 
     @property
     def stored(self) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -40,7 +41,7 @@ class Waves(Rods):
         self.ring = np.zeros(2 * count * self.cells_of_rod)
         # share of a velocity that viscous friction leaves in a step
         self._left_by_wall = 1.0 / (1.0 + self.viscous * self.cell / self.cell_mass * self.step)
-        self._head, self._casing = self._shares(self.head_mass), self._shares(self.casing_mass)
+        self._ends = self.impedance, self._shares(self.head_mass), self._shares(self.casing_mass)
         self._change = 0.25 * self.gravity * self.step
         self._head_weight = self.head_mass * self.head_gravity
         self._casing_weight = self.casing_mass * self.gravity
@@ -57,21 +58,24 @@ class Waves(Rods):
 
     @ring.setter
     def ring(self, waves: np.ndarray) -> None:
-        # two rings, from one to the other at each shift, and what is seen of them
-        self._now, self._next = (
-            (ring, ring[:-1], ring[1:], ring[::-1]) for ring in (waves, np.empty_like(waves))
-        )
-        self._room, self._ones = np.empty_like(waves), np.ones_like(waves)
+        # two rings, from one to the other at each shift, and back to front
+        self._now, self._next = ((ring, ring[::-1]) for ring in (waves, np.empty_like(waves)))
+        self._room = np.empty_like(waves)
+
+    @property
+    def cells(self) -> int:
+        """Number of cells."""
+        return len(self._now[0]) // 2
 
     @property
     def down(self) -> np.ndarray:
         """Velocity waves that go down; the first cell is below the head [m/s]."""
-        return self.ring[: len(self.ring) // 2]
+        return self.ring[: self.cells]
 
     @property
     def up(self) -> np.ndarray:
         """Those that go up; the first cell is below the head [m/s]."""
-        return self.ring[: len(self.ring) // 2 - 1 : -1]
+        return self.ring[: self.cells - 1 : -1]
 
     def rest(self, bottom_force: float) -> None:
         """Stand still, with this compression at the casing's upper side [N]."""
@@ -83,64 +87,78 @@ class Waves(Rods):
         self.up[:] = -self.down
         self.total = float(self.ring.sum())
 
-    def advance(self, head_force: float, casing_force: float) -> None:
-        """Go on by a transit time under forces on head and casing [N], without weights."""
-        h, now, other = self.step, self._now, self._next
-        cells = len(now[0]) // 2
-        # half of the weight's effect before the waves travel, half of it after
-        change, head_weight, casing_weight = self._change, self._head_weight, self._casing_weight
-        arriving_down = float(now[0][cells - 1]) + change
-        arriving_up = float(now[0][-1]) + change
-        top, self.head_velocity = self._end(
-            self.head_velocity, head_force + head_weight, arriving_up, self._head
-        )
-        bottom, self.casing_velocity = self._end(
-            self.casing_velocity, casing_force + casing_weight, arriving_down, self._casing
-        )
-        np.add(now[1], 2.0 * change, other[2])
-        ring = other[0]
-        ring[0], ring[cells] = top - arriving_up + change, bottom - arriving_down + change
-        self._now, self._next = other, now
-        self.head += top * h
-        self.casing += bottom * h
-        entered = top + bottom - 2.0 * (arriving_down + arriving_up)
-        # the sum of the waves in the middle of each half
-        fallen = 2.0 * self.total + entered + 4.0 * cells * change
-        self.weight_work += h * (head_weight * top + casing_weight * bottom)
-        self.weight_work += 2.0 * self.cell_mass * change * fallen
-        self.total += entered + 4.0 * cells * change
-        if self.sticking > 0.0:
-            self._stick(ring)
-        elif self.viscous > 0.0:
-            self._rub(ring, other[3])
+    def advance(self, forces: Sequence[tuple[float, float]]) -> None:
+        """Go on by some transit times, at most as many as there are cells.
 
-    def _stick(self, ring: np.ndarray) -> None:
+        The waves that meet an end in that time are on their way there already; so all others
+        move at once, and wall friction takes its share at the end.
+
+        Parameters
+        ----------
+        forces : sequence of tuple
+            On head and casing in each transit time, without weights [N].
+        """
+        (now, _), (ring, back) = self._now, self._next
+        count, cells, change = len(forces), len(now) // 2, self._change
+        impedance, (of_head, head_keeps), (of_casing, casing_keeps) = self._ends
+        head, casing = self.head_velocity, self.casing_velocity
+        # what comes first lies last
+        down, up = now[cells - count : cells].tolist(), now[-count:].tolist()
+        tops, bottoms = [0.0] * count, [0.0] * count
+        head_way = casing_way = fallen = 0.0
+        total, added = self.total, 4.0 * cells * change
+        gained = change  # half of the weight's effect on a wave before it meets an end
+        for k in range(count - 1, -1, -1):
+            head_force, casing_force = forces[count - 1 - k]
+            rising, falling = up[k] + gained, down[k] + gained
+            # an end tends to the velocity at which force and wave are in balance
+            settled = (head_force + self._head_weight) / impedance + 2.0 * rising
+            off = head - settled
+            head, top = settled + off * head_keeps, settled + off * of_head
+            settled = (casing_force + self._casing_weight) / impedance + 2.0 * falling
+            off = casing - settled
+            casing, bottom = settled + off * casing_keeps, settled + off * of_casing
+            head_way += top
+            casing_way += bottom
+            # what is left is gained by those that go back, till the waves come to rest
+            left = change * (2 * count) - gained
+            tops[k], bottoms[k] = top - rising + left, bottom - falling + left
+            after = total + top + bottom - 2.0 * (falling + rising) + added
+            fallen += total + after  # twice the sum of the waves in the middle of this time
+            total = after
+            gained += 2.0 * change
+        np.add(now[:-count], 2.0 * change * count, ring[count:])
+        ring[:count], ring[cells : cells + count] = tops, bottoms
+        self._now, self._next = self._next, self._now
+        self.head_velocity, self.casing_velocity, self.total = head, casing, total
+        h = self.step
+        self.head += head_way * h
+        self.casing += casing_way * h
+        self.weight_work += h * (self._head_weight * head_way + self._casing_weight * casing_way)
+        self.weight_work += 2.0 * self.cell_mass * change * fallen
+        if self.sticking > 0.0:
+            self._stick(ring, count)
+        elif self.viscous > 0.0:
+            self._rub(ring, back, count)
+
+    def _stick(self, ring: np.ndarray, count: int) -> None:
         """Coulomb and viscous friction on all cells; both waves of a cell lose the same."""
-        cells = len(ring) // 2
+        cells = self.cells
         v = self.down + self.up
-        change = 0.5 * (self.rubbed(v, self.cell_mass, self.cell, self.step) - v)
+        change = 0.5 * (self.rubbed(v, self.cell_mass, self.cell, count * self.step) - v)
         ring[:cells] += change
         ring[cells:] += change[::-1]
         self.total = float(ring.sum())
 
-    def _rub(self, ring: np.ndarray, back: np.ndarray) -> None:
+    def _rub(self, ring: np.ndarray, back: np.ndarray, count: int) -> None:
         """Viscous friction alone: each velocity loses the same share."""
-        v, left = self._room, self._left_by_wall
+        v, left = self._room, self._left_by_wall**count
         np.add(ring, back, v)  # each cell twice
-        total = 0.5 * float(v.dot(self._ones))
         self.friction_loss += 0.25 * self.cell_mass * (1.0 - left * left) * float(v.dot(v))
-        self.lost_momentum += self.cell_mass * (1.0 - left) * total
-        self.total = left * total
+        self.lost_momentum += self.cell_mass * (1.0 - left) * self.total
+        self.total *= left
         v *= 0.5 * (left - 1.0)
         ring += v
-
-    def _end(
-        self, v: float, force: float, arriving: float, shares: tuple[float, float]
-    ) -> tuple[float, float]:
-        """Mean velocity of an end over a step, and that at its end [m/s]."""
-        settled = force / self.impedance + 2.0 * arriving
-        off = v - settled
-        return settled + off * shares[0], settled + off * shares[1]
 
     def add_rod(self) -> None:
         """Put a rod below the head, in the state of the place where it joins."""

@@ -26,6 +26,11 @@ class Supply(Model):
         super().__init__(parameters)
         self.pressure = self.flow = self.energy = self.relief_volume = 0.0
         self.drive_pressure = 0.0
+        p = parameters
+        self.capacity = p["hose.volume"] / p["hose.bulk_modulus"]
+        self.gain = self.capacity / p["source.time"]
+        self.resistance, self.relief = p["hose.resistance"], p["relief_pressure"]
+        self.flows = -p["vent.flow_limit"], p["source.flow_limit"]
 
     def begin(self, inputs: dict[str, Any]) -> None:
         """Start with the hose full."""
@@ -33,36 +38,36 @@ class Supply(Model):
 
     def step(self, inputs: dict[str, Any], step_size: float) -> None:
         """Integrate the pressure of the hose, implicit in it."""
-        p = self.parameters
-        on = 1.0 if inputs["percussion_on"] else 0.0
+        p, capacity, gain, resistance = self.parameters, self.capacity, self.gain, self.resistance
         wanted = min(inputs["pressure_command"], p["source.pressure_limit"])
         wanted *= 1.0 - inputs["pressure_loss"]
-        taken = on * (p["drive.volume"] * inputs["blow_frequency"])
-        leak = on * p["drive.leakage"]
-        capacity = p["hose.volume"] / p["hose.bulk_modulus"]
-        gain = capacity / p["source.time"]
+        taken = leak = 0.0
+        if inputs["percussion_on"]:
+            taken, leak = p["drive.volume"] * inputs["blow_frequency"], p["drive.leakage"]
+        # the leak of the drive sees what is left behind the hose
+        lost = leak / (1.0 + leak * resistance)
         count = max(1, math.ceil(step_size / LONGEST_STEP))
         h = step_size / count
         for _ in range(count):
-            # the leak of the drive sees what is left behind the hose
-            lost = leak / (1.0 + leak * p["hose.resistance"])
             held = self.pressure - h / capacity * taken
             new = (held + h / capacity * gain * wanted) / (1.0 + h / capacity * (gain + lost))
             flow = gain * (wanted - new)
-            if not -p["vent.flow_limit"] <= flow <= p["source.flow_limit"]:
-                flow = min(max(flow, -p["vent.flow_limit"]), p["source.flow_limit"])
+            if not self.flows[0] <= flow <= self.flows[1]:
+                flow = min(max(flow, self.flows[0]), self.flows[1])
                 new = (held + h / capacity * flow) / (1.0 + h / capacity * lost)
             new = max(new, 0.0)
-            if new > p["relief_pressure"]:
-                self.relief_volume += capacity * (new - p["relief_pressure"])
-                new = p["relief_pressure"]
+            if new > self.relief:
+                self.relief_volume += capacity * (new - self.relief)
+                new = self.relief
             self.flow, self.pressure = max(flow, 0.0), new
             self.energy += h * self.flow * new
         drawn = taken + leak * self.pressure
-        self.drive_pressure = max(
-            0.0, (self.pressure - p["hose.resistance"] * drawn)
-            / (1.0 + leak * p["hose.resistance"]),
-        )  # fmt: skip
+        self.drive_pressure = max(0.0, (self.pressure - resistance * drawn)
+                                  / (1.0 + leak * resistance))  # fmt: skip
+
+    def signals(self) -> dict[str, Any]:
+        """What hammer, rock and controller take."""
+        return {"supply_pressure": self.drive_pressure}
 
     def outputs(self) -> dict[str, Any]:
         """Present values by name."""

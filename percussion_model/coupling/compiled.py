@@ -1,0 +1,263 @@
+"""The calls of a step, one after another, by compiled code.
+
+Python takes longer to make a call of an FMU than a small FMU takes to answer it. So where all
+parts are FMUs a step is a list of calls, and one compiled function makes them: it moves the
+values of outputs to the inputs that take them, and looks at each status and number.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic
+
+from percussion_model.core.kernel import entry_of, kernel
+from percussion_model.coupling.component import Component
+from percussion_model.coupling.exchange import WARNING, Group
+from percussion_model.coupling.port import Port
+
+SET_REAL, SET_INTEGER, STEP, GET_REAL, GET_INTEGER = range(5)
+DONE, NOT_FINITE = -1, -2  # statuses of FMI are from 0 on
+
+CALL = np.dtype(
+    [
+        ("kind", np.int64),
+        ("port", np.int64),  # whose call it is
+        ("function", np.int64),  # address
+        ("component", np.int64),  # address
+        ("references", np.int64),  # address
+        ("values", np.int64),  # address of the first one in `reals` or `integers`
+        ("count", np.int64),
+        ("room", np.int64),  # place of the first one there
+        ("place", np.int64),  # of the first one in `places`
+        ("every", np.int64),  # steps of the loop that are done as one
+    ]
+)
+
+_BYTE, _WORD, _INT, _DOUBLE = (
+    ir.IntType(8).as_pointer(), ir.IntType(64), ir.IntType(32), ir.DoubleType(),
+)  # fmt: skip
+
+
+def _called(parameters: Sequence[Any], pointers: Sequence[bool]) -> Any:
+    """Code that calls a function at an address, its first argument, with the others."""
+    shape = ir.FunctionType(_INT, parameters)
+
+    def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        function = builder.inttoptr(arguments[0], shape.as_pointer())
+        given = [
+            builder.inttoptr(one, _BYTE) if is_pointer else one
+            for one, is_pointer in zip(arguments[1:], pointers, strict=True)
+        ]
+        return builder.call(function, given)
+
+    return code
+
+
+@intrinsic
+def exchange(
+    typing: Any, function: Any, component: Any, references: Any, count: Any, values: Any
+) -> tuple[Any, Any]:
+    """Call a getter or a setter of an FMU; all arguments are addresses but for the count."""
+    word = types.int64
+    return types.int32(word, word, word, word, word), _called(
+        (_BYTE, _BYTE, _WORD, _BYTE), (True, True, False, True)
+    )
+
+
+@intrinsic
+def do_step(
+    typing: Any, function: Any, component: Any, time: Any, step: Any, forward: Any
+) -> tuple[Any, Any]:
+    """Call `fmi2DoStep`."""
+    return types.int32(
+        types.int64, types.int64, types.float64, types.float64, types.int32
+    ), _called((_BYTE, _DOUBLE, _DOUBLE, _INT), (True, False, False, False))
+
+
+@kernel
+def make_calls(
+    calls: np.ndarray,
+    places: np.ndarray,
+    values: np.ndarray,
+    reals: np.ndarray,
+    integers: np.ndarray,
+    at: np.ndarray,
+    time: float,
+    step: float,
+) -> None:
+    """Make all calls of a step.
+
+    Parameters
+    ----------
+    calls : ndarray of CALL
+    places : ndarray of int64
+        Place in `values` for each value of each call.
+    values : ndarray
+        Present outputs of all parts.
+    reals, integers : ndarray
+        What the calls read and write.
+    at : ndarray of int64, shape (4,)
+        Number of the step, number of steps in all, and, on the way back, the call that did
+        not succeed and its status.
+    time, step : float
+        [s]
+    """
+    is_last = at[0] == at[1] - 1
+    for k in range(len(calls)):
+        call = calls[k]
+        since = at[0] % call.every + 1
+        if since != call.every and not is_last:
+            continue
+        status = 0
+        if call.kind == STEP:
+            begin = time - (since - 1) * step
+            status = do_step(call.function, call.component, begin, since * step, np.int32(1))
+        elif call.kind == SET_REAL or call.kind == SET_INTEGER:
+            new = False
+            for i in range(call.count):
+                value = values[places[call.place + i]]
+                if call.kind == SET_REAL:
+                    if reals[call.room + i] != value:
+                        reals[call.room + i] = value
+                        new = True
+                elif integers[call.room + i] != int(value):
+                    integers[call.room + i] = int(value)
+                    new = True
+            if new:
+                status = exchange(
+                    call.function, call.component, call.references, call.count, call.values
+                )
+        else:
+            status = exchange(
+                call.function, call.component, call.references, call.count, call.values
+            )
+            if status <= WARNING:
+                for i in range(call.count):
+                    value = reals[call.room + i]
+                    if call.kind == GET_INTEGER:
+                        value = float(integers[call.room + i])
+                    values[places[call.place + i]] = value
+                    if not math.isfinite(value):
+                        status = NOT_FINITE
+        if status > WARNING or status < 0:
+            at[2] = k
+            at[3] = status
+            return
+    at[2] = DONE
+
+
+class CompiledStep:
+    """A step of a system as a list of calls.
+
+    Parameters
+    ----------
+    ports : sequence of Port
+        All of them of FMUs, with nothing on the way.
+    order : {"jacobi", "gauss-seidel"}
+    count : int
+        Steps of the run.
+    every : mapping
+        Steps that a part does as one, by component.
+    """
+
+    def __init__(self, ports: Sequence[Port], order: str, count: int, every: Any) -> None:
+        self.ports = list(ports)
+        self._every = every
+        self._calls: list[tuple[Any, ...]] = []
+        self._names: list[str] = []
+        self._places: list[int] = []
+        groups = [g for port in ports for g in (*port.writer.groups, *port.reader.groups)]
+        room = sum(group.end - group.begin for group in groups)
+        # no number is equal to these: all inputs are set in the first step
+        self._reals = np.full(room, np.nan)
+        self._integers = np.full(room, np.iinfo(np.int32).min, np.int32)
+        self._room = 0
+        for port in ports:
+            self._give_and_step(port)
+            if order == "gauss-seidel":
+                self._take(port)
+        if order == "jacobi":
+            for port in ports:
+                self._take(port)
+        self._all = np.array(self._calls, CALL)
+        self._values = np.array([float(value) for value in self.ports[0].values])
+        self._at = np.array([0, count, DONE, 0])
+        self._arrays = (
+            self._all, np.array(self._places), self._values, self._reals, self._integers, self._at,
+        )  # fmt: skip
+        self._make = make_calls
+        # with no calls: so that the kernel is there, and its entry known
+        self._make(self._all[:0], *self._arrays[1:], 0.0, 0.0)
+        self._make = entry_of(make_calls)
+
+    def _give_and_step(self, port: Port) -> None:
+        for group in port.writer.groups:
+            sources = port.places[group.begin : group.end]
+            self._exchange(port, group, (SET_REAL, SET_INTEGER), sources)
+        function = ctypes.cast(port.part.stepper, ctypes.c_void_p).value
+        self._calls.append((STEP, self.ports.index(port), function, port.part.pointer.value,
+                            0, 0, 0, 0, 0, self._pace(port)))  # fmt: skip
+        self._names.append("fmi2DoStep")
+
+    def _take(self, port: Port) -> None:
+        begin = port.begin
+        for group in port.reader.groups:
+            places = list(range(begin + group.begin, begin + group.end))
+            self._exchange(port, group, (GET_REAL, GET_INTEGER), places)
+
+    def _pace(self, port: Port) -> int:
+        return int(self._every.get(port.name, 1))
+
+    def _exchange(
+        self, port: Port, group: Group, kinds: tuple[int, int], places: Sequence[int]
+    ) -> None:
+        is_real = group.family == "Real"
+        room = self._reals if is_real else self._integers
+        self._calls.append(
+            (
+                kinds[0] if is_real else kinds[1],
+                self.ports.index(port),
+                ctypes.cast(group.call, ctypes.c_void_p).value,
+                port.part.pointer.value,
+                ctypes.addressof(group.arguments[1]),
+                room.ctypes.data + room.itemsize * self._room,
+                len(places),
+                self._room,
+                len(self._places),
+                self._pace(port),
+            )
+        )
+        self._names.append(group.name)
+        self._places += places
+        self._room += len(places)
+
+    def __call__(self, time: float, step: float) -> None:
+        """Let all parts do a communication step [s]."""
+        at = self._at
+        self._make(*self._arrays, time, step)
+        if at[2] != DONE:
+            self._fail(int(at[2]), int(at[3]))
+        at[0] += 1
+
+    def _fail(self, call: int, status: int) -> None:
+        port = self.ports[self._all[call]["port"]]
+        self.publish()
+        if status == NOT_FINITE:
+            port.refuse(port.values[port.begin : port.end])
+        port.part.fail(self._names[call], status)
+
+    def publish(self) -> None:
+        """Put the present values where the ports look for them."""
+        self.ports[0].values[:] = self._values.tolist()
+
+
+def can_compile(ports: Sequence[Port]) -> bool:
+    """Whether all parts are FMUs, with nothing on the way."""
+    return all(isinstance(port.part, Component) and port.on_way is None for port in ports)
