@@ -11,7 +11,7 @@ import functools
 import itertools
 import struct
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 if TYPE_CHECKING:
     from percussion_model.coupling.component import Component
@@ -60,8 +60,8 @@ def _grouped(
     return ordered, [_Group(component, family, found[family], kind) for family in families]
 
 
-class Reader:
-    """Reads variables of an FMU.
+class _Exchange:
+    """Some variables of an FMU, by the calls of one kind.
 
     Attributes
     ----------
@@ -69,33 +69,39 @@ class Reader:
         In the order of the values.
     """
 
+    KIND: ClassVar[str]  # of the calls of the library: "Get" or "Set"
+
     def __init__(self, component: Component, names: Sequence[str]) -> None:
         self.component = component
-        self.names, self._groups = _grouped(component, names, "Get")
+        self.names, self._groups = _grouped(component, names, self.KIND)
+
+    def _call(self, group: _Group) -> None:
+        status = group.call(*group.arguments)
+        if status > WARNING:
+            self.component.fail(group.name, status)
+
+
+class Reader(_Exchange):
+    """Reads variables of an FMU."""
+
+    KIND = "Get"
 
     def read(self) -> list[Any]:
         """Present values."""
         found: list[Any] = []
         for group in self._groups:
-            status = group.call(*group.arguments)
-            if status > WARNING:
-                self.component.fail(group.name, status)
+            self._call(group)
             found += map(bool, group.found()) if group.family == "Boolean" else group.found()
         return found
 
 
-class Writer:
-    """Sets variables of an FMU; a family whose values are as before is left alone.
+class Writer(_Exchange):
+    """Sets variables of an FMU; a family whose values are as before is left alone."""
 
-    Attributes
-    ----------
-    names : list of str
-        In the order of the values.
-    """
+    KIND = "Set"
 
     def __init__(self, component: Component, names: Sequence[str]) -> None:
-        self.component = component
-        self.names, self._groups = _grouped(component, names, "Set")
+        super().__init__(component, names)
         for before, group in itertools.pairwise(self._groups):
             group.begin, group.end = before.end, before.end + group.end
         self._last: list[Any] = []
@@ -112,7 +118,5 @@ class Writer:
             if chosen == self._last[k]:
                 continue
             group.fill(*(chosen if group.family == "Real" else map(int, chosen)))
-            status = group.call(*group.arguments)
-            if status > WARNING:
-                self.component.fail(group.name, status)
+            self._call(group)
             self._last[k] = chosen

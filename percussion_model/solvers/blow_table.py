@@ -8,13 +8,13 @@ import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from percussion_model.core.blow_records import ENTRIES, Axis, Entry
 from percussion_model.scene_rules import SceneError, SceneRules
+from percussion_model.solvers.sources import sources_digest
 
 FORMAT = 1
 # Greatest ratio of neighbouring nodes at density 1, axis by axis: rebound and penetration
@@ -45,7 +45,6 @@ _RANGES = {
     Axis.DRIVE: "force",
 }
 _SECTION = ("length", "area", "youngs_modulus", "density")
-_PACKAGE = Path(__file__).parents[1]
 
 
 class TableError(ValueError):
@@ -261,11 +260,8 @@ def table_key(scene: SceneRules) -> str:
     """Name of a scene's table: a hash of all that it depends on, the sources included."""
     nodes = Nodes.of(scene)
     parts = [FORMAT, fixed_values(scene), nodes.lowest, nodes.highest, nodes.counts]
-    digest = hashlib.sha256(json.dumps(parts, sort_keys=True).encode())
-    for folder in ("core", "solvers"):
-        for source in sorted((_PACKAGE / folder).glob("*.py")):
-            digest.update(source.read_bytes())
-    return digest.hexdigest()[:24]
+    text = json.dumps([*parts, sources_digest()], sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()[:24]
 
 
 def _sum(text: str, values: np.ndarray) -> np.ndarray:

@@ -30,17 +30,18 @@ class RockProfile(Model):
 
     def __init__(self, parameters: dict[str, Any]) -> None:
         super().__init__(parameters)
-        p = parameters
-        layers = sorted(
-            (p[f"layers[{i}].top"], p[f"layers[{i}].loading_stiffness"],
-             p[f"layers[{i}].unloading_ratio"], p[f"layers[{i}].torque_factor"], i)
-            for i in range(1, LAYERS + 1) if p[f"layers[{i}].top"] >= 0.0
-        )  # fmt: skip
-        self.layers = layers or [(0.0, p["layers[1].loading_stiffness"],
-                                  p["layers[1].unloading_ratio"], 1.0, 1)]  # fmt: skip
+        layers = [self._layer(number) for number in range(1, LAYERS + 1)]
+        # without any layer all is rock of the first one
+        self.layers = sorted(layer for layer in layers if layer[0] >= 0.0) or layers[:1]
         self.tops = [layer[0] for layer in self.layers]
         self.depth = self.feed = self.pressure = 0.0
         self._knots: dict[int, float] = {}
+
+    def _layer(self, number: int) -> tuple[float, float, float, float, int]:
+        """Top [m], K_R [N/m], gamma, torque factor and number of a layer."""
+        names = ("top", "loading_stiffness", "unloading_ratio", "torque_factor")
+        top, stiffness, ratio, torque = (self.parameters[f"layers[{number}].{n}"] for n in names)
+        return top, stiffness, ratio, torque, number
 
     def begin(self, inputs: dict[str, Any]) -> None:
         """Look at the rock below the bit."""
