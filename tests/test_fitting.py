@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import re
 
 import numpy as np
 import pytest
-from scipy.stats import binom
+from scipy.stats import binom, chi2
 from typer.testing import CliRunner
 
 from percussion_model import Scene
@@ -22,7 +23,7 @@ from percussion_model.fitting import (
     fit_drop_tests,
     fit_force_penetration,
 )
-from percussion_model.fitting.estimates import Counted, look_around
+from percussion_model.fitting.estimates import Counted, look_around, student_width
 
 STIFFNESS, RATIO, DATUM = 7.5e8, 5.0, 5e-5
 CURVE = {"rock.loading_stiffness": STIFFNESS, "rock.unloading_ratio": RATIO, "datum": DATUM}
@@ -37,6 +38,30 @@ def plausible(covered, trials):
     """Whether intervals of the stated confidence cover so often by chance."""
     low, high = binom.ppf([CHANCE, 1.0 - CHANCE], trials, CONFIDENCE)
     return low <= covered <= high
+
+
+def right_size(deviations, factor=1.0):
+    """Whether intervals have the width that the scatter of the estimates asks for, but for chance.
+
+    Intervals that are far too wide cover always, which is no rare thing in so few trials. Their
+    widths tell: deviations by them have a variance of one, and their squares sum to chi-square.
+
+    Parameters
+    ----------
+    deviations : sequence of float
+        Of estimates from the truth, in standard errors as the intervals have them.
+    factor : float
+        Takes intervals so many times as wide as they are.
+    """
+    low, high = chi2.ppf([CHANCE, 1.0 - CHANCE], len(deviations))
+    return low <= np.sum(np.square(deviations)) / factor**2 <= high
+
+
+def deviation(fit, key, truth, scale=float):
+    """Estimate less truth by half its interval, in widths of one standard error."""
+    value, low, high = (scale(getattr(fit.estimates[key], n)) for n in ("value", "low", "high"))
+    width = student_width(fit.confidence, len(fit.residuals) - len(fit.estimates))
+    return (value - scale(truth)) / (0.5 * (high - low) / width)
 
 
 def way():
@@ -88,30 +113,37 @@ def test_a_curve_without_noise_gives_its_parameters_back():
 def test_intervals_of_a_curve_cover_as_often_as_they_say():
     trials = 200
     counts, halved = dict.fromkeys(CURVE, 0), 0
+    off = {key: [] for key in CURVE}
     for seed in range(trials):
         fit = fit_force_penetration(*noisy_curve(seed), CONFIDENCE)
         for key, covered in covers(fit, CURVE).items():
             counts[key] += covered
+            off[key].append(deviation(fit, key, CURVE[key]))
         value, _error, low, high = fit.estimates["rock.loading_stiffness"]
         halved += low + value <= 2.0 * STIFFNESS <= high + value
     assert all(plausible(count, trials) for count in counts.values()), counts
     assert not plausible(halved, trials)  # intervals half as wide are found out
+    assert all(right_size(found) for found in off.values()), off
+    assert not any(right_size(found, 1.4) for found in off.values())  # and wider ones
 
 
 @pytest.mark.parametrize(
     "solver", ["rigid", pytest.param("wave", marks=pytest.mark.skipif(not LONG, reason=WHY))]
 )
 def test_intervals_of_drop_tests_cover_as_often_as_they_say(solver):
-    trials = 30
-    counts = dict.fromkeys(BARRIER, 0)
+    trials = 60
+    counts, off = dict.fromkeys(BARRIER, 0), {key: [] for key in BARRIER}
     scene = bit(solver)
     guess = scene.replace(**{"rock.barrier_damping": 8.5e3, "rock.barrier_energy": 0.55})
     for seed in range(trials):
         fit = fit_drop_tests(guess, drops(scene, seed), span=1.5, steps=5, confidence=CONFIDENCE)
         for key, covered in covers(fit, BARRIER).items():
             counts[key] += covered
+            off[key].append(deviation(fit, key, BARRIER[key], math.log))  # as they are fitted
         assert fit.noise == pytest.approx(1e-5, rel=0.2)
     assert all(plausible(count, trials) for count in counts.values()), counts
+    assert all(right_size(found) for found in off.values()), off
+    assert not any(right_size(found, 1.7) for found in off.values())  # wider ones are found out
 
 
 def test_the_whole_law_is_found_from_a_far_guess():

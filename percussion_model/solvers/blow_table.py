@@ -139,6 +139,12 @@ class Nodes:
             found += [(j, k, m) for k in loads for m in drives]
         return found
 
+    def blow(self, place: tuple[int, int, int]) -> tuple[float, float, float]:
+        """Impact velocity [m/s], static force of the bit and F_0 [N] at such a node."""
+        axes = (Axis.VELOCITY, Axis.LOAD, Axis.DRIVE)
+        v, load, drive = (float(self.values(a)[k]) for a, k in zip(axes, place, strict=True))
+        return v, load * v, drive * v
+
     def _near(self, axis: Axis, slow: float, fast: float, weight: float) -> range:
         """Nodes of an axis around the forces that belong to impacts from slow to fast."""
         low = math.log((self.lowest[axis] + weight) / fast) - self.origin[axis]
