@@ -151,14 +151,20 @@ def test_a_name_says_how_waves_are_computed_and_nothing_else():
     assert Scene().computed_by("blow-map").computed_by("fem").solver_name == "fem"
 
 
-def test_the_command_makes_shows_and_finds_a_table(cache, tmp_path, capsys):
-    path = tmp_path / "scene.toml"
+def said(folder, capsys, command):
+    """What calls a command on a scene with a tiny table; what it says on stdout."""
+    path = folder / "scene.toml"
     mapped(**TINY).to_toml(path)
 
     def call(*words):
-        assert not _guarded(lambda: app(["blow-map", str(path), *words], standalone_mode=False))
+        assert not _guarded(lambda: app([command, str(path), *words], standalone_mode=False))
         return capsys.readouterr().out
 
+    return call
+
+
+def test_the_command_makes_shows_and_finds_a_table(cache, tmp_path, capsys):
+    call = said(tmp_path, capsys, "blow-map")
     file = Path(call("where").strip())
     assert file.parent == cache
     assert "not made yet" in call("show")
@@ -173,13 +179,7 @@ def test_the_command_makes_shows_and_finds_a_table(cache, tmp_path, capsys):
 
 
 def test_explain_says_what_a_table_would_cost_and_makes_none(cache, tmp_path, capsys):
-    path = tmp_path / "scene.toml"
-    mapped(**TINY).to_toml(path)
-
-    def call(*words):
-        assert not _guarded(lambda: app(["explain", str(path), *words], standalone_mode=False))
-        return capsys.readouterr().out
-
+    call = said(tmp_path, capsys, "explain")
     before = json.loads(call("--json", "-"))
     assert list(cache.glob("*.npz")) == []
     assert before["solver"] == "blow-map"
