@@ -20,7 +20,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from scenarios.harness import FIGURES, Instance, built, save_png
+from scenarios.drawing import save_png
+from scenarios.harness import FIGURES, Instance, built
 
 # Powers of two add up without rounding, so that all loops end at the same time, to the bit.
 STEPS = tuple(2.0**-k for k in (17, 15, 13, 11, 9, 7, 6))  # 8e-6 to 1.6e-2 s

@@ -11,7 +11,8 @@ import numpy as np
 
 from percussion_model.coupling import CoupledRun, Coupling
 from percussion_model.coupling.files import write_columns
-from scenarios.harness import FIGURES, ROOT, save_png, stacked
+from scenarios.drawing import save_png, stacked
+from scenarios.harness import FIGURES, ROOT
 
 STEP = 2e-3  # the longest at which the shoulder is as stiff as it is [s]
 INTERVAL = 4e-3  # of the rows that are kept [s]

@@ -18,7 +18,8 @@ import numpy as np
 
 from percussion_model.coupling import Coupling
 from percussion_model.coupling.balance import known_signals, summary
-from scenarios.harness import FIGURES, ROOT, save_png
+from scenarios.drawing import save_png
+from scenarios.harness import FIGURES, ROOT
 
 ONE_BLOW, EIGHT_BLOWS = 0.04, 0.4  # [s]
 STEPS = (1e-5, 2e-5, 5e-5, 1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2)  # [s]

@@ -12,7 +12,8 @@ import numpy as np
 
 from percussion_model.coupling import CoupledRun, Coupling
 from scenarios.coupled import archive, save_runs, save_table
-from scenarios.harness import FIGURES, save_png
+from scenarios.drawing import save_png
+from scenarios.harness import FIGURES
 
 NAME = "extremum_seeking"
 STEP = 2e-3  # the longest at which the shoulder is as stiff as it is [s]

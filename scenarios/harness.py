@@ -8,7 +8,7 @@ import shutil
 import tempfile
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from fmpy import extract, read_model_description
@@ -18,9 +18,7 @@ from fmpy.fmi2 import (
     fmi2CallbackLoggerTYPE,
 )
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from scenarios.drawing import save_png, stacked
 
 # A constant, or a function of time.
 Signal = float | bool | Callable[[float], float | bool]
@@ -244,46 +242,6 @@ def plot(
             ax.legend(fontsize="small", loc="upper right")
     figure.tight_layout()
     return save_png(figure, path)
-
-
-def stacked(
-    title: str, labels: Sequence[str], size: tuple[float, float]
-) -> tuple[Figure, list[Axes]]:
-    """A figure of panels over time, one below the other.
-
-    Parameters
-    ----------
-    title : str
-    labels : sequence of str
-        "quantity [unit]" of each panel.
-    size : tuple of float
-        Of the figure [inch].
-
-    Returns
-    -------
-    Figure, list of Axes
-    """
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=size)
-    axes = figure.subplots(len(labels), 1, sharex=True, squeeze=False)
-    for ax, label in zip(axes[:, 0], labels, strict=True):
-        quantity, _, unit = label.partition(" [")
-        ax.set_title(quantity, loc="left", fontsize="medium")
-        ax.set_ylabel(f"[{unit}" if unit else "")
-        ax.grid(alpha=0.3)
-    axes[-1, 0].set_xlabel("time [s]")
-    figure.suptitle(title, fontweight="bold")
-    figure.align_ylabels()
-    return figure, list(axes[:, 0])
-
-
-def save_png(figure: Figure, path: Path, dpi: float = 110) -> Path:
-    """Write a figure, whole or not at all; return its file."""
-    # matplotlib is loaded by those who draw
-    from percussion_model.plotting.style import save_png as save
-
-    return save(figure, path, dpi)
 
 
 def built(name: str = "PercussiveHammer") -> Path:

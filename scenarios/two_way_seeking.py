@@ -15,6 +15,7 @@ import numpy as np
 
 from percussion_model.coupling import CoupledRun, Coupling
 from scenarios.coupled import archive
+from scenarios.drawing import save_png
 from scenarios.extremum_seeking import (
     BOUND,
     INTERVAL,
@@ -24,7 +25,6 @@ from scenarios.extremum_seeking import (
     rate_over,
     write_search,
 )
-from scenarios.harness import save_png
 
 NAME = "two_way_seeking"
 DURATION = 45.0  # [s]
