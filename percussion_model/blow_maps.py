@@ -3,15 +3,40 @@
 from __future__ import annotations
 
 import os
+import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import NamedTuple
 
+import numpy as np
+
+from percussion_model.core.blow_records import Axis
 from percussion_model.scene import Scene
 from percussion_model.solvers.blow_builder import cache_folder, get_table, kept_table, table_file
 from percussion_model.solvers.blow_refusals import notes_outside
 from percussion_model.solvers.blow_table import BlowTable, Nodes
+from percussion_model.solvers.single_blow import SingleBlow
 
-__all__ = ["cache_folder", "kept_map", "make_map", "map_file", "node_count", "outside_map"]
+__all__ = [
+    "MapCost",
+    "cache_folder",
+    "kept_map",
+    "make_map",
+    "map_cost",
+    "map_file",
+    "node_count",
+    "outside_map",
+]
+
+# The cost of a table is that of its blows at so many stiffnesses, so many at each.
+SAMPLED_STIFFNESSES, SAMPLED_BLOWS = 5, 8
+
+
+class MapCost(NamedTuple):
+    """What a table is going to cost."""
+
+    blows: int
+    processor_time: float  # of all of them [s]
 
 
 def mapped(scene: Scene) -> Scene:
@@ -73,3 +98,31 @@ def node_count(scene: Scene) -> int:
     """Blows that have to be computed for the table of a scene."""
     nodes = Nodes.of(mapped(scene))
     return len(nodes.wanted()) * nodes.counts[0]
+
+
+def map_cost(scene: Scene) -> MapCost:
+    """Predict what the table of a scene costs, from a few of its blows; nothing is kept.
+
+    The first blow is left out: kernels may have to be compiled for it.
+    """
+    scene = mapped(scene)
+    nodes = Nodes.of(scene)
+    places, stiffness = nodes.wanted(), nodes.values(Axis.STIFFNESS)
+    chosen = [places[k] for k in _spread(len(places), SAMPLED_BLOWS)]
+    SingleBlow(scene, float(stiffness[0])).entries(*nodes.blow(places[0]))
+    setups, blows = [], []
+    for k in _spread(len(stiffness), SAMPLED_STIFFNESSES):
+        begin = time.perf_counter()
+        single = SingleBlow(scene, float(stiffness[k]))
+        ready = time.perf_counter()
+        for place in chosen:
+            single.entries(*nodes.blow(place))
+        setups.append(ready - begin)
+        blows.append((time.perf_counter() - ready) / len(chosen))
+    count = len(places) * len(stiffness)
+    return MapCost(count, float(np.mean(setups)) * len(stiffness) + float(np.mean(blows)) * count)
+
+
+def _spread(count: int, most: int) -> list[int]:
+    """At most so many places, evenly over all."""
+    return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(int)).tolist()

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import os
+import time
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any, Protocol
 
+from percussion_model.blow_maps import MapCost, kept_map, map_cost
 from percussion_model.request import planned_cells, with_cells
 from percussion_model.scene import Scene
 from percussion_model.solvers import Solver
@@ -56,15 +59,17 @@ class Forecast:
 
     Attributes
     ----------
-    solver : Solver
+    solver : Solver or None
+        None where its blow map has not been made.
     setup_time : float
-        Time to make the solver, compilation included [s].
-    wall_time : float
-        Predicted time of the whole run without set-up [s].
+        Time to make the solver, compilation included, and that of its blow map where
+        this has not been made [s].
+    wall_time : float or None
+        Predicted time of the whole run without set-up [s]; None without a solver.
     duration : float
         Simulated time of that run [s].
-    per_second : float
-        Time for a simulated second, once blows follow each other [s].
+    per_second : float or None
+        Time for a simulated second, once blows follow each other [s]; None without a solver.
     per_blow : float or None
         Time for a blow [s]; None where there were fewer than two.
     counts : dict of float
@@ -73,17 +78,20 @@ class Forecast:
         Simulated time that it rests on [s].
     runs : int
         Runs that `setup_time` and `wall_time` are the sum of.
+    blow_map : MapCost or None
+        Of the blow map that has not been made.
     """
 
-    solver: Solver
+    solver: Solver | None
     setup_time: float
-    wall_time: float
+    wall_time: float | None
     duration: float
-    per_second: float
+    per_second: float | None
     per_blow: float | None
     counts: dict[str, float]
     probed: float
     runs: int = 1
+    blow_map: MapCost | None = None
 
 
 def forecast(scene: Scene) -> Forecast:
@@ -91,7 +99,10 @@ def forecast(scene: Scene) -> Forecast:
 
     A wanted accuracy takes several runs: times are those of all, the rest is
     that of the finest. What aperiodic motion or a doubt adds is not foreseen.
+    A blow map that has not been made is not made here: its cost is told instead.
     """
+    if scene.solver_name == "blow-map" and kept_map(scene) is None:
+        return _without_map(scene)
     scenes = [scene]
     if scene.solver.accuracy is not None and scene.solver_name == "wave":
         scenes = [with_cells(scene, cells) for cells in planned_cells(scene)]
@@ -103,9 +114,18 @@ def forecast(scene: Scene) -> Forecast:
     return replace(
         found[-1],
         setup_time=sum(one.setup_time for one in found),
-        wall_time=sum(one.wall_time for one in found),
+        wall_time=sum(one.wall_time or 0.0 for one in found),
         runs=len(found),
     )
+
+
+def _without_map(scene: Scene) -> Forecast:
+    """What the blow map costs; the run cannot be probed before it is there."""
+    begin = time.perf_counter()
+    cost = map_cost(scene)
+    setup = time.perf_counter() - begin + cost.processor_time / (os.cpu_count() or 1)
+    duration = scene.run.duration
+    return Forecast(None, setup, None, duration, None, None, {}, 0.0, blow_map=cost)
 
 
 def probe(simulation: Probed, duration: float) -> list[Mark]:
@@ -178,15 +198,16 @@ def _blows(mark: Mark) -> int:
 
 def explained(scene: Scene, found: Forecast) -> dict[str, Any]:
     """What `percussion explain` tells, as plain values for JSON, SI units."""
+    solver = found.solver
     return {
         "title": scene.title,
         "effects_on": list(scene.effects_on),
         "effects_off": list(scene.effects_off),
         "without_effect": list(scene.unused),
-        "solver": found.solver.name,
-        "cells": found.solver.cells or None,
-        "time_step": found.solver.time_step,
-        "wave_speed_error": found.solver.wave_speed_error,
+        "solver": scene.solver_name,
+        "cells": (solver.cells or None) if solver else None,
+        "time_step": solver.time_step if solver else None,
+        "wave_speed_error": solver.wave_speed_error if solver else None,
         "accuracy": scene.solver.accuracy,
         "setup_time": found.setup_time,
         "predicted_wall_time": found.wall_time,
@@ -196,4 +217,5 @@ def explained(scene: Scene, found: Forecast) -> dict[str, Any]:
         "per_blow": found.counts,
         "probed": found.probed,
         "runs": found.runs,
+        "blow_map_to_make": found.blow_map._asdict() if found.blow_map else None,
     }

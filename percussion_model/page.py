@@ -14,10 +14,9 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from percussion_model.parameter_table import find_row, parameter_table
-from percussion_model.result_files import staged
+from percussion_model.result_files import REPORT, staged
 from percussion_model.scene import Scene
 
-REPORT = "report.html"
 PACKAGES = ("percussion_model", "numpy", "numba", "scipy", "matplotlib", "bokeh")
 
 

@@ -27,6 +27,10 @@ LONGEST_CSV = 100_000
 # What tells a result from any other folder.
 _MARKS = ("summary.json", "scene.toml")
 _TRACES = ("trace.csv", "trace.npz")
+# What is made of a result beside it: the page, and figures as PNG and SVG.
+REPORT = "report.html"
+FIGURES = ("overview", "bit_motion", "activation", "stress_waves")
+_DERIVED = (REPORT, *(f"{name}.{kind}" for name in FIGURES for kind in ("png", "svg")))
 
 
 class ResultError(ValueError):
@@ -95,7 +99,13 @@ def staged_text(path: Path, text: str) -> None:
 
 
 def write_result(result: Result, folder: Path) -> list[Path]:
-    """Write a result to a folder; see `Result.save`."""
+    """Write a result to a folder; see `Result.save`.
+
+    What an earlier result left there goes: its trace, its figures and its report would
+    stand beside numbers that they do not belong to.
+    """
+    was_result = all((folder / name).is_file() for name in _MARKS)
+    left = (*_TRACES, *_DERIVED) if was_result else _TRACES
     with staged(folder) as draft:
         (draft / "summary.json").write_text(to_json(result.summary()) + "\n", encoding="utf-8")
         (draft / "scene.toml").write_text(result.scene.to_toml(), encoding="utf-8")
@@ -109,7 +119,7 @@ def write_result(result: Result, folder: Path) -> list[Path]:
         if result.trace is not None:
             _write_trace(draft, result.trace)
         names = sorted(path.name for path in draft.iterdir())
-    for name in _TRACES:  # of an earlier run
+    for name in left:
         if name not in names:
             (folder / name).unlink(missing_ok=True)
     return [folder / name for name in names]

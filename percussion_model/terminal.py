@@ -126,10 +126,12 @@ def show_explanation(scene: Scene, found: Forecast) -> None:
     effects = scene.effects
     table.add_row("Drive, rock", f"{effects.drive}, {effects.rock}")
     table.add_row("Piston, bit", f"{scene.piston.model}, {scene.bit.model}")
-    table.add_row("Solver", solver.name)
+    table.add_row("Solver", scene.solver_name)
     if scene.solver.accuracy is not None:
         table.add_row("Wanted accuracy of the rate", f"{scene.solver.accuracy:g}")
-    if solver.time_step is not None:
+    if solver is None or scene.solver_name == "blow-map":
+        table.add_row("Steps", "from blow to blow, out of a table")
+    elif solver.time_step is not None:
         cells = ", ".join(f"{count} in the {bar}" for bar, count in solver.cells.items())
         table.add_row("Cells", cells)
         table.add_row("Time step", f"{solver.time_step:.6g} s")
@@ -139,10 +141,19 @@ def show_explanation(scene: Scene, found: Forecast) -> None:
     if found.per_blow is not None:
         counts = ", ".join(f"{value:.3g} {name}" for name, value in found.counts.items())
         table.add_row("A blow", f"{1e3 * found.per_blow:.3g} ms; {counts}")
-    table.add_row("A simulated second", f"{found.per_second:.3g} s")
-    runs = f", {found.runs} runs to compare" if found.runs > 1 else ""
-    whole = f"about {found.wall_time:.2g} s for {found.duration:g} s simulated{runs}"
-    table.add_row("Predicted cost of the run", whole)
+    if found.per_second is not None:
+        table.add_row("A simulated second", f"{found.per_second:.3g} s")
+    if found.wall_time is not None:
+        runs = f", {found.runs} runs to compare" if found.runs > 1 else ""
+        whole = f"about {found.wall_time:.2g} s for {found.duration:g} s simulated{runs}"
+        table.add_row("Predicted cost of the run", whole)
+    if found.blow_map is not None:
+        blows, cost = found.blow_map
+        words = f"not made yet: {blows:,} blows, about {cost:.2g} s of one processor"
+        table.add_row("Blow map", words)
+        table.add_row(
+            "", "the first run makes it, or percussion blow-map; then a run can be predicted"
+        )
     table.add_row("To prepare", f"{found.setup_time:.2g} s")
     Console().print(table)
 

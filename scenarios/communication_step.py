@@ -20,6 +20,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from scenarios.drawing import save_png
 from scenarios.harness import FIGURES, Instance, built
 
 # Powers of two add up without rounding, so that all loops end at the same time, to the bit.
@@ -125,9 +126,10 @@ def table(found: dict[str, list[dict[str, Any]]]) -> str:
 
 def draw(found: dict[str, list[dict[str, Any]]], path: Path) -> Path:
     """Draw error and time against step."""
-    import matplotlib.pyplot as plt
+    from matplotlib.figure import Figure
 
-    figure, (left, right) = plt.subplots(1, 2, figsize=(10.0, 4.4))
+    figure = Figure(figsize=(10.0, 4.4))
+    left, right = figure.subplots(1, 2)
     marks = {"constant": ("#595959", "x"), "ramp": ("#0072B2", "o"), "coupled": ("#D55E00", "s")}
     for case, rows in found.items():
         colour, marker = marks[case]
@@ -156,10 +158,7 @@ def draw(found: dict[str, list[dict[str, Any]]], path: Path) -> Path:
     left.set_title("Held inputs: error against step", loc="left", fontsize=10)
     right.set_title("What short steps cost", loc="left", fontsize=10)
     figure.tight_layout()
-    path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path, dpi=120)
-    plt.close(figure)
-    return path
+    return save_png(figure, path, 120)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

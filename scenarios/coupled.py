@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+import sys
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from percussion_model.coupling import CoupledRun, Coupling
 from percussion_model.coupling.files import write_columns
+from scenarios.drawing import save_png, stacked
 from scenarios.harness import FIGURES, ROOT
 
 STEP = 2e-3  # the longest at which the shoulder is as stiff as it is [s]
@@ -79,13 +81,11 @@ def draw_runs(
     Path
         The PNG file.
     """
-    import matplotlib.pyplot as plt
     from matplotlib.patches import Patch
 
-    figure, axes = plt.subplots(
-        len(panels), 1, sharex=True, figsize=(8.5, 1.6 + 1.5 * len(panels)), squeeze=False
-    )
-    for ax, (label, factor, signal) in zip(axes[:, 0], panels, strict=True):
+    labels = [label for label, _, _ in panels]
+    figure, axes = stacked(title, labels, (8.5, 1.6 + 1.5 * len(panels)))
+    for ax, (_, factor, signal) in zip(axes, panels, strict=True):
         for name, one in runs.items():
             ax.plot(one["time"], factor * one[signal], linewidth=1.2, label=name)
         for begin, end, _ in spans:
@@ -95,23 +95,13 @@ def draw_runs(
             ax.annotate(text, (1.01, level), xycoords=("axes fraction", "data"), fontsize="small",
                         va="center")  # fmt: skip
         ax.margins(x=0.01, y=0.12)
-        quantity, _, unit = label.partition(" [")
-        ax.set_title(quantity, loc="left", fontsize="medium")
-        ax.set_ylabel(f"[{unit}" if unit else "")
-        ax.grid(alpha=0.3)
-    handles, labels = axes[0, 0].get_legend_handles_labels()
+    handles, names = axes[0].get_legend_handles_labels()
     for _, _, text in spans[:1]:
         handles.append(Patch(color="#dddddd"))
-        labels.append(text)
-    axes[-1, 0].set_xlabel("time [s]")
-    figure.suptitle(title, fontweight="bold")
-    figure.align_ylabels()
+        names.append(text)
     figure.tight_layout(rect=(0.0, 0.045, 1.0, 1.0))
-    figure.legend(handles, labels, loc="lower center", ncols=4, fontsize="small", frameon=False)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path, dpi=110)
-    plt.close(figure)
-    return path
+    figure.legend(handles, names, loc="lower center", ncols=4, fontsize="small", frameon=False)
+    return save_png(figure, path)
 
 
 def save_runs(runs: Mapping[str, CoupledRun], name: str, folder: Path = FIGURES) -> list[Path]:
@@ -128,3 +118,25 @@ def save_table(columns: Mapping[str, np.ndarray], path: Path) -> Path:
     np.savetxt(path, np.column_stack(list(columns.values())), delimiter=",",
                header=",".join(columns), comments="")  # fmt: skip
     return path
+
+
+def write(
+    name: str,
+    simulate: Callable[[Path], dict[str, CoupledRun]],
+    numbers: Callable[[CoupledRun], Mapping[str, float]],
+    draw: Callable[[dict[str, CoupledRun], Path], Path],
+) -> None:
+    """Run a scenario on the archive of the command line: write figure and data, print numbers.
+
+    Parameters
+    ----------
+    name : str
+        Of the files.
+    simulate, numbers, draw : callable
+        Runs of an archive, by what the legend calls them; numbers of one run; their figure.
+    """
+    runs = simulate(archive(words=sys.argv[1:]))
+    for case, found in runs.items():
+        print(case, {key: round(value, 3) for key, value in numbers(found).items()})
+    for path in (draw(runs, FIGURES / f"{name}.png"), *save_runs(runs, name)):
+        print(path)

@@ -18,6 +18,7 @@ import numpy as np
 
 from percussion_model.coupling import Coupling
 from percussion_model.coupling.balance import known_signals, summary
+from scenarios.drawing import save_png
 from scenarios.harness import FIGURES, ROOT
 
 ONE_BLOW, EIGHT_BLOWS = 0.04, 0.4  # [s]
@@ -125,9 +126,10 @@ def table_of_eight(rows: Sequence[EightBlows]) -> str:
 
 def draw(ones: Sequence[OneBlow], exact: OneBlow, eights: Sequence[EightBlows], path: Path) -> Path:
     """Draw errors of one blow over the step, and what the shoulder takes in eight."""
-    import matplotlib.pyplot as plt
+    from matplotlib.figure import Figure
 
-    figure, axes = plt.subplots(1, 3, figsize=(12.0, 4.2))
+    figure = Figure(figsize=(12.0, 4.2))
+    axes = figure.subplots(1, 3)
     for ax, order in zip(axes, ORDERS, strict=False):
         rows = [row for row in ones if row.order == order]
         steps = [1e3 * row.step for row in rows]
@@ -156,10 +158,7 @@ def draw(ones: Sequence[OneBlow], exact: OneBlow, eights: Sequence[EightBlows], 
         ax.axvline(1e3 * UNCHANGED, color="0.6", linewidth=0.8)
         ax.grid(alpha=0.3, which="both")
     figure.tight_layout()
-    path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path, dpi=110)
-    plt.close(figure)
-    return path
+    return save_png(figure, path)
 
 
 def main(archive: Path) -> None:

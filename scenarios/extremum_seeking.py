@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import cycle
 from pathlib import Path
@@ -12,6 +12,7 @@ import numpy as np
 
 from percussion_model.coupling import CoupledRun, Coupling
 from scenarios.coupled import archive, save_runs, save_table
+from scenarios.drawing import save_png
 from scenarios.harness import FIGURES
 
 NAME = "extremum_seeking"
@@ -126,10 +127,11 @@ def seek(
 
 def draw(hill: np.ndarray, runs: Sequence[CoupledRun], path: Path) -> Path:
     """Draw the hill and the ways up."""
-    import matplotlib.pyplot as plt
+    from matplotlib.figure import Figure
 
     top = top_of(hill)
-    figure, axes = plt.subplots(1, 2, figsize=(11.0, 4.6))
+    figure = Figure(figsize=(11.0, 4.6))
+    axes = figure.subplots(1, 2)
     axes[0].plot(1e-3 * hill[:, 0], 1e3 * hill[:, 1], "o-", color="0.4", markersize=4,
                  label="feed held (open loop)")  # fmt: skip
     axes[0].axhspan((1.0 - BOUND) * 1e3 * top.rate, 1e3 * top.rate, color="#cfe8cf", zorder=0,
@@ -154,10 +156,7 @@ def draw(hill: np.ndarray, runs: Sequence[CoupledRun], path: Path) -> Path:
         ax.legend(fontsize="small")
     figure.suptitle("Extremum seeking on the feed force", fontweight="bold")
     figure.tight_layout()
-    path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path, dpi=110)
-    plt.close(figure)
-    return path
+    return save_png(figure, path)
 
 
 def main() -> None:
@@ -172,9 +171,33 @@ def main() -> None:
         rate = rate_over(run, DURATION - LAST)
         print(f"{name}: {run['controller.seek.centre'][-1]:.0f} N, {1e3 * rate:.3f} mm/s, "
               f"{100 * (rate / top.rate - 1.0):+.2f} %")  # fmt: skip
-    print(draw(hill, list(runs.values()), FIGURES / f"{NAME}.png"))
-    table = {"feed_force": hill[:, 0], "rate_of_penetration": hill[:, 1]}
-    for path in (save_table(table, FIGURES / f"{NAME}_sweep.csv"), *save_runs(runs, NAME)):
+    write_search(NAME, draw, hill, ("feed_force", "rate_of_penetration"), runs)
+
+
+def write_search(
+    name: str,
+    draw: Callable[[np.ndarray, list[CoupledRun], Path], Path],
+    hill: np.ndarray,
+    columns: Sequence[str],
+    runs: Mapping[str, CoupledRun],
+) -> None:
+    """Write figure, sweep and runs of a search, and say where they are.
+
+    Parameters
+    ----------
+    name : str
+        Of the files.
+    draw : callable
+        Draws hill and runs into a file.
+    hill : ndarray, shape (points, columns)
+    columns : sequence of str
+        Of the hill.
+    runs : mapping
+        Runs by what the names of their files end with.
+    """
+    table = dict(zip(columns, hill.T, strict=True))
+    print(draw(hill, list(runs.values()), FIGURES / f"{name}.png"))
+    for path in (save_table(table, FIGURES / f"{name}_sweep.csv"), *save_runs(runs, name)):
         print(path)
 
 

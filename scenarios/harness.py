@@ -18,6 +18,8 @@ from fmpy.fmi2 import (
     fmi2CallbackLoggerTYPE,
 )
 
+from scenarios.drawing import save_png, stacked
+
 # A constant, or a function of time.
 Signal = float | bool | Callable[[float], float | bool]
 ROOT = Path(__file__).resolve().parents[1]
@@ -231,28 +233,15 @@ def plot(
     Path
         The PNG file.
     """
-    import matplotlib.pyplot as plt
-
-    figure, axes = plt.subplots(
-        len(panels), 1, sharex=True, figsize=(8.0, 1.0 + 1.8 * len(panels)), squeeze=False
-    )
-    for ax, (label, factor, *names) in zip(axes[:, 0], panels, strict=True):
+    labels = [label for label, *_ in panels]
+    figure, axes = stacked(title, labels, (8.0, 1.0 + 1.8 * len(panels)))
+    for ax, (_, factor, *names) in zip(axes, panels, strict=True):
         for name in names:
             ax.plot(found["time"], float(factor) * found[name], linewidth=1.2, label=name)
-        quantity, _, unit = label.partition(" [")
-        ax.set_title(quantity, loc="left", fontsize="medium")
-        ax.set_ylabel(f"[{unit}" if unit else "")
-        ax.grid(alpha=0.3)
         if len(names) > 1:
             ax.legend(fontsize="small", loc="upper right")
-    axes[-1, 0].set_xlabel("time [s]")
-    figure.suptitle(title, fontweight="bold")
-    figure.align_ylabels()
     figure.tight_layout()
-    path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path, dpi=110)
-    plt.close(figure)
-    return path
+    return save_png(figure, path)
 
 
 def built(name: str = "PercussiveHammer") -> Path:

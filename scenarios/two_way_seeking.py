@@ -14,9 +14,17 @@ from pathlib import Path
 import numpy as np
 
 from percussion_model.coupling import CoupledRun, Coupling
-from scenarios.coupled import archive, save_runs, save_table
-from scenarios.extremum_seeking import BOUND, INTERVAL, SETTLING, SIGNALS, STEP, rate_over
-from scenarios.harness import FIGURES
+from scenarios.coupled import archive
+from scenarios.drawing import save_png
+from scenarios.extremum_seeking import (
+    BOUND,
+    INTERVAL,
+    SETTLING,
+    SIGNALS,
+    STEP,
+    rate_over,
+    write_search,
+)
 
 NAME = "two_way_seeking"
 DURATION = 45.0  # [s]
@@ -112,11 +120,11 @@ def _top(hill: np.ndarray) -> tuple[float, float, float]:
 
 def draw(hill: np.ndarray, runs: Sequence[CoupledRun], path: Path) -> Path:
     """Draw the hill from above with the ways up, and both centres over time."""
-    import matplotlib.pyplot as plt
+    from matplotlib.figure import Figure
 
     top, _ = top_of(hill)
     feeds, pressures = _axes(hill)
-    figure = plt.figure(figsize=(11.0, 5.0))
+    figure = Figure(figsize=(11.0, 5.0))
     grid = figure.add_gridspec(2, 2, width_ratios=(1.25, 1.0))
     above = figure.add_subplot(grid[:, 0])
     filled = above.contourf(
@@ -158,10 +166,7 @@ def draw(hill: np.ndarray, runs: Sequence[CoupledRun], path: Path) -> Path:
     figure.tight_layout(rect=(0.0, 0.06, 1.0, 1.0))
     handles, labels = above.get_legend_handles_labels()
     figure.legend(handles, labels, loc="lower center", ncols=5, fontsize="small", frameon=False)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path, dpi=110)
-    plt.close(figure)
-    return path
+    return save_png(figure, path)
 
 
 def main() -> None:
@@ -178,11 +183,7 @@ def main() -> None:
         print(f"{name}: {run['controller.seek.centre'][-1]:.0f} N, "
               f"{1e-5 * run['controller.seek.pressure_centre'][-1]:.2f} bar, "
               f"{1e3 * rate:.3f} mm/s, {100 * (rate / top[2] - 1.0):+.2f} %")  # fmt: skip
-    print(draw(hill, list(runs.values()), FIGURES / f"{NAME}.png"))
-    names = ("feed_force", "supply_pressure", "rate_of_penetration")
-    table = dict(zip(names, hill.T, strict=True))
-    for path in (save_table(table, FIGURES / f"{NAME}_sweep.csv"), *save_runs(runs, NAME)):
-        print(path)
+    write_search(NAME, draw, hill, ("feed_force", "supply_pressure", "rate_of_penetration"), runs)
 
 
 if __name__ == "__main__":

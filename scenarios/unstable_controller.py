@@ -8,15 +8,13 @@ of the swing. All else of the controller is off, so that nothing hides it.
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import numpy as np
 
 from percussion_model.coupling import CoupledRun
 from percussion_model.coupling.bench import HIGHEST_FEED, TRIALS, judge
-from scenarios.coupled import FEED, archive, draw_runs, run, save_runs
-from scenarios.harness import FIGURES
+from scenarios.coupled import FEED, draw_runs, run, write
 
 NAME = "unstable_controller"
 DURATION = 5.0  # [s]
@@ -97,14 +95,5 @@ def draw(runs: dict[str, CoupledRun], path: Path) -> Path:
     )  # fmt: skip
 
 
-def main() -> None:
-    """Write figure and data, and print the numbers."""
-    runs = simulate(archive(words=sys.argv[1:]))
-    for name, found in runs.items():
-        print(name, {key: round(value, 3) for key, value in numbers(found).items()})
-    for path in (draw(runs, FIGURES / f"{NAME}.png"), *save_runs(runs, NAME)):
-        print(path)
-
-
 if __name__ == "__main__":
-    main()
+    write(NAME, simulate, numbers, draw)

@@ -8,14 +8,12 @@ throws the string on the floor.
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import numpy as np
 
 from percussion_model.coupling import CoupledRun
-from scenarios.coupled import FEED, archive, draw_runs, held_since, run, save_runs
-from scenarios.harness import FIGURES
+from scenarios.coupled import FEED, draw_runs, held_since, run, write
 
 NAME = "void_cut_back"
 DURATION = 5.0  # [s]
@@ -93,14 +91,5 @@ def draw(runs: dict[str, CoupledRun], path: Path) -> Path:
     )
 
 
-def main() -> None:
-    """Write figure and data, and print the numbers."""
-    runs = simulate(archive(words=sys.argv[1:]))
-    for name, found in runs.items():
-        print(name, {key: round(value, 3) for key, value in numbers(found).items()})
-    for path in (draw(runs, FIGURES / f"{NAME}.png"), *save_runs(runs, NAME)):
-        print(path)
-
-
 if __name__ == "__main__":
-    main()
+    write(NAME, simulate, numbers, draw)

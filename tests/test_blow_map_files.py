@@ -5,13 +5,14 @@ from __future__ import annotations
 import json
 import math
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from blow_map_scenes import RANGES, mapped
 
 from fmu_src.runtime.blow_map import read_blow_map
-from percussion_model import Scene, SceneError, simulate
+from percussion_model import Scene, SceneError, blow_maps, simulate
 from percussion_model.blow_maps import kept_map, make_map, map_file, node_count, outside_map
 from percussion_model.cli import _guarded, app
 from percussion_model.core.blow_records import Axis
@@ -150,14 +151,20 @@ def test_a_name_says_how_waves_are_computed_and_nothing_else():
     assert Scene().computed_by("blow-map").computed_by("fem").solver_name == "fem"
 
 
-def test_the_command_makes_shows_and_finds_a_table(cache, tmp_path, capsys):
-    path = tmp_path / "scene.toml"
+def said(folder, capsys, command):
+    """What calls a command on a scene with a tiny table; what it says on stdout."""
+    path = folder / "scene.toml"
     mapped(**TINY).to_toml(path)
 
     def call(*words):
-        assert not _guarded(lambda: app(["blow-map", str(path), *words], standalone_mode=False))
+        assert not _guarded(lambda: app([command, str(path), *words], standalone_mode=False))
         return capsys.readouterr().out
 
+    return call
+
+
+def test_the_command_makes_shows_and_finds_a_table(cache, tmp_path, capsys):
+    call = said(tmp_path, capsys, "blow-map")
     file = Path(call("where").strip())
     assert file.parent == cache
     assert "not made yet" in call("show")
@@ -169,6 +176,43 @@ def test_the_command_makes_shows_and_finds_a_table(cache, tmp_path, capsys):
     assert told["restless_nodes"] == 0
     assert told["range"]["feed_force"] == list(RANGES["feed"])
     assert told["outside"] == []
+
+
+def test_explain_says_what_a_table_would_cost_and_makes_none(cache, tmp_path, capsys):
+    call = said(tmp_path, capsys, "explain")
+    before = json.loads(call("--json", "-"))
+    assert list(cache.glob("*.npz")) == []
+    assert before["solver"] == "blow-map"
+    assert before["predicted_wall_time"] is None
+    assert before["blow_map_to_make"]["blows"] == node_count(mapped(**TINY))
+    assert before["setup_time"] > 0.0
+    assert "not made yet" in call()
+    make_map(mapped(**TINY), workers=1)
+    after = json.loads(call("--json", "-"))
+    assert set(after) == set(before)
+    assert after["blow_map_to_make"] is None
+    assert after["predicted_wall_time"] > 0.0
+    assert "not made yet" not in call()
+
+
+def test_the_cost_of_a_table_is_that_of_its_rocks_and_of_its_blows(monkeypatch):
+    """On an invented clock: a rock takes 0.5 s to make ready, a blow 2 ms, the first a minute."""
+    now = [0.0]
+
+    class Slow:
+        def __init__(self, scene, stiffness):
+            now[0] += 0.5
+
+        def entries(self, *blow):
+            now[0] += 2e-3 if now[0] > 60.0 else 60.0
+
+    monkeypatch.setattr(blow_maps, "SingleBlow", Slow)
+    monkeypatch.setattr(blow_maps, "time", SimpleNamespace(perf_counter=lambda: now[0]))
+    scene = mapped()
+    cost, rocks = blow_maps.map_cost(scene), Nodes.of(scene).counts[Axis.STIFFNESS]
+    assert cost.blows == node_count(scene)
+    assert cost.processor_time == pytest.approx(0.5 * rocks + 2e-3 * cost.blows)
+    assert now[0] < 70.0
 
 
 def test_a_scene_outside_its_own_table_is_told_before_the_table_is_made(cache, tmp_path, capsys):

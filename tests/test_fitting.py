@@ -2,31 +2,25 @@
 
 from __future__ import annotations
 
-import json
+import math
 import os
-import re
 
 import numpy as np
 import pytest
-from scipy.stats import binom
-from typer.testing import CliRunner
+from fitting_data import BARRIER, CURVE, DATUM, RATIO, STIFFNESS, bit, drops, noisy_curve, way
+from scipy.stats import binom, chi2
 
 from percussion_model import Scene
-from percussion_model.cli import app
 from percussion_model.fitting import (
     ROCK,
     DropTest,
     FitError,
     bilinear_force,
-    drop_test_signal,
     fit_drop_tests,
     fit_force_penetration,
 )
-from percussion_model.fitting.estimates import Counted, look_around
+from percussion_model.fitting.estimates import Counted, look_around, student_width
 
-STIFFNESS, RATIO, DATUM = 7.5e8, 5.0, 5e-5
-CURVE = {"rock.loading_stiffness": STIFFNESS, "rock.unloading_ratio": RATIO, "datum": DATUM}
-BARRIER = {"rock.barrier_damping": 1e4, "rock.barrier_energy": 0.5}
 CONFIDENCE = 0.95
 # Of that many trials so many cover, but for one chance in a thousand on either side.
 CHANCE = 1e-3
@@ -39,31 +33,28 @@ def plausible(covered, trials):
     return low <= covered <= high
 
 
-def way():
-    """Gauge readings of a slow test; the peak lies between two of them."""
-    return np.concatenate([np.linspace(0.0, 8.47e-4, 60), np.linspace(8.49e-4, 6.7e-4, 40)])
+def right_size(deviations, factor=1.0):
+    """Whether intervals have the width that the scatter of the estimates asks for, but for chance.
+
+    Intervals that are far too wide cover always, which is no rare thing in so few trials. Their
+    widths tell: deviations by them have a variance of one, and their squares sum to chi-square.
+
+    Parameters
+    ----------
+    deviations : sequence of float
+        Of estimates from the truth, in standard errors as the intervals have them.
+    factor : float
+        Takes intervals so many times as wide as they are.
+    """
+    low, high = chi2.ppf([CHANCE, 1.0 - CHANCE], len(deviations))
+    return low <= np.sum(np.square(deviations)) / factor**2 <= high
 
 
-def noisy_curve(seed, noise=6e3):
-    p = way()
-    force = bilinear_force(p, STIFFNESS, RATIO, DATUM, peak=8.5e-4)
-    return p, force + np.random.default_rng(seed).normal(0.0, noise, len(p))
-
-
-def bit(solver="rigid", **changes):
-    """Scene of a bit alone; a rigid one is quick to drop."""
-    scene = Scene().replace(**{"piston.model": "absent", "effects.drive": "none"})
-    scene = scene.computed_by(solver, **{"piston.model": "absent"}, **BARRIER)
-    return scene.replace(**{"solver.cells": 8}, **changes)
-
-
-def drops(scene, seed, noise=1e-5, speeds=(3.0, 5.25), step=4e-4):
-    rng, times = np.random.default_rng(seed), np.arange(0.0, 45e-3, step)
-    return [
-        DropTest(times, y + rng.normal(0.0, noise, len(times)), v)
-        for v in speeds
-        for y in [drop_test_signal(scene, times, v, "bit_position")]
-    ]
+def deviation(fit, key, truth, scale=float):
+    """Estimate less truth by half its interval, in widths of one standard error."""
+    value, low, high = (scale(getattr(fit.estimates[key], n)) for n in ("value", "low", "high"))
+    width = student_width(fit.confidence, len(fit.residuals) - len(fit.estimates))
+    return (value - scale(truth)) / (0.5 * (high - low) / width)
 
 
 def covers(fit, truth):
@@ -88,30 +79,37 @@ def test_a_curve_without_noise_gives_its_parameters_back():
 def test_intervals_of_a_curve_cover_as_often_as_they_say():
     trials = 200
     counts, halved = dict.fromkeys(CURVE, 0), 0
+    off = {key: [] for key in CURVE}
     for seed in range(trials):
         fit = fit_force_penetration(*noisy_curve(seed), CONFIDENCE)
         for key, covered in covers(fit, CURVE).items():
             counts[key] += covered
+            off[key].append(deviation(fit, key, CURVE[key]))
         value, _error, low, high = fit.estimates["rock.loading_stiffness"]
         halved += low + value <= 2.0 * STIFFNESS <= high + value
     assert all(plausible(count, trials) for count in counts.values()), counts
     assert not plausible(halved, trials)  # intervals half as wide are found out
+    assert all(right_size(found) for found in off.values()), off
+    assert not any(right_size(found, 1.4) for found in off.values())  # and wider ones
 
 
 @pytest.mark.parametrize(
     "solver", ["rigid", pytest.param("wave", marks=pytest.mark.skipif(not LONG, reason=WHY))]
 )
 def test_intervals_of_drop_tests_cover_as_often_as_they_say(solver):
-    trials = 30
-    counts = dict.fromkeys(BARRIER, 0)
+    trials = 60
+    counts, off = dict.fromkeys(BARRIER, 0), {key: [] for key in BARRIER}
     scene = bit(solver)
     guess = scene.replace(**{"rock.barrier_damping": 8.5e3, "rock.barrier_energy": 0.55})
     for seed in range(trials):
         fit = fit_drop_tests(guess, drops(scene, seed), span=1.5, steps=5, confidence=CONFIDENCE)
         for key, covered in covers(fit, BARRIER).items():
             counts[key] += covered
+            off[key].append(deviation(fit, key, BARRIER[key], math.log))  # as they are fitted
         assert fit.noise == pytest.approx(1e-5, rel=0.2)
     assert all(plausible(count, trials) for count in counts.values()), counts
+    assert all(right_size(found) for found in off.values()), off
+    assert not any(right_size(found, 1.7) for found in off.values())  # wider ones are found out
 
 
 def test_the_whole_law_is_found_from_a_far_guess():
@@ -220,74 +218,3 @@ def test_data_that_tell_nothing_are_refused():
     scene = bit(**{"start.rock_gap": 0.1})
     with pytest.raises(FitError, match=r"rock\.barrier_damping cannot be told from these data"):
         fit_drop_tests(scene, [DropTest(times, 5.0 * times, 5.0)], span=1.0)
-
-
-# ------------------------------------------------------------------------ command line
-
-
-def written(path, heading, *columns):
-    rows = zip(*(column.tolist() for column in columns), strict=True)
-    lines = [heading, *(",".join(map(repr, row)) for row in rows)]
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    return str(path)
-
-
-def test_the_command_writes_a_calibrated_scene(tmp_path):
-    curve = written(tmp_path / "slow.csv", "penetration, force", *noisy_curve(2))
-    drops_of = [
-        written(tmp_path / f"{k}.csv", "time,bit_position", test.time, test.values)
-        + f"@{test.speed}"
-        for k, test in enumerate(drops(bit(), 2, step=1e-3))
-    ]
-    guess = bit().replace(**{"rock.barrier_damping": 9.5e3, "rock.loading_stiffness": 5e8})
-    guess.to_toml(tmp_path / "guess.toml")
-    words = ["calibrate", str(tmp_path / "guess.toml"), "--curve", curve]
-    words += [word for drop in drops_of for word in ("--drop", drop)]
-    out = tmp_path / "found.toml"
-    ended = CliRunner().invoke(app, [*words, "--span", "1", "--out", str(out), "--json", "-"])
-    assert ended.exit_code == 0, ended.output
-    found = json.loads(ended.stdout)
-    estimates = found["drop tests"]["estimates"]
-    assert list(estimates) == list(ROCK)
-    scene = Scene.from_toml(out)
-    assert {key: scene[key] for key in ROCK} == {k: v["value"] for k, v in estimates.items()}
-    assert found["curve"]["estimates"]["rock.loading_stiffness"]["low"] < STIFFNESS
-
-
-@pytest.mark.parametrize(
-    ("words", "says"),
-    [
-        (["--curve", "none.csv"], "none.csv: cannot be read"),
-        (["--curve", "{swapped}"], "the columns must be penetration, force"),
-        (["--curve", "{ragged}"], "row 2 has 1 columns, the heading 2"),
-        (["--curve", "{words}"], "could not convert string to float: 'much'"),
-        (["--curve", "{empty}"], "is empty"),
-        (["--drop", "drop.csv"], "--drop drop.csv: must be CSV@SPEED"),
-        (["--drop", "{swapped}@5"], "the columns must be time and one signal"),
-        (["--drop", "{gap}@5"], "signal = 'gap': must be one of"),
-    ],
-)
-def test_the_command_refuses_bad_files(words, says, tmp_path):
-    texts = {
-        "swapped": "force,penetration\n1,2\n",
-        "ragged": "penetration,force\n1,2\n3\n",
-        "words": "penetration,force\n1,much\n",
-        "gap": "time,gap\n" + "\n".join(f"{k}e-3,0" for k in range(20)),
-        "empty": "",
-    }
-    files = {name: tmp_path / f"{name}.csv" for name in texts}
-    for name, text in texts.items():
-        files[name].write_text(text, encoding="utf-8")
-    bit().to_toml(tmp_path / "scene.toml")
-    words = [word.format(**files) for word in words]
-    with pytest.raises(FitError, match=re.escape(says)):
-        CliRunner().invoke(
-            app, ["calibrate", str(tmp_path / "scene.toml"), *words], catch_exceptions=False
-        )
-
-
-def test_the_command_wants_something_to_fit(tmp_path):
-    bit().to_toml(tmp_path / "scene.toml")
-    ended = CliRunner().invoke(app, ["calibrate", str(tmp_path / "scene.toml")])
-    assert ended.exit_code == 2
-    assert "nothing to fit" in ended.output

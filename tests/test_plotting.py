@@ -8,13 +8,15 @@ import re
 import matplotlib
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from matplotlib.image import imread
 
 from percussion_model.core.records import EVENT, EventKind, Mode
 from percussion_model.plotting import CAPTIONS, draw_figures, figures
-from percussion_model.plotting.style import MODE_COLOURS, STYLE, draw_by_mode
+from percussion_model.plotting.style import MODE_COLOURS, STYLE, draw_by_mode, save_png
 from percussion_model.plotting.window import closed_contacts, last_blow_window, stress_fields
 from percussion_model.result import Result
+from percussion_model.result_files import ResultError
 from percussion_model.scene import Scene
 from percussion_model.simulation import simulate
 
@@ -146,3 +148,22 @@ def test_a_line_by_mode_leaves_no_gap():
     lines = {line.get_color(): line.get_xdata() for line in ax.lines}
     np.testing.assert_array_equal(lines[MODE_COLOURS[Mode.FC]], [2.0, 3.0])
     np.testing.assert_array_equal(lines[MODE_COLOURS[Mode.FF]], [0.0, 1.0, 2.0, 3.0])
+
+
+class _TornFigure(Figure):
+    """A figure whose file breaks off, as on a full disk."""
+
+    def savefig(self, path, **choice):
+        with open(path, "wb") as file:
+            file.write(b"half of it")
+        raise OSError("no space left on device")
+
+
+def test_a_single_figure_is_written_whole_or_not_at_all(tmp_path):
+    path = save_png(Figure(figsize=(2.0, 1.0)), tmp_path / "new" / "one.png", dpi=50)
+    before = path.read_bytes()
+    assert imread(path).shape[:2] == (50, 100)
+    with pytest.raises(ResultError, match="no space left"):
+        save_png(_TornFigure(), path, dpi=50)
+    assert path.read_bytes() == before
+    assert [file.name for file in path.parent.iterdir()] == ["one.png"]

@@ -9,7 +9,8 @@ import pytest
 
 from percussion_model import Result, ResultError, Scene, simulate
 from percussion_model.core.records import BLOW
-from percussion_model.result_files import check_writable, staged
+from percussion_model.plotting import CAPTIONS
+from percussion_model.result_files import FIGURES, REPORT, check_writable, staged
 
 RIGID = Scene().replace(**{"piston.model": "rigid", "bit.model": "rigid"})
 KEYS = [
@@ -186,6 +187,19 @@ def test_nothing_half_written_stays(tmp_path):
     with pytest.raises(KeyboardInterrupt):
         fail()
     assert list(tmp_path.iterdir()) == []
+
+
+def test_what_was_made_of_an_earlier_result_goes(rigid, tmp_path):
+    """A report beside the numbers of another run would be believed; other files stay."""
+    assert set(FIGURES) == set(CAPTIONS)
+    derived = [REPORT, *(f"{name}.{kind}" for name in FIGURES for kind in ("png", "svg"))]
+    for name in (*derived, "notes.txt"):
+        (tmp_path / name).write_text("made earlier")
+    rigid.save(tmp_path)  # that folder held no result: nothing in it was made of one
+    assert all((tmp_path / name).exists() for name in derived)
+    rigid.save(tmp_path)
+    assert not any((tmp_path / name).exists() for name in derived)
+    assert (tmp_path / "notes.txt").exists()
 
 
 def test_a_long_trace_becomes_a_compressed_file(rigid, tmp_path, monkeypatch):

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import threading
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,57 +17,14 @@ from typer.testing import CliRunner
 
 from percussion_model import Scene, SceneError, settled
 from percussion_model.cli import app
-from percussion_model.result_files import ResultError
-from percussion_model.solvers import operators
-from percussion_model.study import grid, latin_hypercube, read_axis, study, table, workers
-from percussion_model.study.store import PARTS
-from percussion_model.study.work import KINDS, run_points
+from percussion_model.result_files import ResultError, to_json
+from percussion_model.solvers import operators, sources
+from percussion_model.study import grid, study, table, workers
+from percussion_model.study.store import PARTS, PLAN
+from percussion_model.study.work import COMPUTING, KINDS, run_points
 
 SCENE = Scene(title="rigid bodies").computed_by("rigid")
 AXES = {"feed.force": [1500.0, 2500.0, 4000.0], "rock.loading_stiffness": [3e8, 7.5e8]}
-
-
-def test_a_grid_has_all_combinations():
-    points = grid(AXES)
-    assert (len(points), points.shape, points.is_grid) == (6, (3, 2), True)
-    assert points.changes(3) == {"feed.force": 2500.0, "rock.loading_stiffness": 7.5e8}
-
-
-def test_points_dear_to_set_up_come_together():
-    points = grid(AXES)
-    stiffness = points.values[points.in_cheap_order(), 1]
-    assert np.count_nonzero(np.diff(stiffness)) == 1
-
-
-def test_samples_fill_every_slice_and_repeat_with_their_seed():
-    ranges = {"feed.force": (500.0, 5e3), "rock.loading_stiffness": (1e8, 1e10)}
-    points = latin_hypercube(ranges, 50, seed=3, logarithmic=["rock.loading_stiffness"])
-    slices = np.log(points.values[:, 1] / 1e8) / np.log(100.0) * 50
-    assert sorted(slices.astype(int)) == list(range(50))
-    again = latin_hypercube(ranges, 50, seed=3, logarithmic=["rock.loading_stiffness"])
-    assert again.digest() == points.digest()
-    assert latin_hypercube(ranges, 50, seed=4).digest() != points.digest()
-
-
-@pytest.mark.parametrize(
-    ("make", "words"),
-    [
-        (lambda: grid({}), "at least one parameter"),
-        (lambda: grid({"feed.force": []}), "feed.force: values of a study must be finite"),
-        (lambda: grid({"feed.force": ["much"]}), "feed.force: values of a study must be numbers"),
-        (lambda: table({"feed.force": [1.0], "loss.time": [0, 1]}), "of one length"),
-        (lambda: latin_hypercube({"feed.force": (2.0, 1.0)}, 3), "two rising numbers"),
-        (lambda: latin_hypercube({"feed.force": (0, 1)}, 3, 0, ["feed.force"]), "above 0"),
-        (lambda: latin_hypercube({"feed.force": (0, 1)}, 0), "count = 0"),
-        (lambda: read_axis("feed.force"), "--over feed.force: must be"),
-        (lambda: read_axis("feed.force=1:2"), "must be KEY=FIRST:LAST:COUNT"),
-        (lambda: read_axis("feed.force=1:2:0"), "COUNT must be a whole number from 1 on"),
-        (lambda: read_axis("feed.force=-1:2:3log"), "both ends must be above 0"),
-    ],
-)
-def test_senseless_points_are_refused(make, words):
-    with pytest.raises(SceneError, match=words):
-        make()
 
 
 @pytest.mark.parametrize("key", ["feed.strength", "solver.name", "piston.sections"])
@@ -74,14 +32,6 @@ def test_keys_that_no_study_can_vary_are_refused_at_once(key, tmp_path):
     with pytest.raises(SceneError, match=key):
         study(SCENE, grid({key: [1.0]}), tmp_path / "out")
     assert not (tmp_path / "out").exists()
-
-
-def test_axes_of_the_command_line():
-    key, values = read_axis("rock.loading_stiffness=1e8:1e10:3log")
-    assert key == "rock.loading_stiffness"
-    assert values == pytest.approx([1e8, 1e9, 1e10])
-    assert read_axis("feed.force=0:10:3")[1].tolist() == [0.0, 5.0, 10.0]
-    assert read_axis("feed.force=3,7")[1].tolist() == [3.0, 7.0]
 
 
 def test_a_point_has_the_numbers_of_settled_and_whole_numbers_stay_whole():
@@ -149,14 +99,8 @@ def test_a_study_becomes_tables_and_grids(whole, tmp_path):
 
 def test_an_interrupted_study_goes_on_where_it_was(whole, tmp_path):
     """Ctrl-C after two parts; what was finished is not run again."""
-
-    def interrupt(done, count):
-        if done >= 2:
-            raise KeyboardInterrupt
-
     folder = tmp_path / "out"
-    with pytest.raises(KeyboardInterrupt):
-        study(SCENE, grid(AXES), folder, processes=1, progress=interrupt)
+    interrupted(folder)
     finished = {path.name: path.stat().st_mtime_ns for path in (folder / PARTS).iterdir()}
     assert 0 < len(finished) < 6
     seen = []
@@ -182,6 +126,67 @@ def test_another_study_is_not_mixed_in(tmp_path):
     (tmp_path / "full" / "letter.txt").write_text("dear")
     with pytest.raises(ResultError, match="is not empty"):
         study(SCENE, grid(AXES), tmp_path / "full")
+
+
+def interrupted(folder):
+    """A study that was stopped after its first parts."""
+
+    def stop(done, count):
+        if done >= 2:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        study(SCENE, grid(AXES), folder, processes=1, progress=stop)
+    return len(list((folder / PARTS).iterdir()))
+
+
+def test_points_of_other_sources_are_not_mixed_in(tmp_path, monkeypatch):
+    """A kernel was edited since, or the folder is older than this check."""
+    folder = tmp_path / "out"
+    kept = interrupted(folder)
+    monkeypatch.setattr("percussion_model.study.sources_digest", lambda patterns: "edited")
+    with pytest.raises(ResultError, match=r"other sources .* than those of now: give another"):
+        study(SCENE, grid(AXES), folder, processes=1)
+    monkeypatch.undo()
+    plan = json.loads((folder / PLAN).read_text())
+    older = {key: value for key, value in plan.items() if key != "sources"}
+    (folder / PLAN).write_text(to_json(older) + "\n")
+    with pytest.raises(ResultError, match="other sources"):
+        study(SCENE, grid(AXES), folder, processes=1)
+    (folder / PLAN).write_text("[1]")
+    with pytest.raises(ResultError, match="holds another study"):
+        study(SCENE, grid(AXES), folder, processes=1)
+    assert len(list((folder / PARTS).iterdir())) == kept
+
+
+def test_the_hash_of_sources_sees_an_edit_and_a_new_file(tmp_path, monkeypatch):
+    (tmp_path / "core").mkdir()
+    (tmp_path / "core" / "rock.py").write_text("K = 1")
+    monkeypatch.setattr(sources, "PACKAGE", tmp_path)
+    found = [sources.sources_digest()]
+    (tmp_path / "core" / "rock.py").write_text("K = 2")
+    found.append(sources.sources_digest())
+    (tmp_path / "core" / "new.py").write_text("")
+    found.append(sources.sources_digest())
+    (tmp_path / "terminal.py").write_text("shows")
+    assert len(set(found)) == 3
+    assert sources.sources_digest() == found[-1]
+
+
+def test_all_that_computes_a_point_is_in_the_hash():
+    """What a worker loads, but for files, tables, warnings and other points."""
+    code = (
+        "import sys, numpy as np; from percussion_model import Scene; "
+        "from percussion_model.study.work import run_points; "
+        "scene = Scene().computed_by('rigid'); "
+        "run_points(scene, ('feed.force',), np.array([[2500.0]]), 1e-4, 400, 1e-3); "
+        "print(*(m.__file__ for n, m in sys.modules.items() if n.startswith('percussion_model')))"
+    )
+    said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    left = {Path(name) for name in said.stdout.split()} - set(sources.source_files(COMPUTING))
+    names = {path.relative_to(sources.PACKAGE).as_posix() for path in left}
+    of_study = {f"study/{name}.py" for name in ("__init__", "store", "summary", "workers")}
+    assert names == of_study | {"__init__.py", "result.py", "result_files.py", "warnings_of_run.py"}
 
 
 def test_a_part_that_was_damaged_is_named(whole, tmp_path):
@@ -242,6 +247,7 @@ def test_a_cluster_finds_the_same_and_survives_a_worker(whole, tmp_path):
     with distributed.LocalCluster(
         n_workers=2, threads_per_worker=1, dashboard_address=None, silence_logs=50
     ) as cluster:
+        kept, seen = interrupted(tmp_path / "out"), []  # on this machine: the cluster goes on
 
         def kill_one():
             time.sleep(2.0)
@@ -249,7 +255,11 @@ def test_a_cluster_finds_the_same_and_survives_a_worker(whole, tmp_path):
 
         if os.name != "nt":
             threading.Thread(target=kill_one, daemon=True).start()
-        found = study(SCENE, grid(AXES), tmp_path / "out", cluster=cluster.scheduler_address)
+        found = study(
+            SCENE, grid(AXES), tmp_path / "out", cluster=cluster.scheduler_address,
+            progress=lambda *at: seen.append(at),
+        )  # fmt: skip
+        assert (kept, seen[0][0], seen[-1]) == (2, 2, (6, 6))
     for name in set(found.rows.dtype.names) - {"wall_time"}:
         np.testing.assert_array_equal(found.rows[name], whole.rows[name])
 

@@ -52,16 +52,23 @@ def ready_map(scene: Scene, workers: int | None = None) -> BlowTable:
 
     Whatever of the scene lies outside is told first: making a table takes minutes.
     """
-    from percussion_model.blow_maps import kept_map, make_map, outside_map
+    from percussion_model.blow_maps import kept_map, make_map
     from percussion_model.terminal import count_bar
 
-    for text in outside_map(scene):
-        complain(f"warning: {text}")
+    warn_of_outside(scene)
     kept = kept_map(scene)
     if kept is not None:
         return kept
     with count_bar("parts of the blow map") as progress:
         return make_map(scene, progress, workers)
+
+
+def warn_of_outside(scene: Scene) -> None:
+    """Tell what of a scene its table would not answer."""
+    from percussion_model.blow_maps import outside_map
+
+    for text in outside_map(scene):
+        complain(f"warning: {text}")
 
 
 def _numbers(scene: Scene, table: BlowTable | None) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from percussion_model.commands import common
-from percussion_model.commands.blow_map import ready_map
+from percussion_model.commands.blow_map import ready_map, warn_of_outside
 
 if TYPE_CHECKING:
     from percussion_model.result import Result
@@ -67,14 +67,14 @@ def explain(
     settings: common.Settings = None,
     json_file: common.JsonFile = None,
 ) -> None:
-    """Tell what a scene computes, how, and what the run will cost."""
+    """Tell what a scene computes, how, and what the run will cost; makes no blow map."""
     from percussion_model.forecast import explained, forecast
     from percussion_model.terminal import show_explanation, waiting_bar
 
     chosen = common.load_scene(scene, solver, cells, settings, accuracy, check)
     common.check_json(json_file)
     if chosen.solver_name == "blow-map":
-        ready_map(chosen)
+        warn_of_outside(chosen)
     with waiting_bar():
         found = forecast(chosen)
     common.write_json(json_file, explained(chosen, found))

@@ -15,7 +15,7 @@ from typing import Any
 from percussion_model.coupling.component import CouplingError
 from percussion_model.coupling.port import Port
 
-# Steps are the longest one over powers of two, down to this one.
+# Steps are the longest one over powers of two, down to this one; what counts are their halves.
 HALVINGS = 6
 # The error of a step goes by the square of its size, so a double one is tried from here.
 SAFE_SHARE = 0.25

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from html import escape
 from pathlib import Path
 
-import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from percussion_model.coupling.bench import (
@@ -23,7 +23,8 @@ from percussion_model.coupling.bench import (
     TRIALS,
     Score,
 )
-from percussion_model.result_files import staged_text
+from percussion_model.plotting.style import save_png
+from percussion_model.result_files import staged
 
 STYLE = (
     "body{font:15px/1.5 sans-serif;max-width:75em;margin:2em auto;padding:0 1em;color:#222}"
@@ -33,6 +34,7 @@ STYLE = (
     ".bad{color:#b00;font-weight:bold}.good{color:#070}img{max-width:100%}dt{font-weight:bold}"
     "dl{display:grid;grid-template-columns:max-content auto;gap:.1em 1em}dd{margin:0}"
 )
+PAGE = "index.html"
 Columns = Sequence[tuple[str, str, float, str]]
 TEXTS = {trial.name: trial.text for trial in TRIALS}
 VOID_COLOUR, LIMIT_COLOUR = "#dddddd", "#bb0000"
@@ -41,14 +43,13 @@ VOID_COLOUR, LIMIT_COLOUR = "#dddddd", "#bb0000"
 def save_bench(
     scores: Sequence[Score], points: float, columns: Columns, folder: Path, title: str
 ) -> Path:
-    """Write a figure for each run and one page with all; return the page.
+    """Write a figure for each run and one page with all, everything or nothing; return the page.
 
     Parameters
     ----------
     columns : sequence of tuple
         Name of a number, head of its column, factor, and what it is.
     """
-    folder.mkdir(parents=True, exist_ok=True)
     failed = [score.trial for score in scores if score.faults]
     verdict = (
         f'<span class="bad">{len(failed)} of {len(scores)} runs failed: {", ".join(failed)}</span>'
@@ -64,18 +65,22 @@ def save_bench(
         "<dl>" + "".join(f"<dt>{escape(head)}</dt><dd>{escape(text)}</dd>"
                          for _, head, _, text in columns) + "</dl>",
     ]  # fmt: skip
-    for score in scores:
-        picture = _figure(score, folder / f"{score.trial}.png").read_bytes()
-        text = escape(TEXTS.get(score.trial, ""))
-        parts.append(f'<h2 id="{score.trial}">{score.trial}: {text}</h2>')
-        parts += [f'<p class="bad">{escape(fault)}</p>' for fault in score.faults]
-        parts.append(
-            f'<img alt="feed, rig force, depth and torque over time in the run {score.trial}" '
-            f'src="data:image/png;base64,{b64encode(picture).decode()}">'
-        )
-    page = folder / "index.html"
-    staged_text(page, "\n".join(parts) + "\n</body></html>\n")
-    return page
+    with staged(folder) as draft:
+        for score in scores:
+            parts += _section(score, _figure(score, draft / f"{score.trial}.png"))
+        page = "\n".join(parts) + "\n</body></html>\n"
+        (draft / PAGE).write_text(page, encoding="utf-8")
+    return folder / PAGE
+
+
+def _section(score: Score, figure: Path) -> list[str]:
+    picture = b64encode(figure.read_bytes()).decode()
+    return [
+        f'<h2 id="{score.trial}">{score.trial}: {escape(TEXTS.get(score.trial, ""))}</h2>',
+        *(f'<p class="bad">{escape(fault)}</p>' for fault in score.faults),
+        f'<img alt="feed, rig force, depth and torque over time in the run {score.trial}" '
+        f'src="data:image/png;base64,{picture}">',
+    ]
 
 
 def _rules() -> str:
@@ -109,7 +114,8 @@ def _table(scores: Sequence[Score], columns: Columns) -> str:
 def _figure(score: Score, path: Path) -> Path:
     """Feed and what is wanted, force of the rig, depth and torque, over time."""
     run = score.run
-    figure, axes = plt.subplots(2, 2, sharex=True, figsize=(10.0, 5.2))
+    figure = Figure(figsize=(10.0, 5.2))
+    axes = figure.subplots(2, 2, sharex=True)
     (feed, depth), (rig, torque) = axes
     _panel(feed, score, "feed force on the bit [kN]", 1e-3, "string.feed_force_mean")
     _panel(rig, score, "force command to the rig [kN]", 1e-3, "controller.force_command")
@@ -131,9 +137,7 @@ def _figure(score: Score, path: Path) -> Path:
         ax.set_xlabel("time [s]")
     figure.legend(handles, labels, loc="lower center", ncols=4, frameon=False, fontsize="small")
     figure.tight_layout(rect=(0.0, 0.05, 1.0, 1.0))
-    figure.savefig(path, dpi=90)
-    plt.close(figure)
-    return path
+    return save_png(figure, path, dpi=90)
 
 
 def _panel(ax: Axes, score: Score, label: str, factor: float, name: str) -> None:

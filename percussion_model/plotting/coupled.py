@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import matplotlib.pyplot as plt
+from matplotlib.figure import Figure
 
 from percussion_model.coupling.coupled_run import CoupledRun
+from percussion_model.plotting.style import save_png
 
 # Label, factor, signals; a panel is drawn where the run has one of its signals.
 PANELS = (
@@ -27,9 +28,8 @@ def save_coupled(run: CoupledRun, path: Path, title: str) -> Path:
         for label, factor, names in PANELS
     ]
     panels = [panel for panel in panels if panel[2]] or [("", 1.0, list(run.columns)[1:5])]
-    figure, axes = plt.subplots(
-        len(panels), 1, sharex=True, figsize=(8.0, 1.0 + 1.5 * len(panels)), squeeze=False
-    )
+    figure = Figure(figsize=(8.0, 1.0 + 1.5 * len(panels)))
+    axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)
     for ax, (label, factor, names) in zip(axes[:, 0], panels, strict=True):
         for name in names:
             ax.plot(run["time"], factor * run[name], linewidth=1.1, label=name)
@@ -41,7 +41,4 @@ def save_coupled(run: CoupledRun, path: Path, title: str) -> Path:
     axes[0, 0].set_title(title)
     figure.align_ylabels()
     figure.tight_layout()
-    path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path, dpi=110)
-    plt.close(figure)
-    return path
+    return save_png(figure, path, dpi=110)

@@ -200,6 +200,32 @@ def save(fig: Figure, folder: Path, name: str, kinds: Sequence[str] = ("png", "s
     return names
 
 
+def save_png(fig: Figure, path: Path, dpi: float) -> Path:
+    """Write one figure as PNG in the style it was drawn in, whole or not at all.
+
+    Parameters
+    ----------
+    fig : Figure
+    path : Path
+        Its folder is made if it is not there.
+    dpi : float
+        Pixels by inch.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    ResultError
+        If the folder cannot be written.
+    """
+    with staged(path.absolute().parent) as draft:
+        fig.savefig(draft / path.name, dpi=dpi, metadata=_METADATA["png"])
+    return path
+
+
 # Without a date the same result gives the same file.
 _METADATA: dict[str, dict[str, Any]] = {
     "png": {"Software": "percussion_model"},

@@ -156,12 +156,10 @@ def make_slab(scene: SceneRules, stiffness: float) -> np.ndarray:
     ndarray, shape (nodes of velocity, load and drive, ENTRIES)
     """
     nodes = Nodes.of(scene)
-    speeds, loads, drives = (nodes.values(axis) for axis in (Axis.VELOCITY, Axis.LOAD, Axis.DRIVE))
     slab = np.full((*nodes.counts[1:], ENTRIES), np.nan, np.float32)
     single = SingleBlow(scene, stiffness)
-    for j, k, m in nodes.wanted():
-        v = float(speeds[j])
-        slab[j, k, m] = single.entries(v, float(loads[k]) * v, float(drives[m]) * v)
+    for place in nodes.wanted():
+        slab[place] = single.entries(*nodes.blow(place))
     return slab
 
 

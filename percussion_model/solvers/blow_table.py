@@ -8,13 +8,13 @@ import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from percussion_model.core.blow_records import ENTRIES, Axis, Entry
 from percussion_model.scene_rules import SceneError, SceneRules
+from percussion_model.solvers.sources import sources_digest
 
 FORMAT = 1
 # Greatest ratio of neighbouring nodes at density 1, axis by axis: rebound and penetration
@@ -45,7 +45,6 @@ _RANGES = {
     Axis.DRIVE: "force",
 }
 _SECTION = ("length", "area", "youngs_modulus", "density")
-_PACKAGE = Path(__file__).parents[1]
 
 
 class TableError(ValueError):
@@ -139,6 +138,12 @@ class Nodes:
             drives = self._near(Axis.DRIVE, slow, fast, 0.0)
             found += [(j, k, m) for k in loads for m in drives]
         return found
+
+    def blow(self, place: tuple[int, int, int]) -> tuple[float, float, float]:
+        """Impact velocity [m/s], static force of the bit and F_0 [N] at such a node."""
+        axes = (Axis.VELOCITY, Axis.LOAD, Axis.DRIVE)
+        v, load, drive = (float(self.values(a)[k]) for a, k in zip(axes, place, strict=True))
+        return v, load * v, drive * v
 
     def _near(self, axis: Axis, slow: float, fast: float, weight: float) -> range:
         """Nodes of an axis around the forces that belong to impacts from slow to fast."""
@@ -261,11 +266,8 @@ def table_key(scene: SceneRules) -> str:
     """Name of a scene's table: a hash of all that it depends on, the sources included."""
     nodes = Nodes.of(scene)
     parts = [FORMAT, fixed_values(scene), nodes.lowest, nodes.highest, nodes.counts]
-    digest = hashlib.sha256(json.dumps(parts, sort_keys=True).encode())
-    for folder in ("core", "solvers"):
-        for source in sorted((_PACKAGE / folder).glob("*.py")):
-            digest.update(source.read_bytes())
-    return digest.hexdigest()[:24]
+    text = json.dumps([*parts, sources_digest()], sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()[:24]
 
 
 def _sum(text: str, values: np.ndarray) -> np.ndarray:

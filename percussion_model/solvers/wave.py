@@ -1,4 +1,4 @@
-"""The travelling-wave solver: sizes, packing, saving and reading a state."""
+"""The travelling-wave solver: packing, and its kernels on a state."""
 
 from __future__ import annotations
 
@@ -17,15 +17,8 @@ from percussion_model.core.records import (
     Status,
 )
 from percussion_model.core.totals import lost_in_faces, resync, stored_energy
-from percussion_model.core.wave_records import WAVE_STATE, Coef, Row, Task
-from percussion_model.scene_rules import BarNumbers, SceneRules
-from percussion_model.solvers.grid import (
-    Grid,
-    choose_time_step,
-    coefficients,
-    cut,
-    section_count,
-)
+from percussion_model.core.wave_records import WAVE_STATE, Row, Task
+from percussion_model.scene_rules import SceneRules
 from percussion_model.solvers.operators import LEVELS, leap_operators, padded
 from percussion_model.solvers.packing import (
     INPUT_FIELDS,
@@ -33,8 +26,8 @@ from percussion_model.solvers.packing import (
     pack_parameters,
     rock_numbers,
 )
-from percussion_model.solvers.resolution import asked_cells, elastic_bars
 from percussion_model.solvers.step_map import no_operators
+from percussion_model.solvers.wave_bars import WaveBars
 from percussion_model.solvers.wave_state import WORD, WaveState
 
 DONE = int(Status.DONE)
@@ -42,7 +35,7 @@ EVENTS_ON, LEAP_END, T_BASE = WORD["events_on"], WORD["leap_end"], WORD["t_base"
 N_BLOWS, N_EVENTS = WORD["n_blows"], WORD["n_events"]
 
 
-class WaveSolver:
+class WaveSolver(WaveBars):
     """Method of characteristics for a scene with an elastic bit.
 
     Parameters
@@ -51,36 +44,17 @@ class WaveSolver:
 
     Attributes
     ----------
-    time_step : float
-        Transit time of a cell [s].
-    cells : dict of int
-        Cells in each elastic bar.
-    wave_speed_error : float
-        Largest relative error of a section's wave speed, from lengths that
-        fit no common cell.
+    time_step, cells, wave_speed_error
+        As in `WaveBars`.
     """
 
     name = "wave"
 
     def __init__(self, scene: SceneRules) -> None:
-        self.scene = scene
-        elastic_piston = scene.piston.model == "elastic"
-        bars = elastic_bars(scene)
-        self.time_step = choose_time_step(bars, scene.solver.cells or asked_cells(scene))
-        loss_time = scene.loss.time if scene.loss_on else 0.0
-        self._bit = cut(scene.bit, self.time_step)
-        self._piston = cut(scene.piston, self.time_step) if elastic_piston else None
-        self._cb = coefficients(self._bit, loss_time)
-        if self._piston is not None:
-            self._cp = coefficients(self._piston, loss_time)
-        else:
-            self._cp = np.zeros((len(Coef), 1))
-        self.cells = {"bit": self._bit.n}
-        if self._piston is not None:
-            self.cells = {"piston": self._piston.n, **self.cells}
-        grids = [grid for grid in (self._piston, self._bit) if grid is not None]
-        self.wave_speed_error = max(grid.fit for grid in grids)
-        self._par = pack_parameters(scene, self._piston, self._cp, self._bit, self._cb, loss_time)
+        super().__init__(scene)
+        self._par = pack_parameters(
+            scene, self._piston, self._cp, self._bit, self._cb, self._loss_time
+        )
         self._operators = no_operators()
         if scene.solver.leaps:
             found = leap_operators(self._par, self._piston, self._cp, self._bit, self._cb)
@@ -103,11 +77,6 @@ class WaveSolver:
     def place_of_closure(self) -> float:
         """Share of a step after which a closure comes best (docs/numerics.md, eq. 14b)."""
         return float(self._par[0]["front"])
-
-    @property
-    def static_wave(self) -> np.ndarray:
-        """Down-going wave of a bit at rest under unit body acceleration, by cell [s]."""
-        return self._cb[Coef.STATIC, : self._bit.n]
 
     def new_state(self) -> WaveState:
         """State at time zero."""
@@ -164,23 +133,6 @@ class WaveSolver:
         if self._entry is run:
             self._entry = entry_of(run)  # the types of all these never change
         return int(status)
-
-    def time(self, state: WaveState) -> float:
-        """Time up to which the state is committed [s]."""
-        return self._time_of(state, int(state.words[WORD["step"]]))
-
-    def readable_until(self, state: WaveState) -> float:
-        """Time up to which `sample` answers without advancing the state [s]."""
-        words = state.words
-        return self._time_of(state, max(int(words[WORD["leap_end"]]), int(words[WORD["step"]]) + 1))
-
-    def grid_point_after(self, state: WaveState, t: float) -> float:
-        """First grid point at or after `t` [s]."""
-        base = float(state.numbers[WORD["t_base"]])
-        return self._time_of(state, int(np.ceil((t - base) / self.time_step - GRID_ROUNDING)))
-
-    def _time_of(self, state: WaveState, step: int) -> float:
-        return float(state.numbers[WORD["t_base"]]) + step * self.time_step
 
     def advance(
         self,
@@ -279,38 +231,3 @@ class WaveSolver:
         entries |= {"start": float(s["e_start"]), "kinetic": kinetic, "elastic": elastic}
         entries["recoverable"] = rock
         return entries
-
-    def fields(self, state: WaveState) -> dict[str, np.ndarray]:
-        """Force [N] and velocity [m/s] of each cell, top to bottom, by bar."""
-        wp, wb = state.bars
-        r = 2 * int(state.record[0]["parity"])
-        out = {}
-        for name, w, grid in (("piston", wp, self._piston), ("bit", wb, self._bit)):
-            if grid is not None:
-                d, u = w[r, : grid.n], w[r + 1, : grid.n]
-                out[f"{name}_force"] = grid.impedance * (d - u)
-                out[f"{name}_velocity"] = d + u
-        return out
-
-    def force_in(self, state: WaveState, bar: str, cell: int) -> float:
-        """Force in one cell of "piston" or "bit" [N], as `fields` reads it."""
-        grid = self.grid_of(bar)
-        if grid is None:
-            return 0.0
-        w = state.bars[bar == "bit"]
-        r = 2 * int(state.words[WORD["parity"]])
-        return float(grid.impedance[cell] * (w[r, cell] - w[r + 1, cell]))
-
-    def grid_of(self, bar: str) -> Grid | None:
-        """Cells of "piston" or "bit", None where it has none."""
-        return {"piston": self._piston, "bit": self._bit}[bar]
-
-    def section_cells(self, bar: BarNumbers) -> list[int]:
-        """Cells in each section of an elastic bar."""
-        return [section_count(section, self.time_step) for section in bar.sections]
-
-    def statistics(self, state: WaveState) -> dict[str, int]:
-        """Counts of what the solver did."""
-        s = state.record[0]
-        names = ("steps", "leaps", "leap_steps", "wakes", "events", "blows")
-        return {name: int(s[f"count_{name}"]) for name in names} | {"locked": int(s["locked"])}

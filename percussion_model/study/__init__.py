@@ -13,6 +13,7 @@ import numpy as np
 
 from percussion_model.result_files import ResultError, staged
 from percussion_model.scene import Scene
+from percussion_model.solvers.sources import sources_digest
 from percussion_model.stationary import check_request
 from percussion_model.study.points import (
     Points,
@@ -24,7 +25,7 @@ from percussion_model.study.points import (
 )
 from percussion_model.study.store import Store
 from percussion_model.study.summary import headlines
-from percussion_model.study.work import FOUND, KINDS, run_points
+from percussion_model.study.work import COMPUTING, FOUND, KINDS, run_points
 from percussion_model.study.workers import on_a_cluster, on_this_machine
 
 if TYPE_CHECKING:
@@ -169,7 +170,7 @@ def study(
     SceneError
         If a key or value makes no sense.
     ResultError
-        If the folder holds something else.
+        If the folder holds something else, or points that other sources have computed.
     SimulationError
         If workers keep dying, or no scheduler answers.
     """
@@ -216,4 +217,5 @@ def _plan(
         "most_blows": most_blows,
         "scatter": scatter,
         "version": version("percussion_model"),
+        "sources": sources_digest(COMPUTING),
     }

@@ -71,9 +71,10 @@ def grid(axes: Mapping[str, Any]) -> Points:
     Parameters
     ----------
     axes : mapping of str to array_like
-        Values by dotted key; the last key varies fastest.
+        Values by dotted key, in any order, each once; those of an axis will rise. The last
+        key varies fastest.
     """
-    columns = {key: _column(key, values) for key, values in axes.items()}
+    columns = {key: _rising(key, _column(key, values)) for key, values in axes.items()}
     _refuse_empty(columns)
     mesh = np.meshgrid(*columns.values(), indexing="ij")
     values = np.stack([part.ravel() for part in mesh], axis=1)
@@ -193,6 +194,15 @@ def _column(key: str, values: Any) -> np.ndarray:
         raise SceneError(f"{key}: values of a study must be numbers, not {values!r}") from None
     if column.ndim != 1 or not len(column) or not np.isfinite(column).all():
         raise SceneError(f"{key}: values of a study must be finite numbers in one row")
+    return column
+
+
+def _rising(key: str, column: np.ndarray) -> np.ndarray:
+    """Sort the values of an axis; refuse one that stands there twice."""
+    column = np.sort(column)
+    twice = column[1:][np.diff(column) == 0.0]
+    if len(twice):
+        raise SceneError(f"{key}: {float(twice[0])!r} stands twice among the values of the grid")
     return column
 
 

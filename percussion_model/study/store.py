@@ -14,6 +14,8 @@ from percussion_model.study.work import ROW
 
 PLAN = "study.json"
 PARTS = "parts"
+# Entries of a plan that say which sources compute, not what.
+OF_SOURCES = ("version", "sources")
 
 
 class Store:
@@ -24,7 +26,8 @@ class Store:
     folder : Path
         Made if it is not there.
     plan : dict
-        What makes the study what it is. A folder with another plan is refused.
+        What makes the study what it is, and the sources that compute it. A folder with
+        another plan is refused.
     """
 
     def __init__(self, folder: Path, plan: dict[str, Any]) -> None:
@@ -33,9 +36,7 @@ class Store:
         text = to_json(plan) + "\n"
         if path.exists():
             if path.read_text(encoding="utf-8") != text:
-                raise ResultError(
-                    f"{folder}: holds another study (see {PLAN} there): give another folder"
-                )
+                raise ResultError(f"{folder}: {_difference(path, plan)}")
         else:
             if folder.exists() and any(folder.iterdir()):
                 raise ResultError(f"{folder}: is not empty and holds no study")
@@ -81,3 +82,19 @@ class Store:
             for k, text in zip(part.tolist(), words, strict=True):
                 failures[k] = text
         return rows, failures, done
+
+
+def _difference(path: Path, plan: dict[str, Any]) -> str:
+    """Say in what a plan that was found differs, and what to do."""
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+        wanted = json.loads(to_json(plan))
+        same = all(found.get(key) == wanted[key] for key in wanted if key not in OF_SOURCES)
+    except (ValueError, AttributeError):
+        same = False
+    if not same:
+        return f"holds another study (see {PLAN} there): give another folder"
+    return (
+        "its points were computed by other sources of percussion_model than those of now: give "
+        "another folder, or delete this one to compute them again"
+    )

@@ -8,10 +8,28 @@ from typing import Any
 import numpy as np
 
 from percussion_model.scene import Scene
+from percussion_model.solvers.sources import SOLVING
 from percussion_model.stationary import Settled, settled
 from percussion_model.study.points import whole_number
 
 KINDS = ("periodic", "aperiodic", "stalled", "failed")
+
+# What decides the numbers of a point: kernels, solvers, and the way from a scene to its blows.
+COMPUTING = (
+    *SOLVING,
+    "cycles.py",
+    "inputs.py",
+    "ledger.py",
+    "parameter*.py",
+    "runner.py",
+    "scene*.py",
+    "solver_options.py",
+    "stationary.py",
+    "stepping.py",
+    "validity.py",
+    "study/points.py",
+    "study/work.py",
+)
 
 # What a study keeps of each point: name, and unit.
 FOUND = {

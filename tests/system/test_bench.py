@@ -166,6 +166,18 @@ def test_the_page_says_what_a_stranger_needs(tmp_path):
     assert (tmp_path / "void.png").stat().st_size > 15_000
 
 
+def test_a_page_that_cannot_be_finished_leaves_the_old_one(tmp_path):
+    """Its figures too: they would belong to another run."""
+    scores = [judge(TRIALS[0], made_up(3000.0))]
+    save_bench(scores, total(scores), COLUMNS, tmp_path, "first")
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    scores = [judge(TRIALS[0], made_up(2900.0)), judge(TRIALS[3], made_up(2000.0))]
+    del scores[1].run.columns["hammer.bit.position"]
+    with pytest.raises(KeyError):
+        save_bench(scores, total(scores), COLUMNS, tmp_path, "second")
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
 @pytest.mark.parametrize("name", ["nothing", "rods"])
 def test_an_unknown_run_is_named(feed_control, name):
     with pytest.raises(CouplingError, match=f"no run {name}: there are collaring, hard"):

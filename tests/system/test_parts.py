@@ -169,6 +169,19 @@ def test_layers_change_at_their_depth_and_do_not_come_back():
     assert found[-1]["depth"] == 0.2
 
 
+def test_without_any_layer_all_is_rock_of_the_first_one():
+    """Stiffness, ratio and torque alike, at every depth."""
+    first = {"loading_stiffness": 4e8, "unloading_ratio": 7.0, "torque_factor": 3.0}
+    values = {f"layers[1].{name}": value for name, value in first.items()}
+    found = []
+    for top in (-1.0, 0.0):
+        rock = make_model("RockProfile", **values, **{"layers[1].top": top})
+        found += [run(rock, "RockProfile", 1, bit_position=z, feed_force=2e3) for z in (0.0, 5.0)]
+    assert found[:2] == found[2:]
+    assert found[0]["rotation_torque"] == pytest.approx(3.0 * 0.04 * 2e3)
+    assert [one["layer"] for one in found] == [1, 1, 1, 1]
+
+
 def test_variation_has_its_seed_its_mean_and_its_spread():
     rocks = [make_model("RockProfile", variation__spread=0.3, variation__seed=s) for s in (1, 1, 2)]
     depths = [0.0037 * k for k in range(4000)]

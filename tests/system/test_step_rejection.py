@@ -35,6 +35,13 @@ def test_steps_are_shortened_where_it_matters(feed_control):
     assert abs(chosen["hammer.bit.position"][-1] / exact - 1.0) < 0.2 * abs(plain / exact - 1.0)
 
 
+def test_the_shortest_steps_are_kept_whatever_their_error(feed_control):
+    """Halves of 1/64 of the communication step: docs/system.md, section 4."""
+    found = Coupling(feed_control).run(2 * LONGEST, LONGEST, tolerance=1e-300)
+    assert found.error == ""
+    assert (found.steps, found.rejected) == (2 * 128, 6)
+
+
 def test_a_part_that_cannot_be_saved_is_named(feed_control):
     def controller(inputs, time, step):
         return {"force_command": -800.0, "pressure_command": 2e6, "percussion_on": True}

@@ -30,20 +30,22 @@ class RockProfile(Model):
 
     def __init__(self, parameters: dict[str, Any]) -> None:
         super().__init__(parameters)
-        p = parameters
-        layers = sorted(
-            (p[f"layers[{i}].top"], p[f"layers[{i}].loading_stiffness"],
-             p[f"layers[{i}].unloading_ratio"], p[f"layers[{i}].torque_factor"], i)
-            for i in range(1, LAYERS + 1) if p[f"layers[{i}].top"] >= 0.0
-        )  # fmt: skip
-        self.layers = layers or [(0.0, p["layers[1].loading_stiffness"],
-                                  p["layers[1].unloading_ratio"], 1.0, 1)]  # fmt: skip
+        layers = [self._layer(number) for number in range(1, LAYERS + 1)]
+        # without any layer all is rock of the first one
+        self.layers = sorted(layer for layer in layers if layer[0] >= 0.0) or layers[:1]
         self.tops = [layer[0] for layer in self.layers]
         self.depth = self.feed = self.pressure = 0.0
         self._knots: dict[int, float] = {}
-        self._spread, self._length = p["variation.spread"], p["variation.length"]
+        self._spread = parameters["variation.spread"]
+        self._length = parameters["variation.length"]
         self._between = (-1, 0.0, 0.0)  # number of the knot above the bit, and two of them
-        self._arm = p["torque_arm"]
+        self._arm = parameters["torque_arm"]
+
+    def _layer(self, number: int) -> tuple[float, float, float, float, int]:
+        """Top [m], K_R [N/m], gamma, torque factor and number of a layer."""
+        names = ("top", "loading_stiffness", "unloading_ratio", "torque_factor")
+        top, stiffness, ratio, torque = (self.parameters[f"layers[{number}].{n}"] for n in names)
+        return top, stiffness, ratio, torque, number
 
     def begin(self, inputs: dict[str, Any]) -> None:
         """Look at the rock below the bit."""
@@ -79,7 +81,7 @@ class RockProfile(Model):
             self._knots[number] = random.Random(seed).gauss(0.0, 1.0)
         return self._knots[number]
 
-    def _layer(self) -> tuple[float, float, float, float, int]:
+    def _here(self) -> tuple[float, float, float, float, int]:
         return self.layers[max(0, bisect_right(self.tops, self.depth) - 1)]
 
     def _ridden(self, value: float, name: str, best: str) -> float:
@@ -92,7 +94,7 @@ class RockProfile(Model):
 
     def signals(self) -> dict[str, Any]:
         """What hammer and controller take."""
-        _, stiffness, ratio, torque, _ = self._layer()
+        _, stiffness, ratio, torque, _ = self._here()
         factor = self.variation(self.depth)
         factor *= self._ridden(self.feed, "best_feed", "force")
         factor *= self._ridden(self.pressure, "best_pressure", "pressure")
@@ -104,7 +106,7 @@ class RockProfile(Model):
 
     def outputs(self) -> dict[str, Any]:
         """Present values by name."""
-        _, stiffness, _, _, which = self._layer()
+        _, stiffness, _, _, which = self._here()
         return self.signals() | {
             "depth": self.depth,
             "in_void": stiffness <= self.parameters["void_stiffness"],

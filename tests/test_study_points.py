@@ -1,0 +1,72 @@
+"""Points of a study: grids, samples and tables."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from percussion_model import SceneError
+from percussion_model.study import grid, latin_hypercube, read_axis, table
+
+AXES = {"feed.force": [1500.0, 2500.0, 4000.0], "rock.loading_stiffness": [3e8, 7.5e8]}
+
+
+def test_a_grid_has_all_combinations():
+    points = grid(AXES)
+    assert (len(points), points.shape, points.is_grid) == (6, (3, 2), True)
+    assert points.changes(3) == {"feed.force": 2500.0, "rock.loading_stiffness": 7.5e8}
+
+
+def test_values_of_an_axis_may_come_in_any_order():
+    """Maps, cuts and cells between values all take it that an axis rises."""
+    stirred = {key: [values[-1], *values[:-1]] for key, values in AXES.items()}
+    assert grid(stirred).digest() == grid(AXES).digest()
+    falling = grid(dict([read_axis("feed.force=30:10:3"), read_axis("gravity.acceleration=1,0")]))
+    assert falling.changes(0) == {"feed.force": 10.0, "gravity.acceleration": 0.0}
+
+
+def test_points_dear_to_set_up_come_together():
+    points = grid(AXES)
+    stiffness = points.values[points.in_cheap_order(), 1]
+    assert np.count_nonzero(np.diff(stiffness)) == 1
+
+
+def test_samples_fill_every_slice_and_repeat_with_their_seed():
+    ranges = {"feed.force": (500.0, 5e3), "rock.loading_stiffness": (1e8, 1e10)}
+    points = latin_hypercube(ranges, 50, seed=3, logarithmic=["rock.loading_stiffness"])
+    slices = np.log(points.values[:, 1] / 1e8) / np.log(100.0) * 50
+    assert sorted(slices.astype(int)) == list(range(50))
+    again = latin_hypercube(ranges, 50, seed=3, logarithmic=["rock.loading_stiffness"])
+    assert again.digest() == points.digest()
+    assert latin_hypercube(ranges, 50, seed=4).digest() != points.digest()
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: grid({}), "at least one parameter"),
+        (lambda: grid({"feed.force": []}), "feed.force: values of a study must be finite"),
+        (lambda: grid({"feed.force": ["much"]}), "feed.force: values of a study must be numbers"),
+        (lambda: grid({"feed.force": [2.0, 1.0, 2.0]}), "feed.force: 2.0 stands twice"),
+        (lambda: grid(dict([read_axis("feed.force=3:3:2")])), "feed.force: 3.0 stands twice"),
+        (lambda: table({"feed.force": [1.0], "loss.time": [0, 1]}), "of one length"),
+        (lambda: latin_hypercube({"feed.force": (2.0, 1.0)}, 3), "two rising numbers"),
+        (lambda: latin_hypercube({"feed.force": (0, 1)}, 3, 0, ["feed.force"]), "above 0"),
+        (lambda: latin_hypercube({"feed.force": (0, 1)}, 0), "count = 0"),
+        (lambda: read_axis("feed.force"), "--over feed.force: must be"),
+        (lambda: read_axis("feed.force=1:2"), "must be KEY=FIRST:LAST:COUNT"),
+        (lambda: read_axis("feed.force=1:2:0"), "COUNT must be a whole number from 1 on"),
+        (lambda: read_axis("feed.force=-1:2:3log"), "both ends must be above 0"),
+    ],
+)
+def test_senseless_points_are_refused(make, words):
+    with pytest.raises(SceneError, match=words):
+        make()
+
+
+def test_axes_of_the_command_line():
+    key, values = read_axis("rock.loading_stiffness=1e8:1e10:3log")
+    assert key == "rock.loading_stiffness"
+    assert values == pytest.approx([1e8, 1e9, 1e10])
+    assert read_axis("feed.force=0:10:3")[1].tolist() == [0.0, 5.0, 10.0]
+    assert read_axis("feed.force=3,7")[1].tolist() == [3.0, 7.0]
