@@ -187,10 +187,10 @@ class CompiledStep:
             for port in ports:
                 self._take(port)
         self._all = np.array(self._calls, CALL)
-        self._values = np.array([float(value) for value in self.ports[0].values])
-        self._at = np.array([0, count, DONE, 0])
+        self._values = np.array(self.ports[0].values, float)
+        self._at = np.array([0, count, DONE, 0], np.int64)
         self._arrays = (
-            self._all, np.array(self._places), self._values, self._reals, self._integers, self._at,
+            self._all, np.array(self._places, np.int64), self._values, self._reals, self._integers, self._at,
         )  # fmt: skip
         self._make = make_calls
         # with no calls: so that the kernel is there, and its entry known
