@@ -16,16 +16,11 @@ from percussion_model.core.records import (
     SAMPLE_FIELDS,
     Status,
 )
-from percussion_model.core.totals import lost_in_faces, resync, stored_energy
-from percussion_model.core.wave_records import WAVE_STATE, Coef, Row, Task
+from percussion_model.core.totals import begin, lost_in_faces, resync, stored_energy
+from percussion_model.core.wave_records import Coef, Row, Task
 from percussion_model.scene_rules import BarNumbers, SceneRules
-from percussion_model.solvers.grid import (
-    Grid,
-    choose_time_step,
-    coefficients,
-    cut,
-    section_count,
-)
+from percussion_model.solvers.bar_cells import cut_bars
+from percussion_model.solvers.grid import Grid, section_count
 from percussion_model.solvers.operators import LEVELS, leap_operators, padded
 from percussion_model.solvers.packing import (
     INPUT_FIELDS,
@@ -33,7 +28,6 @@ from percussion_model.solvers.packing import (
     pack_parameters,
     rock_numbers,
 )
-from percussion_model.solvers.resolution import asked_cells, elastic_bars
 from percussion_model.solvers.step_map import no_operators
 from percussion_model.solvers.wave_state import WORD, WaveState
 
@@ -64,32 +58,27 @@ class WaveSolver:
 
     def __init__(self, scene: SceneRules) -> None:
         self.scene = scene
-        elastic_piston = scene.piston.model == "elastic"
-        bars = elastic_bars(scene)
-        self.time_step = choose_time_step(bars, scene.solver.cells or asked_cells(scene))
-        loss_time = scene.loss.time if scene.loss_on else 0.0
-        self._bit = cut(scene.bit, self.time_step)
-        self._piston = cut(scene.piston, self.time_step) if elastic_piston else None
-        self._cb = coefficients(self._bit, loss_time)
-        if self._piston is not None:
-            self._cp = coefficients(self._piston, loss_time)
-        else:
-            self._cp = np.zeros((len(Coef), 1))
+        bars = cut_bars(scene)
+        self.time_step = bars.time_step
+        self._bit, self._cb = bars.bit.grid, bars.bit.coefficients
+        self._piston: Grid | None = None
+        self._cp = np.zeros((len(Coef), 1))
+        if bars.piston is not None:
+            self._piston, self._cp = bars.piston.grid, bars.piston.coefficients
         self.cells = {"bit": self._bit.n}
         if self._piston is not None:
             self.cells = {"piston": self._piston.n, **self.cells}
-        grids = [grid for grid in (self._piston, self._bit) if grid is not None]
-        self.wave_speed_error = max(grid.fit for grid in grids)
-        self._par = pack_parameters(scene, self._piston, self._cp, self._bit, self._cb, loss_time)
-        self._operators = no_operators()
+        self.wave_speed_error = max(bar.grid.fit for bar in bars.both)
+        self._par = pack_parameters(scene, bars)
+        found = None
         if scene.solver.leaps:
             found = leap_operators(self._par, self._piston, self._cp, self._bit, self._cb)
-            if found is not None:
-                self._operators = found.arrays
-                self._par["leaps"] = LEVELS
+        if found is not None:
+            self._par["leaps"] = LEVELS
+        self._operators = no_operators() if found is None else found.arrays
         size = padded(2 * max(self._bit.n, self._piston.n if self._piston else 0) + 1)
         self._scratch = np.zeros((3, max(size, WATCHED)))
-        self._entry: Callable[..., int] = run
+        self._entry: Callable[..., int] = entry_of(run)
         self._no_row = np.zeros(len(SAMPLE_FIELDS))
         self._no_blows = np.zeros(1, BLOW)
         self._no_events = np.zeros(1, EVENT)
@@ -112,23 +101,17 @@ class WaveSolver:
     def new_state(self) -> WaveState:
         """State at time zero."""
         scene, start = self.scene, self.scene.start
-        record = np.zeros(1, WAVE_STATE)
-        s = record[0]
-        s["leap_end"] = -1
-        begin_state(s, scene, rock_numbers(scene))
-        has_piston = scene.piston.model != "absent"
         n_p = self._piston.n if self._piston is not None else 0
-        rows = len(Row)
-        state = WaveState(record, np.zeros(rows * (n_p + self._bit.n + 2)), rows * (n_p + 1))
+        state = WaveState.zero(n_p, self._bit.n)
+        begin_state(state, scene, rock_numbers(scene))
+        state["leap_end"] = -1
+        state["v_p"] = start.piston_velocity if scene.piston.model != "absent" else 0.0
+        state["v_b"] = start.bit_velocity
         wp, wb = state.bars
         wb[Row.DOWN : Row.UP + 1, : self._bit.n] = 0.5 * start.bit_velocity
         if n_p:
             wp[Row.DOWN : Row.UP + 1, :n_p] = 0.5 * start.piston_velocity
-        s["v_p"] = start.piston_velocity if has_piston else 0.0
-        s["v_b"] = start.bit_velocity
-        self.derive(state)
-        s["u_start"] = s["u_r"]
-        s["e_start"] = sum(self._stored(state))
+        entry_of(begin)(self._par, state.record, wp, self._cp, wb, self._cb)
         return state
 
     def _stored(self, state: WaveState) -> tuple[float, float, float]:
@@ -161,8 +144,8 @@ class WaveSolver:
             self._no_events if events is None else events,
             self._no_row if row is None else row,
         )
-        if self._entry is run:
-            self._entry = entry_of(run)  # the types of all these never change
+        if self._entry is run:  # compiled just now; the types of all these never change
+            self._entry = entry_of(run)
         return int(status)
 
     def time(self, state: WaveState) -> float:
