@@ -16,6 +16,9 @@ FEWEST_BLOWS = 4
 # Blows converge if their changes fall from so many tolerances on, each by this factor at
 # least, and the factors are alike within that one.
 FAR, FALLING, ALIKE = 10.0, 0.9, 3.0
+# They must have done so for this share of all blows run: a motion that wanders, too, comes
+# by chance upon a few blows that fall evenly, and leaves them again.
+DIRECT = 0.5
 # Where changes are below this share of the tolerance, no scatter is left to hide anything.
 STILL = 1e-4
 # A cycle of several blows, or one that only scatters without converging any more, is believed
@@ -90,7 +93,8 @@ def _converges(changes: list[float], tolerance: float) -> bool:
         if factor > FALLING or not alike:
             break
         factors.append(factor)
-    return len(factors) >= 2 and changes[len(factors)] >= FAR * tolerance
+    enough = max(2.0, DIRECT * len(changes))
+    return len(factors) >= enough and changes[len(factors)] >= FAR * tolerance
 
 
 def _still_shrinking(blows: np.ndarray, order: int) -> bool:

@@ -103,9 +103,10 @@ def settled(
     """Run a scene until its blows repeat, or until it is clear that they do not.
 
     Blows are compared at the section that starts them. One blow is believed to
-    repeat when changes fall evenly from afar and all still to come stay within the
-    tolerance; its rate is extrapolated to the limit (Aitken). A cycle of several,
-    or one that only scatters within the tolerance, is believed after sixty blows.
+    repeat when changes fall evenly from afar, for half of the run at least, and
+    all still to come stay within the tolerance; its rate is extrapolated to the
+    limit (Aitken). A cycle of several, or one that only scatters within the
+    tolerance, is believed after sixty blows.
     A motion that does neither within `most_blows` is aperiodic.
 
     Parameters
