@@ -1,7 +1,8 @@
-"""Time of a study of 10,000 points on two cores, and what its rates are worth.
+"""Time of one stationary response and of a study of 10,000 points, and what they are worth.
 
-`python -m benchmarks.study` runs the map of docs/studies.md in a temporary folder, then a
-random sample of its points for long, and on a finer grid. The kernels should be compiled
+`python -m benchmarks.study --settled` compares the stationary response of the reference
+with a run of 4 s. Without it the map of docs/studies.md is run as well, in a temporary folder,
+then a random sample of its points for long, and on a finer grid. The kernels should be compiled
 before (`python3 build.py setup`). Take figures for the record on an idle machine.
 """
 
@@ -21,6 +22,8 @@ ROOT = Path(__file__).resolve().parent.parent
 REFERENCE = ROOT / "scenarios" / "reference.toml"
 # Long runs that the sample is compared with: blows, and those that settle.
 LONG, SETTLING = 600, 100
+# The run that one stationary response is compared with [s], and how often both are timed.
+USUAL, REPETITIONS = 4.0, 40
 
 
 def axes(points: int) -> dict[str, np.ndarray]:
@@ -40,6 +43,26 @@ def children_time() -> float:
     return used.ru_utime + used.ru_stime
 
 
+def one_response(scene) -> None:
+    """Tell what the stationary response of a scene costs beside a run of `USUAL` seconds."""
+    from percussion_model import settled, simulate
+
+    ways = {"settled": lambda: settled(scene), "run": lambda: simulate(scene, duration=USUAL)}
+    times = {name: [] for name in ways}
+    found = {}
+    for _ in range(REPETITIONS + 1):
+        for name, way in ways.items():
+            began = time.perf_counter()
+            found[name] = way()
+            times[name].append(1e3 * (time.perf_counter() - began))
+    median = {name: float(np.median(taken[1:])) for name, taken in times.items()}
+    rate, long = (found[name].rate_of_penetration for name in ways)
+    print(f"settled: {len(found['settled'].blows)} blows, {median['settled']:.2f} ms; run of "
+          f"{USUAL:g} s: {len(found['run'].blows)} blows, {median['run']:.1f} ms")  # fmt: skip
+    print(f"share: {median['settled'] / median['run']:.1%} of the time; "
+          f"rates differ by {abs(rate / long - 1.0):.1e}")  # fmt: skip
+
+
 def main() -> None:
     """Run, tell, compare."""
     from percussion_model import Scene
@@ -49,8 +72,12 @@ def main() -> None:
     parser.add_argument("--points", type=int, default=10_000)
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--sample", type=int, default=30, help="points to compare")
+    parser.add_argument("--settled", action="store_true", help="one response only")
     chosen = parser.parse_args()
     scene, points = Scene.from_toml(REFERENCE), grid(axes(chosen.points))
+    one_response(scene)
+    if chosen.settled:
+        return
     load = os.getloadavg()[0]
     before, began = children_time(), time.perf_counter()
     with tempfile.TemporaryDirectory() as folder:

@@ -2,12 +2,13 @@
 
 The reversal distance D_1 (at constant power) and the feed are moved up and down in small steps
 without starting the drill anew. At each step some blows pass, and those that follow are drawn.
+From a feed at which blows have no order every other feed is also set at once, at some moments:
+which motion then follows is a matter of chance.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -16,52 +17,22 @@ from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.patches import Patch
 
-from examples.shared import BLACK, BLUE, GREEN, GREY, ORANGE, command_line, figure_of
+from examples.motions import KINDS, Branch, branch_of, kind_of, order_of
+from examples.shared import BLUE, ORANGE, PINK, command_line, figure_of
 from percussion_model import Scene, Simulation
 from percussion_model.paper.sweeps import force_at_constant_power
 from percussion_model.plotting import style
 from percussion_model.plotting.style import KN, MM
 
 NAME = "bifurcation"
-# Impact velocities that differ by less, relative, are the same.
-SAME = 1e-3
-# Blows go round n values where they repeat after n blows so much better than after one.
-BETTER = 8.0
-LONGEST_CYCLE = 8
-# Blows without order that differ by less are nearly alike.
-NEARLY = 0.05
-KINDS = {
-    "every blow alike": "#E6E6E6",
-    "round 2 to 8 values": GREEN,
-    "nearly alike": GREY,
-    "no order": BLACK,
-}
+# The feed from which others are set at once [N], and after how many blows there.
+LOW_FEED, MOMENTS = 250.0, (20, 35, 50)
+# No run of blows takes so long [s].
+LONG = 1e3
+COLOURS = {"falling": ORANGE, "rising": BLUE, "at once": PINK}
+SIZES = {"falling": 2.2, "rising": 1.4, "at once": 1.5}
 # A mean rate that is known no better, relative, is not drawn.
 MOST_ERROR = 0.1
-
-
-@dataclass(frozen=True)
-class Branch:
-    """Blows along one way through the values of a parameter."""
-
-    values: np.ndarray
-    impact_velocity: np.ndarray  # (values, blows) [m/s]
-    rate: np.ndarray  # mean over the blows of each value [m/s]
-    error: np.ndarray  # its standard error [m/s]
-
-
-def order_of(velocity: np.ndarray) -> int:
-    """Values that impact velocities go round, one after the other; 0 if they do not."""
-    lags = range(1, min(LONGEST_CYCLE, len(velocity) // 2) + 1)
-    changes = [float(np.max(np.abs(velocity[n:] - velocity[:-n]))) for n in lags]
-    same = max(SAME * float(np.mean(velocity)), changes[0] / BETTER)
-    return next((n for n, change in zip(lags, changes, strict=True) if change <= same), 0)
-
-
-def kind_of(velocity: np.ndarray) -> int:
-    """Place among `KINDS`."""
-    order = order_of(velocity)
-    return min(order, 2) - 1 if order else 2 + int(np.ptp(velocity) > NEARLY * np.mean(velocity))
 
 
 def follow(
@@ -69,19 +40,29 @@ def follow(
 ) -> Branch:
     """Move a parameter through its values, the drill going on; the branch has them rising."""
     simulation = Simulation(Scene(), record_events=False)
-    velocity, rates = [], []
+    rows = []
     for value in values.tolist():
         simulation.set_inputs(**inputs(value))
         wanted = len(simulation.blows) + settle + keep
         while (missing := wanted - len(simulation.blows)) > 0:
             simulation.advance(simulation.time + 0.04 * missing)
-        blows = simulation.blows[wanted - keep : wanted]
-        velocity.append(blows["impact_velocity"])
-        rate = np.sum(blows["penetration"]) / np.sum(blows["period"])
-        off = np.std(blows["penetration"] - rate * blows["period"])  # docs/model.md, section 7
-        rates.append((rate, off / np.sqrt(keep) / np.mean(blows["period"])))
-    up = np.argsort(values)
-    return Branch(values[up], np.array(velocity)[up], *np.array(rates)[up].T)
+        rows.append(simulation.blows[wanted - keep : wanted])
+    return branch_of(values, rows)
+
+
+def jump(values: np.ndarray, after: int, settle: int, keep: int) -> Branch:
+    """Set each feed at once when the drill has made `after` blows at the low one."""
+    simulation = Simulation(Scene(), record_events=False)
+    simulation.set_inputs(feed_force=LOW_FEED)
+    simulation.advance_blows(after, LONG)
+    here = simulation.save()
+    rows = []
+    for value in values.tolist():
+        simulation.restore(here)
+        simulation.set_inputs(feed_force=value)
+        simulation.advance_blows(settle + keep, LONG)
+        rows.append(simulation.blows[-keep:])
+    return branch_of(values, rows)
 
 
 def at_constant_power(distance: float) -> dict[str, float]:
@@ -99,48 +80,67 @@ def main(out: Path, quick: bool = False) -> dict[str, Any]:
         ("feed", feed, lambda force: {"feed_force": force}, 1.0 / KN, "feed force $F_S$ [kN]"),
     )
     found = {}
-    with figure_of(NAME, Path(out), (10.5, 6.6)) as fig:
-        axes = fig.subplots(3, 2, sharex="col", height_ratios=(0.35, 2.2, 1.4))
+    with figure_of(NAME, Path(out), (10.5, 6.8)) as fig:
+        axes = fig.subplots(3, 2, sharex="col", height_ratios=(0.5, 2.2, 1.4))
         for column, (key, values, inputs, factor, words) in zip(axes.T, ways, strict=True):
-            branches = [follow(way, inputs, settle, keep) for way in (values, values[::-1])]
-            draw(column, values * factor, words, *branches)
-            for name, branch in zip(("rising", "falling"), branches, strict=True):
-                order = [order_of(velocity) for velocity in branch.impact_velocity]
-                told = {"values": values.tolist(), "order": order, "rate": branch.rate.tolist()}
-                found[f"{key}_{name}"] = told
+            branches = {
+                "falling": [follow(values[::-1], inputs, settle, keep)],
+                "rising": [follow(values, inputs, settle, keep)],
+            }
+            if key == "feed":
+                high = values[values > LOW_FEED]
+                branches["at once"] = [jump(high, k, settle, keep) for k in MOMENTS[quick * 2 :]]
+            draw(column, factor, words, branches)
+            for name, some in branches.items():
+                found |= {f"{key}_{name}": [_told(branch) for branch in some]}
         handles = [Patch(color=colour, label=kind) for kind, colour in KINDS.items()]
-        handles += [Patch(color=BLUE, label="rising"), Patch(color=ORANGE, label="falling")]
-        style.head(fig, "Blows of the settled motion, the parameter rising and falling", handles)
+        words = {"at once": f"set at once from {LOW_FEED:g} N"}
+        handles += [Patch(color=c, label=words.get(way, way)) for way, c in COLOURS.items()]
+        style.head(fig, "Blows of the settled motion, by where the drill comes from", handles)
     return found
 
 
-def draw(axes: np.ndarray, x: np.ndarray, words: str, rising: Branch, falling: Branch) -> None:
+def _told(branch: Branch) -> dict[str, list[float]]:
+    order = [order_of(velocity) for velocity in branch.impact_velocity]
+    return {"values": branch.values.tolist(), "order": order, "rate": branch.rate.tolist()}
+
+
+def draw(axes: np.ndarray, factor: float, words: str, branches: dict[str, list[Branch]]) -> None:
     """Draw a column: the order of the blows, each blow, and the rate."""
     strip, blows, rate = axes
-    _draw_kinds(strip, x, rising, falling)
-    for branch, colour, size in ((falling, ORANGE, 2.2), (rising, BLUE, 1.0)):
-        at = np.repeat(x, branch.impact_velocity.shape[1])
-        blows.plot(at, branch.impact_velocity.ravel(), "o", color=colour, markersize=size, mew=0)
-        known = np.where(branch.error < MOST_ERROR * branch.rate, branch.rate, np.nan)
-        rate.plot(x, known * MM, "-o", color=colour, markersize=1.2 * size, linewidth=0.7)
+    x = branches["falling"][0].values * factor
+    _draw_kinds(strip, factor, branches)
+    for way, some in branches.items():
+        look = {"color": COLOURS[way], "markersize": SIZES[way]}
+        for branch in some:
+            at = np.repeat(branch.values * factor, branch.impact_velocity.shape[1])
+            blows.plot(at, branch.impact_velocity.ravel(), "o", mew=0, **look)
+            known = np.where(branch.error < MOST_ERROR * branch.rate, branch.rate, np.nan)
+            rate.plot(branch.values * factor, known * MM, "o", mew=0, alpha=0.8, **look)
     blows.set_xscale("log")
     ticks = [t for t in (0.2, 0.5, 1, 2, 5, 10, 20) if x[0] <= t <= x[-1]]
     rate.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
     rate.minorticks_off()
-    rate.set_ylim(0.0, 1.6 * float(np.median(falling.rate)) * MM)
+    rate.set_ylim(0.0, 1.6 * float(np.median(branches["falling"][0].rate)) * MM)
+    for line in rate.lines:
+        line.set_markersize(2.0 * line.get_markersize())
     style.label(blows, "", "impact velocity [m/s]", "Each blow")
     style.label(rate, words, "rate [mm/s]", "Mean rate of penetration, where it is known to 10 %")
 
 
-def _draw_kinds(ax: Axes, x: np.ndarray, rising: Branch, falling: Branch) -> None:
-    """Two strips that tell the kind of motion, rising above falling."""
-    kinds = np.array([[kind_of(blows) for blows in b.impact_velocity] for b in (rising, falling)])
+def _draw_kinds(ax: Axes, factor: float, branches: dict[str, list[Branch]]) -> None:
+    """A strip for each way that tells the kind of motion; branches of one way share it."""
     colours = ListedColormap(list(KINDS.values()))
-    ax.pcolormesh(
-        x, [0.5, -0.5], kinds, cmap=colours, vmin=0, vmax=len(KINDS) - 1, shading="nearest"
-    )
-    ax.axhline(0.0, color="white", linewidth=2)
-    ax.set_yticks([0.5, -0.5], ["rising", "falling"])
+    for top, some in enumerate(branches.values()):
+        edges = np.linspace(top, top + 0.92, len(some) + 1)
+        for low, high, branch in zip(edges, edges[1:], some, strict=False):
+            x = branch.values * factor
+            ratio = np.sqrt(x[1] / x[0])
+            kinds = [[kind_of(velocity) for velocity in branch.impact_velocity]]
+            ax.pcolormesh(np.append(x / ratio, x[-1] * ratio), [low, high], kinds,
+                          cmap=colours, vmin=0, vmax=len(KINDS) - 1)  # fmt: skip
+            ax.axhline(high, color="white", linewidth=0.7)
+    ax.set_yticks([row + 0.46 for row in range(len(branches))], list(branches))
     ax.tick_params(length=0, labelbottom=False)
     ax.grid(False)
     ax.set_title("Order of the blows")

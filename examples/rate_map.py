@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.colors import ListedColormap
 
 from examples.shared import GREY, command_line, figure_of
 from percussion_model import Scene
@@ -67,7 +68,9 @@ def main(out: Path, quick: bool = False) -> dict[str, Any]:
         )
         fig.colorbar(mesh, ax=ax, label="rate of penetration [mm/s]")
         aperiodic = rows["kind"] != KINDS.index("periodic")
-        ax.contourf(x, y, aperiodic.T, [0.5, 1.5], colors="none", hatches=["////"])
+        cells = np.where(aperiodic, 1.0, np.nan).T
+        clear = ListedColormap(["none"])
+        ax.pcolor(x, y, cells, shading="nearest", cmap=clear, hatch="////", ec="black", lw=0.0)
         percent = np.where(aperiodic, np.nan, 100.0 * share)
         lines = ax.contour(
             x, y, percent.T, [85, 86, 88, 90, 95, 100], colors="white", linewidths=1.1
@@ -84,7 +87,8 @@ def main(out: Path, quick: bool = False) -> dict[str, Any]:
         ax.grid(False)
         style.label(ax, "feed force [kN]", "supply pressure, gauge [bar]")
         style.head(fig, "Rate of penetration, and efficiency of the drive (white)")
-        fig.text(0.99, 0.01, "hatched: no periodic motion", ha="right", color=GREY, fontsize=8.5)
+        words = "hatched: no periodic motion; white: rate unknown"
+        fig.text(0.99, 0.01, words, ha="right", color=GREY, fontsize=8.5)
     return {
         "points": len(points),
         "periodic": int(np.sum(~aperiodic)),

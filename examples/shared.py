@@ -17,6 +17,7 @@ from percussion_model.result_files import staged, to_json
 
 # Energies and rates are drawn in these, and told apart with any colour vision.
 BLUE, ORANGE, GREEN, BLACK, GREY = "#0072B2", "#D55E00", "#009E73", "#222222", "#8C8C8C"
+PINK = "#CC79A7"
 
 
 @contextmanager

@@ -7,11 +7,18 @@ from itertools import pairwise
 
 import numpy as np
 
+from percussion_model.core.records import BLOW
+
 # Longest cycle that is looked for [blows].
 MOST_BLOWS_A_CYCLE = 8
+# Two changes that fall alike take so many blows: looking earlier is in vain.
+FEWEST_BLOWS = 4
 # Blows converge if their changes fall from so many tolerances on, each by this factor at
 # least, and the factors are alike within that one.
 FAR, FALLING, ALIKE = 10.0, 0.9, 3.0
+# They must have done so for this share of all blows run: a motion that wanders, too, comes
+# by chance upon a few blows that fall evenly, and leaves them again.
+DIRECT = 0.5
 # Where changes are below this share of the tolerance, no scatter is left to hide anything.
 STILL = 1e-4
 # A cycle of several blows, or one that only scatters without converging any more, is believed
@@ -19,6 +26,8 @@ STILL = 1e-4
 REPETITIONS, LASTING = 5, 60
 # Numbers of a blow by which two blows are the same.
 COMPARED = ("impact_velocity", "period", "penetration")
+# Their places in a row, whose fields are words of eight bytes.
+_COLUMNS = [(BLOW.names or ()).index(name) for name in COMPARED]
 # Differences within a cycle that fall by less than this from one cycle to the next will stay.
 STEADY = 0.9
 # The means of an aperiodic motion are taken over this many batches of blows.
@@ -69,7 +78,8 @@ def _by_cycle(blows: np.ndarray, order: int) -> list[float]:
     """Largest relative change from cycle to cycle, the newest first."""
     count = len(blows) // order
     changes = np.abs(_changes(blows[-count * order :], order))
-    return [float(value) for value in changes.reshape(count - 1, -1).max(axis=1)[::-1]]
+    found: list[float] = changes.reshape(count - 1, -1).max(axis=1)[::-1].tolist()
+    return found
 
 
 def _converges(changes: list[float], tolerance: float) -> bool:
@@ -83,7 +93,8 @@ def _converges(changes: list[float], tolerance: float) -> bool:
         if factor > FALLING or not alike:
             break
         factors.append(factor)
-    return len(factors) >= 2 and changes[len(factors)] >= FAR * tolerance
+    enough = max(2.0, DIRECT * len(changes))
+    return len(factors) >= enough and changes[len(factors)] >= FAR * tolerance
 
 
 def _still_shrinking(blows: np.ndarray, order: int) -> bool:
@@ -98,9 +109,10 @@ def _still_shrinking(blows: np.ndarray, order: int) -> bool:
 
 def _changes(blows: np.ndarray, order: int) -> np.ndarray:
     """Relative change of each number of `COMPARED` over a cycle, a row for each blow."""
-    values = np.stack([blows[name] for name in COMPARED], axis=1)
-    scale = np.mean(np.abs(values[-order:]), axis=0)
-    return (values[order:] - values[:-order]) / np.where(scale > 0, scale, 1.0)
+    values = blows.view(np.float64).reshape(len(blows), -1)[:, _COLUMNS]
+    scale = np.abs(values[-order:]).sum(axis=0) / order
+    scale[scale == 0.0] = 1.0
+    return (values[order:] - values[:-order]) / scale
 
 
 def _rates(blows: np.ndarray, order: int) -> np.ndarray:
@@ -112,12 +124,12 @@ def _rates(blows: np.ndarray, order: int) -> np.ndarray:
 
 def _limit(blows: np.ndarray, order: int) -> tuple[float, float, float]:
     """Limit of a converging cycle: rate, error and multiplier."""
-    second, third = _rates(blows[-2 * order :], order)
+    second, third = _rates(blows[-2 * order :], order).tolist()
     change = third - second
     ratio = _multiplier(blows, order)
     shift = change * ratio / (1.0 - ratio) if abs(ratio) < 1.0 else 0.0
     # Extrapolating by more than the last change would trust the ratio too far.
-    shift = float(np.clip(shift, -abs(change), abs(change)))
+    shift = max(-abs(change), min(shift, abs(change)))
     # Between cycles that agree to rounding the ratio of changes says nothing.
     return (
         float(third + shift),

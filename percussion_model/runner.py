@@ -87,6 +87,31 @@ class Runner:
         self._time = float(t)
         self.wall_time += time.perf_counter() - began
 
+    def advance_blows(self, count: int, t: float) -> None:
+        """Let the simulation run until so many more blows have ended, or else up to `t` [s].
+
+        It stops soon after the end of the last one. What follows has the same bits as if
+        it had not stopped there.
+
+        Parameters
+        ----------
+        count : int
+            At least 1.
+        t : float
+            As for `advance`, which raises the same errors.
+        """
+        self._check_time(t)
+        began = time.perf_counter()
+        while count > 0:
+            room = self._blow_room[:count]
+            status, found = self._go(self.solver.advance, float(t), room)
+            count -= found
+            if status == _DONE:
+                break
+        reached = float(t) if status == _DONE else self.solver.time(self._state)
+        self._time = max(self._time, reached)
+        self.wall_time += time.perf_counter() - began
+
     def _check_time(self, t: float) -> None:
         if not is_number(t):
             raise SimulationError(f"t = {t!r}: must be a finite time in s")
@@ -98,16 +123,20 @@ class Runner:
 
     def _let(self, solver_goes: Callable[..., tuple[int, int, int]], t: float) -> None:
         """Let the solver go on to `t`, and read its rows out whenever they are full."""
-        while True:
-            status, n_blows, n_events = solver_goes(
-                self._state, t, self._blow_room, self._event_room, self.record_events
-            )
-            if n_blows or n_events:
-                self._keep(self._blow_room[:n_blows], self._event_room[:n_events])
-            if status == _DONE:
-                return
-            if status not in _FULL:
-                break
+        while self._go(solver_goes, t, self._blow_room)[0] != _DONE:
+            pass
+
+    def _go(
+        self, solver_goes: Callable[..., tuple[int, int, int]], t: float, room: np.ndarray
+    ) -> tuple[int, int]:
+        """Let the solver go on until its rows are full; `Status`, and how many blows."""
+        status, n_blows, n_events = solver_goes(
+            self._state, t, room, self._event_room, self.record_events
+        )
+        if n_blows or n_events:
+            self._keep(room[:n_blows], self._event_room[:n_events])
+        if status == _DONE or status in _FULL:
+            return status, n_blows
         where = f"at t = {self.solver.time(self._state)!r} s"
         refusal = getattr(self.solver, "refusal", None)
         if refusal is not None and status == Status.REFUSED:

@@ -9,16 +9,20 @@ from typing import Any
 
 import numpy as np
 
-from percussion_model.cycles import BATCHES, SETTLING_SHARE, batch_means, cycles_in
+from percussion_model.cycles import (
+    BATCHES,
+    FEWEST_BLOWS,
+    SETTLING_SHARE,
+    batch_means,
+    cycles_in,
+)
 from percussion_model.scene import Scene, SceneError
 from percussion_model.stepping import Simulation
 
 __all__ = ["Settled", "settled"]
 
-# A run in which no blow ends for so long has come to a stop [s].
-STALLED_AFTER = 2.0
-# When a run is first looked at [s].
-_FIRST_LOOK = 0.02
+# A run in which no blow ends for so long [s], and so many periods of the last, has stopped.
+STALLED_AFTER, STALLED_PERIODS = 2.0, 4.0
 # The standard error is first believed after so many blows, and looked at again
 # when there are so many times more.
 FEWEST_SCATTERED, NEXT_LOOK = 100, 1.25
@@ -99,9 +103,10 @@ def settled(
     """Run a scene until its blows repeat, or until it is clear that they do not.
 
     Blows are compared at the section that starts them. One blow is believed to
-    repeat when changes fall evenly from afar and all still to come stay within the
-    tolerance; its rate is extrapolated to the limit (Aitken). A cycle of several,
-    or one that only scatters within the tolerance, is believed after sixty blows.
+    repeat when changes fall evenly from afar, for half of the run at least, and
+    all still to come stay within the tolerance; its rate is extrapolated to the
+    limit (Aitken). A cycle of several, or one that only scatters within the
+    tolerance, is believed after sixty blows.
     A motion that does neither within `most_blows` is aperiodic.
 
     Parameters
@@ -132,18 +137,19 @@ def settled(
     """
     check_request(scene, tolerance, most_blows, scatter)
     simulation = Simulation(scene, record_events=False)
-    blows = simulation.blows
-    wait, next_look = _FIRST_LOOK, float(FEWEST_SCATTERED)
+    blows, next_look = simulation.blows, float(FEWEST_SCATTERED)
     while len(blows) < most_blows:
-        last = blows[-1] if len(blows) else None
-        wait = 1.05 * float(last["period"]) if last is not None else wait
-        simulation.advance(simulation.time + wait)
-        before, blows = len(blows), simulation.blows
+        ended, patience = 0.0, STALLED_AFTER
+        if len(blows):
+            last = blows[-1]
+            ended = float(last["time"] + last["period"])
+            patience += STALLED_PERIODS * float(last["period"])
+        before = len(blows)
+        until = max(simulation.time, ended + patience)
+        simulation.advance_blows(max(1, FEWEST_BLOWS - before), until)
+        blows = simulation.blows
         if len(blows) == before:
-            ended = 0.0 if last is None else float(last["time"] + last["period"])
-            if simulation.time - ended > STALLED_AFTER + 4 * wait:
-                return _made("stalled", 0, math.nan, math.nan, math.nan, blows, simulation)
-            continue
+            return _made("stalled", 0, math.nan, math.nan, math.nan, blows, simulation)
         if progress is not None:
             progress(len(blows))
         for order, found in cycles_in(blows, tolerance).items():

@@ -7,7 +7,10 @@ import numpy as np
 import pytest
 
 from percussion_model import Scene, SceneError, Simulation, SimulationError, simulate
+from percussion_model.core.advance import run
 from percussion_model.core.records import SAMPLE_FIELDS
+from percussion_model.core.totals import begin
+from percussion_model.solvers.bar_cells import cut_bars
 from percussion_model.time_loop import sampling_times, stop_on_interrupt
 
 RIGID = {"piston.model": "rigid", "bit.model": "rigid"}
@@ -49,6 +52,55 @@ def test_any_partition_gives_the_same_bits(scene):
     divided.advance(END)
     assert bits(divided) == bits(whole)
     assert divided.energy() == whole.energy()
+
+
+@pytest.mark.parametrize("solver", ["wave", "fem", "rigid"])
+def test_a_stop_after_blows_changes_no_bit(solver):
+    scene = Scene().computed_by(solver)
+    whole = one_go(scene)
+    stopped = Simulation(scene)
+    stopped.advance_blows(1, END)
+    assert len(stopped.blows) == 1
+    first = stopped.blows[0]
+    assert first["time"] + first["period"] <= stopped.time < END
+    stopped.advance_blows(1, END)
+    assert len(stopped.blows) == 2
+    stopped.advance_blows(1, END)  # comes to its end before the third
+    assert (len(stopped.blows), stopped.time) == (2, END)
+    assert bits(stopped) == bits(whole)
+
+
+def test_all_kinds_of_scenes_have_arguments_of_the_same_types(monkeypatch):
+    """On that rests that nothing looks at them any more after the first call."""
+    monkeypatch.setattr("percussion_model.solvers.wave.entry_of", lambda function: function)
+    one_go(Scene(), end=0.002)
+    before = len(run.overloads), len(begin.overloads)
+    for changes in (
+        {"piston.model": "rigid"},
+        {"piston.model": "absent", "effects.drive": "none"},
+        {"solver.leaps": False},
+        {"effects.loss": False},
+        {"solver.cells": 7},
+    ):
+        simulation = one_go(Scene().replace(**changes), end=0.002)
+        simulation.observe()
+        simulation.energy()
+    assert (len(run.overloads), len(begin.overloads)) == before
+
+
+def test_scenes_on_the_same_steel_share_their_cells_and_leave_them_alone():
+    scenes = [Scene().replace(**{"rock.loading_stiffness": k}) for k in (7.5e8, 2e9)]
+    bars = cut_bars(scenes[0])
+    assert cut_bars(scenes[1]) is bars
+    before = [bar.coefficients.copy() for bar in bars.both]
+    alone = one_go(scenes[0])
+    for scene in (scenes[1], Scene().replace(**{"loss.time": 3e-7})):
+        one_go(scene, end=0.06)
+    assert cut_bars(scene) is not bars
+    assert all(
+        np.array_equal(bar.coefficients, c) for bar, c in zip(bars.both, before, strict=True)
+    )
+    assert bits(one_go(scenes[0])) == bits(alone)
 
 
 def test_reading_does_not_touch(scene):

@@ -162,6 +162,35 @@ def test_chance_repetitions_of_an_aperiodic_motion_are_no_cycle():
     assert found.kind == "aperiodic"
 
 
+@pytest.mark.parametrize(
+    ("feed", "distance"),
+    [(500 + 9500 * 11 / 24, 0.01 + 0.07 * 4 / 19), (500 + 9500 * 23 / 24, 0.01 + 0.07 / 19)],
+)
+def test_a_few_blows_that_converge_by_chance_are_no_cycle(feed, distance):
+    """After tens of blows a few fall evenly to less than the tolerance, and rise again."""
+    changes = {"feed.force": feed, "rock.loading_stiffness": 2e9}
+    scene = Scene().replace(**changes, **{"drive.reversal_distance": distance})
+    found = settled(scene, most_blows=120)
+    assert any(converge(found.blows[:n]) for n in range(10, 100))
+    assert found.kind == "aperiodic"
+
+
+def converge(rows):
+    """Whether the last four blows look like a converging motion."""
+    off = [np.abs(np.diff(rows[name][-4:])) / np.abs(rows[name][-1]) for name in COMPARED]
+    first, second, third = np.max(off, axis=0)
+    return first > 10 * TOLERANCE and second < 0.5 * first and third < min(0.5 * second, TOLERANCE)
+
+
+def test_convergence_after_wandering_is_believed_once_it_has_lasted():
+    wandering = np.random.default_rng(5).normal(scale=0.05, size=30)
+    rows = blows(8.0 + np.concatenate([wandering, 0.05 * 0.2 ** np.arange(12)]))
+    found = [n for n in range(4, len(rows) + 1) if cycle(rows[:n], 1, TOLERANCE)]
+    assert found
+    change = np.abs(np.diff(rows["impact_velocity"][: found[0]]))[-1] / 8.0
+    assert change <= 1e-4 * TOLERANCE
+
+
 def test_a_rare_blow_that_is_different_is_not_missed():
     """All is within the tolerance for tens of blows, then one gains two per cent more."""
     changes = {"feed.force": 6437.5, "rock.loading_stiffness": 2e9}

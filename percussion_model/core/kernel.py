@@ -40,18 +40,23 @@ def drop_stale_kernels(folder: Path) -> None:
 drop_stale_kernels(Path(__file__).parent)
 
 
+_entries: dict[Callable, Callable] = {}
+
+
 def entry_of(function: Callable) -> Callable:
     """Where a call of a compiled function ends up, or the function itself.
 
     Numba looks at the types of all arguments at every call, which takes longer than a
     short kernel where they are records. For callers whose arguments never change their
-    types: nothing looks at them any more.
+    types, not from object to object either: nothing looks at them any more.
     """
     overloads = getattr(function, "overloads", {})
     if len(overloads) != 1:
         return function
-    (compiled,) = overloads.values()
-    return getattr(compiled, "entry_point", function)
+    if function not in _entries:  # to find it takes a while as well
+        (compiled,) = overloads.values()
+        _entries[function] = getattr(compiled, "entry_point", function)
+    return _entries[function]
 
 
 # `_nrt=False` leaves out numba's runtime: arrays are passed without reference

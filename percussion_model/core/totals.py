@@ -67,3 +67,21 @@ def lost_in_faces(par, wp, wb):
     for i in range(par.n_p):
         total += wp[LOSS, i]
     return total * par.dt
+
+
+@kernel
+def begin(par_, state, wp, cp, wb, cb):
+    """Complete a new state: mean velocities, u_r, and what is counted from them.
+
+    Parameters
+    ----------
+    par_, state : WAVE_PAR, WAVE_STATE array of length 1
+    wp, cp, wb, cb : float array
+        Waves and coefficients of piston and bit.
+    """
+    par = par_[0]
+    s = state[0]
+    resync(par, s, wp, cp, wb, cb)
+    s.u_start = s.u_r
+    kinetic, elastic, rock = stored_energy(par, s, wp, cp, wb, cb)
+    s.e_start = kinetic + elastic + rock

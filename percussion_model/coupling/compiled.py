@@ -189,9 +189,8 @@ class CompiledStep:
         self._all = np.array(self._calls, CALL)
         self._values = np.array(self.ports[0].values, float)
         self._at = np.array([0, count, DONE, 0], np.int64)
-        self._arrays = (
-            self._all, np.array(self._places, np.int64), self._values, self._reals, self._integers, self._at,
-        )  # fmt: skip
+        places = np.array(self._places, np.int64)
+        self._arrays = (self._all, places, self._values, self._reals, self._integers, self._at)
         self._make = make_calls
         # with no calls: so that the kernel is there, and its entry known
         self._make(self._all[:0], *self._arrays[1:], 0.0, 0.0)

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
 from percussion_model.core.records import DriveKind, Mode, Piston, RockKind
-from percussion_model.core.wave_records import WAVE_PAR, Coef
+from percussion_model.core.wave_records import WAVE_PAR
 from percussion_model.scene_rules import SceneRules
+from percussion_model.solvers.bar_cells import MOST_KEPT, CutBars
 from percussion_model.solvers.fronts import place_of_closure
-from percussion_model.solvers.grid import Grid, end_viscosity, substeps
+from percussion_model.solvers.grid import substeps
 
 # An open gap of this many transits of the slower bar ends a blow where no
 # pressure law does (docs/model.md, section 7).
@@ -31,32 +33,21 @@ INPUT_FIELDS = {
 }
 
 
-def pack_parameters(
-    scene: SceneRules,
-    piston: Grid | None,
-    cp: np.ndarray,
-    bit: Grid,
-    cb: np.ndarray,
-    loss_time: float,
-) -> np.ndarray:
+def pack_parameters(scene: SceneRules, bars: CutBars) -> np.ndarray:
     """Parameter record of a scene.
 
     Parameters
     ----------
-    piston, bit : Grid
-        Cells; no piston where it is rigid or absent.
-    cp, cb : ndarray
-        Their coefficients.
-    loss_time : float
-        Kelvin-Voigt time [s], 0 without loss.
+    scene : SceneRules
+    bars : CutBars
+        Its elastic bars.
 
     Returns
     -------
     WAVE_PAR array of length 1
     """
-    par = np.zeros(1, WAVE_PAR)
+    par = np.ndarray(1, WAVE_PAR, bytearray(_of_bars(bars)))
     p = par[0]
-    p["dt"] = bit.time_step
     p["gravity"] = scene.gravity.acceleration if scene.effects.gravity else 0.0
     p["mass_b"] = scene.bit.mass
     p["mass_p"] = scene.piston.mass
@@ -64,29 +55,37 @@ def pack_parameters(
     p["drive"] = DriveKind[scene.effects.drive.upper()]
     p["rock"] = RockKind[scene.effects.rock.upper()]
     p["barrier"] = scene.barrier_on
-    p["most_crossings"] = MOST_CROSSINGS
     p["release"] = scene.effects.standstill_tension == "release"
-    p["loss"] = substeps(loss_time, bit.time_step)
-    p["n_b"] = bit.n
-    p["z_t"], p["z_b"] = bit.impedance[[0, -1]]
-    p["kappa_t"], p["kappa_b"] = end_viscosity(cb, bit, loss_time)
-    p["bound_t"] = _offset_bound(cb, bit, Coef.TOP)
-    p["bound_b"] = _offset_bound(cb, bit, Coef.BOTTOM)
-    slowest = scene.bit.transit_time
-    if piston is not None:
-        p["n_p"] = piston.n
-        p["z_f"], p["z_p"] = piston.impedance[[0, -1]]
-        p["kappa_f"], p["kappa_p"] = end_viscosity(cp, piston, loss_time)
-        p["bound_p"] = _offset_bound(cp, piston, Coef.BOTTOM)
-        slowest = max(slowest, scene.piston.transit_time)
-    shortest = bit.n if piston is None else min(bit.n, piston.n)
-    p["front"] = place_of_closure(loss_time / bit.time_step * shortest)
-    p["rearm_time"] = REARM_TRANSITS * slowest
     rock = rock_numbers(scene)
     p["ss_stiffness"] = rock["gamma"] * rock["k_r"]
     p["ss_loading"] = rock["k_r"]
     p["ss_damping"] = rock["c_r"]
     return par
+
+
+@lru_cache(MOST_KEPT)
+def _of_bars(bars: CutBars) -> bytes:
+    """Bytes of a parameter record with what depends on the bars alone."""
+    par = np.zeros(1, WAVE_PAR)
+    p = par[0]
+    p["dt"] = bars.time_step
+    p["most_crossings"] = MOST_CROSSINGS
+    p["loss"] = substeps(bars.loss_time, bars.time_step)
+    bit = bars.bit
+    p["n_b"] = bit.grid.n
+    p["z_t"], p["z_b"] = bit.grid.impedance[[0, -1]]
+    p["kappa_t"], p["kappa_b"] = bit.kappa
+    p["bound_t"], p["bound_b"] = bit.bound
+    piston = bars.piston
+    if piston is not None:
+        p["n_p"] = piston.grid.n
+        p["z_f"], p["z_p"] = piston.grid.impedance[[0, -1]]
+        p["kappa_f"], p["kappa_p"] = piston.kappa
+        p["bound_p"] = piston.bound[1]
+    shortest = min(bar.grid.n for bar in bars.both)
+    p["front"] = place_of_closure(bars.loss_time / bars.time_step * shortest)
+    p["rearm_time"] = REARM_TRANSITS * max(bar.transit_time for bar in bars.both)
+    return par.tobytes()
 
 
 def begin_state(s: Any, scene: SceneRules, rock: dict[str, float]) -> None:
@@ -95,7 +94,7 @@ def begin_state(s: Any, scene: SceneRules, rock: dict[str, float]) -> None:
     Parameters
     ----------
     s : record
-        Changed in place.
+        Changed in place, by the names of its fields.
     rock : dict of float
         From `rock_numbers`.
     """
@@ -130,9 +129,3 @@ def rock_numbers(scene: SceneRules) -> dict[str, float]:
         "c_r": rock.barrier_damping if barrier else 0.0,
         "w_r": rock.barrier_energy if barrier else 0.0,
     }
-
-
-def _offset_bound(c: np.ndarray, grid: Grid, row: Coef) -> float:
-    """Factor b in |offset| <= b sqrt(2 E) (docs/numerics.md, eq. 14)."""
-    n = grid.n
-    return float(np.sqrt(np.sum(c[row, :n] * c[row, :n] / c[Coef.MASS, :n])))

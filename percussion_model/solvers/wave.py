@@ -16,8 +16,8 @@ from percussion_model.core.records import (
     SAMPLE_FIELDS,
     Status,
 )
-from percussion_model.core.totals import lost_in_faces, resync, stored_energy
-from percussion_model.core.wave_records import WAVE_STATE, Row, Task
+from percussion_model.core.totals import begin, lost_in_faces, resync, stored_energy
+from percussion_model.core.wave_records import Row, Task
 from percussion_model.scene_rules import SceneRules
 from percussion_model.solvers.operators import LEVELS, leap_operators, padded
 from percussion_model.solvers.packing import (
@@ -52,18 +52,16 @@ class WaveSolver(WaveBars):
 
     def __init__(self, scene: SceneRules) -> None:
         super().__init__(scene)
-        self._par = pack_parameters(
-            scene, self._piston, self._cp, self._bit, self._cb, self._loss_time
-        )
-        self._operators = no_operators()
+        self._par = pack_parameters(scene, self._bars)
+        found = None
         if scene.solver.leaps:
             found = leap_operators(self._par, self._piston, self._cp, self._bit, self._cb)
-            if found is not None:
-                self._operators = found.arrays
-                self._par["leaps"] = LEVELS
+        if found is not None:
+            self._par["leaps"] = LEVELS
+        self._operators = no_operators() if found is None else found.arrays
         size = padded(2 * max(self._bit.n, self._piston.n if self._piston else 0) + 1)
         self._scratch = np.zeros((3, max(size, WATCHED)))
-        self._entry: Callable[..., int] = run
+        self._entry: Callable[..., int] = entry_of(run)
         self._no_row = np.zeros(len(SAMPLE_FIELDS))
         self._no_blows = np.zeros(1, BLOW)
         self._no_events = np.zeros(1, EVENT)
@@ -81,23 +79,17 @@ class WaveSolver(WaveBars):
     def new_state(self) -> WaveState:
         """State at time zero."""
         scene, start = self.scene, self.scene.start
-        record = np.zeros(1, WAVE_STATE)
-        s = record[0]
-        s["leap_end"] = -1
-        begin_state(s, scene, rock_numbers(scene))
-        has_piston = scene.piston.model != "absent"
         n_p = self._piston.n if self._piston is not None else 0
-        rows = len(Row)
-        state = WaveState(record, np.zeros(rows * (n_p + self._bit.n + 2)), rows * (n_p + 1))
+        state = WaveState.zero(n_p, self._bit.n)
+        begin_state(state, scene, rock_numbers(scene))
+        state["leap_end"] = -1
+        state["v_p"] = start.piston_velocity if scene.piston.model != "absent" else 0.0
+        state["v_b"] = start.bit_velocity
         wp, wb = state.bars
         wb[Row.DOWN : Row.UP + 1, : self._bit.n] = 0.5 * start.bit_velocity
         if n_p:
             wp[Row.DOWN : Row.UP + 1, :n_p] = 0.5 * start.piston_velocity
-        s["v_p"] = start.piston_velocity if has_piston else 0.0
-        s["v_b"] = start.bit_velocity
-        self.derive(state)
-        s["u_start"] = s["u_r"]
-        s["e_start"] = sum(self._stored(state))
+        entry_of(begin)(self._par, state.record, wp, self._cp, wb, self._cb)
         return state
 
     def _stored(self, state: WaveState) -> tuple[float, float, float]:
@@ -130,8 +122,8 @@ class WaveSolver(WaveBars):
             self._no_events if events is None else events,
             self._no_row if row is None else row,
         )
-        if self._entry is run:
-            self._entry = entry_of(run)  # the types of all these never change
+        if self._entry is run:  # compiled just now; the types of all these never change
+            self._entry = entry_of(run)
         return int(status)
 
     def advance(

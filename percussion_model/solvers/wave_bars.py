@@ -7,14 +7,8 @@ import numpy as np
 from percussion_model.core.advance import GRID_ROUNDING
 from percussion_model.core.wave_records import Coef
 from percussion_model.scene_rules import BarNumbers, SceneRules
-from percussion_model.solvers.grid import (
-    Grid,
-    choose_time_step,
-    coefficients,
-    cut,
-    section_count,
-)
-from percussion_model.solvers.resolution import asked_cells, elastic_bars
+from percussion_model.solvers.bar_cells import cut_bars
+from percussion_model.solvers.grid import Grid, section_count
 from percussion_model.solvers.wave_state import WORD, WaveState
 
 
@@ -38,22 +32,17 @@ class WaveBars:
 
     def __init__(self, scene: SceneRules) -> None:
         self.scene = scene
-        elastic_piston = scene.piston.model == "elastic"
-        bars = elastic_bars(scene)
-        self.time_step = choose_time_step(bars, scene.solver.cells or asked_cells(scene))
-        self._loss_time = scene.loss.time if scene.loss_on else 0.0
-        self._bit = cut(scene.bit, self.time_step)
-        self._piston = cut(scene.piston, self.time_step) if elastic_piston else None
-        self._cb = coefficients(self._bit, self._loss_time)
-        if self._piston is not None:
-            self._cp = coefficients(self._piston, self._loss_time)
-        else:
-            self._cp = np.zeros((len(Coef), 1))
+        bars = self._bars = cut_bars(scene)
+        self.time_step = bars.time_step
+        self._bit, self._cb = bars.bit.grid, bars.bit.coefficients
+        self._piston: Grid | None = None
+        self._cp = np.zeros((len(Coef), 1))
+        if bars.piston is not None:
+            self._piston, self._cp = bars.piston.grid, bars.piston.coefficients
         self.cells = {"bit": self._bit.n}
         if self._piston is not None:
             self.cells = {"piston": self._piston.n, **self.cells}
-        grids = [grid for grid in (self._piston, self._bit) if grid is not None]
-        self.wave_speed_error = max(grid.fit for grid in grids)
+        self.wave_speed_error = max(bar.grid.fit for bar in bars.both)
 
     @property
     def static_wave(self) -> np.ndarray:
