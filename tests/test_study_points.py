@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from percussion_model import SceneError
-from percussion_model.study import grid, latin_hypercube, read_axis, table
+from percussion_model import Scene, SceneError
+from percussion_model.study import grid, latin_hypercube, read_axis, study, table
 
 AXES = {"feed.force": [1500.0, 2500.0, 4000.0], "rock.loading_stiffness": [3e8, 7.5e8]}
 
@@ -70,3 +70,9 @@ def test_axes_of_the_command_line():
     assert values == pytest.approx([1e8, 1e9, 1e10])
     assert read_axis("feed.force=0:10:3")[1].tolist() == [0.0, 5.0, 10.0]
     assert read_axis("feed.force=3,7")[1].tolist() == [3.0, 7.0]
+
+
+def test_a_whole_number_is_not_cut_from_a_broken_one(tmp_path):
+    with pytest.raises(SceneError, match=r"solver.cells = 17.5: must be a whole number"):
+        study(Scene(), grid({"solver.cells": [10, 17.5, 25]}), tmp_path / "out")
+    assert not (tmp_path / "out").exists()

@@ -64,7 +64,7 @@ def couple(
     )
     wanted = [*known_signals(coupling.outputs), *(signals or ())]
     rows_every = max(step, duration / ROWS) if interval is None else interval
-    run = coupling.run(duration, step, wanted, rows_every, tolerance)
+    run = coupling.run(duration, step, wanted, rows_every, tolerance, on_interrupt="keep")
     found = summary(run)
     path = write_columns(run, folder / "signals.csv")
     common.write_json(json_file, found)
@@ -77,4 +77,5 @@ def couple(
             from percussion_model.plotting.coupled import save_coupled
 
             common.tell_files([save_coupled(run, folder / "signals.png", system.stem)])
-    return common.complain(f"the run ended early, {run.error}", 1) if run.error else 0
+    code = common.INTERRUPTED if run.interrupted else 1
+    return common.complain(f"the run ended early, {run.error}", code) if run.error else 0

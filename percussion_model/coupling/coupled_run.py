@@ -25,6 +25,8 @@ class CoupledRun:
         Steps that were computed beyond those, to know the error, and steps taken back.
     wall_time : float
         Of the stepping [s].
+    interrupted : bool
+        Whether it was Ctrl-C that ended it.
     """
 
     columns: dict[str, np.ndarray]
@@ -34,6 +36,7 @@ class CoupledRun:
     tried: int = 0
     rejected: int = 0
     wall_time: float = field(default=0.0, compare=False)
+    interrupted: bool = False
 
     def __getitem__(self, signal: str) -> np.ndarray:
         return self.columns[signal]

@@ -115,6 +115,7 @@ class Coupling:
         interval: float | None = None,
         tolerance: float | None = None,
         progress: Callable[[float], None] | None = None,
+        on_interrupt: Literal["raise", "keep"] = "raise",
     ) -> CoupledRun:
         """Run the system from time zero, and end all its parts.
 
@@ -131,6 +132,9 @@ class Coupling:
             and taken back, to keep to it. `step` is the longest one then.
         progress : callable, optional
             Called with the time at each row [s].
+        on_interrupt : {"raise", "keep"}
+            What Ctrl-C does when the present step is over: raise KeyboardInterrupt, or return
+            what there is.
 
         Returns
         -------
@@ -147,7 +151,10 @@ class Coupling:
             self._initialise()
             control = None if tolerance is None else StepControl(self.ports, step, tolerance)
             with little_collection():
-                return self._loop(count, step, every, control, progress)
+                run = self._loop(count, step, every, control, progress)
+            if run.interrupted and on_interrupt == "raise":
+                raise KeyboardInterrupt
+            return run
         finally:
             self.free()
 
@@ -178,14 +185,14 @@ class Coupling:
                 if asked_to_stop():
                     error = f"at {done * step:.6g} s it was interrupted"
                     break
+            interrupted = asked_to_stop()
         wall_time = clock.perf_counter() - began
         table = np.array(rows, dtype=float)
         columns = {name: table[:, k] for k, name in enumerate(["time", *names])}
-        if control is None:
-            return CoupledRun(columns, step, done, error, wall_time=wall_time)
-        return CoupledRun(
-            columns, step, control.done, error, control.tried, control.rejected, wall_time
-        )
+        run = CoupledRun(columns, step, done, error, wall_time=wall_time, interrupted=interrupted)
+        if control is not None:
+            run.steps, run.tried, run.rejected = control.done, control.tried, control.rejected
+        return run
 
     def _stepping(self, count: int, control: StepControl | None) -> Callable[[float, float], None]:
         """What does a step: by Python, or by compiled code where that is possible."""

@@ -180,11 +180,14 @@ def _spread(text: str, first: float, last: float, count: str) -> np.ndarray:
 
 
 def refuse_unknown(scene: Scene, points: Points) -> None:
-    """Raise `SceneError` for a key that no point could set, before any of them is run."""
-    for key in points.keys:
+    """Raise `SceneError` for what no point could set, before any of them is run."""
+    for key, column in zip(points.keys, points.values.T, strict=True):
         row = scene.row_of(key)
         if row.kind not in ("number", "whole number"):
             raise SceneError(f"{key}: a study varies numbers, and this is a {row.kind}")
+        broken = column[column != np.floor(column)]
+        if row.kind == "whole number" and len(broken):
+            raise SceneError(f"{key} = {float(broken[0])!r}: must be a whole number in all points")
 
 
 def _column(key: str, values: Any) -> np.ndarray:

@@ -107,7 +107,7 @@ import sys
 from percussion_model.coupling import Coupling
 coupling = Coupling(sys.argv[1], compiled=sys.argv[2] == "True")
 tell = lambda at: at > 0.0205 or print("going", flush=True)
-run = coupling.run(1e4, 1e-3, interval=1e-2, progress=tell)
+run = coupling.run(1e4, 1e-3, interval=1e-2, progress=tell, on_interrupt="keep")
 print(run.error)
 print(len(run["time"]) - 1, round(run.steps * run.step, 3))
 """
