@@ -90,8 +90,8 @@ class Runner:
     def advance_blows(self, count: int, t: float) -> None:
         """Let the simulation run until so many more blows have ended, or else up to `t` [s].
 
-        It stops soon after the end of the last one. What follows has the same bits as if
-        it had not stopped there.
+        It stops before the next one ends; the waves do so at the next grid point. What
+        follows has the same bits as if it had not stopped there.
 
         Parameters
         ----------

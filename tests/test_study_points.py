@@ -70,6 +70,8 @@ def test_axes_of_the_command_line():
     assert values == pytest.approx([1e8, 1e9, 1e10])
     assert read_axis("feed.force=0:10:3")[1].tolist() == [0.0, 5.0, 10.0]
     assert read_axis("feed.force=3,7")[1].tolist() == [3.0, 7.0]
+    # what would be 20.000000000000004 by the logarithm
+    assert read_axis("solver.cells=10:80:4log")[1].tolist() == [10.0, 20.0, 40.0, 80.0]
 
 
 def test_a_whole_number_is_not_cut_from_a_broken_one(tmp_path):

@@ -41,11 +41,11 @@ def save(hammer: PercussiveHammer) -> bytes:
 
 def restore(hammer: PercussiveHammer, state: bytes) -> None:
     """Go back to a state; `StateError` if it is none of this hammer."""
-    hammer.late.clear()
     if hammer.motion is None:
         hammer.check(hammer.values)
         hammer.ready()
     body = unpack(hammer.fingerprint, state)
+    hammer.late.clear()
     phase, _, start, now, time, blows, step_size = NUMBERS.unpack_from(body)
     at = NUMBERS.size
     count = len(hammer.inputs)

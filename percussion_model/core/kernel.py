@@ -64,6 +64,9 @@ def entry_of(function: Callable) -> Callable:
 # not compile, so that it can always be built ahead of time.
 kernel = njit(cache=True, error_model="numpy", _nrt=False)
 
+# For what calls other libraries, which may wait for threads that want to run Python.
+letting_go = njit(cache=True, error_model="numpy", _nrt=False, nogil=True)
+
 # For what runs in every step: arrays cost nine words an argument to pass.
 inlined = njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
 

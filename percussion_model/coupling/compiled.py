@@ -17,13 +17,18 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from percussion_model.core.kernel import entry_of, kernel
+from percussion_model.core.kernel import entry_of, letting_go
 from percussion_model.coupling.component import Component
-from percussion_model.coupling.exchange import WARNING, Group
+from percussion_model.coupling.exchange import LARGEST, WARNING, Group
 from percussion_model.coupling.port import Port
 
-SET_REAL, SET_INTEGER, STEP, GET_REAL, GET_INTEGER = range(5)
-DONE, NOT_FINITE = -1, -2  # statuses of FMI are from 0 on
+STEP, SET_REAL, SET_INTEGER, GET_REAL, GET_INTEGER, GET_BOOLEAN = range(6)
+KINDS = {
+    "Real": (SET_REAL, GET_REAL),
+    "Integer": (SET_INTEGER, GET_INTEGER),
+    "Boolean": (SET_INTEGER, GET_BOOLEAN),
+}
+DONE, NOT_FINITE, TOO_LARGE = -1, -2, -3  # statuses of FMI are from 0 on
 
 CALL = np.dtype(
     [
@@ -81,7 +86,7 @@ def do_step(
     ), _called((_BYTE, _DOUBLE, _DOUBLE, _INT), (True, False, False, False))
 
 
-@kernel
+@letting_go
 def make_calls(
     calls: np.ndarray,
     places: np.ndarray,
@@ -127,10 +132,12 @@ def make_calls(
                     if reals[call.room + i] != value:
                         reals[call.room + i] = value
                         new = True
+                elif not abs(value) < LARGEST:
+                    status = TOO_LARGE
                 elif integers[call.room + i] != int(value):
                     integers[call.room + i] = int(value)
                     new = True
-            if new:
+            if new and status == 0:
                 status = exchange(
                     call.function, call.component, call.references, call.count, call.values
                 )
@@ -143,6 +150,8 @@ def make_calls(
                     value = reals[call.room + i]
                     if call.kind == GET_INTEGER:
                         value = float(integers[call.room + i])
+                    elif call.kind == GET_BOOLEAN:
+                        value = 1.0 if integers[call.room + i] != 0 else 0.0
                     values[places[call.place + i]] = value
                     if not math.isfinite(value):
                         status = NOT_FINITE
@@ -169,7 +178,7 @@ class CompiledStep:
 
     def __init__(self, ports: Sequence[Port], order: str, count: int, every: Any) -> None:
         self.ports = list(ports)
-        self._every = every
+        self._every, self._count = every, count
         self._calls: list[tuple[Any, ...]] = []
         self._names: list[str] = []
         self._places: list[int] = []
@@ -199,7 +208,7 @@ class CompiledStep:
     def _give_and_step(self, port: Port) -> None:
         for group in port.writer.groups:
             sources = port.places[group.begin : group.end]
-            self._exchange(port, group, (SET_REAL, SET_INTEGER), sources)
+            self._exchange(port, group, 0, sources)
         function = ctypes.cast(port.part.stepper, ctypes.c_void_p).value
         self._calls.append((STEP, self.ports.index(port), function, port.part.pointer.value,
                             0, 0, 0, 0, 0, self._pace(port)))  # fmt: skip
@@ -209,19 +218,16 @@ class CompiledStep:
         begin = port.begin
         for group in port.reader.groups:
             places = list(range(begin + group.begin, begin + group.end))
-            self._exchange(port, group, (GET_REAL, GET_INTEGER), places)
+            self._exchange(port, group, 1, places)
 
     def _pace(self, port: Port) -> int:
-        return int(self._every.get(port.name, 1))
+        return min(int(self._every.get(port.name, 1)), int(self._count))
 
-    def _exchange(
-        self, port: Port, group: Group, kinds: tuple[int, int], places: Sequence[int]
-    ) -> None:
-        is_real = group.family == "Real"
-        room = self._reals if is_real else self._integers
+    def _exchange(self, port: Port, group: Group, reads: int, places: Sequence[int]) -> None:
+        room = self._reals if group.family == "Real" else self._integers
         self._calls.append(
             (
-                kinds[0] if is_real else kinds[1],
+                KINDS[group.family][reads],
                 self.ports.index(port),
                 ctypes.cast(group.call, ctypes.c_void_p).value,
                 port.part.pointer.value,
@@ -250,6 +256,9 @@ class CompiledStep:
         self.publish()
         if status == NOT_FINITE:
             port.refuse(port.values[port.begin : port.end])
+        if status == TOO_LARGE:
+            values = [port.values[place] for place in port.places]
+            port.part.refuse_large(port.writer.names, values)
         port.part.fail(self._names[call], status)
 
     def publish(self) -> None:

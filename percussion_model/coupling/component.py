@@ -11,7 +11,7 @@ import numpy as np
 from fmpy import read_model_description
 from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
 
-from percussion_model.coupling.exchange import FAMILIES, WARNING, Reader, Writer
+from percussion_model.coupling.exchange import FAMILIES, LARGEST, WARNING, Reader, Writer
 
 _STATUS = {2: "discard", 3: "error", 4: "fatal", 5: "pending"}
 
@@ -153,6 +153,12 @@ class Component:
     def fail(self, function: str, status: int) -> None:
         """Raise the error of a call that ended with this status."""
         raise self._error(f"{function} failed with status {status} ({_STATUS.get(status, '?')})")
+
+    def refuse_large(self, names: Sequence[str], values: Sequence[Any]) -> None:
+        """Raise the error of an Integer input that is to take a number beyond its range."""
+        for name, value in zip(names, values, strict=True):
+            if FAMILIES[self.variables[name].type] == "Integer" and not abs(value) < LARGEST:
+                raise CouplingError(f"{self.name}: {name} = {value!r} does not fit an Integer")
 
     def _error(self, text: str) -> CouplingError:
         # the line of the FMU itself comes first, that of its export library after it

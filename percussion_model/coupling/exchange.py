@@ -21,6 +21,8 @@ ORDER = ("Real", "Integer", "Boolean")
 _IN_C: dict[str, tuple[Any, str]] = {
     "Real": (ctypes.c_double, "d"), "Integer": (ctypes.c_int, "i"), "Boolean": (ctypes.c_int, "i"),
 }  # fmt: skip
+# Integers of FMI are below this, by size.
+LARGEST = 2.0**31
 # The highest status of a call that did what it should.
 WARNING = 1
 
@@ -115,7 +117,11 @@ class Writer(Exchange):
             chosen = values[group.begin : group.end]
             if chosen == self._last[k]:
                 continue
-            group.fill(*(chosen if group.family == "Real" else map(int, chosen)))
+            try:
+                group.fill(*(chosen if group.family == "Real" else map(int, chosen)))
+            except struct.error:
+                self.component.refuse_large(self.names[group.begin : group.end], chosen)
+                raise
             status = group.call(*group.arguments)
             if status > WARNING:
                 self.component.fail(group.name, status)

@@ -21,7 +21,7 @@ from percussion_model.coupling.archive import choose_values, unpack
 from percussion_model.coupling.compiled import CompiledStep, can_compile
 from percussion_model.coupling.component import Component, CouplingError
 from percussion_model.coupling.coupled_run import CoupledRun
-from percussion_model.coupling.pace import PacedPort, check_pace
+from percussion_model.coupling.pace import PacedPort, check_pace, refuse_remainder
 from percussion_model.coupling.port import OnWay, Port
 from percussion_model.coupling.python_part import PythonPart, Work
 from percussion_model.coupling.rejection import StepControl
@@ -146,6 +146,7 @@ class Coupling:
             raise CouplingError("on_way cannot be taken back with a step: leave the tolerance out")
         if tolerance is not None and self.every:
             raise CouplingError(f"every {self.every} and a tolerance do not go together")
+        refuse_remainder(self.every, self.parts, count)
         try:
             self._connect(list(signals))
             self._initialise()

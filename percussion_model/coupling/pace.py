@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
-from percussion_model.coupling.component import CouplingError
+from percussion_model.coupling.component import Component, CouplingError
 from percussion_model.coupling.port import Port
 
 
 class PacedPort(Port):
     """A part that does several steps of the loop as one.
 
-    It does so when the last of them is over, with the inputs that it finds at the beginning of
-    that one; until then the others see what it gave before. So nothing is known before its time.
+    It does so with the last of them, and takes the inputs that this one takes: those at its
+    beginning, and with Gauss-Seidel what parts before it gave in it. Until then the others
+    see what it gave before. So nothing is known before its time.
     """
 
     is_due = True
@@ -54,3 +56,13 @@ def check_pace(every: Mapping[str, int], components: Sequence[str]) -> dict[str,
         if isinstance(steps, bool) or not isinstance(steps, int) or steps < 1:
             raise CouplingError(f"every {name}={steps!r}: must be a whole number from 1")
     return {name: steps for name, steps in every.items() if steps > 1}
+
+
+def refuse_remainder(every: Mapping[str, int], parts: Mapping[str, Any], count: int) -> None:
+    """Raise `CouplingError` for a part that would have a shorter last step, and takes none."""
+    for name, steps in every.items():
+        if count % steps and isinstance(parts[name], Component) and not parts[name].can_vary:
+            raise CouplingError(
+                f"every {name}={steps}: {name} takes no steps of varying size, and {count} steps "
+                f"are no multiple of {steps}"
+            )

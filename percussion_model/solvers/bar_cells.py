@@ -5,6 +5,7 @@ Scenes on other rock, with another feed or drive, share it: a study makes it onc
 
 from __future__ import annotations
 
+import threading
 from dataclasses import dataclass
 
 import numpy as np
@@ -74,6 +75,7 @@ class CutBars:
 
 
 _kept: dict[tuple, CutBars] = {}
+_lock = threading.Lock()
 
 
 def cut_bars(scene: SceneRules) -> CutBars:
@@ -83,13 +85,16 @@ def cut_bars(scene: SceneRules) -> CutBars:
     loss_time = scene.loss.time if scene.loss_on else 0.0
     sections = [tuple((part.transit_time, part.mass) for part in bar.sections) for bar in bars]
     key = (cells, loss_time, *sections)
-    if key not in _kept:
-        while len(_kept) >= MOST_KEPT:
-            del _kept[next(iter(_kept))]
-        time_step = choose_time_step(bars, cells)
-        *above, bit = [_cut_bar(bar, time_step, loss_time) for bar in bars]
-        _kept[key] = CutBars(time_step, loss_time, above[0] if above else None, bit)
-    return _kept[key]
+    with _lock:  # hosts may make instances in threads
+        found = _kept.get(key)
+        if found is None:
+            while len(_kept) >= MOST_KEPT:
+                del _kept[next(iter(_kept))]
+            time_step = choose_time_step(bars, cells)
+            *above, bit = [_cut_bar(bar, time_step, loss_time) for bar in bars]
+            found = CutBars(time_step, loss_time, above[0] if above else None, bit)
+            _kept[key] = found
+    return found
 
 
 def _cut_bar(bar: BarNumbers, time_step: float, loss_time: float) -> CutBar:

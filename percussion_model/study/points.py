@@ -18,6 +18,9 @@ __all__ = ["Points", "grid", "latin_hypercube", "read_axis", "table"]
 CHEAP_GROUPS = ("feed.", "drive.", "start.", "run.")
 CHEAP_KEYS = ("rock.barrier_energy",)
 
+# A value that misses a whole number by this share is meant to be one.
+ROUNDING = 1e-13
+
 
 @dataclass(frozen=True)
 class Points:
@@ -169,14 +172,20 @@ def read_axis(text: str) -> tuple[str, np.ndarray]:
 
 def _spread(text: str, first: float, last: float, count: str) -> np.ndarray:
     """Values at even steps, of the logarithm where `count` says so."""
-    number = int(count.removesuffix("log"))
+    number = int(count.removesuffix("log"))  # of values
     if number < 1:
         raise SceneError(f"--over {text}: COUNT must be a whole number from 1 on")
     if not count.endswith("log"):
-        return np.linspace(first, last, number)
+        return _snapped(np.linspace(first, last, number))
     if not min(first, last) > 0:
         raise SceneError(f"--over {text}: both ends must be above 0 for steps of the logarithm")
-    return np.geomspace(first, last, number)
+    return _snapped(np.geomspace(first, last, number))
+
+
+def _snapped(values: np.ndarray) -> np.ndarray:
+    """Values that miss a whole number by rounding alone are that number."""
+    whole = np.round(values)
+    return np.where(np.abs(values - whole) <= ROUNDING * np.abs(whole), whole, values)
 
 
 def refuse_unknown(scene: Scene, points: Points) -> None:
@@ -187,7 +196,10 @@ def refuse_unknown(scene: Scene, points: Points) -> None:
             raise SceneError(f"{key}: a study varies numbers, and this is a {row.kind}")
         broken = column[column != np.floor(column)]
         if row.kind == "whole number" and len(broken):
-            raise SceneError(f"{key} = {float(broken[0])!r}: must be a whole number in all points")
+            raise SceneError(
+                f"{key} = {float(broken[0])!r}: must be a whole number in all points; list its "
+                f"values, as in {key}=10,20,40"
+            )
 
 
 def _column(key: str, values: Any) -> np.ndarray:

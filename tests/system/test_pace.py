@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import ctypes
 import signal
 import subprocess
 import sys
+import threading
 
 import numpy as np
 import pytest
 
 from percussion_model.coupling import Coupling, CouplingError
+from percussion_model.coupling.compiled import CALL, DONE, make_calls
+from percussion_model.coupling.compiled import STEP as STEP_CALL
 from percussion_model.coupling.pace import PacedPort
 
 SLOW = {"rock": 10, "supply": 7}
@@ -102,6 +106,33 @@ def test_a_failure_of_an_fmu_is_told_alike(feed_control, compiled):
     assert len(run["time"]) == run.steps + 1
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="needs usleep")
+def test_other_threads_go_on_while_an_fmu_computes():
+    """An FMU may wait for a thread of its own that logs, by way of Python."""
+    calls = np.zeros(1, CALL)
+    # usleep stands in for fmi2DoStep: its time is where the instance would be
+    calls["kind"], calls["component"], calls["every"] = STEP_CALL, 300_000, 1
+    calls["function"] = ctypes.cast(ctypes.CDLL(None).usleep, ctypes.c_void_p).value
+    room, at = np.zeros(1), np.array([0, 1, 0, 0])
+    rest = np.zeros(1, np.int64), room, room, np.zeros(1, np.int32), at, 0.0, 1e-3
+    make_calls(calls[:0], *rest)
+    ticks, over = [], threading.Event()
+
+    def tick():
+        while not over.wait(1e-3):
+            ticks.append(None)
+
+    thread = threading.Thread(target=tick)
+    thread.start()
+    before = len(ticks)
+    make_calls(calls, *rest)
+    during = len(ticks) - before
+    over.set()
+    thread.join()
+    assert at[2] == DONE
+    assert during > 10
+
+
 INTERRUPTED = """
 import sys
 from percussion_model.coupling import Coupling
@@ -130,3 +161,16 @@ def test_an_interrupted_run_keeps_what_there_is(feed_control, compiled):
     assert "it was interrupted" in error
     rows, until = counts.split()
     assert int(rows) == int(float(until) / 1e-2 + 1e-6)
+
+
+def test_a_part_of_fixed_steps_gets_no_shorter_one(feed_control):
+    coupling = Coupling(feed_control, every={"rock": 10})
+    coupling.parts["rock"].can_vary = False
+    with pytest.raises(CouplingError, match="25 steps are no multiple of 10"):
+        coupling.run(25 * STEP, STEP)
+
+
+def test_a_pace_beyond_the_run_is_the_whole_run(feed_control):
+    runs = [Coupling(feed_control, every={"rock": n}).run(5 * STEP, STEP) for n in (5, 10**30)]
+    for name, column in runs[0].columns.items():
+        np.testing.assert_array_equal(runs[1][name], column, err_msg=name)

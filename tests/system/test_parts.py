@@ -223,3 +223,11 @@ def test_stiffness_is_lowest_at_the_best_pressure():
     for pressure, factor in ((1e6, 3.0), (2e6, 1.0), (3e6, 3.0)):
         found = run(rock, "RockProfile", 1, supply_pressure=pressure)
         assert found["loading_stiffness"] == pytest.approx(7.5e8 * factor)
+
+
+def test_the_variation_above_the_first_knot_is_that_of_its_depth():
+    """A rock that is asked there first, and one that has been elsewhere."""
+    values = {"variation__spread": 0.5, "variation__length": 0.5}
+    fresh, used = make_model("RockProfile", **values), make_model("RockProfile", **values)
+    used.variation(0.7)
+    assert fresh.variation(-0.1) == used.variation(-0.1)

@@ -174,8 +174,10 @@ class DrillString(Model):
         ]
         whole = max(0, math.floor((h - first) / cell + ROUNDING))
         forces += [(head_force, casing_force)] * whole
-        for begin in range(0, len(forces), body.cells):
-            body.advance(forces[begin : begin + body.cells])
+        # Coulomb friction holds what is about to turn, so it has to act after each cell
+        most = 1 if body.sticking > 0.0 else body.cells
+        for begin in range(0, len(forces), most):
+            body.advance(forces[begin : begin + most])
         self.lag = max(0.0, h - first - whole * cell)
         self.head_impulse_due = head_force * self.lag
         self.casing_impulse_due = casing_force * self.lag

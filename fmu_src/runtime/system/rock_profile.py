@@ -38,7 +38,8 @@ class RockProfile(Model):
         self._knots: dict[int, float] = {}
         self._spread = parameters["variation.spread"]
         self._length = parameters["variation.length"]
-        self._between = (-1, 0.0, 0.0)  # number of the knot above the bit, and two of them
+        # number of the knot above the bit, none yet, and the values of it and the next
+        self._between: tuple[int | None, float, float] = (None, 0.0, 0.0)
         self._arm = parameters["torque_arm"]
 
     def _layer(self, number: int) -> tuple[float, float, float, float, int]:

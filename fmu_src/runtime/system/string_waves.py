@@ -91,7 +91,8 @@ class Waves(Rods):
         """Go on by some transit times, at most as many as there are cells.
 
         The waves that meet an end in that time are on their way there already; so all others
-        move at once, and wall friction takes its share at the end.
+        move at once, and wall friction takes its share at the end. Coulomb friction, which
+        holds what is about to turn, wants one transit time at a time.
 
         Parameters
         ----------
