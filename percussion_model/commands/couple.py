@@ -48,6 +48,8 @@ def couple(
 
     Files go to out/SYSTEM.
     """
+    from percussion_model.terminal import progress_bar
+
     try:
         from percussion_model.coupling import Coupling
         from percussion_model.coupling.balance import known_signals, summary
@@ -64,7 +66,10 @@ def couple(
     )
     wanted = [*known_signals(coupling.outputs), *(signals or ())]
     rows_every = max(step, duration / ROWS) if interval is None else interval
-    run = coupling.run(duration, step, wanted, rows_every, tolerance, on_interrupt="keep")
+    with progress_bar(duration) as progress:
+        run = coupling.run(
+            duration, step, wanted, rows_every, tolerance, progress, on_interrupt="keep"
+        )
     found = summary(run)
     path = write_columns(run, folder / "signals.csv")
     common.write_json(json_file, found)
