@@ -14,11 +14,12 @@ PANELS = (
     ("K_R [kN/mm]", 1e-6, ("rock.loading_stiffness",)),
     ("bit [mm]", 1e3, ("hammer.bit.position",)),
     ("rate [mm/s]", 1e3, ("hammer.rate_of_penetration",)),
-    ("feed [kN]", 1e-3, ("string.feed_force_mean", "controller.feed_wanted")),
-    ("rig [kN]", 1e-3, ("rig.force", "controller.force_command")),
+    ("feed force [kN]", 1e-3, ("string.feed_force_mean", "controller.feed_wanted")),
+    ("rig force [kN]", 1e-3, ("rig.force", "controller.force_command")),
     ("pressure [bar]", 1e-5, ("supply.supply_pressure", "controller.pressure_command")),
     ("mode", 1.0, ("controller.mode",)),
 )
+MODES = ("drilling", "void", "retract")  # of the controller, by number
 
 
 def save_coupled(run: CoupledRun, path: Path, title: str) -> Path:
@@ -34,6 +35,9 @@ def save_coupled(run: CoupledRun, path: Path, title: str) -> Path:
         for name in names:
             ax.plot(run["time"], factor * run[name], linewidth=1.1, label=name)
         ax.set_ylabel(label)
+        if names == ["controller.mode"]:
+            ax.set_yticks(range(len(MODES)), MODES)
+            ax.set_ylim(-0.4, len(MODES) - 0.6)
         ax.grid(alpha=0.3)
         if len(names) > 1:
             ax.legend(fontsize="small", loc="best")
