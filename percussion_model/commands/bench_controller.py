@@ -12,6 +12,7 @@ import typer
 
 from percussion_model.commands.common import (
     BAD_INPUT,
+    INTERRUPTED,
     JsonFile,
     Out,
     check_json,
@@ -68,7 +69,19 @@ def bench_controller(
     check_writable(folder)
     check_json(json_file)
     values = dict(read_value(f"controller.{text}") for text in settings or ())
-    scores = bench(system, _load(controller), values, trials or (), _show)
+    scores: list[Score] = []
+    interrupted = False
+
+    def take(score: Score) -> None:
+        scores.append(score)
+        _show(score)
+
+    try:
+        bench(system, _load(controller), values, trials or (), take)
+    except KeyboardInterrupt:
+        if not scores:
+            raise
+        interrupted = True
     points = total(scores)
     listed = [
         {"trial": s.trial, "points": s.points, "error": s.error, "faults": s.faults, **s.numbers}
@@ -83,6 +96,10 @@ def bench_controller(
     else:
         title = controller or system.stem
         print(save_bench(scores, points, COLUMNS, folder, title), file=sys.stderr)
+    if interrupted:
+        return complain(
+            f"interrupted: the page has the {len(scores)} runs that were done", INTERRUPTED
+        )
     return 1 if any(score.faults for score in scores) else 0
 
 

@@ -10,6 +10,11 @@ import typer
 from percussion_model.commands import common
 
 SystemFile = Annotated[Path, typer.Argument(metavar="SYSTEM.ssp", help="A system (SSP 1.0).")]
+UNITS = {
+    "time": "s", "step": "s", "depth": "m", "rate_second_half": "m/s", "shoulder_energy": "J",
+    "feed_work": "J", "hammer_energy_residual": "of the energy put in",
+    "string_energy_residual": "of the energy put in", "shoulder_by_blows": "of the blows",
+}  # fmt: skip
 # Rows of a run that is not told otherwise.
 ROWS = 5000
 
@@ -19,7 +24,7 @@ def couple(
     duration: Annotated[float, typer.Option("--duration", help="Simulated time, in s.")] = 6.0,
     step: Annotated[float, typer.Option("--step", help="Communication step, in s.")] = 1e-3,
     interval: Annotated[
-        float | None, typer.Option("--interval", help="Time between rows of the result, in s.")
+        float | None, typer.Option("--interval", help=f"Time between rows, in s; else {ROWS} rows.")
     ] = None,
     order: Annotated[
         Literal["jacobi", "gauss-seidel"], typer.Option(help="Who sees what in a step.")
@@ -75,7 +80,9 @@ def couple(
     common.write_json(json_file, found)
     if json_file != "-":
         for name, value in found.items():
-            typer.echo(f"{name:26s} {value}")
+            if name != "error":  # told at the end
+                number = f"{value:.6g}" if isinstance(value, float) else value
+                typer.echo(f"{name:26s} {number} {UNITS.get(name, '')}".rstrip())
     common.tell_files([path])
     if figures:
         with common.if_drawable():

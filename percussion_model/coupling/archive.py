@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from fmpy import extract
+from fmpy import extract, read_model_description
 from fmpy.ssp.ssd import find_components, read_ssd
 
 from percussion_model.coupling.component import CouplingError
@@ -67,6 +67,24 @@ def _bound(component: Any) -> dict[str, Any]:
             for one in values.parameters:
                 is_flag = one.type == "Boolean"
                 found[one.name] = one.value in ("true", "1") if is_flag else float(one.value)
+    return found
+
+
+def input_starts(fmu: Path, values: Mapping[str, Any]) -> dict[str, Any]:
+    """Start values of an FMU's inputs, after what the archive sets.
+
+    Parameters
+    ----------
+    values : mapping
+        Of the archive, by variable.
+    """
+    kinds: dict[str, Callable[[str], Any]] = {
+        "Real": float, "Boolean": lambda text: text in ("true", "1")
+    }  # fmt: skip
+    found = {}
+    for one in read_model_description(str(fmu), validate=False).modelVariables:
+        if one.causality == "input":
+            found[one.name] = values.get(one.name, kinds.get(one.type, int)(one.start))
     return found
 
 

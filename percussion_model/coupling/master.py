@@ -17,7 +17,7 @@ from typing import Any, Literal
 import numpy as np
 from fmpy import extract
 
-from percussion_model.coupling.archive import choose_values, unpack
+from percussion_model.coupling.archive import choose_values, input_starts, unpack
 from percussion_model.coupling.compiled import CompiledStep, can_compile
 from percussion_model.coupling.component import Component, CouplingError
 from percussion_model.coupling.coupled_run import CoupledRun
@@ -85,8 +85,8 @@ class Coupling:
         for name, source in archive.sources.items():
             chosen = replaced.get(name, source)
             if callable(chosen):
-                self.parts[name] = PythonPart(name, chosen)
-                del archive.values[name]
+                starts = input_starts(source, archive.values.pop(name))
+                self.parts[name] = PythonPart(name, chosen, starts)
                 continue
             folder = tempfile.mkdtemp(prefix=f"{name}-", dir=self._folder)
             extract(str(chosen), folder)
@@ -185,6 +185,8 @@ class Coupling:
                         progress(done * step)
                 if asked_to_stop():
                     error = f"at {done * step:.6g} s it was interrupted"
+                    if done % every:
+                        rows.append([done * step, *self._row()])
                     break
             interrupted = asked_to_stop()
         wall_time = clock.perf_counter() - began

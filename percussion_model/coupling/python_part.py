@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import traceback
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 from percussion_model.coupling.component import CouplingError
@@ -19,21 +21,32 @@ class PythonPart:
         Of the component.
     work : callable
         Reads inputs by name, a time and a step [s]; gives outputs by name.
+    starts : mapping
+        Values of inputs that nothing is connected to, and of the others till they have one.
     """
 
     can_save = False
 
-    def __init__(self, name: str, work: Work) -> None:
-        self.name, self.work = name, work
-        self.inputs: dict[str, Any] = {}
+    def __init__(self, name: str, work: Work, starts: Mapping[str, Any]) -> None:
+        self.name, self.work, self.starts = name, work, dict(starts)
+        self.inputs: dict[str, Any] = dict(starts)
         self.outputs: dict[str, Any] = {}
 
     def step(self, time: float, step: float) -> None:
         """One communication step [s]."""
         try:
             self.outputs = dict(self.work(dict(self.inputs), time, step))
+        except KeyError as error:
+            if error.args and error.args[0] not in self.inputs:
+                known = ", ".join(self.inputs)
+                raise CouplingError(
+                    f"{self.name}: there is no input {error.args[0]!r}, only {known}{_place(error)}"
+                ) from error
+            raise CouplingError(f"{self.name}: KeyError: {error}{_place(error)}") from error
         except Exception as error:
-            raise CouplingError(f"{self.name}: {type(error).__name__}: {error}") from error
+            raise CouplingError(
+                f"{self.name}: {type(error).__name__}: {error}{_place(error)}"
+            ) from error
 
     def reader(self, names: Sequence[str]) -> PythonReader:
         """What reads outputs."""
@@ -67,4 +80,10 @@ class PythonWriter:
 
     def write(self, values: Sequence[Any]) -> None:
         """Set values, in the order of the names."""
-        self.part.inputs = dict(zip(self.names, values, strict=True))
+        self.part.inputs = self.part.starts | dict(zip(self.names, values, strict=True))
+
+
+def _place(error: Exception) -> str:
+    """Where in its file a fault of a callable is."""
+    frames = traceback.extract_tb(error.__traceback__)[1:]  # the first one is ours
+    return f" ({Path(frames[-1].filename).name}, line {frames[-1].lineno})" if frames else ""

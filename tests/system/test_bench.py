@@ -96,6 +96,23 @@ def test_a_bad_controller_fails_visibly(feed_control, tmp_path, monkeypatch, cap
     assert f'<p class="bad">{found["faults"][0]}</p>' in page
 
 
+def test_an_interrupted_bench_keeps_the_runs_that_are_done(
+    feed_control, tmp_path, monkeypatch, capsys
+):
+    def interrupted(system, controller, values, trials, watch):
+        bench(system, controller, values, ["rod"], watch)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("percussion_model.coupling.bench.bench", interrupted)
+    words = ["percussion", "bench-controller", "--system", str(feed_control)]
+    monkeypatch.setattr("sys.argv", [*words, "--out", str(tmp_path / "out")])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code == 130
+    assert "the page has the 1 runs that were done" in capsys.readouterr().err
+    assert "rod" in (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
+
+
 def made_up(feed, torque=100.0, error="", since=3.7):
     """A run of 4 s with a constant feed, and a torque in its last part."""
     time = np.linspace(0.0, 4.0, 801)

@@ -97,7 +97,18 @@ def test_a_python_callable_takes_the_place_of_an_fmu(feed_control):
     assert run.error == ""
     assert seen[-1][:2] == (pytest.approx(SHORT - 1e-3), 1e-3)
     assert {"feed_force", "rate_of_penetration", "rotation_torque"} <= set(seen[-1][2])
+    # what nothing is connected to has its start, that of the archive first
+    assert {"feed_setpoint", "pressure_setpoint"} <= set(seen[0][2])
     assert set(run["controller.force_command"]) == {-800.0}
+
+
+def test_a_fault_of_a_callable_is_told_with_its_place(feed_control):
+    def careless(inputs, time, step):
+        assert inputs["feed_setpoint"] == 3000.0  # of the archive; the table has 2500
+        return {**steady(inputs, time, step), "force_command": inputs["feed"]}
+
+    with pytest.raises(CouplingError, match=r"no input 'feed', only .*test_coupling.py, line"):
+        Coupling(feed_control, replaced={"controller": careless}).run(SHORT, 1e-3)
 
 
 def test_signals_can_be_changed_on_their_way(feed_control):
