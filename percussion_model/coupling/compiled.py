@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import ctypes
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -23,11 +23,8 @@ from percussion_model.coupling.exchange import LARGEST, WARNING, Group
 from percussion_model.coupling.port import Port
 
 STEP, SET_REAL, SET_INTEGER, GET_REAL, GET_INTEGER, GET_BOOLEAN = range(6)
-KINDS = {
-    "Real": (SET_REAL, GET_REAL),
-    "Integer": (SET_INTEGER, GET_INTEGER),
-    "Boolean": (SET_INTEGER, GET_BOOLEAN),
-}
+SETTERS = {"Real": SET_REAL, "Integer": SET_INTEGER, "Boolean": SET_INTEGER}
+GETTERS = {"Real": GET_REAL, "Integer": GET_INTEGER, "Boolean": GET_BOOLEAN}
 DONE, NOT_FINITE, TOO_LARGE = -1, -2, -3  # statuses of FMI are from 0 on
 
 CALL = np.dtype(
@@ -176,7 +173,9 @@ class CompiledStep:
         Steps that a part does as one, by component.
     """
 
-    def __init__(self, ports: Sequence[Port], order: str, count: int, every: Any) -> None:
+    def __init__(
+        self, ports: Sequence[Port], order: str, count: int, every: Mapping[str, int]
+    ) -> None:
         self.ports = list(ports)
         self._every, self._count = every, count
         self._calls: list[tuple[Any, ...]] = []
@@ -200,15 +199,14 @@ class CompiledStep:
         self._at = np.array([0, count, DONE, 0], np.int64)
         places = np.array(self._places, np.int64)
         self._arrays = (self._all, places, self._values, self._reals, self._integers, self._at)
-        self._make = make_calls
         # with no calls: so that the kernel is there, and its entry known
-        self._make(self._all[:0], *self._arrays[1:], 0.0, 0.0)
+        make_calls(self._all[:0], *self._arrays[1:], 0.0, 0.0)
         self._make = entry_of(make_calls)
 
     def _give_and_step(self, port: Port) -> None:
         for group in port.writer.groups:
             sources = port.places[group.begin : group.end]
-            self._exchange(port, group, 0, sources)
+            self._exchange(port, group, SETTERS[group.family], sources)
         function = ctypes.cast(port.part.stepper, ctypes.c_void_p).value
         self._calls.append((STEP, self.ports.index(port), function, port.part.pointer.value,
                             0, 0, 0, 0, 0, self._pace(port)))  # fmt: skip
@@ -218,16 +216,16 @@ class CompiledStep:
         begin = port.begin
         for group in port.reader.groups:
             places = list(range(begin + group.begin, begin + group.end))
-            self._exchange(port, group, 1, places)
+            self._exchange(port, group, GETTERS[group.family], places)
 
     def _pace(self, port: Port) -> int:
         return min(int(self._every.get(port.name, 1)), int(self._count))
 
-    def _exchange(self, port: Port, group: Group, reads: int, places: Sequence[int]) -> None:
+    def _exchange(self, port: Port, group: Group, kind: int, places: Sequence[int]) -> None:
         room = self._reals if group.family == "Real" else self._integers
         self._calls.append(
             (
-                KINDS[group.family][reads],
+                kind,
                 self.ports.index(port),
                 ctypes.cast(group.call, ctypes.c_void_p).value,
                 port.part.pointer.value,

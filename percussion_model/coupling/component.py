@@ -157,7 +157,7 @@ class Component:
     def refuse_large(self, names: Sequence[str], values: Sequence[Any]) -> None:
         """Raise the error of an Integer input that is to take a number beyond its range."""
         for name, value in zip(names, values, strict=True):
-            if FAMILIES[self.variables[name].type] == "Integer" and not abs(value) < LARGEST:
+            if FAMILIES[self.variables[name].type] != "Real" and not abs(value) < LARGEST:
                 raise CouplingError(f"{self.name}: {name} = {value!r} does not fit an Integer")
 
     def _error(self, text: str) -> CouplingError:

@@ -169,7 +169,7 @@ class Coupling:
     ) -> CoupledRun:
         names = [f"{port.name}.{name}" for port in self.ports for name in port.taken + port.kept]
         rows = [[0.0, *self._row()]]
-        go, error, done = self._stepping(count, control), "", 0
+        go, error, done, interrupted = self._stepping(count, control), "", 0, False
         began = clock.perf_counter()
         with stop_on_interrupt(keep=True) as asked_to_stop:
             for k in range(count):
@@ -179,16 +179,14 @@ class Coupling:
                     error = f"at {k * step:.6g} s {failure}"
                     break
                 done = k + 1
-                if done % every == 0 or done == count:
+                interrupted = asked_to_stop()
+                if done % every == 0 or done == count or interrupted:
                     rows.append([done * step, *self._row()])
                     if progress is not None:
                         progress(done * step)
-                if asked_to_stop():
+                if interrupted:
                     error = f"at {done * step:.6g} s it was interrupted"
-                    if done % every:
-                        rows.append([done * step, *self._row()])
                     break
-            interrupted = asked_to_stop()
         wall_time = clock.perf_counter() - began
         table = np.array(rows, dtype=float)
         columns = {name: table[:, k] for k, name in enumerate(["time", *names])}
@@ -223,9 +221,10 @@ class Coupling:
                 raise CouplingError(f"{signal}: there is no component {name}")
             if output not in taken[name] + kept[name]:
                 kept[name].append(output)
-        kinds = {False: Port, True: PacedPort}
         self.ports = [
-            kinds[name in self.every](part, self._links[name], taken[name], kept[name], self.on_way)
+            (PacedPort if name in self.every else Port)(
+                part, self._links[name], taken[name], kept[name], self.on_way
+            )
             for name, part in self.parts.items()
         ]
         places: dict[tuple[str, str], int] = {}

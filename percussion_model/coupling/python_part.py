@@ -12,6 +12,13 @@ from percussion_model.coupling.component import CouplingError
 Work = Callable[[dict[str, Any], float, float], Mapping[str, Any]]
 
 
+class Inputs(dict[str, Any]):
+    """Inputs by name; one that is asked for and not there is told with those that are."""
+
+    def __missing__(self, name: str) -> Any:
+        raise CouplingError(f"there is no input {name!r}, only {', '.join(self)}")
+
+
 class PythonPart:
     """A Python callable in the place of an FMU.
 
@@ -35,18 +42,10 @@ class PythonPart:
     def step(self, time: float, step: float) -> None:
         """One communication step [s]."""
         try:
-            self.outputs = dict(self.work(dict(self.inputs), time, step))
-        except KeyError as error:
-            if error.args and error.args[0] not in self.inputs:
-                known = ", ".join(self.inputs)
-                raise CouplingError(
-                    f"{self.name}: there is no input {error.args[0]!r}, only {known}{_place(error)}"
-                ) from error
-            raise CouplingError(f"{self.name}: KeyError: {error}{_place(error)}") from error
+            self.outputs = dict(self.work(Inputs(self.inputs), time, step))
         except Exception as error:
-            raise CouplingError(
-                f"{self.name}: {type(error).__name__}: {error}{_place(error)}"
-            ) from error
+            kind = "" if isinstance(error, CouplingError) else f"{type(error).__name__}: "
+            raise CouplingError(f"{self.name}: {kind}{error}{_place(error)}") from error
 
     def reader(self, names: Sequence[str]) -> PythonReader:
         """What reads outputs."""
@@ -85,5 +84,5 @@ class PythonWriter:
 
 def _place(error: Exception) -> str:
     """Where in its file a fault of a callable is."""
-    frames = traceback.extract_tb(error.__traceback__)[1:]  # the first one is ours
+    frames = [at for at in traceback.extract_tb(error.__traceback__) if at.filename != __file__]
     return f" ({Path(frames[-1].filename).name}, line {frames[-1].lineno})" if frames else ""

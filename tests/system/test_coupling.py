@@ -111,6 +111,14 @@ def test_a_fault_of_a_callable_is_told_with_its_place(feed_control):
         Coupling(feed_control, replaced={"controller": careless}).run(SHORT, 1e-3)
 
 
+def test_a_key_of_the_callables_own_is_not_taken_for_an_input(feed_control):
+    def careless(inputs, time, step):
+        return {**steady(inputs, time, step), "force_command": {"gain": 1.0}["gian"]}
+
+    with pytest.raises(CouplingError, match=r"controller: KeyError: 'gian' \(test_coupling.py"):
+        Coupling(feed_control, replaced={"controller": careless}).run(SHORT, 1e-3)
+
+
 def test_signals_can_be_changed_on_their_way(feed_control):
     def lose(signal, time, value):
         return 0.5 * value if signal == "hammer.supply_pressure" else value
