@@ -93,8 +93,8 @@ def reference(repeats: int) -> list[dict[str, Any]]:
 def effects(repeats: int) -> list[dict[str, Any]]:
     """Cost of a wave step with one effect off, in flight and in the whole motion."""
     from percussion_model import Scene
-    from percussion_model.effect_turns import turns
-    from percussion_model.effects import NOISE, step_costs
+    from percussion_model.analysis.effect_turns import turns
+    from percussion_model.analysis.effects import NOISE, step_costs
 
     base = Scene.from_toml(REFERENCE).replace(**{"solver.cells": 20, "solver.leaps": False})
     cases = {}
@@ -154,7 +154,7 @@ def elements(repeats: int) -> dict[str, Any]:
 def command_line(repeats: int) -> dict[str, Any]:
     """Time of a whole `percussion run` of a tenth of a second, once the cache is filled."""
     command = [
-        *(sys.executable, "-c", "from percussion_model.cli import main; main()"),
+        *(sys.executable, "-c", "from percussion_model.interface.cli import main; main()"),
         *("run", str(REFERENCE), "--duration", "0.1", "--settle", "0", "--json", "-"),
     ]
     times = []

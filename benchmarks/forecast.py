@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from percussion_model import Scene, simulate
-from percussion_model.forecast import forecast
+from percussion_model.analysis.cost import forecast
 
 HERE = Path(__file__).resolve().parent
 LATEST = HERE / "latest_forecast.json"

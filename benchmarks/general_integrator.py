@@ -14,8 +14,8 @@ import argparse
 import time
 
 from percussion_model import Scene, Simulation
-from percussion_model.accuracy.integrators import INTEGRATORS, integrate
-from percussion_model.accuracy.semidiscrete import Drill, OutOfTime
+from percussion_model.verification.accuracy.integrators import INTEGRATORS, integrate
+from percussion_model.verification.accuracy.semidiscrete import Drill, OutOfTime
 
 BLOW = 0.0456  # from the first impact until just before the next [s]
 RELATIVE = 1e-4

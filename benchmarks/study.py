@@ -66,7 +66,7 @@ def one_response(scene) -> None:
 def main() -> None:
     """Run, tell, compare."""
     from percussion_model import Scene
-    from percussion_model.study import grid, headlines, study
+    from percussion_model.analysis.study import grid, headlines, study
 
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--points", type=int, default=10_000)

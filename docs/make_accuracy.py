@@ -15,11 +15,11 @@ from typing import Any
 
 import matplotlib
 
-from percussion_model.accuracy import Study
-from percussion_model.accuracy.ladders import LADDERS
-from percussion_model.accuracy.quantities import HISTORY, QUANTITIES
-from percussion_model.plotting import style
-from percussion_model.plotting.accuracy import draw_accuracy, draw_quantities
+from percussion_model.interface.plotting import style
+from percussion_model.interface.plotting.accuracy import draw_accuracy, draw_quantities
+from percussion_model.verification.accuracy import Study
+from percussion_model.verification.accuracy.ladders import LADDERS
+from percussion_model.verification.accuracy.quantities import HISTORY, QUANTITIES
 
 HERE = Path(__file__).resolve().parent
 PAGE, DATA, IMAGES = HERE / "accuracy.md", HERE / "accuracy", HERE / "images"
@@ -50,7 +50,7 @@ CLOSED_WAVE, CLOSED_FEM = (5, 20, 40), (20, 40, 80)
 def measure(name: str) -> None:
     """Study a scene; keep its numbers and its figures."""
     from percussion_model import Scene
-    from percussion_model.accuracy import study
+    from percussion_model.verification.accuracy import study
 
     scene = Scene.from_toml(SCENARIOS / f"{name}.toml")
     found = study(scene, False, SCENES[name], lambda share, text: say(f"{name}: {text}"))
@@ -68,7 +68,7 @@ def draw(name: str, found: Study) -> None:
 
 def measure_closed_forms() -> None:
     """Errors of both solvers at closed forms."""
-    from percussion_model.accuracy.closed_forms import closed_forms, found_by
+    from percussion_model.verification.accuracy.closed_forms import closed_forms, found_by
 
     rows = []
     for case in closed_forms():
@@ -190,7 +190,7 @@ def orders(tree: dict[str, Any]) -> str:
 
 def costs(tree: dict[str, Any]) -> str:
     """What an accuracy costs, by method."""
-    from percussion_model.accuracy.orders import cost_at
+    from percussion_model.verification.accuracy.orders import cost_at
 
     key = next(iter(tree["reference"]["bars"]))
     general = [name for name in names(tree) if LADDERS[name].title.startswith("scipy")]

@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 
 from percussion_model import Scene, Simulation, SimulationError, piston_cycle, simulate
-from percussion_model.blow_maps import make_map
-from percussion_model.commands.blow_map import ready_map
-from percussion_model.core.blow_records import Axis, Entry
-from percussion_model.plotting.style import MM, STYLE
+from percussion_model.analysis.blow_maps import make_map
+from percussion_model.interface.commands.blow_map import ready_map
+from percussion_model.interface.plotting.style import MM, STYLE
+from percussion_model.solvers.blow_map.records import Axis, Entry
 
 PAGE = Path(__file__).with_name("fidelity.md")
 FIGURE = Path(__file__).parent / "images" / "blow_map.png"

@@ -12,7 +12,7 @@ from typing import Any
 from fmpy import read_model_description
 
 from fmu_src.hammer import build_hammer
-from percussion_model.scene import Scene
+from percussion_model.scene.scene import Scene
 
 PAGE = Path(__file__).with_name("fmu.md")
 BEGIN, END = "<!-- tables: begin -->", "<!-- tables: end -->"

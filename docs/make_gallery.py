@@ -11,7 +11,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from examples.all import EXAMPLES
-from percussion_model.result_files import to_json
+from percussion_model.simulation.files import to_json
 
 IMAGES = Path(__file__).resolve().parent / "images"
 

@@ -15,9 +15,9 @@ import matplotlib
 from matplotlib.figure import Figure
 
 from percussion_model import Scene, simulate
-from percussion_model.plotting import style
-from percussion_model.scene_text import write_text
-from percussion_model.warnings_of_run import least_loss_time
+from percussion_model.interface.plotting import style
+from percussion_model.scene.text import write_text
+from percussion_model.simulation.warnings import least_loss_time
 
 HERE = Path(__file__).resolve().parent
 CELLS = (20, 40, 80)

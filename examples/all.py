@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 from examples import bifurcation, calibration, drill_design, rate_map, sensitivity
-from percussion_model.result_files import staged_text, to_json
+from percussion_model.simulation.files import staged_text, to_json
 
 EXAMPLES = (bifurcation, rate_map, sensitivity, calibration, drill_design)
 

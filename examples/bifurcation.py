@@ -20,9 +20,9 @@ from matplotlib.patches import Patch
 from examples.motions import KINDS, Branch, branch_of, kind_of, order_of
 from examples.shared import BLUE, ORANGE, PINK, command_line, figure_of
 from percussion_model import Scene, Simulation
-from percussion_model.paper.sweeps import force_at_constant_power
-from percussion_model.plotting import style
-from percussion_model.plotting.style import KN, MM
+from percussion_model.interface.plotting import style
+from percussion_model.interface.plotting.style import KN, MM
+from percussion_model.verification.paper.sweeps import force_at_constant_power
 
 NAME = "bifurcation"
 # The feed from which others are set at once [N], and after how many blows there.

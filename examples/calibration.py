@@ -15,7 +15,7 @@ from matplotlib.axes import Axes
 
 from examples.shared import BLACK, BLUE, ORANGE, command_line, figure_of
 from percussion_model import Scene
-from percussion_model.fitting import (
+from percussion_model.analysis.fitting import (
     ROCK,
     DropTest,
     Fit,
@@ -24,8 +24,8 @@ from percussion_model.fitting import (
     fit_drop_tests,
     fit_force_penetration,
 )
-from percussion_model.plotting import style
-from percussion_model.plotting.style import KN, MM, MS
+from percussion_model.interface.plotting import style
+from percussion_model.interface.plotting.style import KN, MM, MS
 
 NAME = "calibration"
 TRUTH = {

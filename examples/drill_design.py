@@ -15,7 +15,7 @@ from matplotlib.axes import Axes
 
 from examples.shared import BLACK, BLUE, GREEN, GREY, ORANGE, command_line, figure_of
 from percussion_model import Scene, Simulation, settled
-from percussion_model.plotting import style
+from percussion_model.interface.plotting import style
 
 NAME = "drill_design"
 ENERGY = 250.0  # of the blow [J], about that of the reference

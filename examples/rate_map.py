@@ -15,10 +15,10 @@ from matplotlib.colors import ListedColormap
 
 from examples.shared import GREY, command_line, figure_of
 from percussion_model import Scene
-from percussion_model.plotting import style
-from percussion_model.plotting.style import KN, MM
-from percussion_model.study import Study, grid, study
-from percussion_model.study.work import KINDS
+from percussion_model.analysis.study import Study, grid, study
+from percussion_model.analysis.study.work import KINDS
+from percussion_model.interface.plotting import style
+from percussion_model.interface.plotting.style import KN, MM
 
 NAME = "rate_map"
 # Gauge pressure at which an FMU of the reference has its drive force [Pa]; it sets the area.

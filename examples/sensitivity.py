@@ -14,8 +14,8 @@ import numpy as np
 
 from examples.shared import BLUE, ORANGE, command_line, figure_of
 from percussion_model import Scene
-from percussion_model.plotting import style
-from percussion_model.study import study, table
+from percussion_model.analysis.study import study, table
+from percussion_model.interface.plotting import style
 
 NAME = "sensitivity"
 PARAMETERS = {

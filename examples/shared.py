@@ -12,8 +12,8 @@ from typing import Any
 import matplotlib
 from matplotlib.figure import Figure
 
-from percussion_model.plotting import style
-from percussion_model.result_files import staged, to_json
+from percussion_model.interface.plotting import style
+from percussion_model.simulation.files import staged, to_json
 
 # Energies and rates are drawn in these, and told apart with any colour vision.
 BLUE, ORANGE, GREEN, BLACK, GREY = "#0072B2", "#D55E00", "#009E73", "#222222", "#8C8C8C"

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from fmu_src.hammer import build_hammer
 from fmu_src.pneumatics import build_pneumatics
-from percussion_model.scene import Scene, SceneError
+from percussion_model.scene.scene import Scene, SceneError
 
 ROOT = Path(__file__).resolve().parents[1]
 DEFAULT = ROOT / "dist" / "PercussiveHammer.fmu"
@@ -41,7 +41,7 @@ def main(arguments: list[str]) -> int:
         scene = Scene.from_toml(choice.scene or ROOT / "scenarios" / "reference.toml")
         table = None
         if choice.blow_map or scene.solver_name == "blow-map":
-            from percussion_model.commands.blow_map import ready_map
+            from percussion_model.interface.commands.blow_map import ready_map
 
             table = ready_map(scene)
         guid = build_hammer(scene, choice.output, table)

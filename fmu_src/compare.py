@@ -16,8 +16,8 @@ from fmpy import simulate_fmu
 
 from fmu_src.__main__ import DEFAULT, ROOT
 from fmu_src.hammer import build_hammer
-from percussion_model.scene import Scene
-from percussion_model.simulation import simulate
+from percussion_model.scene.scene import Scene
+from percussion_model.simulation.simulate import simulate
 
 STEP_SIZE = 0.01  # of the communication [s]
 

@@ -14,9 +14,9 @@ from fmu_src.interface import VERSION
 from fmu_src.page import write_page
 from fmu_src.staging import stage
 from fmu_src.variables import Variable, plain_row
-from percussion_model.parameter_table import parameter_table
-from percussion_model.scene import Scene, SceneError
-from percussion_model.solvers.blow_table import BlowTable, fixed_values
+from percussion_model.scene.scene import Scene, SceneError
+from percussion_model.scene.table import parameter_table
+from percussion_model.solvers.blow_map.table import BlowTable, fixed_values
 
 RUNTIME = ("plain_scene", "motion", "outputs", "blow_map", "watch", "hammer_states", "hammer")
 STEP_SIZE = 1e-3  # of the default experiment [s]

@@ -5,7 +5,7 @@ The order makes the value references: new outputs go to the end.
 
 from __future__ import annotations
 
-from percussion_model.core.records import Mode
+from percussion_model.physics.records import Mode
 
 MODES = {
     Mode.FF: "free flight",

@@ -13,10 +13,10 @@ from fmu_src.hammer_outputs import MODES, REAL_OUTPUTS
 from fmu_src.interface import FIRST_SECTION, reference, section_reference
 from fmu_src.units import fmi_unit
 from fmu_src.variables import Variable, magnitude, number_row
-from percussion_model.core.records import Mode
-from percussion_model.parameter_rows import Row
-from percussion_model.parameter_table import find_row, parameter_table
-from percussion_model.scene import Scene
+from percussion_model.physics.records import Mode
+from percussion_model.scene.rows import Row
+from percussion_model.scene.scene import Scene
+from percussion_model.scene.table import find_row, parameter_table
 
 # Gauge pressure at which the drive gives the force of the scene [Pa].
 SUPPLY_PRESSURE = 20e5

@@ -7,7 +7,7 @@ from html import escape
 
 from fmu_src.description import About
 from fmu_src.variables import Variable
-from percussion_model.scene import Scene
+from percussion_model.scene.scene import Scene
 
 STYLE = (
     "body{font:15px/1.5 sans-serif;max-width:70em;margin:2em auto;padding:0 1em;color:#222}"

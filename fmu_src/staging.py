@@ -24,14 +24,15 @@ LIBRARY = Path(pythonfmu.__file__).parent
 # What computes, and nothing that plots, reads files or needs more than numpy and numba.
 MODEL_FILES = (
     "__init__.py",
-    "inputs.py",
-    "ledger.py",
-    "parameter_rows.py",
-    "runner.py",
-    "scene_rules.py",
-    "validity.py",
-    "core/*.py",
-    "solvers/*.py",
+    "physics/**/*.py",
+    "scene/__init__.py",
+    "scene/inputs.py",
+    "scene/rows.py",
+    "scene/rules.py",
+    "simulation/__init__.py",
+    "simulation/runner.py",
+    "simulation/validity.py",
+    "solvers/**/*.py",
 )
 LIBRARY_FILES = (
     "_version.py",
@@ -83,7 +84,7 @@ def stage(prefix: str, runtime: tuple[str, ...], with_model: bool) -> Bundle:
     inner["fmu_src/__init__.py"] = inner["fmu_src/runtime/__init__.py"] = '"""Adapters."""\n'
     for name in (*SLAVE_FILES, *runtime):
         inner[f"fmu_src/runtime/{name}.py"] = _read(ADAPTERS / "runtime" / f"{name}.py")
-    patterns = MODEL_FILES if with_model else ("__init__.py", "parameter_rows.py")
+    patterns = MODEL_FILES if with_model else ("__init__.py", "scene/__init__.py", "scene/rows.py")
     for pattern in patterns:
         for source in sorted(MODEL.glob(pattern)):
             inner[f"percussion_model/{source.relative_to(MODEL).as_posix()}"] = _read(source)

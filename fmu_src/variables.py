@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
-from percussion_model.parameter_rows import Row
+from percussion_model.scene.rows import Row
 
 Causality = Literal["parameter", "input", "output"]
 

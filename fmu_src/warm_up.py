@@ -13,8 +13,8 @@ from pathlib import Path
 from fmpy import simulate_fmu
 
 from fmu_src.hammer import build_hammer
-from percussion_model.scene import Scene
-from percussion_model.warm_up import (
+from percussion_model.scene.scene import Scene
+from percussion_model.simulation.warm_up import (
     COARSE,
     SOLVERS,
     compile_blow_map,

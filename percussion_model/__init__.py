@@ -6,48 +6,48 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from percussion_model.calibration import calibrate_drive, piston_cycle
-    from percussion_model.comparison import Comparison, compare
-    from percussion_model.core.records import (
+    from percussion_model.analysis.comparison import Comparison, compare
+    from percussion_model.analysis.stationary import Settled, settled
+    from percussion_model.physics.records import (
         BLOW,
         EVENT,
         SAMPLE_FIELDS,
         EventKind,
         Mode,
     )
-    from percussion_model.inputs import SimulationError
-    from percussion_model.parameters import BitBar, PistonBar, Section
-    from percussion_model.result import Result
-    from percussion_model.result_files import ResultError
-    from percussion_model.scene import Scene, SceneError
-    from percussion_model.simulation import Simulation, Snapshot, simulate
-    from percussion_model.stationary import Settled, settled
+    from percussion_model.scene.drive_calibration import calibrate_drive, piston_cycle
+    from percussion_model.scene.inputs import SimulationError
+    from percussion_model.scene.parameters import BitBar, PistonBar, Section
+    from percussion_model.scene.scene import Scene, SceneError
+    from percussion_model.simulation.files import ResultError
+    from percussion_model.simulation.result import Result
+    from percussion_model.simulation.simulate import Simulation, Snapshot, simulate
 
 # Where each name lives. Nothing is imported before it is used, so that starting
 # costs only what is needed.
 _HOME = {
-    "BLOW": "core.records",
-    "EVENT": "core.records",
-    "SAMPLE_FIELDS": "core.records",
-    "BitBar": "parameters",
-    "EventKind": "core.records",
-    "Mode": "core.records",
-    "PistonBar": "parameters",
-    "Result": "result",
-    "ResultError": "result_files",
-    "Scene": "scene",
-    "Settled": "stationary",
-    "SceneError": "scene",
-    "Section": "parameters",
-    "Simulation": "simulation",
-    "SimulationError": "inputs",
-    "Snapshot": "simulation",
-    "Comparison": "comparison",
-    "calibrate_drive": "calibration",
-    "compare": "comparison",
-    "piston_cycle": "calibration",
-    "settled": "stationary",
-    "simulate": "simulation",
+    "BLOW": "physics.records",
+    "EVENT": "physics.records",
+    "SAMPLE_FIELDS": "physics.records",
+    "BitBar": "scene.parameters",
+    "EventKind": "physics.records",
+    "Mode": "physics.records",
+    "PistonBar": "scene.parameters",
+    "Result": "simulation.result",
+    "ResultError": "simulation.files",
+    "Scene": "scene.scene",
+    "Settled": "analysis.stationary",
+    "SceneError": "scene.scene",
+    "Section": "scene.parameters",
+    "Simulation": "simulation.simulate",
+    "SimulationError": "scene.inputs",
+    "Snapshot": "simulation.simulate",
+    "Comparison": "analysis.comparison",
+    "calibrate_drive": "scene.drive_calibration",
+    "compare": "analysis.comparison",
+    "piston_cycle": "scene.drive_calibration",
+    "settled": "analysis.stationary",
+    "simulate": "simulation.simulate",
 }
 
 __all__ = [

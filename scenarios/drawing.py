@@ -45,6 +45,6 @@ def stacked(
 
 def save_png(figure: Figure, path: Path, dpi: float = 110) -> Path:
     """Write a figure, whole or not at all; return its file."""
-    from percussion_model.plotting.style import save_png as save
+    from percussion_model.interface.plotting.style import save_png as save
 
     return save(figure, path, dpi)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from percussion_model import Scene, Simulation
-from percussion_model.core.blow_records import ENTRIES, Entry
-from percussion_model.solvers.blow_map import BlowMapSolver
-from percussion_model.solvers.blow_table import BlowTable, Nodes, fixed_values
+from percussion_model.solvers.blow_map.records import ENTRIES, Entry
+from percussion_model.solvers.blow_map.solver import BlowMapSolver
+from percussion_model.solvers.blow_map.table import BlowTable, Nodes, fixed_values
 
 # Around the reference: a few hundred blows, as dense as the usual table.
 RANGES = {

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from percussion_model import Scene
-from percussion_model.fitting import DropTest, bilinear_force, drop_test_signal
+from percussion_model.analysis.fitting import DropTest, bilinear_force, drop_test_signal
 
 STIFFNESS, RATIO, DATUM = 7.5e8, 5.0, 5e-5
 CURVE = {"rock.loading_stiffness": STIFFNESS, "rock.unloading_ratio": RATIO, "datum": DATUM}

@@ -10,9 +10,9 @@ import pytest
 from blow_map_scenes import RANGES, mapped, run_by_hand
 
 from percussion_model import Scene, SceneError, Simulation, SimulationError, simulate
-from percussion_model.blow_maps import make_map
-from percussion_model.core.blow_records import Axis, Entry
-from percussion_model.solvers.blow_map import BlowMapSolver
+from percussion_model.analysis.blow_maps import make_map
+from percussion_model.solvers.blow_map.records import Axis, Entry
+from percussion_model.solvers.blow_map.solver import BlowMapSolver
 
 LONG = bool(os.environ.get("PERCUSSION_LONG"))
 

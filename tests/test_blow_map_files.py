@@ -13,11 +13,17 @@ from blow_map_scenes import RANGES, mapped
 
 from fmu_src.runtime.blow_map import read_blow_map
 from percussion_model import Scene, SceneError, blow_maps, simulate
-from percussion_model.blow_maps import kept_map, make_map, map_file, node_count, outside_map
-from percussion_model.cli import _guarded, app
-from percussion_model.core.blow_records import Axis
-from percussion_model.solvers.blow_builder import build_table, get_table
-from percussion_model.solvers.blow_table import BlowTable, Nodes, TableError
+from percussion_model.analysis.blow_maps import (
+    kept_map,
+    make_map,
+    map_file,
+    node_count,
+    outside_map,
+)
+from percussion_model.interface.cli import _guarded, app
+from percussion_model.solvers.blow_map.builder import build_table, get_table
+from percussion_model.solvers.blow_map.records import Axis
+from percussion_model.solvers.blow_map.table import BlowTable, Nodes, TableError
 
 # Nodes so few that a table is made in seconds.
 TINY = {"blow_map__density": 0.1}

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from percussion_model import terminal
-from percussion_model.cli import BAD_INPUT, INTERRUPTED, _guarded, app
+from percussion_model.interface import terminal
+from percussion_model.interface.cli import BAD_INPUT, INTERRUPTED, _guarded, app
 
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
 RIGID = str(SCENARIOS / "rigid.toml")
@@ -114,10 +114,10 @@ def test_who_waits_for_the_compiler_is_told_so(percussion, command, monkeypatch)
     monkeypatch.setattr(terminal, "_PATIENCE", 0.0)
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
     monkeypatch.setenv("TTY_COMPATIBLE", "1")
-    module = importlib.import_module("percussion_model.forecast")
+    module = importlib.import_module("percussion_model.analysis.cost")
     work = module.forecast
     monkeypatch.setattr(module, "forecast", lambda scene: time.sleep(0.3) or work(scene))
-    module = importlib.import_module("percussion_model.stationary")
+    module = importlib.import_module("percussion_model.analysis.stationary")
     settle = module.settled
     monkeypatch.setattr(module, "settled", lambda *words: time.sleep(0.3) or settle(*words))
     code, _, err = percussion(command, RIGID)
@@ -219,10 +219,10 @@ def test_ctrl_c_is_told_whatever_the_command(percussion, monkeypatch):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(
-        importlib.import_module("percussion_model.comparison"), "compare", interrupted
+        importlib.import_module("percussion_model.analysis.comparison"), "compare", interrupted
     )
     monkeypatch.setattr(
-        importlib.import_module("percussion_model.forecast"), "forecast", interrupted
+        importlib.import_module("percussion_model.analysis.cost"), "forecast", interrupted
     )
     for words in (["compare", RIGID, "--solvers", "rigid", "--no-figures"], ["explain", RIGID]):
         code, out, err = percussion(*words)
@@ -236,7 +236,7 @@ def test_ctrl_c_is_told_whatever_the_command(percussion, monkeypatch):
 # The command itself, which tells on stderr when it has drilled for a second.
 TALKING = """
 import contextlib, sys
-import percussion_model.terminal as terminal
+import percussion_model.interface.terminal as terminal
 told = []
 
 def report(t):
@@ -249,7 +249,7 @@ def talk(end):
     yield report
 
 terminal.progress_bar = talk
-from percussion_model.cli import main
+from percussion_model.interface.cli import main
 main()
 """
 
@@ -278,7 +278,7 @@ def test_ctrl_c_keeps_finished_work(tmp_path):
 
 def test_a_json_run_loads_no_pictures_and_no_pandas():
     code = (
-        "import sys; from percussion_model.cli import _guarded, app\n"
+        "import sys; from percussion_model.interface.cli import _guarded, app\n"
         f"assert _guarded(lambda: app(['run', {RIGID!r}, '--json', '-'], standalone_mode=False)) "
         "== 0\nheavy = {'matplotlib', 'pandas', 'jinja2'} & set(sys.modules)\n"
         "assert not heavy, heavy"

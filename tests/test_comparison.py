@@ -9,9 +9,9 @@ import pytest
 from typer.testing import CliRunner
 
 from percussion_model import Scene, SceneError, compare
-from percussion_model.cli import app
-from percussion_model.comparison import COMPARED, Comparison, read_solvers
-from percussion_model.warnings_of_run import find_warnings
+from percussion_model.analysis.comparison import COMPARED, Comparison, read_solvers
+from percussion_model.interface.cli import app
+from percussion_model.simulation.warnings import find_warnings
 
 SHORT = {"run.duration": 0.3, "run.settle": 0.05, "fem.elements": 20}
 
@@ -66,7 +66,7 @@ def test_what_another_solver_needs_was_not_given_in_vain(found):
 
 def test_figure_has_a_line_for_each_solver(found):
     pytest.importorskip("matplotlib")
-    from percussion_model.plotting.comparison import draw_comparison
+    from percussion_model.interface.plotting.comparison import draw_comparison
 
     axes = draw_comparison(found).axes
     assert len(axes) == 6

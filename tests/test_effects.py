@@ -10,15 +10,15 @@ import pytest
 from typer.testing import CliRunner
 
 from percussion_model import Scene, simulate
-from percussion_model.cli import app
-from percussion_model.commands.effects import (
+from percussion_model.analysis.effect_turns import turns
+from percussion_model.analysis.effects import NOISE, EffectsStudy, Trial, step_costs, study_effects
+from percussion_model.interface.cli import app
+from percussion_model.interface.commands.effects import (
     LONGEST_NAME,
     show_effects,
     table_of,
     with_error,
 )
-from percussion_model.effect_turns import turns
-from percussion_model.effects import NOISE, EffectsStudy, Trial, step_costs, study_effects
 
 RIGID = {"piston.model": "rigid", "bit.model": "rigid"}
 SHORT = {"run.duration": 0.6, "run.settle": 0.1}
@@ -196,7 +196,7 @@ def test_numbers_are_plain(rigid):
 
 def test_figure_has_a_bar_for_each_known_number(rigid):
     pytest.importorskip("matplotlib")
-    from percussion_model.plotting.effects import draw_effects
+    from percussion_model.interface.plotting.effects import draw_effects
 
     axes = draw_effects(rigid).axes
     assert len(axes) == 5

@@ -15,7 +15,7 @@ import pytest
 from examples import bifurcation, drill_design, motions, rate_map
 from examples.all import EXAMPLES
 from percussion_model import Scene, Simulation
-from percussion_model.result_files import to_json
+from percussion_model.simulation.files import to_json
 
 ROOT = Path(__file__).resolve().parent.parent
 SHARED = {"__init__", "all", "motions", "shared"}

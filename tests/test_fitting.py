@@ -11,7 +11,7 @@ from fitting_data import BARRIER, CURVE, DATUM, RATIO, STIFFNESS, bit, drops, no
 from scipy.stats import binom, chi2
 
 from percussion_model import Scene
-from percussion_model.fitting import (
+from percussion_model.analysis.fitting import (
     ROCK,
     DropTest,
     FitError,
@@ -19,7 +19,7 @@ from percussion_model.fitting import (
     fit_drop_tests,
     fit_force_penetration,
 )
-from percussion_model.fitting.estimates import Counted, look_around, student_width
+from percussion_model.analysis.fitting.estimates import Counted, look_around, student_width
 
 CONFIDENCE = 0.95
 # Of that many trials so many cover, but for one chance in a thousand on either side.

@@ -10,8 +10,8 @@ from fitting_data import STIFFNESS, bit, drops, noisy_curve
 from typer.testing import CliRunner
 
 from percussion_model import Scene
-from percussion_model.cli import app
-from percussion_model.fitting import ROCK, FitError
+from percussion_model.analysis.fitting import ROCK, FitError
+from percussion_model.interface.cli import app
 
 
 def written(path, heading, *columns):

@@ -8,8 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from percussion_model import Scene
-from percussion_model.cli import app
-from percussion_model.forecast import (
+from percussion_model.analysis.cost import (
     LONGEST_PROBE,
     PROBE_BLOWS,
     PROBE_WALL,
@@ -19,6 +18,7 @@ from percussion_model.forecast import (
     predict,
     probe,
 )
+from percussion_model.interface.cli import app
 from percussion_model.solvers import make_solver
 
 RIGID = {"piston.model": "rigid", "bit.model": "rigid"}

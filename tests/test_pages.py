@@ -5,11 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from percussion_model.report import write_report
-from percussion_model.scene import Scene
-from percussion_model.simulation import simulate
-from percussion_model.study import Study, grid, study, table
-from percussion_model.study_report import CAPTIONS, render_study_report, write_study_report
+from percussion_model.analysis.study import Study, grid, study, table
+from percussion_model.interface.report import write_report
+from percussion_model.interface.study_report import (
+    CAPTIONS,
+    render_study_report,
+    write_study_report,
+)
+from percussion_model.scene.scene import Scene
+from percussion_model.simulation.simulate import simulate
 from tests.browser import Drag, find_browser, visit
 from tests.test_report import Outline
 
@@ -113,7 +117,9 @@ def test_samples_are_scattered_over_each_parameter(tmp_path):
 
 
 def test_a_page_without_zoom_has_tables_and_says_what_is_missing(found, monkeypatch):
-    monkeypatch.setattr("percussion_model.study_report.without_zoom", lambda: "zoom is missing")
+    monkeypatch.setattr(
+        "percussion_model.interface.study_report.without_zoom", lambda: "zoom is missing"
+    )
     text = render_study_report(found)
     assert "zoom is missing" in text
     assert "<script" not in text
@@ -132,6 +138,6 @@ def test_a_large_study_makes_a_page_of_some_megabytes():
 
 
 def study_rows():
-    from percussion_model.study.work import ROW
+    from percussion_model.analysis.study.work import ROW
 
     return ROW

@@ -6,10 +6,18 @@ import math
 import pytest
 from pydantic import ValidationError
 
-from percussion_model.calibration import calibrate_drive, piston_cycle
-from percussion_model.parameter_table import find_row, parameter_table
-from percussion_model.parameters import GROUPS, BitBar, Feed, PistonBar, RockLaw, Section, Start
-from percussion_model.scene import Scene
+from percussion_model.scene.drive_calibration import calibrate_drive, piston_cycle
+from percussion_model.scene.parameters import (
+    GROUPS,
+    BitBar,
+    Feed,
+    PistonBar,
+    RockLaw,
+    Section,
+    Start,
+)
+from percussion_model.scene.scene import Scene
+from percussion_model.scene.table import find_row, parameter_table
 
 PISTON_MASS = PistonBar().mass
 

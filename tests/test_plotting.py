@@ -11,14 +11,18 @@ import pytest
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 
-from percussion_model.core.records import EVENT, EventKind, Mode
-from percussion_model.plotting import CAPTIONS, draw_figures, figures
-from percussion_model.plotting.style import MODE_COLOURS, STYLE, draw_by_mode, save_png
-from percussion_model.plotting.window import closed_contacts, last_blow_window, stress_fields
-from percussion_model.result import Result
-from percussion_model.result_files import ResultError
-from percussion_model.scene import Scene
-from percussion_model.simulation import simulate
+from percussion_model.interface.plotting import CAPTIONS, draw_figures, figures
+from percussion_model.interface.plotting.style import MODE_COLOURS, STYLE, draw_by_mode, save_png
+from percussion_model.interface.plotting.window import (
+    closed_contacts,
+    last_blow_window,
+    stress_fields,
+)
+from percussion_model.physics.records import EVENT, EventKind, Mode
+from percussion_model.scene.scene import Scene
+from percussion_model.simulation.files import ResultError
+from percussion_model.simulation.result import Result
+from percussion_model.simulation.simulate import simulate
 
 ELASTIC = Scene(run={"duration": 0.2, "settle": 0.0})
 RIGID = ELASTIC.replace(**{"piston.model": "rigid", "bit.model": "rigid"})

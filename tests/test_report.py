@@ -9,9 +9,9 @@ from html.parser import HTMLParser
 import pytest
 
 from percussion_model import page, report
-from percussion_model.report import HEADLINES, headline_rows, ledger_rows, write_report
-from percussion_model.scene import Scene
-from percussion_model.simulation import simulate
+from percussion_model.interface.report import HEADLINES, headline_rows, ledger_rows, write_report
+from percussion_model.scene.scene import Scene
+from percussion_model.simulation.simulate import simulate
 
 SHORT = Scene(title="A <short> run", run={"duration": 0.2, "settle": 0.0})
 SCENES = {
@@ -66,7 +66,7 @@ def test_page_needs_nothing_else(case):
 
 def test_what_is_missing_for_zoom_is_said(monkeypatch):
     assert page.without_zoom() == ""
-    monkeypatch.setitem(sys.modules, "percussion_model.plotting.zoom", None)
+    monkeypatch.setitem(sys.modules, "percussion_model.interface.plotting.zoom", None)
     assert "pip install 'percussion_model[report]'" in page.without_zoom()
 
 

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from percussion_model import Scene, simulate
-from percussion_model.request import planned_cells
-from percussion_model.result import Result
-from percussion_model.solvers.grid import fitting_cells
-from percussion_model.solvers.resolution import elastic_bars
+from percussion_model.simulation.accuracy import planned_cells
+from percussion_model.simulation.result import Result
+from percussion_model.solvers.wave.grid import fitting_cells
+from percussion_model.solvers.wave.resolution import elastic_bars
 
 LONG = os.environ.get("PERCUSSION_LONG") == "1"
 RIGID = {"piston.model": "rigid", "bit.model": "rigid"}
@@ -38,7 +38,7 @@ def test_rigid_bodies_run_until_the_standard_error_is_met():
 
 
 def test_a_bound_ends_a_run_that_never_meets_it(monkeypatch):
-    monkeypatch.setattr("percussion_model.simulation.LONGEST", 3.0)
+    monkeypatch.setattr("percussion_model.simulation.simulate.LONGEST", 3.0)
     scene = Scene().replace(**RIGID, **{"drive.reversal_distance": 0.002})
     seen = []
     result = simulate(scene, 2.0, settle=0.5, accuracy=1e-4, progress=seen.append)
@@ -135,7 +135,7 @@ def judge(scene, requests, levels):
 
 def test_requests_are_met_on_scenes_drawn_by_seed(monkeypatch):
     """Finer runs end at 120 cells here, which only makes more of them end with a warning."""
-    monkeypatch.setattr("percussion_model.request.FINEST", 120)
+    monkeypatch.setattr("percussion_model.simulation.accuracy.FINEST", 120)
     judged = [judge(drawn(seed), (1e-2, 1e-3), (56, 80)) for seed in QUICK]
     assert sum(judged) >= 12
 

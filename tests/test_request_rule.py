@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from percussion_model import Scene, SceneError, simulate
-from percussion_model.core.records import BLOW
-from percussion_model.request import GROWTH, Grid, estimated_error, meet, time_needed
-from percussion_model.result import Result
-from percussion_model.solvers.grid import cut
-from percussion_model.solvers.resolution import (
+from percussion_model.physics.records import BLOW
+from percussion_model.simulation.accuracy import GROWTH, Grid, estimated_error, meet, time_needed
+from percussion_model.simulation.result import Result
+from percussion_model.solvers.wave.grid import cut
+from percussion_model.solvers.wave.resolution import (
     CALIBRATED,
     FIT_SHARE,
     cells_by_rule,
@@ -64,8 +64,8 @@ def test_rule_says_how_well_lengths_fit():
 def test_solver_takes_the_cells_of_the_rule_in_library_and_fmu():
     from fmu_src.hammer_variables import hammer_variables
     from fmu_src.runtime.plain_scene import make_scene
-    from percussion_model.parameter_table import rows_by_key
-    from percussion_model.solvers.wave import WaveSolver
+    from percussion_model.scene.table import rows_by_key
+    from percussion_model.solvers.wave.solver import WaveSolver
 
     scene = Scene().replace(**{"solver.accuracy": 1e-3})
     assert WaveSolver(scene).cells == {"piston": 60, "bit": 69}

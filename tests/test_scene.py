@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from percussion_model.parameter_table import parameter_table
-from percussion_model.parameters import BitBar, PistonBar, RockLaw, Section
-from percussion_model.scene import Scene, SceneError, read_setting
+from percussion_model.scene.parameters import BitBar, PistonBar, RockLaw, Section
+from percussion_model.scene.scene import Scene, SceneError, read_setting
+from percussion_model.scene.table import parameter_table
 
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
 
@@ -232,7 +232,7 @@ def test_a_rigid_piston_on_an_elastic_bit_is_for_waves():
 
 def test_reading_a_scene_loads_nothing_that_draws_or_exports():
     code = (
-        "import sys, percussion_model.scene; "
+        "import sys, percussion_model.scene.scene; "
         "print({'matplotlib', 'pandas', 'fmpy', 'pythonfmu'} & set(sys.modules))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

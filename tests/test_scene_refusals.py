@@ -2,7 +2,7 @@
 
 import pytest
 
-from percussion_model.scene import Scene, SceneError
+from percussion_model.scene.scene import Scene, SceneError
 
 # ------------------------------------------------------------------- bad input
 

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from percussion_model import Scene, SceneError, Simulation, SimulationError, simulate
-from percussion_model.core.advance import run
-from percussion_model.core.records import SAMPLE_FIELDS
-from percussion_model.core.totals import begin
-from percussion_model.solvers.bar_cells import cut_bars
-from percussion_model.time_loop import sampling_times, stop_on_interrupt
+from percussion_model.physics.records import SAMPLE_FIELDS
+from percussion_model.simulation.time_loop import sampling_times, stop_on_interrupt
+from percussion_model.solvers.wave.advance import run
+from percussion_model.solvers.wave.bar_cells import cut_bars
+from percussion_model.solvers.wave.totals import begin
 
 RIGID = {"piston.model": "rigid", "bit.model": "rigid"}
 SCENES = {"wave": Scene(), "rigid": Scene().replace(**RIGID)}
@@ -72,7 +72,7 @@ def test_a_stop_after_blows_changes_no_bit(solver):
 
 def test_all_kinds_of_scenes_have_arguments_of_the_same_types(monkeypatch):
     """On that rests that nothing looks at them any more after the first call."""
-    monkeypatch.setattr("percussion_model.solvers.wave.entry_of", lambda function: function)
+    monkeypatch.setattr("percussion_model.solvers.wave.solver.entry_of", lambda function: function)
     one_go(Scene(), end=0.002)
     before = len(run.overloads), len(begin.overloads)
     for changes in (

@@ -9,8 +9,8 @@ import pytest
 from blow_map_scenes import mapped, run_by_hand
 
 from percussion_model import Simulation, piston_cycle
-from percussion_model.core.blow_records import Entry
-from percussion_model.solvers.single_blow import SingleBlow
+from percussion_model.solvers.blow_map.records import Entry
+from percussion_model.solvers.blow_map.single_blow import SingleBlow
 
 # ------------------------------------------------------------------------- flight
 

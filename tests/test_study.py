@@ -16,12 +16,12 @@ import pytest
 from typer.testing import CliRunner
 
 from percussion_model import Scene, SceneError, settled
-from percussion_model.cli import app
-from percussion_model.result_files import ResultError, to_json
+from percussion_model.analysis.study import grid, study, table, workers
+from percussion_model.analysis.study.store import PARTS, PLAN
+from percussion_model.analysis.study.work import COMPUTING, KINDS, run_points
+from percussion_model.interface.cli import app
+from percussion_model.simulation.files import ResultError, to_json
 from percussion_model.solvers import operators, sources
-from percussion_model.study import grid, study, table, workers
-from percussion_model.study.store import PARTS, PLAN
-from percussion_model.study.work import COMPUTING, KINDS, run_points
 
 SCENE = Scene(title="rigid bodies").computed_by("rigid")
 AXES = {"feed.force": [1500.0, 2500.0, 4000.0], "rock.loading_stiffness": [3e8, 7.5e8]}
@@ -144,7 +144,7 @@ def test_points_of_other_sources_are_not_mixed_in(tmp_path, monkeypatch):
     """A kernel was edited since, or the folder is older than this check."""
     folder = tmp_path / "out"
     kept = interrupted(folder)
-    monkeypatch.setattr("percussion_model.study.sources_digest", lambda patterns: "edited")
+    monkeypatch.setattr("percussion_model.analysis.study.sources_digest", lambda patterns: "edited")
     with pytest.raises(ResultError, match=r"other sources .* than those of now: give another"):
         study(SCENE, grid(AXES), folder, processes=1)
     monkeypatch.undo()
@@ -160,13 +160,13 @@ def test_points_of_other_sources_are_not_mixed_in(tmp_path, monkeypatch):
 
 
 def test_the_hash_of_sources_sees_an_edit_and_a_new_file(tmp_path, monkeypatch):
-    (tmp_path / "core").mkdir()
-    (tmp_path / "core" / "rock.py").write_text("K = 1")
+    (tmp_path / "physics").mkdir()
+    (tmp_path / "physics" / "rock.py").write_text("K = 1")
     monkeypatch.setattr(sources, "PACKAGE", tmp_path)
     found = [sources.sources_digest()]
-    (tmp_path / "core" / "rock.py").write_text("K = 2")
+    (tmp_path / "physics" / "rock.py").write_text("K = 2")
     found.append(sources.sources_digest())
-    (tmp_path / "core" / "new.py").write_text("")
+    (tmp_path / "physics" / "new.py").write_text("")
     found.append(sources.sources_digest())
     (tmp_path / "terminal.py").write_text("shows")
     assert len(set(found)) == 3
@@ -177,7 +177,7 @@ def test_all_that_computes_a_point_is_in_the_hash():
     """What a worker loads, but for files, tables, warnings and other points."""
     code = (
         "import sys, numpy as np; from percussion_model import Scene; "
-        "from percussion_model.study.work import run_points; "
+        "from percussion_model.analysis.study.work import run_points; "
         "scene = Scene().computed_by('rigid'); "
         "run_points(scene, ('feed.force',), np.array([[2500.0]]), 1e-4, 400, 1e-3); "
         "print(*(m.__file__ for n, m in sys.modules.items() if n.startswith('percussion_model')))"
@@ -218,7 +218,12 @@ def test_ctrl_c_ends_a_study_at_once_and_says_what_is_kept(tmp_path):
     """While workers start, and while they work."""
     scene = tmp_path / "scene.toml"
     SCENE.to_toml(scene)
-    words = [sys.executable, "-c", "from percussion_model.cli import main; main()", "study"]
+    words = [
+        sys.executable,
+        "-c",
+        "from percussion_model.interface.cli import main; main()",
+        "study",
+    ]
     words += [str(scene), "--over", "feed.force=1:9000:20000", "--processes", "2"]
     for number, wait in enumerate((2.0, 6.0)):
         out = ["--out", str(tmp_path / f"out{number}")]

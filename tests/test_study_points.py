@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from percussion_model import Scene, SceneError
-from percussion_model.study import grid, latin_hypercube, read_axis, study, table
+from percussion_model.analysis.study import grid, latin_hypercube, read_axis, study, table
 
 AXES = {"feed.force": [1500.0, 2500.0, 4000.0], "rock.loading_stiffness": [3e8, 7.5e8]}
 

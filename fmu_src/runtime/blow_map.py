@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 from pathlib import Path
 
-from percussion_model.solvers.blow_table import BlowTable
+from percussion_model.solvers.blow_map.table import BlowTable
 
 
 def read_blow_map(folder: str) -> BlowTable:

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from enum import IntEnum
 from typing import TYPE_CHECKING, Any
 
-from percussion_model.parameter_rows import Row
+from percussion_model.scene.rows import Row
 
 if TYPE_CHECKING:
     from fmu_src.runtime.slave import Slave

@@ -10,7 +10,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
-from percussion_model.parameter_rows import Row
+from percussion_model.scene.rows import Row
 
 
 @dataclass(frozen=True)

@@ -17,12 +17,12 @@ from fmu_src.runtime.slave import Slave
 from fmu_src.runtime.states import fingerprint
 from fmu_src.runtime.values import Read
 from fmu_src.runtime.watch import Watch
-from percussion_model.inputs import INPUTS
-from percussion_model.parameter_rows import Row, refuse_value
-from percussion_model.scene_rules import SceneRules
+from percussion_model.scene.inputs import INPUTS
+from percussion_model.scene.rows import Row, refuse_value
+from percussion_model.scene.rules import SceneRules
 from percussion_model.solvers import Solver
-from percussion_model.solvers.blow_map import BlowMapSolver
-from percussion_model.solvers.grid import cell_at
+from percussion_model.solvers.blow_map.solver import BlowMapSolver
+from percussion_model.solvers.wave.grid import cell_at
 
 # Solvers hold no state: instances of equal parameters share one.
 _SOLVERS: WeakValueDictionary[bytes, Solver] = WeakValueDictionary()

@@ -9,7 +9,7 @@ import numpy as np
 
 from fmu_src.runtime.calls import Phase
 from fmu_src.runtime.states import fill_solver, pack, solver_bytes, unpack
-from percussion_model.inputs import INPUTS
+from percussion_model.scene.inputs import INPUTS
 
 if TYPE_CHECKING:
     from fmu_src.runtime.hammer import PercussiveHammer

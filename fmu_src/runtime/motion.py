@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from fmu_src.runtime.calls import NOWHERE, plain_bounds
-from percussion_model.core.records import (
+from percussion_model.physics.ledger import unexplained
+from percussion_model.physics.records import (
     BLOW,
     LEDGER_FIELDS,
     LONG_SAMPLE_FIELDS,
@@ -16,10 +17,9 @@ from percussion_model.core.records import (
     STORED_FIELDS,
     Mode,
 )
-from percussion_model.inputs import INPUTS, check_input
-from percussion_model.ledger import unexplained
-from percussion_model.runner import Runner
-from percussion_model.scene_rules import SceneRules
+from percussion_model.scene.inputs import INPUTS, check_input
+from percussion_model.scene.rules import SceneRules
+from percussion_model.simulation.runner import Runner
 from percussion_model.solvers import Solver
 
 AT = {name: k for k, name in enumerate(LONG_SAMPLE_FIELDS)}

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from types import SimpleNamespace
 from typing import Any
 
-from percussion_model.parameter_rows import Row, generic_key
-from percussion_model.scene_rules import (
+from percussion_model.scene.rows import Row, generic_key
+from percussion_model.scene.rules import (
     BarNumbers,
     SceneError,
     SceneRules,

@@ -14,7 +14,7 @@ from pythonfmu import Fmi2Slave
 
 from fmu_src.runtime.calls import STEPPING, FmuError, Phase, guarded, plain_bounds
 from fmu_src.runtime.folder import read_variables
-from percussion_model.parameter_rows import refuse_value
+from percussion_model.scene.rows import refuse_value
 
 # Types that share a getter and a setter.
 REAL, INTEGER, BOOLEAN = ("Real",), ("Integer", "Enumeration"), ("Boolean",)

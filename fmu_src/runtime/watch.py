@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from fmu_src.runtime.motion import AT, Motion
-from percussion_model.core.records import Mode
-from percussion_model.validity import (
+from percussion_model.physics.records import Mode
+from percussion_model.simulation.validity import (
     button_note,
     flight_note,
     guard_notes,

@@ -16,7 +16,7 @@ from fmu_src.system.archive import (
     read_plan,
     write_system,
 )
-from percussion_model.scene import SceneError
+from percussion_model.scene.scene import SceneError
 
 
 def main(arguments: list[str]) -> int:

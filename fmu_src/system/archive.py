@@ -16,8 +16,8 @@ from fmu_src.hammer import build_hammer
 from fmu_src.system.parts import build_part
 from fmu_src.system.tables import PARTS
 from fmu_src.units import UNITS
-from percussion_model.commands.blow_map import ready_map
-from percussion_model.scene import Scene
+from percussion_model.interface.commands.blow_map import ready_map
+from percussion_model.scene.scene import Scene
 
 ROOT = Path(__file__).resolve().parents[2]
 SYSTEMS = ROOT / "scenarios" / "systems"

@@ -15,7 +15,7 @@ from fmu_src.staging import stage
 from fmu_src.system.tables import PARTS, PartTable
 from fmu_src.units import fmi_unit
 from fmu_src.variables import Variable, magnitude, number_row
-from percussion_model.parameter_rows import Row
+from percussion_model.scene.rows import Row
 
 FIRST = {"input": 1, "output": 100, "parameter": 200}
 DISPLAY = {"Pa": "bar", "N": "kN", "m/s": "mm/s", "Hz": "1/min"}

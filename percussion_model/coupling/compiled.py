@@ -17,10 +17,10 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from percussion_model.core.kernel import entry_of, letting_go
 from percussion_model.coupling.component import Component
 from percussion_model.coupling.exchange import LARGEST, WARNING, Group
 from percussion_model.coupling.port import Port
+from percussion_model.physics.kernel import entry_of, letting_go
 
 STEP, SET_REAL, SET_INTEGER, GET_REAL, GET_INTEGER, GET_BOOLEAN = range(6)
 SETTERS = {"Real": SET_REAL, "Integer": SET_INTEGER, "Boolean": SET_INTEGER}

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from percussion_model.coupling.component import CouplingError
 from percussion_model.coupling.coupled_run import CoupledRun
-from percussion_model.result_files import staged_text
+from percussion_model.simulation.files import staged_text
 
 
 def write_columns(run: CoupledRun, path: Path) -> Path:

@@ -26,7 +26,7 @@ from percussion_model.coupling.port import OnWay, Port
 from percussion_model.coupling.python_part import PythonPart, Work
 from percussion_model.coupling.rejection import StepControl
 from percussion_model.coupling.stepping import little_collection, whole_steps
-from percussion_model.time_loop import stop_on_interrupt
+from percussion_model.simulation.time_loop import stop_on_interrupt
 
 Order = Literal["jacobi", "gauss-seidel"]
 # Passes over the outputs while all parts are initialised: as many as the longest chain.

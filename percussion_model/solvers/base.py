@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from percussion_model.scene_rules import BarNumbers, SceneRules
+from percussion_model.scene.rules import BarNumbers, SceneRules
 
 if TYPE_CHECKING:
-    from percussion_model.solvers.grid import Cells
+    from percussion_model.solvers.wave.grid import Cells
 
 
 class Solver(Protocol):
@@ -101,18 +101,18 @@ def make_solver(scene: SceneRules) -> Solver:
     """Make the solver that computes a scene."""
     # Only the kernels that are needed are loaded: that is most of a start.
     if scene.solver_name == "fem":
-        from percussion_model.solvers.fem import FemSolver
+        from percussion_model.solvers.fem.solver import FemSolver
 
         return FemSolver(scene)
     if scene.solver_name == "wave":
-        from percussion_model.solvers.wave import WaveSolver
+        from percussion_model.solvers.wave.solver import WaveSolver
 
         return WaveSolver(scene)
     if scene.solver_name == "blow-map":
-        from percussion_model.solvers.blow_builder import get_table
-        from percussion_model.solvers.blow_map import BlowMapSolver
+        from percussion_model.solvers.blow_map.builder import get_table
+        from percussion_model.solvers.blow_map.solver import BlowMapSolver
 
         return BlowMapSolver(scene, get_table(scene))
-    from percussion_model.solvers.rigid import RigidSolver
+    from percussion_model.solvers.rigid.solver import RigidSolver
 
     return RigidSolver(scene)

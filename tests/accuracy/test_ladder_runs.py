@@ -10,17 +10,17 @@ import numpy as np
 import pytest
 
 from percussion_model import Scene, SceneError
-from percussion_model.accuracy import study
-from percussion_model.accuracy.integrators import GeneralRun
-from percussion_model.accuracy.ladders import LADDERS, fem_scene, ladders
-from percussion_model.accuracy.problems import APERIODIC, Run, pose
-from percussion_model.accuracy.quantities import HISTORY, RATE
-from percussion_model.accuracy.timing import interleaved
-from percussion_model.cli import app
-from percussion_model.commands.accuracy_tables import show_study
+from percussion_model.interface.cli import app
+from percussion_model.interface.commands.accuracy_tables import show_study
+from percussion_model.verification.accuracy import study
+from percussion_model.verification.accuracy.integrators import GeneralRun
+from percussion_model.verification.accuracy.ladders import LADDERS, fem_scene, ladders
+from percussion_model.verification.accuracy.problems import APERIODIC, Run, pose
+from percussion_model.verification.accuracy.quantities import HISTORY, RATE
+from percussion_model.verification.accuracy.timing import interleaved
 
 # The package offers a function of the same name.
-study_module = import_module("percussion_model.accuracy.study")
+study_module = import_module("percussion_model.verification.accuracy.study")
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 POINT_KEYS = {
     "ladder", "label", "size", "setup", "second", "blow", "repeats", "values", "errors", "fit",
@@ -92,7 +92,7 @@ def test_json_has_what_it_promises(found):
 
 
 def test_table_and_figures(found, tmp_path, capsys):
-    from percussion_model.plotting.accuracy import draw_accuracy, draw_quantities
+    from percussion_model.interface.plotting.accuracy import draw_accuracy, draw_quantities
 
     show_study(found)
     shown = capsys.readouterr().out

@@ -7,8 +7,13 @@ import math
 import numpy as np
 import pytest
 
-from percussion_model.accuracy.orders import cost_at, fitted_order
-from percussion_model.accuracy.quantities import HISTORY, Answer, batch_means, relative_error
+from percussion_model.verification.accuracy.orders import cost_at, fitted_order
+from percussion_model.verification.accuracy.quantities import (
+    HISTORY,
+    Answer,
+    batch_means,
+    relative_error,
+)
 
 
 @pytest.mark.parametrize("power", [0.5, 1.0, 3.0])

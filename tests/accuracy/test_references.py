@@ -10,17 +10,22 @@ import numpy as np
 import pytest
 
 from percussion_model import Scene
-from percussion_model.accuracy.closed_forms import closed_forms, found_by
-from percussion_model.accuracy.problems import DROP, PERIODIC, Run, pose
-from percussion_model.accuracy.quantities import HISTORY, QUANTITIES, RATE, relative_error
-from percussion_model.accuracy.reference_store import (
+from percussion_model.verification.accuracy.closed_forms import closed_forms, found_by
+from percussion_model.verification.accuracy.problems import DROP, PERIODIC, Run, pose
+from percussion_model.verification.accuracy.quantities import (
+    HISTORY,
+    QUANTITIES,
+    RATE,
+    relative_error,
+)
+from percussion_model.verification.accuracy.reference_store import (
     Reference,
     fingerprint,
     package_store,
     store,
     stored,
 )
-from percussion_model.accuracy.references import CLOSE
+from percussion_model.verification.accuracy.references import CLOSE
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 SCENES = ("reference", "drop_test", "stiff_rock", "chatter", "top_hammer", "aperiodic")

@@ -7,8 +7,8 @@ import pytest
 from scipy.linalg import eigh, expm
 
 from percussion_model import Mode, Scene, Simulation
-from percussion_model.core.fem_records import Node
-from percussion_model.solvers.fem import FemSolver
+from percussion_model.solvers.fem.records import Node
+from percussion_model.solvers.fem.solver import FemSolver
 
 # The bit alone on a linear spring, with weight, feed and loss.
 BIT = {

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from percussion_model.core.lanes import WIDTH
-from percussion_model.core.linear import carry, multiply, quadratic
+from percussion_model.solvers.wave.leaps.lanes import WIDTH
+from percussion_model.solvers.wave.leaps.linear import carry, multiply, quadratic
 
 # Sums of up to 80 products in another order.
 ROUNDING = 1e-13

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from percussion_model import Mode, Scene, Section, Simulation
-from percussion_model.core.wave_records import Coef
-from percussion_model.solvers.step_map import Configuration, step_forms, step_map
-from percussion_model.solvers.wave import WaveSolver
+from percussion_model.solvers.wave.leaps.step_map import Configuration, step_forms, step_map
+from percussion_model.solvers.wave.records import Coef
+from percussion_model.solvers.wave.solver import WaveSolver
 
 L = 0.20125
 ETA = Scene().loss.time

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from percussion_model.core.records import BLOW, EVENT, SAMPLE_FIELDS, EventKind, Status
-from percussion_model.core.rigid_motion import fall_time, oscillate, oscillate_with_loss
-from percussion_model.scene import Scene
-from percussion_model.solvers.rigid import RigidSolver
-from percussion_model.solvers.rigid_packing import st_venant_restitution
+from percussion_model.physics.records import BLOW, EVENT, SAMPLE_FIELDS, EventKind, Status
+from percussion_model.scene.scene import Scene
+from percussion_model.solvers.rigid.motion import fall_time, oscillate, oscillate_with_loss
+from percussion_model.solvers.rigid.packing import st_venant_restitution
+from percussion_model.solvers.rigid.solver import RigidSolver
 
 RIGID = {"piston": {"model": "rigid"}, "bit": {"model": "rigid"}}
 BIT_ONLY = {

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from percussion_model import Scene
-from percussion_model.solvers.operators import _alone
-from percussion_model.solvers.step_map import Configuration, step_forms, step_map
-from percussion_model.solvers.wave import WaveSolver
+from percussion_model.solvers.wave.leaps.operators import _alone
+from percussion_model.solvers.wave.leaps.step_map import Configuration, step_forms, step_map
+from percussion_model.solvers.wave.solver import WaveSolver
 
 LOADS = {"free": (0.0, 0.0), "FC": (7.5e8, 0.0), "SS": (3.75e9, 1e4)}
 

@@ -8,8 +8,8 @@ from blow_map_scenes import mapped
 
 from fmu_src.hammer import build_hammer
 from percussion_model import Scene, Simulation
-from percussion_model.blow_maps import make_map
-from percussion_model.scene import SceneError
+from percussion_model.analysis.blow_maps import make_map
+from percussion_model.scene.scene import SceneError
 from scenarios.harness import Instance
 
 WAVE, RIGID, BLOW_MAP = 1, 2, 3  # of the enumeration

@@ -54,7 +54,7 @@ def test_no_module_is_left_under_a_common_name(make):
     make("PneumaticDrive")
     prefixes = ("percussive_hammer_", "pneumatic_drive_")
     bundled = [name for name in sys.modules if name.startswith(prefixes)]
-    assert any(name.endswith("percussion_model.runner") for name in bundled)
+    assert any(name.endswith("percussion_model.simulation.runner") for name in bundled)
     assert any(name.endswith(".pythonfmu") for name in bundled)
     assert not [path for path in sys.path if path.endswith("/resources")]
 

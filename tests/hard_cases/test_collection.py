@@ -12,12 +12,12 @@ from pathlib import Path
 import pytest
 
 from percussion_model import Scene
-from percussion_model.cli import INTERRUPTED, _guarded, app
-from percussion_model.hard_cases import SOLVERS, hard_cases, measure, run_collection
-from percussion_model.hard_cases.collection import Collection, wrong
-from percussion_model.hard_cases.page import page
-from percussion_model.hard_cases.refinement import refine
-from percussion_model.inputs import SimulationError
+from percussion_model.interface.cli import INTERRUPTED, _guarded, app
+from percussion_model.scene.inputs import SimulationError
+from percussion_model.verification.hard_cases import SOLVERS, hard_cases, measure, run_collection
+from percussion_model.verification.hard_cases.collection import Collection, wrong
+from percussion_model.verification.hard_cases.page import page
+from percussion_model.verification.hard_cases.refinement import refine
 
 PAGE = Path(__file__).parents[2] / "docs" / "stability.md"
 LONG = os.environ.get("PERCUSSION_LONG") == "1"
@@ -28,14 +28,14 @@ DEAR = {("ratio_50", "fem"), ("fine", "fem"), ("fine", "wave")}
 # The command itself, which says when the first of its runs has ended.
 TALKING = """
 import contextlib, sys
-import percussion_model.terminal as terminal
+import percussion_model.interface.terminal as terminal
 
 @contextlib.contextmanager
 def talk(what):
     yield lambda done, total: done == 1 and print("begun", file=sys.stderr, flush=True)
 
 terminal.count_bar = talk
-from percussion_model.cli import main
+from percussion_model.interface.cli import main
 if __name__ == "__main__":
     main()
 """

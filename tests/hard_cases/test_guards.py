@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from percussion_model import Scene, Simulation, simulate
-from percussion_model.validity import BUTTON_LENGTH, LONGEST_FLIGHT, MOST_RATE
+from percussion_model.simulation.validity import BUTTON_LENGTH, LONGEST_FLIGHT, MOST_RATE
 
 REFERENCE = Scene()
 # The paper's figure 9: K_R, gamma, F_S and D_1, the last at constant power.

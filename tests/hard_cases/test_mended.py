@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from percussion_model import EventKind, Scene, Simulation, simulate
-from percussion_model.solvers.wave import WaveSolver
+from percussion_model.solvers.wave.solver import WaveSolver
 
 
 def residual(scene, duration):

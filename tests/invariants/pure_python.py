@@ -23,12 +23,14 @@ FAULT = 0.999
 
 def use_attribute_records() -> None:
     """Let the fields of records be attributes, as they are in compiled kernels."""
-    from percussion_model.core import fem_records, records, wave_records
+    from percussion_model.physics import records
+    from percussion_model.solvers.fem import records as of_fem
+    from percussion_model.solvers.wave import records as of_waves
 
     for module, names in (
         (records, ("BLOW", "EVENT")),
-        (wave_records, ("WAVE_PAR", "WAVE_STATE")),
-        (fem_records, ("FEM_PAR", "FEM_STATE")),
+        (of_waves, ("WAVE_PAR", "WAVE_STATE")),
+        (of_fem, ("FEM_PAR", "FEM_STATE")),
     ):
         for name in names:
             setattr(module, name, np.dtype((np.record, getattr(module, name))))
@@ -36,7 +38,8 @@ def use_attribute_records() -> None:
 
 def replace(name: str, function) -> None:
     """Put a function in the place of a kernel wherever one was imported."""
-    modules = [m for m in sys.modules.values() if m.__name__.startswith("percussion_model.core.")]
+    kernels = ("percussion_model.physics.", "percussion_model.solvers.")
+    modules = [m for m in sys.modules.values() if m.__name__.startswith(kernels)]
     found = [module for module in modules if hasattr(module, name)]
     assert found
     for module in found:
@@ -45,7 +48,7 @@ def replace(name: str, function) -> None:
 
 def weaken_reflection() -> None:
     """Let the free top end of the piston return 0.999 of each wave."""
-    from percussion_model.core.ends import outer_waves as send
+    from percussion_model.solvers.wave.ends import outer_waves as send
 
     def outer_waves(par, w, c, n, r, *ends):
         send(par, w, c, n, r, *ends)
@@ -57,7 +60,7 @@ def weaken_reflection() -> None:
 
 def weaken_contact() -> None:
     """Let piston and bit push each other with 0.999 of the force."""
-    from percussion_model.core.contact import bar_contact as contact
+    from percussion_model.solvers.wave.contact import bar_contact as contact
 
     def bar_contact(closed, gap, v_p, v_t, z_p, z_t, tau):
         out = list(contact(closed, gap, v_p, v_t, z_p, z_t, tau))
@@ -80,7 +83,7 @@ def weaken_contact() -> None:
 
 def lose_body_force(at: int = 1000) -> None:
     """Let the cells of the piston feel no body force in one step."""
-    from percussion_model.core.bar import face_velocities as faces
+    from percussion_model.solvers.wave.bar import face_velocities as faces
 
     count = 0
 
@@ -97,8 +100,8 @@ def lose_body_force(at: int = 1000) -> None:
 
 def weaken_penalty() -> None:
     """Let the bit feel 0.999 of what the penalty contact does to it."""
-    from percussion_model.core.fem_solve import RE
-    from percussion_model.core.fem_solve import meet_at_contact as meet
+    from percussion_model.solvers.fem.solve import RE
+    from percussion_model.solvers.fem.solve import meet_at_contact as meet
 
     def meet_at_contact(par, s, f, at, x, h):
         meet(par, s, f, at, x, h)
@@ -110,8 +113,8 @@ def weaken_penalty() -> None:
 
 def lose_load(at: int = 100) -> None:
     """Let the piston feel neither gravity nor drive in one step."""
-    from percussion_model.core.fem_scheme import RE, SHARE, drive_force
-    from percussion_model.core.fem_scheme import load as full
+    from percussion_model.solvers.fem.scheme import RE, SHARE, drive_force
+    from percussion_model.solvers.fem.scheme import load as full
 
     count = 0
 
@@ -129,8 +132,8 @@ def lose_load(at: int = 100) -> None:
 
 def shorten_path() -> None:
     """Let displacements grow by 0.999 of what velocities ask for."""
-    from percussion_model.core.fem_scheme import U
-    from percussion_model.core.fem_scheme import try_step as whole
+    from percussion_model.solvers.fem.scheme import U
+    from percussion_model.solvers.fem.scheme import try_step as whole
 
     def try_step(par, s, w, c, f, x, h):
         whole(par, s, w, c, f, x, h)
@@ -166,8 +169,6 @@ def main(solver: str, fault: str) -> None:
     if os.environ.get("NUMBA_DISABLE_JIT") != "1":
         raise SystemExit("set NUMBA_DISABLE_JIT=1")
     use_attribute_records()
-    import percussion_model.core.advance
-    import percussion_model.core.fem_advance  # noqa: F401
 
     FAULTS[fault][1]()
     simulation = run_scene(solver)

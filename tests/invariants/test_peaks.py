@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from percussion_model import SAMPLE_FIELDS, Scene, Simulation
-from percussion_model.core.records import LONG_SAMPLE_FIELDS, PEAK_FIELDS, Mode
+from percussion_model.physics.records import LONG_SAMPLE_FIELDS, PEAK_FIELDS, Mode
 
 IMPULSE = SAMPLE_FIELDS.index("bit_impulse")
 PEAK = LONG_SAMPLE_FIELDS.index("peak_bit_force")

@@ -9,15 +9,16 @@ import numpy as np
 import pytest
 
 from percussion_model import simulate
-from percussion_model.paper import paper_scene
-from percussion_model.paper.drop import run_drops
-from percussion_model.paper.statements import (
+from percussion_model.interface.plotting.window import last_blow_window
+from percussion_model.verification.paper import paper_scene
+from percussion_model.verification.paper.drop import run_drops
+from percussion_model.verification.paper.statements import (
     SAME_EXPONENT,
     about_cycle,
     about_drops,
     about_sweeps,
 )
-from percussion_model.paper.sweeps import (
+from percussion_model.verification.paper.sweeps import (
     SWEEPS,
     Sweep,
     along,
@@ -27,7 +28,6 @@ from percussion_model.paper.sweeps import (
     run_sweep,
     straight_line,
 )
-from percussion_model.plotting.window import last_blow_window
 
 
 def test_fits_find_what_was_put_in():

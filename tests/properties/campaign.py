@@ -21,7 +21,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
-from percussion_model.scene_text import write_text
+from percussion_model.scene.text import write_text
 
 # Cases of some ten milliseconds; a hang is far beyond that, on however busy a machine [s].
 PATIENCE = 100.0

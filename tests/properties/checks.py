@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from percussion_model import Simulation
-from percussion_model.core.records import SAMPLE_FIELDS, EventKind, Mode
+from percussion_model.physics.records import SAMPLE_FIELDS, EventKind, Mode
 from tests.properties.scenes import Case
 
 # Of the ledger's denominator, for every solver.
@@ -24,11 +24,11 @@ SHORTEST = 1e-5
 # A penalty that gives way more than this is none [m/N].
 MOST_GIVE = 1e100
 # Events of one step: crossings of the rock, two of the contact, one of the drive, one
-# of the barrier (`percussion_model.core.advance.EVENTS_A_STEP`).
+# of the barrier (`percussion_model.solvers.wave.advance.EVENTS_A_STEP`).
 EVENTS_A_STEP = 36
 # Events of a run of rigid bodies, which has no steps, in the transit time of a bar: 2000 before
 # the guard against storms makes all but closures wait, a 200th of the time each, and four rows
-# a wait (docs/numerics.md, section 12; `percussion_model.core.rigid_schedule`).
+# a wait (docs/numerics.md, section 12; `percussion_model.solvers.rigid.schedule`).
 RIGID_EVENTS_A_TRANSIT = 2000 + 4 * 200
 # What may be undefined, and where.
 WITHOUT_PISTON = ("piston_position", "piston_velocity", "gap", "relative_displacement")

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from percussion_model import Scene
-from percussion_model.inputs import INPUTS
-from percussion_model.parameter_table import find_row
-from percussion_model.solvers.grid import choose_time_step, section_count
+from percussion_model.scene.inputs import INPUTS
+from percussion_model.scene.table import find_row
+from percussion_model.solvers.wave.grid import choose_time_step, section_count
 from tests.properties.source import Source, chance, decades
 
 # Bounds of "wide": low and high of the amount, by decades, and what else may come.

@@ -7,7 +7,7 @@ import math
 import pytest
 
 from percussion_model import Scene, simulate
-from percussion_model.warnings_of_run import least_loss_time
+from percussion_model.simulation.warnings import least_loss_time
 
 REFERENCE = Scene()
 

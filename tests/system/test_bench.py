@@ -8,12 +8,12 @@ import math
 import numpy as np
 import pytest
 
-from percussion_model.cli import main
-from percussion_model.commands.bench_controller import COLUMNS
 from percussion_model.coupling import CouplingError
 from percussion_model.coupling.bench import TRIALS, bench, judge, total
 from percussion_model.coupling.coupled_run import CoupledRun
-from percussion_model.plotting.bench import save_bench
+from percussion_model.interface.cli import main
+from percussion_model.interface.commands.bench_controller import COLUMNS
+from percussion_model.interface.plotting.bench import save_bench
 
 
 def nothing(inputs, time, step):

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from momentum import missing_momentum
 
-from percussion_model.cli import main
 from percussion_model.coupling import Coupling, CouplingError
 from percussion_model.coupling.balance import known_signals, summary
+from percussion_model.interface.cli import main
 
 SHORT = 0.05  # [s]
 LOWER, UPPER = 0.02, 0.04  # the hard layer of a short hole [m]

@@ -9,7 +9,7 @@ from pathlib import Path
 from typer.main import get_command
 
 from docs import make_system
-from percussion_model.cli import app
+from percussion_model.interface.cli import app
 
 PAGE = Path(make_system.__file__).with_name("system.md")
 

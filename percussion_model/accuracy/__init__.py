@@ -1,9 +1,0 @@
-"""What accuracy costs in time: references with error bars, ladders of methods, orders."""
-
-from __future__ import annotations
-
-from percussion_model.accuracy.reference_store import Reference
-from percussion_model.accuracy.references import find_reference
-from percussion_model.accuracy.study import Point, Study, study
-
-__all__ = ["Point", "Reference", "Study", "find_reference", "study"]

@@ -1,0 +1,133 @@
+"""Blow maps of scenes: made with progress, kept, found again, looked at."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from percussion_model.scene.scene import Scene
+from percussion_model.solvers.blow_map.builder import (
+    cache_folder,
+    get_table,
+    kept_table,
+    table_file,
+)
+from percussion_model.solvers.blow_map.records import Axis
+from percussion_model.solvers.blow_map.refusals import notes_outside
+from percussion_model.solvers.blow_map.single_blow import SingleBlow
+from percussion_model.solvers.blow_map.table import BlowTable, Nodes
+
+__all__ = [
+    "MapCost",
+    "cache_folder",
+    "kept_map",
+    "make_map",
+    "map_cost",
+    "map_file",
+    "node_count",
+    "outside_map",
+]
+
+# The cost of a table is that of its blows at so many stiffnesses, so many at each.
+SAMPLED_STIFFNESSES, SAMPLED_BLOWS = 5, 8
+
+
+class MapCost(NamedTuple):
+    """What a table is going to cost."""
+
+    blows: int
+    processor_time: float  # of all of them [s]
+
+
+def mapped(scene: Scene) -> Scene:
+    """The scene on its blow map.
+
+    Raises
+    ------
+    SceneError
+        If no blow map can be made of it.
+    """
+    return scene if scene.solver_name == "blow-map" else scene.computed_by("blow-map")
+
+
+def make_map(
+    scene: Scene,
+    progress: Callable[[int, int], None] | None = None,
+    workers: int | None = None,
+) -> BlowTable:
+    """Table of blows of a scene: from the cache, or made and kept there.
+
+    Parameters
+    ----------
+    scene : Scene
+        Of any fidelity.
+    progress : callable, optional
+        Called with the parts done and their number.
+    workers : int, optional
+        Processes; as many as there are processors if left out. Where processes are
+        spawned, more than one wants the guard `if __name__ == "__main__"` in a script.
+
+    Returns
+    -------
+    BlowTable
+
+    Raises
+    ------
+    SceneError
+        If no blow map can be made of the scene.
+    """
+    return get_table(mapped(scene), progress, workers or os.cpu_count() or 1)
+
+
+def kept_map(scene: Scene) -> BlowTable | None:
+    """Table of a scene from the cache, None where it has not been made."""
+    return kept_table(mapped(scene))
+
+
+def map_file(scene: Scene) -> Path:
+    """File that keeps the table of a scene, whether it is there or not."""
+    return table_file(mapped(scene))
+
+
+def outside_map(scene: Scene) -> list[str]:
+    """What of a scene itself its table would not answer: a text for each such parameter."""
+    return notes_outside(mapped(scene))
+
+
+def node_count(scene: Scene) -> int:
+    """Blows that have to be computed for the table of a scene."""
+    nodes = Nodes.of(mapped(scene))
+    return len(nodes.wanted()) * nodes.counts[0]
+
+
+def map_cost(scene: Scene) -> MapCost:
+    """Predict what the table of a scene costs, from a few of its blows; nothing is kept.
+
+    The first blow is left out: kernels may have to be compiled for it.
+    """
+    scene = mapped(scene)
+    nodes = Nodes.of(scene)
+    places, stiffness = nodes.wanted(), nodes.values(Axis.STIFFNESS)
+    chosen = [places[k] for k in _spread(len(places), SAMPLED_BLOWS)]
+    SingleBlow(scene, float(stiffness[0])).entries(*nodes.blow(places[0]))
+    setups, blows = [], []
+    for k in _spread(len(stiffness), SAMPLED_STIFFNESSES):
+        begin = time.perf_counter()
+        single = SingleBlow(scene, float(stiffness[k]))
+        ready = time.perf_counter()
+        for place in chosen:
+            single.entries(*nodes.blow(place))
+        setups.append(ready - begin)
+        blows.append((time.perf_counter() - ready) / len(chosen))
+    count = len(places) * len(stiffness)
+    return MapCost(count, float(np.mean(setups)) * len(stiffness) + float(np.mean(blows)) * count)
+
+
+def _spread(count: int, most: int) -> list[int]:
+    """At most so many places, evenly over all."""
+    return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(int)).tolist()

@@ -1,0 +1,156 @@
+"""One scene by several solvers, side by side."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, get_args
+
+from percussion_model.scene.scene import Scene, SceneError
+from percussion_model.scene.solver_options import SolverName
+from percussion_model.simulation.result import Result
+from percussion_model.simulation.simulate import simulate
+from percussion_model.simulation.warnings import unused_note
+
+__all__ = ["COMPARED", "Comparison", "compare", "read_solvers"]
+
+# Numbers of a summary that solvers are compared by.
+COMPARED = (
+    "rate_of_penetration",
+    "blow_period",
+    "impact_velocity",
+    "rebound_velocity",
+    "stroke",
+    "blow_energy",
+    "transfer_efficiency",
+    "penetration_per_blow",
+    "contacts_per_blow",
+    "drilling_cycles_per_blow",
+    "peak_bit_force",
+    "peak_contact_force",
+    "standstill_bit_force",
+    "mean_bit_force",
+)
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """What several solvers make of one scene; the first is the one compared with.
+
+    Attributes
+    ----------
+    results : dict of Result
+        By the name of the solver.
+    """
+
+    results: dict[str, Result]
+
+    @property
+    def first(self) -> str:
+        """Name of the solver that the others are compared with."""
+        return next(iter(self.results))
+
+    def summaries(self) -> dict[str, dict[str, Any]]:
+        """Summary of each result, by solver."""
+        return {name: result.summary() for name, result in self.results.items()}
+
+    def differences(self) -> dict[str, dict[str, float | None]]:
+        """Relative difference of each number to the first solver's, by solver.
+
+        None where a number is not defined, or the first solver's is zero.
+        """
+        summaries = self.summaries()
+        base = summaries[self.first]
+        return {
+            name: {key: _relative(summary[key], base[key]) for key in COMPARED}
+            for name, summary in summaries.items()
+            if name != self.first
+        }
+
+    def warnings(self) -> list[str]:
+        """Warnings of all results, each after the name of its solver.
+
+        A parameter that one of the solvers needs was given for it, not in vain: only those
+        that no solver needs are told, once.
+        """
+        scenes = [result.scene for result in self.results.values()]
+        in_vain = [
+            key for key in scenes[0].unused if all(key in scene.unused for scene in scenes[1:])
+        ]
+        told = [unused_note(in_vain)] if in_vain else []
+        for name, result in self.results.items():
+            own = unused_note(result.scene.unused)
+            told += [f"{name}: {text}" for text in result.warnings if text != own]
+        return told
+
+    def to_dict(self) -> dict[str, Any]:
+        """Summaries and differences as plain values for JSON."""
+        return {"solvers": self.summaries(), "differences": self.differences()}
+
+
+def compare(
+    scene: Scene,
+    solvers: Sequence[str],
+    duration: float | None = None,
+    settle: float | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Comparison:
+    """Run a scene with several solvers.
+
+    Parameters
+    ----------
+    scene : Scene
+    solvers : sequence of str
+        Names; the others are compared with the first.
+    duration, settle : float, optional
+        Simulated time, and the time before blows count [s]; default those of
+        the scene.
+    progress : callable, optional
+        Called now and then with the time reached, over all solvers [s].
+
+    Returns
+    -------
+    Comparison
+
+    Raises
+    ------
+    SceneError, SimulationError
+        If a solver cannot compute the scene.
+    """
+    # Every scene is made before the first is run: a refusal comes at once.
+    scenes = {name: scene.computed_by(name) for name in solvers}
+    end = scene.run.duration if duration is None else duration
+    results = {}
+    for k, (name, chosen) in enumerate(scenes.items()):
+        report = None if progress is None else _after(progress, k * end)
+        results[name] = simulate(chosen, duration, settle, progress=report)
+    return Comparison(results)
+
+
+def read_solvers(text: str) -> tuple[str, ...]:
+    """Read names of solvers with commas between them.
+
+    Raises
+    ------
+    SceneError
+        If there is none, or one that is not known or stands there twice.
+    """
+    names = tuple(name.strip() for name in text.split(","))
+    known = [name for name in get_args(SolverName) if name != "auto"] + ["blow-map"]
+    for name in names:
+        if name not in known:
+            raise SceneError(f"--solvers {text}: {name!r} is no solver: {', '.join(known)}")
+        if names.count(name) > 1:
+            raise SceneError(f"--solvers {text}: {name} stands there twice")
+    return names
+
+
+def _after(progress: Callable[[float], None], before: float) -> Callable[[float], None]:
+    return lambda t: progress(before + t)
+
+
+def _relative(value: float | None, base: float | None) -> float | None:
+    if value is None or base is None or base == 0 or not math.isfinite(value / base):
+        return None
+    return value / base - 1.0

@@ -1,0 +1,221 @@
+"""What a run will cost: measured on its first blows, before the whole of it is run."""
+
+from __future__ import annotations
+
+import os
+import time
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any, Protocol
+
+from percussion_model.analysis.blow_maps import MapCost, kept_map, map_cost
+from percussion_model.scene.scene import Scene
+from percussion_model.simulation.accuracy import planned_cells, with_cells
+from percussion_model.simulation.stepping import Simulation
+from percussion_model.solvers import Solver
+
+# A probe ends after so many blows once it took so long [s]; a run that is over sooner is
+# measured, not predicted.
+PROBE_BLOWS, PROBE_WALL = 4, 1.0
+# Without blows, or where they are dear, it ends after so long [s].
+LONGEST_PROBE = 8.0
+# Blows have ceased where none came for so many mean periods.
+CEASED = 4.0
+# The first piece of it [s]. Pieces double while they take less than this [s], so that
+# calling costs little beside what is measured, up to a share of the run.
+FIRST_PIECE, QUICK, LARGEST_PIECE = 1e-6, 3e-3, 0.025
+
+COUNTED = ("steps", "leaps", "events")
+
+
+class Probed(Protocol):
+    """What a probe needs of a `Simulation`."""
+
+    wall_time: float
+
+    @property
+    def time(self) -> float:
+        """Present time [s]."""
+
+    def advance(self, t: float) -> None:
+        """Run up to `t`."""
+
+    def statistics(self) -> dict[str, int]:
+        """Counts of what the solver did."""
+
+
+@dataclass(frozen=True)
+class Mark:
+    """How far a probe was at some time."""
+
+    time: float
+    wall: float
+    counts: dict[str, int]
+
+
+@dataclass(frozen=True)
+class Forecast:
+    """What a run is going to cost.
+
+    Attributes
+    ----------
+    solver : Solver or None
+        None where its blow map has not been made.
+    setup_time : float
+        Time to make the solver, compilation included, and that of its blow map where
+        this has not been made [s].
+    wall_time : float or None
+        Predicted time of the whole run without set-up [s]; None without a solver.
+    duration : float
+        Simulated time of that run [s].
+    per_second : float or None
+        Time for a simulated second, once blows follow each other [s]; None without a solver.
+    per_blow : float or None
+        Time for a blow [s]; None where there were fewer than two.
+    counts : dict of float
+        Steps, leaps and events a blow, as far as the solver has them.
+    probed : float
+        Simulated time that it rests on [s].
+    runs : int
+        Runs that `setup_time` and `wall_time` are the sum of.
+    blow_map : MapCost or None
+        Of the blow map that has not been made.
+    """
+
+    solver: Solver | None
+    setup_time: float
+    wall_time: float | None
+    duration: float
+    per_second: float | None
+    per_blow: float | None
+    counts: dict[str, float]
+    probed: float
+    runs: int = 1
+    blow_map: MapCost | None = None
+
+
+def forecast(scene: Scene) -> Forecast:
+    """Run the first blows of a scene and tell what the whole run will cost.
+
+    A wanted accuracy takes several runs: times are those of all, the rest is
+    that of the finest. What aperiodic motion or a doubt adds is not foreseen.
+    A blow map that has not been made is not made here: its cost is told instead.
+    """
+    if scene.solver_name == "blow-map" and kept_map(scene) is None:
+        return _without_map(scene)
+    scenes = [scene]
+    if scene.solver.accuracy is not None and scene.solver_name == "wave":
+        scenes = [with_cells(scene, cells) for cells in planned_cells(scene)]
+    found = []
+    for chosen in scenes:
+        simulation = Simulation(chosen)
+        marks = probe(simulation, chosen.run.duration)
+        found.append(predict(simulation.solver, simulation.setup_time, marks, chosen.run.duration))
+    return replace(
+        found[-1],
+        setup_time=sum(one.setup_time for one in found),
+        wall_time=sum(one.wall_time or 0.0 for one in found),
+        runs=len(found),
+    )
+
+
+def _without_map(scene: Scene) -> Forecast:
+    """What the blow map costs; the run cannot be probed before it is there."""
+    begin = time.perf_counter()
+    cost = map_cost(scene)
+    setup = time.perf_counter() - begin + cost.processor_time / (os.cpu_count() or 1)
+    duration = scene.run.duration
+    return Forecast(None, setup, None, duration, None, None, {}, 0.0, blow_map=cost)
+
+
+def probe(simulation: Probed, duration: float) -> list[Mark]:
+    """Advance piece by piece through the first blows of a run; a mark after each piece."""
+    marks = [_mark(simulation)]
+    piece = FIRST_PIECE
+    while simulation.time < duration:
+        simulation.advance(min(simulation.time + piece, duration))
+        marks.append(_mark(simulation))
+        wall, blows = marks[-1].wall, marks[-1].counts.get("blows", 0)
+        if wall - marks[-2].wall < QUICK:
+            piece = min(2.0 * piece, LARGEST_PIECE * duration)
+        elif piece > FIRST_PIECE:
+            piece *= 0.5
+        if wall > LONGEST_PROBE or (wall > PROBE_WALL and blows >= PROBE_BLOWS):
+            break
+    return marks
+
+
+def _mark(simulation: Probed) -> Mark:
+    return Mark(simulation.time, simulation.wall_time, simulation.statistics())
+
+
+def predict(solver: Solver, setup_time: float, marks: list[Mark], duration: float) -> Forecast:
+    """Predict a whole run from the marks of a probe.
+
+    What follows the probe costs what whole blows in it did, the first left out:
+    it begins in its own way. Without two blows it costs what the probe did.
+    """
+    last = marks[-1]
+    start, end = _what_goes_on(marks)
+    span = end.time - start.time
+    per_second = (end.wall - start.wall) / span if span > 0 else 0.0
+    blows = end.counts.get("blows", 0) - start.counts.get("blows", 0)
+    return Forecast(
+        solver=solver,
+        setup_time=setup_time,
+        wall_time=last.wall + max(duration - last.time, 0.0) * per_second,
+        duration=duration,
+        per_second=per_second,
+        per_blow=(end.wall - start.wall) / blows if blows > 0 else None,
+        counts={
+            name: (end.counts[name] - start.counts[name]) / blows
+            for name in COUNTED
+            if blows > 0 and name in end.counts
+        },
+        probed=last.time,
+    )
+
+
+def _what_goes_on(marks: list[Mark]) -> tuple[Mark, Mark]:
+    """Marks between which there is what goes on: whole blows, or else all of the probe.
+
+    Where blows have ceased, it is what took the later half of the time since then.
+    """
+    rises = [mark for before, mark in pairwise(marks) if _blows(mark) > _blows(before)]
+    if len(rises) < 2:
+        return marks[0], marks[-1]
+    first, last, end = rises[0], rises[-1], marks[-1]
+    period = (last.time - first.time) / (_blows(last) - _blows(first))
+    if end.time - last.time < CEASED * period:
+        return first, last
+    half = 0.5 * (last.wall + end.wall)
+    return next((mark for mark in marks[:-1] if mark.wall >= half), last), end
+
+
+def _blows(mark: Mark) -> int:
+    return mark.counts.get("blows", 0)
+
+
+def explained(scene: Scene, found: Forecast) -> dict[str, Any]:
+    """What `percussion explain` tells, as plain values for JSON, SI units."""
+    solver = found.solver
+    return {
+        "title": scene.title,
+        "effects_on": list(scene.effects_on),
+        "effects_off": list(scene.effects_off),
+        "without_effect": list(scene.unused),
+        "solver": scene.solver_name,
+        "cells": (solver.cells or None) if solver else None,
+        "time_step": solver.time_step if solver else None,
+        "wave_speed_error": solver.wave_speed_error if solver else None,
+        "accuracy": scene.solver.accuracy,
+        "setup_time": found.setup_time,
+        "predicted_wall_time": found.wall_time,
+        "duration": found.duration,
+        "wall_time_per_second": found.per_second,
+        "wall_time_per_blow": found.per_blow,
+        "per_blow": found.counts,
+        "probed": found.probed,
+        "runs": found.runs,
+        "blow_map_to_make": found.blow_map._asdict() if found.blow_map else None,
+    }

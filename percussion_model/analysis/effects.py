@@ -1,0 +1,259 @@
+"""What each effect costs and changes: a scene with one effect at a time turned off, or on."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from percussion_model.analysis.effect_turns import Turn, turns
+from percussion_model.scene.scene import Scene, SceneError
+from percussion_model.simulation.result import LEAST_BLOWS, Result
+from percussion_model.simulation.simulate import simulate
+from percussion_model.simulation.stepping import Simulation
+
+__all__ = ["NOISE", "EffectsStudy", "Trial", "cost_of_step", "step_costs", "study_effects"]
+
+# A step whose cost differs by this much from the scene's differs by more than noise.
+NOISE = 1.05
+
+# Free flight, in which a step meets nothing: gaps that are not crossed in so
+# many steps [m], however short the stroke.
+FLIGHT: dict[str, Any] = {
+    "start.gap": 100.0,
+    "start.rock_gap": 100.0,
+    "start.piston_velocity": 0.0,
+    "start.bit_velocity": 0.0,
+    "solver.leaps": False,
+}
+FLIGHT_STEPS = 4_000
+# Measurements of a step; noise only adds, so the least is taken.
+ROUNDS = 40
+# A run shorter than this is timed again, so often at most [s].
+SHORT_RUN = 1.5
+MOST_RUNS = 7
+
+# A rate whose standard error is a larger share of it than this tells no change.
+UNDECIDED = 0.25
+
+# Numbers of a summary whose change is shown.
+CHANGED = ("rate_of_penetration", "blow_period", "peak_bit_force")
+_BY_BLOWS = ("rate_of_penetration_standard_error", "drilling_cycles_per_blow")
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One variant of a scene.
+
+    Attributes
+    ----------
+    turn : Turn
+        What was turned; that of the scene itself changes nothing.
+    result : Result
+        Of the whole run.
+    wall_time : float
+        Time of the whole run, the least of several, without compilation and
+        set-up [s].
+    step : float or None
+        Processor time of a time step in free flight, without leaps [s]; None
+        where the solver has no step.
+    """
+
+    turn: Turn
+    result: Result
+    wall_time: float
+    step: float | None
+
+    @property
+    def reason(self) -> str:
+        """Why there is no rate of penetration, or why it must not be trusted; may be empty."""
+        if self.turn.no_blows or self.turn.no_penetration:
+            return self.turn.no_blows or self.turn.no_penetration
+        reasons = [text for text in self.result.warnings if "trusted" in text]
+        if len(self.result.counted) < LEAST_BLOWS:
+            reasons += [text for text in self.result.warnings if "whole blow" in text][:1]
+        elif self.undecided:
+            reasons += [
+                "the motion is aperiodic, and the run too short to tell its rate of penetration"
+            ]
+        return "; ".join(reasons)
+
+    @property
+    def undecided(self) -> bool:
+        """Whether scatter hides the rate of penetration."""
+        rate = self.result.rate_of_penetration
+        return self.result.rate_of_penetration_standard_error > UNDECIDED * abs(rate)
+
+    def numbers(self) -> dict[str, Any]:
+        """What was found, as plain values; None is what is not defined."""
+        summary = self.result.summary()
+        blows = summary["blows"]
+        found = {name: summary[name] for name in (*CHANGED, *_BY_BLOWS)}
+        if self.turn.no_penetration:
+            found["rate_of_penetration"] = found["rate_of_penetration_standard_error"] = None
+        if self.turn.no_blows:
+            found = dict.fromkeys(found)
+            blows = None
+        return {
+            "effect": self.turn.effect,
+            "turned": self.turn.turned,
+            "step_time": self.step,
+            "wall_time": self.wall_time,
+            "blow_time": self.wall_time / blows if blows else None,
+            "events": summary["events"],
+            "blows": blows,
+            "steps": summary["statistics"].get("steps"),
+            **found,
+            "reason": self.reason,
+            "warnings": summary["warnings"],
+        }
+
+
+@dataclass(frozen=True)
+class EffectsStudy:
+    """A scene and its variants, one effect turned in each.
+
+    Attributes
+    ----------
+    scene : Scene
+    base : Trial
+        The scene as it is.
+    trials : list of Trial
+    refused : dict of str
+        Effects that cannot be turned in this scene, and why.
+    """
+
+    scene: Scene
+    base: Trial
+    trials: list[Trial]
+    refused: dict[str, str]
+
+    def changes(self, trial: Trial) -> dict[str, float | None]:
+        """Relative change of each number of `CHANGED` against the scene itself."""
+        here, base = trial.numbers(), self.base.numbers()
+        found = {name: _relative(here[name], base[name]) for name in CHANGED}
+        if trial.undecided or self.base.undecided:
+            found["rate_of_penetration"] = None
+        return found
+
+    def dearer(self, trial: Trial) -> bool:
+        """Whether turning an effect off made a step dearer, beyond noise."""
+        if not trial.turn.off or trial.step is None or self.base.step is None:
+            return False
+        return trial.step > NOISE * self.base.step
+
+    def to_dict(self) -> dict[str, Any]:
+        """All numbers as plain values for JSON, SI units."""
+        return {
+            "title": self.scene.title,
+            "solver": self.base.result.solver,
+            "cells": self.base.result.cells or None,
+            "duration": self.base.result.duration,
+            "settle": self.base.result.settle,
+            "scene": self.base.numbers(),
+            "effects": [
+                {
+                    **trial.numbers(),
+                    "changes": self.changes(trial),
+                    "step_dearer": self.dearer(trial),
+                }
+                for trial in self.trials
+            ],
+            "refused": self.refused,
+        }
+
+
+def study_effects(
+    scene: Scene,
+    duration: float | None = None,
+    settle: float | None = None,
+    progress: Callable[[str, float], None] | None = None,
+) -> EffectsStudy:
+    """Turn each effect of a scene off, or on where it is off, and run all of them.
+
+    Parameters
+    ----------
+    scene : Scene
+    duration, settle : float, optional
+        Simulated time, and the time before blows count [s]; default those of
+        the scene.
+    progress : callable, optional
+        Called with what is done next and the share of the whole that is done.
+
+    Returns
+    -------
+    EffectsStudy
+
+    Raises
+    ------
+    SceneError, SimulationError
+        If the scene itself cannot be computed.
+    """
+    base, *rest = turns(scene)
+    cases = [(base, scene)]
+    refused = {}
+    for turn in rest:
+        try:
+            cases.append((turn, turn.apply(scene)))
+        except SceneError as error:
+            refused[f"{turn.effect} {turn.turned}"] = str(error)
+    found = []
+    for k, (turn, changed) in enumerate(cases):
+        if progress is not None:
+            progress(f"{turn.effect} {turn.turned}".strip(), k / (len(cases) + 1))
+        found.append(_best_run(changed, duration, settle))
+    if progress is not None:
+        progress("time steps", len(cases) / (len(cases) + 1))
+    steps = step_costs([changed for _, changed in cases])
+    trials = [
+        Trial(turn, result, wall, step)
+        for (turn, _), (result, wall), step in zip(cases, found, steps, strict=True)
+    ]
+    return EffectsStudy(scene, trials[0], trials[1:], refused)
+
+
+def _best_run(scene: Scene, duration: float | None, settle: float | None) -> tuple[Result, float]:
+    """Run a scene, a short one several times; the least wall time [s]."""
+    result = simulate(scene, duration, settle)
+    walls = [result.wall_time]
+    while sum(walls) < SHORT_RUN and len(walls) < MOST_RUNS:
+        walls.append(simulate(scene, duration, settle).wall_time)
+    return result, min(walls)
+
+
+def step_costs(scenes: Sequence[Scene], rounds: int = ROUNDS) -> list[float | None]:
+    """Processor time of one time step in free flight, without leaps, of each scene [s].
+
+    Short stretches taken in turn, so that a machine that slows down slows all
+    of them. None where a solver goes from event to event and has no step.
+    """
+    flights = [Simulation(_in_flight(scene), record_events=False) for scene in scenes]
+    best = [math.inf if flight.solver.time_step else None for flight in flights]
+    for _ in range(rounds):
+        for k, flight in enumerate(flights):
+            step, least = flight.solver.time_step, best[k]
+            if step is not None and least is not None:
+                best[k] = min(least, cost_of_step(flight, FLIGHT_STEPS * step))
+    return best
+
+
+def _in_flight(scene: Scene) -> Scene:
+    """Return the scene with both bodies far from each other and from the rock."""
+    return scene.replace(**{key: value for key, value in FLIGHT.items() if scene.matters(key)})
+
+
+def cost_of_step(simulation: Simulation, duration: float) -> float:
+    """Advance a simulation; processor time by the steps that it took [s]."""
+    before = simulation.statistics()["steps"]
+    began = time.process_time()
+    simulation.advance(simulation.time + duration)
+    cost = time.process_time() - began
+    return cost / (simulation.statistics()["steps"] - before)
+
+
+def _relative(value: float | None, base: float | None) -> float | None:
+    if value is None or base is None or base == 0 or not math.isfinite(value / base):
+        return None
+    return value / base - 1.0

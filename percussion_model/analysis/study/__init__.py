@@ -1,0 +1,221 @@
+"""Studies: the stationary response at many points, on many processes."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from percussion_model.analysis.stationary import check_request
+from percussion_model.analysis.study.points import (
+    Points,
+    grid,
+    latin_hypercube,
+    read_axis,
+    refuse_unknown,
+    table,
+)
+from percussion_model.analysis.study.store import Store
+from percussion_model.analysis.study.summary import headlines
+from percussion_model.analysis.study.work import COMPUTING, FOUND, KINDS, run_points
+from percussion_model.analysis.study.workers import on_a_cluster, on_this_machine
+from percussion_model.scene.scene import Scene
+from percussion_model.simulation.files import ResultError, staged
+from percussion_model.solvers.sources import sources_digest
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+
+__all__ = [
+    "Points",
+    "Study",
+    "grid",
+    "headlines",
+    "latin_hypercube",
+    "read_axis",
+    "study",
+    "table",
+]
+
+# Points are handed out in parts of at most so many, and so many parts a process at least.
+MOST_A_PART = 100
+PARTS_A_PROCESS = 8
+
+
+@dataclass(frozen=True)
+class Study:
+    """What a study found at its points.
+
+    Attributes
+    ----------
+    scene : Scene
+    points : Points
+    rows : ndarray of `work.ROW`
+        One for each point, SI units.
+    failures : list of str
+        What went wrong at each point, empty where nothing did.
+    """
+
+    scene: Scene
+    points: Points
+    rows: np.ndarray
+    failures: list[str]
+
+    @property
+    def relative_error(self) -> np.ndarray:
+        """Error of the rate of penetration by the rate, for each point; NaN where it has none."""
+        rate = np.abs(self.rows["rate_of_penetration"])
+        error = self.rows["rate_of_penetration_error"]
+        return np.divide(error, rate, out=np.full(len(rate), np.nan), where=rate > 0)
+
+    def save(self, folder: str | Path) -> list[Path]:
+        """Write `points.parquet` and `points.nc` (NetCDF) to a folder, both or none."""
+        folder = Path(folder)
+        with staged(folder) as draft:
+            self.to_pandas().to_parquet(draft / "points.parquet")
+            self.to_xarray().to_netcdf(draft / "points.nc", engine="h5netcdf")
+            names = sorted(path.name for path in draft.iterdir())
+        return [folder / name for name in names]
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """One row for each point: parameters, numbers found, kind of motion, failure."""
+        from pandas import DataFrame
+
+        columns: dict[str, Any] = dict(zip(self.points.keys, self.points.values.T, strict=True))
+        columns |= {name: self.rows[name] for name in self.rows.dtype.names or ()}
+        columns["kind"] = np.array(KINDS)[self.rows["kind"]]
+        return DataFrame(columns | {"failure": self.failures})
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Numbers found over the axes of the grid, or over the points; units as attributes."""
+        from xarray import DataArray, Dataset
+
+        points, names = self.points, self.rows.dtype.names or ()
+        units = {key: self.scene.row_of(key).unit for key in points.keys}
+        if points.is_grid:
+            mesh = points.values.reshape(*points.shape, len(points.keys))
+            axes = [np.moveaxis(mesh[..., k], k, 0).reshape(n, -1)[:, 0]
+                    for k, n in enumerate(points.shape)]  # fmt: skip
+            coords = {
+                key: DataArray(axis, dims=key, attrs={"units": units[key]})
+                for key, axis in zip(points.keys, axes, strict=True)
+            }
+            dims: tuple[str, ...] = points.keys
+        else:
+            dims = ("point",)
+            coords = {
+                key: DataArray(points.values[:, k], dims=dims, attrs={"units": units[key]})
+                for k, key in enumerate(points.keys)
+            }
+        found = {
+            name: DataArray(
+                self.rows[name].reshape(points.shape),
+                dims=dims,
+                attrs={"units": FOUND[name]} if name in FOUND else {},
+            )
+            for name in names
+        }
+        found["kind"].attrs["meaning"] = ", ".join(f"{k}: {kind}" for k, kind in enumerate(KINDS))
+        found["failure"] = DataArray(np.array(self.failures).reshape(points.shape), dims=dims)
+        return Dataset(found, coords, {"title": self.scene.title, "scene": self.scene.to_toml()})
+
+
+def study(
+    scene: Scene,
+    points: Points,
+    folder: str | Path,
+    tolerance: float = 1e-4,
+    most_blows: int = 400,
+    scatter: float = 1e-3,
+    processes: int | None = None,
+    cluster: str | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Study:
+    """Find the stationary response at many points.
+
+    Finished points are kept in the folder: a study that was interrupted goes on
+    where it was when it is called again. What goes wrong at a point is
+    recorded there and stops nothing.
+
+    Parameters
+    ----------
+    scene : Scene
+        What is common to all points.
+    points : Points
+        From `grid`, `latin_hypercube` or `table`.
+    folder : str or Path
+        New, or that of the same study before.
+    tolerance, most_blows, scatter
+        As in `settled`; aperiodic motion is run until the standard error of its
+        rate is within `scatter`, a relative one, or for `most_blows`.
+    processes : int, optional
+        On this machine; default as many as it has cores.
+    cluster : str, optional
+        Address of a Dask scheduler that does the work instead.
+    progress : callable, optional
+        Called with points done and their number.
+
+    Returns
+    -------
+    Study
+
+    Raises
+    ------
+    SceneError
+        If a key or value makes no sense.
+    ResultError
+        If the folder holds something else, or points that other sources have computed.
+    SimulationError
+        If workers keep dying, or no scheduler answers.
+    """
+    refuse_unknown(scene, points)
+    check_request(scene, tolerance, most_blows, scatter)
+    store = Store(Path(folder), _plan(scene, points, tolerance, most_blows, scatter))
+    _rows, _failures, done = store.read(len(points))
+    order = points.in_cheap_order()
+    order = order[~done[order]]
+    processes = processes or os.cpu_count() or 1
+    size = max(1, min(MOST_A_PART, len(order) // (PARTS_A_PROCESS * processes)))
+    parts = [order[k : k + size] for k in range(0, len(order), size)]
+    asked = tolerance, most_blows, scatter
+    tasks = [(scene, points.keys, points.values[part], *asked) for part in parts]
+    count = int(done.sum())
+    if progress is not None:
+        progress(count, len(points))
+    if tasks:
+        ended = (
+            on_this_machine(run_points, tasks, min(processes, len(tasks)))
+            if cluster is None
+            else on_a_cluster(run_points, tasks, cluster)
+        )
+        for number, (rows, failures) in ended:
+            store.keep(parts[number], rows, failures)
+            count += len(parts[number])
+            if progress is not None:
+                progress(count, len(points))
+    rows, failures, done = store.read(len(points))
+    if not done.all():
+        raise ResultError(f"{folder}: {int((~done).sum())} points are missing: run it again")
+    return Study(scene, points, rows, failures)
+
+
+def _plan(
+    scene: Scene, points: Points, tolerance: float, most_blows: int, scatter: float
+) -> dict[str, Any]:
+    return {
+        "scene": scene.to_toml(),
+        "keys": list(points.keys),
+        "shape": list(points.shape),
+        "points": points.digest(),
+        "tolerance": tolerance,
+        "most_blows": most_blows,
+        "scatter": scatter,
+        "version": version("percussion_model"),
+        "sources": sources_digest(COMPUTING),
+    }

@@ -1,0 +1,124 @@
+"""Where the parts of a study run: processes of this machine, or a Dask cluster."""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Callable, Iterator
+from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from multiprocessing import active_children, get_context
+from threading import current_thread, main_thread
+from typing import Any
+
+from percussion_model.scene.inputs import SimulationError
+
+# A pool whose workers die is made anew so often.
+MOST_RESTARTS = 3
+# One thread a process: their matrices are small, and the processes fill the machine.
+_ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
+Task = tuple[Any, ...]
+
+
+def on_this_machine(
+    work: Callable[..., Any], tasks: list[Task], processes: int
+) -> Iterator[tuple[int, Any]]:
+    """Do the tasks in so many processes; yield number and outcome as they end.
+
+    One process is the present one. A worker that dies takes its task with it, which is
+    done again by another.
+    """
+    if processes == 1:
+        for number, task in enumerate(tasks):
+            yield number, work(*task)
+        return
+    waiting = dict(enumerate(tasks))
+    for _ in range(MOST_RESTARTS + 1):
+        try:
+            for number, outcome in _in_a_pool(work, dict(waiting), processes):
+                del waiting[number]
+                yield number, outcome
+            return
+        except BrokenProcessPool:
+            continue
+    raise SimulationError(
+        f"worker processes died {MOST_RESTARTS + 1} times, out of memory perhaps: what is "
+        "finished is kept; run again with fewer processes"
+    )
+
+
+def _in_a_pool(
+    work: Callable[..., Any], tasks: dict[int, Task], processes: int
+) -> Iterator[tuple[int, Any]]:
+    others = set(active_children())
+    with _one_thread_each(), _interrupts_left_to_this_process():
+        pool = ProcessPoolExecutor(processes, mp_context=get_context("spawn"))
+        running = {pool.submit(work, *task): number for number, task in tasks.items()}
+    try:
+        while running:
+            ended, _ = wait(running, return_when=FIRST_COMPLETED)
+            for future in ended:
+                yield running.pop(future), future.result()
+    finally:
+        if running:  # interrupted: what workers have begun is not waited for
+            for worker in set(active_children()) - others:
+                worker.terminate()
+        pool.shutdown(wait=False, cancel_futures=True)
+
+
+@contextmanager
+def _interrupts_left_to_this_process() -> Iterator[None]:
+    """Let processes that are started meanwhile ignore Ctrl-C from their first line on."""
+    if current_thread() is not main_thread():  # others may not touch signals
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+@contextmanager
+def _one_thread_each() -> Iterator[None]:
+    """Give processes started meanwhile one thread of linear algebra each."""
+    before = {name: os.environ.get(name) for name in _ONE_THREAD}
+    os.environ.update(dict.fromkeys(_ONE_THREAD, "1"))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
+
+
+def on_a_cluster(
+    work: Callable[..., Any], tasks: list[Task], address: str
+) -> Iterator[tuple[int, Any]]:
+    """Do the tasks on a Dask cluster; yield number and outcome as they end.
+
+    Parameters
+    ----------
+    address : str
+        Of the scheduler, as in tcp://127.0.0.1:8786.
+    """
+    try:
+        from distributed import Client, as_completed
+    except ImportError as error:
+        raise SimulationError(
+            f"a cluster needs {error.name}: pip install 'percussion_model[study]'"
+        ) from None
+    try:
+        client = Client(address, timeout="10s")
+    except (OSError, ValueError) as error:
+        raise SimulationError(f"{address}: no Dask scheduler answers there ({error})") from None
+    with client:
+        running = {
+            client.submit(work, *task, pure=False): number for number, task in enumerate(tasks)
+        }
+        for future in as_completed(list(running)):
+            yield running.pop(future), future.result()

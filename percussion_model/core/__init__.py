@@ -1,1 +1,0 @@
-"""Kernels: numbers and records only."""

@@ -1,0 +1,107 @@
+"""The command `percussion`; what it can do is in `percussion_model.interface.commands`."""
+
+from __future__ import annotations
+
+import functools
+import sys
+from collections.abc import Callable
+from typing import Annotated, Any
+
+import typer
+
+from percussion_model.interface.commands.accuracy import accuracy
+from percussion_model.interface.commands.bench_controller import bench_controller
+from percussion_model.interface.commands.blow_map import blow_map
+from percussion_model.interface.commands.calibrate import calibrate
+from percussion_model.interface.commands.common import BAD_INPUT, INTERRUPTED, complain
+from percussion_model.interface.commands.compare import compare
+from percussion_model.interface.commands.couple import couple
+from percussion_model.interface.commands.effects import effects
+from percussion_model.interface.commands.paper import paper
+from percussion_model.interface.commands.scene import explain, new, plot, run
+from percussion_model.interface.commands.settled import settled
+from percussion_model.interface.commands.stability import stability
+from percussion_model.interface.commands.study import study
+from percussion_model.interface.quick_start import own_process
+
+app = typer.Typer(
+    help="Percussive drilling with travelling waves: piston, bit and rock, blow by blow.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        from percussion_model import __version__
+
+        typer.echo(f"percussion {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool,
+        typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version."),
+    ] = False,
+) -> None:
+    """Percussive drilling with travelling waves: piston, bit and rock, blow by blow."""
+
+
+def _interruptible(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Let `_guarded` know of Ctrl-C, after which typer would end without a word."""
+
+    @functools.wraps(command)
+    def call(*words: Any, **options: Any) -> Any:
+        try:
+            return command(*words, **options)
+        except KeyboardInterrupt:
+            raise typer.Abort from None
+
+    return call
+
+
+for _command in (
+    run,
+    settled,
+    study,
+    explain,
+    plot,
+    compare,
+    accuracy,
+    effects,
+    paper,
+    calibrate,
+    stability,
+    couple,
+    bench_controller,
+    new,
+):
+    app.command()(_interruptible(_command))
+app.command("blow-map")(_interruptible(blow_map))
+
+
+def main() -> None:
+    """Run the command line; errors are one message and an exit code."""
+    own_process()
+    sys.exit(_guarded(lambda: app(standalone_mode=False)))
+
+
+def _guarded(work: Callable[[], Any]) -> int:
+    """Turn errors that a user can mend into a message."""
+    try:
+        code = work()
+        return code if isinstance(code, int) else 0
+    except (KeyboardInterrupt, typer.Abort):
+        return complain("interrupted before there was a result", INTERRUPTED)
+    except Exception as error:
+        if type(error).__module__.startswith("percussion_model."):
+            return complain(str(error), BAD_INPUT)
+        # Bad arguments: typer hides the class of its errors, which show themselves.
+        show = getattr(error, "show", None)
+        if show is None:
+            raise
+        show()
+        return BAD_INPUT

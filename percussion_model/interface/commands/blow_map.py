@@ -1,0 +1,101 @@
+"""Make the table of the blow map, or tell about it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+from percussion_model.interface.commands.common import (
+    JsonFile,
+    SceneFile,
+    Settings,
+    check_json,
+    complain,
+    load_scene,
+    write_json,
+)
+
+if TYPE_CHECKING:
+    from percussion_model.scene.scene import Scene
+    from percussion_model.solvers.blow_map.table import BlowTable
+
+
+def blow_map(
+    scene: SceneFile,
+    action: Annotated[
+        Literal["build", "show", "where"],
+        typer.Argument(help="Make the table; tell about it; tell its file."),
+    ] = "build",
+    settings: Settings = None,
+    workers: Annotated[
+        int | None, typer.Option("--workers", min=1, help="Processes; left out: one a processor.")
+    ] = None,
+    json_file: JsonFile = None,
+) -> None:
+    """Make the table of blows that solver.fidelity = "blow-map" takes, and keep it."""
+    from percussion_model.analysis.blow_maps import kept_map, map_file
+
+    check_json(json_file)
+    chosen = load_scene(scene, settings=settings)
+    if action == "where":
+        typer.echo(str(map_file(chosen)))
+        return
+    table = ready_map(chosen, workers) if action == "build" else kept_map(chosen)
+    if json_file != "-":
+        _show(chosen, table)
+    write_json(json_file, _numbers(chosen, table))
+
+
+def ready_map(scene: Scene, workers: int | None = None) -> BlowTable:
+    """Table of a scene, made with a bar if it is not there yet.
+
+    Whatever of the scene lies outside is told first: making a table takes minutes.
+    """
+    from percussion_model.analysis.blow_maps import kept_map, make_map
+    from percussion_model.interface.terminal import count_bar
+
+    warn_of_outside(scene)
+    kept = kept_map(scene)
+    if kept is not None:
+        return kept
+    with count_bar("parts of the blow map") as progress:
+        return make_map(scene, progress, workers)
+
+
+def warn_of_outside(scene: Scene) -> None:
+    """Tell what of a scene its table would not answer."""
+    from percussion_model.analysis.blow_maps import outside_map
+
+    for text in outside_map(scene):
+        complain(f"warning: {text}")
+
+
+def _numbers(scene: Scene, table: BlowTable | None) -> dict[str, Any]:
+    """What there is to tell of a table, plain values."""
+    from percussion_model.analysis.blow_maps import map_file, node_count, outside_map
+
+    found: dict[str, Any] = {
+        "file": str(map_file(scene)),
+        "nodes": node_count(scene),
+        "made": table is not None,
+        "outside": outside_map(scene),
+    }
+    if table is not None:
+        names = ("loading_stiffness", "impact_velocity", "feed_force", "drive_force")
+        ranges = zip(names, table.lowest, table.highest, strict=True)
+        found["range"] = {name: [low, high] for name, low, high in ranges}
+        found["restless_nodes"] = table.restless
+        found["cells"] = table.cells
+    return found
+
+
+def _show(scene: Scene, table: BlowTable | None) -> None:
+    numbers = _numbers(scene, table)
+    typer.echo(f"{numbers['file']}: {'kept' if table is not None else 'not made yet'}")
+    typer.echo(f"{numbers['nodes']} blows")
+    if table is None:
+        return
+    for name, (low, high) in numbers["range"].items():
+        typer.echo(f"{name} {low:g} to {high:g} (SI)")
+    typer.echo(f"{numbers['restless_nodes']} of them refused: the bit does not come to rest")

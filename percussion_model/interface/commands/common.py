@@ -1,0 +1,151 @@
+"""What the commands share: options, reading a scene, messages."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+if TYPE_CHECKING:
+    from percussion_model.scene.scene import Scene
+
+BAD_INPUT = 2
+INTERRUPTED = 130  # what shells report for Ctrl-C
+
+SceneFile = Annotated[Path, typer.Argument(metavar="SCENE", help="A scene file (TOML).")]
+SolverName = Annotated[
+    Literal["wave", "fem", "rigid", "blow-map"] | None,
+    typer.Option("--solver", help="Solver; rigid makes piston and bit rigid."),
+]
+Cells = Annotated[int | None, typer.Option("--cells", help="Cells or elements in the piston.")]
+Settings = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="KEY=VALUE",
+        help="Set any parameter, as in rock.unloading_ratio=10; may be repeated.",
+    ),
+]
+Accuracy = Annotated[
+    float | None,
+    typer.Option("--accuracy", help="Wanted relative error of the rate, in place of cells."),
+]
+Check = Annotated[
+    bool | None, typer.Option("--check/--no-check", help="Verify --accuracy at half the step.")
+]
+Duration = Annotated[float | None, typer.Option("--duration", help="Simulated time, in s.")]
+Settle = Annotated[float | None, typer.Option("--settle", help="Time before blows count, in s.")]
+JsonFile = Annotated[
+    str | None,
+    typer.Option("--json", metavar="FILE|-", help="Write the summary as JSON; - for stdout."),
+]
+Out = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder for results.")]
+# Of commands that write without being told where; each says which folder that is.
+OutOrDefault = Annotated[
+    Path | None,
+    typer.Option("--out", metavar="DIR", help="Folder for what is written, in place of that."),
+]
+Tolerance = Annotated[
+    float, typer.Option("--tolerance", help="Relative change of a blow that is no change.")
+]
+
+
+def load_scene(
+    path: Path,
+    solver: str | None = None,
+    cells: int | None = None,
+    settings: list[str] | None = None,
+    accuracy: float | None = None,
+    check: bool | None = None,
+) -> Scene:
+    """Read a scene and apply what the command line changes."""
+    from percussion_model.interface.quick_start import load_numba
+    from percussion_model.scene.scene import Scene, read_setting
+
+    load_numba()
+    scene = Scene.from_toml(path)
+    changes: dict[str, Any] = dict(read_setting(text) for text in settings or ())
+    if solver is not None:
+        scene = scene.computed_by(solver, **changes)
+    elif changes:
+        scene = scene.replace(**changes)
+    asked = {"solver.accuracy": accuracy, "run.check": check}
+    scene = scene.replace(**{key: value for key, value in asked.items() if value is not None})
+    if cells is not None:
+        key = "fem.elements" if scene.solver_name == "fem" else "solver.cells"
+        scene = scene.replace(**{key: cells})
+    return scene
+
+
+def check_outputs(folder: Path | None, json_file: str | None) -> None:
+    """Refuse a folder or a file that could not be written, before anything is computed."""
+    from percussion_model.simulation.files import check_writable
+
+    if folder is not None:
+        check_writable(folder)
+    check_json(json_file)
+
+
+def check_json(json_file: str | None) -> None:
+    """Refuse a file that could not be written, before anything is computed."""
+    from percussion_model.simulation.files import check_writable
+
+    if json_file in (None, "-"):
+        return
+    if Path(json_file).is_dir():
+        raise refusal(f"--json {json_file!r}: is a folder; give the file to write, or - for stdout")
+    check_writable(Path(json_file).absolute().parent)
+
+
+def write_json(json_file: str | None, values: dict[str, Any]) -> None:
+    """Write plain values as JSON to a file, to stdout (-), or nowhere (None)."""
+    from percussion_model.simulation.files import staged_text, to_json
+
+    if json_file == "-":
+        typer.echo(to_json(values))
+    elif json_file is not None:
+        staged_text(Path(json_file), to_json(values) + "\n")
+
+
+@contextmanager
+def if_drawable() -> Iterator[None]:
+    """Draw figures, or say on stderr which package they lack: results count without them."""
+    try:
+        yield
+    except ImportError as error:
+        complain(needs_plot_extra(error))
+
+
+def tell_files(paths: Iterable[Path]) -> None:
+    """Name on stderr the files that were written."""
+    for path in paths:
+        print(f"wrote {path}", file=sys.stderr)
+
+
+def needs_plot_extra(error: ImportError) -> str:
+    """Say which package the figures lack and how to get it."""
+    return f"no figures, since {_needs_extra(error, 'plot')}"
+
+
+def needs_fmu_extra(error: ImportError) -> str:
+    """Say which package the coupling lacks and how to get it."""
+    return _needs_extra(error, "fmu")
+
+
+def _needs_extra(error: ImportError, extra: str) -> str:
+    return f"{error.name or error} is missing: pip install 'percussion_model[{extra}]'"
+
+
+def refusal(message: str) -> typer.Exit:
+    """Print one message on stderr; return what ends the command as bad input."""
+    return typer.Exit(complain(message, BAD_INPUT))
+
+
+def complain(message: str, code: int = 0) -> int:
+    """Print one message on stderr; return the exit code."""
+    print(f"percussion: {message}", file=sys.stderr)
+    return code

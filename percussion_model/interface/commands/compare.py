@@ -1,0 +1,48 @@
+"""One scene by several solvers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from percussion_model.interface.commands import common
+from percussion_model.interface.commands.blow_map import ready_map
+
+
+def compare(
+    scene: common.SceneFile,
+    solvers: Annotated[
+        str, typer.Option("--solvers", metavar="A,B", help="Solvers, the first to compare with.")
+    ] = "wave,fem,rigid",
+    duration: common.Duration = None,
+    settle: common.Settle = None,
+    settings: common.Settings = None,
+    out: common.OutOrDefault = None,
+    json_file: common.JsonFile = None,
+    figures: Annotated[bool, typer.Option(help="Draw the last blow of all solvers.")] = True,
+) -> None:
+    """Run a scene with several solvers: a table, and a figure in out/SCENE-compared."""
+    from percussion_model.analysis.comparison import compare as run_all
+    from percussion_model.analysis.comparison import read_solvers
+    from percussion_model.interface.commands.tables import show_comparison
+    from percussion_model.interface.terminal import progress_bar
+
+    names = read_solvers(solvers)
+    chosen = common.load_scene(scene, settings=settings)
+    folder = out or Path("out") / f"{scene.stem}-compared"
+    common.check_outputs(folder if figures else None, json_file)
+    if "blow-map" in names:
+        ready_map(chosen)
+    end = chosen.run.duration if duration is None else duration
+    with progress_bar(end * len(names)) as progress:
+        found = run_all(chosen, names, duration, settle, progress)
+    common.write_json(json_file, found.to_dict())
+    if json_file != "-":
+        show_comparison(found)
+    if figures:
+        with common.if_drawable():
+            from percussion_model.interface.plotting.comparison import save_comparison
+
+            common.tell_files(save_comparison(found, folder))

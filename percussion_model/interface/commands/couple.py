@@ -1,0 +1,93 @@
+"""A system of FMUs from an SSP archive."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from percussion_model.interface.commands import common
+
+SystemFile = Annotated[Path, typer.Argument(metavar="SYSTEM.ssp", help="A system (SSP 1.0).")]
+UNITS = {
+    "time": "s", "step": "s", "depth": "m", "rate_second_half": "m/s", "shoulder_energy": "J",
+    "feed_work": "J", "hammer_energy_residual": "of the energy put in",
+    "string_energy_residual": "of the energy put in", "shoulder_by_blows": "of the blows",
+}  # fmt: skip
+# Rows of a run that is not told otherwise.
+ROWS = 5000
+
+
+def couple(
+    system: SystemFile,
+    duration: Annotated[float, typer.Option("--duration", help="Simulated time, in s.")] = 6.0,
+    step: Annotated[float, typer.Option("--step", help="Communication step, in s.")] = 1e-3,
+    interval: Annotated[
+        float | None, typer.Option("--interval", help=f"Time between rows, in s; else {ROWS} rows.")
+    ] = None,
+    order: Annotated[
+        Literal["jacobi", "gauss-seidel"], typer.Option(help="Who sees what in a step.")
+    ] = "jacobi",
+    tolerance: Annotated[
+        float | None,
+        typer.Option("--tolerance", help="Take steps back whose error is larger, by the signals."),
+    ] = None,
+    every: Annotated[
+        list[str] | None,
+        typer.Option("--every", metavar="COMPONENT=STEPS", help="A slow part: steps as one."),
+    ] = None,
+    settings: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="COMPONENT.VARIABLE=VALUE", help="Set any parameter."),
+    ] = None,
+    signals: Annotated[
+        list[str] | None,
+        typer.Option("--signal", metavar="COMPONENT.VARIABLE", help="Keep this output too."),
+    ] = None,
+    out: common.OutOrDefault = None,
+    json_file: common.JsonFile = None,
+    figures: Annotated[bool, typer.Option(help="Draw the signals.")] = True,
+) -> int:
+    """Run a system of FMUs, an SSP archive: signals as CSV, balances, a figure.
+
+    Files go to out/SYSTEM.
+    """
+    from percussion_model.interface.terminal import progress_bar
+
+    try:
+        from percussion_model.coupling import Coupling
+        from percussion_model.coupling.balance import known_signals, summary
+        from percussion_model.coupling.files import read_pace, read_value, write_columns
+    except ImportError as error:
+        return common.complain(common.needs_fmu_extra(error), common.BAD_INPUT)
+    folder = out or Path("out") / system.stem
+    common.check_outputs(folder, json_file)
+    coupling = Coupling(
+        system,
+        dict(read_value(text) for text in settings or ()),
+        order=order,
+        every=dict(read_pace(text) for text in every or ()),
+    )
+    wanted = [*known_signals(coupling.outputs), *(signals or ())]
+    rows_every = max(step, duration / ROWS) if interval is None else interval
+    with progress_bar(duration) as progress:
+        run = coupling.run(
+            duration, step, wanted, rows_every, tolerance, progress, on_interrupt="keep"
+        )
+    found = summary(run)
+    path = write_columns(run, folder / "signals.csv")
+    common.write_json(json_file, found)
+    if json_file != "-":
+        for name, value in found.items():
+            if name != "error":  # told at the end
+                number = f"{value:.6g}" if isinstance(value, float) else value
+                typer.echo(f"{name:26s} {number} {UNITS.get(name, '')}".rstrip())
+    common.tell_files([path])
+    if figures:
+        with common.if_drawable():
+            from percussion_model.interface.plotting.coupled import save_coupled
+
+            common.tell_files([save_coupled(run, folder / "signals.png", system.stem)])
+    code = common.INTERRUPTED if run.interrupted else 1
+    return common.complain(f"the run ended early, {run.error}", code) if run.error else 0

@@ -1,0 +1,153 @@
+"""What each effect of a scene costs and changes."""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from percussion_model.interface.commands import common
+
+if TYPE_CHECKING:
+    from percussion_model.analysis.effects import EffectsStudy, Trial
+
+
+def effects(
+    scene: common.SceneFile,
+    duration: common.Duration = None,
+    settle: common.Settle = None,
+    solver: common.SolverName = None,
+    cells: common.Cells = None,
+    settings: common.Settings = None,
+    out: common.OutOrDefault = None,
+    json_file: common.JsonFile = None,
+    figures: Annotated[bool, typer.Option(help="Draw cost and change as bars.")] = True,
+) -> None:
+    """Turn each effect off, or on, in turn: what it costs and what it changes.
+
+    Prints a table, and draws a figure in out/SCENE-effects.
+    """
+    from percussion_model.analysis.effects import study_effects
+
+    chosen = common.load_scene(scene, solver, cells, settings)
+    folder = out or Path("out") / f"{scene.stem}-effects"
+    common.check_outputs(folder if figures else None, json_file)
+    found = study_effects(chosen, duration, settle, _report)
+    common.write_json(json_file, found.to_dict())
+    if json_file != "-":
+        show_effects(found)
+    if figures:
+        with common.if_drawable():
+            from percussion_model.interface.plotting.effects import save_effects
+
+            common.tell_files(save_effects(found, folder))
+
+
+def _report(what: str, share: float) -> None:
+    """Say on a terminal what is done next."""
+    if sys.stderr.isatty():
+        print(f"\r\033[K{share:4.0%} {what}", end="" if share < 1.0 else "\n", file=sys.stderr)
+
+
+# A longer name of an effect takes two lines.
+LONGEST_NAME = 15
+# More characters than any table has.
+ENDLESS = 1000
+
+# Columns: heading, and what stands in it.
+_COLUMNS: dict[str, Callable[[EffectsStudy, Trial, dict[str, Any]], str]] = {
+    "step\nns": lambda study, trial, row: (
+        _number(row["step_time"], 1e9, 3) + (" dearer" if study.dearer(trial) else "")
+    ),
+    "run\ns": lambda study, trial, row: _number(row["wall_time"], 1.0, 2),
+    "blow\nms": lambda study, trial, row: _number(row["blow_time"], 1e3, 2),
+    "events": lambda study, trial, row: f"{row['events']}",
+    "rate\nmm/s": lambda study, trial, row: rate(row),
+    "rate\n%": lambda study, trial, row: _change(study, trial, "rate_of_penetration"),
+    "period\n%": lambda study, trial, row: _change(study, trial, "blow_period"),
+    "peak\n%": lambda study, trial, row: _change(study, trial, "peak_bit_force"),
+}
+
+
+def table_of(found: EffectsStudy) -> tuple[list[str], list[list[str]], dict[str, str]]:
+    """Headings, rows and the reasons of what is not shown, as text."""
+    rows, reasons = [], {}
+    for trial in (found.base, *found.trials):
+        numbers = trial.numbers()
+        name = f"{trial.turn.effect} {trial.turn.turned}".strip()
+        rows.append([name, *(show(found, trial, numbers) for show in _COLUMNS.values())])
+        if trial.reason:
+            reasons[name] = trial.reason
+    return ["", *_COLUMNS], rows, reasons | found.refused
+
+
+def show_effects(found: EffectsStudy) -> None:
+    """Print the table, and why something is missing from it."""
+    from rich.box import SIMPLE_HEAD
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.table import Table
+
+    headings, rows, reasons = table_of(found)
+    table = Table(
+        title=escape(found.scene.title) or None,
+        title_justify="left",
+        box=SIMPLE_HEAD,
+        show_edge=False,
+        padding=(0, 1, 0, 0),
+    )
+    for k, heading in enumerate(headings):
+        table.add_column(heading, justify="right" if k else "left", no_wrap=True)
+    for name, *cells in rows:
+        table.add_row(_broken(name), *cells)
+    console = Console()
+    # In a narrow terminal lines are broken rather than numbers cut short.
+    whole = Console(width=ENDLESS).measure(table).maximum
+    Console(width=max(console.width, whole)).print(table)
+    for reason in dict.fromkeys(reasons.values()):
+        names = ", ".join(name for name, given in reasons.items() if given == reason)
+        console.print(f"[yellow]{escape(names)}:[/yellow] {escape(reason)}", highlight=False)
+
+
+def rate(row: dict[str, Any]) -> str:
+    """Rate of penetration [mm/s], with its standard error where it matters."""
+    value, error = row["rate_of_penetration"], row["rate_of_penetration_standard_error"]
+    if value is None:
+        return "-"
+    shown = f"{1e3 * value:.4g}"
+    if error <= 1e-3 * abs(value):
+        return shown
+    return with_error(1e3 * value, 1e3 * error) if error < abs(value) else "undecided"
+
+
+def with_error(value: float, error: float) -> str:
+    """Show a value to the one digit that its error is known to: 17.5 ± 0.4, or 40 ± 30."""
+    place = math.floor(math.log10(float(f"{error:.0e}")))
+    digits = max(-place, 0)
+    return f"{round(value, -place):.{digits}f} ± {round(error, -place):.{digits}f}"
+
+
+def _broken(name: str) -> str:
+    """Two lines of a long name."""
+    first, _, last = name.partition(" ")
+    return f"{first}\n  {last}" if len(name) > LONGEST_NAME else name
+
+
+def _number(value: float | None, factor: float, digits: int) -> str:
+    """So many digits, without an exponent where the number is large."""
+    return "-" if value is None else f"{float(f'{factor * value:.{digits}g}'):g}"
+
+
+def _change(found: EffectsStudy, trial: Trial, name: str) -> str:
+    if trial is found.base:
+        return ""
+    change = found.changes(trial)[name]
+    if change is None:
+        return "-"
+    decimals = 2 if abs(change) < 0.1 else 1 if abs(change) < 1.0 else 0
+    shown = f"{100.0 * change:+.{decimals}f}"
+    return "0.00" if float(shown) == 0.0 else shown

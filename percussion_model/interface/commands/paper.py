@@ -1,0 +1,103 @@
+"""The figures and statements of the paper, one after the other."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from percussion_model.interface.commands.common import (
+    JsonFile,
+    check_outputs,
+    needs_plot_extra,
+    refusal,
+    write_json,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from percussion_model.analysis.comparison import Comparison
+    from percussion_model.analysis.study import Study
+
+
+def paper(
+    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the results.")],
+    processes: Annotated[
+        int | None, typer.Option("--processes", min=1, help="For the sweeps; default: all cores.")
+    ] = None,
+    json_file: JsonFile = None,
+) -> None:
+    """Reproduce figures 6 to 9 of the paper, and check what it says one by one."""
+    from percussion_model.interface.commands.tables import show_statements
+    from percussion_model.interface.quick_start import load_numba
+
+    check_outputs(out, json_file)
+    load_numba()
+    try:
+        from percussion_model.interface.plotting.activation import draw_activation
+        from percussion_model.interface.plotting.comparison import draw_comparison
+        from percussion_model.interface.plotting.motion import draw_motion
+        from percussion_model.interface.plotting.paper import draw_drops, draw_sweeps
+        from percussion_model.interface.plotting.style import save_figures
+        from percussion_model.interface.plotting.window import last_blow_window
+    except ImportError as error:
+        raise refusal(needs_plot_extra(error)) from None
+    from percussion_model.verification.paper import paper_scene
+    from percussion_model.verification.paper.drop import run_drops
+    from percussion_model.verification.paper.statements import (
+        about_cycle,
+        about_drops,
+        about_sweeps,
+    )
+
+    drops = run_drops(paper_scene())
+    sweeps = _sweeps(out, processes)
+    both = _cycle()
+    windows = {name: last_blow_window(result) for name, result in both.results.items()}
+
+    def figures() -> Iterator[tuple[str, Figure]]:
+        yield "figure6", draw_drops(drops)
+        yield "figures7and8", draw_comparison(both)
+        for name, window in windows.items():
+            yield f"figure7_{name}", draw_motion(window)
+            yield f"figure8_{name}", draw_activation(window)
+        yield "figure9", draw_sweeps(sweeps)
+
+    save_figures(figures, out)
+    said = list(about_drops(drops))
+    for name, window in windows.items():
+        said += about_cycle(both.results[name], window.samples, window.origin)
+    said += about_sweeps(sweeps)
+    statements = {"statements": [one.to_dict() for one in said]}
+    write_json(json_file, statements)
+    write_json(str(out / "statements.json"), statements)
+    if json_file != "-":
+        show_statements(said)
+
+
+def _cycle() -> Comparison:
+    """Run the paper's scene by waves and by finite elements."""
+    from percussion_model.analysis.comparison import compare
+    from percussion_model.interface.terminal import progress_bar
+    from percussion_model.verification.paper import paper_scene
+
+    scene = paper_scene()
+    with progress_bar(2 * scene.run.duration) as progress:
+        return compare(scene, ("wave", "fem"), progress=progress)
+
+
+def _sweeps(out: Path, processes: int | None) -> dict[str, Study]:
+    from percussion_model.interface.terminal import count_bar
+    from percussion_model.verification.paper import paper_scene
+    from percussion_model.verification.paper.sweeps import SWEEPS, run_sweep
+
+    found = {}
+    for sweep in SWEEPS:
+        with count_bar(f"points of figure 9{sweep.name}") as progress:
+            folder = out / f"figure9{sweep.name}"
+            found[sweep.name] = run_sweep(paper_scene(), sweep, folder, processes, progress)
+        found[sweep.name].save(folder)
+    return found

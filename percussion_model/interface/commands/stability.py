@@ -1,0 +1,73 @@
+"""The hard cases by every solver."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from percussion_model.interface.commands.common import (
+    JsonFile,
+    Out,
+    check_outputs,
+    if_drawable,
+    tell_files,
+    write_json,
+)
+
+if TYPE_CHECKING:
+    from percussion_model.verification.hard_cases import Collection
+
+FAILED = 1
+
+
+def stability(
+    cases: Annotated[
+        list[str] | None, typer.Argument(metavar="[CASE]...", help="Cases; all if left out.")
+    ] = None,
+    solvers: Annotated[
+        str, typer.Option("--solvers", metavar="A,B", help="Solvers that run them.")
+    ] = "wave,fem,rigid",
+    share: Annotated[
+        float, typer.Option("--share", min=0.01, max=1.0, help="Share of each case's duration.")
+    ] = 1.0,
+    refined: Annotated[
+        bool, typer.Option("--refine/--no-refine", help="Run each on a finer grid as well.")
+    ] = True,
+    workers: Annotated[
+        int | None, typer.Option("--workers", min=0, help="Processes; 0: none but this one.")
+    ] = None,
+    out: Out = None,
+    json_file: JsonFile = None,
+) -> None:
+    """Run the hard cases by every solver: what must hold, and where solvers disagree."""
+    from percussion_model.interface.commands.tables import show_stability
+    from percussion_model.interface.terminal import count_bar
+    from percussion_model.verification.hard_cases import run_collection
+
+    check_outputs(out, json_file)
+    names = [name.strip() for name in solvers.split(",")]
+    with count_bar("runs of hard cases") as progress:
+        found = run_collection(cases or None, names, share, refined, workers, progress)
+    write_json(json_file, found.to_dict())
+    if json_file != "-":
+        show_stability(found)
+    if out is not None:
+        _write(found, out)
+    if found.failures():
+        raise typer.Exit(FAILED)
+
+
+def _write(found: Collection, folder: Path) -> None:
+    """Write the page and its figure into a folder."""
+    from percussion_model.simulation.files import staged_text
+    from percussion_model.verification.hard_cases.page import page
+
+    picture = None
+    with if_drawable():
+        from percussion_model.interface.plotting.stability import save_stability
+
+        picture = save_stability(found, folder / "images").relative_to(folder).as_posix()
+    staged_text(folder / "stability.md", page(found, picture))
+    tell_files([folder / "stability.md"])

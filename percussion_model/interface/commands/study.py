@@ -1,0 +1,119 @@
+"""The stationary response over a grid or a sample of parameters."""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from percussion_model.interface.commands.common import (
+    BAD_INPUT,
+    INTERRUPTED,
+    Cells,
+    SceneFile,
+    Settings,
+    SolverName,
+    Tolerance,
+    check_outputs,
+    complain,
+    load_scene,
+    needs_plot_extra,
+)
+
+if TYPE_CHECKING:
+    from percussion_model.analysis.study import Study
+
+# What writes tables and grids; asked for before hours of work, not after.
+NEEDED = ("pandas", "pyarrow", "xarray", "h5netcdf", "h5py", "threadpoolctl")
+
+
+def study(
+    scene: SceneFile,
+    over: Annotated[
+        list[str],
+        typer.Option(
+            "--over",
+            metavar="KEY=FIRST:LAST:COUNT",
+            help="Values of a parameter; COUNTlog for even steps of its logarithm, or KEY=A,B,C. "
+            "May be repeated: the study runs all combinations.",
+        ),
+    ],
+    out: Annotated[
+        Path, typer.Option("--out", metavar="DIR", help="Folder; an interrupted study goes on.")
+    ],
+    samples: Annotated[
+        int | None,
+        typer.Option("--samples", help="So many points of a Latin hypercube instead of the grid."),
+    ] = None,
+    seed: Annotated[int, typer.Option("--seed", help="Of the Latin hypercube.")] = 0,
+    solver: SolverName = None,
+    cells: Cells = None,
+    settings: Settings = None,
+    tolerance: Tolerance = 1e-4,
+    scatter: Annotated[
+        float,
+        typer.Option("--scatter", help="Relative standard error that will do for aperiodic rates."),
+    ] = 1e-3,
+    report: Annotated[bool, typer.Option(help="Write report.html as well.")] = True,
+    processes: Annotated[
+        int | None, typer.Option("--processes", min=1, help="On this machine; default: its cores.")
+    ] = None,
+    cluster: Annotated[
+        str | None,
+        typer.Option("--cluster", metavar="ADDRESS", help="Dask scheduler, as tcp://host:8786."),
+    ] = None,
+) -> None:
+    """Map the stationary response over parameters: points.parquet and points.nc."""
+    from percussion_model.analysis.study import grid, latin_hypercube, read_axis
+    from percussion_model.analysis.study import study as run_study
+    from percussion_model.interface.terminal import count_bar, show_study
+
+    missing = [name for name in NEEDED if importlib.util.find_spec(name) is None]
+    if missing:
+        words = f"a study needs {', '.join(missing)}: pip install 'percussion_model[study]'"
+        raise typer.Exit(complain(words, BAD_INPUT))
+    axes = dict(read_axis(text) for text in over)
+    if len(axes) < len(over):
+        raise typer.Exit(complain("--over: a key stands there twice", BAD_INPUT))
+    for text in settings or ():
+        if text.partition("=")[0] in axes:
+            raise typer.Exit(complain(f"--set {text}: --over varies this key", BAD_INPUT))
+    if samples is None:
+        points = grid(axes)
+    else:
+        logarithmic = [text.partition("=")[0] for text in over if text.endswith("log")]
+        ends = {key: (float(min(values)), float(max(values))) for key, values in axes.items()}
+        points = latin_hypercube(ends, samples, seed, logarithmic)
+    check_outputs(out, None)
+    chosen = load_scene(scene, solver, cells, settings)
+    try:
+        with count_bar("points") as progress:
+            found = run_study(
+                chosen,
+                points,
+                out,
+                tolerance,
+                scatter=scatter,
+                processes=processes,
+                cluster=cluster,
+                progress=progress,
+            )
+    except KeyboardInterrupt:
+        words = f"interrupted; finished points are kept in {out}, the same command goes on"
+        raise typer.Exit(complain(words, INTERRUPTED)) from None
+    show_study(found, [*found.save(out), *(_report(found, out) if report else ())])
+
+
+def _report(found: Study, folder: Path) -> list[Path]:
+    """Write the report; the results are safe already."""
+    try:
+        from percussion_model.interface.page import without_zoom
+        from percussion_model.interface.study_report import write_study_report
+    except ImportError as error:
+        complain(needs_plot_extra(error))
+        return []
+    if remark := without_zoom():
+        complain(remark)
+    return [write_study_report(found, folder)]

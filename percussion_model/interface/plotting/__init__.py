@@ -1,0 +1,89 @@
+"""Figures of a result, as PNG and SVG."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+from percussion_model.interface.plotting.activation import draw_activation
+from percussion_model.interface.plotting.motion import draw_motion
+from percussion_model.interface.plotting.overview import draw_overview
+from percussion_model.interface.plotting.stress import draw_stress
+from percussion_model.interface.plotting.style import save_figures
+from percussion_model.interface.plotting.window import (
+    NotRepeatable,
+    last_blow_window,
+    stress_fields,
+)
+from percussion_model.simulation.result import Result
+
+__all__ = ["CAPTIONS", "draw_figures", "figures"]
+
+# What each figure shows, in the order in which they are made.
+CAPTIONS = {
+    "overview": (
+        "The whole run, one point for each blow. The rate of penetration is the advance of the "
+        "mean bit position over a blow, divided by the blow's period."
+    ),
+    "bit_motion": (
+        "Mean motion of the bit and its force on the rock. Colours tell the drilling mode; grey "
+        "bands are times at which the piston rests on the bit. Displacements count from the start "
+        "of the blow (or from first contact), down positive; forces are positive in compression."
+    ),
+    "activation": (
+        "Piston and bit just after the impact. Letters mark where piston and bit close (A, C, …) "
+        "and part (B, D, …); u_r and v_r are the mean displacement and velocity of the piston "
+        "relative to the bit, down positive."
+    ),
+    "stress_waves": (
+        "Stress along the bars (top to bottom) against time, at every step of the solver. "
+        "Compression is red, tension blue. Waves move at the slope of the stripes; the black line "
+        "is thick where the piston touches the bit. Below: the forces at the two ends of the bit."
+    ),
+}
+# A run of fewer blows has no overview.
+FEWEST_BLOWS = 2
+
+
+def figures(result: Result, folder: str | Path) -> list[Path]:
+    """Draw all figures that a result supports, each as PNG and as SVG.
+
+    Parameters
+    ----------
+    result : Result
+    folder : str or Path
+        Made if it is not there; all figures are written, or none.
+
+    Returns
+    -------
+    list of Path
+        The files, in the order of `CAPTIONS`, PNG before SVG.
+    """
+    return save_figures(lambda: draw_figures(result), folder)
+
+
+def draw_figures(result: Result) -> Iterator[tuple[str, Figure]]:
+    """Draw the figures one by one, without writing them.
+
+    Yields
+    ------
+    name : str
+        A key of `CAPTIONS`.
+    figure : matplotlib.figure.Figure
+    """
+    if len(result.blows) >= FEWEST_BLOWS:
+        yield "overview", draw_overview(result)
+    try:
+        window = last_blow_window(result)
+    except NotRepeatable as error:
+        warnings.warn(f"no detailed figures: {error}", stacklevel=2)
+        return
+    yield "bit_motion", draw_motion(window)
+    if result.scene.piston.model != "absent":
+        yield "activation", draw_activation(window)
+    fields = stress_fields(window)
+    if fields:
+        yield "stress_waves", draw_stress(window, fields)

@@ -1,0 +1,123 @@
+"""A whole run, blow by blow."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from percussion_model.interface.plotting import style
+from percussion_model.interface.plotting.style import KN, MM, MS
+from percussion_model.simulation.result import Result
+
+# Blows beyond this number are drawn as lines without markers.
+MOST_MARKERS = 150
+# An axis never zooms in on less than this share of its values: settled is flat.
+LEAST_SPAN = 0.02
+
+
+def draw_overview(result: Result) -> Figure:
+    """Draw depth, rate, velocities, period, contacts and forces over the blows."""
+    fig = Figure(figsize=(10.0, 8.2), layout="constrained")
+    axes = fig.subplots(3, 2, sharex=True)
+    blows = result.blows
+    time = blows["time"]
+    _depth(axes[0, 0], result)
+    rate = blows["penetration"] / blows["period"]
+    _series(axes[0, 1], time, rate * MM, "rate [mm/s]", "Rate of penetration of each blow")
+    mean = result.summary()["rate_of_penetration"]
+    if mean is not None:
+        _rule(axes[0, 1], mean * MM, f"settled mean {mean * MM:.2f} mm/s")
+    _series(
+        axes[1, 0],
+        time,
+        blows["impact_velocity"],
+        "velocity [m/s]",
+        "Mean piston velocity at impact",
+    )
+    _series(axes[1, 1], time, blows["period"] * MS, "period [ms]", "Period of each blow")
+    _counts(axes[2, 0], blows)
+    _forces(axes[2, 1], blows)
+    for ax in axes.flat:
+        ax.axvspan(0.0, result.settle, color="#F0F0F0", linewidth=0, zorder=0)
+        ax.set_xlim(0.0, result.duration)
+    for ax in axes[:2].flat:
+        ax.set_xlabel("")
+    title = result.scene.title or "Percussive drilling"
+    style.head(fig, f"{title} — {len(blows)} blows in {result.duration:g} s")
+    if result.settle > 0:
+        fig.text(0.99, 0.99, "grey: settling, not averaged", ha="right", va="top", fontsize=8.5)
+    return fig
+
+
+def _marks(count: int) -> dict[str, Any]:
+    if count > MOST_MARKERS:
+        return {"linewidth": 0.9}
+    return {"marker": "o", "markersize": 2.6, "linewidth": 0.9}
+
+
+def _series(ax: Axes, time: np.ndarray, values: np.ndarray, unit: str, title: str) -> None:
+    ax.plot(time, values, color=style.BIT_COLOUR, **_marks(len(time)))
+    _keep_flat(ax, values)
+    style.label(ax, "time [s]", unit, title)
+
+
+def _keep_flat(ax: Axes, values: np.ndarray) -> None:
+    """Do not blow up the rounding of a settled series into a mountain range."""
+    finite = values[np.isfinite(values)]
+    if len(finite) == 0:
+        return
+    low, high = float(finite.min()), float(finite.max())
+    least = LEAST_SPAN * max(abs(low), abs(high))
+    room = max(0.08 * (high - low), 0.5 * (least - (high - low)))
+    if room > 0:
+        ax.set_ylim(low - room, high + room)
+    ax.ticklabel_format(axis="y", useOffset=False)
+
+
+def _rule(ax: Axes, value: float, text: str) -> None:
+    ax.axhline(value, color=style.MEAN_COLOUR, linewidth=1.0, linestyle="--", label=text)
+    ax.legend(loc="best")
+
+
+def _depth(ax: Axes, result: Result) -> None:
+    blows = result.blows
+    depth = blows["bit_position"] * MM
+    ax.plot(blows["time"], depth, color=style.BIT_COLOUR, **_marks(len(blows)))
+    style.label(ax, "time [s]", "depth gained [mm]", "Mean bit position at each blow")
+
+
+def _counts(ax: Axes, blows: np.ndarray) -> None:
+    for field, colour, marker, name in (
+        ("drilling_cycles", style.BIT_COLOUR, "s", "drilling cycles"),
+        ("contacts", style.PISTON_COLOUR, "o", "piston/bit contacts"),
+    ):
+        ax.plot(
+            blows["time"],
+            blows[field],
+            color=colour,
+            label=name,
+            linewidth=0.9,
+            marker=marker if len(blows) <= MOST_MARKERS else "",
+            markersize=2.0,
+        )
+    high = max(int(blows[f].max()) for f in ("drilling_cycles", "contacts"))
+    ax.set_ylim(-0.2, 1.35 * high + 0.5)
+    ax.yaxis.set_major_locator(MaxNLocator(integer=True))
+    ax.legend(loc="upper right", ncols=2)
+    style.label(ax, "time [s]", "number per blow [–]", "Contacts and drilling cycles")
+
+
+def _forces(ax: Axes, blows: np.ndarray) -> None:
+    peaks = [("peak_bit_force", style.BIT_COLOUR, "-", "bit on rock")]
+    if np.any(np.nan_to_num(blows["peak_contact_force"]) > 0):
+        peaks.append(("peak_contact_force", style.PISTON_COLOUR, "--", "piston on bit"))
+    for field, colour, dashes, name in peaks:
+        ax.plot(blows["time"], blows[field] / KN, dashes, color=colour, label=name)
+    high = max(float(np.nanmax(blows[field])) for field, *_ in peaks) / KN
+    ax.set_ylim(0.0, 1.3 * high or 1.0)
+    ax.legend(loc="upper right", ncols=2)
+    style.label(ax, "time [s]", "peak force [kN]", "Greatest forces of each blow")

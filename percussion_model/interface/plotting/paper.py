@@ -1,0 +1,177 @@
+"""Figures 6 and 9 of the paper."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from percussion_model.analysis.study import Study
+from percussion_model.interface.plotting import style
+from percussion_model.interface.plotting.style import KN, MM, MS
+from percussion_model.verification.paper.drop import DAMPINGS, ENERGIES, Drop
+from percussion_model.verification.paper.sweeps import (
+    PAPER_LEAST_DISTANCE,
+    PAPER_LEAST_FEED,
+    along,
+    power_law,
+    straight_line,
+)
+
+# Colours of the drop tests by barrier energy, light to dark.
+ENERGY_COLOURS = ("#9ECAE1", "#56B4E9", "#0072B2", "#08306B")
+DAMPING_LINES: tuple[object, ...] = ((0, (1.2, 1.2)), "-", (0, (4, 1.5)))
+# The part of a drop test worth seeing [s].
+DROP_SHOWN = 45e-3
+# Room above the greatest rate, as a factor on it.
+ROOM = 1.25
+# Error of a rate that is known well enough to set the scale, as a share of it.
+MOST_ERROR = 0.5
+PERIODIC_COLOUR, APERIODIC_COLOUR = "#0072B2", "#D55E00"
+
+
+def draw_drops(drops: Sequence[Drop]) -> Figure:
+    """Draw the drop tests: mean bit motion, and where the bit comes to rest (figure 6)."""
+    fig = Figure(figsize=(10.5, 4.4), layout="constrained")
+    motion, rest = fig.subplots(1, 2)
+    middle = DAMPINGS[len(DAMPINGS) // 2]
+    for drop in drops:
+        shown = drop.time <= DROP_SHOWN
+        colour = ENERGY_COLOURS[ENERGIES.index(drop.energy)]
+        if drop.damping == middle:
+            motion.plot(drop.time[shown] * MS, drop.bit_position[shown] * MM, color=colour)
+    motion.invert_yaxis()
+    title = f"Mean bit motion, $C_R$ = {middle:g} N s/m"
+    style.label(motion, "time [ms]", "mean bit displacement, down [mm]", title)
+    for damping, dashes in zip(DAMPINGS, DAMPING_LINES, strict=True):
+        row = [drop for drop in drops if drop.damping == damping]
+        energies, ends = [drop.energy for drop in row], [drop.rest * MM for drop in row]
+        name = f"$C_R$ = {damping:g} N s/m"
+        rest.semilogx(energies, ends, linestyle=dashes, color="black", marker="o", label=name)
+    rest.legend()
+    style.label(
+        rest,
+        "energy barrier $W_R$ [J]",
+        "bit end at rest, down [mm]",
+        "Penetration when the bit has come to rest",
+    )
+    handles = [
+        Line2D([], [], color=colour, linewidth=2.0, label=f"$W_R$ = {energy:g} J")
+        for energy, colour in zip(ENERGIES, ENERGY_COLOURS, strict=True)
+    ]
+    style.head(fig, "Drop test of the bit at 5.25 m/s (figure 6)", handles)
+    return fig
+
+
+def draw_sweeps(found: Mapping[str, Study]) -> Figure:
+    """Draw the rate of penetration around the reference (figure 9)."""
+    fig = Figure(figsize=(10.5, 7.6), layout="constrained")
+    axes = fig.subplots(2, 2).ravel()
+    _stiffness(axes[0], found["a"])
+    _ratio(axes[1], found["b"], found["b_table"], found["b_text"])
+    _feed(axes[2], found["c"])
+    _distance(axes[3], found["d"])
+    handles = [
+        Line2D([], [], linestyle="", marker="o", color=colour, label=name)
+        for name, colour in (("periodic", PERIODIC_COLOUR), ("aperiodic", APERIODIC_COLOUR))
+    ]
+    handles.append(Line2D([], [], color=style.RULE_COLOUR, linestyle="--", label="fit"))
+    style.head(fig, "Rate of penetration around the reference (figure 9)", handles)
+    return fig
+
+
+def _points(ax: Axes, found: Study, factor: float = 1.0) -> None:
+    x, rate, periodic = along(found)
+    error = found.rows["rate_of_penetration_error"]
+    for colour, chosen in ((PERIODIC_COLOUR, periodic), (APERIODIC_COLOUR, ~periodic)):
+        ax.errorbar(
+            x[chosen] * factor,
+            rate[chosen] * MM,
+            error[chosen] * MM,
+            linestyle="",
+            marker="o",
+            markersize=3.5,
+            color=colour,
+            elinewidth=1.0,
+        )
+    # What is known no better than that may leave the picture.
+    known = error < MOST_ERROR * np.abs(rate)
+    ax.set_ylim(0.0, ROOM * float(np.max(rate[known])) * MM)
+
+
+def _fit(ax: Axes, x: np.ndarray, y: np.ndarray, words: str, at: tuple[float, float]) -> None:
+    ax.plot(x, y * MM, color=style.RULE_COLOUR, linestyle="--", zorder=1)
+    ax.annotate(words, at, xycoords="axes fraction", va="top")
+
+
+RATE = "rate of penetration [mm/s]"
+
+
+def _stiffness(ax: Axes, found: Study) -> None:
+    _points(ax, found, 1e-6)
+    x, rate, _ = along(found)
+    exponent, factor = power_law(x, rate)
+    words = f"$\\sim K_R^{{{exponent:.3f}}}$ (paper: −0.55)"
+    _fit(ax, x * 1e-6, factor * x**exponent, words, (0.35, 0.8))
+    ax.set_xscale("log")
+    style.label(ax, "loading stiffness $K_R$ [kN/mm]", RATE, "(a) Loading stiffness of the rock")
+
+
+def _ratio(ax: Axes, found: Study, by_table: Study, by_text: Study) -> None:
+    _points(ax, found)
+    for elements, marker, name in (
+        (by_table, "x", "finite elements, $K_C$ of Table II"),
+        (by_text, "+", "finite elements, $K_C$ of the text"),
+    ):
+        x, rate, _ = along(elements)
+        line = f"{marker}-"
+        ax.plot(x, rate * MM, line, color="#444444", markersize=5.0, linewidth=0.8, label=name)
+    ax.legend(loc="upper left")
+    ax.set_xscale("log")
+    ax.axvline(40.0, color=style.RULE_COLOUR, linestyle=":")
+    _say_left(ax, 40.0, "paper: greatest rate")
+    style.label(ax, "unloading by loading stiffness $\\gamma$ [-]", RATE, "(b) Unloading stiffness")
+
+
+def _feed(ax: Axes, found: Study) -> None:
+    _points(ax, found, 1.0 / KN)
+    x, rate, _ = along(found)
+    above = x >= PAPER_LEAST_FEED
+    slope, intercept, _explained = straight_line(x[above], rate[above])
+    words = f"${slope * 1e6:.3f}\\,F_S$ [kN] + {intercept * MM:.2f}"
+    _fit(ax, x[above] / KN, slope * x[above] + intercept, words, (0.35, 0.8))
+    _paper_limit(ax, PAPER_LEAST_FEED / KN)
+    ax.set_xscale("log")
+    style.label(ax, "feed force $F_S$ [kN]", RATE, "(c) Feed force")
+
+
+def _distance(ax: Axes, found: Study) -> None:
+    _points(ax, found, MM)
+    x, rate, _ = along(found)
+    above = x >= PAPER_LEAST_DISTANCE
+    exponent, factor = power_law(x[above], rate[above])
+    words = f"$\\sim D_1^{{{exponent:.3f}}}$ (paper: −0.36)"
+    _fit(ax, x[above] * MM, factor * x[above] ** exponent, words, (0.5, 0.75))
+    _paper_limit(ax, PAPER_LEAST_DISTANCE * MM)
+    ax.set_xscale("log")
+    style.label(ax, "reversal distance $D_1$ [mm]", RATE, "(d) Frequency, at constant power")
+
+
+def _paper_limit(ax: Axes, x: float) -> None:
+    ax.axvline(x, color=style.RULE_COLOUR, linestyle=":")
+    _say_left(ax, x, "paper:\naperiodic")
+
+
+def _say_left(ax: Axes, x: float, words: str) -> None:
+    """Write words left of a vertical line, near the foot of the panel."""
+    ax.annotate(
+        words,
+        (x, 0.04),
+        (-4, 0),
+        xycoords=ax.get_xaxis_transform(),
+        textcoords="offset points",
+        ha="right",
+    )

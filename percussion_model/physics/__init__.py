@@ -1,0 +1,1 @@
+"""The equations that every solver shares, each once."""

@@ -1,0 +1,140 @@
+"""Rows of the event list and of the blow table.
+
+A blow starts at the first closure of the piston/bit gap after the downward
+switch of the drive; without a switching drive, after the gap was open for 20
+bar transits (docs/model.md, section 7).
+"""
+
+from __future__ import annotations
+
+import math
+
+from percussion_model.physics.kernel import inlined, kernel, merged
+from percussion_model.physics.records import DriveKind, EventKind, Mode
+from percussion_model.physics.state import CHECKPOINTS
+
+SS = int(Mode.SS)
+PRESSURE = int(DriveKind.PRESSURE)
+CONTACT_CLOSED = int(EventKind.CONTACT_CLOSED)
+CONTACT_OPENED = int(EventKind.CONTACT_OPENED)
+
+# The standstill force is the mean over this last share of the standstill.
+LAST_SHARE = 0.1
+
+
+@inlined
+def push_event(s, events, time, kind, value):
+    """Append a row to the event list, where one is kept."""
+    s.count_events += 1
+    if s.live == 1 and s.events_on == 1:
+        row = events[s.n_events]
+        row.time = time
+        row.kind = kind
+        row.value = value
+        row.bit_position = s.x_r + s.p
+        s.n_events += 1
+
+
+@inlined
+def push_checkpoint(s, time):
+    """Note the running bit impulse during standstill."""
+    k = s.n_check % CHECKPOINTS
+    s.check_time[k] = time
+    s.check_impulse[k] = s.i_bit
+    s.n_check += 1
+
+
+@merged
+def standstill_force(s, time, impulse):
+    """Mean bit force over the last tenth of the standstill that ends at `time`.
+
+    Parameters
+    ----------
+    impulse : float
+        Running bit impulse at `time` [N s].
+
+    Returns
+    -------
+    float
+        Force [N]; NaN where the bit does not stand still.
+    """
+    if s.mode != SS or s.n_check == 0:
+        return math.nan
+    begin = time - LAST_SHARE * (time - s.t_standstill)
+    later_time = time
+    later_impulse = impulse
+    for back in range(1, min(s.n_check, CHECKPOINTS) + 1):
+        k = (s.n_check - back) % CHECKPOINTS
+        if s.check_time[k] <= begin:
+            share = (begin - s.check_time[k]) / (later_time - s.check_time[k])
+            at_begin = s.check_impulse[k] + share * (later_impulse - s.check_impulse[k])
+            return (impulse - at_begin) / (time - begin)
+        later_time = s.check_time[k]
+        later_impulse = s.check_impulse[k]
+    if later_time < time:
+        return (impulse - later_impulse) / (time - later_time)
+    return math.nan
+
+
+@merged
+def finish_blow(s, blows, time, bit_position, mass_p):
+    """Write the row of the blow that ends at `time`."""
+    row = blows[s.n_blows]
+    row.time = s.b_time
+    row.period = time - s.b_time
+    row.impact_velocity = s.b_impact
+    row.rebound_velocity = s.b_rebound
+    row.stroke = s.b_stroke
+    row.blow_energy = 0.5 * mass_p * s.b_impact * s.b_impact
+    row.rock_energy = s.rock_work - s.b_rock0
+    row.penetration = bit_position - s.b_position
+    row.bit_position = s.b_position
+    row.peak_contact_force = s.b_peak_contact
+    row.peak_bit_force = s.b_peak_bit
+    row.standstill_force = s.b_standstill
+    row.contact_impulse = s.i_contact - s.b_contact0
+    row.bit_impulse = s.i_bit - s.b_bit0
+    row.drive_impulse = s.i_drive - s.b_drive0
+    row.contacts = s.b_contacts
+    row.drilling_cycles = s.b_cycles
+    s.n_blows += 1
+
+
+@kernel
+def start_blow(s, blows, time, piston_velocity, bit_position, impulse, mass_p):
+    """End the blow under way, if any, and start the next at `time`.
+
+    Parameters
+    ----------
+    piston_velocity : float
+        Mean velocity of the piston at the closure [m/s].
+    bit_position : float
+        Mean displacement of the bit at the closure [m].
+    impulse : float
+        Running bit impulse at the closure [N s].
+    """
+    if s.live == 1 and s.b_started == 1:
+        finish_blow(s, blows, time, bit_position, mass_p)
+    s.b_standstill = standstill_force(s, time, impulse)
+    s.b_started = 1
+    s.count_blows += 1
+    s.armed = 0
+    s.b_time = time
+    s.b_impact = piston_velocity
+    s.b_rebound = math.nan
+    s.b_stroke = 0.0
+    s.b_peak_contact = 0.0
+    s.b_peak_bit = 0.0
+    s.b_position = bit_position
+    s.b_rock0 = s.rock_work
+    s.b_contact0 = s.i_contact
+    s.b_bit0 = s.i_bit
+    s.b_drive0 = s.i_drive
+    s.b_contacts = 0
+    s.b_cycles = 0
+
+
+@merged
+def starts_blow(par, s, time):
+    """Whether a closure of the gap at `time` starts a blow."""
+    return s.armed == 1 or (par.drive != PRESSURE and time - s.t_open >= par.rearm_time)

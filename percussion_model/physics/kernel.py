@@ -1,0 +1,77 @@
+"""The decorators of every kernel."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+from numba import njit
+
+STAMP = "kernels.sha256"
+
+
+def drop_stale_kernels(folder: Path) -> None:
+    """Delete compiled kernels below `folder` where one of the sources there has changed.
+
+    Numba's cache looks at the file of a function alone, not at those of the
+    functions that it calls; after an edit or an update it would go on with
+    old code. A cache that the user keeps elsewhere is left alone.
+    """
+    if os.environ.get("NUMBA_CACHE_DIR"):
+        return
+    digest = hashlib.sha256()
+    for source in sorted(folder.rglob("*.py")):
+        digest.update(source.read_bytes())
+    stamp = Path(__file__).parent / "__pycache__" / STAMP
+    try:
+        if stamp.is_file() and stamp.read_text() == digest.hexdigest():
+            return
+        for compiled in [*folder.rglob("*.nbi"), *folder.rglob("*.nbc")]:
+            compiled.unlink(missing_ok=True)
+        stamp.parent.mkdir(exist_ok=True)
+        stamp.write_text(digest.hexdigest())
+    except OSError:
+        return  # a folder that cannot be written holds no cache of ours
+
+
+drop_stale_kernels(Path(__file__).parents[1])
+
+
+_entries: dict[Callable, Callable] = {}
+
+
+def entry_of(function: Callable) -> Callable:
+    """Where a call of a compiled function ends up, or the function itself.
+
+    Numba looks at the types of all arguments at every call, which takes longer than a
+    short kernel where they are records. For callers whose arguments never change their
+    types, not from object to object either: nothing looks at them any more.
+    """
+    overloads = getattr(function, "overloads", {})
+    if len(overloads) != 1:
+        return function
+    if function not in _entries:  # to find it takes a while as well
+        (compiled,) = overloads.values()
+        _entries[function] = getattr(compiled, "entry_point", function)
+    return _entries[function]
+
+
+# `_nrt=False` leaves out numba's runtime: arrays are passed without reference
+# counting (which took most of a step's time), and a kernel that allocates does
+# not compile, so that it can always be built ahead of time.
+kernel = njit(cache=True, error_model="numpy", _nrt=False)
+
+# For what calls other libraries, which may wait for threads that want to run Python.
+letting_go = njit(cache=True, error_model="numpy", _nrt=False, nogil=True)
+
+# For what runs in every step: arrays cost nine words an argument to pass.
+inlined = njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+
+# For long recursions, whose latency counts: a product and a sum may be one operation
+# with one rounding. The bits are the same in every run of one build.
+fused = njit(cache=True, error_model="numpy", _nrt=False, forceinline=True, fastmath={"contract"})
+
+# For what is called from one place: compiled as part of its caller alone.
+merged = njit(cache=True, error_model="numpy", _nrt=False, inline="always")

@@ -1,0 +1,1 @@
+"""Scenes: the one table of parameters, and what follows from it."""

@@ -1,0 +1,1 @@
+"""Runs of a scene and what they found."""

@@ -1,0 +1,210 @@
+"""`Runner`: a state that goes through time, without a table of what happened."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from percussion_model.physics.records import BLOW, EVENT, SAMPLE_FIELDS, Status
+from percussion_model.scene.inputs import SimulationError, check_input
+from percussion_model.scene.rows import is_number
+from percussion_model.scene.rules import SceneRules
+from percussion_model.solvers import Solver, make_solver
+
+# Rows that one call of a kernel can fill; a full buffer is read out.
+_BLOW_ROOM = 64
+_EVENT_ROOM = 4096
+
+# Solvers whose kernels are compiled in this process; a scene does not change them.
+_compiled: set[str] = set()
+
+_DONE, _FULL = int(Status.DONE), (int(Status.BLOWS_FULL), int(Status.EVENTS_FULL))
+
+
+class Runner:
+    """A state of a scene that is advanced from time to time.
+
+    Reading is not touching: however an interval is divided into calls of
+    `advance`, and whatever is read between them, the bits are the same. Only
+    `set_inputs` commits the state, at the next grid point of the solver.
+
+    Parameters
+    ----------
+    scene : SceneRules
+    record_events : bool
+        Whether the kernels list events.
+    solver : Solver, optional
+        One that was made for an equal scene; solvers hold no state.
+    """
+
+    def __init__(
+        self, scene: SceneRules, record_events: bool = True, solver: Solver | None = None
+    ) -> None:
+        began = time.perf_counter()
+        self.record_events = record_events
+        self.solver = solver or make_solver(scene)
+        self.wall_time = 0.0
+        self._scene_rules = scene
+        self._state = self.solver.new_state()
+        self._time = 0.0
+        self._blow_room = np.zeros(_BLOW_ROOM, BLOW)
+        self._event_room = np.zeros(_EVENT_ROOM if record_events else 1, EVENT)
+        self._can_sample = False
+        if solver is None and self.solver.name not in _compiled:
+            self._compile()
+            _compiled.add(self.solver.name)
+        self.setup_time = time.perf_counter() - began
+
+    def _compile(self) -> None:
+        """Run the kernels once, so that their compilation is not taken for computing."""
+        trial = self.solver.new_state()
+        t = 2.0 * (self.solver.time_step or 1e-9)
+        self.solver.advance(trial, t, self._blow_room, self._event_room, self.record_events)
+        self.solver.energy(trial, t)
+
+    @property
+    def time(self) -> float:
+        """Present time [s]."""
+        return self._time
+
+    def _keep(self, blows: np.ndarray, events: np.ndarray) -> None:
+        """Take what the kernels have listed; the rows are overwritten afterwards."""
+
+    def advance(self, t: float) -> None:
+        """Let the simulation run up to time `t` [s].
+
+        Raises
+        ------
+        SimulationError
+            If `t` lies in the past or is no time, or if the state does not
+            stay finite.
+        """
+        self._check_time(t)
+        began = time.perf_counter()
+        self._commit_up_to(float(t))
+        self._time = float(t)
+        self.wall_time += time.perf_counter() - began
+
+    def advance_blows(self, count: int, t: float) -> None:
+        """Let the simulation run until so many more blows have ended, or else up to `t` [s].
+
+        It stops before the next one ends; the waves do so at the next grid point. What
+        follows has the same bits as if it had not stopped there.
+
+        Parameters
+        ----------
+        count : int
+            At least 1.
+        t : float
+            As for `advance`, which raises the same errors.
+        """
+        self._check_time(t)
+        began = time.perf_counter()
+        while count > 0:
+            room = self._blow_room[:count]
+            status, found = self._go(self.solver.advance, float(t), room)
+            count -= found
+            if status == _DONE:
+                break
+        reached = float(t) if status == _DONE else self.solver.time(self._state)
+        self._time = max(self._time, reached)
+        self.wall_time += time.perf_counter() - began
+
+    def _check_time(self, t: float) -> None:
+        if not is_number(t):
+            raise SimulationError(f"t = {t!r}: must be a finite time in s")
+        if t < self._time:
+            raise SimulationError(f"t = {t!r} s: lies before the present time {self._time!r} s")
+
+    def _commit_up_to(self, t: float) -> None:
+        self._let(self.solver.advance, t)
+
+    def _let(self, solver_goes: Callable[..., tuple[int, int, int]], t: float) -> None:
+        """Let the solver go on to `t`, and read its rows out whenever they are full."""
+        while self._go(solver_goes, t, self._blow_room)[0] != _DONE:
+            pass
+
+    def _go(
+        self, solver_goes: Callable[..., tuple[int, int, int]], t: float, room: np.ndarray
+    ) -> tuple[int, int]:
+        """Let the solver go on until its rows are full; `Status`, and how many blows."""
+        status, n_blows, n_events = solver_goes(
+            self._state, t, room, self._event_room, self.record_events
+        )
+        if n_blows or n_events:
+            self._keep(room[:n_blows], self._event_room[:n_events])
+        if status == _DONE or status in _FULL:
+            return status, n_blows
+        where = f"at t = {self.solver.time(self._state)!r} s"
+        refusal = getattr(self.solver, "refusal", None)
+        if refusal is not None and status == Status.REFUSED:
+            raise SimulationError(f"after t = {self._time!r} s {refusal(self._state)}")
+        if status == Status.NOT_FINITE:
+            raise SimulationError(f"{where} the state is no longer finite: check the scene")
+        raise SimulationError(f"{where} the solver found no way on ({Status(status).name.lower()})")
+
+    def sample_rows(self, times: np.ndarray) -> np.ndarray:
+        """Advance through rising `times` and tell what it is like at each.
+
+        Returns
+        -------
+        ndarray, shape (len(times), len(SAMPLE_FIELDS))
+        """
+        if np.any(np.diff(times) < 0):
+            raise SimulationError("times must not fall")
+        if len(times):
+            self._check_time(float(times[0]))
+            self._check_time(float(times[-1]))
+        rows = np.empty((len(times), len(SAMPLE_FIELDS)))
+        self._compile_sample()
+        began = time.perf_counter()
+        done = 0
+        while done < len(times):
+            self._commit_up_to(float(times[done]))
+            horizon = self.solver.readable_until(self._state)
+            end = max(done + 1, int(np.searchsorted(times, horizon, side="right")))
+            self._read(times[done:end], rows[done:end])
+            done = end
+        if len(times):
+            self._commit_up_to(float(times[-1]))
+            self._time = float(times[-1])
+        self.wall_time += time.perf_counter() - began
+        return rows
+
+    def _read(self, times: np.ndarray, rows: np.ndarray) -> None:
+        # After a change of inputs the state may lie a step ahead of the present.
+        here = np.maximum(times, self.solver.time(self._state))
+        self.solver.sample(self._state, here, rows)
+        rows[:, 0] = times
+
+    def _compile_sample(self) -> None:
+        if not self._can_sample:
+            self._read(np.array([self._time]), np.empty((1, len(SAMPLE_FIELDS))))
+            self._can_sample = True
+
+    def _checked(self, inputs: dict[str, float]) -> dict[str, float]:
+        """The inputs as numbers; raises `SimulationError` if one is not allowed."""
+        return {name: check_input(self._scene_rules, name, value) for name, value in inputs.items()}
+
+    def set_inputs(self, **inputs: float) -> None:
+        """Change inputs at the first grid point from now on.
+
+        Parameters
+        ----------
+        **inputs
+            feed_force, drive_force, external_force [N] and reversal_distance
+            [m] act at once; loading_stiffness [N/m], unloading_ratio,
+            barrier_damping [N s/m] and barrier_energy [J] from the next
+            drilling cycle on. Bounds are those of the parameter table.
+        """
+        values = self._checked(inputs)
+        if not values:
+            return
+        began = time.perf_counter()
+        t = self.solver.grid_point_after(self._state, self._time)
+        self._commit_up_to(t)
+        self._let(self.solver.commit, t)
+        self.solver.set_inputs(self._state, **values)
+        self.wall_time += time.perf_counter() - began

@@ -1,0 +1,56 @@
+"""Compile all kernels once, so that later starts only load them.
+
+`python -m percussion_model.simulation.warm_up` is a part of the installation.
+"""
+
+from __future__ import annotations
+
+from concurrent.futures import ProcessPoolExecutor
+
+import numpy as np
+
+from percussion_model.scene.scene import Scene
+from percussion_model.simulation.stepping import Simulation
+from percussion_model.solvers.blow_map.records import ENTRIES
+from percussion_model.solvers.blow_map.solver import BlowMapSolver
+from percussion_model.solvers.blow_map.table import BlowTable, Nodes, fixed_values
+
+# Long enough for a contact, a change of mode and a reading [s].
+SHORT = 1e-4
+COARSE = {"blow_map.density": 0.1}
+SOLVERS = ("wave", "fem", "rigid")
+
+
+def compile_kernels(solver: str) -> str:
+    """Run a moment of the reference scene with one of the solvers."""
+    model = "rigid" if solver == "rigid" else "elastic"
+    changes = {"solver.name": solver, "piston.model": model, "bit.model": model}
+    simulation = Simulation(Scene().replace(**changes))
+    simulation.advance(SHORT)
+    simulation.observe()
+    simulation.energy()
+    return solver
+
+
+def empty_table(scene: Scene) -> BlowTable:
+    """A table of blows that do nothing: enough to compile what reads one."""
+    nodes = Nodes.of(scene)
+    return BlowTable(nodes, np.zeros((*nodes.counts, ENTRIES)), fixed_values(scene), {}, 0.0)
+
+
+def compile_blow_map() -> str:
+    """Make the solver of the blow map, which compiles its kernels, without a real table."""
+    scene = Scene().computed_by("blow-map", **COARSE)
+    return BlowMapSolver(scene, empty_table(scene)).name
+
+
+def main() -> None:
+    """Compile the kernels of all solvers, two at a time."""
+    with ProcessPoolExecutor(max_workers=2) as pool:
+        jobs = [pool.submit(compile_kernels, solver) for solver in SOLVERS]
+        for job in [*jobs, pool.submit(compile_blow_map)]:
+            job.result()
+
+
+if __name__ == "__main__":
+    main()

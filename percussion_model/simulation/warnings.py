@@ -1,0 +1,148 @@
+"""What the reader of a result must know before trusting it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from percussion_model.physics.records import EventKind
+from percussion_model.simulation.validity import (
+    button_note,
+    flight_note,
+    guard_notes,
+    ledger_note,
+    rate_note,
+)
+
+if TYPE_CHECKING:
+    from percussion_model.simulation.result import Result
+
+# A larger error of the wave speed shows in the answers.
+MOST_WAVE_SPEED_ERROR = 1e-3
+
+
+def find_warnings(result: Result) -> Iterator[str]:
+    """Go through the warnings that a result deserves."""
+    yield from _about_scene(result)
+    yield from _about_grid(result)
+    yield from _about_blows(result)
+    yield from _about_trust(result)
+    yield from _about_validity(result)
+
+
+def _about_scene(result: Result) -> Iterator[str]:
+    scene = result.scene
+    if scene.unused:
+        yield unused_note(scene.unused)
+    if scene.solver_name != "rigid" and not scene.loss_on:
+        if scene.barrier_on:
+            yield (
+                "structural loss is off: vibration trapped in the bit keeps its kinetic energy "
+                "above the energy barrier, the rate of penetration grows with refinement and "
+                "must not be trusted"
+            )
+        else:
+            yield (
+                "structural loss is off: vibration trapped in the bars never decays, so the "
+                "rate of penetration depends on the cells and must not be trusted"
+            )
+    least = least_loss_time(result)
+    if scene.loss_on and scene.solver_name == "wave" and scene.loss.time < least:
+        yield (
+            f"structural loss is small: at loss.time = {scene.loss.time:.3g} s the bit still "
+            "vibrates above the energy barrier when the next blow comes; the rate of penetration "
+            f"depends on the cells, and on the loss itself, up to some {least:.2g} s"
+        )
+
+
+def unused_note(keys: Iterable[str]) -> str:
+    """Say that parameters were given that nothing of the scene needs."""
+    return f"given, but without effect in this scene: {', '.join(keys)}"
+
+
+def least_loss_time(result: Result) -> float:
+    """Loss time that lets a blow's vibration fall below the energy barrier by the next [s].
+
+    The energy of a mode of frequency w falls as exp(-eta w^2 t). The lowest mode of a
+    free bit has w = pi / (transit time); what a blow can leave in it is at the most the
+    blow energy E. So eta = ln(E / W_R) / (w^2 T), T the period of the blows
+    (docs/undamped.md). Zero where there is no barrier, or no blow to tell.
+    """
+    scene, blows = result.scene, result.counted
+    if not (scene.barrier_on and scene.bit.model == "elastic" and len(blows)):
+        return 0.0
+    above = float(blows["blow_energy"].mean()) / scene.rock.barrier_energy
+    frequency = math.pi / scene.bit.transit_time
+    period = float(blows["period"].mean())
+    return math.log(above) / (frequency * frequency * period) if above > 1.0 else 0.0
+
+
+def _about_grid(result: Result) -> Iterator[str]:
+    error = result.wave_speed_error
+    if error > MOST_WAVE_SPEED_ERROR:
+        yield (
+            f"the lengths fit no common cell: wave speeds are off by up to {100 * error:.2g} %; "
+            "more solver.cells bring them closer"
+        )
+    if result.scene.loss_on:
+        for bar, count in result.cells.items():
+            if count == 1:
+                yield (
+                    f"the {bar} is a single cell: structural loss acts between cells, so it has "
+                    "none; set more solver.cells"
+                )
+
+
+def _about_blows(result: Result) -> Iterator[str]:
+    count = len(result.counted)
+    if result.scene.piston.model == "absent":
+        yield "there is no piston, so there are no blows: the rate of penetration is undefined"
+    elif len(result.blows) == 0:
+        yield "no whole blow in this run: the rate of penetration is undefined"
+    elif count < 3:
+        yield (
+            f"only {count} whole blow{'s' if count != 1 else ''} after settling, fewer than 3: "
+            "the rate of penetration is undefined; run longer"
+        )
+
+
+def _about_trust(result: Result) -> Iterator[str]:
+    if any(result.energy[name] for name in _FLOWS):
+        yield from ledger_note(result.energy["residual_relative"], result.solver)
+    yield from guard_notes(result.statistics)
+
+
+def _about_validity(result: Result) -> Iterator[str]:
+    scene = result.scene
+    if scene.effects.rock == "none":
+        return
+    if scene.effects.rock != "wall" and len(result.blows):
+        peak = float(result.blows["peak_bit_force"].max())
+        yield from button_note(peak, scene.rock.loading_stiffness)
+    if result.solver != "blow-map":  # there the bit stands on the rock between blows
+        yield from flight_note(longest_flight(result))
+    rate = result.rate_of_penetration
+    yield from rate_note(rate, result.rate_of_penetration_standard_error)
+    if scene.loss_on and scene.loss.time > scene.bit.transit_time:
+        yield (
+            f"loss.time = {scene.loss.time:.3g} s is longer than a wave takes through the bit: "
+            "that is no structural loss, and waves do not travel"
+        )
+
+
+def longest_flight(result: Result) -> float:
+    """Longest time without contact of bit and rock [s]; by whole blows without an event list."""
+    events = result.events
+    modes = events[events["kind"] <= EventKind.MODE_SS]
+    if not len(events) and result.statistics.get("events", 0):
+        off = result.blows["bit_impulse"] == 0.0
+        return float(result.blows["period"][off].max()) if off.any() else 0.0
+    times = np.concatenate([[0.0], modes["time"], [result.duration]])
+    flying = np.concatenate([[True], modes["kind"] == EventKind.MODE_FF])
+    return float(np.max(np.diff(times)[flying], initial=0.0))
+
+
+_FLOWS = ("initial", "drive", "feed", "gravity")

@@ -1,0 +1,1 @@
+"""A table of blows, and closed-form flight between them."""

@@ -1,0 +1,196 @@
+"""Makes the table of a blow map, keeps it on disk, and finds it again."""
+
+from __future__ import annotations
+
+import io
+import logging
+import os
+import shutil
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from percussion_model.scene.rules import SceneRules
+from percussion_model.solvers.blow_map.records import ENTRIES, Axis
+from percussion_model.solvers.blow_map.single_blow import SingleBlow
+from percussion_model.solvers.blow_map.table import (
+    BlowTable,
+    Nodes,
+    TableError,
+    fixed_values,
+    table_key,
+)
+
+VARIABLE = "PERCUSSION_CACHE"
+_log = logging.getLogger("percussion_model")
+
+Progress = Callable[[int, int], None]
+
+
+# fmu_src/runtime/start.py finds its folder in the same way: it runs before anything that an
+# FMU brings along can be imported.
+def cache_folder() -> Path:
+    """Folder for tables: that of the environment variable PERCUSSION_CACHE, or the user's."""
+    given = os.environ.get(VARIABLE)
+    if given:
+        return Path(given)
+    if sys.platform == "win32":
+        base = Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
+    elif sys.platform == "darwin":
+        base = Path.home() / "Library" / "Caches"
+    else:
+        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    return base / "percussion_model"
+
+
+def table_file(scene: SceneRules) -> Path:
+    """File that keeps the table of a scene, whether it is there or not."""
+    return cache_folder() / f"blow-map-{table_key(scene)}.npz"
+
+
+def kept_table(scene: SceneRules) -> BlowTable | None:
+    """Table of a scene from the cache; None where there is none, or a damaged one."""
+    path = table_file(scene)
+    try:
+        table = BlowTable.from_bytes(path.read_bytes())
+        table.refuse_other(fixed_values(scene))
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError) as error:
+        _log.warning("%s is not used: %s", path, error)
+        return None
+    return table
+
+
+def get_table(scene: SceneRules, progress: Progress | None = None, workers: int = 1) -> BlowTable:
+    """Table of a scene: from the cache, or made and kept there.
+
+    Parameters
+    ----------
+    scene : SceneRules
+    progress : callable, optional
+        Called with the slabs done and their number.
+    workers : int
+        Processes.
+    """
+    found = kept_table(scene)
+    if found is not None:
+        return found
+    path = table_file(scene)
+    _log.info("making the blow map %s", path)
+    table = build_table(scene, path.with_suffix(".part"), progress, workers)
+    try:
+        write_whole(path, table.to_bytes())
+    except OSError as error:
+        _log.warning("the blow map is not kept: %s", error)
+    return table
+
+
+def build_table(
+    scene: SceneRules, drafts: Path, progress: Progress | None = None, workers: int = 1
+) -> BlowTable:
+    """Make the table of a scene, slab by slab of equal stiffness.
+
+    Finished slabs lie in `drafts` until all are there, so that an interrupted build goes
+    on where it was.
+    """
+    nodes = Nodes.of(scene)
+    stiffness = nodes.values(Axis.STIFFNESS)
+    values = np.full((*nodes.counts, ENTRIES), np.nan, np.float32)
+    left = []
+    for i in range(len(stiffness)):
+        slab = _read_slab(drafts / f"{i}.npy", values.shape[1:])
+        if slab is None:
+            left.append(i)
+        else:
+            values[i] = slab
+    if progress is not None:
+        progress(len(stiffness) - len(left), len(stiffness))
+    for done, (i, slab) in enumerate(_slabs(scene, stiffness, left, workers), 1):
+        values[i] = slab
+        _keep_slab(drafts / f"{i}.npy", slab)
+        if progress is not None:
+            progress(len(stiffness) - len(left) + done, len(stiffness))
+    shutil.rmtree(drafts, ignore_errors=True)
+    solver = SingleBlow(scene, float(stiffness[0])).solver
+    return BlowTable(
+        nodes,
+        values.astype(np.float64),
+        fixed_values(scene),
+        dict(solver.cells),
+        solver.wave_speed_error,
+    )
+
+
+def _slabs(
+    scene: SceneRules, stiffness: np.ndarray, left: list[int], workers: int
+) -> Iterator[tuple[int, np.ndarray]]:
+    """Compute the slabs that are left, in any order."""
+    if workers < 2 or len(left) < 2:
+        for i in left:
+            yield i, make_slab(scene, float(stiffness[i]))
+        return
+    pool = ProcessPoolExecutor(workers)
+    try:
+        jobs: dict[Future[Any], int] = {
+            pool.submit(make_slab, scene, float(stiffness[i])): i for i in left
+        }
+        while jobs:
+            finished, _ = wait(jobs, return_when=FIRST_COMPLETED)
+            for job in finished:
+                yield jobs.pop(job), job.result()
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def make_slab(scene: SceneRules, stiffness: float) -> np.ndarray:
+    """All nodes of one stiffness [N/m].
+
+    Returns
+    -------
+    ndarray, shape (nodes of velocity, load and drive, ENTRIES)
+    """
+    nodes = Nodes.of(scene)
+    slab = np.full((*nodes.counts[1:], ENTRIES), np.nan, np.float32)
+    single = SingleBlow(scene, stiffness)
+    for place in nodes.wanted():
+        slab[place] = single.entries(*nodes.blow(place))
+    return slab
+
+
+def _read_slab(path: Path, shape: tuple[int, ...]) -> np.ndarray | None:
+    try:
+        slab = np.load(io.BytesIO(path.read_bytes()), allow_pickle=False)
+    except (OSError, ValueError, EOFError):
+        return None
+    return slab if slab.shape == shape else None
+
+
+def _keep_slab(path: Path, slab: np.ndarray) -> None:
+    out = io.BytesIO()
+    np.save(out, slab, allow_pickle=False)
+    try:
+        write_whole(path, out.getvalue())
+    except OSError as error:  # then an interruption costs more
+        _log.warning("a part of the blow map is not kept: %s", error)
+
+
+def write_whole(path: Path, data: bytes) -> None:
+    """Write a file whole or not at all, whoever else writes it."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, draft = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(data)
+        os.replace(draft, path)
+    except BaseException:
+        Path(draft).unlink(missing_ok=True)
+        raise
+
+
+__all__ = ["TableError", "build_table", "cache_folder", "get_table", "kept_table", "table_file"]

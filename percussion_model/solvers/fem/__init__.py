@@ -1,0 +1,1 @@
+"""Finite elements: the paper's own computational model."""

@@ -1,0 +1,154 @@
+"""Sums over the nodes: mean motion, energies, and what a state shows of itself."""
+
+from __future__ import annotations
+
+from percussion_model.physics.kernel import fused, inlined, kernel
+from percussion_model.physics.records import Mode
+from percussion_model.physics.rock import recoverable
+from percussion_model.solvers.fem.records import Mesh, Node
+
+SS = int(Mode.SS)
+U, V = int(Node.U), int(Node.V)
+LOSS, NUMERICAL = int(Node.LOSS), int(Node.NUMERICAL)
+MASS, COUPLING = int(Mesh.MASS), int(Mesh.COUPLING)
+STIFFNESS, SHARE = int(Mesh.STIFFNESS), int(Mesh.SHARE)
+
+
+@fused
+def moment(c, a, row, first, count):
+    """Sum of mass times value over `count` nodes."""
+    sum0 = 0.0
+    sum1 = 0.0
+    sum2 = 0.0
+    sum3 = 0.0
+    part = count // 4
+    for i in range(first, first + part):
+        # four sums, so that none waits for the last addition
+        sum0 += c[SHARE, i] * a[row, i]
+        sum1 += c[SHARE, i + part] * a[row, i + part]
+        sum2 += c[SHARE, i + 2 * part] * a[row, i + 2 * part]
+        sum3 += c[SHARE, i + 3 * part] * a[row, i + 3 * part]
+    for i in range(first + 4 * part, first + count):
+        sum0 += c[SHARE, i] * a[row, i]
+    return (sum0 + sum1) + (sum2 + sum3)
+
+
+@inlined
+def relative_motion(par, c, a, row):
+    """Mean of the piston less mean of the bit, u_r of eq. 12 of docs/model.md or its rate."""
+    bit = moment(c, a, row, par.n_p, par.n_b) / par.mass_b
+    return moment(c, a, row, 0, par.n_p) / par.mass_p - bit
+
+
+@fused
+def kinetic_energy(c, a, first, count):
+    """Kinetic energy of `count` nodes that a bar has, eq. 52 of the paper [J]."""
+    p = 0.0
+    q = 0.0
+    r = 0.0
+    s = 0.0
+    half = count // 2
+    for i in range(first, first + half):
+        v = a[V, i]
+        p += c[MASS, i] * (v * v)
+        q += c[COUPLING, i] * (v * a[V, i + 1])
+        v = a[V, i + half]
+        r += c[MASS, i + half] * (v * v)
+        # the last node has no coupling: what follows it does not matter
+        if i + half < first + count - 1:
+            s += c[COUPLING, i + half] * (v * a[V, i + half + 1])
+    if 2 * half < count:
+        v = a[V, first + count - 1]
+        p += c[MASS, first + count - 1] * (v * v)
+    return 0.5 * (p + r) + (q + s)
+
+
+@fused
+def elastic_energy(c, a, n):
+    """Strain energy of all elements [J]."""
+    total = 0.0
+    for i in range(n - 1):
+        stretch = a[U, i + 1] - a[U, i]
+        total += c[STIFFNESS, i] * (stretch * stretch)
+    return 0.5 * total
+
+
+@inlined
+def contact_energy(par, s):
+    """Energy in the penalty spring between piston and bit [J]."""
+    if s.closed == 1:
+        return 0.5 * par.k_c * s.gap * s.gap
+    return 0.0
+
+
+@kernel
+def stored_energy(par, s, w, c):
+    """Energy stored in bars, contact and rock.
+
+    Returns
+    -------
+    kinetic, elastic, rock : float
+        [J]
+    """
+    kinetic = kinetic_energy(c, w, par.n_p, par.n_b)
+    if par.n_p > 0:
+        kinetic += kinetic_energy(c, w, 0, par.n_p)
+    elastic = elastic_energy(c, w, par.n_p + par.n_b) + contact_energy(par, s)
+    return kinetic, elastic, recoverable(s)
+
+
+@kernel
+def dissipated_in_nodes(par, w):
+    """Structural loss and dissipation of the scheme, booked node by node [J]."""
+    loss = 0.0
+    numerical = 0.0
+    for i in range(par.n_p + par.n_b):
+        loss += w[LOSS, i]
+        numerical += w[NUMERICAL, i]
+    return loss, numerical
+
+
+@kernel
+def read_nodes(par, s, w, c):
+    """Derive from nodes and sums what the modes look at: gap, penetration, mean motion."""
+    last = par.n_p + par.n_b - 1
+    s.p = w[U, last]
+    s.v_end = w[V, last]
+    if par.n_p > 0:
+        s.gap = w[U, par.n_p] - w[U, par.n_p - 1]
+        s.gap_rate = w[V, par.n_p] - w[V, par.n_p - 1]
+    s.mean_b = s.next_b
+    s.mean_p = s.next_p
+    s.u_r = s.mean_p - s.mean_b
+    s.kinetic = s.next_kinetic
+
+
+@inlined
+def read_ahead(par, s, a, c):
+    """Derive sums over the nodes of `a` that are the state's to come."""
+    s.next_b = moment(c, a, U, par.n_p, par.n_b) / par.mass_b
+    if par.n_p > 0:
+        s.next_p = moment(c, a, U, 0, par.n_p) / par.mass_p
+    if s.mode == SS:
+        s.next_kinetic = kinetic_energy(c, a, par.n_p, par.n_b)
+
+
+@kernel
+def read_all(par, s, w, c):
+    """Derive from the nodes all that modes and ledger look at."""
+    read_ahead(par, s, w, c)
+    read_nodes(par, s, w, c)
+
+
+@kernel
+def read_means(par, s, w, c):
+    """Derive the mean velocities."""
+    s.v_b = moment(c, w, V, par.n_p, par.n_b) / par.mass_b
+    if par.n_p > 0:
+        s.v_p = moment(c, w, V, 0, par.n_p) / par.mass_p
+
+
+@inlined
+def bit_position(s):
+    """Mean displacement of the bit since the start [m]."""
+    return s.x_r + s.mean_b

@@ -1,0 +1,102 @@
+"""Linear finite elements with consistent mass for bars of any sections."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from percussion_model.scene.rules import BarNumbers, SectionNumbers
+from percussion_model.solvers.fem.records import Mesh
+
+# A length this close to half an element is half an element.
+ROUNDING = 1e-9
+
+
+@dataclass(frozen=True)
+class BarMesh:
+    """Elements of one bar, top to bottom; none where it is rigid.
+
+    Attributes
+    ----------
+    length, stiffness, mass, transit_time : ndarray, shape (n,)
+        Of each element [m], [N/m], [kg], [s].
+    total : float
+        Mass of the bar [kg].
+    """
+
+    length: np.ndarray
+    stiffness: np.ndarray
+    mass: np.ndarray
+    transit_time: np.ndarray
+    total: float
+
+    @property
+    def n(self) -> int:
+        """Number of elements."""
+        return len(self.mass)
+
+
+def section_count(section: SectionNumbers, element: float) -> int:
+    """Elements of about the length `element` [m] that a section gets, half a one for one."""
+    return max(1, math.floor(section.length / element + 0.5 + ROUNDING))
+
+
+def cut_bar(bar: BarNumbers, element: float, elastic: bool = True) -> BarMesh:
+    """Cut the sections of a bar into elements of about one length.
+
+    Parameters
+    ----------
+    bar : BarNumbers
+    element : float
+        Wanted length [m].
+    elastic : bool
+        Whether the bar has elements at all.
+    """
+    if not elastic:
+        none = np.zeros(0)
+        return BarMesh(none, none, none, none, bar.mass)
+    rows = []
+    for section in bar.sections:
+        count = section_count(section, element)
+        length = section.length / count
+        row = (
+            length,
+            section.youngs_modulus * section.area / length,
+            section.mass / count,
+            section.transit_time / count,
+        )
+        rows += [row] * count
+    length, stiffness, mass, transit = np.array(rows).T
+    return BarMesh(length, stiffness, mass, transit, bar.mass)
+
+
+def assemble(bars: list[BarMesh]) -> np.ndarray:
+    """Rows of `Mesh` for bars one below the other (eq. 36 of the paper).
+
+    Returns
+    -------
+    ndarray, shape (len(Mesh), n)
+    """
+    c = np.zeros((len(Mesh), sum(bar.n + 1 for bar in bars)))
+    at = 0
+    for bar in bars:
+        top, low = slice(at, at + bar.n), slice(at + 1, at + bar.n + 1)
+        c[Mesh.MASS, top] += bar.mass / 3.0
+        c[Mesh.MASS, low] += bar.mass / 3.0
+        c[Mesh.COUPLING, top] = bar.mass / 6.0
+        c[Mesh.STIFFNESS, top] = bar.stiffness
+        c[Mesh.SPRINGS, top] += bar.stiffness
+        c[Mesh.SPRINGS, low] += bar.stiffness
+        c[Mesh.SHARE, top] += bar.mass / 2.0
+        c[Mesh.SHARE, low] += bar.mass / 2.0
+        if bar.n == 0:
+            c[Mesh.MASS, at] = c[Mesh.SHARE, at] = bar.total
+        at += bar.n + 1
+    return c
+
+
+def critical_frequency(bar: BarMesh) -> float:
+    """Highest natural frequency of the longest of equal elements, sqrt(12) c0 / L_e [rad/s]."""
+    return math.sqrt(12.0) / float(bar.transit_time.min())

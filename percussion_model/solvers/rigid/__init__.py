@@ -1,0 +1,1 @@
+"""Rigid piston and bit, from event to event in closed form."""

@@ -1,0 +1,247 @@
+"""Closed-form motion over a stretch without events, and its entries in ledger and blow."""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+from percussion_model.solvers.rigid.law import (
+    ABSENT,
+    BC,
+    BILINEAR,
+    COUNTED_CYCLE,
+    DFC,
+    FC,
+    FF,
+    acceleration,
+    bit_force,
+    contact_force,
+    drive_force,
+    free_acceleration,
+    loads,
+    on_wall,
+    recoverable,
+    rock_terms,
+)
+from percussion_model.solvers.rigid.motion import (
+    ROOT_TOLERANCE,
+    SEARCH_LIMIT,
+    oscillate,
+    oscillate_with_loss,
+    zero_time,
+)
+
+
+@njit(cache=True, error_model="numpy")
+def bit_motion(par, s, tau):
+    """Displacement [m] and velocity [m/s] of the bit after tau."""
+    if on_wall(par, s):
+        return 0.0, 0.0
+    F, M = loads(par, s)
+    K, C, P = rock_terms(par, s)
+    if K == 0.0:
+        a = F / M
+        return tau * (s.v_b + 0.5 * a * tau), s.v_b + a * tau
+    y = s.p - P - F / K
+    y1, v1 = oscillate(y, s.v_b, 0.5 * C / M, K / M, tau)
+    return y1 - y, v1
+
+
+@njit(cache=True, error_model="numpy")
+def piston_motion(par, s, tau, d_b, v_b):
+    """Displacement [m] and velocity [m/s] of the piston after tau, given the bit's."""
+    if par.piston == ABSENT:
+        return 0.0, 0.0
+    if s.held == 1:
+        return d_b, v_b
+    a = free_acceleration(par, s)
+    return tau * (s.v_p + 0.5 * a * tau), s.v_p + a * tau
+
+
+@njit(cache=True, error_model="numpy")
+def impulses(par, s, tau, v_b):
+    """Impulse of the rock on the bit and of the piston on the bit over tau [N s].
+
+    By momentum: what the constant loads give and the motion does not show.
+    """
+    F, M = loads(par, s)
+    bit = 0.0
+    if s.mode != FF:
+        bit = F * tau - M * (v_b - s.v_b)
+    contact = 0.0
+    if s.held == 1:
+        contact = (drive_force(par, s) + par.M_p * par.G) * tau - par.M_p * (v_b - s.v_b)
+    return bit, contact
+
+
+@njit(cache=True, error_model="numpy")
+def greatest_gap(par, s, tau, v_b, v_p, gap):
+    """Greatest gap within the stretch: at its ends, or where it stops growing.
+
+    Of several maxima (a bit that still rings) one is taken; they differ by the ringing.
+    """
+    most = max(s.gap, gap)
+    if not (s.v_b > s.v_p and v_b < v_p):
+        return most
+    a_p = free_acceleration(par, s)
+    F, M = loads(par, s)
+    K, C, P = rock_terms(par, s)
+    a_b = 0.0 if on_wall(par, s) else F / M
+    beta = 0.5 * C / M
+    k = K / M
+    y = s.p - P - F / K if K > 0.0 else 0.0
+    lower = 0.0
+    upper = tau
+    t = (s.v_b - s.v_p) / (a_p - a_b if K == 0.0 else a_p)
+    for _ in range(SEARCH_LIMIT):
+        if not lower < t < upper:
+            t = 0.5 * (lower + upper)
+        y1 = 0.0
+        v1 = s.v_b + t * a_b
+        slope = a_b - a_p
+        if K > 0.0:
+            y1, v1 = oscillate(y, s.v_b, beta, k, t)
+            slope = -a_p - 2.0 * beta * v1 - k * y1
+        rate = v1 - s.v_p - a_p * t
+        if rate > 0.0:
+            lower = t
+        else:
+            upper = t
+        step = -rate / slope
+        t += step
+        if abs(step) <= ROOT_TOLERANCE * t or upper - lower <= ROOT_TOLERANCE * t:
+            break
+    d, _ = bit_motion(par, s, t)
+    return max(most, s.gap + d - t * (s.v_p + 0.5 * a_p * t))
+
+
+@njit(cache=True, error_model="numpy")
+def greatest_bit_force(par, s, tau, p, v, known):
+    """Greatest bit force within the stretch: at its ends or at its first maximum.
+
+    Where nothing above the force `known` [N] can come, the ends alone are looked at.
+    """
+    most = max(bit_force(par, s, s.p, s.v_b), bit_force(par, s, p, v))
+    K, C, P = rock_terms(par, s)
+    # In BC the force falls, in FC it rises with the penetration.
+    if K == 0.0 or s.mode == BC or (s.mode == FC and par.rock == BILINEAR):
+        return most
+    F, M = loads(par, s)
+    beta = 0.5 * C / M
+    k = K / M
+    acc = (F - K * (s.p - P) - C * s.v_b) / M
+    # The force less its mean obeys the equation of motion too.
+    f = K * (s.p - P) + C * s.v_b - F
+    rate = K * s.v_b + C * acc
+    if F + math.sqrt(f * f + rate * rate / k) <= max(most, known):
+        return most
+    t = zero_time(rate, -2.0 * beta * rate - k * f, beta, k)
+    if t < tau:
+        most = max(most, F + oscillate(f, rate, beta, k, t)[0])
+        if k > beta * beta:
+            t += math.pi / math.sqrt(k - beta * beta)
+            if t < tau:
+                most = max(most, F + oscillate(f, rate, beta, k, t)[0])
+    return most
+
+
+@njit(cache=True, error_model="numpy")
+def note_peaks(par, s, tau):
+    """Note the greatest forces of the stretch, from `peak_from` of the state on."""
+    p, v_b = s.p, s.v_b
+    early = max(s.peak_from - s.time, 0.0)
+    if early > 0.0:
+        d, s.v_b = bit_motion(par, s, early)
+        s.p += d
+    rest = tau - early
+    d, v = bit_motion(par, s, rest)
+    if s.mode != FF:
+        most = greatest_bit_force(par, s, rest, s.p + d, v, s.peak_bit)
+        s.peak_bit = max(s.peak_bit, most)
+    if s.held == 1:
+        # the free piston's acceleration less the common one, which the bit force changes
+        first = bit_force(par, s, s.p, s.v_b)
+        last = bit_force(par, s, s.p + d, v)
+        most = contact_force(par, s, acceleration(par, s))
+        share = par.M_p / (par.M_p + par.M_b)
+        s.peak_contact = max(s.peak_contact, most, most + share * (last - first))
+    s.p, s.v_b = p, v_b
+
+
+@njit(cache=True, error_model="numpy")
+def dashpot_motion(par, s, tau):
+    """`bit_motion`, and the energy that the dashpot of the rock takes meanwhile [J]."""
+    K, C, P = rock_terms(par, s)
+    if C == 0.0:
+        d, v = bit_motion(par, s, tau)
+        return d, v, 0.0
+    F, M = loads(par, s)
+    y = s.p - P - F / K
+    y1, v, square = oscillate_with_loss(y, s.v_b, 0.5 * C / M, K / M, tau)
+    return y1 - y, v, C * square
+
+
+@njit(cache=True, error_model="numpy")
+def book_rock(par, s, d, taken):
+    """Ledger entries of the rock while the bit moves by d and the dashpot takes `taken`.
+
+    Returns
+    -------
+    work : float
+        Done on the rock [J].
+    """
+    change = recoverable(par, s, s.p + d) - recoverable(par, s, s.p)
+    if s.mode == FF:
+        # Rock that springs back without the bit relaxes on its dashpot.
+        s.standstill -= change
+        return 0.0
+    work = change + taken
+    if s.mode == DFC:
+        s.barrier += taken
+        s.W += taken
+    else:
+        s.standstill += taken
+    if (s.mode == DFC or s.mode == FC) and par.rock == BILINEAR:
+        crushed = 0.5 * s.K_R * (1.0 - 1.0 / s.gamma) * d * (2.0 * s.p + d)
+        s.crushing += crushed
+        s.crushed += crushed
+        work += crushed
+        if s.counted == 0 and s.crushed > COUNTED_CYCLE * s.W_R:
+            s.counted = 1
+            s.count_cycles += 1
+            s.blow.drilling_cycles += 1
+    return work
+
+
+@njit(cache=True, error_model="numpy")
+def move(par, s, tau):
+    """Carry the state over a stretch of tau without events; `time` is left to the caller."""
+    d_b, v_b, taken = dashpot_motion(par, s, tau)
+    d_p, v_p = piston_motion(par, s, tau, d_b, v_b)
+    bit, contact = impulses(par, s, tau, v_b)
+    push = drive_force(par, s) if par.piston != ABSENT else 0.0
+    gap = s.gap + (d_b - d_p)
+    s.drive += push * d_p
+    s.feed += par.F_S * d_b
+    s.gravity += par.G * (par.M_p * d_p + par.M_b * d_b)
+    if s.mode != FF:
+        most = greatest_bit_force(par, s, tau, s.p + d_b, v_b, s.blow.peak_bit_force)
+        s.blow.peak_bit_force = max(s.blow.peak_bit_force, most)
+    if s.time + tau > s.peak_from:
+        note_peaks(par, s, tau)
+    if par.piston != ABSENT and s.held == 0:
+        s.blow.stroke = max(s.blow.stroke, greatest_gap(par, s, tau, v_b, v_p, gap))
+    s.blow.rock_energy += book_rock(par, s, d_b, taken)
+    s.blow.penetration += d_b
+    s.blow.bit_impulse += bit
+    s.blow.contact_impulse += contact
+    s.blow.drive_impulse += push * tau
+    s.bit_impulse += bit
+    s.contact_impulse += contact
+    s.drive_impulse += push * tau
+    s.bit_position += d_b
+    s.p += d_b
+    s.v_b = v_b
+    s.v_p = v_p
+    s.gap = gap

@@ -1,0 +1,1 @@
+"""Travelling waves in stepped bars."""

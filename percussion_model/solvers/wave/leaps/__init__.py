@@ -1,0 +1,1 @@
+"""Leaps over quiet phases of the travelling waves."""

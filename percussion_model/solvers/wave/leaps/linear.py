@@ -1,0 +1,131 @@
+"""Linear maps of a bar's waves: deviation from rest, product, quadratic form.
+
+A map is stored column by column and padded with zeros to a multiple of
+`PADDING`, so that its loops have no remainder.
+"""
+
+from __future__ import annotations
+
+from percussion_model.physics.kernel import inlined, kernel, merged
+from percussion_model.solvers.wave.leaps.lanes import (
+    WIDTH,
+    add_scaled,
+    load_lanes,
+    no_lanes,
+    store_sum,
+)
+from percussion_model.solvers.wave.records import Coef
+
+MASS, STATIC = int(Coef.MASS), int(Coef.STATIC)
+
+# Sizes are padded to a multiple of this, which is what a product takes at a time.
+PADDING = WIDTH
+
+
+@merged
+def load(x, w, c, n, r, velocity, acceleration):
+    """Copy the deviation from mean motion and static load into `x`."""
+    half = 0.5 * velocity
+    for i in range(n):
+        rest = acceleration * c[STATIC, i]
+        x[i] = w[r, i] - half - rest
+        x[n + i] = w[r + 1, i] - half + rest
+
+
+@merged
+def store(x, w, c, n, r, velocity, acceleration):
+    """Copy `x` back about a new mean velocity and the static load."""
+    half = 0.5 * velocity
+    for i in range(n):
+        rest = acceleration * c[STATIC, i]
+        w[r, i] = x[i] + half + rest
+        w[r + 1, i] = x[n + i] + half - rest
+
+
+@merged
+def remove_mean(x, c, n, mass):
+    """Take rounding's share of mean motion out of a free bar's deviation."""
+    a = 0.0
+    for i in range(n):
+        a += c[MASS, i] * (x[i] + x[n + i])
+    half = 0.5 * a / mass
+    for i in range(n):
+        x[i] -= half
+        x[n + i] -= half
+
+
+@kernel
+def multiply(operator, x, y, rows, columns, add):
+    """y = A x, or y += A x, with A stored column by column.
+
+    Parameters
+    ----------
+    operator : float array, shape (at least rows, at least columns)
+        Row k is the k-th column of A.
+    rows, columns : int
+        An even number, a multiple of `PADDING`.
+    """
+    for i in range(0, columns, PADDING):
+        even = load_lanes(y, i) if add else no_lanes()
+        odd = no_lanes()
+        for k in range(0, rows, 2):
+            even = add_scaled(even, operator, k, i, x[k])
+            odd = add_scaled(odd, operator, k + 1, i, x[k + 1])
+        store_sum(y, i, even, odd)
+
+
+@kernel
+def carry(powers, steps, x, y, size):
+    """x = P^steps x from the powers 1, 4, 16, ... of a map.
+
+    Four to a level, not two: fewer matrices, which stay in the cache.
+
+    Parameters
+    ----------
+    powers : float array, shape (levels, size, size)
+    y : float array
+        Scratch.
+    """
+    level = 0
+    while steps > 0:
+        for _ in range(steps & 3):
+            multiply(powers[level], x, y, size, size, False)
+            for i in range(size):
+                x[i] = y[i]
+        steps >>= 2
+        level += 1
+
+
+@inlined
+def dot(row, x, size):
+    """Sum of products of two rows, in four sums that need not wait for each other."""
+    a = 0.0
+    b = 0.0
+    c = 0.0
+    d = 0.0
+    for i in range(0, size, 4):
+        a += row[i] * x[i]
+        b += row[i + 1] * x[i + 1]
+        c += row[i + 2] * x[i + 2]
+        d += row[i + 3] * x[i + 3]
+    return (a + b) + (c + d)
+
+
+@kernel
+def quadratic(operator, x, y, size):
+    """x' A x [J], with A stored as the upper triangle that gives the same."""
+    for i in range(0, size, PADDING):
+        even = no_lanes()
+        odd = no_lanes()
+        for k in range(i, size, 2):
+            even = add_scaled(even, operator, k, i, x[k])
+            odd = add_scaled(odd, operator, k + 1, i, x[k + 1])
+        store_sum(y, i, even, odd)
+    return dot(x, y, size)
+
+
+@merged
+def pad(x, used, size):
+    """Set what lies beyond the `used` numbers of a deviation to zero."""
+    for i in range(used, size):
+        x[i] = 0.0

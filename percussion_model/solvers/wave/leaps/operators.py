@@ -1,0 +1,295 @@
+"""Leap operators of a grid: powers of the step map, by mode (docs/numerics.md, section 5)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from percussion_model.physics.records import DriveKind, Mode, Piston, RockKind
+from percussion_model.solvers.wave.grid import Grid
+from percussion_model.solvers.wave.leaps.contact_leap import WATCH_LEVELS, WATCHED
+from percussion_model.solvers.wave.leaps.linear import PADDING
+from percussion_model.solvers.wave.leaps.step_map import (
+    Configuration,
+    end_row,
+    no_operators,
+    step_forms,
+    step_map,
+)
+from percussion_model.solvers.wave.records import Coef
+
+# Longest leap: 4^LEVELS - 1 steps, 0.1 s on the default grid of the reference.
+LEVELS = 8
+# Without their operators a scene is stepped through; beyond this size they
+# would cost more memory and set-up time than they save [numbers].
+MOST_NUMBERS = 40_000_000
+
+# What a standstill will ever lose is summed over at most 2^40 steps; what is
+# left then is lost too slowly to tell.
+MOST_DOUBLINGS = 40
+
+
+# What a standstill loses in later steps changes no digit of the sum below this share.
+NEGLIGIBLE = 1e-20
+
+# Operators of so many scenes are kept [a few MB each on the default grid].
+MOST_KEPT = 4
+_kept: dict[bytes, LeapOperators | None] = {}
+# Those of free bars, which scenes on other rock share, are kept apart.
+_kept_free: dict[bytes, dict[str, np.ndarray]] = {}
+
+
+@dataclass(frozen=True)
+class LeapOperators:
+    """Powers of the step map, and what can be seen of the next steps.
+
+    Maps are stored column by column and padded with zeros, forms as
+    their upper triangles; `size` is the padded number of waves, with the
+    penetration for the bit.
+
+    Attributes
+    ----------
+    piston : ndarray, shape (LEVELS, size, size)
+        Powers 1, 4, 16, ... of the free piston's step map.
+    bit : ndarray, shape (5, LEVELS, size, size)
+        The same for the bit by `Mode`.
+    watch : ndarray, shape (5, size, WATCHED)
+        By mode: strain offset of the rock end at the end of the next steps in
+        FF, its velocity at their start in DFC, FC, BC and SS.
+    sums : ndarray, shape (5, size)
+        By contact mode: path of the bit's mean motion until it rests.
+    top : ndarray, shape (5, size, WATCHED)
+        By mode: motion of the bit's top end by the end of the next steps, in
+        FF its strain offset.
+    bottom : ndarray, shape (size, WATCHED)
+        Strain offset of the piston's bottom end.
+    forms : ndarray, shape (2, size, size)
+        What a standstill will ever lose in the dashpot and by averaging [J].
+    """
+
+    piston: np.ndarray
+    bit: np.ndarray
+    watch: np.ndarray
+    sums: np.ndarray
+    top: np.ndarray
+    bottom: np.ndarray
+    forms: np.ndarray
+
+    @property
+    def arrays(self) -> tuple[np.ndarray, ...]:
+        """The arrays in the order in which the kernels take them."""
+        return tuple(getattr(self, name) for name in self.__dataclass_fields__)
+
+
+def padded(size: int) -> int:
+    """Size of an operator with its padding."""
+    return -(-size // PADDING) * PADDING
+
+
+def leap_operators(
+    par: np.ndarray, piston: Grid | None, cp: np.ndarray, bit: Grid, cb: np.ndarray
+) -> LeapOperators | None:
+    """Leap operators of a scene, or None where they would be too large.
+
+    They do not depend on feed, drive, barrier energy or start, so that scenes which differ
+    in those alone share them: making them costs as much as tens of blows.
+    None as well where a loaded bit does not come to rest within the digits of a
+    number, as with a loss that freezes its stress: then there is no path to rest.
+
+    Parameters
+    ----------
+    par : WAVE_PAR array of length 1
+        Its padded sizes are filled in.
+    cp, cb : ndarray
+        Coefficients of piston and bit.
+    """
+    n_p = piston.n if piston is not None else 0
+    size_p, size = padded(2 * n_p), padded(2 * bit.n + 1)
+    if LEVELS * (size_p * size_p + len(Mode) * size * size) > MOST_NUMBERS:
+        return None
+    par["size_p"], par["size_r"] = size_p, size
+    key = _key(par, cp, cb, piston, bit)
+    if key not in _kept:
+        _make_room(_kept)
+        _kept[key] = _build(par, piston, cp, bit, cb)
+    return _kept[key]
+
+
+def _key(par: np.ndarray, cp: np.ndarray, cb: np.ndarray, piston: Grid | None, bit: Grid) -> bytes:
+    """Return all that operators depend on."""
+    masses = [grid.mass for grid in (piston, bit) if grid is not None]
+    return b"|".join(part.tobytes() for part in (par, cp, cb, *masses))
+
+
+def _make_room(kept: dict[bytes, Any]) -> None:
+    while len(kept) >= MOST_KEPT:
+        del kept[next(iter(kept))]
+
+
+def _build(
+    par: np.ndarray, piston: Grid | None, cp: np.ndarray, bit: Grid, cb: np.ndarray
+) -> LeapOperators | None:
+    """Operators of piston and bit; arguments as in `leap_operators`."""
+    alone = _alone(par)
+    key = _key(alone, cp, cb, piston, bit)
+    if key not in _kept_free:
+        _make_room(_kept_free)
+        _kept_free[key] = _free(alone, piston, cp, bit, cb)
+    free = _kept_free[key]
+    try:
+        loaded = _of_loaded_bit(alone, bit, cb, free, _loads(par))
+    except np.linalg.LinAlgError:
+        return None
+    return LeapOperators(**{name: loaded.get(name, free[name]) for name in _NAMES})
+
+
+def _free(
+    alone: np.ndarray, piston: Grid | None, cp: np.ndarray, bit: Grid, cb: np.ndarray
+) -> dict[str, np.ndarray]:
+    """Operators of the free piston and of the bit in free flight.
+
+    The contact modes have room in them.
+    """
+    found = dict(zip(_NAMES, no_operators(), strict=True))
+    if piston is not None:
+        of_piston = alone.copy()
+        of_piston["n_b"], of_piston["mass_b"] = piston.n, piston.mass.sum()
+        for end in ("z", "kappa"):
+            of_piston[f"{end}_t"], of_piston[f"{end}_b"] = alone[f"{end}_f"], alone[f"{end}_p"]
+        by_column = step_map(Configuration(of_piston, piston, cp))
+        found["piston"] = _powers(by_column, LEVELS, int(alone["size_p"][0]))
+        found["bottom"] = _watch(found["piston"], by_column @ _offset(cp, piston.n, Coef.BOTTOM))
+    size = int(alone["size_r"][0])
+    powers = np.zeros((len(Mode), LEVELS, size, size))
+    watch, top = np.zeros((2, len(Mode), size, WATCHED))
+    by_column = step_map(Configuration(alone, bit, cb))
+    powers[Mode.FF] = _powers(by_column, LEVELS, size)
+    for rows, row in ((watch, Coef.BOTTOM), (top, Coef.TOP)):
+        rows[Mode.FF] = _watch(powers[Mode.FF], by_column @ _offset(cb, bit.n, row))
+    return found | {"bit": powers, "watch": watch, "top": top}
+
+
+_NAMES = tuple(LeapOperators.__dataclass_fields__)
+
+
+def _loads(par: np.ndarray) -> dict[Mode, tuple[float, float]]:
+    """Stiffness and damping of the contact modes that leaps can cross."""
+    p = par[0]
+    if p["rock"] != RockKind.BILINEAR:
+        return {}
+    return {
+        Mode.DFC: (p["ss_loading"], p["ss_damping"]),
+        Mode.FC: (p["ss_loading"], 0.0),
+        Mode.BC: (p["ss_stiffness"], 0.0),
+        Mode.SS: (p["ss_stiffness"], p["ss_damping"]),
+    }
+
+
+def _offset(c: np.ndarray, n: int, row: Coef) -> np.ndarray:
+    """Strain offset of an end as a row over the waves, see `core.bar.strain_offset`."""
+    return np.concatenate([c[row, :n], -c[row, :n]])
+
+
+def _alone(par: np.ndarray) -> np.ndarray:
+    """Parameters of the bit by itself, without forces and rock."""
+    alone = par.copy()
+    for name in ("gravity", "ss_stiffness", "ss_loading", "ss_damping", "release"):
+        alone[name] = 0.0
+    alone["piston"] = Piston.ABSENT
+    alone["n_p"] = 0
+    alone["drive"] = DriveKind.NONE
+    alone["rock"] = RockKind.NONE
+    alone["barrier"] = 1
+    return alone
+
+
+def _of_loaded_bit(
+    alone: np.ndarray,
+    bit: Grid,
+    cb: np.ndarray,
+    free: dict[str, np.ndarray],
+    loads: dict[Mode, tuple[float, float]],
+) -> dict[str, np.ndarray]:
+    """Operators of the bit, those of `free` among them, in all modes."""
+    powers, watch, top = (free[name].copy() for name in ("bit", "watch", "top"))
+    size = powers.shape[-1]
+    sums, forms = np.zeros((len(Mode), size)), np.zeros((2, size, size))
+    rock = alone.copy()
+    rock["rock"] = RockKind.BILINEAR
+    way = np.append(_offset(cb, bit.n, Coef.TOP) + _offset(cb, bit.n, Coef.BOTTOM), 1.0)
+    for mode, (stiffness, damping) in loads.items():
+        configuration = Configuration(rock, bit, cb, float(stiffness), float(damping))
+        by_column = step_map(configuration)
+        levels = LEVELS if mode == Mode.SS else WATCH_LEVELS
+        powers[mode, :levels] = _powers(by_column, levels, size)
+        watch[mode] = _watch(powers[mode], end_row(configuration, by_column))
+        top[mode] = _watch(powers[mode], by_column @ way)
+        sums[mode, : len(by_column)] = _path_to_rest(configuration, by_column)
+        if mode == Mode.SS:
+            forms = _ever_lost(by_column, step_forms(configuration, by_column)[1:], size)
+    return {"bit": powers, "watch": watch, "sums": sums, "top": top, "forms": forms}
+
+
+def _watch(powers: np.ndarray, row: np.ndarray) -> np.ndarray:
+    """Rows that show at the start of each of the next steps what `row` shows now.
+
+    Parameters
+    ----------
+    powers : ndarray, shape (levels, size, size)
+        Powers 1, 4, 16, ... of the step map.
+    row : ndarray
+        Filled up with zeros to `size`.
+
+    Returns
+    -------
+    ndarray, shape (size, WATCHED)
+    """
+    shown = np.zeros((powers.shape[-1], 1))
+    shown[: len(row), 0] = row
+    for power in powers[: WATCH_LEVELS - 1]:  # one to four of each
+        later = [shown]
+        for _ in range(3):
+            later.append(power @ later[-1])
+        shown = np.hstack(later)
+    return shown
+
+
+def _powers(by_column: np.ndarray, levels: int, size: int) -> np.ndarray:
+    """Powers 1, 4, 16, ... of a step map, padded."""
+    out = np.zeros((levels, size, size))
+    out[0, : len(by_column), : len(by_column)] = by_column
+    for level in range(1, levels):
+        squared = out[level - 1] @ out[level - 1]
+        out[level] = squared @ squared
+    return out
+
+
+def _path_to_rest(configuration: Configuration, by_column: np.ndarray) -> np.ndarray:
+    """Row that shows the path of the bit's mean motion until it rests [m]."""
+    n = configuration.grid.n
+    share = configuration.grid.mass / configuration.grid.mass.sum()
+    mean = np.zeros(len(by_column))
+    mean[:n] = mean[n : 2 * n] = share
+    a_step = 0.5 * (mean + by_column @ mean) * configuration.par[0]["dt"]
+    path: np.ndarray = np.linalg.solve(np.eye(len(by_column)) - by_column, a_step)
+    return path
+
+
+def _ever_lost(by_column: np.ndarray, of_a_step: Sequence[np.ndarray], size: int) -> np.ndarray:
+    """Sums of quadratic forms over all steps to come, as padded upper triangles."""
+    n = len(by_column)
+    totals = np.array([0.5 * (form + form.T) for form in of_a_step])
+    for _ in range(MOST_DOUBLINGS):
+        more = by_column @ totals @ by_column.T
+        totals += 0.5 * (more + more.swapaxes(1, 2))
+        if np.all(np.abs(more).max(axis=(1, 2)) <= NEGLIGIBLE * np.abs(totals).max(axis=(1, 2))):
+            break
+        by_column = by_column @ by_column
+    out = np.zeros((len(totals), size, size))
+    for k, total in enumerate(totals):
+        # symmetric: column by column, the upper triangle says it all
+        out[k, :n, :n] = 2.0 * np.tril(total, -1) + np.diag(np.diag(total))
+    return out

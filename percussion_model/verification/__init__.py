@@ -1,0 +1,1 @@
+"""Accuracy against time, hard cases and the paper's statements."""

@@ -1,0 +1,197 @@
+"""What is computed of a scene to compare methods, and what a solver answers.
+
+A periodic scene starts near its periodic motion, so that few blows tell the answer of
+four seconds; a drop is computed as a whole; an aperiodic scene by statistics.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from percussion_model.scene.scene import Scene, SceneError
+from percussion_model.simulation.simulate import Simulation
+from percussion_model.verification.accuracy.quantities import HISTORY, RATE, Answer, batch_means
+
+__all__ = ["COUNTED_BLOWS", "SETTLING_BLOWS", "Problem", "Run", "pose"]
+
+PERIODIC, APERIODIC, DROP = "periodic", "aperiodic", "drop"
+# From a start near the periodic motion the reference comes closer by a factor of 4 a blow.
+SETTLING_BLOWS, COUNTED_BLOWS = 7, 2
+# A motion counts as periodic where single blows differ by less than this from their mean.
+PERIODIC_WITHIN = 1e-2
+# Fewer blows of the pilot run tell nothing.
+LEAST_BLOWS = 6
+# The history of the force: after the start of a blow or of a drop [s].
+HISTORY_LENGTH, HISTORY_STEP = 2e-3, 2e-6
+# Where before a blow a method of lines begins, as a share of the period.
+AHEAD = 0.2
+_MEANS = ("impact_velocity", "rebound_velocity", "rock_energy")
+
+
+@dataclass(frozen=True)
+class Problem:
+    """What every method computes of a scene.
+
+    Attributes
+    ----------
+    scene : Scene
+        To be computed by any solver; starts near its periodic motion.
+    kind : {"periodic", "aperiodic", "drop"}
+    duration : float
+        Simulated time of a run [s].
+    period : float
+        Of a blow, as the pilot run found it [s]; of a drop its duration.
+    """
+
+    scene: Scene
+    kind: str
+    duration: float
+    period: float
+
+    @property
+    def offsets(self) -> np.ndarray:
+        """Times since the start of a blow at which forces are compared [s]."""
+        return np.arange(0.5 * HISTORY_STEP, min(HISTORY_LENGTH, 0.5 * self.period), HISTORY_STEP)
+
+    @property
+    def quantities(self) -> tuple[str, ...]:
+        """Names of what is compared."""
+        if self.kind == DROP:
+            return ("resting_place", "peak_bit_force", "rock_energy", HISTORY)
+        means = (RATE, "blow_period", *_MEANS)
+        return means if self.kind == APERIODIC else (*means, "peak_bit_force", HISTORY)
+
+    @property
+    def main(self) -> str:
+        """Name of the quantity that comes first."""
+        return self.quantities[0]
+
+
+def pose(scene: Scene) -> Problem:
+    """Find out what kind of motion a scene makes and where to start it.
+
+    Raises
+    ------
+    SceneError
+        If there is nothing to refine, or too few blows.
+    """
+    if scene.bit.model == "rigid" or scene.piston.model == "rigid":
+        raise SceneError(
+            "accuracy: a rigid bar has closed forms and nothing to refine; "
+            "piston.model and bit.model must be 'elastic' (or the piston 'absent')"
+        )
+    if scene.piston.model == "absent":
+        return Problem(scene, DROP, scene.run.duration, scene.run.duration)
+    pilot = Simulation(scene.computed_by("wave"), record_events=False)
+    pilot.advance(scene.run.duration)
+    blows = pilot.blows
+    rows = blows[blows["time"] >= scene.run.settle]
+    if len(rows) < LEAST_BLOWS:
+        raise SceneError(
+            f"accuracy: {len(rows)} blows after run.settle = {scene.run.settle:g} s "
+            f"in run.duration = {scene.run.duration:g} s; at least {LEAST_BLOWS} are needed"
+        )
+    rows = rows[len(rows) // 2 :]
+    rates = rows["penetration"] / rows["period"]
+    period = float(rows["period"].mean())
+    if np.std(rates) > PERIODIC_WITHIN * abs(rates.mean()):
+        return Problem(scene, APERIODIC, scene.run.duration, period)
+    start = {"start.piston_velocity": float(round(rows["impact_velocity"].mean(), 4))}
+    start |= {"start.drive_direction": 1} if scene.matters("start.drive_direction") else {}
+    duration = (SETTLING_BLOWS + COUNTED_BLOWS + 0.5) * period
+    return Problem(scene.replace(**start), PERIODIC, duration, period)
+
+
+class Run:
+    """A solver on a problem: its answer, and how long it takes.
+
+    Parameters
+    ----------
+    problem : Problem
+    scene : Scene
+        That of the problem, with a solver chosen.
+
+    Attributes
+    ----------
+    setup_time : float
+        Time to make the solver [s]; of the first of a kind compilation included.
+    """
+
+    def __init__(self, problem: Problem, scene: Scene) -> None:
+        self.problem = problem
+        self.simulation = Simulation(scene, record_events=False)
+        self.setup_time = self.simulation.setup_time
+        self._start = self.simulation.save()
+
+    def cost(self, duration: float | None = None) -> float:
+        """Processor time of one run [s], without set-up and compilation."""
+        self.simulation.restore(self._start)
+        began = time.process_time()
+        self.simulation.advance(self.problem.duration if duration is None else duration)
+        return time.process_time() - began
+
+    def answer(self) -> Answer:
+        """What the solver finds."""
+        answers: dict[str, Callable[[], Answer]] = {
+            PERIODIC: self._periodic,
+            APERIODIC: self._statistics,
+            DROP: self._drop,
+        }
+        self.simulation.restore(self._start)
+        return answers[self.problem.kind]()
+
+    def _periodic(self) -> Answer:
+        simulation, problem = self.simulation, self.problem
+        simulation.advance((SETTLING_BLOWS + 0.5) * problem.period)
+        before = simulation.save()
+        simulation.advance(problem.duration)
+        blows = simulation.blows
+        rows = blows[-COUNTED_BLOWS:]
+        if len(blows) < COUNTED_BLOWS + 1:
+            raise SceneError(f"accuracy: only {len(blows)} blows in {problem.duration:g} s")
+        values = {
+            RATE: float(rows["penetration"].sum() / rows["period"].sum()),
+            "blow_period": float(rows["period"].mean()),
+            **{name: float(rows[name].mean()) for name in _MEANS},
+            "peak_bit_force": float(rows["peak_bit_force"].mean()),
+        }
+        last = blows[-1]
+        starts = [float(last["time"]), float(last["time"] + last["period"])]
+        start = next((t for t in starts if t > before.time), starts[-1])
+        simulation.restore(before)
+        history = simulation.sample(start + problem.offsets)["bit_force"]
+        return Answer(values, history=history, blows=problem.duration / problem.period)
+
+    def _statistics(self) -> Answer:
+        simulation, scene = self.simulation, self.problem.scene
+        simulation.advance(self.problem.duration)
+        rows = simulation.blows
+        rows = rows[rows["time"] >= scene.run.settle]
+        if len(rows) < LEAST_BLOWS:
+            raise SceneError(f"accuracy: only {len(rows)} blows in {self.problem.duration:g} s")
+        found = {RATE: batch_means(rows["penetration"], rows["period"])}
+        for name, column in (("blow_period", "period"), *((one, one) for one in _MEANS)):
+            known = rows[column][np.isfinite(rows[column])]
+            found[name] = batch_means(known)
+        return Answer(
+            {name: mean for name, (mean, _) in found.items()},
+            {name: error for name, (_, error) in found.items()},
+            blows=float(len(simulation.blows)),
+        )
+
+    def _drop(self) -> Answer:
+        simulation = self.simulation
+        history = simulation.sample(self.problem.offsets)["bit_force"]
+        simulation.advance(self.problem.duration)
+        ledger = simulation.energy()
+        into_rock = ("crushing", "barrier", "standstill", "recoverable")
+        values = {
+            "resting_place": simulation.observe()["bit_end_position"],
+            "peak_bit_force": float(history.max()),
+            "rock_energy": sum(ledger[name] for name in into_rock),
+        }
+        return Answer(values, history=history)

@@ -1,0 +1,193 @@
+"""References with error bars: made by two solvers that share no motion, stored as JSON.
+
+Each solver is refined three times and extrapolated (Richardson). A number is called a
+reference where the two limits agree within their bars.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Sequence
+from importlib.metadata import version
+
+import numpy as np
+
+from percussion_model.scene.scene import Scene
+from percussion_model.verification.accuracy.ladders import fem_scene, reach, stiffness_of
+from percussion_model.verification.accuracy.problems import APERIODIC, Problem, Run
+from percussion_model.verification.accuracy.quantities import HISTORY, Answer
+from percussion_model.verification.accuracy.reference_store import (
+    Bar,
+    Reference,
+    fingerprint,
+    stored,
+)
+
+__all__ = ["find_reference", "make_reference"]
+
+# Order that extrapolation assumes: the least that was ever measured for the waves; the
+# elements' mesh, with a penalty that goes along, is of second order.
+WAVE_ORDER, FEM_ORDER = 1.0, 2.0
+# Cells in all bars together, coarse to fine; elements likewise.
+WAVE_LEVELS, WAVE_LEVELS_QUICK = (172.0, 258.0, 430.0), (86.0, 129.0, 172.0)
+FEM_LEVELS, FEM_LEVELS_QUICK = (108.0, 151.0, 215.0), (65.0, 86.0, 108.0)
+# Simulated time of aperiodic references, by the scene's duration.
+LONG = {"wave": 20.0, "fem": 4.0}
+LONG_CELLS = 40
+# Limits that are relatively closer than this agree whatever their bars say.
+CLOSE = 2e-5
+
+
+def find_reference(
+    problem: Problem, scene: Scene, say: Callable[[str], None] = lambda text: None
+) -> Reference:
+    """Return the stored reference of a scene, or make a quicker one now."""
+    known = stored().get(fingerprint(scene))
+    if known is not None:
+        return known
+    return make_reference(problem, scene, quick=True, say=say)
+
+
+def make_reference(
+    problem: Problem,
+    scene: Scene,
+    quick: bool = False,
+    say: Callable[[str], None] = lambda text: None,
+) -> Reference:
+    """Refine both solvers on a problem and extrapolate.
+
+    Parameters
+    ----------
+    problem : Problem
+    scene : Scene
+        The scene that the problem was made of.
+    quick : bool
+        Whether coarser levels will do.
+    say : callable
+        Told what is being computed.
+    """
+    wave, fem = _scenes(problem, quick)
+    answers: dict[str, list[Answer]] = {"wave": [], "fem": []}
+    for name, chosen in (("wave", wave), ("fem", fem)):
+        for level in chosen:
+            say(f"reference: {_level_name(level)}")
+            answers[name].append(_answer(problem, level, name))
+    bars = {}
+    for key in problem.quantities:
+        if key == HISTORY:
+            continue
+        if problem.kind == APERIODIC:
+            limits = [_statistical(answers[name][-1], key) for name in ("wave", "fem")]
+        else:
+            limits = [
+                _limit(answers["wave"], wave, key, WAVE_ORDER),
+                _limit(answers["fem"], fem, key, FEM_ORDER),
+            ]
+        bars[key] = _agree(*limits)
+    history = answers["wave"][-1].history
+    if history is not None:
+        bars[HISTORY] = _history_bar(answers)
+    made = {
+        "wave": [_level_name(level) for level in wave],
+        "fem": [_level_name(level) for level in fem],
+        "date": time.strftime("%Y-%m-%d"),
+        "version": version("percussion_model"),
+        "numpy": version("numpy"),
+        "numba": version("numba"),
+        "quick": quick,
+    }
+    return Reference(scene.title, problem.kind, bars, history, made)
+
+
+def _scenes(problem: Problem, quick: bool) -> tuple[list[Scene], list[Scene]]:
+    """Levels of both solvers, coarse to fine."""
+    scene = problem.scene
+    if problem.kind == APERIODIC:
+        return (
+            [scene.computed_by("wave", **{"solver.cells": LONG_CELLS})],
+            [fem_scene(scene, LONG_CELLS, 2.0, stiffness_of(LONG_CELLS))],
+        )
+    by = reach(scene)
+    waves, elements = (WAVE_LEVELS_QUICK, FEM_LEVELS_QUICK) if quick else (WAVE_LEVELS, FEM_LEVELS)
+    counts = [max(2, _rounded(level / by)) for level in waves]
+    wave = [scene.computed_by("wave", **{"solver.cells": count}) for count in counts]
+    meshes = [max(3, round(level / by)) for level in elements]
+    finest = FEM_LEVELS[0] / by
+    fem = [fem_scene(scene, count, 1.0, 2.5e13 * (count / finest) ** 2) for count in meshes]
+    return wave, fem
+
+
+def _rounded(cells: float) -> int:
+    """A multiple of 20 where there are that many: lengths of the reference fit those."""
+    return 20 * round(cells / 20.0) if cells >= 30.0 else round(cells)
+
+
+def _level_name(scene: Scene) -> str:
+    if scene.solver_name == "wave":
+        return f"wave, {scene.solver.cells} cells"
+    fem = scene.fem
+    return f"fem, {fem.elements} elements, CFL {fem.courant:g}, K_C {fem.contact_stiffness:.3g} N/m"
+
+
+def _answer(problem: Problem, scene: Scene, solver: str) -> Answer:
+    if problem.kind == APERIODIC:
+        duration = LONG[solver] * problem.duration
+        problem = Problem(problem.scene, problem.kind, duration, problem.period)
+    return Run(problem, scene).answer()
+
+
+def _limit(
+    answers: Sequence[Answer], scenes: Sequence[Scene], key: str, order: float
+) -> tuple[float, float]:
+    """Extrapolate the last two levels; the bar is what the last two steps of it changed.
+
+    Twice the change from the level before to the finest is a bound as well: where answers
+    jump from level to level, extrapolation would promise too much.
+    """
+    sizes = [1.0 / _count(scene) for scene in scenes]
+    values = [answer.values[key] for answer in answers]
+    limits = []
+    for k in range(len(values) - 1):
+        by = (sizes[k] / sizes[k + 1]) ** order - 1.0
+        limits.append(values[k + 1] + (values[k + 1] - values[k]) / by)
+    change = abs(values[-1] - values[-2])
+    return limits[-1], max(abs(limits[-1] - limits[-2]), 0.5 * change)
+
+
+def _count(scene: Scene) -> float:
+    if scene.solver_name == "fem":
+        return float(scene.fem.elements)
+    return float(scene.solver.cells or math.nan)
+
+
+def _statistical(answer: Answer, key: str) -> tuple[float, float]:
+    return answer.values[key], answer.errors[key]
+
+
+def _agree(wave: tuple[float, float], fem: tuple[float, float]) -> Bar:
+    """Two limits agree within the sum of their bars, or so closely that nobody asks for more.
+
+    The one with the smaller bar is taken; where they are further apart than the bars
+    say, the bar is their distance.
+    """
+    off = abs(wave[0] - fem[0])
+    value, error = min((wave, fem), key=lambda limit: limit[1])
+    within = off <= wave[1] + fem[1]
+    agreed = within or off <= CLOSE * abs(value)
+    return Bar(value, error if within else max(error, off), *wave, *fem, agreed)
+
+
+def _history_bar(answers: dict[str, list[Answer]]) -> Bar:
+    """L1 distance of the finest histories to those of the level before, and to each other."""
+    finest, before = answers["wave"][-1].history, answers["wave"][-2].history
+    other, coarser = answers["fem"][-1].history, answers["fem"][-2].history
+    if finest is None or before is None or other is None or coarser is None:
+        return Bar(1.0, math.nan, 1.0, math.nan, math.nan, math.nan, False)
+    whole = float(np.sum(np.abs(finest)))
+
+    def apart(a: np.ndarray, b: np.ndarray) -> float:
+        return float(np.sum(np.abs(a - b))) / whole
+
+    own, theirs, off = apart(finest, before), apart(other, coarser), apart(finest, other)
+    return Bar(1.0, max(own, off), 1.0, own, 1.0 + off, theirs, off <= own + theirs)

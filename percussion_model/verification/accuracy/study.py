@@ -1,0 +1,286 @@
+"""All ladders on one scene: error against time, orders, and what to take."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+from percussion_model.scene.scene import Scene
+from percussion_model.verification.accuracy.integrators import GeneralRun
+from percussion_model.verification.accuracy.ladders import LADDERS, Rung, chosen_ladders, ladders
+from percussion_model.verification.accuracy.machine import machine
+from percussion_model.verification.accuracy.orders import Order, cost_at, fitted_order
+from percussion_model.verification.accuracy.problems import APERIODIC, Problem, Run, pose
+from percussion_model.verification.accuracy.quantities import Answer, relative_error
+from percussion_model.verification.accuracy.reference_store import Reference
+from percussion_model.verification.accuracy.references import find_reference
+from percussion_model.verification.accuracy.semidiscrete import OutOfTime
+from percussion_model.verification.accuracy.timing import interleaved
+
+__all__ = ["WANTED", "Point", "Study", "study"]
+
+# Accuracies that are asked for in the last lines.
+WANTED = (1e-2, 1e-3)
+# A general integrator gets so long for a blow [s].
+PATIENCE, PATIENCE_FULL = 25.0, 120.0
+# Errors below this multiple of the reference's bar are not resolved.
+RESOLVED = 2.0
+# Lengths fit the cells of the waves if their speed is off by less.
+FITS = 1e-6
+
+
+@dataclass(frozen=True)
+class Point:
+    """A rung, measured.
+
+    Attributes
+    ----------
+    ladder, label : str
+    size : float
+        See `Rung`.
+    setup : float
+        Time to make the solver [s]; compilation is apart.
+    second, blow : float
+        Processor time of a simulated second and of a blow [s].
+    repeats : int
+    values, errors : dict of float
+        By quantity: what was found, and the relative error; None where there
+        is no reference.
+    fit : float
+        Error of the wave speed, from lengths that fit no common cell.
+    note : str
+        Why there is no answer.
+    """
+
+    ladder: str
+    label: str
+    size: float
+    setup: float
+    second: float
+    blow: float
+    repeats: int
+    values: dict[str, float]
+    errors: dict[str, float]
+    fit: float = 0.0
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Study:
+    """Error against time on one scene.
+
+    Attributes
+    ----------
+    title : str
+    problem : Problem
+    reference : Reference
+    points : list of Point
+    compilation : dict of float
+        Time of the first set-up of each solver, compilation or its cache included [s].
+    machine : dict
+    """
+
+    title: str
+    problem: Problem
+    reference: Reference
+    points: list[Point]
+    compilation: dict[str, float]
+    machine: dict[str, Any]
+
+    def ladder(self, name: str) -> list[Point]:
+        """Points of a ladder, cheap to dear, without those that failed."""
+        return [point for point in self.points if point.ladder == name and not point.note]
+
+    @property
+    def names(self) -> list[str]:
+        """Ladders that have a point."""
+        return [name for name in LADDERS if self.ladder(name)]
+
+    def fitted(self, name: str, key: str) -> list[Point]:
+        """Points that an order is fitted to: resolved, and with lengths that fit the cells.
+
+        Where lengths fit at no rung, all count.
+        """
+        floor = self.reference.floor(key)
+        limit = 0.0 if math.isnan(floor) else RESOLVED * floor
+        resolved = [point for point in self.ladder(name) if point.errors.get(key, math.nan) > limit]
+        if all(point.fit >= FITS for point in self.ladder(name)):
+            return resolved
+        return [point for point in resolved if point.fit < FITS]
+
+    def order(self, name: str, key: str) -> Order | None:
+        """Measured order of a ladder in a quantity."""
+        points = self.fitted(name, key)
+        return fitted_order([point.size for point in points], [p.errors[key] for p in points])
+
+    def cost(self, name: str, key: str, wanted: float) -> float:
+        """Time of a simulated second at which a ladder meets an error for good [s]."""
+        points = self.ladder(name)
+        errors = [point.errors.get(key, math.nan) for point in points]
+        return cost_at([point.second for point in points], errors, wanted)
+
+    def cheapest(self, names: list[str], key: str, wanted: float) -> tuple[str, float]:
+        """Ladder among `names` that meets an error at the least cost, and that cost [s]."""
+        found = [(self.cost(name, key, wanted), name) for name in names if self.ladder(name)]
+        known = [(cost, name) for cost, name in found if math.isfinite(cost)]
+        cost, name = min(known, default=(math.nan, ""))
+        return name, cost
+
+    def advice(self, wanted: float) -> str:
+        """The sentence "for 1 % take ..."."""
+        key = self.problem.main
+        good = []
+        for name in self.names:
+            points = sorted(self.ladder(name), key=lambda point: point.second)
+            for k, point in enumerate(points):
+                if all(later.errors.get(key, math.inf) <= wanted for later in points[k:]):
+                    good.append(point)
+                    break
+        if not good:
+            return f"For {100 * wanted:g} % there is no method among these."
+        best = min(good, key=lambda point: point.second)
+        return (
+            f"For {100 * wanted:g} % take {LADDERS[best.ladder].title}, {best.label}: "
+            f"{1e3 * best.second:.3g} ms for a simulated second, "
+            f"off by {100 * best.errors[key]:.2g} %."
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values for JSON."""
+        orders: dict[str, dict[str, Any]] = {}
+        for name in self.names:
+            found = {key: self.order(name, key) for key in self.problem.quantities}
+            orders[name] = {key: asdict(one) for key, one in found.items() if one is not None}
+        return _plain(
+            {
+                "title": self.title,
+                "kind": self.problem.kind,
+                "duration": self.problem.duration,
+                "period": self.problem.period,
+                "machine": self.machine,
+                "compilation": self.compilation,
+                "reference": {
+                    "bars": {key: asdict(bar) for key, bar in self.reference.bars.items()},
+                    "made": self.reference.made,
+                },
+                "ladders": {name: asdict(LADDERS[name]) for name in self.names},
+                "points": [asdict(point) for point in self.points],
+                "orders": orders,
+                "advice": [self.advice(wanted) for wanted in WANTED],
+            }
+        )
+
+
+def study(
+    scene: Scene,
+    full: bool = False,
+    methods: Sequence[str] | None = None,
+    progress: Callable[[float, str], None] = lambda share, text: None,
+) -> Study:
+    """Measure error against time on one scene.
+
+    Parameters
+    ----------
+    scene : Scene
+    full : bool
+        Whether to take the dear rungs as well.
+    methods : sequence of str, optional
+        Names of `LADDERS`, or "scipy" for all general integrators.
+    progress : callable
+        Called with the share of the work that is done, and what comes next.
+
+    Raises
+    ------
+    SceneError
+        If the scene has nothing to refine, or a method is not known.
+    """
+    names = chosen_ladders(methods)
+    progress(0.0, "pilot run (the first compiles, about a minute)")
+    compilation = _compile(scene)
+    problem = pose(scene)
+    reference = find_reference(problem, scene, lambda text: progress(0.02, text))
+    rungs = [rung for rung in ladders(problem, full) if rung.ladder in names]
+    points: list[Point] = []
+    runs: list[tuple[int, Run]] = []
+    for k, rung in enumerate(rungs):
+        progress(0.05 + 0.65 * k / len(rungs), f"{LADDERS[rung.ladder].title}, {rung.label}")
+        point, run = _measured(rung, problem, reference, full)
+        points.append(point)
+        if isinstance(run, Run) and not point.note:
+            runs.append((k, run))
+    times = interleaved(
+        [run.cost for _, run in runs],
+        lambda place: progress(0.7 + 0.3 * place / max(len(runs), 1), "times, turn by turn"),
+    )
+    for (k, run), (cost, repeats) in zip(runs, times, strict=True):
+        duration, blows = run.problem.duration, points[k].blow
+        points[k] = replace(points[k], second=cost / duration, blow=cost / blows, repeats=repeats)
+    return Study(scene.title, problem, reference, points, compilation, machine())
+
+
+def _compile(scene: Scene) -> dict[str, float]:
+    """Make each solver once: compile, or load what was compiled before."""
+    from percussion_model.simulation.simulate import Simulation
+
+    return {
+        name: Simulation(scene.computed_by(name)).setup_time for name in ("wave", "fem", "rigid")
+    }
+
+
+def _measured(
+    rung: Rung, problem: Problem, reference: Reference, full: bool
+) -> tuple[Point, Run | GeneralRun | None]:
+    """Take the answer of a rung; its time is taken later, but for general integrators.
+
+    The blows of its run stand in `blow` until then.
+    """
+    empty = Point(rung.ladder, rung.label, rung.size, 0.0, math.nan, math.nan, 0, {}, {})
+    if rung.duration is not None:
+        problem = replace(problem, duration=rung.duration)
+    patience = PATIENCE_FULL if full else PATIENCE
+    run: Run | GeneralRun
+    try:
+        if rung.integrator:
+            run = GeneralRun(problem, rung.scene, rung.integrator, rung.relative, patience)
+        else:
+            run = Run(problem, rung.scene)
+        answer = run.answer()
+    except OutOfTime:
+        return replace(empty, note=f"took more than {patience:g} s for a blow"), None
+    except (RuntimeError, ValueError, IndexError) as error:
+        return replace(empty, note=f"failed: {error}"), None
+    point = replace(
+        empty,
+        setup=run.setup_time,
+        values=answer.values,
+        errors=_errors(answer, problem, reference),
+        blow=answer.blows,
+    )
+    if isinstance(run, GeneralRun):
+        cost = run.cost()
+        point = replace(point, blow=cost, second=cost / problem.period, repeats=1)
+    else:
+        point = replace(point, fit=run.simulation.solver.wave_speed_error)
+    return point, run
+
+
+def _errors(answer: Answer, problem: Problem, reference: Reference) -> dict[str, float]:
+    """Relative errors; of aperiodic motion, relative standard errors."""
+    if problem.kind == APERIODIC:
+        return {key: abs(answer.errors[key] / answer.values[key]) for key in problem.quantities}
+    values = reference.values
+    history = reference.history if reference.bars.get("bit_force_history") else None
+    return {key: relative_error(answer, values, history, key) for key in problem.quantities}
+
+
+def _plain(value: Any) -> Any:
+    """None for what is not finite, as JSON has no name for it."""
+    if isinstance(value, dict):
+        return {str(name): _plain(entry) for name, entry in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(entry) for entry in value]
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return value

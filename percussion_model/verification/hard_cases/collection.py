@@ -1,0 +1,206 @@
+"""All hard cases by all solvers, on several processes, and where solvers disagree."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Any
+
+from percussion_model.analysis.study.workers import on_this_machine
+from percussion_model.scene.inputs import SimulationError
+from percussion_model.verification.hard_cases.cases import SOLVERS, HardCase, hard_cases
+from percussion_model.verification.hard_cases.measures import measure
+from percussion_model.verification.hard_cases.refinement import SIGMAS, refine
+
+# Solvers disagree where their mean rates are further apart than this.
+DISAGREE = 0.02
+# What must hold of every row.
+MOST_RESIDUAL = 1e-6
+MOST_MOMENTUM = 1e-8
+MOST_TENSION = 1e-9
+
+# Why rates differ where a case says nothing else.
+RIGID_REASON = (
+    "rigid bodies: no wave takes its time to the rock, none comes back, none stays in the bit"
+)
+CHANCE_REASON = "within {sigmas:.1f} standard errors of the two rates: too few blows to tell"
+
+
+@dataclass(frozen=True)
+class Collection:
+    """What the solvers made of the cases.
+
+    Attributes
+    ----------
+    rows : list of dict
+        A row for each case and solver: `Measures` and `Refinement` as plain values.
+    share : float
+        Share of each case's duration that was run.
+    """
+
+    rows: list[dict[str, Any]]
+    share: float = 1.0
+
+    def failures(self) -> list[str]:
+        """What does not hold, a line each; empty where all is well."""
+        return [
+            f"{row['case']}, {row['solver']}: {text}" for row in self.rows for text in wrong(row)
+        ]
+
+    def disagreements(self) -> list[dict[str, Any]]:
+        """Where mean rates are further apart than `DISAGREE`, and why."""
+        by_case: dict[str, list[dict[str, Any]]] = {}
+        for row in self.rows:
+            by_case.setdefault(row["case"], []).append(row)
+        found = []
+        for name, rows in by_case.items():
+            first, *others = rows
+            for row in others:
+                entry = _disagreement(hard_cases()[name], first, row)
+                if entry is not None:
+                    found.append(entry)
+        return found
+
+    def unresolved(self) -> list[dict[str, Any]]:
+        """Rows whose rate or periods change on a finer grid."""
+        return [row for row in self.rows if row.get("refined_converged") is False]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values for JSON."""
+        return {
+            "cases": len({row["case"] for row in self.rows}),
+            "runs": len(self.rows),
+            "share": self.share,
+            "failures": self.failures(),
+            "disagreements": self.disagreements(),
+            "rows": self.rows,
+        }
+
+
+def wrong(row: dict[str, Any]) -> list[str]:
+    """What of a row does not hold."""
+    found = [row["error"]] if row["error"] else []
+    for name, most in (
+        ("residual", MOST_RESIDUAL),
+        ("momentum", MOST_MOMENTUM),
+        ("contact_tension", MOST_TENSION),
+        ("rock_tension", MOST_TENSION),
+        ("interpenetration", 1.0),
+        ("events_per_second", row["ceiling"]),
+    ):
+        value = row[name]
+        if value is None:
+            if name in ("residual", "events_per_second"):
+                found.append(f"{name} is no number")
+        elif abs(value) > most:
+            found.append(f"{name} = {value:.3g}, more than {most:.3g}")
+    if not row["same_bits"]:
+        found.append("other calls give other bits")
+    return found
+
+
+def _disagreement(
+    case: HardCase, first: dict[str, Any], row: dict[str, Any]
+) -> dict[str, Any] | None:
+    """Entry of the list of disagreements, None where two rates agree or there is none."""
+    base, rate = first["rate"], row["rate"]
+    if base is None or rate is None or base == rate:
+        return None
+    off = rate / base - 1.0 if base else math.inf
+    if abs(off) <= DISAGREE:
+        return None
+    error = math.hypot(first["rate_error"] or 0.0, row["rate_error"] or 0.0)
+    sigmas = abs(rate - base) / error if error > 0.0 else math.inf
+    reason = case.differs.get(row["solver"])
+    if reason is None and sigmas <= SIGMAS:
+        reason = CHANCE_REASON.format(sigmas=sigmas)
+    if reason is None and row["solver"] == "rigid":
+        reason = RIGID_REASON
+    return {
+        "case": case.name,
+        "solver": row["solver"],
+        "compared_with": first["solver"],
+        "rate": rate,
+        "other_rate": base,
+        "difference": off if math.isfinite(off) else None,
+        "standard_errors": sigmas if math.isfinite(sigmas) else None,
+        "reason": reason or "",
+    }
+
+
+def run_collection(
+    names: Iterable[str] | None = None,
+    solvers: Iterable[str] = SOLVERS,
+    share: float = 1.0,
+    refined: bool = True,
+    workers: int | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Collection:
+    """Run hard cases by every solver that supports them.
+
+    Parameters
+    ----------
+    names : iterable of str, optional
+        Cases; all if left out.
+    solvers : iterable of str
+    share : float
+        Share of each case's duration.
+    refined : bool
+        Whether to run each on a finer grid as well.
+    workers : int, optional
+        Processes; as many as there are processors if left out, 0 or 1: this process.
+    progress : callable, optional
+        Called with the number of runs done and of all.
+
+    Raises
+    ------
+    SimulationError
+        If there is no such case or solver, or nothing to run.
+    """
+    wanted = list(solvers)
+    jobs = [
+        (name, solver, share, refined)
+        for name in (hard_cases() if names is None else names)
+        for solver in _case(name).solvers
+        if solver in wanted
+    ]
+    for solver in wanted:
+        if solver not in SOLVERS:
+            raise SimulationError(f"unknown solver {solver}: there are {', '.join(SOLVERS)}")
+    if not jobs:
+        raise SimulationError(f"none of these cases is computed by {', '.join(wanted)}")
+    order = {(job[0], job[1]): k for k, job in enumerate(jobs)}
+    rows = []
+    for row in _rows(jobs, workers):
+        rows.append(row)
+        if progress is not None:
+            progress(len(rows), len(jobs))
+    rows.sort(key=lambda row: order[row["case"], row["solver"]])
+    return Collection(rows, share)
+
+
+def _case(name: str) -> HardCase:
+    if name not in hard_cases():
+        raise SimulationError(f"unknown case {name}: there are {', '.join(hard_cases())}")
+    return hard_cases()[name]
+
+
+def _rows(jobs: list[tuple[str, str, float, bool]], workers: int | None) -> Iterable[dict]:
+    """Rows as they become ready."""
+    count = (os.cpu_count() or 1) if workers is None else max(workers, 1)
+    # the dearest first, so that no long run is left at the end
+    jobs = sorted(jobs, key=lambda job: job[1] != "fem")
+    for _, row in on_this_machine(_row, jobs, count):
+        yield row
+
+
+def _row(name: str, solver: str, share: float, refined: bool) -> dict[str, Any]:
+    """Measures of one case by one solver."""
+    case = hard_cases()[name]
+    found = measure(case, solver, share)
+    row = found.to_dict()
+    if refined:
+        row |= refine(case, found, share).to_dict()
+    return row

@@ -1,0 +1,215 @@
+"""What a solver makes of a hard case, in figures."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from percussion_model.scene.inputs import SimulationError
+from percussion_model.scene.scene import Scene
+from percussion_model.simulation.stepping import Simulation
+from percussion_model.verification.hard_cases.cases import HardCase
+from percussion_model.verification.hard_cases.mechanics import mechanics, unsound
+
+# Readings of a run: the first contact closely, then the whole of it.
+FIRST_CONTACT, CLOSE_READINGS, READINGS = 6e-4, 150, 250
+# A run that has taken so long is given up [s]; the slowest takes a tenth of it.
+MOST_WALL_TIME = 120.0
+# How often a solver's guards acted: modes that did not settle, storms of events.
+GUARDS = ("locked", "storms")
+
+
+@dataclass(frozen=True)
+class Measures:
+    """Figures of a run; NaN where a case has none.
+
+    Attributes
+    ----------
+    case, solver : str
+    error : str
+        Why the run ended early, or what is not finite; empty where all is well.
+    residual, numerical, overshoot : float
+        Of the energy ledger, by its denominator.
+    momentum : float
+        Greatest difference of momentum and impulses, by the greatest impulse.
+    contact_tension, rock_tension : float
+        Greatest pull between piston and bit, and on the rock where it releases, by
+        the greatest push.
+    interpenetration : float
+        Of piston and bit, or of bit and wall, by what is allowed: all energy put in
+        held by the penalty (finite elements), or rounding (others; in a storm of
+        rigid bodies the passing of events that were put off).
+    events_per_second, ceiling : float
+        [1/s]
+    guards : int
+        How often a guard of the solver acted.
+    same_bits : bool
+        Whether the run, repeated in one call for each change of inputs, gave the
+        same bits as the run that was read several hundred times.
+    rate, rate_error, period : float
+        Rate of penetration, its standard error [m/s], and mean period of a blow [s].
+    periods : list of float
+        Of the counted blows [s].
+    path : list of float
+        Mean bit position at the readings of the first contact [m].
+    drilling_cycles : float
+        A blow.
+    cells : int
+        Cells or elements of the first elastic bar, 0 where there is none.
+    wall_time, duration : float
+        [s]
+    warnings : list of str
+    """
+
+    case: str
+    solver: str
+    error: str
+    residual: float
+    numerical: float
+    overshoot: float
+    momentum: float
+    contact_tension: float
+    rock_tension: float
+    interpenetration: float
+    events_per_second: float
+    ceiling: float
+    guards: int
+    same_bits: bool
+    rate: float
+    rate_error: float
+    period: float
+    periods: list[float]
+    path: list[float]
+    drilling_cycles: float
+    cells: int
+    wall_time: float
+    duration: float
+    warnings: list[str]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values for JSON, without the lists; None where a figure is not defined."""
+        left_out = ("periods", "path")
+        return {
+            key: None if isinstance(value, float) and not math.isfinite(value) else value
+            for key, value in asdict(self).items()
+            if key not in left_out
+        } | {"blows": len(self.periods)}
+
+
+def measure(
+    case: HardCase, solver: str, share: float = 1.0, *, again: bool = True, **changes: Any
+) -> Measures:
+    """Run a case by one solver and take its measures.
+
+    Parameters
+    ----------
+    case : HardCase
+    solver : str
+        "wave", "fem" or "rigid".
+    share : float
+        Share of the case's duration.
+    again : bool
+        Whether to repeat the run in other calls and compare the bits.
+    **changes
+        Further values by dotted key, as for `Scene.replace`.
+    """
+    scene = case.computed_by(solver, **changes)
+    run = Simulation(scene)
+    end = share * scene.run.duration
+    began = time.perf_counter()
+    seen, error = None, ""
+    try:
+        seen = _follow(run, case, end, began + MOST_WALL_TIME)
+    except SimulationError as caught:
+        error = str(caught)
+    taken = time.perf_counter() - began
+    result = run.result(settle=share * scene.run.settle)
+    energy, counts, blows = result.energy, result.statistics, result.counted
+    figures = mechanics(scene, seen, energy, counts.get("storms", 0)) if seen is not None else {}
+    close = seen["bit_position"][:CLOSE_READINGS].tolist() if seen is not None else []
+    # where nothing ever moves there is no energy to divide by
+    idle = energy["residual"] == 0.0
+    return Measures(
+        case=case.name,
+        solver=solver,
+        error=error or unsound(seen, energy),
+        residual=0.0 if idle else energy["residual_relative"],
+        numerical=energy["numerical_relative"],
+        overshoot=energy["overshoot_relative"],
+        momentum=figures.get("momentum", math.nan),
+        contact_tension=figures.get("contact_tension", math.nan),
+        rock_tension=figures.get("rock_tension", math.nan),
+        interpenetration=figures.get("interpenetration", math.nan),
+        events_per_second=counts["events"] / run.time if run.time > 0.0 else math.nan,
+        ceiling=case.ceiling,
+        guards=sum(counts.get(name, 0) for name in GUARDS),
+        same_bits=not error and (not again or _repeats(run, case, scene, end)),
+        rate=result.rate_of_penetration,
+        rate_error=result.rate_of_penetration_standard_error,
+        period=float(np.mean(blows["period"])) if len(blows) else math.nan,
+        periods=blows["period"].tolist(),
+        path=close,
+        drilling_cycles=float(np.mean(blows["drilling_cycles"])) if len(blows) else math.nan,
+        cells=next(iter(result.cells.values()), 0),
+        wall_time=taken,
+        duration=run.time,
+        warnings=list(result.warnings),
+    )
+
+
+def readings(end: float) -> np.ndarray:
+    """Times at which a run is looked at [s]: the first contact, then the rest."""
+    close = np.linspace(0.0, min(FIRST_CONTACT, end), CLOSE_READINGS)
+    return np.concatenate([close, np.linspace(close[-1], end, READINGS)[1:]])
+
+
+def _follow(run: Simulation, case: HardCase, end: float, deadline: float) -> dict[str, np.ndarray]:
+    """Take a run through the script of its case; what was seen, and the feed's impulse."""
+    rows: list[dict[str, float]] = []
+    scene = run.scene
+    force = scene.feed.force if scene.effects.feed else 0.0
+    impulse, since = 0.0, 0.0
+    times = readings(end)
+    done = 0
+    for t, inputs in [*case.changes(end), (end, {})]:
+        until = len(times) if not inputs else int(np.searchsorted(times, t))
+        for moment in times[done:until]:
+            row = {name: float(values[0]) for name, values in run.sample([moment]).items()}
+            # after a change of inputs the state may lie a step ahead
+            here = max(float(moment), since)
+            rows.append(row | {"here": here, "feed_impulse": impulse + force * (here - since)})
+            if time.perf_counter() > deadline:
+                raise SimulationError(f"given up after {MOST_WALL_TIME:g} s at t = {run.time!r} s")
+        done = until
+        run.advance(t)
+        if inputs:
+            run.set_inputs(**inputs)
+            now = max(run.time, run.solver.time(run._state))
+            impulse += force * (now - since)
+            since, force = now, inputs.get("feed_force", force)
+    return {name: np.array([row[name] for row in rows]) for name in rows[0]}
+
+
+def _repeats(run: Simulation, case: HardCase, scene: Scene, end: float) -> bool:
+    """Whether the run has the bits of another one, in the fewest calls."""
+    again = Simulation(scene)
+    for t, inputs in case.changes(end):
+        again.advance(t)
+        again.set_inputs(**inputs)
+    again.advance(end)
+    return _bits(again) == _bits(run)
+
+
+def _bits(run: Simulation) -> tuple[bytes, bytes, bytes]:
+    """State, blows and events as bytes."""
+    state = run.save().state
+    if isinstance(state, np.ndarray):
+        return state.tobytes(), run.blows.tobytes(), run.events.tobytes()
+    record = state.record.copy()
+    record["n_blows"] = record["n_events"] = 0  # rows filled in the last call
+    plain = record.tobytes() + state.workspace.tobytes()
+    return plain, run.blows.tobytes(), run.events.tobytes()
