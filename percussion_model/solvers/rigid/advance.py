@@ -20,12 +20,8 @@ from percussion_model.solvers.rigid.law import (
     watch_standstill,
 )
 from percussion_model.solvers.rigid.move import bit_motion, impulses, move, piston_motion
-from percussion_model.solvers.rigid.records import ROWS_AN_EVENT
-from percussion_model.solvers.rigid.schedule import CLOSE, NOTHING, schedule
-
-DONE, BLOWS_FULL, EVENTS_FULL = int(Status.DONE), int(Status.BLOWS_FULL), int(Status.EVENTS_FULL)
-NOT_FINITE = int(Status.NOT_FINITE)
-ABSENT = int(Piston.ABSENT)
+from percussion_model.solvers.rigid.records import ROWS_AN_EVENT, Next
+from percussion_model.solvers.rigid.schedule import schedule
 
 # Where a longer row goes on.
 PEAKS = len(SAMPLE_FIELDS)
@@ -74,13 +70,15 @@ def advance(par_, state, t, blows, n_blows, events, n_events, record):
     while True:
         if s.scheduled == 0:
             schedule(par, s)
-        if not s.next_time <= t or s.next_kind == NOTHING:
-            return DONE
+        if not s.next_time <= t or s.next_kind == Next.NOTHING:
+            return Status.DONE
         if record and n_events[0] + ROWS_AN_EVENT > events.shape[0]:
-            return EVENTS_FULL
-        ends_blow = s.next_kind == CLOSE and s.in_blow == 1 and starts_blow(par, s, s.next_time)
+            return Status.EVENTS_FULL
+        ends_blow = (
+            s.next_kind == Next.CLOSE and s.in_blow == 1 and starts_blow(par, s, s.next_time)
+        )
         if ends_blow and n_blows[0] >= blows.shape[0]:
-            return BLOWS_FULL
+            return Status.BLOWS_FULL
         if s.next_tau > 0.0:
             move(par, s, s.next_tau)
             s.time = s.next_time
@@ -103,7 +101,7 @@ def advance(par_, state, t, blows, n_blows, events, n_events, record):
                 n_events[0] += 1
         s.scheduled = 0
         if not is_finite(s):
-            return NOT_FINITE
+            return Status.NOT_FINITE
 
 
 @njit(cache=True, error_model="numpy")
@@ -128,7 +126,7 @@ def begin(par_, state):
     start_cycle(par, s, s.p)
     s.mode = mode
     s.standstill = 0.0
-    if par.piston != ABSENT and s.gap == 0.0 and s.v_p == s.v_b:
+    if par.piston != Piston.ABSENT and s.gap == 0.0 and s.v_p == s.v_b:
         s.held = 1
         if not contact_force(par, s, acceleration(par, s)) > 0.0:
             s.held = 0
@@ -191,7 +189,7 @@ def fill_sample(par, s, t, row):
     row[15] = s.bit_impulse + bit
     row[16] = s.contact_impulse + contact
     row[17] = s.drive_impulse
-    if par.piston == ABSENT:
+    if par.piston == Piston.ABSENT:
         row[1] = math.nan
         row[2] = math.nan
         row[7] = math.nan
@@ -206,8 +204,8 @@ def fill_sample(par, s, t, row):
 @njit(cache=True, error_model="numpy")
 def run_to(par_, copy, t, blows, n_blows, events, n_events):
     """Advance a copy that is only read to time t; its blows are dropped."""
-    status = BLOWS_FULL
-    while status == BLOWS_FULL:
+    status = Status.BLOWS_FULL
+    while status == Status.BLOWS_FULL:
         n_blows[0] = 0
         status = advance(par_, copy, t, blows, n_blows, events, n_events, False)
     return status
@@ -233,10 +231,10 @@ def sample(par_, copy, times, out, blows, n_blows, events, n_events):
     """
     for i in range(times.shape[0]):
         status = run_to(par_, copy, times[i], blows, n_blows, events, n_events)
-        if status != DONE:
+        if status != Status.DONE:
             return status
         fill_sample(par_[0], copy[0], times[i], out[i])
-    return DONE
+    return Status.DONE
 
 
 @njit(cache=True, error_model="numpy")

@@ -6,15 +6,8 @@ import math
 
 from numba import njit
 
-from percussion_model.physics.records import EventKind
+from percussion_model.physics.records import DriveKind, EventKind, Mode, RockKind
 from percussion_model.solvers.rigid.law import (
-    BC,
-    BILINEAR,
-    FC,
-    PRESSURE,
-    SPRING,
-    SS,
-    WALL,
     acceleration,
     acceleration_doubt,
     bit_force,
@@ -30,22 +23,7 @@ from percussion_model.solvers.rigid.law import (
     start_cycle,
     watch_standstill,
 )
-from percussion_model.solvers.rigid.schedule import (
-    BARRIER,
-    CLOSE,
-    LEAVE_DOWN,
-    LIFT,
-    PEAK,
-    RELEASE,
-    SWITCH,
-    TOUCH,
-    TOUCH_INSIDE,
-    TURN,
-)
-
-MODE = int(EventKind.MODE_FF)
-CLOSED, OPENED = int(EventKind.CONTACT_CLOSED), int(EventKind.CONTACT_OPENED)
-UP, DOWN = int(EventKind.DRIVE_UP), int(EventKind.DRIVE_DOWN)
+from percussion_model.solvers.rigid.records import Next
 
 # Pressed together, a rebound slower than this ends the bouncing: what is left of a blow
 # of 10 m/s is 1e-10 of its energy, and the rest would be endless ever shorter bounces.
@@ -69,7 +47,7 @@ def starts_blow(par, s, time):
     """Whether a closure of the gap at `time` starts a blow; no two start at one instant."""
     if s.in_blow == 1 and time <= s.blow.time:
         return False
-    if par.drive == PRESSURE:
+    if par.drive == DriveKind.PRESSURE:
         return s.armed == 1
     return time - s.opened >= par.blow_gap_time
 
@@ -120,7 +98,7 @@ def part(par, s):
     s.held = 0
     s.opened = s.time
     s.blow.rebound_velocity = s.v_p
-    push_event(s, OPENED, s.v_p - s.v_b)
+    push_event(s, EventKind.CONTACT_OPENED, s.v_p - s.v_b)
 
 
 @njit(cache=True, error_model="numpy")
@@ -133,12 +111,12 @@ def impact(par, s):
     w = max(s.v_p - s.v_b, 0.0)
     s.blow.contacts += 1
     s.count_contacts += 1
-    push_event(s, CLOSED, w)
-    if par.drive == PRESSURE and s.alpha > 0:
+    push_event(s, EventKind.CONTACT_CLOSED, w)
+    if par.drive == DriveKind.PRESSURE and s.alpha > 0:
         s.alpha = -1
-        push_event(s, UP, 0.0)
+        push_event(s, EventKind.DRIVE_UP, 0.0)
     # A bit at the wall stays there, even if its feed pulls and it is about to leave.
-    rests = par.rock == WALL and s.p >= s.P_u and s.v_b == 0.0
+    rests = par.rock == RockKind.WALL and s.p >= s.P_u and s.v_b == 0.0
     mass = par.M_p if rests else par.M_p * par.M_b / (par.M_p + par.M_b)
     # In a storm they do not rebound; in the worst they stay together, pressed or not.
     e = 0.0 if in_storm(par, s) else par.e
@@ -173,14 +151,14 @@ def touch_rock(par, s, inside):
     """The bit meets the rock."""
     if not inside:
         s.p = s.P_u
-    if par.rock == BILINEAR:
+    if par.rock == RockKind.BILINEAR:
         if overcomes_barrier(par, s):
             start_cycle(par, s, 0.0)
         else:
             set_down(par, s)
-    elif par.rock == SPRING:
+    elif par.rock == RockKind.SPRING:
         s.K_R = par.K_R
-        s.mode = FC
+        s.mode = Mode.FC
     else:
         # The wall stops the bit; a piston that rode on it goes on and hits it.
         impulse = par.M_b * s.v_b
@@ -196,34 +174,34 @@ def touch_rock(par, s, inside):
 @njit(cache=True, error_model="numpy")
 def change_mode(par, s, kind, moved):
     """Leave the present drilling mode for the reason `kind`."""
-    if (kind == PEAK or kind == TURN) and moved:
+    if (kind == Next.PEAK or kind == Next.TURN) and moved:
         s.v_b = 0.0
         if s.held == 1:
             s.v_p = 0.0
-    if s.mode == SS:
+    if s.mode == Mode.SS:
         note_standstill_force(par, s)
-    if kind == TOUCH or kind == TOUCH_INSIDE:
-        touch_rock(par, s, kind == TOUCH_INSIDE)
-    elif kind == BARRIER:
-        s.mode = FC
-    elif kind == PEAK:
+    if kind == Next.TOUCH or kind == Next.TOUCH_INSIDE:
+        touch_rock(par, s, kind == Next.TOUCH_INSIDE)
+    elif kind == Next.BARRIER:
+        s.mode = Mode.FC
+    elif kind == Next.PEAK:
         end_loading(s)
-    elif kind == LIFT:
-        if moved and (s.mode == BC or par.rock == SPRING):
+    elif kind == Next.LIFT:
+        if moved and (s.mode == Mode.BC or par.rock == RockKind.SPRING):
             s.p = s.P_u  # exactly unloaded; else it already was in tension
         lift_off(par, s)
-    elif kind == TURN:
+    elif kind == Next.TURN:
         if overcomes_barrier(par, s):
             resume_cycle(par, s)
         else:
             set_down(par, s)
-    elif kind == LEAVE_DOWN:
+    elif kind == Next.LEAVE_DOWN:
         resume_cycle(par, s)
     else:
-        s.mode = BC
+        s.mode = Mode.BC
     force = bit_force(par, s, s.p, s.v_b)
     s.blow.peak_bit_force = max(s.blow.peak_bit_force, force)
-    push_event(s, MODE + s.mode, force)
+    push_event(s, EventKind.MODE_FF + s.mode, force)
 
 
 @njit(cache=True, error_model="numpy")
@@ -231,16 +209,16 @@ def happen(par, s):
     """Let the scheduled event happen; the state has been carried to it."""
     kind = s.next_kind
     s.n_rows = 0
-    if kind == CLOSE:
+    if kind == Next.CLOSE:
         impact(par, s)
-    elif kind == RELEASE:
+    elif kind == Next.RELEASE:
         note_standstill_force(par, s)
         part(par, s)
         watch_standstill(s)
-    elif kind == SWITCH:
+    elif kind == Next.SWITCH:
         s.alpha = -s.alpha
         if s.alpha > 0:
             s.armed = 1
-        push_event(s, DOWN if s.alpha > 0 else UP, -s.gap)
+        push_event(s, EventKind.DRIVE_DOWN if s.alpha > 0 else EventKind.DRIVE_UP, -s.gap)
     else:
         change_mode(par, s, kind, s.next_tau > 0.0 and s.late == 0)

@@ -12,11 +12,6 @@ from numba import njit
 from percussion_model.physics.records import DriveKind, Mode, Piston, RockKind
 from percussion_model.solvers.rigid.motion import oscillate
 
-FF, DFC, FC, BC, SS = (int(mode) for mode in Mode)
-ABSENT = int(Piston.ABSENT)
-PRESSURE, EXTERNAL = int(DriveKind.PRESSURE), int(DriveKind.EXTERNAL)
-BILINEAR, SPRING, WALL = int(RockKind.BILINEAR), int(RockKind.SPRING), int(RockKind.WALL)
-
 # Relative rounding of an acceleration, and of a force that is the difference of two lengths.
 ROUNDING = 1e-12
 LAST_PLACES = 1e-15
@@ -34,9 +29,9 @@ LAST_SHARE = 0.1
 @njit(cache=True, error_model="numpy")
 def drive_force(par, s):
     """Force of the drive on the piston, down positive [N]."""
-    if par.drive == PRESSURE:
+    if par.drive == DriveKind.PRESSURE:
         return s.alpha * par.F_0
-    if par.drive == EXTERNAL:
+    if par.drive == DriveKind.EXTERNAL:
         return par.external
     return 0.0
 
@@ -65,13 +60,13 @@ def loads(par, s):
 @njit(cache=True, error_model="numpy")
 def rock_terms(par, s):
     """Stiffness K, damping C and origin P_R of the present mode; K = 0 off the rock."""
-    if s.mode == FF or par.rock == WALL:
+    if s.mode == Mode.FF or par.rock == RockKind.WALL:
         return 0.0, 0.0, 0.0
-    if s.mode == DFC:
+    if s.mode == Mode.DFC:
         return s.K_R, s.C_R, 0.0
-    if s.mode == FC:
+    if s.mode == Mode.FC:
         return s.K_R, 0.0, 0.0
-    if s.mode == BC:
+    if s.mode == Mode.BC:
         return s.gamma * s.K_R, 0.0, s.P_u
     return s.gamma * s.K_R, s.C_R, s.P_u
 
@@ -79,7 +74,7 @@ def rock_terms(par, s):
 @njit(cache=True, error_model="numpy")
 def on_wall(par, s):
     """Whether the bit rests on a rigid wall."""
-    return par.rock == WALL and s.mode == SS
+    return par.rock == RockKind.WALL and s.mode == Mode.SS
 
 
 @njit(cache=True, error_model="numpy")
@@ -122,11 +117,11 @@ def bit_force(par, s, p, v):
 @njit(cache=True, error_model="numpy")
 def recoverable(par, s, p):
     """Energy F_e**2 / (2 gamma K_R) that the rock would give back [J]."""
-    if par.rock != BILINEAR and par.rock != SPRING:
+    if par.rock != RockKind.BILINEAR and par.rock != RockKind.SPRING:
         return 0.0
-    if s.mode == DFC or s.mode == FC:
+    if s.mode == Mode.DFC or s.mode == Mode.FC:
         return 0.5 * s.K_R * p * p / s.gamma
-    if s.mode == FF and p <= s.P_u:
+    if s.mode == Mode.FF and p <= s.P_u:
         return 0.0
     return 0.5 * s.gamma * s.K_R * (p - s.P_u) * (p - s.P_u)
 
@@ -150,7 +145,7 @@ def start_cycle(par, s, p):
     What the rock could have given back and no longer can is booked: after free flight
     it has relaxed (standstill), else the law has changed (crushing).
     """
-    from_flight = s.mode == FF
+    from_flight = s.mode == Mode.FF
     before = recoverable(par, s, s.p)
     s.p = p
     s.W = 0.0
@@ -160,7 +155,7 @@ def start_cycle(par, s, p):
     s.gamma = par.gamma
     s.C_R = par.C_R
     s.W_R = par.W_R
-    s.mode = DFC if barrier_on(par, s) else FC
+    s.mode = Mode.DFC if barrier_on(par, s) else Mode.FC
     lost = before - recoverable(par, s, p)
     if from_flight:
         s.standstill += lost
@@ -178,14 +173,14 @@ def resume_cycle(par, s):
 def end_loading(s):
     """Loading ends at the peak: P_u = p (gamma - 1)/gamma (eq. 22)."""
     s.P_u = s.p * (s.gamma - 1.0) / s.gamma
-    s.mode = BC
+    s.mode = Mode.BC
 
 
 @njit(cache=True, error_model="numpy")
 def lift_off(par, s):
     """Free flight begins; a rock in tension gives its energy up."""
     before = recoverable(par, s, s.p)
-    s.mode = FF
+    s.mode = Mode.FF
     s.standstill += before - recoverable(par, s, s.p)
 
 
@@ -203,7 +198,7 @@ def note_standstill_force(par, s):
 
     From momentum, F_tot - M dv/dt; a disturbance within the last tenth shortens it.
     """
-    if s.mode != SS or s.time <= s.ss_from:
+    if s.mode != Mode.SS or s.time <= s.ss_from:
         return
     begin = s.time - LAST_SHARE * (s.time - s.ss_time)
     F, M = loads(par, s)
@@ -219,7 +214,7 @@ def note_standstill_force(par, s):
 @njit(cache=True, error_model="numpy")
 def set_down(par, s):
     """Standstill begins."""
-    s.mode = SS
+    s.mode = Mode.SS
     s.ss_time = s.time
     watch_standstill(s)
 
@@ -228,7 +223,7 @@ def set_down(par, s):
 def kinetic_energy(par, v_p, v_b):
     """Kinetic energy of piston and bit [J]."""
     energy = 0.5 * par.M_b * v_b * v_b
-    if par.piston != ABSENT:
+    if par.piston != Piston.ABSENT:
         energy += 0.5 * par.M_p * v_p * v_p
     return energy
 

@@ -6,14 +6,9 @@ import math
 
 from numba import njit
 
+from percussion_model.physics.records import Mode, Piston, RockKind
 from percussion_model.solvers.rigid.law import (
-    ABSENT,
-    BC,
-    BILINEAR,
     COUNTED_CYCLE,
-    DFC,
-    FC,
-    FF,
     acceleration,
     bit_force,
     contact_force,
@@ -51,7 +46,7 @@ def bit_motion(par, s, tau):
 @njit(cache=True, error_model="numpy")
 def piston_motion(par, s, tau, d_b, v_b):
     """Displacement [m] and velocity [m/s] of the piston after tau, given the bit's."""
-    if par.piston == ABSENT:
+    if par.piston == Piston.ABSENT:
         return 0.0, 0.0
     if s.held == 1:
         return d_b, v_b
@@ -67,7 +62,7 @@ def impulses(par, s, tau, v_b):
     """
     F, M = loads(par, s)
     bit = 0.0
-    if s.mode != FF:
+    if s.mode != Mode.FF:
         bit = F * tau - M * (v_b - s.v_b)
     contact = 0.0
     if s.held == 1:
@@ -125,7 +120,7 @@ def greatest_bit_force(par, s, tau, p, v, known):
     most = max(bit_force(par, s, s.p, s.v_b), bit_force(par, s, p, v))
     K, C, P = rock_terms(par, s)
     # In BC the force falls, in FC it rises with the penetration.
-    if K == 0.0 or s.mode == BC or (s.mode == FC and par.rock == BILINEAR):
+    if K == 0.0 or s.mode == Mode.BC or (s.mode == Mode.FC and par.rock == RockKind.BILINEAR):
         return most
     F, M = loads(par, s)
     beta = 0.5 * C / M
@@ -156,7 +151,7 @@ def note_peaks(par, s, tau):
         s.p += d
     rest = tau - early
     d, v = bit_motion(par, s, rest)
-    if s.mode != FF:
+    if s.mode != Mode.FF:
         most = greatest_bit_force(par, s, rest, s.p + d, v, s.peak_bit)
         s.peak_bit = max(s.peak_bit, most)
     if s.held == 1:
@@ -192,17 +187,17 @@ def book_rock(par, s, d, taken):
         Done on the rock [J].
     """
     change = recoverable(par, s, s.p + d) - recoverable(par, s, s.p)
-    if s.mode == FF:
+    if s.mode == Mode.FF:
         # Rock that springs back without the bit relaxes on its dashpot.
         s.standstill -= change
         return 0.0
     work = change + taken
-    if s.mode == DFC:
+    if s.mode == Mode.DFC:
         s.barrier += taken
         s.W += taken
     else:
         s.standstill += taken
-    if (s.mode == DFC or s.mode == FC) and par.rock == BILINEAR:
+    if (s.mode == Mode.DFC or s.mode == Mode.FC) and par.rock == RockKind.BILINEAR:
         crushed = 0.5 * s.K_R * (1.0 - 1.0 / s.gamma) * d * (2.0 * s.p + d)
         s.crushing += crushed
         s.crushed += crushed
@@ -220,17 +215,17 @@ def move(par, s, tau):
     d_b, v_b, taken = dashpot_motion(par, s, tau)
     d_p, v_p = piston_motion(par, s, tau, d_b, v_b)
     bit, contact = impulses(par, s, tau, v_b)
-    push = drive_force(par, s) if par.piston != ABSENT else 0.0
+    push = drive_force(par, s) if par.piston != Piston.ABSENT else 0.0
     gap = s.gap + (d_b - d_p)
     s.drive += push * d_p
     s.feed += par.F_S * d_b
     s.gravity += par.G * (par.M_p * d_p + par.M_b * d_b)
-    if s.mode != FF:
+    if s.mode != Mode.FF:
         most = greatest_bit_force(par, s, tau, s.p + d_b, v_b, s.blow.peak_bit_force)
         s.blow.peak_bit_force = max(s.blow.peak_bit_force, most)
     if s.time + tau > s.peak_from:
         note_peaks(par, s, tau)
-    if par.piston != ABSENT and s.held == 0:
+    if par.piston != Piston.ABSENT and s.held == 0:
         s.blow.stroke = max(s.blow.stroke, greatest_gap(par, s, tau, v_b, v_p, gap))
     s.blow.rock_energy += book_rock(par, s, d_b, taken)
     s.blow.penetration += d_b
