@@ -36,7 +36,7 @@ _SWITCHES = [
     ("n_blows", "i8"),  # rows written into the buffers of the present call
     ("n_events", "i8"),
     ("cycle_counted", "i8"),
-    ("locked", "i8"),  # steps in which the rock law did not settle
+    ("count_locked", "i8"),  # steps in which the rock law did not settle
     ("count_steps", "i8"),
     ("count_events", "i8"),
     ("count_contacts", "i8"),

@@ -172,8 +172,7 @@ class Solver(ABC):
     def statistics(self, state: State) -> dict[str, int]:
         """Counts of what the solver did."""
         s = state.record[0]
-        counts = {name: int(s[f"count_{name}"]) for name in self.COUNTS}
-        return counts | {"locked": int(s["locked"])}
+        return {name: int(s[f"count_{name}"]) for name in self.COUNTS}
 
 
 class Entry(NamedTuple):

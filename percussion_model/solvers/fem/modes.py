@@ -149,4 +149,4 @@ def change_modes(par, s, w, c, blows, events):
             s.stuck = 0
             return
     s.stuck = 1
-    s.locked += 1
+    s.count_locked += 1

@@ -85,7 +85,7 @@ class FemSolver(Solver):
 
     name = "fem"
     time_step: float
-    COUNTS: ClassVar = ("steps", "trials", "events", "blows", "storms")
+    COUNTS: ClassVar = ("steps", "trials", "events", "blows", "storms", "locked")
 
     def __init__(self, scene: SceneRules) -> None:
         super().__init__(scene)

@@ -1,18 +1,18 @@
-"""When the present closed-form stretch ends, and what ends it."""
+"""End of the present closed-form stretch: the time and kind of the next event."""
 
 from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from percussion_model.physics.body import hold_effects, piston_acceleration
+from percussion_model.physics.drive import drive_force
+from percussion_model.physics.kernel import kernel
 from percussion_model.physics.records import DriveKind, Mode, Piston, RockKind
-from percussion_model.solvers.rigid.law import (
+from percussion_model.physics.rock import REST_VELOCITY, barrier_off
+from percussion_model.solvers.rigid.forces import (
     ROUNDING,
     acceleration,
     acceleration_doubt,
-    barrier_on,
-    free_acceleration,
     in_storm,
     in_worst_storm,
     loads,
@@ -27,21 +27,18 @@ from percussion_model.solvers.rigid.search import (
     fall_time_parabola,
 )
 
-# A velocity below this counts as zero on leaving standstill [m/s].
-REST_VELOCITY = 1e-9
-
 # An overdamped bit is at rest after this many of its slowest time constants.
 SETTLED = 100.0
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def touch_event(par, s):
     """Next contact of a flying bit with the rock."""
     if par.rock == RockKind.NONE:
         return NEVER, Next.NOTHING
     a = acceleration(par, s)
     v = s.v_b
-    h = s.P_u - s.p
+    h = s.p_u - s.p
     if h >= 0.0:
         return fall_time_parabola(h, -v, -a), Next.TOUCH
     # Let go while p > P_u: contact is made again where the bit turns, or from above P_u.
@@ -55,7 +52,7 @@ def touch_event(par, s):
     return (math.sqrt(root) - v) / a, Next.TOUCH
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def loading_event(par, s, y, acc, beta, k, M):
     """End of DFC or FC: the barrier is spent, or the bit turns upward."""
     v = s.v_b
@@ -64,19 +61,19 @@ def loading_event(par, s, y, acc, beta, k, M):
     tau = zero_time(v, acc, beta, k)
     if s.mode == Mode.DFC:
         end = tau if tau < NEVER else SETTLED * 2.0 * beta / k
-        spent = barrier_time(y, v, beta, k, M, s.W_R - s.W, end)
+        spent = barrier_time(y, v, beta, k, M, s.w_r - s.w, end)
         if spent < NEVER:
             return spent, Next.BARRIER
     return tau, Next.PEAK
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def unloading_event(s, y, acc, k, level):
     """End of BC: the bit turns downward, or lifts off at p = P_u (y = level)."""
     v = s.v_b
     if v > 0.0 or (v == 0.0 and acc > ROUNDING * k * abs(y - level)):
         return 0.0, Next.TURN
-    if s.p <= s.P_u:
+    if s.p <= s.p_u:
         return 0.0, Next.LIFT
     if v < 0.0 or acc < 0.0:
         tau = fall_time(y, v, 0.0, k, level)
@@ -86,14 +83,14 @@ def unloading_event(s, y, acc, k, level):
     return zero_time(v, acc, 0.0, k), Next.TURN
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def standstill_event(par, s, y, acc, beta, k, F, M):
     """End of standstill: KE_b exceeds W_R, or (release) the bit force vanishes."""
     v = s.v_b
     tau = NEVER
     kind = Next.NOTHING
-    if barrier_on(par, s):
-        limit = math.sqrt(2.0 * s.W_R / par.M_b)
+    if not barrier_off(par, s):
+        limit = math.sqrt(2.0 * s.w_r / par.mass_b)
         if abs(v) > limit:
             return 0.0, Next.LEAVE_DOWN if v > -REST_VELOCITY else Next.LEAVE_UP
         if math.sqrt(v * v + acc * acc / k) > limit:
@@ -116,7 +113,7 @@ def standstill_event(par, s, y, acc, beta, k, F, M):
     return tau, kind
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def release_time(a_p, acc, jerk, doubt, beta, k):
     """When a held piston lets go: the common acceleration exceeds its own, F_C < 0."""
     if acc - a_p > doubt:
@@ -126,7 +123,7 @@ def release_time(a_p, acc, jerk, doubt, beta, k):
     return fall_time(-acc, -jerk, beta, k, -a_p)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def close_time_flight(gap, dv, acc, a_p, doubt):
     """When two freely flying bodies meet."""
     da = acc - a_p
@@ -135,8 +132,8 @@ def close_time_flight(gap, dv, acc, a_p, doubt):
     return fall_time_parabola(gap, dv, da)
 
 
-@njit(cache=True, error_model="numpy")
-def put_off(par, s, tau, kind):
+@kernel
+def postponed(par, s, tau, kind):
     """In a storm of events, the earliest that one may come (docs/numerics.md, section 12).
 
     Bodies that meet never wait: they would pass through each other. Of the rest the
@@ -157,20 +154,20 @@ def put_off(par, s, tau, kind):
         return tau
     if kind != Next.SWITCH and not in_worst_storm(par, s):
         return tau
-    return max(tau, par.storm_window / par.most_events - (s.time - s.last_event))
+    return max(tau, par.window / par.most_events - (s.time - s.last_event))
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def piston_event(par, s, y, acc, beta, k, tau, kind):
     """Earlier of (tau, kind) and what comes next between piston, bit and drive."""
-    a_p = free_acceleration(par, s)
+    a_p = piston_acceleration(par, drive_force(par, s))
     jerk = -2.0 * beta * acc - k * s.v_b
     doubt = acceleration_doubt(par, s, acc)
     if s.held == 1 and par.drive == DriveKind.PRESSURE and s.alpha > 0:
         return 0.0, Next.SWITCH  # a start in contact: u_r = 0 is reached
     if s.held == 1:
         let_go = release_time(a_p, acc, jerk, doubt, beta, k)
-        let_go = put_off(par, s, let_go, Next.RELEASE)
+        let_go = postponed(par, s, let_go, Next.RELEASE)
         if let_go < tau:
             return let_go, Next.RELEASE
         return tau, kind
@@ -179,7 +176,7 @@ def piston_event(par, s, y, acc, beta, k, tau, kind):
         # No further than this can the gap change before tau.
         reach = abs(acc) + abs(a_p) + abs(jerk) / math.sqrt(k)
         reach = tau * (abs(s.v_b - s.v_p) + 0.5 * tau * reach)
-        if reach < s.gap and not (lift and reach >= par.D_1 - s.gap):
+        if reach < s.gap and not (lift and reach >= s.reversal - s.gap):
             return tau, kind
         close = approach_time(s.gap, 1.0, y, s.v_b, beta, k, s.v_p, a_p, doubt, tau)
     else:
@@ -188,8 +185,8 @@ def piston_event(par, s, y, acc, beta, k, tau, kind):
         tau = close
         kind = Next.CLOSE
     if lift:
-        h = par.D_1 - s.gap
-        if h <= 0.0 and put_off(par, s, 0.0, Next.SWITCH) == 0.0:
+        h = s.reversal - s.gap
+        if h <= 0.0 and postponed(par, s, 0.0, Next.SWITCH) == 0.0:
             return 0.0, Next.SWITCH
         if h <= 0.0:
             turn = 0.0
@@ -197,16 +194,17 @@ def piston_event(par, s, y, acc, beta, k, tau, kind):
             turn = approach_time(h, -1.0, y, s.v_b, beta, k, s.v_p, a_p, doubt, tau)
         else:
             turn = fall_time_parabola(h, s.v_p - s.v_b, a_p - acc)
-        turn = put_off(par, s, turn, Next.SWITCH)
+        turn = postponed(par, s, turn, Next.SWITCH)
         if turn < tau:
             tau = turn
             kind = Next.SWITCH
     return tau, kind
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def schedule(par, s):
     """Find the next event and note it in the state. Depends on the state alone."""
+    hold_effects(par, s)
     F, M = loads(par, s)
     K, C, P = rock_terms(par, s)
     acc = acceleration(par, s)
@@ -228,11 +226,14 @@ def schedule(par, s):
             tau, kind = unloading_event(s, y, acc, k, -F / K)
         else:
             tau, kind = standstill_event(par, s, y, acc, beta, k, F, M)
-    later = put_off(par, s, tau, kind)
+    later = postponed(par, s, tau, kind)
     s.late = 1 if later > tau else 0
     tau = later
     if par.piston != Piston.ABSENT:
         tau, kind = piston_event(par, s, y, acc, beta, k, tau, kind)
+    if par.effects == 1 and tau > par.window:
+        tau = par.window
+        kind = Next.HOLD
     s.next_tau = tau
     s.next_time = s.time + tau
     s.next_kind = kind

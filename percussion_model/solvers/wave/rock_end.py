@@ -216,7 +216,7 @@ def rock_step(par, s, w, c, v_free, z, tau, time, events):
             return d, q
         s.mode = next_mode
         push_event(s, events, here + t, s.mode, spring_force(s))
-    s.locked += 1
+    s.count_locked += 1
     return d, q
 
 

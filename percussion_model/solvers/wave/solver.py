@@ -95,7 +95,7 @@ class WaveSolver(Solver):
 
     name = "wave"
     time_step: float
-    COUNTS: ClassVar = ("steps", "leaps", "leap_steps", "wakes", "events", "blows")
+    COUNTS: ClassVar = ("steps", "leaps", "leap_steps", "wakes", "events", "blows", "locked")
 
     def __init__(self, scene: SceneRules) -> None:
         super().__init__(scene)
