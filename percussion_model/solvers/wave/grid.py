@@ -326,6 +326,10 @@ class CutBars:
         Transit time of a cell [s].
     loss_time : float
         Kelvin-Voigt time [s], 0 without loss.
+    substeps : int
+        Of the loss operator in a step, 0 without loss.
+    front : float
+        Share of a step before its closure (`place_of_closure`).
     piston : CutBar or None
         None where it is rigid or absent.
     bit : CutBar
@@ -333,19 +337,10 @@ class CutBars:
 
     time_step: float
     loss_time: float
+    substeps: int
+    front: float
     piston: CutBar | None
     bit: CutBar
-
-    @property
-    def substeps(self) -> int:
-        """Sub-steps of the loss operator, 0 without loss."""
-        return substeps(self.loss_time, self.time_step)
-
-    @property
-    def front(self) -> float:
-        """Share of a step before its closure (docs/numerics.md, eq. 14b)."""
-        shortest = min(bar.grid.n for bar in self.both)
-        return place_of_closure(self.loss_time / self.time_step * shortest)
 
     @property
     def both(self) -> tuple[CutBar, ...]:
@@ -383,7 +378,15 @@ def cut_bars(scene: SceneRules, cells: int | None) -> CutBars:
                 del _kept[next(iter(_kept))]
             time_step = choose_time_step(bars, cells)
             *above, bit = [_cut_bar(bar, time_step, loss_time) for bar in bars]
-            found = CutBars(time_step, loss_time, above[0] if above else None, bit)
+            shortest = min(bar.grid.n for bar in (*above, bit))
+            found = CutBars(
+                time_step,
+                loss_time,
+                substeps(loss_time, time_step),
+                place_of_closure(loss_time / time_step * shortest),
+                above[0] if above else None,
+                bit,
+            )
             _kept[key] = found
     return found
 

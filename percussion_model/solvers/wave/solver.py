@@ -21,12 +21,7 @@ from percussion_model.solvers.state import State, words_of
 from percussion_model.solvers.wave.advance import GRID_ROUNDING, run
 from percussion_model.solvers.wave.grid import CutBars, Grid, cut_bars, section_count
 from percussion_model.solvers.wave.leaps.lookahead import LOOKAHEAD
-from percussion_model.solvers.wave.leaps.operators import (
-    LEVELS,
-    leap_operators,
-    no_operators,
-    padded,
-)
+from percussion_model.solvers.wave.leaps.operators import LEVELS, leap_operators, padded
 from percussion_model.solvers.wave.records import (
     WAVE_PAR,
     WAVE_STATE,
@@ -35,6 +30,7 @@ from percussion_model.solvers.wave.records import (
     Row,
     Scratch,
     Task,
+    no_operators,
 )
 from percussion_model.solvers.wave.resolution import asked_cells
 from percussion_model.solvers.wave.totals import begin, resync
