@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from percussion_model.scene.parameters import BitBar, PistonBar, RockLaw, Section
-from percussion_model.scene.scene import Scene, SceneError, read_setting
-from percussion_model.scene.table import parameter_table
+from percussion_model.scene.parameters import BitBar, PistonBar, RockLaw, Section, parameter_table
+from percussion_model.scene.scene import Scene, SceneError
+from percussion_model.scene.text import read_setting
 
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
 

@@ -1,6 +1,6 @@
 """What is known of a parameter, and the wording of what is allowed.
 
-Standard library only: a scene that is exported takes its rows along.
+Standard library only: every FMU takes this module along.
 """
 
 from __future__ import annotations
@@ -9,11 +9,20 @@ import json
 import math
 import numbers
 import reprlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
 Kind = Literal["number", "whole number", "flag", "choice", "sections"]
+
+# Of a key or of a parser's words, no more than this is repeated in a message.
+_LONGEST_WORDS = 200
+# What `Row.read` returns for a value that is not allowed.
+REFUSED = object()
+
+
+class SceneError(ValueError):
+    """A scene that cannot be read or makes no sense; the message says what to do."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +41,7 @@ class Row:
     upper_open: bool
     default: Any
     required: bool
-    choices: tuple[Any, ...]
+    choices: Sequence[Any]
     description: str
     needs: Mapping[str, tuple[Any, ...]]
 
@@ -64,10 +73,33 @@ class Row:
             parts.append(f"{key} = " + " or ".join(toml_value(value) for value in values))
         return ", ".join(parts)
 
+    def read(self, value: Any) -> Any:
+        """Return a value as a scene keeps it, `REFUSED` if it is not allowed.
+
+        Words and whole numbers must be such themselves: True and 1.0 are no 1.
+        """
+        if self.kind == "number":
+            if self.allows(value):
+                return float(value)
+        elif self.kind == "whole number":
+            if isinstance(value, int) and self.allows(value):
+                return int(value)
+        elif self.kind == "flag":
+            if type(value) is bool:
+                return value
+        elif type(value) is int or isinstance(value, str):
+            for choice in self.choices:
+                if value == choice:
+                    return choice
+        if value is None and self.default is None and not self.required:
+            return None
+        return REFUSED
+
     def allows(self, value: Any) -> bool:
         """Whether a number lies within the bounds."""
         if not is_number(value):
             return False
+        value = float(value)  # narrow numbers would narrow the bounds
         low = self.lower is None or value > self.lower
         low = low or (value == self.lower and not self.lower_open)
         high = self.upper is None or value < self.upper
@@ -79,7 +111,12 @@ def is_number(value: Any) -> bool:
     """Whether a value is a finite real number, and no truth value."""
     if type(value) is float:  # by far the most frequent, and the rest takes its time
         return math.isfinite(value)
-    return isinstance(value, numbers.Real) and not isinstance(value, bool) and math.isfinite(value)
+    if isinstance(value, bool) or not isinstance(value, numbers.Real):
+        return False
+    try:
+        return math.isfinite(value)
+    except OverflowError:  # a whole number beyond all floats
+        return False
 
 
 def _short(number: float) -> str:
@@ -109,7 +146,12 @@ def toml_value(value: object) -> str:
 
 def generic_key(key: str) -> str:
     """Replace the numbers of sections in a dotted key by `*`."""
-    return ".".join("*" if part.isdigit() else part for part in key.split("."))
+    return ".".join("*" if part.isdecimal() else part for part in key.split("."))
+
+
+def shortened(text: str) -> str:
+    """Text of others, no longer than a message bears."""
+    return text if len(text) <= _LONGEST_WORDS else text[:_LONGEST_WORDS] + "..."
 
 
 def refuse_value(row: Row, key: str, value: Any) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 from percussion_model.physics.records import BLOW, EVENT, SAMPLE_FIELDS, Status
 from percussion_model.scene.inputs import SimulationError, check_input
 from percussion_model.scene.rows import is_number
-from percussion_model.scene.rules import SceneRules
+from percussion_model.scene.scene import Scene
 from percussion_model.solvers import Solver, make_solver
 
 # Rows that one call of a kernel can fill; a full buffer is read out.
@@ -32,7 +32,7 @@ class Runner:
 
     Parameters
     ----------
-    scene : SceneRules
+    scene : Scene
     record_events : bool
         Whether the kernels list events.
     solver : Solver, optional
@@ -40,7 +40,7 @@ class Runner:
     """
 
     def __init__(
-        self, scene: SceneRules, record_events: bool = True, solver: Solver | None = None
+        self, scene: Scene, record_events: bool = True, solver: Solver | None = None
     ) -> None:
         began = time.perf_counter()
         self.record_events = record_events

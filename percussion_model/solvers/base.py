@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from percussion_model.scene.rules import BarNumbers, SceneRules
+from percussion_model.scene.parameters import Bar
+from percussion_model.scene.scene import Scene
 
 if TYPE_CHECKING:
     from percussion_model.solvers.wave.grid import Cells
@@ -18,7 +19,7 @@ class Solver(Protocol):
     Attributes
     ----------
     name : str
-    scene : SceneRules
+    scene : Scene
     time_step : float or None
         Distance of grid points [s]; None where there are none.
     cells : dict of int
@@ -28,7 +29,7 @@ class Solver(Protocol):
     """
 
     name: str
-    scene: SceneRules
+    scene: Scene
     cells: dict[str, int]
 
     @property
@@ -90,14 +91,14 @@ class Solver(Protocol):
     def energy(self, state: Any, t: float) -> dict[str, float]:
         """Ledger [J] at the last grid point before `t`: LEDGER_FIELDS, start, stored."""
 
-    def section_cells(self, bar: BarNumbers) -> list[int]:
+    def section_cells(self, bar: Bar) -> list[int]:
         """Cells or elements in each section of an elastic bar."""
 
     def statistics(self, state: Any) -> dict[str, int]:
         """Counts of what the solver did."""
 
 
-def make_solver(scene: SceneRules) -> Solver:
+def make_solver(scene: Scene) -> Solver:
     """Make the solver that computes a scene."""
     # Only the kernels that are needed are loaded: that is most of a start.
     if scene.solver_name == "fem":

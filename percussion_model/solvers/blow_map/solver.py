@@ -16,7 +16,7 @@ from percussion_model.physics.records import (
     STORED_FIELDS,
     Status,
 )
-from percussion_model.scene.rules import SceneError
+from percussion_model.scene.scene import SceneError
 from percussion_model.solvers.blow_map import advance as kernel
 from percussion_model.solvers.blow_map.flight import commit, plan_next
 from percussion_model.solvers.blow_map.records import BLOW_PAR, BLOW_STATE, ENTRIES
@@ -25,7 +25,8 @@ from percussion_model.solvers.blow_map.sample import read
 from percussion_model.solvers.blow_map.table import BlowTable, fixed_values
 
 if TYPE_CHECKING:
-    from percussion_model.scene.rules import BarNumbers, SceneRules
+    from percussion_model.scene.parameters import Bar
+    from percussion_model.scene.scene import Scene
 
 # Place of a field in a state.
 WORD = {name: int(place[1]) // 8 for name, place in (BLOW_STATE.fields or {}).items()}
@@ -78,7 +79,7 @@ class BlowMapSolver:
 
     Parameters
     ----------
-    scene : SceneRules
+    scene : Scene
         With `solver.fidelity = "blow-map"`.
     table : BlowTable
         Made for the scene.
@@ -92,7 +93,7 @@ class BlowMapSolver:
     name = "blow-map"
     time_step: float | None = None
 
-    def __init__(self, scene: SceneRules, table: BlowTable) -> None:
+    def __init__(self, scene: Scene, table: BlowTable) -> None:
         table.refuse_other(fixed_values(scene))
         if not scene.start.rock_gap <= MOST_ROCK_GAP or scene.start.bit_velocity != 0.0:
             raise SceneError(
@@ -285,7 +286,7 @@ class BlowMapSolver:
         found = dict(zip(LONG_SAMPLE_FIELDS, row.tolist(), strict=True))
         return {name: found[name] for name in (*LEDGER_FIELDS, *STORED_FIELDS)}
 
-    def section_cells(self, bar: BarNumbers) -> list[int]:
+    def section_cells(self, bar: Bar) -> list[int]:
         """Cells belong to the waves that made the table."""
         return []
 

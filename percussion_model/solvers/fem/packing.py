@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from percussion_model.physics.records import DriveKind, Piston, RockKind
-from percussion_model.scene.rules import SceneRules
+from percussion_model.scene.scene import Scene
 from percussion_model.solvers.fem.mesh import BarMesh, critical_frequency
 from percussion_model.solvers.fem.records import FEM_PAR
 from percussion_model.solvers.wave.packing import REARM_TRANSITS
@@ -19,7 +19,7 @@ MOST_CHANGES = 12
 MOST_EVENTS = 64
 
 
-def loss_time(scene: SceneRules, bit: BarMesh) -> float:
+def loss_time(scene: Scene, bit: BarMesh) -> float:
     """Kelvin-Voigt time [s]: that of the scene, or 2 zeta_K / omega_cr (eq. 55 of the paper)."""
     if not scene.effects.loss:
         return 0.0
@@ -29,7 +29,7 @@ def loss_time(scene: SceneRules, bit: BarMesh) -> float:
 
 
 def pack_fem(
-    scene: SceneRules, piston: BarMesh | None, bit: BarMesh, time_step: float, eta: float
+    scene: Scene, piston: BarMesh | None, bit: BarMesh, time_step: float, eta: float
 ) -> np.ndarray:
     """Parameter record of a scene.
 

@@ -10,7 +10,8 @@ from percussion_model.physics.records import (
     LEDGER_FIELDS,
     SAMPLE_FIELDS,
 )
-from percussion_model.scene.rules import BarNumbers, SceneRules
+from percussion_model.scene.parameters import Bar
+from percussion_model.scene.scene import Scene
 from percussion_model.solvers.fem.advance import run
 from percussion_model.solvers.fem.bars import dissipated_in_nodes, read_all, stored_energy
 from percussion_model.solvers.fem.mesh import (
@@ -44,7 +45,7 @@ class FemSolver:
 
     Parameters
     ----------
-    scene : SceneRules
+    scene : Scene
         With an elastic bit.
 
     Attributes
@@ -60,7 +61,7 @@ class FemSolver:
     name = "fem"
     wave_speed_error = 0.0
 
-    def __init__(self, scene: SceneRules) -> None:
+    def __init__(self, scene: Scene) -> None:
         self.scene = scene
         elastic_piston = scene.piston.model == "elastic"
         first = scene.piston if elastic_piston else scene.bit
@@ -282,7 +283,7 @@ class FemSolver:
         """Force in one element of "piston" or "bit" [N], as `fields` reads it."""
         return float(self.fields(state)[f"{bar}_force"][cell])
 
-    def section_cells(self, bar: BarNumbers) -> list[int]:
+    def section_cells(self, bar: Bar) -> list[int]:
         """Elements in each section of an elastic bar."""
         return [section_count(section, self._element) for section in bar.sections]
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from percussion_model.physics.records import DriveKind, Mode, Piston, RockKind
-from percussion_model.scene.rules import SceneRules
+from percussion_model.scene.scene import Scene
 from percussion_model.solvers.rigid.records import RIGID
 
 # Without a switching drive a blow ends when the gap was open for so many bar transits.
@@ -46,7 +46,7 @@ def st_venant_restitution(
     return min(max(e, 0.0), 1.0)
 
 
-def restitution(scene: SceneRules) -> float:
+def restitution(scene: Scene) -> float:
     """Coefficient of restitution of piston and bit, NaN without a piston."""
     if scene.piston.model == "absent":
         return float("nan")
@@ -60,7 +60,7 @@ def restitution(scene: SceneRules) -> float:
     )
 
 
-def pack_rigid(scene: SceneRules) -> np.ndarray:
+def pack_rigid(scene: Scene) -> np.ndarray:
     """State of a scene at time zero, parameters and inputs included.
 
     Returns
@@ -74,7 +74,7 @@ def pack_rigid(scene: SceneRules) -> np.ndarray:
     return state
 
 
-def _fill_parameters(scene: SceneRules, par: Any) -> None:
+def _fill_parameters(scene: Scene, par: Any) -> None:
     effects = scene.effects
     has_piston = scene.piston.model != "absent"
     par["M_p"] = scene.piston.mass if has_piston else 0.0
@@ -102,7 +102,7 @@ def _fill_parameters(scene: SceneRules, par: Any) -> None:
     par["release"] = int(effects.standstill_tension == "release")
 
 
-def _fill_start(scene: SceneRules, now: Any) -> None:
+def _fill_start(scene: Scene, now: Any) -> None:
     spring_or_wall = scene.effects.rock in ("spring", "wall")
     now["mode"] = Mode.FF
     now["alpha"] = scene.start.drive_direction

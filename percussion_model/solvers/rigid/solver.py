@@ -20,7 +20,8 @@ from percussion_model.solvers.rigid.packing import pack_rigid, restitution
 from percussion_model.solvers.rigid.records import ROWS_AN_EVENT
 
 if TYPE_CHECKING:
-    from percussion_model.scene.rules import BarNumbers, SceneRules
+    from percussion_model.scene.parameters import Bar
+    from percussion_model.scene.scene import Scene
 
 # Input of `set_inputs`, the field it changes, and the scenes in which it has an effect.
 _INPUTS: Mapping[str, tuple[str, str]] = MappingProxyType(
@@ -52,7 +53,7 @@ class RigidSolver:
     time_step: float | None = None
     wave_speed_error = 0.0
 
-    def __init__(self, scene: SceneRules) -> None:
+    def __init__(self, scene: Scene) -> None:
         rigid = scene.bit.model == "rigid" and scene.piston.model != "elastic"
         if not (rigid or scene.solver_name == "rigid"):
             raise ValueError(
@@ -258,7 +259,7 @@ class RigidSolver:
         """Time of the last event of a state [s]."""
         return float(state["now"]["time"][0])
 
-    def section_cells(self, bar: BarNumbers) -> list[int]:
+    def section_cells(self, bar: Bar) -> list[int]:
         """Rigid bodies have no cells."""
         return []
 

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from percussion_model.scene.rules import BarNumbers, SceneRules
+from percussion_model.scene.parameters import Bar
+from percussion_model.scene.scene import Scene
 from percussion_model.solvers.wave.grid import (
     Grid,
     choose_time_step,
@@ -78,7 +79,7 @@ _kept: dict[tuple, CutBars] = {}
 _lock = threading.Lock()
 
 
-def cut_bars(scene: SceneRules) -> CutBars:
+def cut_bars(scene: Scene) -> CutBars:
     """Cut the elastic bars of a scene, or find them cut."""
     bars = elastic_bars(scene)
     cells = scene.solver.cells or asked_cells(scene)
@@ -97,7 +98,7 @@ def cut_bars(scene: SceneRules) -> CutBars:
     return found
 
 
-def _cut_bar(bar: BarNumbers, time_step: float, loss_time: float) -> CutBar:
+def _cut_bar(bar: Bar, time_step: float, loss_time: float) -> CutBar:
     grid = cut(bar, time_step)
     c = coefficients(grid, loss_time)
     kappa = end_viscosity(c, grid, loss_time)

@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from percussion_model.scene.rules import BarNumbers, SectionNumbers
+from percussion_model.scene.parameters import Bar, Section
 from percussion_model.solvers.wave.records import Coef
 
 # Cells in the piston (or the only elastic bar) where the scene names none.
@@ -62,12 +62,12 @@ class Grid:
         return len(self.mass)
 
 
-def section_count(section: SectionNumbers, time_step: float) -> int:
+def section_count(section: Section, time_step: float) -> int:
     """Cells that a section gets."""
     return max(1, round(section.transit_time / time_step))
 
 
-def cut(bar: BarNumbers, time_step: float) -> Grid:
+def cut(bar: Bar, time_step: float) -> Grid:
     """Cut a bar into cells of one transit time.
 
     Length and mass of each section stay as they are; where its transit time
@@ -84,7 +84,7 @@ def cut(bar: BarNumbers, time_step: float) -> Grid:
     return Grid(np.array(impedance), np.array(mass), time_step, fit)
 
 
-def cell_at(bar: BarNumbers, grid: Cells, place: float) -> tuple[int, float]:
+def cell_at(bar: Bar, grid: Cells, place: float) -> tuple[int, float]:
     """Cell at a place along a bar.
 
     Parameters
@@ -109,7 +109,7 @@ def cell_at(bar: BarNumbers, grid: Cells, place: float) -> tuple[int, float]:
     return min(cell, grid.n - 1), section.area
 
 
-def choose_time_step(bars: list[BarNumbers], cells: int | None) -> float:
+def choose_time_step(bars: list[Bar], cells: int | None) -> float:
     """Transit time of a cell that suits all bars.
 
     Parameters
@@ -127,9 +127,7 @@ def choose_time_step(bars: list[BarNumbers], cells: int | None) -> float:
     return first / fitting_cells(bars, DEFAULT_CELLS, most, WANTED_FIT)[0]
 
 
-def fitting_cells(
-    bars: Sequence[BarNumbers], fewest: int, most: int, wanted: float
-) -> tuple[int, float]:
+def fitting_cells(bars: Sequence[Bar], fewest: int, most: int, wanted: float) -> tuple[int, float]:
     """Cells in the first bar that suit the lengths of all.
 
     Parameters

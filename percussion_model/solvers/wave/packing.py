@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from percussion_model.physics.records import DriveKind, Mode, Piston, RockKind
-from percussion_model.scene.rules import SceneRules
+from percussion_model.scene.scene import Scene
 from percussion_model.solvers.wave.bar_cells import MOST_KEPT, CutBars
 from percussion_model.solvers.wave.fronts import place_of_closure
 from percussion_model.solvers.wave.grid import substeps
@@ -33,12 +33,12 @@ INPUT_FIELDS = {
 }
 
 
-def pack_parameters(scene: SceneRules, bars: CutBars) -> np.ndarray:
+def pack_parameters(scene: Scene, bars: CutBars) -> np.ndarray:
     """Parameter record of a scene.
 
     Parameters
     ----------
-    scene : SceneRules
+    scene : Scene
     bars : CutBars
         Its elastic bars.
 
@@ -88,7 +88,7 @@ def _of_bars(bars: CutBars) -> bytes:
     return par.tobytes()
 
 
-def begin_state(s: Any, scene: SceneRules, rock: dict[str, float]) -> None:
+def begin_state(s: Any, scene: Scene, rock: dict[str, float]) -> None:
     """Fill what states have in common (`COMMON_STATE`) at time zero.
 
     Parameters
@@ -119,7 +119,7 @@ def begin_state(s: Any, scene: SceneRules, rock: dict[str, float]) -> None:
     s["gap"] = start.gap if scene.piston.model != "absent" else np.inf
 
 
-def rock_numbers(scene: SceneRules) -> dict[str, float]:
+def rock_numbers(scene: Scene) -> dict[str, float]:
     """Numbers of the rock law as the kernels take them."""
     rock, kind = scene.rock, scene.effects.rock
     barrier = scene.barrier_on

@@ -14,7 +14,7 @@ from percussion_model.physics.records import (
     SAMPLE_FIELDS,
     Status,
 )
-from percussion_model.scene.rules import SceneRules
+from percussion_model.scene.scene import Scene
 from percussion_model.solvers.wave.advance import GRID_ROUNDING, run
 from percussion_model.solvers.wave.leaps.contact_leap import WATCHED
 from percussion_model.solvers.wave.leaps.operators import LEVELS, leap_operators, padded
@@ -40,7 +40,7 @@ class WaveSolver(WaveBars):
 
     Parameters
     ----------
-    scene : SceneRules
+    scene : Scene
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class WaveSolver(WaveBars):
 
     name = "wave"
 
-    def __init__(self, scene: SceneRules) -> None:
+    def __init__(self, scene: Scene) -> None:
         super().__init__(scene)
         self._par = pack_parameters(scene, self._bars)
         found = None

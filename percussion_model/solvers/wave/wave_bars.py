@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from percussion_model.scene.rules import BarNumbers, SceneRules
+from percussion_model.scene.parameters import Bar
+from percussion_model.scene.scene import Scene
 from percussion_model.solvers.wave.advance import GRID_ROUNDING
 from percussion_model.solvers.wave.bar_cells import cut_bars
 from percussion_model.solvers.wave.grid import Grid, section_count
@@ -17,7 +18,7 @@ class WaveBars:
 
     Parameters
     ----------
-    scene : SceneRules
+    scene : Scene
 
     Attributes
     ----------
@@ -30,7 +31,7 @@ class WaveBars:
         fit no common cell.
     """
 
-    def __init__(self, scene: SceneRules) -> None:
+    def __init__(self, scene: Scene) -> None:
         self.scene = scene
         bars = self._bars = cut_bars(scene)
         self.time_step = bars.time_step
@@ -91,7 +92,7 @@ class WaveBars:
         """Cells of "piston" or "bit", None where it has none."""
         return {"piston": self._piston, "bit": self._bit}[bar]
 
-    def section_cells(self, bar: BarNumbers) -> list[int]:
+    def section_cells(self, bar: Bar) -> list[int]:
         """Cells in each section of an elastic bar."""
         return [section_count(section, self.time_step) for section in bar.sections]
 
