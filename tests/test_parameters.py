@@ -3,6 +3,7 @@
 import dataclasses
 import math
 
+import numpy as np
 import pytest
 
 from percussion_model.scene.drive_calibration import calibrate_drive, piston_cycle
@@ -158,3 +159,24 @@ def test_piston_cycle_agrees_with_integrated_motion():
 def test_calibration_without_solution(values, message):
     with pytest.raises(ValueError, match=message):
         calibrate_drive(*values)
+
+
+@pytest.mark.parametrize("value", [np.float32(2500.0), np.float64(2500.0), np.int64(2500), 2500])
+def test_numbers_of_all_kinds_are_kept_as_floats(value):
+    assert type(Feed(force=value).force) is float
+    assert Feed(force=value).force == 2500.0
+
+
+@pytest.mark.parametrize(
+    "value", [10**400, -(10**400), np.float32("nan"), np.bool_(True), "1", None]
+)
+def test_what_is_no_finite_number_is_refused(value):
+    with pytest.raises(SceneError, match=r"feed\.force = .*: must be a number from -1e9 to 1e9 N"):
+        Feed(force=value)
+
+
+def test_a_group_on_its_own_names_its_key():
+    with pytest.raises(SceneError, match=r"unknown key feed\.forse: did you mean feed\.force\?"):
+        Feed(forse=1.0)
+    with pytest.raises(SceneError, match=r"section\.area is missing: must be a number above 0"):
+        Section(length=0.1)

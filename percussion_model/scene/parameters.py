@@ -170,7 +170,7 @@ class Parameters:
         if isinstance(value, cls):
             return value
         group = cls.__new__(cls)
-        if isinstance(value, Mapping):
+        if isinstance(value, (dict, Mapping)):  # mostly the first, which is quick to see
             group._fill(value, key, faults)
         elif generic_key(key).endswith(".*"):
             faults.add(_refuse_table, key, value, "a table with length and area")
@@ -181,30 +181,24 @@ class Parameters:
     def _fill(self, values: Mapping[str, Any], key: str, faults: Faults) -> None:
         kept, rows = self.__dict__, self.rows
         kept.update(self._defaults)
+        kept["_given"] = frozenset(values)
         for name, row in rows.items():
             if name not in values:
                 if row.required:
                     faults.add(_refuse_missing, row, f"{key}.{name}")
-                continue
-            value = values[name]
-            read = _read_sections if row.kind == "sections" else _read_value
-            kept[name] = read(row, f"{key}.{name}", value, faults)
-        kept["_given"] = frozenset(values)
+            elif row.kind == "sections":
+                kept[name] = _read_sections(row, f"{key}.{name}", values[name], faults)
+            else:
+                kept[name] = found = row.read(values[name])
+                if found is REFUSED:
+                    faults.add(refuse_value, row, f"{key}.{name}", values[name])
         for name in values:
             if name not in rows:
                 faults.add(unknown_key, f"{key}.{name}")
 
-    @property
-    def given(self) -> dict[str, Any]:
-        """Values that were given, not left to their defaults."""
+    def given_values(self) -> dict[str, Any]:
+        """Return the values that were given, not left to their defaults."""
         return {name: self.__dict__[name] for name in self.rows if name in self._given}
-
-
-def _read_value(row: Row, key: str, value: Any, faults: Faults) -> Any:
-    found = row.read(value)
-    if found is REFUSED:
-        faults.add(refuse_value, row, key, value)
-    return found
 
 
 def _read_sections(row: Row, key: str, value: Any, faults: Faults) -> tuple[Section, ...]:

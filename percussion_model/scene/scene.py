@@ -150,7 +150,7 @@ class Scene:
             goes back to the default. A whole group may be given as well.
         """
         tree: dict[str, Any] = {"title": self.title}
-        tree |= {name: self.__dict__[name] for name in GROUPS if self.__dict__[name].given}
+        tree |= {name: self.__dict__[name] for name in GROUPS if self.__dict__[name]._given}
         for key, value in changes.items():
             if key not in ("title", *GROUPS) and find_row(key) is None:
                 raise SceneError(unknown_key(key))
@@ -167,7 +167,7 @@ class Scene:
             present = tree.get(name, {})
             if not isinstance(present, (Parameters, Mapping)):
                 raise SceneError(unknown_key(key))
-            entries = present.given if isinstance(present, Parameters) else dict(present)
+            entries = present.given_values() if isinstance(present, Parameters) else dict(present)
             tree[name], (name, *rest) = entries, rest
         if rest:
             entries, name = self._section_to_change(entries, key), rest[-1]
@@ -179,13 +179,20 @@ class Scene:
     def _section_to_change(self, bar: dict[str, Any], key: str) -> dict[str, Any]:
         """Make the sections of a bar a list of their own, and return one of them."""
         path, _, _ = key.rpartition(".")
-        bar["sections"] = sections = list(bar.get("sections", self[path.rpartition(".")[0]]))
-        k = int(path.rpartition(".")[2])
-        if k >= len(sections):
-            raise SceneError(f"{path}: no such section; there are {len(sections)}, counted from 0")
-        section = sections[k]
-        sections[k] = asdict(section) if isinstance(section, Parameters) else dict(section)
-        return sections[k]
+        group, _, place = path.partition(".sections.")
+        try:
+            bar["sections"] = sections = list(bar.get("sections", self[f"{group}.sections"]))
+            section = sections[int(place)]
+            sections[int(place)] = found = (
+                asdict(section) if isinstance(section, Parameters) else dict(section)
+            )
+        except IndexError:
+            raise SceneError(
+                f"{path}: no such section; there are {len(sections)}, counted from 0"
+            ) from None
+        except (TypeError, ValueError):  # what was given before is no list of tables
+            raise SceneError(unknown_key(key)) from None
+        return found
 
     def computed_by(self, solver: str, **changes: Any) -> Self:
         """Return the scene for a solver, with other changes; that of rigid bodies makes them so."""
@@ -211,14 +218,14 @@ class Scene:
     def given(self) -> frozenset[str]:
         """Dotted keys that were given, not left to their defaults."""
         return frozenset(
-            f"{group}.{name}" for group in GROUPS for name in self.__dict__[group].given
+            f"{group}.{name}" for group in GROUPS for name in self.__dict__[group]._given
         )
 
     def given_values(self) -> dict[str, Any]:
         """Return what was given as nested plain values: `Scene(**values)` is an equal scene."""
         tree: dict[str, Any] = {"title": self.title}
         for group in GROUPS:
-            for name, value in self.__dict__[group].given.items():
+            for name, value in self.__dict__[group].given_values().items():
                 if name == "sections":
                     value = [asdict(section) for section in value]
                 tree.setdefault(group, {})[name] = value
