@@ -30,25 +30,24 @@ def names():
 
 
 def test_a_registered_solver_can_be_asked_for(names):
-    with pytest.raises(SceneError, match='must be one of "auto", "wave", "fem", "rigid"$'):
+    with pytest.raises(SceneError, match=r'must be one of "auto", "wave", "fem", "rigid"$'):
         Scene(solver={"name": "modal"})
     names.register_name("modal", "elastic")
     scene = Scene(solver={"name": "modal"})
     assert scene.solver_name == "modal"
     assert scene.loss_on
     assert list(find_row("solver.name").choices)[-1] == "modal"
-    with pytest.raises(SceneError, match='solver.name = "modal" needs bit.model = "elastic"'):
+    with pytest.raises(SceneError, match=r'solver\.name = "modal" needs bit\.model = "elastic"'):
         scene.replace(**{"piston.model": "rigid", "bit.model": "rigid"})
 
 
 def test_a_registered_solver_of_rigid_bodies_makes_them_so(names):
     names.register_name("impulses", "rigid")
     scene = Scene().computed_by("impulses")
-    assert (scene.solver_name, scene.piston.model, scene.bit.model) == ("impulses",) + (
-        "rigid",
-    ) * 2
+    assert scene.solver_name == "impulses"
+    assert scene.piston.model == scene.bit.model == "rigid"
     assert not scene.loss_on
-    with pytest.raises(SceneError, match='solver.name = "impulses" computes no elastic bars'):
+    with pytest.raises(SceneError, match=r'solver\.name = "impulses" computes no elastic bars'):
         Scene(solver={"name": "impulses"})
 
 
@@ -70,9 +69,7 @@ def test_an_effect_brings_a_switch_and_a_group():
     assert isinstance(effects, Effects)
     assert effects.friction
     assert effects.gravity
-    with pytest.raises(
-        SceneError, match=r"friction.force = -1 N: must be a number from 0 to 1e6 N"
-    ):
+    with pytest.raises(SceneError, match=r"friction\.force = -1 N: must be a number from 0"):
         groups["friction"](force=-1)
 
 

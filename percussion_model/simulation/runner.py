@@ -194,10 +194,9 @@ class Runner:
         Parameters
         ----------
         **inputs
-            feed_force, drive_force, external_force [N] and reversal_distance
-            [m] act at once; loading_stiffness [N/m], unloading_ratio,
-            barrier_damping [N s/m] and barrier_energy [J] from the next
-            drilling cycle on. Bounds are those of the parameter table.
+            Those of `percussion_model.scene.inputs.INPUTS`: forces and the reversal
+            distance act at once, the rock from the next drilling cycle on. Units
+            and bounds are those of the parameter table.
         """
         values = self._checked(inputs)
         if not values:
