@@ -10,31 +10,30 @@ from __future__ import annotations
 import dataclasses
 import difflib
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
-from types import MappingProxyType
 from typing import Any, ClassVar, NamedTuple, Self
 
 from percussion_model.scene import bars
 from percussion_model.scene.rows import (
     REFUSED,
+    Faults,
+    Needs,
     Row,
-    SceneError,
+    choice,
+    count,
+    flag,
     generic_key,
+    quantity,
     refuse_value,
+    section_list,
     shortened,
     show_value,
 )
 from percussion_model.scene.solver_names import SOLVER_NAMES
 
-# More faults of one scene than this are counted, not told.
-_MOST_FAULTS = 30
 # Below this similarity a guess at a misspelt key misleads more than it helps.
 _SIMILAR_ENOUGH = 0.6
-
-# ------------------------------------------------------------- how they are declared
-
-Needs = dict[str, tuple[object, ...]]
 
 # What must hold, key by key, for a parameter to have any influence.
 HAS_PISTON: Needs = {"piston.model": ("elastic", "rigid")}
@@ -52,93 +51,6 @@ ROCK_BILINEAR: Needs = {"effects.rock": ("bilinear",)}
 ROCK_SPRINGY: Needs = {"effects.rock": ("bilinear", "spring")}
 ROCK_PRESENT: Needs = {"effects.rock": ("bilinear", "spring", "wall")}
 BARRIER_ON: Needs = {"effects.barrier": (True,), **ROCK_BILINEAR}
-
-
-def quantity(
-    default: Any,
-    unit: str,
-    description: str,
-    needs: Needs | None = None,
-    **bounds: float,
-) -> Any:
-    """Declare a number with its unit, bounds (gt, ge, lt, le) and what it needs.
-
-    The default ... makes it required; None lets it be left out.
-    """
-    return _declare("number", default, description, needs, unit, bounds=bounds)
-
-
-def count(
-    default: int | None, unit: str, description: str, needs: Needs | None = None, **bounds: float
-) -> Any:
-    """Declare a whole number, as `quantity` does a number."""
-    return _declare("whole number", default, description, needs, unit, bounds=bounds)
-
-
-def flag(default: bool, description: str, needs: Needs | None = None) -> Any:
-    """Declare a switch."""
-    return _declare("flag", default, description, needs)
-
-
-def choice(
-    default: Any, choices: Sequence[Any], description: str, needs: Needs | None = None
-) -> Any:
-    """Declare one of several words or whole numbers."""
-    return _declare("choice", default, description, needs, choices=choices)
-
-
-def section_list(default: tuple[Section, ...], needs: Needs | None = None) -> Any:
-    """Declare the sections of a bar."""
-    return _declare("sections", default, "sections from top to bottom", needs)
-
-
-def _declare(
-    kind: Any,
-    default: Any,
-    description: str,
-    needs: Needs | None,
-    unit: str = "",
-    choices: Sequence[Any] = (),
-    bounds: Mapping[str, float] = MappingProxyType({}),
-) -> Any:
-    low, high = bounds.get("gt", bounds.get("ge")), bounds.get("lt", bounds.get("le"))
-    row = Row(
-        key="",
-        kind=kind,
-        unit=unit,
-        lower=None if low is None else float(low),
-        lower_open="gt" in bounds,
-        upper=None if high is None else float(high),
-        upper_open="lt" in bounds,
-        default=None if default is ... else default,
-        required=default is ...,
-        choices=choices,
-        description=description,
-        needs=needs or {},
-    )
-    return dataclasses.field(default=row.default, metadata={"row": row})
-
-
-class Faults:
-    """What is wrong with a scene, a line for each fault, as long as they can be read."""
-
-    def __init__(self) -> None:
-        self.lines: list[str] = []
-        self.untold = 0
-
-    def add(self, say: Callable[..., str], *words: Any) -> None:
-        """Note a fault; its wording is worked out only if it will be told."""
-        if len(self.lines) < _MOST_FAULTS:
-            self.lines.append(say(*words))
-        else:
-            self.untold += 1
-
-    def refuse(self) -> None:
-        """Raise `SceneError` if there are any."""
-        if self.untold:
-            self.lines.append(f"and {self.untold} more faults")
-        if self.lines:
-            raise SceneError("\n".join(self.lines))
 
 
 class Parameters:
@@ -357,12 +269,7 @@ class Feed(Parameters):
     """Force from the surface on the bit."""
 
     force: float = quantity(
-        2500.0,
-        "N",
-        "feed force F_S on the bit, down positive",
-        FEED_ON,
-        ge=-1e9,
-        le=1e9,
+        2500.0, "N", "feed force F_S on the bit, down positive", FEED_ON, ge=-1e9, le=1e9
     )
 
 
@@ -373,12 +280,7 @@ class Drive(Parameters):
         3000.0, "N", "drive force F_0 of the pressure law", DRIVE_PRESSURE, ge=0, le=1e9
     )
     reversal_distance: float = quantity(
-        0.040,
-        "m",
-        "D_1: piston this far up turns the drive downward",
-        DRIVE_PRESSURE,
-        gt=0,
-        le=100,
+        0.040, "m", "D_1: piston this far up turns the drive downward", DRIVE_PRESSURE, gt=0, le=100
     )
     external_force: float = quantity(
         0.0, "N", "force on the piston, down positive", DRIVE_EXTERNAL, ge=-1e9, le=1e9
@@ -389,12 +291,7 @@ class Loss(Parameters):
     """Structural loss, stress = E (strain + time * strain rate)."""
 
     time: float = quantity(
-        _reference_loss_time(),
-        "s",
-        "Kelvin-Voigt time eta of the bars",
-        LOSS_ON,
-        ge=0,
-        le=1e-3,
+        _reference_loss_time(), "s", "Kelvin-Voigt time eta of the bars", LOSS_ON, ge=0, le=1e-3
     )
 
 
@@ -417,12 +314,7 @@ class Contact(Parameters):
     """Contact between a rigid piston and a rigid bit."""
 
     restitution: float | None = quantity(
-        None,
-        "-",
-        "coefficient of restitution; St Venant value if left out",
-        ALL_RIGID,
-        ge=0,
-        le=1,
+        None, "-", "coefficient of restitution; St Venant value if left out", ALL_RIGID, ge=0, le=1
     )
 
 
@@ -430,12 +322,7 @@ class Start(Parameters):
     """The state at time zero."""
 
     piston_velocity: float = quantity(
-        10.0,
-        "m/s",
-        "velocity of the piston, down positive",
-        HAS_PISTON,
-        ge=-1000,
-        le=1000,
+        10.0, "m/s", "velocity of the piston, down positive", HAS_PISTON, ge=-1000, le=1000
     )
     bit_velocity: float = quantity(
         0.0, "m/s", "velocity of the bit, down positive", ge=-1000, le=1000

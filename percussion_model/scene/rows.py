@@ -1,22 +1,26 @@
-"""What is known of a parameter, and the wording of what is allowed.
+"""What is known of a parameter: how it is declared, what is allowed, and how faults are told.
 
 Standard library only: every FMU takes this module along.
 """
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import math
 import numbers
 import reprlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any, Literal
 
 Kind = Literal["number", "whole number", "flag", "choice", "sections"]
 
 # Of a key or of a parser's words, no more than this is repeated in a message.
 _LONGEST_WORDS = 200
+# More faults of one scene than this are counted, not told.
+_MOST_FAULTS = 30
 # What `Row.read` returns for a value that is not allowed.
 REFUSED = object()
 
@@ -107,6 +111,71 @@ class Row:
         return low and high
 
 
+# What must hold, key by key, for a parameter to have any influence.
+Needs = dict[str, tuple[object, ...]]
+
+
+def quantity(
+    default: Any, unit: str, description: str, needs: Needs | None = None, **bounds: float
+) -> Any:
+    """Declare a number with its unit, bounds (gt, ge, lt, le) and what it needs.
+
+    The default ... makes it required; None lets it be left out.
+    """
+    return _declare("number", default, description, needs, unit, bounds=bounds)
+
+
+def count(
+    default: int | None, unit: str, description: str, needs: Needs | None = None, **bounds: float
+) -> Any:
+    """Declare a whole number, as `quantity` does a number."""
+    return _declare("whole number", default, description, needs, unit, bounds=bounds)
+
+
+def flag(default: bool, description: str, needs: Needs | None = None) -> Any:
+    """Declare a switch."""
+    return _declare("flag", default, description, needs)
+
+
+def choice(
+    default: Any, choices: Sequence[Any], description: str, needs: Needs | None = None
+) -> Any:
+    """Declare one of several words or whole numbers."""
+    return _declare("choice", default, description, needs, choices=choices)
+
+
+def section_list(default: tuple[Any, ...], needs: Needs | None = None) -> Any:
+    """Declare the sections of a bar."""
+    return _declare("sections", default, "sections from top to bottom", needs)
+
+
+def _declare(
+    kind: Any,
+    default: Any,
+    description: str,
+    needs: Needs | None,
+    unit: str = "",
+    choices: Sequence[Any] = (),
+    bounds: Mapping[str, float] = MappingProxyType({}),
+) -> Any:
+    low, high = bounds.get("gt", bounds.get("ge")), bounds.get("lt", bounds.get("le"))
+    row = Row(
+        key="",
+        kind=kind,
+        unit=unit,
+        lower=None if low is None else float(low),
+        lower_open="gt" in bounds,
+        upper=None if high is None else float(high),
+        upper_open="lt" in bounds,
+        default=None if default is ... else default,
+        required=default is ...,
+        choices=choices,
+        description=description,
+        needs=needs or {},
+    )
+    return dataclasses.field(default=row.default, metadata={"row": row})
+
+
 def is_number(value: Any) -> bool:
     """Whether a value is a finite real number, and no truth value."""
     if type(value) is float:  # by far the most frequent, and the rest takes its time
@@ -168,3 +237,25 @@ def show_value(value: Any) -> str:
     except TypeError:
         text = repr(value)
     return text if len(text) <= 60 and "\n" not in text else reprlib.repr(value)
+
+
+class Faults:
+    """What is wrong with a scene, a line for each fault, as long as they can be read."""
+
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+        self.untold = 0
+
+    def add(self, say: Callable[..., str], *words: Any) -> None:
+        """Note a fault; its wording is worked out only if it will be told."""
+        if len(self.lines) < _MOST_FAULTS:
+            self.lines.append(say(*words))
+        else:
+            self.untold += 1
+
+    def refuse(self) -> None:
+        """Raise `SceneError` if there are any."""
+        if self.untold:
+            self.lines.append(f"and {self.untold} more faults")
+        if self.lines:
+            raise SceneError("\n".join(self.lines))

@@ -15,7 +15,6 @@ from percussion_model.scene.parameters import (
     Contact,
     Drive,
     Effects,
-    Faults,
     Feed,
     FemOptions,
     Gravity,
@@ -30,7 +29,7 @@ from percussion_model.scene.parameters import (
     parameter_table,
     unknown_key,
 )
-from percussion_model.scene.rows import Row, SceneError, show_value
+from percussion_model.scene.rows import Faults, Row, SceneError, show_value
 from percussion_model.scene.solver_names import BODIES
 from percussion_model.scene.text import commented_scene, plain_scene, read_toml, write_text
 
