@@ -85,6 +85,7 @@ def test_the_name_of_an_effect_must_be_new(name):
 
 def test_a_scene_has_the_groups_that_effects_bring(tmp_path):
     code = """
+import pickle
 import sys
 from percussion_model.scene import parameters
 parameters.EFFECTS = (parameters.Effect("friction", "rub", {"force": (50.0, "N", "F", 0.0, 1e6)}),)
@@ -94,6 +95,8 @@ scene = Scene().replace(**{"friction.force": 60.0})
 assert scene.unused == ("friction.force",) and "friction" in scene.effects_off
 scene = scene.replace(**{"effects.friction": True})
 assert scene["friction.force"] == 60.0 and "friction" in scene.effects_on and not scene.unused
+vars(parameters).update({group.__name__: group for group in parameters.GROUPS.values()})
+assert pickle.loads(pickle.dumps(scene)) == scene
 assert scene != Scene() and hash(scene) != hash(Scene())
 for comments in (False, True):
     scene.to_toml(sys.argv[1], comments=comments)

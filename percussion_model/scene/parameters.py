@@ -523,8 +523,8 @@ def groups_with(effects: Iterable[Effect]) -> dict[str, type[Parameters]]:
             for name, (default, unit, description, lower, upper) in effect.parameters.items()
         }
         if fields:
-            words = effect.name.title().replace("_", "")
-            groups[effect.name] = _group(words, Parameters, effect.description, fields)
+            name_of_class = effect.name.title().replace("_", "") + "Group"
+            groups[effect.name] = _group(name_of_class, Parameters, effect.description, fields)
     if switches:
         groups["effects"] = _group("Effects", Effects, Effects.__doc__, switches)
     for key, group in groups.items():
