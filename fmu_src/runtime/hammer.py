@@ -19,7 +19,7 @@ from fmu_src.runtime.watch import Watch
 from percussion_model.scene.inputs import INPUTS, why_without_effect
 from percussion_model.scene.rows import refuse_value
 from percussion_model.scene.scene import Scene
-from percussion_model.solvers import Solver
+from percussion_model.solvers.base import Solver
 from percussion_model.solvers.blow_map.solver import BlowMapSolver
 from percussion_model.solvers.wave.grid import cell_at
 
