@@ -15,7 +15,7 @@ from typing import Any, ClassVar, NamedTuple, Protocol
 import numpy as np
 
 from percussion_model.physics.records import BLOW, EVENT, READING, SAMPLE_FIELDS
-from percussion_model.scene.rules import SceneRules
+from percussion_model.scene.scene import Scene
 from percussion_model.solvers.setup import INPUT_FIELDS
 from percussion_model.solvers.state import State, words_of
 
@@ -38,7 +38,7 @@ class Solver(ABC):
     Attributes
     ----------
     name : str
-    scene : SceneRules
+    scene : Scene
     time_step : float or None
         Distance of grid points [s]; None where there are none.
     cells : dict of int
@@ -54,7 +54,7 @@ class Solver(ABC):
     wave_speed_error = 0.0
     COUNTS: ClassVar[tuple[str, ...]] = ("events", "blows")
 
-    def __init__(self, scene: SceneRules) -> None:
+    def __init__(self, scene: Scene) -> None:
         self.scene = scene
         self.cells: dict[str, int] = {}
         self._no_blows = np.zeros(1, BLOW)
@@ -198,8 +198,8 @@ _REGISTRY = {
 }
 
 
-def make_solver(scene: SceneRules) -> Solver:
+def make_solver(scene: Scene) -> Solver:
     """Make the solver that computes a scene."""
     entry = _REGISTRY[scene.solver_name]
-    factory: Callable[[SceneRules], Solver] = getattr(import_module(entry.module), entry.factory)
+    factory: Callable[[Scene], Solver] = getattr(import_module(entry.module), entry.factory)
     return factory(scene)

@@ -8,7 +8,7 @@ import numpy as np
 
 from percussion_model.physics.effects import EFFECTS
 from percussion_model.physics.records import DriveKind, Mode, Piston, RockKind
-from percussion_model.scene.rules import SceneRules
+from percussion_model.scene.scene import Scene
 
 # An open gap of this many transits of the slower bar ends a blow where no
 # pressure law does (docs/model.md, section 7).
@@ -30,7 +30,7 @@ INPUT_FIELDS = {
 }
 
 
-def fill_parameters(p: Any, scene: SceneRules, with_piston: bool) -> float:
+def fill_parameters(p: Any, scene: Scene, with_piston: bool) -> float:
     """Fill `COMMON_PARAMETERS`.
 
     Parameters
@@ -66,7 +66,7 @@ def fill_parameters(p: Any, scene: SceneRules, with_piston: bool) -> float:
     return float(slowest)
 
 
-def rock_numbers(scene: SceneRules) -> dict[str, float]:
+def rock_numbers(scene: Scene) -> dict[str, float]:
     """Numbers of the rock law as the kernels take them."""
     rock, kind = scene.rock, scene.effects.rock
     barrier = scene.barrier_on
@@ -78,7 +78,7 @@ def rock_numbers(scene: SceneRules) -> dict[str, float]:
     }
 
 
-def fill_start(s: Any, scene: SceneRules, rock: dict[str, float]) -> None:
+def fill_start(s: Any, scene: Scene, rock: dict[str, float]) -> None:
     """Fill what states have in common (`COMMON_STATE`) at time zero.
 
     Parameters

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from percussion_model.scene.rules import BarNumbers, SceneRules, SectionNumbers
+from percussion_model.scene.parameters import Bar, Section
+from percussion_model.scene.scene import Scene
 from percussion_model.solvers.base import Cells
 from percussion_model.solvers.wave.records import Coef
 
@@ -55,12 +56,12 @@ class Grid:
         return len(self.mass)
 
 
-def section_count(section: SectionNumbers, time_step: float) -> int:
+def section_count(section: Section, time_step: float) -> int:
     """Cells that a section gets."""
     return max(1, round(section.transit_time / time_step))
 
 
-def cut(bar: BarNumbers, time_step: float) -> Grid:
+def cut(bar: Bar, time_step: float) -> Grid:
     """Cut a bar into cells of one transit time.
 
     Length and mass of each section stay as they are; where its transit time
@@ -77,7 +78,7 @@ def cut(bar: BarNumbers, time_step: float) -> Grid:
     return Grid(np.array(impedance), np.array(mass), time_step, fit)
 
 
-def cell_at(bar: BarNumbers, grid: Cells, place: float) -> tuple[int, float]:
+def cell_at(bar: Bar, grid: Cells, place: float) -> tuple[int, float]:
     """Cell at a place along a bar.
 
     Parameters
@@ -102,7 +103,7 @@ def cell_at(bar: BarNumbers, grid: Cells, place: float) -> tuple[int, float]:
     return min(cell, grid.n - 1), section.area
 
 
-def choose_time_step(bars: list[BarNumbers], cells: int | None) -> float:
+def choose_time_step(bars: list[Bar], cells: int | None) -> float:
     """Transit time of a cell that suits all bars.
 
     Parameters
@@ -120,9 +121,7 @@ def choose_time_step(bars: list[BarNumbers], cells: int | None) -> float:
     return first / fitting_cells(bars, DEFAULT_CELLS, most, WANTED_FIT)[0]
 
 
-def fitting_cells(
-    bars: Sequence[BarNumbers], fewest: int, most: int, wanted: float
-) -> tuple[int, float]:
+def fitting_cells(bars: Sequence[Bar], fewest: int, most: int, wanted: float) -> tuple[int, float]:
     """Cells in the first bar that suit the lengths of all.
 
     Parameters
@@ -352,14 +351,14 @@ _kept: dict[tuple, CutBars] = {}
 _lock = threading.Lock()
 
 
-def elastic_bars(scene: SceneRules) -> list[BarNumbers]:
+def elastic_bars(scene: Scene) -> list[Bar]:
     """The bars that get cells, the one first whose cells are counted."""
     if scene.bit.model != "elastic":
         return []
     return [scene.piston, scene.bit] if scene.piston.model == "elastic" else [scene.bit]
 
 
-def cut_bars(scene: SceneRules, cells: int | None) -> CutBars:
+def cut_bars(scene: Scene, cells: int | None) -> CutBars:
     """Cut the elastic bars of a scene, or find them cut.
 
     Parameters
@@ -391,7 +390,7 @@ def cut_bars(scene: SceneRules, cells: int | None) -> CutBars:
     return found
 
 
-def _cut_bar(bar: BarNumbers, time_step: float, loss_time: float) -> CutBar:
+def _cut_bar(bar: Bar, time_step: float, loss_time: float) -> CutBar:
     grid = cut(bar, time_step)
     c = coefficients(grid, loss_time)
     kappa = end_viscosity(c, grid, loss_time)
