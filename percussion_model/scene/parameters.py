@@ -12,8 +12,9 @@ import difflib
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
-from typing import Any, ClassVar, NamedTuple, Self
+from typing import Any, ClassVar, Self
 
+from percussion_model.physics.effects import EFFECTS, Effect
 from percussion_model.scene import bars
 from percussion_model.scene.rows import (
     REFUSED,
@@ -481,26 +482,6 @@ _BUILT_IN: dict[str, type[Parameters]] = {
     "blow_map": BlowMapOptions,
     "run": RunOptions,
 }
-
-
-class Effect(NamedTuple):
-    """What a file of an effect adds to the table.
-
-    Attributes
-    ----------
-    name : str
-        Of its switch in `effects`, which is off by default, and of its group.
-    description : str
-    parameters : mapping
-        Default, unit, description, least and greatest value of each, by name.
-    """
-
-    name: str
-    description: str
-    parameters: Mapping[str, tuple[float, str, str, float, float]]
-
-
-EFFECTS: tuple[Effect, ...] = ()
 
 
 def groups_with(effects: Iterable[Effect]) -> dict[str, type[Parameters]]:

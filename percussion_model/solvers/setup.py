@@ -17,18 +17,6 @@ REARM_TRANSITS = 20.0
 # DFC, FC, BC and again; more would be a loop.
 MOST_CHANGES = 12
 
-# Inputs that can change during a run, and the fields of the state that hold them.
-INPUT_FIELDS = {
-    "feed_force": "feed",
-    "drive_force": "drive_force",
-    "reversal_distance": "reversal",
-    "external_force": "external",
-    "loading_stiffness": "next_k_r",
-    "unloading_ratio": "next_gamma",
-    "barrier_damping": "next_c_r",
-    "barrier_energy": "next_w_r",
-}
-
 
 def fill_parameters(p: Any, scene: Scene, with_piston: bool) -> float:
     """Fill `COMMON_PARAMETERS`.
