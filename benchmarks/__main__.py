@@ -93,8 +93,7 @@ def reference(repeats: int) -> list[dict[str, Any]]:
 def effects(repeats: int) -> list[dict[str, Any]]:
     """Cost of a wave step with one effect off, in flight and in the whole motion."""
     from percussion_model import Scene
-    from percussion_model.analysis.effect_turns import turns
-    from percussion_model.analysis.effects import NOISE, step_costs
+    from percussion_model.analysis.effect_study import NOISE, step_costs, turns
 
     base = Scene.from_toml(REFERENCE).replace(**{"solver.cells": 20, "solver.leaps": False})
     cases = {}

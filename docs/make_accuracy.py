@@ -16,7 +16,7 @@ from typing import Any
 import matplotlib
 
 from percussion_model.interface.plotting import style
-from percussion_model.interface.plotting.accuracy import draw_accuracy, draw_quantities
+from percussion_model.interface.plotting.error_against_time import draw_accuracy, draw_quantities
 from percussion_model.verification.accuracy import Study
 from percussion_model.verification.accuracy.ladders import LADDERS
 from percussion_model.verification.accuracy.quantities import HISTORY, QUANTITIES
@@ -68,13 +68,13 @@ def draw(name: str, found: Study) -> None:
 
 def measure_closed_forms() -> None:
     """Errors of both solvers at closed forms."""
-    from percussion_model.verification.accuracy.closed_forms import closed_forms, found_by
+    from percussion_model.verification.accuracy.closed_forms import closed_forms, solver_error
 
     rows = []
     for case in closed_forms():
         say(case.name)
-        wave = [found_by(case, "wave", count) for count in CLOSED_WAVE]
-        fem = [found_by(case, "fem", count) for count in CLOSED_FEM]
+        wave = [solver_error(case, "wave", count) for count in CLOSED_WAVE]
+        fem = [solver_error(case, "fem", count) for count in CLOSED_FEM]
         rows.append({"name": case.name, "value": case.value, "wave": wave, "fem": fem})
     keep("closed_forms", {"rows": rows})
 

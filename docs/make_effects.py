@@ -11,10 +11,10 @@ import matplotlib
 
 from benchmarks.__main__ import machine
 from percussion_model import Scene
-from percussion_model.analysis.effects import EffectsStudy, study_effects
+from percussion_model.analysis.effect_study import EffectsStudy, study_effects
 from percussion_model.interface.commands.effects import table_of
 from percussion_model.interface.plotting import style
-from percussion_model.interface.plotting.effects import draw_effects
+from percussion_model.interface.plotting.effect_bars import draw_effects
 
 HERE = Path(__file__).resolve().parent
 REFERENCE = HERE.parent / "scenarios" / "reference.toml"

@@ -16,7 +16,7 @@ from matplotlib.colors import ListedColormap
 from examples.shared import GREY, command_line, figure_of
 from percussion_model import Scene
 from percussion_model.analysis.study import Study, grid, study
-from percussion_model.analysis.study.work import KINDS
+from percussion_model.analysis.study.response import KINDS
 from percussion_model.interface.plotting import style
 from percussion_model.interface.plotting.style import KN, MM
 

@@ -10,8 +10,14 @@ import pytest
 from typer.testing import CliRunner
 
 from percussion_model import Scene, simulate
-from percussion_model.analysis.effect_turns import turns
-from percussion_model.analysis.effects import NOISE, EffectsStudy, Trial, step_costs, study_effects
+from percussion_model.analysis.effect_study import (
+    NOISE,
+    EffectsStudy,
+    Trial,
+    step_costs,
+    study_effects,
+    turns,
+)
 from percussion_model.interface.cli import app
 from percussion_model.interface.commands.effects import (
     LONGEST_NAME,
@@ -196,7 +202,7 @@ def test_numbers_are_plain(rigid):
 
 def test_figure_has_a_bar_for_each_known_number(rigid):
     pytest.importorskip("matplotlib")
-    from percussion_model.interface.plotting.effects import draw_effects
+    from percussion_model.interface.plotting.effect_bars import draw_effects
 
     axes = draw_effects(rigid).axes
     assert len(axes) == 5

@@ -17,8 +17,8 @@ from typer.testing import CliRunner
 
 from percussion_model import Scene, SceneError, settled
 from percussion_model.analysis.study import grid, study, table, workers
+from percussion_model.analysis.study.response import COMPUTING, KINDS, run_points
 from percussion_model.analysis.study.store import PARTS, PLAN
-from percussion_model.analysis.study.work import COMPUTING, KINDS, run_points
 from percussion_model.interface.cli import app
 from percussion_model.simulation.files import ResultError, to_json
 from percussion_model.solvers import operators, sources
@@ -177,7 +177,7 @@ def test_all_that_computes_a_point_is_in_the_hash():
     """What a worker loads, but for files, tables, warnings and other points."""
     code = (
         "import sys, numpy as np; from percussion_model import Scene; "
-        "from percussion_model.analysis.study.work import run_points; "
+        "from percussion_model.analysis.study.response import run_points; "
         "scene = Scene().computed_by('rigid'); "
         "run_points(scene, ('feed.force',), np.array([[2500.0]]), 1e-4, 400, 1e-3); "
         "print(*(m.__file__ for n, m in sys.modules.items() if n.startswith('percussion_model')))"
@@ -185,7 +185,7 @@ def test_all_that_computes_a_point_is_in_the_hash():
     said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     left = {Path(name) for name in said.stdout.split()} - set(sources.source_files(COMPUTING))
     names = {path.relative_to(sources.PACKAGE).as_posix() for path in left}
-    of_study = {f"study/{name}.py" for name in ("__init__", "store", "summary", "workers")}
+    of_study = {f"study/{name}.py" for name in ("__init__", "store", "workers")}
     assert names == of_study | {"__init__.py", "result.py", "result_files.py", "warnings_of_run.py"}
 
 

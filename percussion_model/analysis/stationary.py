@@ -1,4 +1,4 @@
-"""The stationary response of a scene: run until the blows repeat, and no longer."""
+"""Stationary response of a scene: a run until the blows repeat, and no longer."""
 
 from __future__ import annotations
 
@@ -17,15 +17,16 @@ from percussion_model.simulation.cycles import (
     batch_means,
     cycles_in,
 )
-from percussion_model.simulation.stepping import Simulation
+from percussion_model.simulation.files import plain
+from percussion_model.simulation.simulate import Simulation
 
 __all__ = ["Settled", "settled"]
 
 # A run in which no blow ends for so long [s], and so many periods of the last, has stopped.
 STALLED_AFTER, STALLED_PERIODS = 2.0, 4.0
-# The standard error is first believed after so many blows, and looked at again
+# The standard error is first believed after so many blows, and checked again
 # when there are so many times more.
-FEWEST_SCATTERED, NEXT_LOOK = 100, 1.25
+FEWEST_SCATTERED, NEXT_CHECK = 100, 1.25
 
 
 @dataclass(frozen=True)
@@ -87,10 +88,8 @@ class Settled:
             "duration": self.duration,
             "wall_time": self.wall_time,
         }
-        return {
-            name: None if isinstance(value, float) and not math.isfinite(value) else value
-            for name, value in numbers.items()
-        }
+        values: dict[str, Any] = plain(numbers)
+        return values
 
 
 def settled(
@@ -122,7 +121,7 @@ def settled(
     scatter : float
         Relative standard error of the rate with which a motion that has not
         settled is known well enough, and called aperiodic before `most_blows`.
-        By 0 it never is.
+        0: it never is.
 
     Returns
     -------
@@ -133,11 +132,16 @@ def settled(
     SceneError
         If the scene has no piston, or an argument makes no sense.
     SimulationError
-        If the run cannot go on.
+        If the run cannot continue.
     """
     check_request(scene, tolerance, most_blows, scatter)
     simulation = Simulation(scene, record_events=False)
-    blows, next_look = simulation.blows, float(FEWEST_SCATTERED)
+    blows, next_check = simulation.blows, float(FEWEST_SCATTERED)
+
+    def made(kind: str, order: int, rate: float, error: float, multiplier: float) -> Settled:
+        cycle, times = blows[len(blows) - order :], (simulation.time, simulation.wall_time)
+        return Settled(kind, order, rate, error, multiplier, cycle, blows, *times)
+
     while len(blows) < most_blows:
         ended, patience = 0.0, STALLED_AFTER
         if len(blows):
@@ -149,20 +153,21 @@ def settled(
         simulation.advance_blows(max(1, FEWEST_BLOWS - before), until)
         blows = simulation.blows
         if len(blows) == before:
-            return _made("stalled", 0, math.nan, math.nan, math.nan, blows, simulation)
+            return made("stalled", 0, math.nan, math.nan, math.nan)
         if progress is not None:
             progress(len(blows))
         for order, found in cycles_in(blows, tolerance).items():
-            return _made("periodic", order, *found, blows, simulation)
-        if scatter and len(blows) >= next_look:
-            next_look = NEXT_LOOK * len(blows)
+            return made("periodic", order, *found)
+        if scatter and len(blows) >= next_check:
+            next_check = NEXT_CHECK * len(blows)
             rate, error = batch_means(blows)
             if error <= scatter * abs(rate):
                 break
-    return _made("aperiodic", 0, *batch_means(blows), math.nan, blows, simulation)
+    return made("aperiodic", 0, *batch_means(blows), math.nan)
 
 
 def check_request(scene: Scene, tolerance: float, most_blows: int, scatter: float) -> None:
+    """Raise `SceneError` for arguments of `settled` that make no sense."""
     if scene.piston.model == "absent":
         raise SceneError('piston.model = "absent": a bit alone has no blows that could settle')
     if not 0 < tolerance < 1:
@@ -172,26 +177,3 @@ def check_request(scene: Scene, tolerance: float, most_blows: int, scatter: floa
     least = 2 * BATCHES
     if most_blows < least:
         raise SceneError(f"most_blows = {most_blows!r}: must be a whole number from {least} on")
-
-
-def _made(
-    kind: str,
-    order: int,
-    rate: float,
-    error: float,
-    multiplier: float,
-    blows: np.ndarray,
-    simulation: Simulation,
-) -> Settled:
-    cycle = blows[len(blows) - order :]
-    return Settled(
-        kind=kind,
-        order=order,
-        rate_of_penetration=rate,
-        rate_of_penetration_error=error,
-        multiplier=multiplier,
-        cycle=cycle,
-        blows=blows,
-        duration=simulation.time,
-        wall_time=simulation.wall_time,
-    )

@@ -1,4 +1,4 @@
-"""What a coupled run of hammer and string says about itself: depth, energy, momentum."""
+"""Balances of a coupled run of hammer and string: depth, energy, momentum."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from percussion_model.coupling.coupled_run import CoupledRun
 
-# What the balances read, by what it is.
+# Signals that the balances read.
 STRING_ENERGIES = ("head", "reaction", "weight", "bit", "shoulder", "wall", "stored")
 SIGNALS = (
     *(f"string.energy.{name}" for name in STRING_ENERGIES),
@@ -42,9 +42,9 @@ def summary(run: CoupledRun) -> dict[str, Any]:
     Returns
     -------
     dict
-        depth [m], mean rate over the second half [m/s], greatest residual of the balances of
-        the string: energy by the energy put in, momentum by the impulses put in; energy that
-        the shoulder took, by the work of the feed on the bit [1].
+        depth [m], mean rate over the second half [m/s], greatest residual of the energy
+        balance of the string divided by the energy put in; energy that the shoulder took and work
+        of the feed [J]; the former divided by the energy of the blows [1].
     """
     columns = run.columns
     found: dict[str, Any] = {

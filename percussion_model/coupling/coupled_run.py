@@ -1,10 +1,13 @@
-"""What a coupled run leaves behind."""
+"""Result of a coupled run: its signals over time."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
+
+from percussion_model.simulation.files import staged_text
 
 
 @dataclass
@@ -40,3 +43,12 @@ class CoupledRun:
 
     def __getitem__(self, signal: str) -> np.ndarray:
         return self.columns[signal]
+
+    def write_csv(self, path: Path) -> Path:
+        """Write time and signals as CSV, with all digits."""
+        lines = [",".join(f'"{name}"' for name in self.columns)]
+        for row in zip(*(column.tolist() for column in self.columns.values()), strict=True):
+            lines.append(",".join(repr(value) for value in row))
+        path.parent.mkdir(parents=True, exist_ok=True)
+        staged_text(path, "\n".join(lines) + "\n")
+        return path

@@ -1,4 +1,4 @@
-"""The command `percussion`; what it can do is in `percussion_model.interface.commands`."""
+"""The command `percussion`; its subcommands are in `percussion_model.interface.commands`."""
 
 from __future__ import annotations
 
@@ -18,8 +18,7 @@ from percussion_model.interface.commands.compare import compare
 from percussion_model.interface.commands.couple import couple
 from percussion_model.interface.commands.effects import effects
 from percussion_model.interface.commands.paper import paper
-from percussion_model.interface.commands.scene import explain, new, plot, run
-from percussion_model.interface.commands.settled import settled
+from percussion_model.interface.commands.scene import explain, new, plot, run, settled
 from percussion_model.interface.commands.stability import stability
 from percussion_model.interface.commands.study import study
 from percussion_model.interface.quick_start import own_process

@@ -1,6 +1,6 @@
-"""What makes a process of the command line start sooner, and nothing else.
+"""Faster start of a process of the command line.
 
-A library must not do any of this to the process of its caller.
+A library must not do this to the process of its caller.
 """
 
 from __future__ import annotations

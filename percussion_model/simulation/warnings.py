@@ -1,14 +1,14 @@
-"""What the reader of a result must know before trusting it."""
+"""Warnings that a result carries: what limits the trust in its numbers."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from percussion_model.physics.records import EventKind
+from percussion_model.simulation.result import LEAST_BLOWS, Result
 from percussion_model.simulation.validity import (
     button_note,
     flight_note,
@@ -16,9 +16,6 @@ from percussion_model.simulation.validity import (
     ledger_note,
     rate_note,
 )
-
-if TYPE_CHECKING:
-    from percussion_model.simulation.result import Result
 
 # A larger error of the wave speed shows in the answers.
 MOST_WAVE_SPEED_ERROR = 1e-3
@@ -102,10 +99,10 @@ def _about_blows(result: Result) -> Iterator[str]:
         yield "there is no piston, so there are no blows: the rate of penetration is undefined"
     elif len(result.blows) == 0:
         yield "no whole blow in this run: the rate of penetration is undefined"
-    elif count < 3:
+    elif count < LEAST_BLOWS:
         yield (
-            f"only {count} whole blow{'s' if count != 1 else ''} after settling, fewer than 3: "
-            "the rate of penetration is undefined; run longer"
+            f"only {count} whole blow{'s' if count != 1 else ''} after settling, fewer than "
+            f"{LEAST_BLOWS}: the rate of penetration is undefined; run longer"
         )
 
 

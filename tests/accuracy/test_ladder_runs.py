@@ -92,7 +92,10 @@ def test_json_has_what_it_promises(found):
 
 
 def test_table_and_figures(found, tmp_path, capsys):
-    from percussion_model.interface.plotting.accuracy import draw_accuracy, draw_quantities
+    from percussion_model.interface.plotting.error_against_time import (
+        draw_accuracy,
+        draw_quantities,
+    )
 
     show_study(found)
     shown = capsys.readouterr().out

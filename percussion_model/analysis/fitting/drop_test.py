@@ -20,7 +20,7 @@ from percussion_model.analysis.fitting.estimates import (
 )
 from percussion_model.analysis.fitting.minimum import LEAST_STEPS, descend, search
 from percussion_model.scene.scene import Scene
-from percussion_model.simulation.stepping import Simulation
+from percussion_model.simulation.simulate import Simulation
 
 __all__ = ["BARRIER", "ROCK", "DropTest", "drop_test_signal", "fit_drop_tests"]
 

@@ -1,4 +1,4 @@
-"""Tables of a study of accuracy."""
+"""Tables of an accuracy study."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A controller on the standard runs."""
+"""Command `bench-controller`: a controller on the standard runs."""
 
 from __future__ import annotations
 
@@ -17,10 +17,11 @@ from percussion_model.interface.commands.common import (
     Out,
     check_json,
     complain,
-    needs_fmu_extra,
+    needs_extra,
     needs_plot_extra,
     write_json,
 )
+from percussion_model.interface.commands.couple import read_value
 
 if TYPE_CHECKING:
     from percussion_model.coupling.bench import Score
@@ -60,9 +61,8 @@ def bench_controller(
     """Put a controller of feed and pressure through standard runs: scores, figures, a page."""
     try:
         from percussion_model.coupling.bench import bench, total
-        from percussion_model.coupling.files import read_value
     except ImportError as error:
-        return complain(needs_fmu_extra(error), BAD_INPUT)
+        return complain(needs_extra(error, "fmu"), BAD_INPUT)
     from percussion_model.simulation.files import check_writable
 
     folder = out or Path("out") / "bench-controller"
@@ -90,12 +90,12 @@ def bench_controller(
     write_json(json_file, {"points": points, "trials": listed})
     print(f"{'total':10s} {points:6.1f}", file=sys.stderr)
     try:
-        from percussion_model.interface.plotting.bench import save_bench
+        from percussion_model.interface.bench_page import write_bench_page
     except ImportError as error:
         complain(needs_plot_extra(error))
     else:
         title = controller or system.stem
-        print(save_bench(scores, points, COLUMNS, folder, title), file=sys.stderr)
+        print(write_bench_page(scores, points, COLUMNS, folder, title), file=sys.stderr)
     if interrupted:
         return complain(
             f"interrupted: the page has the {len(scores)} runs that were done", INTERRUPTED

@@ -1,4 +1,4 @@
-"""Make the table of the blow map, or tell about it."""
+"""Command `blow-map`: the table of a blow map, made or described."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def blow_map(
 def ready_map(scene: Scene, workers: int | None = None) -> BlowTable:
     """Table of a scene, made with a bar if it is not there yet.
 
-    Whatever of the scene lies outside is told first: making a table takes minutes.
+    What of the scene lies outside is listed first: making a table takes minutes.
     """
     from percussion_model.analysis.blow_maps import kept_map, make_map
     from percussion_model.interface.terminal import count_bar
@@ -64,7 +64,7 @@ def ready_map(scene: Scene, workers: int | None = None) -> BlowTable:
 
 
 def warn_of_outside(scene: Scene) -> None:
-    """Tell what of a scene its table would not answer."""
+    """Warn of what of a scene its table would not answer."""
     from percussion_model.analysis.blow_maps import outside_map
 
     for text in outside_map(scene):
@@ -72,7 +72,7 @@ def warn_of_outside(scene: Scene) -> None:
 
 
 def _numbers(scene: Scene, table: BlowTable | None) -> dict[str, Any]:
-    """What there is to tell of a table, plain values."""
+    """Numbers of a table as plain values."""
     from percussion_model.analysis.blow_maps import map_file, node_count, outside_map
 
     found: dict[str, Any] = {

@@ -1,4 +1,4 @@
-"""Rock parameters from measurements."""
+"""Command `calibrate`: rock parameters from measurements."""
 
 from __future__ import annotations
 
@@ -8,21 +8,19 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from percussion_model.interface.commands.common import (
-    BAD_INPUT,
     Cells,
     JsonFile,
     SceneFile,
     Settings,
     SolverName,
     check_json,
-    complain,
     load_scene,
+    refusal,
     write_json,
 )
 
 if TYPE_CHECKING:
     from percussion_model.analysis.fitting import DropTest, Fit
-    from percussion_model.scene.scene import Scene
 
 
 def calibrate(
@@ -61,12 +59,11 @@ def calibrate(
     from percussion_model.simulation.files import check_writable
 
     if curve is None and not drop:
-        raise typer.Exit(complain("nothing to fit: give --curve, --drop or both", BAD_INPUT))
+        raise refusal("nothing to fit: give --curve, --drop or both")
     check_json(json_file)
     if out is not None:
         if out.is_dir():
-            text = f"--out {str(out)!r}: is a folder; give the file to write"
-            raise typer.Exit(complain(text, BAD_INPUT))
+            raise refusal(f"--out {str(out)!r}: is a folder; give the file to write")
         check_writable(out.absolute().parent)
     chosen = load_scene(scene, solver, cells, settings)
     found: dict[str, Fit] = {}
@@ -78,7 +75,7 @@ def calibrate(
         chosen = chosen.replace(**found["curve"].changes())
     if drop:
         signal, tests = _drop_tests(drop)
-        bit_alone = _bit_alone(chosen)
+        bit_alone = chosen.replace(**{"piston.model": "absent", "effects.drive": "none"})
         found["drop tests"] = fit_drop_tests(bit_alone, tests, ROCK, signal=signal, span=span)
         chosen = chosen.replace(**found["drop tests"].changes())
     write_json(json_file, {name: fit.summary() for name, fit in found.items()})
@@ -86,11 +83,6 @@ def calibrate(
         _show(found)
     if out is not None:
         chosen.to_toml(out)
-
-
-def _bit_alone(scene: Scene) -> Scene:
-    """The bit of a scene without its piston, as it is dropped."""
-    return scene.replace(**{"piston.model": "absent", "effects.drive": "none"})
 
 
 def _drop_tests(words: list[str]) -> tuple[str, list[DropTest]]:

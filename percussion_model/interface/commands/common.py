@@ -1,4 +1,4 @@
-"""What the commands share: options, reading a scene, messages."""
+"""Shared parts of the commands: options, loading a scene, outputs, messages."""
 
 from __future__ import annotations
 
@@ -120,7 +120,7 @@ def if_drawable() -> Iterator[None]:
         complain(needs_plot_extra(error))
 
 
-def tell_files(paths: Iterable[Path]) -> None:
+def list_files(paths: Iterable[Path]) -> None:
     """Name on stderr the files that were written."""
     for path in paths:
         print(f"wrote {path}", file=sys.stderr)
@@ -128,15 +128,11 @@ def tell_files(paths: Iterable[Path]) -> None:
 
 def needs_plot_extra(error: ImportError) -> str:
     """Say which package the figures lack and how to get it."""
-    return f"no figures, since {_needs_extra(error, 'plot')}"
+    return f"no figures, since {needs_extra(error, 'plot')}"
 
 
-def needs_fmu_extra(error: ImportError) -> str:
-    """Say which package the coupling lacks and how to get it."""
-    return _needs_extra(error, "fmu")
-
-
-def _needs_extra(error: ImportError, extra: str) -> str:
+def needs_extra(error: ImportError, extra: str) -> str:
+    """Say which package is missing, and the extra that installs it."""
     return f"{error.name or error} is missing: pip install 'percussion_model[{extra}]'"
 
 

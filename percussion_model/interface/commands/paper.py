@@ -1,4 +1,4 @@
-"""The figures and statements of the paper, one after the other."""
+"""Command `paper`: the figures and statements of the paper, one after the other."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ def paper(
     json_file: JsonFile = None,
 ) -> None:
     """Reproduce figures 6 to 9 of the paper, and check what it says one by one."""
-    from percussion_model.interface.commands.tables import show_statements
     from percussion_model.interface.quick_start import load_numba
+    from percussion_model.interface.terminal import show_statements
 
     check_outputs(out, json_file)
     load_numba()
     try:
         from percussion_model.interface.plotting.activation import draw_activation
-        from percussion_model.interface.plotting.comparison import draw_comparison
+        from percussion_model.interface.plotting.compared_blows import draw_comparison
         from percussion_model.interface.plotting.motion import draw_motion
         from percussion_model.interface.plotting.paper import draw_drops, draw_sweeps
         from percussion_model.interface.plotting.style import save_figures
@@ -67,15 +67,15 @@ def paper(
         yield "figure9", draw_sweeps(sweeps)
 
     save_figures(figures, out)
-    said = list(about_drops(drops))
+    statements = list(about_drops(drops))
     for name, window in windows.items():
-        said += about_cycle(both.results[name], window.samples, window.origin)
-    said += about_sweeps(sweeps)
-    statements = {"statements": [one.to_dict() for one in said]}
-    write_json(json_file, statements)
-    write_json(str(out / "statements.json"), statements)
+        statements += about_cycle(both.results[name], window.samples, window.origin)
+    statements += about_sweeps(sweeps)
+    tree = {"statements": [one.to_dict() for one in statements]}
+    write_json(json_file, tree)
+    write_json(str(out / "statements.json"), tree)
     if json_file != "-":
-        show_statements(said)
+        show_statements(statements)
 
 
 def _cycle() -> Comparison:

@@ -1,4 +1,4 @@
-"""The hard cases by every solver."""
+"""Command `stability`: the hard cases by every solver."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from percussion_model.interface.commands.common import (
     Out,
     check_outputs,
     if_drawable,
-    tell_files,
+    list_files,
     write_json,
 )
 
@@ -42,8 +42,7 @@ def stability(
     json_file: JsonFile = None,
 ) -> None:
     """Run the hard cases by every solver: what must hold, and where solvers disagree."""
-    from percussion_model.interface.commands.tables import show_stability
-    from percussion_model.interface.terminal import count_bar
+    from percussion_model.interface.terminal import count_bar, show_stability
     from percussion_model.verification.hard_cases import run_collection
 
     check_outputs(out, json_file)
@@ -62,12 +61,16 @@ def stability(
 def _write(found: Collection, folder: Path) -> None:
     """Write the page and its figure into a folder."""
     from percussion_model.simulation.files import staged_text
-    from percussion_model.verification.hard_cases.page import page
+    from percussion_model.verification.hard_cases.stability_page import page
 
     picture = None
     with if_drawable():
-        from percussion_model.interface.plotting.stability import save_stability
+        from percussion_model.interface.plotting.stability_map import draw_stability
+        from percussion_model.interface.plotting.style import save_figures
 
-        picture = save_stability(found, folder / "images").relative_to(folder).as_posix()
+        save_figures(
+            lambda: [("stability", draw_stability(found))], folder / "images", kinds=("png",)
+        )
+        picture = "images/stability.png"
     staged_text(folder / "stability.md", page(found, picture))
-    tell_files([folder / "stability.md"])
+    list_files([folder / "stability.md"])

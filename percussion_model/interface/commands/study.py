@@ -1,4 +1,4 @@
-"""The stationary response over a grid or a sample of parameters."""
+"""Command `study`: the stationary response over a grid or a sample of parameters."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from percussion_model.interface.commands.common import (
-    BAD_INPUT,
     INTERRUPTED,
     Cells,
     SceneFile,
@@ -20,12 +19,13 @@ from percussion_model.interface.commands.common import (
     complain,
     load_scene,
     needs_plot_extra,
+    refusal,
 )
 
 if TYPE_CHECKING:
     from percussion_model.analysis.study import Study
 
-# What writes tables and grids; asked for before hours of work, not after.
+# Packages that write tables and grids; checked before hours of work, not after.
 NEEDED = ("pandas", "pyarrow", "xarray", "h5netcdf", "h5py", "threadpoolctl")
 
 
@@ -41,7 +41,7 @@ def study(
         ),
     ],
     out: Annotated[
-        Path, typer.Option("--out", metavar="DIR", help="Folder; an interrupted study goes on.")
+        Path, typer.Option("--out", metavar="DIR", help="Folder; an interrupted study continues.")
     ],
     samples: Annotated[
         int | None,
@@ -54,7 +54,9 @@ def study(
     tolerance: Tolerance = 1e-4,
     scatter: Annotated[
         float,
-        typer.Option("--scatter", help="Relative standard error that will do for aperiodic rates."),
+        typer.Option(
+            "--scatter", help="Relative standard error that is enough for aperiodic rates."
+        ),
     ] = 1e-3,
     report: Annotated[bool, typer.Option(help="Write report.html as well.")] = True,
     processes: Annotated[
@@ -72,14 +74,13 @@ def study(
 
     missing = [name for name in NEEDED if importlib.util.find_spec(name) is None]
     if missing:
-        words = f"a study needs {', '.join(missing)}: pip install 'percussion_model[study]'"
-        raise typer.Exit(complain(words, BAD_INPUT))
+        raise refusal(f"a study needs {', '.join(missing)}: pip install 'percussion_model[study]'")
     axes = dict(read_axis(text) for text in over)
     if len(axes) < len(over):
-        raise typer.Exit(complain("--over: a key stands there twice", BAD_INPUT))
+        raise refusal("--over: a key is given twice")
     for text in settings or ():
         if text.partition("=")[0] in axes:
-            raise typer.Exit(complain(f"--set {text}: --over varies this key", BAD_INPUT))
+            raise refusal(f"--set {text}: --over varies this key")
     if samples is None:
         points = grid(axes)
     else:
@@ -101,7 +102,7 @@ def study(
                 progress=progress,
             )
     except KeyboardInterrupt:
-        words = f"interrupted; finished points are kept in {out}, the same command goes on"
+        words = f"interrupted; finished points are kept in {out}, the same command continues"
         raise typer.Exit(complain(words, INTERRUPTED)) from None
     show_study(found, [*found.save(out), *(_report(found, out) if report else ())])
 
@@ -109,11 +110,10 @@ def study(
 def _report(found: Study, folder: Path) -> list[Path]:
     """Write the report; the results are safe already."""
     try:
-        from percussion_model.interface.page import without_zoom
-        from percussion_model.interface.study_report import write_study_report
+        from percussion_model.interface.report import why_not_interactive, write_study_report
     except ImportError as error:
         complain(needs_plot_extra(error))
         return []
-    if remark := without_zoom():
+    if remark := why_not_interactive():
         complain(remark)
     return [write_study_report(found, folder)]

@@ -1,4 +1,4 @@
-"""One look for all figures: colours, units, lines coloured by drilling mode, saving."""
+"""Common style of all figures: colours, units, lines coloured by drilling mode, saving."""
 
 from __future__ import annotations
 

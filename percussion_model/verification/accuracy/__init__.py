@@ -1,4 +1,4 @@
-"""What accuracy costs in time: references with error bars, ladders of methods, orders."""
+"""Error against computing time: references with error bars, ladders of methods, orders."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is computed of a scene to compare methods, and what a solver answers.
+"""Problems on which methods are compared, and runs of the solvers on them.
 
 A periodic scene starts near its periodic motion, so that few blows tell the answer of
 four seconds; a drop is computed as a whole; an aperiodic scene by statistics.
@@ -7,7 +7,6 @@ four seconds; a drop is computed as a whole; an aperiodic scene by statistics.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -72,7 +71,7 @@ class Problem:
 
 
 def pose(scene: Scene) -> Problem:
-    """Find out what kind of motion a scene makes and where to start it.
+    """Find the kind of motion of a scene, and where to start it.
 
     Raises
     ------
@@ -136,13 +135,10 @@ class Run:
 
     def answer(self) -> Answer:
         """What the solver finds."""
-        answers: dict[str, Callable[[], Answer]] = {
-            PERIODIC: self._periodic,
-            APERIODIC: self._statistics,
-            DROP: self._drop,
-        }
         self.simulation.restore(self._start)
-        return answers[self.problem.kind]()
+        if self.problem.kind == PERIODIC:
+            return self._periodic()
+        return self._statistics() if self.problem.kind == APERIODIC else self._drop()
 
     def _periodic(self) -> Answer:
         simulation, problem = self.simulation, self.problem

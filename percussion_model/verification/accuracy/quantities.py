@@ -1,4 +1,4 @@
-"""What methods are compared by, and how far an answer is from a reference."""
+"""Compared quantities, and the error of an answer against a reference."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ QUANTITIES = {
 
 @dataclass
 class Answer:
-    """What a method finds.
+    """Answer of a method.
 
     Attributes
     ----------
@@ -64,7 +64,7 @@ class Answer:
 def relative_error(
     answer: Answer, values: dict[str, float], history: np.ndarray | None, key: str
 ) -> float:
-    """Error of a quantity relative to a reference; of the history, L1 by L1.
+    """Error of a quantity relative to a reference; of the history, the ratio of L1 norms.
 
     NaN where one of the two does not have it.
     """
@@ -78,7 +78,7 @@ def relative_error(
     return abs(found / wanted - 1.0)
 
 
-def batch_means(values: np.ndarray, by: np.ndarray | None = None) -> tuple[float, float]:
+def batch_means(values: np.ndarray, weights: np.ndarray | None = None) -> tuple[float, float]:
     """Mean of rows, or ratio of two sums, and its standard error from batches.
 
     Blows of an aperiodic motion are not independent: where the bit leaps far, the next
@@ -86,14 +86,14 @@ def batch_means(values: np.ndarray, by: np.ndarray | None = None) -> tuple[float
 
     Parameters
     ----------
-    values, by : ndarray, shape (n,)
-        The mean is sum(values) / sum(by), or / n.
+    values, weights : ndarray, shape (n,)
+        The mean is sum(values) / sum(weights), or / n.
 
     Returns
     -------
     mean, standard_error : float
     """
-    below = np.ones(len(values)) if by is None else by
+    below = np.ones(len(values)) if weights is None else weights
     mean = float(np.sum(values) / np.sum(below))
     parts = np.array_split(np.arange(len(values)), min(BATCHES, len(values)))
     means = np.array([np.sum(values[part]) / np.sum(below[part]) for part in parts])

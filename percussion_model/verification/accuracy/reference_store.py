@@ -1,4 +1,4 @@
-"""References with error bars as they are kept: JSON with how they were made."""
+"""Stored references with error bars: JSON, with how they were made."""
 
 from __future__ import annotations
 
@@ -13,8 +13,16 @@ from typing import Any
 import numpy as np
 
 from percussion_model.scene.scene import Scene
+from percussion_model.simulation.files import staged_text
 
-__all__ = ["Bar", "Reference", "fingerprint", "package_store", "store", "stored"]
+__all__ = [
+    "Bar",
+    "Reference",
+    "fingerprint",
+    "load_references",
+    "package_store",
+    "save_references",
+]
 
 STORE = "references.json"
 FORMAT = 1
@@ -47,7 +55,7 @@ class Bar:
 
 @dataclass(frozen=True)
 class Reference:
-    """What a scene comes to.
+    """Reference answer of a scene.
 
     Attributes
     ----------
@@ -127,7 +135,7 @@ def fingerprint(scene: Scene) -> str:
     return hashlib.sha256(json.dumps(found, sort_keys=True).encode()).hexdigest()[:16]
 
 
-def stored(path: Path | None = None) -> dict[str, Reference]:
+def load_references(path: Path | None = None) -> dict[str, Reference]:
     """References of a file, by fingerprint; those of the package if left out."""
     path = package_store() if path is None else path
     if not path.exists():
@@ -141,10 +149,8 @@ def package_store() -> Path:
     return Path(str(files("percussion_model.verification.accuracy").joinpath(STORE)))
 
 
-def store(path: Path, references: dict[str, Reference]) -> None:
+def save_references(path: Path, references: dict[str, Reference]) -> None:
     """Write references to a file."""
-    from percussion_model.simulation.files import staged_text
-
     tree = {
         "format": FORMAT,
         "references": {key: one.to_dict() for key, one in sorted(references.items())},

@@ -1,4 +1,4 @@
-"""References with error bars: made by two solvers that share no motion, stored as JSON.
+"""References with error bars, made by two solvers that share no motion.
 
 Each solver is refined three times and extrapolated (Richardson). A number is called a
 reference where the two limits agree within their bars.
@@ -14,14 +14,14 @@ from importlib.metadata import version
 import numpy as np
 
 from percussion_model.scene.scene import Scene
-from percussion_model.verification.accuracy.ladders import fem_scene, reach, stiffness_of
+from percussion_model.verification.accuracy.ladders import fem_scene, stiffness_of, total_length
 from percussion_model.verification.accuracy.problems import APERIODIC, Problem, Run
 from percussion_model.verification.accuracy.quantities import HISTORY, Answer
 from percussion_model.verification.accuracy.reference_store import (
     Bar,
     Reference,
     fingerprint,
-    stored,
+    load_references,
 )
 
 __all__ = ["find_reference", "make_reference"]
@@ -40,20 +40,20 @@ CLOSE = 2e-5
 
 
 def find_reference(
-    problem: Problem, scene: Scene, say: Callable[[str], None] = lambda text: None
+    problem: Problem, scene: Scene, progress: Callable[[str], None] = lambda text: None
 ) -> Reference:
     """Return the stored reference of a scene, or make a quicker one now."""
-    known = stored().get(fingerprint(scene))
+    known = load_references().get(fingerprint(scene))
     if known is not None:
         return known
-    return make_reference(problem, scene, quick=True, say=say)
+    return make_reference(problem, scene, quick=True, progress=progress)
 
 
 def make_reference(
     problem: Problem,
     scene: Scene,
     quick: bool = False,
-    say: Callable[[str], None] = lambda text: None,
+    progress: Callable[[str], None] = lambda text: None,
 ) -> Reference:
     """Refine both solvers on a problem and extrapolate.
 
@@ -64,21 +64,22 @@ def make_reference(
         The scene that the problem was made of.
     quick : bool
         Whether coarser levels will do.
-    say : callable
-        Told what is being computed.
+    progress : callable
+        Called with what is being computed.
     """
     wave, fem = _scenes(problem, quick)
     answers: dict[str, list[Answer]] = {"wave": [], "fem": []}
     for name, chosen in (("wave", wave), ("fem", fem)):
         for level in chosen:
-            say(f"reference: {_level_name(level)}")
+            progress(f"reference: {_level_name(level)}")
             answers[name].append(_answer(problem, level, name))
     bars = {}
     for key in problem.quantities:
         if key == HISTORY:
             continue
         if problem.kind == APERIODIC:
-            limits = [_statistical(answers[name][-1], key) for name in ("wave", "fem")]
+            last = [answers[name][-1] for name in ("wave", "fem")]
+            limits = [(answer.values[key], answer.errors[key]) for answer in last]
         else:
             limits = [
                 _limit(answers["wave"], wave, key, WAVE_ORDER),
@@ -108,12 +109,12 @@ def _scenes(problem: Problem, quick: bool) -> tuple[list[Scene], list[Scene]]:
             [scene.computed_by("wave", **{"solver.cells": LONG_CELLS})],
             [fem_scene(scene, LONG_CELLS, 2.0, stiffness_of(LONG_CELLS))],
         )
-    by = reach(scene)
+    lengths = total_length(scene)
     waves, elements = (WAVE_LEVELS_QUICK, FEM_LEVELS_QUICK) if quick else (WAVE_LEVELS, FEM_LEVELS)
-    counts = [max(2, _rounded(level / by)) for level in waves]
+    counts = [max(2, _rounded(level / lengths)) for level in waves]
     wave = [scene.computed_by("wave", **{"solver.cells": count}) for count in counts]
-    meshes = [max(3, round(level / by)) for level in elements]
-    finest = FEM_LEVELS[0] / by
+    meshes = [max(3, round(level / lengths)) for level in elements]
+    finest = FEM_LEVELS[0] / lengths
     fem = [fem_scene(scene, count, 1.0, 2.5e13 * (count / finest) ** 2) for count in meshes]
     return wave, fem
 
@@ -149,8 +150,8 @@ def _limit(
     values = [answer.values[key] for answer in answers]
     limits = []
     for k in range(len(values) - 1):
-        by = (sizes[k] / sizes[k + 1]) ** order - 1.0
-        limits.append(values[k + 1] + (values[k + 1] - values[k]) / by)
+        ratio = (sizes[k] / sizes[k + 1]) ** order - 1.0
+        limits.append(values[k + 1] + (values[k + 1] - values[k]) / ratio)
     change = abs(values[-1] - values[-2])
     return limits[-1], max(abs(limits[-1] - limits[-2]), 0.5 * change)
 
@@ -159,10 +160,6 @@ def _count(scene: Scene) -> float:
     if scene.solver_name == "fem":
         return float(scene.fem.elements)
     return float(scene.solver.cells or math.nan)
-
-
-def _statistical(answer: Answer, key: str) -> tuple[float, float]:
-    return answer.values[key], answer.errors[key]
 
 
 def _agree(wave: tuple[float, float], fem: tuple[float, float]) -> Bar:

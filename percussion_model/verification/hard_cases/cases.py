@@ -1,4 +1,4 @@
-"""The hard cases, as they are stored beside this file: one table each.
+"""Hard cases, stored beside this file as TOML: one table each.
 
 Keys of a table: `hard` and `holds`, in words; `scene`, what differs from the
 reference scene; `script`, inputs that change during the run; `duration` and
@@ -83,10 +83,6 @@ class HardCase:
     script: tuple[Change, ...] = ()
     ceiling: float = CEILING
     differs: dict[str, str] = field(default_factory=dict)
-
-    def computed_by(self, solver: str, **changes: Any) -> Scene:
-        """Scene of the case for one solver."""
-        return self.scene.computed_by(solver, **changes)
 
     def changes(self, end: float) -> list[tuple[float, dict[str, float]]]:
         """Times before `end` [s] and the inputs that change then, in order."""

@@ -1,4 +1,4 @@
-"""What a solver makes of a hard case, in figures."""
+"""Measures of a solver on a hard case: ledger, momentum, events, rate, bits."""
 
 from __future__ import annotations
 
@@ -11,9 +11,10 @@ import numpy as np
 
 from percussion_model.scene.inputs import SimulationError
 from percussion_model.scene.scene import Scene
-from percussion_model.simulation.stepping import Simulation
+from percussion_model.simulation.files import plain
+from percussion_model.simulation.simulate import Simulation
 from percussion_model.verification.hard_cases.cases import HardCase
-from percussion_model.verification.hard_cases.mechanics import mechanics, unsound
+from percussion_model.verification.hard_cases.mechanics import mechanics, not_finite
 
 # Readings of a run: the first contact closely, then the whole of it.
 FIRST_CONTACT, CLOSE_READINGS, READINGS = 6e-4, 150, 250
@@ -33,16 +34,16 @@ class Measures:
     error : str
         Why the run ended early, or what is not finite; empty where all is well.
     residual, numerical, overshoot : float
-        Of the energy ledger, by its denominator.
+        Of the energy ledger, divided by its denominator.
     momentum : float
-        Greatest difference of momentum and impulses, by the greatest impulse.
+        Greatest difference of momentum and impulses, divided by the greatest impulse.
     contact_tension, rock_tension : float
-        Greatest pull between piston and bit, and on the rock where it releases, by
-        the greatest push.
+        Greatest pull between piston and bit, and on the rock where it releases,
+        divided by the greatest push.
     interpenetration : float
-        Of piston and bit, or of bit and wall, by what is allowed: all energy put in
+        Of piston and bit, or of bit and wall, divided by what is allowed: all energy put in
         held by the penalty (finite elements), or rounding (others; in a storm of
-        rigid bodies the passing of events that were put off).
+        rigid bodies the passing of postponed events).
     events_per_second, ceiling : float
         [1/s]
     guards : int
@@ -93,11 +94,9 @@ class Measures:
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON, without the lists; None where a figure is not defined."""
         left_out = ("periods", "path")
-        return {
-            key: None if isinstance(value, float) and not math.isfinite(value) else value
-            for key, value in asdict(self).items()
-            if key not in left_out
-        } | {"blows": len(self.periods)}
+        values = {key: value for key, value in asdict(self).items() if key not in left_out}
+        found: dict[str, Any] = plain(values | {"blows": len(self.periods)})
+        return found
 
 
 def measure(
@@ -117,26 +116,28 @@ def measure(
     **changes
         Further values by dotted key, as for `Scene.replace`.
     """
-    scene = case.computed_by(solver, **changes)
+    scene = case.scene.computed_by(solver, **changes)
     run = Simulation(scene)
     end = share * scene.run.duration
     began = time.perf_counter()
-    seen, error = None, ""
+    samples, error = None, ""
     try:
-        seen = _follow(run, case, end, began + MOST_WALL_TIME)
+        samples = _follow(run, case, end, began + MOST_WALL_TIME)
     except SimulationError as caught:
         error = str(caught)
     taken = time.perf_counter() - began
     result = run.result(settle=share * scene.run.settle)
     energy, counts, blows = result.energy, result.statistics, result.counted
-    figures = mechanics(scene, seen, energy, counts.get("storms", 0)) if seen is not None else {}
-    close = seen["bit_position"][:CLOSE_READINGS].tolist() if seen is not None else []
+    figures = (
+        mechanics(scene, samples, energy, counts.get("storms", 0)) if samples is not None else {}
+    )
+    close = samples["bit_position"][:CLOSE_READINGS].tolist() if samples is not None else []
     # where nothing ever moves there is no energy to divide by
     idle = energy["residual"] == 0.0
     return Measures(
         case=case.name,
         solver=solver,
-        error=error or unsound(seen, energy),
+        error=error or not_finite(samples, energy),
         residual=0.0 if idle else energy["residual_relative"],
         numerical=energy["numerical_relative"],
         overshoot=energy["overshoot_relative"],
@@ -162,13 +163,13 @@ def measure(
 
 
 def readings(end: float) -> np.ndarray:
-    """Times at which a run is looked at [s]: the first contact, then the rest."""
+    """Times at which a run is sampled [s]: the first contact, then the rest."""
     close = np.linspace(0.0, min(FIRST_CONTACT, end), CLOSE_READINGS)
     return np.concatenate([close, np.linspace(close[-1], end, READINGS)[1:]])
 
 
 def _follow(run: Simulation, case: HardCase, end: float, deadline: float) -> dict[str, np.ndarray]:
-    """Take a run through the script of its case; what was seen, and the feed's impulse."""
+    """Run the script of a case; its samples, and the feed's impulse."""
     rows: list[dict[str, float]] = []
     scene = run.scene
     force = scene.feed.force if scene.effects.feed else 0.0
@@ -188,9 +189,9 @@ def _follow(run: Simulation, case: HardCase, end: float, deadline: float) -> dic
         run.advance(t)
         if inputs:
             run.set_inputs(**inputs)
-            now = max(run.time, run.solver.time(run._state))
-            impulse += force * (now - since)
-            since, force = now, inputs.get("feed_force", force)
+            changed = max(run.time, run.solver.time(run._state))
+            impulse += force * (changed - since)
+            since, force = changed, inputs.get("feed_force", force)
     return {name: np.array([row[name] for row in rows]) for name in rows[0]}
 
 

@@ -1,4 +1,4 @@
-"""Does a run obey mechanics: momentum, no tension, no interpenetration."""
+"""Checks of mechanics on a run: momentum, no tension, no interpenetration."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from percussion_model.scene.scene import Scene
 
 # Without a penalty nothing interpenetrates but by the rounding of a flight of metres [m].
 ROUNDING_GAP = 1e-12
-# Rigid bodies whose events a guard puts off by 0.2 µs pass each other by 1e-11 m where the
+# Rigid bodies whose events a guard postpones by 0.2 µs pass each other by 1e-11 m where the
 # reference's drive presses them together, and by not much more elsewhere [m].
 STORM_GAP = 1e-10
 # Forces are compared with the greatest push, or with this where there is none [N].
 LEAST_FORCE = 1.0
 
 
-def unsound(seen: dict[str, np.ndarray] | None, energy: dict[str, float]) -> str:
-    """Name of what is no number in a run; empty where all are."""
-    for name, values in (seen or {}).items():
+def not_finite(samples: dict[str, np.ndarray] | None, energy: dict[str, float]) -> str:
+    """Return what is not finite in a run; empty where all is."""
+    for name, values in (samples or {}).items():
         # what a scene does not have is undefined throughout
         if not np.all(np.isfinite(values)) and not np.all(np.isnan(values)):
             return f"{name} is not finite"
@@ -31,7 +31,7 @@ def unsound(seen: dict[str, np.ndarray] | None, energy: dict[str, float]) -> str
 
 
 def mechanics(
-    scene: Scene, seen: dict[str, np.ndarray], energy: dict[str, float], storms: int
+    scene: Scene, samples: dict[str, np.ndarray], energy: dict[str, float], storms: int
 ) -> dict[str, float]:
     """Momentum, tension and interpenetration of a run; see `Measures`.
 
@@ -46,39 +46,44 @@ def mechanics(
         allowed = STORM_GAP
     if scene.solver_name == "fem":
         allowed += math.sqrt(2.0 * put_in / scene.fem.contact_stiffness)
-    found = {"momentum": _momentum(scene, seen)}
+    found = {"momentum": _momentum(scene, samples)}
     deep = []
     if scene.piston.model != "absent":
-        found["contact_tension"] = _pull(seen["contact_force"])
-        deep.append(-float(seen["gap"].min()))
+        found["contact_tension"] = _pull(samples["contact_force"])
+        deep.append(-float(samples["gap"].min()))
     if scene.effects.standstill_tension == "release" or scene.effects.rock != "bilinear":
-        found["rock_tension"] = _pull(seen["bit_force"])
+        found["rock_tension"] = _pull(samples["bit_force"])
     if scene.effects.rock == "wall":
-        deep.append(float(seen["bit_end_position"].max()) - scene.start.rock_gap)
+        deep.append(float(samples["bit_end_position"].max()) - scene.start.rock_gap)
     if deep:
         found["interpenetration"] = max(0.0, *deep) / allowed
     return found
 
 
 def _pull(force: np.ndarray) -> float:
-    """Greatest tension by the greatest compression."""
+    """Greatest tension divided by the greatest compression."""
     return max(0.0, -float(force.min())) / max(float(force.max()), LEAST_FORCE)
 
 
-def _momentum(scene: Scene, seen: dict[str, np.ndarray]) -> float:
-    """Greatest difference of momentum and impulse of a body, by the greatest impulse."""
+def _momentum(scene: Scene, samples: dict[str, np.ndarray]) -> float:
+    """Greatest difference of momentum and impulse of a body, divided by the greatest impulse."""
     weight = scene.gravity.acceleration if scene.effects.gravity else 0.0
-    t = seen["here"]
-    contact = np.nan_to_num(seen["contact_impulse"])
+    t = samples["here"]
+    contact = np.nan_to_num(samples["contact_impulse"])
     mass = scene.bit.mass
-    given = seen["feed_impulse"] + mass * weight * t + contact - seen["bit_impulse"]
-    off = _mismatch(mass * seen["bit_velocity"], given)
-    parts = [seen["feed_impulse"], contact, seen["bit_impulse"], mass * seen["bit_velocity"]]
+    given = samples["feed_impulse"] + mass * weight * t + contact - samples["bit_impulse"]
+    off = _mismatch(mass * samples["bit_velocity"], given)
+    parts = [
+        samples["feed_impulse"],
+        contact,
+        samples["bit_impulse"],
+        mass * samples["bit_velocity"],
+    ]
     if scene.piston.model != "absent":
         mass = scene.piston.mass
-        given = mass * weight * t + seen["drive_impulse"] - contact
-        off = max(off, _mismatch(mass * seen["piston_velocity"], given))
-        parts += [seen["drive_impulse"], mass * seen["piston_velocity"]]
+        given = mass * weight * t + samples["drive_impulse"] - contact
+        off = max(off, _mismatch(mass * samples["piston_velocity"], given))
+        parts += [samples["drive_impulse"], mass * samples["piston_velocity"]]
     greatest = max(float(np.abs(part).max()) for part in parts)
     return off / greatest if greatest > 0.0 else off
 

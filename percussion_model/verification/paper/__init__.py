@@ -1,10 +1,10 @@
-"""Section 4 of the paper again: drop tests, the stationary blow, and four sweeps."""
+"""Section 4 of the paper repeated: drop tests, the stationary blow, and four sweeps."""
 
 from __future__ import annotations
 
 from percussion_model.scene.scene import Scene
 
-# How the paper ran its simulations: rock that pulls in standstill.
+# As the paper ran its simulations: rock that pulls in standstill.
 PAPER = {"effects.standstill_tension": "paper"}
 
 

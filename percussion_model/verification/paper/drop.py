@@ -8,7 +8,7 @@ import numpy as np
 
 from percussion_model.physics.records import EventKind
 from percussion_model.scene.scene import Scene
-from percussion_model.simulation.stepping import Simulation
+from percussion_model.simulation.simulate import Simulation
 
 # The bit falls with F_0 D_1 of kinetic energy, rounded in the paper [m/s].
 SPEED = 5.25

@@ -1,4 +1,4 @@
-"""What the paper says in words and numbers, beside what this program finds."""
+"""Statements of the paper in words and numbers, beside the findings of this program."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ AT_REST = 1e-3
 
 @dataclass(frozen=True)
 class Statement:
-    """One statement of the paper and what becomes of it."""
+    """One statement of the paper, and whether it holds."""
 
     place: str
     says: str

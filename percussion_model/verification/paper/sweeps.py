@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from percussion_model.analysis.study import Study, study, table
-from percussion_model.analysis.study.work import KINDS
+from percussion_model.analysis.study.response import KINDS
 from percussion_model.scene.scene import Scene
 
 # Below this distance, at constant power, the paper finds no stationary motion [m].

@@ -1,4 +1,4 @@
-"""The page of the hard cases: what was run, what came out, where solvers disagree."""
+"""Page of the hard cases (docs/stability.md): runs, verdict, disagreements of solvers."""
 
 from __future__ import annotations
 

@@ -1,20 +1,19 @@
-"""What each effect costs and changes: a scene with one effect at a time turned off, or on."""
+"""Study of effects: a scene with one effect at a time turned off, or on."""
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
-from percussion_model.analysis.effect_turns import Turn, turns
+from percussion_model.analysis.comparison import relative_change
 from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.simulation.result import LEAST_BLOWS, Result
-from percussion_model.simulation.simulate import simulate
-from percussion_model.simulation.stepping import Simulation
+from percussion_model.simulation.simulate import Simulation, simulate
 
-__all__ = ["NOISE", "EffectsStudy", "Trial", "cost_of_step", "step_costs", "study_effects"]
+__all__ = ["NOISE", "EffectsStudy", "Trial", "Turn", "step_costs", "study_effects", "turns"]
 
 # A step whose cost differs by this much from the scene's differs by more than noise.
 NOISE = 1.05
@@ -41,6 +40,116 @@ UNDECIDED = 0.25
 # Numbers of a summary whose change is shown.
 CHANGED = ("rate_of_penetration", "blow_period", "peak_bit_force")
 _BY_BLOWS = ("rate_of_penetration_standard_error", "drilling_cycles_per_blow")
+
+_NO_ROCK = "the bit meets no rock: it flies, and drills nothing"
+_NO_DRIVE = "nothing throws the piston: what moves is left from the start and comes to rest"
+_NO_CRUSHING = "a linear spring gives all back: nothing is crushed"
+_BARRIER = ("rock.barrier_energy", "rock.barrier_damping")
+
+
+@dataclass(frozen=True)
+class Turn:
+    """One effect turned.
+
+    Attributes
+    ----------
+    effect : str
+        Its name; empty for the scene as it is.
+    turned : str
+        "off", "on", or what takes its place.
+    changes : dict
+        Values by dotted key.
+    off : bool
+        Whether something is left out, so that nothing may become dearer.
+    no_penetration : str
+        Why the rate of penetration means nothing then; may be empty.
+    no_blows : str
+        Why nothing that is counted by blows means anything; may be empty.
+    """
+
+    effect: str
+    turned: str
+    changes: dict[str, Any] = field(default_factory=dict)
+    off: bool = False
+    no_penetration: str = ""
+    no_blows: str = ""
+
+    def apply(self, scene: Scene) -> Scene:
+        """Return the scene with the effect turned; `SceneError` where that is none."""
+        if self.changes.get("solver.name") == "rigid":
+            rest = {key: value for key, value in self.changes.items() if key != "solver.name"}
+            return scene.computed_by("rigid", **rest)
+        return scene.replace(**self.changes)
+
+
+def turns(scene: Scene) -> Iterator[Turn]:
+    """Go through the scene as it is, then one effect after the other."""
+    effects = scene.effects
+    yield Turn("", "as it is", no_penetration=_NO_CRUSHING if effects.rock == "spring" else "")
+    for name in ("gravity", "feed"):
+        is_on = getattr(effects, name)
+        yield Turn(name, "off" if is_on else "on", {f"effects.{name}": not is_on}, off=is_on)
+    yield from _drive(scene)
+    yield from _rock(scene)
+    yield from _bars(scene)
+    if scene.solver_name == "wave":
+        is_on = scene.solver.leaps
+        # Leaps are no effect but an accelerator: a step without them is the same step.
+        yield Turn("leaps", "off" if is_on else "on", {"solver.leaps": not is_on})
+
+
+def _drive(scene: Scene) -> Iterator[Turn]:
+    if scene.effects.drive != "none":
+        yield Turn("drive", "off", {"effects.drive": "none"}, off=True, no_blows=_NO_DRIVE)
+    elif scene.piston.model != "absent":
+        yield Turn("drive", "on", {"effects.drive": "pressure"})
+
+
+def _rock(scene: Scene) -> Iterator[Turn]:
+    rock = scene.effects.rock
+    if rock == "bilinear":
+        if scene.barrier_on:
+            yield Turn("barrier", "off", {"effects.barrier": False}, off=True)
+        else:
+            yield Turn("barrier", "on", {"effects.barrier": True, **_not_zero(scene, _BARRIER)})
+        other = "paper" if scene.effects.standstill_tension == "release" else "release"
+        yield Turn("standstill tension", other, {"effects.standstill_tension": other})
+        yield Turn(
+            "bilinear law",
+            "spring",
+            {"effects.rock": "spring", "effects.barrier": False},
+            off=True,
+            no_penetration=_NO_CRUSHING,
+        )
+    if rock == "none":
+        yield Turn("rock", "on", {"effects.rock": "bilinear"})
+    else:
+        changes = {"effects.rock": "none", "effects.barrier": False}
+        yield Turn("rock", "off", changes, off=True, no_blows=_NO_ROCK)
+
+
+def _bars(scene: Scene) -> Iterator[Turn]:
+    if scene.bit.model == "elastic":
+        if scene.loss_on:
+            yield Turn("loss", "off", {"effects.loss": False}, off=True)
+        else:
+            changes = {"effects.loss": True, **_not_zero(scene, ("loss.time",))}
+            yield Turn("loss", "on", changes)
+        if scene.piston.model == "elastic":
+            yield Turn("elastic piston", "rigid", {"piston.model": "rigid"}, off=True)
+        elif scene.piston.model == "rigid":
+            yield Turn("elastic piston", "on", {"piston.model": "elastic"})
+        yield Turn("elastic bars", "rigid", {"solver.name": "rigid"}, off=True)
+        return
+    changes = {"bit.model": "elastic", "solver.name": "auto"}
+    if scene.piston.model == "rigid":
+        changes["piston.model"] = "elastic"
+    yield Turn("elastic bars", "on", changes)
+
+
+def _not_zero(scene: Scene, keys: tuple[str, ...]) -> dict[str, Any]:
+    """Defaults for what the scene sets to zero, which would keep the effect off."""
+    return {key: scene.row_of(key).default for key in keys if scene[key] == 0}
 
 
 @dataclass(frozen=True)
@@ -133,7 +242,7 @@ class EffectsStudy:
     def changes(self, trial: Trial) -> dict[str, float | None]:
         """Relative change of each number of `CHANGED` against the scene itself."""
         here, base = trial.numbers(), self.base.numbers()
-        found = {name: _relative(here[name], base[name]) for name in CHANGED}
+        found = {name: relative_change(here[name], base[name]) for name in CHANGED}
         if trial.undecided or self.base.undecided:
             found["rate_of_penetration"] = None
         return found
@@ -235,7 +344,7 @@ def step_costs(scenes: Sequence[Scene], rounds: int = ROUNDS) -> list[float | No
         for k, flight in enumerate(flights):
             step, least = flight.solver.time_step, best[k]
             if step is not None and least is not None:
-                best[k] = min(least, cost_of_step(flight, FLIGHT_STEPS * step))
+                best[k] = min(least, _cost_of_step(flight, FLIGHT_STEPS * step))
     return best
 
 
@@ -244,16 +353,10 @@ def _in_flight(scene: Scene) -> Scene:
     return scene.replace(**{key: value for key, value in FLIGHT.items() if scene.matters(key)})
 
 
-def cost_of_step(simulation: Simulation, duration: float) -> float:
+def _cost_of_step(simulation: Simulation, duration: float) -> float:
     """Advance a simulation; processor time by the steps that it took [s]."""
     before = simulation.statistics()["steps"]
     began = time.process_time()
     simulation.advance(simulation.time + duration)
     cost = time.process_time() - began
     return cost / (simulation.statistics()["steps"] - before)
-
-
-def _relative(value: float | None, base: float | None) -> float | None:
-    if value is None or base is None or base == 0 or not math.isfinite(value / base):
-        return None
-    return value / base - 1.0

@@ -1,17 +1,15 @@
-"""What each effect costs and changes, as bars."""
+"""Figure of the cost and change of each effect, as bars."""
 
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from percussion_model.analysis.effects import EffectsStudy
+from percussion_model.analysis.effect_study import EffectsStudy
 from percussion_model.interface.plotting import style
 
-NAME = "effects"
 COST_COLOUR, MORE_COLOUR, LESS_COLOUR = "#0072B2", "#D55E00", "#009E73"
 # Axes are made for changes up to this [%].
 WIDEST = 60.0
@@ -99,14 +97,3 @@ def _changes(ax: Axes, values: list[float | None]) -> None:
         box = {"facecolor": "white", "edgecolor": "none", "pad": 0.8} if cut else None
         ax.text(shown, y, text, va="center", ha=align, fontsize=8.0, bbox=box)
     ax.axvline(0.0, color=style.RULE_COLOUR, linewidth=0.8)
-
-
-def save_effects(found: EffectsStudy, folder: str | Path) -> list[Path]:
-    """Draw the figure as PNG and SVG into a folder.
-
-    Returns
-    -------
-    list of Path
-        The files.
-    """
-    return style.save_figures(lambda: [(NAME, draw_effects(found))], folder)
