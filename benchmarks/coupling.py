@@ -1,4 +1,4 @@
-"""Where the time of a coupled run goes: `python -m benchmarks.coupling [SYSTEM.ssp ...]`.
+"""Time of a coupled run, by part and call: `python -m benchmarks.coupling [SYSTEM.ssp ...]`.
 
 Each system of the drilling loop runs at 1 kHz, its rows thinned. For each part the processor
 time of setting its inputs, of its step and of reading its outputs is taken, in a run of its
@@ -84,15 +84,15 @@ def measure(
 
 
 def minutes() -> Callable[[float], None]:
-    """Tells of each simulated minute."""
+    """Return a progress callback that prints each simulated minute."""
     began, used = time.perf_counter(), time.process_time()
 
-    def tell(at: float) -> None:
+    def report(at: float) -> None:
         if at % 60.0 < 0.5 * ROWS_EVERY:
             wall, cost = time.perf_counter() - began, time.process_time() - used
             print(f"{at:6.0f} s in {wall:.0f} s ({cost:.0f} s of the processor)", file=sys.stderr)
 
-    return tell
+    return report
 
 
 def by_part(system: Path, parameters: dict[str, Any]) -> dict[tuple[str, str], float]:
@@ -115,7 +115,7 @@ def table(spent: dict[tuple[str, str], float]) -> str:
 
 
 def line(system: Path, run: CoupledRun, cost: float) -> str:
-    """What a run took."""
+    """One line on the cost of a run."""
     simulated = run.steps * run.step
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else float("nan")
     return (

@@ -19,7 +19,7 @@ from percussion_model.interface.plotting import style
 from percussion_model.interface.plotting.error_against_time import draw_accuracy, draw_quantities
 from percussion_model.verification.accuracy import Study
 from percussion_model.verification.accuracy.ladders import LADDERS
-from percussion_model.verification.accuracy.quantities import HISTORY, QUANTITIES
+from percussion_model.verification.accuracy.problems import HISTORY, QUANTITIES
 
 HERE = Path(__file__).resolve().parent
 PAGE, DATA, IMAGES = HERE / "accuracy.md", HERE / "accuracy", HERE / "images"

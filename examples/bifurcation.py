@@ -1,4 +1,4 @@
-"""Which motions does a hammer settle in, and does that depend on where it comes from?
+"""Motions that a hammer settles in, and whether they depend on where it comes from.
 
 The reversal distance D_1 (at constant power) and the feed are moved up and down in small steps
 without starting the drill anew. At each step some blows pass, and those that follow are drawn.
@@ -9,6 +9,7 @@ which motion then follows is a matter of chance.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -17,12 +18,11 @@ from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.patches import Patch
 
-from examples.motions import KINDS, Branch, branch_of, kind_of, order_of
-from examples.shared import BLUE, ORANGE, PINK, command_line, figure_of
+from examples.shared import BLACK, BLUE, GREEN, GREY, ORANGE, PINK, command_line, figure_of
 from percussion_model import Scene, Simulation
 from percussion_model.interface.plotting import style
 from percussion_model.interface.plotting.style import KN, MM
-from percussion_model.verification.paper.sweeps import force_at_constant_power
+from percussion_model.verification.paper.runs import force_at_constant_power
 
 NAME = "bifurcation"
 # The feed from which others are set at once [N], and after how many blows there.
@@ -33,12 +33,64 @@ COLOURS = {"falling": ORANGE, "rising": BLUE, "at once": PINK}
 SIZES = {"falling": 2.2, "rising": 1.4, "at once": 1.5}
 # A mean rate that is known no better, relative, is not drawn.
 MOST_ERROR = 0.1
+# Impact velocities that differ by less, relative, are the same.
+SAME = 1e-3
+# Blows go round n values where they repeat after n blows so much better than after one.
+BETTER = 8.0
+LONGEST_CYCLE = 8
+# Blows without order that differ by less are nearly alike.
+NEARLY = 0.05
+KINDS = {
+    "every blow alike": "#E6E6E6",
+    "round 2 to 8 values": GREEN,
+    "nearly alike": GREY,
+    "no order": BLACK,
+}
+
+
+@dataclass(frozen=True)
+class Branch:
+    """Blows along one way through the values of a parameter."""
+
+    values: np.ndarray
+    impact_velocity: np.ndarray  # (values, blows) [m/s]
+    rate: np.ndarray  # mean over the blows of each value [m/s]
+    error: np.ndarray  # its standard error [m/s]
+
+
+def order_of(velocity: np.ndarray) -> int:
+    """Values that impact velocities go round, one after the other; 0 if they do not."""
+    lags = range(1, min(LONGEST_CYCLE, len(velocity) // 2) + 1)
+    changes = [float(np.max(np.abs(velocity[n:] - velocity[:-n]))) for n in lags]
+    same = max(SAME * float(np.mean(velocity)), changes[0] / BETTER)
+    return next((n for n, change in zip(lags, changes, strict=True) if change <= same), 0)
+
+
+def kind_of(velocity: np.ndarray) -> int:
+    """Place among `KINDS`."""
+    order = order_of(velocity)
+    return min(order, 2) - 1 if order else 2 + int(np.ptp(velocity) > NEARLY * np.mean(velocity))
+
+
+def branch_of(values: np.ndarray, rows: list[np.ndarray]) -> Branch:
+    """Blows at each value, and their mean rate; the branch has the values rising."""
+    up = np.argsort(values)
+    velocity = np.array([blows["impact_velocity"] for blows in rows])
+    rate, error = np.array([mean_rate(blows) for blows in rows]).T
+    return Branch(values[up], velocity[up], rate[up], error[up])
+
+
+def mean_rate(blows: np.ndarray) -> tuple[float, float]:
+    """Mean rate of some blows and its standard error [m/s] (docs/model.md, section 7)."""
+    rate = np.sum(blows["penetration"]) / np.sum(blows["period"])
+    off = np.std(blows["penetration"] - rate * blows["period"])
+    return float(rate), float(off / np.sqrt(len(blows)) / np.mean(blows["period"]))
 
 
 def follow(
     values: np.ndarray, inputs: Callable[[float], dict[str, float]], settle: int, keep: int
 ) -> Branch:
-    """Move a parameter through its values, the drill going on; the branch has them rising."""
+    """Move a parameter through its values, without a new start; the branch has them rising."""
     simulation = Simulation(Scene(), record_events=False)
     rows = []
     for value in values.tolist():
@@ -92,7 +144,7 @@ def main(out: Path, quick: bool = False) -> dict[str, Any]:
                 branches["at once"] = [jump(high, k, settle, keep) for k in MOMENTS[quick * 2 :]]
             draw(column, factor, words, branches)
             for name, some in branches.items():
-                found |= {f"{key}_{name}": [_told(branch) for branch in some]}
+                found |= {f"{key}_{name}": [_described(branch) for branch in some]}
         handles = [Patch(color=colour, label=kind) for kind, colour in KINDS.items()]
         words = {"at once": f"set at once from {LOW_FEED:g} N"}
         handles += [Patch(color=c, label=words.get(way, way)) for way, c in COLOURS.items()]
@@ -100,7 +152,7 @@ def main(out: Path, quick: bool = False) -> dict[str, Any]:
     return found
 
 
-def _told(branch: Branch) -> dict[str, list[float]]:
+def _described(branch: Branch) -> dict[str, list[float]]:
     order = [order_of(velocity) for velocity in branch.impact_velocity]
     return {"values": branch.values.tolist(), "order": order, "rate": branch.rate.tolist()}
 
@@ -111,12 +163,12 @@ def draw(axes: np.ndarray, factor: float, words: str, branches: dict[str, list[B
     x = branches["falling"][0].values * factor
     _draw_kinds(strip, factor, branches)
     for way, some in branches.items():
-        look = {"color": COLOURS[way], "markersize": SIZES[way]}
+        markers = {"color": COLOURS[way], "markersize": SIZES[way]}
         for branch in some:
             at = np.repeat(branch.values * factor, branch.impact_velocity.shape[1])
-            blows.plot(at, branch.impact_velocity.ravel(), "o", mew=0, **look)
+            blows.plot(at, branch.impact_velocity.ravel(), "o", mew=0, **markers)
             known = np.where(branch.error < MOST_ERROR * branch.rate, branch.rate, np.nan)
-            rate.plot(branch.values * factor, known * MM, "o", mew=0, alpha=0.8, **look)
+            rate.plot(branch.values * factor, known * MM, "o", mew=0, alpha=0.8, **markers)
     blows.set_xscale("log")
     ticks = [t for t in (0.2, 0.5, 1, 2, 5, 10, 20) if x[0] <= t <= x[-1]]
     rate.set_xticks(ticks, [f"{tick:g}" for tick in ticks])

@@ -1,6 +1,6 @@
-"""What do feed and pressure buy? Rate of penetration as a map, with contours of efficiency.
+"""Map of the rate of penetration over feed and pressure, with contours of efficiency.
 
-Efficiency is the energy into the rock over a blow by the work of the drive over it. The rest of
+Efficiency is the energy into the rock over a blow divided by the work of the drive. The rest of
 the drive's work goes into structural loss. Feed and weight work on the rock too, so that a drill
 of little power under much feed can come out above 100 %.
 """

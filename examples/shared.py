@@ -1,4 +1,4 @@
-"""What the examples share: the command line, and where figures go."""
+"""Shared parts of the examples: the command line, and the place of figures."""
 
 from __future__ import annotations
 

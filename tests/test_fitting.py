@@ -19,7 +19,7 @@ from percussion_model.analysis.fitting import (
     fit_drop_tests,
     fit_force_penetration,
 )
-from percussion_model.analysis.fitting.estimates import Counted, look_around, student_width
+from percussion_model.analysis.fitting.least_squares import Counted, look_around, student_width
 
 CONFIDENCE = 0.95
 # Of that many trials so many cover, but for one chance in a thousand on either side.

@@ -123,7 +123,7 @@ def compare(
     end = scene.run.duration if duration is None else duration
     results = {}
     for k, (name, chosen) in enumerate(scenes.items()):
-        report = None if progress is None else partial(_report_from, progress, k * end)
+        report = None if progress is None else partial(_add_time, progress, k * end)
         results[name] = simulate(chosen, duration, settle, progress=report)
     return Comparison(results)
 
@@ -151,8 +151,7 @@ def read_solvers(text: str) -> tuple[str, ...]:
     return names
 
 
-def _report_from(progress: Callable[[float], None], start: float, t: float) -> None:
-    """Report the time over all solvers; those before have taken `start` [s]."""
+def _add_time(progress: Callable[[float], None], start: float, t: float) -> None:
     progress(start + t)
 
 

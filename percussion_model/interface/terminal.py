@@ -274,13 +274,6 @@ def progress_bar(end: float) -> Iterator[Callable[[float], None] | None]:
 
 
 @contextmanager
-def waiting_bar() -> Iterator[None]:
-    """Show on stderr, in a terminal, that a long preparation continues."""
-    with progress_bar(0.0):
-        yield
-
-
-@contextmanager
 def count_bar(what: str) -> Iterator[Callable[[int, int], None] | None]:
     """Show on stderr how many of a number of things are done, in a terminal.
 

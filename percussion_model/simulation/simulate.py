@@ -245,8 +245,7 @@ def simulate(
     SceneError, SimulationError
         If the arguments make no sense or the run cannot continue.
     """
-    scene, notes = _with_run_times(scene, duration, settle)
-    scene = _with_request(scene, accuracy, check)
+    scene, notes = _requested(scene, duration, settle, accuracy, check)
     windows = tuple(windows)
     sampling_times(scene.run.duration, None, trace, windows)  # refuses before anything is compiled
     wanted = scene.solver.accuracy
@@ -274,21 +273,20 @@ def simulate(
     return result
 
 
-def _with_request(scene: Scene, accuracy: float | None, check: bool | None) -> Scene:
-    """Return the scene with what is asked of its accuracy."""
-    changes = {"solver.accuracy": accuracy, "run.check": check}
-    given = {key: value for key, value in changes.items() if value is not None}
-    scene = scene.replace(**given) if given else scene
-    if scene.run.check and scene.solver.accuracy is None:
-        raise SceneError("run.check = true verifies solver.accuracy: set that too")
-    return scene
-
-
-def _with_run_times(
-    scene: Scene, duration: float | None, settle: float | None
+def _requested(
+    scene: Scene,
+    duration: float | None,
+    settle: float | None,
+    accuracy: float | None,
+    check: bool | None,
 ) -> tuple[Scene, list[str]]:
-    """Return the scene with its run times replaced, and what to warn of."""
-    changes = {"run.duration": duration, "run.settle": settle}
+    """Return the scene with the request of a run in it, and what to warn of."""
+    changes = {
+        "run.duration": duration,
+        "run.settle": settle,
+        "solver.accuracy": accuracy,
+        "run.check": check,
+    }
     given = {key: value for key, value in changes.items() if value is not None}
     notes = []
     longest = scene.run.settle
@@ -298,7 +296,10 @@ def _with_run_times(
             f"run.settle = {longest!r} s is not below the duration of {duration!r} s: "
             f"blows count from {_SETTLING_SHARE * duration!r} s on"
         )
-    return (scene.replace(**given) if given else scene), notes
+    scene = scene.replace(**given) if given else scene
+    if scene.run.check and scene.solver.accuracy is None:
+        raise SceneError("run.check = true verifies solver.accuracy: set that too")
+    return scene, notes
 
 
 def run_in_chunks(

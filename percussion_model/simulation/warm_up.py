@@ -1,4 +1,4 @@
-"""Compile all kernels once, so that later starts only load them.
+"""Compilation of all kernels, once, so that later starts only load them.
 
 `python -m percussion_model.simulation.warm_up` is a part of the installation.
 """

@@ -11,21 +11,24 @@ import pytest
 
 from percussion_model import Scene
 from percussion_model.verification.accuracy.closed_forms import closed_forms, solver_error
-from percussion_model.verification.accuracy.problems import DROP, PERIODIC, Run, pose
-from percussion_model.verification.accuracy.quantities import (
+from percussion_model.verification.accuracy.problems import (
+    DROP,
     HISTORY,
+    PERIODIC,
     QUANTITIES,
     RATE,
+    Run,
+    pose,
     relative_error,
 )
-from percussion_model.verification.accuracy.reference_store import (
+from percussion_model.verification.accuracy.references import (
+    CLOSE,
     Reference,
     fingerprint,
     load_references,
     package_store,
     save_references,
 )
-from percussion_model.verification.accuracy.references import CLOSE
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 SCENES = ("reference", "drop_test", "stiff_rock", "chatter", "top_hammer", "aperiodic")

@@ -8,17 +8,19 @@ from typing import Any
 
 import numpy as np
 
-from percussion_model.analysis.fitting.estimates import (
+from percussion_model.analysis.fitting.least_squares import (
+    LEAST_STEPS,
     Counted,
     Fit,
     FitError,
     check_confidence,
     checked_columns,
+    descend,
     look_around,
     make_fit,
+    search,
     student_width,
 )
-from percussion_model.analysis.fitting.minimum import LEAST_STEPS, descend, search
 from percussion_model.scene.scene import Scene
 from percussion_model.simulation.simulate import Simulation
 

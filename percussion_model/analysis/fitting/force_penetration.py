@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from percussion_model.analysis.fitting.estimates import (
+from percussion_model.analysis.fitting.least_squares import (
     Counted,
     Fit,
     FitError,

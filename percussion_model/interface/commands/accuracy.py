@@ -104,13 +104,13 @@ def _draw(found: Study, folder: Path) -> list[Path]:
 def _make_reference(scene: Scene) -> Any:
     """Make the reference of a scene and keep it with the package."""
     from percussion_model.verification.accuracy.problems import pose
-    from percussion_model.verification.accuracy.reference_store import (
+    from percussion_model.verification.accuracy.references import (
         fingerprint,
         load_references,
+        make_reference,
         package_store,
         save_references,
     )
-    from percussion_model.verification.accuracy.references import make_reference
 
     with _progress() as report:
         made = make_reference(pose(scene), scene, progress=lambda text: report(0.0, text))

@@ -11,9 +11,8 @@ from rich.markup import escape
 from rich.table import Table
 
 from percussion_model.verification.accuracy.ladders import LADDERS
-from percussion_model.verification.accuracy.problems import APERIODIC
-from percussion_model.verification.accuracy.quantities import HISTORY, QUANTITIES
-from percussion_model.verification.accuracy.reference_store import Reference
+from percussion_model.verification.accuracy.problems import APERIODIC, HISTORY, QUANTITIES
+from percussion_model.verification.accuracy.references import Reference
 from percussion_model.verification.accuracy.study import FITS, WANTED, Point, Study
 
 _SHORT = {
@@ -34,7 +33,8 @@ _ELEMENTS = ("fem", "fem-time", "fem-paper", "fem-gauss")
 
 def show_study(found: Study) -> None:
     """Print reference, points, orders, what accuracies cost, and advice."""
-    console = _wide_console()
+    # room for all columns, however narrow the terminal
+    console = Console(width=max(Console().width, LEAST_WIDTH))
     show_bars(found.reference, console)
     _show_points(found, console)
     _show_orders(found, console)
@@ -69,11 +69,6 @@ def show_bars(reference: Reference, console: Console | None = None) -> None:
             "" if bar.agreed else "no reference: the limits disagree",
         )
     (console or Console()).print(table)
-
-
-def _wide_console() -> Console:
-    """A console with room for all columns, however narrow the terminal."""
-    return Console(width=max(Console().width, LEAST_WIDTH))
 
 
 def _table(title: str, first: str) -> Table:
@@ -136,7 +131,7 @@ def _show_orders(found: Study, console: Console) -> None:
 
 
 def _show_costs(found: Study, console: Console) -> None:
-    """What accuracies of the first quantity cost, best of each family."""
+    """Print the cost of accuracies of the first quantity, best of each family."""
     key = found.problem.main
     table = _table(f"ms to compute a simulated second, for an error in {_SHORT[key]}", "error")
     for heading in ("wave", "best fem", "by wave", "best of scipy", "by wave"):

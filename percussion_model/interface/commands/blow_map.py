@@ -6,15 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from percussion_model.interface.commands.common import (
-    JsonFile,
-    SceneFile,
-    Settings,
-    check_json,
-    complain,
-    load_scene,
-    write_json,
-)
+from percussion_model.interface.commands import common
 
 if TYPE_CHECKING:
     from percussion_model.scene.scene import Scene
@@ -22,29 +14,29 @@ if TYPE_CHECKING:
 
 
 def blow_map(
-    scene: SceneFile,
+    scene: common.SceneFile,
     action: Annotated[
         Literal["build", "show", "where"],
         typer.Argument(help="Make the table; tell about it; tell its file."),
     ] = "build",
-    settings: Settings = None,
+    settings: common.Settings = None,
     workers: Annotated[
         int | None, typer.Option("--workers", min=1, help="Processes; left out: one a processor.")
     ] = None,
-    json_file: JsonFile = None,
+    json_file: common.JsonFile = None,
 ) -> None:
     """Make the table of blows that solver.fidelity = "blow-map" takes, and keep it."""
     from percussion_model.analysis.blow_maps import kept_map, map_file
 
-    check_json(json_file)
-    chosen = load_scene(scene, settings=settings)
+    common.check_json(json_file)
+    chosen = common.load_scene(scene, settings=settings)
     if action == "where":
         typer.echo(str(map_file(chosen)))
         return
     table = ready_map(chosen, workers) if action == "build" else kept_map(chosen)
     if json_file != "-":
         _show(chosen, table)
-    write_json(json_file, _numbers(chosen, table))
+    common.write_json(json_file, _numbers(chosen, table))
 
 
 def ready_map(scene: Scene, workers: int | None = None) -> BlowTable:
@@ -68,7 +60,7 @@ def warn_of_outside(scene: Scene) -> None:
     from percussion_model.analysis.blow_maps import outside_map
 
     for text in outside_map(scene):
-        complain(f"warning: {text}")
+        common.complain(f"warning: {text}")
 
 
 def _numbers(scene: Scene, table: BlowTable | None) -> dict[str, Any]:

@@ -7,24 +7,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from percussion_model.interface.commands.common import (
-    Cells,
-    JsonFile,
-    SceneFile,
-    Settings,
-    SolverName,
-    check_json,
-    load_scene,
-    refusal,
-    write_json,
-)
+from percussion_model.interface.commands import common
 
 if TYPE_CHECKING:
     from percussion_model.analysis.fitting import DropTest, Fit
 
 
 def calibrate(
-    scene: SceneFile,
+    scene: common.SceneFile,
     curve: Annotated[
         Path | None,
         typer.Option("--curve", metavar="CSV", help="Slow test: columns penetration, force."),
@@ -44,10 +34,10 @@ def calibrate(
     span: Annotated[
         float, typer.Option("--span", help="C_R and W_R are searched this factor around the scene.")
     ] = 10.0,
-    solver: SolverName = None,
-    cells: Cells = None,
-    settings: Settings = None,
-    json_file: JsonFile = None,
+    solver: common.SolverName = None,
+    cells: common.Cells = None,
+    settings: common.Settings = None,
+    json_file: common.JsonFile = None,
 ) -> None:
     """Fit the rock of a scene: K_R, gamma to a slow test, all four to drop tests; SI units."""
     from percussion_model.analysis.fitting import (
@@ -59,13 +49,13 @@ def calibrate(
     from percussion_model.simulation.files import check_writable
 
     if curve is None and not drop:
-        raise refusal("nothing to fit: give --curve, --drop or both")
-    check_json(json_file)
+        raise common.refusal("nothing to fit: give --curve, --drop or both")
+    common.check_json(json_file)
     if out is not None:
         if out.is_dir():
-            raise refusal(f"--out {str(out)!r}: is a folder; give the file to write")
+            raise common.refusal(f"--out {str(out)!r}: is a folder; give the file to write")
         check_writable(out.absolute().parent)
-    chosen = load_scene(scene, solver, cells, settings)
+    chosen = common.load_scene(scene, solver, cells, settings)
     found: dict[str, Fit] = {}
     if curve is not None:
         names, columns = _read(curve)
@@ -78,7 +68,7 @@ def calibrate(
         bit_alone = chosen.replace(**{"piston.model": "absent", "effects.drive": "none"})
         found["drop tests"] = fit_drop_tests(bit_alone, tests, ROCK, signal=signal, span=span)
         chosen = chosen.replace(**found["drop tests"].changes())
-    write_json(json_file, {name: fit.summary() for name, fit in found.items()})
+    common.write_json(json_file, {name: fit.summary() for name, fit in found.items()})
     if json_file != "-":
         _show(found)
     if out is not None:

@@ -57,7 +57,7 @@ def couple(
 
     try:
         from percussion_model.coupling import Coupling
-        from percussion_model.coupling.balance import known_signals, summary
+        from percussion_model.coupling.coupled_run import known_signals, summary
     except ImportError as error:
         return common.complain(common.needs_extra(error, "fmu"), common.BAD_INPUT)
     folder = out or Path("out") / system.stem

@@ -63,7 +63,7 @@ ENDLESS = 1000
 # Columns: heading, and what stands in it.
 _COLUMNS: dict[str, Callable[[EffectsStudy, Trial, dict[str, Any]], str]] = {
     "step\nns": lambda study, trial, row: (
-        _number(row["step_time"], 1e9, 3) + (" dearer" if study.dearer(trial) else "")
+        _number(row["step_time"], 1e9, 3) + (" dearer" if study.is_costlier(trial) else "")
     ),
     "run\ns": lambda study, trial, row: _number(row["wall_time"], 1.0, 2),
     "blow\nms": lambda study, trial, row: _number(row["blow_time"], 1e3, 2),
@@ -80,7 +80,7 @@ def table_of(found: EffectsStudy) -> tuple[list[str], list[list[str]], dict[str,
     rows, reasons = [], {}
     for trial in (found.base, *found.trials):
         numbers = trial.numbers()
-        name = f"{trial.turn.effect} {trial.turn.turned}".strip()
+        name = trial.variant.name
         rows.append([name, *(show(found, trial, numbers) for show in _COLUMNS.values())])
         if trial.reason:
             reasons[name] = trial.reason

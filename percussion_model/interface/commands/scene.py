@@ -68,11 +68,11 @@ def settled(
 ) -> None:
     """Run until the blows repeat: rate, period, order and stability of the cycle."""
     from percussion_model.analysis.stationary import settled as run_until_settled
-    from percussion_model.interface.terminal import show_settled, waiting_bar
+    from percussion_model.interface.terminal import progress_bar, show_settled
 
     common.check_json(json_file)
     chosen = common.load_scene(scene, solver, cells, settings)
-    with waiting_bar():
+    with progress_bar(0.0):
         found = run_until_settled(chosen, tolerance)
     common.write_json(json_file, found.summary())
     if json_file != "-":
@@ -90,13 +90,13 @@ def explain(
 ) -> None:
     """Tell what a scene computes, how, and what the run will cost; makes no blow map."""
     from percussion_model.analysis.cost import explained, forecast
-    from percussion_model.interface.terminal import show_explanation, waiting_bar
+    from percussion_model.interface.terminal import progress_bar, show_explanation
 
     chosen = common.load_scene(scene, solver, cells, settings, accuracy, check)
     common.check_json(json_file)
     if chosen.solver_name == "blow-map":
         warn_of_outside(chosen)
-    with waiting_bar():
+    with progress_bar(0.0):
         found = forecast(chosen)
     common.write_json(json_file, explained(chosen, found))
     if json_file != "-":

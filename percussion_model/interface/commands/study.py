@@ -8,19 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from percussion_model.interface.commands.common import (
-    INTERRUPTED,
-    Cells,
-    SceneFile,
-    Settings,
-    SolverName,
-    Tolerance,
-    check_outputs,
-    complain,
-    load_scene,
-    needs_plot_extra,
-    refusal,
-)
+from percussion_model.interface.commands import common
 
 if TYPE_CHECKING:
     from percussion_model.analysis.study import Study
@@ -30,7 +18,7 @@ NEEDED = ("pandas", "pyarrow", "xarray", "h5netcdf", "h5py", "threadpoolctl")
 
 
 def study(
-    scene: SceneFile,
+    scene: common.SceneFile,
     over: Annotated[
         list[str],
         typer.Option(
@@ -48,10 +36,10 @@ def study(
         typer.Option("--samples", help="So many points of a Latin hypercube instead of the grid."),
     ] = None,
     seed: Annotated[int, typer.Option("--seed", help="Of the Latin hypercube.")] = 0,
-    solver: SolverName = None,
-    cells: Cells = None,
-    settings: Settings = None,
-    tolerance: Tolerance = 1e-4,
+    solver: common.SolverName = None,
+    cells: common.Cells = None,
+    settings: common.Settings = None,
+    tolerance: common.Tolerance = 1e-4,
     scatter: Annotated[
         float,
         typer.Option(
@@ -74,21 +62,23 @@ def study(
 
     missing = [name for name in NEEDED if importlib.util.find_spec(name) is None]
     if missing:
-        raise refusal(f"a study needs {', '.join(missing)}: pip install 'percussion_model[study]'")
+        raise common.refusal(
+            f"a study needs {', '.join(missing)}: pip install 'percussion_model[study]'"
+        )
     axes = dict(read_axis(text) for text in over)
     if len(axes) < len(over):
-        raise refusal("--over: a key is given twice")
+        raise common.refusal("--over: a key is given twice")
     for text in settings or ():
         if text.partition("=")[0] in axes:
-            raise refusal(f"--set {text}: --over varies this key")
+            raise common.refusal(f"--set {text}: --over varies this key")
     if samples is None:
         points = grid(axes)
     else:
         logarithmic = [text.partition("=")[0] for text in over if text.endswith("log")]
         ends = {key: (float(min(values)), float(max(values))) for key, values in axes.items()}
         points = latin_hypercube(ends, samples, seed, logarithmic)
-    check_outputs(out, None)
-    chosen = load_scene(scene, solver, cells, settings)
+    common.check_outputs(out, None)
+    chosen = common.load_scene(scene, solver, cells, settings)
     try:
         with count_bar("points") as progress:
             found = run_study(
@@ -103,7 +93,7 @@ def study(
             )
     except KeyboardInterrupt:
         words = f"interrupted; finished points are kept in {out}, the same command continues"
-        raise typer.Exit(complain(words, INTERRUPTED)) from None
+        raise typer.Exit(common.complain(words, common.INTERRUPTED)) from None
     show_study(found, [*found.save(out), *(_report(found, out) if report else ())])
 
 
@@ -112,8 +102,8 @@ def _report(found: Study, folder: Path) -> list[Path]:
     try:
         from percussion_model.interface.report import why_not_interactive, write_study_report
     except ImportError as error:
-        complain(needs_plot_extra(error))
+        common.complain(common.needs_plot_extra(error))
         return []
     if remark := why_not_interactive():
-        complain(remark)
+        common.complain(remark)
     return [write_study_report(found, folder)]

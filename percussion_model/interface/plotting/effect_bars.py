@@ -24,7 +24,7 @@ NOTHING = 5e-3
 def draw_effects(found: EffectsStudy) -> Figure:
     """Draw cost of a step, of a blow, and change in rate, period and peak force."""
     trials = found.trials
-    names = [f"{trial.turn.effect}: {trial.turn.turned}" for trial in trials]
+    names = [f"{trial.variant.effect}: {trial.variant.setting}" for trial in trials]
     height = 1.6 + 0.32 * len(trials)
     fig = Figure(figsize=(12.0, height), layout="constrained")
     axes = fig.subplots(1, 5, sharey=True)
@@ -33,7 +33,8 @@ def draw_effects(found: EffectsStudy) -> Figure:
         (axes[0], "step_time", "a time step"),
         (axes[1], "blow_time", "a blow"),
     ):
-        values = [_ratio(trial.numbers()[key], base[key]) for trial in trials]
+        costs = [trial.numbers()[key] for trial in trials]
+        values = [c / base[key] if c is not None and base[key] else None for c in costs]
         _costs(ax, values)
         style.label(ax, "by the scene's own", "", f"Cost of {title}")
     for ax, key, title in (
@@ -51,10 +52,6 @@ def draw_effects(found: EffectsStudy) -> Figure:
     title = found.scene.title
     style.head(fig, "One effect turned at a time" + (f" — {title}" if title else ""))
     return fig
-
-
-def _ratio(value: float | None, base: float | None) -> float | None:
-    return None if value is None or not base else value / base
 
 
 def _costs(ax: Axes, values: list[float | None]) -> None:

@@ -13,8 +13,7 @@ from matplotlib.ticker import LogLocator, NullLocator
 
 from percussion_model.interface.plotting import style
 from percussion_model.verification.accuracy.ladders import LADDERS
-from percussion_model.verification.accuracy.problems import APERIODIC
-from percussion_model.verification.accuracy.quantities import HISTORY, QUANTITIES
+from percussion_model.verification.accuracy.problems import APERIODIC, HISTORY, QUANTITIES
 from percussion_model.verification.accuracy.study import Point, Study
 
 # Colour, dashes and marker of each ladder; families share a colour.

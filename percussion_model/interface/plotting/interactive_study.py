@@ -224,7 +224,8 @@ def _map(found: Study, columns: dict[str, np.ndarray]) -> LayoutDOM:
     )
     kinds = found.rows["kind"]
     cells = _cells(x, y, offset, columns["rate"], kinds, base)
-    shown = _chosen_lines(len(y.values))
+    rows = len(y.values)
+    shown = sorted({int(k) for k in np.linspace(0, rows - 1, min(rows, MOST_LINES)).round()})
     lines = ColumnDataSource(
         {
             "xs": [x.values.tolist()] * len(shown),
@@ -257,7 +258,8 @@ def _map(found: Study, columns: dict[str, np.ndarray]) -> LayoutDOM:
     everything = ColumnDataSource({**columns, "kind": kinds.astype(np.int32)})
     names = _titles()
     left.title.text = names["rate"]
-    right.title.text = _cut_words(y)
+    low, high = y.values.min(), y.values.max()
+    right.title.text = f"Cuts: {y.label} from {low:.4g} (dark) to {high:.4g} (light)"
     right.yaxis.axis_label = names["rate"]
     update = CustomJS(
         args={
@@ -332,15 +334,6 @@ def _limits(values: Any) -> dict[str, float]:
 
 def _over(axis: Axis) -> Range1d:
     return Range1d(float(axis.edges[0]), float(axis.edges[-1]))
-
-
-def _chosen_lines(count: int) -> list[int]:
-    return sorted({int(k) for k in np.linspace(0, count - 1, min(count, MOST_LINES)).round()})
-
-
-def _cut_words(axis: Axis) -> str:
-    low, high = axis.values.min(), axis.values.max()
-    return f"Cuts: {axis.label} from {low:.4g} (dark) to {high:.4g} (light)"
 
 
 def _slider(axis: Axis) -> Slider:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from percussion_model.verification.accuracy.reference_store import Reference
-from percussion_model.verification.accuracy.references import find_reference
+from percussion_model.verification.accuracy.references import Reference, find_reference
 from percussion_model.verification.accuracy.study import Point, Study, study
 
 __all__ = ["Point", "Reference", "Study", "find_reference", "study"]

@@ -13,8 +13,14 @@ from percussion_model.physics.records import SAMPLE_FIELDS, Mode
 from percussion_model.scene.scene import Scene
 from percussion_model.simulation.simulate import Simulation
 from percussion_model.solvers.fem.records import Node
-from percussion_model.verification.accuracy.problems import AHEAD, DROP, SETTLING_BLOWS, Problem
-from percussion_model.verification.accuracy.quantities import RATE, Answer
+from percussion_model.verification.accuracy.problems import (
+    AHEAD,
+    DROP,
+    RATE,
+    SETTLING_BLOWS,
+    Answer,
+    Problem,
+)
 from percussion_model.verification.accuracy.semidiscrete import DRIVE, GAP, Drill
 
 __all__ = ["INTEGRATORS", "Course", "GeneralRun", "integrate"]

@@ -13,10 +13,15 @@ from percussion_model.simulation.simulate import Simulation
 from percussion_model.verification.accuracy.integrators import GeneralRun
 from percussion_model.verification.accuracy.ladders import LADDERS, Rung, chosen_ladders, ladders
 from percussion_model.verification.accuracy.orders import Order, cost_at, fitted_order
-from percussion_model.verification.accuracy.problems import APERIODIC, Problem, Run, pose
-from percussion_model.verification.accuracy.quantities import Answer, relative_error
-from percussion_model.verification.accuracy.reference_store import Reference
-from percussion_model.verification.accuracy.references import find_reference
+from percussion_model.verification.accuracy.problems import (
+    APERIODIC,
+    Answer,
+    Problem,
+    Run,
+    pose,
+    relative_error,
+)
+from percussion_model.verification.accuracy.references import Reference, find_reference
 from percussion_model.verification.accuracy.semidiscrete import OutOfTime
 from percussion_model.verification.accuracy.timing import interleaved, machine
 

@@ -11,11 +11,13 @@ import numpy as np
 from percussion_model.analysis.study import Study
 from percussion_model.physics.records import Mode
 from percussion_model.simulation.result import Result
-from percussion_model.verification.paper.drop import DAMPINGS, ENERGIES, Drop
-from percussion_model.verification.paper.sweeps import (
+from percussion_model.verification.paper.runs import (
+    DAMPINGS,
+    ENERGIES,
     PAPER_CHATTER,
     PAPER_LEAST_DISTANCE,
     PAPER_LEAST_FEED,
+    Drop,
     along,
     maxima,
     power_law,
