@@ -239,18 +239,16 @@ def bench(quick: bool, say: Callable[[str], None]) -> dict[str, Any]:
     found: dict[str, Any] = {"date": computer.pop("date"), "machine": computer}
     say("compiling")
     found["compilation"] = compiled_in()
-    say("reference scene")
-    found["reference"] = reference(3 if quick else 9)
-    say("effects")
-    found["effects"] = effects(3 if quick else 11)
-    say("rigid option")
-    found["rigid"] = rigid(3 if quick else 7)
-    say("finite elements")
-    found["elements"] = elements(3 if quick else 7)
-    say("FMU")
-    found["fmu"] = fmu(1 if quick else 5)
-    say("command line")
-    found["command_line"] = command_line(1 if quick else 5)
+    for name, text, measured, repeats, fewer in (
+        ("reference", "reference scene", reference, 9, 3),
+        ("effects", "effects", effects, 11, 3),
+        ("rigid", "rigid option", rigid, 7, 3),
+        ("elements", "finite elements", elements, 7, 3),
+        ("fmu", "FMU", fmu, 5, 1),
+        ("command_line", "command line", command_line, 5, 1),
+    ):
+        say(text)
+        found[name] = measured(fewer if quick else repeats)
     return found
 
 

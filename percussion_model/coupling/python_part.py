@@ -47,38 +47,29 @@ class PythonPart:
             kind = "" if isinstance(error, CouplingError) else f"{type(error).__name__}: "
             raise CouplingError(f"{self.name}: {kind}{error}{_source_place(error)}") from error
 
-    def reader(self, names: Sequence[str]) -> PythonReader:
+    def reader(self, names: Sequence[str]) -> PythonSignals:
         """Return a reader of outputs."""
-        return PythonReader(self, names)
+        return PythonSignals(self, names)
 
-    def writer(self, names: Sequence[str]) -> PythonWriter:
-        """Return a writer of inputs."""
-        return PythonWriter(self, names)
+    writer = reader  # of inputs
 
 
-class PythonReader:
-    """Reads outputs of a Python callable."""
+class PythonSignals:
+    """Outputs of a Python callable that are read together, or inputs that are set together."""
 
     def __init__(self, part: PythonPart, names: Sequence[str]) -> None:
         self.part, self.names = part, list(names)
 
     def read(self) -> list[Any]:
-        """Present values."""
+        """Present values of outputs."""
         found = self.part.outputs
         lacking = sorted(name for name in self.names if name not in found)
         if lacking:
             raise CouplingError(f"{self.part.name} gave no {', '.join(lacking)}")
         return [found[name] for name in self.names]
 
-
-class PythonWriter:
-    """Sets inputs of a Python callable."""
-
-    def __init__(self, part: PythonPart, names: Sequence[str]) -> None:
-        self.part, self.names = part, list(names)
-
     def write(self, values: Sequence[Any]) -> None:
-        """Set values, in the order of the names."""
+        """Set inputs, in the order of the names."""
         self.part.inputs = self.part.starts | dict(zip(self.names, values, strict=True))
 
 

@@ -13,7 +13,12 @@ from percussion_model.interface.commands.accuracy import accuracy
 from percussion_model.interface.commands.bench_controller import bench_controller
 from percussion_model.interface.commands.blow_map import blow_map
 from percussion_model.interface.commands.calibrate import calibrate
-from percussion_model.interface.commands.common import BAD_INPUT, INTERRUPTED, complain
+from percussion_model.interface.commands.common import (
+    BAD_INPUT,
+    INTERRUPTED,
+    complain,
+    own_process,
+)
 from percussion_model.interface.commands.compare import compare
 from percussion_model.interface.commands.couple import couple
 from percussion_model.interface.commands.effects import effects
@@ -21,7 +26,6 @@ from percussion_model.interface.commands.paper import paper
 from percussion_model.interface.commands.scene import explain, new, plot, run, settled
 from percussion_model.interface.commands.stability import stability
 from percussion_model.interface.commands.study import study
-from percussion_model.interface.quick_start import own_process
 
 app = typer.Typer(
     help="Percussive drilling with travelling waves: piston, bit and rock, blow by blow.",

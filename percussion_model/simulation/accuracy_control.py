@@ -107,7 +107,7 @@ def run_to_accuracy(scene: Scene, run_once: RunOnce) -> Result:
     if not scene.run.check and _trusted(grids, wanted):
         return _finished(scene, grids, wanted)
     while _useful(grids) and 2 * cells <= FINEST:
-        cells = _halved(scene, cells)
+        cells = _halved(scene, wanted, cells)
         finer = _run(scene, cells, run_once)
         if finer.result.cut_short:
             note = "interrupted while it was verified: this is the run before"
@@ -126,7 +126,7 @@ def planned_cells(scene: Scene) -> list[int]:
     cells, _ = cells_for(scene, wanted)
     plan = [coarser_cells(scene, cells), cells]
     if scene.run.check and 2 * cells <= FINEST:
-        plan.append(_halved(scene, cells))
+        plan.append(_halved(scene, wanted, cells))
     return plan
 
 
@@ -135,10 +135,8 @@ def with_cells(scene: Scene, cells: int) -> Scene:
     return scene.replace(**{"solver.accuracy": None, "run.check": False, "solver.cells": cells})
 
 
-def _halved(scene: Scene, cells: int) -> int:
+def _halved(scene: Scene, wanted: float, cells: int) -> int:
     """Cells of a run at half the step that fit the lengths."""
-    wanted = scene.solver.accuracy
-    assert wanted is not None
     return cells_for(scene, wanted, fewest=2 * cells, most=FINEST)[0]
 
 

@@ -202,9 +202,8 @@ class Result:
         """Event list as a data frame; kinds as words."""
         from pandas import DataFrame
 
-        columns = {name: self.events[name] for name in EVENT.names or ()}
-        columns["kind"] = np.array([EventKind(k).name.lower() for k in self.events["kind"]], object)
-        return DataFrame(columns)
+        columns = _event_columns(self.events)
+        return DataFrame(columns | {"kind": np.array(columns["kind"], object)})
 
     def save(self, folder: str | Path) -> list[Path]:
         """Write summary, blows, events, trace and scene to a folder, in one go.
@@ -222,13 +221,7 @@ class Result:
         return cls(**_read_result(Path(folder)))
 
 
-_MEANS = (
-    "impact_velocity",
-    "rebound_velocity",
-    "stroke",
-    "blow_energy",
-    "rock_energy",
-)
+_MEANS = ("impact_velocity", "rebound_velocity", "stroke", "blow_energy", "rock_energy")
 
 
 def _mean(values: np.ndarray) -> float:
@@ -260,11 +253,7 @@ def _write_result(result: Result, folder: Path) -> list[Path]:
         (draft / "scene.toml").write_text(result.scene.to_toml(), encoding="utf-8")
         blows = result.blows
         _write_csv(draft / "blows.csv", {name: blows[name] for name in BLOW.names or ()})
-        events = {name: result.events[name] for name in EVENT.names or ()}
-        _write_csv(
-            draft / "events.csv",
-            events | {"kind": [EventKind(k).name.lower() for k in events["kind"]]},
-        )
+        _write_csv(draft / "events.csv", _event_columns(result.events))
         if result.trace is not None:
             _write_trace(draft, result.trace)
         names = sorted(path.name for path in draft.iterdir())
@@ -272,6 +261,12 @@ def _write_result(result: Result, folder: Path) -> list[Path]:
         if name not in names:
             (folder / name).unlink(missing_ok=True)
     return [folder / name for name in names]
+
+
+def _event_columns(events: np.ndarray) -> dict[str, Any]:
+    """Columns of the event list; kinds as words."""
+    columns = {name: events[name] for name in EVENT.names or ()}
+    return columns | {"kind": [EventKind(k).name.lower() for k in columns["kind"]]}
 
 
 def _write_trace(draft: Path, trace: dict[str, np.ndarray]) -> None:

@@ -13,7 +13,7 @@ from rich.table import Table
 from percussion_model.verification.accuracy.ladders import LADDERS
 from percussion_model.verification.accuracy.problems import APERIODIC, HISTORY, QUANTITIES
 from percussion_model.verification.accuracy.references import Reference
-from percussion_model.verification.accuracy.study import FITS, WANTED, Point, Study
+from percussion_model.verification.accuracy.study import FITS, WANTED, Study
 
 _SHORT = {
     "rate_of_penetration": "rate",
@@ -93,10 +93,12 @@ def _show_points(found: Study, console: Console) -> None:
     for heading in ("ms/s", "set-up"):
         table.add_column(heading, justify="right", no_wrap=True)
     for name in found.names:
-        points = found.ladder(name)
         table.add_row(f"[bold]{LADDERS[name].title}[/bold]")
-        for point in points:
-            table.add_row(*_row(found, point))
+        for point in found.ladder(name):
+            label = point.label + (" *" if point.fit > FITS else "")
+            errors = [_number(point.errors.get(key, math.nan)) for key in found.problem.quantities]
+            times = [f"{1e3 * value:.3g}" for value in (point.second, point.setup)]
+            table.add_row(f" {label}", *errors, *times)
     console.print(table)
     per_blow = found.problem.period
     console.print(f"A blow takes {per_blow:.4g} s; its cost is that part of ms/s.", highlight=False)
@@ -106,13 +108,6 @@ def _show_points(found: Study, console: Console) -> None:
             "ladder and is not in its order.",
             highlight=False,
         )
-
-
-def _row(found: Study, point: Point) -> list[str]:
-    label = point.label + (" *" if point.fit > FITS else "")
-    errors = [_number(point.errors.get(key, math.nan)) for key in found.problem.quantities]
-    times = [f"{1e3 * value:.3g}" for value in (point.second, point.setup)]
-    return [f" {label}", *errors, *times]
 
 
 def _show_orders(found: Study, console: Console) -> None:

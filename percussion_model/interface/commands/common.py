@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import sys
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -15,6 +16,10 @@ if TYPE_CHECKING:
 
 BAD_INPUT = 2
 INTERRUPTED = 130  # what shells report for Ctrl-C
+# Starting makes hundreds of thousands of objects that stay [objects].
+COLLECT_AFTER = 100_000
+
+_own_process = False
 
 SceneFile = Annotated[Path, typer.Argument(metavar="SCENE", help="A scene file (TOML).")]
 SolverName = Annotated[
@@ -54,6 +59,28 @@ Tolerance = Annotated[
 ]
 
 
+def own_process() -> None:
+    """Let this process start faster; a library must not do so to the process of its caller."""
+    global _own_process
+    _own_process = True
+    gc.set_threshold(COLLECT_AFTER)
+
+
+def load_numba() -> None:
+    """Load numba without scipy's linear algebra, if the process is our own.
+
+    Numba looks for a BLAS in scipy, whose import takes longer than all of our
+    kernels; none of them calls it.
+    """
+    if not _own_process or "numba" in sys.modules or "scipy.linalg" in sys.modules:
+        return
+    sys.modules["scipy.linalg"] = None  # type: ignore[assignment]
+    try:
+        import numba.np.arraymath  # noqa: F401
+    finally:
+        del sys.modules["scipy.linalg"]
+
+
 def load_scene(
     path: Path,
     solver: str | None = None,
@@ -63,7 +90,6 @@ def load_scene(
     check: bool | None = None,
 ) -> Scene:
     """Read a scene and apply what the command line changes."""
-    from percussion_model.interface.quick_start import load_numba
     from percussion_model.scene.scene import Scene, read_setting
 
     load_numba()

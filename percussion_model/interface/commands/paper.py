@@ -24,11 +24,10 @@ def paper(
     json_file: common.JsonFile = None,
 ) -> None:
     """Reproduce figures 6 to 9 of the paper, and check what it says one by one."""
-    from percussion_model.interface.quick_start import load_numba
     from percussion_model.interface.terminal import progress_bar, show_statements
 
     common.check_outputs(out, json_file)
-    load_numba()
+    common.load_numba()
     try:
         from percussion_model.interface.plotting.activation import draw_activation
         from percussion_model.interface.plotting.compared_blows import draw_comparison
