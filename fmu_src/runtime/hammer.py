@@ -20,7 +20,7 @@ from fmu_src.runtime.watch import Watch
 from percussion_model.scene.inputs import INPUTS
 from percussion_model.scene.rows import Row, refuse_value
 from percussion_model.scene.rules import SceneRules
-from percussion_model.solvers import Solver
+from percussion_model.solvers.base import Solver
 from percussion_model.solvers.blow_map.solver import BlowMapSolver
 from percussion_model.solvers.wave.grid import cell_at
 

@@ -20,7 +20,7 @@ from percussion_model.physics.records import (
 from percussion_model.scene.inputs import INPUTS, check_input
 from percussion_model.scene.rules import SceneRules
 from percussion_model.simulation.runner import Runner
-from percussion_model.solvers import Solver
+from percussion_model.solvers.base import Solver
 
 AT = {name: k for k, name in enumerate(LONG_SAMPLE_FIELDS)}
 LEDGER = (*LEDGER_FIELDS, *STORED_FIELDS)  # the last columns of a long row

@@ -19,7 +19,7 @@ from numba.extending import intrinsic
 
 from percussion_model.coupling.component import LARGEST, WARNING, Component, Group
 from percussion_model.coupling.port import Port
-from percussion_model.physics.kernel import entry_of, letting_go
+from percussion_model.physics.kernel import entry_of, nogil
 
 STEP, SET_REAL, SET_INTEGER, GET_REAL, GET_INTEGER, GET_BOOLEAN = range(6)
 SETTERS = {"Real": SET_REAL, "Integer": SET_INTEGER, "Boolean": SET_INTEGER}
@@ -82,7 +82,7 @@ def do_step(
     ), _called((_BYTE, _DOUBLE, _DOUBLE, _INT), (True, False, False, False))
 
 
-@letting_go
+@nogil
 def make_calls(
     calls: np.ndarray,
     places: np.ndarray,

@@ -13,8 +13,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from percussion_model.physics.ledger import complete_ledger
-from percussion_model.physics.records import BLOW, EVENT, SAMPLE_FIELDS
+from percussion_model.physics.ledger import complete_ledger, energies
+from percussion_model.physics.records import BLOW, EVENT, READING, SAMPLE_FIELDS
 from percussion_model.scene.inputs import SimulationError
 from percussion_model.scene.rows import is_number
 from percussion_model.scene.scene import Scene, SceneError
@@ -22,6 +22,7 @@ from percussion_model.simulation.accuracy_control import LONGEST, run_to_accurac
 from percussion_model.simulation.result import Result
 from percussion_model.simulation.runner import Runner
 from percussion_model.simulation.warnings import find_warnings
+from percussion_model.solvers.state import State
 
 __all__ = ["Simulation", "SimulationError", "Snapshot", "simulate"]
 
@@ -131,22 +132,23 @@ class Simulation(Runner):
         self._state = snapshot.state.copy()
         self._blows, self._events = snapshot.blows, snapshot.events
 
-    @property
-    def _reading_time(self) -> float:
-        """Present time, or that of the state, which a change of inputs puts a step ahead [s]."""
-        return max(self._time, self.solver.time(self._state))
-
     def energy(self) -> dict[str, float]:
         """Energy ledger [J] at the present grid point; see `Result.energy`."""
-        return complete_ledger(self.solver.energy(self._state, self._reading_time))
+        return complete_ledger(energies(self._read_state()[0]))
 
     def fields(self) -> dict[str, np.ndarray]:
         """Force [N] and velocity [m/s] in each cell of the elastic bars, top to bottom.
 
         At the last grid point up to the present; empty where no bar is elastic.
         """
-        row = np.empty(len(SAMPLE_FIELDS))
-        return self.solver.fields(self.solver.look(self._state, self._reading_time, row))
+        return self.solver.fields(self._read_state()[1])
+
+    def _read_state(self) -> tuple[np.ndarray, State]:
+        """Reading at the present time, and the copy of the state that it was made of."""
+        # after a change of inputs the state may lie a step ahead of the present
+        here = max(self._time, self.solver.time(self._state))
+        reading = np.zeros(1, READING)
+        return reading, self.solver.read(self._state, here, reading, peaks=False)
 
     def statistics(self) -> dict[str, int]:
         """Counts of what the solver did."""
