@@ -151,11 +151,6 @@ def bars(tree: dict[str, Any]) -> str:
     return table(["quantity", "value", "bar, relative", "solvers apart", "a reference?"], rows)
 
 
-def names(tree: dict[str, Any]) -> list[str]:
-    """Ladders of a study."""
-    return list(tree["ladders"])
-
-
 def points(tree: dict[str, Any]) -> str:
     """Every rung: errors and times."""
     keys = list(next(point["errors"] for point in tree["points"] if point["errors"]))
@@ -177,7 +172,7 @@ def orders(tree: dict[str, Any]) -> str:
     """Measured orders."""
     keys = list(next(point["errors"] for point in tree["points"] if point["errors"]))
     rows = []
-    for name in names(tree):
+    for name in tree["ladders"]:
         found = tree["orders"].get(name, {})
         cells = []
         for key in keys:
@@ -193,8 +188,8 @@ def costs(tree: dict[str, Any]) -> str:
     from percussion_model.verification.accuracy.orders import cost_at
 
     key = next(iter(tree["reference"]["bars"]))
-    general = [name for name in names(tree) if LADDERS[name].title.startswith("scipy")]
-    elements = [name for name in names(tree) if name.startswith("fem")]
+    general = [name for name in tree["ladders"] if LADDERS[name].title.startswith("scipy")]
+    elements = [name for name in tree["ladders"] if name.startswith("fem")]
 
     def cost(name: str, wanted: float) -> float:
         rungs = [point for point in tree["points"] if point["ladder"] == name]

@@ -36,6 +36,11 @@ class Mark:
     wall: float
     counts: dict[str, int]
 
+    @property
+    def blows(self) -> int:
+        """Blows finished."""
+        return self.counts.get("blows", 0)
+
 
 @dataclass(frozen=True)
 class Forecast:
@@ -119,7 +124,7 @@ def probe(simulation: Simulation, duration: float) -> list[Mark]:
     while simulation.time < duration:
         simulation.advance(min(simulation.time + piece, duration))
         marks.append(_mark(simulation))
-        wall, blows = marks[-1].wall, marks[-1].counts.get("blows", 0)
+        wall, blows = marks[-1].wall, marks[-1].blows
         if wall - marks[-2].wall < QUICK:
             piece = min(2.0 * piece, LARGEST_PIECE * duration)
         elif piece > FIRST_PIECE:
@@ -143,7 +148,7 @@ def predict(solver: Solver, setup_time: float, marks: list[Mark], duration: floa
     start, end = _steady_part(marks)
     span = end.time - start.time
     per_second = (end.wall - start.wall) / span if span > 0 else 0.0
-    blows = end.counts.get("blows", 0) - start.counts.get("blows", 0)
+    blows = end.blows - start.blows
     return Forecast(
         solver=solver,
         setup_time=setup_time,
@@ -165,19 +170,15 @@ def _steady_part(marks: list[Mark]) -> tuple[Mark, Mark]:
 
     Where blows have ceased, it is what took the later half of the time since then.
     """
-    rises = [mark for before, mark in pairwise(marks) if _blows(mark) > _blows(before)]
+    rises = [mark for before, mark in pairwise(marks) if mark.blows > before.blows]
     if len(rises) < 2:
         return marks[0], marks[-1]
     first, last, end = rises[0], rises[-1], marks[-1]
-    period = (last.time - first.time) / (_blows(last) - _blows(first))
+    period = (last.time - first.time) / (last.blows - first.blows)
     if end.time - last.time < CEASED * period:
         return first, last
     half = 0.5 * (last.wall + end.wall)
     return next((mark for mark in marks[:-1] if mark.wall >= half), last), end
-
-
-def _blows(mark: Mark) -> int:
-    return mark.counts.get("blows", 0)
 
 
 def explained(scene: Scene, found: Forecast) -> dict[str, Any]:

@@ -39,7 +39,7 @@ class CoupledRun:
         Why it ended before its time; empty if it did not.
     tried, rejected : int
         Steps that were computed beyond those, to know the error, and steps taken back.
-    wall_time : float
+    wall_time, processor_time : float
         Of the stepping [s].
     interrupted : bool
         Whether it was Ctrl-C that ended it.
@@ -52,6 +52,7 @@ class CoupledRun:
     tried: int = 0
     rejected: int = 0
     wall_time: float = field(default=0.0, compare=False)
+    processor_time: float = field(default=0.0, compare=False)
     interrupted: bool = False
 
     def __getitem__(self, signal: str) -> np.ndarray:

@@ -32,7 +32,7 @@ from percussion_model.coupling.port import (
 )
 from percussion_model.coupling.python_part import PythonPart, Work
 from percussion_model.coupling.rejection import StepControl
-from percussion_model.coupling.ssp import choose_values, input_starts, unpack
+from percussion_model.coupling.ssp import input_starts, unpack
 from percussion_model.simulation.simulate import stop_on_interrupt
 
 Order = Literal["jacobi", "gauss-seidel"]
@@ -106,7 +106,12 @@ class Coupling:
                 known = self.parts[name].variables
                 values = archive.values[name]
                 archive.values[name] = {key: values[key] for key in values if key in known}
-        self._parameters = choose_values(archive, given, self.path.name)
+        self._parameters = archive.values
+        for signal, value in given.items():  # before those of the archive
+            component, _, variable = signal.partition(".")
+            if component not in archive.values:
+                raise CouplingError(f"{signal}: there is no FMU {component} in {self.path.name}")
+            archive.values[component][variable] = value
 
     @property
     def outputs(self) -> dict[str, list[str]]:
@@ -181,7 +186,7 @@ class Coupling:
         names = [f"{port.name}.{name}" for port in self.ports for name in port.taken + port.kept]
         rows = [[0.0, *self._row()]]
         go, error, done, interrupted = self._stepping(count, control), "", 0, False
-        began = clock.perf_counter()
+        began, used = clock.perf_counter(), clock.process_time()
         with stop_on_interrupt(keep=True) as stop:
             for k in range(count):
                 try:
@@ -198,10 +203,10 @@ class Coupling:
                 if interrupted:
                     error = f"at {done * step:.6g} s it was interrupted"
                     break
-        wall_time = clock.perf_counter() - began
+        times = clock.perf_counter() - began, clock.process_time() - used
         table = np.array(rows, dtype=float)
         columns = {name: table[:, k] for k, name in enumerate(["time", *names])}
-        run = CoupledRun(columns, step, done, error, wall_time=wall_time, interrupted=interrupted)
+        run = CoupledRun(columns, step, done, error, 0, 0, *times, interrupted)
         if control is not None:
             run.steps, run.tried, run.rejected = control.done, control.tried, control.rejected
         return run
@@ -270,17 +275,13 @@ class Coupling:
 
     def step(self, time: float, step: float) -> None:
         """Let all parts do a communication step [s]."""
-        ports = self.ports
-        if self.order == "gauss-seidel":
-            for port in ports:
-                port.set_inputs(time)
-                port.step(time, step)
-                port.read_outputs()
-            return
-        for port in ports:
+        one_after_another = self.order == "gauss-seidel"
+        for port in self.ports:
             port.set_inputs(time)
             port.step(time, step)
-        for port in ports:
+            if one_after_another:
+                port.read_outputs()
+        for port in () if one_after_another else self.ports:
             port.read_outputs()
 
     def _row(self) -> list[Any]:

@@ -61,8 +61,13 @@ class StepControl:
         self.done = self.tried = self.rejected = 0
         self._level = 0  # of the present step: longest / 2**level
         self._values = self.ports[0].values
-        self._compared = _forces(self.ports) or list(range(len(self._values)))
-        self._is_force = bool(_forces(self.ports))
+        forces = [
+            port.begin + k
+            for port in ports
+            for k, name in enumerate(port.taken)
+            if port.part.variables[name].unit == "N"
+        ]
+        self._compared, self._is_force = forces or list(range(len(self._values))), bool(forces)
         self._sizes = [abs(float(value)) for value in self._values]
 
     def stepping(self, step: Step) -> Step:
@@ -124,13 +129,3 @@ class StepControl:
             if whole[place] != halves:
                 error = max(error, abs(whole[place] - halves) / size)
         return error
-
-
-def _forces(ports: Sequence[Port]) -> list[int]:
-    """Places of the forces that are exchanged."""
-    return [
-        port.begin + k
-        for port in ports
-        for k, name in enumerate(port.taken)
-        if port.part.variables[name].unit == "N"
-    ]

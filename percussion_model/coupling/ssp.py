@@ -91,24 +91,3 @@ def input_starts(fmu: Path, values: Mapping[str, Any]) -> dict[str, Any]:
         if one.causality == "input":
             found[one.name] = values.get(one.name, kinds.get(one.type, int)(one.start))
     return found
-
-
-def choose_values(
-    archive: Archive, given: Mapping[str, Any], name: str
-) -> dict[str, dict[str, Any]]:
-    """Values of the archive, and those that go before them.
-
-    Parameters
-    ----------
-    given : mapping
-        By `component.variable`.
-    name : str
-        Of the archive, for the error.
-    """
-    found = {component: dict(values) for component, values in archive.values.items()}
-    for signal, value in given.items():
-        component, _, variable = signal.partition(".")
-        if component not in found:
-            raise CouplingError(f"{signal}: there is no FMU {component} in {name}")
-        found[component][variable] = value
-    return found

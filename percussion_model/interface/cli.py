@@ -16,8 +16,8 @@ from percussion_model.interface.commands.calibrate import calibrate
 from percussion_model.interface.commands.common import (
     BAD_INPUT,
     INTERRUPTED,
-    complain,
     own_process,
+    print_message,
 )
 from percussion_model.interface.commands.compare import compare
 from percussion_model.interface.commands.couple import couple
@@ -98,10 +98,10 @@ def _guarded(work: Callable[[], Any]) -> int:
         code = work()
         return code if isinstance(code, int) else 0
     except (KeyboardInterrupt, typer.Abort):
-        return complain("interrupted before there was a result", INTERRUPTED)
+        return print_message("interrupted before there was a result", INTERRUPTED)
     except Exception as error:
         if type(error).__module__.startswith("percussion_model."):
-            return complain(str(error), BAD_INPUT)
+            return print_message(str(error), BAD_INPUT)
         # Bad arguments: typer hides the class of its errors, which show themselves.
         show = getattr(error, "show", None)
         if show is None:

@@ -19,6 +19,8 @@ from percussion_model.simulation.validity import (
 
 # A larger error of the wave speed shows in the answers.
 MOST_WAVE_SPEED_ERROR = 1e-3
+# Entries of the ledger that put energy in.
+_FLOWS = ("initial", "drive", "feed", "gravity")
 
 
 def find_warnings(result: Result) -> Iterator[str]:
@@ -26,7 +28,6 @@ def find_warnings(result: Result) -> Iterator[str]:
     yield from _about_scene(result)
     yield from _about_grid(result)
     yield from _about_blows(result)
-    yield from _about_trust(result)
     yield from _about_validity(result)
 
 
@@ -106,13 +107,10 @@ def _about_blows(result: Result) -> Iterator[str]:
         )
 
 
-def _about_trust(result: Result) -> Iterator[str]:
+def _about_validity(result: Result) -> Iterator[str]:
     if any(result.energy[name] for name in _FLOWS):
         yield from ledger_note(result.energy["residual_relative"], result.solver)
     yield from guard_notes(result.statistics)
-
-
-def _about_validity(result: Result) -> Iterator[str]:
     scene = result.scene
     if scene.effects.rock == "none":
         return
@@ -140,6 +138,3 @@ def longest_flight(result: Result) -> float:
     times = np.concatenate([[0.0], modes["time"], [result.duration]])
     flying = np.concatenate([[True], modes["kind"] == EventKind.MODE_FF])
     return float(np.max(np.diff(times)[flying], initial=0.0))
-
-
-_FLOWS = ("initial", "drive", "feed", "gravity")

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from percussion_model.analysis.fitting.least_squares import (
-    Counted,
+    CountedModel,
     Estimate,
     Fit,
     FitError,
@@ -115,7 +115,7 @@ def fit_force_penetration(penetration: Any, force: Any, confidence: float = 0.95
     errors = np.sqrt(np.diag(covariance(jacobian, variance, NAMES)))
     reach = student_width(confidence, freedom) * errors
     ends = np.stack([found.x - reach, found.x + reach], axis=1)
-    curve = Counted(model)
+    curve = CountedModel(model)
     fit = make_fit(
         curve, measured, found.x, jacobian, ends, NAMES, (True, True, False, False), confidence
     )

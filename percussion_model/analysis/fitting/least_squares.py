@@ -14,8 +14,8 @@ Model = Callable[[np.ndarray], np.ndarray]
 
 # The misfit at an end of an interval may stay this far below what a straight model has there.
 STRAIGHT_ENOUGH = 0.9
-# Where the misfit is looked at on both sides, in half-widths of the interval.
-LOOKED_AT = (0.4, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0)
+# Points of the profile on both sides, in half-widths of the interval.
+PROFILE_POINTS = (0.4, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0)
 # Residuals that follow from each other by so many standard errors are no independent noise.
 MOST_CORRELATION = 4.0
 # Step of the first slopes, in the logarithm: far above the noise of events that move from cell
@@ -95,8 +95,8 @@ class Fit:
         }
 
 
-class Counted:
-    """A model that counts its calls, and knows where it holds.
+class CountedModel:
+    """A model that counts its calls, within bounds of its parameters.
 
     Parameters
     ----------
@@ -144,8 +144,8 @@ def covariance(jacobian: np.ndarray, variance: float, names: Sequence[str]) -> n
     return np.asarray(variance * np.linalg.inv(alike) / np.outer(scale, scale))
 
 
-def look_around(
-    model: Counted, data: np.ndarray, at: np.ndarray, spread: np.ndarray, width: float
+def profile_intervals(
+    model: CountedModel, data: np.ndarray, at: np.ndarray, spread: np.ndarray, width: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Check intervals by the misfit itself, and look for a better place on the way.
 
@@ -156,7 +156,7 @@ def look_around(
 
     Parameters
     ----------
-    model : Counted
+    model : CountedModel
         Parameters to data.
     data : ndarray
     at : ndarray
@@ -184,7 +184,7 @@ def look_around(
             continue
         for side, sign in enumerate((-1.0, 1.0)):
             reach = width
-            for factor, beyond in zip(LOOKED_AT, (*LOOKED_AT[1:], math.inf), strict=True):
+            for factor, beyond in zip(PROFILE_POINTS, (*PROFILE_POINTS[1:], math.inf), strict=True):
                 place = at + sign * factor * width / error * spread[:, k]
                 there = model.misfit(data, place)
                 if there < least:
@@ -196,7 +196,7 @@ def look_around(
 
 
 def make_fit(
-    model: Counted,
+    model: CountedModel,
     data: np.ndarray,
     at: np.ndarray,
     jacobian: np.ndarray,
@@ -209,7 +209,7 @@ def make_fit(
 
     Parameters
     ----------
-    model : Counted
+    model : CountedModel
         Parameters to data.
     data : ndarray
     at : ndarray
@@ -304,13 +304,13 @@ def check_confidence(confidence: float) -> None:
 
 
 def search(
-    model: Counted, data: np.ndarray, guess: np.ndarray, reach: np.ndarray, steps: int
+    model: CountedModel, data: np.ndarray, guess: np.ndarray, reach: np.ndarray, steps: int
 ) -> np.ndarray:
     """Best point of a grid around the guess, of a finer one around that, and so on.
 
     Parameters
     ----------
-    model : Counted
+    model : CountedModel
         Parameters to data.
     data : ndarray
     guess : ndarray
@@ -338,7 +338,7 @@ def search(
 
 
 def descend(
-    model: Counted, data: np.ndarray, start: np.ndarray, names: Sequence[str]
+    model: CountedModel, data: np.ndarray, start: np.ndarray, names: Sequence[str]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Go down to the minimum next to a point.
 

@@ -126,19 +126,17 @@ class Study:
         units = {key: self.scene.row_of(key).unit for key in points.keys}
         if points.is_grid:
             mesh = points.values.reshape(*points.shape, len(points.keys))
-            axes = [np.moveaxis(mesh[..., k], k, 0).reshape(n, -1)[:, 0]
-                    for k, n in enumerate(points.shape)]  # fmt: skip
-            coords = {
-                key: DataArray(axis, dims=key, attrs={"units": units[key]})
-                for key, axis in zip(points.keys, axes, strict=True)
-            }
-            dims: tuple[str, ...] = points.keys
+            columns = [np.moveaxis(mesh[..., k], k, 0).reshape(n, -1)[:, 0]
+                       for k, n in enumerate(points.shape)]  # fmt: skip
+            dims = points.keys
         else:
-            dims = ("point",)
-            coords = {
-                key: DataArray(points.values[:, k], dims=dims, attrs={"units": units[key]})
-                for k, key in enumerate(points.keys)
-            }
+            columns, dims = list(points.values.T), ("point",)
+        coords = {
+            key: DataArray(
+                column, dims=key if points.is_grid else dims, attrs={"units": units[key]}
+            )
+            for key, column in zip(points.keys, columns, strict=True)
+        }
         found = {
             name: DataArray(
                 self.rows[name].reshape(points.shape),

@@ -88,9 +88,7 @@ def _number(value: float) -> str:
 def _show_points(found: Study, console: Console) -> None:
     what = "Relative standard error" if found.problem.kind == APERIODIC else "Relative error"
     table = _table(f"{what}; ms to compute a simulated second; ms of set-up", "method")
-    for key in found.problem.quantities:
-        table.add_column(_SHORT[key], justify="right", no_wrap=True)
-    for heading in ("ms/s", "set-up"):
+    for heading in (*(_SHORT[key] for key in found.problem.quantities), "ms/s", "set-up"):
         table.add_column(heading, justify="right", no_wrap=True)
     for name in found.names:
         table.add_row(f"[bold]{LADDERS[name].title}[/bold]")

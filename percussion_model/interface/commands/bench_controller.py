@@ -52,7 +52,7 @@ def bench_controller(
     try:
         from percussion_model.coupling.bench import bench, total
     except ImportError as error:
-        return common.complain(common.needs_extra(error, "fmu"), common.BAD_INPUT)
+        return common.print_message(common.needs_extra(error, "fmu"), common.BAD_INPUT)
     from percussion_model.simulation.files import check_writable
 
     folder = out or Path("out") / "bench-controller"
@@ -82,12 +82,12 @@ def bench_controller(
     try:
         from percussion_model.interface.bench_page import write_bench_page
     except ImportError as error:
-        common.complain(common.needs_plot_extra(error))
+        common.print_message(common.needs_plot_extra(error))
     else:
         title = controller or system.stem
         print(write_bench_page(scores, points, COLUMNS, folder, title), file=sys.stderr)
     if interrupted:
-        return common.complain(
+        return common.print_message(
             f"interrupted: the page has the {len(scores)} runs that were done", common.INTERRUPTED
         )
     return 1 if any(score.faults for score in scores) else 0
@@ -99,7 +99,7 @@ def _show(score: Score) -> None:
                         for name, text, factor, _ in COLUMNS)  # fmt: skip
     print(f"{score.trial:10s} {score.points:6.1f}  {numbers}", file=sys.stderr)
     for fault in score.faults:
-        common.complain(f"{score.trial} {'' if score.error else 'failed: '}{fault}")
+        common.print_message(f"{score.trial} {'' if score.error else 'failed: '}{fault}")
 
 
 def _load(controller: str | None) -> Any:

@@ -34,9 +34,10 @@ def blow_map(
         typer.echo(str(map_file(chosen)))
         return
     table = ready_map(chosen, workers) if action == "build" else kept_map(chosen)
+    numbers = _numbers(chosen, table)
     if json_file != "-":
-        _show(chosen, table)
-    common.write_json(json_file, _numbers(chosen, table))
+        _show(numbers)
+    common.write_json(json_file, numbers)
 
 
 def ready_map(scene: Scene, workers: int | None = None) -> BlowTable:
@@ -60,7 +61,7 @@ def warn_of_outside(scene: Scene) -> None:
     from percussion_model.analysis.blow_maps import outside_map
 
     for text in outside_map(scene):
-        common.complain(f"warning: {text}")
+        common.print_message(f"warning: {text}")
 
 
 def _numbers(scene: Scene, table: BlowTable | None) -> dict[str, Any]:
@@ -82,12 +83,11 @@ def _numbers(scene: Scene, table: BlowTable | None) -> dict[str, Any]:
     return found
 
 
-def _show(scene: Scene, table: BlowTable | None) -> None:
-    numbers = _numbers(scene, table)
-    typer.echo(f"{numbers['file']}: {'kept' if table is not None else 'not made yet'}")
+def _show(numbers: dict[str, Any]) -> None:
+    typer.echo(f"{numbers['file']}: {'kept' if numbers['made'] else 'not made yet'}")
     typer.echo(f"{numbers['nodes']} blows")
-    if table is None:
-        return
-    for name, (low, high) in numbers["range"].items():
-        typer.echo(f"{name} {low:g} to {high:g} (SI)")
-    typer.echo(f"{numbers['restless_nodes']} of them refused: the bit does not come to rest")
+    if numbers["made"]:
+        for name, (low, high) in numbers["range"].items():
+            typer.echo(f"{name} {low:g} to {high:g} (SI)")
+        nodes = numbers["restless_nodes"]
+        typer.echo(f"{nodes} of them refused: the bit does not come to rest")

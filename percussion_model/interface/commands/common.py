@@ -143,7 +143,7 @@ def if_drawable() -> Iterator[None]:
     try:
         yield
     except ImportError as error:
-        complain(needs_plot_extra(error))
+        print_message(needs_plot_extra(error))
 
 
 def list_files(paths: Iterable[Path]) -> None:
@@ -164,10 +164,10 @@ def needs_extra(error: ImportError, extra: str) -> str:
 
 def refusal(message: str) -> typer.Exit:
     """Print one message on stderr; return what ends the command as bad input."""
-    return typer.Exit(complain(message, BAD_INPUT))
+    return typer.Exit(print_message(message, BAD_INPUT))
 
 
-def complain(message: str, code: int = 0) -> int:
+def print_message(message: str, code: int = 0) -> int:
     """Print one message on stderr; return the exit code."""
     print(f"percussion: {message}", file=sys.stderr)
     return code

@@ -59,7 +59,7 @@ def couple(
         from percussion_model.coupling import Coupling
         from percussion_model.coupling.coupled_run import known_signals, summary
     except ImportError as error:
-        return common.complain(common.needs_extra(error, "fmu"), common.BAD_INPUT)
+        return common.print_message(common.needs_extra(error, "fmu"), common.BAD_INPUT)
     folder = out or Path("out") / system.stem
     common.check_outputs(folder, json_file)
     coupling = Coupling(
@@ -89,7 +89,7 @@ def couple(
 
             common.list_files([save_signals(run, folder / "signals.png", system.stem)])
     code = common.INTERRUPTED if run.interrupted else 1
-    return common.complain(f"the run ended early, {run.error}", code) if run.error else 0
+    return common.print_message(f"the run ended early, {run.error}", code) if run.error else 0
 
 
 def read_value(text: str) -> tuple[str, float | bool | str]:

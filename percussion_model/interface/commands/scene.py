@@ -54,7 +54,7 @@ def run(
     if json_file != "-":
         show_summary(result)
     if interrupted:
-        common.complain(result.warnings[-1])
+        common.print_message(result.warnings[-1])
         raise typer.Exit(common.INTERRUPTED)
 
 
@@ -157,5 +157,5 @@ def _draw(result: Result, folder: Path) -> None:
         from percussion_model.interface.report import why_not_interactive, write_report
 
         if remark := why_not_interactive():
-            common.complain(remark)
+            common.print_message(remark)
         write_report(result, folder, figures(result, folder))

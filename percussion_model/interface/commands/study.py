@@ -93,7 +93,7 @@ def study(
             )
     except KeyboardInterrupt:
         words = f"interrupted; finished points are kept in {out}, the same command continues"
-        raise typer.Exit(common.complain(words, common.INTERRUPTED)) from None
+        raise typer.Exit(common.print_message(words, common.INTERRUPTED)) from None
     show_study(found, [*found.save(out), *(_report(found, out) if report else ())])
 
 
@@ -102,8 +102,8 @@ def _report(found: Study, folder: Path) -> list[Path]:
     try:
         from percussion_model.interface.report import why_not_interactive, write_study_report
     except ImportError as error:
-        common.complain(common.needs_plot_extra(error))
+        common.print_message(common.needs_plot_extra(error))
         return []
     if remark := why_not_interactive():
-        common.complain(remark)
+        common.print_message(remark)
     return [write_study_report(found, folder)]

@@ -161,11 +161,14 @@ def run_collection(
     SimulationError
         If there is no such case or solver, or nothing to run.
     """
-    wanted = list(solvers)
+    wanted, chosen = list(solvers), list(hard_cases() if names is None else names)
+    for name in chosen:
+        if name not in hard_cases():
+            raise SimulationError(f"unknown case {name}: there are {', '.join(hard_cases())}")
     jobs: list[tuple[Any, ...]] = [
         (name, solver, share, refined)
-        for name in (hard_cases() if names is None else names)
-        for solver in _case(name).solvers
+        for name in chosen
+        for solver in hard_cases()[name].solvers
         if solver in wanted
     ]
     for solver in wanted:
@@ -184,12 +187,6 @@ def run_collection(
             progress(len(rows), len(jobs))
     rows.sort(key=lambda row: order[row["case"], row["solver"]])
     return Collection(rows, share)
-
-
-def _case(name: str) -> HardCase:
-    if name not in hard_cases():
-        raise SimulationError(f"unknown case {name}: there are {', '.join(hard_cases())}")
-    return hard_cases()[name]
 
 
 def _row(name: str, solver: str, share: float, refined: bool) -> dict[str, Any]:
