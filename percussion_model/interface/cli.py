@@ -108,3 +108,7 @@ def _guarded(work: Callable[[], Any]) -> int:
             raise
         show()
         return BAD_INPUT
+
+
+if __name__ == "__main__":
+    main()

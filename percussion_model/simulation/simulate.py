@@ -50,7 +50,7 @@ class Snapshot:
 
     scene: Scene
     time: float
-    state: Any
+    state: State
     blows: tuple[np.ndarray, ...]
     events: tuple[np.ndarray, ...]
 

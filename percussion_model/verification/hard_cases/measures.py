@@ -214,8 +214,6 @@ def _repeats(run: Simulation, case: HardCase, scene: Scene, end: float) -> bool:
 def _bits(run: Simulation) -> tuple[bytes, bytes, bytes]:
     """State, blows and events as bytes."""
     state = run.save().state
-    if isinstance(state, np.ndarray):
-        return state.tobytes(), run.blows.tobytes(), run.events.tobytes()
     record = state.record.copy()
     record["n_blows"] = record["n_events"] = 0  # rows filled in the last call
     plain = record.tobytes() + state.workspace.tobytes()
