@@ -84,6 +84,10 @@ class HardCase:
     ceiling: float = CEILING
     differs: dict[str, str] = field(default_factory=dict)
 
+    def computed_by(self, solver: str, **changes: Any) -> Scene:
+        """Scene of the case for one solver."""
+        return self.scene.computed_by(solver, **changes)
+
     def changes(self, end: float) -> list[tuple[float, dict[str, float]]]:
         """Times before `end` [s] and the inputs that change then, in order."""
         found: dict[float, dict[str, float]] = {}

@@ -125,7 +125,7 @@ def measure(
     **changes
         Further values by dotted key, as for `Scene.replace`.
     """
-    scene = case.scene.computed_by(solver, **changes)
+    scene = case.computed_by(solver, **changes)
     run = Simulation(scene)
     end = share * scene.run.duration
     began = time.perf_counter()
