@@ -9,7 +9,6 @@ which motion then follows is a matter of chance.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +17,8 @@ from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.patches import Patch
 
-from examples.shared import BLACK, BLUE, GREEN, GREY, ORANGE, PINK, command_line, figure_of
+from examples.motions import KINDS, Branch, branch_of, kind_of, order_of
+from examples.shared import BLUE, ORANGE, PINK, command_line, figure_of
 from percussion_model import Scene, Simulation
 from percussion_model.interface.plotting import style
 from percussion_model.interface.plotting.style import KN, MM
@@ -33,58 +33,6 @@ COLOURS = {"falling": ORANGE, "rising": BLUE, "at once": PINK}
 SIZES = {"falling": 2.2, "rising": 1.4, "at once": 1.5}
 # A mean rate that is known no better, relative, is not drawn.
 MOST_ERROR = 0.1
-# Impact velocities that differ by less, relative, are the same.
-SAME = 1e-3
-# Blows go round n values where they repeat after n blows so much better than after one.
-BETTER = 8.0
-LONGEST_CYCLE = 8
-# Blows without order that differ by less are nearly alike.
-NEARLY = 0.05
-KINDS = {
-    "every blow alike": "#E6E6E6",
-    "round 2 to 8 values": GREEN,
-    "nearly alike": GREY,
-    "no order": BLACK,
-}
-
-
-@dataclass(frozen=True)
-class Branch:
-    """Blows along one way through the values of a parameter."""
-
-    values: np.ndarray
-    impact_velocity: np.ndarray  # (values, blows) [m/s]
-    rate: np.ndarray  # mean over the blows of each value [m/s]
-    error: np.ndarray  # its standard error [m/s]
-
-
-def order_of(velocity: np.ndarray) -> int:
-    """Values that impact velocities go round, one after the other; 0 if they do not."""
-    lags = range(1, min(LONGEST_CYCLE, len(velocity) // 2) + 1)
-    changes = [float(np.max(np.abs(velocity[n:] - velocity[:-n]))) for n in lags]
-    same = max(SAME * float(np.mean(velocity)), changes[0] / BETTER)
-    return next((n for n, change in zip(lags, changes, strict=True) if change <= same), 0)
-
-
-def kind_of(velocity: np.ndarray) -> int:
-    """Place among `KINDS`."""
-    order = order_of(velocity)
-    return min(order, 2) - 1 if order else 2 + int(np.ptp(velocity) > NEARLY * np.mean(velocity))
-
-
-def branch_of(values: np.ndarray, rows: list[np.ndarray]) -> Branch:
-    """Blows at each value, and their mean rate; the branch has the values rising."""
-    up = np.argsort(values)
-    velocity = np.array([blows["impact_velocity"] for blows in rows])
-    rate, error = np.array([mean_rate(blows) for blows in rows]).T
-    return Branch(values[up], velocity[up], rate[up], error[up])
-
-
-def mean_rate(blows: np.ndarray) -> tuple[float, float]:
-    """Mean rate of some blows and its standard error [m/s] (docs/model.md, section 7)."""
-    rate = np.sum(blows["penetration"]) / np.sum(blows["period"])
-    off = np.std(blows["penetration"] - rate * blows["period"])
-    return float(rate), float(off / np.sqrt(len(blows)) / np.mean(blows["period"]))
 
 
 def follow(

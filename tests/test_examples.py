@@ -12,13 +12,13 @@ import matplotlib.image
 import numpy as np
 import pytest
 
-from examples import bifurcation, drill_design, rate_map
+from examples import bifurcation, drill_design, motions, rate_map
 from examples.all import EXAMPLES
 from percussion_model import Scene, Simulation
 from percussion_model.simulation.files import to_json
 
 ROOT = Path(__file__).resolve().parent.parent
-SHARED = {"__init__", "all", "shared"}
+SHARED = {"__init__", "all", "motions", "shared"}
 NAMES = {path.stem for path in (ROOT / "examples").glob("*.py")} - SHARED
 
 
@@ -76,14 +76,14 @@ def test_command_line_refuses_what_it_does_not_know():
 @pytest.mark.parametrize("order", [1, 2, 3, 8])
 def test_blows_that_go_round_some_values_are_counted(order):
     noise = np.random.default_rng(0).normal(0.0, 1e-3 if order > 1 else 1e-5, 48)
-    assert bifurcation.order_of(np.resize(8.0 + np.arange(order), 48) + noise) == order
+    assert motions.order_of(np.resize(8.0 + np.arange(order), 48) + noise) == order
 
 
 def test_blows_without_order_have_none():
     noise = np.random.default_rng(1).uniform(-1.0, 1.0, 48)
-    assert bifurcation.order_of(8.0 + 2.0 * noise) == 0
-    kinds = [bifurcation.kind_of(8.0 + size * noise) for size in (2.0, 0.1, 1e-3)]
-    assert [list(bifurcation.KINDS)[k] for k in kinds] == [
+    assert motions.order_of(8.0 + 2.0 * noise) == 0
+    kinds = [motions.kind_of(8.0 + size * noise) for size in (2.0, 0.1, 1e-3)]
+    assert [list(motions.KINDS)[k] for k in kinds] == [
         "no order",
         "nearly alike",
         "every blow alike",
