@@ -5,8 +5,8 @@ from __future__ import annotations
 from itertools import groupby
 from pathlib import Path
 
+from percussion_model.scene.parameters import parameter_table
 from percussion_model.scene.rows import Row, toml_value
-from percussion_model.scene.table import parameter_table
 
 HEAD = """# Parameters
 

@@ -13,12 +13,11 @@ from fmu_src.hammer_variables import hammer_variables
 from fmu_src.interface import VERSION
 from fmu_src.page import write_page
 from fmu_src.staging import stage
-from fmu_src.variables import Variable, plain_row
+from fmu_src.variables import Variable
 from percussion_model.scene.scene import Scene, SceneError
-from percussion_model.scene.table import parameter_table
 from percussion_model.solvers.blow_map.table import BlowTable, fixed_values
 
-RUNTIME = ("plain_scene", "motion", "outputs", "blow_map", "watch", "hammer_states", "hammer")
+RUNTIME = ("motion", "outputs", "blow_map", "watch", "hammer_states", "hammer")
 STEP_SIZE = 1e-3  # of the default experiment [s]
 AUTHOR = "percussion_model developers"
 LICENSE = "BSD-3-Clause"
@@ -75,16 +74,8 @@ def about_hammer(scene: Scene, path: Path) -> About:
 
 def _scene(scene: Scene, variables: list[Variable], bundle: str) -> dict[str, object]:
     """What an instance needs of the scene, besides its variables."""
-    rows = {row.key: plain_row(row) for row in parameter_table() if row.kind != "sections"}
-    values = {key: scene[key] for key in rows if "*" not in key}
-    for bar in ("piston", "bit"):
-        for i, section in enumerate(scene[f"{bar}.sections"]):
-            for field, value in section.model_dump().items():
-                values[f"{bar}.sections.{i}.{field}"] = value
     return {
-        "values": values,
-        "given": sorted(scene.given),
-        "rows": rows,
+        "given": scene.given_values(),
         "identity": [bundle, [variable.name for variable in variables]],
     }
 

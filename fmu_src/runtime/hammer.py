@@ -12,14 +12,13 @@ from fmu_src.runtime.blow_map import read_blow_map
 from fmu_src.runtime.calls import STEPPING, Phase, guarded, plain_bounds
 from fmu_src.runtime.motion import Gauge, Motion
 from fmu_src.runtime.outputs import OUTPUTS
-from fmu_src.runtime.plain_scene import PlainScene, make_scene
 from fmu_src.runtime.slave import Slave
 from fmu_src.runtime.states import fingerprint
 from fmu_src.runtime.values import Read
 from fmu_src.runtime.watch import Watch
-from percussion_model.scene.inputs import INPUTS
-from percussion_model.scene.rows import Row, refuse_value
-from percussion_model.scene.rules import SceneRules
+from percussion_model.scene.inputs import INPUTS, why_without_effect
+from percussion_model.scene.rows import refuse_value
+from percussion_model.scene.scene import Scene
 from percussion_model.solvers.base import Solver
 from percussion_model.solvers.blow_map.solver import BlowMapSolver
 from percussion_model.solvers.wave.grid import cell_at
@@ -27,24 +26,15 @@ from percussion_model.solvers.wave.grid import cell_at
 # Solvers hold no state: instances of equal parameters share one.
 _SOLVERS: WeakValueDictionary[bytes, Solver] = WeakValueDictionary()
 
-# Inputs of the FMU that are inputs of the solver as they are.
-PLAIN_INPUTS = {
+# The solver's inputs as hosts know them: by keys of the parameter table, but for these.
+NAMES_OUTSIDE = {name: one.key for name, one in INPUTS.items()} | {
     "feed_force": "feed_force",
-    "rock.loading_stiffness": "loading_stiffness",
-    "rock.unloading_ratio": "unloading_ratio",
-    "rock.barrier_damping": "barrier_damping",
-    "rock.barrier_energy": "barrier_energy",
-    "drive.reversal_distance": "reversal_distance",
+    "drive_force": "supply_pressure",
+    "external_force": "piston_force",
 }
 
 # What the drive's forces follow from.
 DRIVE_INPUTS = ("percussion_on", "supply_pressure", "drive.effective_area", "piston_force")
-
-# The solver's inputs as hosts know them.
-NAMES_OUTSIDE = {inner: name for name, inner in PLAIN_INPUTS.items()} | {
-    "drive_force": "supply_pressure",
-    "external_force": "piston_force",
-}
 
 
 class PercussiveHammer(Slave):
@@ -55,16 +45,18 @@ class PercussiveHammer(Slave):
         self.folder = str(arguments["resources"])
         text = (Path(self.folder) / "scene.json").read_text(encoding="utf-8")
         scene = json.loads(text)
-        self.baked: dict[str, Any] = scene["values"]
-        self.given: set[str] = set(scene["given"])
-        self.rows = {one.row.key: one.row for one in self.known.values() if one.row is not None}
-        self.rows |= {key: _row(row) for key, row in scene["rows"].items()}
-        self._drive_bounds = plain_bounds(self.rows["drive.force"])
+        self.baked = Scene(**scene["given"])
+        self._drive_row = self.baked.row_of("drive.force")
+        self._drive_bounds = plain_bounds(self._drive_row)
         self.identity = scene["identity"]
         self.inputs = [one for one in self.known.values() if one.causality == "input"]
         self._readers = {self.by_name[name]: read for name, read in OUTPUTS.items()}
-        self._plain = {inner: self.by_name[name] for name, inner in PLAIN_INPUTS.items()}
         self._forced = [self.by_name[name] for name in DRIVE_INPUTS]
+        self._plain = {
+            inner: self.by_name[name]
+            for inner, name in NAMES_OUTSIDE.items()
+            if name not in DRIVE_INPUTS
+        }
         self._forces = frozenset(self._forced)
         self.motion: Motion | None = None
         self.given_inputs: list[Any] = []  # values of the inputs when the solver was made
@@ -114,9 +106,9 @@ class PercussiveHammer(Slave):
         if self.phase is STEPPING and self._forces.isdisjoint(references):
             return
         force = self.drive_force()
-        if not self.rows["drive.force"].allows(force):
+        if not self._drive_row.allows(force):
             name = "supply_pressure * drive.effective_area"
-            raise ValueError(refuse_value(self.rows["drive.force"], name, force))
+            raise ValueError(refuse_value(self._drive_row, name, force))
         if self.phase < STEPPING:
             self.make_scene()
 
@@ -139,10 +131,9 @@ class PercussiveHammer(Slave):
             "external_force": force if on else 0.0,
         }
 
-    def make_scene(self) -> PlainScene:
+    def make_scene(self) -> Scene:
         """Scene of the present values; raises `SceneError` if they contradict each other."""
-        values = dict(self.baked)
-        given = set(self.given)
+        changes: dict[str, Any] = {}
         for one in self.known.values():
             if one.key is None or one.causality != "parameter":
                 continue
@@ -151,11 +142,13 @@ class PercussiveHammer(Slave):
                 value = None
             elif one.type == "Enumeration":
                 value = self.choice(one.reference)
-            if value != values[one.key]:
-                given.add(one.key)
-            values[one.key] = value
-        values |= {INPUTS[name]: value for name, value in self.solver_inputs().items()}
-        return make_scene(values, given, self.rows)
+            if value != self.baked[one.key]:
+                changes[one.key] = value
+        for name, value in self.solver_inputs().items():
+            key = INPUTS[name].key
+            if value != self.baked[key]:
+                changes[key] = value
+        return self.baked.replace(**changes)
 
     # stepping
 
@@ -178,7 +171,7 @@ class PercussiveHammer(Slave):
             self._new.clear()
         return self.motion
 
-    def map_solver(self, scene: PlainScene) -> Solver | None:
+    def map_solver(self, scene: Scene) -> Solver | None:
         """Solver on the table that the FMU brings along, if the scene wants that."""
         if scene.solver_name != "blow-map":
             return None
@@ -192,7 +185,7 @@ class PercussiveHammer(Slave):
             if one.causality == "parameter"
         ]
 
-    def find_gauge(self, scene: PlainScene, solver: Solver) -> Gauge | None:
+    def find_gauge(self, scene: Scene, solver: Solver) -> Gauge | None:
         """Cell at the place of the gauge, None in a bar without cells."""
         name = ("piston", "bit")[self.value("gauge.bar") - 1]
         bar, place = scene[name], self.value("gauge.position")
@@ -233,16 +226,13 @@ class PercussiveHammer(Slave):
         acting |= changed
         return {name: value for name, value in changed.items() if self.acts(motion.scene, name)}
 
-    def acts(self, scene: SceneRules, name: str) -> bool:
+    def acts(self, scene: Scene, name: str) -> bool:
         """Whether an input has an effect in the scene; says so in the log where not."""
         acts = self._acts.get(name)
         if acts is None:
-            acts = scene.matters(INPUTS[name])
-            if name.startswith("barrier"):
-                acts = acts and scene.barrier_on
-            self._acts[name] = acts
+            acts = self._acts[name] = not why_without_effect(scene, name)
         if not acts:
-            outside = NAMES_OUTSIDE.get(name, name)
+            outside = NAMES_OUTSIDE[name]
             self.warn(f"{self.instance_name}: a new {outside} has no effect in this scene")
         return acts
 
@@ -271,8 +261,3 @@ class PercussiveHammer(Slave):
     @guarded
     def _set_fmu_state(self, state: bytes) -> None:
         hammer_states.restore(self, state)
-
-
-def _row(entry: dict[str, Any]) -> Row:
-    needs = {key: tuple(values) for key, values in entry["needs"].items()}
-    return Row(**{**entry, "choices": tuple(entry["choices"]), "needs": needs})

@@ -18,7 +18,7 @@ from percussion_model.physics.records import (
     Mode,
 )
 from percussion_model.scene.inputs import INPUTS, check_input
-from percussion_model.scene.rules import SceneRules
+from percussion_model.scene.scene import Scene
 from percussion_model.simulation.runner import Runner
 from percussion_model.solvers.base import Solver
 
@@ -46,12 +46,12 @@ class Motion(Runner):
 
     Parameters
     ----------
-    scene : SceneRules
+    scene : Scene
     solver : Solver or None
         One that was made for an equal scene.
     """
 
-    def __init__(self, scene: SceneRules, solver: Solver | None) -> None:
+    def __init__(self, scene: Scene, solver: Solver | None) -> None:
         super().__init__(scene, record_events=False, solver=solver)
         self.scene = scene
         self.gauge: Gauge | None = None
@@ -83,7 +83,7 @@ class Motion(Runner):
             low, high = self._bounds.get(name, NOWHERE)
             if not low <= value <= high:
                 check_input(self.scene, name, value)
-                self._bounds[name] = plain_bounds(self.scene.row_of(INPUTS[name]))
+                self._bounds[name] = plain_bounds(self.scene.row_of(INPUTS[name].key))
         return inputs
 
     def _numbers_of_blow(self) -> dict[str, float]:

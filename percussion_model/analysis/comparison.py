@@ -6,10 +6,10 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, get_args
+from typing import Any
 
 from percussion_model.scene.scene import Scene, SceneError
-from percussion_model.scene.solver_options import SolverName
+from percussion_model.scene.solver_names import SOLVER_NAMES
 from percussion_model.simulation.result import Result
 from percussion_model.simulation.simulate import simulate
 from percussion_model.simulation.warnings import unused_note
@@ -130,7 +130,7 @@ def compare(
 
 def solver_names() -> tuple[str, ...]:
     """Names of all solvers, as a scene is computed by them."""
-    return (*(name for name in get_args(SolverName) if name != "auto"), "blow-map")
+    return (*(name for name in SOLVER_NAMES if name != "auto"), "blow-map")
 
 
 def read_solvers(text: str) -> tuple[str, ...]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import platform
 import re
 from collections.abc import Iterable, Sequence
+from dataclasses import asdict
 from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -16,8 +17,8 @@ from markupsafe import Markup
 
 from percussion_model.analysis.study import Study
 from percussion_model.interface.plotting import CAPTIONS, figures
+from percussion_model.scene.parameters import find_row, parameter_table
 from percussion_model.scene.scene import Scene
-from percussion_model.scene.table import find_row, parameter_table
 from percussion_model.simulation.files import staged
 from percussion_model.simulation.result import REPORT, Result
 
@@ -340,12 +341,12 @@ def _section_rows(
 ) -> list[tuple[str, str, str, str]]:
     rows = []
     for k, section in enumerate(scene[sections]):
-        for name in type(section).model_fields:
+        for name, value in asdict(section).items():
             key = f"{sections}.{k}.{name}"
             row = find_row(key)
             assert row is not None
-            value = _written(changed.get(key, getattr(section, name)))
-            rows.append((key, value, _shown_unit(row.unit), row.description))
+            shown = _written(changed.get(key, value))
+            rows.append((key, shown, _shown_unit(row.unit), row.description))
     return rows
 
 

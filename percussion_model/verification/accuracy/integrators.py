@@ -179,8 +179,7 @@ def start_periodic(drill: Drill, problem: Problem) -> None:
     last = simulation.blows[-1]
     simulation.restore(before)
     simulation.advance(float(last["time"] - AHEAD * last["period"]))
-    reading = np.zeros(1, READING)
-    state = simulation.solver.read(simulation.save().state, simulation.time, reading)
+    state = simulation.solver.read(simulation.save().state, simulation.time, np.zeros(1, READING))
     record, nodes = state.record[0], state.workspace.reshape(len(Node), -1)
     drill.y[: drill.n], drill.y[drill.n : 2 * drill.n] = nodes[Node.U], nodes[Node.V]
     drill.y[-2:] = float(record["w"]), 0.0
