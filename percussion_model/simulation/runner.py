@@ -1,4 +1,4 @@
-"""`Runner`: a state that goes through time, without a table of what happened."""
+"""`Runner`: a state that is advanced in time, without tables of blows and events."""
 
 from __future__ import annotations
 
@@ -142,10 +142,11 @@ class Runner:
             raise SimulationError(f"after t = {self._time!r} s {self.solver.refusal(self._state)}")
         if status == Status.NOT_FINITE:
             raise SimulationError(f"{where} the state is no longer finite: check the scene")
-        raise SimulationError(f"{where} the solver found no way on ({Status(status).name.lower()})")
+        reason = Status(status).name.lower()
+        raise SimulationError(f"{where} the solver could not continue ({reason})")
 
     def sample_rows(self, times: np.ndarray) -> np.ndarray:
-        """Advance through rising `times` and tell what it is like at each.
+        """Advance through rising `times` and read the sample at each.
 
         Returns
         -------
@@ -188,7 +189,7 @@ class Runner:
         return {name: check_input(self._scene_rules, name, value) for name, value in inputs.items()}
 
     def set_inputs(self, **inputs: float) -> None:
-        """Change inputs at the first grid point from now on.
+        """Change inputs at the next grid point.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""The page of the hard cases: what was run, what came out, where solvers disagree."""
+"""Page of the hard cases (docs/stability.md): runs, verdict, disagreements of solvers."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ GROUPS = {
 _INTRODUCTION = """# Stability
 
 What the solvers make of the nastiest scenes that this model has. This page is written by
-`percussion stability --out docs`; the cases are stored in `percussion_model/hard_cases/*.toml`,
-each with what makes it hard and what must hold. How guards act and what they warn of is told in
-[numerics.md](numerics.md), section 12.
+`percussion stability --out docs`; the cases are stored in
+`percussion_model/verification/hard_cases/*.toml`, each with what makes it hard and what must hold.
+How guards act and what they warn of is told in [numerics.md](numerics.md), section 12.
 
 **What must hold of every run**: it ends, with finite numbers; the energy residual is below
 {residual:g} of the ledger's denominator; momentum equals impulses within {momentum:g}; nothing
@@ -37,11 +37,11 @@ other calls gives the same bits.
 """
 
 _COLUMNS = """**Columns.** *rate*: rate of penetration with its standard error where that is above
-1 %; *residual* and *numerical*: entries of the energy ledger by its denominator; *momentum*: its
-greatest difference to the impulses, by the greatest impulse; *events*: per simulated second;
-*guards*: how often one acted; *refined*: change of the rate on a grid of twice as many cells or
-elements, of aperiodic cases in standard errors; *speed*: simulated time by time to compute,
-readings included.
+1 %; *residual* and *numerical*: entries of the energy ledger divided by its denominator;
+*momentum*: its greatest difference to the impulses, divided by the greatest impulse; *events*: per
+simulated second; *guards*: how often one acted; *refined*: change of the rate on a grid of twice as
+many cells or elements, of aperiodic cases in standard errors; *speed*: simulated time divided by
+time to compute, readings included.
 """
 
 

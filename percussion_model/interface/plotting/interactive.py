@@ -1,4 +1,4 @@
-"""What figures that can be zoomed have in common: panels, lines, the script that draws them."""
+"""Interactive figures (bokeh): panels, lines, and their embedding in a page."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def thinned(values: np.ndarray, most: int = MOST_POINTS) -> np.ndarray:
 
 
 def hover(to: Any, drawn: Any, *shown: tuple[str, str]) -> None:
-    """Tell numbers beside the pointer."""
+    """Show numbers beside the pointer."""
     to.add_tools(HoverTool(renderers=[drawn], tooltips=list(shown), mode="vline"))
 
 

@@ -1,20 +1,27 @@
-"""What each effect costs and changes: a scene with one effect at a time turned off, or on."""
+"""Study of effects: a scene with one effect at a time turned off, or on."""
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
-from percussion_model.analysis.effect_turns import Turn, turns
+from percussion_model.analysis.comparison import relative_change
 from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.simulation.result import LEAST_BLOWS, Result
-from percussion_model.simulation.simulate import simulate
-from percussion_model.simulation.stepping import Simulation
+from percussion_model.simulation.simulate import Simulation, simulate
 
-__all__ = ["NOISE", "EffectsStudy", "Trial", "cost_of_step", "step_costs", "study_effects"]
+__all__ = [
+    "NOISE",
+    "EffectsStudy",
+    "Trial",
+    "Variant",
+    "effect_variants",
+    "step_costs",
+    "study_effects",
+]
 
 # A step whose cost differs by this much from the scene's differs by more than noise.
 NOISE = 1.05
@@ -42,6 +49,121 @@ UNDECIDED = 0.25
 CHANGED = ("rate_of_penetration", "blow_period", "peak_bit_force")
 _BY_BLOWS = ("rate_of_penetration_standard_error", "drilling_cycles_per_blow")
 
+_NO_ROCK = "the bit meets no rock: it flies, and drills nothing"
+_NO_DRIVE = "nothing throws the piston: what moves is left from the start and comes to rest"
+_NO_CRUSHING = "a linear spring gives all back: nothing is crushed"
+_BARRIER = ("rock.barrier_energy", "rock.barrier_damping")
+
+
+@dataclass(frozen=True)
+class Variant:
+    """One effect changed.
+
+    Attributes
+    ----------
+    effect : str
+        Its name; empty for the scene as it is.
+    setting : str
+        "off", "on", or what takes its place.
+    changes : dict
+        Values by dotted key.
+    off : bool
+        Whether something is left out, so that nothing may cost more.
+    no_penetration : str
+        Why the rate of penetration means nothing then; may be empty.
+    no_blows : str
+        Why nothing that is counted by blows means anything; may be empty.
+    """
+
+    effect: str
+    setting: str
+    changes: dict[str, Any] = field(default_factory=dict)
+    off: bool = False
+    no_penetration: str = ""
+    no_blows: str = ""
+
+    @property
+    def name(self) -> str:
+        """Effect and setting."""
+        return f"{self.effect} {self.setting}".strip()
+
+    def apply(self, scene: Scene) -> Scene:
+        """Return the scene with the effect changed; `SceneError` where it cannot be."""
+        if self.changes.get("solver.name") == "rigid":
+            rest = {key: value for key, value in self.changes.items() if key != "solver.name"}
+            return scene.computed_by("rigid", **rest)
+        return scene.replace(**self.changes)
+
+
+def effect_variants(scene: Scene) -> Iterator[Variant]:
+    """Go through the scene as it is, then one effect after the other."""
+    effects = scene.effects
+    yield Variant("", "as it is", no_penetration=_NO_CRUSHING if effects.rock == "spring" else "")
+    for name in ("gravity", "feed"):
+        is_on = getattr(effects, name)
+        yield Variant(name, "off" if is_on else "on", {f"effects.{name}": not is_on}, off=is_on)
+    yield from _drive(scene)
+    yield from _rock(scene)
+    yield from _bars(scene)
+    if scene.solver_name == "wave":
+        is_on = scene.solver.leaps
+        # Leaps are no effect but an accelerator: a step without them is the same step.
+        yield Variant("leaps", "off" if is_on else "on", {"solver.leaps": not is_on})
+
+
+def _drive(scene: Scene) -> Iterator[Variant]:
+    if scene.effects.drive != "none":
+        yield Variant("drive", "off", {"effects.drive": "none"}, off=True, no_blows=_NO_DRIVE)
+    elif scene.piston.model != "absent":
+        yield Variant("drive", "on", {"effects.drive": "pressure"})
+
+
+def _rock(scene: Scene) -> Iterator[Variant]:
+    rock = scene.effects.rock
+    if rock == "bilinear":
+        if scene.barrier_on:
+            yield Variant("barrier", "off", {"effects.barrier": False}, off=True)
+        else:
+            yield Variant("barrier", "on", {"effects.barrier": True, **_not_zero(scene, _BARRIER)})
+        other = "paper" if scene.effects.standstill_tension == "release" else "release"
+        yield Variant("standstill tension", other, {"effects.standstill_tension": other})
+        yield Variant(
+            "bilinear law",
+            "spring",
+            {"effects.rock": "spring", "effects.barrier": False},
+            off=True,
+            no_penetration=_NO_CRUSHING,
+        )
+    if rock == "none":
+        yield Variant("rock", "on", {"effects.rock": "bilinear"})
+    else:
+        changes = {"effects.rock": "none", "effects.barrier": False}
+        yield Variant("rock", "off", changes, off=True, no_blows=_NO_ROCK)
+
+
+def _bars(scene: Scene) -> Iterator[Variant]:
+    if scene.bit.model == "elastic":
+        if scene.loss_on:
+            yield Variant("loss", "off", {"effects.loss": False}, off=True)
+        else:
+            changes = {"effects.loss": True, **_not_zero(scene, ("loss.time",))}
+            yield Variant("loss", "on", changes)
+        if scene.piston.model == "elastic":
+            yield Variant("elastic piston", "rigid", {"piston.model": "rigid"}, off=True)
+        elif scene.piston.model == "rigid":
+            yield Variant("elastic piston", "on", {"piston.model": "elastic"})
+        yield Variant("elastic bars", "rigid", {"solver.name": "rigid"}, off=True)
+        return
+    changes = {"bit.model": "elastic", "solver.name": "auto"}
+    if scene.piston.model == "rigid":
+        changes["piston.model"] = "elastic"
+    yield Variant("elastic bars", "on", changes)
+
+
+def _not_zero(scene: Scene, keys: tuple[str, ...]) -> dict[str, Any]:
+    """Defaults for what the scene sets to zero, which would keep the effect off."""
+    return {key: scene.row_of(key).default for key in keys if scene[key] == 0}
+
 
 @dataclass(frozen=True)
 class Trial:
@@ -49,8 +171,8 @@ class Trial:
 
     Attributes
     ----------
-    turn : Turn
-        What was turned; that of the scene itself changes nothing.
+    variant : Variant
+        What was changed; that of the scene itself changes nothing.
     result : Result
         Of the whole run.
     wall_time : float
@@ -61,7 +183,7 @@ class Trial:
         where the solver has no step.
     """
 
-    turn: Turn
+    variant: Variant
     result: Result
     wall_time: float
     step: float | None
@@ -69,8 +191,8 @@ class Trial:
     @property
     def reason(self) -> str:
         """Why there is no rate of penetration, or why it must not be trusted; may be empty."""
-        if self.turn.no_blows or self.turn.no_penetration:
-            return self.turn.no_blows or self.turn.no_penetration
+        if self.variant.no_blows or self.variant.no_penetration:
+            return self.variant.no_blows or self.variant.no_penetration
         reasons = [text for text in self.result.warnings if "trusted" in text]
         if len(self.result.counted) < LEAST_BLOWS:
             reasons += [text for text in self.result.warnings if "whole blow" in text][:1]
@@ -91,14 +213,14 @@ class Trial:
         summary = self.result.summary()
         blows = summary["blows"]
         found = {name: summary[name] for name in (*CHANGED, *_BY_BLOWS)}
-        if self.turn.no_penetration:
+        if self.variant.no_penetration:
             found["rate_of_penetration"] = found["rate_of_penetration_standard_error"] = None
-        if self.turn.no_blows:
+        if self.variant.no_blows:
             found = dict.fromkeys(found)
             blows = None
         return {
-            "effect": self.turn.effect,
-            "turned": self.turn.turned,
+            "effect": self.variant.effect,
+            "turned": self.variant.setting,
             "step_time": self.step,
             "wall_time": self.wall_time,
             "blow_time": self.wall_time / blows if blows else None,
@@ -113,7 +235,7 @@ class Trial:
 
 @dataclass(frozen=True)
 class EffectsStudy:
-    """A scene and its variants, one effect turned in each.
+    """A scene and its variants, one effect changed in each.
 
     Attributes
     ----------
@@ -122,7 +244,7 @@ class EffectsStudy:
         The scene as it is.
     trials : list of Trial
     refused : dict of str
-        Effects that cannot be turned in this scene, and why.
+        Effects that cannot be changed in this scene, and why.
     """
 
     scene: Scene
@@ -133,14 +255,14 @@ class EffectsStudy:
     def changes(self, trial: Trial) -> dict[str, float | None]:
         """Relative change of each number of `CHANGED` against the scene itself."""
         here, base = trial.numbers(), self.base.numbers()
-        found = {name: _relative(here[name], base[name]) for name in CHANGED}
+        found = {name: relative_change(here[name], base[name]) for name in CHANGED}
         if trial.undecided or self.base.undecided:
             found["rate_of_penetration"] = None
         return found
 
-    def dearer(self, trial: Trial) -> bool:
-        """Whether turning an effect off made a step dearer, beyond noise."""
-        if not trial.turn.off or trial.step is None or self.base.step is None:
+    def is_costlier(self, trial: Trial) -> bool:
+        """Whether turning an effect off made a step costlier, beyond noise."""
+        if not trial.variant.off or trial.step is None or self.base.step is None:
             return False
         return trial.step > NOISE * self.base.step
 
@@ -157,7 +279,7 @@ class EffectsStudy:
                 {
                     **trial.numbers(),
                     "changes": self.changes(trial),
-                    "step_dearer": self.dearer(trial),
+                    "step_dearer": self.is_costlier(trial),
                 }
                 for trial in self.trials
             ],
@@ -191,25 +313,25 @@ def study_effects(
     SceneError, SimulationError
         If the scene itself cannot be computed.
     """
-    base, *rest = turns(scene)
+    base, *rest = effect_variants(scene)
     cases = [(base, scene)]
     refused = {}
-    for turn in rest:
+    for variant in rest:
         try:
-            cases.append((turn, turn.apply(scene)))
+            cases.append((variant, variant.apply(scene)))
         except SceneError as error:
-            refused[f"{turn.effect} {turn.turned}"] = str(error)
+            refused[variant.name] = str(error)
     found = []
-    for k, (turn, changed) in enumerate(cases):
+    for k, (variant, changed) in enumerate(cases):
         if progress is not None:
-            progress(f"{turn.effect} {turn.turned}".strip(), k / (len(cases) + 1))
+            progress(variant.name, k / (len(cases) + 1))
         found.append(_best_run(changed, duration, settle))
     if progress is not None:
         progress("time steps", len(cases) / (len(cases) + 1))
     steps = step_costs([changed for _, changed in cases])
     trials = [
-        Trial(turn, result, wall, step)
-        for (turn, _), (result, wall), step in zip(cases, found, steps, strict=True)
+        Trial(variant, result, wall, step)
+        for (variant, _), (result, wall), step in zip(cases, found, steps, strict=True)
     ]
     return EffectsStudy(scene, trials[0], trials[1:], refused)
 
@@ -229,31 +351,23 @@ def step_costs(scenes: Sequence[Scene], rounds: int = ROUNDS) -> list[float | No
     Short stretches taken in turn, so that a machine that slows down slows all
     of them. None where a solver goes from event to event and has no step.
     """
-    flights = [Simulation(_in_flight(scene), record_events=False) for scene in scenes]
+    flights = []
+    for scene in scenes:
+        changes = {key: value for key, value in FLIGHT.items() if scene.matters(key)}
+        flights.append(Simulation(scene.replace(**changes), record_events=False))
     best = [math.inf if flight.solver.time_step else None for flight in flights]
     for _ in range(rounds):
         for k, flight in enumerate(flights):
             step, least = flight.solver.time_step, best[k]
             if step is not None and least is not None:
-                best[k] = min(least, cost_of_step(flight, FLIGHT_STEPS * step))
+                best[k] = min(least, _cost_of_step(flight, FLIGHT_STEPS * step))
     return best
 
 
-def _in_flight(scene: Scene) -> Scene:
-    """Return the scene with both bodies far from each other and from the rock."""
-    return scene.replace(**{key: value for key, value in FLIGHT.items() if scene.matters(key)})
-
-
-def cost_of_step(simulation: Simulation, duration: float) -> float:
+def _cost_of_step(simulation: Simulation, duration: float) -> float:
     """Advance a simulation; processor time by the steps that it took [s]."""
     before = simulation.statistics()["steps"]
     began = time.process_time()
     simulation.advance(simulation.time + duration)
     cost = time.process_time() - began
     return cost / (simulation.statistics()["steps"] - before)
-
-
-def _relative(value: float | None, base: float | None) -> float | None:
-    if value is None or base is None or base == 0 or not math.isfinite(value / base):
-        return None
-    return value / base - 1.0

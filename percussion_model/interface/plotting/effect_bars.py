@@ -1,17 +1,15 @@
-"""What each effect costs and changes, as bars."""
+"""Figure of the cost and change of each effect, as bars."""
 
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from percussion_model.analysis.effects import EffectsStudy
+from percussion_model.analysis.effect_study import EffectsStudy
 from percussion_model.interface.plotting import style
 
-NAME = "effects"
 COST_COLOUR, MORE_COLOUR, LESS_COLOUR = "#0072B2", "#D55E00", "#009E73"
 # Axes are made for changes up to this [%].
 WIDEST = 60.0
@@ -26,7 +24,7 @@ NOTHING = 5e-3
 def draw_effects(found: EffectsStudy) -> Figure:
     """Draw cost of a step, of a blow, and change in rate, period and peak force."""
     trials = found.trials
-    names = [f"{trial.turn.effect}: {trial.turn.turned}" for trial in trials]
+    names = [f"{trial.variant.effect}: {trial.variant.setting}" for trial in trials]
     height = 1.6 + 0.32 * len(trials)
     fig = Figure(figsize=(12.0, height), layout="constrained")
     axes = fig.subplots(1, 5, sharey=True)
@@ -35,7 +33,8 @@ def draw_effects(found: EffectsStudy) -> Figure:
         (axes[0], "step_time", "a time step"),
         (axes[1], "blow_time", "a blow"),
     ):
-        values = [_ratio(trial.numbers()[key], base[key]) for trial in trials]
+        costs = [trial.numbers()[key] for trial in trials]
+        values = [c / base[key] if c is not None and base[key] else None for c in costs]
         _costs(ax, values)
         style.label(ax, "by the scene's own", "", f"Cost of {title}")
     for ax, key, title in (
@@ -53,10 +52,6 @@ def draw_effects(found: EffectsStudy) -> Figure:
     title = found.scene.title
     style.head(fig, "One effect turned at a time" + (f" — {title}" if title else ""))
     return fig
-
-
-def _ratio(value: float | None, base: float | None) -> float | None:
-    return None if value is None or not base else value / base
 
 
 def _costs(ax: Axes, values: list[float | None]) -> None:
@@ -99,14 +94,3 @@ def _changes(ax: Axes, values: list[float | None]) -> None:
         box = {"facecolor": "white", "edgecolor": "none", "pad": 0.8} if cut else None
         ax.text(shown, y, text, va="center", ha=align, fontsize=8.0, bbox=box)
     ax.axvline(0.0, color=style.RULE_COLOUR, linewidth=0.8)
-
-
-def save_effects(found: EffectsStudy, folder: str | Path) -> list[Path]:
-    """Draw the figure as PNG and SVG into a folder.
-
-    Returns
-    -------
-    list of Path
-        The files.
-    """
-    return style.save_figures(lambda: [(NAME, draw_effects(found))], folder)

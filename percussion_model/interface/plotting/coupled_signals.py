@@ -1,4 +1,4 @@
-"""Signals of a coupled run over time."""
+"""Figure of the signals of a coupled run over time."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ PANELS = (
 MODES = ("drilling", "void", "retract")  # of the controller, by number
 
 
-def save_coupled(run: CoupledRun, path: Path, title: str) -> Path:
+def save_signals(run: CoupledRun, path: Path, title: str) -> Path:
     """Draw what a drilling system has of the usual signals; return the PNG file."""
     panels = [
         (label, factor, [name for name in names if name in run.columns])

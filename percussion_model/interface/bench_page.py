@@ -1,4 +1,4 @@
-"""Figures and page of a controller's standard runs."""
+"""Page of a controller's standard runs, with a figure for each."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ TEXTS = {trial.name: trial.text for trial in TRIALS}
 VOID_COLOUR, LIMIT_COLOUR = "#dddddd", "#bb0000"
 
 
-def save_bench(
+def write_bench_page(
     scores: Sequence[Score], points: float, columns: Columns, folder: Path, title: str
 ) -> Path:
     """Write a figure for each run and one page with all, everything or nothing; return the page.

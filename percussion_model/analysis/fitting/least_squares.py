@@ -1,7 +1,8 @@
-"""Least squares with honest intervals: what every fit shares."""
+"""Least squares of a model that is smooth piece by piece: minimum, and honest intervals."""
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -9,16 +10,27 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-__all__ = ["Estimate", "Fit", "FitError"]
-
 Model = Callable[[np.ndarray], np.ndarray]
 
 # The misfit at an end of an interval may stay this far below what a straight model has there.
 STRAIGHT_ENOUGH = 0.9
-# Where the misfit is looked at on both sides, in half-widths of the interval.
-LOOKED_AT = (0.4, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0)
+# Points of the profile on both sides, in half-widths of the interval.
+PROFILE_POINTS = (0.4, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0)
 # Residuals that follow from each other by so many standard errors are no independent noise.
 MOST_CORRELATION = 4.0
+# Step of the first slopes, in the logarithm: far above the noise of events that move from cell
+# to cell, far below the steps at which the number of drilling cycles changes.
+FIRST_STEP = 0.01
+# Steps of the last slopes, which are taken over one standard error.
+LEAST_STEP, MOST_STEP = 1e-4, 0.1
+# Grids are refined down to steps of this size, in the logarithm.
+SEARCHED = 0.1
+LEAST_STEPS = 4  # with fewer a finer grid is no finer
+# Least squares have arrived when a step is as small, relative.
+ARRIVED = 1e-4
+# The search without derivatives ends at this share of a standard error.
+POLISHED = 0.05
+MOST_POLISH = 40  # runs a parameter
 
 
 class FitError(ValueError):
@@ -83,8 +95,8 @@ class Fit:
         }
 
 
-class Counted:
-    """A model that counts its calls, and knows where it holds.
+class CountedModel:
+    """A model that counts its calls, within bounds of its parameters.
 
     Parameters
     ----------
@@ -102,6 +114,7 @@ class Counted:
         self.high: Any = math.inf if high is None else high
 
     def __call__(self, at: np.ndarray) -> np.ndarray:
+        """Compute the model, at the nearest place within the bounds."""
         self.runs += 1
         return self.model(np.clip(at, self.low, self.high))
 
@@ -131,8 +144,8 @@ def covariance(jacobian: np.ndarray, variance: float, names: Sequence[str]) -> n
     return np.asarray(variance * np.linalg.inv(alike) / np.outer(scale, scale))
 
 
-def look_around(
-    model: Counted, data: np.ndarray, at: np.ndarray, spread: np.ndarray, width: float
+def profile_intervals(
+    model: CountedModel, data: np.ndarray, at: np.ndarray, spread: np.ndarray, width: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Check intervals by the misfit itself, and look for a better place on the way.
 
@@ -143,7 +156,7 @@ def look_around(
 
     Parameters
     ----------
-    model : Counted
+    model : CountedModel
         Parameters to data.
     data : ndarray
     at : ndarray
@@ -171,7 +184,7 @@ def look_around(
             continue
         for side, sign in enumerate((-1.0, 1.0)):
             reach = width
-            for factor, beyond in zip(LOOKED_AT, (*LOOKED_AT[1:], math.inf), strict=True):
+            for factor, beyond in zip(PROFILE_POINTS, (*PROFILE_POINTS[1:], math.inf), strict=True):
                 place = at + sign * factor * width / error * spread[:, k]
                 there = model.misfit(data, place)
                 if there < least:
@@ -183,7 +196,7 @@ def look_around(
 
 
 def make_fit(
-    model: Counted,
+    model: CountedModel,
     data: np.ndarray,
     at: np.ndarray,
     jacobian: np.ndarray,
@@ -196,7 +209,7 @@ def make_fit(
 
     Parameters
     ----------
-    model : Counted
+    model : CountedModel
         Parameters to data.
     data : ndarray
     at : ndarray
@@ -288,3 +301,102 @@ def check_confidence(confidence: float) -> None:
     """Raise `FitError` unless a confidence makes sense."""
     if not 0 < confidence < 1:
         raise FitError(f"confidence = {confidence!r}: must be a number above 0 and below 1")
+
+
+def search(
+    model: CountedModel, data: np.ndarray, guess: np.ndarray, reach: np.ndarray, steps: int
+) -> np.ndarray:
+    """Best point of a grid around the guess, of a finer one around that, and so on.
+
+    Parameters
+    ----------
+    model : CountedModel
+        Parameters to data.
+    data : ndarray
+    guess : ndarray
+        Logarithms.
+    reach : ndarray
+        How far to search on either side; parameters with 0 stay.
+    steps : int
+        Values of each parameter on a grid.
+
+    Returns
+    -------
+    ndarray
+    """
+    centre = np.clip(guess, model.low, model.high)
+    while np.max(reach) > SEARCHED:
+        axes = [np.linspace(-r, r, steps) if r > 0 else np.zeros(1) for r in reach]
+        # The last varies fastest; among C_R and W_R it is the one that is cheap to change.
+        points = [
+            np.clip(centre + np.array(shift), model.low, model.high)
+            for shift in itertools.product(*axes)
+        ]
+        centre = min(points, key=lambda at: model.misfit(data, at))
+        reach = 2.0 * reach / (steps - 1)
+    return centre
+
+
+def descend(
+    model: CountedModel, data: np.ndarray, start: np.ndarray, names: Sequence[str]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Go down to the minimum next to a point.
+
+    Returns
+    -------
+    at : ndarray
+        The minimum.
+    jacobian : ndarray, shape (data, parameters)
+        Taken over one standard error.
+    spread : ndarray
+        Covariance.
+    """
+    from scipy.optimize import least_squares, minimize
+
+    def covariance_at(at: np.ndarray, jacobian: np.ndarray) -> np.ndarray:
+        variance = model.misfit(data, at) / (len(data) - len(at))
+        return covariance(jacobian, variance, names)
+
+    found = least_squares(
+        lambda at: model(at) - data,
+        start,
+        lambda at: slopes(model, at, np.full(len(at), FIRST_STEP)),
+        (model.low, model.high),
+        xtol=ARRIVED,
+        ftol=ARRIVED**2,
+        x_scale="jac",
+    )
+    spread = covariance_at(found.x, found.jac)
+    size = _steps(spread)
+    corners = np.vstack([np.zeros(len(start)), np.eye(len(start))])
+    polished = minimize(
+        lambda shift: model.misfit(data, found.x + shift * size),
+        corners[0],
+        method="Nelder-Mead",
+        options={
+            "initial_simplex": corners,
+            "xatol": POLISHED,
+            "fatol": math.inf,
+            "maxfev": MOST_POLISH * len(start),
+        },
+    )
+    at = found.x + polished.x * size
+    for _ in range(2):  # the step is the error, which follows from the step
+        jacobian = slopes(model, at, _steps(spread))
+        spread = covariance_at(at, jacobian)
+    return at, jacobian, spread
+
+
+def slopes(model: Model, at: np.ndarray, steps: np.ndarray) -> np.ndarray:
+    """Jacobian by central differences over given steps, shape (data, parameters)."""
+    columns = []
+    for k, step in enumerate(steps):
+        shift = np.zeros(len(at))
+        shift[k] = step
+        columns.append((model(at + shift) - model(at - shift)) / (2.0 * step))
+    return np.stack(columns, axis=1)
+
+
+def _steps(spread: np.ndarray) -> np.ndarray:
+    """Steps of one standard error, within limits."""
+    return np.clip(np.sqrt(np.diag(spread)), LEAST_STEP, MOST_STEP)

@@ -1,6 +1,6 @@
-"""Meeting a wanted accuracy: finer runs until they agree, longer ones where motion is aperiodic.
+"""Accuracy control: finer runs until they agree, longer ones where motion is aperiodic.
 
-What the numbers below rest on is told in docs/requested_accuracy.md.
+The evidence for the constants is in docs/requested_accuracy.md.
 """
 
 from __future__ import annotations
@@ -31,6 +31,9 @@ CONFIDENCE = 2.0
 # More cells in the first bar are not tried: leaps end there, and a run without
 # them takes minutes for a second.
 FINEST = 256
+
+# Runs a scene; the second argument: whether for as long as aperiodic motion needs.
+RunOnce = Callable[[Scene, bool], Result]
 
 
 @dataclass(frozen=True)
@@ -75,14 +78,14 @@ def time_needed(result: Result, accuracy: float) -> float:
     return result.settle + factor * (result.duration - result.settle)
 
 
-def meet(scene: Scene, once: Callable[[Scene, bool], Result]) -> Result:
+def run_to_accuracy(scene: Scene, run_once: RunOnce) -> Result:
     """Run a scene so that its rate of penetration has the accuracy that it asks for.
 
     Parameters
     ----------
     scene : Scene
         With `solver.accuracy`.
-    once : callable
+    run_once : callable
         Runs a scene; the second argument says whether as long as aperiodic
         motion needs.
 
@@ -95,17 +98,17 @@ def meet(scene: Scene, once: Callable[[Scene, bool], Result]) -> Result:
     wanted = scene.solver.accuracy
     assert wanted is not None
     if scene.solver_name != "wave":  # rigid bodies move in closed form
-        return _finished(scene, [Grid(once(scene, True), 0.0)], wanted)
+        return _finished(scene, [Grid(run_once(scene, True), 0.0)], wanted)
     coarse, cells = planned_cells(scene)[:2]
-    grids = [_run(scene, coarse, once, longer=False)]
+    grids = [_run(scene, coarse, run_once, extend=False)]
     if grids[0].result.cut_short:
         return _finished(scene, grids, wanted)
-    grids.append(_run(scene, cells, once))
+    grids.append(_run(scene, cells, run_once))
     if not scene.run.check and _trusted(grids, wanted):
         return _finished(scene, grids, wanted)
     while _useful(grids) and 2 * cells <= FINEST:
-        cells = _halved(scene, cells)
-        finer = _run(scene, cells, once)
+        cells = _halved(scene, wanted, cells)
+        finer = _run(scene, cells, run_once)
         if finer.result.cut_short:
             note = "interrupted while it was verified: this is the run before"
             grids[-1].result.warnings.append(note)
@@ -123,7 +126,7 @@ def planned_cells(scene: Scene) -> list[int]:
     cells, _ = cells_for(scene, wanted)
     plan = [coarser_cells(scene, cells), cells]
     if scene.run.check and 2 * cells <= FINEST:
-        plan.append(_halved(scene, cells))
+        plan.append(_halved(scene, wanted, cells))
     return plan
 
 
@@ -132,17 +135,13 @@ def with_cells(scene: Scene, cells: int) -> Scene:
     return scene.replace(**{"solver.accuracy": None, "run.check": False, "solver.cells": cells})
 
 
-def _halved(scene: Scene, cells: int) -> int:
+def _halved(scene: Scene, wanted: float, cells: int) -> int:
     """Cells of a run at half the step that fit the lengths."""
-    wanted = scene.solver.accuracy
-    assert wanted is not None
     return cells_for(scene, wanted, fewest=2 * cells, most=FINEST)[0]
 
 
-def _run(
-    scene: Scene, cells: int, once: Callable[[Scene, bool], Result], longer: bool = True
-) -> Grid:
-    result = once(with_cells(scene, cells), longer)
+def _run(scene: Scene, cells: int, run_once: RunOnce, extend: bool = True) -> Grid:
+    result = run_once(with_cells(scene, cells), extend)
     return Grid(result, FIT_EFFECT * result.wave_speed_error)
 
 

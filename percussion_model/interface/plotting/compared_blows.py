@@ -1,12 +1,10 @@
-"""Bit force and motion through a blow, by several solvers."""
+"""Figure of bit force and motion through a blow, by several solvers."""
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
@@ -15,7 +13,6 @@ from percussion_model.interface.plotting import style
 from percussion_model.interface.plotting.style import KN, MM, MS
 from percussion_model.interface.plotting.window import CONTACTS_SHARE, Window, last_blow_window
 
-NAME = "comparison"
 # The close view ends at this multiple of the last early contact.
 CLOSE = 1.6
 # Colour, dashes and width of each solver; dashes tell apart what lies on each other.
@@ -51,13 +48,10 @@ def draw_comparison(comparison: Comparison) -> Figure:
         for name, (colour, dashes, _) in LINES.items()
         if name in windows
     ]
-    style.head(fig, f"The last blow by {len(windows)} solvers{_title(comparison)}", handles)
-    return fig
-
-
-def _title(comparison: Comparison) -> str:
     title = comparison.results[comparison.first].scene.title
-    return f" — {title}" if title else ""
+    title = f" — {title}" if title else ""
+    style.head(fig, f"The last blow by {len(windows)} solvers{title}", handles)
+    return fig
 
 
 def _draw(axes: np.ndarray, name: str, window: Window, shown: np.ndarray) -> None:
@@ -69,19 +63,4 @@ def _draw(axes: np.ndarray, name: str, window: Window, shown: np.ndarray) -> Non
         window.samples["relative_displacement"] * MM,
     )
     for ax, values in zip(axes, curves, strict=True):
-        _line(ax, time, values[shown], colour, dashes, width)
-
-
-def _line(ax: Axes, x: np.ndarray, y: np.ndarray, colour: str, dashes: Any, width: float) -> None:
-    ax.plot(x, y, color=colour, linestyle=dashes, linewidth=width)
-
-
-def save_comparison(comparison: Comparison, folder: str | Path) -> list[Path]:
-    """Draw the figure of a comparison as PNG and SVG into a folder.
-
-    Returns
-    -------
-    list of Path
-        The files.
-    """
-    return style.save_figures(lambda: [(NAME, draw_comparison(comparison))], folder)
+        ax.plot(time, values[shown], color=colour, linestyle=dashes, linewidth=width)

@@ -1,19 +1,24 @@
-"""A system as its SSP archive has it, unpacked."""
+"""Unpacked SSP archive: components, connections and parameter values of a system."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from fmpy import extract, read_model_description
 from fmpy.ssp.ssd import find_components, read_ssd
 
 from percussion_model.coupling.component import CouplingError
 
-# An input of a component, the component it comes from, and the output there.
-Link = tuple[str, str, str]
+
+class Link(NamedTuple):
+    """A connection to an input of a component."""
+
+    input: str
+    source: str  # component
+    output: str  # of that component
 
 
 @dataclass(frozen=True)
@@ -51,7 +56,7 @@ def unpack(path: Path, folder: str) -> Archive:
     components = find_components(system)
     links: dict[str, list[Link]] = {one.name: [] for one in components}
     for one in system.connections:
-        links[one.endElement].append((one.endConnector, one.startElement, one.startConnector))
+        links[one.endElement].append(Link(one.endConnector, one.startElement, one.startConnector))
     return Archive(
         {one.name: Path(folder) / one.source for one in components},
         {one.name: _bound(one) for one in components},
@@ -85,25 +90,4 @@ def input_starts(fmu: Path, values: Mapping[str, Any]) -> dict[str, Any]:
     for one in read_model_description(str(fmu), validate=False).modelVariables:
         if one.causality == "input":
             found[one.name] = values.get(one.name, kinds.get(one.type, int)(one.start))
-    return found
-
-
-def choose_values(
-    archive: Archive, given: Mapping[str, Any], name: str
-) -> dict[str, dict[str, Any]]:
-    """Values of the archive, and those that go before them.
-
-    Parameters
-    ----------
-    given : mapping
-        By `component.variable`.
-    name : str
-        Of the archive, for the error.
-    """
-    found = {component: dict(values) for component, values in archive.values.items()}
-    for signal, value in given.items():
-        component, _, variable = signal.partition(".")
-        if component not in found:
-            raise CouplingError(f"{signal}: there is no FMU {component} in {name}")
-        found[component][variable] = value
     return found

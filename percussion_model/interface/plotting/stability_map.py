@@ -1,8 +1,7 @@
-"""How stable the solvers are: cases by solvers, a panel for each measure."""
+"""Figure of the stability of the solvers: cases by solvers, a panel for each measure."""
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import matplotlib
@@ -12,7 +11,6 @@ from matplotlib.figure import Figure
 from percussion_model.interface.plotting import style
 from percussion_model.verification.hard_cases import SOLVERS, Collection
 
-NAME = "stability"
 # What lies below this is rounding of one number: it gets the colour of it.
 LEAST = 1e-16
 # Title, key of a row, limits of the colours (powers of ten), colours.
@@ -63,15 +61,3 @@ def _table(
             place = cases.index(row["case"]), solvers.index(row["solver"])
             values[place] = np.log10(max(abs(row[key]), LEAST))
     return np.ma.masked_invalid(values)
-
-
-def save_stability(found: Collection, folder: str | Path) -> Path:
-    """Draw the figure as PNG into a folder.
-
-    Returns
-    -------
-    Path
-        The file.
-    """
-    (file,) = style.save_figures(lambda: [(NAME, draw_stability(found))], folder, kinds=("png",))
-    return file

@@ -1,4 +1,4 @@
-"""A map of a study over two axes of its grid, cuts through it, sliders for the others."""
+"""Interactive figures of a study: maps with sliders or scatter, and a table to sort."""
 
 from __future__ import annotations
 
@@ -13,23 +13,151 @@ from bokeh.models import (
     ColumnDataSource,
     CustomJS,
     CustomJSTickFormatter,
+    DataTable,
     HoverTool,
     LayoutDOM,
     LinearColorMapper,
     Range1d,
+    ScientificFormatter,
+    Select,
     Slider,
+    TableColumn,
 )
 from bokeh.palettes import Viridis256
 
 from percussion_model.analysis.study import Study
-from percussion_model.analysis.study.work import KINDS
-from percussion_model.interface.plotting.zoom import panel
-from percussion_model.interface.plotting.zoom_quantities import choice, labelled, titles
+from percussion_model.analysis.study.response import KINDS
+from percussion_model.interface.plotting import style
+from percussion_model.interface.plotting.interactive import TOOLS, panel
 
+# Larger studies are thinned evenly where they are no grid, and in the table.
+MOST_SHOWN = 20_000
+KIND_COLOURS = dict(
+    zip(KINDS, (style.BIT_COLOUR, style.MEAN_COLOUR, "#222222", "#999999"), strict=True)
+)
+# Columns of the table [pixels].
+WIDE, NARROW = 190, 80
 # Lines that can be told apart.
 MOST_LINES = 9
 # Steps of an axis are even if they differ by no more than this share.
 EVEN = 1e-6
+# What can be shown: column of the page, name, unit, column of a study, factor from SI.
+QUANTITIES = (
+    ("rate", "Rate of penetration", "mm/s", "rate_of_penetration", 1e3),
+    ("error", "Relative error of the rate", "–", "", 1.0),
+    ("period", "Blow period", "ms", "blow_period", 1e3),
+    ("impact", "Impact velocity", "m/s", "impact_velocity", 1.0),
+    ("stroke", "Stroke", "mm", "stroke", 1e3),
+    ("energy", "Blow energy", "J", "blow_energy", 1.0),
+    ("given", "Energy into the rock, per blow", "J", "rock_energy", 1.0),
+    ("advance", "Penetration per blow", "mm", "penetration_per_blow", 1e3),
+    ("bit_force", "Greatest bit force", "kN", "peak_bit_force", 1e-3),
+    ("contact_force", "Greatest contact force", "kN", "peak_contact_force", 1e-3),
+    ("contacts", "Contacts per blow", "–", "contacts_per_blow", 1.0),
+    ("cycles", "Drilling cycles per blow", "–", "drilling_cycles_per_blow", 1.0),
+    ("order", "Blows of a cycle", "–", "order", 1.0),
+)
+
+
+def interactive_study(found: Study) -> dict[str, LayoutDOM]:
+    """Draw a study: "map" of a grid or "scatter" of samples, and "points", a table."""
+    carried = _columns(found)
+    if found.points.is_grid:
+        made: dict[str, LayoutDOM] = {"map": _map(found, carried)}
+    else:
+        made = {"scatter": _scatter(found, carried)}
+    made["points"] = _table(found, carried)
+    return made
+
+
+def _thinned(count: int) -> np.ndarray:
+    return np.unique(np.linspace(0, count - 1, min(count, MOST_SHOWN)).astype(int))
+
+
+def _scatter(found: Study, columns: dict[str, np.ndarray]) -> LayoutDOM:
+    """What is shown over each parameter; points chosen in one panel stand out in all."""
+    kept = _thinned(len(found.points))
+    kinds = [KINDS[kind] for kind in found.rows["kind"][kept].tolist()]
+    shared = ColumnDataSource(
+        {
+            **{name: values[kept] for name, values in columns.items()},
+            **{f"at{k}": found.points.values[kept, k] for k in range(len(found.points.keys))},
+            "value": columns["rate"][kept].copy(),
+            "kind": kinds,
+            "colour": [KIND_COLOURS[kind] for kind in kinds],
+        }
+    )
+    chosen, names = _selector(), _titles()
+    panels = []
+    for k, key in enumerate(found.points.keys):
+        label = _label(key, found.scene.row_of(key).unit)
+        made = panel(names["rate"], label, "", tools=f"{TOOLS},box_select,lasso_select")
+        if len(found.points.keys) == 1:
+            order = np.argsort(found.points.values[kept, 0])
+            if np.array_equal(order, np.arange(len(order))):
+                made.line("at0", "value", source=shared, color=style.BIT_COLOUR)
+        drawn = made.scatter(f"at{k}", "value", source=shared, color="colour", size=5, alpha=0.7,
+                             nonselection_alpha=0.06)  # fmt: skip
+        made.add_tools(HoverTool(renderers=[drawn], tooltips=[
+            (key, f"@at{k}{{0.[00000]}}"), ("shown", "@value{0.[00000]}"), ("motion", "@kind")
+        ]))  # fmt: skip
+        panels.append(made)
+    update = CustomJS(
+        args={"all": shared, "choice": chosen, "titles": names,
+              "heads": [made.title for made in panels]},
+        code="all.data.value = all.data[choice.value].slice(); all.change.emit();"
+        "for (const head of heads) head.text = titles[choice.value];",
+    )  # fmt: skip
+    chosen.js_on_change("value", update)
+    plots = gridplot(panels, ncols=min(2, len(panels)), sizing_mode="stretch_width")
+    return column(chosen, plots, sizing_mode="stretch_width")
+
+
+def _table(found: Study, columns: dict[str, np.ndarray]) -> LayoutDOM:
+    """Points and numbers found; a click on a heading sorts."""
+    kept = _thinned(len(found.points))
+    number = ScientificFormatter(precision=4, power_limit_low=-4, power_limit_high=6)
+    data: dict[str, Any] = {"kind": [KINDS[kind] for kind in found.rows["kind"][kept].tolist()]}
+    shown = []
+    for k, key in enumerate(found.points.keys):
+        data[f"at{k}"] = found.points.values[kept, k]
+        title = _label(key, found.scene.row_of(key).unit)
+        shown.append(TableColumn(field=f"at{k}", title=title, formatter=number, width=WIDE))
+    shown.append(TableColumn(field="kind", title="motion", width=NARROW))
+    for name, title in _titles().items():
+        data[name] = columns[name][kept]
+        shown.append(TableColumn(field=name, title=title, formatter=number, width=WIDE))
+    return DataTable(source=ColumnDataSource(data), columns=shown, height=360, index_position=None,
+                     autosize_mode="none", reorderable=False,
+                     sizing_mode="stretch_width")  # fmt: skip
+
+
+def _columns(found: Study) -> dict[str, np.ndarray]:
+    """What the page carries of each point, in the units that it shows."""
+    rows = found.rows
+    return {
+        name: np.asarray(
+            (rows[field] if field else found.relative_error) * factor, dtype=np.float32
+        )
+        for name, _, _, field, factor in QUANTITIES
+    }
+
+
+def _label(key: str, unit: str) -> str:
+    """Key and unit of a parameter."""
+    return f"{key} [{unit}]".replace("[-]", "[–]").replace("^2", "²").replace("^3", "³")
+
+
+def _titles() -> dict[str, str]:
+    """Name and unit of each quantity."""
+    return {name: f"{words} [{unit}]" for name, words, unit, _, _ in QUANTITIES}
+
+
+def _selector() -> Select:
+    """A list to choose a quantity from."""
+    return Select(
+        title="Show", name="shown", value="rate", options=list(_titles().items()), width=280
+    )
 
 
 @dataclass(frozen=True)
@@ -45,7 +173,7 @@ class Axis:
     @property
     def label(self) -> str:
         """Key and unit."""
-        return labelled(self.key, self.unit)
+        return _label(self.key, self.unit)
 
     @property
     def scale(self) -> str:
@@ -86,7 +214,7 @@ def _axes(found: Study) -> list[Axis]:
     return sorted(made, key=lambda axis: -len(axis.values))
 
 
-def draw_map(found: Study, columns: dict[str, np.ndarray]) -> LayoutDOM:
+def _map(found: Study, columns: dict[str, np.ndarray]) -> LayoutDOM:
     """A map over two axes and cuts through it; sliders for the other axes."""
     x, y, *others = _axes(found)
     others = [axis for axis in others if len(axis.values) > 1]
@@ -96,7 +224,8 @@ def draw_map(found: Study, columns: dict[str, np.ndarray]) -> LayoutDOM:
     )
     kinds = found.rows["kind"]
     cells = _cells(x, y, offset, columns["rate"], kinds, base)
-    shown = _chosen_lines(len(y.values))
+    rows = len(y.values)
+    shown = sorted({int(k) for k in np.linspace(0, rows - 1, min(rows, MOST_LINES)).round()})
     lines = ColumnDataSource(
         {
             "xs": [x.values.tolist()] * len(shown),
@@ -125,11 +254,12 @@ def draw_map(found: Study, columns: dict[str, np.ndarray]) -> LayoutDOM:
     right.add_tools(HoverTool(renderers=[drawn], tooltips=[
         (y.key, "@at{0.[00000]}"), ("shown", "$data_y{0.[0000]}")
     ]))  # fmt: skip
-    chosen, sliders = choice(), [_slider(axis) for axis in others]
+    chosen, sliders = _selector(), [_slider(axis) for axis in others]
     everything = ColumnDataSource({**columns, "kind": kinds.astype(np.int32)})
-    names = titles()
+    names = _titles()
     left.title.text = names["rate"]
-    right.title.text = _cut_words(y)
+    low, high = y.values.min(), y.values.max()
+    right.title.text = f"Cuts: {y.label} from {low:.4g} (dark) to {high:.4g} (light)"
     right.yaxis.axis_label = names["rate"]
     update = CustomJS(
         args={
@@ -204,15 +334,6 @@ def _limits(values: Any) -> dict[str, float]:
 
 def _over(axis: Axis) -> Range1d:
     return Range1d(float(axis.edges[0]), float(axis.edges[-1]))
-
-
-def _chosen_lines(count: int) -> list[int]:
-    return sorted({int(k) for k in np.linspace(0, count - 1, min(count, MOST_LINES)).round()})
-
-
-def _cut_words(axis: Axis) -> str:
-    low, high = axis.values.min(), axis.values.max()
-    return f"Cuts: {axis.label} from {low:.4g} (dark) to {high:.4g} (light)"
 
 
 def _slider(axis: Axis) -> Slider:

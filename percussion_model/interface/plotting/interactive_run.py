@@ -1,4 +1,4 @@
-"""Figures of a run that can be zoomed: the same panels as those of `figures`."""
+"""Interactive figures of a run: the same panels as those of `figures`."""
 
 from __future__ import annotations
 
@@ -7,10 +7,19 @@ from typing import Any
 
 import numpy as np
 from bokeh.layouts import column, gridplot
-from bokeh.models import BasicTicker, ColorBar, LayoutDOM, LinearColorMapper, Range1d, RangeTool
+from bokeh.models import (
+    BasicTicker,
+    ColorBar,
+    HoverTool,
+    LayoutDOM,
+    LinearColorMapper,
+    Range1d,
+    RangeTool,
+)
 from bokeh.palettes import interp_palette
 
 from percussion_model.interface.plotting import FEWEST_BLOWS, style
+from percussion_model.interface.plotting.interactive import hover, legend, line, panel, rule, shade
 from percussion_model.interface.plotting.style import KN, MM, MPA, MS, US
 from percussion_model.interface.plotting.window import (
     NotRepeatable,
@@ -19,7 +28,6 @@ from percussion_model.interface.plotting.window import (
     last_blow_window,
     stress_fields,
 )
-from percussion_model.interface.plotting.zoom import hover, legend, line, panel, rule, shade
 from percussion_model.physics.records import Mode
 from percussion_model.simulation.result import Result
 
@@ -29,24 +37,24 @@ STRESS_COLOURS = ("#053061", "#4393C3", "#F7F7F7", "#D6604D", "#67001F")
 MOST_ROWS = 240
 
 
-def zoomable(result: Result) -> dict[str, LayoutDOM]:
+def interactive_figures(result: Result) -> dict[str, LayoutDOM]:
     """Draw the figures of a result, by the names of `CAPTIONS`."""
     made: dict[str, LayoutDOM] = {}
     if len(result.blows) >= FEWEST_BLOWS:
-        made["overview"] = overview(result)
+        made["overview"] = _overview(result)
     try:
         window = last_blow_window(result)
     except NotRepeatable as error:
         warnings.warn(f"no detailed figures: {error}", stacklevel=2)
         return made
-    made["bit_motion"] = motion(window)
+    made["bit_motion"] = _motion(window)
     fields = stress_fields(window)
     if fields:
-        made["stress_waves"] = stress(window, fields)
+        made["stress_waves"] = _stress(window, fields)
     return made
 
 
-def overview(result: Result) -> LayoutDOM:
+def _overview(result: Result) -> LayoutDOM:
     """Six panels over the blows, with one time axis."""
     blows, shared = result.blows, Range1d(0.0, result.duration)
     time = blows["time"]
@@ -102,7 +110,7 @@ def _keep_flat(made: Any, values: np.ndarray) -> None:
         made.y_range = Range1d(low - room, high + room)
 
 
-def motion(window: Window) -> LayoutDOM:
+def _motion(window: Window) -> LayoutDOM:
     """Bit motion and forces over time, the whole blow to choose from, and two portraits."""
     end, time = window.active_until * MS, window.time * MS
     shared = Range1d(min(0.0, float(time[0])), end)
@@ -151,7 +159,7 @@ def _by_mode(to: Any, x: np.ndarray, y: np.ndarray, modes: np.ndarray, named: bo
         line(to, xs, ys, style.MODE_COLOURS[mode], **name)
 
 
-def stress(window: Window, fields: dict[str, StressField]) -> LayoutDOM:
+def _stress(window: Window, fields: dict[str, StressField]) -> LayoutDOM:
     """Stress over time and depth, with the forces at the ends of the bit below."""
     end = float(next(iter(fields.values())).time_edges[-1]) * US
     shared = Range1d(0.0, end)
@@ -201,13 +209,6 @@ def _image(to: Any, field: StressField, top: float, mapper: LinearColorMapper) -
     first, last = field.time_edges[0] * US, field.time_edges[-1] * US
     drawn = to.image([values], x=[first], y=[top], dw=[last - first], dh=[edges[-1] * MM],
                      color_mapper=mapper)  # fmt: skip
-    hover_image(to, drawn)
-    return float(top + edges[-1] * MM)
-
-
-def hover_image(to: Any, drawn: Any) -> None:
-    """Tell time, depth and stress below the pointer."""
-    from bokeh.models import HoverTool
-
     shown = [("time", "$x{0.0} µs"), ("depth", "$y{0.0} mm"), ("stress", "@image{0.0} MPa")]
     to.add_tools(HoverTool(renderers=[drawn], tooltips=shown))
+    return float(top + edges[-1] * MM)

@@ -1,9 +1,8 @@
-"""Error against time: every ladder a line, both axes logarithmic."""
+"""Figure of error against computing time: every ladder a line, both axes logarithmic."""
 
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,11 +13,9 @@ from matplotlib.ticker import LogLocator, NullLocator
 
 from percussion_model.interface.plotting import style
 from percussion_model.verification.accuracy.ladders import LADDERS
-from percussion_model.verification.accuracy.problems import APERIODIC
-from percussion_model.verification.accuracy.quantities import HISTORY, QUANTITIES
+from percussion_model.verification.accuracy.problems import APERIODIC, HISTORY, QUANTITIES
 from percussion_model.verification.accuracy.study import Point, Study
 
-NAME, MORE_NAME = "accuracy", "accuracy_quantities"
 # Colour, dashes and marker of each ladder; families share a colour.
 _WAVE, _FEM, _SCIPY, _RIGID = "#0072B2", "#D55E00", "#009E73", "#595959"
 LINES: dict[str, tuple[str, Any, str]] = {
@@ -35,7 +32,7 @@ LINES: dict[str, tuple[str, Any, str]] = {
     "dop853": ("#8C6D00", (0, (4, 1.5)), "h"),
     "bdf": ("#7A5195", (0, (4, 1.5)), "d"),
 }
-# Errors below this are drawn at it: they are nought but for the bar of the reference.
+# Errors below this are drawn at it: they are zero within the bar of the reference.
 LEAST = 1e-7
 IN_A_ROW = 4
 
@@ -160,16 +157,3 @@ def _handles(found: Study) -> list[Any]:
         bar = Line2D([], [], color=style.SHADE_COLOUR, linewidth=6, label="bar of the reference")
         handles += [hollow, bar]
     return handles
-
-
-def save_accuracy(found: Study, folder: str | Path) -> list[Path]:
-    """Draw both figures of a study as PNG and SVG into a folder.
-
-    Returns
-    -------
-    list of Path
-        The files.
-    """
-    return style.save_figures(
-        lambda: [(NAME, draw_accuracy(found)), (MORE_NAME, draw_quantities(found))], folder
-    )

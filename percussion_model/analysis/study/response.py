@@ -1,4 +1,4 @@
-"""What is done at each point of a study; runs in other processes too."""
+"""Stationary response at the points of a study; runs in worker processes too."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ COMPUTING = (
     "simulation/*.py",
     "analysis/stationary.py",
     "analysis/study/points.py",
-    "analysis/study/work.py",
+    "analysis/study/response.py",
 )
 
 # What a study keeps of each point: name, and unit.
@@ -84,29 +84,20 @@ def run_points(
     """
     from threadpoolctl import threadpool_limits
 
-    with threadpool_limits(1):
-        return _run_points(scene, keys, values, tolerance, most_blows, scatter)
-
-
-def _run_points(
-    scene: Scene, keys: tuple[str, ...], values: np.ndarray, *asked: Any
-) -> tuple[np.ndarray, list[str]]:
     rows, failures = np.zeros(len(values), ROW), []
-    for row, point in zip(rows, values.tolist(), strict=True):
-        changes = {key: whole_number(key, value) for key, value in zip(keys, point, strict=True)}
-        try:
-            _fill(row, _settled(scene.replace(**changes), *asked))
-            failures.append("")
-        except Exception as error:
-            for name in FOUND:
-                row[name] = math.nan
-            row["kind"] = KINDS.index("failed")
-            failures.append(f"{type(error).__name__}: {error}")
+    with threadpool_limits(1):
+        for row, point in zip(rows, values.tolist(), strict=True):
+            changes = {k: whole_number(k, value) for k, value in zip(keys, point, strict=True)}
+            try:
+                chosen = scene.replace(**changes)
+                _fill(row, settled(chosen, tolerance, most_blows, scatter=scatter))
+                failures.append("")
+            except Exception as error:
+                for name in FOUND:
+                    row[name] = math.nan
+                row["kind"] = KINDS.index("failed")
+                failures.append(f"{type(error).__name__}: {error}")
     return rows, failures
-
-
-def _settled(scene: Scene, tolerance: float, most_blows: int, scatter: float) -> Settled:
-    return settled(scene, tolerance, most_blows, scatter=scatter)
 
 
 def _fill(row: Any, found: Settled) -> None:
