@@ -88,7 +88,8 @@ def test_a_scene_has_the_groups_that_effects_bring(tmp_path):
 import pickle
 import sys
 from percussion_model.scene import parameters
-parameters.EFFECTS = (parameters.Effect("friction", "rub", {"force": (50.0, "N", "F", 0.0, 1e6)}, max),)
+friction = {"force": (50.0, "N", "F", 0.0, 1e6)}
+parameters.EFFECTS = (parameters.Effect("friction", "rub", friction, max),)
 parameters.GROUPS.update(parameters.groups_with(parameters.EFFECTS))
 from percussion_model.scene.scene import Scene
 scene = Scene().replace(**{"friction.force": 60.0})
