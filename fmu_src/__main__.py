@@ -6,8 +6,8 @@ import argparse
 import sys
 from pathlib import Path
 
-from fmu_src.hammer import build_hammer
-from fmu_src.pneumatics import build_pneumatics
+from fmu_src.hammer.build import build_hammer
+from fmu_src.parts.pneumatics_build import build_pneumatics
 from percussion_model.scene.scene import Scene, SceneError
 
 ROOT = Path(__file__).resolve().parents[1]

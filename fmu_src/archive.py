@@ -37,7 +37,7 @@ def write_fmu(
     Parameters
     ----------
     slave : tuple of str
-        Module of `runtime` and class in it.
+        Module of this package and class in it.
     resources : dict of str
         Further files for the folder `resources`.
     page : str

@@ -53,7 +53,7 @@ def section_reference(bar: str, section: int, field: int) -> int:
 
 def main() -> None:
     """Add the variables that are not in the file yet."""
-    from fmu_src.hammer_variables import hammer_variables
+    from fmu_src.hammer.variables import hammer_variables
     from percussion_model.scene.scene import Scene
 
     entries = dict(known())

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from fmpy import simulate_fmu
 
-from fmu_src.hammer import build_hammer
+from fmu_src.hammer.build import build_hammer
 from percussion_model.scene.scene import Scene
 from percussion_model.simulation.warm_up import (
     COARSE,

@@ -62,8 +62,8 @@ def test_rule_says_how_well_lengths_fit():
 
 
 def test_solver_takes_the_cells_of_the_rule_in_library_and_fmu():
-    from fmu_src.hammer_variables import hammer_variables
-    from fmu_src.runtime.plain_scene import make_scene
+    from fmu_src.hammer.plain_scene import make_scene
+    from fmu_src.hammer.variables import hammer_variables
     from percussion_model.scene.table import rows_by_key
     from percussion_model.solvers.wave.solver import WaveSolver
 

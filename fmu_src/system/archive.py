@@ -12,9 +12,9 @@ from xml.etree.ElementTree import Element, SubElement, indent, register_namespac
 from fmpy import read_model_description
 
 from fmu_src.archive import DATE, PERMISSIONS
-from fmu_src.hammer import build_hammer
-from fmu_src.system.parts import build_part
-from fmu_src.system.tables import PARTS
+from fmu_src.hammer.build import build_hammer
+from fmu_src.parts.build import build_part
+from fmu_src.parts.tables import PARTS
 from fmu_src.units import UNITS
 from percussion_model.interface.commands.blow_map import ready_map
 from percussion_model.scene.scene import Scene

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from fmu_src.hammer import build_hammer
-from fmu_src.pneumatics import build_pneumatics
+from fmu_src.hammer.build import build_hammer
+from fmu_src.parts.pneumatics_build import build_pneumatics
 from percussion_model import Scene
 from scenarios.harness import Instance
 

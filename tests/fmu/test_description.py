@@ -12,11 +12,11 @@ from fmpy import read_model_description
 from fmpy.validation import validate_fmu
 from lxml import etree
 
-from fmu_src.hammer import build_hammer
-from fmu_src.hammer_outputs import REAL_OUTPUTS
-from fmu_src.hammer_variables import hammer_variables, split_drive_force
+from fmu_src.hammer.build import build_hammer
+from fmu_src.hammer.outputs import REAL_OUTPUTS
+from fmu_src.hammer.readers import OUTPUTS
+from fmu_src.hammer.variables import hammer_variables, split_drive_force
 from fmu_src.interface import FILE
-from fmu_src.runtime.outputs import OUTPUTS
 from fmu_src.units import UNITS
 from percussion_model import Scene, SceneError, Section
 from percussion_model.scene.table import parameter_table

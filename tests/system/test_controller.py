@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from fmu_src.system.parts import make_model, start_inputs
+from fmu_src.parts.build import make_model, start_inputs
 
 
 def drive(control, count, **inputs):

@@ -11,8 +11,8 @@ import pytest
 from fmpy.validation import validate_fmu
 from lxml import etree
 
-from fmu_src.system.parts import make_model, part_variables, start_inputs
-from fmu_src.system.tables import PARTS
+from fmu_src.parts.build import make_model, part_variables, start_inputs
+from fmu_src.parts.tables import PARTS
 from fmu_src.units import UNITS
 from scenarios.harness import Instance
 

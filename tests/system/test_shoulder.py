@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from fmu_src.system.parts import make_model, start_inputs
-from fmu_src.system.tables import STRING
+from fmu_src.parts.build import make_model, start_inputs
+from fmu_src.parts.tables import STRING
 
 VALUES = {name: entry[3] for name, entry in STRING.parameters.items()}
 

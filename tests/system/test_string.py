@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from fmu_src.runtime.system.string_body import Lumps
-from fmu_src.runtime.system.string_waves import Waves
-from fmu_src.system.parts import make_model, start_inputs
-from fmu_src.system.tables import STRING
+from fmu_src.parts.build import make_model, start_inputs
+from fmu_src.parts.string_body import Lumps
+from fmu_src.parts.string_waves import Waves
+from fmu_src.parts.tables import STRING
 
 RODS = 6
 VALUES = {name: entry[3] for name, entry in STRING.parameters.items()}

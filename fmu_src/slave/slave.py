@@ -8,9 +8,9 @@ from typing import Any
 
 from pythonfmu.enums import Fmi2Status
 
-from fmu_src.runtime.calls import INFINITE, STEPPING, FmuError, Phase, guarded
-from fmu_src.runtime.folder import finalise_in_time
-from fmu_src.runtime.values import Variables
+from fmu_src.slave.calls import INFINITE, STEPPING, FmuError, Phase, guarded
+from fmu_src.slave.folder import finalise_in_time
+from fmu_src.slave.values import Variables
 
 # Communication points may differ from the present time by rounding: this share
 # of a step, and some units in the last place of the time.

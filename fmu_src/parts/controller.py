@@ -11,8 +11,8 @@ import math
 from copy import copy
 from typing import Any
 
-from fmu_src.runtime.system.part import Model
-from fmu_src.runtime.system.seeker import FEED, PRESSURE, Seeker
+from fmu_src.parts.part import Model
+from fmu_src.parts.seeker import FEED, PRESSURE, Seeker
 
 DRILLING, VOID, RETRACT = 0, 1, 2
 

@@ -20,9 +20,9 @@ from typing import Any
 
 import numpy as np
 
-from fmu_src.runtime.system.part import Model
-from fmu_src.runtime.system.string_body import Lumps
-from fmu_src.runtime.system.string_waves import Waves
+from fmu_src.parts.part import Model
+from fmu_src.parts.string_body import Lumps
+from fmu_src.parts.string_waves import Waves
 
 # Damping by stiffness and step: 3/2 is the limit, the rest is margin.
 DAMPING_OF_DELAY = 2.0

@@ -16,7 +16,7 @@ import random
 from bisect import bisect_right
 from typing import Any
 
-from fmu_src.runtime.system.part import Model
+from fmu_src.parts.part import Model
 
 LAYERS = 6
 # Knots of the variation that are kept, by number.

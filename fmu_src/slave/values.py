@@ -12,8 +12,8 @@ from typing import Any
 
 from pythonfmu import Fmi2Slave
 
-from fmu_src.runtime.calls import STEPPING, FmuError, Phase, guarded, plain_bounds
-from fmu_src.runtime.folder import read_variables
+from fmu_src.slave.calls import STEPPING, FmuError, Phase, guarded, plain_bounds
+from fmu_src.slave.folder import read_variables
 from percussion_model.scene.rows import refuse_value
 
 # Types that share a getter and a setter.

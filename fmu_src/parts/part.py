@@ -8,10 +8,10 @@ from collections.abc import Mapping
 from operator import itemgetter
 from typing import Any, ClassVar
 
-from fmu_src.runtime.calls import STEPPING, Phase, guarded
-from fmu_src.runtime.slave import Slave
-from fmu_src.runtime.states import StateError, fingerprint, pack, unpack
-from fmu_src.runtime.values import Read
+from fmu_src.slave.calls import STEPPING, Phase, guarded
+from fmu_src.slave.slave import Slave
+from fmu_src.slave.states import StateError, fingerprint, pack, unpack
+from fmu_src.slave.values import Read
 
 
 class Model:

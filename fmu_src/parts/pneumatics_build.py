@@ -116,7 +116,7 @@ def build_pneumatics(path: Path) -> str:
         step_size=1e-4,
     )
     variables = pneumatic_variables()
-    bundle = stage("pneumatic_drive", ("pneumatics",), with_model=False)
+    bundle = stage("pneumatic_drive", "parts", with_model=False)
     text = json.dumps([variable.for_instance() for variable in variables], indent=1)
     page = write_page(about, variables)
     return write_fmu(
@@ -124,7 +124,7 @@ def build_pneumatics(path: Path) -> str:
         about,
         variables,
         bundle,
-        ("pneumatics", "PneumaticDrive"),
+        ("parts.pneumatic_drive", "PneumaticDrive"),
         {"variables.json": text + "\n"},
         page,
     )

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fmu_src.runtime.calls import Phase
-from fmu_src.runtime.states import fill_solver, pack, solver_bytes, unpack
+from fmu_src.slave.calls import Phase
+from fmu_src.slave.states import fill_solver, pack, solver_bytes, unpack
 from percussion_model.scene.inputs import INPUTS
 
 if TYPE_CHECKING:
-    from fmu_src.runtime.hammer import PercussiveHammer
+    from fmu_src.hammer.slave import PercussiveHammer
 
 # Numbers of an instance in a saved state.
 NUMBERS = struct.Struct("<BBdddQd")  # phase, moving, start, now, time, blows, step size

@@ -10,9 +10,9 @@ from typing import Any
 from fmu_src.archive import write_fmu
 from fmu_src.description import About
 from fmu_src.page import write_page
-from fmu_src.runtime.system.part import Model
+from fmu_src.parts.part import Model
+from fmu_src.parts.tables import PARTS, PartTable
 from fmu_src.staging import stage
-from fmu_src.system.tables import PARTS, PartTable
 from fmu_src.units import fmi_unit
 from fmu_src.variables import Variable, magnitude, number_row
 from percussion_model.scene.rows import Row
@@ -110,13 +110,10 @@ def build_part(name: str, path: Path) -> str:
         stop_time=STOP_TIME,
         step_size=STEP_SIZE,
     )
-    modules = ("__init__", "part", *part.modules)
-    bundle = stage(
-        "drilling_system", tuple(f"system/{module}" for module in modules), with_model=False
-    )
+    bundle = stage("drilling_system", "parts", with_model=False)
     text = json.dumps([variable.for_instance() for variable in variables], indent=1)
     return write_fmu(
-        path, about, variables, bundle, ("system.part", part.slave),
+        path, about, variables, bundle, ("parts.part", part.slave),
         {"variables.json": text + "\n"}, write_page(about, variables),
     )  # fmt: skip
 
@@ -131,7 +128,7 @@ def make_model(name: str, **values: Any) -> Model:
     """
     import importlib
 
-    from fmu_src.runtime.system import part as slaves
+    from fmu_src.parts import part as slaves
 
     part = PARTS[name]
     given = {key.replace("__", "."): value for key, value in values.items()}

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from fmu_src.runtime.system.part import Model
+from fmu_src.parts.part import Model
 
 LONGEST_STEP = 1e-3  # of the integration, short against filling the hose [s]
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from fmu_src.archive import write_fmu
 from fmu_src.description import About
-from fmu_src.hammer_variables import hammer_variables
+from fmu_src.hammer.variables import hammer_variables
 from fmu_src.interface import VERSION
 from fmu_src.page import write_page
 from fmu_src.staging import stage
@@ -18,7 +18,6 @@ from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.scene.table import parameter_table
 from percussion_model.solvers.blow_map.table import BlowTable, fixed_values
 
-RUNTIME = ("plain_scene", "motion", "outputs", "blow_map", "watch", "hammer_states", "hammer")
 STEP_SIZE = 1e-3  # of the default experiment [s]
 AUTHOR = "percussion_model developers"
 LICENSE = "BSD-3-Clause"
@@ -41,7 +40,7 @@ def build_hammer(scene: Scene, path: Path, blow_map: BlowTable | None = None) ->
     """
     about = about_hammer(scene, path)
     variables = hammer_variables(scene)
-    bundle = stage("percussive_hammer", RUNTIME, with_model=True)
+    bundle = stage("percussive_hammer", "hammer", with_model=True)
     resources: dict[str, str | bytes] = {
         "variables.json": _json([variable.for_instance() for variable in variables]),
         "scene.json": _json(_scene(scene, variables, bundle.name)),
@@ -51,7 +50,7 @@ def build_hammer(scene: Scene, path: Path, blow_map: BlowTable | None = None) ->
         resources["blow_map.npz"] = blow_map.to_bytes()
     page = write_page(about, variables, scene)
     return write_fmu(
-        path, about, variables, bundle, ("hammer", "PercussiveHammer"), resources, page
+        path, about, variables, bundle, ("hammer.slave", "PercussiveHammer"), resources, page
     )
 
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from percussion_model.scene.rows import Row
 
 if TYPE_CHECKING:
-    from fmu_src.runtime.slave import Slave
+    from fmu_src.slave.slave import Slave
 
 INFINITE = float("inf")
 NOWHERE = (INFINITE, -INFINITE)

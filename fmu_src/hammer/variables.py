@@ -9,7 +9,7 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
-from fmu_src.hammer_outputs import MODES, REAL_OUTPUTS
+from fmu_src.hammer.outputs import MODES, REAL_OUTPUTS
 from fmu_src.interface import FIRST_SECTION, reference, section_reference
 from fmu_src.units import fmi_unit
 from fmu_src.variables import Variable, magnitude, number_row

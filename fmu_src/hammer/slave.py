@@ -7,16 +7,16 @@ from pathlib import Path
 from typing import Any
 from weakref import WeakValueDictionary
 
-from fmu_src.runtime import hammer_states
-from fmu_src.runtime.blow_map import read_blow_map
-from fmu_src.runtime.calls import STEPPING, Phase, guarded, plain_bounds
-from fmu_src.runtime.motion import Gauge, Motion
-from fmu_src.runtime.outputs import OUTPUTS
-from fmu_src.runtime.plain_scene import PlainScene, make_scene
-from fmu_src.runtime.slave import Slave
-from fmu_src.runtime.states import fingerprint
-from fmu_src.runtime.values import Read
-from fmu_src.runtime.watch import Watch
+from fmu_src.hammer import states as hammer_states
+from fmu_src.hammer.blow_map import read_blow_map
+from fmu_src.hammer.motion import Gauge, Motion
+from fmu_src.hammer.plain_scene import PlainScene, make_scene
+from fmu_src.hammer.readers import OUTPUTS
+from fmu_src.hammer.watch import Watch
+from fmu_src.slave.calls import STEPPING, Phase, guarded, plain_bounds
+from fmu_src.slave.slave import Slave
+from fmu_src.slave.states import fingerprint
+from fmu_src.slave.values import Read
 from percussion_model.scene.inputs import INPUTS
 from percussion_model.scene.rows import Row, refuse_value
 from percussion_model.scene.rules import SceneRules

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Any
 
-from fmu_src.runtime.motion import AT, Motion
+from fmu_src.hammer.motion import AT, Motion
 
 
 def _sample(name: str, sign: float = 1.0) -> Callable[[Motion], float]:

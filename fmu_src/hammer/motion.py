@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from fmu_src.runtime.calls import NOWHERE, plain_bounds
+from fmu_src.slave.calls import NOWHERE, plain_bounds
 from percussion_model.physics.ledger import unexplained
 from percussion_model.physics.records import (
     BLOW,

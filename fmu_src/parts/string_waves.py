@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fmu_src.runtime.system.string_body import Rods
+from fmu_src.parts.string_body import Rods
 
 
 class Waves(Rods):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from fmu_src.runtime.motion import AT, Motion
+from fmu_src.hammer.motion import AT, Motion
 from percussion_model.physics.records import Mode
 from percussion_model.simulation.validity import (
     button_note,

@@ -12,10 +12,10 @@ import math
 import struct
 from typing import Any
 
-from fmu_src.runtime.calls import Phase, guarded
-from fmu_src.runtime.slave import Slave
-from fmu_src.runtime.states import fingerprint, pack, unpack
-from fmu_src.runtime.values import Read
+from fmu_src.slave.calls import Phase, guarded
+from fmu_src.slave.slave import Slave
+from fmu_src.slave.states import fingerprint, pack, unpack
+from fmu_src.slave.values import Read
 
 GAS_CONSTANT = 287.0  # of air [J/(kg K)]
 AMBIENT = 101_325.0  # [Pa], absolute; pressures in the chambers are gauge
