@@ -5,8 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from fmu_src.parts.build import part_variables
-from fmu_src.parts.tables import PARTS
+from fmu_src.parts.build import PARTS, part_variables
 from fmu_src.system.archive import SYSTEMS, read_plan
 from fmu_src.variables import Variable
 

@@ -43,10 +43,10 @@ LIBRARY_FILES = (
     "variables.py",
 )
 # What every slave needs; START runs outside the package that the sources become.
-SLAVE_FILES = ("__init__.py", "slave/*.py")
+SLAVE_FILES = ("__init__.py", "variables.py", "slave/*.py")
 START = "slave/start.py"
 # Files of a model's folder that make its FMU and do not run in it.
-BUILD_FILES = ("build.py", "variables.py", "tables.py", "pneumatics_build.py")
+BUILD_FILES = ("build.py", "variables.py")
 
 _IMPORT = re.compile(
     r"^(?P<before>\s*(?:from|import) )(?P<package>percussion_model|fmu_src|pythonfmu)\b",
@@ -109,14 +109,15 @@ def stage(prefix: str, folder: str, with_model: bool) -> Bundle:
     return Bundle(name, {path: text.replace(PLACEHOLDER, name) for path, text in files.items()})
 
 
-def script(bundle: Bundle, module: str, class_name: str) -> tuple[str, str]:
+def script(bundle: Bundle, slave: type) -> tuple[str, str]:
     """Name and text of the script that the export library runs for each instance."""
+    class_name = slave.__name__
     name = f"{bundle.name}_{class_name.lower()}"
     return name, (
         f'"""Loads {class_name}; run anew for each instance, and therefore short."""\n'
         f"import {bundle.name}_start\n"
         f"{class_name} = {bundle.name}_start.slave_class("
-        f'globals(), "fmu_src.{module}", "{class_name}")\n'
+        f'globals(), "{slave.__module__}", "{class_name}")\n'
     )
 
 

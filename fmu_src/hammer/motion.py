@@ -1,4 +1,4 @@
-"""The hammer in motion, as a communication step sees it."""
+"""Motion of the hammer, as a communication step sees it."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from fmu_src.slave.calls import NOWHERE, plain_bounds
+from fmu_src.slave.states import StateError
 from percussion_model.physics.ledger import unexplained
 from percussion_model.physics.records import (
     BLOW,
@@ -17,7 +17,6 @@ from percussion_model.physics.records import (
     STORED_FIELDS,
     Mode,
 )
-from percussion_model.scene.inputs import INPUTS, check_input
 from percussion_model.scene.rules import SceneRules
 from percussion_model.simulation.runner import Runner
 from percussion_model.solvers import Solver
@@ -55,7 +54,6 @@ class Motion(Runner):
         super().__init__(scene, record_events=False, solver=solver)
         self.scene = scene
         self.gauge: Gauge | None = None
-        self._bounds: dict[str, tuple[float, float]] = {}  # of inputs that have changed once
         self.row_of_blow = np.zeros(1, BLOW)  # the last whole one
         self.blow = self._numbers_of_blow()
         self.blow_count = 0
@@ -63,13 +61,14 @@ class Motion(Runner):
         self.row = np.zeros(len(LONG_SAMPLE_FIELDS))
         self.numbers: list[float] = []  # the same as plain numbers
         self._is_read = self._has_peaks = False
-        self._spare_look: Any = None  # an old copy to be used again
         self._here: Any = None  # copy of the state that belongs to `row`
         self._stress: float | None = None
         # impulses at the start of the last step, or the state from which they follow
         self._before = np.zeros(len(IMPULSES))
         self._left: tuple[Any, float] | None = None
-        self._spare: Any = None  # an old copy to be used again
+        # old copies to be used again
+        self._spare: Any = None
+        self._spare_of_peaks: Any = None
 
     def _keep(self, blows: np.ndarray, events: np.ndarray) -> None:
         if len(blows):
@@ -77,23 +76,14 @@ class Motion(Runner):
             self.blow = self._numbers_of_blow()
             self.blow_count += len(blows)
 
-    def _checked(self, inputs: dict[str, float]) -> dict[str, float]:
-        # whether an input acts is the same in all steps, and so are its bounds
-        for name, value in inputs.items():
-            low, high = self._bounds.get(name, NOWHERE)
-            if not low <= value <= high:
-                check_input(self.scene, name, value)
-                self._bounds[name] = plain_bounds(self.scene.row_of(INPUTS[name]))
-        return inputs
-
     def _numbers_of_blow(self) -> dict[str, float]:
         """Last row as plain numbers; what is undefined is 0."""
         names = BLOW.names or ()
         row = dict(zip(names, self.row_of_blow[0].item(), strict=True))
         return {name: float(value) if value == value else 0.0 for name, value in row.items()}
 
-    def go_on(self, t: float, step_size: float, inputs: dict[str, float]) -> None:
-        """Change inputs and advance to `t` [s]."""
+    def advance_to(self, t: float, step_size: float, inputs: dict[str, float]) -> None:
+        """Change inputs, which are allowed and act, and advance to `t` [s]."""
         if self._is_read:
             self._before, self._left = self._impulses(self.row), None
         else:
@@ -101,41 +91,38 @@ class Motion(Runner):
             self._left = (self._spare, self.time)
         self.solver.watch_peaks(self._state, self.time)
         if inputs:
-            self.set_inputs(**inputs)
+            self._commit_inputs(inputs)
         t = max(t, self.time)
         self._commit_up_to(t)
         self._time = t
         self.step_size = step_size
         self._is_read = False
 
-    def adopt(
-        self,
-        times: tuple[float, float],
-        blows: tuple[int, np.ndarray],
-        row: np.ndarray,
-        last: np.ndarray,
-    ) -> None:
-        """Take what a saved state holds beside that of the solver.
+    def save(self) -> bytes:
+        """What `restore` needs beside times and the number of blows."""
+        self.peaks()
+        floats = np.array([self.stress(), *self.before()])
+        return b"".join(array.tobytes() for array in self._arrays(floats))
 
-        Parameters
-        ----------
-        times : tuple of float
-            Present time and size of the last step [s].
-        blows : tuple
-            Their number, and the bytes of the last row.
-        row : ndarray
-            Reading at the present time.
-        last : ndarray, shape (4,)
-            Stress at the gauge [Pa], impulses at the start of the last step [N s].
-        """
+    def restore(self, times: tuple[float, float], blow_count: int, saved: bytes) -> None:
+        """Go back to a state; times are the present one and the size of the last step [s]."""
+        floats = np.zeros(1 + len(IMPULSES))
+        arrays = self._arrays(floats)
+        if sum(array.nbytes for array in arrays) != len(saved):
+            raise StateError("the saved state does not fit the solver")
+        start = 0
+        for array in arrays:
+            array.view(np.uint8)[:] = np.frombuffer(saved, np.uint8, array.nbytes, start)
+            start += array.nbytes
         self._time, self.step_size = times
-        self.blow_count = blows[0]
-        self.row_of_blow.view(np.uint8)[:] = blows[1]
+        self.blow_count = blow_count
         self.blow = self._numbers_of_blow()
-        self.row[:] = row
-        self._stress, self._before, self._left = float(last[0]), last[1:].copy(), None
+        self._stress, self._before, self._left = float(floats[0]), floats[1:], None
         self._take_row()
         self._has_peaks = True
+
+    def _arrays(self, floats: np.ndarray) -> list[np.ndarray]:
+        return [floats, self.row, self.row_of_blow, *_memory(self._state)]
 
     @staticmethod
     def _impulses(row: np.ndarray) -> np.ndarray:
@@ -159,7 +146,9 @@ class Motion(Runner):
         self.read()
         if not self._has_peaks:
             row = np.zeros(len(LONG_SAMPLE_FIELDS))
-            self._spare_look = self._look(self._state, self.time, row, self._spare_look, True)
+            self._spare_of_peaks = self._look(
+                self._state, self.time, row, self._spare_of_peaks, True
+            )
             self.row[PEAKS] = row[PEAKS]
             self.numbers[PEAKS] = row[PEAKS].tolist()
             self._has_peaks = True
@@ -222,7 +211,11 @@ class Motion(Runner):
 
 def copied(state: Any, spare: Any) -> Any:
     """Copy of a state, into an old copy where there is one."""
-    if spare is None or isinstance(state, np.ndarray) or not hasattr(state, "take"):
+    if spare is None or isinstance(state, np.ndarray):
         return state.copy()
     spare.take(state)
     return spare
+
+
+def _memory(state: Any) -> list[np.ndarray]:
+    return [state] if isinstance(state, np.ndarray) else [state.record, state.workspace]

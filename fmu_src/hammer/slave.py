@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 import json
+import struct
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 from weakref import WeakValueDictionary
 
-from fmu_src.hammer import states as hammer_states
+import numpy as np
+
 from fmu_src.hammer.blow_map import read_blow_map
+from fmu_src.hammer.inputs import DRIVE_INPUTS, NAMES_OUTSIDE, PLAIN_INPUTS
 from fmu_src.hammer.motion import Gauge, Motion
+from fmu_src.hammer.outputs import OUTPUTS
 from fmu_src.hammer.plain_scene import PlainScene, make_scene
-from fmu_src.hammer.readers import OUTPUTS
-from fmu_src.hammer.watch import Watch
-from fmu_src.slave.calls import STEPPING, Phase, guarded, plain_bounds
-from fmu_src.slave.slave import Slave
+from fmu_src.hammer.warnings import Warnings
+from fmu_src.slave.slave import STEPPING, Phase, Read, Slave
 from fmu_src.slave.states import fingerprint
-from fmu_src.slave.values import Read
+from fmu_src.variables import closed_bounds, read_row
 from percussion_model.scene.inputs import INPUTS
-from percussion_model.scene.rows import Row, refuse_value
+from percussion_model.scene.rows import refuse_value
 from percussion_model.scene.rules import SceneRules
 from percussion_model.solvers import Solver
 from percussion_model.solvers.blow_map.solver import BlowMapSolver
@@ -27,24 +30,8 @@ from percussion_model.solvers.wave.grid import cell_at
 # Solvers hold no state: instances of equal parameters share one.
 _SOLVERS: WeakValueDictionary[bytes, Solver] = WeakValueDictionary()
 
-# Inputs of the FMU that are inputs of the solver as they are.
-PLAIN_INPUTS = {
-    "feed_force": "feed_force",
-    "rock.loading_stiffness": "loading_stiffness",
-    "rock.unloading_ratio": "unloading_ratio",
-    "rock.barrier_damping": "barrier_damping",
-    "rock.barrier_energy": "barrier_energy",
-    "drive.reversal_distance": "reversal_distance",
-}
-
-# What the drive's forces follow from.
-DRIVE_INPUTS = ("percussion_on", "supply_pressure", "drive.effective_area", "piston_force")
-
-# The solver's inputs as hosts know them.
-NAMES_OUTSIDE = {inner: name for name, inner in PLAIN_INPUTS.items()} | {
-    "drive_force": "supply_pressure",
-    "external_force": "piston_force",
-}
+# Numbers of an instance in a saved state.
+NUMBERS = struct.Struct("<BBdddQd")  # phase, 1, start, now, time, blows, step size
 
 
 class PercussiveHammer(Slave):
@@ -57,100 +44,61 @@ class PercussiveHammer(Slave):
         scene = json.loads(text)
         self.baked: dict[str, Any] = scene["values"]
         self.given: set[str] = set(scene["given"])
-        self.rows = {one.row.key: one.row for one in self.known.values() if one.row is not None}
-        self.rows |= {key: _row(row) for key, row in scene["rows"].items()}
-        self._drive_bounds = plain_bounds(self.rows["drive.force"])
+        self.rows = {one.row.key: one.row for one in self.by_name.values() if one.row is not None}
+        self.rows |= {key: read_row(row) for key, row in scene["rows"].items()}
         self.identity = scene["identity"]
-        self.inputs = [one for one in self.known.values() if one.causality == "input"]
-        self._readers = {self.by_name[name]: read for name, read in OUTPUTS.items()}
-        self._plain = {inner: self.by_name[name] for name, inner in PLAIN_INPUTS.items()}
-        self._forced = [self.by_name[name] for name in DRIVE_INPUTS]
-        self._forces = frozenset(self._forced)
+        self._drive_bounds = closed_bounds(self.rows["drive.force"])
+        self._drive_inputs = frozenset(DRIVE_INPUTS)
+        self._warnings = Warnings()
+        self.reset()
+
+    def reset(self) -> None:
+        """Make the solver anew when it is needed."""
         self.motion: Motion | None = None
         self.given_inputs: list[Any] = []  # values of the inputs when the solver was made
-        self.fingerprint = b""
         self.acting: dict[str, float] = {}  # inputs as the solver has them
-        self._inner = {reference: inner for inner, reference in self._plain.items()}
-        self._new: set[int] = set()  # inputs that were set, perhaps to what they were
-        self._doubtful: list[int] = []  # inputs to be checked
-        self._acts: dict[str, bool] = {}
-        self._watch = Watch()
+        self._fingerprint: bytes | None = None
 
     # parameters and inputs
 
-    def value(self, name: str) -> Any:
-        """Value of a parameter or an input."""
-        return self.values[self.by_name[name]]
-
-    def changed(self, references: list[int]) -> None:
-        """Note that inputs are new, or that the solver has to be made anew."""
+    def check(self, names: Iterable[str]) -> None:
+        """Check bounds; before the first step the drive force and contradictions as well."""
+        super().check(names)
         if self.phase < STEPPING:
-            self.motion = None
-        else:
-            self._new.update(references)
-            self._doubtful += references
-
-    def take_late(self) -> None:
-        """Take inputs that were set and not yet looked at."""
-        held = self.values
-        for references, values in self.late.items():
-            plan = self._inputs_alone[references]
-            for (reference, _, low, high), value in zip(plan, values, strict=True):
-                if held[reference] != value:
-                    held[reference] = value
-                    self._new.add(reference)
-                    if not low <= value <= high:
-                        self._doubtful.append(reference)
-        self.late.clear()
-
-    def look_at_inputs(self) -> None:
-        """Look at all inputs in the next step."""
-        self._new.update(one.reference for one in self.inputs)
-        self._doubtful = list(self._new)
-
-    def check(self, references: Any) -> None:
-        """Check bounds, the drive force, and contradictions between parameters."""
-        super().check(references)
-        if self.phase is STEPPING and self._forces.isdisjoint(references):
-            return
-        force = self.drive_force()
-        if not self.rows["drive.force"].allows(force):
-            name = "supply_pressure * drive.effective_area"
-            raise ValueError(refuse_value(self.rows["drive.force"], name, force))
-        if self.phase < STEPPING:
+            self._check_drive(self.drive_forces()["drive_force"])
             self.make_scene()
 
-    def drive_force(self) -> float:
-        """F_0 of the pressure law [N]."""
-        on, pressure, area, _ = (self.values[reference] for reference in self._forced)
-        return pressure * area if on else 0.0
+    def _check_drive(self, force: float) -> None:
+        low, high = self._drive_bounds
+        if not low <= force <= high and not self.rows["drive.force"].allows(force):
+            name = "supply_pressure * drive.effective_area"
+            raise ValueError(refuse_value(self.rows["drive.force"], name, force))
 
-    def solver_inputs(self) -> dict[str, float]:
-        """Inputs as the solver takes them."""
-        values = self.values
-        found = {inner: values[reference] for inner, reference in self._plain.items()}
-        return found | self.drive_inputs()
-
-    def drive_inputs(self) -> dict[str, float]:
+    def drive_forces(self) -> dict[str, float]:
         """Forces of the drive as the solver takes them [N]."""
-        on, pressure, area, force = (self.values[reference] for reference in self._forced)
+        on, pressure, area, force = (self.values[name] for name in DRIVE_INPUTS)
         return {
             "drive_force": pressure * area if on else 0.0,
             "external_force": force if on else 0.0,
         }
 
+    def solver_inputs(self) -> dict[str, float]:
+        """Inputs as the solver takes them."""
+        found = {inner: self.values[name] for name, inner in PLAIN_INPUTS.items()}
+        return found | self.drive_forces()
+
     def make_scene(self) -> PlainScene:
         """Scene of the present values; raises `SceneError` if they contradict each other."""
         values = dict(self.baked)
         given = set(self.given)
-        for one in self.known.values():
-            if one.key is None or one.causality != "parameter":
+        for one in self.parameters:
+            if one.key is None:
                 continue
-            value = self.values[one.reference]
+            value = self.values[one.name]
             if value == one.left_out:
                 value = None
             elif one.type == "Enumeration":
-                value = self.choice(one.reference)
+                value = self.choice(one.name)
             if value != values[one.key]:
                 given.add(one.key)
             values[one.key] = value
@@ -159,44 +107,31 @@ class PercussiveHammer(Slave):
 
     # stepping
 
-    def begin(self) -> None:
-        """Make the solver, unless reading an output has made it already."""
-        self.ready()
-
-    def ready(self) -> Motion:
+    def initialise(self) -> Motion:
         """Solver and state; made at time zero for the present values where there are none."""
         if self.motion is None:
             scene = self.make_scene()
-            self.given_inputs = [self.values[one.reference] for one in self.inputs]
-            self.fingerprint = fingerprint(self.identity, self.parameters())
-            key = fingerprint(self.identity, self.parameters(), self.given_inputs)
-            self.motion = Motion(scene, _SOLVERS.get(key) or self.map_solver(scene))
+            self.given_inputs = [self.values[one.name] for one in self.inputs]
+            key = fingerprint(self.fingerprint().hex(), self.given_inputs)
+            self.motion = Motion(scene, _SOLVERS.get(key) or self._map_solver(scene))
             _SOLVERS[key] = self.motion.solver
-            self.motion.gauge = self.find_gauge(scene, self.motion.solver)
+            self.motion.gauge = self._find_gauge(scene, self.motion.solver)
             self.acting = self.solver_inputs()
-            self._acts = {}
-            self._new.clear()
+            self._acts: dict[str, bool] = {}
+            self.new.clear()
         return self.motion
 
-    def map_solver(self, scene: PlainScene) -> Solver | None:
+    def _map_solver(self, scene: PlainScene) -> Solver | None:
         """Solver on the table that the FMU brings along, if the scene wants that."""
         if scene.solver_name != "blow-map":
             return None
         return BlowMapSolver(scene, read_blow_map(self.folder))
 
-    def parameters(self) -> list[Any]:
-        """Values of all parameters, in the order of their references."""
-        return [
-            self.values[one.reference]
-            for one in self.known.values()
-            if one.causality == "parameter"
-        ]
-
-    def find_gauge(self, scene: PlainScene, solver: Solver) -> Gauge | None:
+    def _find_gauge(self, scene: PlainScene, solver: Solver) -> Gauge | None:
         """Cell at the place of the gauge, None in a bar without cells."""
-        name = ("piston", "bit")[self.value("gauge.bar") - 1]
-        bar, place = scene[name], self.value("gauge.position")
-        if place == self.known[self.by_name["gauge.position"]].left_out:
+        name = self.choice("gauge.bar")
+        bar, place = scene[name], self.values["gauge.position"]
+        if place == self.by_name["gauge.position"].left_out:
             place = 0.5 * bar.length
         if place > bar.length:
             raise ValueError(
@@ -208,26 +143,19 @@ class PercussiveHammer(Slave):
 
     def step(self, time: float, step_size: float) -> None:
         """Pass on changed inputs, then advance."""
-        motion = self.motion or self.ready()
-        if self.late:
-            self.take_late()
-        changes = self.take_inputs(motion) if self._new else {}
-        motion.go_on(time, step_size, changes)
-        for text in self._watch.look(motion, self.acting["loading_stiffness"]):
-            self.warn(f"{self.instance_name}: at t = {time:.6g} s: {text}")
+        motion = self.motion or self.initialise()
+        motion.advance_to(time, step_size, self._changed_inputs(motion) if self.new else {})
+        for text in self._warnings.new(motion, self.acting["loading_stiffness"]):
+            self.warn(f"at t = {time:.6g} s: {text}")
 
-    def take_inputs(self, motion: Motion) -> dict[str, float]:
-        """Inputs of the solver that have changed, checked."""
-        values, acting, new = self.values, self.acting, self._new
-        if self._doubtful:
-            self.check(self._doubtful)
-            self._doubtful.clear()
-        wanted = {self._inner[r]: values[r] for r in new if r in self._inner}
-        if not self._forces.isdisjoint(new):
-            drive = self.drive_inputs()
-            if not self._drive_bounds[0] <= drive["drive_force"] <= self._drive_bounds[1]:
-                self.check(self._forced)
-            wanted |= drive
+    def _changed_inputs(self, motion: Motion) -> dict[str, float]:
+        """Inputs of the solver that have changed, and act."""
+        values, acting, new = self.values, self.acting, self.new
+        wanted = {PLAIN_INPUTS[name]: values[name] for name in new if name in PLAIN_INPUTS}
+        if not self._drive_inputs.isdisjoint(new):
+            forces = self.drive_forces()
+            self._check_drive(forces["drive_force"])
+            wanted |= forces
         new.clear()
         changed = {name: value for name, value in wanted.items() if value != acting[name]}
         acting |= changed
@@ -243,36 +171,63 @@ class PercussiveHammer(Slave):
             self._acts[name] = acts
         if not acts:
             outside = NAMES_OUTSIDE.get(name, name)
-            self.warn(f"{self.instance_name}: a new {outside} has no effect in this scene")
+            self.warn(f"a new {outside} has no effect in this scene")
         return acts
 
     # outputs
 
-    def reader(self, references: list[int]) -> Read:
+    def reader(self, names: list[str]) -> Read:
         """What gives the present values of these outputs; 0 before there are any."""
-        reads = [self._readers[reference] for reference in references]
+        reads = [OUTPUTS[name].read for name in names]
 
         def read(hammer: PercussiveHammer) -> list[Any]:
             motion = hammer.motion
             if motion is None:
                 if hammer.phase != Phase.INITIALISING:
                     return [0] * len(reads)
-                motion = hammer.ready()
+                motion = hammer.initialise()
             return [one(motion) for one in reads]
 
         return read
 
     # states
 
-    @guarded
-    def _get_fmu_state(self) -> bytes:
-        return hammer_states.save(self)
+    def fingerprint(self) -> bytes:
+        """Hash of sources, variables and parameters."""
+        if self._fingerprint is None:
+            parameters = [self.values[one.name] for one in self.parameters]
+            self._fingerprint = fingerprint(self.identity, parameters)
+        return self._fingerprint
 
-    @guarded
-    def _set_fmu_state(self, state: bytes) -> None:
-        hammer_states.restore(self, state)
+    def save(self) -> bytes:
+        """Numbers of the instance, its inputs, its motion."""
+        motion = self.motion
+        if self.phase == Phase.INSTANTIATED or motion is None:
+            raise ValueError("there is no state to save before the initialisation has ended")
+        solver = motion.save()  # reads, and so fills the row
+        numbers = NUMBERS.pack(
+            self.phase, 1, self.start_time, self.now, motion.time,
+            motion.blow_count, motion.step_size,
+        )  # fmt: skip
+        inputs = [self.values[one.name] for one in self.inputs]
+        acting = [self.acting[name] for name in INPUTS]
+        floats = np.array([*self.given_inputs, *inputs, *acting], float)
+        return numbers + floats.tobytes() + solver
 
+    def restore(self, body: bytes) -> None:
+        """Go back to a state."""
+        phase, _, start, now, time, blows, step_size = NUMBERS.unpack_from(body)
+        count = len(self.inputs)
+        floats = np.frombuffer(body, np.float64, 2 * count + len(INPUTS), NUMBERS.size)
+        self._set_inputs(floats[:count])
+        if [self.values[one.name] for one in self.inputs] != self.given_inputs:
+            self.motion = None  # the solver was made with other inputs
+        motion = self.initialise()
+        self._set_inputs(floats[count : 2 * count])
+        motion.restore((time, step_size), blows, body[NUMBERS.size + floats.nbytes :])
+        self.acting = dict(zip(INPUTS, floats[2 * count :].tolist(), strict=True))
+        self.phase, self.start_time, self.now = Phase(phase), start, now
 
-def _row(entry: dict[str, Any]) -> Row:
-    needs = {key: tuple(values) for key, values in entry["needs"].items()}
-    return Row(**{**entry, "choices": tuple(entry["choices"]), "needs": needs})
+    def _set_inputs(self, values: np.ndarray) -> None:
+        for one, value in zip(self.inputs, values, strict=True):
+            self.values[one.name] = bool(value) if one.type == "Boolean" else float(value)

@@ -11,7 +11,7 @@ import math
 from copy import copy
 from typing import Any
 
-from fmu_src.parts.part import Model
+from fmu_src.parts.part import COUNT, Model, Part, PartTable
 from fmu_src.parts.seeker import FEED, PRESSURE, Seeker
 
 DRILLING, VOID, RETRACT = 0, 1, 2
@@ -173,3 +173,76 @@ class DrillController(Model):
         super().restore(saved)
         for name, value in saved["seeker"].items():
             setattr(self.seeker, name, copy(value))
+
+
+class DrillControllerPart(Part):
+    """Controller of feed, pressure and percussion."""
+
+    MODEL = DrillController
+
+
+TABLE = PartTable(
+    name="DrillController",
+    slave=DrillControllerPart,
+    description="Feed PI, pressure by feed, cut-back in voids, retract from jams, rate seeking",
+    inputs={
+        "feed_setpoint": ("N", 0.0, 1e9, 2500.0, "feed force that is wanted"),
+        "pressure_setpoint": ("Pa", 0.0, 1e9, 2e6, "supply pressure that is wanted"),
+        "feed_force": ("N", -1e9, 1e9, 2500.0, "measured feed force, filtered"),
+        "rate_of_penetration": ("m/s", -1e4, 1e4, 0.0, "measured rate of penetration"),
+        "supply_pressure": ("Pa", 0.0, 1e9, 2e6, "measured supply pressure"),
+        "blow_frequency": ("Hz", 0.0, 1e6, 0.0, "measured frequency of the blows"),
+        "rotation_torque": ("N m", -1e9, 1e9, 0.0, "measured torque of the rotation"),
+        "head_velocity": ("m/s", -1e4, 1e4, 0.0, "measured velocity of the head"),
+    },
+    outputs={
+        "force_command": ("N", "force that the rig is to give"),
+        "pressure_command": ("Pa", "pressure that the supply is to give"),
+        "percussion_on": (False, "whether the drive is to be open"),
+        "mode": (COUNT, "0 drilling, 1 void, 2 retract"),
+        "feed_wanted": ("N", "feed force that the PI keeps"),
+        "seek.centre": ("N", "feed force about which the seeker swings"),
+        "seek.gradient": ("1", "d ln rate / d ln feed, as the seeker found it last"),
+        "seek.pressure_centre": ("Pa", "pressure about which the seeker swings"),
+        "seek.pressure_gradient": ("1", "d ln rate / d ln pressure, as it was found last"),
+    },
+    parameters={
+        "pi.on": ("", 0, 1, True, "PI on the feed force; off: the force at the start stays"),
+        "pi.gain": ("1", 0.0, 1e3, 0.5, "gain of the PI"),
+        "pi.time": ("s", 1e-3, 1e3, 0.2, "integral time of the PI"),
+        "start.force": ("N", -1e6, 1e6, 0.0, "force command at the start"),
+        "force_limit": ("N", 0.0, 1e7, 2e4, "greatest force command"),
+        "force_rate": ("N/s", 0.0, 1e9, 4e4, "fastest change of the command outside the PI"),
+        "feed_rate": ("N/s", 0.0, 1e9, 3e3, "fastest change of the feed that is wanted"),
+        "pressure_rate": ("Pa/s", 0.0, 1e12, 2e7, "fastest change of the pressure command"),
+        "speed_filter": ("s", 1e-4, 100.0, 0.05, "time of the filter of the head's velocity"),
+        "mode_time": ("s", 0.0, 100.0, 0.3, "shortest stay in void or retract"),
+        "ratio.on": ("", 0, 1, False, "pressure follows the feed"),
+        "ratio.slope": ("Pa/N", 0.0, 1e9, 800.0, "pressure by feed force"),
+        "ratio.lowest": ("Pa", 0.0, 1e9, 8e5, "lowest pressure of the ratio"),
+        "cutback.on": ("", 0, 1, True, "cut percussion back in a void"),
+        "cutback.velocity": ("m/s", 0.0, 100.0, 0.12, "velocity of the head that tells a void"),
+        "cutback.pressure": ("Pa", 0.0, 1e9, 4e5, "pressure in a void; 0 shuts the drive"),
+        "cutback.force": ("N", -1e6, 1e6, 0.0, "force in a void, beside that of the weights"),
+        "cutback.feed": ("N", 0.0, 1e6, 800.0, "feed from which drilling begins again"),
+        "retract.on": ("", 0, 1, True, "retract where the rotation jams"),
+        "retract.torque": ("N m", 0.0, 1e9, 250.0, "torque that tells a jam"),
+        "retract.share": ("1", 0.0, 1.0, 0.4, "share of it at which the jam is over"),
+        "retract.delay": ("s", 0.0, 100.0, 0.1, "time that a jam has to last"),
+        "retract.force": ("N", -1e6, 1e6, 400.0, "force while retracting, beside the weights"),
+        "seek.on": ("", 0, 1, False, "seek the feed of the best rate"),
+        "seek.swing": ("1", 1e-4, 0.5, 0.06, "swing of the feed by its mean"),
+        "seek.period": ("s", 0.01, 1e3, 2.0, "period of the swing"),
+        "seek.wait": ("s", 0.0, 1e4, 2.0, "time before the first period counts"),
+        "seek.gain": ("1", 0.0, 100.0, 0.15, "move of ln feed by the gradient found"),
+        "seek.largest_move": ("1", 0.0, 1.0, 0.12, "largest move of ln feed in a period"),
+        "seek.lowest": ("N", 1.0, 1e9, 500.0, "lowest feed of the seeker"),
+        "seek.highest": ("N", 1.0, 1e9, 2e4, "highest feed of the seeker"),
+        "seek.pressure_on": ("", 0, 1, False, "seek the pressure too, by a second swing"),
+        "seek.pressure_swing": ("1", 1e-4, 0.5, 0.06, "swing of the pressure by its mean"),
+        "seek.pressure_cycles": (COUNT, 2, 50, 3, "swings of the pressure in a period"),
+        "seek.pressure_gain": ("1", 0.0, 100.0, 0.15, "move of ln pressure by its gradient"),
+        "seek.pressure_lowest": ("Pa", 1.0, 1e9, 8e5, "lowest pressure of the seeker"),
+        "seek.pressure_highest": ("Pa", 1.0, 1e9, 3e6, "highest pressure of the seeker"),
+    },
+)  # fmt: skip

@@ -1,17 +1,19 @@
-"""A part of a drilling system: a plain model, and the slave around it."""
+"""A part of a drilling system: a plain model, its table of variables, and the slave around it."""
 
 from __future__ import annotations
 
-import importlib
 import json
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from operator import itemgetter
 from typing import Any, ClassVar
 
-from fmu_src.slave.calls import STEPPING, Phase, guarded
-from fmu_src.slave.slave import Slave
-from fmu_src.slave.states import StateError, fingerprint, pack, unpack
-from fmu_src.slave.values import Read
+from fmu_src.slave.slave import Phase, Read, Slave
+from fmu_src.slave.states import StateError, fingerprint
+
+Entries = dict[str, tuple[Any, ...]]
+
+COUNT = "count"  # in place of a unit, makes a whole number
 
 
 class Model:
@@ -37,7 +39,7 @@ class Model:
         """Take the state at time zero."""
 
     def step(self, inputs: dict[str, Any], step_size: float) -> None:
-        """Go on by a communication step [s], the inputs held."""
+        """Advance by a communication step [s], the inputs held."""
         raise NotImplementedError
 
     def outputs(self) -> dict[str, Any]:
@@ -63,86 +65,42 @@ def _plain(value: Any) -> Any:
 
 
 class Part(Slave):
-    """Slave around the model that the class attributes name."""
+    """Slave around the model that the class attribute names."""
 
-    MODEL: ClassVar[tuple[str, str]] = ("", "")  # module beside this one, and class in it
+    MODEL: ClassVar[type[Model]] = Model
 
     def __init__(self, **arguments: Any) -> None:
         super().__init__(**arguments)
-        package = __name__.rpartition(".")[0]
-        module = importlib.import_module(f"{package}.{self.MODEL[0]}")
-        self._model_class = getattr(module, self.MODEL[1])
-        known = self.known.values()
-        self._inputs = [(one.name, one.reference) for one in known if one.causality == "input"]
-        self._fixed = [one for one in known if one.causality == "parameter"]
-        self._input_references = [reference for _, reference in self._inputs]
-        self._names = {one.reference: one.name for one in known}
+        self.reset()
+
+    def reset(self) -> None:
+        """Make the model anew when it is needed."""
         self._model: Model | None = None
         self._found: Mapping[str, Any] | None = None  # outputs that were asked for
         self._fingerprint: bytes | None = None
-        self._given = self.inputs()  # as `inputs` gives them
-        self._doubtful: list[int] = []  # inputs to be checked
 
-    def changed(self, references: list[int]) -> None:
-        """Check inputs before the next step; before the first one, make the model anew."""
-        if self.phase < STEPPING:
-            self._model = self._found = self._fingerprint = None
-            return
-        for reference in references:
-            self._given[self._names[reference]] = self.values[reference]
-        self._doubtful += references
-
-    def take_late(self) -> None:
-        """Take inputs that were set and not yet looked at."""
-        held, given = self.values, self._given
-        for references, values in self.late.items():
-            plan = self._inputs_alone[references]
-            for (reference, name, low, high), value in zip(plan, values, strict=True):
-                held[reference] = given[name] = value
-                if not low <= value <= high:
-                    self._doubtful.append(reference)
-        self.late.clear()
-
-    def inputs(self) -> dict[str, Any]:
-        """Present inputs by name."""
-        values = self.values
-        return {name: values[reference] for name, reference in self._inputs}
-
-    def parameters(self) -> dict[str, Any]:
+    def _parameters(self) -> dict[str, Any]:
         """Parameters by name, words for enumerations."""
         return {
-            one.name: self.choice(one.reference)
-            if one.type == "Enumeration"
-            else self.values[one.reference]
-            for one in self._fixed
+            one.name: self.choice(one.name) if one.type == "Enumeration" else self.values[one.name]
+            for one in self.parameters
         }
 
-    def ready(self) -> Model:
+    def initialise(self) -> Model:
         """The model, made where there is none."""
         if self._model is None:
-            self._model = self._model_class(self.parameters())
-            self._given = self.inputs()
-            self._model.begin(self._given)
+            self._model = self.MODEL(self._parameters())
+            self._model.begin(self.values)
             self._found = None
         return self._model
 
-    def begin(self) -> None:
-        """Make the model, unless reading an output has made it already."""
-        self.ready()
-
     def step(self, time: float, step_size: float) -> None:
-        """Pass on changed inputs, then go on."""
-        if self.late:
-            self.take_late()
-        if self._doubtful:
-            self.check(self._doubtful)
-            self._doubtful.clear()
-        (self._model or self.ready()).step(self._given, step_size)
+        """Advance with the present inputs."""
+        (self._model or self.initialise()).step(self.values, step_size)
         self._found = None
 
-    def reader(self, references: list[int]) -> Read:
+    def reader(self, names: list[str]) -> Read:
         """What gives the present values of these outputs; 0 before there are any."""
-        names = [self._names[reference] for reference in references]
         pick = itemgetter(*names) if len(names) > 1 else lambda found: [found[n] for n in names]
 
         def read(part: Part) -> list[Any]:
@@ -150,11 +108,11 @@ class Part(Slave):
             if found is None:
                 if part._model is None and part.phase != Phase.INITIALISING:
                     return [0] * len(names)
-                found = part._found = part.ready().signals()
+                found = part._found = part.initialise().signals()
             try:
                 return list(pick(found))
             except KeyError:  # one that no other part takes
-                found = part._found = part.ready().outputs()
+                found = part._found = part.initialise().outputs()
             return list(pick(found))
 
         return read
@@ -162,63 +120,72 @@ class Part(Slave):
     def fingerprint(self) -> bytes:
         """Hash of the kind of part and its parameters."""
         if self._fingerprint is None:
-            self._fingerprint = fingerprint(*self.MODEL, self.parameters())
+            self._fingerprint = fingerprint(self.MODEL.__name__, self._parameters())
         return self._fingerprint
 
-    @guarded
-    def _get_fmu_state(self) -> bytes:
+    def save(self) -> bytes:
+        """Phase, times, inputs, and the state of the model."""
         if self._model is None:
             raise ValueError("there is no state to save before the initialisation has ended")
-        self.take_late()
         body = {
             "phase": int(self.phase),
             "times": [self.start_time, self.now],
-            "inputs": self.inputs(),
+            "inputs": {one.name: self.values[one.name] for one in self.inputs},
             "model": self._model.save(),
         }
-        return pack(self.fingerprint(), json.dumps(body).encode())
+        return json.dumps(body).encode()
 
-    @guarded
-    def _set_fmu_state(self, state: bytes) -> None:
+    def restore(self, body: bytes) -> None:
+        """Go back to a state."""
         try:
-            body = json.loads(unpack(self.fingerprint(), state))
+            saved = json.loads(body)
         except json.JSONDecodeError as error:
             raise StateError(f"the saved state cannot be read: {error}") from None
-        self.late.clear()
-        for name, value in body["inputs"].items():
-            self.values[self.by_name[name]] = value
-        self.ready().restore(body["model"])
-        self.phase = Phase(body["phase"])
-        self.start_time, self.now = body["times"]
-        self._given, self._found = self.inputs(), None
-        self._doubtful = list(self._input_references)
+        self.values |= saved["inputs"]
+        self.initialise().restore(saved["model"])
+        self.phase = Phase(saved["phase"])
+        self.start_time, self.now = saved["times"]
+        self._found = None
 
 
-class DrillStringPart(Part):
-    """Drill string with head, casing and shoulder."""
+@dataclass(frozen=True)
+class PartTable:
+    """Description and variables of a part; SI, forces and positions down positive.
 
-    MODEL = ("drill_string", "DrillString")
+    An entry of inputs and parameters is (unit, lower, upper, start, description), one of
+    outputs (unit, description) or (unit, lower, upper, nominal, description). A start that is
+    a flag makes a Boolean, as does False for the unit of an output; the unit COUNT makes a
+    whole number, and a tuple in place of the start an enumeration, whose first word is the
+    start.
 
+    Attributes
+    ----------
+    name : str
+        Of the FMU.
+    slave : type
+        What runs in it.
+    first : dict of int
+        First value reference by causality.
+    displays : dict of str
+        Units to display, by unit of the interface.
+    stop_time, step_size : float
+        Of the default experiment [s].
+    bundle : str
+        Beginning of the name under which the FMU keeps its sources.
+    """
 
-class RigFeedPart(Part):
-    """Hydraulic cylinder that pushes the head."""
-
-    MODEL = ("rig_feed", "RigFeed")
-
-
-class SupplyPart(Part):
-    """Source, hose and relief valve of the drive's fluid."""
-
-    MODEL = ("supply", "Supply")
-
-
-class RockProfilePart(Part):
-    """Rock by depth."""
-
-    MODEL = ("rock_profile", "RockProfile")
-
-
-class DrillControllerPart(Part):
-    """Controller of feed, pressure and percussion."""
-
-    MODEL = ("controller", "DrillController")
+    name: str
+    slave: type[Part]
+    description: str
+    inputs: Entries
+    outputs: Entries
+    parameters: Entries
+    first: Mapping[str, int] = field(
+        default_factory=lambda: {"input": 1, "output": 100, "parameter": 200}
+    )
+    displays: Mapping[str, str] = field(
+        default_factory=lambda: {"Pa": "bar", "N": "kN", "m/s": "mm/s", "Hz": "1/min"}
+    )
+    stop_time: float = 4.0
+    step_size: float = 1e-3
+    bundle: str = "drilling_system"

@@ -6,14 +6,14 @@ import math
 
 import numpy as np
 import pytest
+from models import make_model, start_inputs
 
-from fmu_src.parts.build import make_model, start_inputs
+from fmu_src.parts.drill_string import TABLE
 from fmu_src.parts.string_body import Lumps
 from fmu_src.parts.string_waves import Waves
-from fmu_src.parts.tables import STRING
 
 RODS = 6
-VALUES = {name: entry[3] for name, entry in STRING.parameters.items()}
+VALUES = {name: entry[3] for name, entry in TABLE.parameters.items()}
 FREE = {**VALUES, "gravity": 0.0, "friction.viscosity": 0.0}
 # Ends so light that they are open: their time constant is short against a cell.
 OPEN = {**FREE, "head.mass": 1e-3, "casing.mass": 1e-3, "rod.cells": 10}
