@@ -1,1 +1,1 @@
-"""Parts of a drilling system, each a plain model; `part` makes a slave of any of them."""
+"""Parts of a drilling system: of each its equations, its variables, and the slave around it."""

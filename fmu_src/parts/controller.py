@@ -27,7 +27,7 @@ class DrillController(Model):
     integral: float
     command: float
     pressure: float
-    jammed_for: float
+    jam_time: float
     speed: float
     STATE = tuple(__annotations__)
 
@@ -58,34 +58,34 @@ class DrillController(Model):
         goal, pressure = inputs["feed_setpoint"], inputs["pressure_setpoint"]
         if p["seek.on"]:
             if self.mode == DRILLING:
-                sought = self.seeker.go_on(inputs, self.time, h)
+                sought = self.seeker.sample(inputs, self.time, h)
                 goal, pressure = sought if p["seek.pressure_on"] else (sought[0], pressure)
             else:
                 self.seeker.pause(self.time)
                 if p["seek.pressure_on"]:
                     pressure = self.seeker.centres[PRESSURE]
         if self.mode == DRILLING:
-            self._go_towards(goal, h)
-            self._keep_feed(inputs["feed_force"], h)
+            self._ramp_feed(goal, h)
+            self._control_feed(inputs["feed_force"], h)
             self._set_pressure(inputs, pressure, h)
         elif self.mode == VOID:
             self.wanted = min(self.wanted, p["cutback.feed"])
-            self._command(self.integral + p["cutback.force"], h)
+            self._send(self.integral + p["cutback.force"], h)
             self._set_pressure(inputs, p["cutback.pressure"], h)
         else:
             self.wanted = min(self.wanted, p["cutback.feed"])
-            self._give_way(inputs["feed_force"], h)
-            self._command(self.integral + p["retract.force"], h)
+            self._relax_integral(inputs["feed_force"], h)
+            self._send(self.integral + p["retract.force"], h)
             self._set_pressure(inputs, pressure, h)
 
     def _choose_mode(self, inputs: dict[str, Any], h: float) -> None:
         p = self.parameters
         self.since += h
         torque = inputs["rotation_torque"]
-        self.jammed_for = self.jammed_for + h if torque > p["retract.torque"] else 0.0
+        self.jam_time = self.jam_time + h if torque > p["retract.torque"] else 0.0
         settled = self.since >= p["mode_time"]
         mode = self.mode
-        if p["retract.on"] and mode != RETRACT and self.jammed_for >= p["retract.delay"]:
+        if p["retract.on"] and mode != RETRACT and self.jam_time >= p["retract.delay"]:
             mode = RETRACT
         elif mode == RETRACT and settled and torque < p["retract.share"] * p["retract.torque"]:
             mode = DRILLING
@@ -101,12 +101,12 @@ class DrillController(Model):
         if mode != self.mode:
             self.mode, self.since = mode, 0.0
 
-    def _go_towards(self, goal: float, h: float) -> None:
+    def _ramp_feed(self, goal: float, h: float) -> None:
         """The wanted feed moves at a limited rate."""
         most = self.parameters["feed_rate"] * h
         self.wanted += min(max(goal - self.wanted, -most), most)
 
-    def _keep_feed(self, feed: float, h: float) -> None:
+    def _control_feed(self, feed: float, h: float) -> None:
         """PI beside the wanted feed itself; the integral stops where the command is limited.
 
         So the integral is what weights and reaction bring, which a void does not change much.
@@ -117,16 +117,16 @@ class DrillController(Model):
         command = self.wanted + p["pi.gain"] * error + raised
         if abs(command) <= p["force_limit"] or error * command < 0.0:
             self.integral = raised
-        self._command(command, 0.0)
+        self._send(command, 0.0)
 
-    def _give_way(self, feed: float, h: float) -> None:
+    def _relax_integral(self, feed: float, h: float) -> None:
         """A retract that does not help in its time takes too much for the weights: less of it."""
         p = self.parameters
         if self.since > p["mode_time"] and self.command > -p["force_limit"]:
             excess = max(0.0, feed - self.wanted)
             self.integral -= h * p["pi.gain"] / p["pi.time"] * excess
 
-    def _command(self, force: float, h: float) -> None:
+    def _send(self, force: float, h: float) -> None:
         """Send a force; at a limited rate where `h` [s] is given."""
         limit = self.parameters["force_limit"]
         force = min(max(force, -limit), limit)

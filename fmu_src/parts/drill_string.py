@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from fmu_src.parts.part import COUNT, Model, Part, PartTable
+from fmu_src.parts.part import COUNT, Model, Part, PartTable, plain
 from fmu_src.parts.string_body import Lumps
 from fmu_src.parts.string_waves import Waves
 
@@ -130,12 +130,12 @@ class DrillString(Model):
         h, body = step_size, self.body
         reaction = (inputs["casing_impulse"] - self.casing_impulse) / h
         self.casing_impulse = inputs["casing_impulse"]
-        before = body.head, self.casing_place()
+        before = body.head, self.casing_position()
         self._travel(inputs["head_force"], reaction - self.force, h)
         self.head_work += inputs["head_force"] * (body.head - before[0])
         self.head_impulse += inputs["head_force"] * h
         self.time += h
-        moved = self.casing_place() - before[1]
+        moved = self.casing_position() - before[1]
         self.reaction_work += reaction * moved
         self.shoulder_work += self.force * moved
         self.bit_impulse += self.force * h
@@ -143,12 +143,12 @@ class DrillString(Model):
         # what the bit did is known a step late, as it is in a master that goes by Jacobi
         self.bit_work += self.force_before * (bit - self.bit)
         self.force_before = self.force
-        self._push((bit - self.bit) / h, bit, h)
+        self._update_force((bit - self.bit) / h, bit, h)
         self.bit = bit
         if h != self._share[0]:
             self._share = h, 1.0 - math.exp(-h / self.parameters["feed_filter"])
         self.mean_force += self._share[1] * (self.force - self.mean_force)
-        self._rods(inputs["add_rod"])
+        self._add_rods(inputs["add_rod"])
 
     def _travel(self, head_force: float, casing_force: float, h: float) -> None:
         """Bring the body up to the communication point, or within a cell of it."""
@@ -156,7 +156,7 @@ class DrillString(Model):
         if isinstance(body, Lumps):
             count = max(1, math.ceil(h / LONGEST_LUMPED_STEP - ROUNDING))
             for _ in range(count):
-                body.go_on(head_force, casing_force, h / count)
+                body.advance(head_force, casing_force, h / count)
             return
         cell, enough = body.step, body.step * (1.0 - ROUNDING)
         if self.lag + h < enough:
@@ -182,11 +182,11 @@ class DrillString(Model):
         self.head_impulse_due = head_force * self.lag
         self.casing_impulse_due = casing_force * self.lag
 
-    def casing_place(self) -> float:
+    def casing_position(self) -> float:
         """Displacement of the casing at the communication point [m]."""
         return self.body.casing + self.body.casing_velocity * self.lag
 
-    def _push(self, bit_velocity: float, bit: float, h: float) -> None:
+    def _update_force(self, bit_velocity: float, bit: float, h: float) -> None:
         """Force of the shoulder for the step to come."""
         k, c = self.shoulder.constants(h)
         if k != self.stiffness:
@@ -195,13 +195,13 @@ class DrillString(Model):
             self.gap += self.force * softer
             self.loaded += 0.5 * self.force**2 * softer
             self.stiffness = k
-        compression = self.gap + self.casing_place() - bit
+        compression = self.gap + self.casing_position() - bit
         if compression <= 0.0:
             self.force = 0.0
             return
         self.force = max(0.0, k * compression + c * (self.body.casing_velocity - bit_velocity))
 
-    def _rods(self, asked: bool) -> None:
+    def _add_rods(self, asked: bool) -> None:
         """Add a rod on the rising edge of `add_rod`, or by itself where the head is down."""
         wanted = self.body.head >= self.next_rod
         if wanted and (self.parameters["rod.automatic"] or (asked and not self.was_asked)):
@@ -227,7 +227,7 @@ class DrillString(Model):
         stored_in_shoulder = 0.5 * self.force**2 / self.stiffness
         return self.signals() | {
             "head_position": body.head + body.head_velocity * self.lag,
-            "casing_position": self.casing_place(),
+            "casing_position": self.casing_position(),
             "casing_velocity": body.casing_velocity,
             "length": body.count * body.length_of_rod,
             "weight": body.weight,
@@ -252,8 +252,7 @@ class DrillString(Model):
 
     def save(self) -> dict[str, Any]:
         """State of shoulder and body."""
-        body = {name: getattr(self.body, name) for name in self.body.STATE}
-        body = {k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in body.items()}
+        body = {name: plain(getattr(self.body, name)) for name in self.body.STATE}
         return super().save() | {"body": body}
 
     def restore(self, saved: dict[str, Any]) -> None:

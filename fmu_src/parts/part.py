@@ -52,7 +52,7 @@ class Model:
 
     def save(self) -> dict[str, Any]:
         """State as plain values; `restore` takes them back."""
-        return {name: _plain(getattr(self, name)) for name in self.STATE}
+        return {name: plain(getattr(self, name)) for name in self.STATE}
 
     def restore(self, saved: dict[str, Any]) -> None:
         """Go back to a state."""
@@ -60,7 +60,8 @@ class Model:
             setattr(self, name, saved[name])
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
+    """A number, or a list of numbers, as JSON writes it."""
     return value.tolist() if hasattr(value, "tolist") else value
 
 

@@ -20,7 +20,7 @@ from fmu_src.parts.part import COUNT, Entries, Model, Part, PartTable
 
 LAYERS = 6
 # Knots of the variation that are kept, by number.
-KEPT = 64
+MOST_KNOTS = 64
 
 
 class RockProfile(Model):
@@ -76,16 +76,16 @@ class RockProfile(Model):
 
     def _knot(self, number: int) -> float:
         if number not in self._knots:
-            if len(self._knots) > KEPT:
+            if len(self._knots) > MOST_KNOTS:
                 self._knots.clear()
             seed = f"{int(self.parameters['variation.seed'])}:{number}"
             self._knots[number] = random.Random(seed).gauss(0.0, 1.0)
         return self._knots[number]
 
-    def _here(self) -> tuple[float, float, float, float, int]:
+    def _layer_at_depth(self) -> tuple[float, float, float, float, int]:
         return self.layers[max(0, bisect_right(self.tops, self.depth) - 1)]
 
-    def _ridden(self, value: float, name: str, best: str) -> float:
+    def _quadratic_factor(self, value: float, name: str, best: str) -> float:
         """Factor on the stiffness that is least at the best feed, or pressure."""
         factor = self.parameters[f"{name}.factor"]
         if factor == 0.0:
@@ -95,10 +95,10 @@ class RockProfile(Model):
 
     def signals(self) -> dict[str, Any]:
         """What hammer and controller take."""
-        _, stiffness, ratio, torque, _ = self._here()
+        _, stiffness, ratio, torque, _ = self._layer_at_depth()
         factor = self.variation(self.depth)
-        factor *= self._ridden(self.feed, "best_feed", "force")
-        factor *= self._ridden(self.pressure, "best_pressure", "pressure")
+        factor *= self._quadratic_factor(self.feed, "best_feed", "force")
+        factor *= self._quadratic_factor(self.pressure, "best_pressure", "pressure")
         return {
             "loading_stiffness": stiffness * factor,
             "unloading_ratio": ratio,
@@ -107,7 +107,7 @@ class RockProfile(Model):
 
     def outputs(self) -> dict[str, Any]:
         """Present values by name."""
-        _, stiffness, _, _, which = self._here()
+        _, stiffness, _, _, which = self._layer_at_depth()
         return self.signals() | {
             "depth": self.depth,
             "in_void": stiffness <= self.parameters["void_stiffness"],

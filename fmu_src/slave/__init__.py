@@ -1,1 +1,1 @@
-"""What runs inside an FMU. Needs numpy and numba alone; pythonfmu comes along."""
+"""What every slave is made of; runs inside FMUs."""
