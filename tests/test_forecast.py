@@ -19,7 +19,7 @@ from percussion_model.analysis.cost import (
     probe,
 )
 from percussion_model.interface.cli import app
-from percussion_model.solvers import make_solver
+from percussion_model.solvers.base import make_solver
 
 RIGID = {"piston.model": "rigid", "bit.model": "rigid"}
 SOLVER = make_solver(Scene().replace(**RIGID))

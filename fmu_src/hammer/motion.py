@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -12,17 +11,19 @@ from percussion_model.physics.ledger import unexplained
 from percussion_model.physics.records import (
     BLOW,
     LEDGER_FIELDS,
-    LONG_SAMPLE_FIELDS,
     PEAK_FIELDS,
+    READING,
+    READING_FIELDS,
     STORED_FIELDS,
     Mode,
 )
 from percussion_model.scene.rules import SceneRules
 from percussion_model.simulation.runner import Runner
-from percussion_model.solvers import Solver
+from percussion_model.solvers.base import Solver
+from percussion_model.solvers.state import State
 
-AT = {name: k for k, name in enumerate(LONG_SAMPLE_FIELDS)}
-LEDGER = (*LEDGER_FIELDS, *STORED_FIELDS)  # the last columns of a long row
+AT = {name: k for k, name in enumerate(READING_FIELDS)}
+LEDGER = (*LEDGER_FIELDS, *STORED_FIELDS)  # the last fields of a reading
 PEAKS = slice(AT[PEAK_FIELDS[0]], AT[PEAK_FIELDS[-1]] + 1)
 IMPULSES = ("bit_impulse", "contact_impulse", "drive_impulse")
 # An impulse below this in a communication step is no contact [N s].
@@ -58,17 +59,19 @@ class Motion(Runner):
         self.blow = self._numbers_of_blow()
         self.blow_count = 0
         self.step_size = 0.0
-        self.row = np.zeros(len(LONG_SAMPLE_FIELDS))
+        self.reading = np.zeros(1, READING)
+        self.row = self.reading.view(np.float64)
         self.numbers: list[float] = []  # the same as plain numbers
         self._is_read = self._has_peaks = False
-        self._here: Any = None  # copy of the state that belongs to `row`
+        self._here: State | None = None  # copy of the state that belongs to `row`
         self._stress: float | None = None
         # impulses at the start of the last step, or the state from which they follow
         self._before = np.zeros(len(IMPULSES))
-        self._left: tuple[Any, float] | None = None
+        self._left: tuple[State, float] | None = None
         # old copies to be used again
-        self._spare: Any = None
-        self._spare_of_peaks: Any = None
+        self._spare: State | None = None
+        self._spare_of_peaks: State | None = None
+        self._other = np.zeros(1, READING)  # what is read beside the present
 
     def _keep(self, blows: np.ndarray, events: np.ndarray) -> None:
         if len(blows):
@@ -87,7 +90,10 @@ class Motion(Runner):
         if self._is_read:
             self._before, self._left = self._impulses(self.row), None
         else:
-            self._spare = copied(self._state, self._spare)
+            if self._spare is None:
+                self._spare = self._state.copy()
+            else:
+                self._spare.take(self._state)
             self._left = (self._spare, self.time)
         self.solver.watch_peaks(self._state, self.time)
         if inputs:
@@ -122,21 +128,25 @@ class Motion(Runner):
         self._has_peaks = True
 
     def _arrays(self, floats: np.ndarray) -> list[np.ndarray]:
-        return [floats, self.row, self.row_of_blow, *_memory(self._state)]
+        state = self._state
+        return [floats, self.row, self.row_of_blow, state.record, state.workspace]
 
     @staticmethod
     def _impulses(row: np.ndarray) -> np.ndarray:
         first = AT[IMPULSES[0]]  # they stand side by side
         return row[first : first + len(IMPULSES)].copy()
 
-    def _look(self, state: Any, t: float, row: np.ndarray, here: Any, peaks: bool) -> Any:
+    def _evaluate(
+        self, state: State, t: float, reading: np.ndarray, spare: State | None, peaks: bool
+    ) -> State:
         # After a change of inputs a state may lie a step ahead.
-        return self.solver.look(state, max(t, self.solver.time(state)), row, here, peaks)
+        t = max(t, self.solver.time(state))
+        return self.solver.read(state, t, reading, None if spare is state else spare, peaks)
 
     def read(self) -> list[float]:
-        """What it is like now (`LONG_SAMPLE_FIELDS`) but for the peaks; 0 where undefined."""
+        """What it is like now (`READING_FIELDS`) but for the peaks; 0 where undefined."""
         if not self._is_read:
-            self._here = self._look(self._state, self.time, self.row, self._here, False)
+            self._here = self._evaluate(self._state, self.time, self.reading, self._here, False)
             self._take_row()
             self._stress, self._has_peaks = None, False
         return self.numbers
@@ -145,10 +155,10 @@ class Motion(Runner):
         """Greatest bit and contact force in the last step [N]."""
         self.read()
         if not self._has_peaks:
-            row = np.zeros(len(LONG_SAMPLE_FIELDS))
-            self._spare_of_peaks = self._look(
-                self._state, self.time, row, self._spare_of_peaks, True
+            self._spare_of_peaks = self._evaluate(
+                self._state, self.time, self._other, self._spare_of_peaks, True
             )
+            row = self._other.view(np.float64)
             self.row[PEAKS] = row[PEAKS]
             self.numbers[PEAKS] = row[PEAKS].tolist()
             self._has_peaks = True
@@ -166,9 +176,8 @@ class Motion(Runner):
     def before(self) -> np.ndarray:
         """Impulses at the start of the last step [N s]."""
         if self._left is not None:
-            row = np.zeros(len(LONG_SAMPLE_FIELDS))
-            self._look(*self._left, row, None, False)
-            self._before, self._left = self._impulses(row), None
+            self._evaluate(*self._left, self._other, None, False)
+            self._before, self._left = self._impulses(self._other.view(np.float64)), None
         return self._before
 
     def mean_force(self, which: int) -> float:
@@ -189,7 +198,7 @@ class Motion(Runner):
         self.read()
         if self._stress is None:
             self._stress = 0.0
-            if self.gauge is not None:
+            if self.gauge is not None and self._here is not None:
                 force = self.solver.force_in(self._here, self.gauge.bar, self.gauge.cell)
                 self._stress = force / self.gauge.area
         return self._stress
@@ -207,15 +216,3 @@ class Motion(Runner):
         since = self.time - (blow["time"] + blow["period"])
         late = since / blow["period"] - (PERIODS_HELD - 1.0)
         return min(1.0, 1.0 / late) if late > 0.0 else 1.0
-
-
-def copied(state: Any, spare: Any) -> Any:
-    """Copy of a state, into an old copy where there is one."""
-    if spare is None or isinstance(state, np.ndarray):
-        return state.copy()
-    spare.take(state)
-    return spare
-
-
-def _memory(state: Any) -> list[np.ndarray]:
-    return [state] if isinstance(state, np.ndarray) else [state.record, state.workspace]

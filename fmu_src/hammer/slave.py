@@ -23,8 +23,7 @@ from fmu_src.variables import closed_bounds, read_row
 from percussion_model.scene.inputs import INPUTS
 from percussion_model.scene.rows import refuse_value
 from percussion_model.scene.rules import SceneRules
-from percussion_model.solvers import Solver
-from percussion_model.solvers.blow_map.solver import BlowMapSolver
+from percussion_model.solvers.base import Solver
 from percussion_model.solvers.wave.grid import cell_at
 
 # Solvers hold no state: instances of equal parameters share one.
@@ -125,6 +124,9 @@ class PercussiveHammer(Slave):
         """Solver on the table that the FMU brings along, if the scene wants that."""
         if scene.solver_name != "blow-map":
             return None
+        # its kernels are loaded where they are needed only
+        from percussion_model.solvers.blow_map.solver import BlowMapSolver
+
         return BlowMapSolver(scene, read_blow_map(self.folder))
 
     def _find_gauge(self, scene: PlainScene, solver: Solver) -> Gauge | None:

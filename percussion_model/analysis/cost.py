@@ -12,7 +12,7 @@ from percussion_model.analysis.blow_maps import MapCost, kept_map, map_cost
 from percussion_model.scene.scene import Scene
 from percussion_model.simulation.accuracy import planned_cells, with_cells
 from percussion_model.simulation.stepping import Simulation
-from percussion_model.solvers import Solver
+from percussion_model.solvers.base import Solver
 
 # A probe ends after so many blows once it took so long [s]; a run that is over sooner is
 # measured, not predicted.

@@ -1,4 +1,4 @@
-"""Rows of the event list and of the blow table.
+"""Rows of blows, events and readings, which every solver writes alike.
 
 A blow starts at the first closure of the piston/bit gap after the downward
 switch of the drive; without a switching drive, after the gap was open for 20
@@ -9,17 +9,23 @@ from __future__ import annotations
 
 import math
 
-from percussion_model.physics.kernel import inlined, kernel, merged
-from percussion_model.physics.records import DriveKind, EventKind, Mode
-from percussion_model.physics.state import CHECKPOINTS
+from numba import literal_unroll
 
-SS = int(Mode.SS)
-PRESSURE = int(DriveKind.PRESSURE)
-CONTACT_CLOSED = int(EventKind.CONTACT_CLOSED)
-CONTACT_OPENED = int(EventKind.CONTACT_OPENED)
+from percussion_model.physics.kernel import inlined, kernel, merged
+from percussion_model.physics.records import (
+    LEDGER_ENTRIES,
+    PEAK_FIELDS,
+    DriveKind,
+    EventKind,
+    Mode,
+)
+from percussion_model.physics.state import CHECKPOINTS
 
 # The standstill force is the mean over this last share of the standstill.
 LAST_SHARE = 0.1
+
+# What a reading takes over from a state as it is.
+_KEPT = (*LEDGER_ENTRIES, *PEAK_FIELDS)
 
 
 @inlined
@@ -58,7 +64,7 @@ def standstill_force(s, time, impulse):
     float
         Force [N]; NaN where the bit does not stand still.
     """
-    if s.mode != SS or s.n_check == 0:
+    if s.mode != Mode.SS or s.n_check == 0:
         return math.nan
     begin = time - LAST_SHARE * (time - s.t_standstill)
     later_time = time
@@ -101,7 +107,7 @@ def finish_blow(s, blows, time, bit_position, mass_p):
 
 
 @kernel
-def start_blow(s, blows, time, piston_velocity, bit_position, impulse, mass_p):
+def start_blow(s, blows, time, piston_velocity, bit_position, standstill, mass_p):
     """End the blow under way, if any, and start the next at `time`.
 
     Parameters
@@ -110,12 +116,12 @@ def start_blow(s, blows, time, piston_velocity, bit_position, impulse, mass_p):
         Mean velocity of the piston at the closure [m/s].
     bit_position : float
         Mean displacement of the bit at the closure [m].
-    impulse : float
-        Running bit impulse at the closure [N s].
+    standstill : float
+        Mean bit force at the end of the standstill before, NaN where there was none [N].
     """
     if s.live == 1 and s.b_started == 1:
         finish_blow(s, blows, time, bit_position, mass_p)
-    s.b_standstill = standstill_force(s, time, impulse)
+    s.b_standstill = standstill
     s.b_started = 1
     s.count_blows += 1
     s.armed = 0
@@ -134,7 +140,42 @@ def start_blow(s, blows, time, piston_velocity, bit_position, impulse, mass_p):
     s.b_cycles = 0
 
 
-@merged
+@inlined
 def starts_blow(par, s, time):
-    """Whether a closure of the gap at `time` starts a blow."""
-    return s.armed == 1 or (par.drive != PRESSURE and time - s.t_open >= par.rearm_time)
+    """Whether a closure of the gap at `time` starts a blow; no two start at one instant."""
+    if s.b_started == 1 and time <= s.b_time:
+        return False
+    return s.armed == 1 or (par.drive != DriveKind.PRESSURE and time - s.t_open >= par.rearm_time)
+
+
+@merged
+def close_gap(s, events, time, approach):
+    """Note that the gap closes at `time` with a closing speed [m/s]."""
+    s.b_contacts += 1
+    s.count_contacts += 1
+    push_event(s, events, time, EventKind.CONTACT_CLOSED, approach)
+
+
+@merged
+def open_gap(s, events, time, approach):
+    """Note that the gap opens at `time`; the piston then has its rebound velocity."""
+    s.b_rebound = s.v_p
+    s.t_open = time
+    push_event(s, events, time, EventKind.CONTACT_OPENED, approach)
+
+
+@merged
+def fill_ledger(s, reading, kinetic, elastic, recoverable):
+    """Write the energies of a state and the peaks that its observer asked for.
+
+    Parameters
+    ----------
+    reading : record of READING
+    kinetic, elastic, recoverable : float
+        Stored energies [J].
+    """
+    for name in literal_unroll(_KEPT):
+        reading[name] = s[name]
+    reading.kinetic = kinetic
+    reading.elastic = elastic
+    reading.recoverable = recoverable

@@ -6,18 +6,26 @@ from percussion_model.physics.blows import push_event
 from percussion_model.physics.kernel import inlined
 from percussion_model.physics.records import DriveKind, EventKind
 
-PRESSURE, EXTERNAL = int(DriveKind.PRESSURE), int(DriveKind.EXTERNAL)
-DRIVE_UP, DRIVE_DOWN = int(EventKind.DRIVE_UP), int(EventKind.DRIVE_DOWN)
-
 
 @inlined
 def drive_force(par, s):
     """Force of the drive on the piston, down positive [N]."""
-    if par.drive == PRESSURE:
+    if par.drive == DriveKind.PRESSURE:
         return s.alpha * s.drive_force
-    if par.drive == EXTERNAL:
+    if par.drive == DriveKind.EXTERNAL:
         return s.external
     return 0.0
+
+
+@inlined
+def turn_drive(s, events, time, u_r):
+    """Turn the pressure at `time`, where the relative displacement is `u_r` [m]."""
+    s.alpha = -s.alpha
+    kind = EventKind.DRIVE_UP
+    if s.alpha > 0:
+        kind = EventKind.DRIVE_DOWN
+        s.armed = 1
+    push_event(s, events, time, kind, u_r)
 
 
 @inlined
@@ -39,7 +47,7 @@ def switch_drive(par, s, u_before, time, tau, events):
     float
         Share of the step before the switch, or -1 where there is none.
     """
-    if par.drive != PRESSURE:
+    if par.drive != DriveKind.PRESSURE:
         return -1.0
     if s.alpha > 0:
         level = 0.0
@@ -52,10 +60,5 @@ def switch_drive(par, s, u_before, time, tau, events):
     share = 0.0
     if u_before != s.u_r:
         share = min(max((level - u_before) / (s.u_r - u_before), 0.0), 1.0)
-    s.alpha = -s.alpha
-    kind = DRIVE_UP
-    if s.alpha > 0:
-        kind = DRIVE_DOWN
-        s.armed = 1
-    push_event(s, events, time + share * tau, kind, level)
+    turn_drive(s, events, time + share * tau, level)
     return share

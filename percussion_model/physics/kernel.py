@@ -1,4 +1,4 @@
-"""The decorators of every kernel."""
+"""Decorators of every kernel, and the check that no stale compiled code is loaded."""
 
 from __future__ import annotations
 
@@ -63,8 +63,8 @@ def entry_of(function: Callable) -> Callable:
 # not compile, so that it can always be built ahead of time.
 kernel = njit(cache=True, error_model="numpy", _nrt=False)
 
-# For what calls other libraries, which may wait for threads that want to run Python.
-letting_go = njit(cache=True, error_model="numpy", _nrt=False, nogil=True)
+# For calls of other libraries, which may wait for threads that want to run Python.
+nogil = njit(cache=True, error_model="numpy", _nrt=False, nogil=True)
 
 # For what runs in every step: arrays cost nine words an argument to pass.
 inlined = njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
@@ -75,3 +75,6 @@ fused = njit(cache=True, error_model="numpy", _nrt=False, forceinline=True, fast
 
 # For what is called from one place: compiled as part of its caller alone.
 merged = njit(cache=True, error_model="numpy", _nrt=False, inline="always")
+
+# For kernels put together at import, which a cache could not tell apart: part of their callers.
+composed = njit(error_model="numpy", _nrt=False, forceinline=True)

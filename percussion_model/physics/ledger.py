@@ -4,14 +4,30 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
+from percussion_model.physics.effects import EFFECTS
+from percussion_model.physics.records import LEDGER_FIELDS, STORED_FIELDS
+
 WORKS = ("drive", "feed", "gravity")
-DISSIPATED = ("crushing", "barrier", "standstill", "loss", "contact")
+DISSIPATED = (
+    *("crushing", "barrier", "standstill", "loss", "contact"),
+    *(effect.name for effect in EFFECTS),
+)
 NUMERICAL = ("numerical", "overshoot")
 STORED = ("kinetic", "elastic", "recoverable")
 
+# They stand at the end of a reading.
+_ENERGIES = (*LEDGER_FIELDS, *STORED_FIELDS)
+
+
+def energies(reading: np.ndarray) -> dict[str, float]:
+    """Entries of the ledger and stored energies [J] in a READING array of length 1."""
+    return dict(zip(_ENERGIES, reading.view(np.float64)[-len(_ENERGIES) :].tolist(), strict=True))
+
 
 def complete_ledger(entries: dict[str, float]) -> dict[str, float]:
-    """Add sums, residual and relative figures to the entries of a solver [J]."""
+    """Add sums, residual and relative figures to the entries of a reading [J]."""
     ledger = {"initial": entries["start"]}
     ledger |= {name: entries[name] for name in (*WORKS, *DISSIPATED, *NUMERICAL, *STORED)}
     for name, parts in (("input", WORKS), ("stored", STORED), ("dissipated", DISSIPATED)):

@@ -1,4 +1,4 @@
-"""What every solver writes: enumerations and the records of a blow, an event and a sample.
+"""Enumerations, and the records of a blow, an event and a reading.
 
 Plain data only. The kernels fill these records; Python reads them.
 """
@@ -8,6 +8,8 @@ from __future__ import annotations
 from enum import IntEnum
 
 import numpy as np
+
+from percussion_model.physics.effects import EFFECTS
 
 
 class Mode(IntEnum):
@@ -105,7 +107,7 @@ EVENT = np.dtype(
     align=True,
 )
 
-# Columns of a sample (a row of float64): the answer to "what is it like at t".
+# What is seen of a state at a time, in the order of the columns of a sample.
 SAMPLE_FIELDS = (
     "time",  # [s]
     "piston_position",  # mean displacement since the start of the run [m], down positive
@@ -139,15 +141,22 @@ LEDGER_FIELDS = (
     "contact",  # restitution of rigid contact
     "numerical",  # what the discretisation dissipates
     "overshoot",  # what springs lose where an event is found just past its place
+    *(effect.name for effect in EFFECTS),  # what their forces take from the bit
 )
 
-# Stored energies [J] found by reading a state: at the start, and now.
+# Stored energies [J]: at the start, and now.
 STORED_FIELDS = ("start", "kinetic", "elastic", "recoverable")
 
 # Greatest forces since the time that a state carries as `peak_from` [N]. Contact: the
 # elastic part of the force; rigid bodies have none but where they rest on each other.
 PEAK_FIELDS = ("peak_bit_force", "peak_contact_force")
 
-# A row that is longer than a sample holds these besides; the ledger is that of
-# the last grid point before.
-LONG_SAMPLE_FIELDS = (*SAMPLE_FIELDS, *PEAK_FIELDS, *LEDGER_FIELDS, *STORED_FIELDS)
+# All that is read of a state; the ledger is that of the last grid point before.
+READING_FIELDS = (*SAMPLE_FIELDS, *PEAK_FIELDS, *LEDGER_FIELDS, *STORED_FIELDS)
+
+# The same as a record, in the same order; entries of the ledger are called as in a state.
+LEDGER_ENTRIES = tuple(f"e_{name}" for name in (*LEDGER_FIELDS, "start"))
+READING = np.dtype(
+    [(name, "f8") for name in (*SAMPLE_FIELDS, *PEAK_FIELDS, *LEDGER_ENTRIES, *STORED_FIELDS[1:])],
+    align=True,
+)

@@ -1,4 +1,4 @@
-"""The five-mode bit/rock law: its numbers and its changes of mode.
+"""The five-mode bit/rock law: its numbers, its energies and its changes of mode.
 
 Table 1 of docs/model.md, with the readings given there.
 """
@@ -7,9 +7,6 @@ from __future__ import annotations
 
 from percussion_model.physics.kernel import inlined, kernel, merged
 from percussion_model.physics.records import Mode, RockKind
-
-FF, DFC, FC, BC, SS = (int(m) for m in Mode)
-BILINEAR, SPRING, WALL = int(RockKind.BILINEAR), int(RockKind.SPRING), int(RockKind.WALL)
 
 # A velocity below this counts as zero: the ringing left after a long
 # standstill is of this size, its sign means nothing [m/s].
@@ -22,30 +19,50 @@ COUNTED_CYCLE = 0.01
 @inlined
 def stiffness(s):
     """K of the present mode [N/m], table 1 of docs/model.md."""
-    if s.mode == DFC or s.mode == FC:
+    if s.mode == Mode.DFC or s.mode == Mode.FC:
         return s.k_r
-    if s.mode == FF:
+    if s.mode == Mode.FF:
         return 0.0
     return s.gamma * s.k_r
 
 
 @inlined
+def damping(s):
+    """C of the present mode [N s/m], table 1 of docs/model.md."""
+    if s.mode == Mode.DFC or s.mode == Mode.SS:
+        return s.c_r
+    return 0.0
+
+
+@inlined
 def origin(s):
     """P_R of the present mode [m], table 1 of docs/model.md."""
-    if s.mode == BC or s.mode == SS:
+    if s.mode == Mode.BC or s.mode == Mode.SS:
         return s.p_u
     return 0.0
 
 
 @inlined
+def spring_force(s):
+    """Force of the rock without its damping [N]."""
+    return stiffness(s) * (s.p - origin(s))
+
+
+@inlined
+def recoverable_at(s, p):
+    """Energy that the rock would give back on unloading from `p` in the present mode [J]."""
+    if s.mode == Mode.DFC or s.mode == Mode.FC:
+        return 0.5 * s.k_r * p * p / s.gamma
+    if s.mode == Mode.FF and p <= s.p_u:
+        return 0.0
+    y = p - s.p_u
+    return 0.5 * s.gamma * s.k_r * y * y
+
+
+@inlined
 def recoverable(s):
     """Energy that the rock would give back on unloading [J]."""
-    if s.mode == DFC or s.mode == FC:
-        return 0.5 * s.k_r * s.p * s.p / s.gamma
-    if s.mode == FF and s.p <= s.p_u:
-        return 0.0
-    y = s.p - s.p_u
-    return 0.5 * s.gamma * s.k_r * y * y
+    return recoverable_at(s, s.p)
 
 
 @inlined
@@ -67,9 +84,9 @@ def start_cycle(s, barrier, p):
     s.c_r = s.next_c_r
     s.w_r = s.next_w_r
     if barrier == 1 and s.c_r > 0.0 and s.w_r > 0.0:
-        s.mode = DFC
+        s.mode = Mode.DFC
     else:
-        s.mode = FC
+        s.mode = Mode.FC
 
 
 @kernel
@@ -80,6 +97,22 @@ def resume_cycle(s, barrier):
     start_cycle(s, barrier, force / s.next_k_r)
     # With other rock than before, what can be recovered changes at once.
     s.e_crushing += before - recoverable(s)
+
+
+@inlined
+def end_loading(s):
+    """Unloading begins at the peak of a drilling cycle (eq. 22 of the paper)."""
+    s.p_u = s.p * (s.gamma - 1.0) / s.gamma
+    s.mode = Mode.BC
+
+
+@merged
+def end_unloading(par, s, energy):
+    """The bit turns downward while unloading: a new cycle, or standstill."""
+    if barrier_off(par, s) or energy > s.w_r:
+        resume_cycle(s, par.barrier)
+    else:
+        s.mode = Mode.SS
 
 
 @merged
@@ -98,18 +131,14 @@ def leave_by_velocity(par, s, v, energy):
     int
         1 where the mode changed.
     """
-    if par.rock != BILINEAR:
+    if par.rock != RockKind.BILINEAR:
         return 0
-    if s.mode == DFC or s.mode == FC:
+    if s.mode == Mode.DFC or s.mode == Mode.FC:
         if v < -REST_VELOCITY:
-            s.p_u = s.p * (s.gamma - 1.0) / s.gamma
-            s.mode = BC
+            end_loading(s)
             return 1
-    elif s.mode == BC and v > REST_VELOCITY:
-        if barrier_off(par, s) or energy > s.w_r:
-            resume_cycle(s, par.barrier)
-        else:
-            s.mode = SS
+    elif s.mode == Mode.BC and v > REST_VELOCITY:
+        end_unloading(par, s, energy)
         return 1
     return 0
 
@@ -117,22 +146,22 @@ def leave_by_velocity(par, s, v, energy):
 @merged
 def close_interface(par, s, energy):
     """Contact with the rock begins: a new cycle, standstill, spring or wall."""
-    if par.rock == SPRING:
-        s.mode = FC
-    elif par.rock == WALL:
-        s.mode = SS
+    if par.rock == RockKind.SPRING:
+        s.mode = Mode.FC
+    elif par.rock == RockKind.WALL:
+        s.mode = Mode.SS
     elif barrier_off(par, s) or energy > s.w_r:
         s.e_standstill += recoverable(s)
         start_cycle(s, par.barrier, 0.0)
     else:
-        s.mode = SS
+        s.mode = Mode.SS
 
 
 @merged
 def leave_standstill(par, s, v):
     """Standstill ends because KE_b > W_R: a new cycle, or unloading."""
     if v < -REST_VELOCITY:
-        s.mode = BC
+        s.mode = Mode.BC
     else:
         resume_cycle(s, par.barrier)
 
@@ -145,11 +174,25 @@ def enter_standstill(s, time):
 
 
 @inlined
-def crush(s, p_before):
-    """Book the irrecoverable part of loading from `p_before` to s.p."""
+def book_dashpot(s, work):
+    """Book what the dashpot of the present mode took [J]."""
+    if s.mode == Mode.DFC:
+        s.e_barrier += work
+        s.w += work
+    elif s.mode == Mode.SS:
+        s.e_standstill += work
+
+
+@inlined
+def crush(par, s, p_before):
+    """Book the irrecoverable part of loading from `p_before` to s.p, if this is loading [J]."""
+    if par.rock != RockKind.BILINEAR or (s.mode != Mode.DFC and s.mode != Mode.FC):
+        return 0.0
     work = 0.5 * s.k_r * (s.p - p_before) * (s.p + p_before) * (1.0 - 1.0 / s.gamma)
     s.e_crushing += work
     s.crushed += work
     if s.cycle_counted == 0 and s.crushed > COUNTED_CYCLE * s.w_r:
         s.cycle_counted = 1
+        s.count_cycles += 1
         s.b_cycles += 1
+    return work

@@ -1,15 +1,31 @@
-"""What the states of the solvers with elastic bars have in common.
+"""Fields that the parameters and states of all solvers have in common.
 
-Modes, inputs, rock law, running sums and the blow under way: the fields that
-`blows`, `drive` and `rock_law` read and write, whoever moves the bars.
+Symbols as in the paper. Modes, inputs, rock law, running sums and the blow under way:
+what `rock`, `drive`, `body` and `blows` read and write, whoever moves the bodies.
 """
 
 from __future__ import annotations
 
-from percussion_model.physics.records import LEDGER_FIELDS
+from percussion_model.physics.effects import EFFECTS
+from percussion_model.physics.records import LEDGER_ENTRIES
 
 # Checkpoints of the running bit impulse during standstill.
 CHECKPOINTS = 32
+
+# What stays fixed during a run.
+COMMON_PARAMETERS = [
+    ("gravity", "f8"),  # [m/s2], 0 where it is off
+    ("mass_p", "f8"),  # [kg]
+    ("mass_b", "f8"),
+    ("rearm_time", "f8"),  # without a pressure law a gap open this long ends a blow [s]
+    ("piston", "i8"),  # Piston
+    ("drive", "i8"),  # DriveKind
+    ("rock", "i8"),  # RockKind
+    ("barrier", "i8"),  # 1: the energy barrier is on
+    ("release", "i8"),  # 1: standstill leaves to free flight when F_R reaches 0
+    ("effects", "i8"),  # 1: there are effects that hold a force
+    *[(f"{effect.name}_{name}", "f8") for effect in EFFECTS for name in effect.parameters],
+]
 
 _SWITCHES = [
     ("mode", "i8"),  # Mode
@@ -20,9 +36,11 @@ _SWITCHES = [
     ("n_blows", "i8"),  # rows written into the buffers of the present call
     ("n_events", "i8"),
     ("cycle_counted", "i8"),
-    ("locked", "i8"),  # steps in which the rock law did not settle
+    ("count_locked", "i8"),  # steps in which the rock law did not settle
     ("count_steps", "i8"),
     ("count_events", "i8"),
+    ("count_contacts", "i8"),
+    ("count_cycles", "i8"),
     ("count_blows", "i8"),
 ]
 
@@ -39,6 +57,8 @@ _INPUTS = [  # changed from outside at grid points
     ("next_gamma", "f8"),
     ("next_c_r", "f8"),
     ("next_w_r", "f8"),
+    ("f_held", "f8"),  # sum of the forces that effects hold on the bit [N]
+    *[(f"f_{effect.name}", "f8") for effect in EFFECTS],
 ]
 
 _MOTION = [
@@ -63,15 +83,14 @@ _SUMS = [
     ("i_bit", "f8"),
     ("i_drive", "f8"),
     ("rock_work", "f8"),  # [J]
-    *[(f"e_{name}", "f8") for name in LEDGER_FIELDS],
-    ("e_start", "f8"),  # stored energy at the start [J]
+    *[(name, "f8") for name in LEDGER_ENTRIES],  # [J]
     # greatest forces since a time that the observer sets; infinite: nobody asks
     ("peak_from", "f8"),  # [s]
-    ("peak_bit", "f8"),  # [N]
-    ("peak_contact", "f8"),
+    ("peak_bit_force", "f8"),  # [N]
+    ("peak_contact_force", "f8"),
 ]
 
-_BLOW = [
+_BLOW = [  # the blow under way: what it began with, and what it has come to
     ("b_time", "f8"),
     ("b_impact", "f8"),
     ("b_rebound", "f8"),
@@ -90,4 +109,5 @@ _BLOW = [
     ("armed", "i8"),  # the next closure starts a blow
 ]
 
+# What changes; every field is a word of eight bytes or a row of such.
 COMMON_STATE = [*_SWITCHES, *_INPUTS, *_MOTION, *_SUMS, *_BLOW]

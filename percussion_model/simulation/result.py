@@ -17,7 +17,7 @@ from percussion_model.simulation.warnings import find_warnings
 if TYPE_CHECKING:
     import pandas
 
-    from percussion_model.solvers import Solver
+    from percussion_model.solvers.base import Solver
 
 __all__ = ["Result", "check_writable", "make_result"]
 

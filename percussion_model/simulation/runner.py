@@ -7,11 +7,11 @@ from collections.abc import Callable
 
 import numpy as np
 
-from percussion_model.physics.records import BLOW, EVENT, SAMPLE_FIELDS, Status
+from percussion_model.physics.records import BLOW, EVENT, READING, SAMPLE_FIELDS, Status
 from percussion_model.scene.inputs import SimulationError, check_input
 from percussion_model.scene.rows import is_number
 from percussion_model.scene.rules import SceneRules
-from percussion_model.solvers import Solver, make_solver
+from percussion_model.solvers.base import Solver, make_solver
 
 # Rows that one call of a kernel can fill; a full buffer is read out.
 _BLOW_ROOM = 64
@@ -62,7 +62,7 @@ class Runner:
         trial = self.solver.new_state()
         t = 2.0 * (self.solver.time_step or 1e-9)
         self.solver.advance(trial, t, self._blow_room, self._event_room, self.record_events)
-        self.solver.energy(trial, t)
+        self.solver.read(trial, t, np.zeros(1, READING))
 
     @property
     def time(self) -> float:
@@ -138,9 +138,8 @@ class Runner:
         if status == _DONE or status in _FULL:
             return status, n_blows
         where = f"at t = {self.solver.time(self._state)!r} s"
-        refusal = getattr(self.solver, "refusal", None)
-        if refusal is not None and status == Status.REFUSED:
-            raise SimulationError(f"after t = {self._time!r} s {refusal(self._state)}")
+        if status == Status.REFUSED:
+            raise SimulationError(f"after t = {self._time!r} s {self.solver.refusal(self._state)}")
         if status == Status.NOT_FINITE:
             raise SimulationError(f"{where} the state is no longer finite: check the scene")
         raise SimulationError(f"{where} the solver found no way on ({Status(status).name.lower()})")

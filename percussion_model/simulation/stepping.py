@@ -7,12 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from percussion_model.physics.ledger import complete_ledger
-from percussion_model.physics.records import BLOW, EVENT, SAMPLE_FIELDS
+from percussion_model.physics.ledger import complete_ledger, energies
+from percussion_model.physics.records import BLOW, EVENT, READING, SAMPLE_FIELDS
 from percussion_model.scene.inputs import SimulationError
 from percussion_model.scene.scene import Scene
 from percussion_model.simulation.result import Result, make_result
 from percussion_model.simulation.runner import Runner
+from percussion_model.solvers.state import State
 
 
 @dataclass(frozen=True)
@@ -106,17 +107,20 @@ class Simulation(Runner):
 
     def energy(self) -> dict[str, float]:
         """Energy ledger [J] at the present grid point; see `Result.energy`."""
-        now = max(self._time, self.solver.time(self._state))
-        return complete_ledger(self.solver.energy(self._state, now))
+        return complete_ledger(energies(self._read_state()[0]))
 
     def fields(self) -> dict[str, np.ndarray]:
         """Force [N] and velocity [m/s] in each cell of the elastic bars, top to bottom.
 
         At the last grid point up to the present; empty where no bar is elastic.
         """
-        now = max(self._time, self.solver.time(self._state))
-        row = np.empty(len(SAMPLE_FIELDS))
-        return self.solver.fields(self.solver.look(self._state, now, row))
+        return self.solver.fields(self._read_state()[1])
+
+    def _read_state(self) -> tuple[np.ndarray, State]:
+        """Reading at the present time, and the copy of the state that it was made of."""
+        here = max(self._time, self.solver.time(self._state))
+        reading = np.zeros(1, READING)
+        return reading, self.solver.read(self._state, here, reading, peaks=False)
 
     def statistics(self) -> dict[str, int]:
         """Counts of what the solver did."""

@@ -1,5 +1,1 @@
-"""Solvers: the Python side of the kernels."""
-
-from percussion_model.solvers.base import Solver, make_solver
-
-__all__ = ["Solver", "make_solver"]
+"""Solvers: a folder each, behind the interface of `base`."""

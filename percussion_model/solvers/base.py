@@ -1,19 +1,39 @@
-"""What every solver offers to the one time loop above it."""
+"""Base of all solvers, and the registry by which scenes name them.
+
+A solver moves states of one scene through time. It has to give a first state, to
+advance it and to read it; the rest has defaults that fit a solver without grid and
+cells. `register` makes it known by name (CONTRIBUTING.md, "To add a solver").
+"""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Protocol
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from importlib import import_module
+from typing import Any, ClassVar, NamedTuple, Protocol
 
 import numpy as np
 
-from percussion_model.scene.rules import BarNumbers, SceneRules
+from percussion_model.physics.records import BLOW, EVENT, READING, SAMPLE_FIELDS
+from percussion_model.scene.rules import SceneRules
+from percussion_model.solvers.setup import INPUT_FIELDS
+from percussion_model.solvers.state import State, words_of
 
-if TYPE_CHECKING:
-    from percussion_model.solvers.wave.grid import Cells
+
+class Cells(Protocol):
+    """Cells or elements of one bar."""
+
+    @property
+    def mass(self) -> np.ndarray:
+        """Mass of each, top to bottom [kg]."""
+
+    @property
+    def n(self) -> int:
+        """How many there are."""
 
 
-class Solver(Protocol):
-    """Advances states of one scene; a state is plain data with a method `copy`.
+class Solver(ABC):
+    """Advances states of one scene; holds no state itself.
 
     Attributes
     ----------
@@ -22,97 +42,164 @@ class Solver(Protocol):
     time_step : float or None
         Distance of grid points [s]; None where there are none.
     cells : dict of int
-        Cells in each elastic bar.
+        Cells in each elastic bar, by its name.
     wave_speed_error : float
         Largest relative error of a section's wave speed.
+    COUNTS : tuple of str
+        Counts of what was done that a state carries, without their `count_`.
     """
 
     name: str
-    scene: SceneRules
-    cells: dict[str, int]
+    time_step: float | None = None
+    wave_speed_error = 0.0
+    COUNTS: ClassVar[tuple[str, ...]] = ("events", "blows")
 
-    @property
-    def time_step(self) -> float | None:
-        """Distance of grid points [s]."""
+    def __init__(self, scene: SceneRules) -> None:
+        self.scene = scene
+        self.cells: dict[str, int] = {}
+        self._no_blows = np.zeros(1, BLOW)
+        self._no_events = np.zeros(1, EVENT)
+        self._no_reading = np.zeros(1, READING)
 
-    @property
-    def wave_speed_error(self) -> float:
-        """Largest relative error of a section's wave speed."""
+    # what every solver gives
 
-    def new_state(self) -> Any:
-        """State at time zero."""
+    @abstractmethod
+    def new_state(self) -> State:
+        """State at time zero; its record has the fields of `COMMON_STATE`."""
 
-    def time(self, state: Any) -> float:
+    @abstractmethod
+    def time(self, state: State) -> float:
         """Time up to which a state is committed [s]."""
 
+    @abstractmethod
     def advance(
-        self, state: Any, t: float, blows: np.ndarray, events: np.ndarray, record_events: bool
+        self, state: State, t: float, blows: np.ndarray, events: np.ndarray, record_events: bool
     ) -> tuple[int, int, int]:
-        """Commit as far as `t` allows; return `Status` and the rows filled."""
+        """Commit as far as `t` allows.
 
-    def sample(self, state: Any, times: np.ndarray, out: np.ndarray) -> None:
-        """Evaluate without touching the state."""
+        Parameters
+        ----------
+        blows, events : BLOW and EVENT array
+            Filled from index 0.
 
-    def look(
-        self, state: Any, t: float, row: np.ndarray, here: Any = None, peaks: bool = True
-    ) -> Any:
-        """Evaluate at `t` into a row (`LONG_SAMPLE_FIELDS`); return a copy for `fields`.
-
-        `here` is an old copy to be used again; without `peaks` those need not be right.
+        Returns
+        -------
+        status, n_blows, n_events : int
+            `Status`, and rows filled. Where it tells of a full list the next call goes on
+            as if there had been no interruption.
         """
 
-    def fields(self, state: Any) -> dict[str, np.ndarray]:
-        """Force [N] and velocity [m/s] in each cell of the elastic bars, top to bottom."""
+    @abstractmethod
+    def read(
+        self, state: State, t: float, reading: np.ndarray, spare: State | None = None,
+        peaks: bool = True,
+    ) -> State:  # fmt: skip
+        """Evaluate at `t` without touching the state.
 
-    def force_in(self, state: Any, bar: str, cell: int) -> float:
+        Parameters
+        ----------
+        reading : READING array of length 1
+            Filled.
+        spare : State, optional
+            An old copy to be used again.
+        peaks : bool
+            Whether the peaks have to be right: in standstill they are dear.
+
+        Returns
+        -------
+        State
+            What `fields` reads: a copy at the last grid point up to `t`, or the state itself.
+        """
+
+    # what a solver may leave as it is
+
+    def commit(
+        self, state: State, t: float, blows: np.ndarray, events: np.ndarray, record_events: bool
+    ) -> tuple[int, int, int]:
+        """Bring an advanced state to the first grid point at or after `t`; as `advance`."""
+        return self.advance(state, t, blows, events, record_events)
+
+    def set_inputs(self, state: State, **inputs: float) -> None:
+        """Change inputs of a committed state; those of the rock wait for the next cycle."""
+        for name, value in inputs.items():
+            state.record[0][INPUT_FIELDS[name]] = value
+
+    def grid_point_after(self, state: State, t: float) -> float:
+        """First time at or after `t` at which inputs can change [s]."""
+        return max(t, self.time(state))
+
+    def readable_until(self, state: State) -> float:
+        """Time up to which `read` answers without advancing the state far [s]."""
+        return self.time(state)
+
+    def watch_peaks(self, state: State, t: float) -> None:
+        """Count the peak forces of `read` from `t` on [s]."""
+        words, numbers = words_of(state.dtype), state.numbers
+        numbers[words["peak_from"]] = t
+        numbers[words["peak_bit_force"]] = numbers[words["peak_contact_force"]] = 0.0
+
+    def sample(self, state: State, times: np.ndarray, out: np.ndarray) -> None:
+        """Evaluate at `times` into rows of `SAMPLE_FIELDS`."""
+        reading, spare = np.zeros(1, READING), None
+        row = reading.view(np.float64)[: len(SAMPLE_FIELDS)]
+        for k, time in enumerate(times):
+            spare = self.read(state, float(time), reading, spare, False)
+            if spare is state:
+                spare = None
+            out[k] = row
+
+    def fields(self, state: State) -> dict[str, np.ndarray]:
+        """Force [N] and velocity [m/s] in each cell of the elastic bars, top to bottom."""
+        return {}
+
+    def force_in(self, state: State, bar: str, cell: int) -> float:
         """Force in one cell of "piston" or "bit" [N], as `fields` reads it."""
+        found = self.fields(state).get(f"{bar}_force")
+        return 0.0 if found is None else float(found[cell])
 
     def grid_of(self, bar: str) -> Cells | None:
         """Cells of "piston" or "bit", None where it has none."""
+        return None
 
-    def watch_peaks(self, state: Any, t: float) -> None:
-        """Count the peak forces of `look` from `t` on [s]."""
-
-    def commit(
-        self, state: Any, t: float, blows: np.ndarray, events: np.ndarray, record_events: bool
-    ) -> tuple[int, int, int]:
-        """Bring an advanced state to the first grid point at or after `t`; as `advance`."""
-
-    def set_inputs(self, state: Any, **inputs: float) -> None:
-        """Change inputs of a committed state."""
-
-    def grid_point_after(self, state: Any, t: float) -> float:
-        """First time at or after `t` at which inputs can change [s]."""
-
-    def readable_until(self, state: Any) -> float:
-        """Time up to which `sample` answers without advancing the state [s]."""
-
-    def energy(self, state: Any, t: float) -> dict[str, float]:
-        """Ledger [J] at the last grid point before `t`: LEDGER_FIELDS, start, stored."""
-
-    def section_cells(self, bar: BarNumbers) -> list[int]:
+    def section_cells(self, bar: Any) -> list[int]:
         """Cells or elements in each section of an elastic bar."""
+        return []
 
-    def statistics(self, state: Any) -> dict[str, int]:
+    def refusal(self, state: State) -> str:
+        """Why the solver ended with `Status.REFUSED`."""
+        return ""
+
+    def statistics(self, state: State) -> dict[str, int]:
         """Counts of what the solver did."""
+        s = state.record[0]
+        return {name: int(s[f"count_{name}"]) for name in self.COUNTS}
+
+
+class Entry(NamedTuple):
+    """A solver that scenes can name.
+
+    Attributes
+    ----------
+    module, factory : str
+        Where it is made: a class or a function of the scene. Its kernels are loaded only
+        when it is used, which is most of a start.
+    """
+
+    module: str
+    factory: str
+
+
+_HERE = __name__.rpartition(".")[0]
+_REGISTRY = {
+    "wave": Entry(f"{_HERE}.wave.solver", "WaveSolver"),
+    "fem": Entry(f"{_HERE}.fem.solver", "FemSolver"),
+    "rigid": Entry(f"{_HERE}.rigid.solver", "RigidSolver"),
+    "blow-map": Entry(f"{_HERE}.blow_map.solver", "make_map_solver"),
+}
 
 
 def make_solver(scene: SceneRules) -> Solver:
     """Make the solver that computes a scene."""
-    # Only the kernels that are needed are loaded: that is most of a start.
-    if scene.solver_name == "fem":
-        from percussion_model.solvers.fem.solver import FemSolver
-
-        return FemSolver(scene)
-    if scene.solver_name == "wave":
-        from percussion_model.solvers.wave.solver import WaveSolver
-
-        return WaveSolver(scene)
-    if scene.solver_name == "blow-map":
-        from percussion_model.solvers.blow_map.builder import get_table
-        from percussion_model.solvers.blow_map.solver import BlowMapSolver
-
-        return BlowMapSolver(scene, get_table(scene))
-    from percussion_model.solvers.rigid.solver import RigidSolver
-
-    return RigidSolver(scene)
+    entry = _REGISTRY[scene.solver_name]
+    factory: Callable[[SceneRules], Solver] = getattr(import_module(entry.module), entry.factory)
+    return factory(scene)

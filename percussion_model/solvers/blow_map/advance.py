@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from percussion_model.physics.kernel import kernel
-from percussion_model.physics.records import EventKind, Mode, Status
+from percussion_model.physics.records import EventKind, Status
 from percussion_model.solvers.blow_map.flight import bit_at, move, plan
 from percussion_model.solvers.blow_map.records import (
     ENTRIES,
@@ -16,33 +16,6 @@ from percussion_model.solvers.blow_map.records import (
     Refusal,
 )
 
-STIFFNESS, VELOCITY = int(Axis.STIFFNESS), int(Axis.VELOCITY)
-LOAD, DRIVE = int(Axis.LOAD), int(Axis.DRIVE)
-TURN, IMPACT = int(Next.TURN), int(Next.IMPACT)
-DONE, BLOWS_FULL, EVENTS_FULL = int(Status.DONE), int(Status.BLOWS_FULL), int(Status.EVENTS_FULL)
-REFUSED = int(Status.REFUSED)
-OUT_STIFFNESS, OUT_VELOCITY = int(Refusal.STIFFNESS), int(Refusal.VELOCITY)
-OUT_FEED, OUT_DRIVE = int(Refusal.FEED), int(Refusal.DRIVE)
-MOVING, TURNED, FALLEN = int(Refusal.MOVING), int(Refusal.TURNED), int(Refusal.FALLEN)
-CLOSED, OPENED = int(EventKind.CONTACT_CLOSED), int(EventKind.CONTACT_OPENED)
-UP, DOWN = int(EventKind.DRIVE_UP), int(EventKind.DRIVE_DOWN)
-FF, SS = int(Mode.FF), int(Mode.SS)
-
-E_PENETRATION, E_REBOUND, E_OFFSET = (
-    int(Entry.PENETRATION),
-    int(Entry.REBOUND),
-    int(Entry.OFFSET),
-)
-E_REST, E_OPENED = int(Entry.REST), int(Entry.OPENED)
-E_CONTACTS, E_CYCLES = int(Entry.CONTACTS), int(Entry.CYCLES)
-E_PEAK_CONTACT, E_PEAK_BIT = int(Entry.PEAK_CONTACT), int(Entry.PEAK_BIT)
-E_CRUSHING, E_BARRIER = int(Entry.CRUSHING), int(Entry.BARRIER)
-E_STANDSTILL, E_LOSS, E_NUMERICAL = (
-    int(Entry.STANDSTILL),
-    int(Entry.LOSS),
-    int(Entry.NUMERICAL),
-)
-E_PATH = int(Entry.PATH)
 PIECES = len(PATH_TIMES)
 # Rows of the event list that one call of `happen` can fill.
 ROWS = 3
@@ -71,10 +44,10 @@ def find_blow(par, table, found, k_r, v, load, drive):
     k_r, v, load, drive : float
         Coordinates (`Axis`).
     """
-    i, a = place(par, STIFFNESS, k_r, table.shape[0])
-    j, b = place(par, VELOCITY, v, table.shape[1])
-    k, c = place(par, LOAD, load, table.shape[2])
-    m, d = place(par, DRIVE, drive, table.shape[3])
+    i, a = place(par, Axis.STIFFNESS, k_r, table.shape[0])
+    j, b = place(par, Axis.VELOCITY, v, table.shape[1])
+    k, c = place(par, Axis.LOAD, load, table.shape[2])
+    m, d = place(par, Axis.DRIVE, drive, table.shape[3])
     for e in range(ENTRIES):
         found[e] = 0.0
     rest = 0.0
@@ -91,16 +64,16 @@ def find_blow(par, table, found, k_r, v, load, drive):
         node = table[i + di, j + dj, k + dk, m + dm]
         for e in range(ENTRIES):
             found[e] += weight * node[e]
-        rest = max(rest, node[E_REST])
-        opened = max(opened, node[E_OPENED])
+        rest = max(rest, node[Entry.REST])
+        opened = max(opened, node[Entry.OPENED])
         if weight > best:
             best = weight
-            contacts = node[E_CONTACTS]
-            cycles = node[E_CYCLES]
-    found[E_REST] = rest
-    found[E_OPENED] = opened
-    found[E_CONTACTS] = contacts
-    found[E_CYCLES] = cycles
+            contacts = node[Entry.CONTACTS]
+            cycles = node[Entry.CYCLES]
+    found[Entry.REST] = rest
+    found[Entry.OPENED] = opened
+    found[Entry.CONTACTS] = contacts
+    found[Entry.CYCLES] = cycles
 
 
 @kernel
@@ -108,21 +81,21 @@ def refuse(s, reason, value):
     """Note why there is no answer."""
     s.refusal = reason
     s.refused_value = value
-    return REFUSED
+    return Status.REFUSED
 
 
 @kernel
 def outside(par, s, v):
     """Look whether an impact lies in the table; `REFUSED` if not."""
-    if not par.lowest[VELOCITY] <= v <= par.highest[VELOCITY]:
-        return refuse(s, OUT_VELOCITY, v)
-    if not par.lowest[STIFFNESS] <= s.k_r <= par.highest[STIFFNESS]:
-        return refuse(s, OUT_STIFFNESS, s.k_r)
-    if not par.lowest[LOAD] <= s.feed <= par.highest[LOAD]:
-        return refuse(s, OUT_FEED, s.feed)
-    if not par.lowest[DRIVE] <= s.drive_force <= par.highest[DRIVE]:
-        return refuse(s, OUT_DRIVE, s.drive_force)
-    return DONE
+    if not par.lowest[Axis.VELOCITY] <= v <= par.highest[Axis.VELOCITY]:
+        return refuse(s, Refusal.VELOCITY, v)
+    if not par.lowest[Axis.STIFFNESS] <= s.k_r <= par.highest[Axis.STIFFNESS]:
+        return refuse(s, Refusal.STIFFNESS, s.k_r)
+    if not par.lowest[Axis.LOAD] <= s.feed <= par.highest[Axis.LOAD]:
+        return refuse(s, Refusal.FEED, s.feed)
+    if not par.lowest[Axis.DRIVE] <= s.drive_force <= par.highest[Axis.DRIVE]:
+        return refuse(s, Refusal.DRIVE, s.drive_force)
+    return Status.DONE
 
 
 @kernel
@@ -164,32 +137,32 @@ def take_blow(par, s, found, v):
     """Let the blow of `found` begin at the present time."""
     a = par.gravity - s.drive_force / par.mass_p
     s.t_blow = s.t
-    s.penetration = v * found[E_PENETRATION]
-    s.rest = found[E_REST]
-    s.opened = found[E_OPENED]
+    s.penetration = v * found[Entry.PENETRATION]
+    s.rest = found[Entry.REST]
+    s.opened = found[Entry.OPENED]
     for k in range(PIECES):
-        s.path[k] = v * found[E_PATH + k]
-    s.y = v * found[E_OFFSET]
-    s.v = v * found[E_REBOUND]
+        s.path[k] = v * found[Entry.PATH + k]
+    s.y = v * found[Entry.OFFSET]
+    s.v = v * found[Entry.REBOUND]
     s.alpha = -1.0
     static = s.feed + par.mass_b * par.gravity
-    crushing, barrier = v * v * found[E_CRUSHING], v * v * found[E_BARRIER]
-    standstill = v * v * found[E_STANDSTILL]
+    crushing, barrier = v * v * found[Entry.CRUSHING], v * v * found[Entry.BARRIER]
+    standstill = v * v * found[Entry.STANDSTILL]
     s.b_started = 1.0
     s.b_time = s.t
     s.b_impact = v
     s.b_rebound = s.v + a * s.opened
     s.b_stroke = 0.0
-    s.b_peak_contact = v * found[E_PEAK_CONTACT]
-    s.b_peak_bit = v * found[E_PEAK_BIT]
+    s.b_peak_contact = v * found[Entry.PEAK_CONTACT]
+    s.b_peak_bit = v * found[Entry.PEAK_BIT]
     s.b_position = s.x_rest
     s.b_standstill = static
     s.b_rock = crushing + barrier + standstill
     s.b_contact = par.mass_p * (v - s.v)
     s.b_bit0 = s.i_bit
     s.b_drive0 = s.i_drive
-    s.b_contacts = found[E_CONTACTS]
-    s.b_cycles = found[E_CYCLES]
+    s.b_contacts = found[Entry.CONTACTS]
+    s.b_cycles = found[Entry.CYCLES]
     s.count_blows += 1
     s.i_contact += s.b_contact
     s.i_bit += s.b_contact
@@ -202,8 +175,8 @@ def take_blow(par, s, found, v):
     s.e_crushing += crushing
     s.e_barrier += barrier
     s.e_standstill += standstill
-    s.e_loss += v * v * found[E_LOSS]
-    s.e_numerical += v * v * found[E_NUMERICAL]
+    s.e_loss += v * v * found[Entry.LOSS]
+    s.e_numerical += v * v * found[Entry.NUMERICAL]
     if s.t >= s.peak_from:
         s.peak_bit = max(s.peak_bit, s.b_peak_bit)
         s.peak_contact = max(s.peak_contact, s.b_peak_contact)
@@ -214,15 +187,15 @@ def strike(par, s, table, found, t):
     """Let the piston strike the bit at `t`, or refuse and leave the state alone."""
     v = s.v + (par.gravity + s.alpha * s.drive_force / par.mass_p) * (t - s.t)
     status = outside(par, s, v)
-    if status != DONE:
+    if status != Status.DONE:
         return status
     if not t - s.t_blow >= s.rest:
-        return refuse(s, MOVING, t - s.t_blow)
+        return refuse(s, Refusal.MOVING, t - s.t_blow)
     load = (s.feed + par.mass_b * par.gravity) / v
     find_blow(par, table, found, s.k_r, v, load, s.drive_force / v)
-    if not found[E_PENETRATION] == found[E_PENETRATION]:
-        return refuse(s, OUT_FEED, s.feed)
-    return DONE
+    if not found[Entry.PENETRATION] == found[Entry.PENETRATION]:
+        return refuse(s, Refusal.FEED, s.feed)
+    return Status.DONE
 
 
 @kernel
@@ -235,16 +208,16 @@ def happen(par, s, table, found, blows, n_blows, events, n_events, events_on):
     """
     t = s.t_next
     position = s.x_rest + bit_at(s, t)[0]
-    if s.next == TURN:
+    if s.next == Next.TURN:
         if t < s.t_blow + s.opened:
-            return refuse(s, TURNED, s.reversal), n_blows, n_events
+            return refuse(s, Refusal.TURNED, s.reversal), n_blows, n_events
         move(par, s, t)
         s.alpha = 1.0
         if events_on:
-            n_events = push(s, events, n_events, t, DOWN, -s.reversal, position)
-    elif s.next == IMPACT:
+            n_events = push(s, events, n_events, t, EventKind.DRIVE_DOWN, -s.reversal, position)
+    elif s.next == Next.IMPACT:
         status = strike(par, s, table, found, t)
-        if status != DONE:
+        if status != Status.DONE:
             return status, n_blows, n_events
         move(par, s, t)
         v = s.v
@@ -254,15 +227,17 @@ def happen(par, s, table, found, blows, n_blows, events, n_events, events_on):
             n_blows += 1
         take_blow(par, s, found, v)
         if events_on:
-            n_events = push(s, events, n_events, t, UP, 0.0, s.x_rest)
-            n_events = push(s, events, n_events, t, CLOSED, v, s.x_rest)
+            n_events = push(s, events, n_events, t, EventKind.DRIVE_UP, 0.0, s.x_rest)
+            n_events = push(s, events, n_events, t, EventKind.CONTACT_CLOSED, v, s.x_rest)
             opened = t + s.opened
             position = s.x_rest + bit_at(s, opened)[0]
-            n_events = push(s, events, n_events, opened, OPENED, s.b_rebound, position)
+            n_events = push(
+                s, events, n_events, opened, EventKind.CONTACT_OPENED, s.b_rebound, position
+            )
     else:
-        return refuse(s, FALLEN, s.drive_force), n_blows, n_events
+        return refuse(s, Refusal.FALLEN, s.drive_force), n_blows, n_events
     plan(par, s)
-    return DONE, n_blows, n_events
+    return Status.DONE, n_blows, n_events
 
 
 @kernel
@@ -277,12 +252,12 @@ def advance(pars, states, table, found, t, blows, events, events_on, counts):
     s = states[0]
     n_blows = 0
     n_events = 0
-    status = DONE
-    while status == DONE and s.t_next <= t:
+    status = Status.DONE
+    while status == Status.DONE and s.t_next <= t:
         if n_blows == len(blows):
-            status = BLOWS_FULL
+            status = Status.BLOWS_FULL
         elif events_on and n_events + ROWS > len(events):
-            status = EVENTS_FULL
+            status = Status.EVENTS_FULL
         else:
             status, n_blows, n_events = happen(
                 par, s, table, found, blows, n_blows, events, n_events, events_on

@@ -11,12 +11,6 @@ import math
 from percussion_model.physics.kernel import inlined, kernel
 from percussion_model.solvers.blow_map.records import PATH_TIMES, Next
 
-NOTHING, TURN, IMPACT, FALL = (
-    int(Next.NOTHING),
-    int(Next.TURN),
-    int(Next.IMPACT),
-    int(Next.FALL),
-)
 PIECES = len(PATH_TIMES)
 
 
@@ -116,14 +110,14 @@ def crossing(par, s, level, sign):
 @kernel
 def plan(par, s):
     """Find what ends the present piece of flight, docs/model.md eq. 13."""
-    s.next = NOTHING
+    s.next = Next.NOTHING
     if s.alpha > 0.0:
         s.t_next = crossing(par, s, 0.0, -1.0)
         if s.t_next < math.inf:
-            s.next = IMPACT
+            s.next = Next.IMPACT
         return
     s.t_next = crossing(par, s, -s.reversal, 1.0)
-    s.next = TURN
+    s.next = Next.TURN
     back = math.inf
     if acceleration(par, s) >= 0.0 or s.v > 0.0:
         # what the flight is carried back to is above the bit only once contacts are over
@@ -132,9 +126,9 @@ def plan(par, s):
             back = crossing(par, s, 0.0, -1.0)
     if back < s.t_next:
         s.t_next = back
-        s.next = FALL
+        s.next = Next.FALL
     if s.t_next == math.inf:
-        s.next = NOTHING
+        s.next = Next.NOTHING
 
 
 @kernel

@@ -6,7 +6,6 @@ from percussion_model.physics.kernel import kernel
 from percussion_model.physics.records import SAMPLE_FIELDS, Mode
 from percussion_model.solvers.blow_map.flight import acceleration, bit_at
 
-FF, SS = int(Mode.FF), int(Mode.SS)
 SHORT = len(SAMPLE_FIELDS)
 
 
@@ -48,7 +47,7 @@ def read(pars, states, t, row):
     row[10] = static
     row[11] = 0.0
     row[12] = drive
-    row[13] = SS if t - s.t_blow >= s.rest else FF
+    row[13] = Mode.SS if t - s.t_blow >= s.rest else Mode.FF
     row[14] = 0.5 * par.mass_b * v_b * v_b
     row[15] = s.i_bit + static * since
     row[16] = s.i_contact

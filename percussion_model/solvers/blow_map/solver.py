@@ -31,7 +31,6 @@ if TYPE_CHECKING:
 WORD = {name: int(place[1]) // 8 for name, place in (BLOW_STATE.fields or {}).items()}
 T, T_NEXT, PEAK_FROM = WORD["t"], WORD["t_next"], WORD["peak_from"]
 PEAK_BIT, PEAK_CONTACT = WORD["peak_bit"], WORD["peak_contact"]
-DONE = int(Status.DONE)
 
 # Inputs and the fields that hold them; the rest of the rock law is fixed in the table.
 _INPUTS = {
@@ -180,7 +179,7 @@ class BlowMapSolver:
         status, n_blows, n_events : int
         """
         if state.numbers[T_NEXT] > t:
-            return DONE, 0, 0
+            return Status.DONE, 0, 0
         status = self._call(state, t, blows, events, record_events)
         return status, int(self._counts[0]), int(self._counts[1])
 
@@ -250,7 +249,7 @@ class BlowMapSolver:
     ) -> tuple[int, int, int]:
         """Start a new piece of flight at `t`, so that inputs can change."""
         self._move(self._par, state.record, float(t))
-        return DONE, 0, 0
+        return Status.DONE, 0, 0
 
     def set_inputs(self, state: MapState, **inputs: float) -> None:
         """Change inputs of a committed state.

@@ -7,12 +7,6 @@ from percussion_model.physics.records import Mode
 from percussion_model.physics.rock import recoverable
 from percussion_model.solvers.fem.records import Mesh, Node
 
-SS = int(Mode.SS)
-U, V = int(Node.U), int(Node.V)
-LOSS, NUMERICAL = int(Node.LOSS), int(Node.NUMERICAL)
-MASS, COUPLING = int(Mesh.MASS), int(Mesh.COUPLING)
-STIFFNESS, SHARE = int(Mesh.STIFFNESS), int(Mesh.SHARE)
-
 
 @fused
 def moment(c, a, row, first, count):
@@ -24,12 +18,12 @@ def moment(c, a, row, first, count):
     part = count // 4
     for i in range(first, first + part):
         # four sums, so that none waits for the last addition
-        sum0 += c[SHARE, i] * a[row, i]
-        sum1 += c[SHARE, i + part] * a[row, i + part]
-        sum2 += c[SHARE, i + 2 * part] * a[row, i + 2 * part]
-        sum3 += c[SHARE, i + 3 * part] * a[row, i + 3 * part]
+        sum0 += c[Mesh.SHARE, i] * a[row, i]
+        sum1 += c[Mesh.SHARE, i + part] * a[row, i + part]
+        sum2 += c[Mesh.SHARE, i + 2 * part] * a[row, i + 2 * part]
+        sum3 += c[Mesh.SHARE, i + 3 * part] * a[row, i + 3 * part]
     for i in range(first + 4 * part, first + count):
-        sum0 += c[SHARE, i] * a[row, i]
+        sum0 += c[Mesh.SHARE, i] * a[row, i]
     return (sum0 + sum1) + (sum2 + sum3)
 
 
@@ -49,17 +43,17 @@ def kinetic_energy(c, a, first, count):
     s = 0.0
     half = count // 2
     for i in range(first, first + half):
-        v = a[V, i]
-        p += c[MASS, i] * (v * v)
-        q += c[COUPLING, i] * (v * a[V, i + 1])
-        v = a[V, i + half]
-        r += c[MASS, i + half] * (v * v)
+        v = a[Node.V, i]
+        p += c[Mesh.MASS, i] * (v * v)
+        q += c[Mesh.COUPLING, i] * (v * a[Node.V, i + 1])
+        v = a[Node.V, i + half]
+        r += c[Mesh.MASS, i + half] * (v * v)
         # the last node has no coupling: what follows it does not matter
         if i + half < first + count - 1:
-            s += c[COUPLING, i + half] * (v * a[V, i + half + 1])
+            s += c[Mesh.COUPLING, i + half] * (v * a[Node.V, i + half + 1])
     if 2 * half < count:
-        v = a[V, first + count - 1]
-        p += c[MASS, first + count - 1] * (v * v)
+        v = a[Node.V, first + count - 1]
+        p += c[Mesh.MASS, first + count - 1] * (v * v)
     return 0.5 * (p + r) + (q + s)
 
 
@@ -68,8 +62,8 @@ def elastic_energy(c, a, n):
     """Strain energy of all elements [J]."""
     total = 0.0
     for i in range(n - 1):
-        stretch = a[U, i + 1] - a[U, i]
-        total += c[STIFFNESS, i] * (stretch * stretch)
+        stretch = a[Node.U, i + 1] - a[Node.U, i]
+        total += c[Mesh.STIFFNESS, i] * (stretch * stretch)
     return 0.5 * total
 
 
@@ -103,8 +97,8 @@ def dissipated_in_nodes(par, w):
     loss = 0.0
     numerical = 0.0
     for i in range(par.n_p + par.n_b):
-        loss += w[LOSS, i]
-        numerical += w[NUMERICAL, i]
+        loss += w[Node.LOSS, i]
+        numerical += w[Node.NUMERICAL, i]
     return loss, numerical
 
 
@@ -112,11 +106,11 @@ def dissipated_in_nodes(par, w):
 def read_nodes(par, s, w, c):
     """Derive from nodes and sums what the modes look at: gap, penetration, mean motion."""
     last = par.n_p + par.n_b - 1
-    s.p = w[U, last]
-    s.v_end = w[V, last]
+    s.p = w[Node.U, last]
+    s.v_end = w[Node.V, last]
     if par.n_p > 0:
-        s.gap = w[U, par.n_p] - w[U, par.n_p - 1]
-        s.gap_rate = w[V, par.n_p] - w[V, par.n_p - 1]
+        s.gap = w[Node.U, par.n_p] - w[Node.U, par.n_p - 1]
+        s.gap_rate = w[Node.V, par.n_p] - w[Node.V, par.n_p - 1]
     s.mean_b = s.next_b
     s.mean_p = s.next_p
     s.u_r = s.mean_p - s.mean_b
@@ -126,10 +120,10 @@ def read_nodes(par, s, w, c):
 @inlined
 def read_ahead(par, s, a, c):
     """Derive sums over the nodes of `a` that are the state's to come."""
-    s.next_b = moment(c, a, U, par.n_p, par.n_b) / par.mass_b
+    s.next_b = moment(c, a, Node.U, par.n_p, par.n_b) / par.mass_b
     if par.n_p > 0:
-        s.next_p = moment(c, a, U, 0, par.n_p) / par.mass_p
-    if s.mode == SS:
+        s.next_p = moment(c, a, Node.U, 0, par.n_p) / par.mass_p
+    if s.mode == Mode.SS:
         s.next_kinetic = kinetic_energy(c, a, par.n_p, par.n_b)
 
 
@@ -143,9 +137,9 @@ def read_all(par, s, w, c):
 @kernel
 def read_means(par, s, w, c):
     """Derive the mean velocities."""
-    s.v_b = moment(c, w, V, par.n_p, par.n_b) / par.mass_b
+    s.v_b = moment(c, w, Node.V, par.n_p, par.n_b) / par.mass_b
     if par.n_p > 0:
-        s.v_p = moment(c, w, V, 0, par.n_p) / par.mass_p
+        s.v_p = moment(c, w, Node.V, 0, par.n_p) / par.mass_p
 
 
 @inlined

@@ -1,4 +1,4 @@
-"""Where in a step the first event lies: Hermite interpolation, driven just past it.
+"""First event of a step: Hermite interpolation, driven just past it.
 
 Every event function is positive until its event. Values and slopes at both ends
 of a bracket make a cubic; a step to its root is tried, and the bracket shrinks
@@ -9,27 +9,19 @@ from __future__ import annotations
 
 from percussion_model.physics.kernel import inlined, kernel, merged
 from percussion_model.physics.records import DriveKind, Mode, RockKind
-from percussion_model.physics.rock import REST_VELOCITY, origin, stiffness
+from percussion_model.physics.rock import REST_VELOCITY, damping, origin, stiffness
 from percussion_model.solvers.fem.bars import relative_motion
-from percussion_model.solvers.fem.hermite import first_root
-from percussion_model.solvers.fem.records import Column, Look, Mesh, Node, Trial
+from percussion_model.solvers.fem.records import Column, Look, Mesh, Node
 from percussion_model.solvers.fem.scheme import acceleration, try_step
-from percussion_model.solvers.fem.solve import damping
 from percussion_model.solvers.fem.step import dashpot_work
 
-FF, DFC, FC, BC, SS = (int(m) for m in Mode)
-NO_ROCK, SPRING = int(RockKind.NONE), int(RockKind.SPRING)
-PRESSURE = int(DriveKind.PRESSURE)
-U, V = int(Node.U), int(Node.V)
-RE, IM = int(Trial.RE), int(Trial.IM)
-MASS, COUPLING = int(Mesh.MASS), int(Mesh.COUPLING)
-CONTACT, DRIVE, ROCK, TURN = (int(look) for look in Look)
-LOW, LOW_SLOPE, HIGH, HIGH_SLOPE, TRIED, TRIED_SLOPE, SCALE = (int(k) for k in Column)
 LOOKS = len(Look)
 
 # Steps tried for one event; bisection takes over half-way.
 MOST_TRIALS = 60
 HERMITE_TRIALS = 12
+# Halvings that find a root to rounding.
+HALVINGS = 50
 # A function that is not watched has this value: never an event.
 NEVER = 1.0
 
@@ -37,14 +29,14 @@ NEVER = 1.0
 @inlined
 def contact_value(par, s, a):
     """Gap, or its negative while it is closed [m]."""
-    gap = a[U, par.n_p] - a[U, par.n_p - 1]
+    gap = a[Node.U, par.n_p] - a[Node.U, par.n_p - 1]
     return -gap if s.closed == 1 else gap
 
 
 @inlined
 def drive_value(par, s, u_r):
     """Distance of u_r to the threshold that is watched [m]."""
-    if par.drive != PRESSURE:
+    if par.drive != DriveKind.PRESSURE:
         return NEVER
     return -u_r if s.alpha > 0 else u_r + s.reversal
 
@@ -52,17 +44,17 @@ def drive_value(par, s, u_r):
 @inlined
 def rock_value(par, s, p, v, work):
     """What ends the present mode by position, work or force."""
-    if s.mode == FF:
-        if par.rock == NO_ROCK:
+    if s.mode == Mode.FF:
+        if par.rock == RockKind.NONE:
             return NEVER
         return -v if s.springing == 1 else s.p_u - p
-    if par.rock == SPRING:
+    if par.rock == RockKind.SPRING:
         return p
-    if s.mode == DFC:
+    if s.mode == Mode.DFC:
         return s.w_r - s.w - work
-    if s.mode == BC:
+    if s.mode == Mode.BC:
         return p - s.p_u
-    if s.mode == SS and par.release == 1:
+    if s.mode == Mode.SS and par.release == 1:
         return stiffness(s) * (p - origin(s)) + damping(s) * v
     return NEVER
 
@@ -70,11 +62,11 @@ def rock_value(par, s, p, v, work):
 @inlined
 def turn_value(par, s, v, energy):
     """What ends the present mode by the sign of the velocity or the bit's energy."""
-    if s.mode == FF or par.rock == SPRING:
+    if s.mode == Mode.FF or par.rock == RockKind.SPRING:
         return NEVER
-    if s.mode == SS:
+    if s.mode == Mode.SS:
         return s.w_r - energy
-    if s.mode == BC:
+    if s.mode == Mode.BC:
         return REST_VELOCITY - v
     return v + REST_VELOCITY
 
@@ -84,39 +76,39 @@ def power(par, c, a, x, end):
     """Rate of the bit's kinetic energy at an end of a tried step [W]."""
     n_p = par.n_p
     last = n_p + par.n_b - 1
-    total = c[MASS, last] * a[V, last] * acceleration(par, x, last, end)
+    total = c[Mesh.MASS, last] * a[Node.V, last] * acceleration(par, x, last, end)
     for i in range(n_p, last):
         here = acceleration(par, x, i, end)
         there = acceleration(par, x, i + 1, end)
-        total += c[MASS, i] * (a[V, i] * here)
-        total += c[COUPLING, i] * (a[V, i] * there + a[V, i + 1] * here)
+        total += c[Mesh.MASS, i] * (a[Node.V, i] * here)
+        total += c[Mesh.COUPLING, i] * (a[Node.V, i] * there + a[Node.V, i + 1] * here)
     return total
 
 
 @inlined
 def fill_low(par, s, q):
     """Values at the start of the step, from what the state knows."""
-    q[CONTACT, LOW] = NEVER
-    q[DRIVE, LOW] = NEVER
+    q[Look.CONTACT, Column.LOW] = NEVER
+    q[Look.DRIVE, Column.LOW] = NEVER
     if par.n_p > 0:
-        q[CONTACT, LOW] = -s.gap if s.closed == 1 else s.gap
-        q[DRIVE, LOW] = drive_value(par, s, s.u_r)
-    q[ROCK, LOW] = rock_value(par, s, s.p, s.v_end, 0.0)
-    q[TURN, LOW] = turn_value(par, s, s.v_end, s.kinetic)
+        q[Look.CONTACT, Column.LOW] = -s.gap if s.closed == 1 else s.gap
+        q[Look.DRIVE, Column.LOW] = drive_value(par, s, s.u_r)
+    q[Look.ROCK, Column.LOW] = rock_value(par, s, s.p, s.v_end, 0.0)
+    q[Look.TURN, Column.LOW] = turn_value(par, s, s.v_end, s.kinetic)
 
 
 @inlined
 def fill_values(par, s, w, c, x, h, q, column):
     """Values at the end of a tried step of length `h`."""
     last = par.n_p + par.n_b - 1
-    q[CONTACT, column] = NEVER
-    q[DRIVE, column] = NEVER
+    q[Look.CONTACT, column] = NEVER
+    q[Look.DRIVE, column] = NEVER
     if par.n_p > 0:
-        q[CONTACT, column] = contact_value(par, s, x)
-        q[DRIVE, column] = drive_value(par, s, s.next_p - s.next_b)
-    work = dashpot_work(par, s, x, w, h) if s.mode == DFC else 0.0
-    q[ROCK, column] = rock_value(par, s, x[U, last], x[V, last], work)
-    q[TURN, column] = turn_value(par, s, x[V, last], s.next_kinetic)
+        q[Look.CONTACT, column] = contact_value(par, s, x)
+        q[Look.DRIVE, column] = drive_value(par, s, s.next_p - s.next_b)
+    work = dashpot_work(par, s, x, w, h) if s.mode == Mode.DFC else 0.0
+    q[Look.ROCK, column] = rock_value(par, s, x[Node.U, last], x[Node.V, last], work)
+    q[Look.TURN, column] = turn_value(par, s, x[Node.V, last], s.next_kinetic)
 
 
 @merged
@@ -124,29 +116,75 @@ def fill_slopes(par, s, c, a, x, end, h, q, column):
     """Slopes at an end of a tried step; `a` holds displacements and velocities there."""
     n_p = par.n_p
     last = n_p + par.n_b - 1
-    v = a[V, last]
+    v = a[Node.V, last]
     for k in range(LOOKS):
         q[k, column] = 0.0
     if n_p > 0:
-        rate = a[V, n_p] - a[V, n_p - 1]
-        q[CONTACT, column] = h * (-rate if s.closed == 1 else rate)
-        rate = relative_motion(par, c, a, V)
-        q[DRIVE, column] = h * (-rate if s.alpha > 0 else rate)
+        rate = a[Node.V, n_p] - a[Node.V, n_p - 1]
+        q[Look.CONTACT, column] = h * (-rate if s.closed == 1 else rate)
+        rate = relative_motion(par, c, a, Node.V)
+        q[Look.DRIVE, column] = h * (-rate if s.alpha > 0 else rate)
     turn = acceleration(par, x, last, end)
-    if s.mode == FF:
-        q[ROCK, column] = -h * (turn if s.springing == 1 else v)
-    elif par.rock == SPRING or s.mode == BC:
-        q[ROCK, column] = h * v
-    elif s.mode == DFC:
-        q[ROCK, column] = -h * s.c_r * v * v
-    elif s.mode == SS:
-        q[ROCK, column] = h * (stiffness(s) * v + damping(s) * turn)
-    if s.mode == SS:
-        q[TURN, column] = -h * power(par, c, a, x, end)
-    elif s.mode == BC:
-        q[TURN, column] = -h * turn
+    if s.mode == Mode.FF:
+        q[Look.ROCK, column] = -h * (turn if s.springing == 1 else v)
+    elif par.rock == RockKind.SPRING or s.mode == Mode.BC:
+        q[Look.ROCK, column] = h * v
+    elif s.mode == Mode.DFC:
+        q[Look.ROCK, column] = -h * s.c_r * v * v
+    elif s.mode == Mode.SS:
+        q[Look.ROCK, column] = h * (stiffness(s) * v + damping(s) * turn)
+    if s.mode == Mode.SS:
+        q[Look.TURN, column] = -h * power(par, c, a, x, end)
+    elif s.mode == Mode.BC:
+        q[Look.TURN, column] = -h * turn
     else:
-        q[TURN, column] = h * turn
+        q[Look.TURN, column] = h * turn
+
+
+@inlined
+def cubic(q0, d0, q1, d1, t):
+    """Hermite's cubic at `t` between 0 and 1."""
+    rise = q1 - q0
+    b = 3.0 * rise - 2.0 * d0 - d1
+    a = d0 + d1 - 2.0 * rise
+    return q0 + t * (d0 + t * (b + t * a))
+
+
+@merged
+def lowest_inside(q0, d0, q1, d1):
+    """Where a cubic that falls at 0 and rises at 1 turns between."""
+    low = 0.0
+    high = 1.0
+    rise = q1 - q0
+    b = 3.0 * rise - 2.0 * d0 - d1
+    a = d0 + d1 - 2.0 * rise
+    for _ in range(HALVINGS):
+        t = 0.5 * (low + high)
+        if d0 + t * (2.0 * b + 3.0 * a * t) < 0.0:
+            low = t
+        else:
+            high = t
+    return low
+
+
+@merged
+def first_root(q0, d0, q1, d1):
+    """First place between 0 and 1 where a cubic goes below zero, 2 where it does not."""
+    high = 1.0
+    if q1 >= 0.0:
+        if d0 >= 0.0 or d1 <= 0.0:
+            return 2.0
+        high = lowest_inside(q0, d0, q1, d1)
+        if cubic(q0, d0, q1, d1, high) >= 0.0:
+            return 2.0
+    low = 0.0
+    for _ in range(HALVINGS):
+        t = 0.5 * (low + high)
+        if cubic(q0, d0, q1, d1, t) < 0.0:
+            high = t
+        else:
+            low = t
+    return high
 
 
 @merged
@@ -158,16 +196,18 @@ def next_guess(par, q, width):
     """
     first = 2.0
     for k in range(LOOKS):
-        if q[k, LOW] < 0.0 or (q[k, HIGH] >= 0.0 and k != CONTACT and k != ROCK):
+        if q[k, Column.LOW] < 0.0 or (
+            q[k, Column.HIGH] >= 0.0 and k != Look.CONTACT and k != Look.ROCK
+        ):
             continue
-        past = 0.5 * par.q_tol * q[k, SCALE]
+        past = 0.5 * par.q_tol * q[k, Column.SCALE]
         first = min(
             first,
             first_root(
-                q[k, LOW] + past,
-                width * q[k, LOW_SLOPE],
-                q[k, HIGH] + past,
-                width * q[k, HIGH_SLOPE],
+                q[k, Column.LOW] + past,
+                width * q[k, Column.LOW_SLOPE],
+                q[k, Column.HIGH] + past,
+                width * q[k, Column.HIGH_SLOPE],
             ),
         )
     return first
@@ -178,25 +218,25 @@ def past_by(q, column):
     """How far the functions are past their events, by their scales; -1 where none is."""
     most = -1.0
     for k in range(LOOKS):
-        if q[k, LOW] >= 0.0 and q[k, column] < 0.0:
-            most = max(most, -q[k, column] / q[k, SCALE])
+        if q[k, Column.LOW] >= 0.0 and q[k, column] < 0.0:
+            most = max(most, -q[k, column] / q[k, Column.SCALE])
     return most
 
 
 @inlined
-def worth_a_look(par, s, x, q):
+def may_cross(par, s, x, q):
     """Whether a function may have crossed zero within the step."""
     for k in range(LOOKS):
-        if q[k, HIGH] < 0.0 and q[k, LOW] >= 0.0:
+        if q[k, Column.HIGH] < 0.0 and q[k, Column.LOW] >= 0.0:
             return True
     if par.n_p > 0:
-        rate = x[V, par.n_p] - x[V, par.n_p - 1]
+        rate = x[Node.V, par.n_p] - x[Node.V, par.n_p - 1]
         if s.closed == 0 and s.gap_rate < 0.0 and rate > 0.0:
             return True
         if s.closed == 1 and s.gap_rate > 0.0 and rate < 0.0:
             return True
-    v = x[V, par.n_p + par.n_b - 1]
-    if s.mode == FF and par.rock != NO_ROCK:
+    v = x[Node.V, par.n_p + par.n_b - 1]
+    if s.mode == Mode.FF and par.rock != RockKind.NONE:
         return s.v_end > 0.0 and v < 0.0
     return False
 
@@ -225,8 +265,8 @@ def end_of_step(par, s, w, c, f, x, q, h):
         s.stuck = 0
         return h
     fill_low(par, s, q)
-    fill_values(par, s, w, c, x, h, q, HIGH)
-    if not worth_a_look(par, s, x, q):
+    fill_values(par, s, w, c, x, h, q, Column.HIGH)
+    if not may_cross(par, s, x, q):
         return h
     return locate(par, s, w, c, f, x, q, h)
 
@@ -235,15 +275,15 @@ def end_of_step(par, s, w, c, f, x, q, h):
 def locate(par, s, w, c, f, x, q, h):
     """Shrink a bracket around the first event of a step; see `end_of_step`."""
     for k in range(LOOKS):
-        q[k, SCALE] = abs(q[k, LOW]) + abs(q[k, HIGH])
-    fill_slopes(par, s, c, w, x, 0, h, q, LOW_SLOPE)
-    fill_slopes(par, s, c, x, x, 1, h, q, HIGH_SLOPE)
+        q[k, Column.SCALE] = abs(q[k, Column.LOW]) + abs(q[k, Column.HIGH])
+    fill_slopes(par, s, c, w, x, 0, h, q, Column.LOW_SLOPE)
+    fill_slopes(par, s, c, x, x, 1, h, q, Column.HIGH_SLOPE)
     low = 0.0
     high = 1.0
     tried = 1.0
     for trial in range(MOST_TRIALS):
         width = high - low
-        past = past_by(q, HIGH)
+        past = past_by(q, Column.HIGH)
         if past >= 0.0 and (past <= par.q_tol or width <= par.t_tol):
             break
         guess = next_guess(par, q, width)
@@ -255,17 +295,17 @@ def locate(par, s, w, c, f, x, q, h):
         if tried <= low or tried >= high:
             break
         try_step(par, s, w, c, f, x, tried * h)
-        fill_values(par, s, w, c, x, tried * h, q, TRIED)
-        fill_slopes(par, s, c, x, x, 1, h, q, TRIED_SLOPE)
-        column = LOW
-        if past_by(q, TRIED) >= 0.0:
-            column = HIGH
+        fill_values(par, s, w, c, x, tried * h, q, Column.TRIED)
+        fill_slopes(par, s, c, x, x, 1, h, q, Column.TRIED_SLOPE)
+        column = Column.LOW
+        if past_by(q, Column.TRIED) >= 0.0:
+            column = Column.HIGH
             high = tried
         else:
             low = tried
         for k in range(LOOKS):
-            q[k, column] = q[k, TRIED]
-            q[k, column + 1] = q[k, TRIED_SLOPE]
+            q[k, column] = q[k, Column.TRIED]
+            q[k, column + 1] = q[k, Column.TRIED_SLOPE]
     if tried != high:
         try_step(par, s, w, c, f, x, high * h)
     return high * h

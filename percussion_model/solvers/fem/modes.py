@@ -6,28 +6,29 @@ overshoot.
 
 from __future__ import annotations
 
-from percussion_model.physics.blows import push_event, start_blow, starts_blow
+from percussion_model.physics.blows import (
+    close_gap,
+    open_gap,
+    push_event,
+    standstill_force,
+    start_blow,
+    starts_blow,
+)
 from percussion_model.physics.drive import switch_drive
 from percussion_model.physics.kernel import kernel, merged
-from percussion_model.physics.records import EventKind, Mode, RockKind
+from percussion_model.physics.records import Mode, RockKind
 from percussion_model.physics.rock import (
     barrier_off,
     close_interface,
+    damping,
     enter_standstill,
     leave_by_velocity,
     leave_standstill,
-    origin,
     recoverable,
-    stiffness,
+    spring_force,
 )
 from percussion_model.solvers.fem.bars import bit_position, kinetic_energy, read_means
 from percussion_model.solvers.fem.records import Node
-from percussion_model.solvers.fem.solve import damping
-
-FF, DFC, FC, BC, SS = (int(m) for m in Mode)
-NO_ROCK, BILINEAR, SPRING = int(RockKind.NONE), int(RockKind.BILINEAR), int(RockKind.SPRING)
-CONTACT_CLOSED, CONTACT_OPENED = int(EventKind.CONTACT_CLOSED), int(EventKind.CONTACT_OPENED)
-U = int(Node.U)
 
 
 @merged
@@ -38,21 +39,18 @@ def change_contact(par, s, w, c, blows, events):
             return 0
         read_means(par, s, w, c)
         if starts_blow(par, s, s.time):
-            here = bit_position(s)
-            start_blow(s, blows, s.time, s.v_p, here, s.i_bit, par.mass_p)
-        s.b_contacts += 1
+            force = standstill_force(s, s.time, s.i_bit)
+            start_blow(s, blows, s.time, s.v_p, bit_position(s), force, par.mass_p)
         s.closed = 1
         s.e_overshoot -= 0.5 * par.k_c * s.gap * s.gap
-        push_event(s, events, s.time, CONTACT_CLOSED, -s.gap_rate)
+        close_gap(s, events, s.time, -s.gap_rate)
         return 1
     if s.gap <= 0.0:
         return 0
     read_means(par, s, w, c)
     s.closed = 0
-    s.b_rebound = s.v_p
-    s.t_open = s.time
     s.e_overshoot += 0.5 * par.k_c * s.gap * s.gap
-    push_event(s, events, s.time, CONTACT_OPENED, -s.gap_rate)
+    open_gap(s, events, s.time, -s.gap_rate)
     return 1
 
 
@@ -70,10 +68,10 @@ def close_on_rock(par, s, energy):
 
 
 @merged
-def fly(s):
+def lift_off(s):
     """The bit leaves the rock, which may still be pressed in."""
     left = recoverable(s)
-    s.mode = FF
+    s.mode = Mode.FF
     if s.p > s.p_u:
         s.springing = 1
     else:
@@ -85,9 +83,9 @@ def change_rock(par, s, w, c):
     """Make the change that the present mode asks for; 1 where there is one."""
     v = s.v_end
     energy = 0.0
-    if s.mode != SS and par.rock == BILINEAR:
+    if s.mode != Mode.SS and par.rock == RockKind.BILINEAR:
         energy = kinetic_energy(c, w, par.n_p, par.n_b)
-    if s.mode == FF:
+    if s.mode == Mode.FF:
         if s.springing == 1 and s.p <= s.p_u:
             s.springing = 0
         if s.springing == 1:
@@ -97,23 +95,23 @@ def change_rock(par, s, w, c):
             return 0
         close_on_rock(par, s, energy)
         return 1
-    if par.rock == SPRING:
+    if par.rock == RockKind.SPRING:
         if s.p >= 0.0:
             return 0
-        fly(s)
+        lift_off(s)
         return 1
-    if s.mode == DFC and s.w >= s.w_r:
-        s.mode = FC
+    if s.mode == Mode.DFC and s.w >= s.w_r:
+        s.mode = Mode.FC
         return 1
-    if s.mode == BC and s.p < s.p_u:
-        fly(s)
+    if s.mode == Mode.BC and s.p < s.p_u:
+        lift_off(s)
         return 1
-    if s.mode == SS:
+    if s.mode == Mode.SS:
         if barrier_off(par, s) or s.kinetic > s.w_r:
             leave_standstill(par, s, v)
             return 1
-        if par.release == 1 and stiffness(s) * (s.p - origin(s)) + damping(s) * v < 0.0:
-            fly(s)
+        if par.release == 1 and spring_force(s) + damping(s) * v < 0.0:
+            lift_off(s)
             return 1
         return 0
     return leave_by_velocity(par, s, v, energy)
@@ -123,11 +121,11 @@ def change_rock(par, s, w, c):
 def move_datum(par, s, w):
     """Count the nodes from the datum of the drilling cycle that has begun."""
     last = par.n_p + par.n_b - 1
-    shift = s.p - w[U, last]
+    shift = s.p - w[Node.U, last]
     if shift != 0.0:
         for i in range(last):
-            w[U, i] += shift
-        w[U, last] = s.p
+            w[Node.U, i] += shift
+        w[Node.U, last] = s.p
         s.mean_p += shift
         s.mean_b += shift
 
@@ -140,15 +138,15 @@ def change_modes(par, s, w, c, blows, events):
         if par.n_p > 0:
             changed = change_contact(par, s, w, c, blows, events)
             switch_drive(par, s, s.u_r, s.time, 0.0, events)
-        if par.rock != NO_ROCK and change_rock(par, s, w, c) == 1:
+        if par.rock != RockKind.NONE and change_rock(par, s, w, c) == 1:
             changed = 1
             move_datum(par, s, w)
-            if s.mode == SS:
+            if s.mode == Mode.SS:
                 enter_standstill(s, s.time)
                 s.kinetic = kinetic_energy(c, w, par.n_p, par.n_b)
-            push_event(s, events, s.time, s.mode, stiffness(s) * (s.p - origin(s)))
+            push_event(s, events, s.time, s.mode, spring_force(s))
         if changed == 0:
             s.stuck = 0
             return
     s.stuck = 1
-    s.locked += 1
+    s.count_locked += 1

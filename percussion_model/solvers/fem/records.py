@@ -11,7 +11,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from percussion_model.physics.state import COMMON_STATE
+from percussion_model.physics.state import COMMON_PARAMETERS, COMMON_STATE
 
 
 class Node(IntEnum):
@@ -87,12 +87,13 @@ class FemTask(IntEnum):
     """What the kernels are to do with a state."""
 
     ADVANCE = 0  # commit whole steps
-    BRING = 1  # the same, and a part of a step up to the time given
-    SAMPLE = 2  # BRING without writing rows, then tell what is seen
+    COMMIT = 1  # the same, and a part of a step up to the time given
+    READ = 2  # COMMIT without writing rows, then tell what is seen
 
 
 FEM_PAR = np.dtype(
     [
+        *COMMON_PARAMETERS,
         ("dt", "f8"),  # time step [s]
         ("mu_re", "f8"),  # eigenvalue of the scheme, docs/numerics.md
         ("mu_im", "f8"),
@@ -101,18 +102,9 @@ FEM_PAR = np.dtype(
         ("eta", "f8"),  # Kelvin-Voigt time [s]
         ("q_tol", "f8"),  # of an event function, by its change over the step
         ("t_tol", "f8"),  # of an event's place in the step
-        ("gravity", "f8"),  # [m/s2]
-        ("mass_p", "f8"),  # [kg]
-        ("mass_b", "f8"),
-        ("rearm_time", "f8"),  # an open gap this long ends a blow (no pressure law) [s]
         ("start_gap", "f8"),  # [m]
         ("n_p", "i8"),  # nodes of the piston, 0 when it is absent
         ("n_b", "i8"),
-        ("piston", "i8"),  # Piston
-        ("drive", "i8"),  # DriveKind
-        ("rock", "i8"),  # RockKind
-        ("barrier", "i8"),  # 1: the energy barrier is on
-        ("release", "i8"),  # 1: standstill leaves to free flight when F_R reaches 0
         ("most_changes", "i8"),  # changes of mode at one instant; more are a loop
         ("most_events", "i8"),  # steps cut short by events within a whole one; more are a storm
     ],

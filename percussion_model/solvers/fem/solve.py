@@ -7,30 +7,13 @@ towards the contact, where two unknowns are left (docs/numerics.md, section 10).
 from __future__ import annotations
 
 from percussion_model.physics.kernel import fused, inlined, kernel, merged
-from percussion_model.physics.records import Mode
-from percussion_model.physics.rock import stiffness
+from percussion_model.physics.rock import damping, stiffness
 from percussion_model.solvers.fem.records import Factor, Key, Mesh, Trial
 
-DFC, SS = int(Mode.DFC), int(Mode.SS)
-MASS, COUPLING = int(Mesh.MASS), int(Mesh.COUPLING)
-STIFFNESS, SPRINGS = int(Mesh.STIFFNESS), int(Mesh.SPRINGS)
-RE, IM = int(Trial.RE), int(Trial.IM)
-LOW_RE, LOW_IM = int(Factor.LOW_RE), int(Factor.LOW_IM)
-PIVOT_RE, PIVOT_IM = int(Factor.PIVOT_RE), int(Factor.PIVOT_IM)
-KEY = int(Factor.KEY)
-STEP, ROCK_STIFFNESS, ROCK_DAMPING = (int(key) for key in Key)
 ROWS = len(Factor)
 
 # Factorisations: of the whole step, of any other.
 WHOLE, PART = 0, 1
-
-
-@inlined
-def damping(s):
-    """C of the present mode [N s/m], table 1 of docs/model.md."""
-    if s.mode == DFC or s.mode == SS:
-        return s.c_r
-    return 0.0
 
 
 @merged
@@ -52,24 +35,24 @@ def eliminate(par, c, f, at, h, low, last, way):
         side_re = 0.0
         side_im = 0.0
         if k > 0:
-            side_re = c[COUPLING, side] - bars_re * c[STIFFNESS, side]
-            side_im = -bars_im * c[STIFFNESS, side]
+            side_re = c[Mesh.COUPLING, side] - bars_re * c[Mesh.STIFFNESS, side]
+            side_im = -bars_im * c[Mesh.STIFFNESS, side]
         low_re = side_re * inverse_re - side_im * inverse_im
         low_im = side_re * inverse_im + side_im * inverse_re
-        re = f[at + PIVOT_RE, i] + c[MASS, i] + bars_re * c[SPRINGS, i]
-        im = f[at + PIVOT_IM, i] + bars_im * c[SPRINGS, i]
+        re = f[at + Factor.PIVOT_RE, i] + c[Mesh.MASS, i] + bars_re * c[Mesh.SPRINGS, i]
+        im = f[at + Factor.PIVOT_IM, i] + bars_im * c[Mesh.SPRINGS, i]
         re -= low_re * side_re - low_im * side_im
         im -= low_re * side_im + low_im * side_re
         size = re * re + im * im
         inverse_re = re / size
         inverse_im = -im / size
-        f[at + LOW_RE, i] = low_re
-        f[at + LOW_IM, i] = low_im
-        f[at + PIVOT_RE, i] = inverse_re
-        f[at + PIVOT_IM, i] = inverse_im
+        f[at + Factor.LOW_RE, i] = low_re
+        f[at + Factor.LOW_IM, i] = low_im
+        f[at + Factor.PIVOT_RE, i] = inverse_re
+        f[at + Factor.PIVOT_IM, i] = inverse_im
         if i == last:
-            f[at + PIVOT_RE, i] = re
-            f[at + PIVOT_IM, i] = im
+            f[at + Factor.PIVOT_RE, i] = re
+            f[at + Factor.PIVOT_IM, i] = im
         i += way
 
 
@@ -83,18 +66,18 @@ def factorise(par, c, f, slot, h, K, C):
     at = slot * ROWS
     n = par.n_p + par.n_b
     for i in range(n):
-        f[at + PIVOT_RE, i] = 0.0
-        f[at + PIVOT_IM, i] = 0.0
+        f[at + Factor.PIVOT_RE, i] = 0.0
+        f[at + Factor.PIVOT_IM, i] = 0.0
     h_re = h * par.mu_re
     h_im = h * par.mu_im
-    f[at + PIVOT_RE, n - 1] = h_re * C + (h_re * h_re - h_im * h_im) * K
-    f[at + PIVOT_IM, n - 1] = h_im * C + 2.0 * h_re * h_im * K
+    f[at + Factor.PIVOT_RE, n - 1] = h_re * C + (h_re * h_re - h_im * h_im) * K
+    f[at + Factor.PIVOT_IM, n - 1] = h_im * C + 2.0 * h_re * h_im * K
     if par.n_p > 0:
         eliminate(par, c, f, at, h, 0, par.n_p - 1, 1)
     eliminate(par, c, f, at, h, n - 1, par.n_p, -1)
-    f[at + KEY, STEP] = h
-    f[at + KEY, ROCK_STIFFNESS] = K
-    f[at + KEY, ROCK_DAMPING] = C
+    f[at + Factor.KEY, Key.STEP] = h
+    f[at + Factor.KEY, Key.STIFFNESS] = K
+    f[at + Factor.KEY, Key.DAMPING] = C
 
 
 @inlined
@@ -104,8 +87,10 @@ def factors(par, s, c, f, h):
     at = slot * ROWS
     K = stiffness(s)
     C = damping(s)
-    known = f[at + KEY, STEP] == h
-    if not (known and f[at + KEY, ROCK_STIFFNESS] == K and f[at + KEY, ROCK_DAMPING] == C):
+    known = f[at + Factor.KEY, Key.STEP] == h
+    if not (
+        known and f[at + Factor.KEY, Key.STIFFNESS] == K and f[at + Factor.KEY, Key.DAMPING] == C
+    ):
         factorise(par, c, f, slot, h, K, C)
     return slot
 
@@ -114,25 +99,25 @@ def factors(par, s, c, f, h):
 def meet_at_contact(par, s, f, at, x, h):
     """Solve for the two nodes at the contact, whose spring couples them while it is closed."""
     lower = par.n_p
-    re = x[RE, lower]
-    im = x[IM, lower]
-    b_re = f[at + PIVOT_RE, lower]
-    b_im = f[at + PIVOT_IM, lower]
+    re = x[Trial.RE, lower]
+    im = x[Trial.IM, lower]
+    b_re = f[at + Factor.PIVOT_RE, lower]
+    b_im = f[at + Factor.PIVOT_IM, lower]
     if s.closed == 0:
         size = b_re * b_re + b_im * b_im
-        x[RE, lower] = (re * b_re + im * b_im) / size
-        x[IM, lower] = (im * b_re - re * b_im) / size
+        x[Trial.RE, lower] = (re * b_re + im * b_im) / size
+        x[Trial.IM, lower] = (im * b_re - re * b_im) / size
     if par.n_p == 0:
         return
     upper = par.n_p - 1
-    up_re = x[RE, upper]
-    up_im = x[IM, upper]
-    p_re = f[at + PIVOT_RE, upper]
-    p_im = f[at + PIVOT_IM, upper]
+    up_re = x[Trial.RE, upper]
+    up_im = x[Trial.IM, upper]
+    p_re = f[at + Factor.PIVOT_RE, upper]
+    p_im = f[at + Factor.PIVOT_IM, upper]
     if s.closed == 0:
         size = p_re * p_re + p_im * p_im
-        x[RE, upper] = (up_re * p_re + up_im * p_im) / size
-        x[IM, upper] = (up_im * p_re - up_re * p_im) / size
+        x[Trial.RE, upper] = (up_re * p_re + up_im * p_im) / size
+        x[Trial.IM, upper] = (up_im * p_re - up_re * p_im) / size
         return
     # [p + q, -q; -q, b + q]: its determinant is p b + q (p + b), without cancellation
     h_re = h * par.mu_re
@@ -150,31 +135,35 @@ def meet_at_contact(par, s, f, at, x, h):
     low_re = re * p_re - im * p_im + both_re
     low_im = re * p_im + im * p_re + both_im
     size = det_re * det_re + det_im * det_im
-    x[RE, upper] = (top_re * det_re + top_im * det_im) / size
-    x[IM, upper] = (top_im * det_re - top_re * det_im) / size
-    x[RE, lower] = (low_re * det_re + low_im * det_im) / size
-    x[IM, lower] = (low_im * det_re - low_re * det_im) / size
+    x[Trial.RE, upper] = (top_re * det_re + top_im * det_im) / size
+    x[Trial.IM, upper] = (top_im * det_re - top_re * det_im) / size
+    x[Trial.RE, lower] = (low_re * det_re + low_im * det_im) / size
+    x[Trial.IM, lower] = (low_im * det_re - low_re * det_im) / size
 
 
 @fused
 def forward(f, at, x, i, re, im):
     """Eliminate row `i`, with what the row before it came to."""
-    next_re = x[RE, i] - f[at + LOW_RE, i] * re + f[at + LOW_IM, i] * im
-    next_im = x[IM, i] - f[at + LOW_RE, i] * im - f[at + LOW_IM, i] * re
-    x[RE, i] = next_re
-    x[IM, i] = next_im
+    next_re = x[Trial.RE, i] - f[at + Factor.LOW_RE, i] * re + f[at + Factor.LOW_IM, i] * im
+    next_im = x[Trial.IM, i] - f[at + Factor.LOW_RE, i] * im - f[at + Factor.LOW_IM, i] * re
+    x[Trial.RE, i] = next_re
+    x[Trial.IM, i] = next_im
     return next_re, next_im
 
 
 @fused
 def backward(f, at, x, i, solved, re, im):
     """Solve for row `i`, with the solution of the row `solved` next to it."""
-    pivot_re = x[RE, i] * f[at + PIVOT_RE, i] - x[IM, i] * f[at + PIVOT_IM, i]
-    pivot_im = x[RE, i] * f[at + PIVOT_IM, i] + x[IM, i] * f[at + PIVOT_RE, i]
-    next_re = pivot_re - f[at + LOW_RE, solved] * re + f[at + LOW_IM, solved] * im
-    next_im = pivot_im - f[at + LOW_RE, solved] * im - f[at + LOW_IM, solved] * re
-    x[RE, i] = next_re
-    x[IM, i] = next_im
+    pivot_re = (
+        x[Trial.RE, i] * f[at + Factor.PIVOT_RE, i] - x[Trial.IM, i] * f[at + Factor.PIVOT_IM, i]
+    )
+    pivot_im = (
+        x[Trial.RE, i] * f[at + Factor.PIVOT_IM, i] + x[Trial.IM, i] * f[at + Factor.PIVOT_RE, i]
+    )
+    next_re = pivot_re - f[at + Factor.LOW_RE, solved] * re + f[at + Factor.LOW_IM, solved] * im
+    next_im = pivot_im - f[at + Factor.LOW_RE, solved] * im - f[at + Factor.LOW_IM, solved] * re
+    x[Trial.RE, i] = next_re
+    x[Trial.IM, i] = next_im
     return next_re, next_im
 
 
@@ -189,8 +178,8 @@ def substitute(par, s, f, slot, x, h):
     n_p = par.n_p
     last = n_p + par.n_b - 1
     both = max(min(n_p, par.n_b) - 1, 0)
-    a, b = x[RE, 0], x[IM, 0]
-    c, d = x[RE, last], x[IM, last]
+    a, b = x[Trial.RE, 0], x[Trial.IM, 0]
+    c, d = x[Trial.RE, last], x[Trial.IM, last]
     for k in range(both):
         a, b = forward(f, at, x, 1 + k, a, b)
         c, d = forward(f, at, x, last - 1 - k, c, d)
@@ -199,9 +188,9 @@ def substitute(par, s, f, slot, x, h):
     for k in range(both, par.n_b - 1):
         c, d = forward(f, at, x, last - 1 - k, c, d)
     meet_at_contact(par, s, f, at, x, h)
-    c, d = x[RE, n_p], x[IM, n_p]
+    c, d = x[Trial.RE, n_p], x[Trial.IM, n_p]
     if n_p > 0:
-        a, b = x[RE, n_p - 1], x[IM, n_p - 1]
+        a, b = x[Trial.RE, n_p - 1], x[Trial.IM, n_p - 1]
     for k in range(both):
         a, b = backward(f, at, x, n_p - 2 - k, n_p - 1 - k, a, b)
         c, d = backward(f, at, x, n_p + 1 + k, n_p + k, c, d)

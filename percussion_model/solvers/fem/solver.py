@@ -1,26 +1,26 @@
-"""The finite-element solver: the paper's own computational model."""
+"""Finite-element solver: the paper's own computational model."""
 
 from __future__ import annotations
 
+import math
+from typing import Any, ClassVar
+
 import numpy as np
 
-from percussion_model.physics.records import (
-    BLOW,
-    EVENT,
-    LEDGER_FIELDS,
-    SAMPLE_FIELDS,
-)
+from percussion_model.physics.records import RockKind
 from percussion_model.scene.rules import BarNumbers, SceneRules
+from percussion_model.solvers.base import Solver
 from percussion_model.solvers.fem.advance import run
-from percussion_model.solvers.fem.bars import dissipated_in_nodes, read_all, stored_energy
+from percussion_model.solvers.fem.bars import read_all, stored_energy
 from percussion_model.solvers.fem.mesh import (
     BarMesh,
     assemble,
+    critical_frequency,
     cut_bar,
     section_count,
 )
-from percussion_model.solvers.fem.packing import loss_time, pack_fem
 from percussion_model.solvers.fem.records import (
+    FEM_PAR,
     FEM_STATE,
     Column,
     Factor,
@@ -31,15 +31,41 @@ from percussion_model.solvers.fem.records import (
     Node,
     Trial,
 )
-from percussion_model.solvers.fem.state import FemState
-from percussion_model.solvers.wave.packing import (
-    INPUT_FIELDS,
-    begin_state,
+from percussion_model.solvers.setup import (
+    MOST_CHANGES,
+    fill_parameters,
+    fill_start,
     rock_numbers,
 )
+from percussion_model.solvers.state import State
+
+# Steps cut short by events within the length of a whole one; more are a storm. The
+# reference has no more than 5.
+MOST_EVENTS = 64
 
 
-class FemSolver:
+def loss_time(scene: SceneRules, bit: BarMesh) -> float:
+    """Kelvin-Voigt time [s]: that of the scene, or 2 zeta_K / omega_cr (eq. 55 of the paper)."""
+    if not scene.effects.loss:
+        return 0.0
+    if scene.fem.damping_ratio is None:
+        return float(scene.loss.time)
+    return 2.0 * float(scene.fem.damping_ratio) / critical_frequency(bit)
+
+
+def eigenvalue(spectral_radius: float) -> complex:
+    """Complex eigenvalue of the scheme's matrix (docs/numerics.md, section 10)."""
+    p = (2.0 + spectral_radius) / (3.0 * (1.0 + spectral_radius))
+    q = 1.0 / (6.0 * (1.0 + spectral_radius))
+    return complex(0.5 * p, math.sqrt(q - 0.25 * p * p))
+
+
+def defect(spectral_radius: float) -> float:
+    """Defect of the scheme's energy identity (docs/numerics.md, section 10)."""
+    return (1.0 - spectral_radius) / (36.0 * (1.0 + spectral_radius))
+
+
+class FemSolver(Solver):
     """Linear finite elements, penalty contact, event-driven third-order steps.
 
     Parameters
@@ -58,10 +84,11 @@ class FemSolver:
     """
 
     name = "fem"
-    wave_speed_error = 0.0
+    time_step: float
+    COUNTS: ClassVar = ("steps", "trials", "events", "blows", "storms", "locked")
 
     def __init__(self, scene: SceneRules) -> None:
-        self.scene = scene
+        super().__init__(scene)
         elastic_piston = scene.piston.model == "elastic"
         first = scene.piston if elastic_piston else scene.bit
         element = self._element = first.length / scene.fem.elements
@@ -71,34 +98,49 @@ class FemSolver:
             self._piston = cut_bar(scene.piston, element, elastic_piston)
         bars = [bar for bar in (self._piston, self._bit) if bar is not None]
         self._mesh = assemble(bars)
-        elastic = [bar for bar in bars if bar.n]
-        shortest = min(float(bar.transit_time.min()) for bar in elastic)
-        self.time_step: float = scene.fem.courant * shortest
+        shortest = min(float(bar.transit_time.min()) for bar in bars if bar.n)
+        self.time_step = scene.fem.courant * shortest
         self.loss_time = loss_time(scene, self._bit)
         self.cells = {"bit": self._bit.n}
         if elastic_piston and self._piston is not None:
             self.cells = {"piston": self._piston.n, **self.cells}
-        self._par = pack_fem(scene, self._piston, self._bit, self.time_step, self.loss_time)
+        self._par = self._parameters()
         n = self._mesh.shape[1]
         self._factors = np.zeros((2 * len(Factor), max(n, len(Key))))
         self._trial = np.zeros((len(Trial), n))
         self._looks = np.zeros((len(Look), len(Column)))
-        self._no_blows = np.zeros(1, BLOW)
-        self._no_events = np.zeros(1, EVENT)
-        self._no_row = np.zeros(len(SAMPLE_FIELDS))
 
-    def new_state(self) -> FemState:
+    def _parameters(self) -> np.ndarray:
+        scene, options = self.scene, self.scene.fem
+        par = np.zeros(1, FEM_PAR)
+        p: Any = par[0]
+        fill_parameters(p, scene, with_piston=scene.piston.model == "elastic")
+        p["dt"] = self.time_step
+        mu = eigenvalue(options.spectral_radius)
+        p["mu_re"], p["mu_im"] = mu.real, mu.imag
+        p["dissipation"] = defect(options.spectral_radius)
+        p["k_c"] = options.contact_stiffness
+        p["eta"] = self.loss_time
+        p["q_tol"], p["t_tol"] = options.event_tolerance, options.time_tolerance
+        p["start_gap"] = scene.start.gap
+        p["n_p"] = 0 if self._piston is None else self._piston.n + 1
+        p["n_b"] = self._bit.n + 1
+        if p["rock"] == RockKind.WALL:
+            p["rock"] = RockKind.SPRING  # a wall is met like the piston: by a penalty
+        p["most_changes"], p["most_events"] = MOST_CHANGES, MOST_EVENTS
+        return par
+
+    def new_state(self) -> State:
         """State at time zero."""
         scene, start = self.scene, self.scene.start
-        record = np.zeros(1, FEM_STATE)
-        s = record[0]
         rock = rock_numbers(scene)
         if scene.effects.rock == "wall":
             rock["k_r"] = scene.fem.contact_stiffness
-        begin_state(s, scene, rock)
+        state = State(FEM_STATE, ((len(Node), self._mesh.shape[1]),))
+        s: Any = state.record[0]
+        fill_start(s, scene, rock)
         s["fresh"] = 1
-        state = FemState(record, np.zeros(len(Node) * self._mesh.shape[1]))
-        w, n_p = self._nodes(state), int(self._par[0]["n_p"])
+        (w,), n_p = state.arrays, int(self._par[0]["n_p"])
         w[Node.U] = -start.rock_gap
         w[Node.V, n_p:] = start.bit_velocity
         if n_p:
@@ -107,168 +149,71 @@ class FemSolver:
         self.refresh(state)
         return state
 
-    def refresh(self, state: FemState) -> None:
+    def refresh(self, state: State) -> None:
         """Derive everything from the nodes, as at the start of a run."""
-        s = state.record[0]
-        read_all(self._par[0], s, self._nodes(state), self._mesh)
-        s["e_start"] = sum(self._stored(state))
-
-    def _nodes(self, state: FemState) -> np.ndarray:
-        return state.workspace.reshape(len(Node), -1)
-
-    def _stored(self, state: FemState) -> tuple[float, float, float]:
-        return stored_energy(self._par[0], state.record[0], self._nodes(state), self._mesh)
+        s, (w,) = state.record[0], state.arrays
+        read_all(self._par[0], s, w, self._mesh)
+        s["e_start"] = sum(stored_energy(self._par[0], s, w, self._mesh))
 
     def _run(
-        self,
-        task: FemTask,
-        state: FemState,
-        time: float,
-        blows: np.ndarray | None = None,
-        events: np.ndarray | None = None,
-        row: np.ndarray | None = None,
-    ) -> int:
-        """Call the kernels; see `core.fem_advance.run`."""
-        return run(
-            int(task),
-            self._par,
-            state.record,
-            self._nodes(state),
-            self._mesh,
-            self._factors,
-            self._trial,
-            self._looks,
-            time,
-            self._no_blows if blows is None else blows,
-            self._no_events if events is None else events,
-            self._no_row if row is None else row,
-        )
-
-    def _counted(
-        self,
-        task: FemTask,
-        state: FemState,
-        time: float,
-        blows: np.ndarray | None,
-        events: np.ndarray | None,
-    ) -> tuple[int, int, int]:
-        """Call the kernels; status, and the rows of blows and events that were filled."""
-        status = self._run(task, state, time, blows, events)
+        self, task: FemTask, state: State, time: float, blows: np.ndarray, events: np.ndarray,
+        reading: np.ndarray,
+    ) -> tuple[int, int, int]:  # fmt: skip
+        """Call the kernels; see `solvers.fem.advance.run`."""
+        status = run(
+            int(task), self._par, state.record, *state.arrays, self._mesh, self._factors,
+            self._trial, self._looks, time, blows, events, reading,
+        )  # fmt: skip
         s = state.record[0]
         return status, int(s["n_blows"]), int(s["n_events"])
 
-    def time(self, state: FemState) -> float:
+    def time(self, state: State) -> float:
         """Time up to which the state is committed [s]."""
         return float(state.record[0]["time"])
 
-    def readable_until(self, state: FemState) -> float:
-        """Time up to which `sample` answers without advancing the state [s]."""
+    def readable_until(self, state: State) -> float:
+        """Time up to which `read` answers without advancing the state [s]."""
         return self.time(state) + self.time_step
 
-    def grid_point_after(self, state: FemState, t: float) -> float:
-        """First time at or after `t` at which inputs can change: `t` itself [s]."""
-        return max(t, self.time(state))
-
     def advance(
-        self,
-        state: FemState,
-        t: float,
-        blows: np.ndarray,
-        events: np.ndarray,
-        record_events: bool = False,
+        self, state: State, t: float, blows: np.ndarray, events: np.ndarray, record_events: bool
     ) -> tuple[int, int, int]:
-        """Commit the whole steps up to `t`.
-
-        Returns
-        -------
-        status, n_blows, n_events : int
-        """
+        """Commit the whole steps up to `t`; as in `Solver`."""
         state.record[0]["events_on"] = record_events
-        return self._counted(FemTask.ADVANCE, state, t, blows, events)
+        return self._run(FemTask.ADVANCE, state, t, blows, events, self._no_reading)
 
-    def sample(self, state: FemState, times: np.ndarray, out: np.ndarray) -> None:
-        """Evaluate at `times` without touching the state (`SAMPLE_FIELDS`)."""
-        for k, time in enumerate(times):
-            self.look(state, float(time), out[k])
+    def commit(
+        self, state: State, t: float, blows: np.ndarray, events: np.ndarray, record_events: bool
+    ) -> tuple[int, int, int]:
+        """Bring an advanced state to `t`, with a part of a step; as in `Solver`."""
+        state.record[0]["events_on"] = record_events
+        return self._run(FemTask.COMMIT, state, t, blows, events, self._no_reading)
 
-    def look(
-        self,
-        state: FemState,
-        t: float,
-        row: np.ndarray,
-        here: FemState | None = None,
+    def read(
+        self, state: State, t: float, reading: np.ndarray, spare: State | None = None,
         peaks: bool = True,
-    ) -> FemState:
-        """Evaluate at `t` into a row (`LONG_SAMPLE_FIELDS`, or their beginning).
-
-        Parameters
-        ----------
-        here : FemState, optional
-            What an earlier call returned; it becomes the copy.
-
-        Returns
-        -------
-        FemState
-            A copy at `t`.
-        """
-        if here is None:
-            here = state.copy()
+    ) -> State:  # fmt: skip
+        """Evaluate at `t`; a copy at that time. As in `Solver`."""
+        if spare is None:
+            spare = state.copy()
         else:
-            here.take(state)
-        self._run(FemTask.SAMPLE, here, t, row=row)
-        return here
+            spare.take(state)
+        self._run(FemTask.READ, spare, t, self._no_blows, self._no_events, reading)
+        return spare
+
+    def set_inputs(self, state: State, **inputs: float) -> None:
+        """Change inputs of a committed state; modes may have to follow."""
+        super().set_inputs(state, **inputs)
+        state.record[0]["fresh"] = 1
 
     def grid_of(self, bar: str) -> BarMesh | None:
         """Elements of "piston" or "bit", None where it has none."""
         mesh = {"piston": self._piston, "bit": self._bit}[bar]
         return mesh if mesh is not None and mesh.n else None
 
-    def watch_peaks(self, state: FemState, t: float) -> None:
-        """Count the peak forces of `look` from `t` on [s]."""
-        s = state.record[0]
-        s["peak_from"], s["peak_bit"], s["peak_contact"] = t, 0.0, 0.0
-
-    def commit(
-        self,
-        state: FemState,
-        t: float,
-        blows: np.ndarray | None = None,
-        events: np.ndarray | None = None,
-        record_events: bool = False,
-    ) -> tuple[int, int, int]:
-        """Bring an advanced state to `t`, with a part of a step.
-
-        Returns
-        -------
-        status, n_blows, n_events : int
-        """
-        state.record[0]["events_on"] = record_events
-        return self._counted(FemTask.BRING, state, t, blows, events)
-
-    def set_inputs(self, state: FemState, **inputs: float) -> None:
-        """Change inputs of a committed state; rock inputs wait for the next cycle."""
-        for key, value in inputs.items():
-            state.record[0][INPUT_FIELDS[key]] = value
-        state.record[0]["fresh"] = 1
-
-    def energy(self, state: FemState, t: float) -> dict[str, float]:
-        """Ledger [J] at `t`."""
-        here = state.copy()
-        s = here.record[0]
-        s["live"] = 0
-        self._run(FemTask.BRING, here, t)
-        entries = {name: float(s[f"e_{name}"]) for name in LEDGER_FIELDS}
-        loss, numerical = dissipated_in_nodes(self._par[0], self._nodes(here))
-        entries["loss"] += loss
-        entries["numerical"] += numerical
-        kinetic, elastic, rock = self._stored(here)
-        entries |= {"start": float(s["e_start"]), "kinetic": kinetic, "elastic": elastic}
-        entries["recoverable"] = rock
-        return entries
-
-    def fields(self, state: FemState) -> dict[str, np.ndarray]:
+    def fields(self, state: State) -> dict[str, np.ndarray]:
         """Force [N] and velocity [m/s] of each element, top to bottom, by bar."""
-        w, n_p = self._nodes(state), int(self._par[0]["n_p"])
+        (w,), n_p = state.arrays, int(self._par[0]["n_p"])
         out = {}
         for name, first, bar in (("piston", 0, self._piston), ("bit", n_p, self._bit)):
             if bar is not None and bar.n:
@@ -278,16 +223,6 @@ class FemSolver:
                 out[f"{name}_velocity"] = 0.5 * (nodes[Node.V, :-1] + nodes[Node.V, 1:])
         return out
 
-    def force_in(self, state: FemState, bar: str, cell: int) -> float:
-        """Force in one element of "piston" or "bit" [N], as `fields` reads it."""
-        return float(self.fields(state)[f"{bar}_force"][cell])
-
     def section_cells(self, bar: BarNumbers) -> list[int]:
         """Elements in each section of an elastic bar."""
         return [section_count(section, self._element) for section in bar.sections]
-
-    def statistics(self, state: FemState) -> dict[str, int]:
-        """Counts of what the solver did."""
-        s = state.record[0]
-        names = ("steps", "trials", "events", "blows", "storms")
-        return {name: int(s[f"count_{name}"]) for name in names} | {"locked": int(s["locked"])}

@@ -6,22 +6,22 @@ is one of a mean and a bend (docs/numerics.md, section 10).
 
 from __future__ import annotations
 
+from percussion_model.physics.body import book_bit_load, book_piston_load
 from percussion_model.physics.drive import drive_force
 from percussion_model.physics.kernel import fused, inlined, kernel, merged
-from percussion_model.physics.records import Mode, RockKind
-from percussion_model.physics.rock import crush, origin, recoverable, stiffness
+from percussion_model.physics.records import Mode
+from percussion_model.physics.rock import (
+    book_dashpot,
+    crush,
+    damping,
+    origin,
+    recoverable,
+    spring_force,
+    stiffness,
+)
 from percussion_model.solvers.fem.bars import read_nodes
 from percussion_model.solvers.fem.records import Mesh, Node, Trial
 from percussion_model.solvers.fem.scheme import rate_bend
-from percussion_model.solvers.fem.solve import damping
-
-FF, DFC, FC, BC, SS = (int(m) for m in Mode)
-BILINEAR = int(RockKind.BILINEAR)
-U, V = int(Node.U), int(Node.V)
-LOSS, NUMERICAL = int(Node.LOSS), int(Node.NUMERICAL)
-RE, IM = int(Trial.RE), int(Trial.IM)
-MASS, COUPLING, STIFFNESS = int(Mesh.MASS), int(Mesh.COUPLING), int(Mesh.STIFFNESS)
-TARGET_RE, TARGET_IM = int(Trial.TARGET_RE), int(Trial.TARGET_IM)
 
 # Mean square of a bend that rises by one over the step.
 TWELFTH = 1.0 / 12.0
@@ -35,7 +35,7 @@ def dashpot_work(par, s, x, w, h):
         return 0.0
     i = par.n_p + par.n_b - 1
     bend = rate_bend(par, x, i, h)
-    mean = (x[U, i] - w[U, i]) / h
+    mean = (x[Node.U, i] - w[Node.U, i]) / h
     return C * h * (mean * mean + TWELFTH * bend * bend)
 
 
@@ -48,19 +48,19 @@ def book_bars(par, w, c, x, h):
     by = 1.0 / h
     turn = 1.0 / par.mu_im
     for i in range(n):
-        x[TARGET_RE, i] = (x[U, i] - w[U, i]) * by
-        x[TARGET_IM, i] = h * turn * (par.mu_re * x[IM, i] + par.mu_im * x[RE, i])
-        x[IM, i] = x[IM, i] * turn
+        x[Trial.TARGET_RE, i] = (x[Node.U, i] - w[Node.U, i]) * by
+        x[Trial.TARGET_IM, i] = h * turn * (par.mu_re * x[Trial.IM, i] + par.mu_im * x[Trial.RE, i])
+        x[Trial.IM, i] = x[Trial.IM, i] * turn
     for i in range(n - 1):
-        mean = x[TARGET_RE, i + 1] - x[TARGET_RE, i]
-        bend = x[TARGET_IM, i + 1] - x[TARGET_IM, i]
-        stiff = c[STIFFNESS, i] * (bend * bend)
-        w[LOSS, i] += viscous * (c[STIFFNESS, i] * (mean * mean) + TWELFTH * stiff)
-        a = x[IM, i]
-        inert = c[MASS, i] * (a * a) + 2.0 * c[COUPLING, i] * (a * x[IM, i + 1])
-        w[NUMERICAL, i] += defect * (stiff + inert)
-    a = x[IM, n - 1]
-    w[NUMERICAL, n - 1] += defect * (c[MASS, n - 1] * (a * a))
+        mean = x[Trial.TARGET_RE, i + 1] - x[Trial.TARGET_RE, i]
+        bend = x[Trial.TARGET_IM, i + 1] - x[Trial.TARGET_IM, i]
+        stiff = c[Mesh.STIFFNESS, i] * (bend * bend)
+        w[Node.LOSS, i] += viscous * (c[Mesh.STIFFNESS, i] * (mean * mean) + TWELFTH * stiff)
+        a = x[Trial.IM, i]
+        inert = c[Mesh.MASS, i] * (a * a) + 2.0 * c[Mesh.COUPLING, i] * (a * x[Trial.IM, i + 1])
+        w[Node.NUMERICAL, i] += defect * (stiff + inert)
+    a = x[Trial.IM, n - 1]
+    w[Node.NUMERICAL, n - 1] += defect * (c[Mesh.MASS, n - 1] * (a * a))
 
 
 @inlined
@@ -69,7 +69,7 @@ def book_contact(par, s, x, w, h):
     lower = par.n_p
     upper = par.n_p - 1
     bend = rate_bend(par, x, lower, h) - rate_bend(par, x, upper, h)
-    closing = (x[U, lower] - w[U, lower]) - (x[U, upper] - w[U, upper])
+    closing = (x[Node.U, lower] - w[Node.U, lower]) - (x[Node.U, upper] - w[Node.U, upper])
     # the mean of a parabola whose slope rises by `bend`
     mean = s.gap + 0.5 * closing - TWELFTH * bend * h
     s.i_contact -= par.k_c * mean * h
@@ -83,7 +83,7 @@ def book_rock(par, s, x, w, h):
     K = stiffness(s)
     C = damping(s)
     bend = rate_bend(par, x, i, h)
-    path = x[U, i] - w[U, i]
+    path = x[Node.U, i] - w[Node.U, i]
     y = s.p - origin(s)
     after = y + path
     defect = 0.5 * h * h * par.dissipation * K * bend * bend
@@ -91,19 +91,15 @@ def book_rock(par, s, x, w, h):
     s.i_bit += K * h * (y + 0.5 * path - TWELFTH * bend * h) + C * path
     s.rock_work += 0.5 * K * (after - y) * (after + y) + defect + dashpot
     s.e_numerical += defect
-    if s.mode == DFC:
-        s.w += dashpot
-        s.e_barrier += dashpot
-    elif s.mode == SS:
-        s.e_standstill += dashpot
+    book_dashpot(s, dashpot)
 
 
 @inlined
 def bit_force(s):
     """Force of the bit on the rock, compression positive [N]."""
-    if s.mode == FF:
+    if s.mode == Mode.FF:
         return 0.0
-    return stiffness(s) * (s.p - origin(s)) + damping(s) * s.v_end
+    return spring_force(s) + damping(s) * s.v_end
 
 
 @inlined
@@ -122,8 +118,8 @@ def note_forces(par, s):
     s.b_peak_bit = max(s.b_peak_bit, bit)
     s.b_peak_contact = max(s.b_peak_contact, contact)
     if s.time >= s.peak_from:
-        s.peak_bit = max(s.peak_bit, bit)
-        s.peak_contact = max(s.peak_contact, contact)
+        s.peak_bit_force = max(s.peak_bit_force, bit)
+        s.peak_contact_force = max(s.peak_contact_force, contact)
 
 
 @kernel
@@ -132,29 +128,24 @@ def take_step(par, s, w, c, x, h):
     n_p = par.n_p
     before = recoverable(s)
     p_before = s.p
-    if s.mode != FF:
+    if s.mode != Mode.FF:
         book_rock(par, s, x, w, h)
     if s.closed == 1:
         book_contact(par, s, x, w, h)
     book_bars(par, w, c, x, h)
-    path = s.next_b - s.mean_b
-    s.e_gravity += par.mass_b * par.gravity * path
-    s.e_feed += s.feed * path
+    book_bit_load(par, s, s.next_b - s.mean_b)
     if n_p > 0:
         push = drive_force(par, s)
-        path = s.next_p - s.mean_p
-        s.e_gravity += par.mass_p * par.gravity * path
-        s.e_drive += push * path
-        s.i_drive += push * h
+        book_piston_load(par, s, push, s.next_p - s.mean_p, push * h)
     for i in range(n_p + par.n_b):
-        w[U, i] = x[U, i]
-        w[V, i] = x[V, i]
+        w[Node.U, i] = x[Node.U, i]
+        w[Node.V, i] = x[Node.V, i]
     read_nodes(par, s, w, c)
-    if s.mode == FF:
+    if s.mode == Mode.FF:
         # a rock that was still springing back relaxes without doing work
         s.e_standstill += before - recoverable(s)
-    elif (s.mode == DFC or s.mode == FC) and par.rock == BILINEAR:
-        crush(s, p_before)
+    else:
+        crush(par, s, p_before)
     if -s.u_r > s.b_stroke and n_p > 0:
         s.b_stroke = -s.u_r
     s.time += h

@@ -1,52 +1,43 @@
-"""Rigid piston and bit from event to event, all in closed form (docs/model.md, section 9)."""
+"""Loop of the rigid-body solver: from event to event, all in closed form (docs/model.md, sec. 9)."""
 
 from __future__ import annotations
 
 import math
 
-from numba import njit
-
-from percussion_model.physics.records import PEAK_FIELDS, SAMPLE_FIELDS, Piston, Status
-from percussion_model.solvers.rigid.events import happen, starts_blow
-from percussion_model.solvers.rigid.law import (
+from percussion_model.physics.blows import fill_ledger, starts_blow
+from percussion_model.physics.drive import drive_force
+from percussion_model.physics.kernel import kernel
+from percussion_model.physics.records import Piston, Status
+from percussion_model.physics.rock import recoverable
+from percussion_model.solvers.rigid.events import process_event
+from percussion_model.solvers.rigid.forces import (
     acceleration,
     bit_force,
     contact_force,
-    drive_force,
     is_finite,
     kinetic_energy,
-    recoverable,
-    start_cycle,
-    watch_standstill,
+    mark_standstill,
 )
-from percussion_model.solvers.rigid.move import bit_motion, impulses, move, piston_motion
-from percussion_model.solvers.rigid.records import ROWS_AN_EVENT
-from percussion_model.solvers.rigid.schedule import CLOSE, NOTHING, schedule
-
-DONE, BLOWS_FULL, EVENTS_FULL = int(Status.DONE), int(Status.BLOWS_FULL), int(Status.EVENTS_FULL)
-NOT_FINITE = int(Status.NOT_FINITE)
-ABSENT = int(Piston.ABSENT)
-
-# Where a longer row goes on.
-PEAKS = len(SAMPLE_FIELDS)
-LEDGER = PEAKS + len(PEAK_FIELDS)
+from percussion_model.solvers.rigid.move import move
+from percussion_model.solvers.rigid.records import ROWS_AN_EVENT, Next
+from percussion_model.solvers.rigid.schedule import schedule
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def count_event(par, s):
-    """Count the event that is about to happen; too many within a window are a storm."""
+    """Zeno guard: count an event; too many within a window are a storm."""
     s.last_event = s.time
-    if s.time - s.window > par.storm_window:
-        s.window = s.time
+    if s.time - s.window_from > par.window:
+        s.window_from = s.time
         s.window_events = 0
     s.window_events += 1
     if s.window_events == par.most_events:
         s.count_storms += 1
 
 
-@njit(cache=True, error_model="numpy")
-def advance(par_, state, t, blows, n_blows, events, n_events, record):
-    """Let all events up to time t happen.
+@kernel
+def advance(par_, state, t, blows, events):
+    """Process all events up to time t.
 
     The state comes to rest at the last of them, so that it does not depend on how an
     interval is divided into calls.
@@ -57,11 +48,8 @@ def advance(par_, state, t, blows, n_blows, events, n_events, record):
     t : float
         Time [s].
     blows, events : BLOW, EVENT arrays
-        Filled from the counts on; events needs room for ROWS_AN_EVENT rows at least.
-    n_blows, n_events : integer arrays of length 1
-        Rows used up; raised here.
-    record : bool
-        Whether to keep events.
+        Filled from index 0; the state says how far. Events needs room for ROWS_AN_EVENT
+        rows at least, where they are listed.
 
     Returns
     -------
@@ -71,42 +59,34 @@ def advance(par_, state, t, blows, n_blows, events, n_events, record):
     """
     par = par_[0]
     s = state[0]
+    s.n_blows = 0
+    s.n_events = 0
     while True:
         if s.scheduled == 0:
             schedule(par, s)
-        if not s.next_time <= t or s.next_kind == NOTHING:
-            return DONE
-        if record and n_events[0] + ROWS_AN_EVENT > events.shape[0]:
-            return EVENTS_FULL
-        ends_blow = s.next_kind == CLOSE and s.in_blow == 1 and starts_blow(par, s, s.next_time)
-        if ends_blow and n_blows[0] >= blows.shape[0]:
-            return BLOWS_FULL
+        if not s.next_time <= t or s.next_kind == Next.NOTHING:
+            return Status.DONE
+        if s.live == 1:
+            if s.events_on == 1 and s.n_events + ROWS_AN_EVENT > events.shape[0]:
+                return Status.EVENTS_FULL
+            closes = s.next_kind == Next.CLOSE and s.b_started == 1
+            if closes and starts_blow(par, s, s.next_time) and s.n_blows >= blows.shape[0]:
+                return Status.BLOWS_FULL
         if s.next_tau > 0.0:
             move(par, s, s.next_tau)
             s.time = s.next_time
             s.standing_events = 0
         else:
             s.standing_events += 1
-        if ends_blow:
-            s.blow.period = s.time - s.blow.time
-            blows[n_blows[0]] = s.blow
-            n_blows[0] += 1
-        count_event(par, s)
-        happen(par, s)
-        if record:
-            for i in range(s.n_rows):
-                row = events[n_events[0]]
-                row.time = s.time
-                row.value = s.row_value[i]
-                row.bit_position = s.bit_position
-                row.kind = s.row_kind[i]
-                n_events[0] += 1
+        if s.next_kind != Next.HOLD:
+            count_event(par, s)
+        process_event(par, s, blows, events)
         s.scheduled = 0
         if not is_finite(s):
-            return NOT_FINITE
+            return Status.NOT_FINITE
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def commit(par_, state, t):
     """Carry the state itself to time t, before its next event, so that inputs may change."""
     par = par_[0]
@@ -115,133 +95,69 @@ def commit(par_, state, t):
         move(par, s, t - s.time)
         s.time = t
         s.standing_events = 0
-    watch_standstill(s)
+    mark_standstill(s)
     s.scheduled = 0
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def begin(par_, state):
-    """Complete a new state: rock law in force, a piston at rest on the bit, energy."""
+    """Complete a new state: a piston at rest on the bit, energy."""
     par = par_[0]
     s = state[0]
-    mode = s.mode
-    start_cycle(par, s, s.p)
-    s.mode = mode
-    s.standstill = 0.0
-    if par.piston != ABSENT and s.gap == 0.0 and s.v_p == s.v_b:
+    if par.piston != Piston.ABSENT and s.gap == 0.0 and s.v_p == s.v_b:
         s.held = 1
         if not contact_force(par, s, acceleration(par, s)) > 0.0:
             s.held = 0
-    s.initial_energy = kinetic_energy(par, s.v_p, s.v_b)
+    s.e_start = kinetic_energy(par, s.v_p, s.v_b)
 
 
-@njit(cache=True, error_model="numpy")
-def fill_ledger(par, s, tau, row):
-    """Carry the state over `tau` and write peaks and energies (LONG_SAMPLE_FIELDS)."""
-    if tau > 0.0:
-        move(par, s, tau)
-        s.time += tau
-    row[PEAKS] = s.peak_bit
-    row[PEAKS + 1] = s.peak_contact
-    row[LEDGER] = s.drive
-    row[LEDGER + 1] = s.feed
-    row[LEDGER + 2] = s.gravity
-    row[LEDGER + 3] = s.crushing
-    row[LEDGER + 4] = s.barrier
-    row[LEDGER + 5] = s.standstill
-    row[LEDGER + 6] = s.loss
-    row[LEDGER + 7] = s.contact
-    row[LEDGER + 8] = s.numerical
-    row[LEDGER + 9] = s.overshoot
-    row[LEDGER + 10] = s.initial_energy
-    row[LEDGER + 11] = kinetic_energy(par, s.v_p, s.v_b)
-    row[LEDGER + 12] = 0.0
-    row[LEDGER + 13] = recoverable(par, s, s.p)
-
-
-@njit(cache=True, error_model="numpy")
-def fill_sample(par, s, t, row):
-    """Write what is seen at time t, up to the next event (SAMPLE_FIELDS)."""
-    tau = t - s.time
-    d_b, v_b = bit_motion(par, s, tau)
-    d_p, v_p = piston_motion(par, s, tau, d_b, v_b)
-    bit, contact = impulses(par, s, tau, v_b)
-    force = bit_force(par, s, s.p + d_b, v_b)
-    gap = s.gap + (d_b - d_p)
-    row[0] = t
-    row[1] = s.bit_position + d_b + s.first_gap - gap
-    row[2] = v_p
-    row[3] = s.bit_position + d_b
-    row[4] = v_b
-    row[5] = row[3]
-    row[6] = v_b
-    row[7] = gap
-    row[8] = -gap
-    row[9] = s.p + d_b
-    row[10] = force
-    row[11] = 0.0
-    if s.held == 1:
-        before = acceleration(par, s)
-        # The common acceleration changes with the bit force alone.
-        change = (bit_force(par, s, s.p, s.v_b) - force) / (par.M_p + par.M_b)
-        row[11] = contact_force(par, s, before + change)
-    row[12] = 0.0
-    row[13] = s.mode
-    row[14] = 0.5 * par.M_b * v_b * v_b
-    row[15] = s.bit_impulse + bit
-    row[16] = s.contact_impulse + contact
-    row[17] = s.drive_impulse
-    if par.piston == ABSENT:
-        row[1] = math.nan
-        row[2] = math.nan
-        row[7] = math.nan
-        row[8] = math.nan
-    else:
-        row[12] = drive_force(par, s)
-        row[17] += row[12] * tau
-    if row.shape[0] > LEDGER:
-        fill_ledger(par, s, tau, row)
-
-
-@njit(cache=True, error_model="numpy")
-def run_to(par_, copy, t, blows, n_blows, events, n_events):
-    """Advance a copy that is only read to time t; its blows are dropped."""
-    status = BLOWS_FULL
-    while status == BLOWS_FULL:
-        n_blows[0] = 0
-        status = advance(par_, copy, t, blows, n_blows, events, n_events, False)
-    return status
-
-
-@njit(cache=True, error_model="numpy")
-def sample(par_, copy, times, out, blows, n_blows, events, n_events):
-    """Fill a row of SAMPLE_FIELDS for each of the rising `times`.
+@kernel
+def read(par_, state, t, blows, events, reading):
+    """Carry a state to time t and tell what it is like; spoils it, so give a copy.
 
     Parameters
     ----------
-    par_, copy : RIGID_PAR, RIGID_STATE arrays of length 1
-        The state is a copy: it is used up.
-    times : float array
-        Not before the time of the state [s].
-    out : float array, one row per time
-    blows, n_blows, events, n_events : arrays of length 1
-        Room that `advance` needs; nothing of it is kept.
+    blows, events : BLOW, EVENT arrays
+        Not filled.
+    reading : READING array of length 1
 
     Returns
     -------
-    status : int
+    int
+        A `Status`.
     """
-    for i in range(times.shape[0]):
-        status = run_to(par_, copy, times[i], blows, n_blows, events, n_events)
-        if status != DONE:
-            return status
-        fill_sample(par_[0], copy[0], times[i], out[i])
-    return DONE
-
-
-@njit(cache=True, error_model="numpy")
-def stored_energy(par_, state):
-    """Kinetic energy and energy that the rock would give back [J]."""
     par = par_[0]
     s = state[0]
-    return kinetic_energy(par, s.v_p, s.v_b), recoverable(par, s, s.p)
+    row = reading[0]
+    s.live = 0
+    status = advance(par_, state, t, blows, events)
+    if t > s.time:
+        move(par, s, t - s.time)
+    here = s.x_r + s.p
+    row.time = t
+    row.piston_position = here + s.start_gap - s.gap
+    row.piston_velocity = s.v_p
+    row.bit_position = here
+    row.bit_velocity = s.v_b
+    row.bit_end_position = here
+    row.bit_end_velocity = s.v_b
+    row.gap = s.gap
+    row.relative_displacement = -s.gap
+    row.penetration = s.p
+    row.bit_force = bit_force(par, s, s.p, s.v_b)
+    row.contact_force = 0.0
+    if s.held == 1:
+        row.contact_force = contact_force(par, s, acceleration(par, s))
+    row.drive_force = drive_force(par, s)
+    row.drilling_mode = s.mode
+    row.bit_kinetic_energy = 0.5 * par.mass_b * s.v_b * s.v_b
+    row.bit_impulse = s.i_bit
+    row.contact_impulse = s.i_contact
+    row.drive_impulse = s.i_drive
+    if par.piston == Piston.ABSENT:
+        row.piston_position = math.nan
+        row.piston_velocity = math.nan
+        row.gap = math.nan
+        row.relative_displacement = math.nan
+    fill_ledger(s, row, kinetic_energy(par, s.v_p, s.v_b), 0.0, recoverable(s))
+    return status

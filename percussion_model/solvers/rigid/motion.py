@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
+from percussion_model.physics.kernel import kernel
 
 NEVER = math.inf
 
@@ -23,7 +23,7 @@ SEARCH_LIMIT = 200
 NEAR_CRITICAL = 1e-4
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def oscillate(y, v, beta, k, tau):
     """Solution of y'' + 2 beta y' + k y = 0 after a time tau.
 
@@ -55,7 +55,7 @@ def oscillate(y, v, beta, k, tau):
     return decay * (y * c + (v + beta * y) * s), decay * (v * c - (beta * v + k * y) * s)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def zero_time(f, df, beta, k):
     """First tau > 0 at which a solution with value f and rate df is zero; NEVER if none.
 
@@ -78,7 +78,7 @@ def zero_time(f, df, beta, k):
     return math.atanh(r * ratio) / r if r > 0.0 else ratio
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _fall_between(f, df, beta, k, level, a, b, t):
     """Instant in [a, b] at which a falling solution reaches a level: Halley from t, bracketed."""
     for _ in range(SEARCH_LIMIT):
@@ -104,7 +104,7 @@ def _fall_between(f, df, beta, k, level, a, b, t):
     return t
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def fall_time(f, df, beta, k, level):
     """First tau at which a solution falls to a level; NEVER if it does not.
 
@@ -149,7 +149,7 @@ def fall_time(f, df, beta, k, level):
     return _fall_between(f, df, beta, k, level, a, b, t)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def oscillate_with_loss(y, v, beta, k, tau):
     """`oscillate`, and the integral of y'**2 over [0, tau].
 

@@ -4,24 +4,17 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
-from percussion_model.solvers.rigid.law import (
-    ABSENT,
-    BC,
-    BILINEAR,
-    COUNTED_CYCLE,
-    DFC,
-    FC,
-    FF,
+from percussion_model.physics.body import book_bit_load, book_piston_load, piston_acceleration
+from percussion_model.physics.drive import drive_force
+from percussion_model.physics.kernel import kernel
+from percussion_model.physics.records import Mode, Piston, RockKind
+from percussion_model.physics.rock import book_dashpot, crush, recoverable, recoverable_at
+from percussion_model.solvers.rigid.forces import (
     acceleration,
     bit_force,
     contact_force,
-    drive_force,
-    free_acceleration,
     loads,
     on_wall,
-    recoverable,
     rock_terms,
 )
 from percussion_model.solvers.rigid.motion import (
@@ -33,7 +26,7 @@ from percussion_model.solvers.rigid.motion import (
 )
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def bit_motion(par, s, tau):
     """Displacement [m] and velocity [m/s] of the bit after tau."""
     if on_wall(par, s):
@@ -48,18 +41,18 @@ def bit_motion(par, s, tau):
     return y1 - y, v1
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def piston_motion(par, s, tau, d_b, v_b):
     """Displacement [m] and velocity [m/s] of the piston after tau, given the bit's."""
-    if par.piston == ABSENT:
+    if par.piston == Piston.ABSENT:
         return 0.0, 0.0
     if s.held == 1:
         return d_b, v_b
-    a = free_acceleration(par, s)
+    a = piston_acceleration(par, drive_force(par, s))
     return tau * (s.v_p + 0.5 * a * tau), s.v_p + a * tau
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def impulses(par, s, tau, v_b):
     """Impulse of the rock on the bit and of the piston on the bit over tau [N s].
 
@@ -67,15 +60,17 @@ def impulses(par, s, tau, v_b):
     """
     F, M = loads(par, s)
     bit = 0.0
-    if s.mode != FF:
+    if s.mode != Mode.FF:
         bit = F * tau - M * (v_b - s.v_b)
     contact = 0.0
     if s.held == 1:
-        contact = (drive_force(par, s) + par.M_p * par.G) * tau - par.M_p * (v_b - s.v_b)
+        contact = (drive_force(par, s) + par.mass_p * par.gravity) * tau - par.mass_p * (
+            v_b - s.v_b
+        )
     return bit, contact
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def greatest_gap(par, s, tau, v_b, v_p, gap):
     """Greatest gap within the stretch: at its ends, or where it stops growing.
 
@@ -84,7 +79,7 @@ def greatest_gap(par, s, tau, v_b, v_p, gap):
     most = max(s.gap, gap)
     if not (s.v_b > s.v_p and v_b < v_p):
         return most
-    a_p = free_acceleration(par, s)
+    a_p = piston_acceleration(par, drive_force(par, s))
     F, M = loads(par, s)
     K, C, P = rock_terms(par, s)
     a_b = 0.0 if on_wall(par, s) else F / M
@@ -116,7 +111,7 @@ def greatest_gap(par, s, tau, v_b, v_p, gap):
     return max(most, s.gap + d - t * (s.v_p + 0.5 * a_p * t))
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def greatest_bit_force(par, s, tau, p, v, known):
     """Greatest bit force within the stretch: at its ends or at its first maximum.
 
@@ -125,7 +120,7 @@ def greatest_bit_force(par, s, tau, p, v, known):
     most = max(bit_force(par, s, s.p, s.v_b), bit_force(par, s, p, v))
     K, C, P = rock_terms(par, s)
     # In BC the force falls, in FC it rises with the penetration.
-    if K == 0.0 or s.mode == BC or (s.mode == FC and par.rock == BILINEAR):
+    if K == 0.0 or s.mode == Mode.BC or (s.mode == Mode.FC and par.rock == RockKind.BILINEAR):
         return most
     F, M = loads(par, s)
     beta = 0.5 * C / M
@@ -146,7 +141,7 @@ def greatest_bit_force(par, s, tau, p, v, known):
     return most
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def note_peaks(par, s, tau):
     """Note the greatest forces of the stretch, from `peak_from` of the state on."""
     p, v_b = s.p, s.v_b
@@ -156,20 +151,20 @@ def note_peaks(par, s, tau):
         s.p += d
     rest = tau - early
     d, v = bit_motion(par, s, rest)
-    if s.mode != FF:
-        most = greatest_bit_force(par, s, rest, s.p + d, v, s.peak_bit)
-        s.peak_bit = max(s.peak_bit, most)
+    if s.mode != Mode.FF:
+        most = greatest_bit_force(par, s, rest, s.p + d, v, s.peak_bit_force)
+        s.peak_bit_force = max(s.peak_bit_force, most)
     if s.held == 1:
         # the free piston's acceleration less the common one, which the bit force changes
         first = bit_force(par, s, s.p, s.v_b)
         last = bit_force(par, s, s.p + d, v)
         most = contact_force(par, s, acceleration(par, s))
-        share = par.M_p / (par.M_p + par.M_b)
-        s.peak_contact = max(s.peak_contact, most, most + share * (last - first))
+        share = par.mass_p / (par.mass_p + par.mass_b)
+        s.peak_contact_force = max(s.peak_contact_force, most, most + share * (last - first))
     s.p, s.v_b = p, v_b
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def dashpot_motion(par, s, tau):
     """`bit_motion`, and the energy that the dashpot of the rock takes meanwhile [J]."""
     K, C, P = rock_terms(par, s)
@@ -182,66 +177,47 @@ def dashpot_motion(par, s, tau):
     return y1 - y, v, C * square
 
 
-@njit(cache=True, error_model="numpy")
-def book_rock(par, s, d, taken):
-    """Ledger entries of the rock while the bit moves by d and the dashpot takes `taken`.
+@kernel
+def book_rock(par, s, p_before, taken):
+    """Ledger entries of the rock while the bit has moved on from `p_before`.
 
-    Returns
-    -------
-    work : float
-        Done on the rock [J].
+    Parameters
+    ----------
+    taken : float
+        By the dashpot meanwhile [J].
     """
-    change = recoverable(par, s, s.p + d) - recoverable(par, s, s.p)
-    if s.mode == FF:
+    change = recoverable(s) - recoverable_at(s, p_before)
+    if s.mode == Mode.FF:
         # Rock that springs back without the bit relaxes on its dashpot.
-        s.standstill -= change
-        return 0.0
-    work = change + taken
-    if s.mode == DFC:
-        s.barrier += taken
-        s.W += taken
-    else:
-        s.standstill += taken
-    if (s.mode == DFC or s.mode == FC) and par.rock == BILINEAR:
-        crushed = 0.5 * s.K_R * (1.0 - 1.0 / s.gamma) * d * (2.0 * s.p + d)
-        s.crushing += crushed
-        s.crushed += crushed
-        work += crushed
-        if s.counted == 0 and s.crushed > COUNTED_CYCLE * s.W_R:
-            s.counted = 1
-            s.count_cycles += 1
-            s.blow.drilling_cycles += 1
-    return work
+        s.e_standstill -= change
+        return
+    book_dashpot(s, taken)
+    s.rock_work += change + taken + crush(par, s, p_before)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def move(par, s, tau):
     """Carry the state over a stretch of tau without events; `time` is left to the caller."""
     d_b, v_b, taken = dashpot_motion(par, s, tau)
     d_p, v_p = piston_motion(par, s, tau, d_b, v_b)
     bit, contact = impulses(par, s, tau, v_b)
-    push = drive_force(par, s) if par.piston != ABSENT else 0.0
     gap = s.gap + (d_b - d_p)
-    s.drive += push * d_p
-    s.feed += par.F_S * d_b
-    s.gravity += par.G * (par.M_p * d_p + par.M_b * d_b)
-    if s.mode != FF:
-        most = greatest_bit_force(par, s, tau, s.p + d_b, v_b, s.blow.peak_bit_force)
-        s.blow.peak_bit_force = max(s.blow.peak_bit_force, most)
+    book_bit_load(par, s, d_b)
+    if s.mode != Mode.FF:
+        most = greatest_bit_force(par, s, tau, s.p + d_b, v_b, s.b_peak_bit)
+        s.b_peak_bit = max(s.b_peak_bit, most)
     if s.time + tau > s.peak_from:
         note_peaks(par, s, tau)
-    if par.piston != ABSENT and s.held == 0:
-        s.blow.stroke = max(s.blow.stroke, greatest_gap(par, s, tau, v_b, v_p, gap))
-    s.blow.rock_energy += book_rock(par, s, d_b, taken)
-    s.blow.penetration += d_b
-    s.blow.bit_impulse += bit
-    s.blow.contact_impulse += contact
-    s.blow.drive_impulse += push * tau
-    s.bit_impulse += bit
-    s.contact_impulse += contact
-    s.drive_impulse += push * tau
-    s.bit_position += d_b
+    if par.piston != Piston.ABSENT:
+        push = drive_force(par, s)
+        book_piston_load(par, s, push, d_p, push * tau)
+        if s.held == 0:
+            s.b_stroke = max(s.b_stroke, greatest_gap(par, s, tau, v_b, v_p, gap))
+    s.i_bit += bit
+    s.i_contact += contact
+    p_before = s.p
     s.p += d_b
     s.v_b = v_b
     s.v_p = v_p
     s.gap = gap
+    book_rock(par, s, p_before, taken)

@@ -1,25 +1,18 @@
-"""When the present closed-form stretch ends, and what ends it."""
+"""End of the present closed-form stretch: the time and kind of the next event."""
 
 from __future__ import annotations
 
 import math
 
-from numba import njit
-
-from percussion_model.physics.records import RockKind
-from percussion_model.solvers.rigid.law import (
-    ABSENT,
-    BC,
-    DFC,
-    FC,
-    FF,
-    PRESSURE,
+from percussion_model.physics.body import hold_effects, piston_acceleration
+from percussion_model.physics.drive import drive_force
+from percussion_model.physics.kernel import kernel
+from percussion_model.physics.records import DriveKind, Mode, Piston, RockKind
+from percussion_model.physics.rock import REST_VELOCITY, barrier_off
+from percussion_model.solvers.rigid.forces import (
     ROUNDING,
-    SPRING,
     acceleration,
     acceleration_doubt,
-    barrier_on,
-    free_acceleration,
     in_storm,
     in_worst_storm,
     loads,
@@ -34,104 +27,81 @@ from percussion_model.solvers.rigid.search import (
     fall_time_parabola,
 )
 
-NO_ROCK = int(RockKind.NONE)
-NOTHING, SWITCH, CLOSE, RELEASE = (
-    int(Next.NOTHING),
-    int(Next.SWITCH),
-    int(Next.CLOSE),
-    int(Next.RELEASE),
-)
-TOUCH, TOUCH_INSIDE, BARRIER, PEAK = (
-    int(Next.TOUCH),
-    int(Next.TOUCH_INSIDE),
-    int(Next.BARRIER),
-    int(Next.PEAK),
-)
-LIFT, TURN, LEAVE_DOWN, LEAVE_UP = (
-    int(Next.LIFT),
-    int(Next.TURN),
-    int(Next.LEAVE_DOWN),
-    int(Next.LEAVE_UP),
-)
-
-# A velocity below this counts as zero on leaving standstill [m/s].
-REST_VELOCITY = 1e-9
-
 # An overdamped bit is at rest after this many of its slowest time constants.
 SETTLED = 100.0
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def touch_event(par, s):
     """Next contact of a flying bit with the rock."""
-    if par.rock == NO_ROCK:
-        return NEVER, NOTHING
+    if par.rock == RockKind.NONE:
+        return NEVER, Next.NOTHING
     a = acceleration(par, s)
     v = s.v_b
-    h = s.P_u - s.p
+    h = s.p_u - s.p
     if h >= 0.0:
-        return fall_time_parabola(h, -v, -a), TOUCH
+        return fall_time_parabola(h, -v, -a), Next.TOUCH
     # Let go while p > P_u: contact is made again where the bit turns, or from above P_u.
     if v > 0.0 or (v == 0.0 and a > 0.0):
-        return 0.0, TOUCH_INSIDE
+        return 0.0, Next.TOUCH_INSIDE
     if a <= 0.0:
-        return NEVER, NOTHING
+        return NEVER, Next.NOTHING
     root = v * v + 2.0 * a * h
     if root <= 0.0:
-        return -v / a, TOUCH_INSIDE
-    return (math.sqrt(root) - v) / a, TOUCH
+        return -v / a, Next.TOUCH_INSIDE
+    return (math.sqrt(root) - v) / a, Next.TOUCH
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def loading_event(par, s, y, acc, beta, k, M):
     """End of DFC or FC: the barrier is spent, or the bit turns upward."""
     v = s.v_b
     if v < 0.0 or (v == 0.0 and acc < -ROUNDING * k * abs(s.p)):
-        return 0.0, PEAK
+        return 0.0, Next.PEAK
     tau = zero_time(v, acc, beta, k)
-    if s.mode == DFC:
+    if s.mode == Mode.DFC:
         end = tau if tau < NEVER else SETTLED * 2.0 * beta / k
-        spent = barrier_time(y, v, beta, k, M, s.W_R - s.W, end)
+        spent = barrier_time(y, v, beta, k, M, s.w_r - s.w, end)
         if spent < NEVER:
-            return spent, BARRIER
-    return tau, PEAK
+            return spent, Next.BARRIER
+    return tau, Next.PEAK
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def unloading_event(s, y, acc, k, level):
     """End of BC: the bit turns downward, or lifts off at p = P_u (y = level)."""
     v = s.v_b
     if v > 0.0 or (v == 0.0 and acc > ROUNDING * k * abs(y - level)):
-        return 0.0, TURN
-    if s.p <= s.P_u:
-        return 0.0, LIFT
+        return 0.0, Next.TURN
+    if s.p <= s.p_u:
+        return 0.0, Next.LIFT
     if v < 0.0 or acc < 0.0:
         tau = fall_time(y, v, 0.0, k, level)
         # What lifts off does so before it turns.
         if tau < NEVER:
-            return tau, LIFT
-    return zero_time(v, acc, 0.0, k), TURN
+            return tau, Next.LIFT
+    return zero_time(v, acc, 0.0, k), Next.TURN
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def standstill_event(par, s, y, acc, beta, k, F, M):
     """End of standstill: KE_b exceeds W_R, or (release) the bit force vanishes."""
     v = s.v_b
     tau = NEVER
-    kind = NOTHING
-    if barrier_on(par, s):
-        limit = math.sqrt(2.0 * s.W_R / par.M_b)
+    kind = Next.NOTHING
+    if not barrier_off(par, s):
+        limit = math.sqrt(2.0 * s.w_r / par.mass_b)
         if abs(v) > limit:
-            return 0.0, LEAVE_DOWN if v > -REST_VELOCITY else LEAVE_UP
+            return 0.0, Next.LEAVE_DOWN if v > -REST_VELOCITY else Next.LEAVE_UP
         if math.sqrt(v * v + acc * acc / k) > limit:
             tau = fall_time(v, acc, beta, k, -limit)
-            kind = LEAVE_UP
+            kind = Next.LEAVE_UP
             down = fall_time(-v, -acc, beta, k, -limit)
             if down < tau:
                 tau = down
-                kind = LEAVE_DOWN
+                kind = Next.LEAVE_DOWN
     else:
-        return 0.0, LEAVE_DOWN if v > -REST_VELOCITY else LEAVE_UP
+        return 0.0, Next.LEAVE_DOWN if v > -REST_VELOCITY else Next.LEAVE_UP
     if par.release == 1:
         force = M * (k * y + 2.0 * beta * v)
         rate = M * (k * v + 2.0 * beta * acc)
@@ -139,11 +109,11 @@ def standstill_event(par, s, y, acc, beta, k, F, M):
             gone = fall_time(force, rate, beta, k, -F)
             if gone < tau:
                 tau = gone
-                kind = LIFT
+                kind = Next.LIFT
     return tau, kind
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def release_time(a_p, acc, jerk, doubt, beta, k):
     """When a held piston lets go: the common acceleration exceeds its own, F_C < 0."""
     if acc - a_p > doubt:
@@ -153,7 +123,7 @@ def release_time(a_p, acc, jerk, doubt, beta, k):
     return fall_time(-acc, -jerk, beta, k, -a_p)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def close_time_flight(gap, dv, acc, a_p, doubt):
     """When two freely flying bodies meet."""
     da = acc - a_p
@@ -162,8 +132,8 @@ def close_time_flight(gap, dv, acc, a_p, doubt):
     return fall_time_parabola(gap, dv, da)
 
 
-@njit(cache=True, error_model="numpy")
-def put_off(par, s, tau, kind):
+@kernel
+def postponed(par, s, tau, kind):
     """In a storm of events, the earliest that one may come (docs/numerics.md, section 12).
 
     Bodies that meet never wait: they would pass through each other. Of the rest the
@@ -175,86 +145,95 @@ def put_off(par, s, tau, kind):
         Time until it [s]. That of a state depends on its last event alone, so that
         commits in between do not put it off again and again.
     """
-    if not in_storm(par, s) or kind == TOUCH or kind == TOUCH_INSIDE or kind == NOTHING:
+    if (
+        not in_storm(par, s)
+        or kind == Next.TOUCH
+        or kind == Next.TOUCH_INSIDE
+        or kind == Next.NOTHING
+    ):
         return tau
-    if kind != SWITCH and not in_worst_storm(par, s):
+    if kind != Next.SWITCH and not in_worst_storm(par, s):
         return tau
-    return max(tau, par.storm_window / par.most_events - (s.time - s.last_event))
+    return max(tau, par.window / par.most_events - (s.time - s.last_event))
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def piston_event(par, s, y, acc, beta, k, tau, kind):
     """Earlier of (tau, kind) and what comes next between piston, bit and drive."""
-    a_p = free_acceleration(par, s)
+    a_p = piston_acceleration(par, drive_force(par, s))
     jerk = -2.0 * beta * acc - k * s.v_b
     doubt = acceleration_doubt(par, s, acc)
-    if s.held == 1 and par.drive == PRESSURE and s.alpha > 0:
-        return 0.0, SWITCH  # a start in contact: u_r = 0 is reached
+    if s.held == 1 and par.drive == DriveKind.PRESSURE and s.alpha > 0:
+        return 0.0, Next.SWITCH  # a start in contact: u_r = 0 is reached
     if s.held == 1:
         let_go = release_time(a_p, acc, jerk, doubt, beta, k)
-        let_go = put_off(par, s, let_go, RELEASE)
+        let_go = postponed(par, s, let_go, Next.RELEASE)
         if let_go < tau:
-            return let_go, RELEASE
+            return let_go, Next.RELEASE
         return tau, kind
-    lift = par.drive == PRESSURE and s.alpha < 0
+    lift = par.drive == DriveKind.PRESSURE and s.alpha < 0
     if k > 0.0:
         # No further than this can the gap change before tau.
         reach = abs(acc) + abs(a_p) + abs(jerk) / math.sqrt(k)
         reach = tau * (abs(s.v_b - s.v_p) + 0.5 * tau * reach)
-        if reach < s.gap and not (lift and reach >= par.D_1 - s.gap):
+        if reach < s.gap and not (lift and reach >= s.reversal - s.gap):
             return tau, kind
         close = approach_time(s.gap, 1.0, y, s.v_b, beta, k, s.v_p, a_p, doubt, tau)
     else:
         close = close_time_flight(s.gap, s.v_b - s.v_p, acc, a_p, doubt)
     if close < tau:
         tau = close
-        kind = CLOSE
+        kind = Next.CLOSE
     if lift:
-        h = par.D_1 - s.gap
-        if h <= 0.0 and put_off(par, s, 0.0, SWITCH) == 0.0:
-            return 0.0, SWITCH
+        h = s.reversal - s.gap
+        if h <= 0.0 and postponed(par, s, 0.0, Next.SWITCH) == 0.0:
+            return 0.0, Next.SWITCH
         if h <= 0.0:
             turn = 0.0
         elif k > 0.0:
             turn = approach_time(h, -1.0, y, s.v_b, beta, k, s.v_p, a_p, doubt, tau)
         else:
             turn = fall_time_parabola(h, s.v_p - s.v_b, a_p - acc)
-        turn = put_off(par, s, turn, SWITCH)
+        turn = postponed(par, s, turn, Next.SWITCH)
         if turn < tau:
             tau = turn
-            kind = SWITCH
+            kind = Next.SWITCH
     return tau, kind
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def schedule(par, s):
     """Find the next event and note it in the state. Depends on the state alone."""
+    hold_effects(par, s)
     F, M = loads(par, s)
     K, C, P = rock_terms(par, s)
     acc = acceleration(par, s)
     beta = 0.5 * C / M
     k = K / M
     y = 0.0
-    if s.mode == FF:
+    if s.mode == Mode.FF:
         tau, kind = touch_event(par, s)
     elif on_wall(par, s):
-        tau, kind = (0.0, LIFT) if F < 0.0 else (NEVER, NOTHING)
+        tau, kind = (0.0, Next.LIFT) if F < 0.0 else (NEVER, Next.NOTHING)
     else:
         y = s.p - P - F / K
         acc = -2.0 * beta * s.v_b - k * y
-        if par.rock == SPRING:
-            tau, kind = fall_time(y, s.v_b, 0.0, k, -F / K), LIFT
-        elif s.mode == DFC or s.mode == FC:
+        if par.rock == RockKind.SPRING:
+            tau, kind = fall_time(y, s.v_b, 0.0, k, -F / K), Next.LIFT
+        elif s.mode == Mode.DFC or s.mode == Mode.FC:
             tau, kind = loading_event(par, s, y, acc, beta, k, M)
-        elif s.mode == BC:
+        elif s.mode == Mode.BC:
             tau, kind = unloading_event(s, y, acc, k, -F / K)
         else:
             tau, kind = standstill_event(par, s, y, acc, beta, k, F, M)
-    later = put_off(par, s, tau, kind)
+    later = postponed(par, s, tau, kind)
     s.late = 1 if later > tau else 0
     tau = later
-    if par.piston != ABSENT:
+    if par.piston != Piston.ABSENT:
         tau, kind = piston_event(par, s, y, acc, beta, k, tau, kind)
+    if par.effects == 1 and tau > par.window:
+        tau = par.window
+        kind = Next.HOLD
     s.next_tau = tau
     s.next_time = s.time + tau
     s.next_kind = kind

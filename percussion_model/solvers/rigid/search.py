@@ -1,11 +1,10 @@
-"""When two bodies meet, and when the dashpot of the energy barrier has taken its share."""
+"""Times at which two bodies meet, and at which the dashpot of the barrier has taken its share."""
 
 from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from percussion_model.physics.kernel import kernel
 from percussion_model.solvers.rigid.motion import (
     NEVER,
     ROOT_TOLERANCE,
@@ -21,7 +20,7 @@ CLOSED_GAP = 1e-15
 APPROACH_LIMIT = 100000
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def fall_time_parabola(h, dh, ddh):
     """First tau >= 0 at which h + dh tau + ddh tau**2/2 falls to zero; NEVER if it does not.
 
@@ -38,7 +37,7 @@ def fall_time_parabola(h, dh, ddh):
     return 2.0 * h / (root - dh) if dh < 0.0 else (dh + root) / -ddh
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def approach_time(h, sign, y, v, beta, k, v_p, a_p, doubt, end):
     """First tau in [0, end] at which the distance to an oscillating body falls to zero.
 
@@ -101,7 +100,7 @@ def approach_time(h, sign, y, v, beta, k, v_p, a_p, doubt, end):
     return tau
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def barrier_time(y, v, beta, k, mass, work, end):
     """Time at which a dashpot has taken a given energy, NEVER if not before `end`.
 

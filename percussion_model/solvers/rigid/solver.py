@@ -1,282 +1,154 @@
-"""Solver for scenes with a rigid (or absent) piston and a rigid bit."""
+"""Rigid-body solver: for scenes with a rigid bit and a rigid or absent piston."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import Any, ClassVar
 
 import numpy as np
 
-from percussion_model.physics.records import (
-    BLOW,
-    EVENT,
-    LEDGER_FIELDS,
-    SAMPLE_FIELDS,
-    Status,
+from percussion_model.physics.records import Piston, Status
+from percussion_model.scene.rules import SceneRules
+from percussion_model.solvers.base import Solver
+from percussion_model.solvers.rigid import advance as kernels
+from percussion_model.solvers.rigid.records import RIGID_PAR, RIGID_STATE, ROWS_AN_EVENT
+from percussion_model.solvers.setup import (
+    REARM_TRANSITS,
+    fill_parameters,
+    fill_start,
+    rock_numbers,
 )
-from percussion_model.solvers.rigid import advance as kernel
-from percussion_model.solvers.rigid.packing import pack_rigid, restitution
-from percussion_model.solvers.rigid.records import ROWS_AN_EVENT
+from percussion_model.solvers.state import State
 
-if TYPE_CHECKING:
-    from percussion_model.scene.rules import BarNumbers, SceneRules
-
-# Input of `set_inputs`, the field it changes, and the scenes in which it has an effect.
-_INPUTS: Mapping[str, tuple[str, str]] = MappingProxyType(
-    {
-        "feed_force": ("F_S", "feed"),
-        "drive_force": ("F_0", "pressure"),
-        "reversal_distance": ("D_1", "pressure"),
-        "external_force": ("external", "external"),
-        "loading_stiffness": ("K_R", "rock"),
-        "unloading_ratio": ("gamma", "rock"),
-        "barrier_damping": ("C_R", "rock"),
-        "barrier_energy": ("W_R", "rock"),
-    }
-)
+# More events than this within a transit of the longer bar are a storm: the reference has
+# no more than 13. What rigid bodies do within a transit is not theirs to tell anyway.
+MOST_EVENTS = 200
+SHORTEST_WINDOW = 1e-6  # of a very short bar [s]
 
 
-class RigidSolver:
-    """Advance rigid bodies from event to event, in closed form.
+def st_venant_restitution(
+    piston_mass: float, piston_transit: float, bit_mass: float, bit_transit: float
+) -> float:
+    """Restitution of two free elastic bars after their first contact (docs/model.md, sec. 9).
 
-    A state is one structured array (`new_state`); copying it saves a run.
+    The shorter bar sends a rectangular wave of force Z_c v into the longer one for twice
+    its own transit time. With equal impedances this is the ratio of the lengths.
 
     Parameters
     ----------
-    scene : Scene
+    piston_mass, bit_mass : float
+        Masses [kg].
+    piston_transit, bit_transit : float
+        Times that a wave takes from end to end [s].
+
+    Returns
+    -------
+    float
+        Between 0 and 1.
+    """
+    z_p = piston_mass / piston_transit
+    z_b = bit_mass / bit_transit
+    impulse = 2.0 * min(piston_transit, bit_transit) * z_p * z_b / (z_p + z_b)
+    e = impulse * (1.0 / piston_mass + 1.0 / bit_mass) - 1.0
+    return min(max(e, 0.0), 1.0)
+
+
+def restitution(scene: SceneRules) -> float:
+    """Coefficient of restitution of piston and bit, NaN without a piston."""
+    if scene.piston.model == "absent":
+        return float("nan")
+    if scene.bit.model == "rigid" and scene.contact.restitution is not None:
+        return float(scene.contact.restitution)
+    return st_venant_restitution(
+        scene.piston.mass,
+        scene.piston.transit_time,
+        scene.bit.mass,
+        scene.bit.transit_time,
+    )
+
+
+class RigidSolver(Solver):
+    """Advance rigid bodies from event to event, in closed form.
+
+    Parameters
+    ----------
+    scene : SceneRules
         With a rigid bit and a rigid or absent piston.
     """
 
     name = "rigid"
-    time_step: float | None = None
-    wave_speed_error = 0.0
+    COUNTS: ClassVar = ("events", "contacts", "blows", "cycles", "storms")
 
     def __init__(self, scene: SceneRules) -> None:
-        rigid = scene.bit.model == "rigid" and scene.piston.model != "elastic"
-        if not (rigid or scene.solver_name == "rigid"):
-            raise ValueError(
-                "the rigid solver needs bit.model = 'rigid' and piston.model = 'rigid' or "
-                f"'absent', not {scene.bit.model!r} and {scene.piston.model!r}"
-            )
-        self.scene = scene
-        self.cells: dict[str, int] = {}
+        super().__init__(scene)
+        has_piston = scene.piston.model != "absent"
+        self._par = np.zeros(1, RIGID_PAR)
+        p: Any = self._par[0]
+        fill_parameters(p, scene, with_piston=has_piston)
+        p["piston"] = Piston.RIGID if has_piston else Piston.ABSENT
+        p["restitution"] = self.restitution
+        p["window"] = max(p["rearm_time"] / REARM_TRANSITS, SHORTEST_WINDOW)
+        p["most_events"] = MOST_EVENTS
 
     @property
     def restitution(self) -> float:
         """Coefficient of restitution of piston and bit, NaN without a piston."""
         return restitution(self.scene)
 
-    def new_state(self) -> np.ndarray:
-        """Return the state at time zero, inputs and parameters included."""
-        state = pack_rigid(self.scene)
-        kernel.begin(state["par"], state["now"])
+    def new_state(self) -> State:
+        """State at time zero."""
+        scene = self.scene
+        state = State(RIGID_STATE)
+        s: Any = state.record[0]
+        fill_start(s, scene, rock_numbers(scene))
+        if scene.piston.model == "absent":
+            s["gap"] = 0.0
+        s["start_gap"] = s["gap"]
+        s["ss_force"] = np.nan
+        kernels.begin(self._par, state.record)
         return state
 
+    def time(self, state: State) -> float:
+        """Time of the last event of a state [s]."""
+        return float(state.record["time"][0])
+
+    def readable_until(self, state: State) -> float:
+        """Time of the next event [s]."""
+        s = state.record[0]
+        return float(s["next_time"] if s["scheduled"] else s["time"])
+
     def advance(
-        self,
-        state: np.ndarray,
-        t: float,
-        blows: np.ndarray,
-        events: np.ndarray,
-        record_events: bool = True,
+        self, state: State, t: float, blows: np.ndarray, events: np.ndarray, record_events: bool
     ) -> tuple[int, int, int]:
-        """Let all events up to time t happen.
-
-        Parameters
-        ----------
-        state : ndarray
-            Changed in place; comes to rest at the last event.
-        t : float
-            Time [s].
-        blows, events : ndarray
-            Room for rows of BLOW and EVENT, filled from index 0; events at least 4 long.
-        record_events : bool
-            Whether to list events.
-
-        Returns
-        -------
-        status, n_blows, n_events : int
-            A `Status`, and the rows filled. After BLOWS_FULL or EVENTS_FULL call again.
-        """
+        """Process all events up to `t`; as in `Solver`, with room for 4 events at least."""
         if len(blows) < 1 or (record_events and len(events) < ROWS_AN_EVENT):
             raise ValueError(f"room for 1 blow and {ROWS_AN_EVENT} events is needed at least")
-        n_blows = np.zeros(1, np.int64)
-        n_events = np.zeros(1, np.int64)
-        status = kernel.advance(
-            state["par"],
-            state["now"],
-            float(t),
-            blows,
-            n_blows,
-            events,
-            n_events,
-            bool(record_events),
-        )
-        return int(status), int(n_blows[0]), int(n_events[0])
-
-    def sample(self, state: np.ndarray, times: np.ndarray, out: np.ndarray) -> None:
-        """Evaluate the state without changing it.
-
-        Parameters
-        ----------
-        state : ndarray
-        times : ndarray
-            Not falling, not before the state's last event [s].
-        out : ndarray, shape (len(times), len(SAMPLE_FIELDS))
-        """
-        times = np.ascontiguousarray(times, dtype=float)
-        if out.shape != (len(times), len(SAMPLE_FIELDS)):
-            raise ValueError(f"out must have the shape {(len(times), len(SAMPLE_FIELDS))}")
-        if len(times) == 0:
-            return
-        if np.any(np.diff(times) < 0) or times[0] < self.time(state):
-            raise ValueError("times must not fall, nor lie before the last event of the state")
-        copy = state.copy()
-        room = self._room()
-        status = kernel.sample(copy["par"], copy["now"], times, out, *room)
-        self._require_done(status)
-
-    def look(
-        self,
-        state: np.ndarray,
-        t: float,
-        row: np.ndarray,
-        here: np.ndarray | None = None,
-        peaks: bool = True,
-    ) -> np.ndarray:
-        """Evaluate at `t` into a row (`LONG_SAMPLE_FIELDS`, or their beginning).
-
-        Returns
-        -------
-        ndarray
-            A copy, carried to `t` where the row is long.
-        """
-        copy = state.copy()
-        times = np.array([max(t, self.time(state))])
-        self._require_done(
-            kernel.sample(copy["par"], copy["now"], times, row[np.newaxis], *self._room())
-        )
-        return copy
-
-    def fields(self, state: np.ndarray) -> dict[str, np.ndarray]:
-        """Rigid bodies have no cells."""
-        return {}
-
-    def force_in(self, state: np.ndarray, bar: str, cell: int) -> float:
-        """Rigid bodies have no cells, and no force in them."""
-        return 0.0
-
-    def grid_of(self, bar: str) -> None:
-        """Rigid bodies have no cells."""
-
-    def watch_peaks(self, state: np.ndarray, t: float) -> None:
-        """Count the peak forces of `look` from `t` on [s]."""
-        now = state["now"]
-        now["peak_from"], now["peak_bit"], now["peak_contact"] = t, 0.0, 0.0
-
-    def grid_point_after(self, state: np.ndarray, t: float) -> float:
-        """First time at or after `t` at which inputs can change: `t` itself [s]."""
-        return t
-
-    def readable_until(self, state: np.ndarray) -> float:
-        """A state can be read at any time: its copy runs on."""
-        return float("inf")
-
-    def energy(self, state: np.ndarray, t: float) -> dict[str, float]:
-        """Energy ledger at time t [J], not before the state's last event.
-
-        Returns
-        -------
-        dict
-            Entries of LEDGER_FIELDS since the start, stored `kinetic`, `elastic` and
-            `recoverable`, `start`, and `residual`: what no entry explains.
-        """
-        copy = state.copy()
-        par, now = copy["par"], copy["now"]
-        self._require_done(kernel.run_to(par, now, float(t), *self._room()))
-        kernel.commit(par, now, float(t))
-        entries = {name: float(now[name][0]) for name in LEDGER_FIELDS}
-        kinetic, rock = kernel.stored_energy(par, now)
-        entries |= {"kinetic": float(kinetic), "elastic": 0.0, "recoverable": float(rock)}
-        entries["start"] = float(now["initial_energy"][0])
-        given = sum(entries[name] for name in ("start", "drive", "feed", "gravity"))
-        found = sum(
-            value
-            for name, value in entries.items()
-            if name not in ("start", "drive", "feed", "gravity")
-        )
-        entries["residual"] = given - found
-        return entries
+        s: Any = state.record[0]
+        s["events_on"] = record_events
+        status = kernels.advance(self._par, state.record, float(t), blows, events)
+        return int(status), int(s["n_blows"]), int(s["n_events"])
 
     def commit(
-        self,
-        state: np.ndarray,
-        t: float,
-        blows: np.ndarray | None = None,
-        events: np.ndarray | None = None,
-        record_events: bool = False,
+        self, state: State, t: float, blows: np.ndarray, events: np.ndarray, record_events: bool
     ) -> tuple[int, int, int]:
-        """Bring a state that was advanced to time t there; nothing happens meanwhile."""
-        now = state["now"]
-        if t < self.time(state) or (now["scheduled"][0] and now["next_time"][0] <= t):
+        """Bring a state that was advanced to `t` there; nothing happens meanwhile."""
+        if t < self.time(state) or self.readable_until(state) <= t:
             raise ValueError(f"advance the state to {t} s before committing it")
-        kernel.commit(state["par"], now, float(t))
+        kernels.commit(self._par, state.record, float(t))
         return int(Status.DONE), 0, 0
 
-    def set_inputs(self, state: np.ndarray, **inputs: float | None) -> None:
-        """Change inputs of a committed state.
-
-        Parameters
-        ----------
-        state : ndarray
-            Changed in place.
-        **inputs
-            feed_force, drive_force, external_force [N] and reversal_distance [m] act at
-            once; loading_stiffness [N/m], unloading_ratio, barrier_damping [N s/m] and
-            barrier_energy [J] from the next drilling cycle on. None leaves a value alone.
-        """
-        changes = {}
-        effects = self.scene.effects
-        for name, value in inputs.items():
-            if name not in _INPUTS:
-                raise ValueError(f"unknown input {name!r}; known: {', '.join(_INPUTS)}")
-            if value is None:
-                continue
-            field, needs = _INPUTS[name]
-            on = {
-                "feed": effects.feed,
-                "rock": effects.rock == "bilinear" or name == "loading_stiffness",
-            }.get(needs, effects.drive == needs)
-            if not on:
-                raise ValueError(f"{name} has no effect in this scene")
-            changes[field] = float(value)
-        for field, value in changes.items():
-            state["par"][field] = value
-
-    def time(self, state: np.ndarray) -> float:
-        """Time of the last event of a state [s]."""
-        return float(state["now"]["time"][0])
-
-    def section_cells(self, bar: BarNumbers) -> list[int]:
-        """Rigid bodies have no cells."""
-        return []
-
-    def statistics(self, state: np.ndarray) -> dict[str, int]:
-        """Counters of the run so far."""
-        now = state["now"]
-        return {
-            name: int(now[f"count_{name}"][0])
-            for name in ("events", "contacts", "blows", "cycles", "storms")
-        }
-
-    @staticmethod
-    def _room() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Room that a read-only run needs."""
-        count = np.zeros(1, np.int64)
-        return np.zeros(1, BLOW), count, np.zeros(1, EVENT), count.copy()
-
-    @staticmethod
-    def _require_done(status: int) -> None:
+    def read(
+        self, state: State, t: float, reading: np.ndarray, spare: State | None = None,
+        peaks: bool = True,
+    ) -> State:  # fmt: skip
+        """Evaluate at `t`; a copy at that time. As in `Solver`."""
+        if spare is None:
+            spare = state.copy()
+        else:
+            spare.take(state)
+        t = max(t, self.time(state))
+        status = kernels.read(
+            self._par, spare.record, t, self._no_blows, self._no_events, reading
+        )  # fmt: skip
         if status != Status.DONE:
             raise RuntimeError(f"the rigid solver stopped: {Status(status).name}")
+        return spare

@@ -11,10 +11,6 @@ import math
 from percussion_model.physics.kernel import inlined, kernel
 from percussion_model.solvers.wave.records import Coef, Row
 
-ALPHA, BETA, INV_Z = int(Coef.ALPHA), int(Coef.BETA), int(Coef.INV_Z)
-VISCOUS, MASS, STATIC = int(Coef.VISCOUS), int(Coef.MASS), int(Coef.STATIC)
-FACE, LOSS = int(Row.FACE), int(Row.LOSS)
-
 
 @inlined
 def face_velocities(w, c, n, r, kick):
@@ -35,7 +31,7 @@ def face_velocities(w, c, n, r, kick):
         Velocity that the body force gives in half a step [m/s].
     """
     for i in range(1, n):
-        w[FACE, i] = c[ALPHA, i] * w[r, i - 1] + c[BETA, i] * w[r + 1, i] + kick
+        w[Row.FACE, i] = c[Coef.ALPHA, i] * w[r, i - 1] + c[Coef.BETA, i] * w[r + 1, i] + kick
 
 
 @inlined
@@ -47,8 +43,8 @@ def send_waves(w, n, r):
     """
     q = 2 - r
     for i in range(n):
-        w[q, i] = w[FACE, i] - w[r + 1, i]
-        w[q + 1, i] = w[FACE, i + 1] - w[r, i]
+        w[q, i] = w[Row.FACE, i] - w[r + 1, i]
+        w[q + 1, i] = w[Row.FACE, i + 1] - w[r, i]
 
 
 @inlined
@@ -59,13 +55,15 @@ def send_waves_with_loss(w, c, n, r):
     (docs/numerics.md, eq. 4); the end velocities in the FACE row are final.
     """
     q = 2 - r
-    w[q, 0] = w[FACE, 0] - w[r + 1, 0]
-    w[q + 1, n - 1] = w[FACE, n] - w[r, n - 1]
+    w[q, 0] = w[Row.FACE, 0] - w[r + 1, 0]
+    w[q + 1, n - 1] = w[Row.FACE, n] - w[r, n - 1]
     for i in range(1, n):
-        v = w[FACE, i]
-        force = c[VISCOUS, i] * (w[FACE, i + 1] - v) - c[VISCOUS, i - 1] * (v - w[FACE, i - 1])
-        v += force * c[INV_Z, i]
-        w[LOSS, i] -= force * v
+        v = w[Row.FACE, i]
+        force = c[Coef.VISCOUS, i] * (w[Row.FACE, i + 1] - v) - c[Coef.VISCOUS, i - 1] * (
+            v - w[Row.FACE, i - 1]
+        )
+        v += force * c[Coef.INV_Z, i]
+        w[Row.LOSS, i] -= force * v
         w[q + 1, i - 1] = v - w[r, i - 1]
         w[q, i] = v - w[r + 1, i]
 
@@ -85,8 +83,8 @@ def mean_velocity(w, c, n, r, mass):
     a = 0.0
     b = 0.0
     for i in range(n):
-        a += c[MASS, i] * w[r, i]
-        b += c[MASS, i] * w[r + 1, i]
+        a += c[Coef.MASS, i] * w[r, i]
+        b += c[Coef.MASS, i] * w[r + 1, i]
     return (a + b) / mass
 
 
@@ -120,11 +118,11 @@ def kinetic_energy(w, c, n, r):
     for i in range(half):
         x = w[r, i] + w[r + 1, i]
         y = w[r, half + i] + w[r + 1, half + i]
-        a += c[MASS, i] * (x * x)
-        b += c[MASS, half + i] * (y * y)
+        a += c[Coef.MASS, i] * (x * x)
+        b += c[Coef.MASS, half + i] * (y * y)
     if 2 * half < n:
         x = w[r, n - 1] + w[r + 1, n - 1]
-        a += c[MASS, n - 1] * (x * x)
+        a += c[Coef.MASS, n - 1] * (x * x)
     return 0.5 * (a + b)
 
 
@@ -134,7 +132,7 @@ def elastic_energy(w, c, n, r):
     a = 0.0
     for i in range(n):
         x = w[r, i] - w[r + 1, i]
-        a += c[MASS, i] * (x * x)
+        a += c[Coef.MASS, i] * (x * x)
     return 0.5 * a
 
 
@@ -153,10 +151,10 @@ def deviation_energy(w, c, n, r, velocity, acceleration):
     half = 0.5 * velocity
     a = 0.0
     for i in range(n):
-        rest = acceleration * c[STATIC, i]
+        rest = acceleration * c[Coef.STATIC, i]
         x = w[r, i] - half - rest
         y = w[r + 1, i] - half + rest
-        a += c[MASS, i] * (x * x + y * y)
+        a += c[Coef.MASS, i] * (x * x + y * y)
     return a
 
 

@@ -1,4 +1,4 @@
-"""What the ends of the bars meet within a step: each other, the rock, nothing.
+"""Ends of the bars within a step: contact with each other, with the rock, or none.
 
 Contact and rock are followed in closed form with the waves that come to the
 ends (docs/numerics.md, section 1). Mean motion and the ledger move along.
@@ -6,20 +6,28 @@ ends (docs/numerics.md, section 1). Mean motion and the ledger move along.
 
 from __future__ import annotations
 
-from percussion_model.physics.blows import push_event, start_blow, starts_blow
+from percussion_model.physics.blows import (
+    close_gap,
+    open_gap,
+    standstill_force,
+    start_blow,
+    starts_blow,
+)
+from percussion_model.physics.body import (
+    bit_acceleration,
+    book_bit_load,
+    hold_effects,
+    piston_acceleration,
+)
 from percussion_model.physics.drive import drive_force, switch_drive
 from percussion_model.physics.kernel import inlined, kernel, merged
-from percussion_model.physics.records import EventKind, Piston
+from percussion_model.physics.records import Piston
 from percussion_model.solvers.wave.bar import face_velocities, send_waves, send_waves_with_loss
 from percussion_model.solvers.wave.contact import bar_contact, mass_contact
 from percussion_model.solvers.wave.loss import finish_loss, loss_substeps, smooth_cells
 from percussion_model.solvers.wave.records import Row
 from percussion_model.solvers.wave.rock_end import rock_step
-from percussion_model.solvers.wave.totals import bit_position, now
-
-ABSENT, ELASTIC = int(Piston.ABSENT), int(Piston.ELASTIC)
-CONTACT_CLOSED, CONTACT_OPENED = int(EventKind.CONTACT_CLOSED), int(EventKind.CONTACT_OPENED)
-FACE = int(Row.FACE)
+from percussion_model.solvers.wave.totals import bit_position, time_of
 
 # A part of a step shorter than this is not worth a step of its own.
 SHORTEST_PART = 1e-3
@@ -41,7 +49,7 @@ def inner_waves(par, w, c, n, r, kick):
     if par.loss == 0 or n < 2:
         return 0.0, 0.0
     if par.loss == 1:
-        return w[FACE, 1], w[FACE, n - 1]
+        return w[Row.FACE, 1], w[Row.FACE, n - 1]
     return loss_substeps(w, c, n, par.loss)
 
 
@@ -61,8 +69,8 @@ def outer_waves(par, w, c, n, r, top, bottom, z_top, z_bottom):
     elif par.loss == 1:
         send_waves_with_loss(w, c, n, r)
     else:
-        force_top = z_top * (w[FACE, 0] - top)
-        force_bottom = -z_bottom * (w[FACE, n] - bottom)
+        force_top = z_top * (w[Row.FACE, 0] - top)
+        force_bottom = -z_bottom * (w[Row.FACE, n] - bottom)
         finish_loss(w, c, n, force_top, force_bottom)
         send_waves(w, n, r)
     if par.loss > 0 and n > 1:
@@ -90,27 +98,25 @@ def book_end(s, z, kappa, inner, d, q, tau):
 def record_contact(par, s, wb, cb, opened, t_close, approach, peak, time, tau, blows, events):
     """Book the opening and the closure of the piston/bit gap in this step."""
     if opened == 1:
-        s.b_rebound = s.v_p
-        s.t_open = time
-        push_event(s, events, time, CONTACT_OPENED, approach)
+        open_gap(s, events, time, approach)
     if t_close >= 0.0:
         closure = time + t_close
         if starts_blow(par, s, closure):
             r = 2 * s.parity
             here = bit_position(s, wb, cb, par.n_b, r) + s.v_b * t_close
-            speed = s.v_p + (par.gravity + drive_force(par, s) / par.mass_p) * t_close
+            speed = s.v_p + piston_acceleration(par, drive_force(par, s)) * t_close
             impulse = s.i_bit + s.gamma * s.k_r * (s.p - s.p_u) * t_close
-            start_blow(s, blows, closure, speed, here, impulse, par.mass_p)
-        s.b_contacts += 1
-        push_event(s, events, closure, CONTACT_CLOSED, approach)
+            force = standstill_force(s, closure, impulse)
+            start_blow(s, blows, closure, speed, here, force, par.mass_p)
+        close_gap(s, events, closure, approach)
     if s.closed == 1:
         s.b_peak_contact = max(s.b_peak_contact, peak)
         if time + tau > s.peak_from:
-            s.peak_contact = max(s.peak_contact, peak)
+            s.peak_contact_force = max(s.peak_contact_force, peak)
 
 
 @inlined
-def meet_piston(par, s, wp, wb, cb, v_p, v_t, in_p, in_t, elastic, tau, time, blows, events):
+def meet_piston(par, s, bars, v_p, v_t, in_p, in_t, elastic, tau, time, blows, events):
     """Contact of piston and bit over `tau`.
 
     Parameters
@@ -130,37 +136,39 @@ def meet_piston(par, s, wp, wb, cb, v_p, v_t, in_p, in_t, elastic, tau, time, bl
         Displacement of the piston's lower end [m].
     """
     z_t = par.z_t * (1.0 + par.kappa_t)
-    if par.piston == ABSENT or s.asleep == 1:
+    if par.piston == Piston.ABSENT or s.dormant == 1:
         d_t = v_t * tau
         book_end(s, par.z_t, par.kappa_t, in_t, d_t, v_t * d_t, tau)
-        wb[FACE, 0] = v_t
+        bars.wb[Row.FACE, 0] = v_t
         return 0.0, 0.0
     # the elastic part: a viscous front has no peak of its own
     peak = par.z_t * elastic
-    if par.piston == ELASTIC:
+    if par.piston == Piston.ELASTIC:
         z_p = par.z_p * (1.0 + par.kappa_p)
         closed, gap, d_p, q_p, d_t, q_t, impulse, t_close, opened = bar_contact(
             s.closed, s.gap, v_p, v_t, z_p, z_t, tau
         )
         peak *= par.z_p / (par.z_p + par.z_t)
         book_end(s, par.z_p, par.kappa_p, in_p, d_p, q_p, tau)
-        wp[FACE, par.n_p] = d_p / tau
+        bars.wp[Row.FACE, par.n_p] = d_p / tau
     else:
         closed, gap, d_p, q_p, d_t, q_t, impulse, t_close, opened = mass_contact(
             s.closed, s.gap, v_p, v_t, par.mass_p, z_t, tau
         )
     book_end(s, par.z_t, par.kappa_t, in_t, d_t, q_t, tau)
-    wb[FACE, 0] = d_t / tau
+    bars.wb[Row.FACE, 0] = d_t / tau
     if t_close >= 0.0 and par.front > 0.0:
         # what averaging takes from a front is what loss would have taken
         taken = par.z_t * (q_t - d_t * d_t / tau)
-        if par.piston == ELASTIC:
+        if par.piston == Piston.ELASTIC:
             taken += par.z_p * (q_p - d_p * d_p / tau)
         s.e_numerical -= taken
         s.e_loss += taken
     if closed != s.closed or t_close >= 0.0 or closed == 1:
         s.closed = closed
-        record_contact(par, s, wb, cb, opened, t_close, v_p - v_t, peak, time, tau, blows, events)
+        record_contact(
+            par, s, bars.wb, bars.cb, opened, t_close, v_p - v_t, peak, time, tau, blows, events
+        )
     s.gap = gap
     return impulse, d_p
 
@@ -184,7 +192,7 @@ def time_to_cut(par, s, approach, tau, time):
 
 
 @inlined
-def meet(par, s, wp, cp, wb, cb, tau, blows, events):
+def meet(par, s, bars, tau, blows, events):
     """Let the ends meet what they meet for `tau`, up to a whole step.
 
     Mean motion, gap, penetration, modes, impulses and the ledger move on; the
@@ -201,47 +209,59 @@ def meet(par, s, wp, cp, wb, cb, tau, blows, events):
         Time that has passed [s].
     """
     r = 2 * s.parity
-    time = now(par, s)
-    a_b = par.gravity + s.feed / par.mass_b
-    top, bottom = inner_waves(par, wb, cb, par.n_b, r, a_b * 0.5 * par.dt)
+    time = time_of(par, s)
+    hold_effects(par, s)
+    a_b = bit_acceleration(par, s)
+    top, bottom = inner_waves(par, bars.wb, bars.cb, par.n_b, r, a_b * 0.5 * par.dt)
     kick = a_b * 0.5 * par.dt
-    elastic = -(2.0 * wb[r + 1, 0] + kick)
+    elastic = -(2.0 * bars.wb[r + 1, 0] + kick)
     v_t = (par.kappa_t * top - elastic) / (1.0 + par.kappa_t)
-    v_free = (2.0 * wb[r, par.n_b - 1] + kick + par.kappa_b * bottom) / (1.0 + par.kappa_b)
+    v_free = (2.0 * bars.wb[r, par.n_b - 1] + kick + par.kappa_b * bottom) / (1.0 + par.kappa_b)
     top_p = 0.0
     bottom_p = 0.0
     impulse = 0.0
     push = 0.0
     a_p = 0.0
-    awake = par.piston != ABSENT and s.asleep == 0
+    awake = par.piston != Piston.ABSENT and s.dormant == 0
     if awake:
         push = drive_force(par, s)
-        a_p = par.gravity + push / par.mass_p
+        a_p = piston_acceleration(par, push)
         kick = a_p * 0.5 * par.dt
-        if par.piston == ELASTIC:
+        if par.piston == Piston.ELASTIC:
             n = par.n_p
-            top_p, bottom_p = inner_waves(par, wp, cp, n, r, kick)
-            v_f = (2.0 * wp[r + 1, 0] + kick + par.kappa_f * top_p) / (1.0 + par.kappa_f)
-            wp[FACE, 0] = v_f
-            v_p = 2.0 * wp[r, n - 1] + kick
+            top_p, bottom_p = inner_waves(par, bars.wp, bars.cp, n, r, kick)
+            v_f = (2.0 * bars.wp[r + 1, 0] + kick + par.kappa_f * top_p) / (1.0 + par.kappa_f)
+            bars.wp[Row.FACE, 0] = v_f
+            v_p = 2.0 * bars.wp[r, n - 1] + kick
             elastic += v_p
             v_p = (v_p + par.kappa_p * bottom_p) / (1.0 + par.kappa_p)
         else:
             v_p = s.v_p + kick
             elastic += v_p
         tau = time_to_cut(par, s, v_p - v_t, tau, time)
-        if par.piston == ELASTIC:
+        if par.piston == Piston.ELASTIC:
             book_end(s, par.z_f, par.kappa_f, top_p, v_f * tau, v_f * v_f * tau, tau)
     else:
         v_p = 0.0
     half = 0.5 * tau
     impulse, d_p = meet_piston(
-        par, s, wp, wb, cb, v_p, v_t, bottom_p, top, elastic, tau, time, blows, events
+        par,
+        s,
+        bars,
+        v_p,
+        v_t,
+        bottom_p,
+        top,
+        elastic,
+        tau,
+        time,
+        blows,
+        events,
     )
     z = par.z_b * (1.0 + par.kappa_b)
-    d, q = rock_step(par, s, wb, cb, v_free, z, tau, time, events)
+    d, q = rock_step(par, s, bars.wb, bars.cb, v_free, z, tau, time, events)
     book_end(s, par.z_b, par.kappa_b, bottom, d, q, tau)
-    wb[FACE, par.n_b] = d / tau
+    bars.wb[Row.FACE, par.n_b] = d / tau
     push_rock = z * (v_free * tau - d)
     s.rock_work += z * (v_free * d - q)
     s.i_bit += push_rock
@@ -251,10 +271,10 @@ def meet(par, s, wp, cp, wb, cb, tau, blows, events):
     if awake:
         u_before = s.u_r
         # the strain of the cells moves the mean by the trapezoidal rule, exactly
-        if par.piston == ELASTIC:
+        if par.piston == Piston.ELASTIC:
             d_p = half * (2.0 * (s.v_p + a_p * half) - impulse / par.mass_p)
         s.u_r += d_p - half * (v_b + s.v_b)
-        move_piston(par, s, wp, push, impulse, u_before, time, tau, events)
+        move_piston(par, s, bars.wp, push, impulse, u_before, time, tau, events)
     return top, bottom, top_p, bottom_p, tau
 
 
@@ -264,9 +284,7 @@ def move_bit(par, s, a_b, impulse, half):
     v0 = s.v_b
     v1 = v0 + 2.0 * a_b * half + impulse / par.mass_b
     s.v_b = v1
-    path = half * (v0 + v1)
-    s.e_feed += s.feed * path
-    s.e_gravity += par.mass_b * par.gravity * path
+    book_bit_load(par, s, half * (v0 + v1))
 
 
 @merged
@@ -283,9 +301,9 @@ def move_piston(par, s, wp, push, impulse, u_before, time, tau, events):
         mean = share * push + (1.0 - share) * drive_force(par, s)
         later = 2.0 * mean - push
     v0 = s.v_p
-    v1 = v0 + (par.gravity + push / par.mass_p) * half
+    v1 = v0 + piston_acceleration(par, push) * half
     v2 = v1 - impulse / par.mass_p
-    v3 = v2 + (par.gravity + later / par.mass_p) * half
+    v3 = v2 + piston_acceleration(par, later) * half
     first = 0.5 * half * (v0 + v1)
     second = 0.5 * half * (v2 + v3)
     s.v_p = v3

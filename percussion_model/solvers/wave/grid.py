@@ -1,14 +1,15 @@
-"""Cells of equal transit time for bars of any sections, and their coefficients."""
+"""Bars of any sections cut into cells of equal transit time, and what follows from steel alone."""
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
-from percussion_model.scene.rules import BarNumbers, SectionNumbers
+from percussion_model.scene.rules import BarNumbers, SceneRules, SectionNumbers
+from percussion_model.solvers.base import Cells
 from percussion_model.solvers.wave.records import Coef
 
 # Cells in the piston (or the only elastic bar) where the scene names none.
@@ -21,20 +22,12 @@ MOST_REFINED = 2.0
 HALF_LOSS = 0.5
 # Terms of a series that halves each time: thirty make nine digits.
 HALVINGS = 30
+# Terms of the series of a front's variance; the largest is a tenth.
+HARMONICS = 200
+# Bars of so many scenes are kept [some ten kB each on the default grid].
+MOST_KEPT = 16
 # Explicit loss stays free of overshoot up to this viscous number a sub-step.
 MOST_VISCOUS = 0.5
-
-
-class Cells(Protocol):
-    """Cells or elements of one bar."""
-
-    @property
-    def mass(self) -> np.ndarray:
-        """Mass of each, top to bottom [kg]."""
-
-    @property
-    def n(self) -> int:
-        """How many there are."""
 
 
 @dataclass(frozen=True)
@@ -273,3 +266,137 @@ def _response(c: np.ndarray, n: int, parts: int, where: int) -> tuple[np.ndarray
         _diffuse(c, n, v)
         v[where] += 2.0 * c[Coef.INV_Z, where] / parts
     return v, mean
+
+
+def place_of_closure(variance: float) -> float:
+    """Where in a step a closure has to come for its front to get the right width.
+
+    Loss spreads a sharp front to a Gaussian; the means over cells then have a larger
+    variance than the Gaussian, by the mean of f (1 - f) of what its places leave over
+    whole cells. Smoothing from cell to cell, exact for smooth waves, misses that while
+    the front is narrower than a cell. A front that begins at the share f of a step
+    is averaged over a cell and has f (1 - f) (docs/numerics.md, eqs 14a and 14b).
+
+    Parameters
+    ----------
+    variance : float
+        Of the Gaussian after one transit of the bar [cells squared].
+
+    Returns
+    -------
+    float
+        Share of the step, from 0 without loss to 0.211.
+    """
+    order = np.arange(1, HARMONICS + 1)
+    missing = np.exp(-2.0 * np.pi**2 * order**2 * variance) / (np.pi * order) ** 2
+    width = max(1.0 / 6.0 - missing.sum(), 0.0)
+    return 0.0 if variance == 0.0 else float(0.5 * (1.0 - np.sqrt(1.0 - 4.0 * width)))
+
+
+@dataclass(frozen=True)
+class CutBar:
+    """An elastic bar in cells; arrays are shared and must not be changed.
+
+    Attributes
+    ----------
+    grid : Grid
+    coefficients : ndarray, shape (len(Coef), n + 1)
+    transit_time : float
+        Of the whole bar [s].
+    kappa : tuple of float
+        Viscous numbers of the top and the bottom end cell.
+    bound : tuple of float
+        Largest strain offset of the top and the bottom end, over sqrt(2 E) [m/J^0.5].
+    """
+
+    grid: Grid
+    coefficients: np.ndarray
+    transit_time: float
+    kappa: tuple[float, float]
+    bound: tuple[float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class CutBars:
+    """The bars of a scene in cells of one transit time; equal if the same object.
+
+    Attributes
+    ----------
+    time_step : float
+        Transit time of a cell [s].
+    loss_time : float
+        Kelvin-Voigt time [s], 0 without loss.
+    piston : CutBar or None
+        None where it is rigid or absent.
+    bit : CutBar
+    """
+
+    time_step: float
+    loss_time: float
+    piston: CutBar | None
+    bit: CutBar
+
+    @property
+    def substeps(self) -> int:
+        """Sub-steps of the loss operator, 0 without loss."""
+        return substeps(self.loss_time, self.time_step)
+
+    @property
+    def front(self) -> float:
+        """Share of a step before its closure (docs/numerics.md, eq. 14b)."""
+        shortest = min(bar.grid.n for bar in self.both)
+        return place_of_closure(self.loss_time / self.time_step * shortest)
+
+    @property
+    def both(self) -> tuple[CutBar, ...]:
+        """The elastic bars, top to bottom."""
+        return (self.bit,) if self.piston is None else (self.piston, self.bit)
+
+
+_kept: dict[tuple, CutBars] = {}
+_lock = threading.Lock()
+
+
+def elastic_bars(scene: SceneRules) -> list[BarNumbers]:
+    """The bars that get cells, the one first whose cells are counted."""
+    if scene.bit.model != "elastic":
+        return []
+    return [scene.piston, scene.bit] if scene.piston.model == "elastic" else [scene.bit]
+
+
+def cut_bars(scene: SceneRules, cells: int | None) -> CutBars:
+    """Cut the elastic bars of a scene, or find them cut.
+
+    Parameters
+    ----------
+    cells : int or None
+        As for `choose_time_step`.
+    """
+    bars = elastic_bars(scene)
+    loss_time = scene.loss.time if scene.loss_on else 0.0
+    sections = [tuple((part.transit_time, part.mass) for part in bar.sections) for bar in bars]
+    key = (cells, loss_time, *sections)
+    with _lock:  # hosts may make instances in threads
+        found = _kept.get(key)
+        if found is None:
+            while len(_kept) >= MOST_KEPT:
+                del _kept[next(iter(_kept))]
+            time_step = choose_time_step(bars, cells)
+            *above, bit = [_cut_bar(bar, time_step, loss_time) for bar in bars]
+            found = CutBars(time_step, loss_time, above[0] if above else None, bit)
+            _kept[key] = found
+    return found
+
+
+def _cut_bar(bar: BarNumbers, time_step: float, loss_time: float) -> CutBar:
+    grid = cut(bar, time_step)
+    c = coefficients(grid, loss_time)
+    kappa = end_viscosity(c, grid, loss_time)
+    bound = _offset_bound(c, grid, Coef.TOP), _offset_bound(c, grid, Coef.BOTTOM)
+    return CutBar(grid, c, bar.transit_time, kappa, bound)
+
+
+def _offset_bound(c: np.ndarray, grid: Grid, row: Coef) -> float:
+    """Factor b in |offset| <= b sqrt(2 E) (docs/numerics.md, eq. 14)."""
+    n = grid.n
+    return float(np.sqrt(np.sum(c[row, :n] * c[row, :n] / c[Coef.MASS, :n])))

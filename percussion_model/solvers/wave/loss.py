@@ -11,11 +11,6 @@ from __future__ import annotations
 from percussion_model.physics.kernel import inlined, kernel
 from percussion_model.solvers.wave.records import Coef, Row
 
-FACE, LOSS, SCRATCH = int(Row.FACE), int(Row.LOSS), int(Row.SCRATCH)
-INV_Z, VISCOUS = int(Coef.INV_Z), int(Coef.VISCOUS)
-BETWEEN, INV_CELL_Z = int(Coef.BETWEEN), int(Coef.INV_CELL_Z)
-FROM_TOP, FROM_BOTTOM = int(Coef.FROM_TOP), int(Coef.FROM_BOTTOM)
-
 
 @kernel
 def loss_substeps(w, c, n, m):
@@ -31,19 +26,19 @@ def loss_substeps(w, c, n, m):
         interface, against which the end cells work [m/s].
     """
     for i in range(1, n):
-        w[SCRATCH, i] = w[FACE, i]
+        w[Row.SCRATCH, i] = w[Row.FACE, i]
     top = 0.0
     bottom = 0.0
     for _ in range(m):
-        top += w[SCRATCH, 1]
-        bottom += w[SCRATCH, n - 1]
+        top += w[Row.SCRATCH, 1]
+        bottom += w[Row.SCRATCH, n - 1]
         above = 0.0
         for i in range(1, n):
-            v = w[SCRATCH, i]
+            v = w[Row.SCRATCH, i]
             below = 0.0
             if i < n - 1:
-                below = c[VISCOUS, i] * (w[SCRATCH, i + 1] - v)
-            w[SCRATCH, i] = v + 2.0 * c[INV_Z, i] * (below - above)
+                below = c[Coef.VISCOUS, i] * (w[Row.SCRATCH, i + 1] - v)
+            w[Row.SCRATCH, i] = v + 2.0 * c[Coef.INV_Z, i] * (below - above)
             above = below
     return top / m, bottom / m
 
@@ -59,11 +54,15 @@ def finish_loss(w, c, n, force_top, force_bottom):
         positive [N].
     """
     for i in range(1, n):
-        before = w[FACE, i]
-        after = w[SCRATCH, i] + force_top * c[FROM_TOP, i] - force_bottom * c[FROM_BOTTOM, i]
+        before = w[Row.FACE, i]
+        after = (
+            w[Row.SCRATCH, i]
+            + force_top * c[Coef.FROM_TOP, i]
+            - force_bottom * c[Coef.FROM_BOTTOM, i]
+        )
         v = 0.5 * (before + after)
-        w[LOSS, i] -= 0.5 * (after - before) / c[INV_Z, i] * v
-        w[FACE, i] = v
+        w[Row.LOSS, i] -= 0.5 * (after - before) / c[Coef.INV_Z, i] * v
+        w[Row.FACE, i] = v
 
 
 @kernel
@@ -79,24 +78,24 @@ def smooth_cells(w, c, n, q, parts):
     """
     for _ in range(parts):
         for i in range(n):
-            w[SCRATCH, i] = w[q, i] + w[q + 1, i]
-        push_cell(w, c, q, 0, c[BETWEEN, 0] * (w[SCRATCH, 1] - w[SCRATCH, 0]))
+            w[Row.SCRATCH, i] = w[q, i] + w[q + 1, i]
+        push_cell(w, c, q, 0, c[Coef.BETWEEN, 0] * (w[Row.SCRATCH, 1] - w[Row.SCRATCH, 0]))
         for i in range(1, n - 1):
-            v = w[SCRATCH, i]
-            force = c[BETWEEN, i] * (w[SCRATCH, i + 1] - v)
-            force -= c[BETWEEN, i - 1] * (v - w[SCRATCH, i - 1])
-            half = 0.5 * force * c[INV_CELL_Z, i]
-            w[LOSS, i] -= force * (v + half)
+            v = w[Row.SCRATCH, i]
+            force = c[Coef.BETWEEN, i] * (w[Row.SCRATCH, i + 1] - v)
+            force -= c[Coef.BETWEEN, i - 1] * (v - w[Row.SCRATCH, i - 1])
+            half = 0.5 * force * c[Coef.INV_CELL_Z, i]
+            w[Row.LOSS, i] -= force * (v + half)
             w[q, i] += half
             w[q + 1, i] += half
-        last = c[BETWEEN, n - 2] * (w[SCRATCH, n - 2] - w[SCRATCH, n - 1])
+        last = c[Coef.BETWEEN, n - 2] * (w[Row.SCRATCH, n - 2] - w[Row.SCRATCH, n - 1])
         push_cell(w, c, q, n - 1, last)
 
 
 @inlined
 def push_cell(w, c, q, i, force):
     """Let a viscous force [N] act on a cell over the step."""
-    half = 0.5 * force * c[INV_CELL_Z, i]
-    w[LOSS, i] -= force * (w[SCRATCH, i] + half)
+    half = 0.5 * force * c[Coef.INV_CELL_Z, i]
+    w[Row.LOSS, i] -= force * (w[Row.SCRATCH, i] + half)
     w[q, i] += half
     w[q + 1, i] += half

@@ -8,10 +8,11 @@ A bar is kept in two arrays. ``w`` (rows of `Row`) holds what changes, ``c``
 from __future__ import annotations
 
 from enum import IntEnum
+from typing import NamedTuple
 
 import numpy as np
 
-from percussion_model.physics.state import COMMON_STATE
+from percussion_model.physics.state import COMMON_PARAMETERS, COMMON_STATE
 
 
 class Row(IntEnum):
@@ -51,9 +52,26 @@ class Task(IntEnum):
     """What the kernels are to do with a state."""
 
     ADVANCE = 0
-    BRING = 1
-    SAMPLE = 2
+    COMMIT = 1
+    READ = 2
     STEP = 3
+
+
+class Bars(NamedTuple):
+    """Arrays of piston and bit: rows of `Row`, which change, and rows of `Coef`."""
+
+    wp: np.ndarray
+    cp: np.ndarray
+    wb: np.ndarray
+    cb: np.ndarray
+
+
+class Scratch(NamedTuple):
+    """Room for the products of leaps."""
+
+    x: np.ndarray
+    v: np.ndarray
+    y: np.ndarray
 
 
 class LeapKind(IntEnum):
@@ -67,10 +85,8 @@ class LeapKind(IntEnum):
 # Parameters: what stays fixed during a run.
 WAVE_PAR = np.dtype(
     [
+        *COMMON_PARAMETERS,
         ("dt", "f8"),  # time step = transit time of a cell [s]
-        ("gravity", "f8"),  # [m/s2]
-        ("mass_p", "f8"),  # [kg]
-        ("mass_b", "f8"),
         # ends that meet something: piston bottom (p), bit top (t), bit bottom (b)
         ("z_p", "f8"),  # impedance of the end cell [N s/m]
         ("z_t", "f8"),
@@ -87,14 +103,8 @@ WAVE_PAR = np.dtype(
         ("bound_p", "f8"),  # |S_p| <= bound_p sqrt(2 E): piston strain offset [m/J^0.5]
         ("bound_t", "f8"),
         ("bound_b", "f8"),
-        ("rearm_time", "f8"),  # an open gap this long ends a blow (no pressure law) [s]
         ("n_p", "i8"),  # cells in the piston, 0 when it is rigid or absent
         ("n_b", "i8"),
-        ("piston", "i8"),  # Piston
-        ("drive", "i8"),  # DriveKind
-        ("rock", "i8"),  # RockKind
-        ("barrier", "i8"),  # 1: the energy barrier is on
-        ("release", "i8"),  # 1: standstill leaves to free flight when F_R reaches 0
         ("loss", "i8"),  # sub-steps of the loss operator, 0: no loss
         ("leaps", "i8"),  # levels of the leap operators, four to one: 0: no leaps
         ("most_crossings", "i8"),  # of the rock law within a step; more are a loop
@@ -111,19 +121,19 @@ WAVE_STATE = np.dtype(
         ("leap_end", "i8"),  # step at which the pending leap ends, or -1
         ("leap_kind", "i8"),  # LeapKind of it
         ("no_plan", "i8"),  # do not plan a leap before this step
-        ("asleep", "i8"),  # 1: the piston waits at an earlier step
+        ("dormant", "i8"),  # 1: the piston waits at an earlier step
         ("piston_step", "i8"),  # the step at which it waits
         ("piston_parity", "i8"),  # and which pair of its wave rows is the present one
         ("wake", "i8"),  # step before which it can meet nothing
-        ("no_sleep", "i8"),  # do not put it to sleep before this step
+        ("no_dormancy", "i8"),  # do not let it wait before this step
         ("parity", "i8"),  # which pair of wave rows is the present one (0 or 1)
         ("count_wakes", "i8"),
         ("count_leaps", "i8"),
         ("count_leap_steps", "i8"),
         ("t_base", "f8"),  # time = t_base + step * dt [s]
-        ("moved", "f8"),  # what the bit's mean displacement counts from, piston asleep [m]
-        ("spread_p", "f8"),  # bound of the sleeping piston's strain offset [m]
-        ("x_sleep", "f8"),  # datum of p when the piston went to sleep [m]
+        ("moved", "f8"),  # what the bit's mean displacement counts from, piston dormant [m]
+        ("spread_p", "f8"),  # bound of the dormant piston's strain offset [m]
+        ("x_dormant", "f8"),  # datum of p when it began to wait [m]
         ("u_start", "f8"),  # u_r - u_p + u_b at the start [m]
         ("offset_start", "f8"),  # (bottom end - mean) of the bit at the start [m]
     ],

@@ -8,8 +8,8 @@ from __future__ import annotations
 import math
 from itertools import pairwise
 
-from percussion_model.scene.rules import BarNumbers, SceneRules
-from percussion_model.solvers.wave.grid import fitting_cells
+from percussion_model.scene.rules import SceneRules
+from percussion_model.solvers.wave.grid import elastic_bars, fitting_cells
 
 # Relative error of the rate of penetration, and the cells of the bar with the shortest
 # transit for which it held with a margin of two or more.
@@ -21,13 +21,6 @@ FIT_SHARE = 0.1
 MOST_REFINED = 2.0
 # A run to compare with has between these shares of the cells.
 COARSER = (0.5, 0.75)
-
-
-def elastic_bars(scene: SceneRules) -> list[BarNumbers]:
-    """The bars that get cells, the one first whose cells are counted."""
-    if scene.bit.model != "elastic":
-        return []
-    return [scene.piston, scene.bit] if scene.piston.model == "elastic" else [scene.bit]
 
 
 def asked_cells(scene: SceneRules) -> int | None:

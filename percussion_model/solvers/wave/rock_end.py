@@ -1,4 +1,4 @@
-"""The rock end of the bit, followed exactly through one step.
+"""Rock end of the bit, followed exactly through one step.
 
 The bit end obeys F_R = z (v_free - v), the rock answers with
 F_R = K (p - P_R) + C v: a scalar linear equation with constant input over a
@@ -10,26 +10,24 @@ from __future__ import annotations
 import math
 
 from percussion_model.physics.blows import push_event
-from percussion_model.physics.kernel import inlined, merged
+from percussion_model.physics.kernel import inlined, kernel, merged
 from percussion_model.physics.records import Mode, RockKind
 from percussion_model.physics.rock import (
     REST_VELOCITY,
     barrier_off,
+    book_dashpot,
     close_interface,
     crush,
+    damping,
     enter_standstill,
     leave_by_velocity,
     leave_standstill,
     origin,
     recoverable,
+    spring_force,
     stiffness,
 )
 from percussion_model.solvers.wave.bar import kinetic_energy
-from percussion_model.solvers.wave.peaks import note_peak
-
-FF, DFC, FC, BC, SS = (int(m) for m in Mode)
-NO_ROCK, BILINEAR = int(RockKind.NONE), int(RockKind.BILINEAR)
-SPRING, WALL = int(RockKind.SPRING), int(RockKind.WALL)
 
 
 @merged
@@ -43,28 +41,49 @@ def time_in_mode(par, s, v_free, v, y, rate, y_end, rest):
     next_mode : int
         Mode that follows, -1 where none does.
     """
-    if s.mode == DFC:
+    if s.mode == Mode.DFC:
         left = 1.0 - 2.0 * (s.w_r - s.w) * rate / (s.c_r * v * v)
         if left > 0.0:
             t = -0.5 * math.log(left) / rate
             if t < rest:
-                return max(t, 0.0), FC
-    elif s.mode == BC or (s.mode == FC and par.rock == SPRING):
+                return max(t, 0.0), Mode.FC
+    elif s.mode == Mode.BC or (s.mode == Mode.FC and par.rock == RockKind.SPRING):
         if v < 0.0 and y_end < 0.0:
             t = -math.log(-y_end / (y - y_end)) / rate if y > 0.0 else 0.0
             if t < rest:
-                return t, FF
-    elif s.mode == SS and par.release == 1:
+                return t, Mode.FF
+    elif s.mode == Mode.SS and par.release == 1:
         if v < 0.0 and v_free < 0.0:
             t = -math.log(v_free / v) / rate if v_free > v else 0.0
             if t < rest:
-                return t, FF
+                return t, Mode.FF
     return rest, -1
 
 
+@kernel
+def note_peak(s, time, first, change, rate, last):
+    """Note the bit force of a stretch for an observer; it is monotone, so its ends tell.
+
+    What came before the communication step that the observer looks at (`peak_from`)
+    must not count.
+
+    Parameters
+    ----------
+    time : float
+        Start of the stretch [s].
+    first, last : float
+        Force at its start and its end [N].
+    change, rate : float
+        Force t after the start is first + change (1 - exp(-rate t)) [N, 1/s].
+    """
+    if time < s.peak_from:
+        first -= change * math.expm1(-rate * (s.peak_from - time))
+    s.peak_bit_force = max(s.peak_bit_force, first, last)
+
+
 @merged
-def contact_stretch(par, s, v_free, z, rest, now):
-    """Follow one contact mode until it ends or the step does, from time `now`.
+def contact_stretch(par, s, v_free, z, rest, time):
+    """Follow one contact mode until it ends or the step does, from `time` on.
 
     Returns
     -------
@@ -73,9 +92,9 @@ def contact_stretch(par, s, v_free, z, rest, now):
     next_mode : int
     """
     K = stiffness(s)
-    C = s.c_r if s.mode == DFC or s.mode == SS else 0.0
-    origin = s.p_u if s.mode == BC or s.mode == SS else 0.0
-    y = s.p - origin
+    C = damping(s)
+    start = origin(s)
+    y = s.p - start
     v = (z * v_free - K * y) / (z + C)
     rate = K / (z + C)
     t, next_mode = time_in_mode(par, s, v_free, v, y, rate, y + v / rate, rest)
@@ -84,22 +103,17 @@ def contact_stretch(par, s, v_free, z, rest, now):
     q = 0.5 * v * v * fade * (2.0 - fade) / rate
     p_before = s.p
     s.p += d
-    if s.mode == DFC:
-        s.e_barrier += C * q
-        s.w += C * q
-    elif s.mode == SS:
-        s.e_standstill += C * q
-    if (s.mode == DFC or s.mode == FC) and par.rock == BILINEAR:
-        crush(s, p_before)
-    if next_mode == FF and y < 0.0:
+    book_dashpot(s, C * q)
+    crush(par, s, p_before)
+    if next_mode == Mode.FF and y < 0.0:
         # standstill had pulled the bit when its unloading began: the rock lets go
         s.e_standstill += recoverable(s)
-    elif next_mode == FF and s.mode != SS:
-        s.p = origin  # exactly unloaded
+    elif next_mode == Mode.FF and s.mode != Mode.SS:
+        s.p = start  # exactly unloaded
     last = z * (v_free - v * (1.0 - fade))
     s.b_peak_bit = max(s.b_peak_bit, K * y + C * v, last)
-    if now + t > s.peak_from:
-        note_peak(s, now, K * y + C * v, z * v, rate, last)
+    if time + t > s.peak_from:
+        note_peak(s, time, K * y + C * v, z * v, rate, last)
     return t, d, q, next_mode
 
 
@@ -117,7 +131,7 @@ def flight_stretch(par, s, v_free, rest):
     before = recoverable(s)
     t = rest
     closes = 0
-    if par.rock != NO_ROCK and v_free > 0.0:
+    if par.rock != RockKind.NONE and v_free > 0.0:
         reach = (s.p_u - s.p) / v_free
         if reach < rest:
             t = max(reach, 0.0)
@@ -155,19 +169,18 @@ def rock_step(par, s, w, c, v_free, z, tau, time, events):
         Integrals of velocity [m] and of its square [m2/s].
     """
     r = 2 * s.parity
-    if s.mode == SS and par.rock == BILINEAR:
+    if s.mode == Mode.SS and par.rock == RockKind.BILINEAR:
         energy = kinetic_energy(w, c, par.n_b, r)
         if barrier_off(par, s) or energy > s.w_r:
-            K = s.gamma * s.k_r
-            force = K * (s.p - s.p_u)
+            force = spring_force(s)
             leave_standstill(par, s, (z * v_free - force) / (z + s.c_r))
             push_event(s, events, time, s.mode, force)
     rest = tau
     d = 0.0
     q = 0.0
     for _ in range(par.most_crossings):
-        now = time + (tau - rest)
-        if s.mode == FF:
+        here = time + (tau - rest)
+        if s.mode == Mode.FF:
             t, closes = flight_stretch(par, s, v_free, rest)
             step = v_free * t
             d += step
@@ -176,44 +189,42 @@ def rock_step(par, s, w, c, v_free, z, tau, time, events):
             if closes == 0:
                 return d, q
             close_interface(par, s, kinetic_energy(w, c, par.n_b, r))
-            if s.mode == SS:
-                enter_standstill(s, now + t)
-            push_event(s, events, now + t, s.mode, 0.0)
+            if s.mode == Mode.SS:
+                enter_standstill(s, here + t)
+            push_event(s, events, here + t, s.mode, 0.0)
             continue
-        if par.rock == WALL:
+        if par.rock == RockKind.WALL:
             if v_free > 0.0:
                 s.b_peak_bit = max(s.b_peak_bit, z * v_free)
-                if now + rest > s.peak_from:
-                    s.peak_bit = max(s.peak_bit, z * v_free)
+                if here + rest > s.peak_from:
+                    s.peak_bit_force = max(s.peak_bit_force, z * v_free)
                 return d, q
-            s.mode = FF
+            s.mode = Mode.FF
             s.p_u = s.p
-            push_event(s, events, now, s.mode, 0.0)
+            push_event(s, events, here, s.mode, 0.0)
             continue
         if end_of_mode(par, s, w, c, v_free, z, r) == 1:
-            if s.mode == SS:
-                enter_standstill(s, now)
-            push_event(s, events, now, s.mode, stiffness(s) * (s.p - origin(s)))
+            if s.mode == Mode.SS:
+                enter_standstill(s, here)
+            push_event(s, events, here, s.mode, spring_force(s))
             continue
-        t, step, square, next_mode = contact_stretch(par, s, v_free, z, rest, now)
+        t, step, square, next_mode = contact_stretch(par, s, v_free, z, rest, here)
         d += step
         q += square
         rest -= t
         if next_mode < 0:
             return d, q
         s.mode = next_mode
-        push_event(s, events, now + t, s.mode, stiffness(s) * (s.p - origin(s)))
-    s.locked += 1
+        push_event(s, events, here + t, s.mode, spring_force(s))
+    s.count_locked += 1
     return d, q
 
 
 @merged
 def end_of_mode(par, s, w, c, v_free, z, r):
     """Whether the sign of the velocity ends the mode at once; sets the next."""
-    K = stiffness(s)
-    C = s.c_r if s.mode == DFC or s.mode == SS else 0.0
-    v = (z * v_free - K * (s.p - origin(s))) / (z + C)
+    v = (z * v_free - spring_force(s)) / (z + damping(s))
     energy = 0.0
-    if s.mode == BC and v > REST_VELOCITY:
+    if s.mode == Mode.BC and v > REST_VELOCITY:
         energy = kinetic_energy(w, c, par.n_b, r)
     return leave_by_velocity(par, s, v, energy)

@@ -1,41 +1,81 @@
-"""The travelling-wave solver: packing, and its kernels on a state."""
+"""Travelling-wave solver: the method of characteristics for stepped bars."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any, ClassVar
 
 import numpy as np
 
 from percussion_model.physics.kernel import entry_of
-from percussion_model.physics.records import (
-    BLOW,
-    EVENT,
-    LEDGER_FIELDS,
-    SAMPLE_FIELDS,
-    Status,
-)
-from percussion_model.scene.rules import SceneRules
-from percussion_model.solvers.wave.advance import GRID_ROUNDING, run
-from percussion_model.solvers.wave.leaps.contact_leap import WATCHED
-from percussion_model.solvers.wave.leaps.operators import LEVELS, leap_operators, padded
-from percussion_model.solvers.wave.leaps.step_map import no_operators
-from percussion_model.solvers.wave.packing import (
-    INPUT_FIELDS,
-    begin_state,
-    pack_parameters,
+from percussion_model.physics.records import Status
+from percussion_model.scene.rules import BarNumbers, SceneRules
+from percussion_model.solvers.base import Solver
+from percussion_model.solvers.setup import (
+    MOST_CHANGES,
+    fill_parameters,
+    fill_start,
     rock_numbers,
 )
-from percussion_model.solvers.wave.records import Row, Task
-from percussion_model.solvers.wave.state import WORD, WaveState
-from percussion_model.solvers.wave.totals import begin, lost_in_faces, resync, stored_energy
-from percussion_model.solvers.wave.wave_bars import WaveBars
+from percussion_model.solvers.state import State, words_of
+from percussion_model.solvers.wave.advance import GRID_ROUNDING, run
+from percussion_model.solvers.wave.grid import CutBars, Grid, cut_bars, section_count
+from percussion_model.solvers.wave.leaps.lookahead import LOOKAHEAD
+from percussion_model.solvers.wave.leaps.operators import (
+    LEVELS,
+    leap_operators,
+    no_operators,
+    padded,
+)
+from percussion_model.solvers.wave.records import (
+    WAVE_PAR,
+    WAVE_STATE,
+    Bars,
+    Coef,
+    Row,
+    Scratch,
+    Task,
+)
+from percussion_model.solvers.wave.resolution import asked_cells
+from percussion_model.solvers.wave.totals import begin, resync
 
-DONE = int(Status.DONE)
-EVENTS_ON, LEAP_END, T_BASE = WORD["events_on"], WORD["leap_end"], WORD["t_base"]
-N_BLOWS, N_EVENTS = WORD["n_blows"], WORD["n_events"]
+_WORD = words_of(WAVE_STATE)
+LEAP_END, STEP, T_BASE = _WORD["leap_end"], _WORD["step"], _WORD["t_base"]
+EVENTS_ON, N_BLOWS, N_EVENTS = _WORD["events_on"], _WORD["n_blows"], _WORD["n_events"]
+PARITY, PEAK_FROM = _WORD["parity"], _WORD["peak_from"]
 
 
-class WaveSolver(WaveBars):
+def wave_parameters(scene: SceneRules, bars: CutBars) -> np.ndarray:
+    """Parameter record of a scene on its grid.
+
+    Returns
+    -------
+    WAVE_PAR array of length 1
+    """
+    par = np.zeros(1, WAVE_PAR)
+    p: Any = par[0]
+    fill_parameters(p, scene, with_piston=bars.piston is not None)
+    bit, piston = bars.bit, bars.piston
+    p["dt"] = bars.time_step
+    p["most_crossings"] = MOST_CHANGES
+    p["loss"], p["front"] = bars.substeps, bars.front
+    p["n_b"] = bit.grid.n
+    p["z_t"], p["z_b"] = bit.grid.impedance[[0, -1]]
+    p["kappa_t"], p["kappa_b"] = bit.kappa
+    p["bound_t"], p["bound_b"] = bit.bound
+    if piston is not None:
+        p["n_p"] = piston.grid.n
+        p["z_f"], p["z_p"] = piston.grid.impedance[[0, -1]]
+        p["kappa_f"], p["kappa_p"] = piston.kappa
+        p["bound_p"] = piston.bound[1]
+    rock = rock_numbers(scene)
+    p["ss_stiffness"] = rock["gamma"] * rock["k_r"]
+    p["ss_loading"] = rock["k_r"]
+    p["ss_damping"] = rock["c_r"]
+    return par
+
+
+class WaveSolver(Solver):
     """Method of characteristics for a scene with an elastic bit.
 
     Parameters
@@ -44,102 +84,95 @@ class WaveSolver(WaveBars):
 
     Attributes
     ----------
-    time_step, cells, wave_speed_error
-        As in `WaveBars`.
+    time_step : float
+        Transit time of a cell [s].
+    cells : dict of int
+        Cells in each elastic bar.
+    wave_speed_error : float
+        Largest relative error of a section's wave speed, from lengths that
+        fit no common cell.
     """
 
     name = "wave"
+    time_step: float
+    COUNTS: ClassVar = ("steps", "leaps", "leap_steps", "wakes", "events", "blows", "locked")
 
     def __init__(self, scene: SceneRules) -> None:
         super().__init__(scene)
-        self._par = pack_parameters(scene, self._bars)
-        found = None
-        if scene.solver.leaps:
-            found = leap_operators(self._par, self._piston, self._cp, self._bit, self._cb)
-        if found is not None:
-            self._par["leaps"] = LEVELS
-        self._operators = no_operators() if found is None else found.arrays
-        size = padded(2 * max(self._bit.n, self._piston.n if self._piston else 0) + 1)
-        self._scratch = np.zeros((3, max(size, WATCHED)))
+        bars = cut_bars(scene, scene.solver.cells or asked_cells(scene))
+        self.time_step = bars.time_step
+        self._grids: dict[str, Grid | None] = {
+            "piston": None if bars.piston is None else bars.piston.grid,
+            "bit": bars.bit.grid,
+        }
+        self.cells = {name: grid.n for name, grid in self._grids.items() if grid is not None}
+        self.wave_speed_error = max(bar.grid.fit for bar in bars.both)
+        self._cb = bars.bit.coefficients
+        self._cp = np.zeros((len(Coef), 1)) if bars.piston is None else bars.piston.coefficients
+        self._par = wave_parameters(scene, bars)
+        self._operators = no_operators()
+        # forces that change from step to step leave no step a constant map
+        if scene.solver.leaps and not self._par[0]["effects"]:
+            found = leap_operators(
+                self._par, self._grids["piston"], self._cp, bars.bit.grid, self._cb
+            )
+            if found is not None:
+                self._par["leaps"] = LEVELS
+                self._operators = found
+        size = max(padded(2 * max(self.cells.values()) + 1), LOOKAHEAD)
+        self._scratch = Scratch(*np.zeros((3, size)))
         self._entry: Callable[..., int] = entry_of(run)
-        self._no_row = np.zeros(len(SAMPLE_FIELDS))
-        self._no_blows = np.zeros(1, BLOW)
-        self._no_events = np.zeros(1, EVENT)
 
-    def derive(self, state: WaveState) -> None:
+    def _bars(self, state: State) -> Bars:
+        wp, wb = state.arrays
+        return Bars(wp, self._cp, wb, self._cb)
+
+    def new_state(self) -> State:
+        """State at time zero."""
+        scene, start = self.scene, self.scene.start
+        n_p, n_b = self.cells.get("piston", 0), self.cells["bit"]
+        state = State(WAVE_STATE, ((len(Row), n_p + 1), (len(Row), n_b + 1)))
+        s: Any = state.record[0]
+        fill_start(s, scene, rock_numbers(scene))
+        s["leap_end"] = -1
+        wp, wb = state.arrays
+        wb[Row.DOWN : Row.UP + 1, :n_b] = 0.5 * start.bit_velocity
+        if n_p:
+            wp[Row.DOWN : Row.UP + 1, :n_p] = 0.5 * start.piston_velocity
+        entry_of(begin)(self._par, state.record, self._bars(state))
+        return state
+
+    def derive(self, state: State) -> None:
         """Derive the mean velocities and u_r of a state whose gap and waves were set."""
-        wp, wb = state.bars
-        resync(self._par[0], state.record[0], wp, self._cp, wb, self._cb)
+        resync(self._par[0], state.record[0], self._bars(state))
 
     @property
     def place_of_closure(self) -> float:
         """Share of a step after which a closure comes best (docs/numerics.md, eq. 14b)."""
         return float(self._par[0]["front"])
 
-    def new_state(self) -> WaveState:
-        """State at time zero."""
-        scene, start = self.scene, self.scene.start
-        n_p = self._piston.n if self._piston is not None else 0
-        state = WaveState.zero(n_p, self._bit.n)
-        begin_state(state, scene, rock_numbers(scene))
-        state["leap_end"] = -1
-        state["v_p"] = start.piston_velocity if scene.piston.model != "absent" else 0.0
-        state["v_b"] = start.bit_velocity
-        wp, wb = state.bars
-        wb[Row.DOWN : Row.UP + 1, : self._bit.n] = 0.5 * start.bit_velocity
-        if n_p:
-            wp[Row.DOWN : Row.UP + 1, :n_p] = 0.5 * start.piston_velocity
-        entry_of(begin)(self._par, state.record, wp, self._cp, wb, self._cb)
-        return state
-
-    def _stored(self, state: WaveState) -> tuple[float, float, float]:
-        wp, wb = state.bars
-        return stored_energy(self._par[0], state.record[0], wp, self._cp, wb, self._cb)
+    @property
+    def static_wave(self) -> np.ndarray:
+        """Down-going wave of a bit at rest under unit body acceleration, by cell [s]."""
+        return self._cb[Coef.STATIC, : self.cells["bit"]]
 
     def _run(
-        self,
-        task: Task,
-        state: WaveState,
-        time: float,
-        blows: np.ndarray | None = None,
-        events: np.ndarray | None = None,
-        row: np.ndarray | None = None,
-    ) -> int:
-        """Call the kernels; see `core.advance.run`."""
-        wp, wb = state.bars
+        self, task: Task, state: State, time: float, blows: np.ndarray, events: np.ndarray,
+        reading: np.ndarray,
+    ) -> int:  # fmt: skip
+        """Call the kernels; see `solvers.wave.advance.run`."""
         status = self._entry(
-            int(task),
-            self._par,
-            state.record,
-            wp,
-            self._cp,
-            wb,
-            self._cb,
-            self._operators,
-            *self._scratch,
-            time,
-            self._no_blows if blows is None else blows,
-            self._no_events if events is None else events,
-            self._no_row if row is None else row,
-        )
+            int(task), self._par, state.record, self._bars(state), self._operators,
+            self._scratch, time, blows, events, reading,
+        )  # fmt: skip
         if self._entry is run:  # compiled just now; the types of all these never change
             self._entry = entry_of(run)
         return int(status)
 
     def advance(
-        self,
-        state: WaveState,
-        t: float,
-        blows: np.ndarray,
-        events: np.ndarray,
-        record_events: bool = False,
+        self, state: State, t: float, blows: np.ndarray, events: np.ndarray, record_events: bool
     ) -> tuple[int, int, int]:
-        """Commit the state up to `t`; see `core.advance.advance`.
-
-        Returns
-        -------
-        status, n_blows, n_events : int
-        """
+        """Commit the whole steps and leaps up to `t`; as in `Solver`."""
         words = state.words
         leap_end = words[LEAP_END]
         if leap_end >= 0:
@@ -147,79 +180,72 @@ class WaveSolver(WaveBars):
             steps = (t - float(state.numbers[T_BASE])) / self.time_step + GRID_ROUNDING
             if steps < leap_end:
                 words[N_BLOWS] = words[N_EVENTS] = 0
-                return DONE, 0, 0
+                return int(Status.DONE), 0, 0
         words[EVENTS_ON] = record_events
-        status = self._run(Task.ADVANCE, state, t, blows, events)
+        status = self._run(Task.ADVANCE, state, t, blows, events, self._no_reading)
         return status, int(words[N_BLOWS]), int(words[N_EVENTS])
 
-    def sample(self, state: WaveState, times: np.ndarray, out: np.ndarray) -> None:
-        """Evaluate at `times` without touching the state (`SAMPLE_FIELDS`)."""
-        for k, time in enumerate(times):
-            self.look(state, float(time), out[k])
-
-    def look(
-        self,
-        state: WaveState,
-        t: float,
-        row: np.ndarray,
-        here: WaveState | None = None,
+    def read(
+        self, state: State, t: float, reading: np.ndarray, spare: State | None = None,
         peaks: bool = True,
-    ) -> WaveState:
-        """Evaluate at `t` into a row (`LONG_SAMPLE_FIELDS`, or their beginning).
-
-        Parameters
-        ----------
-        here : WaveState, optional
-            An old copy to be used again.
-        peaks : bool
-            Whether the peaks of a long row are wanted: in standstill they are dear.
-
-        Returns
-        -------
-        WaveState
-            A copy whose waves are those of the last grid point up to `t`, as
-            `fields` reads them.
-        """
-        if here is None:
-            here = state.copy()
+    ) -> State:  # fmt: skip
+        """Evaluate at `t`; a copy with the waves of the last grid point. As in `Solver`."""
+        if spare is None:
+            spare = state.copy()
         else:
-            here.take(state)
+            spare.take(state)
         if not peaks:
-            here.numbers[WORD["peak_from"]] = np.inf
-        self._run(Task.SAMPLE, here, t, row=row)
-        return here
-
-    def watch_peaks(self, state: WaveState, t: float) -> None:
-        """Count the peak forces of `look` from `t` on [s]."""
-        numbers = state.numbers
-        numbers[WORD["peak_from"]] = t
-        numbers[WORD["peak_bit"]] = numbers[WORD["peak_contact"]] = 0.0
+            spare.numbers[PEAK_FROM] = np.inf
+        self._run(Task.READ, spare, t, self._no_blows, self._no_events, reading)
+        return spare
 
     def commit(
-        self,
-        state: WaveState,
-        t: float,
-        blows: np.ndarray | None = None,
-        events: np.ndarray | None = None,
-        record_events: bool = False,
+        self, state: State, t: float, blows: np.ndarray, events: np.ndarray, record_events: bool
     ) -> tuple[int, int, int]:
         """Bring the state to the first grid point at or after `t`; nothing happens meanwhile."""
-        return self._run(Task.BRING, state, self.grid_point_after(state, t)), 0, 0
+        t = self.grid_point_after(state, t)
+        return self._run(Task.COMMIT, state, t, blows, events, self._no_reading), 0, 0
 
-    def set_inputs(self, state: WaveState, **inputs: float) -> None:
-        """Change inputs of a committed state; rock inputs wait for the next cycle."""
-        for key, value in inputs.items():
-            state.record[0][INPUT_FIELDS[key]] = value
+    def time(self, state: State) -> float:
+        """Time up to which the state is committed [s]."""
+        return self._time_of(state, int(state.words[STEP]))
 
-    def energy(self, state: WaveState, t: float) -> dict[str, float]:
-        """Ledger [J] at the last grid point before `t`."""
-        here = state.copy()
-        self._run(Task.BRING, here, t)
-        s = here.record[0]
-        wp, wb = here.bars
-        entries = {name: float(s[f"e_{name}"]) for name in LEDGER_FIELDS}
-        entries["loss"] += lost_in_faces(self._par[0], wp, wb)
-        kinetic, elastic, rock = self._stored(here)
-        entries |= {"start": float(s["e_start"]), "kinetic": kinetic, "elastic": elastic}
-        entries["recoverable"] = rock
-        return entries
+    def readable_until(self, state: State) -> float:
+        """Time up to which `read` answers without advancing the state [s]."""
+        return self._time_of(state, max(int(state.words[LEAP_END]), int(state.words[STEP]) + 1))
+
+    def grid_point_after(self, state: State, t: float) -> float:
+        """First grid point at or after `t` [s]."""
+        base = float(state.numbers[T_BASE])
+        return self._time_of(state, int(np.ceil((t - base) / self.time_step - GRID_ROUNDING)))
+
+    def _time_of(self, state: State, step: int) -> float:
+        return float(state.numbers[T_BASE]) + step * self.time_step
+
+    def fields(self, state: State) -> dict[str, np.ndarray]:
+        """Force [N] and velocity [m/s] of each cell, top to bottom, by bar."""
+        r = 2 * int(state.words[PARITY])
+        out = {}
+        for (name, grid), w in zip(self._grids.items(), state.arrays, strict=True):
+            if grid is not None:
+                d, u = w[r, : grid.n], w[r + 1, : grid.n]
+                out[f"{name}_force"] = grid.impedance * (d - u)
+                out[f"{name}_velocity"] = d + u
+        return out
+
+    def force_in(self, state: State, bar: str, cell: int) -> float:
+        """Force in one cell of "piston" or "bit" [N], as `fields` reads it."""
+        grid = self._grids[bar]
+        if grid is None:
+            return 0.0
+        w = state.arrays[bar == "bit"]
+        r = 2 * int(state.words[PARITY])
+        return float(grid.impedance[cell] * (w[r, cell] - w[r + 1, cell]))
+
+    def grid_of(self, bar: str) -> Grid | None:
+        """Cells of "piston" or "bit", None where it has none."""
+        return self._grids[bar]
+
+    def section_cells(self, bar: BarNumbers) -> list[int]:
+        """Cells in each section of an elastic bar."""
+        return [section_count(section, self.time_step) for section in bar.sections]

@@ -8,17 +8,14 @@ waves to the ends, contact and rock in closed form, loss, the other half
 from __future__ import annotations
 
 from percussion_model.physics.blows import push_checkpoint
+from percussion_model.physics.body import bit_acceleration, piston_acceleration
 from percussion_model.physics.drive import drive_force
 from percussion_model.physics.kernel import kernel, merged
 from percussion_model.physics.records import Mode, Piston
 from percussion_model.solvers.wave.bar import add_velocity
 from percussion_model.solvers.wave.ends import meet, outer_waves
 from percussion_model.solvers.wave.records import Coef
-from percussion_model.solvers.wave.totals import lost_in_faces, now, resync
-
-ELASTIC = int(Piston.ELASTIC)
-SS = int(Mode.SS)
-MASS = int(Coef.MASS)
+from percussion_model.solvers.wave.totals import lost_in_faces, resync, time_of
 
 # Mean motion is derived anew from the waves this often, so that rounding in
 # its running sums can never drift away from the gap [steps].
@@ -44,12 +41,12 @@ def part_of_step(w, c, n, r, share):
         for k in range(2):
             jump = w[q + k, i] - w[r + k, i]
             w[q + k, i] = w[r + k, i] + share * jump
-            lost += c[MASS, i] * jump * jump
+            lost += c[Coef.MASS, i] * jump * jump
     return share * (1.0 - share) * lost
 
 
 @merged
-def shorten_step(par, s, wp, cp, wb, cb, tau, loss_before, push, dv_p, dv_b):
+def shorten_step(par, s, bars, tau, loss_before, push, dv_p, dv_b):
     """Turn the step just done into one of duration `tau`, with its ledger.
 
     Parameters
@@ -64,20 +61,20 @@ def shorten_step(par, s, wp, cp, wb, cb, tau, loss_before, push, dv_p, dv_b):
     r = 2 * s.parity
     share = tau / par.dt
     rest = 1.0 - share
-    s.e_loss -= rest * (lost_in_faces(par, wp, wb) - loss_before)
-    s.e_numerical += part_of_step(wb, cb, par.n_b, r, share)
+    s.e_loss -= rest * (lost_in_faces(par, bars) - loss_before)
+    s.e_numerical += part_of_step(bars.wb, bars.cb, par.n_b, r, share)
     # the body forces worked along the whole step's path, not along its part
-    a = par.gravity + s.feed / par.mass_b
+    a = bit_acceleration(par, s)
     s.e_numerical -= 0.5 * par.mass_b * a * par.dt * rest * dv_b
-    if par.piston == ELASTIC:
-        s.e_numerical += part_of_step(wp, cp, par.n_p, r, share)
-        a = par.gravity + push / par.mass_p
+    if par.piston == Piston.ELASTIC:
+        s.e_numerical += part_of_step(bars.wp, bars.cp, par.n_p, r, share)
+        a = piston_acceleration(par, push)
         s.e_numerical -= 0.5 * par.mass_p * a * par.dt * rest * dv_p
     s.t_base -= par.dt - tau
 
 
 @kernel
-def step(par, s, wp, cp, wb, cb, dt, blows, events):
+def step(par, s, bars, dt, blows, events):
     """Advance the state by one step of the transit time of a cell.
 
     A copy that is only read (s.live = 0) moves on by `dt` of a step: what its
@@ -88,29 +85,29 @@ def step(par, s, wp, cp, wb, cb, dt, blows, events):
     v_p, v_b = s.v_p, s.v_b
     contact_before = s.i_contact
     push = drive_force(par, s)
-    top, bottom, top_p, bottom_p, tau = meet(par, s, wp, cp, wb, cb, dt, blows, events)
+    top, bottom, top_p, bottom_p, tau = meet(par, s, bars, dt, blows, events)
     if s.live == 0:
         return
     short = tau < dt
     loss_before = 0.0
     if short:
-        loss_before = lost_in_faces(par, wp, wb)
+        loss_before = lost_in_faces(par, bars)
     z_t, z_b = par.kappa_t * par.z_t, par.kappa_b * par.z_b
-    outer_waves(par, wb, cb, par.n_b, r, top, bottom, z_t, z_b)
-    if par.piston == ELASTIC and s.asleep == 0:
+    outer_waves(par, bars.wb, bars.cb, par.n_b, r, top, bottom, z_t, z_b)
+    if par.piston == Piston.ELASTIC and s.dormant == 0:
         z_t, z_b = par.kappa_f * par.z_f, par.kappa_p * par.z_p
-        outer_waves(par, wp, cp, par.n_p, r, top_p, bottom_p, z_t, z_b)
-    given = (par.gravity + push / par.mass_p) * tau
+        outer_waves(par, bars.wp, bars.cp, par.n_p, r, top_p, bottom_p, z_t, z_b)
+    given = piston_acceleration(par, push) * tau
     if short:
-        shorten_step(par, s, wp, cp, wb, cb, tau, loss_before, push, given, s.v_b - v_b)
-    if alpha != s.alpha and par.piston == ELASTIC:
+        shorten_step(par, s, bars, tau, loss_before, push, given, s.v_b - v_b)
+    if alpha != s.alpha and par.piston == Piston.ELASTIC:
         # what the waves got is the old force over the whole step
         due = s.v_p - v_p + (s.i_contact - contact_before) / par.mass_p
-        add_velocity(wp, par.n_p, 2 - r, due - given)
+        add_velocity(bars.wp, par.n_p, 2 - r, due - given)
     s.parity = 1 - s.parity
     s.step += 1
     s.count_steps += 1
     if short or s.step % RESYNC_STEPS == 0:
-        resync(par, s, wp, cp, wb, cb)
-    if s.mode == SS and (s.n_check == 0 or s.step % CHECKPOINT_STEPS == 0):
-        push_checkpoint(s, now(par, s))
+        resync(par, s, bars)
+    if s.mode == Mode.SS and (s.n_check == 0 or s.step % CHECKPOINT_STEPS == 0):
+        push_checkpoint(s, time_of(par, s))

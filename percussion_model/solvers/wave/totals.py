@@ -13,13 +13,9 @@ from percussion_model.solvers.wave.bar import (
 )
 from percussion_model.solvers.wave.records import Coef, Row
 
-ABSENT, RIGID, ELASTIC = int(Piston.ABSENT), int(Piston.RIGID), int(Piston.ELASTIC)
-TOP, BOTTOM = int(Coef.TOP), int(Coef.BOTTOM)
-LOSS = int(Row.LOSS)
-
 
 @merged
-def now(par, s):
+def time_of(par, s):
     """Time of a state [s]."""
     return s.t_base + s.step * par.dt
 
@@ -27,24 +23,24 @@ def now(par, s):
 @inlined
 def bit_position(s, wb, cb, n, r):
     """Mean displacement of the bit since the start [m]."""
-    return s.x_r + s.p + strain_offset(wb, cb, n, r, BOTTOM) - s.offset_start
+    return s.x_r + s.p + strain_offset(wb, cb, n, r, Coef.BOTTOM) - s.offset_start
 
 
 @kernel
-def resync(par, s, wp, cp, wb, cb):
+def resync(par, s, bars):
     """Derive the mean velocities and u_r from gap and waves."""
     r = 2 * s.parity
-    s.v_b = mean_velocity(wb, cb, par.n_b, r, par.mass_b)
-    if par.piston == ABSENT or s.asleep == 1:
+    s.v_b = mean_velocity(bars.wb, bars.cb, par.n_b, r, par.mass_b)
+    if par.piston == Piston.ABSENT or s.dormant == 1:
         return
-    s.u_r = strain_offset(wb, cb, par.n_b, r, TOP) - s.gap
-    if par.piston == ELASTIC:
-        s.v_p = mean_velocity(wp, cp, par.n_p, r, par.mass_p)
-        s.u_r += strain_offset(wp, cp, par.n_p, r, BOTTOM)
+    s.u_r = strain_offset(bars.wb, bars.cb, par.n_b, r, Coef.TOP) - s.gap
+    if par.piston == Piston.ELASTIC:
+        s.v_p = mean_velocity(bars.wp, bars.cp, par.n_p, r, par.mass_p)
+        s.u_r += strain_offset(bars.wp, bars.cp, par.n_p, r, Coef.BOTTOM)
 
 
 @kernel
-def stored_energy(par, s, wp, cp, wb, cb):
+def stored_energy(par, s, bars):
     """Energy stored in bars and rock.
 
     Returns
@@ -53,40 +49,39 @@ def stored_energy(par, s, wp, cp, wb, cb):
         [J]
     """
     r = 2 * s.parity
-    kinetic = kinetic_energy(wb, cb, par.n_b, r)
-    elastic = elastic_energy(wb, cb, par.n_b, r)
-    if par.piston == ELASTIC:
-        kinetic += kinetic_energy(wp, cp, par.n_p, r)
-        elastic += elastic_energy(wp, cp, par.n_p, r)
-    elif par.piston == RIGID:
+    kinetic = kinetic_energy(bars.wb, bars.cb, par.n_b, r)
+    elastic = elastic_energy(bars.wb, bars.cb, par.n_b, r)
+    if par.piston == Piston.ELASTIC:
+        kinetic += kinetic_energy(bars.wp, bars.cp, par.n_p, r)
+        elastic += elastic_energy(bars.wp, bars.cp, par.n_p, r)
+    elif par.piston == Piston.RIGID:
         kinetic += 0.5 * par.mass_p * s.v_p * s.v_p
     return kinetic, elastic, recoverable(s)
 
 
 @kernel
-def lost_in_faces(par, wp, wb):
+def lost_in_faces(par, bars):
     """Structural loss booked interface by interface [J]."""
     total = 0.0
     for i in range(par.n_b):
-        total += wb[LOSS, i]
+        total += bars.wb[Row.LOSS, i]
     for i in range(par.n_p):
-        total += wp[LOSS, i]
+        total += bars.wp[Row.LOSS, i]
     return total * par.dt
 
 
 @kernel
-def begin(par_, state, wp, cp, wb, cb):
+def begin(par_, state, bars):
     """Complete a new state: mean velocities, u_r, and what is counted from them.
 
     Parameters
     ----------
     par_, state : WAVE_PAR, WAVE_STATE array of length 1
-    wp, cp, wb, cb : float array
-        Waves and coefficients of piston and bit.
+    bars : Bars
     """
     par = par_[0]
     s = state[0]
-    resync(par, s, wp, cp, wb, cb)
+    resync(par, s, bars)
     s.u_start = s.u_r
-    kinetic, elastic, rock = stored_energy(par, s, wp, cp, wb, cb)
+    kinetic, elastic, rock = stored_energy(par, s, bars)
     s.e_start = kinetic + elastic + rock

@@ -1,8 +1,8 @@
 """Leaps of the bit: many steps of free flight, standstill or contact in one go.
 
 While the bit's mode does not change, a step is a constant linear map of its
-waves. Powers of two of that map, made once from the step itself, carry the
-bit over any number of steps; a leap ends before the next event can happen
+waves. Powers of that map, made once from the step itself, carry the bit over
+any number of steps; a leap ends before the next event can happen
 (docs/numerics.md, section 5).
 """
 
@@ -11,22 +11,21 @@ from __future__ import annotations
 import math
 
 from percussion_model.physics.blows import push_checkpoint
+from percussion_model.physics.body import bit_acceleration, bit_load, book_bit_load
 from percussion_model.physics.kernel import kernel, merged
 from percussion_model.physics.records import Mode, RockKind
-from percussion_model.physics.rock import recoverable
+from percussion_model.physics.rock import (
+    barrier_off,
+    book_dashpot,
+    crush,
+    origin,
+    recoverable,
+)
 from percussion_model.solvers.wave.bar import (
     deviation_energy,
     mean_velocity,
     strain_offset,
     time_to_cover,
-)
-from percussion_model.solvers.wave.leaps.contact_leap import (
-    GRAIN,
-    WATCHED,
-    can_watch,
-    leap_contact,
-    watch_contact,
-    watch_flight,
 )
 from percussion_model.solvers.wave.leaps.linear import (
     carry,
@@ -37,19 +36,27 @@ from percussion_model.solvers.wave.leaps.linear import (
     remove_mean,
     store,
 )
-from percussion_model.solvers.wave.leaps.standstill_peak import watch_standstill
+from percussion_model.solvers.wave.leaps.lookahead import (
+    GRAIN,
+    LOOKAHEAD,
+    has_operators,
+    load_contact,
+    look_ahead,
+    step_constants,
+    steps_in_contact,
+    steps_in_flight,
+)
 from percussion_model.solvers.wave.records import Coef, LeapKind
-from percussion_model.solvers.wave.totals import now
-
-FF, SS = int(Mode.FF), int(Mode.SS)
-NO_ROCK, BILINEAR = int(RockKind.NONE), int(RockKind.BILINEAR)
-BOTTOM = int(Coef.BOTTOM)
-FLIGHT, STANDSTILL, CONTACT = (int(kind) for kind in LeapKind)
+from percussion_model.solvers.wave.rock_end import note_peak
+from percussion_model.solvers.wave.totals import time_of
 
 # A leap shorter than this costs more than the steps it saves.
 FEWEST_STEPS = 8
 # Standstill can end only above W_R; below this share of it the barrier is safe.
 QUIET_SHARE = 0.9
+
+# Standstill is searched until its vibration is below this share of the force at rest.
+STILL_SHARE = 1e-3
 
 # What a vibration of less than this gives to the rock is not booked [J].
 NEGLIGIBLE = 1e-13
@@ -69,26 +76,26 @@ def longest_leap(par):
 @kernel
 def standstill_energy(par, s, wb, cb):
     """Energy of the bit about its rest on the rock [J]."""
-    a = par.gravity + s.feed / par.mass_b
+    a = bit_acceleration(par, s)
     K = s.gamma * s.k_r
     y = s.p - s.p_u - par.mass_b * a / K
     return deviation_energy(wb, cb, par.n_b, 2 * s.parity, 0.0, a) + 0.5 * K * y * y
 
 
 @merged
-def drills_not(par, s, energy):
+def stays_below_barrier(par, s, energy):
     """Whether a standstill of that energy stays below the barrier."""
-    if par.barrier == 0 or s.next_w_r == 0.0 or s.next_c_r == 0.0:
+    if barrier_off(par, s):
         return False
     return energy <= QUIET_SHARE * s.w_r
 
 
 @merged
-def lifts_not(par, s, energy):
+def keeps_contact(par, s, energy):
     """Whether a standstill of that energy cannot lose its contact force."""
     if par.release == 0:
         return True
-    rest = par.mass_b * par.gravity + s.feed
+    rest = bit_load(par, s)
     if rest <= 0.0:
         return False
     # |dF| <= K |dy| + C |v| with both terms bounded by the energy
@@ -99,27 +106,27 @@ def lifts_not(par, s, energy):
 
 
 @merged
-def plan_flight(par, s, wb, cb, watch, x, v, most):
+def plan_flight(par, s, wb, cb, watch, scratch, most):
     """Steps of free flight before the rock can be met, at most `most`."""
-    if par.rock == NO_ROCK:
+    if par.rock == RockKind.NONE:
         return most
     if s.p >= s.p_u:  # let go while the rock still springs back
-        return watch_flight(par, s, wb, cb, watch, x, v, most)
+        return steps_in_flight(par, s, wb, cb, watch, scratch, most)
     energy = deviation_energy(wb, cb, par.n_b, 2 * s.parity, s.v_b, 0.0)
-    a = par.gravity + s.feed / par.mass_b
+    a = bit_acceleration(par, s)
     room = s.p_u - s.p - 2.0 * par.bound_b * math.sqrt(2.0 * energy)
     limit = time_to_cover(room, s.v_b, a)
     if limit >= most * par.dt:
         return most
     steps = int(limit / par.dt) - 1
-    if steps < WATCHED and par.rock == BILINEAR:
+    if steps < LOOKAHEAD and par.rock == RockKind.BILINEAR:
         # the bound is too coarse so close to the rock: look
-        steps = max(steps, watch_flight(par, s, wb, cb, watch, x, v, most))
+        steps = max(steps, steps_in_flight(par, s, wb, cb, watch, scratch, most))
     return steps
 
 
 @kernel
-def plan_leap(par, s, wb, cb, watch, x, v, most):
+def plan_leap(par, s, wb, cb, watch, scratch, most):
     """Decide how far the bit may leap next, at most `most` steps.
 
     s.leap_end says where to, or -1.
@@ -127,22 +134,22 @@ def plan_leap(par, s, wb, cb, watch, x, v, most):
     steps = 0
     looked = False
     s.v_b = mean_velocity(wb, cb, par.n_b, 2 * s.parity, par.mass_b)
-    if s.mode == FF:
-        s.leap_kind = FLIGHT
-        if par.rock == NO_ROCK or par.rock == BILINEAR or s.p < s.p_u:
-            steps = plan_flight(par, s, wb, cb, watch, x, v, most)
-            looked = par.rock == BILINEAR
-    elif par.rock == BILINEAR and can_watch(par, s):
-        s.leap_kind = CONTACT
-        if s.mode == SS:
+    if s.mode == Mode.FF:
+        s.leap_kind = LeapKind.FLIGHT
+        if par.rock == RockKind.NONE or par.rock == RockKind.BILINEAR or s.p < s.p_u:
+            steps = plan_flight(par, s, wb, cb, watch, scratch, most)
+            looked = par.rock == RockKind.BILINEAR
+    elif par.rock == RockKind.BILINEAR and has_operators(par, s):
+        s.leap_kind = LeapKind.CONTACT
+        if s.mode == Mode.SS:
             energy = standstill_energy(par, s, wb, cb)
-            if not drills_not(par, s, energy):
+            if not stays_below_barrier(par, s, energy):
                 most = 0
-            elif lifts_not(par, s, energy):
-                s.leap_kind = STANDSTILL
+            elif keeps_contact(par, s, energy):
+                s.leap_kind = LeapKind.STANDSTILL
                 steps = most
-        if s.leap_kind == CONTACT and most >= FEWEST_STEPS:
-            steps = watch_contact(par, s, wb, cb, watch, x, v, most)
+        if s.leap_kind == LeapKind.CONTACT and most >= FEWEST_STEPS:
+            steps = steps_in_contact(par, s, wb, cb, watch, scratch, most)
             looked = True
     if steps >= FEWEST_STEPS:
         s.leap_end = s.step + steps - steps % GRAIN
@@ -153,8 +160,9 @@ def plan_leap(par, s, wb, cb, watch, x, v, most):
 
 
 @kernel
-def leap_free_bar(par, s, w, c, n, mass, v0, v1, steps, powers, size, x, y):
+def leap_free_bar(par, s, w, c, n, mass, v0, v1, steps, powers, size, scratch):
     """Carry the vibration of a free bar over `steps` steps."""
+    x, y = scratch.x, scratch.y
     r = 2 * s.parity
     load(x, w, c, n, r, v0, 0.0)
     pad(x, 2 * n, size)
@@ -167,24 +175,25 @@ def leap_free_bar(par, s, w, c, n, mass, v0, v1, steps, powers, size, x, y):
 
 
 @merged
-def leap_flight(par, s, wb, cb, powers, steps, x, y):
+def leap_flight(par, s, wb, cb, powers, steps, scratch):
     """Carry the bit over `steps` steps of free flight."""
     r = 2 * s.parity
-    a = par.gravity + s.feed / par.mass_b
+    a = bit_acceleration(par, s)
     time = steps * par.dt
-    offset = strain_offset(wb, cb, par.n_b, r, BOTTOM)
+    offset = strain_offset(wb, cb, par.n_b, r, Coef.BOTTOM)
     unloading = recoverable(s)
     v0 = s.v_b
     s.v_b = v0 + a * time
     path = (v0 + 0.5 * a * time) * time
-    leap_free_bar(par, s, wb, cb, par.n_b, par.mass_b, v0, s.v_b, steps, powers, par.size_r, x, y)
-    s.p += path - (strain_offset(wb, cb, par.n_b, r, BOTTOM) - offset)
+    size = par.size_r
+    leap_free_bar(par, s, wb, cb, par.n_b, par.mass_b, v0, s.v_b, steps, powers, size, scratch)
+    s.p += path - (strain_offset(wb, cb, par.n_b, r, Coef.BOTTOM) - offset)
     s.e_standstill += unloading - recoverable(s)
     return path
 
 
 @merged
-def leap_standstill(par, s, wb, cb, powers, sums, forms, steps, x, y):
+def leap_standstill(par, s, wb, cb, ops, steps, scratch):
     """Carry the bit over `steps` steps of standstill.
 
     Returns
@@ -194,7 +203,8 @@ def leap_standstill(par, s, wb, cb, powers, sums, forms, steps, x, y):
     """
     r = 2 * s.parity
     n, size = par.n_b, par.size_r
-    a = par.gravity + s.feed / par.mass_b
+    x, y = scratch.x, scratch.y
+    a = bit_acceleration(par, s)
     K = s.gamma * s.k_r
     still = s.p_u + par.mass_b * a / K
     v0 = s.v_b
@@ -203,17 +213,17 @@ def leap_standstill(par, s, wb, cb, powers, sums, forms, steps, x, y):
     x[2 * n] = s.p - still
     pad(x, 2 * n + 1, size)
     before = standstill_energy(par, s, wb, cb)
-    path = dot(sums[SS], x, size)
+    path = dot(ops.sums[Mode.SS], x, size)
     damped = 0.0
     lost = 0.0
     if before > NEGLIGIBLE:
-        damped += quadratic(forms[DASHPOT_FORM], x, y, size)
-        lost += quadratic(forms[NUMERICAL_FORM], x, y, size)
-    carry(powers[SS], steps, x, y, size)
-    path -= dot(sums[SS], x, size)
+        damped += quadratic(ops.forms[DASHPOT_FORM], x, y, size)
+        lost += quadratic(ops.forms[NUMERICAL_FORM], x, y, size)
+    carry(ops.bit[Mode.SS], steps, x, y, size)
+    path -= dot(ops.sums[Mode.SS], x, size)
     if before > NEGLIGIBLE:
-        damped -= quadratic(forms[DASHPOT_FORM], x, y, size)
-        lost -= quadratic(forms[NUMERICAL_FORM], x, y, size)
+        damped -= quadratic(ops.forms[DASHPOT_FORM], x, y, size)
+        lost -= quadratic(ops.forms[NUMERICAL_FORM], x, y, size)
     store(x, wb, cb, n, r, 0.0, a)
     s.p = still + x[2 * n]
     s.e_standstill += damped
@@ -227,36 +237,176 @@ def leap_standstill(par, s, wb, cb, powers, sums, forms, steps, x, y):
 
 
 @kernel
-def leap(par, s, wb, cb, ops, x, v, y, watched):
+def note_steps(s, time, dt, spring, v, steps, K, C, z, fade, d, level):
+    """Bit force of steps in one contact mode from the end velocities at their starts.
+
+    Parameters
+    ----------
+    time, dt : float
+        Start of the first step, and duration of each [s].
+    spring : float
+        Force of the rock's spring at the start [N].
+    v : float array
+        End velocities [m/s].
+    K, C, z, fade, d : float
+        From `step_constants`.
+    level : float
+        [N]
+
+    Returns
+    -------
+    float
+        Greatest distance of the force from `level` at the start of a step [N].
+    """
+    rate = K / (z + C)
+    swing = 0.0
+    for k in range(steps):
+        first = spring + C * v[k]
+        begin = time + k * dt
+        if begin + dt > s.peak_from:
+            note_peak(s, begin, first, z * v[k], rate, first + z * v[k] * fade)
+        spring += K * d * v[k]
+        swing = max(swing, abs(first - level))
+    return swing
+
+
+@kernel
+def note_standstill_peak(par, s, wb, cb, ops, steps, scratch):
+    """Note the greatest bit force of a leap of `steps` steps about to be made.
+
+    The lookahead of a leap in contact, chunk by chunk, until the vibration has
+    died away.
+    """
+    x, v, y = scratch.x, scratch.v, scratch.y
+    load_contact(par, s, wb, cb, x)
+    K, C, z, fade, d, _q = step_constants(par, s)
+    level = bit_load(par, s)
+    time = time_of(par, s)
+    done = 0
+    if s.peak_from > time:
+        done = min(int((s.peak_from - time) / par.dt), steps - 1)
+        carry(ops.bit[Mode.SS], done, x, y, par.size_r)
+    while done < steps:
+        count = min(LOOKAHEAD, steps - done)
+        look_ahead(ops.watch[Mode.SS], par.size_r, x, v, count, False)
+        spring = level + K * x[2 * par.n_b]
+        begin = time + done * par.dt
+        swing = note_steps(s, begin, par.dt, spring, v, count, K, C, z, fade, d, level)
+        if swing < STILL_SHARE * abs(level):
+            s.peak_bit_force = max(s.peak_bit_force, level)
+            return
+        carry(ops.bit[Mode.SS], LOOKAHEAD, x, y, par.size_r)
+        done += LOOKAHEAD
+
+
+@kernel
+def leap_contact(par, s, wb, cb, ops, steps, scratch):
+    """Carry the bit over `steps` steps within a contact mode.
+
+    Parameters
+    ----------
+    scratch : Scratch
+        Its v holds the end velocities that `steps_in_contact` found.
+
+    Returns
+    -------
+    path : float
+        Path of the bit's mean motion as its body forces see it [m].
+    """
+    x, v, y = scratch.x, scratch.v, scratch.y
+    still = load_contact(par, s, wb, cb, x)
+    K, C, z, fade, d, q = step_constants(par, s)
+    squares = 0.0
+    spring = K * (s.p - origin(s))
+    peak = s.b_peak_bit
+    for k in range(steps):
+        squares += v[k] * v[k]
+        force = spring + C * v[k]
+        spring += K * d * v[k]
+        peak = max(peak, force + max(0.0, z * fade * v[k]))
+    s.b_peak_bit = peak
+    begin = time_of(par, s)
+    if begin + steps * par.dt > s.peak_from:
+        first = K * (s.p - origin(s))
+        note_steps(s, begin, par.dt, first, v, steps, K, C, z, fade, d, 0.0)
+    before = contact_energy(par, s, wb, cb, K, s.p - still)
+    path = dot(ops.sums[s.mode], x, par.size_r)
+    carry(ops.bit[s.mode], steps, x, y, par.size_r)
+    path -= dot(ops.sums[s.mode], x, par.size_r)
+    a = bit_acceleration(par, s)
+    store(x, wb, cb, par.n_b, 2 * s.parity, 0.0, a)
+    if par.loss > 0:
+        after = contact_energy(par, s, wb, cb, K, x[2 * par.n_b])
+        elsewhere = (C * q + par.z_b * (q - d * d / par.dt)) * squares
+        s.e_loss += before - after - elsewhere
+    book_contact(par, s, wb, cb, K, C, still + x[2 * par.n_b], d, q, squares, steps)
+    return path
+
+
+@kernel
+def contact_energy(par, s, wb, cb, K, y):
+    """Energy of bit and rock about rest, `y` away from it [J]."""
+    a = bit_acceleration(par, s)
+    return deviation_energy(wb, cb, par.n_b, 2 * s.parity, 0.0, a) + 0.5 * K * y * y
+
+
+@merged
+def book_contact(par, s, wb, cb, K, C, p, d, q, squares, steps):
+    """Penetration, impulse and ledger after a leap in contact.
+
+    Parameters
+    ----------
+    K, C : float
+        Of the mode.
+    p : float
+        Penetration at the end [m].
+    d, q : float
+        Integrals over a step of unit velocity at its start, and its square.
+    squares : float
+        Sum over the steps of the square of that velocity [m2/s2].
+    """
+    before = s.p
+    start = origin(s)
+    s.p = p
+    damped = C * q * squares
+    s.rock_work += 0.5 * K * (p - before) * (p + before - 2.0 * start) + damped
+    book_dashpot(s, damped)
+    crush(par, s, before)
+    s.e_numerical += par.z_b * (q - d * d / par.dt) * squares
+    v0 = s.v_b
+    a = bit_acceleration(par, s)
+    s.v_b = mean_velocity(wb, cb, par.n_b, 2 * s.parity, par.mass_b)
+    s.i_bit += par.mass_b * (a * steps * par.dt - (s.v_b - v0))
+
+
+@kernel
+def leap(par, s, wb, cb, ops, scratch, planned):
     """Carry the bit to s.leap_end in one go.
 
     Parameters
     ----------
-    watched : bool
-        Whether `v` still holds what the plan of this leap saw.
-    ops : tuple of float arrays
-        (piston, bit, watch, sums, top, bottom, forms), see `LeapOperators`.
-    x, v, y : float array
-        Scratch.
+    ops : LeapOperators
+    scratch : Scratch
+    planned : bool
+        Whether its v still holds what the plan of this leap saw.
     """
     steps = s.leap_end - s.step
-    if s.mode == SS:
-        push_checkpoint(s, now(par, s))
-    if s.leap_kind == FLIGHT:
-        path = leap_flight(par, s, wb, cb, ops[1][FF], steps, x, y)
-    elif s.leap_kind == STANDSTILL:
-        if now(par, s) + steps * par.dt > s.peak_from:
-            watch_standstill(par, s, wb, cb, ops[1], ops[2], steps, x, v, y)
-        path = leap_standstill(par, s, wb, cb, ops[1], ops[3], ops[6], steps, x, y)
+    if s.mode == Mode.SS:
+        push_checkpoint(s, time_of(par, s))
+    if s.leap_kind == LeapKind.FLIGHT:
+        path = leap_flight(par, s, wb, cb, ops.bit[Mode.FF], steps, scratch)
+    elif s.leap_kind == LeapKind.STANDSTILL:
+        if time_of(par, s) + steps * par.dt > s.peak_from:
+            note_standstill_peak(par, s, wb, cb, ops, steps, scratch)
+        path = leap_standstill(par, s, wb, cb, ops, steps, scratch)
     else:
-        if not watched:
-            watch_contact(par, s, wb, cb, ops[2], x, v, steps)
-        path = leap_contact(par, s, wb, cb, ops[1], ops[3], steps, x, v, y)
-    s.e_feed += s.feed * path
-    s.e_gravity += par.mass_b * par.gravity * path
+        if not planned:
+            steps_in_contact(par, s, wb, cb, ops.watch, scratch, steps)
+        path = leap_contact(par, s, wb, cb, ops, steps, scratch)
+    book_bit_load(par, s, path)
     s.step = s.leap_end
     s.leap_end = -1
     s.count_leaps += 1
     s.count_leap_steps += steps
-    if s.mode == SS:
-        push_checkpoint(s, now(par, s))
+    if s.mode == Mode.SS:
+        push_checkpoint(s, time_of(par, s))

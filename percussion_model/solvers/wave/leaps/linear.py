@@ -16,8 +16,6 @@ from percussion_model.solvers.wave.leaps.lanes import (
 )
 from percussion_model.solvers.wave.records import Coef
 
-MASS, STATIC = int(Coef.MASS), int(Coef.STATIC)
-
 # Sizes are padded to a multiple of this, which is what a product takes at a time.
 PADDING = WIDTH
 
@@ -27,7 +25,7 @@ def load(x, w, c, n, r, velocity, acceleration):
     """Copy the deviation from mean motion and static load into `x`."""
     half = 0.5 * velocity
     for i in range(n):
-        rest = acceleration * c[STATIC, i]
+        rest = acceleration * c[Coef.STATIC, i]
         x[i] = w[r, i] - half - rest
         x[n + i] = w[r + 1, i] - half + rest
 
@@ -37,7 +35,7 @@ def store(x, w, c, n, r, velocity, acceleration):
     """Copy `x` back about a new mean velocity and the static load."""
     half = 0.5 * velocity
     for i in range(n):
-        rest = acceleration * c[STATIC, i]
+        rest = acceleration * c[Coef.STATIC, i]
         w[r, i] = x[i] + half + rest
         w[r + 1, i] = x[n + i] + half - rest
 
@@ -47,7 +45,7 @@ def remove_mean(x, c, n, mass):
     """Take rounding's share of mean motion out of a free bar's deviation."""
     a = 0.0
     for i in range(n):
-        a += c[MASS, i] * (x[i] + x[n + i])
+        a += c[Coef.MASS, i] * (x[i] + x[n + i])
     half = 0.5 * a / mass
     for i in range(n):
         x[i] -= half

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from percussion_model.physics.records import DriveKind, Mode, Piston, RockKind
 from percussion_model.solvers.wave.grid import Grid
-from percussion_model.solvers.wave.leaps.contact_leap import WATCH_LEVELS, WATCHED
 from percussion_model.solvers.wave.leaps.linear import PADDING
+from percussion_model.solvers.wave.leaps.lookahead import LOOKAHEAD, LOOKAHEAD_LEVELS
 from percussion_model.solvers.wave.leaps.step_map import (
     Configuration,
     end_row,
-    no_operators,
     step_forms,
     step_map,
 )
@@ -42,8 +40,7 @@ _kept: dict[bytes, LeapOperators | None] = {}
 _kept_free: dict[bytes, dict[str, np.ndarray]] = {}
 
 
-@dataclass(frozen=True)
-class LeapOperators:
+class LeapOperators(NamedTuple):
     """Powers of the step map, and what can be seen of the next steps.
 
     Maps are stored column by column and padded with zeros, forms as
@@ -56,15 +53,15 @@ class LeapOperators:
         Powers 1, 4, 16, ... of the free piston's step map.
     bit : ndarray, shape (5, LEVELS, size, size)
         The same for the bit by `Mode`.
-    watch : ndarray, shape (5, size, WATCHED)
+    watch : ndarray, shape (5, size, LOOKAHEAD)
         By mode: strain offset of the rock end at the end of the next steps in
         FF, its velocity at their start in DFC, FC, BC and SS.
     sums : ndarray, shape (5, size)
         By contact mode: path of the bit's mean motion until it rests.
-    top : ndarray, shape (5, size, WATCHED)
+    top : ndarray, shape (5, size, LOOKAHEAD)
         By mode: motion of the bit's top end by the end of the next steps, in
         FF its strain offset.
-    bottom : ndarray, shape (size, WATCHED)
+    bottom : ndarray, shape (size, LOOKAHEAD)
         Strain offset of the piston's bottom end.
     forms : ndarray, shape (2, size, size)
         What a standstill will ever lose in the dashpot and by averaging [J].
@@ -78,10 +75,10 @@ class LeapOperators:
     bottom: np.ndarray
     forms: np.ndarray
 
-    @property
-    def arrays(self) -> tuple[np.ndarray, ...]:
-        """The arrays in the order in which the kernels take them."""
-        return tuple(getattr(self, name) for name in self.__dataclass_fields__)
+
+def no_operators() -> LeapOperators:
+    """Stand-ins where no leaps are made."""
+    return LeapOperators(*(np.zeros((1,) * rank) for rank in (3, 4, 3, 2, 3, 2, 3)))
 
 
 def padded(size: int) -> int:
@@ -143,7 +140,7 @@ def _build(
         loaded = _of_loaded_bit(alone, bit, cb, free, _loads(par))
     except np.linalg.LinAlgError:
         return None
-    return LeapOperators(**{name: loaded.get(name, free[name]) for name in _NAMES})
+    return LeapOperators(**(free | loaded))
 
 
 def _free(
@@ -153,26 +150,25 @@ def _free(
 
     The contact modes have room in them.
     """
-    found = dict(zip(_NAMES, no_operators(), strict=True))
+    found = no_operators()._asdict()
     if piston is not None:
         of_piston = alone.copy()
         of_piston["n_b"], of_piston["mass_b"] = piston.n, piston.mass.sum()
         for end in ("z", "kappa"):
             of_piston[f"{end}_t"], of_piston[f"{end}_b"] = alone[f"{end}_f"], alone[f"{end}_p"]
-        by_column = step_map(Configuration(of_piston, piston, cp))
+        by_column = step_map(Configuration(of_piston, piston, cp), no_operators())
         found["piston"] = _powers(by_column, LEVELS, int(alone["size_p"][0]))
-        found["bottom"] = _watch(found["piston"], by_column @ _offset(cp, piston.n, Coef.BOTTOM))
+        found["bottom"] = _lookahead(
+            found["piston"], by_column @ _offset(cp, piston.n, Coef.BOTTOM)
+        )
     size = int(alone["size_r"][0])
     powers = np.zeros((len(Mode), LEVELS, size, size))
-    watch, top = np.zeros((2, len(Mode), size, WATCHED))
-    by_column = step_map(Configuration(alone, bit, cb))
+    watch, top = np.zeros((2, len(Mode), size, LOOKAHEAD))
+    by_column = step_map(Configuration(alone, bit, cb), no_operators())
     powers[Mode.FF] = _powers(by_column, LEVELS, size)
     for rows, row in ((watch, Coef.BOTTOM), (top, Coef.TOP)):
-        rows[Mode.FF] = _watch(powers[Mode.FF], by_column @ _offset(cb, bit.n, row))
+        rows[Mode.FF] = _lookahead(powers[Mode.FF], by_column @ _offset(cb, bit.n, row))
     return found | {"bit": powers, "watch": watch, "top": top}
-
-
-_NAMES = tuple(LeapOperators.__dataclass_fields__)
 
 
 def _loads(par: np.ndarray) -> dict[Mode, tuple[float, float]]:
@@ -222,18 +218,18 @@ def _of_loaded_bit(
     way = np.append(_offset(cb, bit.n, Coef.TOP) + _offset(cb, bit.n, Coef.BOTTOM), 1.0)
     for mode, (stiffness, damping) in loads.items():
         configuration = Configuration(rock, bit, cb, float(stiffness), float(damping))
-        by_column = step_map(configuration)
-        levels = LEVELS if mode == Mode.SS else WATCH_LEVELS
+        by_column = step_map(configuration, no_operators())
+        levels = LEVELS if mode == Mode.SS else LOOKAHEAD_LEVELS
         powers[mode, :levels] = _powers(by_column, levels, size)
-        watch[mode] = _watch(powers[mode], end_row(configuration, by_column))
-        top[mode] = _watch(powers[mode], by_column @ way)
+        watch[mode] = _lookahead(powers[mode], end_row(configuration, by_column))
+        top[mode] = _lookahead(powers[mode], by_column @ way)
         sums[mode, : len(by_column)] = _path_to_rest(configuration, by_column)
         if mode == Mode.SS:
             forms = _ever_lost(by_column, step_forms(configuration, by_column)[1:], size)
     return {"bit": powers, "watch": watch, "sums": sums, "top": top, "forms": forms}
 
 
-def _watch(powers: np.ndarray, row: np.ndarray) -> np.ndarray:
+def _lookahead(powers: np.ndarray, row: np.ndarray) -> np.ndarray:
     """Rows that show at the start of each of the next steps what `row` shows now.
 
     Parameters
@@ -245,11 +241,11 @@ def _watch(powers: np.ndarray, row: np.ndarray) -> np.ndarray:
 
     Returns
     -------
-    ndarray, shape (size, WATCHED)
+    ndarray, shape (size, LOOKAHEAD)
     """
     shown = np.zeros((powers.shape[-1], 1))
     shown[: len(row), 0] = row
-    for power in powers[: WATCH_LEVELS - 1]:  # one to four of each
+    for power in powers[: LOOKAHEAD_LEVELS - 1]:  # one to four of each
         later = [shown]
         for _ in range(3):
             later.append(power @ later[-1])

@@ -1,4 +1,4 @@
-"""The linear map of one step in a given configuration, and what it dissipates.
+"""Linear map of one step in a given configuration, and what it dissipates.
 
 The map is made by the solver's own step, from unit deviations. Its quadratic
 forms follow from the same formulas as the ledger of a step
@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from percussion_model.physics.records import BLOW, EVENT, SAMPLE_FIELDS, Mode
+from percussion_model.physics.records import BLOW, EVENT, READING, Mode
 from percussion_model.solvers.wave.advance import run
 from percussion_model.solvers.wave.grid import Grid
-from percussion_model.solvers.wave.records import WAVE_STATE, Coef, Row, Task
+from percussion_model.solvers.wave.records import WAVE_STATE, Bars, Coef, Row, Scratch, Task
 
 # Unit in which the map counts the penetration while it is made [m].
 SCALE = 1e-6
@@ -38,13 +38,13 @@ class Configuration:
         return 2 * self.grid.n + (1 if self.stiffness else 0)
 
 
-def no_operators() -> tuple[np.ndarray, ...]:
-    """Stand-ins for the leap operators where no leaps are made."""
-    return tuple(np.zeros((1,) * rank) for rank in (3, 4, 3, 2, 3, 2, 3))
-
-
-def step_map(configuration: Configuration) -> np.ndarray:
+def step_map(configuration: Configuration, operators: tuple[np.ndarray, ...]) -> np.ndarray:
     """What one step makes of each unit deviation.
+
+    Parameters
+    ----------
+    operators : LeapOperators
+        Not used by a step; it tells the kernel's types.
 
     Returns
     -------
@@ -62,11 +62,11 @@ def step_map(configuration: Configuration) -> np.ndarray:
     start["c_r"] = configuration.damping
     start["next_c_r"] = 1.0  # a barrier stands, so that standstill lasts
     start["w_r"] = start["next_w_r"] = NO_WAY_OUT
-    piston = np.zeros((len(Row), 1)), np.zeros((len(Coef), 1))
-    none, row = np.zeros(1), np.zeros(len(SAMPLE_FIELDS))
-    blows, events, operators = np.zeros(1, BLOW), np.zeros(1, EVENT), no_operators()
+    none = np.zeros(1)
+    unused = np.zeros(1, BLOW), np.zeros(1, EVENT), np.zeros(1, READING)
     by_column = np.zeros((size, size))
     state, w = start.copy(), np.zeros((len(Row), n + 1))
+    bars = Bars(np.zeros((len(Row), 1)), np.zeros((len(Coef), 1)), w, configuration.c)
     # As bytes, since NumPy copies records field by field.
     to, origin = state.view(np.uint8), start.view(np.uint8)
     for k in range(size):
@@ -79,21 +79,9 @@ def step_map(configuration: Configuration) -> np.ndarray:
         else:
             state["p"] = SCALE
         run(
-            int(Task.STEP),
-            configuration.par,
-            state,
-            *piston,
-            w,
-            configuration.c,
-            operators,
-            none,
-            none,
-            none,
-            0.0,
-            blows,
-            events,
-            row,
-        )
+            int(Task.STEP), configuration.par, state, bars, operators, Scratch(none, none, none),
+            0.0, *unused,
+        )  # fmt: skip
         by_column[k, :n], by_column[k, n : 2 * n] = w[Row.DOWN_OTHER, :n], w[Row.UP_OTHER, :n]
         if size > 2 * n:
             by_column[k, -1] = state[0]["p"]
