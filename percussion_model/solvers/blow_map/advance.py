@@ -4,8 +4,16 @@ from __future__ import annotations
 
 import math
 
+from percussion_model.physics.blows import close_gap, open_gap, start_blow
+from percussion_model.physics.body import (
+    bit_load,
+    book_bit_load,
+    book_piston_load,
+    piston_acceleration,
+)
+from percussion_model.physics.drive import drive_force, turn_drive
 from percussion_model.physics.kernel import kernel
-from percussion_model.physics.records import EventKind, Status
+from percussion_model.physics.records import Status
 from percussion_model.solvers.blow_map.flight import bit_at, move, plan
 from percussion_model.solvers.blow_map.records import (
     ENTRIES,
@@ -17,7 +25,7 @@ from percussion_model.solvers.blow_map.records import (
 )
 
 PIECES = len(PATH_TIMES)
-# Rows of the event list that one call of `happen` can fill.
+# Rows of the event list that one event can fill.
 ROWS = 3
 
 
@@ -89,8 +97,8 @@ def outside(par, s, v):
     """Look whether an impact lies in the table; `REFUSED` if not."""
     if not par.lowest[Axis.VELOCITY] <= v <= par.highest[Axis.VELOCITY]:
         return refuse(s, Refusal.VELOCITY, v)
-    if not par.lowest[Axis.STIFFNESS] <= s.k_r <= par.highest[Axis.STIFFNESS]:
-        return refuse(s, Refusal.STIFFNESS, s.k_r)
+    if not par.lowest[Axis.STIFFNESS] <= s.next_k_r <= par.highest[Axis.STIFFNESS]:
+        return refuse(s, Refusal.STIFFNESS, s.next_k_r)
     if not par.lowest[Axis.LOAD] <= s.feed <= par.highest[Axis.LOAD]:
         return refuse(s, Refusal.FEED, s.feed)
     if not par.lowest[Axis.DRIVE] <= s.drive_force <= par.highest[Axis.DRIVE]:
@@ -99,43 +107,8 @@ def outside(par, s, v):
 
 
 @kernel
-def push(s, events, n, time, kind, value, position):
-    """Append a row to the event list."""
-    s.count_events += 1
-    row = events[n]
-    row.time = time
-    row.kind = kind
-    row.value = value
-    row.bit_position = position
-    return n + 1
-
-
-@kernel
-def finish_blow(par, s, row):
-    """Write the row of the blow that ends at the present impact."""
-    row.time = s.b_time
-    row.period = s.t - s.b_time
-    row.impact_velocity = s.b_impact
-    row.rebound_velocity = s.b_rebound
-    row.stroke = s.b_stroke
-    row.blow_energy = 0.5 * par.mass_p * s.b_impact * s.b_impact
-    row.rock_energy = s.b_rock
-    row.penetration = s.x_rest - s.b_position
-    row.bit_position = s.b_position
-    row.peak_contact_force = s.b_peak_contact
-    row.peak_bit_force = s.b_peak_bit
-    row.standstill_force = s.b_standstill
-    row.contact_impulse = s.b_contact
-    row.bit_impulse = s.i_bit - s.b_bit0
-    row.drive_impulse = s.i_drive - s.b_drive0
-    row.contacts = int(s.b_contacts)
-    row.drilling_cycles = int(s.b_cycles)
-
-
-@kernel
 def take_blow(par, s, found, v):
-    """Let the blow of `found` begin at the present time."""
-    a = par.gravity - s.drive_force / par.mass_p
+    """Let the blow of `found` act on bit, piston and ledger from the present time on."""
     s.t_blow = s.t
     s.penetration = v * found[Entry.PENETRATION]
     s.rest = found[Entry.REST]
@@ -143,125 +116,104 @@ def take_blow(par, s, found, v):
     for k in range(PIECES):
         s.path[k] = v * found[Entry.PATH + k]
     s.y = v * found[Entry.OFFSET]
-    s.v = v * found[Entry.REBOUND]
-    s.alpha = -1.0
-    static = s.feed + par.mass_b * par.gravity
+    s.v_p = v * found[Entry.REBOUND]
     crushing, barrier = v * v * found[Entry.CRUSHING], v * v * found[Entry.BARRIER]
     standstill = v * v * found[Entry.STANDSTILL]
-    s.b_started = 1.0
-    s.b_time = s.t
-    s.b_impact = v
-    s.b_rebound = s.v + a * s.opened
-    s.b_stroke = 0.0
+    s.rock_work = crushing + barrier + standstill
+    s.b_rock0 = 0.0  # counted from each blow on, which keeps the digits
     s.b_peak_contact = v * found[Entry.PEAK_CONTACT]
     s.b_peak_bit = v * found[Entry.PEAK_BIT]
-    s.b_position = s.x_rest
-    s.b_standstill = static
-    s.b_rock = crushing + barrier + standstill
-    s.b_contact = par.mass_p * (v - s.v)
-    s.b_bit0 = s.i_bit
-    s.b_drive0 = s.i_drive
-    s.b_contacts = found[Entry.CONTACTS]
-    s.b_cycles = found[Entry.CYCLES]
-    s.count_blows += 1
-    s.i_contact += s.b_contact
-    s.i_bit += s.b_contact
+    s.b_cycles = int(found[Entry.CYCLES])
+    impulse = par.mass_p * (v - s.v_p)
+    s.i_contact += impulse
+    s.i_bit += impulse
     # The flight is carried back to the start of the blow, where it begins at y and not
     # at 0: the works on that way are missing in what `move` adds.
-    s.e_drive += s.y * -s.drive_force
-    s.e_gravity += s.y * par.mass_p * par.gravity
-    s.e_gravity += par.mass_b * par.gravity * s.penetration
-    s.e_feed += s.feed * s.penetration
+    book_piston_load(par, s, -s.drive_force, s.y, 0.0)
+    book_bit_load(par, s, s.penetration)
     s.e_crushing += crushing
     s.e_barrier += barrier
     s.e_standstill += standstill
     s.e_loss += v * v * found[Entry.LOSS]
     s.e_numerical += v * v * found[Entry.NUMERICAL]
     if s.t >= s.peak_from:
-        s.peak_bit = max(s.peak_bit, s.b_peak_bit)
-        s.peak_contact = max(s.peak_contact, s.b_peak_contact)
+        s.peak_bit_force = max(s.peak_bit_force, s.b_peak_bit)
+        s.peak_contact_force = max(s.peak_contact_force, s.b_peak_contact)
 
 
 @kernel
 def strike(par, s, table, found, t):
-    """Let the piston strike the bit at `t`, or refuse and leave the state alone."""
-    v = s.v + (par.gravity + s.alpha * s.drive_force / par.mass_p) * (t - s.t)
+    """Find the blow of the piston that strikes the bit at `t`, or refuse."""
+    v = s.v_p + piston_acceleration(par, drive_force(par, s)) * (t - s.t)
     status = outside(par, s, v)
     if status != Status.DONE:
         return status
     if not t - s.t_blow >= s.rest:
         return refuse(s, Refusal.MOVING, t - s.t_blow)
-    load = (s.feed + par.mass_b * par.gravity) / v
-    find_blow(par, table, found, s.k_r, v, load, s.drive_force / v)
+    find_blow(par, table, found, s.next_k_r, v, bit_load(par, s) / v, s.drive_force / v)
     if not found[Entry.PENETRATION] == found[Entry.PENETRATION]:
         return refuse(s, Refusal.FEED, s.feed)
     return Status.DONE
 
 
 @kernel
-def happen(par, s, table, found, blows, n_blows, events, n_events, events_on):
-    """Let what ends the present piece of flight happen.
-
-    Returns
-    -------
-    status, n_blows, n_events : int
-    """
+def process_event(par, s, table, found, blows, events):
+    """Process what ends the present piece of flight; a `Status`."""
     t = s.t_next
-    position = s.x_rest + bit_at(s, t)[0]
     if s.next == Next.TURN:
         if t < s.t_blow + s.opened:
-            return refuse(s, Refusal.TURNED, s.reversal), n_blows, n_events
+            return refuse(s, Refusal.TURNED, s.reversal)
+        s.p = bit_at(s, t)[0]
         move(par, s, t)
-        s.alpha = 1.0
-        if events_on:
-            n_events = push(s, events, n_events, t, EventKind.DRIVE_DOWN, -s.reversal, position)
+        turn_drive(s, events, t, -s.reversal)
     elif s.next == Next.IMPACT:
         status = strike(par, s, table, found, t)
         if status != Status.DONE:
-            return status, n_blows, n_events
+            return status
         move(par, s, t)
-        v = s.v
-        s.x_rest += s.penetration
-        if s.b_started > 0.0:
-            finish_blow(par, s, blows[n_blows])
-            n_blows += 1
+        v = s.v_p
+        s.x_r += s.penetration
+        s.p = 0.0
+        start_blow(s, blows, t, v, s.x_r, bit_load(par, s), par.mass_p)
         take_blow(par, s, found, v)
-        if events_on:
-            n_events = push(s, events, n_events, t, EventKind.DRIVE_UP, 0.0, s.x_rest)
-            n_events = push(s, events, n_events, t, EventKind.CONTACT_CLOSED, v, s.x_rest)
-            opened = t + s.opened
-            position = s.x_rest + bit_at(s, opened)[0]
-            n_events = push(
-                s, events, n_events, opened, EventKind.CONTACT_OPENED, s.b_rebound, position
-            )
+        turn_drive(s, events, t, 0.0)
+        close_gap(s, events, t, v)
+        s.b_contacts = int(found[Entry.CONTACTS])
+        opened = t + s.opened
+        s.p = bit_at(s, opened)[0]
+        rebound = s.v_p + piston_acceleration(par, drive_force(par, s)) * s.opened
+        open_gap(s, events, opened, rebound)
+        s.b_rebound = rebound
     else:
-        return refuse(s, Refusal.FALLEN, s.drive_force), n_blows, n_events
+        return refuse(s, Refusal.FALLEN, s.drive_force)
     plan(par, s)
-    return Status.DONE, n_blows, n_events
+    return Status.DONE
 
 
 @kernel
-def advance(pars, states, table, found, t, blows, events, events_on, counts):
-    """Let all that happens up to `t` happen; `counts` gets the rows filled.
+def advance(pars, states, table, found, t, blows, events):
+    """Process all that happens up to `t`; a `Status`.
 
     Parameters
     ----------
-    pars, states : arrays of BLOW_PAR and BLOW_STATE of length 1
+    pars, states : arrays of MAP_PAR and MAP_STATE of length 1
+    table, found : float array
+        As in `find_blow`.
+    t : float
+        [s]
+    blows, events : arrays of BLOW and EVENT
+        Filled from index 0; the state says how far.
     """
     par = pars[0]
     s = states[0]
-    n_blows = 0
-    n_events = 0
-    status = Status.DONE
-    while status == Status.DONE and s.t_next <= t:
-        if n_blows == len(blows):
-            status = Status.BLOWS_FULL
-        elif events_on and n_events + ROWS > len(events):
-            status = Status.EVENTS_FULL
-        else:
-            status, n_blows, n_events = happen(
-                par, s, table, found, blows, n_blows, events, n_events, events_on
-            )
-    counts[0] = n_blows
-    counts[1] = n_events
-    return status
+    s.n_blows = 0
+    s.n_events = 0
+    while s.t_next <= t:
+        if s.n_blows == len(blows):
+            return Status.BLOWS_FULL
+        if s.events_on == 1 and s.n_events + ROWS > len(events):
+            return Status.EVENTS_FULL
+        status = process_event(par, s, table, found, blows, events)
+        if status != Status.DONE:
+            return status
+    return Status.DONE

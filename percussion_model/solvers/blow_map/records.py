@@ -6,7 +6,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from percussion_model.physics.records import LEDGER_FIELDS
+from percussion_model.physics.state import COMMON_PARAMETERS, COMMON_STATE
 
 # Times after the start of a blow at which the table has the bit's position [s].
 PATH_TIMES = (0.5e-3, 1e-3, 1.5e-3, 2e-3, 3e-3, 4e-3, 5e-3, 6.5e-3, 9e-3, 14e-3)
@@ -67,13 +67,11 @@ class Refusal(IntEnum):
 
 
 # Parameters: what stays fixed during a run.
-BLOW_PAR = np.dtype(
+MAP_PAR = np.dtype(
     [
-        ("mass_p", "f8"),  # [kg]
-        ("mass_b", "f8"),
-        ("gravity", "f8"),  # [m/s2]
+        *COMMON_PARAMETERS,
+        ("start_gap", "f8"),  # g_0 [m]
         ("gamma", "f8"),
-        ("gap", "f8"),  # g_0 [m]
         ("lowest", "f8", (len(Axis),)),  # of K_R, v, F_S and F_0: what is answered
         ("highest", "f8", (len(Axis),)),
         ("origin", "f8", (len(Axis),)),  # of the axes of the table
@@ -82,45 +80,23 @@ BLOW_PAR = np.dtype(
     align=True,
 )
 
-_MEASURES = ("time", "impact", "rebound", "stroke", "peak_contact", "peak_bit", "position")
-_BLOW = (*_MEASURES, "standstill", "rock", "contact", "bit0", "drive0", "contacts", "cycles")
-
-# All fields are words of eight bytes.
-BLOW_STATE = np.dtype(
+# The bit's datum x_r is where it stood before the blow, and p its way since then.
+MAP_STATE = np.dtype(
     [
-        ("feed", "f8"),  # inputs: [N]
-        ("drive_force", "f8"),  # [N]
-        ("reversal", "f8"),  # [m]
-        ("k_r", "f8"),  # [N/m]
+        *COMMON_STATE,
         # the present piece of the flight
         ("t", "f8"),  # its start [s]
         ("y", "f8"),  # piston from where it struck the resting bit last, at t [m]
-        ("v", "f8"),  # [m/s]
-        ("alpha", "f8"),  # direction of the drive
         ("t_next", "f8"),  # its end [s]
-        ("next", "f8"),  # Next
-        # the bit: where it stood before the blow, and what the blow does to it
-        ("x_rest", "f8"),  # [m]
+        ("next", "i8"),  # Next
+        # what the last blow does to the bit
         ("t_blow", "f8"),  # [s]
         ("penetration", "f8"),  # [m]
         ("rest", "f8"),  # [s]
         ("opened", "f8"),  # [s]
         ("path", "f8", (len(PATH_TIMES),)),  # [m]
-        ("refusal", "f8"),  # Refusal of the last call
+        ("refusal", "i8"),  # Refusal of the last call
         ("refused_value", "f8"),
-        # running sums, up to t
-        ("i_bit", "f8"),  # [N s]
-        ("i_contact", "f8"),
-        ("i_drive", "f8"),
-        *[(f"e_{name}", "f8") for name in LEDGER_FIELDS],
-        ("e_start", "f8"),  # [J]
-        ("peak_from", "f8"),  # [s]
-        ("peak_bit", "f8"),  # [N]
-        ("peak_contact", "f8"),
-        # the blow under way
-        ("b_started", "f8"),
-        *[(f"b_{name}", "f8") for name in _BLOW],
-        ("count_blows", "f8"),
-        ("count_events", "f8"),
-    ]
+    ],
+    align=True,
 )

@@ -11,7 +11,8 @@ import numpy as np
 from percussion_model.physics.records import (
     BLOW,
     EVENT,
-    LONG_SAMPLE_FIELDS,
+    READING,
+    READING_FIELDS,
     EventKind,
     Mode,
     Status,
@@ -19,11 +20,11 @@ from percussion_model.physics.records import (
 from percussion_model.scene.rows import Row as ParameterRow
 from percussion_model.scene.rules import SceneRules
 from percussion_model.solvers.blow_map.records import ENTRIES, PATH_TIMES, Entry
+from percussion_model.solvers.state import State
 from percussion_model.solvers.wave.records import Row
 from percussion_model.solvers.wave.solver import WaveSolver
-from percussion_model.solvers.wave.state import WaveState
 
-AT = {name: k for k, name in enumerate(LONG_SAMPLE_FIELDS)}
+AT = {name: k for k, name in enumerate(READING_FIELDS)}
 # Times at which the bit is looked at [s]: those of the path, and until it must rest.
 LATER = (20e-3, 28e-3, 40e-3, 60e-3, 80e-3, 100e-3)
 # The bit stands still once its energy is below this share of the blow's: it then moves
@@ -104,7 +105,7 @@ class SingleBlow:
         self.gravity = gravity
         self.weight = gravity * scene.bit.mass
 
-    def start(self, velocity: float, load: float, drive: float) -> WaveState:
+    def start(self, velocity: float, load: float, drive: float) -> State:
         """State shortly before the impact, which comes at `self.impact`.
 
         Parameters
@@ -118,7 +119,7 @@ class SingleBlow:
         """
         solver, state = self.solver, self._base.copy()
         s: Any = state.record[0]
-        wp, wb = state.bars
+        wp, wb = state.arrays
         n = solver.cells["bit"]
         standing = load / self.scene.bit.mass * solver.static_wave
         wb[Row.DOWN, :n], wb[Row.UP, :n] = standing, -standing
@@ -145,19 +146,17 @@ class SingleBlow:
         Raises
         ------
         ArithmeticError
-            If the wave solver finds no way on.
+            If the wave solver could not continue.
         """
-        solver, scene = self.solver, self.scene
+        scene = self.scene
         state = self.start(velocity, load, drive)
         energy = 0.5 * scene.piston.mass * velocity * velocity
-        rows: list[np.ndarray] = [np.zeros(len(LONG_SAMPLE_FIELDS))]
-        solver.look(state, self.impact, rows[0])
+        rows = [self._reading(state, self.impact)]
         opened = 0.0
         times = (*PATH_TIMES, *LATER)
         for k, t in enumerate(times):
             opened = max(opened, self._advance(state, self.impact + t) - self.impact)
-            row = np.zeros(len(LONG_SAMPLE_FIELDS))
-            solver.look(state, self.impact + t, row, peaks=False)
+            row = self._reading(state, self.impact + t)
             rows.append(row)
             if k + 1 >= len(PATH_TIMES) and row[AT["bit_kinetic_energy"]] < SILENT * energy:
                 above = row[AT["bit_position"]] - rows[-2][AT["bit_position"]]
@@ -177,7 +176,13 @@ class SingleBlow:
         found[Entry.PEAK_BIT] = s["b_peak_bit"] / velocity
         return found
 
-    def _advance(self, state: WaveState, t: float) -> float:
+    def _reading(self, state: State, t: float) -> np.ndarray:
+        """Numbers of a reading at `t` (`READING_FIELDS`)."""
+        reading = np.zeros(1, READING)
+        self.solver.read(state, t, reading, peaks=False)
+        return reading.view(np.float64)
+
+    def _advance(self, state: State, t: float) -> float:
         """Advance to `t`; return when a contact opened last, 0 if none did [s]."""
         opened = 0.0
         while True:
@@ -189,7 +194,9 @@ class SingleBlow:
             if status == Status.DONE:
                 return opened
             if status not in (Status.BLOWS_FULL, Status.EVENTS_FULL):
-                raise ArithmeticError(f"a blow of the map found no way on: {Status(status).name}")
+                raise ArithmeticError(
+                    f"a blow of the map could not be computed: {Status(status).name}"
+                )
 
     def _found(self, rows: np.ndarray, velocity: float, drive: float) -> np.ndarray:
         """Entries that follow from the readings at the start, on the way and at the end."""

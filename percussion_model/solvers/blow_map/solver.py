@@ -3,43 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from percussion_model.physics.kernel import entry_of
-from percussion_model.physics.records import (
-    BLOW,
-    EVENT,
-    LEDGER_FIELDS,
-    LONG_SAMPLE_FIELDS,
-    STORED_FIELDS,
-    Status,
-)
-from percussion_model.scene.rules import SceneError
-from percussion_model.solvers.blow_map import advance as kernel
-from percussion_model.solvers.blow_map.flight import commit, plan_next
-from percussion_model.solvers.blow_map.records import BLOW_PAR, BLOW_STATE, ENTRIES
+from percussion_model.physics.records import READING, Status
+from percussion_model.scene.rules import SceneError, SceneRules
+from percussion_model.solvers.base import Solver
+from percussion_model.solvers.blow_map import advance as kernels
+from percussion_model.solvers.blow_map import flight
+from percussion_model.solvers.blow_map.builder import get_table
+from percussion_model.solvers.blow_map.records import ENTRIES, MAP_PAR, MAP_STATE
 from percussion_model.solvers.blow_map.refusals import explain_refusal
-from percussion_model.solvers.blow_map.sample import read
 from percussion_model.solvers.blow_map.table import BlowTable, fixed_values
+from percussion_model.solvers.setup import fill_parameters, fill_start, rock_numbers
+from percussion_model.solvers.state import State, words_of
 
-if TYPE_CHECKING:
-    from percussion_model.scene.rules import BarNumbers, SceneRules
+_WORD = words_of(MAP_STATE)
+T, T_NEXT, EVENTS_ON = _WORD["t"], _WORD["t_next"], _WORD["events_on"]
+N_BLOWS, N_EVENTS = _WORD["n_blows"], _WORD["n_events"]
 
-# Place of a field in a state.
-WORD = {name: int(place[1]) // 8 for name, place in (BLOW_STATE.fields or {}).items()}
-T, T_NEXT, PEAK_FROM = WORD["t"], WORD["t_next"], WORD["peak_from"]
-PEAK_BIT, PEAK_CONTACT = WORD["peak_bit"], WORD["peak_contact"]
-
-# Inputs and the fields that hold them; the rest of the rock law is fixed in the table.
-_INPUTS = {
-    "feed_force": WORD["feed"],
-    "drive_force": WORD["drive_force"],
-    "reversal_distance": WORD["reversal"],
-    "loading_stiffness": WORD["k_r"],
-}
-# Those that the flight follows; the others count at the next blow.
+# Inputs that the flight follows; others count at the next blow.
 _FLIGHT = frozenset({"drive_force", "reversal_distance"})
 _FIXED = {
     "unloading_ratio": "rock.unloading_ratio",
@@ -50,29 +35,7 @@ _FIXED = {
 MOST_ROCK_GAP = 1e-3
 
 
-class MapState:
-    """State between blows: one record, which is quick to copy as numbers."""
-
-    __slots__ = ("numbers", "record", "workspace")
-
-    def __init__(self, numbers: np.ndarray) -> None:
-        self.numbers = numbers
-        self.record = numbers.view(BLOW_STATE)
-        self.workspace = np.zeros(0)
-
-    def copy(self) -> MapState:
-        """An independent copy."""
-        return MapState(self.numbers.copy())
-
-    def take(self, other: MapState) -> None:
-        """Become a copy of another state."""
-        self.numbers[:] = other.numbers
-
-    def __reduce__(self) -> tuple[object, ...]:
-        return MapState, (self.numbers,)
-
-
-class BlowMapSolver:
+class BlowMapSolver(Solver):
     """Blow map of a scene (docs/fidelity.md).
 
     Parameters
@@ -89,9 +52,9 @@ class BlowMapSolver:
     """
 
     name = "blow-map"
-    time_step: float | None = None
 
     def __init__(self, scene: SceneRules, table: BlowTable) -> None:
+        super().__init__(scene)
         table.refuse_other(fixed_values(scene))
         if not scene.start.rock_gap <= MOST_ROCK_GAP or scene.start.bit_velocity != 0.0:
             raise SceneError(
@@ -99,159 +62,88 @@ class BlowMapSolver:
                 f"{scene.start.bit_velocity!r} m/s: the blow map needs a bit that stands on "
                 f"the rock, within {MOST_ROCK_GAP:g} m and at 0 m/s"
             )
-        self.scene = scene
         self.table = table
         self.cells = dict(table.cells)
         self.wave_speed_error = table.wave_speed_error
         self._values = table.values
-        self._par = self._parameters()
+        self._par = np.zeros(1, MAP_PAR)
+        p: Any = self._par[0]
+        fill_parameters(p, scene, with_piston=True)
+        p["gamma"] = scene.rock.unloading_ratio
+        p["start_gap"] = scene.start.gap
+        p["lowest"], p["highest"] = table.lowest, table.highest
+        p["origin"], p["step"] = table.origin, table.step
         self._found = np.zeros(ENTRIES)
-        self._counts = np.zeros(2, np.int64)
-        self._advance: Callable[..., int] = kernel.advance
-        self._read: Callable[..., None] = read
-        self._move: Callable[..., None] = commit
-        self._plan_next: Callable[..., None] = plan_next
+        self._advance: Callable[..., int] = kernels.advance
+        self._read: Callable[..., None] = flight.read
+        self._move: Callable[..., None] = flight.commit
+        self._plan: Callable[..., None] = flight.plan_next
         self._load_kernels()
 
     def _load_kernels(self) -> None:
         """Have the kernels compiled, and called without a look at types that never change."""
         state = self.new_state()
         state.numbers[T_NEXT] = np.inf
-        self._call(state, 0.0, np.zeros(1, BLOW), np.zeros(1, EVENT), False)
-        self._read(self._par, state.record, 0.0, np.zeros(len(LONG_SAMPLE_FIELDS)))
-        self.commit(state, 0.0)
-        self._advance, self._read = entry_of(kernel.advance), entry_of(read)
-        self._move, self._plan_next = entry_of(commit), entry_of(plan_next)
+        self._run(state, 0.0, self._no_blows, self._no_events)
+        self._read(self._par, state.record, 0.0, np.zeros(1, READING))
+        self._move(self._par, state.record, 0.0)
+        self._advance, self._read = entry_of(kernels.advance), entry_of(flight.read)
+        self._move, self._plan = entry_of(flight.commit), entry_of(flight.plan_next)
 
-    def _parameters(self) -> np.ndarray:
-        par = np.zeros(1, BLOW_PAR)
-        p = par[0]
-        scene = self.scene
-        p["mass_p"], p["mass_b"] = scene.piston.mass, scene.bit.mass
-        p["gravity"] = scene.gravity.acceleration if scene.effects.gravity else 0.0
-        p["gamma"] = scene.rock.unloading_ratio
-        p["gap"] = scene.start.gap
-        p["lowest"], p["highest"] = self.table.lowest, self.table.highest
-        p["origin"], p["step"] = self.table.origin, self.table.step
-        return par
-
-    def new_state(self) -> MapState:
+    def new_state(self) -> State:
         """State at time zero: the bit stands on the rock, the piston flies."""
-        scene, start = self.scene, self.scene.start
-        state = MapState(np.zeros(BLOW_STATE.itemsize // 8))
-        s = state.record[0]
-        s["feed"] = scene.feed.force if scene.effects.feed else 0.0
-        s["drive_force"] = scene.drive.force
-        s["reversal"] = scene.drive.reversal_distance
-        s["k_r"] = scene.rock.loading_stiffness
+        scene, start, par = self.scene, self.scene.start, self._par[0]
+        state = State(MAP_STATE)
+        s: Any = state.record[0]
+        fill_start(s, scene, rock_numbers(scene))
+        s["x_r"], s["p"] = start.rock_gap, 0.0
         s["y"] = -start.gap
-        s["v"] = start.piston_velocity
-        s["alpha"] = start.drive_direction
-        s["x_rest"] = start.rock_gap
-        s["b_rebound"] = np.nan
-        s["peak_from"] = np.inf
-        par = self._par[0]
         static = s["feed"] + par["mass_b"] * par["gravity"]
-        s["e_start"] = 0.5 * par["mass_p"] * s["v"] ** 2
+        s["e_start"] = 0.5 * par["mass_p"] * s["v_p"] ** 2
         s["e_start"] += static**2 / (2.0 * par["gamma"] * s["k_r"])
-        self._plan(state)
+        self._plan(self._par, state.record)
         return state
 
-    def _plan(self, state: MapState) -> None:
-        self._plan_next(self._par, state.record)
+    def _run(self, state: State, t: float, blows: np.ndarray, events: np.ndarray) -> int:
+        return int(
+            self._advance(self._par, state.record, self._values, self._found, t, blows, events)
+        )
 
-    def time(self, state: MapState) -> float:
+    def time(self, state: State) -> float:
         """Start of the present piece of flight [s]."""
         return float(state.numbers[T])
 
     def advance(
-        self,
-        state: MapState,
-        t: float,
-        blows: np.ndarray,
-        events: np.ndarray,
-        record_events: bool = False,
+        self, state: State, t: float, blows: np.ndarray, events: np.ndarray, record_events: bool
     ) -> tuple[int, int, int]:
-        """Let all that happens up to `t` happen.
-
-        Returns
-        -------
-        status, n_blows, n_events : int
-        """
+        """Process all that happens up to `t`; as in `Solver`."""
         if state.numbers[T_NEXT] > t:
-            return Status.DONE, 0, 0
-        status = self._call(state, t, blows, events, record_events)
-        return status, int(self._counts[0]), int(self._counts[1])
+            return int(Status.DONE), 0, 0
+        words = state.words
+        words[EVENTS_ON] = record_events
+        status = self._run(state, float(t), blows, events)
+        return status, int(words[N_BLOWS]), int(words[N_EVENTS])
 
-    def _call(
-        self, state: MapState, t: float, blows: np.ndarray, events: np.ndarray, events_on: bool
-    ) -> int:
-        return int(
-            self._advance(
-                self._par,
-                state.record,
-                self._values,
-                self._found,
-                float(t),
-                blows,
-                events,
-                bool(events_on),
-                self._counts,
-            )
-        )
-
-    def refusal(self, state: MapState) -> str:
-        """Say why the map did not answer."""
+    def refusal(self, state: State) -> str:
+        """Why the map did not answer."""
         return explain_refusal(self.table, state.record[0])
 
-    def sample(self, state: MapState, times: np.ndarray, out: np.ndarray) -> None:
-        """Evaluate at `times` without touching the state (`SAMPLE_FIELDS`)."""
-        for k, time in enumerate(times):
-            self.look(state, float(time), out[k])
-
-    def look(
-        self, state: MapState, t: float, row: np.ndarray, here: Any = None, peaks: bool = True
-    ) -> MapState:
-        """Evaluate at `t` into a row (`LONG_SAMPLE_FIELDS`, or their beginning).
-
-        Returns
-        -------
-        MapState
-            The state itself: reading moves nothing.
-        """
-        self._read(self._par, state.record, t, row)
+    def read(
+        self, state: State, t: float, reading: np.ndarray, spare: State | None = None,
+        peaks: bool = True,
+    ) -> State:  # fmt: skip
+        """Evaluate at `t`; the state itself, since reading moves nothing. As in `Solver`."""
+        self._read(self._par, state.record, t, reading)
         return state
 
-    def fields(self, state: MapState) -> dict[str, np.ndarray]:
-        """The table has no stress."""
-        return {}
-
-    def force_in(self, state: MapState, bar: str, cell: int) -> float:
-        """The table has no stress."""
-        return 0.0
-
-    def grid_of(self, bar: str) -> None:
-        """The table has no stress."""
-
-    def watch_peaks(self, state: MapState, t: float) -> None:
-        """Count the peak forces of `look` from `t` on [s]."""
-        numbers = state.numbers
-        numbers[PEAK_FROM] = t
-        numbers[PEAK_BIT] = numbers[PEAK_CONTACT] = 0.0
-
     def commit(
-        self,
-        state: MapState,
-        t: float,
-        blows: np.ndarray | None = None,
-        events: np.ndarray | None = None,
-        record_events: bool = False,
+        self, state: State, t: float, blows: np.ndarray, events: np.ndarray, record_events: bool
     ) -> tuple[int, int, int]:
         """Start a new piece of flight at `t`, so that inputs can change."""
         self._move(self._par, state.record, float(t))
-        return Status.DONE, 0, 0
+        return int(Status.DONE), 0, 0
 
-    def set_inputs(self, state: MapState, **inputs: float) -> None:
+    def set_inputs(self, state: State, **inputs: float) -> None:
         """Change inputs of a committed state.
 
         The drive acts at once, feed and rock from the next blow on. The other numbers of
@@ -263,32 +155,19 @@ class BlowMapSolver:
                     f"{_FIXED[name]} = {value!r}: the blow map was made for "
                     f"{self.table.fixed[_FIXED[name]]!r} and holds for that alone"
                 )
-        for name, value in inputs.items():
-            if name in _INPUTS:
-                state.numbers[_INPUTS[name]] = value
+        super().set_inputs(state, **inputs)
         if not _FLIGHT.isdisjoint(inputs):
-            self._plan(state)
+            self._plan(self._par, state.record)
 
-    def grid_point_after(self, state: MapState, t: float) -> float:
+    def grid_point_after(self, state: State, t: float) -> float:
         """First time at or after `t` at which inputs can change: `t` itself [s]."""
         return t
 
-    def readable_until(self, state: MapState) -> float:
-        """Time up to which `sample` answers without advancing the state [s]."""
+    def readable_until(self, state: State) -> float:
+        """Time up to which `read` answers without advancing the state [s]."""
         return float(np.nextafter(state.numbers[T_NEXT], 0.0))
 
-    def energy(self, state: MapState, t: float) -> dict[str, float]:
-        """Ledger at `t` [J]: LEDGER_FIELDS, start, stored."""
-        row = np.zeros(len(LONG_SAMPLE_FIELDS))
-        self.look(state, t, row)
-        found = dict(zip(LONG_SAMPLE_FIELDS, row.tolist(), strict=True))
-        return {name: found[name] for name in (*LEDGER_FIELDS, *STORED_FIELDS)}
 
-    def section_cells(self, bar: BarNumbers) -> list[int]:
-        """Cells belong to the waves that made the table."""
-        return []
-
-    def statistics(self, state: MapState) -> dict[str, int]:
-        """Counts of what the solver did."""
-        s = state.record[0]
-        return {name: int(s[f"count_{name}"]) for name in ("events", "blows")}
+def make_map_solver(scene: SceneRules) -> BlowMapSolver:
+    """Solver on the table of a scene, which is made where it is not kept."""
+    return BlowMapSolver(scene, get_table(scene))

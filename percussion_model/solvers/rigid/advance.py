@@ -1,4 +1,4 @@
-"""Loop of the rigid-body solver: from event to event, all in closed form (docs/model.md, sec. 9)."""
+"""Loop of the rigid-body solver: from event to event, in closed form (docs/model.md, section 9)."""
 
 from __future__ import annotations
 
