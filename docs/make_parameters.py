@@ -5,8 +5,8 @@ from __future__ import annotations
 from itertools import groupby
 from pathlib import Path
 
+from percussion_model.scene.parameters import parameter_table
 from percussion_model.scene.rows import Row, toml_value
-from percussion_model.scene.table import parameter_table
 
 HEAD = """# Parameters
 
@@ -15,7 +15,7 @@ Any of them can be set on the command line, as in `--set rock.unloading_ratio=10
 are counted from 0, as in `--set piston.sections.0.length=0.2`.
 
 This page is written by `python docs/make_parameters.py`; change
-`percussion_model/parameters.py` instead.
+`percussion_model/scene/parameters.py` instead.
 """
 
 

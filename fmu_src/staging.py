@@ -25,10 +25,7 @@ LIBRARY = Path(pythonfmu.__file__).parent
 MODEL_FILES = (
     "__init__.py",
     "physics/**/*.py",
-    "scene/__init__.py",
-    "scene/inputs.py",
-    "scene/rows.py",
-    "scene/rules.py",
+    "scene/*.py",
     "simulation/__init__.py",
     "simulation/runner.py",
     "simulation/validity.py",

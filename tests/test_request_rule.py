@@ -62,9 +62,7 @@ def test_rule_says_how_well_lengths_fit():
 
 
 def test_solver_takes_the_cells_of_the_rule_in_library_and_fmu():
-    from fmu_src.hammer.plain_scene import make_scene
     from fmu_src.hammer.variables import hammer_variables
-    from percussion_model.scene.table import rows_by_key
     from percussion_model.solvers.wave.solver import WaveSolver
 
     scene = Scene().replace(**{"solver.accuracy": 1e-3})
@@ -72,15 +70,7 @@ def test_solver_takes_the_cells_of_the_rule_in_library_and_fmu():
     variable = next(v for v in hammer_variables(scene) if v.name == "solver.accuracy")
     assert (variable.causality, variable.variability) == ("parameter", "fixed")
     assert (variable.start, variable.left_out) == (1e-3, 0.0)
-    values = {
-        key: scene[key]
-        for key, row in rows_by_key().items()
-        if row.kind != "sections" and "*" not in key
-    }
-    for bar in ("piston", "bit"):
-        for name, value in scene[f"{bar}.sections"][0].model_dump().items():
-            values[f"{bar}.sections.0.{name}"] = value
-    plain = make_scene(values, scene.given, rows_by_key())
+    plain = Scene(**scene.given_values())
     assert WaveSolver(plain).cells == {"piston": 60, "bit": 69}
 
 

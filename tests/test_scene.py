@@ -1,5 +1,6 @@
 """Scenes: reading, writing, changing, and what has no effect."""
 
+import copy
 import pickle
 import subprocess
 import sys
@@ -10,9 +11,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from percussion_model.scene.parameters import BitBar, PistonBar, RockLaw, Section
-from percussion_model.scene.scene import Scene, SceneError, read_setting
-from percussion_model.scene.table import parameter_table
+from percussion_model.scene.parameters import BitBar, PistonBar, RockLaw, Section, parameter_table
+from percussion_model.scene.scene import Scene, SceneError
+from percussion_model.scene.text import read_setting
 
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
 
@@ -237,3 +238,33 @@ def test_reading_a_scene_loads_nothing_that_draws_or_exports():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "set()"
+
+
+@pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy])
+def test_a_copy_is_an_equal_scene(copied):
+    scene = Scene(rock={"unloading_ratio": 7.0}, title="hard")
+    assert copied(scene) == scene
+    assert copied(scene).given == scene.given
+
+
+def test_values_given_make_an_equal_scene():
+    scene = Scene(title="x").replace(**{"bit.sections.0.length": 0.3, "effects.loss": False})
+    again = Scene(**scene.given_values())
+    assert (again, again.given) == (scene, scene.given)
+
+
+def test_a_change_leaves_what_it_was_given_alone():
+    group, sections = {"unloading_ratio": 7.0}, [{"length": 0.1, "area": 1e-3}]
+    scene = Scene().replace(**{"rock": group, "rock.loading_stiffness": 1e8})
+    assert (scene.rock.unloading_ratio, scene.rock.loading_stiffness) == (7.0, 1e8)
+    scene = Scene().replace(**{"bit.sections": sections, "bit.sections.0.length": 0.2})
+    assert scene.bit.length == 0.2
+    assert (group, sections) == ({"unloading_ratio": 7.0}, [{"length": 0.1, "area": 1e-3}])
+
+
+def test_groups_given_as_objects_can_be_changed_further():
+    piston = PistonBar(model="rigid", sections=[Section(length=0.1, area=1e-3)])
+    scene = Scene().replace(piston=piston, **{"piston.sections.0.length": 0.3})
+    assert (scene.piston.model, scene.piston.length) == ("rigid", 0.3)
+    with pytest.raises(SceneError, match=r"unknown key bit\.sections\.0\.length"):
+        Scene().replace(**{"bit.sections": 5, "bit.sections.0.length": 0.3})

@@ -21,7 +21,8 @@ from percussion_model.analysis.study.store import PARTS, PLAN
 from percussion_model.analysis.study.work import COMPUTING, KINDS, run_points
 from percussion_model.interface.cli import app
 from percussion_model.simulation.files import ResultError, to_json
-from percussion_model.solvers import operators, sources
+from percussion_model.solvers import sources
+from percussion_model.solvers.wave.leaps import operators
 
 SCENE = Scene(title="rigid bodies").computed_by("rigid")
 AXES = {"feed.force": [1500.0, 2500.0, 4000.0], "rock.loading_stiffness": [3e8, 7.5e8]}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
 
@@ -15,7 +14,6 @@ from fmu_src.page import write_page
 from fmu_src.staging import stage
 from fmu_src.variables import FILE, Variable, to_json, write_variables
 from percussion_model.scene.scene import Scene, SceneError
-from percussion_model.scene.table import parameter_table
 from percussion_model.solvers.blow_map.table import BlowTable, fixed_values
 
 STEP_SIZE = 1e-3  # of the default experiment [s]
@@ -68,15 +66,7 @@ def about_hammer(scene: Scene, path: Path) -> About:
 
 def _scene(scene: Scene, variables: list[Variable], bundle: str) -> dict[str, object]:
     """What an instance needs of the scene, besides its variables."""
-    rows = {row.key: asdict(row) for row in parameter_table() if row.kind != "sections"}
-    values = {key: scene[key] for key in rows if "*" not in key}
-    for bar in ("piston", "bit"):
-        for i, section in enumerate(scene[f"{bar}.sections"]):
-            for field, value in section.model_dump().items():
-                values[f"{bar}.sections.{i}.{field}"] = value
     return {
-        "values": values,
-        "given": sorted(scene.given),
-        "rows": rows,
+        "given": scene.given_values(),
         "identity": [bundle, [variable.name for variable in variables]],
     }

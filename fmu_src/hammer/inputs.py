@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-# Inputs of the FMU that are inputs of the solver as they are.
-PLAIN_INPUTS = {
-    "feed_force": "feed_force",
-    "rock.loading_stiffness": "loading_stiffness",
-    "rock.unloading_ratio": "unloading_ratio",
-    "rock.barrier_damping": "barrier_damping",
-    "rock.barrier_energy": "barrier_energy",
-    "drive.reversal_distance": "reversal_distance",
-}
-# Those from which the drive's forces follow.
-DRIVE_INPUTS = ("percussion_on", "supply_pressure", "drive.effective_area", "piston_force")
+from percussion_model.scene.inputs import INPUTS
 
-# The solver's inputs as hosts know them.
-NAMES_OUTSIDE = {inner: name for name, inner in PLAIN_INPUTS.items()} | {
+# The solver's inputs as hosts know them: by keys of the parameter table, but for these.
+NAMES_OUTSIDE = {name: one.key for name, one in INPUTS.items()} | {
+    "feed_force": "feed_force",
     "drive_force": "supply_pressure",
     "external_force": "piston_force",
+}
+# Inputs from which the drive's forces follow.
+DRIVE_INPUTS = ("percussion_on", "supply_pressure", "drive.effective_area", "piston_force")
+# Inputs that are inputs of the solver as they are.
+PLAIN_INPUTS = {
+    outside: inner for inner, outside in NAMES_OUTSIDE.items() if outside not in DRIVE_INPUTS
 }

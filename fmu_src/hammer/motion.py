@@ -17,7 +17,7 @@ from percussion_model.physics.records import (
     STORED_FIELDS,
     Mode,
 )
-from percussion_model.scene.rules import SceneRules
+from percussion_model.scene.scene import Scene
 from percussion_model.simulation.runner import Runner
 from percussion_model.solvers.base import Solver
 from percussion_model.solvers.state import State
@@ -46,12 +46,12 @@ class Motion(Runner):
 
     Parameters
     ----------
-    scene : SceneRules
+    scene : Scene
     solver : Solver or None
         One that was made for an equal scene.
     """
 
-    def __init__(self, scene: SceneRules, solver: Solver | None) -> None:
+    def __init__(self, scene: Scene, solver: Solver | None) -> None:
         super().__init__(scene, record_events=False, solver=solver)
         self.scene = scene
         self.gauge: Gauge | None = None

@@ -15,14 +15,13 @@ from fmu_src.hammer.blow_map import read_blow_map
 from fmu_src.hammer.inputs import DRIVE_INPUTS, NAMES_OUTSIDE, PLAIN_INPUTS
 from fmu_src.hammer.motion import Gauge, Motion
 from fmu_src.hammer.outputs import OUTPUTS
-from fmu_src.hammer.plain_scene import PlainScene, make_scene
 from fmu_src.hammer.warnings import Warnings
 from fmu_src.slave.slave import STEPPING, Phase, Read, Slave
 from fmu_src.slave.states import fingerprint
-from fmu_src.variables import closed_bounds, read_row
-from percussion_model.scene.inputs import INPUTS
+from fmu_src.variables import closed_bounds
+from percussion_model.scene.inputs import INPUTS, why_without_effect
 from percussion_model.scene.rows import refuse_value
-from percussion_model.scene.rules import SceneRules
+from percussion_model.scene.scene import Scene
 from percussion_model.solvers.base import Solver
 from percussion_model.solvers.wave.grid import cell_at
 
@@ -41,12 +40,10 @@ class PercussiveHammer(Slave):
         self.folder = str(arguments["resources"])
         text = (Path(self.folder) / "scene.json").read_text(encoding="utf-8")
         scene = json.loads(text)
-        self.baked: dict[str, Any] = scene["values"]
-        self.given: set[str] = set(scene["given"])
-        self.rows = {one.row.key: one.row for one in self.by_name.values() if one.row is not None}
-        self.rows |= {key: read_row(row) for key, row in scene["rows"].items()}
+        self.baked = Scene(**scene["given"])
         self.identity = scene["identity"]
-        self._drive_bounds = closed_bounds(self.rows["drive.force"])
+        self._drive_row = self.baked.row_of("drive.force")
+        self._drive_bounds = closed_bounds(self._drive_row)
         self._drive_inputs = frozenset(DRIVE_INPUTS)
         self._warnings = Warnings()
         self.reset()
@@ -69,9 +66,9 @@ class PercussiveHammer(Slave):
 
     def _check_drive(self, force: float) -> None:
         low, high = self._drive_bounds
-        if not low <= force <= high and not self.rows["drive.force"].allows(force):
+        if not low <= force <= high and not self._drive_row.allows(force):
             name = "supply_pressure * drive.effective_area"
-            raise ValueError(refuse_value(self.rows["drive.force"], name, force))
+            raise ValueError(refuse_value(self._drive_row, name, force))
 
     def drive_forces(self) -> dict[str, float]:
         """Forces of the drive as the solver takes them [N]."""
@@ -86,10 +83,9 @@ class PercussiveHammer(Slave):
         found = {inner: self.values[name] for name, inner in PLAIN_INPUTS.items()}
         return found | self.drive_forces()
 
-    def make_scene(self) -> PlainScene:
+    def make_scene(self) -> Scene:
         """Scene of the present values; raises `SceneError` if they contradict each other."""
-        values = dict(self.baked)
-        given = set(self.given)
+        values: dict[str, Any] = {}
         for one in self.parameters:
             if one.key is None:
                 continue
@@ -98,11 +94,10 @@ class PercussiveHammer(Slave):
                 value = None
             elif one.type == "Enumeration":
                 value = self.choice(one.name)
-            if value != values[one.key]:
-                given.add(one.key)
             values[one.key] = value
-        values |= {INPUTS[name]: value for name, value in self.solver_inputs().items()}
-        return make_scene(values, given, self.rows)
+        values |= {INPUTS[name].key: value for name, value in self.solver_inputs().items()}
+        changes = {key: value for key, value in values.items() if value != self.baked[key]}
+        return self.baked.replace(**changes)
 
     # stepping
 
@@ -120,7 +115,7 @@ class PercussiveHammer(Slave):
             self.new.clear()
         return self.motion
 
-    def _map_solver(self, scene: PlainScene) -> Solver | None:
+    def _map_solver(self, scene: Scene) -> Solver | None:
         """Solver on the table that the FMU brings along, if the scene wants that."""
         if scene.solver_name != "blow-map":
             return None
@@ -129,7 +124,7 @@ class PercussiveHammer(Slave):
 
         return BlowMapSolver(scene, read_blow_map(self.folder))
 
-    def _find_gauge(self, scene: PlainScene, solver: Solver) -> Gauge | None:
+    def _find_gauge(self, scene: Scene, solver: Solver) -> Gauge | None:
         """Cell at the place of the gauge, None in a bar without cells."""
         name = self.choice("gauge.bar")
         bar, place = scene[name], self.values["gauge.position"]
@@ -163,17 +158,13 @@ class PercussiveHammer(Slave):
         acting |= changed
         return {name: value for name, value in changed.items() if self.acts(motion.scene, name)}
 
-    def acts(self, scene: SceneRules, name: str) -> bool:
+    def acts(self, scene: Scene, name: str) -> bool:
         """Whether an input has an effect in the scene; says so in the log where not."""
         acts = self._acts.get(name)
         if acts is None:
-            acts = scene.matters(INPUTS[name])
-            if name.startswith("barrier"):
-                acts = acts and scene.barrier_on
-            self._acts[name] = acts
+            acts = self._acts[name] = not why_without_effect(scene, name)
         if not acts:
-            outside = NAMES_OUTSIDE.get(name, name)
-            self.warn(f"a new {outside} has no effect in this scene")
+            self.warn(f"a new {NAMES_OUTSIDE[name]} has no effect in this scene")
         return acts
 
     # outputs

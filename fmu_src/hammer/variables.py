@@ -15,14 +15,14 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from fmu_src.hammer.inputs import PLAIN_INPUTS
+from fmu_src.hammer.inputs import NAMES_OUTSIDE
 from fmu_src.hammer.outputs import MODES, OUTPUTS
 from fmu_src.units import fmi_unit
 from fmu_src.variables import Variable, magnitude, number_row
 from percussion_model.scene.inputs import INPUTS
+from percussion_model.scene.parameters import find_row, parameter_table
 from percussion_model.scene.rows import Row
 from percussion_model.scene.scene import Scene
-from percussion_model.scene.table import find_row, parameter_table
 
 VERSION = 1
 INTERFACE = Path(__file__).with_name(f"interface-{VERSION}.json")
@@ -36,14 +36,13 @@ SUPPLY_PRESSURE = 20e5
 DISPLAYS = {"m": "mm", "N": "kN", "Pa": "bar", "m2": "mm2", "Hz": "1/min", "N/m": "kN/mm"}
 DISPLAYS_OF = {"youngs_modulus": "MPa"}
 
-# What an input of the FMU stands for in the table; the rest of a scene is a parameter.
-TABLE_INPUTS = {name: INPUTS[inner] for name, inner in PLAIN_INPUTS.items()} | {
-    "piston_force": INPUTS["external_force"]
+# What an input of the FMU stands for in the table, rock before drive; the rest of a scene
+# is a parameter. The drive force is the product of two numbers.
+TABLE_INPUTS = {
+    NAMES_OUTSIDE[name]: one
+    for name, one in sorted(INPUTS.items(), key=lambda item: item[1].at_once)
+    if name != "drive_force"
 }
-_NEXT_CYCLE = "; acts from the next drilling cycle on"
-_INPUT_NOTES = {
-    "piston_force": "; acts while effects.drive = external and percussion_on",
-} | {name: _NEXT_CYCLE for name in PLAIN_INPUTS if name.startswith("rock.")}
 PRESSURE_ROW = number_row(
     "supply_pressure", "Pa", 0.0, 1e9,
     "gauge supply pressure; drive force F_0 = pressure * drive.effective_area",
@@ -106,7 +105,7 @@ def split_drive_force(force: float) -> tuple[float, float]:
 
 def _inputs(scene: Scene) -> Iterator[Variable]:
     pressure, _ = split_drive_force(scene.drive.force)
-    starts: dict[str, Any] = {name: scene[key] for name, key in TABLE_INPUTS.items()}
+    starts: dict[str, Any] = {name: scene[one.key] for name, one in TABLE_INPUTS.items()}
     starts |= {"supply_pressure": pressure, "percussion_on": True}
     order = ["feed_force", "supply_pressure", "piston_force", "percussion_on"]
     order += [name for name in TABLE_INPUTS if name not in order]
@@ -122,10 +121,13 @@ def _inputs(scene: Scene) -> Iterator[Variable]:
                 start=True,
             )
             continue
-        row = PRESSURE_ROW if name == "supply_pressure" else _row(TABLE_INPUTS[name])
-        yield _number(
-            name, reference(name, "input"), row, starts[name], "input", _INPUT_NOTES.get(name, "")
-        )
+        one = TABLE_INPUTS.get(name)
+        row, note = PRESSURE_ROW if one is None else _row(one.key), ""
+        if name == "piston_force":
+            note = "; acts while effects.drive = external and percussion_on"
+        elif one is not None and not one.at_once:
+            note = "; acts from the next drilling cycle on"
+        yield _number(name, reference(name, "input"), row, starts[name], "input", note)
 
 
 def _outputs() -> Iterator[Variable]:
@@ -154,7 +156,7 @@ def _outputs() -> Iterator[Variable]:
 
 
 def _parameters(scene: Scene) -> Iterator[Variable]:
-    replaced = {"drive.force", *TABLE_INPUTS.values()}
+    replaced = {one.key for one in INPUTS.values()}
     for row in parameter_table():
         group = row.key.partition(".")[0]
         if row.kind == "sections":

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, get_args
+from typing import Any
 
 from percussion_model.scene.scene import Scene, SceneError
-from percussion_model.scene.solver_options import SolverName
+from percussion_model.scene.solver_names import SOLVER_NAMES
 from percussion_model.simulation.result import Result
 from percussion_model.simulation.simulate import simulate
 from percussion_model.simulation.warnings import unused_note
@@ -137,7 +137,7 @@ def read_solvers(text: str) -> tuple[str, ...]:
         If there is none, or one that is not known or stands there twice.
     """
     names = tuple(name.strip() for name in text.split(","))
-    known = [name for name in get_args(SolverName) if name != "auto"] + ["blow-map"]
+    known = [name for name in SOLVER_NAMES if name != "auto"] + ["blow-map"]
     for name in names:
         if name not in known:
             raise SceneError(f"--solvers {text}: {name!r} is no solver: {', '.join(known)}")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import platform
 import re
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -13,8 +13,8 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
+from percussion_model.scene.parameters import find_row, parameter_table
 from percussion_model.scene.scene import Scene
-from percussion_model.scene.table import find_row, parameter_table
 from percussion_model.simulation.files import REPORT, staged
 
 PACKAGES = ("percussion_model", "numpy", "numba", "scipy", "matplotlib", "bokeh")
@@ -87,12 +87,12 @@ def _section_rows(
 ) -> list[tuple[str, str, str, str]]:
     rows = []
     for k, section in enumerate(scene[sections]):
-        for name in type(section).model_fields:
+        for name, value in asdict(section).items():
             key = f"{sections}.{k}.{name}"
             row = find_row(key)
             assert row is not None
-            value = written(changed.get(key, getattr(section, name)))
-            rows.append((key, value, shown_unit(row.unit), row.description))
+            shown = written(changed.get(key, value))
+            rows.append((key, shown, shown_unit(row.unit), row.description))
     return rows
 
 

@@ -2,8 +2,51 @@
 
 from __future__ import annotations
 
-from percussion_model.physics.effects import book_forces, hold_forces
-from percussion_model.physics.kernel import inlined, merged
+from collections.abc import Callable
+from typing import Any
+
+from percussion_model.physics.effects import EFFECTS, Effect
+from percussion_model.physics.kernel import composed, inlined, merged
+
+
+@composed
+def _no_force(par: Any, s: Any) -> float:
+    return 0.0
+
+
+@composed
+def _no_work(s: Any, path: float) -> None:
+    pass
+
+
+def _and_force(before: Callable, effect: Effect) -> Callable:
+    force, held = effect.force, f"f_{effect.name}"
+
+    @composed
+    def hold(par: Any, s: Any) -> float:
+        total = before(par, s)
+        s[held] = force(par, s)
+        return total + s[held]
+
+    return hold
+
+
+def _and_work(before: Callable, effect: Effect) -> Callable:
+    held, entry = f"f_{effect.name}", f"e_{effect.name}"
+
+    @composed
+    def book(s: Any, path: float) -> None:
+        before(s, path)
+        s[entry] -= s[held] * path
+
+    return book
+
+
+# hold_forces(par, s): take the force of each effect now; their sum [N].
+# book_forces(s, path): enter what the held forces take from the bit over a path [m].
+hold_forces, book_forces = _no_force, _no_work
+for _effect in EFFECTS:
+    hold_forces, book_forces = _and_force(hold_forces, _effect), _and_work(book_forces, _effect)
 
 
 @inlined

@@ -2,29 +2,57 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
-from percussion_model.scene.rows import refuse_value
-from percussion_model.scene.rules import SceneRules
-
-# Each input and its row in the parameter table.
-INPUTS = {
-    "feed_force": "feed.force",
-    "drive_force": "drive.force",
-    "reversal_distance": "drive.reversal_distance",
-    "external_force": "drive.external_force",
-    "loading_stiffness": "rock.loading_stiffness",
-    "unloading_ratio": "rock.unloading_ratio",
-    "barrier_damping": "rock.barrier_damping",
-    "barrier_energy": "rock.barrier_energy",
-}
+from percussion_model.scene.rows import REFUSED, refuse_value
+from percussion_model.scene.scene import Scene
 
 
 class SimulationError(ValueError):
     """A run that cannot go on, or that was asked for what makes no sense."""
 
 
-def check_input(scene: SceneRules, name: str, value: Any) -> float:
+class Input(NamedTuple):
+    """One input.
+
+    Attributes
+    ----------
+    key : str
+        Of its parameter, whose value it has at the start and whose bounds it keeps.
+    field : str
+        Of the state of a solver that holds it.
+    at_once : bool
+        Whether it acts at once, or from the next drilling cycle on.
+    """
+
+    key: str
+    field: str
+    at_once: bool
+
+
+INPUTS = {
+    "feed_force": Input("feed.force", "feed", True),
+    "drive_force": Input("drive.force", "drive_force", True),
+    "reversal_distance": Input("drive.reversal_distance", "reversal", True),
+    "external_force": Input("drive.external_force", "external", True),
+    "loading_stiffness": Input("rock.loading_stiffness", "next_k_r", False),
+    "unloading_ratio": Input("rock.unloading_ratio", "next_gamma", False),
+    "barrier_damping": Input("rock.barrier_damping", "next_c_r", False),
+    "barrier_energy": Input("rock.barrier_energy", "next_w_r", False),
+}
+
+
+def why_without_effect(scene: Scene, name: str) -> str:
+    """Say why an input has no effect in a scene; empty if it has one."""
+    row = scene.row_of(INPUTS[name].key)
+    if not scene.matters(row.key):
+        return f"needs {row.effect}"
+    if name.startswith("barrier") and not scene.barrier_on:
+        return "it began without a barrier, since rock.barrier_energy or rock.barrier_damping is 0"
+    return ""
+
+
+def check_input(scene: Scene, name: str, value: Any) -> float:
     """Return the value of an input as a number.
 
     Raises
@@ -35,14 +63,11 @@ def check_input(scene: SceneRules, name: str, value: Any) -> float:
     """
     if name not in INPUTS:
         raise SimulationError(f"unknown input {name}: there are {', '.join(INPUTS)}")
-    row = scene.row_of(INPUTS[name])
-    if not scene.matters(row.key):
-        raise SimulationError(f"{name} has no effect in this scene: needs {row.effect}")
-    if name.startswith("barrier") and not scene.barrier_on:
-        raise SimulationError(
-            f"{name} has no effect in this scene: it began without a barrier, since "
-            "rock.barrier_energy or rock.barrier_damping is 0"
-        )
-    if not row.allows(value):
+    reason = why_without_effect(scene, name)
+    if reason:
+        raise SimulationError(f"{name} has no effect in this scene: {reason}")
+    row = scene.row_of(INPUTS[name].key)
+    number = row.read(value)
+    if number is REFUSED:
         raise SimulationError(refuse_value(row, name, value))
-    return float(value)
+    return float(number)

@@ -1,43 +1,138 @@
-"""Parameters of the model: frozen, validated, SI.
+"""Parameters of the model: the one table.
 
-The fields below are the one table of the parameters: their defaults, bounds,
-units, descriptions and the effects that need them. The TOML schema, the command
-line's help and the docs are read off it by `percussion_model.scene.table`.
+Each parameter is declared once, as a field with its default, unit, bounds, description
+and what must hold for it to matter. Rows, error messages, the TOML schema, the command
+line's help, the FMU's variables and the docs are read off these fields.
 """
 
 from __future__ import annotations
 
+import dataclasses
+import difflib
 import math
-from typing import Annotated, Literal
+from collections.abc import Iterable, Iterator, Mapping
+from functools import cache
+from typing import Any, ClassVar, Self
 
-from pydantic import Field
-
-from percussion_model.scene.fields import (
-    ALL_RIGID,
-    BARRIER_ON,
-    DRIVE_EXTERNAL,
-    DRIVE_PRESSURE,
-    FEED_ON,
-    GRAVITY_ON,
-    HAS_PISTON,
-    HAS_WAVES,
-    LOSS_ON,
-    ROCK_BILINEAR,
-    ROCK_PRESENT,
-    ROCK_SPRINGY,
-    Direction,
-    Flag,
-    Parameters,
+from percussion_model.physics.effects import EFFECTS, Effect
+from percussion_model.scene import bars
+from percussion_model.scene.rows import (
+    REFUSED,
+    Faults,
+    Needs,
+    Row,
     choice,
+    count,
+    flag,
+    generic_key,
     quantity,
+    refuse_value,
+    section_list,
+    shortened,
+    show_value,
 )
-from percussion_model.scene.rules import BarNumbers, SectionNumbers
-from percussion_model.scene.solver_options import (
-    BlowMapOptions,
-    FemOptions,
-    RunOptions,
-    SolverOptions,
-)
+from percussion_model.scene.solver_names import SOLVER_NAMES
+
+# Below this similarity a guess at a misspelt key misleads more than it helps.
+_SIMILAR_ENOUGH = 0.6
+
+# What must hold, key by key, for a parameter to have any influence.
+HAS_PISTON: Needs = {"piston.model": ("elastic", "rigid")}
+HAS_WAVES: Needs = {"bit.model": ("elastic",)}
+SOLVER_WAVE: Needs = {"solver.name": ("auto", "wave"), **HAS_WAVES}
+SOLVER_FEM: Needs = {"solver.name": ("fem",)}
+BLOW_MAP: Needs = {"solver.fidelity": ("blow-map",), **HAS_WAVES}
+ALL_RIGID: Needs = {"piston.model": ("rigid",), "bit.model": ("rigid",)}
+GRAVITY_ON: Needs = {"effects.gravity": (True,)}
+FEED_ON: Needs = {"effects.feed": (True,)}
+DRIVE_PRESSURE: Needs = {"effects.drive": ("pressure",)}
+DRIVE_EXTERNAL: Needs = {"effects.drive": ("external",)}
+LOSS_ON: Needs = {"effects.loss": (True,), **HAS_WAVES}
+ROCK_BILINEAR: Needs = {"effects.rock": ("bilinear",)}
+ROCK_SPRINGY: Needs = {"effects.rock": ("bilinear", "spring")}
+ROCK_PRESENT: Needs = {"effects.rock": ("bilinear", "spring", "wall")}
+BARRIER_ON: Needs = {"effects.barrier": (True,), **ROCK_BILINEAR}
+
+
+class Parameters:
+    """A group of parameters: plain frozen values, checked when they are given.
+
+    Bad values raise `SceneError`.
+    """
+
+    key: ClassVar[str] = ""  # of the group in a scene
+    rows: ClassVar[dict[str, Row]] = {}  # by the name of the field
+    __dataclass_fields__: ClassVar[dict[str, dataclasses.Field[Any]]]
+    _defaults: ClassVar[dict[str, Any]] = {}
+    _given: frozenset[str]
+
+    def __init_subclass__(cls) -> None:
+        dataclasses.dataclass(frozen=True, init=False)(cls)
+        fields = dataclasses.fields(cls)
+        cls.rows = {one.name: one.metadata["row"] for one in fields if one.metadata}
+        cls._defaults = {name: row.default for name, row in cls.rows.items()}
+
+    def __init__(self, **values: Any) -> None:
+        faults = Faults()
+        self._fill(values, self.key, faults)
+        faults.refuse()
+
+    @classmethod
+    def read(cls, value: Any, key: str, faults: Faults) -> Self:
+        """Return a group as it is, or make it of a table of values."""
+        if isinstance(value, cls):
+            return value
+        group = cls.__new__(cls)
+        if isinstance(value, (dict, Mapping)):  # mostly the first, which is quick to see
+            group._fill(value, key, faults)
+        elif generic_key(key).endswith(".*"):
+            faults.add(_refuse_table, key, value, "a table with length and area")
+        else:
+            faults.add(_refuse_table, key, value, f"a table, written [{key}]")
+        return group
+
+    def _fill(self, values: Mapping[str, Any], key: str, faults: Faults) -> None:
+        kept, rows = self.__dict__, self.rows
+        kept.update(self._defaults)
+        kept["_given"] = frozenset(values)
+        for name, row in rows.items():
+            if name not in values:
+                if row.required:
+                    faults.add(_refuse_missing, row, f"{key}.{name}")
+            elif row.kind == "sections":
+                kept[name] = _read_sections(row, f"{key}.{name}", values[name], faults)
+            else:
+                kept[name] = found = row.read(values[name])
+                if found is REFUSED:
+                    faults.add(refuse_value, row, f"{key}.{name}", values[name])
+        for name in values:
+            if name not in rows:
+                faults.add(unknown_key, f"{key}.{name}")
+
+    def given_values(self) -> dict[str, Any]:
+        """Return the values that were given, not left to their defaults."""
+        return {name: self.__dict__[name] for name in self.rows if name in self._given}
+
+
+def _read_sections(row: Row, key: str, value: Any, faults: Faults) -> tuple[Section, ...]:
+    try:
+        found = [] if isinstance(value, (str, bytes, Mapping)) else list(value)
+    except TypeError:  # no list of anything
+        found = []
+    if not found:
+        faults.add(refuse_value, row, key, value)
+    return tuple(Section.read(one, f"{key}.{k}", faults) for k, one in enumerate(found))
+
+
+def _refuse_table(key: str, value: Any, wanted: str) -> str:
+    return f"{key} = {show_value(value)}: must be {wanted}"
+
+
+def _refuse_missing(row: Row, key: str) -> str:
+    return f"{key} is missing: must be {row.allowed}"
+
+
+# ------------------------------------------------------------------------- the groups
 
 # Table II of the paper as repaired in docs/model.md.
 STEEL_YOUNGS_MODULUS = 210e9
@@ -58,60 +153,106 @@ def _reference_loss_time() -> float:
     return 2.0 * _PAPER_DAMPING_RATIO / critical
 
 
-class Section(SectionNumbers, Parameters):
+class Section(Parameters):
     """A length of bar with one cross-section and one material."""
 
+    key = "section"
     length: float = quantity(..., "m", "length", gt=0, le=1000)
     area: float = quantity(..., "m^2", "cross-section", gt=0, le=10)
     youngs_modulus: float = quantity(STEEL_YOUNGS_MODULUS, "Pa", "Young's modulus E", gt=0, le=1e13)
     density: float = quantity(STEEL_DENSITY, "kg/m^3", "density rho", gt=0, le=1e5)
 
+    @property
+    def numbers(self) -> tuple[float, float, float, float]:
+        """Length [m], area [m^2], Young's modulus [Pa] and density [kg/m^3]."""
+        return self.length, self.area, self.youngs_modulus, self.density
+
+    @property
+    def wave_speed(self) -> float:
+        """Speed of longitudinal waves, sqrt(E/rho) [m/s]."""
+        return bars.section_wave_speed(self.numbers)
+
+    @property
+    def impedance(self) -> float:
+        """Force per particle velocity of a wave, A sqrt(E rho) [N s/m]."""
+        return bars.section_impedance(self.numbers)
+
+    @property
+    def mass(self) -> float:
+        """Mass [kg]."""
+        return bars.section_mass(self.numbers)
+
+    @property
+    def transit_time(self) -> float:
+        """Time a wave takes from end to end [s]."""
+        return bars.section_transit_time(self.numbers)
+
 
 REFERENCE_PISTON = (Section(length=REFERENCE_PISTON_LENGTH, area=REFERENCE_AREA),)
 REFERENCE_BIT = (Section(length=REFERENCE_BIT_LENGTH, area=REFERENCE_AREA),)
 
-_SECTIONS = "sections from top to bottom"
 
-
-class Bar(BarNumbers, Parameters):
+class Bar(Parameters):
     """Sections one below the other; base of piston and bit."""
 
     model: str
     sections: tuple[Section, ...]
 
+    @property
+    def numbers(self) -> tuple[tuple[float, float, float, float], ...]:
+        """Numbers of each section."""
+        return tuple(section.numbers for section in self.sections)
+
+    @property
+    def mass(self) -> float:
+        """Mass [kg]."""
+        return bars.bar_mass(self.numbers)
+
+    @property
+    def length(self) -> float:
+        """Length [m]."""
+        return bars.bar_length(self.numbers)
+
+    @property
+    def transit_time(self) -> float:
+        """Time a wave takes from end to end [s]."""
+        return bars.bar_transit_time(self.numbers)
+
 
 class PistonBar(Bar):
     """The piston; the reference one if no sections are given."""
 
-    model: Literal["elastic", "rigid", "absent"] = choice("elastic", "how the piston is modelled")
-    sections: Annotated[tuple[Section, ...], Field(min_length=1)] = choice(
-        REFERENCE_PISTON, _SECTIONS, HAS_PISTON
-    )
+    model: str = choice("elastic", ("elastic", "rigid", "absent"), "how the piston is modelled")
+    sections: tuple[Section, ...] = section_list(REFERENCE_PISTON, HAS_PISTON)
 
 
 class BitBar(Bar):
     """The bit; the reference one if no sections are given."""
 
-    model: Literal["elastic", "rigid"] = choice("elastic", "how the bit is modelled")
-    sections: Annotated[tuple[Section, ...], Field(min_length=1)] = choice(REFERENCE_BIT, _SECTIONS)
+    model: str = choice("elastic", ("elastic", "rigid"), "how the bit is modelled")
+    sections: tuple[Section, ...] = section_list(REFERENCE_BIT)
 
 
 class Effects(Parameters):
     """Which effects are on; only those are computed."""
 
-    gravity: Flag = choice(True, "weight of piston and bit")
-    feed: Flag = choice(True, "feed force on the bit")
-    drive: Literal["pressure", "external", "none"] = choice(
-        "pressure", "force on the piston: switching pressure law, a given force or none"
+    gravity: bool = flag(True, "weight of piston and bit")
+    feed: bool = flag(True, "feed force on the bit")
+    drive: str = choice(
+        "pressure",
+        ("pressure", "external", "none"),
+        "force on the piston: switching pressure law, a given force or none",
     )
-    loss: Flag = choice(True, "structural (Kelvin-Voigt) loss in the elastic bars", HAS_WAVES)
-    barrier: Flag = choice(True, "energy barrier of the bilinear rock law", ROCK_BILINEAR)
-    rock: Literal["bilinear", "spring", "wall", "none"] = choice(
+    loss: bool = flag(True, "structural (Kelvin-Voigt) loss in the elastic bars", HAS_WAVES)
+    barrier: bool = flag(True, "energy barrier of the bilinear rock law", ROCK_BILINEAR)
+    rock: str = choice(
         "bilinear",
+        ("bilinear", "spring", "wall", "none"),
         "what the bit meets: bilinear law, linear spring, rigid wall or nothing",
     )
-    standstill_tension: Literal["release", "paper"] = choice(
+    standstill_tension: str = choice(
         "release",
+        ("release", "paper"),
         "in standstill: let go of the rock when the force vanishes, or pull as in the paper",
         ROCK_BILINEAR,
     )
@@ -129,12 +270,7 @@ class Feed(Parameters):
     """Force from the surface on the bit."""
 
     force: float = quantity(
-        2500.0,
-        "N",
-        "feed force F_S on the bit, down positive",
-        FEED_ON,
-        ge=-1e9,
-        le=1e9,
+        2500.0, "N", "feed force F_S on the bit, down positive", FEED_ON, ge=-1e9, le=1e9
     )
 
 
@@ -145,12 +281,7 @@ class Drive(Parameters):
         3000.0, "N", "drive force F_0 of the pressure law", DRIVE_PRESSURE, ge=0, le=1e9
     )
     reversal_distance: float = quantity(
-        0.040,
-        "m",
-        "D_1: piston this far up turns the drive downward",
-        DRIVE_PRESSURE,
-        gt=0,
-        le=100,
+        0.040, "m", "D_1: piston this far up turns the drive downward", DRIVE_PRESSURE, gt=0, le=100
     )
     external_force: float = quantity(
         0.0, "N", "force on the piston, down positive", DRIVE_EXTERNAL, ge=-1e9, le=1e9
@@ -161,12 +292,7 @@ class Loss(Parameters):
     """Structural loss, stress = E (strain + time * strain rate)."""
 
     time: float = quantity(
-        _reference_loss_time(),
-        "s",
-        "Kelvin-Voigt time eta of the bars",
-        LOSS_ON,
-        ge=0,
-        le=1e-3,
+        _reference_loss_time(), "s", "Kelvin-Voigt time eta of the bars", LOSS_ON, ge=0, le=1e-3
     )
 
 
@@ -189,12 +315,7 @@ class Contact(Parameters):
     """Contact between a rigid piston and a rigid bit."""
 
     restitution: float | None = quantity(
-        None,
-        "-",
-        "coefficient of restitution; St Venant value if left out",
-        ALL_RIGID,
-        ge=0,
-        le=1,
+        None, "-", "coefficient of restitution; St Venant value if left out", ALL_RIGID, ge=0, le=1
     )
 
 
@@ -202,12 +323,7 @@ class Start(Parameters):
     """The state at time zero."""
 
     piston_velocity: float = quantity(
-        10.0,
-        "m/s",
-        "velocity of the piston, down positive",
-        HAS_PISTON,
-        ge=-1000,
-        le=1000,
+        10.0, "m/s", "velocity of the piston, down positive", HAS_PISTON, ge=-1000, le=1000
     )
     bit_velocity: float = quantity(
         0.0, "m/s", "velocity of the bit, down positive", ge=-1000, le=1000
@@ -217,13 +333,140 @@ class Start(Parameters):
         1e-5, "m", "gap P_u between bit and rock", ROCK_PRESENT, ge=0, le=100
     )
     depth: float = quantity(0.0, "m", "depth of the hole", ge=0, le=20000)
-    drive_direction: Direction = choice(
-        1, "alpha of the pressure law: 1 down, -1 up", DRIVE_PRESSURE
+    drive_direction: int = choice(
+        1, (1, -1), "alpha of the pressure law: 1 down, -1 up", DRIVE_PRESSURE
     )
 
 
-# The groups of a scene, in the order in which they are written.
-GROUPS: dict[str, type[Parameters]] = {
+# Elements that the paper gives the piston.
+PAPER_PISTON_ELEMENTS = 50
+
+
+class SolverOptions(Parameters):
+    """How the scene is computed."""
+
+    name: str = choice("auto", SOLVER_NAMES, "solver; auto: wave for an elastic bit, else rigid")
+    fidelity: str = choice(
+        "wave",
+        ("wave", "rigid", "blow-map"),
+        "elastic waves, rigid bodies in place of elastic ones, or a table of blows",
+        HAS_WAVES,
+    )
+    cells: int | None = count(
+        None,
+        "-",
+        "cells in the piston, or in the bit where no piston is elastic; left out: by the solver",
+        SOLVER_WAVE,
+        ge=1,
+        le=100_000,
+    )
+    leaps: bool = flag(True, "cross quiet phases in leaps", SOLVER_WAVE)
+    accuracy: float | None = quantity(
+        None,
+        "-",
+        "wanted relative error of the rate of penetration, in place of cells; "
+        "left out: none is asked for",
+        ge=1e-4,
+        le=0.1,
+    )
+
+
+class FemOptions(Parameters):
+    """Finite elements, with the paper's settings as defaults."""
+
+    elements: int = count(
+        PAPER_PISTON_ELEMENTS,
+        "-",
+        "elements in the piston, or in the bit where no piston is elastic",
+        SOLVER_FEM,
+        ge=1,
+        le=100_000,
+    )
+    courant: float = quantity(
+        5.0,
+        "-",
+        "time step, in transit times of the smallest element (CFL number)",
+        SOLVER_FEM,
+        ge=1e-3,
+        le=1e4,
+    )
+    contact_stiffness: float = quantity(
+        1e12,
+        "N/m",
+        "K_C of the penalty contact of piston and bit, and of the bit with a wall",
+        SOLVER_FEM,
+        ge=1,
+        le=1e18,
+    )
+    damping_ratio: float | None = quantity(
+        None,
+        "-",
+        "zeta_K of the bit's highest mode on its mesh, in place of loss.time",
+        {**SOLVER_FEM, **LOSS_ON},
+        ge=0,
+        le=1e3,
+    )
+    spectral_radius: float = quantity(
+        0.0,
+        "-",
+        "of the time scheme at infinite frequency: 0 annihilates, 1 conserves",
+        SOLVER_FEM,
+        ge=0,
+        le=1,
+    )
+    event_tolerance: float = quantity(
+        1e-6,
+        "-",
+        "qTol: overshoot of an event function, by its values over the step",
+        SOLVER_FEM,
+        gt=0,
+        le=1,
+    )
+    time_tolerance: float = quantity(
+        1e-4,
+        "-",
+        "tTol: bracket of an event that is narrow enough, by the time step",
+        SOLVER_FEM,
+        gt=0,
+        le=1,
+    )
+
+
+def _edge(default: float, unit: str, description: str) -> float:
+    """Declare an edge of the blow map."""
+    found: float = quantity(default, unit, description, BLOW_MAP, gt=0, le=1e13)
+    return found
+
+
+class BlowMapOptions(Parameters):
+    """What the table of blows covers."""
+
+    velocity_from: float = _edge(4.0, "m/s", "least impact velocity")
+    velocity_to: float = _edge(12.0, "m/s", "greatest impact velocity")
+    feed_from: float = _edge(1000.0, "N", "least feed force")
+    feed_to: float = _edge(8000.0, "N", "greatest feed force")
+    force_from: float = _edge(1500.0, "N", "least drive force")
+    force_to: float = _edge(5000.0, "N", "greatest drive force")
+    stiffness_from: float = _edge(3e8, "N/m", "least loading stiffness of the rock")
+    stiffness_to: float = _edge(2e9, "N/m", "greatest loading stiffness of the rock")
+    density: float = quantity(
+        1.0, "-", "nodes along each axis, by the usual number", BLOW_MAP, gt=0, le=10
+    )
+
+
+class RunOptions(Parameters):
+    """How long the scene runs."""
+
+    duration: float = quantity(4.0, "s", "simulated time", gt=0, le=1e6)
+    settle: float = quantity(
+        1.0, "s", "time before blows count for the rate of penetration", ge=0, le=1e6
+    )
+    check: bool = flag(False, "verify solver.accuracy by runs at half the step")
+
+
+# --------------------------------------------------------------------- the whole table
+
+_BUILT_IN: dict[str, type[Parameters]] = {
     "effects": Effects,
     "piston": PistonBar,
     "bit": BitBar,
@@ -239,3 +482,95 @@ GROUPS: dict[str, type[Parameters]] = {
     "blow_map": BlowMapOptions,
     "run": RunOptions,
 }
+
+
+def groups_with(effects: Iterable[Effect]) -> dict[str, type[Parameters]]:
+    """Return the groups of a scene, the built-in ones and those that effects add.
+
+    Parameters
+    ----------
+    effects : iterable of Effect
+        Each gets a switch in `effects` and, for its parameters, a group of its own.
+    """
+    groups = dict(_BUILT_IN)
+    switches: dict[str, Any] = {}
+    for effect in effects:
+        if effect.name in groups or effect.name in switches or effect.name in Effects.rows:
+            raise ValueError(f"effect {effect.name}: there is a group or a switch of this name")
+        switches[effect.name] = flag(False, effect.description)
+        needs: Needs = {f"effects.{effect.name}": (True,)}
+        fields = {
+            name: quantity(default, unit, description, needs, ge=lower, le=upper)
+            for name, (default, unit, description, lower, upper) in effect.parameters.items()
+        }
+        if fields:
+            name_of_class = effect.name.title().replace("_", "") + "Group"
+            groups[effect.name] = _group(name_of_class, Parameters, effect.description, fields)
+    if switches:
+        groups["effects"] = _group("Effects", Effects, Effects.__doc__, switches)
+    for key, group in groups.items():
+        group.key = key
+    return groups
+
+
+def _group(
+    name: str, base: type[Parameters], doc: str | None, fields: Mapping[str, Any]
+) -> type[Parameters]:
+    about = {"__module__": __name__, "__doc__": doc, "__annotations__": dict.fromkeys(fields, Any)}
+    return type(name, (base,), {**about, **fields})
+
+
+# The groups of a scene, in the order in which they are written.
+GROUPS = groups_with(EFFECTS)
+# Objects of the added ones are found here by name, when they come from another process.
+globals().update({group.__name__: group for group in GROUPS.values()})
+
+
+@cache
+def parameter_table() -> tuple[Row, ...]:
+    """Return a row for each parameter, in the order of a scene file."""
+    return tuple(table_of(GROUPS))
+
+
+def table_of(groups: Mapping[str, type[Parameters]]) -> Iterator[Row]:
+    """Go through the rows of groups; keys of sections have a `*` for their number."""
+    for key, group in groups.items():
+        for name, row in group.rows.items():
+            yield dataclasses.replace(row, key=f"{key}.{name}")
+            if row.kind == "sections":
+                yield from table_of({f"{key}.{name}.*": Section})
+
+
+@cache
+def rows_by_key() -> Mapping[str, Row]:
+    """Return the rows of `parameter_table` by their dotted keys."""
+    return {row.key: row for row in parameter_table()}
+
+
+def find_row(key: str) -> Row | None:
+    """Find the row of a dotted key, `piston.sections.0.length` included."""
+    return rows_by_key().get(generic_key(key))
+
+
+def unknown_key(key: str) -> str:
+    """Say that a key is not known, and which known one is nearest."""
+    key = shortened(key)
+    parent, _, name = key.rpartition(".")
+    prefix = generic_key(parent) + "." if parent else ""
+    keys = rows_by_key()
+    siblings = [one.removeprefix(prefix) for one in keys if one.startswith(prefix)]
+    siblings = [one for one in siblings if "." not in one]
+    near = [one for one in siblings if one.startswith(name)]  # a shortened name
+    near += difflib.get_close_matches(name, siblings, 1, _SIMILAR_ENOUGH)
+    if near and parent:
+        return f"unknown key {key}: did you mean {parent}.{near[0]}?"
+    underlined = {one.replace(".", "_"): one for one in keys}
+    if key in underlined:  # as keyword arguments of Python are written
+        return f"unknown key {key}: did you mean {underlined[key]}?"
+    known = list(keys) if parent else ["title", *GROUPS]
+    near = difflib.get_close_matches(generic_key(key), known, 1, _SIMILAR_ENOUGH)
+    if near:
+        return f"unknown key {key}: did you mean {near[0].replace('.*', '.0')}?"
+    if siblings and parent:
+        return f"unknown key {key}: [{parent}] has the keys {', '.join(siblings)}"
+    return f"unknown key {key}: a scene has a title and the tables {', '.join(GROUPS)}"

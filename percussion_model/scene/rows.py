@@ -1,19 +1,32 @@
-"""What is known of a parameter, and the wording of what is allowed.
+"""What is known of a parameter: how it is declared, what is allowed, and how faults are told.
 
-Standard library only: a scene that is exported takes its rows along.
+Standard library only: every FMU takes this module along.
 """
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import math
 import numbers
 import reprlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any, Literal
 
 Kind = Literal["number", "whole number", "flag", "choice", "sections"]
+
+# Of a key or of a parser's words, no more than this is repeated in a message.
+_LONGEST_WORDS = 200
+# More faults of one scene than this are counted, not told.
+_MOST_FAULTS = 30
+# What `Row.read` returns for a value that is not allowed.
+REFUSED = object()
+
+
+class SceneError(ValueError):
+    """A scene that cannot be read or makes no sense; the message says what to do."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +45,7 @@ class Row:
     upper_open: bool
     default: Any
     required: bool
-    choices: tuple[Any, ...]
+    choices: Sequence[Any]
     description: str
     needs: Mapping[str, tuple[Any, ...]]
 
@@ -64,10 +77,33 @@ class Row:
             parts.append(f"{key} = " + " or ".join(toml_value(value) for value in values))
         return ", ".join(parts)
 
+    def read(self, value: Any) -> Any:
+        """Return a value as a scene keeps it, `REFUSED` if it is not allowed.
+
+        Words and whole numbers must be such themselves: True and 1.0 are no 1.
+        """
+        if self.kind == "number":
+            if self.allows(value):
+                return float(value)
+        elif self.kind == "whole number":
+            if isinstance(value, int) and self.allows(value):
+                return int(value)
+        elif self.kind == "flag":
+            if type(value) is bool:
+                return value
+        elif type(value) is int or isinstance(value, str):
+            for choice in self.choices:
+                if value == choice:
+                    return choice
+        if value is None and self.default is None and not self.required:
+            return None
+        return REFUSED
+
     def allows(self, value: Any) -> bool:
         """Whether a number lies within the bounds."""
         if not is_number(value):
             return False
+        value = float(value)  # narrow numbers would narrow the bounds
         low = self.lower is None or value > self.lower
         low = low or (value == self.lower and not self.lower_open)
         high = self.upper is None or value < self.upper
@@ -75,11 +111,81 @@ class Row:
         return low and high
 
 
+# What must hold, key by key, for a parameter to have any influence.
+Needs = dict[str, tuple[object, ...]]
+
+
+def quantity(
+    default: Any, unit: str, description: str, needs: Needs | None = None, **bounds: float
+) -> Any:
+    """Declare a number with its unit, bounds (gt, ge, lt, le) and what it needs.
+
+    The default ... makes it required; None lets it be left out.
+    """
+    return _declare("number", default, description, needs, unit, bounds=bounds)
+
+
+def count(
+    default: int | None, unit: str, description: str, needs: Needs | None = None, **bounds: float
+) -> Any:
+    """Declare a whole number, as `quantity` does a number."""
+    return _declare("whole number", default, description, needs, unit, bounds=bounds)
+
+
+def flag(default: bool, description: str, needs: Needs | None = None) -> Any:
+    """Declare a switch."""
+    return _declare("flag", default, description, needs)
+
+
+def choice(
+    default: Any, choices: Sequence[Any], description: str, needs: Needs | None = None
+) -> Any:
+    """Declare one of several words or whole numbers."""
+    return _declare("choice", default, description, needs, choices=choices)
+
+
+def section_list(default: tuple[Any, ...], needs: Needs | None = None) -> Any:
+    """Declare the sections of a bar."""
+    return _declare("sections", default, "sections from top to bottom", needs)
+
+
+def _declare(
+    kind: Any,
+    default: Any,
+    description: str,
+    needs: Needs | None,
+    unit: str = "",
+    choices: Sequence[Any] = (),
+    bounds: Mapping[str, float] = MappingProxyType({}),
+) -> Any:
+    low, high = bounds.get("gt", bounds.get("ge")), bounds.get("lt", bounds.get("le"))
+    row = Row(
+        key="",
+        kind=kind,
+        unit=unit,
+        lower=None if low is None else float(low),
+        lower_open="gt" in bounds,
+        upper=None if high is None else float(high),
+        upper_open="lt" in bounds,
+        default=None if default is ... else default,
+        required=default is ...,
+        choices=choices,
+        description=description,
+        needs=needs or {},
+    )
+    return dataclasses.field(default=row.default, metadata={"row": row})
+
+
 def is_number(value: Any) -> bool:
     """Whether a value is a finite real number, and no truth value."""
     if type(value) is float:  # by far the most frequent, and the rest takes its time
         return math.isfinite(value)
-    return isinstance(value, numbers.Real) and not isinstance(value, bool) and math.isfinite(value)
+    if isinstance(value, bool) or not isinstance(value, numbers.Real):
+        return False
+    try:
+        return math.isfinite(value)
+    except OverflowError:  # a whole number beyond all floats
+        return False
 
 
 def _short(number: float) -> str:
@@ -109,7 +215,12 @@ def toml_value(value: object) -> str:
 
 def generic_key(key: str) -> str:
     """Replace the numbers of sections in a dotted key by `*`."""
-    return ".".join("*" if part.isdigit() else part for part in key.split("."))
+    return ".".join("*" if part.isdecimal() else part for part in key.split("."))
+
+
+def shortened(text: str) -> str:
+    """Text of others, no longer than a message bears."""
+    return text if len(text) <= _LONGEST_WORDS else text[:_LONGEST_WORDS] + "..."
 
 
 def refuse_value(row: Row, key: str, value: Any) -> str:
@@ -126,3 +237,25 @@ def show_value(value: Any) -> str:
     except TypeError:
         text = repr(value)
     return text if len(text) <= 60 and "\n" not in text else reprlib.repr(value)
+
+
+class Faults:
+    """What is wrong with a scene, a line for each fault, as long as they can be read."""
+
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+        self.untold = 0
+
+    def add(self, say: Callable[..., str], *words: Any) -> None:
+        """Note a fault; its wording is worked out only if it will be told."""
+        if len(self.lines) < _MOST_FAULTS:
+            self.lines.append(say(*words))
+        else:
+            self.untold += 1
+
+    def refuse(self) -> None:
+        """Raise `SceneError` if there are any."""
+        if self.untold:
+            self.lines.append(f"and {self.untold} more faults")
+        if self.lines:
+            raise SceneError("\n".join(self.lines))

@@ -2,78 +2,89 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Self
 
-import tomli_w
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
-
 from percussion_model.scene.parameters import (
+    EFFECTS,
     GROUPS,
     BitBar,
+    BlowMapOptions,
     Contact,
     Drive,
     Effects,
     Feed,
+    FemOptions,
     Gravity,
     Loss,
+    Parameters,
     PistonBar,
     RockLaw,
-    Start,
-)
-from percussion_model.scene.rows import Row
-from percussion_model.scene.rules import SceneError, SceneRules, refuse_contradictions
-from percussion_model.scene.solver_options import (
-    BlowMapOptions,
-    FemOptions,
     RunOptions,
     SolverOptions,
-)
-from percussion_model.scene.table import find_row, parameter_table
-from percussion_model.scene.text import (
-    commented_scene,
-    explain_validation,
-    flat_keys,
-    read_setting,
-    read_toml,
-    set_key,
+    Start,
+    find_row,
+    parameter_table,
     unknown_key,
-    write_text,
 )
+from percussion_model.scene.rows import Faults, Row, SceneError, show_value
+from percussion_model.scene.solver_names import BODIES
+from percussion_model.scene.text import commented_scene, plain_scene, read_toml, write_text
 
-__all__ = ["Scene", "SceneError", "read_setting"]
+__all__ = ["Scene", "SceneError"]
+
+# Groups that nothing was given of; they cannot change, so all scenes share them.
+_DEFAULTS = {name: group() for name, group in GROUPS.items()}
 
 
-class Scene(SceneRules, BaseModel):
+@dataclass(frozen=True, init=False)
+class Scene:
     """Everything that a run needs to know; immutable.
 
     Without arguments it is the reference scene of the paper. Bad values raise
     `SceneError`, as do effects that contradict each other.
+
+    Parameters
+    ----------
+    **values
+        A title, and groups as tables of values or as objects.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    title: str = Field("", strict=True)
-    effects: Effects = Effects()
-    piston: PistonBar = PistonBar()
-    bit: BitBar = BitBar()
-    gravity: Gravity = Gravity()
-    feed: Feed = Feed()
-    drive: Drive = Drive()
-    loss: Loss = Loss()
-    rock: RockLaw = RockLaw()
-    contact: Contact = Contact()
-    start: Start = Start()
-    solver: SolverOptions = SolverOptions()
-    fem: FemOptions = FemOptions()
-    blow_map: BlowMapOptions = BlowMapOptions()
-    run: RunOptions = RunOptions()
+    title: str
+    effects: Effects
+    piston: PistonBar
+    bit: BitBar
+    gravity: Gravity
+    feed: Feed
+    drive: Drive
+    loss: Loss
+    rock: RockLaw
+    contact: Contact
+    start: Start
+    solver: SolverOptions
+    fem: FemOptions
+    blow_map: BlowMapOptions
+    run: RunOptions
+    # fields of the dataclass: those above, and groups that effects have added
+    __annotations__ = {"title": "str"} | dict.fromkeys(GROUPS, Parameters) | __annotations__
 
     def __init__(self, **values: Any) -> None:
-        try:
-            super().__init__(**values)
-        except ValidationError as error:
-            raise SceneError(explain_validation(error)) from None
+        faults = Faults()
+        kept = self.__dict__
+        kept["title"] = title = values.get("title", "")
+        if not isinstance(title, str):
+            faults.add(_refuse_title, title)
+        for name, group in GROUPS.items():
+            if name in values:
+                kept[name] = group.read(values[name], name, faults)
+            else:
+                kept[name] = _DEFAULTS[name]
+        for name in values:
+            if name not in kept:
+                faults.add(unknown_key, name)
+        faults.refuse()
         refuse_contradictions(self)
 
     @classmethod
@@ -122,7 +133,7 @@ class Scene(SceneRules, BaseModel):
             silent = [key for key in values if not (self.matters(key) or key in given)]
             text = commented_scene(self.title, values, silent)
         else:
-            text = tomli_w.dumps(self._tree())
+            text = plain_scene(self._tree())
         if path is not None:
             write_text(Path(path), text)
         return text
@@ -137,19 +148,56 @@ class Scene(SceneRules, BaseModel):
             sections are counted from 0, as in `piston.sections.0.length`. None
             goes back to the default. A whole group may be given as well.
         """
-        tree = self.model_dump(exclude_unset=True)
+        tree: dict[str, Any] = {"title": self.title}
+        tree |= {name: self.__dict__[name] for name in GROUPS if self.__dict__[name]._given}
         for key, value in changes.items():
             if key not in ("title", *GROUPS) and find_row(key) is None:
                 raise SceneError(unknown_key(key))
-            self._list_sections(tree, key)
-            set_key(tree, key, value)
+            self._change(tree, key, value)
         return type(self)(**tree)
 
+    def _change(self, tree: dict[str, Any], key: str, value: Any) -> None:
+        """Change a known key in the groups that a scene will be made of."""
+        if getattr(value, "shape", None) == ():
+            value = value.item()  # a number of numpy
+        name, *rest = key.split(".")
+        entries = tree
+        if rest:
+            present = tree.get(name, {})
+            if not isinstance(present, (Parameters, Mapping)):
+                raise SceneError(unknown_key(key))
+            entries = present.given_values() if isinstance(present, Parameters) else dict(present)
+            tree[name], (name, *rest) = entries, rest
+        if rest:
+            entries, name = self._section_to_change(entries, key), rest[-1]
+        if value is None:
+            entries.pop(name, None)
+        else:
+            entries[name] = value
+
+    def _section_to_change(self, bar: dict[str, Any], key: str) -> dict[str, Any]:
+        """Make the sections of a bar a list of their own, and return one of them."""
+        path, _, _ = key.rpartition(".")
+        group, _, place = path.partition(".sections.")
+        try:
+            bar["sections"] = sections = list(bar.get("sections", self[f"{group}.sections"]))
+            section = sections[int(place)]
+            sections[int(place)] = found = (
+                asdict(section) if isinstance(section, Parameters) else dict(section)
+            )
+        except IndexError:
+            raise SceneError(
+                f"{path}: no such section; there are {len(sections)}, counted from 0"
+            ) from None
+        except (TypeError, ValueError):  # what was given before is no list of tables
+            raise SceneError(unknown_key(key)) from None
+        return found
+
     def computed_by(self, solver: str, **changes: Any) -> Self:
-        """Return the scene for a solver, with other changes; rigid makes piston and bit rigid."""
+        """Return the scene for a solver, with other changes; that of rigid bodies makes them so."""
         changes["solver.fidelity"] = "blow-map" if solver == "blow-map" else None
         changes["solver.name"] = "auto" if solver == "blow-map" else solver
-        if solver == "rigid":
+        if BODIES.get(solver) == "rigid":
             changes["bit.model"] = "rigid"
             if changes.get("piston.model", self.piston.model) == "elastic":
                 changes["piston.model"] = "rigid"
@@ -157,15 +205,30 @@ class Scene(SceneRules, BaseModel):
 
     def __getitem__(self, key: str) -> Any:
         """Return the value of a dotted key."""
+        value: Any = self
         try:
-            return super().__getitem__(key)
-        except KeyError:
+            for part in key.split("."):
+                value = value[int(part)] if part.isdecimal() else getattr(value, part)
+        except (AttributeError, IndexError):
             raise KeyError(unknown_key(key)) from None
+        return value
 
     @property
     def given(self) -> frozenset[str]:
         """Dotted keys that were given, not left to their defaults."""
-        return frozenset(flat_keys(self.model_dump(exclude_unset=True)))
+        return frozenset(
+            f"{group}.{name}" for group in GROUPS for name in self.__dict__[group]._given
+        )
+
+    def given_values(self) -> dict[str, Any]:
+        """Return what was given as nested plain values: `Scene(**values)` is an equal scene."""
+        tree: dict[str, Any] = {"title": self.title}
+        for group in GROUPS:
+            for name, value in self.__dict__[group].given_values().items():
+                if name == "sections":
+                    value = [asdict(section) for section in value]
+                tree.setdefault(group, {})[name] = value
+        return tree
 
     @property
     def unused(self) -> tuple[str, ...]:
@@ -181,6 +244,31 @@ class Scene(SceneRules, BaseModel):
         if row is None:
             raise SceneError(unknown_key(key))
         return row
+
+    def matters(self, key: str) -> bool:
+        """Tell whether a parameter has any influence on this scene."""
+        return all(self[need] in values for need, values in self.row_of(key).needs.items())
+
+    @property
+    def solver_name(self) -> str:
+        """Solver that computes the scene: "wave", "fem", "rigid" or "blow-map"."""
+        if self.bit.model == "elastic" and self.solver.fidelity != "wave":
+            return str(self.solver.fidelity)
+        if self.solver.name != "auto":
+            return str(self.solver.name)
+        return "wave" if self.bit.model == "elastic" else "rigid"
+
+    @property
+    def loss_on(self) -> bool:
+        """Whether bars lose energy to structural loss."""
+        elastic = BODIES.get(self.solver_name) != "rigid"
+        return self.effects.loss and elastic and self.loss.time > 0
+
+    @property
+    def barrier_on(self) -> bool:
+        """Whether the rock law has an energy barrier (mode DFC)."""
+        wanted = self.effects.barrier and self.effects.rock == "bilinear"
+        return bool(wanted and self.rock.barrier_energy > 0 and self.rock.barrier_damping > 0)
 
     @property
     def effects_on(self) -> tuple[str, ...]:
@@ -200,6 +288,7 @@ class Scene(SceneRules, BaseModel):
             "loss": self.loss_on,
             "barrier": self.barrier_on,
             "rock": self.effects.rock != "none",
+            **{effect.name: getattr(self.effects, effect.name) for effect in EFFECTS},
         }
 
     def _tree(self) -> dict[str, Any]:
@@ -211,20 +300,107 @@ class Scene(SceneRules, BaseModel):
             if value is None or not (self.matters(row.key) or row.key in given):
                 continue
             if row.kind == "sections":
-                value = [section.model_dump() for section in value]
-            set_key(tree, row.key, value)
+                value = [asdict(section) for section in value]
+            group, _, name = row.key.partition(".")
+            tree.setdefault(group, {})[name] = value
         return tree
-
-    def _list_sections(self, tree: dict[str, Any], key: str) -> None:
-        """Make the sections of a bar a list in `tree`, so that one can be changed."""
-        bar, *rest = key.split(".")
-        if len(rest) > 1 and rest[0] == "sections":
-            sections = self[f"{bar}.sections"]
-            present = tree.setdefault(bar, {}).get("sections")
-            if not isinstance(present, list):
-                tree[bar]["sections"] = [section.model_dump() for section in sections]
 
 
 def _plain_rows() -> tuple[Row, ...]:
     """Rows of the keys that stand in a group itself, sections as one."""
     return tuple(row for row in parameter_table() if "*" not in row.key)
+
+
+def _refuse_title(title: Any) -> str:
+    return f"title = {show_value(title)}: must be text"
+
+
+def refuse_contradictions(scene: Scene) -> None:
+    """Raise `SceneError` if parts of a scene contradict each other."""
+    effects, piston, bit, run = scene.effects, scene.piston.model, scene.bit.model, scene.run
+    if piston == "absent" and effects.drive != "none":
+        raise SceneError(
+            f'effects.drive = "{effects.drive}" needs a piston, but piston.model = "absent": '
+            'set effects.drive = "none" or give a piston'
+        )
+    if piston == "elastic" and bit == "rigid":
+        raise SceneError(
+            'piston.model = "elastic" with bit.model = "rigid": no solver computes this; '
+            'set bit.model = "elastic" or piston.model = "rigid"'
+        )
+    bodies = BODIES.get(scene.solver.name)
+    if bodies == "elastic" and bit == "rigid":
+        raise SceneError(
+            f'solver.name = "{scene.solver.name}" needs bit.model = "elastic": '
+            'set that, or solver.name = "rigid" or "auto"'
+        )
+    if bodies == "rigid" and bit == "elastic":
+        raise SceneError(
+            f'solver.name = "{scene.solver.name}" computes no elastic bars: '
+            'set piston.model = "rigid" and bit.model = "rigid", or solver.name = "wave", "fem" '
+            'or "auto"'
+        )
+    _refuse_fidelity(scene)
+    _refuse_requests(scene)
+    if effects.barrier and effects.rock != "bilinear" and "effects.barrier" in scene.given:
+        raise SceneError(
+            f'effects.barrier = true needs effects.rock = "bilinear", not "{effects.rock}": '
+            "set effects.barrier = false"
+        )
+    if run.settle >= run.duration:
+        raise SceneError(
+            f"run.settle = {run.settle!r} s: must be below run.duration = {run.duration!r} s"
+        )
+
+
+# What the blow map is a table of, and the ranges that must rise.
+_MAPPED = {"effects.drive": "pressure", "effects.rock": "bilinear", "bit.model": "elastic"}
+_RANGES = ("velocity", "feed", "force", "stiffness")
+
+
+def _refuse_fidelity(scene: Scene) -> None:
+    """Raise `SceneError` if a scene asks for a fidelity that it cannot have."""
+    fidelity = scene.solver.fidelity
+    if fidelity == "wave":
+        return
+    if scene.solver.name != "auto":
+        raise SceneError(
+            f'solver.fidelity = "{fidelity}" and solver.name = "{scene.solver.name}": a name '
+            'says how elastic waves are computed; leave it "auto"'
+        )
+    if fidelity != "blow-map":
+        return
+    for key, wanted in _MAPPED.items():
+        if scene[key] != wanted:
+            raise SceneError(
+                f'solver.fidelity = "blow-map" needs {key} = "{wanted}", not "{scene[key]}"'
+            )
+    for name in _RANGES:
+        low, high = scene[f"blow_map.{name}_from"], scene[f"blow_map.{name}_to"]
+        if not low < high:
+            raise SceneError(
+                f"blow_map.{name}_from = {low!r}: must be below blow_map.{name}_to = {high!r}"
+            )
+
+
+def _refuse_requests(scene: Scene) -> None:
+    """Refuse an accuracy that is said in two ways, or that no rule picks a mesh for."""
+    accuracy, cells = scene.solver.accuracy, scene.solver.cells
+    if accuracy is None:
+        return
+    if cells is not None:
+        raise SceneError(
+            f"solver.accuracy = {accuracy!r} and solver.cells = {cells!r} both choose the "
+            "resolution: give one of them"
+        )
+    if scene.solver.name == "fem":
+        raise SceneError(
+            f"solver.accuracy = {accuracy!r} picks the cells of waves, no finite elements: set "
+            "fem.elements, fem.courant and fem.contact_stiffness, or solver.name = "
+            '"wave" or "auto"'
+        )
+    if scene.solver_name == "blow-map":
+        raise SceneError(
+            f"solver.accuracy = {accuracy!r}: a blow map is as accurate as its table "
+            '(docs/fidelity.md); set blow_map.density, or solver.fidelity = "wave"'
+        )

@@ -10,7 +10,7 @@ import numpy as np
 from percussion_model.physics.records import BLOW, EVENT, READING, SAMPLE_FIELDS, Status
 from percussion_model.scene.inputs import SimulationError, check_input
 from percussion_model.scene.rows import is_number
-from percussion_model.scene.rules import SceneRules
+from percussion_model.scene.scene import Scene
 from percussion_model.solvers.base import Solver, make_solver
 
 # Rows that one call of a kernel can fill; a full buffer is read out.
@@ -32,7 +32,7 @@ class Runner:
 
     Parameters
     ----------
-    scene : SceneRules
+    scene : Scene
     record_events : bool
         Whether the kernels list events.
     solver : Solver, optional
@@ -40,7 +40,7 @@ class Runner:
     """
 
     def __init__(
-        self, scene: SceneRules, record_events: bool = True, solver: Solver | None = None
+        self, scene: Scene, record_events: bool = True, solver: Solver | None = None
     ) -> None:
         began = time.perf_counter()
         self.record_events = record_events
@@ -189,10 +189,9 @@ class Runner:
         Parameters
         ----------
         **inputs
-            feed_force, drive_force, external_force [N] and reversal_distance
-            [m] act at once; loading_stiffness [N/m], unloading_ratio,
-            barrier_damping [N s/m] and barrier_energy [J] from the next
-            drilling cycle on. Bounds are those of the parameter table.
+            Those of `percussion_model.scene.inputs.INPUTS`: forces and the reversal
+            distance act at once, the rock from the next drilling cycle on. Units
+            and bounds are those of the parameter table.
         """
         values = {name: check_input(self._scene_rules, name, v) for name, v in inputs.items()}
         if not values:

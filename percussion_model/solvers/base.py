@@ -10,13 +10,14 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from importlib import import_module
-from typing import Any, ClassVar, NamedTuple, Protocol
+from typing import Any, ClassVar, Literal, NamedTuple, Protocol
 
 import numpy as np
 
 from percussion_model.physics.records import BLOW, EVENT, READING, SAMPLE_FIELDS
-from percussion_model.scene.rules import SceneRules
-from percussion_model.solvers.setup import INPUT_FIELDS
+from percussion_model.scene.inputs import INPUTS
+from percussion_model.scene.scene import Scene
+from percussion_model.scene.solver_names import register_name
 from percussion_model.solvers.state import State, words_of
 
 
@@ -38,7 +39,7 @@ class Solver(ABC):
     Attributes
     ----------
     name : str
-    scene : SceneRules
+    scene : Scene
     time_step : float or None
         Distance of grid points [s]; None where there are none.
     cells : dict of int
@@ -54,7 +55,7 @@ class Solver(ABC):
     wave_speed_error = 0.0
     COUNTS: ClassVar[tuple[str, ...]] = ("events", "blows")
 
-    def __init__(self, scene: SceneRules) -> None:
+    def __init__(self, scene: Scene) -> None:
         self.scene = scene
         self.cells: dict[str, int] = {}
         self._no_blows = np.zeros(1, BLOW)
@@ -122,7 +123,7 @@ class Solver(ABC):
     def set_inputs(self, state: State, **inputs: float) -> None:
         """Change inputs of a committed state; those of the rock wait for the next cycle."""
         for name, value in inputs.items():
-            state.record[0][INPUT_FIELDS[name]] = value
+            state.record[0][INPUTS[name].field] = value
 
     def grid_point_after(self, state: State, t: float) -> float:
         """First time at or after `t` at which inputs can change [s]."""
@@ -176,13 +177,13 @@ class Solver(ABC):
 
 
 class Entry(NamedTuple):
-    """A solver that scenes can name.
+    """Where a solver is made.
 
     Attributes
     ----------
     module, factory : str
-        Where it is made: a class or a function of the scene. Its kernels are loaded only
-        when it is used, which is most of a start.
+        A class or a function of the scene. Its kernels are loaded only when it is used,
+        which is most of a start.
     """
 
     module: str
@@ -198,8 +199,31 @@ _REGISTRY = {
 }
 
 
-def make_solver(scene: SceneRules) -> Solver:
+def register(
+    name: str, module: str, factory: str, bodies: Literal["elastic", "rigid"] | None = None
+) -> None:
+    """Let scenes name one more solver, in this process and in FMUs that are built in it.
+
+    Parameters
+    ----------
+    name : str
+        Value of `solver.name`.
+    module, factory : str
+        Where it is made, as in `Entry`.
+    bodies : {"elastic", "rigid"}, optional
+        What `bit.model` must be for it; either if left out.
+    """
+    register_name(name, bodies)
+    _REGISTRY[name] = Entry(module, factory)
+
+
+def added_solvers() -> dict[str, Entry]:
+    """Solvers that are not a part of this package, by name."""
+    return {k: entry for k, entry in _REGISTRY.items() if not entry.module.startswith(_HERE)}
+
+
+def make_solver(scene: Scene) -> Solver:
     """Make the solver that computes a scene."""
     entry = _REGISTRY[scene.solver_name]
-    factory: Callable[[SceneRules], Solver] = getattr(import_module(entry.module), entry.factory)
+    factory: Callable[[Scene], Solver] = getattr(import_module(entry.module), entry.factory)
     return factory(scene)

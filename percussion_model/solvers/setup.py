@@ -8,7 +8,7 @@ import numpy as np
 
 from percussion_model.physics.effects import EFFECTS
 from percussion_model.physics.records import DriveKind, Mode, Piston, RockKind
-from percussion_model.scene.rules import SceneRules
+from percussion_model.scene.scene import Scene
 
 # An open gap of this many transits of the slower bar ends a blow where no
 # pressure law does (docs/model.md, section 7).
@@ -17,20 +17,8 @@ REARM_TRANSITS = 20.0
 # DFC, FC, BC and again; more would be a loop.
 MOST_CHANGES = 12
 
-# Inputs that can change during a run, and the fields of the state that hold them.
-INPUT_FIELDS = {
-    "feed_force": "feed",
-    "drive_force": "drive_force",
-    "reversal_distance": "reversal",
-    "external_force": "external",
-    "loading_stiffness": "next_k_r",
-    "unloading_ratio": "next_gamma",
-    "barrier_damping": "next_c_r",
-    "barrier_energy": "next_w_r",
-}
 
-
-def fill_parameters(p: Any, scene: SceneRules, with_piston: bool) -> float:
+def fill_parameters(p: Any, scene: Scene, with_piston: bool) -> float:
     """Fill `COMMON_PARAMETERS`.
 
     Parameters
@@ -66,7 +54,7 @@ def fill_parameters(p: Any, scene: SceneRules, with_piston: bool) -> float:
     return float(slowest)
 
 
-def rock_numbers(scene: SceneRules) -> dict[str, float]:
+def rock_numbers(scene: Scene) -> dict[str, float]:
     """Numbers of the rock law as the kernels take them."""
     rock, kind = scene.rock, scene.effects.rock
     barrier = scene.barrier_on
@@ -78,7 +66,7 @@ def rock_numbers(scene: SceneRules) -> dict[str, float]:
     }
 
 
-def fill_start(s: Any, scene: SceneRules, rock: dict[str, float]) -> None:
+def fill_start(s: Any, scene: Scene, rock: dict[str, float]) -> None:
     """Fill what states have in common (`COMMON_STATE`) at time zero.
 
     Parameters

@@ -35,7 +35,7 @@ def free_bar(sections, cells, eta=ETA):
     )
     solver = WaveSolver(scene)
     solver._par["barrier"] = 1  # as for the leap operators: the bar by itself
-    return Configuration(solver._par, solver._bit, solver._cb), solver.time_step
+    return Configuration(solver._par, solver.grid_of("bit"), solver._cb), solver.time_step
 
 
 def decay_of_modes(sections, cells, most, eta=ETA):

@@ -26,9 +26,9 @@ def test_forms_of_a_step_are_the_energy_it_takes(load, cells, loss):
     par = _alone(solver._par)
     if stiffness:
         par["rock"] = solver._par["rock"]
-    bar = Configuration(par, solver._bit, solver._cb, stiffness, damping)
+    bar = Configuration(par, solver.grid_of("bit"), solver._cb, stiffness, damping)
     by_column = step_map(bar)
-    mass = solver._bit.mass
+    mass = solver.grid_of("bit").mass
     energy = np.diag([*mass, *mass, 0.5 * stiffness][: bar.size])
     taken = energy - by_column @ energy @ by_column.T
     lost = sum(step_forms(bar, by_column))
@@ -54,4 +54,4 @@ def test_forms_of_a_step_are_the_energy_it_takes(load, cells, loss):
 def test_scenes_share_the_operators_that_they_have_in_common(key, value, shared):
     scene = Scene().replace(**{"solver.cells": 5})
     one, other = WaveSolver(scene), WaveSolver(scene.replace(**{key: value}))
-    assert (one._operators[1] is other._operators[1]) == shared
+    assert (one._operators.bit is other._operators.bit) == shared

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from fmpy import simulate_fmu
 
-from percussion_model import SAMPLE_FIELDS, Scene, Simulation
+from percussion_model import Scene, Simulation
+from percussion_model.physics.records import READING
 
 # Random steps between the shortest and the longest of a master [s].
 SHORTEST, LONGEST = 1e-6, 0.06
@@ -133,13 +134,13 @@ def test_the_gauge_reads_the_stress_of_its_cell(make):
     place = 0.13
     instance = make("PercussiveHammer", gauge__bar="piston", gauge__position=place)
     simulation = Simulation(scene)
-    row = np.zeros(len(SAMPLE_FIELDS))
+    reading = np.zeros(1, READING)
     found = []
     for k in range(400):
         instance.time = k * 1e-6
         instance.step(1e-6)
         simulation.advance(instance.time)
-        here = simulation.solver.look(simulation._state, instance.time, row)
+        here = simulation.solver.read(simulation._state, instance.time, reading)
         stress = simulation.solver.fields(here)["piston_force"] / scene.piston.sections[0].area
         found.append(instance.get("gauge_stress"))
         assert found[-1] == stress[int(place / scene.piston.length * len(stress))]

@@ -17,7 +17,7 @@ from fmu_src.hammer.outputs import OUTPUTS
 from fmu_src.hammer.variables import INTERFACE, hammer_variables, split_drive_force
 from fmu_src.units import UNITS
 from percussion_model import Scene, SceneError, Section
-from percussion_model.scene.table import parameter_table
+from percussion_model.scene.parameters import parameter_table
 
 NAMES = ["PercussiveHammer", "RigidHammer", "PneumaticDrive"]
 SCHEMA = Path(fmpy.__file__).parent / "schema" / "fmi2" / "fmi2ModelDescription.xsd"

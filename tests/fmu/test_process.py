@@ -43,10 +43,7 @@ slaves[0].freeInstance()
 assert len(values) == 1
 sys.stderr.write(repr(values.pop()))
 """
-ABSENT = (
-    "percussion_model,fmu_src,pythonfmu,pydantic,pydantic_core,scipy,pandas,matplotlib,"
-    "typer,rich,tomli_w"
-)
+ABSENT = "percussion_model,fmu_src,pythonfmu,scipy,pandas,matplotlib,typer,rich,tomli_w"
 
 
 def host(fmu, cwd, output="blow_position", **environment):

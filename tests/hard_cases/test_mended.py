@@ -70,7 +70,7 @@ def test_what_happens_before_a_change_of_inputs_is_listed():
 def test_loss_never_gives_energy(cells, loss_time):
     """Both ends of a bar at once gave energy where each reaches the other within a step."""
     solver = WaveSolver(Scene().replace(**{"loss.time": loss_time, "solver.cells": cells}))
-    for operator in (solver._operators[0][0], solver._operators[1][0, 0]):
+    for operator in (solver._operators.piston[0], solver._operators.bit[0, 0]):
         assert np.abs(np.linalg.eigvals(operator)).max() < 1.0 + 1e-9
 
 
@@ -143,7 +143,7 @@ def test_a_light_bit_between_piston_and_rock_stays_between_them(rock, most_event
     """In a storm of rebounds closures waited: bodies met too late, or lost energy unbooked."""
     simulation = Simulation(Scene().computed_by("rigid", **LIGHT_BITS[rock]))
     # with one event unhindered, the rule of the worst storm acts as well
-    simulation._state["par"]["most_events"] = most_events
+    simulation.solver._par["most_events"] = most_events
     for t in np.linspace(0.0, 0.02, 500):
         simulation.advance(float(t))
         assert simulation.observe()["gap"] >= -1e-12

@@ -28,7 +28,7 @@ def use_attribute_records() -> None:
     from percussion_model.solvers.wave import records as of_waves
 
     for module, names in (
-        (records, ("BLOW", "EVENT")),
+        (records, ("BLOW", "EVENT", "READING")),
         (of_waves, ("WAVE_PAR", "WAVE_STATE")),
         (of_fem, ("FEM_PAR", "FEM_STATE")),
     ):
@@ -100,20 +100,21 @@ def lose_body_force(at: int = 1000) -> None:
 
 def weaken_penalty() -> None:
     """Let the bit feel 0.999 of what the penalty contact does to it."""
-    from percussion_model.solvers.fem.solve import RE
+    from percussion_model.solvers.fem.records import Trial
     from percussion_model.solvers.fem.solve import meet_at_contact as meet
 
     def meet_at_contact(par, s, f, at, x, h):
         meet(par, s, f, at, x, h)
         if s.closed == 1:
-            x[RE, par.n_p] *= FAULT
+            x[Trial.RE, par.n_p] *= FAULT
 
     replace("meet_at_contact", meet_at_contact)
 
 
 def lose_load(at: int = 100) -> None:
     """Let the piston feel neither gravity nor drive in one step."""
-    from percussion_model.solvers.fem.scheme import RE, SHARE, drive_force
+    from percussion_model.solvers.fem.records import Mesh, Trial
+    from percussion_model.solvers.fem.scheme import drive_force
     from percussion_model.solvers.fem.scheme import load as full
 
     count = 0
@@ -125,20 +126,20 @@ def lose_load(at: int = 100) -> None:
         if count == at:
             a = par.gravity + drive_force(par, s) / par.mass_p
             for i in range(par.n_p):
-                x[RE, i] -= a * c[SHARE, i]
+                x[Trial.RE, i] -= a * c[Mesh.SHARE, i]
 
     replace("load", load)
 
 
 def shorten_path() -> None:
     """Let displacements grow by 0.999 of what velocities ask for."""
-    from percussion_model.solvers.fem.scheme import U
+    from percussion_model.solvers.fem.records import Node
     from percussion_model.solvers.fem.scheme import try_step as whole
 
     def try_step(par, s, w, c, f, x, h):
         whole(par, s, w, c, f, x, h)
         for i in range(par.n_p + par.n_b):
-            x[U, i] = w[U, i] + FAULT * (x[U, i] - w[U, i])
+            x[Node.U, i] = w[Node.U, i] + FAULT * (x[Node.U, i] - w[Node.U, i])
 
     replace("try_step", try_step)
 

@@ -8,11 +8,9 @@ import numpy as np
 import pytest
 
 from percussion_model import SAMPLE_FIELDS, Scene, Simulation
-from percussion_model.physics.records import LONG_SAMPLE_FIELDS, PEAK_FIELDS, Mode
+from percussion_model.physics.records import READING, Mode
 
 IMPULSE = SAMPLE_FIELDS.index("bit_impulse")
-PEAK = LONG_SAMPLE_FIELDS.index("peak_bit_force")
-CONTACT_PEAK = LONG_SAMPLE_FIELDS.index("peak_contact_force")
 
 RIGID = {"piston.model": "rigid", "bit.model": "rigid"}
 # Blow, rebound and the standstill that rings after it; then only standstill and flight.
@@ -22,14 +20,14 @@ SPAN = 6e-3
 def peaks(scene, points):
     """Peak of the bit and the contact force between the points, as an observer sees them."""
     simulation = Simulation(scene)
-    row = np.zeros(len(LONG_SAMPLE_FIELDS))
+    reading = np.zeros(1, READING)
     found = []
     for begin, end in pairwise(points):
         simulation.advance(float(begin))
         simulation.solver.watch_peaks(simulation._state, float(begin))
         simulation.advance(float(end))
-        simulation.solver.look(simulation._state, float(end), row)
-        found.append((row[PEAK], row[CONTACT_PEAK]))
+        simulation.solver.read(simulation._state, float(end), reading)
+        found.append((reading["peak_bit_force"][0], reading["peak_contact_force"][0]))
     return np.array(found), simulation
 
 
@@ -100,16 +98,3 @@ def test_peaks_of_intervals_make_the_peak_of_the_blow():
     first = simulation.blows[0]
     assert found[:46, 0].max() == pytest.approx(first["peak_bit_force"], rel=1e-12)
     assert found[:46, 1].max() == pytest.approx(first["peak_contact_force"], rel=1e-12)
-
-
-def test_a_long_row_carries_the_ledger():
-    for changes in ({}, {"solver.name": "fem"}, RIGID):
-        simulation = Simulation(Scene().replace(**changes))
-        t = 0.0123
-        simulation.advance(t)
-        row = np.zeros(len(LONG_SAMPLE_FIELDS))
-        simulation.solver.look(simulation._state, t, row)
-        entries = simulation.solver.energy(simulation._state, t)
-        for k, name in enumerate(LONG_SAMPLE_FIELDS[len(SAMPLE_FIELDS) + len(PEAK_FIELDS) :]):
-            value = row[len(SAMPLE_FIELDS) + len(PEAK_FIELDS) + k]
-            assert value == pytest.approx(entries[name], rel=1e-12, abs=1e-12), name

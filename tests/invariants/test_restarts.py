@@ -18,12 +18,9 @@ SCENES = {"reference": {}, "short stroke": {"drive.reversal_distance": 0.004}}
 def bits(simulation):
     """State, blow table and events as bytes."""
     state = simulation.save().state
-    if isinstance(state, np.ndarray):
-        plain = state.tobytes()
-    else:
-        record = state.record.copy()
-        record["n_blows"] = record["n_events"] = 0  # rows filled in the last call
-        plain = record.tobytes() + state.workspace.tobytes()
+    record = state.record.copy()
+    record["n_blows"] = record["n_events"] = 0  # rows filled in the last call
+    plain = record.tobytes() + state.workspace.tobytes()
     return plain, simulation.blows.tobytes(), simulation.events.tobytes()
 
 

@@ -29,7 +29,7 @@ PATIENCE = 100.0
 PATIENCE_AT_START = 1800.0
 # Cases between two writings of the record.
 CHUNK = 100
-PACKAGES = ("numpy", "numba", "llvmlite", "scipy", "pydantic")
+PACKAGES = ("numpy", "numba", "llvmlite", "scipy")
 
 
 # How far the numbers of cases reach: bounds of WIDE, or all that the parameter table allows.

@@ -139,12 +139,9 @@ class Watch:
 def bits_of(simulation: Simulation) -> tuple[bytes, ...]:
     """State, blow table and events as bytes."""
     state = simulation.save().state
-    if isinstance(state, np.ndarray):
-        plain = state.tobytes()
-    else:
-        record = state.record.copy()
-        record["n_blows"] = record["n_events"] = 0  # rows filled in the last call
-        plain = record.tobytes() + state.workspace.tobytes()
+    record = state.record.copy()
+    record["n_blows"] = record["n_events"] = 0  # rows filled in the last call
+    plain = record.tobytes() + state.workspace.tobytes()
     return plain, simulation.blows.tobytes(), simulation.events.tobytes()
 
 

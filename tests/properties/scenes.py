@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from percussion_model import Scene
-from percussion_model.scene.inputs import INPUTS
-from percussion_model.scene.table import find_row
+from percussion_model.scene.inputs import INPUTS, why_without_effect
+from percussion_model.scene.parameters import find_row
 from percussion_model.solvers.wave.grid import choose_time_step, section_count
 from tests.properties.source import Source, chance, decades
 
@@ -232,9 +232,7 @@ READS = ("observe", "energy", "fields", "statistics", "result", "blows", "events
 
 def draw_calls(source: Source, scene: Scene, reach: str) -> list[tuple[float, str, Any]]:
     """What is called and when, as shares of the length."""
-    inputs = [name for name, key in INPUTS.items() if scene.matters(key)]
-    if not scene.barrier_on:
-        inputs = [name for name in inputs if not name.startswith("barrier")]
+    inputs = [name for name in INPUTS if not why_without_effect(scene, name)]
     calls: list[tuple[float, str, Any]] = []
     for _ in range(source.count(1, 8)):
         share = source.between(0.0, 1.0)
@@ -258,5 +256,5 @@ def draw_inputs(source: Source, inputs: list[str], reach: str) -> dict[str, floa
     if not inputs:
         return {}
     names = [source.pick(inputs) for _ in range(source.count(1, 3))]
-    values = {name: number(source, INPUTS[name], reach) for name in names}
+    values = {name: number(source, INPUTS[name].key, reach) for name in names}
     return {name: value for name, value in values.items() if value is not None}

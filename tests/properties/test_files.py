@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from percussion_model import Scene, SceneError, Simulation
 from percussion_model.interface.cli import BAD_INPUT, _guarded, app
-from percussion_model.scene.table import parameter_table
+from percussion_model.scene.parameters import parameter_table
 
 EXAMPLES = 2000 if "PERCUSSION_LONG" in os.environ else 100
 KEYS = [row.key for row in parameter_table() if "*" not in row.key]

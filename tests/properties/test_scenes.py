@@ -10,7 +10,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from percussion_model import Scene, SceneError, Simulation
-from percussion_model.scene.table import rows_by_key
+from percussion_model.scene.parameters import rows_by_key
 from tests.properties import checks
 from tests.properties.campaign import campaign, run_case
 from tests.properties.scenes import BOTH_SIGNS, WIDE, ZERO, Case, draw_case

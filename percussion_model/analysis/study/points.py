@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from percussion_model.scene.parameters import find_row
 from percussion_model.scene.scene import Scene, SceneError
-from percussion_model.scene.table import find_row
 
 __all__ = ["Points", "grid", "latin_hypercube", "read_axis", "table"]
 

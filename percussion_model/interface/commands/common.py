@@ -64,7 +64,8 @@ def load_scene(
 ) -> Scene:
     """Read a scene and apply what the command line changes."""
     from percussion_model.interface.quick_start import load_numba
-    from percussion_model.scene.scene import Scene, read_setting
+    from percussion_model.scene.scene import Scene
+    from percussion_model.scene.text import read_setting
 
     load_numba()
     scene = Scene.from_toml(path)

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from percussion_model.scene.rules import SceneRules
+from percussion_model.scene.scene import Scene
 from percussion_model.solvers.blow_map.records import ENTRIES, Axis
 from percussion_model.solvers.blow_map.single_blow import SingleBlow
 from percussion_model.solvers.blow_map.table import (
@@ -48,12 +48,12 @@ def cache_folder() -> Path:
     return base / "percussion_model"
 
 
-def table_file(scene: SceneRules) -> Path:
+def table_file(scene: Scene) -> Path:
     """File that keeps the table of a scene, whether it is there or not."""
     return cache_folder() / f"blow-map-{table_key(scene)}.npz"
 
 
-def kept_table(scene: SceneRules) -> BlowTable | None:
+def kept_table(scene: Scene) -> BlowTable | None:
     """Table of a scene from the cache; None where there is none, or a damaged one."""
     path = table_file(scene)
     try:
@@ -67,12 +67,12 @@ def kept_table(scene: SceneRules) -> BlowTable | None:
     return table
 
 
-def get_table(scene: SceneRules, progress: Progress | None = None, workers: int = 1) -> BlowTable:
+def get_table(scene: Scene, progress: Progress | None = None, workers: int = 1) -> BlowTable:
     """Table of a scene: from the cache, or made and kept there.
 
     Parameters
     ----------
-    scene : SceneRules
+    scene : Scene
     progress : callable, optional
         Called with the slabs done and their number.
     workers : int
@@ -92,7 +92,7 @@ def get_table(scene: SceneRules, progress: Progress | None = None, workers: int 
 
 
 def build_table(
-    scene: SceneRules, drafts: Path, progress: Progress | None = None, workers: int = 1
+    scene: Scene, drafts: Path, progress: Progress | None = None, workers: int = 1
 ) -> BlowTable:
     """Make the table of a scene, slab by slab of equal stiffness.
 
@@ -128,7 +128,7 @@ def build_table(
 
 
 def _slabs(
-    scene: SceneRules, stiffness: np.ndarray, left: list[int], workers: int
+    scene: Scene, stiffness: np.ndarray, left: list[int], workers: int
 ) -> Iterator[tuple[int, np.ndarray]]:
     """Compute the slabs that are left, in any order."""
     if workers < 2 or len(left) < 2:
@@ -148,7 +148,7 @@ def _slabs(
         pool.shutdown(cancel_futures=True)
 
 
-def make_slab(scene: SceneRules, stiffness: float) -> np.ndarray:
+def make_slab(scene: Scene, stiffness: float) -> np.ndarray:
     """All nodes of one stiffness [N/m].
 
     Returns

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from percussion_model.scene.rules import SceneRules
+from percussion_model.scene.scene import Scene
 from percussion_model.solvers.blow_map.records import Axis, Refusal
 from percussion_model.solvers.blow_map.table import BlowTable, Nodes
 
@@ -25,7 +25,7 @@ _RANGES = {
 }
 
 
-def notes_outside(scene: SceneRules) -> list[str]:
+def notes_outside(scene: Scene) -> list[str]:
     """Say which parameters of a scene lie outside the ranges of its blow map."""
     nodes = Nodes.of(scene)
     found = []

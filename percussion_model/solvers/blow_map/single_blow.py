@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -17,8 +16,7 @@ from percussion_model.physics.records import (
     Mode,
     Status,
 )
-from percussion_model.scene.rows import Row as ParameterRow
-from percussion_model.scene.rules import SceneRules
+from percussion_model.scene.scene import Scene
 from percussion_model.solvers.blow_map.records import ENTRIES, PATH_TIMES, Entry
 from percussion_model.solvers.state import State
 from percussion_model.solvers.wave.records import Row
@@ -39,48 +37,32 @@ FAR = 100.0
 _BLOWS, _EVENTS = 4, 4096
 
 
-class SceneAt(SceneRules):
-    """A scene of elastic bodies on a rock of another stiffness.
+def scene_at(scene: Scene, stiffness: float) -> Scene:
+    """Return a scene for waves on a rock of another stiffness, about to strike.
 
     Parameters
     ----------
-    scene : SceneRules
+    scene : Scene
+        With elastic bodies.
     stiffness : float
-        K_R [N/m].
+        K_R [N/m]; what rounding puts beyond the bounds of the parameter counts as they do.
     """
-
-    def __init__(self, scene: SceneRules, stiffness: float) -> None:
-        self._scene = scene
-        for name in ("effects", "piston", "bit", "gravity", "feed", "drive", "loss", "contact"):
-            setattr(self, name, getattr(scene, name))
-        self.run, self.fem = scene.run, scene.fem
-        rock, solver, start = scene.rock, scene.solver, scene.start
-        self.rock = SimpleNamespace(
-            loading_stiffness=stiffness,
-            unloading_ratio=rock.unloading_ratio,
-            barrier_damping=rock.barrier_damping,
-            barrier_energy=rock.barrier_energy,
-        )
-        self.solver = SimpleNamespace(
-            name="wave", fidelity="wave", cells=solver.cells, accuracy=None, leaps=solver.leaps
-        )
-        self.start = SimpleNamespace(
-            piston_velocity=start.piston_velocity,
-            bit_velocity=0.0,
-            gap=CLOSE,
-            rock_gap=0.0,
-            depth=0.0,
-            drive_direction=1,
-        )
-
-    def row_of(self, key: str) -> ParameterRow:
-        """Row of a dotted key in the parameter table."""
-        return self._scene.row_of(key)
-
-    @property
-    def given(self) -> frozenset[str]:
-        """Dotted keys that were given."""
-        return self._scene.given
+    row = scene.row_of("rock.loading_stiffness")
+    assert row.lower is not None
+    assert row.upper is not None
+    return scene.replace(
+        **{
+            "rock.loading_stiffness": min(max(stiffness, row.lower), row.upper),
+            "solver.name": "wave",
+            "solver.fidelity": "wave",
+            "solver.accuracy": None,
+            "start.bit_velocity": 0.0,
+            "start.gap": CLOSE,
+            "start.rock_gap": 0.0,
+            "start.depth": 0.0,
+            "start.drive_direction": 1,
+        }
+    )
 
 
 class SingleBlow:
@@ -88,14 +70,14 @@ class SingleBlow:
 
     Parameters
     ----------
-    scene : SceneRules
+    scene : Scene
         With an elastic bit and a pressure drive.
     stiffness : float
         K_R [N/m].
     """
 
-    def __init__(self, scene: SceneRules, stiffness: float) -> None:
-        self.scene = SceneAt(scene, stiffness)
+    def __init__(self, scene: Scene, stiffness: float) -> None:
+        self.scene = scene_at(scene, stiffness)
         self.solver = WaveSolver(self.scene)
         self._base = self.solver.new_state()
         self.impact = self.solver.place_of_closure * self.solver.time_step

@@ -9,7 +9,7 @@ import numpy as np
 
 from percussion_model.physics.kernel import entry_of
 from percussion_model.physics.records import READING, Status
-from percussion_model.scene.rules import SceneError, SceneRules
+from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.solvers.base import Solver
 from percussion_model.solvers.blow_map import advance as kernels
 from percussion_model.solvers.blow_map import flight
@@ -40,7 +40,7 @@ class BlowMapSolver(Solver):
 
     Parameters
     ----------
-    scene : SceneRules
+    scene : Scene
         With `solver.fidelity = "blow-map"`.
     table : BlowTable
         Made for the scene.
@@ -53,7 +53,7 @@ class BlowMapSolver(Solver):
 
     name = "blow-map"
 
-    def __init__(self, scene: SceneRules, table: BlowTable) -> None:
+    def __init__(self, scene: Scene, table: BlowTable) -> None:
         super().__init__(scene)
         table.refuse_other(fixed_values(scene))
         if not scene.start.rock_gap <= MOST_ROCK_GAP or scene.start.bit_velocity != 0.0:
@@ -168,6 +168,6 @@ class BlowMapSolver(Solver):
         return float(np.nextafter(state.numbers[T_NEXT], 0.0))
 
 
-def make_map_solver(scene: SceneRules) -> BlowMapSolver:
+def make_map_solver(scene: Scene) -> BlowMapSolver:
     """Solver on the table of a scene, which is made where it is not kept."""
     return BlowMapSolver(scene, get_table(scene))

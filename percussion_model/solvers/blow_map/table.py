@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from percussion_model.scene.rules import SceneError, SceneRules
+from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.solvers.blow_map.records import ENTRIES, Axis, Entry
 from percussion_model.solvers.sources import sources_digest
 
@@ -51,7 +51,7 @@ class TableError(ValueError):
     """Bytes that are no table of blows."""
 
 
-def fixed_values(scene: SceneRules) -> dict[str, Any]:
+def fixed_values(scene: Scene) -> dict[str, Any]:
     """Parameters that a table is made for, by dotted key."""
     found = {key: scene[key] for key in FIXED}
     for bar in ("piston", "bit"):
@@ -86,7 +86,7 @@ class Nodes:
     weight: float
 
     @classmethod
-    def of(cls, scene: SceneRules) -> Nodes:
+    def of(cls, scene: Scene) -> Nodes:
         """Nodes that a scene asks for."""
         ranges = [
             tuple(float(scene[f"blow_map.{name}_{end}"]) for end in ("from", "to"))
@@ -262,7 +262,7 @@ class BlowTable:
         )
 
 
-def table_key(scene: SceneRules) -> str:
+def table_key(scene: Scene) -> str:
     """Name of a scene's table: a hash of all that it depends on, the sources included."""
     nodes = Nodes.of(scene)
     parts = [FORMAT, fixed_values(scene), nodes.lowest, nodes.highest, nodes.counts]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from percussion_model.scene.rules import BarNumbers, SectionNumbers
+from percussion_model.scene.parameters import Bar, Section
 from percussion_model.solvers.fem.records import Mesh
 
 # A length this close to half an element is half an element.
@@ -38,17 +38,17 @@ class BarMesh:
         return len(self.mass)
 
 
-def section_count(section: SectionNumbers, element: float) -> int:
+def section_count(section: Section, element: float) -> int:
     """Elements of about the length `element` [m] that a section gets, half a one for one."""
     return max(1, math.floor(section.length / element + 0.5 + ROUNDING))
 
 
-def cut_bar(bar: BarNumbers, element: float, elastic: bool = True) -> BarMesh:
+def cut_bar(bar: Bar, element: float, elastic: bool = True) -> BarMesh:
     """Cut the sections of a bar into elements of about one length.
 
     Parameters
     ----------
-    bar : BarNumbers
+    bar : Bar
     element : float
         Wanted length [m].
     elastic : bool

@@ -8,7 +8,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from percussion_model.physics.records import RockKind
-from percussion_model.scene.rules import BarNumbers, SceneRules
+from percussion_model.scene.parameters import Bar
+from percussion_model.scene.scene import Scene
 from percussion_model.solvers.base import Solver
 from percussion_model.solvers.fem.advance import run
 from percussion_model.solvers.fem.bars import read_all, stored_energy
@@ -44,7 +45,7 @@ from percussion_model.solvers.state import State
 MOST_EVENTS = 64
 
 
-def loss_time(scene: SceneRules, bit: BarMesh) -> float:
+def loss_time(scene: Scene, bit: BarMesh) -> float:
     """Kelvin-Voigt time [s]: that of the scene, or 2 zeta_K / omega_cr (eq. 55 of the paper)."""
     if not scene.effects.loss:
         return 0.0
@@ -70,7 +71,7 @@ class FemSolver(Solver):
 
     Parameters
     ----------
-    scene : SceneRules
+    scene : Scene
         With an elastic bit.
 
     Attributes
@@ -87,7 +88,7 @@ class FemSolver(Solver):
     time_step: float
     COUNTS: ClassVar = ("steps", "trials", "events", "blows", "storms", "locked")
 
-    def __init__(self, scene: SceneRules) -> None:
+    def __init__(self, scene: Scene) -> None:
         super().__init__(scene)
         elastic_piston = scene.piston.model == "elastic"
         first = scene.piston if elastic_piston else scene.bit
@@ -223,6 +224,6 @@ class FemSolver(Solver):
                 out[f"{name}_velocity"] = 0.5 * (nodes[Node.V, :-1] + nodes[Node.V, 1:])
         return out
 
-    def section_cells(self, bar: BarNumbers) -> list[int]:
+    def section_cells(self, bar: Bar) -> list[int]:
         """Elements in each section of an elastic bar."""
         return [section_count(section, self._element) for section in bar.sections]

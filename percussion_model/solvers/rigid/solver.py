@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from percussion_model.physics.records import Piston, Status
-from percussion_model.scene.rules import SceneRules
+from percussion_model.scene.scene import Scene
 from percussion_model.solvers.base import Solver
 from percussion_model.solvers.rigid import advance as kernels
 from percussion_model.solvers.rigid.records import RIGID_PAR, RIGID_STATE, ROWS_AN_EVENT
@@ -52,7 +52,7 @@ def st_venant_restitution(
     return min(max(e, 0.0), 1.0)
 
 
-def restitution(scene: SceneRules) -> float:
+def restitution(scene: Scene) -> float:
     """Coefficient of restitution of piston and bit, NaN without a piston."""
     if scene.piston.model == "absent":
         return float("nan")
@@ -71,14 +71,14 @@ class RigidSolver(Solver):
 
     Parameters
     ----------
-    scene : SceneRules
+    scene : Scene
         With a rigid bit and a rigid or absent piston.
     """
 
     name = "rigid"
     COUNTS: ClassVar = ("events", "contacts", "blows", "cycles", "storms")
 
-    def __init__(self, scene: SceneRules) -> None:
+    def __init__(self, scene: Scene) -> None:
         super().__init__(scene)
         has_piston = scene.piston.model != "absent"
         self._par = np.zeros(1, RIGID_PAR)

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from percussion_model.scene.rules import BarNumbers, SceneRules, SectionNumbers
+from percussion_model.scene.parameters import Bar, Section
+from percussion_model.scene.scene import Scene
 from percussion_model.solvers.base import Cells
 from percussion_model.solvers.wave.records import Coef
 
@@ -55,12 +56,12 @@ class Grid:
         return len(self.mass)
 
 
-def section_count(section: SectionNumbers, time_step: float) -> int:
+def section_count(section: Section, time_step: float) -> int:
     """Cells that a section gets."""
     return max(1, round(section.transit_time / time_step))
 
 
-def cut(bar: BarNumbers, time_step: float) -> Grid:
+def cut(bar: Bar, time_step: float) -> Grid:
     """Cut a bar into cells of one transit time.
 
     Length and mass of each section stay as they are; where its transit time
@@ -77,7 +78,7 @@ def cut(bar: BarNumbers, time_step: float) -> Grid:
     return Grid(np.array(impedance), np.array(mass), time_step, fit)
 
 
-def cell_at(bar: BarNumbers, grid: Cells, place: float) -> tuple[int, float]:
+def cell_at(bar: Bar, grid: Cells, place: float) -> tuple[int, float]:
     """Cell at a place along a bar.
 
     Parameters
@@ -102,7 +103,7 @@ def cell_at(bar: BarNumbers, grid: Cells, place: float) -> tuple[int, float]:
     return min(cell, grid.n - 1), section.area
 
 
-def choose_time_step(bars: list[BarNumbers], cells: int | None) -> float:
+def choose_time_step(bars: list[Bar], cells: int | None) -> float:
     """Transit time of a cell that suits all bars.
 
     Parameters
@@ -120,9 +121,7 @@ def choose_time_step(bars: list[BarNumbers], cells: int | None) -> float:
     return first / fitting_cells(bars, DEFAULT_CELLS, most, WANTED_FIT)[0]
 
 
-def fitting_cells(
-    bars: Sequence[BarNumbers], fewest: int, most: int, wanted: float
-) -> tuple[int, float]:
+def fitting_cells(bars: Sequence[Bar], fewest: int, most: int, wanted: float) -> tuple[int, float]:
     """Cells in the first bar that suit the lengths of all.
 
     Parameters
@@ -326,6 +325,10 @@ class CutBars:
         Transit time of a cell [s].
     loss_time : float
         Kelvin-Voigt time [s], 0 without loss.
+    substeps : int
+        Of the loss operator in a step, 0 without loss.
+    front : float
+        Share of a step before its closure (`place_of_closure`).
     piston : CutBar or None
         None where it is rigid or absent.
     bit : CutBar
@@ -333,19 +336,10 @@ class CutBars:
 
     time_step: float
     loss_time: float
+    substeps: int
+    front: float
     piston: CutBar | None
     bit: CutBar
-
-    @property
-    def substeps(self) -> int:
-        """Sub-steps of the loss operator, 0 without loss."""
-        return substeps(self.loss_time, self.time_step)
-
-    @property
-    def front(self) -> float:
-        """Share of a step before its closure (docs/numerics.md, eq. 14b)."""
-        shortest = min(bar.grid.n for bar in self.both)
-        return place_of_closure(self.loss_time / self.time_step * shortest)
 
     @property
     def both(self) -> tuple[CutBar, ...]:
@@ -357,14 +351,14 @@ _kept: dict[tuple, CutBars] = {}
 _lock = threading.Lock()
 
 
-def elastic_bars(scene: SceneRules) -> list[BarNumbers]:
+def elastic_bars(scene: Scene) -> list[Bar]:
     """The bars that get cells, the one first whose cells are counted."""
     if scene.bit.model != "elastic":
         return []
     return [scene.piston, scene.bit] if scene.piston.model == "elastic" else [scene.bit]
 
 
-def cut_bars(scene: SceneRules, cells: int | None) -> CutBars:
+def cut_bars(scene: Scene, cells: int | None) -> CutBars:
     """Cut the elastic bars of a scene, or find them cut.
 
     Parameters
@@ -383,12 +377,20 @@ def cut_bars(scene: SceneRules, cells: int | None) -> CutBars:
                 del _kept[next(iter(_kept))]
             time_step = choose_time_step(bars, cells)
             *above, bit = [_cut_bar(bar, time_step, loss_time) for bar in bars]
-            found = CutBars(time_step, loss_time, above[0] if above else None, bit)
+            shortest = min(bar.grid.n for bar in (*above, bit))
+            found = CutBars(
+                time_step,
+                loss_time,
+                substeps(loss_time, time_step),
+                place_of_closure(loss_time / time_step * shortest),
+                above[0] if above else None,
+                bit,
+            )
             _kept[key] = found
     return found
 
 
-def _cut_bar(bar: BarNumbers, time_step: float, loss_time: float) -> CutBar:
+def _cut_bar(bar: Bar, time_step: float, loss_time: float) -> CutBar:
     grid = cut(bar, time_step)
     c = coefficients(grid, loss_time)
     kappa = end_viscosity(c, grid, loss_time)

@@ -82,6 +82,47 @@ class LeapKind(IntEnum):
     CONTACT = 2  # contact whose every step was looked at beforehand
 
 
+class LeapOperators(NamedTuple):
+    """Powers of the step map, and what can be seen of the next steps.
+
+    Maps are stored column by column and padded with zeros, forms as
+    their upper triangles; `size` is the padded number of waves, with the
+    penetration for the bit.
+
+    Attributes
+    ----------
+    piston : ndarray, shape (LEVELS, size, size)
+        Powers 1, 4, 16, ... of the free piston's step map.
+    bit : ndarray, shape (5, LEVELS, size, size)
+        The same for the bit by `Mode`.
+    watch : ndarray, shape (5, size, LOOKAHEAD)
+        By mode: strain offset of the rock end at the end of the next steps in
+        FF, its velocity at their start in DFC, FC, BC and SS.
+    sums : ndarray, shape (5, size)
+        By contact mode: path of the bit's mean motion until it rests.
+    top : ndarray, shape (5, size, LOOKAHEAD)
+        By mode: motion of the bit's top end by the end of the next steps, in
+        FF its strain offset.
+    bottom : ndarray, shape (size, LOOKAHEAD)
+        Strain offset of the piston's bottom end.
+    forms : ndarray, shape (2, size, size)
+        What a standstill will ever lose in the dashpot and by averaging [J].
+    """
+
+    piston: np.ndarray
+    bit: np.ndarray
+    watch: np.ndarray
+    sums: np.ndarray
+    top: np.ndarray
+    bottom: np.ndarray
+    forms: np.ndarray
+
+
+def no_operators() -> LeapOperators:
+    """Stand-ins where no leaps are made."""
+    return LeapOperators(*(np.zeros((1,) * rank) for rank in (3, 4, 3, 2, 3, 2, 3)))
+
+
 # Parameters: what stays fixed during a run.
 WAVE_PAR = np.dtype(
     [

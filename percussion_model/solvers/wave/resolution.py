@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from itertools import pairwise
 
-from percussion_model.scene.rules import SceneRules
+from percussion_model.scene.scene import Scene
 from percussion_model.solvers.wave.grid import elastic_bars, fitting_cells
 
 # Relative error of the rate of penetration, and the cells of the bar with the shortest
@@ -23,7 +23,7 @@ MOST_REFINED = 2.0
 COARSER = (0.5, 0.75)
 
 
-def asked_cells(scene: SceneRules) -> int | None:
+def asked_cells(scene: Scene) -> int | None:
     """Cells in the first elastic bar for the accuracy that a scene asks for, if it asks."""
     if scene.solver.accuracy is None:
         return None
@@ -31,13 +31,13 @@ def asked_cells(scene: SceneRules) -> int | None:
 
 
 def cells_for(
-    scene: SceneRules, accuracy: float, fewest: int = 1, most: int | None = None
+    scene: Scene, accuracy: float, fewest: int = 1, most: int | None = None
 ) -> tuple[int, float]:
     """Cells in the first elastic bar for a wanted accuracy.
 
     Parameters
     ----------
-    scene : SceneRules
+    scene : Scene
         With an elastic bit.
     accuracy : float
         Wanted relative error of the rate of penetration.
@@ -59,7 +59,7 @@ def cells_for(
     return fitting_cells(bars, least, end, FIT_SHARE * accuracy)
 
 
-def coarser_cells(scene: SceneRules, cells: int) -> int:
+def coarser_cells(scene: Scene, cells: int) -> int:
     """Cells of a coarser run that fit the lengths best."""
     low, high = COARSER
     fewest = max(1, math.ceil(low * cells))

@@ -9,7 +9,8 @@ import numpy as np
 
 from percussion_model.physics.kernel import entry_of
 from percussion_model.physics.records import Status
-from percussion_model.scene.rules import BarNumbers, SceneRules
+from percussion_model.scene.parameters import Bar
+from percussion_model.scene.scene import Scene
 from percussion_model.solvers.base import Solver
 from percussion_model.solvers.setup import (
     MOST_CHANGES,
@@ -21,12 +22,7 @@ from percussion_model.solvers.state import State, words_of
 from percussion_model.solvers.wave.advance import GRID_ROUNDING, run
 from percussion_model.solvers.wave.grid import CutBars, Grid, cut_bars, section_count
 from percussion_model.solvers.wave.leaps.lookahead import LOOKAHEAD
-from percussion_model.solvers.wave.leaps.operators import (
-    LEVELS,
-    leap_operators,
-    no_operators,
-    padded,
-)
+from percussion_model.solvers.wave.leaps.operators import LEVELS, leap_operators, padded
 from percussion_model.solvers.wave.records import (
     WAVE_PAR,
     WAVE_STATE,
@@ -35,6 +31,7 @@ from percussion_model.solvers.wave.records import (
     Row,
     Scratch,
     Task,
+    no_operators,
 )
 from percussion_model.solvers.wave.resolution import asked_cells
 from percussion_model.solvers.wave.totals import begin, resync
@@ -45,7 +42,7 @@ EVENTS_ON, N_BLOWS, N_EVENTS = _WORD["events_on"], _WORD["n_blows"], _WORD["n_ev
 PARITY, PEAK_FROM = _WORD["parity"], _WORD["peak_from"]
 
 
-def wave_parameters(scene: SceneRules, bars: CutBars) -> np.ndarray:
+def wave_parameters(scene: Scene, bars: CutBars) -> np.ndarray:
     """Parameter record of a scene on its grid.
 
     Returns
@@ -80,7 +77,7 @@ class WaveSolver(Solver):
 
     Parameters
     ----------
-    scene : SceneRules
+    scene : Scene
 
     Attributes
     ----------
@@ -97,7 +94,7 @@ class WaveSolver(Solver):
     time_step: float
     COUNTS: ClassVar = ("steps", "leaps", "leap_steps", "wakes", "events", "blows", "locked")
 
-    def __init__(self, scene: SceneRules) -> None:
+    def __init__(self, scene: Scene) -> None:
         super().__init__(scene)
         bars = cut_bars(scene, scene.solver.cells or asked_cells(scene))
         self.time_step = bars.time_step
@@ -246,6 +243,6 @@ class WaveSolver(Solver):
         """Cells of "piston" or "bit", None where it has none."""
         return self._grids[bar]
 
-    def section_cells(self, bar: BarNumbers) -> list[int]:
+    def section_cells(self, bar: Bar) -> list[int]:
         """Cells in each section of an elastic bar."""
         return [section_count(section, self.time_step) for section in bar.sections]

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from percussion_model.physics.records import SAMPLE_FIELDS, Mode
+from percussion_model.physics.records import READING, Mode
 from percussion_model.scene.scene import Scene
 from percussion_model.simulation.simulate import Simulation
 from percussion_model.solvers.fem.records import Node
@@ -173,9 +173,7 @@ def settled(drill: Drill, problem: Problem) -> None:
     last = simulation.blows[-1]
     simulation.restore(before)
     simulation.advance(float(last["time"] - AHEAD * last["period"]))
-    state = simulation.solver.look(
-        simulation.save().state, simulation.time, np.empty(len(SAMPLE_FIELDS))
-    )
+    state = simulation.solver.read(simulation.save().state, simulation.time, np.zeros(1, READING))
     record, nodes = state.record[0], state.workspace.reshape(len(Node), -1)
     drill.y[: drill.n], drill.y[drill.n : 2 * drill.n] = nodes[Node.U], nodes[Node.V]
     drill.y[-2:] = float(record["w"]), 0.0

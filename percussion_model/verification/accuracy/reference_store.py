@@ -113,7 +113,7 @@ def fingerprint(scene: Scene) -> str:
     Title, solver and, but for a drop, run times do not count; so parameters that come
     later, at their defaults, leave the fingerprint as it is.
     """
-    tree, usual = (one.model_dump(mode="json") for one in (scene, Scene()))
+    tree, usual = (asdict(one) for one in (scene, Scene()))
     apart = {"title", "solver", "fem"}
     if scene.piston.model != "absent":
         apart.add("run")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from percussion_model.solvers.wave.leaps.step_map import (
     step_forms,
     step_map,
 )
-from percussion_model.solvers.wave.records import Coef
+from percussion_model.solvers.wave.records import Coef, LeapOperators, no_operators
 
 # Longest leap: 4^LEVELS - 1 steps, 0.1 s on the default grid of the reference.
 LEVELS = 8
@@ -38,47 +38,6 @@ MOST_KEPT = 4
 _kept: dict[bytes, LeapOperators | None] = {}
 # Those of free bars, which scenes on other rock share, are kept apart.
 _kept_free: dict[bytes, dict[str, np.ndarray]] = {}
-
-
-class LeapOperators(NamedTuple):
-    """Powers of the step map, and what can be seen of the next steps.
-
-    Maps are stored column by column and padded with zeros, forms as
-    their upper triangles; `size` is the padded number of waves, with the
-    penetration for the bit.
-
-    Attributes
-    ----------
-    piston : ndarray, shape (LEVELS, size, size)
-        Powers 1, 4, 16, ... of the free piston's step map.
-    bit : ndarray, shape (5, LEVELS, size, size)
-        The same for the bit by `Mode`.
-    watch : ndarray, shape (5, size, LOOKAHEAD)
-        By mode: strain offset of the rock end at the end of the next steps in
-        FF, its velocity at their start in DFC, FC, BC and SS.
-    sums : ndarray, shape (5, size)
-        By contact mode: path of the bit's mean motion until it rests.
-    top : ndarray, shape (5, size, LOOKAHEAD)
-        By mode: motion of the bit's top end by the end of the next steps, in
-        FF its strain offset.
-    bottom : ndarray, shape (size, LOOKAHEAD)
-        Strain offset of the piston's bottom end.
-    forms : ndarray, shape (2, size, size)
-        What a standstill will ever lose in the dashpot and by averaging [J].
-    """
-
-    piston: np.ndarray
-    bit: np.ndarray
-    watch: np.ndarray
-    sums: np.ndarray
-    top: np.ndarray
-    bottom: np.ndarray
-    forms: np.ndarray
-
-
-def no_operators() -> LeapOperators:
-    """Stand-ins where no leaps are made."""
-    return LeapOperators(*(np.zeros((1,) * rank) for rank in (3, 4, 3, 2, 3, 2, 3)))
 
 
 def padded(size: int) -> int:
@@ -156,7 +115,7 @@ def _free(
         of_piston["n_b"], of_piston["mass_b"] = piston.n, piston.mass.sum()
         for end in ("z", "kappa"):
             of_piston[f"{end}_t"], of_piston[f"{end}_b"] = alone[f"{end}_f"], alone[f"{end}_p"]
-        by_column = step_map(Configuration(of_piston, piston, cp), no_operators())
+        by_column = step_map(Configuration(of_piston, piston, cp))
         found["piston"] = _powers(by_column, LEVELS, int(alone["size_p"][0]))
         found["bottom"] = _lookahead(
             found["piston"], by_column @ _offset(cp, piston.n, Coef.BOTTOM)
@@ -164,7 +123,7 @@ def _free(
     size = int(alone["size_r"][0])
     powers = np.zeros((len(Mode), LEVELS, size, size))
     watch, top = np.zeros((2, len(Mode), size, LOOKAHEAD))
-    by_column = step_map(Configuration(alone, bit, cb), no_operators())
+    by_column = step_map(Configuration(alone, bit, cb))
     powers[Mode.FF] = _powers(by_column, LEVELS, size)
     for rows, row in ((watch, Coef.BOTTOM), (top, Coef.TOP)):
         rows[Mode.FF] = _lookahead(powers[Mode.FF], by_column @ _offset(cb, bit.n, row))
@@ -218,7 +177,7 @@ def _of_loaded_bit(
     way = np.append(_offset(cb, bit.n, Coef.TOP) + _offset(cb, bit.n, Coef.BOTTOM), 1.0)
     for mode, (stiffness, damping) in loads.items():
         configuration = Configuration(rock, bit, cb, float(stiffness), float(damping))
-        by_column = step_map(configuration, no_operators())
+        by_column = step_map(configuration)
         levels = LEVELS if mode == Mode.SS else LOOKAHEAD_LEVELS
         powers[mode, :levels] = _powers(by_column, levels, size)
         watch[mode] = _lookahead(powers[mode], end_row(configuration, by_column))

@@ -14,7 +14,15 @@ import numpy as np
 from percussion_model.physics.records import BLOW, EVENT, READING, Mode
 from percussion_model.solvers.wave.advance import run
 from percussion_model.solvers.wave.grid import Grid
-from percussion_model.solvers.wave.records import WAVE_STATE, Bars, Coef, Row, Scratch, Task
+from percussion_model.solvers.wave.records import (
+    WAVE_STATE,
+    Bars,
+    Coef,
+    Row,
+    Scratch,
+    Task,
+    no_operators,
+)
 
 # Unit in which the map counts the penetration while it is made [m].
 SCALE = 1e-6
@@ -38,13 +46,8 @@ class Configuration:
         return 2 * self.grid.n + (1 if self.stiffness else 0)
 
 
-def step_map(configuration: Configuration, operators: tuple[np.ndarray, ...]) -> np.ndarray:
+def step_map(configuration: Configuration) -> np.ndarray:
     """What one step makes of each unit deviation.
-
-    Parameters
-    ----------
-    operators : LeapOperators
-        Not used by a step; it tells the kernel's types.
 
     Returns
     -------
@@ -79,7 +82,8 @@ def step_map(configuration: Configuration, operators: tuple[np.ndarray, ...]) ->
         else:
             state["p"] = SCALE
         run(
-            int(Task.STEP), configuration.par, state, bars, operators, Scratch(none, none, none),
+            int(Task.STEP), configuration.par, state, bars, no_operators(),
+            Scratch(none, none, none),
             0.0, *unused,
         )  # fmt: skip
         by_column[k, :n], by_column[k, n : 2 * n] = w[Row.DOWN_OTHER, :n], w[Row.UP_OTHER, :n]

@@ -1,0 +1,64 @@
+"""Numbers that follow from the sections of a bar.
+
+A section is a row of length [m], cross-section [m^2], Young's modulus [Pa] and density
+[kg/m^3]; a bar is such rows from top to bottom, as an array (n, 4) or as tuples.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+LENGTH, AREA, YOUNGS_MODULUS, DENSITY = range(4)
+
+
+def section_wave_speed(section: Any) -> float:
+    """Speed of longitudinal waves, sqrt(E/rho) [m/s]."""
+    return math.sqrt(section[YOUNGS_MODULUS] / section[DENSITY])
+
+
+def section_impedance(section: Any) -> float:
+    """Force per particle velocity of a wave, A sqrt(E rho) [N s/m]."""
+    return float(section[AREA] * math.sqrt(section[YOUNGS_MODULUS] * section[DENSITY]))
+
+
+def section_mass(section: Any) -> float:
+    """Mass [kg]."""
+    return float(section[DENSITY] * section[AREA] * section[LENGTH])
+
+
+def section_transit_time(section: Any) -> float:
+    """Time a wave takes from end to end [s]."""
+    return float(section[LENGTH] / section_wave_speed(section))
+
+
+def bar_mass(sections: Any) -> float:
+    """Mass [kg]."""
+    total = rest = 0.0
+    for k in range(len(sections)):
+        total, rest = add(total, rest, section_mass(sections[k]))
+    return total + rest
+
+
+def bar_length(sections: Any) -> float:
+    """Length [m]."""
+    total = rest = 0.0
+    for k in range(len(sections)):
+        total, rest = add(total, rest, float(sections[k][LENGTH]))
+    return total + rest
+
+
+def bar_transit_time(sections: Any) -> float:
+    """Time a wave takes from end to end [s]."""
+    total = rest = 0.0
+    for k in range(len(sections)):
+        total, rest = add(total, rest, section_transit_time(sections[k]))
+    return total + rest
+
+
+def add(total: float, rest: float, term: float) -> tuple[float, float]:
+    """Add to a sum of two floats, the second of which is what the first rounds off."""
+    rounded = total + term
+    shift = rounded - total
+    lost = (total - (rounded - shift)) + (term - shift)
+    return rounded, rest + lost

@@ -1,0 +1,105 @@
+"""What may be added to the table of parameters: solvers by name, effects with parameters."""
+
+import subprocess
+import sys
+
+import pytest
+
+from percussion_model.scene import solver_names
+from percussion_model.scene.parameters import (
+    GROUPS,
+    Effect,
+    Effects,
+    find_row,
+    groups_with,
+    table_of,
+)
+from percussion_model.scene.rows import SceneError
+from percussion_model.scene.scene import Scene
+
+FRICTION = Effect("friction", "friction", {"force": (50.0, "N", "friction force", 0.0, 1e6)})
+
+
+@pytest.fixture
+def names():
+    before, bodies = list(solver_names.SOLVER_NAMES), dict(solver_names.BODIES)
+    yield solver_names
+    solver_names.SOLVER_NAMES[:] = before
+    solver_names.BODIES.clear()
+    solver_names.BODIES.update(bodies)
+
+
+def test_a_registered_solver_can_be_asked_for(names):
+    with pytest.raises(SceneError, match=r'must be one of "auto", "wave", "fem", "rigid"$'):
+        Scene(solver={"name": "modal"})
+    names.register_name("modal", "elastic")
+    scene = Scene(solver={"name": "modal"})
+    assert scene.solver_name == "modal"
+    assert scene.loss_on
+    assert list(find_row("solver.name").choices)[-1] == "modal"
+    with pytest.raises(SceneError, match=r'solver\.name = "modal" needs bit\.model = "elastic"'):
+        scene.replace(**{"piston.model": "rigid", "bit.model": "rigid"})
+
+
+def test_a_registered_solver_of_rigid_bodies_makes_them_so(names):
+    names.register_name("impulses", "rigid")
+    scene = Scene().computed_by("impulses")
+    assert scene.solver_name == "impulses"
+    assert scene.piston.model == scene.bit.model == "rigid"
+    assert not scene.loss_on
+    with pytest.raises(SceneError, match=r'solver\.name = "impulses" computes no elastic bars'):
+        Scene(solver={"name": "impulses"})
+
+
+def test_a_name_is_registered_once(names):
+    for name in ("wave", "auto", "blow-map"):
+        with pytest.raises(ValueError, match="there is a solver of this name"):
+            names.register_name(name)
+
+
+def test_an_effect_brings_a_switch_and_a_group():
+    groups = groups_with([FRICTION])
+    assert list(groups) == [*GROUPS, "friction"]
+    rows = {row.key: row for row in table_of(groups)}
+    assert rows["effects.friction"].default is False
+    force = rows["friction.force"]
+    assert (force.default, force.lower, force.upper, force.unit) == (50.0, 0.0, 1e6, "N")
+    assert force.effect == "effects.friction = true"
+    effects = groups["effects"](friction=True)
+    assert isinstance(effects, Effects)
+    assert effects.friction
+    assert effects.gravity
+    with pytest.raises(SceneError, match=r"friction\.force = -1 N: must be a number from 0"):
+        groups["friction"](force=-1)
+
+
+def test_the_table_is_as_it_was_without_additions():
+    assert groups_with([]) == GROUPS
+
+
+@pytest.mark.parametrize("name", ["gravity", "rock", "friction"])
+def test_the_name_of_an_effect_must_be_new(name):
+    with pytest.raises(ValueError, match="there is a group or a switch of this name"):
+        groups_with([FRICTION, Effect(name, "again", {})])
+
+
+def test_a_scene_has_the_groups_that_effects_bring(tmp_path):
+    code = """
+import pickle
+import sys
+from percussion_model.scene import parameters
+parameters.EFFECTS = (parameters.Effect("friction", "rub", {"force": (50.0, "N", "F", 0.0, 1e6)}),)
+parameters.GROUPS.update(parameters.groups_with(parameters.EFFECTS))
+from percussion_model.scene.scene import Scene
+scene = Scene().replace(**{"friction.force": 60.0})
+assert scene.unused == ("friction.force",) and "friction" in scene.effects_off
+scene = scene.replace(**{"effects.friction": True})
+assert scene["friction.force"] == 60.0 and "friction" in scene.effects_on and not scene.unused
+vars(parameters).update({group.__name__: group for group in parameters.GROUPS.values()})
+assert pickle.loads(pickle.dumps(scene)) == scene
+assert scene != Scene() and hash(scene) != hash(Scene())
+for comments in (False, True):
+    scene.to_toml(sys.argv[1], comments=comments)
+    assert Scene.from_toml(sys.argv[1]) == scene
+"""
+    subprocess.run([sys.executable, "-c", code, str(tmp_path / "scene.toml")], check=True)
