@@ -68,7 +68,7 @@ def test_rule_says_how_well_lengths_fit():
 
 
 def test_solver_takes_the_cells_of_the_rule_in_library_and_fmu():
-    from fmu_src.hammer_variables import hammer_variables
+    from fmu_src.hammer.variables import hammer_variables
     from percussion_model.solvers.wave.solver import WaveSolver
 
     scene = Scene().replace(**{"solver.accuracy": 1e-3})

@@ -1,4 +1,4 @@
-"""The rods of a drill string as travelling waves on a characteristic grid."""
+"""Body of a drill string as travelling waves on a characteristic grid."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fmu_src.runtime.system.string_body import Rods
+from fmu_src.parts.string_body import Rods
 
 
 class Waves(Rods):
@@ -138,20 +138,20 @@ class Waves(Rods):
         self.weight_work += h * (self._head_weight * head_way + self._casing_weight * casing_way)
         self.weight_work += 2.0 * self.cell_mass * change * fallen
         if self.sticking > 0.0:
-            self._stick(ring, count)
+            self._apply_coulomb_friction(ring, count)
         elif self.viscous > 0.0:
-            self._rub(ring, back, count)
+            self._apply_viscous_friction(ring, back, count)
 
-    def _stick(self, ring: np.ndarray, count: int) -> None:
+    def _apply_coulomb_friction(self, ring: np.ndarray, count: int) -> None:
         """Coulomb and viscous friction on all cells; both waves of a cell lose the same."""
         cells = self.cells
         v = self.down + self.up
-        change = 0.5 * (self.rubbed(v, self.cell_mass, self.cell, count * self.step) - v)
+        change = 0.5 * (self.apply_friction(v, self.cell_mass, self.cell, count * self.step) - v)
         ring[:cells] += change
         ring[cells:] += change[::-1]
         self.total = float(ring.sum())
 
-    def _rub(self, ring: np.ndarray, back: np.ndarray, count: int) -> None:
+    def _apply_viscous_friction(self, ring: np.ndarray, back: np.ndarray, count: int) -> None:
         """Viscous friction alone: each velocity loses the same share."""
         v, left = self._room, self._left_by_wall**count
         np.add(ring, back, v)  # each cell twice

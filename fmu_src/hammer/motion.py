@@ -1,29 +1,29 @@
-"""The hammer in motion, as a communication step sees it."""
+"""Motion of the hammer, as a communication step sees it."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from fmu_src.runtime.calls import NOWHERE, plain_bounds
+from fmu_src.slave.states import StateError
 from percussion_model.physics.ledger import unexplained
 from percussion_model.physics.records import (
     BLOW,
     LEDGER_FIELDS,
-    LONG_SAMPLE_FIELDS,
     PEAK_FIELDS,
+    READING,
+    READING_FIELDS,
     STORED_FIELDS,
     Mode,
 )
-from percussion_model.scene.inputs import INPUTS, check_input
 from percussion_model.scene.scene import Scene
 from percussion_model.simulation.runner import Runner
 from percussion_model.solvers.base import Solver
+from percussion_model.solvers.state import State
 
-AT = {name: k for k, name in enumerate(LONG_SAMPLE_FIELDS)}
-LEDGER = (*LEDGER_FIELDS, *STORED_FIELDS)  # the last columns of a long row
+AT = {name: k for k, name in enumerate(READING_FIELDS)}
+LEDGER = (*LEDGER_FIELDS, *STORED_FIELDS)  # the last fields of a reading
 PEAKS = slice(AT[PEAK_FIELDS[0]], AT[PEAK_FIELDS[-1]] + 1)
 IMPULSES = ("bit_impulse", "contact_impulse", "drive_impulse")
 # An impulse below this in a communication step is no contact [N s].
@@ -55,21 +55,23 @@ class Motion(Runner):
         super().__init__(scene, record_events=False, solver=solver)
         self.scene = scene
         self.gauge: Gauge | None = None
-        self._bounds: dict[str, tuple[float, float]] = {}  # of inputs that have changed once
         self.row_of_blow = np.zeros(1, BLOW)  # the last whole one
         self.blow = self._numbers_of_blow()
         self.blow_count = 0
         self.step_size = 0.0
-        self.row = np.zeros(len(LONG_SAMPLE_FIELDS))
+        self.reading = np.zeros(1, READING)
+        self.row = self.reading.view(np.float64)
         self.numbers: list[float] = []  # the same as plain numbers
         self._is_read = self._has_peaks = False
-        self._spare_look: Any = None  # an old copy to be used again
-        self._here: Any = None  # copy of the state that belongs to `row`
+        self._here: State | None = None  # copy of the state that belongs to `row`
         self._stress: float | None = None
         # impulses at the start of the last step, or the state from which they follow
         self._before = np.zeros(len(IMPULSES))
-        self._left: tuple[Any, float] | None = None
-        self._spare: Any = None  # an old copy to be used again
+        self._left: tuple[State, float] | None = None
+        # old copies to be used again
+        self._spare: State | None = None
+        self._spare_of_peaks: State | None = None
+        self._other = np.zeros(1, READING)  # what is read beside the present
 
     def _keep(self, blows: np.ndarray, events: np.ndarray) -> None:
         if len(blows):
@@ -77,79 +79,74 @@ class Motion(Runner):
             self.blow = self._numbers_of_blow()
             self.blow_count += len(blows)
 
-    def _checked(self, inputs: dict[str, float]) -> dict[str, float]:
-        # whether an input acts is the same in all steps, and so are its bounds
-        for name, value in inputs.items():
-            low, high = self._bounds.get(name, NOWHERE)
-            if not low <= value <= high:
-                check_input(self.scene, name, value)
-                self._bounds[name] = plain_bounds(self.scene.row_of(INPUTS[name].key))
-        return inputs
-
     def _numbers_of_blow(self) -> dict[str, float]:
         """Last row as plain numbers; what is undefined is 0."""
         names = BLOW.names or ()
         row = dict(zip(names, self.row_of_blow[0].item(), strict=True))
         return {name: float(value) if value == value else 0.0 for name, value in row.items()}
 
-    def go_on(self, t: float, step_size: float, inputs: dict[str, float]) -> None:
-        """Change inputs and advance to `t` [s]."""
+    def advance_to(self, t: float, step_size: float, inputs: dict[str, float]) -> None:
+        """Change inputs, which are allowed and act, and advance to `t` [s]."""
         if self._is_read:
             self._before, self._left = self._impulses(self.row), None
         else:
-            self._spare = copied(self._state, self._spare)
+            if self._spare is None:
+                self._spare = self._state.copy()
+            else:
+                self._spare.take(self._state)
             self._left = (self._spare, self.time)
         self.solver.watch_peaks(self._state, self.time)
         if inputs:
-            self.set_inputs(**inputs)
+            self._commit_inputs(inputs)
         t = max(t, self.time)
         self._commit_up_to(t)
         self._time = t
         self.step_size = step_size
         self._is_read = False
 
-    def adopt(
-        self,
-        times: tuple[float, float],
-        blows: tuple[int, np.ndarray],
-        row: np.ndarray,
-        last: np.ndarray,
-    ) -> None:
-        """Take what a saved state holds beside that of the solver.
+    def save(self) -> bytes:
+        """What `restore` needs beside times and the number of blows."""
+        self.peaks()
+        floats = np.array([self.stress(), *self.before()])
+        return b"".join(array.tobytes() for array in self._arrays(floats))
 
-        Parameters
-        ----------
-        times : tuple of float
-            Present time and size of the last step [s].
-        blows : tuple
-            Their number, and the bytes of the last row.
-        row : ndarray
-            Reading at the present time.
-        last : ndarray, shape (4,)
-            Stress at the gauge [Pa], impulses at the start of the last step [N s].
-        """
+    def restore(self, times: tuple[float, float], blow_count: int, saved: bytes) -> None:
+        """Go back to a state; times are the present one and the size of the last step [s]."""
+        floats = np.zeros(1 + len(IMPULSES))
+        arrays = self._arrays(floats)
+        if sum(array.nbytes for array in arrays) != len(saved):
+            raise StateError("the saved state does not fit the solver")
+        start = 0
+        for array in arrays:
+            array.view(np.uint8)[:] = np.frombuffer(saved, np.uint8, array.nbytes, start)
+            start += array.nbytes
         self._time, self.step_size = times
-        self.blow_count = blows[0]
-        self.row_of_blow.view(np.uint8)[:] = blows[1]
+        self.blow_count = blow_count
         self.blow = self._numbers_of_blow()
-        self.row[:] = row
-        self._stress, self._before, self._left = float(last[0]), last[1:].copy(), None
+        self._stress, self._before, self._left = float(floats[0]), floats[1:], None
         self._take_row()
         self._has_peaks = True
+
+    def _arrays(self, floats: np.ndarray) -> list[np.ndarray]:
+        state = self._state
+        return [floats, self.row, self.row_of_blow, state.record, state.workspace]
 
     @staticmethod
     def _impulses(row: np.ndarray) -> np.ndarray:
         first = AT[IMPULSES[0]]  # they stand side by side
         return row[first : first + len(IMPULSES)].copy()
 
-    def _look(self, state: Any, t: float, row: np.ndarray, here: Any, peaks: bool) -> Any:
+    def _evaluate(
+        self, state: State, t: float, reading: np.ndarray, spare: State | None, peaks: bool
+    ) -> State:
         # After a change of inputs a state may lie a step ahead.
-        return self.solver.look(state, max(t, self.solver.time(state)), row, here, peaks)
+        t = max(t, self.solver.time(state))
+        return self.solver.read(state, t, reading, None if spare is state else spare, peaks)
 
     def read(self) -> list[float]:
-        """What it is like now (`LONG_SAMPLE_FIELDS`) but for the peaks; 0 where undefined."""
+        """What it is like now (`READING_FIELDS`) but for the peaks; 0 where undefined."""
         if not self._is_read:
-            self._here = self._look(self._state, self.time, self.row, self._here, False)
+            self._here = self._evaluate(self._state, self.time, self.reading, self._here, False)
             self._take_row()
             self._stress, self._has_peaks = None, False
         return self.numbers
@@ -158,8 +155,10 @@ class Motion(Runner):
         """Greatest bit and contact force in the last step [N]."""
         self.read()
         if not self._has_peaks:
-            row = np.zeros(len(LONG_SAMPLE_FIELDS))
-            self._spare_look = self._look(self._state, self.time, row, self._spare_look, True)
+            self._spare_of_peaks = self._evaluate(
+                self._state, self.time, self._other, self._spare_of_peaks, True
+            )
+            row = self._other.view(np.float64)
             self.row[PEAKS] = row[PEAKS]
             self.numbers[PEAKS] = row[PEAKS].tolist()
             self._has_peaks = True
@@ -177,9 +176,8 @@ class Motion(Runner):
     def before(self) -> np.ndarray:
         """Impulses at the start of the last step [N s]."""
         if self._left is not None:
-            row = np.zeros(len(LONG_SAMPLE_FIELDS))
-            self._look(*self._left, row, None, False)
-            self._before, self._left = self._impulses(row), None
+            self._evaluate(*self._left, self._other, None, False)
+            self._before, self._left = self._impulses(self._other.view(np.float64)), None
         return self._before
 
     def mean_force(self, which: int) -> float:
@@ -200,7 +198,7 @@ class Motion(Runner):
         self.read()
         if self._stress is None:
             self._stress = 0.0
-            if self.gauge is not None:
+            if self.gauge is not None and self._here is not None:
                 force = self.solver.force_in(self._here, self.gauge.bar, self.gauge.cell)
                 self._stress = force / self.gauge.area
         return self._stress
@@ -218,11 +216,3 @@ class Motion(Runner):
         since = self.time - (blow["time"] + blow["period"])
         late = since / blow["period"] - (PERIODS_HELD - 1.0)
         return min(1.0, 1.0 / late) if late > 0.0 else 1.0
-
-
-def copied(state: Any, spare: Any) -> Any:
-    """Copy of a state, into an old copy where there is one."""
-    if spare is None or isinstance(state, np.ndarray) or not hasattr(state, "take"):
-        return state.copy()
-    spare.take(state)
-    return spare

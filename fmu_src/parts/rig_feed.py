@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from fmu_src.runtime.system.part import Model
+from fmu_src.parts.part import Model, Part, PartTable
 
 LONGEST_STEP = 1e-3  # of the integration, short against the servo [s]
 
@@ -71,3 +71,38 @@ class RigFeed(Model):
             "relief_volume": self.relief_volume,
             "limited": self.limited,
         }
+
+
+class RigFeedPart(Part):
+    """Hydraulic cylinder that pushes the head."""
+
+    MODEL = RigFeed
+
+
+TABLE = PartTable(
+    name="RigFeed",
+    slave=RigFeedPart,
+    description="Hydraulic cylinder with servo valve, which pushes the head",
+    inputs={
+        "force_command": ("N", -1e9, 1e9, 0.0, "force that is wanted on the head"),
+        "head_velocity": ("m/s", -1e4, 1e4, 0.0, "velocity of the head"),
+    },
+    outputs={
+        "force": ("N", "force on the head"),
+        "pressure": ("Pa", "pressure difference over the piston"),
+        "energy": ("J", "hydraulic energy used"),
+        "relief_volume": ("m3", "volume through the relief valves"),
+        "limited": (False, "whether the valve gives its full flow"),
+    },
+    parameters={
+        "cylinder.area": ("m^2", 1e-5, 1.0, 4e-3, "area of the piston"),
+        "cylinder.volume": ("m^3", 1e-5, 10.0, 1e-2, "volume under pressure, with hoses"),
+        "cylinder.bulk_modulus": ("Pa", 1e5, 1e10, 2e8, "stiffness of oil and hoses"),
+        "cylinder.leakage": ("m^3/(s Pa)", 0.0, 1e-6, 0.0, "leak by pressure"),
+        "servo.time": ("s", 1e-3, 10.0, 0.02, "time constant of the pressure"),
+        "servo.velocity": ("m/s", 1e-3, 10.0, 0.3, "velocity of the head at full flow"),
+        "force_limit": ("N", 0.0, 1e7, 2e4, "force at which the relief valves open"),
+        "slide.friction": ("N s/m", 0.0, 1e7, 2e3, "viscous friction of the slide"),
+        "start.force": ("N", -1e6, 1e6, 0.0, "force at the start"),
+    },
+)  # fmt: skip

@@ -1,24 +1,34 @@
 """The hammer's variables: parameters from the one table, inputs and outputs of an FMU.
 
-Value references come from `fmu_src.interface`: numbers that were given once stay.
+`interface-1.json` holds names and value references: an interface, given once and kept. New
+variables get the next free number of their kind by `python -m fmu_src.interface`; entries are
+never changed or taken out. What cannot keep to that is version 2.
 """
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Iterator
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
 from typing import Any
 
-from fmu_src.hammer_outputs import MODES, REAL_OUTPUTS
-from fmu_src.interface import FIRST_SECTION, reference, section_reference
-from fmu_src.runtime.hammer import NAMES_OUTSIDE
+from fmu_src.hammer.inputs import NAMES_OUTSIDE
+from fmu_src.hammer.outputs import MODES, OUTPUTS
 from fmu_src.units import fmi_unit
 from fmu_src.variables import Variable, magnitude, number_row
-from percussion_model.physics.records import Mode
 from percussion_model.scene.inputs import INPUTS
 from percussion_model.scene.parameters import find_row, parameter_table
 from percussion_model.scene.rows import Row
 from percussion_model.scene.scene import Scene
+
+VERSION = 1
+INTERFACE = Path(__file__).with_name(f"interface-{VERSION}.json")
+# Sections of a bar: this, plus SECTION for each, plus the place of the field in it.
+FIRST_SECTION = {"piston": 10_000, "bit": 20_000}
+SECTION = 10
 
 # Gauge pressure at which the drive gives the force of the scene [Pa].
 SUPPLY_PRESSURE = 20e5
@@ -57,6 +67,28 @@ LEFT_OUT = {
 def hammer_variables(scene: Scene) -> list[Variable]:
     """Return the variables of an FMU that bakes in a scene, inputs first."""
     return [*_inputs(scene), *_outputs(), *_parameters(scene)]
+
+
+@cache
+def interface_entries() -> dict[str, dict[str, Any]]:
+    """Entries of the interface by name; those of sections follow a rule instead."""
+    found: dict[str, dict[str, Any]] = json.loads(INTERFACE.read_text(encoding="utf-8"))
+    return found
+
+
+@cache
+def reference(name: str, kind: str) -> int:
+    """Value reference of a variable; a free one for what is not in the file yet."""
+    entries = interface_entries()
+    if name in entries:
+        return int(entries[name]["reference"])
+    fresh = _fresh.setdefault(kind, [])
+    fresh.append(name)
+    used = [entry["reference"] for entry in entries.values() if entry["kind"] == kind]
+    return int(max(used)) + len(fresh)
+
+
+_fresh: dict[str, list[str]] = {}  # names that are not in the file yet, by kind
 
 
 def split_drive_force(force: float) -> tuple[float, float]:
@@ -99,49 +131,28 @@ def _inputs(scene: Scene) -> Iterator[Variable]:
 
 
 def _outputs() -> Iterator[Variable]:
-    for name, (unit, lower, upper, nominal, description) in REAL_OUTPUTS.items():
-        display = {"m/s": "mm/s"}.get(unit) if name == "rate_of_penetration" else DISPLAYS.get(unit)
+    for name, one in OUTPUTS.items():
+        real = one.type == "Real"
+        unit = one.unit or ""
+        display = {"rate_of_penetration": "mm/s", "gauge_stress": "MPa"}.get(name)
+        modes: dict[str, Any] = {
+            "enumeration": "DrillingMode",
+            "items": tuple((mode.name, int(mode), text) for mode, text in MODES.items()),
+        }
         yield Variable(
             name=name,
-            reference=reference(name, "output"),
-            type="Real",
+            reference=reference(name, "output" if real else "discrete output"),
+            type=one.type,
             causality="output",
-            description=description,
-            variability="continuous",
-            unit=unit,
-            display="MPa" if name == "gauge_stress" else display,
-            lower=lower,
-            upper=upper,
-            nominal=nominal,
+            description=one.description,
+            variability="continuous" if real else "discrete",
+            unit=one.unit,
+            display=display or DISPLAYS.get(unit),
+            lower=one.lower,
+            upper=one.upper,
+            nominal=one.nominal,
+            **(modes if one.type == "Enumeration" else {}),
         )
-    common: dict[str, Any] = {"causality": "output", "variability": "discrete"}
-    yield Variable(
-        name="blow_count",
-        reference=reference("blow_count", "discrete output"),
-        type="Integer",
-        description="whole blows so far; when it rises, all numbers of a blow are new",
-        lower=0,
-        upper=2**31 - 1,
-        **common,
-    )
-    yield Variable(
-        name="drilling_mode",
-        reference=reference("drilling_mode", "discrete output"),
-        type="Enumeration",
-        description="mode of the rock law",
-        enumeration="DrillingMode",
-        items=tuple((mode.name, int(mode), text) for mode, text in MODES.items()),
-        lower=int(min(Mode)),
-        upper=int(max(Mode)),
-        **common,
-    )
-    yield Variable(
-        name="off_bottom",
-        reference=reference("off_bottom", "discrete output"),
-        type="Boolean",
-        description="whether the bit met no rock in the last communication step",
-        **common,
-    )
 
 
 def _parameters(scene: Scene) -> Iterator[Variable]:
@@ -193,7 +204,12 @@ def _sections(scene: Scene, bar: str) -> Iterator[Variable]:
             key = f"{bar}.sections.{i}.{field}"
             name = f"{bar}.sections[{i + 1}].{field}"
             yield _number(
-                name, section_reference(bar, i, k), _row(key), scene[key], "parameter", key=key
+                name,
+                FIRST_SECTION[bar] + SECTION * i + k,
+                _row(key),
+                scene[key],
+                "parameter",
+                key=key,
             )
 
 
@@ -264,7 +280,7 @@ def _described(row: Row) -> str:
 
 def _choice_row(key: str, choices: tuple[str, ...]) -> Row:
     row = number_row(key, "", 0.0, 0.0, "bar that carries the gauge")
-    return Row(**{**vars(row), "kind": "choice", "choices": choices})
+    return replace(row, kind="choice", choices=choices)
 
 
 def _row(key: str) -> Row:

@@ -1,10 +1,10 @@
-"""What the log of an instance must say of its motion: once, and as soon as it is seen."""
+"""Warnings about a motion for the log: each once, and as soon as it is seen."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
-from fmu_src.runtime.motion import AT, Motion
+from fmu_src.hammer.motion import AT, Motion
 from percussion_model.physics.records import Mode
 from percussion_model.simulation.validity import (
     button_note,
@@ -14,12 +14,12 @@ from percussion_model.simulation.validity import (
     rate_note,
 )
 
-# How often a motion is looked at [s]; a look costs as much as reading an output.
+# Time between two checks of a motion [s]; one costs as much as reading an output.
 INTERVAL = 0.1
 
 
-class Watch:
-    """Finds what is wrong with a motion; says each thing once."""
+class Warnings:
+    """Finds what is wrong with a motion; tells each thing once."""
 
     def __init__(self) -> None:
         self._told: set[str] = set()
@@ -28,7 +28,7 @@ class Watch:
         self._pushed = 0.0  # when the rock was last seen to be pushed [s]
         self._impulse = 0.0  # of the bit force, then [N s]
 
-    def look(self, motion: Motion, loading_stiffness: float) -> list[str]:
+    def new(self, motion: Motion, loading_stiffness: float) -> list[str]:
         """Messages that are new.
 
         Parameters

@@ -1,26 +1,22 @@
-"""Makes the hammer's FMU from a scene."""
+"""The hammer's FMU, from a scene."""
 
 from __future__ import annotations
 
-import json
 import re
 from importlib.metadata import version
 from pathlib import Path
 
 from fmu_src.archive import write_fmu
 from fmu_src.description import About
-from fmu_src.hammer_variables import hammer_variables
-from fmu_src.interface import VERSION
+from fmu_src.hammer.slave import PercussiveHammer
+from fmu_src.hammer.variables import VERSION, hammer_variables
 from fmu_src.page import write_page
 from fmu_src.staging import stage
-from fmu_src.variables import Variable
+from fmu_src.variables import FILE, Variable, to_json, write_variables
 from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.solvers.blow_map.table import BlowTable, fixed_values
 
-RUNTIME = ("motion", "outputs", "blow_map", "watch", "hammer_states", "hammer")
 STEP_SIZE = 1e-3  # of the default experiment [s]
-AUTHOR = "percussion_model developers"
-LICENSE = "BSD-3-Clause"
 
 
 def build_hammer(scene: Scene, path: Path, blow_map: BlowTable | None = None) -> str:
@@ -40,18 +36,16 @@ def build_hammer(scene: Scene, path: Path, blow_map: BlowTable | None = None) ->
     """
     about = about_hammer(scene, path)
     variables = hammer_variables(scene)
-    bundle = stage("percussive_hammer", RUNTIME, with_model=True)
+    bundle = stage("percussive_hammer", "hammer", with_model=True)
     resources: dict[str, str | bytes] = {
-        "variables.json": _json([variable.for_instance() for variable in variables]),
-        "scene.json": _json(_scene(scene, variables, bundle.name)),
+        FILE: write_variables(variables),
+        "scene.json": to_json(_scene(scene, variables, bundle.name)),
     }
     if blow_map is not None:
         blow_map.refuse_other(fixed_values(scene))
         resources["blow_map.npz"] = blow_map.to_bytes()
     page = write_page(about, variables, scene)
-    return write_fmu(
-        path, about, variables, bundle, ("hammer", "PercussiveHammer"), resources, page
-    )
+    return write_fmu(path, about, variables, bundle, PercussiveHammer, resources, page)
 
 
 def about_hammer(scene: Scene, path: Path) -> About:
@@ -64,11 +58,9 @@ def about_hammer(scene: Scene, path: Path) -> About:
     return About(
         model=path.stem,
         description=f"Percussive drill with travelling waves{title}",
-        author=AUTHOR,
-        version=f"{version('percussion_model')}, interface {VERSION}",
-        license=LICENSE,
         stop_time=scene.run.duration,
         step_size=min(STEP_SIZE, scene.run.duration),
+        version=f"{version('percussion_model')}, interface {VERSION}",
     )
 
 
@@ -78,7 +70,3 @@ def _scene(scene: Scene, variables: list[Variable], bundle: str) -> dict[str, ob
         "given": scene.given_values(),
         "identity": [bundle, [variable.name for variable in variables]],
     }
-
-
-def _json(value: object) -> str:
-    return json.dumps(value, indent=1, sort_keys=True, allow_nan=False) + "\n"

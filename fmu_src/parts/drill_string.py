@@ -20,9 +20,9 @@ from typing import Any
 
 import numpy as np
 
-from fmu_src.runtime.system.part import Model
-from fmu_src.runtime.system.string_body import Lumps
-from fmu_src.runtime.system.string_waves import Waves
+from fmu_src.parts.part import COUNT, Model, Part, PartTable, plain
+from fmu_src.parts.string_body import Lumps
+from fmu_src.parts.string_waves import Waves
 
 # Damping by stiffness and step: 3/2 is the limit, the rest is margin.
 DAMPING_OF_DELAY = 2.0
@@ -130,12 +130,12 @@ class DrillString(Model):
         h, body = step_size, self.body
         reaction = (inputs["casing_impulse"] - self.casing_impulse) / h
         self.casing_impulse = inputs["casing_impulse"]
-        before = body.head, self.casing_place()
+        before = body.head, self.casing_position()
         self._travel(inputs["head_force"], reaction - self.force, h)
         self.head_work += inputs["head_force"] * (body.head - before[0])
         self.head_impulse += inputs["head_force"] * h
         self.time += h
-        moved = self.casing_place() - before[1]
+        moved = self.casing_position() - before[1]
         self.reaction_work += reaction * moved
         self.shoulder_work += self.force * moved
         self.bit_impulse += self.force * h
@@ -143,12 +143,12 @@ class DrillString(Model):
         # what the bit did is known a step late, as it is in a master that goes by Jacobi
         self.bit_work += self.force_before * (bit - self.bit)
         self.force_before = self.force
-        self._push((bit - self.bit) / h, bit, h)
+        self._update_force((bit - self.bit) / h, bit, h)
         self.bit = bit
         if h != self._share[0]:
             self._share = h, 1.0 - math.exp(-h / self.parameters["feed_filter"])
         self.mean_force += self._share[1] * (self.force - self.mean_force)
-        self._rods(inputs["add_rod"])
+        self._add_rods(inputs["add_rod"])
 
     def _travel(self, head_force: float, casing_force: float, h: float) -> None:
         """Bring the body up to the communication point, or within a cell of it."""
@@ -156,7 +156,7 @@ class DrillString(Model):
         if isinstance(body, Lumps):
             count = max(1, math.ceil(h / LONGEST_LUMPED_STEP - ROUNDING))
             for _ in range(count):
-                body.go_on(head_force, casing_force, h / count)
+                body.advance(head_force, casing_force, h / count)
             return
         cell, enough = body.step, body.step * (1.0 - ROUNDING)
         if self.lag + h < enough:
@@ -182,11 +182,11 @@ class DrillString(Model):
         self.head_impulse_due = head_force * self.lag
         self.casing_impulse_due = casing_force * self.lag
 
-    def casing_place(self) -> float:
+    def casing_position(self) -> float:
         """Displacement of the casing at the communication point [m]."""
         return self.body.casing + self.body.casing_velocity * self.lag
 
-    def _push(self, bit_velocity: float, bit: float, h: float) -> None:
+    def _update_force(self, bit_velocity: float, bit: float, h: float) -> None:
         """Force of the shoulder for the step to come."""
         k, c = self.shoulder.constants(h)
         if k != self.stiffness:
@@ -195,13 +195,13 @@ class DrillString(Model):
             self.gap += self.force * softer
             self.loaded += 0.5 * self.force**2 * softer
             self.stiffness = k
-        compression = self.gap + self.casing_place() - bit
+        compression = self.gap + self.casing_position() - bit
         if compression <= 0.0:
             self.force = 0.0
             return
         self.force = max(0.0, k * compression + c * (self.body.casing_velocity - bit_velocity))
 
-    def _rods(self, asked: bool) -> None:
+    def _add_rods(self, asked: bool) -> None:
         """Add a rod on the rising edge of `add_rod`, or by itself where the head is down."""
         wanted = self.body.head >= self.next_rod
         if wanted and (self.parameters["rod.automatic"] or (asked and not self.was_asked)):
@@ -227,7 +227,7 @@ class DrillString(Model):
         stored_in_shoulder = 0.5 * self.force**2 / self.stiffness
         return self.signals() | {
             "head_position": body.head + body.head_velocity * self.lag,
-            "casing_position": self.casing_place(),
+            "casing_position": self.casing_position(),
             "casing_velocity": body.casing_velocity,
             "length": body.count * body.length_of_rod,
             "weight": body.weight,
@@ -252,8 +252,7 @@ class DrillString(Model):
 
     def save(self) -> dict[str, Any]:
         """State of shoulder and body."""
-        body = {name: getattr(self.body, name) for name in self.body.STATE}
-        body = {k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in body.items()}
+        body = {name: plain(getattr(self.body, name)) for name in self.body.STATE}
         return super().save() | {"body": body}
 
     def restore(self, saved: dict[str, Any]) -> None:
@@ -263,3 +262,74 @@ class DrillString(Model):
             setattr(self.body, name, np.array(value) if isinstance(value, list) else value)
         if isinstance(self.body, Lumps):
             self.body.assemble()
+
+
+class DrillStringPart(Part):
+    """Drill string with head, casing and shoulder."""
+
+    MODEL = DrillString
+
+
+TABLE = PartTable(
+    name="DrillString",
+    slave=DrillStringPart,
+    description="Axial drill string with head, casing and the shoulder that pushes the bit",
+    inputs={
+        "head_force": ("N", -1e9, 1e9, 0.0, "force of the rig on the head"),
+        "bit_position": ("m", -1e6, 1e6, 0.0, "displacement of the bit"),
+        "casing_impulse": (
+            "N s", -1e12, 1e12, 0.0, "running integral of the drive's reaction on the casing"
+        ),
+        "add_rod": ("", 0, 1, False, "a rising edge adds a rod, where rod_wanted"),
+    },
+    outputs={
+        "feed_force": ("N", "force of the shoulder on the bit, held for the next step"),
+        "feed_force_mean": ("N", "the same, filtered"),
+        "head_position": ("m", "displacement of the head, new rods left out of account"),
+        "head_velocity": ("m/s", "velocity of the head"),
+        "casing_position": ("m", "displacement of the casing"),
+        "casing_velocity": ("m/s", "velocity of the casing"),
+        "length": ("m", "length of the rods"),
+        "weight": ("N", "weight of head, rods and casing, less buoyancy"),
+        "rod_wanted": (False, "whether the head is down and a rod may be added"),
+        "lifted": (False, "whether the shoulder is off the bit"),
+        "shoulder_stiffness": ("N/m", "stiffness of the shoulder that the step size allows"),
+        "head_impulse": ("N s", "running integral of head_force"),
+        "bit_impulse": ("N s", "running integral of feed_force"),
+        "momentum": ("N s", "of head, rods and casing, less what new rods brought"),
+        "wall_momentum": ("N s", "momentum that the wall has taken"),
+        "energy.head": ("J", "work of head_force"),
+        "energy.reaction": ("J", "work of the drive's reaction on the casing"),
+        "energy.weight": ("J", "work of the weight"),
+        "energy.bit": ("J", "work of feed_force on the bit"),
+        "energy.shoulder": (
+            "J", "energy that the shoulder has taken; below 0 the coupling has made energy"
+        ),
+        "energy.wall": ("J", "energy that wall friction has taken"),
+        "energy.stored": ("J", "kinetic and elastic energy, less what new rods brought"),
+        "rod_count": (COUNT, "rods in the string"),
+    },
+    parameters={
+        "model": ("", 0, 0, ("waves", "lumped"), "travelling waves, or a mass for each rod"),
+        "rod.length": ("m", 0.1, 100.0, 3.0, "length of a rod"),
+        "rod.area": ("m^2", 1e-5, 1.0, 2.4e-3, "cross-section of steel"),
+        "rod.density": ("kg/m^3", 100.0, 3e4, 7850.0, "density"),
+        "rod.youngs_modulus": ("Pa", 1e9, 1e12, 2.1e11, "Young's modulus"),
+        "rod.cells": (COUNT, 1, 200, 2, "cells of the wave grid in a rod"),
+        "rod.automatic": ("", 0, 1, True, "whether a rod is added as soon as one is wanted"),
+        "start.rods": (COUNT, 1, 1000, 4, "rods at the start"),
+        "start.rod_left": ("m", 0.0, 100.0, 3.0, "way of the head to the first new rod"),
+        "start.feed_force": ("N", 0.0, 1e6, 2500.0, "force of the shoulder at the start"),
+        "head.mass": ("kg", 1.0, 1e5, 300.0, "rotation head with carriage"),
+        "casing.mass": ("kg", 0.1, 1e5, 40.0, "casing of the hammer; part of the string"),
+        "shoulder.stiffness": ("N/m", 1e3, 1e10, 1e5, "stiffness of shoulder, chuck and damper"),
+        "shoulder.damping": ("N s/m", 0.0, 1e7, 200.0, "damping of the same"),
+        "shoulder.bit_mass": ("kg", 0.1, 1e4, 8.69, "mass of the bit, for the limit of a step"),
+        "shoulder.passive": ("", 0, 1, True, "keep to what a communication step can bear"),
+        "friction.force": ("N/m", 0.0, 1e5, 0.0, "Coulomb friction at the wall by length"),
+        "friction.viscosity": ("N s/m^2", 0.0, 1e5, 20.0, "viscous friction by length"),
+        "fluid_density": ("kg/m^3", 0.0, 3e3, 0.0, "density of the fluid in the hole (buoyancy)"),
+        "gravity": ("m/s^2", -100.0, 100.0, 10.0, "acceleration, down positive"),
+        "feed_filter": ("s", 1e-4, 100.0, 0.1, "time of the filter of feed_force_mean"),
+    },
+)  # fmt: skip

@@ -1,6 +1,6 @@
-"""The body of a drill string between two end masses: travelling waves, or lumped masses.
+"""Body of a drill string between two end masses: what all have in common, and lumped masses.
 
-Both take the force on the head and on the casing (down positive), and know the
+Bodies take the force on the head and on the casing (down positive), and know the
 displacements and velocities of the two ends. Weight and wall friction act on the way.
 """
 
@@ -54,7 +54,7 @@ class Rods:
         self.head = self.casing = self.head_velocity = self.casing_velocity = 0.0
         self.friction_loss = self.weight_work = self.lost_momentum = 0.0
 
-    def rubbed(self, v: np.ndarray, mass: float, length: float, step: float) -> np.ndarray:
+    def apply_friction(self, v: np.ndarray, mass: float, length: float, step: float) -> np.ndarray:
         """Velocities after a step of wall friction on pieces of a mass and a length.
 
         Coulomb friction stops a piece at most, viscous friction is implicit:
@@ -118,9 +118,9 @@ class Lumps(Rods):
             buffer[-1] = 1.0
         now = self._buffers[0]
         now[: n + 2], now[n + 2 : -3] = self.places, self.velocities
-        self._see(now)
+        self._view(now)
 
-    def _see(self, buffer: np.ndarray) -> None:
+    def _view(self, buffer: np.ndarray) -> None:
         n = self.count
         self.places, self.velocities = buffer[: n + 2], buffer[n + 2 : -3]
 
@@ -146,19 +146,19 @@ class Lumps(Rods):
             self.places[i] = self.places[i + 1] + force / self.springs[i]
             force -= self.weights[i]
 
-    def go_on(self, head_force: float, casing_force: float, h: float) -> None:
+    def advance(self, head_force: float, casing_force: float, h: float) -> None:
         """Go on by a step `h` [s] under forces on head and casing [N], without weights."""
         if h != self._made_for:
             self._make(h)
         if self.sticking > 0.0:
-            self._rub_and_go_on(head_force, casing_force, h)
+            self._advance_with_friction(head_force, casing_force, h)
             return
         now, after = self._buffers
         before, last = self.places, self.count + 1
         now[-3], now[-2] = head_force, casing_force
         np.dot(self._moves, now, after[:-3])
         self._buffers = [after, now]
-        self._see(after)
+        self._view(after)
         self.head += after.item(0) - now.item(0)
         self.casing += after.item(last) - now.item(last)
         self.weight_work += float(self.weights.dot(self.places - before))
@@ -168,7 +168,7 @@ class Lumps(Rods):
             self.friction_loss += 0.5 * mass * (1.0 / left**2 - 1.0) * float(rods.dot(rods))
             self.lost_momentum += mass * (1.0 / left - 1.0) * float(rods.dot(self._ones))
 
-    def _rub_and_go_on(self, head_force: float, casing_force: float, h: float) -> None:
+    def _advance_with_friction(self, head_force: float, casing_force: float, h: float) -> None:
         """The same with Coulomb friction."""
         force = self.weights - self.stiffness @ self.places
         force[0] += head_force
@@ -181,7 +181,7 @@ class Lumps(Rods):
         self.head += h * float(mean[0])
         self.casing += h * float(mean[-1])
         rods = self.velocities[1:-1]
-        rods[:] = self.rubbed(rods.copy(), float(self.masses[1]), self.length_of_rod, h)
+        rods[:] = self.apply_friction(rods.copy(), float(self.masses[1]), self.length_of_rod, h)
         self.head_velocity = float(self.velocities[0])
         self.casing_velocity = float(self.velocities[-1])
 

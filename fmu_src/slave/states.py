@@ -1,4 +1,4 @@
-"""A saved state as bytes: header, numbers of the instance, state of the solver."""
+"""Saved states: a header, and the bytes that a slave gives."""
 
 from __future__ import annotations
 
@@ -6,8 +6,6 @@ import hashlib
 import json
 import struct
 from typing import Any
-
-import numpy as np
 
 MAGIC = b"PHAMMER\0"
 VERSION = 1
@@ -49,25 +47,3 @@ def unpack(parameters: bytes, state: bytes) -> bytes:
     if len(body) != length:
         raise StateError(f"the saved state has {len(body)} bytes where {length} belong")
     return body
-
-
-def solver_bytes(state: Any) -> bytes:
-    """State of a solver as bytes."""
-    return b"".join(part.tobytes() for part in _parts(state))
-
-
-def fill_solver(state: Any, found: bytes) -> None:
-    """Write bytes into a state of the same scene."""
-    parts = _parts(state)
-    if sum(part.nbytes for part in parts) != len(found):
-        raise StateError("the saved state does not fit the solver")
-    start = 0
-    for part in parts:
-        part[:] = np.frombuffer(found, np.uint8, part.nbytes, start)
-        start += part.nbytes
-
-
-def _parts(state: Any) -> list[np.ndarray]:
-    """Views of a state's memory, byte by byte."""
-    arrays = [state] if isinstance(state, np.ndarray) else [state.record, state.workspace]
-    return [array.view(np.uint8) for array in arrays]

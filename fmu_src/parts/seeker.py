@@ -59,8 +59,8 @@ class Seeker:
         self.sums = [0.0] * 3  # feed, pressure, rate
         self.waves = [0.0] * 12  # the same at both frequencies, real and imaginary
 
-    def go_on(self, inputs: Mapping[str, Any], time: float, h: float) -> tuple[float, float]:
-        """Take a sample; return the feed [N] and the pressure [Pa] to be kept."""
+    def sample(self, inputs: Mapping[str, Any], time: float, h: float) -> tuple[float, float]:
+        """Take a sample of the inputs; return the feed [N] and the pressure [Pa] to be kept."""
         p = self.parameters
         if self.phase == 0.0:
             self.counts = time > self.since

@@ -16,11 +16,11 @@ import random
 from bisect import bisect_right
 from typing import Any
 
-from fmu_src.runtime.system.part import Model
+from fmu_src.parts.part import COUNT, Entries, Model, Part, PartTable
 
 LAYERS = 6
 # Knots of the variation that are kept, by number.
-KEPT = 64
+MOST_KNOTS = 64
 
 
 class RockProfile(Model):
@@ -76,16 +76,16 @@ class RockProfile(Model):
 
     def _knot(self, number: int) -> float:
         if number not in self._knots:
-            if len(self._knots) > KEPT:
+            if len(self._knots) > MOST_KNOTS:
                 self._knots.clear()
             seed = f"{int(self.parameters['variation.seed'])}:{number}"
             self._knots[number] = random.Random(seed).gauss(0.0, 1.0)
         return self._knots[number]
 
-    def _here(self) -> tuple[float, float, float, float, int]:
+    def _layer_at_depth(self) -> tuple[float, float, float, float, int]:
         return self.layers[max(0, bisect_right(self.tops, self.depth) - 1)]
 
-    def _ridden(self, value: float, name: str, best: str) -> float:
+    def _quadratic_factor(self, value: float, name: str, best: str) -> float:
         """Factor on the stiffness that is least at the best feed, or pressure."""
         factor = self.parameters[f"{name}.factor"]
         if factor == 0.0:
@@ -95,10 +95,10 @@ class RockProfile(Model):
 
     def signals(self) -> dict[str, Any]:
         """What hammer and controller take."""
-        _, stiffness, ratio, torque, _ = self._here()
+        _, stiffness, ratio, torque, _ = self._layer_at_depth()
         factor = self.variation(self.depth)
-        factor *= self._ridden(self.feed, "best_feed", "force")
-        factor *= self._ridden(self.pressure, "best_pressure", "pressure")
+        factor *= self._quadratic_factor(self.feed, "best_feed", "force")
+        factor *= self._quadratic_factor(self.pressure, "best_pressure", "pressure")
         return {
             "loading_stiffness": stiffness * factor,
             "unloading_ratio": ratio,
@@ -107,9 +107,69 @@ class RockProfile(Model):
 
     def outputs(self) -> dict[str, Any]:
         """Present values by name."""
-        _, stiffness, _, _, which = self._here()
+        _, stiffness, _, _, which = self._layer_at_depth()
         return self.signals() | {
             "depth": self.depth,
             "in_void": stiffness <= self.parameters["void_stiffness"],
             "layer": which,
         }
+
+
+class RockProfilePart(Part):
+    """Rock by depth."""
+
+    MODEL = RockProfile
+
+
+_LAYER = {
+    "top": ("m", -1.0, 2e4, "depth at which the layer begins (-1: no such layer)"),
+    "loading_stiffness": ("N/m", 1e3, 1e13, "loading stiffness K_R"),
+    "unloading_ratio": ("1", 1.0, 1e4, "gamma: unloading by loading stiffness"),
+    "torque_factor": ("1", 0.0, 100.0, "torque on the rotation, by that of sound rock"),
+}
+_LAYER_START = {
+    "top": -1.0, "loading_stiffness": 7.5e8, "unloading_ratio": 5.0, "torque_factor": 1.0,
+}  # fmt: skip
+
+
+def _layers() -> Entries:
+    """Parameters of six layers; the first begins at the surface."""
+    found: Entries = {}
+    for i in range(1, LAYERS + 1):
+        for name, (unit, lower, upper, text) in _LAYER.items():
+            start = 0.0 if i == 1 and name == "top" else _LAYER_START[name]
+            found[f"layers[{i}].{name}"] = (unit, lower, upper, start, text)
+    return found
+
+
+TABLE = PartTable(
+    name="RockProfile",
+    slave=RockProfilePart,
+    description="Rock by depth: layers, voids, random variation, stiffness by feed",
+    inputs={
+        "bit_position": ("m", -1e6, 1e6, 0.0, "displacement of the bit"),
+        "feed_force": ("N", -1e9, 1e9, 2500.0, "feed force on the bit"),
+        "supply_pressure": ("Pa", 0.0, 1e9, 2e6, "gauge pressure at the hammer"),
+    },
+    outputs={
+        "loading_stiffness": ("N/m", "loading stiffness K_R at the bit"),
+        "unloading_ratio": ("1", "gamma at the bit"),
+        "depth": ("m", "greatest depth of the bit"),
+        "rotation_torque": ("N.m", "torque on the rotation"),
+        "in_void": (False, "whether the layer is soft enough to count as a void"),
+        "layer": (COUNT, "number of the layer"),
+    },
+    parameters=_layers()
+    | {
+        "start.depth": ("m", 0.0, 2e4, 0.0, "depth of the hole at the start"),
+        "variation.spread": ("1", 0.0, 2.0, 0.0, "standard deviation of ln K_R"),
+        "variation.length": ("m", 1e-4, 1e3, 0.01, "distance of the knots of the variation"),
+        "variation.seed": (COUNT, 0, 1_000_000, 1, "seed of the variation"),
+        "best_feed.force": ("N", 1.0, 1e9, 2500.0, "feed force at which K_R is lowest"),
+        "best_feed.factor": ("1", 0.0, 1e6, 0.0, "growth of K_R by the square of the distance"),
+        "best_pressure.pressure": ("Pa", 1.0, 1e9, 2e6, "supply pressure at which K_R is lowest"),
+        "best_pressure.factor": ("1", 0.0, 1e6, 0.0, "growth of K_R by the square of the distance"),
+        "torque_arm": ("m", 0.0, 10.0, 0.04, "torque by feed force in sound rock"),
+        "void_stiffness": ("N/m", 0.0, 1e13, 1e7, "K_R up to which a layer counts as a void"),
+    },
+)

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from fmu_src.runtime.system.part import Model
+from fmu_src.parts.part import Model, Part, PartTable
 
 LONGEST_STEP = 1e-3  # of the integration, short against filling the hose [s]
 
@@ -79,3 +79,43 @@ class Supply(Model):
             "relief_volume": self.relief_volume,
             "relief_open": self.pressure >= self.parameters["relief_pressure"],
         }
+
+
+class SupplyPart(Part):
+    """Source, hose and relief valve of the drive's fluid."""
+
+    MODEL = Supply
+
+
+TABLE = PartTable(
+    name="Supply",
+    slave=SupplyPart,
+    description="Air or oil supply: source, hose volume, pressure drop, relief valve",
+    inputs={
+        "pressure_command": ("Pa", 0.0, 1e9, 2e6, "pressure that is wanted"),
+        "percussion_on": ("", 0, 1, True, "whether the drive is open"),
+        "blow_frequency": ("Hz", 0.0, 1e6, 0.0, "blows of the hammer"),
+        "pressure_loss": ("1", 0.0, 1.0, 0.0, "share of the pressure that a fault takes"),
+    },
+    outputs={
+        "supply_pressure": ("Pa", "gauge pressure at the hammer"),
+        "hose_pressure": ("Pa", "gauge pressure at the source"),
+        "flow": ("m3/s", "flow of the source"),
+        "energy": ("J", "energy given by the source"),
+        "relief_volume": ("m3", "volume through the relief valve"),
+        "relief_open": (False, "whether the relief valve is open"),
+    },
+    parameters={
+        "source.pressure_limit": ("Pa", 0.0, 1e9, 3e6, "highest pressure of the source"),
+        "source.flow_limit": ("m^3/s", 0.0, 100.0, 2e-2, "highest flow of the source"),
+        "source.time": ("s", 1e-4, 100.0, 0.02, "time constant of the source"),
+        "vent.flow_limit": ("m^3/s", 0.0, 100.0, 0.1, "flow of the vent above what is wanted"),
+        "hose.volume": ("m^3", 1e-6, 100.0, 2e-2, "volume of the hose"),
+        "hose.bulk_modulus": ("Pa", 1e4, 1e10, 2.1e6, "stiffness of oil and hose, or of gas"),
+        "hose.resistance": ("Pa s/m^3", 0.0, 1e12, 2e7, "pressure drop by flow"),
+        "drive.volume": ("m^3", 0.0, 1.0, 1.2e-4, "volume that the drive takes for a blow"),
+        "drive.leakage": ("m^3/(s Pa)", 0.0, 1e-3, 2e-10, "flow past the piston by pressure"),
+        "relief_pressure": ("Pa", 0.0, 1e9, 3.2e6, "pressure at which the relief valve opens"),
+        "start.pressure": ("Pa", 0.0, 1e9, 2e6, "pressure at the start"),
+    },
+)  # fmt: skip
