@@ -147,6 +147,7 @@ def leave_by_velocity(par, s, v, energy):
 def close_interface(par, s, energy):
     """Contact with the rock begins: a new cycle, standstill, spring or wall."""
     if par.rock == RockKind.SPRING:
+        s.k_r = s.next_k_r
         s.mode = Mode.FC
     elif par.rock == RockKind.WALL:
         s.mode = Mode.SS

@@ -160,3 +160,18 @@ def test_no_two_blows_start_at_one_instant():
     result = simulate(Scene().computed_by("rigid", **changes), 0.002, settle=0.0)
     assert len(result.blows) > 3
     assert np.all(np.diff(result.blows["time"]) > 0.0)
+
+
+@pytest.mark.parametrize("solver", ["wave", "fem", "rigid"])
+def test_another_stiffness_reaches_a_spring_at_its_next_contact(solver):
+    """Waves and elements kept the spring of the start for ever."""
+    drop = {"effects.rock": "spring", "effects.barrier": False, "effects.drive": "none"}
+    drop |= {"piston.model": "absent", "start.bit_velocity": 1.0, "start.rock_gap": 1e-3}
+    scene = Scene().computed_by(solver, **drop, **{"run.settle": 0.0})
+    simulation = Simulation(scene)
+    simulation.advance(3e-4)  # still in flight
+    simulation.set_inputs(loading_stiffness=3e9)
+    other = Simulation(scene.replace(**{"rock.loading_stiffness": 3e9}))
+    times = np.linspace(1e-3, 2e-3, 500)
+    found, wanted = (run.sample(times)["bit_force"].max() for run in (simulation, other))
+    assert found == pytest.approx(wanted, rel=1e-3)
