@@ -17,6 +17,7 @@ from fmu_src.runtime.states import fingerprint
 from fmu_src.runtime.values import Read
 from fmu_src.runtime.watch import Watch
 from percussion_model.scene.inputs import INPUTS, why_without_effect
+from percussion_model.scene.numbers import section_numbers
 from percussion_model.scene.rows import refuse_value
 from percussion_model.scene.scene import Scene
 from percussion_model.solvers.base import Solver
@@ -197,7 +198,7 @@ class PercussiveHammer(Slave):
                 f"which is {bar.length!r} m long"
             )
         grid = solver.grid_of(name)
-        return None if grid is None else Gauge(name, *cell_at(bar, grid, place))
+        return None if grid is None else Gauge(name, *cell_at(section_numbers(bar), grid, place))
 
     def step(self, time: float, step_size: float) -> None:
         """Pass on changed inputs, then advance."""

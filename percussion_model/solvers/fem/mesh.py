@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from percussion_model.scene.parameters import Bar, Section
+from percussion_model.scene.bars import (
+    AREA,
+    LENGTH,
+    YOUNGS_MODULUS,
+    bar_mass,
+    section_mass,
+    section_transit_time,
+)
 from percussion_model.solvers.fem.records import Mesh
 
 # A length this close to half an element is half an element.
 ROUNDING = 1e-9
 
 
-@dataclass(frozen=True)
-class BarMesh:
+class BarMesh(NamedTuple):
     """Elements of one bar, top to bottom; none where it is rigid.
 
     Attributes
@@ -38,38 +44,39 @@ class BarMesh:
         return len(self.mass)
 
 
-def section_count(section: Section, element: float) -> int:
+def section_count(section: np.ndarray, element: float) -> int:
     """Elements of about the length `element` [m] that a section gets, half a one for one."""
-    return max(1, math.floor(section.length / element + 0.5 + ROUNDING))
+    return max(1, math.floor(section[LENGTH] / element + 0.5 + ROUNDING))
 
 
-def cut_bar(bar: Bar, element: float, elastic: bool = True) -> BarMesh:
+def cut_bar(sections: np.ndarray, element: float, elastic: bool = True) -> BarMesh:
     """Cut the sections of a bar into elements of about one length.
 
     Parameters
     ----------
-    bar : Bar
+    sections : float array, shape (n, 4)
+        As from `section_numbers`.
     element : float
         Wanted length [m].
     elastic : bool
         Whether the bar has elements at all.
     """
+    total = bar_mass(sections)
     if not elastic:
         none = np.zeros(0)
-        return BarMesh(none, none, none, none, bar.mass)
-    rows = []
-    for section in bar.sections:
-        count = section_count(section, element)
-        length = section.length / count
-        row = (
-            length,
-            section.youngs_modulus * section.area / length,
-            section.mass / count,
-            section.transit_time / count,
-        )
-        rows += [row] * count
-    length, stiffness, mass, transit = np.array(rows).T
-    return BarMesh(length, stiffness, mass, transit, bar.mass)
+        return BarMesh(none, none, none, none, total)
+    counts = np.array([section_count(section, element) for section in sections])
+    masses = np.array([section_mass(section) for section in sections])
+    transits = np.array([section_transit_time(section) for section in sections])
+    length = sections[:, LENGTH] / counts
+    stiffness = sections[:, YOUNGS_MODULUS] * sections[:, AREA] / length
+    return BarMesh(
+        np.repeat(length, counts),
+        np.repeat(stiffness, counts),
+        np.repeat(masses / counts, counts),
+        np.repeat(transits / counts, counts),
+        total,
+    )
 
 
 def assemble(bars: list[BarMesh]) -> np.ndarray:
