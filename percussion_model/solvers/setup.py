@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from enum import IntEnum
 from typing import Any, NamedTuple
 
 from percussion_model.physics.effects import EFFECTS
@@ -19,11 +20,23 @@ MOST_CHANGES = 12
 
 # What the choices of the parameter table mean, in their order.
 PISTONS = (Piston.ELASTIC, Piston.RIGID, Piston.ABSENT)
-ELASTIC_BIT, RIGID_BIT = range(2)
 DRIVES = (DriveKind.PRESSURE, DriveKind.EXTERNAL, DriveKind.NONE)
 ROCKS = (RockKind.BILINEAR, RockKind.SPRING, RockKind.WALL, RockKind.NONE)
-RELEASE, PAPER = range(2)
 DIRECTIONS = (1, -1)
+
+
+class Bit(IntEnum):
+    """How the bit is modelled: choices of `bit.model`."""
+
+    ELASTIC = 0
+    RIGID = 1
+
+
+class StandstillTension(IntEnum):
+    """What ends standstill: choices of `effects.standstill_tension`."""
+
+    RELEASE = 0
+    PAPER = 1
 
 
 class RockNumbers(NamedTuple):
@@ -81,7 +94,7 @@ def fill_parameters(p: Any, numbers: Numbers, with_piston: bool) -> None:
     p["drive"] = DRIVES[values.effects_drive]
     p["rock"] = ROCKS[values.effects_rock]
     p["barrier"] = barrier_on(values)
-    p["release"] = values.effects_standstill_tension == RELEASE
+    p["release"] = values.effects_standstill_tension == StandstillTension.RELEASE
     for effect in EFFECTS:
         if getattr(values, f"effects_{effect.name}"):
             p["effects"] = 1

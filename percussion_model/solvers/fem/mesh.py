@@ -7,15 +7,19 @@ from typing import NamedTuple
 
 import numpy as np
 
+from percussion_model.physics.records import Piston
 from percussion_model.scene.bars import (
     AREA,
     LENGTH,
     YOUNGS_MODULUS,
+    bar_length,
     bar_mass,
     section_mass,
     section_transit_time,
 )
+from percussion_model.scene.numbers import Numbers
 from percussion_model.solvers.fem.records import Mesh
+from percussion_model.solvers.setup import PISTONS
 
 # A length this close to half an element is half an element.
 ROUNDING = 1e-9
@@ -42,6 +46,28 @@ class BarMesh(NamedTuple):
     def n(self) -> int:
         """Number of elements."""
         return len(self.mass)
+
+
+class BarMeshes(NamedTuple):
+    """Elements of a scene.
+
+    Attributes
+    ----------
+    element : float
+        About their length [m].
+    piston : BarMesh or None
+        None where it is absent.
+    bit : BarMesh
+    """
+
+    element: float
+    piston: BarMesh | None
+    bit: BarMesh
+
+    @property
+    def both(self) -> list[BarMesh]:
+        """The bars, top to bottom."""
+        return [self.bit] if self.piston is None else [self.piston, self.bit]
 
 
 def section_count(section: np.ndarray, element: float) -> int:
@@ -77,6 +103,17 @@ def cut_bar(sections: np.ndarray, element: float, elastic: bool = True) -> BarMe
         np.repeat(transits / counts, counts),
         total,
     )
+
+
+def cut_bars(numbers: Numbers) -> BarMeshes:
+    """Cut the elastic bars of a scene into elements of about one length."""
+    values, kind = numbers.values, PISTONS[numbers.values.piston_model]
+    first = numbers.piston if kind == Piston.ELASTIC else numbers.bit
+    element = bar_length(first) / values.fem_elements
+    piston = None
+    if kind != Piston.ABSENT:
+        piston = cut_bar(numbers.piston, element, kind == Piston.ELASTIC)
+    return BarMeshes(element, piston, cut_bar(numbers.bit, element))
 
 
 def assemble(bars: list[BarMesh]) -> np.ndarray:

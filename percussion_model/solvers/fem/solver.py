@@ -8,7 +8,6 @@ from typing import Any, ClassVar
 import numpy as np
 
 from percussion_model.physics.records import Piston, RockKind
-from percussion_model.scene.bars import bar_length
 from percussion_model.scene.numbers import Numbers, numbers_of, section_numbers
 from percussion_model.scene.parameters import Bar
 from percussion_model.scene.scene import Scene
@@ -17,9 +16,10 @@ from percussion_model.solvers.fem.advance import run
 from percussion_model.solvers.fem.bars import read_all, stored_energy
 from percussion_model.solvers.fem.mesh import (
     BarMesh,
+    BarMeshes,
     assemble,
     critical_frequency,
-    cut_bar,
+    cut_bars,
     section_count,
 )
 from percussion_model.solvers.fem.records import (
@@ -68,19 +68,8 @@ def defect(spectral_radius: float) -> float:
     return (1.0 - spectral_radius) / (36.0 * (1.0 + spectral_radius))
 
 
-def fem_parameters(
-    numbers: Numbers, time_step: float, loss_time: float, n_p: int, n_b: int
-) -> np.ndarray:
+def fem_parameters(numbers: Numbers, bars: BarMeshes) -> np.ndarray:
     """Parameter record of a scene on its mesh.
-
-    Parameters
-    ----------
-    time_step : float
-        Longest step [s].
-    loss_time : float
-        Kelvin-Voigt time [s].
-    n_p, n_b : int
-        Nodes of piston and bit.
 
     Returns
     -------
@@ -90,15 +79,17 @@ def fem_parameters(
     par = np.zeros(1, FEM_PAR)
     p: Any = par[0]
     fill_parameters(p, numbers, with_piston=PISTONS[values.piston_model] == Piston.ELASTIC)
-    p["dt"] = time_step
+    shortest = min([float(bar.transit_time.min()) for bar in bars.both if bar.n])
+    p["dt"] = values.fem_courant * shortest
     mu = eigenvalue(values.fem_spectral_radius)
     p["mu_re"], p["mu_im"] = mu.real, mu.imag
     p["dissipation"] = defect(values.fem_spectral_radius)
     p["k_c"] = values.fem_contact_stiffness
-    p["eta"] = loss_time
+    p["eta"] = loss_time(values, bars.bit)
     p["q_tol"], p["t_tol"] = values.fem_event_tolerance, values.fem_time_tolerance
     p["start_gap"] = values.start_gap
-    p["n_p"], p["n_b"] = n_p, n_b
+    p["n_p"] = 0 if bars.piston is None else bars.piston.n + 1
+    p["n_b"] = bars.bit.n + 1
     if p["rock"] == RockKind.WALL:
         p["rock"] = RockKind.SPRING  # a wall is met like the piston: by a penalty
     p["most_changes"], p["most_events"] = MOST_CHANGES, MOST_EVENTS
@@ -153,24 +144,13 @@ class FemSolver(Solver):
     def __init__(self, scene: Scene) -> None:
         super().__init__(scene)
         self._numbers = numbers = numbers_of(scene)
-        values, piston = numbers.values, PISTONS[numbers.values.piston_model]
-        elastic_piston = piston == Piston.ELASTIC
-        first = numbers.piston if elastic_piston else numbers.bit
-        element = self._element = bar_length(first) / values.fem_elements
-        self._bit = cut_bar(numbers.bit, element)
-        self._piston: BarMesh | None = None
-        if piston != Piston.ABSENT:
-            self._piston = cut_bar(numbers.piston, element, elastic_piston)
-        bars = [bar for bar in (self._piston, self._bit) if bar is not None]
-        self._mesh = assemble(bars)
-        shortest = min([float(bar.transit_time.min()) for bar in bars if bar.n])
-        self.time_step = values.fem_courant * shortest
-        self.loss_time = loss_time(values, self._bit)
-        self.cells = {"bit": self._bit.n}
-        if elastic_piston and self._piston is not None:
-            self.cells = {"piston": self._piston.n, **self.cells}
-        n_p = 0 if self._piston is None else self._piston.n + 1
-        self._par = fem_parameters(numbers, self.time_step, self.loss_time, n_p, self._bit.n + 1)
+        bars = cut_bars(numbers)
+        self._element, self._piston, self._bit = bars
+        self._mesh = assemble(bars.both)
+        self._par = fem_parameters(numbers, bars)
+        self.time_step, self.loss_time = float(self._par[0]["dt"]), float(self._par[0]["eta"])
+        grids = {name: self.grid_of(name) for name in ("piston", "bit")}
+        self.cells = {name: grid.n for name, grid in grids.items() if grid is not None}
         n = self._mesh.shape[1]
         self._factors = np.zeros((2 * len(Factor), max(n, len(Key))))
         self._trial = np.zeros((len(Trial), n))

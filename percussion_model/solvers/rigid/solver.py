@@ -17,7 +17,7 @@ from percussion_model.solvers.rigid.records import RIGID_PAR, RIGID_STATE, ROWS_
 from percussion_model.solvers.setup import (
     PISTONS,
     REARM_TRANSITS,
-    RIGID_BIT,
+    Bit,
     fill_parameters,
     fill_start,
 )
@@ -61,7 +61,7 @@ def restitution(numbers: Numbers) -> float:
     values, piston, bit = numbers
     if PISTONS[values.piston_model] == Piston.ABSENT:
         return math.nan
-    if values.bit_model == RIGID_BIT and not math.isnan(values.contact_restitution):
+    if values.bit_model == Bit.RIGID and not math.isnan(values.contact_restitution):
         return float(values.contact_restitution)
     return st_venant_restitution(
         bar_mass(piston), bar_transit_time(piston), bar_mass(bit), bar_transit_time(bit)

@@ -18,7 +18,7 @@ from percussion_model.scene.bars import (
 )
 from percussion_model.scene.numbers import Numbers
 from percussion_model.solvers.base import Cells
-from percussion_model.solvers.setup import ELASTIC_BIT, PISTONS, kelvin_voigt_time
+from percussion_model.solvers.setup import PISTONS, Bit, kelvin_voigt_time
 from percussion_model.solvers.wave.records import Coef
 
 # Cells in the piston (or the only elastic bar) where the scene names none.
@@ -127,7 +127,7 @@ def cell_at(sections: np.ndarray, grid: Cells, place: float) -> tuple[int, float
 
 def elastic_bars(numbers: Numbers) -> list[np.ndarray]:
     """Sections of the bars that get cells, the one first whose cells are counted."""
-    if numbers.values.bit_model != ELASTIC_BIT:
+    if numbers.values.bit_model != Bit.ELASTIC:
         return []
     if PISTONS[numbers.values.piston_model] == Piston.ELASTIC:
         return [numbers.piston, numbers.bit]
