@@ -1,4 +1,4 @@
-"""Measure speed on one thread, compilation excluded: table, and benchmarks/latest.json.
+"""Speed on one thread, compilation excluded: a table, and benchmarks/latest.json.
 
 `python3 build.py bench` runs this with a fresh numba cache. `--quick` takes fewer
 repetitions. Take figures for the record on an idle machine.
@@ -9,7 +9,6 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import platform
 import statistics
 import subprocess
 import sys
@@ -93,15 +92,14 @@ def reference(repeats: int) -> list[dict[str, Any]]:
 def effects(repeats: int) -> list[dict[str, Any]]:
     """Cost of a wave step with one effect off, in flight and in the whole motion."""
     from percussion_model import Scene
-    from percussion_model.analysis.effect_turns import turns
-    from percussion_model.analysis.effects import NOISE, step_costs
+    from percussion_model.analysis.effect_study import NOISE, effect_variants, step_costs
 
     base = Scene.from_toml(REFERENCE).replace(**{"solver.cells": 20, "solver.leaps": False})
     cases = {}
-    for turn in turns(base):
-        scene = turn.apply(base)
-        if scene.solver_name == "wave" and turn.effect != "leaps":
-            cases[f"{turn.effect} {turn.turned}".strip()] = (turn, scene)
+    for variant in effect_variants(base):
+        scene = variant.apply(base)
+        if scene.solver_name == "wave" and variant.effect != "leaps":
+            cases[variant.name] = (variant, scene)
     scenes = [scene for _, scene in cases.values()]
     flights = step_costs(scenes, FLIGHT_ROUNDS * repeats)
     # Turn by turn, so that a machine that slows down slows all of them.
@@ -113,13 +111,13 @@ def effects(repeats: int) -> list[dict[str, Any]]:
         {
             "name": name,
             "flight_step": flight,
-            "dearer": bool(turn.off and flight > NOISE * flights[0]),
+            "dearer": bool(variant.off and flight > NOISE * flights[0]),
             "motion_step": best_step(motions[name]),
             "motion_cost": min(run["cost"] for run in motions[name]),
             "motion_steps": motions[name][0]["steps"],
             "motion_events": motions[name][0]["events"],
         }
-        for (name, (turn, _)), flight in zip(cases.items(), flights, strict=True)
+        for (name, (variant, _)), flight in zip(cases.items(), flights, strict=True)
     ]
 
 
@@ -163,28 +161,6 @@ def command_line(repeats: int) -> dict[str, Any]:
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
         times.append(time.perf_counter() - began)
     return {"first": times[0], "second": statistics.median(times[1:])}
-
-
-def machine() -> dict[str, Any]:
-    """What the figures were taken on."""
-    from importlib.metadata import version
-
-    name = platform.processor() or platform.machine()
-    cpuinfo = Path("/proc/cpuinfo")
-    if cpuinfo.exists():
-        for line in cpuinfo.read_text(encoding="utf-8").splitlines():
-            if line.startswith("model name"):
-                name = line.split(":", 1)[1].strip()
-                break
-    load = os.getloadavg()[0] if hasattr(os, "getloadavg") else None
-    return {
-        "processor": name,
-        "cores": os.cpu_count(),
-        "load_before": load,
-        "system": platform.system(),
-        "python": platform.python_version(),
-        **{package: version(package) for package in ("numba", "numpy", "percussion_model")},
-    }
 
 
 def show(found: dict[str, Any]) -> None:
@@ -256,21 +232,23 @@ def compiled_in() -> float:
 
 def bench(quick: bool, say: Callable[[str], None]) -> dict[str, Any]:
     """Take all measurements."""
-    found: dict[str, Any] = {"date": time.strftime("%Y-%m-%d"), "machine": machine()}
+    from percussion_model.verification.accuracy.timing import machine
+
+    computer = machine()
+    computer["load_before"] = computer.pop("load")
+    found: dict[str, Any] = {"date": computer.pop("date"), "machine": computer}
     say("compiling")
     found["compilation"] = compiled_in()
-    say("reference scene")
-    found["reference"] = reference(3 if quick else 9)
-    say("effects")
-    found["effects"] = effects(3 if quick else 11)
-    say("rigid option")
-    found["rigid"] = rigid(3 if quick else 7)
-    say("finite elements")
-    found["elements"] = elements(3 if quick else 7)
-    say("FMU")
-    found["fmu"] = fmu(1 if quick else 5)
-    say("command line")
-    found["command_line"] = command_line(1 if quick else 5)
+    for name, text, measured, repeats, fewer in (
+        ("reference", "reference scene", reference, 9, 3),
+        ("effects", "effects", effects, 11, 3),
+        ("rigid", "rigid option", rigid, 7, 3),
+        ("elements", "finite elements", elements, 7, 3),
+        ("fmu", "FMU", fmu, 5, 1),
+        ("command_line", "command line", command_line, 5, 1),
+    ):
+        say(text)
+        found[name] = measured(fewer if quick else repeats)
     return found
 
 

@@ -1,4 +1,4 @@
-"""Where the time of a coupled run goes: `python -m benchmarks.coupling [SYSTEM.ssp ...]`.
+"""Time of a coupled run, by part and call: `python -m benchmarks.coupling [SYSTEM.ssp ...]`.
 
 Each system of the drilling loop runs at 1 kHz, its rows thinned. For each part the processor
 time of setting its inputs, of its step and of reading its outputs is taken, in a run of its
@@ -60,39 +60,28 @@ class Clocked(Coupling):
         return clocked
 
 
-class Timed(Coupling):
-    """A system whose stepping is timed: `cost` is processor time [s]."""
-
-    def _loop(self, *arguments: Any) -> CoupledRun:
-        began = time.process_time()
-        run = super()._loop(*arguments)
-        self.cost = time.process_time() - began
-        return run
-
-
 def measure(
     system: Path,
     duration: float,
     parameters: dict[str, Any],
     every: dict[str, int] | None = None,
     progress: Callable[[float], None] | None = None,
-) -> tuple[CoupledRun, float]:
-    """Run a system; return the run and the processor time of its stepping [s]."""
-    coupling = Timed(system, parameters, every=every)
-    run = coupling.run(duration, STEP, interval=ROWS_EVERY, progress=progress)
-    return run, coupling.cost
+) -> CoupledRun:
+    """Run a system with its rows thinned."""
+    coupling = Coupling(system, parameters, every=every)
+    return coupling.run(duration, STEP, interval=ROWS_EVERY, progress=progress)
 
 
 def minutes() -> Callable[[float], None]:
-    """Tells of each simulated minute."""
+    """Return a progress callback that prints each simulated minute."""
     began, used = time.perf_counter(), time.process_time()
 
-    def tell(at: float) -> None:
+    def report(at: float) -> None:
         if at % 60.0 < 0.5 * ROWS_EVERY:
             wall, cost = time.perf_counter() - began, time.process_time() - used
             print(f"{at:6.0f} s in {wall:.0f} s ({cost:.0f} s of the processor)", file=sys.stderr)
 
-    return tell
+    return report
 
 
 def by_part(system: Path, parameters: dict[str, Any]) -> dict[tuple[str, str], float]:
@@ -114,9 +103,9 @@ def table(spent: dict[tuple[str, str], float]) -> str:
     return "\n".join(lines)
 
 
-def line(system: Path, run: CoupledRun, cost: float) -> str:
-    """What a run took."""
-    simulated = run.steps * run.step
+def line(system: Path, run: CoupledRun) -> str:
+    """One line on the cost of a run."""
+    simulated, cost = run.steps * run.step, run.processor_time
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else float("nan")
     return (
         f"{system.stem}: {simulated:g} s in {run.wall_time:.1f} s ({cost:.1f} s of the processor), "
@@ -135,12 +124,12 @@ def main() -> None:
     dist = [ROOT / "dist" / f"{name}.ssp" for name in SYSTEMS]
     if choice.hour:
         system = choice.systems[0] if choice.systems else dist[-1]
-        print(line(system, *measure(system, HOUR, LONG_HOLE | LUMPED, SLOW, minutes())))
+        print(line(system, measure(system, HOUR, LONG_HOLE | LUMPED, SLOW, minutes())))
         return
     for system in choice.systems or dist:
-        print(line(system, *measure(system, choice.duration, LONG_HOLE)), flush=True)
+        print(line(system, measure(system, choice.duration, LONG_HOLE)), flush=True)
         print(f"as for hours, {LUMPED}, steps of slow parts {SLOW}:", flush=True)
-        print(line(system, *measure(system, choice.duration, LONG_HOLE | LUMPED, SLOW)), flush=True)
+        print(line(system, measure(system, choice.duration, LONG_HOLE | LUMPED, SLOW)), flush=True)
         print(table(by_part(system, LONG_HOLE)), flush=True)
 
 

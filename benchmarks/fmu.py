@@ -75,7 +75,7 @@ def fmu(repeats: int) -> dict[str, Any]:
         physics [s]. `none`, `few`, `all`: simulated time by time, with that many outputs
         read at each point; `physics`: the library alone, in one call.
     """
-    from fmu_src.hammer import build_hammer
+    from fmu_src.hammer.build import build_hammer
     from percussion_model import Scene, Simulation
 
     with tempfile.TemporaryDirectory() as folder:

@@ -66,7 +66,7 @@ def one_response(scene) -> None:
 def main() -> None:
     """Run, tell, compare."""
     from percussion_model import Scene
-    from percussion_model.analysis.study import grid, headlines, study
+    from percussion_model.analysis.study import grid, study
 
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--points", type=int, default=10_000)
@@ -90,7 +90,7 @@ def main() -> None:
         f"{len(points)} points in {wall:.1f} s with {chosen.processes} processes (load {load:.1f})"
     )
     print(f"processor time {used:.1f} s, {1e3 * used / len(points):.1f} ms a point")
-    for name, text in headlines(found):
+    for name, text in found.headlines():
         print(f"{name}: {text}")
     aperiodic = found.rows["order"] == 0
     share = found.rows["wall_time"][aperiodic].sum() / found.rows["wall_time"].sum()

@@ -16,10 +16,10 @@ from typing import Any
 import matplotlib
 
 from percussion_model.interface.plotting import style
-from percussion_model.interface.plotting.accuracy import draw_accuracy, draw_quantities
+from percussion_model.interface.plotting.error_against_time import draw_accuracy, draw_quantities
 from percussion_model.verification.accuracy import Study
 from percussion_model.verification.accuracy.ladders import LADDERS
-from percussion_model.verification.accuracy.quantities import HISTORY, QUANTITIES
+from percussion_model.verification.accuracy.problems import HISTORY, QUANTITIES
 
 HERE = Path(__file__).resolve().parent
 PAGE, DATA, IMAGES = HERE / "accuracy.md", HERE / "accuracy", HERE / "images"
@@ -68,13 +68,13 @@ def draw(name: str, found: Study) -> None:
 
 def measure_closed_forms() -> None:
     """Errors of both solvers at closed forms."""
-    from percussion_model.verification.accuracy.closed_forms import closed_forms, found_by
+    from percussion_model.verification.accuracy.closed_forms import closed_forms, solver_error
 
     rows = []
     for case in closed_forms():
         say(case.name)
-        wave = [found_by(case, "wave", count) for count in CLOSED_WAVE]
-        fem = [found_by(case, "fem", count) for count in CLOSED_FEM]
+        wave = [solver_error(case, "wave", count) for count in CLOSED_WAVE]
+        fem = [solver_error(case, "fem", count) for count in CLOSED_FEM]
         rows.append({"name": case.name, "value": case.value, "wave": wave, "fem": fem})
     keep("closed_forms", {"rows": rows})
 
@@ -151,11 +151,6 @@ def bars(tree: dict[str, Any]) -> str:
     return table(["quantity", "value", "bar, relative", "solvers apart", "a reference?"], rows)
 
 
-def names(tree: dict[str, Any]) -> list[str]:
-    """Ladders of a study."""
-    return list(tree["ladders"])
-
-
 def points(tree: dict[str, Any]) -> str:
     """Every rung: errors and times."""
     keys = list(next(point["errors"] for point in tree["points"] if point["errors"]))
@@ -177,7 +172,7 @@ def orders(tree: dict[str, Any]) -> str:
     """Measured orders."""
     keys = list(next(point["errors"] for point in tree["points"] if point["errors"]))
     rows = []
-    for name in names(tree):
+    for name in tree["ladders"]:
         found = tree["orders"].get(name, {})
         cells = []
         for key in keys:
@@ -193,8 +188,8 @@ def costs(tree: dict[str, Any]) -> str:
     from percussion_model.verification.accuracy.orders import cost_at
 
     key = next(iter(tree["reference"]["bars"]))
-    general = [name for name in names(tree) if LADDERS[name].title.startswith("scipy")]
-    elements = [name for name in names(tree) if name.startswith("fem")]
+    general = [name for name in tree["ladders"] if LADDERS[name].title.startswith("scipy")]
+    elements = [name for name in tree["ladders"] if name.startswith("fem")]
 
     def cost(name: str, wanted: float) -> float:
         rungs = [point for point in tree["points"] if point["ladder"] == name]

@@ -9,12 +9,12 @@ from pathlib import Path
 
 import matplotlib
 
-from benchmarks.__main__ import machine
 from percussion_model import Scene
-from percussion_model.analysis.effects import EffectsStudy, study_effects
+from percussion_model.analysis.effect_study import EffectsStudy, study_effects
 from percussion_model.interface.commands.effects import table_of
 from percussion_model.interface.plotting import style
-from percussion_model.interface.plotting.effects import draw_effects
+from percussion_model.interface.plotting.effect_bars import draw_effects
+from percussion_model.verification.accuracy.timing import machine
 
 HERE = Path(__file__).resolve().parent
 REFERENCE = HERE.parent / "scenarios" / "reference.toml"
@@ -59,7 +59,7 @@ def page(found: EffectsStudy, computer: dict[str, object]) -> str:
     """Text of the page."""
     result = found.base.result
     cells = " + ".join(str(count) for count in result.cells.values())
-    load = computer["load_before"]
+    load = computer["load"]
     where = (
         f"Reference scene, {cells} cells, {result.duration:g} s simulated; "
         f"{computer['processor']}, one thread, load {load:.1f} before.\n\n"

@@ -11,7 +11,7 @@ from typing import Any
 
 from fmpy import read_model_description
 
-from fmu_src.hammer import build_hammer
+from fmu_src.hammer.build import build_hammer
 from percussion_model.scene.scene import Scene
 
 PAGE = Path(__file__).with_name("fmu.md")

@@ -5,9 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from fmu_src.parts.build import PARTS, part_variables
 from fmu_src.system.archive import SYSTEMS, read_plan
-from fmu_src.system.parts import part_variables
-from fmu_src.system.tables import PARTS
 from fmu_src.variables import Variable
 
 PAGE = Path(__file__).with_name("system.md")

@@ -1,12 +1,12 @@
-"""Run every example: `python -m examples.all [--out DIR] [--quick]`."""
+"""All examples, one after the other: `python -m examples.all [--out DIR] [--quick]`."""
 
 from __future__ import annotations
 
-import argparse
 import sys
 from pathlib import Path
 
 from examples import bifurcation, calibration, drill_design, rate_map, sensitivity
+from examples.shared import arguments
 from percussion_model.simulation.files import staged_text, to_json
 
 EXAMPLES = (bifurcation, rate_map, sensitivity, calibration, drill_design)
@@ -21,8 +21,5 @@ def main(out: Path, quick: bool = False) -> None:
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(prog="python -m examples.all", description=main.__doc__)
-    parser.add_argument("--out", type=Path, default=Path("out/examples"), metavar="DIR")
-    parser.add_argument("--quick", action="store_true", help="few points: seconds, not minutes")
-    words = parser.parse_args()
+    words = arguments(main, "all", Path("out/examples"))
     main(words.out, words.quick)

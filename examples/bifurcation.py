@@ -1,4 +1,4 @@
-"""Which motions does a hammer settle in, and does that depend on where it comes from?
+"""Motions that a hammer settles in, and whether they depend on where it comes from.
 
 The reversal distance D_1 (at constant power) and the feed are moved up and down in small steps
 without starting the drill anew. At each step some blows pass, and those that follow are drawn.
@@ -22,7 +22,7 @@ from examples.shared import BLUE, ORANGE, PINK, command_line, figure_of
 from percussion_model import Scene, Simulation
 from percussion_model.interface.plotting import style
 from percussion_model.interface.plotting.style import KN, MM
-from percussion_model.verification.paper.sweeps import force_at_constant_power
+from percussion_model.verification.paper.runs import force_at_constant_power
 
 NAME = "bifurcation"
 # The feed from which others are set at once [N], and after how many blows there.
@@ -38,7 +38,7 @@ MOST_ERROR = 0.1
 def follow(
     values: np.ndarray, inputs: Callable[[float], dict[str, float]], settle: int, keep: int
 ) -> Branch:
-    """Move a parameter through its values, the drill going on; the branch has them rising."""
+    """Move a parameter through its values, without a new start; the branch has them rising."""
     simulation = Simulation(Scene(), record_events=False)
     rows = []
     for value in values.tolist():
@@ -92,7 +92,7 @@ def main(out: Path, quick: bool = False) -> dict[str, Any]:
                 branches["at once"] = [jump(high, k, settle, keep) for k in MOMENTS[quick * 2 :]]
             draw(column, factor, words, branches)
             for name, some in branches.items():
-                found |= {f"{key}_{name}": [_told(branch) for branch in some]}
+                found |= {f"{key}_{name}": [_described(branch) for branch in some]}
         handles = [Patch(color=colour, label=kind) for kind, colour in KINDS.items()]
         words = {"at once": f"set at once from {LOW_FEED:g} N"}
         handles += [Patch(color=c, label=words.get(way, way)) for way, c in COLOURS.items()]
@@ -100,7 +100,7 @@ def main(out: Path, quick: bool = False) -> dict[str, Any]:
     return found
 
 
-def _told(branch: Branch) -> dict[str, list[float]]:
+def _described(branch: Branch) -> dict[str, list[float]]:
     order = [order_of(velocity) for velocity in branch.impact_velocity]
     return {"values": branch.values.tolist(), "order": order, "rate": branch.rate.tolist()}
 
@@ -111,12 +111,12 @@ def draw(axes: np.ndarray, factor: float, words: str, branches: dict[str, list[B
     x = branches["falling"][0].values * factor
     _draw_kinds(strip, factor, branches)
     for way, some in branches.items():
-        look = {"color": COLOURS[way], "markersize": SIZES[way]}
+        markers = {"color": COLOURS[way], "markersize": SIZES[way]}
         for branch in some:
             at = np.repeat(branch.values * factor, branch.impact_velocity.shape[1])
-            blows.plot(at, branch.impact_velocity.ravel(), "o", mew=0, **look)
+            blows.plot(at, branch.impact_velocity.ravel(), "o", mew=0, **markers)
             known = np.where(branch.error < MOST_ERROR * branch.rate, branch.rate, np.nan)
-            rate.plot(branch.values * factor, known * MM, "o", mew=0, alpha=0.8, **look)
+            rate.plot(branch.values * factor, known * MM, "o", mew=0, alpha=0.8, **markers)
     blows.set_xscale("log")
     ticks = [t for t in (0.2, 0.5, 1, 2, 5, 10, 20) if x[0] <= t <= x[-1]]
     rate.set_xticks(ticks, [f"{tick:g}" for tick in ticks])

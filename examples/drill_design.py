@@ -1,4 +1,4 @@
-"""How long a piston, and where to step it, to get a blow into the rock?
+"""Length and step of a piston that bring a blow into the rock best.
 
 A single blow of given energy, without a drive, by the wave solver. What counts is what stays in
 the rock once the bit is at rest: crushing and barrier, not what springs back.

@@ -1,4 +1,4 @@
-"""Kinds of motion that blows tell, and their mean rate."""
+"""Kinds of motion by their blows, and mean rates."""
 
 from __future__ import annotations
 

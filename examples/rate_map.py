@@ -1,6 +1,6 @@
-"""What do feed and pressure buy? Rate of penetration as a map, with contours of efficiency.
+"""Map of the rate of penetration over feed and pressure, with contours of efficiency.
 
-Efficiency is the energy into the rock over a blow by the work of the drive over it. The rest of
+Efficiency is the energy into the rock over a blow divided by the work of the drive. The rest of
 the drive's work goes into structural loss. Feed and weight work on the rock too, so that a drill
 of little power under much feed can come out above 100 %.
 """
@@ -16,7 +16,7 @@ from matplotlib.colors import ListedColormap
 from examples.shared import GREY, command_line, figure_of
 from percussion_model import Scene
 from percussion_model.analysis.study import Study, grid, study
-from percussion_model.analysis.study.work import KINDS
+from percussion_model.analysis.study.response import KINDS
 from percussion_model.interface.plotting import style
 from percussion_model.interface.plotting.style import KN, MM
 

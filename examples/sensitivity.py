@@ -1,4 +1,4 @@
-"""Which of eight parameters decide the rate of penetration? Sobol indices by SALib.
+"""Sensitivity of the rate of penetration to eight parameters: Sobol indices by SALib.
 
 Each parameter is drawn between half and twice its reference value, evenly in the logarithm. The
 first-order index is the share of the variance of the rate that a parameter explains by itself, the

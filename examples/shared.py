@@ -1,4 +1,4 @@
-"""What the examples share: the command line, and where figures go."""
+"""Shared parts of the examples: the command line, and the place of figures."""
 
 from __future__ import annotations
 
@@ -30,11 +30,16 @@ def figure_of(name: str, out: Path, size: tuple[float, float]) -> Iterator[Figur
             style.save(fig, draft, name, ("png",))
 
 
+def arguments(main: Callable[..., Any], name: str, out: Path) -> argparse.Namespace:
+    """Words of the command line of an example: out and quick."""
+    parser = argparse.ArgumentParser(prog=f"python -m examples.{name}", description=main.__doc__)
+    parser.add_argument("--out", type=Path, default=out, metavar="DIR")
+    parser.add_argument("--quick", action="store_true", help="few points: seconds, not minutes")
+    return parser.parse_args()
+
+
 def command_line(main: Callable[..., dict[str, Any]], name: str) -> None:
     """Run an example with the words of the command line, and print what it found."""
-    parser = argparse.ArgumentParser(prog=f"python -m examples.{name}", description=main.__doc__)
-    parser.add_argument("--out", type=Path, default=Path("out/examples") / name, metavar="DIR")
-    parser.add_argument("--quick", action="store_true", help="few points: seconds, not minutes")
-    words = parser.parse_args()
+    words = arguments(main, name, Path("out/examples") / name)
     print(to_json(main(words.out, words.quick)))
     print(words.out / f"{name}.png", file=sys.stderr)

@@ -6,13 +6,13 @@ import argparse
 import sys
 from pathlib import Path
 
-from fmu_src.hammer import build_hammer
-from fmu_src.pneumatics import build_pneumatics
+from fmu_src.archive import ROOT
+from fmu_src.hammer.build import build_hammer
+from fmu_src.parts import pneumatic_drive
+from fmu_src.parts.build import build_part
 from percussion_model.scene.scene import Scene, SceneError
 
-ROOT = Path(__file__).resolve().parents[1]
 DEFAULT = ROOT / "dist" / "PercussiveHammer.fmu"
-
 DEFAULT_DRIVE = ROOT / "dist" / "PneumaticDrive.fmu"
 
 
@@ -36,7 +36,7 @@ def main(arguments: list[str]) -> int:
     try:
         if choice.pneumatics:
             path = DEFAULT_DRIVE if choice.output == DEFAULT else choice.output
-            print(f"{path} {{{build_pneumatics(path)}}}")
+            print(f"{path} {{{build_part(pneumatic_drive.TABLE, path)}}}")
             return 0
         scene = Scene.from_toml(choice.scene or ROOT / "scenarios" / "reference.toml")
         table = None

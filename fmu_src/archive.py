@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import os
 import zipfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from fmu_src.description import About, write_description
@@ -28,7 +28,7 @@ def write_fmu(
     about: About,
     variables: Sequence[Variable],
     bundle: Bundle,
-    slave: tuple[str, str],
+    slave: type,
     resources: dict[str, str | bytes],
     page: str,
 ) -> str:
@@ -36,14 +36,14 @@ def write_fmu(
 
     Parameters
     ----------
-    slave : tuple of str
-        Module of `runtime` and class in it.
+    slave : type
+        Class of this package that runs in it.
     resources : dict of str
         Further files for the folder `resources`.
     page : str
         Documentation, HTML.
     """
-    module, text = script(bundle, *slave)
+    module, text = script(bundle, slave)
     entries: dict[str, bytes] = {
         f"resources/{name}": content if isinstance(content, bytes) else content.encode()
         for name, content in {
@@ -63,12 +63,18 @@ def write_fmu(
     for name, content in sorted(entries.items()):
         digest.update(name.encode() + b"\0" + hashlib.sha256(content).digest())
     guid, xml = write_description(about, variables, digest.digest())
+    # the description comes first, so that tools find it at once
+    write_archive(path, {"modelDescription.xml": xml} | dict(sorted(entries.items())))
+    return guid
+
+
+def write_archive(path: Path, entries: Mapping[str, bytes]) -> None:
+    """Write a zip archive whole or not at all; the same entries give the same bytes."""
     path.parent.mkdir(parents=True, exist_ok=True)
     draft = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         with zipfile.ZipFile(draft, "w") as archive:
-            # the description comes first, so that tools find it at once
-            for name, content in [("modelDescription.xml", xml), *sorted(entries.items())]:
+            for name, content in entries.items():
                 info = zipfile.ZipInfo(name, DATE)
                 info.compress_type = zipfile.ZIP_DEFLATED
                 info.external_attr = PERMISSIONS
@@ -76,4 +82,3 @@ def write_fmu(
         draft.replace(path)
     finally:
         draft.unlink(missing_ok=True)
-    return guid

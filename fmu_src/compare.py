@@ -14,8 +14,9 @@ from typing import Any
 import numpy as np
 from fmpy import simulate_fmu
 
-from fmu_src.__main__ import DEFAULT, ROOT
-from fmu_src.hammer import build_hammer
+from fmu_src.__main__ import DEFAULT
+from fmu_src.archive import ROOT
+from fmu_src.hammer.build import build_hammer
 from percussion_model.scene.scene import Scene
 from percussion_model.simulation.simulate import simulate
 

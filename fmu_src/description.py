@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
+from importlib.metadata import version
 from typing import Any
 from uuid import UUID
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
@@ -25,15 +26,15 @@ OPTIONS = {
 
 @dataclass(frozen=True)
 class About:
-    """What the head of a model description says."""
+    """What the head of a model description says; times in s."""
 
     model: str
     description: str
-    author: str
-    version: str
-    license: str
     stop_time: float
     step_size: float
+    version: str = version("percussion_model")
+    author: str = "percussion_model developers"
+    license: str = "BSD-3-Clause"
 
 
 class Described(Fmi2Slave):  # type: ignore[misc]

@@ -39,9 +39,11 @@ LIBRARY_FILES = (
     "logmsg.py",
     "variables.py",
 )
-# Files of `runtime` that every slave needs.
-SLAVE_FILES = ("folder", "calls", "values", "slave", "states")
-START = "runtime/start.py"
+# What every slave needs; START runs outside the package that the sources become.
+SLAVE_FILES = ("__init__.py", "variables.py", "slave/*.py")
+START = "slave/start.py"
+# Files of a model's folder that make its FMU and do not run in it.
+BUILD_FILES = ("build.py", "variables.py")
 
 _IMPORT = re.compile(
     r"^(?P<before>\s*(?:from|import) )(?P<package>percussion_model|fmu_src|pythonfmu)\b",
@@ -65,22 +67,24 @@ class Bundle:
     files: dict[str, str]
 
 
-def stage(prefix: str, runtime: tuple[str, ...], with_model: bool) -> Bundle:
+def stage(prefix: str, folder: str, with_model: bool) -> Bundle:
     """Collect sources and give them their names.
 
     Parameters
     ----------
     prefix : str
         Beginning of the package's name.
-    runtime : tuple of str
-        Files of `fmu_src/runtime` without their ending, besides those of every slave.
+    folder : str
+        Folder of `fmu_src` with what runs in the FMU, besides the files of every slave.
     with_model : bool
         Whether all of what computes is wanted, or the parameter rows alone.
     """
     inner = {"__init__.py": f'"""{prefix}: sources of an FMU."""\n'}
-    inner["fmu_src/__init__.py"] = inner["fmu_src/runtime/__init__.py"] = '"""Adapters."""\n'
-    for name in (*SLAVE_FILES, *runtime):
-        inner[f"fmu_src/runtime/{name}.py"] = _read(ADAPTERS / "runtime" / f"{name}.py")
+    for pattern in (*SLAVE_FILES, f"{folder}/*.py"):
+        for source in sorted(ADAPTERS.glob(pattern)):
+            path = source.relative_to(ADAPTERS).as_posix()
+            if path != START and not (pattern.startswith(folder) and source.name in BUILD_FILES):
+                inner[f"fmu_src/{path}"] = _read(source)
     patterns = MODEL_FILES if with_model else ("__init__.py", "scene/__init__.py", "scene/rows.py")
     for pattern in patterns:
         for source in sorted(MODEL.glob(pattern)):
@@ -102,14 +106,15 @@ def stage(prefix: str, runtime: tuple[str, ...], with_model: bool) -> Bundle:
     return Bundle(name, {path: text.replace(PLACEHOLDER, name) for path, text in files.items()})
 
 
-def script(bundle: Bundle, module: str, class_name: str) -> tuple[str, str]:
+def script(bundle: Bundle, slave: type) -> tuple[str, str]:
     """Name and text of the script that the export library runs for each instance."""
+    class_name = slave.__name__
     name = f"{bundle.name}_{class_name.lower()}"
     return name, (
         f'"""Loads {class_name}; run anew for each instance, and therefore short."""\n'
         f"import {bundle.name}_start\n"
         f"{class_name} = {bundle.name}_start.slave_class("
-        f'globals(), "fmu_src.runtime.{module}", "{class_name}")\n'
+        f'globals(), "{slave.__module__}", "{class_name}")\n'
     )
 
 

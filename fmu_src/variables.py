@@ -1,13 +1,23 @@
-"""What a variable of an FMU is, as model description and instance need it."""
+"""Variables of an FMU: what model description and instance need to know of them."""
 
 from __future__ import annotations
 
+import functools
+import json
+import math
+import sys
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Any, Literal
 
 from percussion_model.scene.rows import Row
 
 Causality = Literal["parameter", "input", "output"]
+# Within the resources of an FMU.
+FILE = "variables.json"
+# Bounds that no number keeps.
+EMPTY = (math.inf, -math.inf)
 
 
 @dataclass(frozen=True)
@@ -30,48 +40,57 @@ class Variable:
     upper: float | None = None
     nominal: float | None = None
     start: Any = None
-    row: Row | None = None
-    key: str | None = None
-    left_out: Any = None
+    row: Row | None = None  # bounds of a parameter or an input
+    key: str | None = None  # of the scene
+    left_out: Any = None  # value that stands for "left out"
     enumeration: str | None = None
     items: tuple[tuple[str, int, str], ...] = ()  # name, value, description
 
-    def for_instance(self) -> dict[str, Any]:
-        """What `runtime.folder.Known` holds, as plain values."""
-        return {
-            "name": self.name,
-            "reference": self.reference,
-            "type": self.type,
-            "causality": self.causality,
-            "start": self.start,
-            "row": None if self.row is None else plain_row(self.row),
-            "key": self.key,
-            "left_out": self.left_out,
-        }
+
+def to_json(value: Any) -> str:
+    """Text of a resource; the same value gives the same bytes."""
+    return json.dumps(value, indent=1, sort_keys=True, allow_nan=False) + "\n"
 
 
-def plain_row(row: Row) -> dict[str, Any]:
-    """A row as plain values; those of `Row` are JSON but for tuples."""
-    return asdict(row) | {"needs": {key: list(values) for key, values in row.needs.items()}}
+def write_variables(variables: Iterable[Variable]) -> str:
+    """Text from which an instance reads its variables."""
+    return to_json([asdict(variable) for variable in variables])
 
 
-def number_row(
-    key: str, unit: str, lower: float, upper: float, description: str, lower_open: bool = False
-) -> Row:
+@functools.cache
+def read_variables(folder: str) -> tuple[Variable, ...]:
+    """Variables of the FMU whose resources lie in a folder."""
+    entries = json.loads((Path(folder) / FILE).read_text(encoding="utf-8"))
+    return tuple(
+        Variable(**entry | {"row": None if entry["row"] is None else read_row(entry["row"])})
+        for entry in entries
+    )
+
+
+def read_row(entry: Mapping[str, Any]) -> Row:
+    """A row of the parameter table from its plain values; JSON has no tuples."""
+    needs = {key: tuple(values) for key, values in entry["needs"].items()}
+    return Row(**{**entry, "choices": tuple(entry["choices"]), "needs": needs})
+
+
+def number_row(key: str, unit: str, lower: float, upper: float, description: str) -> Row:
     """Row of a number that only an FMU has."""
     return Row(
-        key=key,
-        kind="number",
-        unit=unit,
-        lower=lower,
-        lower_open=lower_open,
-        upper=upper,
-        upper_open=False,
-        default=None,
-        required=False,
-        choices=(),
-        description=description,
+        key=key, kind="number", unit=unit, lower=lower, lower_open=False, upper=upper,
+        upper_open=False, default=None, required=False, choices=(), description=description,
         needs={},
+    )  # fmt: skip
+
+
+def closed_bounds(row: Row | None) -> tuple[float, float]:
+    """Between these, both included, a number is allowed without a closer look."""
+    if row is None or row.kind != "number" or row.choices:
+        return EMPTY
+    low = -sys.float_info.max if row.lower is None else row.lower
+    high = sys.float_info.max if row.upper is None else row.upper
+    return (
+        math.nextafter(low, math.inf) if row.lower_open else low,
+        math.nextafter(high, -math.inf) if row.upper_open else high,
     )
 
 

@@ -7,12 +7,13 @@ its own copy of the sources along, so its kernels are compiled for themselves.
 from __future__ import annotations
 
 import tempfile
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import Future, ProcessPoolExecutor
 from pathlib import Path
+from typing import Any
 
 from fmpy import simulate_fmu
 
-from fmu_src.hammer import build_hammer
+from fmu_src.hammer.build import build_hammer
 from percussion_model.scene.scene import Scene
 from percussion_model.simulation.warm_up import (
     COARSE,
@@ -21,38 +22,37 @@ from percussion_model.simulation.warm_up import (
     compile_kernels,
     empty_table,
 )
+from percussion_model.solvers.blow_map.table import BlowTable
 
 # Long enough for a contact, a change of mode and a reading [s].
 SHORT = 1e-3
 
 
-def compile_fmu(model: str) -> str:
+def compile_fmu(model: str) -> None:
     """Run a moment of an FMU with elastic or rigid bodies."""
-    scene = Scene().replace(**{"piston.model": model, "bit.model": model})
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "PercussiveHammer.fmu"
-        build_hammer(scene, path)
-        simulate_fmu(str(path), stop_time=SHORT, step_size=SHORT)
-    return model
+    _run_fmu(Scene().replace(**{"piston.model": model, "bit.model": model}), None, SHORT)
 
 
-def compile_fmu_of_blow_map() -> str:
+def compile_fmu_of_blow_map() -> None:
     """Initialise an FMU on the blow map, which compiles its kernels."""
     scene = Scene().computed_by("blow-map", **COARSE)
+    _run_fmu(scene, empty_table(scene), 1e-9)
+
+
+def _run_fmu(scene: Scene, blow_map: BlowTable | None, duration: float) -> None:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "PercussiveHammer.fmu"
-        build_hammer(scene, path, empty_table(scene))
-        simulate_fmu(str(path), stop_time=1e-9, step_size=1e-9)
-    return "blow-map"
+        build_hammer(scene, path, blow_map)
+        simulate_fmu(str(path), stop_time=duration, step_size=duration)
 
 
 def main() -> None:
     """Compile the kernels of all solvers, two at a time, the longest first."""
     with ProcessPoolExecutor(max_workers=2) as pool:
-        of_fmu = [pool.submit(compile_fmu, model) for model in ("elastic", "rigid")]
-        of_package = [pool.submit(compile_kernels, solver) for solver in SOLVERS]
-        of_map = [pool.submit(compile_fmu_of_blow_map), pool.submit(compile_blow_map)]
-        for job in [*of_fmu, *of_package, *of_map]:
+        jobs: list[Future[Any]] = [pool.submit(compile_fmu, m) for m in ("elastic", "rigid")]
+        jobs += [pool.submit(compile_kernels, solver) for solver in SOLVERS]
+        jobs += [pool.submit(compile_fmu_of_blow_map), pool.submit(compile_blow_map)]
+        for job in jobs:
             job.result()
 
 

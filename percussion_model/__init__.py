@@ -23,32 +23,21 @@ if TYPE_CHECKING:
     from percussion_model.simulation.result import Result
     from percussion_model.simulation.simulate import Simulation, Snapshot, simulate
 
-# Where each name lives. Nothing is imported before it is used, so that starting
+# Home of each name. Nothing is imported before it is used, so that starting
 # costs only what is needed.
-_HOME = {
-    "BLOW": "physics.records",
-    "EVENT": "physics.records",
-    "SAMPLE_FIELDS": "physics.records",
-    "BitBar": "scene.parameters",
-    "EventKind": "physics.records",
-    "Mode": "physics.records",
-    "PistonBar": "scene.parameters",
-    "Result": "simulation.result",
-    "ResultError": "simulation.files",
-    "Scene": "scene.scene",
-    "Settled": "analysis.stationary",
-    "SceneError": "scene.scene",
-    "Section": "scene.parameters",
-    "Simulation": "simulation.simulate",
-    "SimulationError": "scene.inputs",
-    "Snapshot": "simulation.simulate",
-    "Comparison": "analysis.comparison",
-    "calibrate_drive": "scene.drive_calibration",
-    "compare": "analysis.comparison",
-    "piston_cycle": "scene.drive_calibration",
-    "settled": "analysis.stationary",
-    "simulate": "simulation.simulate",
+_NAMES = {
+    "analysis.comparison": ("Comparison", "compare"),
+    "analysis.stationary": ("Settled", "settled"),
+    "physics.records": ("BLOW", "EVENT", "SAMPLE_FIELDS", "EventKind", "Mode"),
+    "scene.drive_calibration": ("calibrate_drive", "piston_cycle"),
+    "scene.inputs": ("SimulationError",),
+    "scene.parameters": ("BitBar", "PistonBar", "Section"),
+    "scene.scene": ("Scene", "SceneError"),
+    "simulation.files": ("ResultError",),
+    "simulation.result": ("Result",),
+    "simulation.simulate": ("Simulation", "Snapshot", "simulate"),
 }
+_HOME = {name: module for module, names in _NAMES.items() for name in names}
 
 __all__ = [
     "BLOW",

@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 
 from percussion_model.coupling import CoupledRun, Coupling
-from percussion_model.coupling.files import write_columns
 from scenarios.drawing import save_png, stacked
 from scenarios.harness import FIGURES, ROOT
 
@@ -107,7 +106,7 @@ def draw_runs(
 def save_runs(runs: Mapping[str, CoupledRun], name: str, folder: Path = FIGURES) -> list[Path]:
     """Write the signals of each run as `NAME_RUN.csv` into the folder of the figures."""
     return [
-        write_columns(one, folder / f"{name}_{re.sub('[^a-z0-9]+', '_', label.lower())}.csv")
+        one.write_csv(folder / f"{name}_{re.sub('[^a-z0-9]+', '_', label.lower())}.csv")
         for label, one in runs.items()
     ]
 

@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from percussion_model.coupling import Coupling
-from percussion_model.coupling.balance import known_signals, summary
+from percussion_model.coupling.coupled_run import known_signals, summary
 from scenarios.drawing import save_png
 from scenarios.harness import FIGURES, ROOT
 

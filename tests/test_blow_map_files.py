@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from blow_map_scenes import RANGES, mapped
 
-from fmu_src.runtime.blow_map import read_blow_map
+from fmu_src.hammer.blow_map import read_blow_map
 from percussion_model import Scene, SceneError, simulate
 from percussion_model.analysis import blow_maps
 from percussion_model.analysis.blow_maps import (

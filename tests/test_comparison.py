@@ -66,7 +66,7 @@ def test_what_another_solver_needs_was_not_given_in_vain(found):
 
 def test_figure_has_a_line_for_each_solver(found):
     pytest.importorskip("matplotlib")
-    from percussion_model.interface.plotting.comparison import draw_comparison
+    from percussion_model.interface.plotting.compared_blows import draw_comparison
 
     axes = draw_comparison(found).axes
     assert len(axes) == 6

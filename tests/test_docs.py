@@ -22,7 +22,7 @@ PAGES = (
     *("docs/paper.md", "docs/gallery.md"),
     "docs/stability_record.md",
     *("docs/accuracy.md", "docs/requested_accuracy.md", "docs/effects.md", "docs/undamped.md"),
-    *("README.md", "CONTRIBUTING.md"),
+    *("docs/glossary.md", "README.md", "CONTRIBUTING.md"),
 )
 
 

@@ -10,8 +10,14 @@ import pytest
 from typer.testing import CliRunner
 
 from percussion_model import Scene, simulate
-from percussion_model.analysis.effect_turns import turns
-from percussion_model.analysis.effects import NOISE, EffectsStudy, Trial, step_costs, study_effects
+from percussion_model.analysis.effect_study import (
+    NOISE,
+    EffectsStudy,
+    Trial,
+    effect_variants,
+    step_costs,
+    study_effects,
+)
 from percussion_model.interface.cli import app
 from percussion_model.interface.commands.effects import (
     LONGEST_NAME,
@@ -24,15 +30,15 @@ RIGID = {"piston.model": "rigid", "bit.model": "rigid"}
 SHORT = {"run.duration": 0.6, "run.settle": 0.1}
 
 
-def turn_of(scene, effect):
-    return next(turn for turn in turns(scene) if turn.effect == effect)
+def variant_of(scene, effect):
+    return next(variant for variant in effect_variants(scene) if variant.effect == effect)
 
 
 def names(scene):
-    return {turn.effect: turn.turned for turn in turns(scene)}
+    return {variant.effect: variant.setting for variant in effect_variants(scene)}
 
 
-# ---------------------------------------------------------------------------- turns
+# ---------------------------------------------------------------------------- variants
 
 
 def test_every_effect_of_the_reference_is_turned():
@@ -51,7 +57,7 @@ def test_every_effect_of_the_reference_is_turned():
         "elastic bars": "rigid",
         "leaps": "off",
     }
-    # whatever a scene calls an effect has a turn
+    # whatever a scene calls an effect has a variant
     assert set(Scene().effects_on) <= set(found)
 
 
@@ -74,17 +80,17 @@ def test_every_effect_of_the_reference_is_turned():
 )
 def test_each_turn_makes_a_scene_that_differs_in_it(changes):
     scene = Scene().replace(**changes)
-    base, *rest = turns(scene)
+    base, *rest = effect_variants(scene)
     assert base.apply(scene) == scene
-    assert len({turn.effect for turn in rest}) == len(rest)
-    for turn in rest:
-        changed = turn.apply(scene)
+    assert len({variant.effect for variant in rest}) == len(rest)
+    for variant in rest:
+        changed = variant.apply(scene)
         assert changed != scene
         gone = set(scene.effects_on) - set(changed.effects_on)
         new = set(changed.effects_on) - set(scene.effects_on)
-        if turn.effect in ("gravity", "feed", "drive", "barrier", "rock", "loss"):
-            assert turn.effect in (gone if turn.turned == "off" else new)
-            assert turn.off == (turn.turned == "off")
+        if variant.effect in ("gravity", "feed", "drive", "barrier", "rock", "loss"):
+            assert variant.effect in (gone if variant.setting == "off" else new)
+            assert variant.off == (variant.setting == "off")
 
 
 # ---------------------------------------------------------------------------- study
@@ -98,7 +104,7 @@ def rigid():
 
 def test_changes_are_those_of_two_runs(rigid):
     scene = rigid.scene
-    trial = next(trial for trial in rigid.trials if trial.turn.effect == "barrier")
+    trial = next(trial for trial in rigid.trials if trial.variant.effect == "barrier")
     with_it = simulate(scene)
     without = simulate(scene.replace(**{"effects.barrier": False}))
     expected = without.rate_of_penetration / with_it.rate_of_penetration - 1.0
@@ -110,7 +116,7 @@ def test_changes_are_those_of_two_runs(rigid):
 
 
 def test_what_an_effect_makes_something_else_is_not_compared(rigid):
-    by_name = {trial.turn.effect: trial for trial in rigid.trials}
+    by_name = {trial.variant.effect: trial for trial in rigid.trials}
     for effect, word in (("drive", "nothing throws"), ("rock", "no rock"), ("bilinear law", "sp")):
         trial = by_name[effect]
         assert trial.numbers()["rate_of_penetration"] is None
@@ -133,7 +139,7 @@ def test_a_rate_that_scatter_hides_is_no_change(rigid):
 def test_a_short_run_does_not_hide_that_the_rate_cannot_be_trusted():
     scene = Scene().replace(**{"effects.loss": False, "solver.cells": 4})
     result = simulate(scene, 0.05, settle=0.0)
-    reason = Trial(turn_of(Scene(), "loss"), result, result.wall_time, None).reason
+    reason = Trial(variant_of(Scene(), "loss"), result, result.wall_time, None).reason
     assert "structural loss is off" in reason
     assert "whole blow" in reason
 
@@ -170,14 +176,14 @@ def test_the_table_fits_a_terminal_and_cuts_no_number(rigid, monkeypatch, capsys
 def test_a_dearer_step_is_marked_where_something_was_turned_off(rigid):
     scene = Scene()
     base = replace(rigid.base, step=1e-7)
-    off, tension = turn_of(scene, "feed"), turn_of(scene, "standstill tension")
-    trial = replace(rigid.trials[0], turn=off, step=1.01 * NOISE * 1e-7)
+    off, tension = variant_of(scene, "feed"), variant_of(scene, "standstill tension")
+    trial = replace(rigid.trials[0], variant=off, step=1.01 * NOISE * 1e-7)
     study = EffectsStudy(scene, base, [trial], {})
-    assert study.dearer(trial)
+    assert study.is_costlier(trial)
     assert study.to_dict()["effects"][0]["step_dearer"]
-    assert not study.dearer(replace(trial, step=0.99 * NOISE * 1e-7))
-    assert not study.dearer(replace(trial, turn=tension))
-    assert not study.dearer(replace(trial, step=None))
+    assert not study.is_costlier(replace(trial, step=0.99 * NOISE * 1e-7))
+    assert not study.is_costlier(replace(trial, variant=tension))
+    assert not study.is_costlier(replace(trial, step=None))
 
 
 def test_a_step_is_measured_in_free_flight():
@@ -196,7 +202,7 @@ def test_numbers_are_plain(rigid):
 
 def test_figure_has_a_bar_for_each_known_number(rigid):
     pytest.importorskip("matplotlib")
-    from percussion_model.interface.plotting.effects import draw_effects
+    from percussion_model.interface.plotting.effect_bars import draw_effects
 
     axes = draw_effects(rigid).axes
     assert len(axes) == 5

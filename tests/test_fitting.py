@@ -19,7 +19,11 @@ from percussion_model.analysis.fitting import (
     fit_drop_tests,
     fit_force_penetration,
 )
-from percussion_model.analysis.fitting.estimates import Counted, look_around, student_width
+from percussion_model.analysis.fitting.least_squares import (
+    CountedModel,
+    profile_intervals,
+    student_width,
+)
 
 CONFIDENCE = 0.95
 # Of that many trials so many cover, but for one chance in a thousand on either side.
@@ -142,10 +146,10 @@ def test_an_interval_reaches_to_where_the_misfit_has_grown():
     x = np.linspace(1.0, 2.0, 20)
     noise = np.resize([0.05, -0.05], len(x))
     noise -= x * (noise @ x) / (x @ x)  # so that the minimum is at 1
-    model = Counted(lambda at: x * (at[0] if at[0] > 1.0 else 1.0 - 0.2 * (1.0 - at[0])))
+    model = CountedModel(lambda at: x * (at[0] if at[0] > 1.0 else 1.0 - 0.2 * (1.0 - at[0])))
     at, data = np.array([1.0]), x + noise
     error = np.sqrt(model.misfit(data, at) / (len(x) - 1) / (x @ x))
-    ends, best = look_around(model, data, at, np.array([[error**2]]), 2.0)
+    ends, best = profile_intervals(model, data, at, np.array([[error**2]]), 2.0)
     assert best is at
     assert ends[0, 1] == pytest.approx(1.0 + 2.0 * error)
     assert 9.4 * error < 1.0 - ends[0, 0] < 12.0 * error

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from percussion_model.analysis.study import Study, grid, study, table
-from percussion_model.interface.report import write_report
-from percussion_model.interface.study_report import (
-    CAPTIONS,
+from percussion_model.interface.report import (
+    STUDY_CAPTIONS,
     render_study_report,
+    write_report,
     write_study_report,
 )
 from percussion_model.scene.scene import Scene
@@ -111,14 +111,14 @@ def test_samples_are_scattered_over_each_parameter(tmp_path):
     path = write_study_report(found, tmp_path)
     text = path.read_text(encoding="utf-8")
     assert "rock.unloading_ratio = 0.5: must be a number above 1" in text
-    assert CAPTIONS["scatter"] in text
+    assert STUDY_CAPTIONS["scatter"] in text
     (count,) = opened(path, tmp_path, f"{MODEL}('shown').options.length")
     assert count > 10
 
 
-def test_a_page_without_zoom_has_tables_and_says_what_is_missing(found, monkeypatch):
+def test_a_page_why_not_interactive_has_tables_and_says_what_is_missing(found, monkeypatch):
     monkeypatch.setattr(
-        "percussion_model.interface.study_report.without_zoom", lambda: "zoom is missing"
+        "percussion_model.interface.report.why_not_interactive", lambda: "zoom is missing"
     )
     text = render_study_report(found)
     assert "zoom is missing" in text
@@ -138,6 +138,6 @@ def test_a_large_study_makes_a_page_of_some_megabytes():
 
 
 def study_rows():
-    from percussion_model.analysis.study.work import ROW
+    from percussion_model.analysis.study.response import ROW
 
     return ROW

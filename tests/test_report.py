@@ -8,7 +8,7 @@ from html.parser import HTMLParser
 
 import pytest
 
-from percussion_model import page, report
+from percussion_model.interface import report
 from percussion_model.interface.report import HEADLINES, headline_rows, ledger_rows, write_report
 from percussion_model.scene.scene import Scene
 from percussion_model.simulation.simulate import simulate
@@ -50,7 +50,7 @@ def case(request, tmp_path_factory):
     """A scene and its page with still pictures."""
     result = simulate(SCENES[request.param])
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(report, "without_zoom", lambda: "zoom is missing")
+        patch.setattr(report, "why_not_interactive", lambda: "zoom is missing")
         path = write_report(result, tmp_path_factory.mktemp("report"))
     return request.param, result, path.read_text(encoding="utf-8")
 
@@ -65,9 +65,9 @@ def test_page_needs_nothing_else(case):
 
 
 def test_what_is_missing_for_zoom_is_said(monkeypatch):
-    assert page.without_zoom() == ""
-    monkeypatch.setitem(sys.modules, "percussion_model.interface.plotting.zoom", None)
-    assert "pip install 'percussion_model[report]'" in page.without_zoom()
+    assert report.why_not_interactive() == ""
+    monkeypatch.setitem(sys.modules, "percussion_model.interface.plotting.interactive", None)
+    assert "pip install 'percussion_model[report]'" in report.why_not_interactive()
 
 
 def test_parts_of_drawings_are_told_apart(case):

@@ -10,7 +10,7 @@ import pytest
 
 from percussion_model import Scene, simulate
 from percussion_model.scene.numbers import numbers_of
-from percussion_model.simulation.accuracy import planned_cells
+from percussion_model.simulation.accuracy_control import planned_cells
 from percussion_model.simulation.result import Result
 from percussion_model.solvers.wave.grid import elastic_bars, fitting_cells
 
@@ -135,7 +135,7 @@ def judge(scene, requests, levels):
 
 def test_requests_are_met_on_scenes_drawn_by_seed(monkeypatch):
     """Finer runs end at 120 cells here, which only makes more of them end with a warning."""
-    monkeypatch.setattr("percussion_model.simulation.accuracy.FINEST", 120)
+    monkeypatch.setattr("percussion_model.simulation.accuracy_control.FINEST", 120)
     judged = [judge(drawn(seed), (1e-2, 1e-3), (56, 80)) for seed in QUICK]
     assert sum(judged) >= 12
 

@@ -11,7 +11,13 @@ import pytest
 from percussion_model import Scene, SceneError, simulate
 from percussion_model.physics.records import BLOW
 from percussion_model.scene.numbers import numbers_of, section_numbers
-from percussion_model.simulation.accuracy import GROWTH, Grid, estimated_error, meet, time_needed
+from percussion_model.simulation.accuracy_control import (
+    GROWTH,
+    Grid,
+    estimated_error,
+    run_to_accuracy,
+    time_needed,
+)
 from percussion_model.simulation.result import Result
 from percussion_model.solvers.wave.grid import cut
 from percussion_model.solvers.wave.resolution import (
@@ -63,7 +69,7 @@ def test_rule_says_how_well_lengths_fit():
 
 
 def test_solver_takes_the_cells_of_the_rule_in_library_and_fmu():
-    from fmu_src.hammer_variables import hammer_variables
+    from fmu_src.hammer.variables import hammer_variables
     from percussion_model.solvers.wave.solver import WaveSolver
 
     scene = Scene().replace(**{"solver.accuracy": 1e-3})
@@ -178,7 +184,7 @@ def test_doubt_leads_to_finer_runs(rates, check, cells, warned):
         asked.append((chosen.solver.cells, longer))
         return invented(0.02 * rates[chosen.solver.cells], cells=chosen.solver.cells)
 
-    result = meet(scene, once)
+    result = run_to_accuracy(scene, once)
     assert result.scene == scene
     assert result.cells["piston"] == cells == asked[-1][0]
     assert [longer for _, longer in asked] == [False] + [True] * (len(asked) - 1)

@@ -10,7 +10,8 @@ import pytest
 from percussion_model import Result, ResultError, Scene, simulate
 from percussion_model.interface.plotting import CAPTIONS
 from percussion_model.physics.records import BLOW
-from percussion_model.simulation.files import FIGURES, REPORT, check_writable, staged
+from percussion_model.simulation.files import check_writable, staged
+from percussion_model.simulation.result import FIGURES, REPORT
 
 RIGID = Scene().replace(**{"piston.model": "rigid", "bit.model": "rigid"})
 KEYS = [
@@ -203,7 +204,7 @@ def test_what_was_made_of_an_earlier_result_goes(rigid, tmp_path):
 
 
 def test_a_long_trace_becomes_a_compressed_file(rigid, tmp_path, monkeypatch):
-    monkeypatch.setattr("percussion_model.simulation.files.LONGEST_CSV", 100)
+    monkeypatch.setattr("percussion_model.simulation.result.LONGEST_CSV", 100)
     rigid.save(tmp_path)
     assert (tmp_path / "trace.npz").exists()
     assert not (tmp_path / "trace.csv").exists()

@@ -17,7 +17,7 @@ from percussion_model.scene.parameters import (
 from percussion_model.scene.rows import SceneError
 from percussion_model.scene.scene import Scene
 
-FRICTION = Effect("friction", "friction", {"force": (50.0, "N", "friction force", 0.0, 1e6)})
+FRICTION = Effect("friction", "friction", {"force": (50.0, "N", "friction force", 0.0, 1e6)}, max)
 
 
 @pytest.fixture
@@ -80,7 +80,7 @@ def test_the_table_is_as_it_was_without_additions():
 @pytest.mark.parametrize("name", ["gravity", "rock", "friction"])
 def test_the_name_of_an_effect_must_be_new(name):
     with pytest.raises(ValueError, match="there is a group or a switch of this name"):
-        groups_with([FRICTION, Effect(name, "again", {})])
+        groups_with([FRICTION, Effect(name, "again", {}, max)])
 
 
 def test_a_scene_has_the_groups_that_effects_bring(tmp_path):
@@ -88,7 +88,8 @@ def test_a_scene_has_the_groups_that_effects_bring(tmp_path):
 import pickle
 import sys
 from percussion_model.scene import parameters
-parameters.EFFECTS = (parameters.Effect("friction", "rub", {"force": (50.0, "N", "F", 0.0, 1e6)}),)
+friction = {"force": (50.0, "N", "F", 0.0, 1e6)}
+parameters.EFFECTS = (parameters.Effect("friction", "rub", friction, max),)
 parameters.GROUPS.update(parameters.groups_with(parameters.EFFECTS))
 from percussion_model.scene.scene import Scene
 scene = Scene().replace(**{"friction.force": 60.0})

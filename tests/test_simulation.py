@@ -9,7 +9,7 @@ import pytest
 from percussion_model import Scene, SceneError, Simulation, SimulationError, simulate
 from percussion_model.physics.records import SAMPLE_FIELDS
 from percussion_model.scene.numbers import numbers_of
-from percussion_model.simulation.time_loop import sampling_times, stop_on_interrupt
+from percussion_model.simulation.simulate import sampling_times, stop_on_interrupt
 from percussion_model.solvers.wave.advance import run
 from percussion_model.solvers.wave.grid import cut_bars
 from percussion_model.solvers.wave.totals import begin

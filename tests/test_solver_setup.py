@@ -5,7 +5,7 @@ import pytest
 from numba import njit
 
 from percussion_model.physics.records import DriveKind, RockKind
-from percussion_model.scene.numbers import SCENE_NUMBERS, Values, numbers_of, scene_numbers
+from percussion_model.scene.numbers import SCENE_NUMBERS, Numbers, Values, numbers_of, scene_numbers
 from percussion_model.scene.parameters import find_row
 from percussion_model.scene.scene import Scene
 from percussion_model.solvers.setup import (
@@ -56,10 +56,10 @@ def test_enumerations_are_covered_by_the_choices():
 @pytest.mark.parametrize("changes", SCENES)
 def test_numbers_say_what_the_scene_says(changes):
     scene = Scene().replace(**changes)
-    values = numbers_of(scene).values
-    assert barrier_on(values) == scene.barrier_on
-    assert kelvin_voigt_time(values) == (scene.loss.time if scene.loss_on else 0.0)
-    rock = rock_numbers(values)
+    numbers = numbers_of(scene)
+    assert barrier_on(numbers) == scene.barrier_on
+    assert kelvin_voigt_time(numbers) == (scene.loss.time if scene.loss_on else 0.0)
+    rock = rock_numbers(numbers)
     assert (rock.c_r, rock.w_r) == ((1e4, 0.05) if scene.barrier_on else (0.0, 0.0))
     assert rock.k_r == (0.0 if scene.effects.rock == "none" else 7.5e8)
     assert rock.gamma == (5.0 if scene.effects.rock == "bilinear" else 1.0)
@@ -75,6 +75,7 @@ def test_values_are_the_fields_of_the_record():
 @pytest.mark.parametrize("changes", [{}, {"effects.barrier": False, "effects.loss": False}])
 def test_compiled_functions_take_the_record_in_place_of_the_values(changes):
     scene = Scene().replace(**changes)
-    values, record = numbers_of(scene).values, scene_numbers(scene)[0]
+    numbers = numbers_of(scene)
+    as_record = Numbers(scene_numbers(scene)[0], numbers.piston, numbers.bit)
     for function in (barrier_on, kelvin_voigt_time):
-        assert njit(function)(record) == function(values)
+        assert njit(function)(as_record) == function(numbers)

@@ -10,9 +10,9 @@ import pytest
 from typer.testing import CliRunner
 
 from percussion_model import Scene, SceneError, settled, simulate
+from percussion_model.analysis.stationary import COMPARED, batch_means, cycle, cycles_in
 from percussion_model.interface.cli import app
 from percussion_model.physics.records import BLOW
-from percussion_model.simulation.cycles import COMPARED, batch_means, cycle, cycles_in
 
 TOLERANCE = 1e-4
 # Drive force that keeps the power of the reference at another reversal distance.

@@ -17,8 +17,8 @@ from typer.testing import CliRunner
 
 from percussion_model import Scene, SceneError, settled
 from percussion_model.analysis.study import grid, study, table, workers
+from percussion_model.analysis.study.response import COMPUTING, KINDS, run_points
 from percussion_model.analysis.study.store import PARTS, PLAN
-from percussion_model.analysis.study.work import COMPUTING, KINDS, run_points
 from percussion_model.interface.cli import app
 from percussion_model.simulation.files import ResultError, to_json
 from percussion_model.solvers import sources
@@ -178,16 +178,16 @@ def test_all_that_computes_a_point_is_in_the_hash():
     """What a worker loads, but for files, tables, warnings and other points."""
     code = (
         "import sys, numpy as np; from percussion_model import Scene; "
-        "from percussion_model.analysis.study.work import run_points; "
+        "from percussion_model.analysis.study.response import run_points; "
         "scene = Scene().computed_by('rigid'); "
         "run_points(scene, ('feed.force',), np.array([[2500.0]]), 1e-4, 400, 1e-3); "
         "print(*(m.__file__ for n, m in sys.modules.items() if n.startswith('percussion_model')))"
     )
-    said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    left = {Path(name) for name in said.stdout.split()} - set(sources.source_files(COMPUTING))
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    left = {Path(name) for name in done.stdout.split()} - set(sources.source_files(COMPUTING))
     names = {path.relative_to(sources.PACKAGE).as_posix() for path in left}
-    of_study = {f"study/{name}.py" for name in ("__init__", "store", "summary", "workers")}
-    assert names == of_study | {"__init__.py", "result.py", "result_files.py", "warnings_of_run.py"}
+    of_study = {f"analysis/study/{name}.py" for name in ("__init__", "store", "workers")}
+    assert names == of_study | {"__init__.py", "analysis/__init__.py"}
 
 
 def test_a_part_that_was_damaged_is_named(whole, tmp_path):
@@ -245,7 +245,7 @@ def test_ctrl_c_ends_a_study_at_once_and_says_what_is_kept(tmp_path):
         assert child.returncode == 130
         assert "Traceback" not in errors
         if (tmp_path / f"out{number}" / PARTS).is_dir():
-            assert "the same command goes on" in errors
+            assert "the same command continues" in errors
 
 
 def test_a_cluster_finds_the_same_and_survives_a_worker(whole, tmp_path):

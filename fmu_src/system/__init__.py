@@ -1,1 +1,1 @@
-"""Makes the FMUs that surround the hammer, and archives of whole systems."""
+"""Archives of whole systems of FMUs (SSP)."""

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from fmpy.validation import validate_fmu
 
+from fmu_src.archive import ROOT
 from fmu_src.system.archive import (
-    ROOT,
     SystemPlanError,
     build_fmus,
     plans,

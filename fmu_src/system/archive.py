@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import tomllib
-import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,15 +10,13 @@ from xml.etree.ElementTree import Element, SubElement, indent, register_namespac
 
 from fmpy import read_model_description
 
-from fmu_src.archive import DATE, PERMISSIONS
-from fmu_src.hammer import build_hammer
-from fmu_src.system.parts import build_part
-from fmu_src.system.tables import PARTS
+from fmu_src.archive import ROOT, write_archive
+from fmu_src.hammer.build import build_hammer
+from fmu_src.parts.build import PARTS, build_part
 from fmu_src.units import UNITS
 from percussion_model.interface.commands.blow_map import ready_map
 from percussion_model.scene.scene import Scene
 
-ROOT = Path(__file__).resolve().parents[2]
 SYSTEMS = ROOT / "scenarios" / "systems"
 HAMMER = "PercussiveHammer"
 # Masters find the parameters of all components under one name.
@@ -113,7 +110,7 @@ def build_fmus(plan: SystemPlan, folder: Path) -> dict[str, Path]:
     for component, name in plan.components.items():
         path = folder / f"{name}.fmu"
         if name in PARTS:
-            build_part(name, path)
+            build_part(PARTS[name], path)
         elif name == HAMMER:
             path = _hammer(plan, folder)
         else:
@@ -149,18 +146,7 @@ def write_system(plan: SystemPlan, fmus: dict[str, Path], path: Path) -> Path:
         entries[f"resources/{component}.ssv"] = _values(values, variables[component])
     for fmu in sorted(set(fmus.values())):
         entries[f"resources/{fmu.name}"] = fmu.read_bytes()
-    path.parent.mkdir(parents=True, exist_ok=True)
-    draft = path.with_name(f".{path.name}.part")
-    try:
-        with zipfile.ZipFile(draft, "w", zipfile.ZIP_DEFLATED) as archive:
-            for name, content in entries.items():
-                info = zipfile.ZipInfo(name, DATE)
-                info.compress_type = zipfile.ZIP_DEFLATED
-                info.external_attr = PERMISSIONS
-                archive.writestr(info, content)
-        draft.replace(path)
-    finally:
-        draft.unlink(missing_ok=True)
+    write_archive(path, entries)
     return path
 
 

@@ -1,4 +1,4 @@
-"""Blow maps of scenes: made with progress, kept, found again, looked at."""
+"""Blow maps of scenes: built with progress, cached, inspected, and their cost."""
 
 from __future__ import annotations
 

@@ -1,10 +1,11 @@
-"""One scene by several solvers, side by side."""
+"""Comparison of several solvers on one scene."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from percussion_model.scene.scene import Scene, SceneError
@@ -13,7 +14,7 @@ from percussion_model.simulation.result import Result
 from percussion_model.simulation.simulate import simulate
 from percussion_model.simulation.warnings import unused_note
 
-__all__ = ["COMPARED", "Comparison", "compare", "read_solvers"]
+__all__ = ["COMPARED", "Comparison", "compare", "read_solvers", "relative_change", "solver_names"]
 
 # Numbers of a summary that solvers are compared by.
 COMPARED = (
@@ -36,7 +37,7 @@ COMPARED = (
 
 @dataclass(frozen=True)
 class Comparison:
-    """What several solvers make of one scene; the first is the one compared with.
+    """Results of several solvers on one scene; the first is the one compared with.
 
     Attributes
     ----------
@@ -63,7 +64,7 @@ class Comparison:
         summaries = self.summaries()
         base = summaries[self.first]
         return {
-            name: {key: _relative(summary[key], base[key]) for key in COMPARED}
+            name: {key: relative_change(summary[key], base[key]) for key in COMPARED}
             for name, summary in summaries.items()
             if name != self.first
         }
@@ -71,18 +72,17 @@ class Comparison:
     def warnings(self) -> list[str]:
         """Warnings of all results, each after the name of its solver.
 
-        A parameter that one of the solvers needs was given for it, not in vain: only those
-        that no solver needs are told, once.
+        Of the parameters without effect only those that no solver needs are listed, once.
         """
         scenes = [result.scene for result in self.results.values()]
-        in_vain = [
+        unused = [
             key for key in scenes[0].unused if all(key in scene.unused for scene in scenes[1:])
         ]
-        told = [unused_note(in_vain)] if in_vain else []
+        texts = [unused_note(unused)] if unused else []
         for name, result in self.results.items():
             own = unused_note(result.scene.unused)
-            told += [f"{name}: {text}" for text in result.warnings if text != own]
-        return told
+            texts += [f"{name}: {text}" for text in result.warnings if text != own]
+        return texts
 
     def to_dict(self) -> dict[str, Any]:
         """Summaries and differences as plain values for JSON."""
@@ -123,9 +123,14 @@ def compare(
     end = scene.run.duration if duration is None else duration
     results = {}
     for k, (name, chosen) in enumerate(scenes.items()):
-        report = None if progress is None else _after(progress, k * end)
+        report = None if progress is None else partial(_add_time, progress, k * end)
         results[name] = simulate(chosen, duration, settle, progress=report)
     return Comparison(results)
+
+
+def solver_names() -> tuple[str, ...]:
+    """Names of all solvers, as a scene is computed by them."""
+    return (*(name for name in SOLVER_NAMES if name != "auto"), "blow-map")
 
 
 def read_solvers(text: str) -> tuple[str, ...]:
@@ -134,23 +139,24 @@ def read_solvers(text: str) -> tuple[str, ...]:
     Raises
     ------
     SceneError
-        If there is none, or one that is not known or stands there twice.
+        If there is none, or one that is not known or is given twice.
     """
     names = tuple(name.strip() for name in text.split(","))
-    known = [name for name in SOLVER_NAMES if name != "auto"] + ["blow-map"]
+    known = solver_names()
     for name in names:
         if name not in known:
             raise SceneError(f"--solvers {text}: {name!r} is no solver: {', '.join(known)}")
         if names.count(name) > 1:
-            raise SceneError(f"--solvers {text}: {name} stands there twice")
+            raise SceneError(f"--solvers {text}: {name} is given twice")
     return names
 
 
-def _after(progress: Callable[[float], None], before: float) -> Callable[[float], None]:
-    return lambda t: progress(before + t)
+def _add_time(progress: Callable[[float], None], start: float, t: float) -> None:
+    progress(start + t)
 
 
-def _relative(value: float | None, base: float | None) -> float | None:
+def relative_change(value: float | None, base: float | None) -> float | None:
+    """Return value / base - 1, None where that is not defined."""
     if value is None or base is None or base == 0 or not math.isfinite(value / base):
         return None
     return value / base - 1.0

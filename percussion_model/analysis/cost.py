@@ -1,4 +1,4 @@
-"""What a run will cost: measured on its first blows, before the whole of it is run."""
+"""Cost estimate of a run, from measurements on its first blows."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ import os
 import time
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any, Protocol
+from typing import Any
 
 from percussion_model.analysis.blow_maps import MapCost, kept_map, map_cost
 from percussion_model.scene.scene import Scene
-from percussion_model.simulation.accuracy import planned_cells, with_cells
-from percussion_model.simulation.stepping import Simulation
+from percussion_model.simulation.accuracy_control import planned_cells, with_cells
+from percussion_model.simulation.simulate import Simulation
 from percussion_model.solvers.base import Solver
 
 # A probe ends after so many blows once it took so long [s]; a run that is over sooner is
@@ -28,34 +28,23 @@ FIRST_PIECE, QUICK, LARGEST_PIECE = 1e-6, 3e-3, 0.025
 COUNTED = ("steps", "leaps", "events")
 
 
-class Probed(Protocol):
-    """What a probe needs of a `Simulation`."""
-
-    wall_time: float
-
-    @property
-    def time(self) -> float:
-        """Present time [s]."""
-
-    def advance(self, t: float) -> None:
-        """Run up to `t`."""
-
-    def statistics(self) -> dict[str, int]:
-        """Counts of what the solver did."""
-
-
 @dataclass(frozen=True)
 class Mark:
-    """How far a probe was at some time."""
+    """Progress of a probe: simulated time and wall time [s], and counts of the solver."""
 
     time: float
     wall: float
     counts: dict[str, int]
 
+    @property
+    def blows(self) -> int:
+        """Blows finished."""
+        return self.counts.get("blows", 0)
+
 
 @dataclass(frozen=True)
 class Forecast:
-    """What a run is going to cost.
+    """Cost estimate of a run.
 
     Attributes
     ----------
@@ -95,11 +84,11 @@ class Forecast:
 
 
 def forecast(scene: Scene) -> Forecast:
-    """Run the first blows of a scene and tell what the whole run will cost.
+    """Estimate the cost of a whole run from the first blows of a scene.
 
     A wanted accuracy takes several runs: times are those of all, the rest is
     that of the finest. What aperiodic motion or a doubt adds is not foreseen.
-    A blow map that has not been made is not made here: its cost is told instead.
+    A blow map that is missing is not made here: its cost is estimated instead.
     """
     if scene.solver_name == "blow-map" and kept_map(scene) is None:
         return _without_map(scene)
@@ -128,14 +117,14 @@ def _without_map(scene: Scene) -> Forecast:
     return Forecast(None, setup, None, duration, None, None, {}, 0.0, blow_map=cost)
 
 
-def probe(simulation: Probed, duration: float) -> list[Mark]:
+def probe(simulation: Simulation, duration: float) -> list[Mark]:
     """Advance piece by piece through the first blows of a run; a mark after each piece."""
     marks = [_mark(simulation)]
     piece = FIRST_PIECE
     while simulation.time < duration:
         simulation.advance(min(simulation.time + piece, duration))
         marks.append(_mark(simulation))
-        wall, blows = marks[-1].wall, marks[-1].counts.get("blows", 0)
+        wall, blows = marks[-1].wall, marks[-1].blows
         if wall - marks[-2].wall < QUICK:
             piece = min(2.0 * piece, LARGEST_PIECE * duration)
         elif piece > FIRST_PIECE:
@@ -145,21 +134,21 @@ def probe(simulation: Probed, duration: float) -> list[Mark]:
     return marks
 
 
-def _mark(simulation: Probed) -> Mark:
+def _mark(simulation: Simulation) -> Mark:
     return Mark(simulation.time, simulation.wall_time, simulation.statistics())
 
 
 def predict(solver: Solver, setup_time: float, marks: list[Mark], duration: float) -> Forecast:
     """Predict a whole run from the marks of a probe.
 
-    What follows the probe costs what whole blows in it did, the first left out:
-    it begins in its own way. Without two blows it costs what the probe did.
+    The rest costs as much as the whole blows of the probe, but for the first, which
+    begins in its own way; without two blows as much as the probe.
     """
     last = marks[-1]
-    start, end = _what_goes_on(marks)
+    start, end = _steady_part(marks)
     span = end.time - start.time
     per_second = (end.wall - start.wall) / span if span > 0 else 0.0
-    blows = end.counts.get("blows", 0) - start.counts.get("blows", 0)
+    blows = end.blows - start.blows
     return Forecast(
         solver=solver,
         setup_time=setup_time,
@@ -176,28 +165,24 @@ def predict(solver: Solver, setup_time: float, marks: list[Mark], duration: floa
     )
 
 
-def _what_goes_on(marks: list[Mark]) -> tuple[Mark, Mark]:
-    """Marks between which there is what goes on: whole blows, or else all of the probe.
+def _steady_part(marks: list[Mark]) -> tuple[Mark, Mark]:
+    """Marks around the part that continues: whole blows, or else all of the probe.
 
     Where blows have ceased, it is what took the later half of the time since then.
     """
-    rises = [mark for before, mark in pairwise(marks) if _blows(mark) > _blows(before)]
+    rises = [mark for before, mark in pairwise(marks) if mark.blows > before.blows]
     if len(rises) < 2:
         return marks[0], marks[-1]
     first, last, end = rises[0], rises[-1], marks[-1]
-    period = (last.time - first.time) / (_blows(last) - _blows(first))
+    period = (last.time - first.time) / (last.blows - first.blows)
     if end.time - last.time < CEASED * period:
         return first, last
     half = 0.5 * (last.wall + end.wall)
     return next((mark for mark in marks[:-1] if mark.wall >= half), last), end
 
 
-def _blows(mark: Mark) -> int:
-    return mark.counts.get("blows", 0)
-
-
 def explained(scene: Scene, found: Forecast) -> dict[str, Any]:
-    """What `percussion explain` tells, as plain values for JSON, SI units."""
+    """Numbers of `percussion explain`, as plain values for JSON, SI units."""
     solver = found.solver
     return {
         "title": scene.title,

@@ -1,4 +1,4 @@
-"""Runs systems of FMUs that an SSP archive describes, with fmpy."""
+"""Coupled runs of systems of FMUs that an SSP archive describes, with fmpy."""
 
 from percussion_model.coupling.component import CouplingError
 from percussion_model.coupling.coupled_run import CoupledRun

@@ -1,4 +1,4 @@
-"""Standard runs for a controller of feed and pressure, and what they are worth."""
+"""Bench of controllers of feed and pressure: standard runs and their scores."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ import numpy as np
 from percussion_model.coupling.component import CouplingError
 from percussion_model.coupling.coupled_run import CoupledRun
 from percussion_model.coupling.master import Coupling
+from percussion_model.coupling.port import OnWay
 from percussion_model.coupling.python_part import Work
 
 STEP = 1e-3  # [s]
@@ -29,7 +30,6 @@ SETTLING = 0.5
 LATE = 1.0  # the last part of a run, in which the swing of the feed is measured [s]
 NOISE, DELAY = 0.05, 0.03  # of the sensors: share of the value, time [s]
 
-OnWay = Callable[[str, float, Any], Any]
 SIGNALS = (
     "string.lifted", "string.bit_impulse", "hammer.bit.force_peak", "hammer.blow_count",
     "hammer.off_bottom", "rig.energy", "supply.energy", "controller.force_command",
@@ -39,7 +39,7 @@ SIGNALS = (
 
 @dataclass(frozen=True)
 class Trial:
-    """A standard run: parameters of the system, and what happens to signals on the way."""
+    """A standard run: parameters of the system, and disturbances of its signals."""
 
     name: str
     text: str
@@ -110,7 +110,7 @@ TRIALS = (
 
 @dataclass
 class Score:
-    """What a run was worth.
+    """Score of a run.
 
     Attributes
     ----------
@@ -181,7 +181,7 @@ def bench(
     controller: str | Path | Work | None = None,
     parameters: Mapping[str, Any] | None = None,
     trials: Sequence[str] = (),
-    watch: Callable[[Score], None] | None = None,
+    progress: Callable[[Score], None] | None = None,
 ) -> list[Score]:
     """Put a controller through the standard runs.
 
@@ -195,7 +195,7 @@ def bench(
         Values of the controller, by `controller.variable`.
     trials : sequence of str, optional
         Names of runs; all if left out.
-    watch : callable, optional
+    progress : callable, optional
         Called with each score.
     """
     names = [trial.name for trial in TRIALS]
@@ -214,8 +214,8 @@ def bench(
         )
         run = coupling.run(trial.duration, STEP, SIGNALS, ROWS_EVERY)
         found.append(judge(trial, run))
-        if watch is not None:
-            watch(found[-1])
+        if progress is not None:
+            progress(found[-1])
     return found
 
 

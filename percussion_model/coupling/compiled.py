@@ -1,8 +1,8 @@
-"""The calls of a step, one after another, by compiled code.
+"""Compiled calls: all FMU calls of a step, one after another.
 
 Python takes longer to make a call of an FMU than a small FMU takes to answer it. So where all
 parts are FMUs a step is a list of calls, and one compiled function makes them: it moves the
-values of outputs to the inputs that take them, and looks at each status and number.
+values of outputs to the inputs that take them, and checks each status and number.
 """
 
 from __future__ import annotations
@@ -17,10 +17,9 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from percussion_model.coupling.component import Component
-from percussion_model.coupling.exchange import LARGEST, WARNING, Group
+from percussion_model.coupling.component import LARGEST, WARNING, Component, Group
 from percussion_model.coupling.port import Port
-from percussion_model.physics.kernel import entry_of, letting_go
+from percussion_model.physics.kernel import entry_of, nogil
 
 STEP, SET_REAL, SET_INTEGER, GET_REAL, GET_INTEGER, GET_BOOLEAN = range(6)
 SETTERS = {"Real": SET_REAL, "Integer": SET_INTEGER, "Boolean": SET_INTEGER}
@@ -83,7 +82,7 @@ def do_step(
     ), _called((_BYTE, _DOUBLE, _DOUBLE, _INT), (True, False, False, False))
 
 
-@letting_go
+@nogil
 def make_calls(
     calls: np.ndarray,
     places: np.ndarray,
@@ -188,12 +187,12 @@ class CompiledStep:
         self._integers = np.full(room, np.iinfo(np.int32).min, np.int32)
         self._room = 0
         for port in ports:
-            self._give_and_step(port)
+            self._set_and_step(port)
             if order == "gauss-seidel":
-                self._take(port)
+                self._read(port)
         if order == "jacobi":
             for port in ports:
-                self._take(port)
+                self._read(port)
         self._all = np.array(self._calls, CALL)
         self._values = np.array(self.ports[0].values, float)
         self._at = np.array([0, count, DONE, 0], np.int64)
@@ -203,7 +202,7 @@ class CompiledStep:
         make_calls(self._all[:0], *self._arrays[1:], 0.0, 0.0)
         self._make = entry_of(make_calls)
 
-    def _give_and_step(self, port: Port) -> None:
+    def _set_and_step(self, port: Port) -> None:
         for group in port.writer.groups:
             sources = port.places[group.begin : group.end]
             self._exchange(port, group, SETTERS[group.family], sources)
@@ -212,7 +211,7 @@ class CompiledStep:
                             0, 0, 0, 0, 0, self._pace(port)))  # fmt: skip
         self._names.append("fmi2DoStep")
 
-    def _take(self, port: Port) -> None:
+    def _read(self, port: Port) -> None:
         begin = port.begin
         for group in port.reader.groups:
             places = list(range(begin + group.begin, begin + group.end))

@@ -1,9 +1,15 @@
-"""One FMU in a coupled run: its instance, and what its log says of an error."""
+"""An FMU in a coupled run: its instance, errors from its log, and grouped reads and writes.
+
+fmpy makes new arrays for each call. In a run the same variables are asked for again and
+again, so arrays are made once here and the functions of the library called with them.
+"""
 
 from __future__ import annotations
 
 import ctypes
 import difflib
+import functools
+import struct
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -11,13 +17,124 @@ import numpy as np
 from fmpy import read_model_description
 from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
 
-from percussion_model.coupling.exchange import FAMILIES, LARGEST, WARNING, Reader, Writer
-
+# What fmpy calls the types that share a getter, and what their values are in C.
+FAMILIES = {"Real": "Real", "Integer": "Integer", "Enumeration": "Integer", "Boolean": "Boolean"}
+ORDER = ("Real", "Integer", "Boolean")
+_IN_C: dict[str, tuple[Any, str]] = {
+    "Real": (ctypes.c_double, "d"), "Integer": (ctypes.c_int, "i"), "Boolean": (ctypes.c_int, "i"),
+}  # fmt: skip
+# Integers of FMI are below this, by size.
+LARGEST = 2.0**31
+# The highest status of a call that did what it should.
+WARNING = 1
 _STATUS = {2: "discard", 3: "error", 4: "fatal", 5: "pending"}
 
 
 class CouplingError(ValueError):
     """A system that cannot be set up or cannot go on; says which part, when and why."""
+
+
+class Group:
+    """Variables of one family with the arrays of their calls."""
+
+    def __init__(
+        self, component: Component, family: str, names: Sequence[str], kind: str, begin: int
+    ) -> None:
+        references = [component.find(name).valueReference for name in names]
+        self.family = family
+        self.begin, self.end = begin, begin + len(names)  # places among all values
+        kind_in_c, letter = _IN_C[family]
+        values = (kind_in_c * len(names))()
+        packed = struct.Struct(f"{len(names)}{letter}")
+        self.fill = functools.partial(packed.pack_into, values, 0)
+        self.found = functools.partial(packed.unpack_from, values)
+        self.name = f"fmi2{kind}{family}"
+        self.call = component.function(self.name)
+        self.arguments = (
+            component.pointer,
+            (ctypes.c_uint * len(names))(*references),
+            ctypes.c_size_t(len(names)),
+            values,
+        )
+
+
+class Exchange:
+    """Variables of an FMU that are read, or set, all at once.
+
+    Parameters
+    ----------
+    component : Component
+    names : sequence of str
+
+    Attributes
+    ----------
+    names : list of str
+        In the order of the values: family by family.
+    groups : list of Group
+        Families with what calls them.
+    """
+
+    kind = ""  # "Get" or "Set"
+
+    def __init__(self, component: Component, names: Sequence[str]) -> None:
+        found: dict[str, list[str]] = {}
+        for name in names:
+            found.setdefault(FAMILIES[component.find(name).type], []).append(name)
+        self.component = component
+        self.names: list[str] = []
+        self.groups: list[Group] = []
+        for family in ORDER:
+            if family in found:
+                group = Group(component, family, found[family], self.kind, len(self.names))
+                self.groups.append(group)
+                self.names += found[family]
+
+
+class Reader(Exchange):
+    """Reads variables of an FMU."""
+
+    kind = "Get"
+
+    def read(self) -> list[Any]:
+        """Present values."""
+        found: list[Any] = []
+        for group in self.groups:
+            status = group.call(*group.arguments)
+            if status > WARNING:
+                self.component.fail(group.name, status)
+            found += map(bool, group.found()) if group.family == "Boolean" else group.found()
+        return found
+
+
+class Writer(Exchange):
+    """Sets variables of an FMU; a family whose values are as before is left alone."""
+
+    kind = "Set"
+
+    def __init__(self, component: Component, names: Sequence[str]) -> None:
+        super().__init__(component, names)
+        self._last: list[Any] = []
+        self.forget()
+
+    def forget(self) -> None:
+        """Set all values the next time: the FMU may have others than were set last."""
+        self._last = [None for _ in self.groups]
+
+    def write(self, values: Sequence[Any]) -> None:
+        """Set values, in the order of the names."""
+        for k, group in enumerate(self.groups):
+            chosen = values[group.begin : group.end]
+            if chosen == self._last[k]:
+                continue
+            try:
+                group.fill(*(chosen if group.family == "Real" else map(int, chosen)))
+            except struct.error:
+                self.component.refuse_large(self.names[group.begin : group.end], chosen)
+                raise
+            status = group.call(*group.arguments)
+            if status > WARNING:
+                self.component.fail(group.name, status)
+            self._last[k] = chosen
 
 
 class Component:
@@ -55,7 +172,7 @@ class Component:
         self.stepper = self.function(
             "fmi2DoStep", ctypes.c_void_p, ctypes.c_double, ctypes.c_double, ctypes.c_int
         )
-        self._goes_forward = 1  # to the FMU: it will not be told to go back
+        self._no_rollback = 1  # promised to the FMU until a state is saved
 
     def function(self, name: str, *types: Any) -> Any:
         """A function of the library that returns a status; without types, by those of ctypes."""
@@ -87,14 +204,18 @@ class Component:
             self._guarded(setter, [one.valueReference], [converted])
 
     def _converted(self, one: Any, family: str, value: Any) -> Any:
-        """A value as its type; nothing is rounded, no number is taken for a truth."""
+        """A value as its type; nothing is rounded, no number is taken for a Boolean."""
         kind = {"Real": float, "Integer": int, "Boolean": bool}[family]
         try:
             converted = kind(value)
         except (ValueError, OverflowError, TypeError):
             converted = None
-        truth = isinstance(value, bool | np.bool_)
-        if converted is None or truth != (kind is bool) or (kind is int and converted != value):
+        is_boolean = isinstance(value, bool | np.bool_)
+        if (
+            converted is None
+            or is_boolean != (kind is bool)
+            or (kind is int and converted != value)
+        ):
             raise CouplingError(f"{self.name}.{one.name} = {value!r}: must be of type {one.type}")
         return converted
 
@@ -108,11 +229,11 @@ class Component:
         return found[word]
 
     def reader(self, names: Sequence[str]) -> Reader:
-        """What reads these variables, all at once."""
+        """Return a reader of these variables, all at once."""
         return Reader(self, names)
 
     def writer(self, names: Sequence[str]) -> Writer:
-        """What sets these variables, all at once."""
+        """Return a writer of these variables, all at once."""
         return Writer(self, names)
 
     def begin(self, time: float) -> None:
@@ -126,13 +247,13 @@ class Component:
 
     def step(self, time: float, step: float) -> None:
         """One communication step [s]."""
-        status = self.stepper(self.pointer, time, step, self._goes_forward)
+        status = self.stepper(self.pointer, time, step, self._no_rollback)
         if status > WARNING:
             self.fail("fmi2DoStep", status)
 
     def save(self) -> Any:
         """State of the instance, to be given back by `drop`."""
-        self._goes_forward = 0
+        self._no_rollback = 0
         return self._guarded(self._slave.getFMUstate)
 
     def restore(self, state: Any) -> None:
@@ -162,8 +283,8 @@ class Component:
 
     def _error(self, text: str) -> CouplingError:
         # the line of the FMU itself comes first, that of its export library after it
-        said = [text for status, text in self.messages if status > WARNING and text.strip()]
-        text = said[0].removeprefix(f"{self.name}: ") if said else text
+        logged = [text for status, text in self.messages if status > WARNING and text.strip()]
+        text = logged[0].removeprefix(f"{self.name}: ") if logged else text
         return CouplingError(f"{self.name}: {text}")
 
     def free(self) -> None:

@@ -1,10 +1,26 @@
-"""What a coupled run leaves behind."""
+"""Result of a coupled run: signals over time, summary and energy balance of the string."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+
+from percussion_model.simulation.files import staged_text
+
+# Signals that the balances read.
+STRING_ENERGIES = ("head", "reaction", "weight", "bit", "shoulder", "wall", "stored")
+SIGNALS = (
+    *(f"string.energy.{name}" for name in STRING_ENERGIES),
+    "string.head_impulse", "string.bit_impulse", "string.momentum", "string.wall_momentum",
+    "string.weight", "string.casing_position", "string.lifted",
+    "hammer.bit.impulse", "hammer.contact.impulse", "hammer.bit.velocity",
+    "hammer.piston.velocity", "hammer.blow_energy", "hammer.blow_count",
+    "hammer.energy_residual", "hammer.off_bottom", "rock.layer",
+    "controller.mode", "controller.feed_wanted", "rig.energy", "supply.energy",
+)  # fmt: skip
 
 
 @dataclass
@@ -23,7 +39,7 @@ class CoupledRun:
         Why it ended before its time; empty if it did not.
     tried, rejected : int
         Steps that were computed beyond those, to know the error, and steps taken back.
-    wall_time : float
+    wall_time, processor_time : float
         Of the stepping [s].
     interrupted : bool
         Whether it was Ctrl-C that ended it.
@@ -36,7 +52,81 @@ class CoupledRun:
     tried: int = 0
     rejected: int = 0
     wall_time: float = field(default=0.0, compare=False)
+    processor_time: float = field(default=0.0, compare=False)
     interrupted: bool = False
 
     def __getitem__(self, signal: str) -> np.ndarray:
         return self.columns[signal]
+
+    def write_csv(self, path: Path) -> Path:
+        """Write time and signals as CSV, with all digits."""
+        lines = [",".join(f'"{name}"' for name in self.columns)]
+        for row in zip(*(column.tolist() for column in self.columns.values()), strict=True):
+            lines.append(",".join(repr(value) for value in row))
+        path.parent.mkdir(parents=True, exist_ok=True)
+        staged_text(path, "\n".join(lines) + "\n")
+        return path
+
+
+def known_signals(outputs: dict[str, list[str]]) -> list[str]:
+    """Those of SIGNALS that a system has.
+
+    Parameters
+    ----------
+    outputs : dict
+        Names of all outputs, by component.
+    """
+    return [
+        signal
+        for signal in SIGNALS
+        if signal.partition(".")[2] in outputs.get(signal.partition(".")[0], ())
+    ]
+
+
+def summary(run: CoupledRun) -> dict[str, Any]:
+    """Numbers of a run, of what is in it.
+
+    Returns
+    -------
+    dict
+        depth [m], mean rate over the second half [m/s], greatest residual of the energy
+        balance of the string divided by the energy put in; energy that the shoulder took and work
+        of the feed [J]; the former divided by the energy of the blows [1].
+    """
+    columns = run.columns
+    found: dict[str, Any] = {
+        "time": float(columns["time"][-1]), "step": run.step, "steps": run.steps,
+        "error": run.error,
+    }  # fmt: skip
+    if "hammer.bit.position" in columns:
+        place, time = columns["hammer.bit.position"], columns["time"]
+        half = len(time) // 2
+        found["depth"] = float(place[-1])
+        if len(time) > 2:
+            found["rate_second_half"] = float((place[-1] - place[half]) / (time[-1] - time[half]))
+    if "hammer.energy_residual" in columns:
+        found["hammer_energy_residual"] = float(np.max(np.abs(columns["hammer.energy_residual"])))
+    if all(f"string.energy.{name}" in columns for name in STRING_ENERGIES):
+        found |= _energies(columns)
+    return found
+
+
+def _energies(columns: dict[str, np.ndarray]) -> dict[str, float]:
+    """Residual of the string's energies, and the part of the shoulder."""
+    e = {name: columns[f"string.energy.{name}"] for name in STRING_ENERGIES}
+    put_in = e["head"] + e["reaction"] + e["weight"]
+    gone = e["bit"] + e["shoulder"] + e["wall"] + e["stored"] - e["stored"][0]
+    # what is stored at the start was not put in
+    residual = put_in - gone - (put_in - gone)[0]
+    scale = sum(float(np.max(np.abs(e[name]))) for name in ("head", "reaction", "weight"))
+    blows = columns.get("hammer.blow_energy")
+    found = {
+        "string_energy_residual": float(np.max(np.abs(residual))) / (scale or 1.0),
+        "shoulder_energy": float(e["shoulder"][-1]),
+        "feed_work": float(e["bit"][-1]),
+    }
+    if blows is not None and "hammer.blow_count" in columns:
+        total = float(columns["hammer.blow_count"][-1] * np.mean(blows[len(blows) // 2 :]))
+        if total > 0.0:
+            found["shoulder_by_blows"] = found["shoulder_energy"] / total
+    return found

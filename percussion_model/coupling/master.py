@@ -1,4 +1,4 @@
-"""The loop over the parts of a system.
+"""Co-simulation master: the loop over the parts of a system.
 
 fmpy reads the archive. Its own loop (`fmpy.ssp.simulation`) starts every input at 0, takes
 no parameters from the archive, keeps one order and every row, and loses all of them with
@@ -7,30 +7,41 @@ the first error; so the loop is here, with the same meaning of a step.
 
 from __future__ import annotations
 
+import gc
+import math
 import shutil
 import tempfile
 import time as clock
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 from fmpy import extract
 
-from percussion_model.coupling.archive import choose_values, input_starts, unpack
 from percussion_model.coupling.compiled import CompiledStep, can_compile
 from percussion_model.coupling.component import Component, CouplingError
 from percussion_model.coupling.coupled_run import CoupledRun
-from percussion_model.coupling.pace import PacedPort, check_pace, refuse_remainder
-from percussion_model.coupling.port import OnWay, Port
+from percussion_model.coupling.port import (
+    OnWay,
+    PacedPort,
+    Port,
+    check_pace,
+    refuse_remainder,
+)
 from percussion_model.coupling.python_part import PythonPart, Work
 from percussion_model.coupling.rejection import StepControl
-from percussion_model.coupling.stepping import little_collection, whole_steps
-from percussion_model.simulation.time_loop import stop_on_interrupt
+from percussion_model.coupling.ssp import input_starts, unpack
+from percussion_model.simulation.simulate import stop_on_interrupt
 
 Order = Literal["jacobi", "gauss-seidel"]
 # Passes over the outputs while all parts are initialised: as many as the longest chain.
 INITIAL_PASSES = 4
+# New objects that may be there before garbage is looked for.
+YOUNG = 50_000
+# A number of steps is whole if it misses by no more than this.
+ROUNDING = 1e-9
 
 
 class Coupling:
@@ -95,7 +106,12 @@ class Coupling:
                 known = self.parts[name].variables
                 values = archive.values[name]
                 archive.values[name] = {key: values[key] for key in values if key in known}
-        self._parameters = choose_values(archive, given, self.path.name)
+        self._parameters = archive.values
+        for signal, value in given.items():  # before those of the archive
+            component, _, variable = signal.partition(".")
+            if component not in archive.values:
+                raise CouplingError(f"{signal}: there is no FMU {component} in {self.path.name}")
+            archive.values[component][variable] = value
 
     @property
     def outputs(self) -> dict[str, list[str]]:
@@ -151,7 +167,7 @@ class Coupling:
             self._connect(list(signals))
             self._initialise()
             control = None if tolerance is None else StepControl(self.ports, step, tolerance)
-            with little_collection():
+            with rare_garbage_collection():
                 run = self._loop(count, step, every, control, progress)
             if run.interrupted and on_interrupt == "raise":
                 raise KeyboardInterrupt
@@ -170,8 +186,8 @@ class Coupling:
         names = [f"{port.name}.{name}" for port in self.ports for name in port.taken + port.kept]
         rows = [[0.0, *self._row()]]
         go, error, done, interrupted = self._stepping(count, control), "", 0, False
-        began = clock.perf_counter()
-        with stop_on_interrupt(keep=True) as asked_to_stop:
+        began, used = clock.perf_counter(), clock.process_time()
+        with stop_on_interrupt(keep=True) as stop:
             for k in range(count):
                 try:
                     go(k * step, step)
@@ -179,7 +195,7 @@ class Coupling:
                     error = f"at {k * step:.6g} s {failure}"
                     break
                 done = k + 1
-                interrupted = asked_to_stop()
+                interrupted = stop()
                 if done % every == 0 or done == count or interrupted:
                     rows.append([done * step, *self._row()])
                     if progress is not None:
@@ -187,16 +203,16 @@ class Coupling:
                 if interrupted:
                     error = f"at {done * step:.6g} s it was interrupted"
                     break
-        wall_time = clock.perf_counter() - began
+        times = clock.perf_counter() - began, clock.process_time() - used
         table = np.array(rows, dtype=float)
         columns = {name: table[:, k] for k, name in enumerate(["time", *names])}
-        run = CoupledRun(columns, step, done, error, wall_time=wall_time, interrupted=interrupted)
+        run = CoupledRun(columns, step, done, error, 0, 0, *times, interrupted)
         if control is not None:
             run.steps, run.tried, run.rejected = control.done, control.tried, control.rejected
         return run
 
     def _stepping(self, count: int, control: StepControl | None) -> Callable[[float, float], None]:
-        """What does a step: by Python, or by compiled code where that is possible."""
+        """Return what does a step: compiled code where that is possible, else Python."""
         if control is not None:
             return control.stepping(self.step)
         if self.compiled and can_compile(self.ports):
@@ -208,13 +224,13 @@ class Coupling:
         return self.step
 
     def _connect(self, signals: list[str]) -> None:
-        """Make what reads and sets; everything that is kept is read."""
+        """Make the ports; everything that is kept is read."""
         taken: dict[str, list[str]] = {name: [] for name in self.parts}
         kept: dict[str, list[str]] = {name: [] for name in self.parts}
         for links in self._links.values():
-            for _, source, output in links:
-                if output not in taken[source]:
-                    taken[source].append(output)
+            for link in links:
+                if link.output not in taken[link.source]:
+                    taken[link.source].append(link.output)
         for signal in signals:
             name, _, output = signal.partition(".")
             if name not in self.parts:
@@ -243,34 +259,30 @@ class Coupling:
         for _ in range(INITIAL_PASSES):
             for port in self.ports:
                 if isinstance(port.part, Component):
-                    port.take()
+                    port.read_outputs()
                 elif port.is_fed:
-                    port.give(0.0)
+                    port.set_inputs(0.0)
                     port.step(0.0, 0.0)
-                    port.take()
+                    port.read_outputs()
             for port in self.ports:
                 if port.is_fed:
-                    port.give(0.0)
+                    port.set_inputs(0.0)
         for part in self.parts.values():
             if isinstance(part, Component):
                 part.end_initialisation()
         for port in self.ports:
-            port.take()
+            port.read_outputs()
 
     def step(self, time: float, step: float) -> None:
         """Let all parts do a communication step [s]."""
-        ports = self.ports
-        if self.order == "gauss-seidel":
-            for port in ports:
-                port.give(time)
-                port.step(time, step)
-                port.take()
-            return
-        for port in ports:
-            port.give(time)
+        one_after_another = self.order == "gauss-seidel"
+        for port in self.ports:
+            port.set_inputs(time)
             port.step(time, step)
-        for port in ports:
-            port.take()
+            if one_after_another:
+                port.read_outputs()
+        for port in () if one_after_another else self.ports:
+            port.read_outputs()
 
     def _row(self) -> list[Any]:
         if self._compiled_step is not None:
@@ -285,4 +297,29 @@ class Coupling:
         shutil.rmtree(self._folder, ignore_errors=True)
 
 
-__all__ = ["CoupledRun", "Coupling", "Order"]
+@contextmanager
+def rare_garbage_collection() -> Iterator[None]:
+    """Collect garbage rarely, and not what is there already: a step makes hardly any."""
+    thresholds = gc.get_threshold()
+    gc.freeze()
+    gc.set_threshold(YOUNG, *thresholds[1:])
+    try:
+        yield
+    finally:
+        gc.set_threshold(*thresholds)
+        gc.unfreeze()
+
+
+def whole_steps(duration: float, step: float, interval: float | None) -> tuple[int, int]:
+    """Number of steps, and of steps between rows."""
+    given = {"duration": duration, "step": step}
+    if interval is not None:
+        given["interval"] = interval
+    for name, value in given.items():
+        if not 0.0 < value < math.inf:
+            raise CouplingError(f"{name} = {value!r} s: must be above 0 s")
+    count = math.floor(duration / step + ROUNDING)
+    if count < 1:
+        raise CouplingError(f"step = {step!r} s: is longer than the duration of {duration!r} s")
+    every = 1 if interval is None else max(1, round(interval / step))
+    return count, every

@@ -1,13 +1,14 @@
-"""A part of a system at its place in the loop: where its inputs come from, where its outputs go."""
+"""Ports: the parts of a system wired into the loop, each at its own pace."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from operator import itemgetter
 from typing import Any
 
-from percussion_model.coupling.component import CouplingError
+from percussion_model.coupling.component import Component, CouplingError
+from percussion_model.coupling.ssp import Link
 
 OnWay = Callable[[str, float, Any], Any]
 
@@ -20,8 +21,8 @@ class Port:
     Parameters
     ----------
     part : Component or PythonPart
-    links : sequence of tuple
-        Name of an input, component and output that it takes.
+    links : sequence of Link
+        Of its inputs.
     taken : sequence of str
         Outputs that other parts take.
     kept : sequence of str
@@ -33,7 +34,7 @@ class Port:
     def __init__(
         self,
         part: Any,
-        links: Sequence[tuple[str, str, str]],
+        links: Sequence[Link],
         taken: Sequence[str],
         kept: Sequence[str],
         on_way: OnWay | None,
@@ -43,12 +44,12 @@ class Port:
         self.reader, late = part.reader(taken), part.reader(kept)
         self.taken: list[str] = self.reader.names
         self.kept: list[str] = late.names
-        self.writer = part.writer([sink for sink, _, _ in links])
+        self.writer = part.writer([link.input for link in links])
         self.read: Callable[[], list[Any]] = self.reader.read
         self.read_kept: Callable[[], list[Any]] = late.read
         self.write: Callable[[Sequence[Any]], None] = self.writer.write
         self.begin = self.end = 0
-        self._links = {sink: (source, output) for sink, source, output in links}
+        self._links = {link.input: (link.source, link.output) for link in links}
 
     def connect(self, values: list[Any], places: dict[tuple[str, str], int]) -> None:
         """Find the places of inputs and outputs; `places` has those of all outputs."""
@@ -71,7 +72,7 @@ class Port:
         """Whether all inputs have a value."""
         return None not in [self.values[place] for place in self.places]
 
-    def give(self, time: float) -> None:
+    def set_inputs(self, time: float) -> None:
         """Set the inputs."""
         chosen = self._chosen(self.values)
         if self.on_way is not None:
@@ -80,15 +81,15 @@ class Port:
             chosen = tuple(change(signal, time, value) for signal, value in pairs)
         self.write(chosen)
 
-    def take(self) -> None:
+    def read_outputs(self) -> None:
         """Read the outputs that others take; they have to be numbers."""
         found = self.read()
         try:
-            sound = math.isfinite(sum(found))
+            are_finite = math.isfinite(sum(found))
         except TypeError:
-            said = dict(zip(self.taken, found, strict=False))
-            raise CouplingError(f"{self.name}: {said} are not all numbers") from None
-        if not sound:
+            given = dict(zip(self.taken, found, strict=False))
+            raise CouplingError(f"{self.name}: {given} are not all numbers") from None
+        if not are_finite:
             self.refuse(found)
         self.values[self.begin : self.end] = found
 
@@ -101,3 +102,62 @@ class Port:
     def row(self) -> list[Any]:
         """Values of all outputs that are kept."""
         return [*self.values[self.begin : self.end], *self.read_kept()]
+
+
+class PacedPort(Port):
+    """A part that does several steps of the loop as one.
+
+    It does so with the last of them, and takes the inputs that this one takes: those at its
+    beginning, and with Gauss-Seidel what parts before it gave in it. Until then the others
+    see what it gave before. So nothing is known before its time.
+    """
+
+    is_due = True
+    _every = _count = _done = _since = 0
+
+    def start(self, every: int, count: int) -> None:
+        """Do `every` steps at once from now on, and fewer at the end of `count` steps."""
+        self._every, self._count = every, count
+        self._whole_step, self.step = self.step, self._step
+
+    def set_inputs(self, time: float) -> None:
+        """Set the inputs where a step is due."""
+        if self._count:
+            self._done += 1
+            self._since += 1
+            self.is_due = self._since == self._every or self._done == self._count
+        if self.is_due:
+            super().set_inputs(time)
+
+    def _step(self, time: float, step: float) -> None:
+        if self.is_due:
+            before = self._since - 1
+            self._whole_step(time - before * step, step * self._since)
+
+    def read_outputs(self) -> None:
+        """Read the outputs where a step was done."""
+        if self.is_due:
+            super().read_outputs()
+            self._since = 0
+
+
+def check_pace(every: Mapping[str, int], components: Sequence[str]) -> dict[str, int]:
+    """Those parts that are slower than the loop; `CouplingError` if one is not known."""
+    for name, steps in every.items():
+        if name not in components:
+            raise CouplingError(
+                f"every {name}={steps}: there is no component {name}, only {', '.join(components)}"
+            )
+        if isinstance(steps, bool) or not isinstance(steps, int) or steps < 1:
+            raise CouplingError(f"every {name}={steps!r}: must be a whole number from 1")
+    return {name: steps for name, steps in every.items() if steps > 1}
+
+
+def refuse_remainder(every: Mapping[str, int], parts: Mapping[str, Any], count: int) -> None:
+    """Raise `CouplingError` for a part that would have a shorter last step, and takes none."""
+    for name, steps in every.items():
+        if count % steps and isinstance(parts[name], Component) and not parts[name].can_vary:
+            raise CouplingError(
+                f"every {name}={steps}: {name} takes no steps of varying size, and {count} steps "
+                f"are no multiple of {steps}"
+            )

@@ -13,7 +13,7 @@ Work = Callable[[dict[str, Any], float, float], Mapping[str, Any]]
 
 
 class Inputs(dict[str, Any]):
-    """Inputs by name; one that is asked for and not there is told with those that are."""
+    """Inputs by name; the error of a missing one names those that are there."""
 
     def __missing__(self, name: str) -> Any:
         raise CouplingError(f"there is no input {name!r}, only {', '.join(self)}")
@@ -45,44 +45,35 @@ class PythonPart:
             self.outputs = dict(self.work(Inputs(self.inputs), time, step))
         except Exception as error:
             kind = "" if isinstance(error, CouplingError) else f"{type(error).__name__}: "
-            raise CouplingError(f"{self.name}: {kind}{error}{_place(error)}") from error
+            raise CouplingError(f"{self.name}: {kind}{error}{_source_place(error)}") from error
 
-    def reader(self, names: Sequence[str]) -> PythonReader:
-        """What reads outputs."""
-        return PythonReader(self, names)
+    def reader(self, names: Sequence[str]) -> PythonSignals:
+        """Return a reader of outputs."""
+        return PythonSignals(self, names)
 
-    def writer(self, names: Sequence[str]) -> PythonWriter:
-        """What sets inputs."""
-        return PythonWriter(self, names)
+    writer = reader  # of inputs
 
 
-class PythonReader:
-    """Reads outputs of a Python callable."""
+class PythonSignals:
+    """Outputs of a Python callable that are read together, or inputs that are set together."""
 
     def __init__(self, part: PythonPart, names: Sequence[str]) -> None:
         self.part, self.names = part, list(names)
 
     def read(self) -> list[Any]:
-        """Present values."""
+        """Present values of outputs."""
         found = self.part.outputs
         lacking = sorted(name for name in self.names if name not in found)
         if lacking:
             raise CouplingError(f"{self.part.name} gave no {', '.join(lacking)}")
         return [found[name] for name in self.names]
 
-
-class PythonWriter:
-    """Sets inputs of a Python callable."""
-
-    def __init__(self, part: PythonPart, names: Sequence[str]) -> None:
-        self.part, self.names = part, list(names)
-
     def write(self, values: Sequence[Any]) -> None:
-        """Set values, in the order of the names."""
+        """Set inputs, in the order of the names."""
         self.part.inputs = self.part.starts | dict(zip(self.names, values, strict=True))
 
 
-def _place(error: Exception) -> str:
-    """Where in its file a fault of a callable is."""
+def _source_place(error: Exception) -> str:
+    """File and line of a fault in a callable."""
     frames = [at for at in traceback.extract_tb(error.__traceback__) if at.filename != __file__]
     return f" ({Path(frames[-1].filename).name}, line {frames[-1].lineno})" if frames else ""

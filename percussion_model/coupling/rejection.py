@@ -1,4 +1,4 @@
-"""Steps that are taken back where their error is too large.
+"""Step rejection: steps are taken back where their error is too large.
 
 A step is done whole and again as two halves; the difference of the forces that the parts
 exchange tells the error, and the halves count. A position that is wrong shows in them by the
@@ -33,8 +33,8 @@ class StepControl:
     longest : float
         Step [s].
     tolerance : float
-        Greatest difference of a force between one step and two halves, by the greatest force
-        so far [1]; of any number by its own size where the parts exchange no forces.
+        Greatest difference of a force between one step and two halves, divided by the greatest
+        force so far [1]; of any number, divided by its own size, where parts exchange no forces.
 
     Attributes
     ----------
@@ -61,14 +61,19 @@ class StepControl:
         self.done = self.tried = self.rejected = 0
         self._level = 0  # of the present step: longest / 2**level
         self._values = self.ports[0].values
-        self._watched = _forces(self.ports) or list(range(len(self._values)))
-        self._is_force = bool(_forces(self.ports))
+        forces = [
+            port.begin + k
+            for port in ports
+            for k, name in enumerate(port.taken)
+            if port.part.variables[name].unit == "N"
+        ]
+        self._compared, self._is_force = forces or list(range(len(self._values))), bool(forces)
         self._sizes = [abs(float(value)) for value in self._values]
 
     def stepping(self, step: Step) -> Step:
-        """What does a communication step by steps of its own choice."""
+        """Return what does a communication step by steps of its own choice."""
 
-        def go(time: float, length: float) -> None:
+        def step_controlled(time: float, length: float) -> None:
             ticks, at = 2**HALVINGS, 0
             while at < ticks:
                 # a longer step only where it fits the grid of its size
@@ -76,7 +81,7 @@ class StepControl:
                     self._level += 1
                 at += self._try(step, time, length, at)
 
-        return go
+        return step_controlled
 
     def _try(self, step: Step, time: float, length: float, at: int) -> int:
         """Do one step, by halves; return its ticks."""
@@ -102,7 +107,7 @@ class StepControl:
         for port, state in zip(self.ports, saved, strict=True):
             port.part.drop(state)
         self.done += 2
-        for place in self._watched:
+        for place in self._compared:
             self._sizes[place] = max(self._sizes[place], abs(self._values[place]))
         if error < SAFE_SHARE * self.tolerance and self._level > 0:
             self._level -= 1
@@ -115,22 +120,12 @@ class StepControl:
         self._values[:] = before
 
     def _error(self, whole: Sequence[Any]) -> float:
-        """Greatest difference from what one whole step gives, by size."""
-        greatest = max(self._sizes[place] for place in self._watched) if self._is_force else 0.0
+        """Greatest difference from the result of one whole step, divided by size."""
+        greatest = max(self._sizes[place] for place in self._compared) if self._is_force else 0.0
         error = 0.0
-        for place in self._watched:
-            now = self._values[place]
-            size = greatest or max(self._sizes[place], abs(now), abs(whole[place]))
-            if whole[place] != now:
-                error = max(error, abs(whole[place] - now) / size)
+        for place in self._compared:
+            halves = self._values[place]
+            size = greatest or max(self._sizes[place], abs(halves), abs(whole[place]))
+            if whole[place] != halves:
+                error = max(error, abs(whole[place] - halves) / size)
         return error
-
-
-def _forces(ports: Sequence[Port]) -> list[int]:
-    """Places of the forces that are exchanged."""
-    return [
-        port.begin + k
-        for port in ports
-        for k, name in enumerate(port.taken)
-        if port.part.variables[name].unit == "N"
-    ]

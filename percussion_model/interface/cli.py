@@ -1,4 +1,4 @@
-"""The command `percussion`; what it can do is in `percussion_model.interface.commands`."""
+"""The command `percussion`; its subcommands are in `percussion_model.interface.commands`."""
 
 from __future__ import annotations
 
@@ -13,16 +13,19 @@ from percussion_model.interface.commands.accuracy import accuracy
 from percussion_model.interface.commands.bench_controller import bench_controller
 from percussion_model.interface.commands.blow_map import blow_map
 from percussion_model.interface.commands.calibrate import calibrate
-from percussion_model.interface.commands.common import BAD_INPUT, INTERRUPTED, complain
+from percussion_model.interface.commands.common import (
+    BAD_INPUT,
+    INTERRUPTED,
+    own_process,
+    print_message,
+)
 from percussion_model.interface.commands.compare import compare
 from percussion_model.interface.commands.couple import couple
 from percussion_model.interface.commands.effects import effects
 from percussion_model.interface.commands.paper import paper
-from percussion_model.interface.commands.scene import explain, new, plot, run
-from percussion_model.interface.commands.settled import settled
+from percussion_model.interface.commands.scene import explain, new, plot, run, settled
 from percussion_model.interface.commands.stability import stability
 from percussion_model.interface.commands.study import study
-from percussion_model.interface.quick_start import own_process
 
 app = typer.Typer(
     help="Percussive drilling with travelling waves: piston, bit and rock, blow by blow.",
@@ -95,13 +98,17 @@ def _guarded(work: Callable[[], Any]) -> int:
         code = work()
         return code if isinstance(code, int) else 0
     except (KeyboardInterrupt, typer.Abort):
-        return complain("interrupted before there was a result", INTERRUPTED)
+        return print_message("interrupted before there was a result", INTERRUPTED)
     except Exception as error:
         if type(error).__module__.startswith("percussion_model."):
-            return complain(str(error), BAD_INPUT)
+            return print_message(str(error), BAD_INPUT)
         # Bad arguments: typer hides the class of its errors, which show themselves.
         show = getattr(error, "show", None)
         if show is None:
             raise
         show()
         return BAD_INPUT
+
+
+if __name__ == "__main__":
+    main()

@@ -1,22 +1,26 @@
-"""A result as one self-contained HTML page."""
+"""Reports: a result or a study as one self-contained HTML page."""
 
 from __future__ import annotations
 
+import platform
+import re
 from collections.abc import Iterable, Sequence
+from dataclasses import asdict
+from importlib import import_module
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
+import numpy as np
+from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from percussion_model.interface.page import (
-    FigureBlock,
-    inline_svg,
-    render,
-    without_zoom,
-    write_page,
-)
+from percussion_model.analysis.study import Study
 from percussion_model.interface.plotting import CAPTIONS, figures
-from percussion_model.simulation.result import Result
+from percussion_model.scene.parameters import find_row, parameter_table
+from percussion_model.scene.scene import Scene
+from percussion_model.simulation.files import staged
+from percussion_model.simulation.result import REPORT, Result
 
 # Numbers at the head of the report: key of the summary, what it is called, its
 # SI unit, the unit that people use and SI units in one of those.
@@ -76,6 +80,41 @@ LEDGER: tuple[tuple[str, tuple[tuple[str, str], ...]], ...] = (
     ),
     ("Unexplained", (("residual", "residual"),)),
 )
+# Figures of a study.
+STUDY_CAPTIONS = {
+    "map": (
+        "A map over two parameters and cuts through it; choose what is shown, and values of the "
+        "others by the sliders. Crosses mark points whose motion is not periodic."
+    ),
+    "scatter": (
+        "All points over each parameter. Blue is periodic, orange aperiodic. Points that are "
+        "chosen with a box or lasso in one panel stand out in all."
+    ),
+    "points": "All points and what was found there; a click on a heading sorts.",
+}
+# So many failed points are listed.
+MOST_FAILURES = 10
+PACKAGES = ("percussion_model", "numpy", "numba", "scipy", "matplotlib", "bokeh")
+
+
+class FigureBlock(NamedTuple):
+    """A figure as HTML and what it shows."""
+
+    html: Markup
+    caption: str
+
+
+def why_not_interactive() -> str:
+    """Return why figures of a page cannot be zoomed, nothing if they can."""
+    try:
+        import_module("percussion_model.interface.plotting.interactive")
+    except ImportError as error:
+        name = error.name or str(error)
+        return (
+            f"figures cannot be zoomed, since {name} is missing: "
+            "pip install 'percussion_model[report]'"
+        )
+    return ""
 
 
 def write_report(
@@ -103,7 +142,7 @@ def write_report(
     if figure_files is None:
         figure_files = figures(result, folder)
     page = render_report(result, [path for path in figure_files if path.suffix == ".svg"])
-    return write_page(folder, page)
+    return _write_page(folder, page)
 
 
 def render_report(result: Result, drawings: Sequence[Path]) -> str:
@@ -115,20 +154,20 @@ def render_report(result: Result, drawings: Sequence[Path]) -> str:
     drawings : sequence of Path
         SVG files, for figures that cannot be zoomed.
     """
-    blocks = {path.stem: inline_svg(path, CAPTIONS[path.stem]) for path in drawings}
-    remark, scripts = without_zoom(), ""
+    blocks = {path.stem: _inline_svg(path, CAPTIONS[path.stem]) for path in drawings}
+    remark, scripts = why_not_interactive(), ""
     if not remark:
-        from percussion_model.interface.plotting.zoom import embedded
-        from percussion_model.interface.plotting.zoom_run import zoomable
+        from percussion_model.interface.plotting.interactive import embedded
+        from percussion_model.interface.plotting.interactive_run import interactive_figures
 
-        made = zoomable(result)
+        made = interactive_figures(result)
         places, scripts = embedded(list(made.values()))
         blocks |= {name: Markup(place) for name, place in zip(made, places, strict=True)}
     summary = result.summary()
     scene = result.scene
-    # The run may have been asked for another length than the scene's.
+    # The run may have other times than the scene.
     ran = {"run.duration": result.duration, "run.settle": result.settle}
-    return render(
+    return _render(
         "report.html.j2",
         scene,
         ran,
@@ -140,7 +179,7 @@ def render_report(result: Result, drawings: Sequence[Path]) -> str:
         remark=remark,
         scripts=Markup(scripts),
         ledger=ledger_rows(result.energy),
-        computing=computing_rows(result),
+        computing=_computing_rows(result),
     )  # fmt: skip
 
 
@@ -179,8 +218,8 @@ def ledger_rows(energy: dict[str, float]) -> list[tuple[str, list[tuple[str, flo
     ]
 
 
-def computing_rows(result: Result) -> list[tuple[str, str]]:
-    """What was computed with, and how fast."""
+def _computing_rows(result: Result) -> list[tuple[str, str]]:
+    """Solver, grid, counts and speed."""
     rows = [("solver", result.solver)]
     if result.cells:
         rows.append(("cells", ", ".join(f"{n} in the {bar}" for bar, n in result.cells.items())))
@@ -191,3 +230,168 @@ def computing_rows(result: Result) -> list[tuple[str, str]]:
     if result.wall_time > 0:
         rows.append(("times real time", f"{result.real_time_factor:.3g}"))
     return rows
+
+
+def write_study_report(found: Study, folder: str | Path) -> Path:
+    """Write `report.html`, which needs no other file and no network.
+
+    Without bokeh it has no figures, and says so.
+
+    Parameters
+    ----------
+    found : Study
+    folder : str or Path
+        Made if it is not there.
+
+    Returns
+    -------
+    Path
+        The report.
+    """
+    return _write_page(Path(folder), render_study_report(found))
+
+
+def render_study_report(found: Study) -> str:
+    """Return the page as text."""
+    remark, scripts = why_not_interactive(), ""
+    blocks: list[FigureBlock] = []
+    if not remark:
+        from percussion_model.interface.plotting.interactive import embedded
+        from percussion_model.interface.plotting.interactive_study import interactive_study
+
+        made = interactive_study(found)
+        places, scripts = embedded(list(made.values()))
+        blocks = [
+            FigureBlock(Markup(place), STUDY_CAPTIONS[name])
+            for name, place in zip(made, places, strict=True)
+        ]
+    points = found.points
+    failed = [k for k, text in enumerate(found.failures) if text]
+    return _render(
+        "study.html.j2",
+        found.scene,
+        dict.fromkeys(points.keys, "varied"),
+        count=len(points),
+        headlines=found.headlines(),
+        axes=[_axis(found, k) for k in range(len(points.keys))],
+        failures=[
+            (", ".join(f"{key} = {value:.6g}" for key, value in points.changes(k).items()),
+             found.failures[k])
+            for k in failed[:MOST_FAILURES]
+        ],
+        failed=len(failed),
+        figures=blocks,
+        zoomable=bool(blocks),
+        remark=remark,
+        scripts=Markup(scripts),
+    )  # fmt: skip
+
+
+def _axis(found: Study, k: int) -> tuple[str, str, str, str, str, str]:
+    """Key, ends, count, unit and meaning of what was varied."""
+    key, values = found.points.keys[k], found.points.values[:, k]
+    row = found.scene.row_of(key)
+    ends = f"{values.min():.6g}", f"{values.max():.6g}"
+    return key, *ends, f"{len(np.unique(values)):,}", _shown_unit(row.unit), row.description
+
+
+def _write_page(folder: Path, page: str) -> Path:
+    """Write a page as the report of a folder."""
+    with staged(folder) as draft:
+        (draft / REPORT).write_text(page, encoding="utf-8")
+    return folder / REPORT
+
+
+def _render(template: str, scene: Scene, changed: dict[str, Any], **values: Any) -> str:
+    """Fill a template that shows a scene, with parameters that the run replaced."""
+    environment = Environment(
+        loader=PackageLoader("percussion_model.interface", "templates"),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=StrictUndefined,
+    )
+    return environment.get_template(template).render(
+        title=scene.title or "Percussive drilling",
+        parameters=_parameter_rows(scene, changed),
+        effects_on=scene.effects_on,
+        effects_off=scene.effects_off,
+        unused=scene.unused,
+        versions=_versions(),
+        **values,
+    )
+
+
+def _parameter_rows(scene: Scene, changed: dict[str, Any]) -> list[tuple[str, str, str, str]]:
+    """Key, value, unit and description of each parameter that has an influence."""
+    rows = []
+    for row in parameter_table():
+        if "*" in row.key or not scene.matters(row.key):
+            continue
+        if row.kind == "sections":
+            rows += _section_rows(scene, row.key, changed)
+            continue
+        value = changed.get(row.key, scene[row.key])
+        rows.append((row.key, _written(value), _shown_unit(row.unit), row.description))
+    return rows
+
+
+def _section_rows(
+    scene: Scene, sections: str, changed: dict[str, Any]
+) -> list[tuple[str, str, str, str]]:
+    rows = []
+    for k, section in enumerate(scene[sections]):
+        for name, value in asdict(section).items():
+            key = f"{sections}.{k}.{name}"
+            row = find_row(key)
+            assert row is not None
+            shown = _written(changed.get(key, value))
+            rows.append((key, shown, _shown_unit(row.unit), row.description))
+    return rows
+
+
+def _written(value: Any) -> str:
+    """A value as a page shows it."""
+    if value is None:
+        return "by default"
+    if isinstance(value, bool):
+        return "on" if value else "off"
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def _shown_unit(unit: str) -> str:
+    """A unit as a page shows it."""
+    return {"-": "–"}.get(unit, unit).replace("^2", "²").replace("^3", "³")
+
+
+def _versions() -> list[tuple[str, str]]:
+    """Versions of what the numbers were made with."""
+    found = [("Python", platform.python_version())]
+    for name in PACKAGES:
+        try:
+            found.append((name, version(name)))
+        except PackageNotFoundError:
+            continue
+    return found
+
+
+def _inline_svg(path: Path, caption: str) -> Markup:
+    """Read an SVG file for use inside a page.
+
+    The page knows the name spaces; names of parts get the file's name in
+    front, since several drawings share the page.
+    """
+    text = path.read_text(encoding="utf-8")
+    text = text[text.index("<svg") :]
+    text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
+    text = re.sub(r'\sxmlns(:\w+)?="[^"]*"', "", text)
+    text = re.sub(r'\sid="', f' id="{path.stem}-', text)
+    text = re.sub(r'href="#', f'href="#{path.stem}-', text)
+    text = text.replace("*{stroke", "svg *{stroke")  # its style sheet is for drawings only
+    text = text.replace("url(#", f"url(#{path.stem}-")
+    name = caption.split(".")[0]
+    # Only the page decides how wide a drawing is.
+    text = re.sub(r'(<svg\b[^>]*?)\swidth="[^"]*"', r"\1", text, count=1)
+    text = re.sub(r'(<svg\b[^>]*?)\sheight="[^"]*"', r"\1", text, count=1)
+    label = Markup.escape(name)
+    return Markup(text.replace("<svg", f'<svg role="img" aria-label="{label}"', 1))

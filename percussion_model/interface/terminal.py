@@ -1,4 +1,4 @@
-"""What the command line shows: tables, and a progress bar for long runs."""
+"""Terminal output of the command line: tables, warnings, progress bars."""
 
 from __future__ import annotations
 
@@ -14,13 +14,14 @@ from rich.markup import escape
 from rich.table import Table
 
 if TYPE_CHECKING:
-    from rich.progress import Progress, TaskID
-
+    from percussion_model.analysis.comparison import Comparison
     from percussion_model.analysis.cost import Forecast
     from percussion_model.analysis.stationary import Settled
     from percussion_model.analysis.study import Study
     from percussion_model.scene.scene import Scene
     from percussion_model.simulation.result import Result
+    from percussion_model.verification.hard_cases import Collection
+    from percussion_model.verification.paper.statements import Statement
 
 # A run that ends sooner shows no bar [s].
 _PATIENCE = 2.0
@@ -84,17 +85,15 @@ def show_settled(found: Settled) -> None:
         ("Blow period", "blow_period", 1e3, "ms"),
         ("Multiplier of the cycle", "multiplier", 1.0, ""),
     ):
-        table.add_row(name, f"{number(summary[key], factor)} {unit}".rstrip())
+        table.add_row(name, f"{_number(summary[key], factor)} {unit}".rstrip())
     table.add_row("Blows run", f"{len(found.blows)} in {found.duration:.4g} s")
     Console().print(table)
 
 
 def show_study(found: Study, files: list[Path]) -> None:
-    """Print what a study found, in short, and where it is."""
-    from percussion_model.analysis.study import headlines
-
+    """Print the headlines of a study, and its files."""
     table = Table(show_header=False)
-    for name, text in headlines(found):
+    for name, text in found.headlines():
         table.add_row(name, text)
     table.add_row("Written", ", ".join(str(path) for path in files))
     console = Console()
@@ -111,13 +110,13 @@ def show_warnings(console: Console, warnings: list[str]) -> None:
         console.print(f"[yellow]warning:[/yellow] {escape(text)}", highlight=False)
 
 
-def number(value: float | None, factor: float, digits: int = 5) -> str:
+def _number(value: float | None, factor: float, digits: int = 5) -> str:
     """Show a number in other units, `digits` of it, or a dash where there is none."""
     return "-" if value is None else f"{factor * value:.{digits}g}"
 
 
 def show_explanation(scene: Scene, found: Forecast) -> None:
-    """Print what would be computed and what it will cost."""
+    """Print what a scene computes, and its cost estimate."""
     solver = found.solver
     table = Table(title=escape(scene.title) or None, show_header=False)
     table.add_row("Effects on", ", ".join(scene.effects_on) or "none")
@@ -158,6 +157,90 @@ def show_explanation(scene: Scene, found: Forecast) -> None:
     Console().print(table)
 
 
+def show_comparison(found: Comparison) -> None:
+    """Print the numbers of several solvers, each beside its difference to the first."""
+    summaries, differences = found.summaries(), found.differences()
+    title = found.results[found.first].scene.title
+    table = Table(title=escape(title) or None)
+    table.add_column("", min_width=22)
+    for name in summaries:
+        table.add_column(name, justify="right", no_wrap=True)
+        if name in differences:
+            table.add_column("off, %", justify="right", no_wrap=True)
+    for label, key, factor, unit in SHOWN:
+        if key in ONLY_WHERE_KNOWN:
+            continue
+        cells = []
+        for name, summary in summaries.items():
+            cells.append(_number(summary[key], factor))
+            if name in differences:
+                off = differences[name].get(key)
+                cells.append("-" if off is None else f"{100.0 * off:+.2f}")
+        table.add_row(f"{label}, {unit}" if unit else label, *cells)
+    table.add_section()
+    for label, value in _EFFORT.items():
+        cells = []
+        for name, summary in summaries.items():
+            found_here = value(summary)
+            cells.append("-" if found_here is None else f"{found_here:.2g}")
+            cells += [""] * (name in differences)
+        table.add_row(label, *cells)
+    console = Console()
+    console.print(table)
+    show_warnings(console, found.warnings())
+
+
+# Cost of a run and closure of its ledger: name, and where in a summary.
+_EFFORT: dict[str, Callable[[dict[str, Any]], float | None]] = {
+    "Computed in, s": lambda summary: summary["wall_time"],
+    "Times real time": lambda summary: summary["real_time_factor"],
+    "Ledger: numerical": lambda summary: summary["energy"]["numerical_relative"],
+    "Ledger: residual": lambda summary: summary["energy"]["residual_relative"],
+}
+
+
+def show_stability(found: Collection) -> None:
+    """Print the measures of each solver on each hard case, and the failures."""
+    table = Table()
+    for name in ("case", "solver"):
+        table.add_column(name, no_wrap=True)
+    for name in ("mm/s", "residual", "momentum", "events/s", "guards", "s"):
+        table.add_column(name, justify="right", no_wrap=True)
+    for row in found.rows:
+        table.add_row(
+            row["case"],
+            row["solver"],
+            _number(row["rate"], 1e3, 4),
+            *(_number(row[key], 1.0, 2) for key in ("residual", "momentum", "events_per_second")),
+            str(row["guards"] or ""),
+            f"{row['wall_time']:.2g}",
+        )
+    console = Console()
+    console.print(table)
+    show_warnings(console, found.failures())
+    cases = len({row["case"] for row in found.rows})
+    failed = len(found.failures())
+    console.print(
+        f"{cases} cases, {len(found.rows)} runs, {failed} failures, "
+        f"{len(found.disagreements())} rates more than 2 % off the first solver's"
+    )
+
+
+def show_statements(statements: list[Statement]) -> None:
+    """Print what the paper says beside what was found."""
+    table = Table(show_lines=True)
+    for heading in ("section", "the paper says", "found here", ""):
+        table.add_column(heading)
+    for one in statements:
+        verdict = "[green]agrees[/green]" if one.agrees else "[yellow]differs[/yellow]"
+        table.add_row(one.place, escape(one.says), escape(one.found), verdict)
+    console = Console()
+    console.print(table)
+    for one in statements:
+        if one.why and not one.agrees:
+            console.print(f"{one.place}: {escape(one.why)}", highlight=False)
+
+
 @contextmanager
 def progress_bar(end: float) -> Iterator[Callable[[float], None] | None]:
     """Show a bar on stderr once a run in a terminal takes long.
@@ -178,19 +261,16 @@ def progress_bar(end: float) -> Iterator[Callable[[float], None] | None]:
     starter = threading.Timer(_PATIENCE, bar.start)
     starter.daemon = True
     starter.start()
+
+    def report(t: float) -> None:
+        bar.update(task, completed=t, total=max(t, end), description=f"{t:.4g} s of {end:g} s")
+
     try:
-        yield _reporter(bar, task, end)
+        yield report
     finally:
         starter.cancel()
         starter.join()
         bar.stop()
-
-
-@contextmanager
-def waiting_bar() -> Iterator[None]:
-    """Say on stderr that a long preparation goes on, in a terminal."""
-    with progress_bar(0.0):
-        yield
 
 
 @contextmanager
@@ -211,10 +291,3 @@ def count_bar(what: str) -> Iterator[Callable[[int, int], None] | None]:
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("", total=None)
         yield lambda done, total: bar.update(task, completed=done, total=total)
-
-
-def _reporter(bar: Progress, task: TaskID, end: float) -> Callable[[float], None]:
-    def report(t: float) -> None:
-        bar.update(task, completed=t, total=max(t, end), description=f"{t:.4g} s of {end:g} s")
-
-    return report

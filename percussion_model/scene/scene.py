@@ -7,8 +7,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Self
 
+from percussion_model.physics.effects import EFFECTS
 from percussion_model.scene.parameters import (
-    EFFECTS,
     GROUPS,
     BitBar,
     BlowMapOptions,

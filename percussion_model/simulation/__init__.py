@@ -1,1 +1,1 @@
-"""Runs of a scene and what they found."""
+"""Runs of a scene and their results."""

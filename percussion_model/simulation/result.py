@@ -1,8 +1,11 @@
-"""What a run found: blows, events, trace, energy ledger, warnings."""
+"""Result of a run: blows, events, trace, energy ledger, warnings; saved and loaded."""
 
 from __future__ import annotations
 
+import csv
+import json
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
@@ -11,18 +14,26 @@ import numpy as np
 
 from percussion_model.physics.records import BLOW, EVENT, EventKind
 from percussion_model.scene.scene import Scene
-from percussion_model.simulation.files import check_writable, read_result, write_result
-from percussion_model.simulation.warnings import find_warnings
+from percussion_model.simulation.files import ResultError, plain, staged, to_json
 
 if TYPE_CHECKING:
     import pandas
 
-    from percussion_model.solvers.base import Solver
-
-__all__ = ["Result", "check_writable", "make_result"]
+__all__ = ["Result"]
 
 # Fewer whole blows than this tell no rate.
 LEAST_BLOWS = 3
+
+# A longer trace goes into a compressed NumPy file.
+LONGEST_CSV = 100_000
+
+# What tells a result from any other folder.
+_MARKS = ("summary.json", "scene.toml")
+_TRACES = ("trace.csv", "trace.npz")
+# What is made of a result beside it: the page, and figures as PNG and SVG.
+REPORT = "report.html"
+FIGURES = ("overview", "bit_motion", "activation", "stress_waves")
+_DERIVED = (REPORT, *(f"{name}.{kind}" for name in FIGURES for kind in ("png", "svg")))
 
 
 @dataclass(frozen=True)
@@ -178,7 +189,8 @@ class Result:
             "statistics": self.statistics,
             "warnings": self.warnings,
         }
-        return {name: _plain(value) for name, value in numbers.items()}
+        values: dict[str, Any] = plain(numbers)
+        return values
 
     def to_pandas(self) -> pandas.DataFrame:
         """Blow table as a data frame."""
@@ -190,9 +202,8 @@ class Result:
         """Event list as a data frame; kinds as words."""
         from pandas import DataFrame
 
-        columns = {name: self.events[name] for name in EVENT.names or ()}
-        columns["kind"] = np.array([EventKind(k).name.lower() for k in self.events["kind"]], object)
-        return DataFrame(columns)
+        columns = _event_columns(self.events)
+        return DataFrame(columns | {"kind": np.array(columns["kind"], object)})
 
     def save(self, folder: str | Path) -> list[Path]:
         """Write summary, blows, events, trace and scene to a folder, in one go.
@@ -202,55 +213,15 @@ class Result:
         list of Path
             The files.
         """
-        return write_result(self, Path(folder))
+        return _write_result(self, Path(folder))
 
     @classmethod
     def load(cls, folder: str | Path) -> Self:
         """Read what `save` has written."""
-        return cls(**read_result(Path(folder)))
+        return cls(**_read_result(Path(folder)))
 
 
-_MEANS = (
-    "impact_velocity",
-    "rebound_velocity",
-    "stroke",
-    "blow_energy",
-    "rock_energy",
-)
-
-
-def make_result(
-    scene: Scene,
-    solver: Solver,
-    blows: np.ndarray,
-    events: np.ndarray,
-    trace: dict[str, np.ndarray] | None,
-    energy: dict[str, float],
-    statistics: dict[str, int],
-    times: tuple[float, float],
-    wall_time: float,
-    setup_time: float,
-) -> Result:
-    """Put a result together; `times` are its duration and settling time [s]."""
-    result = Result(
-        scene=scene,
-        solver=solver.name,
-        cells=dict(solver.cells),
-        time_step=solver.time_step,
-        wave_speed_error=solver.wave_speed_error,
-        duration=times[0],
-        settle=times[1],
-        blows=blows,
-        events=events,
-        trace=trace,
-        energy=energy,
-        statistics=statistics,
-        wall_time=wall_time,
-        setup_time=setup_time,
-        warnings=[],
-    )
-    result.warnings.extend(find_warnings(result))
-    return result
+_MEANS = ("impact_velocity", "rebound_velocity", "stroke", "blow_energy", "rock_energy")
 
 
 def _mean(values: np.ndarray) -> float:
@@ -269,12 +240,125 @@ def _ratio(rows: np.ndarray, name: str, by: str) -> float:
     return float(np.sum(rows[name])) / below if below > 0 else math.nan
 
 
-def _plain(value: Any) -> Any:
-    """Turn numbers that are not finite into None, in tables too."""
-    if isinstance(value, dict):
-        return {name: _plain(entry) for name, entry in value.items()}
-    if isinstance(value, list):
-        return [_plain(entry) for entry in value]
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    return value
+def _write_result(result: Result, folder: Path) -> list[Path]:
+    """Write a result to a folder; see `Result.save`.
+
+    What an earlier result left there goes: its trace, its figures and its report would
+    stand beside numbers that they do not belong to.
+    """
+    was_result = all((folder / name).is_file() for name in _MARKS)
+    left = (*_TRACES, *_DERIVED) if was_result else _TRACES
+    with staged(folder) as draft:
+        (draft / "summary.json").write_text(to_json(result.summary()) + "\n", encoding="utf-8")
+        (draft / "scene.toml").write_text(result.scene.to_toml(), encoding="utf-8")
+        blows = result.blows
+        _write_csv(draft / "blows.csv", {name: blows[name] for name in BLOW.names or ()})
+        _write_csv(draft / "events.csv", _event_columns(result.events))
+        if result.trace is not None:
+            _write_trace(draft, result.trace)
+        names = sorted(path.name for path in draft.iterdir())
+    for name in left:
+        if name not in names:
+            (folder / name).unlink(missing_ok=True)
+    return [folder / name for name in names]
+
+
+def _event_columns(events: np.ndarray) -> dict[str, Any]:
+    """Columns of the event list; kinds as words."""
+    columns = {name: events[name] for name in EVENT.names or ()}
+    return columns | {"kind": [EventKind(k).name.lower() for k in columns["kind"]]}
+
+
+def _write_trace(draft: Path, trace: dict[str, np.ndarray]) -> None:
+    if len(trace["time"]) <= LONGEST_CSV:
+        _write_csv(draft / "trace.csv", trace)
+    else:
+        arrays: dict[str, Any] = dict(trace)
+        np.savez_compressed(draft / "trace.npz", **arrays)
+
+
+def _write_csv(path: Path, columns: dict[str, Any]) -> None:
+    """Write columns with a heading; numbers keep all their digits."""
+    plain = [c.tolist() if isinstance(c, np.ndarray) else c for c in columns.values()]
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(columns)
+        writer.writerows(zip(*plain, strict=True))
+
+
+def _read_result(folder: Path) -> dict[str, Any]:
+    """Read the fields of a `Result` that was saved in a folder."""
+    if not folder.is_dir():
+        raise ResultError(f"{folder}: there is no such result folder")
+    missing = [name for name in _MARKS if not (folder / name).is_file()]
+    if missing:
+        raise ResultError(
+            f"{folder}: no result folder, it has no {' and no '.join(missing)}; "
+            "percussion run SCENE --out DIR writes one"
+        )
+    scene = Scene.from_toml(folder / "scene.toml")
+    try:
+        summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+        fields = {name: summary[name] for name in _FROM_SUMMARY}
+        fields["cells"] = fields["cells"] or {}
+        for name, value in fields["energy"].items():
+            fields["energy"][name] = math.nan if value is None else value
+        error = summary.get(_ERROR)  # unknown to older files
+        fields[_ERROR] = math.nan if error is None else error
+        blows = _read_csv(folder / "blows.csv", float)
+        events = _read_csv(folder / "events.csv", _number_or_kind)
+        tables = {"blows": _rows(blows, BLOW), "events": _rows(events, EVENT)}
+        return {"scene": scene, **fields, **tables, "trace": _read_trace(folder)}
+    except OSError as error:
+        raise ResultError(f"{error.filename}: cannot be read: {error.strerror}") from None
+    except (KeyError, ValueError, TypeError, StopIteration) as error:
+        raise ResultError(f"{folder}: not a complete result: {error!r}") from None
+
+
+_FROM_SUMMARY = (
+    "solver",
+    "cells",
+    "time_step",
+    "wave_speed_error",
+    "duration",
+    "settle",
+    "energy",
+    "statistics",
+    "wall_time",
+    "setup_time",
+    "warnings",
+)
+
+
+_ERROR = "rate_of_penetration_relative_error"
+
+
+def _number_or_kind(text: str) -> float:
+    kind = EventKind.__members__.get(text.upper())
+    return float(text) if kind is None else float(kind)
+
+
+def _read_csv(path: Path, convert: Callable[[str], float]) -> dict[str, Sequence[float]]:
+    with path.open(encoding="utf-8", newline="") as file:
+        reader = csv.reader(file)
+        names = next(reader)
+        rows = [[convert(text) for text in row] for row in reader]
+    columns = list(zip(*rows, strict=True)) or [()] * len(names)
+    return dict(zip(names, columns, strict=True))
+
+
+def _rows(columns: dict[str, Sequence[float]], dtype: np.dtype) -> np.ndarray:
+    rows = np.zeros(len(columns["time"]), dtype)
+    for name in dtype.names or ():
+        rows[name] = columns[name]
+    return rows
+
+
+def _read_trace(folder: Path) -> dict[str, np.ndarray] | None:
+    if (folder / "trace.npz").exists():
+        with np.load(folder / "trace.npz") as arrays:
+            return {name: arrays[name] for name in arrays.files}
+    if (folder / "trace.csv").exists():
+        columns = _read_csv(folder / "trace.csv", float)
+        return {name: np.array(column) for name, column in columns.items()}
+    return None

@@ -1,4 +1,4 @@
-"""`Runner`: a state that goes through time, without a table of what happened."""
+"""`Runner`: a state that is advanced in time, without tables of blows and events."""
 
 from __future__ import annotations
 
@@ -142,10 +142,11 @@ class Runner:
             raise SimulationError(f"after t = {self._time!r} s {self.solver.refusal(self._state)}")
         if status == Status.NOT_FINITE:
             raise SimulationError(f"{where} the state is no longer finite: check the scene")
-        raise SimulationError(f"{where} the solver found no way on ({Status(status).name.lower()})")
+        reason = Status(status).name.lower()
+        raise SimulationError(f"{where} the solver could not continue ({reason})")
 
     def sample_rows(self, times: np.ndarray) -> np.ndarray:
-        """Advance through rising `times` and tell what it is like at each.
+        """Advance through rising `times` and read the sample at each.
 
         Returns
         -------
@@ -183,12 +184,8 @@ class Runner:
             self._read(np.array([self._time]), np.empty((1, len(SAMPLE_FIELDS))))
             self._can_sample = True
 
-    def _checked(self, inputs: dict[str, float]) -> dict[str, float]:
-        """The inputs as numbers; raises `SimulationError` if one is not allowed."""
-        return {name: check_input(self._scene_rules, name, value) for name, value in inputs.items()}
-
     def set_inputs(self, **inputs: float) -> None:
-        """Change inputs at the first grid point from now on.
+        """Change inputs at the next grid point.
 
         Parameters
         ----------
@@ -197,12 +194,16 @@ class Runner:
             distance act at once, the rock from the next drilling cycle on. Units
             and bounds are those of the parameter table.
         """
-        values = self._checked(inputs)
+        values = {name: check_input(self._scene_rules, name, v) for name, v in inputs.items()}
         if not values:
             return
         began = time.perf_counter()
+        self._commit_inputs(values)
+        self.wall_time += time.perf_counter() - began
+
+    def _commit_inputs(self, values: dict[str, float]) -> None:
+        """Commit the state at its next grid point, and give it inputs that are checked."""
         t = self.solver.grid_point_after(self._state, self._time)
         self._commit_up_to(t)
         self._let(self.solver.commit, t)
         self.solver.set_inputs(self._state, **values)
-        self.wall_time += time.perf_counter() - began

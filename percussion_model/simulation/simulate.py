@@ -1,26 +1,202 @@
-"""The one time loop above the kernels: `Simulation` and `simulate`."""
+"""A run of a scene: `Simulation`, advanced step by step, and `simulate`, from start to end."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from typing import Literal
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from types import FrameType
+from typing import Any, Literal
 
 import numpy as np
 
-from percussion_model.physics.records import SAMPLE_FIELDS
+from percussion_model.physics.ledger import complete_ledger, energies
+from percussion_model.physics.records import BLOW, EVENT, READING, SAMPLE_FIELDS
 from percussion_model.scene.inputs import SimulationError
+from percussion_model.scene.rows import is_number
 from percussion_model.scene.scene import Scene, SceneError
-from percussion_model.simulation.accuracy import LONGEST, meet, time_needed
+from percussion_model.simulation.accuracy_control import LONGEST, run_to_accuracy, time_needed
 from percussion_model.simulation.result import Result
-from percussion_model.simulation.stepping import Simulation, Snapshot
-from percussion_model.simulation.time_loop import run_in_chunks, sampling_times, stop_on_interrupt
+from percussion_model.simulation.runner import Runner
+from percussion_model.simulation.warnings import find_warnings
+from percussion_model.solvers.state import State
 
 __all__ = ["Simulation", "SimulationError", "Snapshot", "simulate"]
 
+# Between chunks a run reports progress and can be interrupted: short enough in
+# wall time [s] to react at once, and at most so long in simulated time [s].
+_WANTED_CHUNK_TIME = 0.05
+_LONGEST_CHUNK = 50.0
+# The first is so short that even a very fine grid comes back soon [s].
+_FIRST_CHUNK = 1e-6
+_GROWTH = 4.0
+
+# More samples than this would fill the memory of a common computer.
+_MOST_SAMPLES = 20_000_000
+# Samples in a window where the solver has no time step.
+_WINDOW_SAMPLES = 1000
+# A sampling interval this close to dividing the duration does divide it.
+_ROUNDING = 1e-9
 # Share of the duration that settles where the scene's settling time is too long.
 _SETTLING_SHARE = 0.25
 
-_NO_TIMES = np.zeros(0)
+
+@dataclass(frozen=True)
+class Snapshot:
+    """A saved simulation; opaque, can be pickled."""
+
+    scene: Scene
+    time: float
+    state: State
+    blows: tuple[np.ndarray, ...]
+    events: tuple[np.ndarray, ...]
+
+
+class Simulation(Runner):
+    """A scene that is advanced from time to time, with its blows and events.
+
+    Reading is not touching: however an interval is divided into calls of
+    `advance`, and whatever is read between them, the bits are the same. Only
+    `set_inputs` commits the state, at the next grid point of the solver.
+
+    Parameters
+    ----------
+    scene : Scene
+    record_events : bool
+        Whether to keep the event list.
+    """
+
+    def __init__(self, scene: Scene, record_events: bool = True) -> None:
+        super().__init__(scene, record_events)
+        self.scene = scene
+        self._blows: tuple[np.ndarray, ...] = ()  # bytes of the rows
+        self._events: tuple[np.ndarray, ...] = ()
+
+    def _keep(self, blows: np.ndarray, events: np.ndarray) -> None:
+        if len(blows):
+            self._blows = _appended(self._blows, blows)
+        if len(events):
+            self._events = _appended(self._events, events)
+
+    @property
+    def blows(self) -> np.ndarray:
+        """Blows finished so far, rows of `BLOW`."""
+        self._blows = _joined(self._blows)
+        return self._blows[0].copy().view(BLOW) if self._blows else np.zeros(0, BLOW)
+
+    @property
+    def events(self) -> np.ndarray:
+        """Events so far in the order of time, rows of `EVENT`."""
+        self._events = _joined(self._events)
+        if not self._events:
+            return np.zeros(0, EVENT)
+        rows = self._events[0].view(EVENT)
+        return rows[np.argsort(rows["time"], kind="stable")]
+
+    def sample(self, times: Any) -> dict[str, np.ndarray]:
+        """Advance through rising `times` and read the sample at each.
+
+        Parameters
+        ----------
+        times : array_like
+            Not falling, not in the past [s].
+
+        Returns
+        -------
+        dict of ndarray
+            An array for each of `SAMPLE_FIELDS`.
+        """
+        return _columns(self.sample_rows(np.atleast_1d(np.asarray(times, dtype=float))))
+
+    def observe(self) -> dict[str, float]:
+        """Sample at the present time: `SAMPLE_FIELDS`, SI units."""
+        self._compile_sample()
+        row = np.empty((1, len(SAMPLE_FIELDS)))
+        self._read(np.array([self._time]), row)
+        return {name: float(row[0, k]) for k, name in enumerate(SAMPLE_FIELDS)}
+
+    def save(self) -> Snapshot:
+        """Return a snapshot to go back to; it can be pickled."""
+        return Snapshot(self.scene, self._time, self._state.copy(), self._blows, self._events)
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Go back to a snapshot; what follows repeats bit for bit."""
+        if not isinstance(snapshot, Snapshot):
+            raise SimulationError("not a snapshot made by Simulation.save")
+        if snapshot.scene is not self.scene and snapshot.scene != self.scene:
+            raise SimulationError("the snapshot is of another scene")
+        self._time = snapshot.time
+        self._state = snapshot.state.copy()
+        self._blows, self._events = snapshot.blows, snapshot.events
+
+    def energy(self) -> dict[str, float]:
+        """Energy ledger [J] at the present grid point; see `Result.energy`."""
+        return complete_ledger(energies(self._read_state()[0]))
+
+    def fields(self) -> dict[str, np.ndarray]:
+        """Force [N] and velocity [m/s] in each cell of the elastic bars, top to bottom.
+
+        At the last grid point up to the present; empty where no bar is elastic.
+        """
+        return self.solver.fields(self._read_state()[1])
+
+    def _read_state(self) -> tuple[np.ndarray, State]:
+        """Reading at the present time, and the copy of the state that it was made of."""
+        # after a change of inputs the state may lie a step ahead of the present
+        here = max(self._time, self.solver.time(self._state))
+        reading = np.zeros(1, READING)
+        return reading, self.solver.read(self._state, here, reading, peaks=False)
+
+    def statistics(self) -> dict[str, int]:
+        """Counts of what the solver did."""
+        return self.solver.statistics(self._state)
+
+    def result(
+        self, settle: float | None = None, trace: dict[str, np.ndarray] | None = None
+    ) -> Result:
+        """Everything found so far; means begin at `settle`, default that of the scene [s]."""
+        result = Result(
+            scene=self.scene,
+            solver=self.solver.name,
+            cells=dict(self.solver.cells),
+            time_step=self.solver.time_step,
+            wave_speed_error=self.solver.wave_speed_error,
+            duration=self._time,
+            settle=self.scene.run.settle if settle is None else settle,
+            blows=self.blows,
+            events=self.events,
+            trace=trace,
+            energy=self.energy(),
+            statistics=self.statistics(),
+            wall_time=self.wall_time,
+            setup_time=self.setup_time,
+            warnings=[],
+        )
+        result.warnings.extend(find_warnings(result))
+        return result
+
+
+def _appended(chunks: tuple[np.ndarray, ...], rows: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Add a copy of rows, as bytes; chunks halve in size from one to the next.
+
+    NumPy copies records field by field, which took a fifth of a whole run.
+    """
+    kept = [*chunks, rows.view(np.uint8).copy()]
+    while len(kept) > 1 and len(kept[-2]) <= len(kept[-1]):
+        kept[-2:] = [np.concatenate(kept[-2:])]
+    return tuple(kept)
+
+
+def _joined(chunks: tuple[np.ndarray, ...]) -> tuple[np.ndarray, ...]:
+    return chunks if len(chunks) < 2 else (np.concatenate(chunks),)
+
+
+def _columns(rows: np.ndarray) -> dict[str, np.ndarray]:
+    """Samples as an array for each of `SAMPLE_FIELDS`."""
+    return {name: rows[:, k].copy() for k, name in enumerate(SAMPLE_FIELDS)}
 
 
 def simulate(
@@ -69,68 +245,50 @@ def simulate(
     Raises
     ------
     SceneError, SimulationError
-        If the arguments make no sense or the run cannot go on.
+        If the arguments make no sense or the run cannot continue.
     """
-    scene, notes = _with_run_times(scene, duration, settle)
-    scene = _with_request(scene, accuracy, check)
+    scene, notes = _requested(scene, duration, settle, accuracy, check)
     windows = tuple(windows)
     sampling_times(scene.run.duration, None, trace, windows)  # refuses before anything is compiled
     wanted = scene.solver.accuracy
 
-    def once(chosen: Scene, longer: bool) -> Result:
-        grow = wanted if longer else None
-        return _run_once(chosen, trace, windows, record_events, progress, on_interrupt, grow)
+    def run_once(chosen: Scene, extend: bool) -> Result:
+        """Run a scene as it is; longer, until the standard error is as wanted, to `extend`."""
+        end = chosen.run.duration
+        longest = LONGEST * end
+        simulation = Simulation(chosen, record_events)
+        times = sampling_times(end, simulation.solver.time_step, trace, windows)
+        with stop_on_interrupt(on_interrupt == "keep") as stop:
+            rows = run_in_chunks(simulation, end, times, progress, stop)
+            while extend and wanted is not None and not stop():
+                end = min(time_needed(simulation.result(), wanted), longest)
+                if end <= simulation.time:
+                    break
+                run_in_chunks(simulation, end, np.zeros(0), progress, stop)
+        result = simulation.result(trace=_columns(rows) if len(times) else None)
+        if result.cut_short:
+            result.warnings.append(f"interrupted at t = {simulation.time:.6g} s")
+        return result
 
-    result = once(scene, False) if wanted is None else meet(scene, once)
+    result = run_once(scene, False) if wanted is None else run_to_accuracy(scene, run_once)
     result.warnings.extend(notes)
     return result
 
 
-def _run_once(
+def _requested(
     scene: Scene,
-    trace: float | None,
-    windows: Iterable[tuple[float, float]],
-    record_events: bool,
-    progress: Callable[[float], None] | None,
-    on_interrupt: Literal["raise", "keep"],
-    wanted: float | None,
-) -> Result:
-    """Run a scene as it is; on and on until the standard error is as `wanted`, if given."""
-    end = scene.run.duration
-    longest = LONGEST * end
-    simulation = Simulation(scene, record_events)
-    times = sampling_times(end, simulation.solver.time_step, trace, windows)
-    with stop_on_interrupt(on_interrupt == "keep") as stop:
-        rows = run_in_chunks(simulation, end, times, progress, stop)
-        while wanted is not None and not stop():
-            end = min(time_needed(simulation.result(), wanted), longest)
-            if end <= simulation.time:
-                break
-            run_in_chunks(simulation, end, _NO_TIMES, progress, stop)
-    columns = None
-    if len(times):
-        columns = {name: rows[:, k].copy() for k, name in enumerate(SAMPLE_FIELDS)}
-    result = simulation.result(trace=columns)
-    if result.cut_short:
-        result.warnings.append(f"interrupted at t = {simulation.time:.6g} s")
-    return result
-
-
-def _with_request(scene: Scene, accuracy: float | None, check: bool | None) -> Scene:
-    """Return the scene with what is asked of its accuracy."""
-    changes = {"solver.accuracy": accuracy, "run.check": check}
-    given = {key: value for key, value in changes.items() if value is not None}
-    scene = scene.replace(**given) if given else scene
-    if scene.run.check and scene.solver.accuracy is None:
-        raise SceneError("run.check = true verifies solver.accuracy: set that too")
-    return scene
-
-
-def _with_run_times(
-    scene: Scene, duration: float | None, settle: float | None
+    duration: float | None,
+    settle: float | None,
+    accuracy: float | None,
+    check: bool | None,
 ) -> tuple[Scene, list[str]]:
-    """Return the scene with its run times replaced, and what to warn of."""
-    changes = {"run.duration": duration, "run.settle": settle}
+    """Return the scene with the request of a run in it, and what to warn of."""
+    changes = {
+        "run.duration": duration,
+        "run.settle": settle,
+        "solver.accuracy": accuracy,
+        "run.check": check,
+    }
     given = {key: value for key, value in changes.items() if value is not None}
     notes = []
     longest = scene.run.settle
@@ -140,4 +298,112 @@ def _with_run_times(
             f"run.settle = {longest!r} s is not below the duration of {duration!r} s: "
             f"blows count from {_SETTLING_SHARE * duration!r} s on"
         )
-    return (scene.replace(**given) if given else scene), notes
+    scene = scene.replace(**given) if given else scene
+    if scene.run.check and scene.solver.accuracy is None:
+        raise SceneError("run.check = true verifies solver.accuracy: set that too")
+    return scene, notes
+
+
+def run_in_chunks(
+    run: Simulation,
+    end: float,
+    times: np.ndarray,
+    progress: Callable[[float], None] | None,
+    stop: Callable[[], bool],
+) -> np.ndarray:
+    """Advance a run to `end` and sample it at `times`.
+
+    Chunks change no bit of the run, since reading is not touching.
+
+    Returns
+    -------
+    ndarray, shape (m, len(SAMPLE_FIELDS))
+        Samples; fewer than `times` after an interruption.
+    """
+    rows = np.empty((len(times), len(SAMPLE_FIELDS)))
+    done = 0
+    chunk = _FIRST_CHUNK
+    while run.time < end and not stop():
+        began = time.perf_counter()
+        t = min(run.time + chunk, end)
+        until = int(np.searchsorted(times, t, side="right"))
+        if until > done:
+            rows[done:until] = run.sample_rows(times[done:until])
+        done = until
+        run.advance(t)
+        if progress is not None:
+            progress(t)
+        taken = time.perf_counter() - began
+        if taken < _WANTED_CHUNK_TIME / _GROWTH:
+            chunk = min(chunk * _GROWTH, _LONGEST_CHUNK)
+        elif taken > _WANTED_CHUNK_TIME * _GROWTH:
+            chunk = max(chunk / _GROWTH, _FIRST_CHUNK)
+    return rows[:done]
+
+
+def sampling_times(
+    end: float,
+    time_step: float | None,
+    interval: float | None,
+    windows: Iterable[tuple[float, float]],
+) -> np.ndarray:
+    """Times of a trace: every `interval`, and each step within the windows [s]."""
+    parts = [np.zeros(0)]
+    if interval is not None:
+        if not is_number(interval) or not interval > 0:
+            raise SimulationError(f"trace = {interval!r}: must be a sampling interval above 0 s")
+        _refuse_too_many(end / interval)
+        count = int(np.floor(end / interval * (1.0 + _ROUNDING)))
+        parts.append(np.minimum(np.arange(count + 1) * interval, end))
+    for window in windows:
+        start, stop = _checked_window(window, end)
+        if time_step is None:
+            parts.append(np.linspace(start, stop, _WINDOW_SAMPLES))
+            continue
+        _refuse_too_many((stop - start) / time_step)
+        first, last = np.ceil(start / time_step), np.floor(stop / time_step)
+        parts.append(np.arange(first, last + 1) * time_step)
+    return np.unique(np.concatenate(parts))
+
+
+def _checked_window(window: tuple[float, float], end: float) -> tuple[float, float]:
+    start, stop = window
+    if not (is_number(start) and is_number(stop) and 0 <= start < stop <= end):
+        raise SimulationError(
+            f"window {start!r} to {stop!r} s: must rise and lie within the {end!r} s of the run"
+        )
+    return float(start), float(stop)
+
+
+def _refuse_too_many(count: float) -> None:
+    if count > _MOST_SAMPLES:
+        raise SimulationError(
+            f"the trace would have {count:.3g} samples, more than {_MOST_SAMPLES:.0g}: "
+            "sample less often or in shorter windows"
+        )
+
+
+@contextmanager
+def stop_on_interrupt(keep: bool) -> Iterator[Callable[[], bool]]:
+    """Turn Ctrl-C into a wish to stop at the end of a chunk; a second one raises.
+
+    Yields
+    ------
+    callable
+        Whether to stop.
+    """
+    if not keep or threading.current_thread() is not threading.main_thread():
+        yield lambda: False
+        return
+    wishes: list[int] = []
+
+    def note(number: int, frame: FrameType | None) -> None:
+        if wishes:
+            raise KeyboardInterrupt
+        wishes.append(number)
+
+    previous = signal.signal(signal.SIGINT, note)
+    try:
+        yield lambda: bool(wishes)
+    finally:
+        signal.signal(signal.SIGINT, previous)

@@ -1,6 +1,6 @@
-"""Where a run leaves what the model can tell, and what its guards had to do.
+"""Limits of validity of a run, and notes on what its guards had to do.
 
-Standard library only: an exported simulation asks the same questions.
+Standard library only: an exported simulation gives the same notes.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def guard_notes(statistics: Mapping[str, int]) -> Iterator[str]:
     if storms:
         yield (
             f"{storms} storm{'s' if storms != 1 else ''} of events: more within a moment than can "
-            "mean anything; rebounds were left out or events put off: bounded but not exact"
+            "mean anything; rebounds were left out or events postponed: bounded but not exact"
         )
 
 

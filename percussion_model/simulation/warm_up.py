@@ -1,4 +1,4 @@
-"""Compile all kernels once, so that later starts only load them.
+"""Compilation of all kernels, once, so that later starts only load them.
 
 `python -m percussion_model.simulation.warm_up` is a part of the installation.
 """
@@ -10,7 +10,7 @@ from concurrent.futures import ProcessPoolExecutor
 import numpy as np
 
 from percussion_model.scene.scene import Scene
-from percussion_model.simulation.stepping import Simulation
+from percussion_model.simulation.simulate import Simulation
 from percussion_model.solvers.blow_map.records import ENTRIES
 from percussion_model.solvers.blow_map.solver import BlowMapSolver
 from percussion_model.solvers.blow_map.table import BlowTable, Nodes, fixed_values

@@ -1,14 +1,14 @@
-"""What the reader of a result must know before trusting it."""
+"""Warnings that a result carries: what limits the trust in its numbers."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from percussion_model.physics.records import EventKind
+from percussion_model.simulation.result import LEAST_BLOWS, Result
 from percussion_model.simulation.validity import (
     button_note,
     flight_note,
@@ -17,11 +17,10 @@ from percussion_model.simulation.validity import (
     rate_note,
 )
 
-if TYPE_CHECKING:
-    from percussion_model.simulation.result import Result
-
 # A larger error of the wave speed shows in the answers.
 MOST_WAVE_SPEED_ERROR = 1e-3
+# Entries of the ledger that put energy in.
+_FLOWS = ("initial", "drive", "feed", "gravity")
 
 
 def find_warnings(result: Result) -> Iterator[str]:
@@ -29,7 +28,6 @@ def find_warnings(result: Result) -> Iterator[str]:
     yield from _about_scene(result)
     yield from _about_grid(result)
     yield from _about_blows(result)
-    yield from _about_trust(result)
     yield from _about_validity(result)
 
 
@@ -102,20 +100,17 @@ def _about_blows(result: Result) -> Iterator[str]:
         yield "there is no piston, so there are no blows: the rate of penetration is undefined"
     elif len(result.blows) == 0:
         yield "no whole blow in this run: the rate of penetration is undefined"
-    elif count < 3:
+    elif count < LEAST_BLOWS:
         yield (
-            f"only {count} whole blow{'s' if count != 1 else ''} after settling, fewer than 3: "
-            "the rate of penetration is undefined; run longer"
+            f"only {count} whole blow{'s' if count != 1 else ''} after settling, fewer than "
+            f"{LEAST_BLOWS}: the rate of penetration is undefined; run longer"
         )
 
 
-def _about_trust(result: Result) -> Iterator[str]:
+def _about_validity(result: Result) -> Iterator[str]:
     if any(result.energy[name] for name in _FLOWS):
         yield from ledger_note(result.energy["residual_relative"], result.solver)
     yield from guard_notes(result.statistics)
-
-
-def _about_validity(result: Result) -> Iterator[str]:
     scene = result.scene
     if scene.effects.rock == "none":
         return
@@ -143,6 +138,3 @@ def longest_flight(result: Result) -> float:
     times = np.concatenate([[0.0], modes["time"], [result.duration]])
     flying = np.concatenate([[True], modes["kind"] == EventKind.MODE_FF])
     return float(np.max(np.diff(times)[flying], initial=0.0))
-
-
-_FLOWS = ("initial", "drive", "feed", "gravity")

@@ -48,21 +48,23 @@ class RockNumbers(NamedTuple):
     w_r: float
 
 
-def barrier_on(values: Any) -> bool:
+def barrier_on(numbers: Numbers) -> bool:
     """Whether the rock law has an energy barrier (mode DFC)."""
+    values = numbers.values
     if not values.effects_barrier or ROCKS[values.effects_rock] != RockKind.BILINEAR:
         return False
     return bool(values.rock_barrier_energy > 0.0 and values.rock_barrier_damping > 0.0)
 
 
-def kelvin_voigt_time(values: Any) -> float:
+def kelvin_voigt_time(numbers: Numbers) -> float:
     """Kelvin-Voigt time of elastic bars, 0 without loss [s]."""
-    return float(values.loss_time) if values.effects_loss else 0.0
+    return float(numbers.values.loss_time) if numbers.values.effects_loss else 0.0
 
 
-def rock_numbers(values: Any) -> RockNumbers:
-    """Numbers of the rock law; values as in `Numbers`."""
-    kind, barrier = ROCKS[values.effects_rock], barrier_on(values)
+def rock_numbers(numbers: Numbers) -> RockNumbers:
+    """Numbers of the rock law."""
+    values, barrier = numbers.values, barrier_on(numbers)
+    kind = ROCKS[values.effects_rock]
     return RockNumbers(
         values.rock_loading_stiffness if kind != RockKind.NONE else 0.0,
         values.rock_unloading_ratio if kind == RockKind.BILINEAR else 1.0,
@@ -93,7 +95,7 @@ def fill_parameters(p: Any, numbers: Numbers, with_piston: bool) -> None:
     p["piston"] = PISTONS[values.piston_model]
     p["drive"] = DRIVES[values.effects_drive]
     p["rock"] = ROCKS[values.effects_rock]
-    p["barrier"] = barrier_on(values)
+    p["barrier"] = barrier_on(numbers)
     p["release"] = values.effects_standstill_tension == StandstillTension.RELEASE
     for effect in EFFECTS:
         if getattr(values, f"effects_{effect.name}"):
@@ -102,16 +104,16 @@ def fill_parameters(p: Any, numbers: Numbers, with_piston: bool) -> None:
                 p[f"{effect.name}_{name}"] = getattr(values, f"{effect.name}_{name}")
 
 
-def fill_start(s: Any, values: Any) -> None:
+def fill_start(s: Any, numbers: Numbers) -> None:
     """Fill what states have in common (`COMMON_STATE`) at time zero.
 
     Parameters
     ----------
     s : record
         Changed in place.
-    values : Values
-        As in `Numbers`.
+    numbers : Numbers
     """
+    values, rock = numbers.values, rock_numbers(numbers)
     has_piston = PISTONS[values.piston_model] != Piston.ABSENT
     direction = DIRECTIONS[values.start_drive_direction]
     s["live"] = 1
@@ -122,7 +124,6 @@ def fill_start(s: Any, values: Any) -> None:
     s["drive_force"] = values.drive_force
     s["reversal"] = values.drive_reversal_distance
     s["external"] = values.drive_external_force
-    rock = rock_numbers(values)
     s["k_r"] = s["next_k_r"] = rock.k_r
     s["gamma"] = s["next_gamma"] = rock.gamma
     s["c_r"] = s["next_c_r"] = rock.c_r

@@ -15,8 +15,7 @@ from percussion_model.interface.commands.accuracy_tables import show_study
 from percussion_model.verification.accuracy import study
 from percussion_model.verification.accuracy.integrators import GeneralRun
 from percussion_model.verification.accuracy.ladders import LADDERS, fem_scene, ladders
-from percussion_model.verification.accuracy.problems import APERIODIC, Run, pose
-from percussion_model.verification.accuracy.quantities import HISTORY, RATE
+from percussion_model.verification.accuracy.problems import APERIODIC, HISTORY, RATE, Run, pose
 from percussion_model.verification.accuracy.timing import interleaved
 
 # The package offers a function of the same name.
@@ -92,7 +91,10 @@ def test_json_has_what_it_promises(found):
 
 
 def test_table_and_figures(found, tmp_path, capsys):
-    from percussion_model.interface.plotting.accuracy import draw_accuracy, draw_quantities
+    from percussion_model.interface.plotting.error_against_time import (
+        draw_accuracy,
+        draw_quantities,
+    )
 
     show_study(found)
     shown = capsys.readouterr().out

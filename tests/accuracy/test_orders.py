@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from percussion_model.verification.accuracy.orders import cost_at, fitted_order
-from percussion_model.verification.accuracy.quantities import (
+from percussion_model.verification.accuracy.problems import (
     HISTORY,
     Answer,
     batch_means,

@@ -10,26 +10,29 @@ import numpy as np
 import pytest
 
 from percussion_model import Scene
-from percussion_model.verification.accuracy.closed_forms import closed_forms, found_by
-from percussion_model.verification.accuracy.problems import DROP, PERIODIC, Run, pose
-from percussion_model.verification.accuracy.quantities import (
+from percussion_model.verification.accuracy.closed_forms import closed_forms, solver_error
+from percussion_model.verification.accuracy.problems import (
+    DROP,
     HISTORY,
+    PERIODIC,
     QUANTITIES,
     RATE,
+    Run,
+    pose,
     relative_error,
 )
-from percussion_model.verification.accuracy.reference_store import (
+from percussion_model.verification.accuracy.references import (
+    CLOSE,
     Reference,
     fingerprint,
+    load_references,
     package_store,
-    store,
-    stored,
+    save_references,
 )
-from percussion_model.verification.accuracy.references import CLOSE
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 SCENES = ("reference", "drop_test", "stiff_rock", "chatter", "top_hammer", "aperiodic")
-STORED = stored()
+STORED = load_references()
 CLOSED = {case.name: case for case in closed_forms()}
 
 
@@ -80,10 +83,10 @@ def test_the_reference_scene_is_known_by_what_it_says_not_by_how_it_is_written()
 
 def test_references_survive_their_file(tmp_path):
     path = tmp_path / "references.json"
-    store(path, STORED)
+    save_references(path, STORED)
     assert json.loads(path.read_text()) == json.loads(package_store().read_text())
-    assert stored(path).keys() == STORED.keys()
-    assert stored(tmp_path / "none.json") == {}
+    assert load_references(path).keys() == STORED.keys()
+    assert load_references(tmp_path / "none.json") == {}
 
 
 def test_the_waves_find_the_reference_scene():
@@ -99,11 +102,11 @@ def test_the_waves_find_the_reference_scene():
 @pytest.mark.parametrize("name", CLOSED)
 def test_waves_meet_closed_forms(name):
     """No loss, one section: nothing but the start of the front is averaged."""
-    assert found_by(CLOSED[name], "wave", 20) < 1e-7
+    assert solver_error(CLOSED[name], "wave", 20) < 1e-7
 
 
 @pytest.mark.parametrize("name", CLOSED)
 def test_elements_come_closer_to_closed_forms_with_the_mesh(name):
-    errors = [found_by(CLOSED[name], "fem", count) for count in (20, 80)]
+    errors = [solver_error(CLOSED[name], "fem", count) for count in (20, 80)]
     assert errors[1] < 0.75 * errors[0]
     assert errors[1] < 1e-2

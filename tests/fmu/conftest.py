@@ -8,8 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from fmu_src.hammer import build_hammer
-from fmu_src.pneumatics import build_pneumatics
+from fmu_src.hammer.build import build_hammer
+from fmu_src.parts import pneumatic_drive
+from fmu_src.parts.build import build_part
 from percussion_model import Scene
 from scenarios.harness import Instance
 
@@ -28,7 +29,7 @@ def fmus(tmp_path_factory):
     folder = tmp_path_factory.mktemp("fmus")
     build_hammer(Scene(), folder / "PercussiveHammer.fmu")
     build_hammer(Scene().replace(**RIGID), folder / "RigidHammer.fmu")
-    build_pneumatics(folder / "PneumaticDrive.fmu")
+    build_part(pneumatic_drive.TABLE, folder / "PneumaticDrive.fmu")
     return folder
 
 

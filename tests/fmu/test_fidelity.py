@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from blow_map_scenes import mapped
 
-from fmu_src.hammer import build_hammer
+from fmu_src.hammer.build import build_hammer
 from percussion_model import Scene, Simulation
 from percussion_model.analysis.blow_maps import make_map
 from percussion_model.scene.scene import SceneError

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from fmpy.fmi1 import FMICallException
 
-from fmu_src.runtime.states import HEADER, MAGIC, VERSION
+from fmu_src.slave.states import HEADER, MAGIC, VERSION
 
 ROOT = Path(__file__).parents[2]
 STEP = 1.9e-3

@@ -15,9 +15,9 @@ from percussion_model import Scene
 from percussion_model.interface.cli import INTERRUPTED, _guarded, app
 from percussion_model.scene.inputs import SimulationError
 from percussion_model.verification.hard_cases import SOLVERS, hard_cases, measure, run_collection
-from percussion_model.verification.hard_cases.collection import Collection, wrong
-from percussion_model.verification.hard_cases.page import page
+from percussion_model.verification.hard_cases.collection import Collection, violations
 from percussion_model.verification.hard_cases.refinement import refine
+from percussion_model.verification.hard_cases.stability_page import page
 
 PAGE = Path(__file__).parents[2] / "docs" / "stability.md"
 LONG = os.environ.get("PERCUSSION_LONG") == "1"
@@ -66,7 +66,7 @@ def test_what_must_hold_of_every_run(name, solver):
     if (name, solver) in DEAR and not LONG:
         pytest.skip("takes seconds: PERCUSSION_LONG=1 runs it")
     found = measure(hard_cases()[name], solver, 1.0 if LONG else SHARES[solver])
-    assert wrong(found.to_dict()) == []
+    assert violations(found.to_dict()) == []
     assert found.duration > 0.0
 
 
@@ -111,8 +111,8 @@ ROW = {
     ],
 )
 def test_what_does_not_hold_is_found(change, words):
-    assert wrong(ROW) == []
-    (text,) = wrong(ROW | change)
+    assert violations(ROW) == []
+    (text,) = violations(ROW | change)
     assert words in text
 
 

@@ -10,23 +10,23 @@ import pytest
 
 from percussion_model import simulate
 from percussion_model.interface.plotting.window import last_blow_window
-from percussion_model.verification.paper import paper_scene
-from percussion_model.verification.paper.drop import run_drops
-from percussion_model.verification.paper.statements import (
-    SAME_EXPONENT,
-    about_cycle,
-    about_drops,
-    about_sweeps,
-)
-from percussion_model.verification.paper.sweeps import (
+from percussion_model.verification.paper.runs import (
     SWEEPS,
     Sweep,
     along,
     force_at_constant_power,
     maxima,
+    paper_scene,
     power_law,
+    run_drops,
     run_sweep,
     straight_line,
+)
+from percussion_model.verification.paper.statements import (
+    SAME_EXPONENT,
+    about_cycle,
+    about_drops,
+    about_sweeps,
 )
 
 

@@ -11,9 +11,9 @@ import pytest
 from percussion_model.coupling import CouplingError
 from percussion_model.coupling.bench import TRIALS, bench, judge, total
 from percussion_model.coupling.coupled_run import CoupledRun
+from percussion_model.interface.bench_page import write_bench_page
 from percussion_model.interface.cli import main
 from percussion_model.interface.commands.bench_controller import COLUMNS
-from percussion_model.interface.plotting.bench import save_bench
 
 
 def nothing(inputs, time, step):
@@ -171,7 +171,7 @@ def test_a_run_fails_for_a_reason(changes, faults):
 
 def test_the_page_says_what_a_stranger_needs(tmp_path):
     scores = [judge(TRIALS[0], made_up(3000.0)), judge(TRIALS[3], made_up(2000.0))]
-    page = save_bench(scores, total(scores), COLUMNS, tmp_path, "<mine>").read_text("utf-8")
+    page = write_bench_page(scores, total(scores), COLUMNS, tmp_path, "<mine>").read_text("utf-8")
     assert "Controller bench: &lt;mine&gt;" in page
     assert "1 of 2 runs failed: void" in page
     assert page.count("<img alt=") == 2
@@ -186,12 +186,12 @@ def test_the_page_says_what_a_stranger_needs(tmp_path):
 def test_a_page_that_cannot_be_finished_leaves_the_old_one(tmp_path):
     """Its figures too: they would belong to another run."""
     scores = [judge(TRIALS[0], made_up(3000.0))]
-    save_bench(scores, total(scores), COLUMNS, tmp_path, "first")
+    write_bench_page(scores, total(scores), COLUMNS, tmp_path, "first")
     before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
     scores = [judge(TRIALS[0], made_up(2900.0)), judge(TRIALS[3], made_up(2000.0))]
     del scores[1].run.columns["hammer.bit.position"]
     with pytest.raises(KeyError):
-        save_bench(scores, total(scores), COLUMNS, tmp_path, "second")
+        write_bench_page(scores, total(scores), COLUMNS, tmp_path, "second")
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
 
 

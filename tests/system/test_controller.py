@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 
 import pytest
-
-from fmu_src.system.parts import make_model, start_inputs
+from models import make_model, start_inputs
 
 
 def drive(control, count, **inputs):

@@ -9,7 +9,7 @@ import pytest
 from momentum import missing_momentum
 
 from percussion_model.coupling import Coupling, CouplingError
-from percussion_model.coupling.balance import known_signals, summary
+from percussion_model.coupling.coupled_run import known_signals, summary
 from percussion_model.interface.cli import main
 
 SHORT = 0.05  # [s]

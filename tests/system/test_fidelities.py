@@ -9,7 +9,7 @@ from momentum import missing_momentum
 
 from fmu_src.system.archive import SYSTEMS, build_fmus, read_plan, write_system
 from percussion_model.coupling import Coupling, CouplingError
-from percussion_model.coupling.balance import known_signals, summary
+from percussion_model.coupling.coupled_run import known_signals, summary
 
 DURATION = 1.5  # [s]: some thirty blows
 ONE_ROCK = {

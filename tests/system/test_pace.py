@@ -15,7 +15,7 @@ import pytest
 from percussion_model.coupling import Coupling, CouplingError
 from percussion_model.coupling.compiled import CALL, DONE, make_calls
 from percussion_model.coupling.compiled import STEP as STEP_CALL
-from percussion_model.coupling.pace import PacedPort
+from percussion_model.coupling.port import PacedPort
 
 SLOW = {"rock": 10, "supply": 7}
 STEP = 1e-3  # [s]

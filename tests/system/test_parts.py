@@ -10,9 +10,9 @@ import fmpy
 import pytest
 from fmpy.validation import validate_fmu
 from lxml import etree
+from models import make_model, start_inputs
 
-from fmu_src.system.parts import make_model, part_variables, start_inputs
-from fmu_src.system.tables import PARTS
+from fmu_src.parts.build import PARTS, part_variables
 from fmu_src.units import UNITS
 from scenarios.harness import Instance
 

@@ -6,12 +6,12 @@ import math
 
 import numpy as np
 import pytest
+from models import make_model, start_inputs
 from scipy.linalg import expm
 
-from fmu_src.system.parts import make_model, start_inputs
-from fmu_src.system.tables import STRING
+from fmu_src.parts.drill_string import TABLE
 
-VALUES = {name: entry[3] for name, entry in STRING.parameters.items()}
+VALUES = {name: entry[3] for name, entry in TABLE.parameters.items()}
 
 # The shoulder, coupled by Jacobi to a struck bit: free, or on rock that loses little.
 MASS, SPEED, PUSH = 8.69, 0.5, 2500.0

@@ -6,14 +6,14 @@ import math
 
 import numpy as np
 import pytest
+from models import make_model, start_inputs
 
-from fmu_src.runtime.system.string_body import Lumps
-from fmu_src.runtime.system.string_waves import Waves
-from fmu_src.system.parts import make_model, start_inputs
-from fmu_src.system.tables import STRING
+from fmu_src.parts.drill_string import TABLE
+from fmu_src.parts.string_body import Lumps
+from fmu_src.parts.string_waves import Waves
 
 RODS = 6
-VALUES = {name: entry[3] for name, entry in STRING.parameters.items()}
+VALUES = {name: entry[3] for name, entry in TABLE.parameters.items()}
 FREE = {**VALUES, "gravity": 0.0, "friction.viscosity": 0.0}
 # Ends so light that they are open: their time constant is short against a cell.
 OPEN = {**FREE, "head.mass": 1e-3, "casing.mass": 1e-3, "rod.cells": 10}
@@ -111,7 +111,7 @@ def stuck(step):
     inputs["head_force"] = 1e4  # the wall holds 15 kN
     for _ in range(round(0.5 / step)):
         string.step(inputs, step)
-    return string.casing_place()
+    return string.casing_position()
 
 
 def test_a_string_that_the_wall_holds_creeps_no_more_at_longer_steps():
@@ -125,7 +125,7 @@ def settle(made, head_force, casing_force, duration):
             made.advance([(head_force, casing_force)])
     else:
         for _ in range(round(duration / 1e-3)):
-            made.go_on(head_force, casing_force, 1e-3)
+            made.advance(head_force, casing_force, 1e-3)
     return made
 
 
@@ -209,7 +209,7 @@ def test_waves_and_lumps_agree_where_motion_is_slow():
             if kind is Waves:
                 made.advance([(push, -bottom)])
             else:
-                made.go_on(push, -bottom, 1e-4)
+                made.advance(push, -bottom, 1e-4)
         ways.append(made.head)
     assert ways[0] == pytest.approx(ways[1], rel=2e-3)
 

@@ -9,11 +9,11 @@ from percussion_model.analysis.fitting.drop_test import (
     drop_test_signal,
     fit_drop_tests,
 )
-from percussion_model.analysis.fitting.estimates import Estimate, Fit, FitError
 from percussion_model.analysis.fitting.force_penetration import (
     bilinear_force,
     fit_force_penetration,
 )
+from percussion_model.analysis.fitting.least_squares import Estimate, Fit, FitError
 
 __all__ = [
     "BARRIER",

@@ -8,19 +8,21 @@ from typing import Any
 
 import numpy as np
 
-from percussion_model.analysis.fitting.estimates import (
-    Counted,
+from percussion_model.analysis.fitting.least_squares import (
+    LEAST_STEPS,
+    CountedModel,
     Fit,
     FitError,
     check_confidence,
     checked_columns,
-    look_around,
+    descend,
     make_fit,
+    profile_intervals,
+    search,
     student_width,
 )
-from percussion_model.analysis.fitting.minimum import LEAST_STEPS, descend, search
 from percussion_model.scene.scene import Scene
-from percussion_model.simulation.stepping import Simulation
+from percussion_model.simulation.simulate import Simulation
 
 __all__ = ["BARRIER", "ROCK", "DropTest", "drop_test_signal", "fit_drop_tests"]
 
@@ -140,13 +142,13 @@ def fit_drop_tests(
 
     guess = np.log([scene[name] for name in names])
     bounds = _bounds(scene, names, guess)
-    model = Counted(signals, *bounds)
+    model = CountedModel(signals, *bounds)
     reach = np.where(np.isin(names, BARRIER), np.log(span), 0.0)
     width = student_width(confidence, len(data) - len(names))
     at = search(model, data, guess, reach, steps)
     for left in reversed(range(MOST_STARTS)):
         at, jacobian, spread = descend(model, data, at, names)
-        ends, best = look_around(model, data, at, spread, width)
+        ends, best = profile_intervals(model, data, at, spread, width)
         # the last intervals stay with the point that they were found at
         if best is at or left == 0:
             break

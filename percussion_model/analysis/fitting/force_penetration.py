@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from percussion_model.analysis.fitting.estimates import (
-    Counted,
+from percussion_model.analysis.fitting.least_squares import (
+    CountedModel,
+    Estimate,
     Fit,
     FitError,
     check_confidence,
@@ -113,7 +115,7 @@ def fit_force_penetration(penetration: Any, force: Any, confidence: float = 0.95
     errors = np.sqrt(np.diag(covariance(jacobian, variance, NAMES)))
     reach = student_width(confidence, freedom) * errors
     ends = np.stack([found.x - reach, found.x + reach], axis=1)
-    curve = Counted(model)
+    curve = CountedModel(model)
     fit = make_fit(
         curve, measured, found.x, jacobian, ends, NAMES, (True, True, False, False), confidence
     )
@@ -156,14 +158,10 @@ def _first_guess(p: np.ndarray, measured: np.ndarray) -> tuple[float, float, flo
 
 def _unscaled(fit: Fit, origin: float, span: float) -> Fit:
     """Return the fit with lengths in metres again."""
-    from dataclasses import replace
-
     found = dict(fit.estimates)
-    stiffness = found[NAMES[0]]
-    found[NAMES[0]] = type(stiffness)(*(value / span for value in stiffness))
+    found[NAMES[0]] = Estimate(*(value / span for value in found[NAMES[0]]))
     for name in NAMES[2:]:
         value, error, low, high = found[name]
-        found[name] = type(stiffness)(
-            origin + span * value, span * error, origin + span * low, origin + span * high
-        )
+        ends = origin + span * low, origin + span * high
+        found[name] = Estimate(origin + span * value, span * error, *ends)
     return replace(fit, estimates=found)

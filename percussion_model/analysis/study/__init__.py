@@ -20,9 +20,8 @@ from percussion_model.analysis.study.points import (
     refuse_unknown,
     table,
 )
+from percussion_model.analysis.study.response import COMPUTING, FOUND, KINDS, run_points
 from percussion_model.analysis.study.store import Store
-from percussion_model.analysis.study.summary import headlines
-from percussion_model.analysis.study.work import COMPUTING, FOUND, KINDS, run_points
 from percussion_model.analysis.study.workers import on_a_cluster, on_this_machine
 from percussion_model.scene.scene import Scene
 from percussion_model.simulation.files import ResultError, staged
@@ -36,7 +35,6 @@ __all__ = [
     "Points",
     "Study",
     "grid",
-    "headlines",
     "latin_hypercube",
     "read_axis",
     "study",
@@ -46,17 +44,19 @@ __all__ = [
 # Points are handed out in parts of at most so many, and so many parts a process at least.
 MOST_A_PART = 100
 PARTS_A_PROCESS = 8
+# Rates with a larger relative error are counted in the headlines.
+LARGE_ERROR = 1e-3
 
 
 @dataclass(frozen=True)
 class Study:
-    """What a study found at its points.
+    """Result of a study.
 
     Attributes
     ----------
     scene : Scene
     points : Points
-    rows : ndarray of `work.ROW`
+    rows : ndarray of `response.ROW`
         One for each point, SI units.
     failures : list of str
         What went wrong at each point, empty where nothing did.
@@ -69,10 +69,36 @@ class Study:
 
     @property
     def relative_error(self) -> np.ndarray:
-        """Error of the rate of penetration by the rate, for each point; NaN where it has none."""
+        """Error of the rate divided by the rate, for each point; NaN where there is none."""
         rate = np.abs(self.rows["rate_of_penetration"])
         error = self.rows["rate_of_penetration_error"]
         return np.divide(error, rate, out=np.full(len(rate), np.nan), where=rate > 0)
+
+    def headlines(self) -> list[tuple[str, str]]:
+        """Motions, lowest and highest rate with their points, errors, cost: names and texts."""
+        rows = self.rows
+        counts = np.bincount(rows["kind"], minlength=len(KINDS)).tolist()
+        motions = [f"{n} {kind}" for n, kind in zip(counts, KINDS, strict=True) if n]
+        lines = [("Points", f"{len(self.points)}: {', '.join(motions)}")]
+        rate = rows["rate_of_penetration"]
+        if np.isfinite(rate).any():
+            for name, k in (
+                ("Lowest rate", np.nanargmin(rate)),
+                ("Highest rate", np.nanargmax(rate)),
+            ):
+                at = ", ".join(
+                    f"{key} = {value:.5g}" for key, value in self.points.changes(int(k)).items()
+                )
+                lines.append((name, f"{1e3 * rate[k]:.5g} mm/s at {at}"))
+        for kind in ("periodic", "aperiodic"):
+            error = self.relative_error[rows["kind"] == KINDS.index(kind)]
+            if np.isfinite(error).any():
+                count = int(np.count_nonzero(error > LARGE_ERROR))
+                words = f"{count} of them above {100 * LARGE_ERROR:g} %" if count else ""
+                largest = f"at most {100 * np.nanmax(error):.3g} % of the rate"
+                lines.append((f"Error, {kind}", ", ".join(filter(None, (largest, words)))))
+        lines.append(("Computed in", f"{rows['wall_time'].sum():.3g} s of one core"))
+        return lines
 
     def save(self, folder: str | Path) -> list[Path]:
         """Write `points.parquet` and `points.nc` (NetCDF) to a folder, both or none."""
@@ -100,19 +126,17 @@ class Study:
         units = {key: self.scene.row_of(key).unit for key in points.keys}
         if points.is_grid:
             mesh = points.values.reshape(*points.shape, len(points.keys))
-            axes = [np.moveaxis(mesh[..., k], k, 0).reshape(n, -1)[:, 0]
-                    for k, n in enumerate(points.shape)]  # fmt: skip
-            coords = {
-                key: DataArray(axis, dims=key, attrs={"units": units[key]})
-                for key, axis in zip(points.keys, axes, strict=True)
-            }
-            dims: tuple[str, ...] = points.keys
+            columns = [np.moveaxis(mesh[..., k], k, 0).reshape(n, -1)[:, 0]
+                       for k, n in enumerate(points.shape)]  # fmt: skip
+            dims = points.keys
         else:
-            dims = ("point",)
-            coords = {
-                key: DataArray(points.values[:, k], dims=dims, attrs={"units": units[key]})
-                for k, key in enumerate(points.keys)
-            }
+            columns, dims = list(points.values.T), ("point",)
+        coords = {
+            key: DataArray(
+                column, dims=key if points.is_grid else dims, attrs={"units": units[key]}
+            )
+            for key, column in zip(points.keys, columns, strict=True)
+        }
         found = {
             name: DataArray(
                 self.rows[name].reshape(points.shape),
@@ -139,8 +163,8 @@ def study(
 ) -> Study:
     """Find the stationary response at many points.
 
-    Finished points are kept in the folder: a study that was interrupted goes on
-    where it was when it is called again. What goes wrong at a point is
+    Finished points are kept in the folder: a study that was interrupted continues
+    where it stopped when it is called again. What goes wrong at a point is
     recorded there and stops nothing.
 
     Parameters

@@ -53,7 +53,7 @@ class Points:
         return dict(zip(self.keys, self.values[k].tolist(), strict=True))
 
     def digest(self) -> str:
-        """Hash by which a study knows its own points again."""
+        """Hash that identifies the points of a study."""
         words = "\n".join((*self.keys, repr(self.shape))).encode()
         return hashlib.sha256(words + np.ascontiguousarray(self.values).tobytes()).hexdigest()
 
@@ -213,11 +213,11 @@ def _column(key: str, values: Any) -> np.ndarray:
 
 
 def _rising(key: str, column: np.ndarray) -> np.ndarray:
-    """Sort the values of an axis; refuse one that stands there twice."""
+    """Sort the values of an axis; refuse one that is given twice."""
     column = np.sort(column)
     twice = column[1:][np.diff(column) == 0.0]
     if len(twice):
-        raise SceneError(f"{key}: {float(twice[0])!r} stands twice among the values of the grid")
+        raise SceneError(f"{key}: {float(twice[0])!r} is given twice among the values of the grid")
     return column
 
 

@@ -1,4 +1,4 @@
-"""Finished points of a study on disk: none is lost, none is computed twice."""
+"""Finished points of a study on disk; none is computed twice."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from zipfile import BadZipFile
 
 import numpy as np
 
-from percussion_model.analysis.study.work import ROW
+from percussion_model.analysis.study.response import ROW
 from percussion_model.simulation.files import ResultError, staged, to_json
 
 PLAN = "study.json"

@@ -1,4 +1,4 @@
-"""Where the parts of a study run: processes of this machine, or a Dask cluster."""
+"""Worker processes: on this machine, or of a Dask cluster."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What accuracy costs in time, scene by scene."""
+"""Command `accuracy`: error against computing time, scene by scene."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def accuracy(
         typer.Argument(metavar="[SCENE]...", help="Scene files; the reference scene if left out."),
     ] = None,
     full: Annotated[
-        bool, typer.Option("--full", help="Finer and dearer rungs too: up to an hour.")
+        bool, typer.Option("--full", help="Finer and costlier rungs too: up to an hour.")
     ] = False,
     methods: Annotated[
         str | None,
@@ -46,6 +46,7 @@ def accuracy(
     """
     from percussion_model.interface.commands.accuracy_tables import show_bars, show_study
     from percussion_model.scene.scene import Scene
+    from percussion_model.verification.accuracy import study
     from percussion_model.verification.accuracy.ladders import chosen_ladders
 
     chosen = [(path.stem, common.load_scene(path, settings=settings)) for path in scenes or ()]
@@ -65,13 +66,14 @@ def accuracy(
     common.check_json(json_file)
     if make_references:
         for _, scene in chosen:
-            show_bars(_referenced(scene))
+            show_bars(_make_reference(scene))
         return
     if figures or json_file is None:
         common.check_outputs(folder, None)
     found: dict[str, dict[str, Any]] = {}
     for name, scene in chosen:
-        result = _studied(scene, full, words)
+        with _progress() as report:
+            result = study(scene, full, words, report)
         found[name] = result.to_dict()
         if json_file != "-":
             show_study(result)
@@ -79,45 +81,52 @@ def accuracy(
             common.write_json(str(folder / f"{name}.json"), found[name])
         if figures:
             with common.if_drawable():
-                from percussion_model.interface.plotting.accuracy import save_accuracy
-
-                common.tell_files(save_accuracy(result, folder / name))
+                common.list_files(_draw(result, folder / name))
     common.write_json(json_file, found)
 
 
-def _studied(scene: Scene, full: bool, methods: list[str] | None) -> Study:
-    from percussion_model.verification.accuracy import study
+def _draw(found: Study, folder: Path) -> list[Path]:
+    from percussion_model.interface.plotting.error_against_time import (
+        draw_accuracy,
+        draw_quantities,
+    )
+    from percussion_model.interface.plotting.style import save_figures
 
-    with _shares() as report:
-        return study(scene, full, methods, report)
+    return save_figures(
+        lambda: [
+            ("accuracy", draw_accuracy(found)),
+            ("accuracy_quantities", draw_quantities(found)),
+        ],
+        folder,
+    )
 
 
-def _referenced(scene: Scene) -> Any:
+def _make_reference(scene: Scene) -> Any:
     """Make the reference of a scene and keep it with the package."""
     from percussion_model.verification.accuracy.problems import pose
-    from percussion_model.verification.accuracy.reference_store import (
+    from percussion_model.verification.accuracy.references import (
         fingerprint,
+        load_references,
+        make_reference,
         package_store,
-        store,
-        stored,
+        save_references,
     )
-    from percussion_model.verification.accuracy.references import make_reference
 
-    with _shares() as report:
-        made = make_reference(pose(scene), scene, say=lambda text: report(0.0, text))
-    store(package_store(), {**stored(), fingerprint(scene): made})
+    with _progress() as report:
+        made = make_reference(pose(scene), scene, progress=lambda text: report(0.0, text))
+    save_references(package_store(), {**load_references(), fingerprint(scene): made})
     return made
 
 
 @contextmanager
-def _shares() -> Iterator[Report]:
-    """Show on stderr how far the work is: a bar in a terminal, else a line for each part."""
+def _progress() -> Iterator[Report]:
+    """Show progress on stderr: a bar in a terminal, else a line for each part."""
     if not sys.stderr.isatty():
-        said: set[str] = set()
+        shown: set[str] = set()
 
         def line(share: float, text: str) -> None:
-            if text not in said:
-                said.add(text)
+            if text not in shown:
+                shown.add(text)
                 print(f"{100 * share:3.0f} %  {text}", file=sys.stderr, flush=True)
 
         yield line

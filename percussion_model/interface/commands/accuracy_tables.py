@@ -1,4 +1,4 @@
-"""Tables of a study of accuracy."""
+"""Tables of an accuracy study."""
 
 from __future__ import annotations
 
@@ -11,10 +11,9 @@ from rich.markup import escape
 from rich.table import Table
 
 from percussion_model.verification.accuracy.ladders import LADDERS
-from percussion_model.verification.accuracy.problems import APERIODIC
-from percussion_model.verification.accuracy.quantities import HISTORY, QUANTITIES
-from percussion_model.verification.accuracy.reference_store import Reference
-from percussion_model.verification.accuracy.study import FITS, WANTED, Point, Study
+from percussion_model.verification.accuracy.problems import APERIODIC, HISTORY, QUANTITIES
+from percussion_model.verification.accuracy.references import Reference
+from percussion_model.verification.accuracy.study import FITS, WANTED, Study
 
 _SHORT = {
     "rate_of_penetration": "rate",
@@ -34,7 +33,8 @@ _ELEMENTS = ("fem", "fem-time", "fem-paper", "fem-gauss")
 
 def show_study(found: Study) -> None:
     """Print reference, points, orders, what accuracies cost, and advice."""
-    console = _wide_console()
+    # room for all columns, however narrow the terminal
+    console = Console(width=max(Console().width, LEAST_WIDTH))
     show_bars(found.reference, console)
     _show_points(found, console)
     _show_orders(found, console)
@@ -71,11 +71,6 @@ def show_bars(reference: Reference, console: Console | None = None) -> None:
     (console or Console()).print(table)
 
 
-def _wide_console() -> Console:
-    """A console with room for all columns, however narrow the terminal."""
-    return Console(width=max(Console().width, LEAST_WIDTH))
-
-
 def _table(title: str, first: str) -> Table:
     """An airy table: the columns of numbers need the room."""
     table = Table(
@@ -93,15 +88,15 @@ def _number(value: float) -> str:
 def _show_points(found: Study, console: Console) -> None:
     what = "Relative standard error" if found.problem.kind == APERIODIC else "Relative error"
     table = _table(f"{what}; ms to compute a simulated second; ms of set-up", "method")
-    for key in found.problem.quantities:
-        table.add_column(_SHORT[key], justify="right", no_wrap=True)
-    for heading in ("ms/s", "set-up"):
+    for heading in (*(_SHORT[key] for key in found.problem.quantities), "ms/s", "set-up"):
         table.add_column(heading, justify="right", no_wrap=True)
     for name in found.names:
-        points = found.ladder(name)
         table.add_row(f"[bold]{LADDERS[name].title}[/bold]")
-        for point in points:
-            table.add_row(*_row(found, point))
+        for point in found.ladder(name):
+            label = point.label + (" *" if point.fit > FITS else "")
+            errors = [_number(point.errors.get(key, math.nan)) for key in found.problem.quantities]
+            times = [f"{1e3 * value:.3g}" for value in (point.second, point.setup)]
+            table.add_row(f" {label}", *errors, *times)
     console.print(table)
     per_blow = found.problem.period
     console.print(f"A blow takes {per_blow:.4g} s; its cost is that part of ms/s.", highlight=False)
@@ -111,13 +106,6 @@ def _show_points(found: Study, console: Console) -> None:
             "ladder and is not in its order.",
             highlight=False,
         )
-
-
-def _row(found: Study, point: Point) -> list[str]:
-    label = point.label + (" *" if point.fit > FITS else "")
-    errors = [_number(point.errors.get(key, math.nan)) for key in found.problem.quantities]
-    times = [f"{1e3 * value:.3g}" for value in (point.second, point.setup)]
-    return [f" {label}", *errors, *times]
 
 
 def _show_orders(found: Study, console: Console) -> None:
@@ -136,7 +124,7 @@ def _show_orders(found: Study, console: Console) -> None:
 
 
 def _show_costs(found: Study, console: Console) -> None:
-    """What accuracies of the first quantity cost, best of each family."""
+    """Print the cost of accuracies of the first quantity, best of each family."""
     key = found.problem.main
     table = _table(f"ms to compute a simulated second, for an error in {_SHORT[key]}", "error")
     for heading in ("wave", "best fem", "by wave", "best of scipy", "by wave"):

@@ -1,4 +1,4 @@
-"""A controller on the standard runs."""
+"""Command `bench-controller`: a controller on the standard runs."""
 
 from __future__ import annotations
 
@@ -10,17 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from percussion_model.interface.commands.common import (
-    BAD_INPUT,
-    INTERRUPTED,
-    JsonFile,
-    Out,
-    check_json,
-    complain,
-    needs_fmu_extra,
-    needs_plot_extra,
-    write_json,
-)
+from percussion_model.interface.commands import common
+from percussion_model.interface.commands.couple import read_value
 
 if TYPE_CHECKING:
     from percussion_model.coupling.bench import Score
@@ -54,20 +45,19 @@ def bench_controller(
         list[str] | None,
         typer.Option("--set", metavar="VARIABLE=VALUE", help="Set a variable of the controller."),
     ] = None,
-    out: Out = None,
-    json_file: JsonFile = None,
+    out: common.Out = None,
+    json_file: common.JsonFile = None,
 ) -> int:
     """Put a controller of feed and pressure through standard runs: scores, figures, a page."""
     try:
         from percussion_model.coupling.bench import bench, total
-        from percussion_model.coupling.files import read_value
     except ImportError as error:
-        return complain(needs_fmu_extra(error), BAD_INPUT)
+        return common.print_message(common.needs_extra(error, "fmu"), common.BAD_INPUT)
     from percussion_model.simulation.files import check_writable
 
     folder = out or Path("out") / "bench-controller"
     check_writable(folder)
-    check_json(json_file)
+    common.check_json(json_file)
     values = dict(read_value(f"controller.{text}") for text in settings or ())
     scores: list[Score] = []
     interrupted = False
@@ -87,18 +77,18 @@ def bench_controller(
         {"trial": s.trial, "points": s.points, "error": s.error, "faults": s.faults, **s.numbers}
         for s in scores
     ]
-    write_json(json_file, {"points": points, "trials": listed})
+    common.write_json(json_file, {"points": points, "trials": listed})
     print(f"{'total':10s} {points:6.1f}", file=sys.stderr)
     try:
-        from percussion_model.interface.plotting.bench import save_bench
+        from percussion_model.interface.bench_page import write_bench_page
     except ImportError as error:
-        complain(needs_plot_extra(error))
+        common.print_message(common.needs_plot_extra(error))
     else:
         title = controller or system.stem
-        print(save_bench(scores, points, COLUMNS, folder, title), file=sys.stderr)
+        print(write_bench_page(scores, points, COLUMNS, folder, title), file=sys.stderr)
     if interrupted:
-        return complain(
-            f"interrupted: the page has the {len(scores)} runs that were done", INTERRUPTED
+        return common.print_message(
+            f"interrupted: the page has the {len(scores)} runs that were done", common.INTERRUPTED
         )
     return 1 if any(score.faults for score in scores) else 0
 
@@ -109,7 +99,7 @@ def _show(score: Score) -> None:
                         for name, text, factor, _ in COLUMNS)  # fmt: skip
     print(f"{score.trial:10s} {score.points:6.1f}  {numbers}", file=sys.stderr)
     for fault in score.faults:
-        complain(f"{score.trial} {'' if score.error else 'failed: '}{fault}")
+        common.print_message(f"{score.trial} {'' if score.error else 'failed: '}{fault}")
 
 
 def _load(controller: str | None) -> Any:

@@ -1,4 +1,4 @@
-"""Make the table of the blow map, or tell about it."""
+"""Command `blow-map`: the table of a blow map, made or described."""
 
 from __future__ import annotations
 
@@ -6,15 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from percussion_model.interface.commands.common import (
-    JsonFile,
-    SceneFile,
-    Settings,
-    check_json,
-    complain,
-    load_scene,
-    write_json,
-)
+from percussion_model.interface.commands import common
 
 if TYPE_CHECKING:
     from percussion_model.scene.scene import Scene
@@ -22,35 +14,36 @@ if TYPE_CHECKING:
 
 
 def blow_map(
-    scene: SceneFile,
+    scene: common.SceneFile,
     action: Annotated[
         Literal["build", "show", "where"],
         typer.Argument(help="Make the table; tell about it; tell its file."),
     ] = "build",
-    settings: Settings = None,
+    settings: common.Settings = None,
     workers: Annotated[
         int | None, typer.Option("--workers", min=1, help="Processes; left out: one a processor.")
     ] = None,
-    json_file: JsonFile = None,
+    json_file: common.JsonFile = None,
 ) -> None:
     """Make the table of blows that solver.fidelity = "blow-map" takes, and keep it."""
     from percussion_model.analysis.blow_maps import kept_map, map_file
 
-    check_json(json_file)
-    chosen = load_scene(scene, settings=settings)
+    common.check_json(json_file)
+    chosen = common.load_scene(scene, settings=settings)
     if action == "where":
         typer.echo(str(map_file(chosen)))
         return
     table = ready_map(chosen, workers) if action == "build" else kept_map(chosen)
+    numbers = _numbers(chosen, table)
     if json_file != "-":
-        _show(chosen, table)
-    write_json(json_file, _numbers(chosen, table))
+        _show(numbers)
+    common.write_json(json_file, numbers)
 
 
 def ready_map(scene: Scene, workers: int | None = None) -> BlowTable:
     """Table of a scene, made with a bar if it is not there yet.
 
-    Whatever of the scene lies outside is told first: making a table takes minutes.
+    What of the scene lies outside is listed first: making a table takes minutes.
     """
     from percussion_model.analysis.blow_maps import kept_map, make_map
     from percussion_model.interface.terminal import count_bar
@@ -64,15 +57,15 @@ def ready_map(scene: Scene, workers: int | None = None) -> BlowTable:
 
 
 def warn_of_outside(scene: Scene) -> None:
-    """Tell what of a scene its table would not answer."""
+    """Warn of what of a scene its table would not answer."""
     from percussion_model.analysis.blow_maps import outside_map
 
     for text in outside_map(scene):
-        complain(f"warning: {text}")
+        common.print_message(f"warning: {text}")
 
 
 def _numbers(scene: Scene, table: BlowTable | None) -> dict[str, Any]:
-    """What there is to tell of a table, plain values."""
+    """Numbers of a table as plain values."""
     from percussion_model.analysis.blow_maps import map_file, node_count, outside_map
 
     found: dict[str, Any] = {
@@ -90,12 +83,11 @@ def _numbers(scene: Scene, table: BlowTable | None) -> dict[str, Any]:
     return found
 
 
-def _show(scene: Scene, table: BlowTable | None) -> None:
-    numbers = _numbers(scene, table)
-    typer.echo(f"{numbers['file']}: {'kept' if table is not None else 'not made yet'}")
+def _show(numbers: dict[str, Any]) -> None:
+    typer.echo(f"{numbers['file']}: {'kept' if numbers['made'] else 'not made yet'}")
     typer.echo(f"{numbers['nodes']} blows")
-    if table is None:
-        return
-    for name, (low, high) in numbers["range"].items():
-        typer.echo(f"{name} {low:g} to {high:g} (SI)")
-    typer.echo(f"{numbers['restless_nodes']} of them refused: the bit does not come to rest")
+    if numbers["made"]:
+        for name, (low, high) in numbers["range"].items():
+            typer.echo(f"{name} {low:g} to {high:g} (SI)")
+        nodes = numbers["restless_nodes"]
+        typer.echo(f"{nodes} of them refused: the bit does not come to rest")

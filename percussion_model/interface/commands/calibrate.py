@@ -1,4 +1,4 @@
-"""Rock parameters from measurements."""
+"""Command `calibrate`: rock parameters from measurements."""
 
 from __future__ import annotations
 
@@ -7,26 +7,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from percussion_model.interface.commands.common import (
-    BAD_INPUT,
-    Cells,
-    JsonFile,
-    SceneFile,
-    Settings,
-    SolverName,
-    check_json,
-    complain,
-    load_scene,
-    write_json,
-)
+from percussion_model.interface.commands import common
 
 if TYPE_CHECKING:
     from percussion_model.analysis.fitting import DropTest, Fit
-    from percussion_model.scene.scene import Scene
 
 
 def calibrate(
-    scene: SceneFile,
+    scene: common.SceneFile,
     curve: Annotated[
         Path | None,
         typer.Option("--curve", metavar="CSV", help="Slow test: columns penetration, force."),
@@ -46,10 +34,10 @@ def calibrate(
     span: Annotated[
         float, typer.Option("--span", help="C_R and W_R are searched this factor around the scene.")
     ] = 10.0,
-    solver: SolverName = None,
-    cells: Cells = None,
-    settings: Settings = None,
-    json_file: JsonFile = None,
+    solver: common.SolverName = None,
+    cells: common.Cells = None,
+    settings: common.Settings = None,
+    json_file: common.JsonFile = None,
 ) -> None:
     """Fit the rock of a scene: K_R, gamma to a slow test, all four to drop tests; SI units."""
     from percussion_model.analysis.fitting import (
@@ -61,14 +49,13 @@ def calibrate(
     from percussion_model.simulation.files import check_writable
 
     if curve is None and not drop:
-        raise typer.Exit(complain("nothing to fit: give --curve, --drop or both", BAD_INPUT))
-    check_json(json_file)
+        raise common.refusal("nothing to fit: give --curve, --drop or both")
+    common.check_json(json_file)
     if out is not None:
         if out.is_dir():
-            text = f"--out {str(out)!r}: is a folder; give the file to write"
-            raise typer.Exit(complain(text, BAD_INPUT))
+            raise common.refusal(f"--out {str(out)!r}: is a folder; give the file to write")
         check_writable(out.absolute().parent)
-    chosen = load_scene(scene, solver, cells, settings)
+    chosen = common.load_scene(scene, solver, cells, settings)
     found: dict[str, Fit] = {}
     if curve is not None:
         names, columns = _read(curve)
@@ -78,19 +65,14 @@ def calibrate(
         chosen = chosen.replace(**found["curve"].changes())
     if drop:
         signal, tests = _drop_tests(drop)
-        bit_alone = _bit_alone(chosen)
+        bit_alone = chosen.replace(**{"piston.model": "absent", "effects.drive": "none"})
         found["drop tests"] = fit_drop_tests(bit_alone, tests, ROCK, signal=signal, span=span)
         chosen = chosen.replace(**found["drop tests"].changes())
-    write_json(json_file, {name: fit.summary() for name, fit in found.items()})
+    common.write_json(json_file, {name: fit.summary() for name, fit in found.items()})
     if json_file != "-":
         _show(found)
     if out is not None:
         chosen.to_toml(out)
-
-
-def _bit_alone(scene: Scene) -> Scene:
-    """The bit of a scene without its piston, as it is dropped."""
-    return scene.replace(**{"piston.model": "absent", "effects.drive": "none"})
 
 
 def _drop_tests(words: list[str]) -> tuple[str, list[DropTest]]:

@@ -1,7 +1,8 @@
-"""What the commands share: options, reading a scene, messages."""
+"""Shared parts of the commands: options, loading a scene, outputs, messages."""
 
 from __future__ import annotations
 
+import gc
 import sys
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -15,6 +16,10 @@ if TYPE_CHECKING:
 
 BAD_INPUT = 2
 INTERRUPTED = 130  # what shells report for Ctrl-C
+# Starting makes hundreds of thousands of objects that stay [objects].
+COLLECT_AFTER = 100_000
+
+_own_process = False
 
 SceneFile = Annotated[Path, typer.Argument(metavar="SCENE", help="A scene file (TOML).")]
 SolverName = Annotated[
@@ -54,6 +59,28 @@ Tolerance = Annotated[
 ]
 
 
+def own_process() -> None:
+    """Let this process start faster; a library must not do so to the process of its caller."""
+    global _own_process
+    _own_process = True
+    gc.set_threshold(COLLECT_AFTER)
+
+
+def load_numba() -> None:
+    """Load numba without scipy's linear algebra, if the process is our own.
+
+    Numba looks for a BLAS in scipy, whose import takes longer than all of our
+    kernels; none of them calls it.
+    """
+    if not _own_process or "numba" in sys.modules or "scipy.linalg" in sys.modules:
+        return
+    sys.modules["scipy.linalg"] = None  # type: ignore[assignment]
+    try:
+        import numba.np.arraymath  # noqa: F401
+    finally:
+        del sys.modules["scipy.linalg"]
+
+
 def load_scene(
     path: Path,
     solver: str | None = None,
@@ -63,7 +90,6 @@ def load_scene(
     check: bool | None = None,
 ) -> Scene:
     """Read a scene and apply what the command line changes."""
-    from percussion_model.interface.quick_start import load_numba
     from percussion_model.scene.scene import Scene
     from percussion_model.scene.text import read_setting
 
@@ -118,10 +144,10 @@ def if_drawable() -> Iterator[None]:
     try:
         yield
     except ImportError as error:
-        complain(needs_plot_extra(error))
+        print_message(needs_plot_extra(error))
 
 
-def tell_files(paths: Iterable[Path]) -> None:
+def list_files(paths: Iterable[Path]) -> None:
     """Name on stderr the files that were written."""
     for path in paths:
         print(f"wrote {path}", file=sys.stderr)
@@ -129,24 +155,20 @@ def tell_files(paths: Iterable[Path]) -> None:
 
 def needs_plot_extra(error: ImportError) -> str:
     """Say which package the figures lack and how to get it."""
-    return f"no figures, since {_needs_extra(error, 'plot')}"
+    return f"no figures, since {needs_extra(error, 'plot')}"
 
 
-def needs_fmu_extra(error: ImportError) -> str:
-    """Say which package the coupling lacks and how to get it."""
-    return _needs_extra(error, "fmu")
-
-
-def _needs_extra(error: ImportError, extra: str) -> str:
+def needs_extra(error: ImportError, extra: str) -> str:
+    """Say which package is missing, and the extra that installs it."""
     return f"{error.name or error} is missing: pip install 'percussion_model[{extra}]'"
 
 
 def refusal(message: str) -> typer.Exit:
     """Print one message on stderr; return what ends the command as bad input."""
-    return typer.Exit(complain(message, BAD_INPUT))
+    return typer.Exit(print_message(message, BAD_INPUT))
 
 
-def complain(message: str, code: int = 0) -> int:
+def print_message(message: str, code: int = 0) -> int:
     """Print one message on stderr; return the exit code."""
     print(f"percussion: {message}", file=sys.stderr)
     return code

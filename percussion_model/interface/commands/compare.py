@@ -1,4 +1,4 @@
-"""One scene by several solvers."""
+"""Command `compare`: one scene by several solvers."""
 
 from __future__ import annotations
 
@@ -26,8 +26,7 @@ def compare(
     """Run a scene with several solvers: a table, and a figure in out/SCENE-compared."""
     from percussion_model.analysis.comparison import compare as run_all
     from percussion_model.analysis.comparison import read_solvers
-    from percussion_model.interface.commands.tables import show_comparison
-    from percussion_model.interface.terminal import progress_bar
+    from percussion_model.interface.terminal import progress_bar, show_comparison
 
     names = read_solvers(solvers)
     chosen = common.load_scene(scene, settings=settings)
@@ -43,6 +42,8 @@ def compare(
         show_comparison(found)
     if figures:
         with common.if_drawable():
-            from percussion_model.interface.plotting.comparison import save_comparison
+            from percussion_model.interface.plotting.compared_blows import draw_comparison
+            from percussion_model.interface.plotting.style import save_figures
 
-            common.tell_files(save_comparison(found, folder))
+            files = save_figures(lambda: [("comparison", draw_comparison(found))], folder)
+            common.list_files(files)

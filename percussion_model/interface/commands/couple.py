@@ -1,4 +1,4 @@
-"""A system of FMUs from an SSP archive."""
+"""Command `couple`: a system of FMUs from an SSP archive."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ UNITS = {
     "feed_work": "J", "hammer_energy_residual": "of the energy put in",
     "string_energy_residual": "of the energy put in", "shoulder_by_blows": "of the blows",
 }  # fmt: skip
-# Rows of a run that is not told otherwise.
+# Rows of a run without --interval.
 ROWS = 5000
 
 
@@ -57,17 +57,16 @@ def couple(
 
     try:
         from percussion_model.coupling import Coupling
-        from percussion_model.coupling.balance import known_signals, summary
-        from percussion_model.coupling.files import read_pace, read_value, write_columns
+        from percussion_model.coupling.coupled_run import known_signals, summary
     except ImportError as error:
-        return common.complain(common.needs_fmu_extra(error), common.BAD_INPUT)
+        return common.print_message(common.needs_extra(error, "fmu"), common.BAD_INPUT)
     folder = out or Path("out") / system.stem
     common.check_outputs(folder, json_file)
     coupling = Coupling(
         system,
         dict(read_value(text) for text in settings or ()),
         order=order,
-        every=dict(read_pace(text) for text in every or ()),
+        every=dict(_read_pace(text) for text in every or ()),
     )
     wanted = [*known_signals(coupling.outputs), *(signals or ())]
     rows_every = max(step, duration / ROWS) if interval is None else interval
@@ -76,18 +75,39 @@ def couple(
             duration, step, wanted, rows_every, tolerance, progress, on_interrupt="keep"
         )
     found = summary(run)
-    path = write_columns(run, folder / "signals.csv")
+    path = run.write_csv(folder / "signals.csv")
     common.write_json(json_file, found)
     if json_file != "-":
         for name, value in found.items():
             if name != "error":  # told at the end
                 number = f"{value:.6g}" if isinstance(value, float) else value
                 typer.echo(f"{name:26s} {number} {UNITS.get(name, '')}".rstrip())
-    common.tell_files([path])
+    common.list_files([path])
     if figures:
         with common.if_drawable():
-            from percussion_model.interface.plotting.coupled import save_coupled
+            from percussion_model.interface.plotting.coupled_signals import save_signals
 
-            common.tell_files([save_coupled(run, folder / "signals.png", system.stem)])
+            common.list_files([save_signals(run, folder / "signals.png", system.stem)])
     code = common.INTERRUPTED if run.interrupted else 1
-    return common.complain(f"the run ended early, {run.error}", code) if run.error else 0
+    return common.print_message(f"the run ended early, {run.error}", code) if run.error else 0
+
+
+def read_value(text: str) -> tuple[str, float | bool | str]:
+    """Signal and value of `component.variable=value`; words are for enumerations."""
+    signal, equals, value = text.partition("=")
+    if not equals or "." not in signal or not value:
+        raise common.refusal(f"--set {text}: must be COMPONENT.VARIABLE=VALUE")
+    if value in ("true", "false"):
+        return signal, value == "true"
+    try:
+        return signal, float(value)
+    except ValueError:
+        return signal, value
+
+
+def _read_pace(text: str) -> tuple[str, int]:
+    """Component and steps of `component=steps`."""
+    name, _, steps = text.partition("=")
+    if not name or not steps.isdecimal():
+        raise common.refusal(f"--every {text}: must be COMPONENT=STEPS, a whole number from 1")
+    return name, int(steps)

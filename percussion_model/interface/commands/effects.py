@@ -1,4 +1,4 @@
-"""What each effect of a scene costs and changes."""
+"""Command `effects`: cost and change of each effect of a scene."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import typer
 from percussion_model.interface.commands import common
 
 if TYPE_CHECKING:
-    from percussion_model.analysis.effects import EffectsStudy, Trial
+    from percussion_model.analysis.effect_study import EffectsStudy, Trial
 
 
 def effects(
@@ -31,7 +31,7 @@ def effects(
 
     Prints a table, and draws a figure in out/SCENE-effects.
     """
-    from percussion_model.analysis.effects import study_effects
+    from percussion_model.analysis.effect_study import study_effects
 
     chosen = common.load_scene(scene, solver, cells, settings)
     folder = out or Path("out") / f"{scene.stem}-effects"
@@ -42,9 +42,11 @@ def effects(
         show_effects(found)
     if figures:
         with common.if_drawable():
-            from percussion_model.interface.plotting.effects import save_effects
+            from percussion_model.interface.plotting.effect_bars import draw_effects
+            from percussion_model.interface.plotting.style import save_figures
 
-            common.tell_files(save_effects(found, folder))
+            files = save_figures(lambda: [("effects", draw_effects(found))], folder)
+            common.list_files(files)
 
 
 def _report(what: str, share: float) -> None:
@@ -61,12 +63,12 @@ ENDLESS = 1000
 # Columns: heading, and what stands in it.
 _COLUMNS: dict[str, Callable[[EffectsStudy, Trial, dict[str, Any]], str]] = {
     "step\nns": lambda study, trial, row: (
-        _number(row["step_time"], 1e9, 3) + (" dearer" if study.dearer(trial) else "")
+        _number(row["step_time"], 1e9, 3) + (" dearer" if study.is_costlier(trial) else "")
     ),
     "run\ns": lambda study, trial, row: _number(row["wall_time"], 1.0, 2),
     "blow\nms": lambda study, trial, row: _number(row["blow_time"], 1e3, 2),
     "events": lambda study, trial, row: f"{row['events']}",
-    "rate\nmm/s": lambda study, trial, row: rate(row),
+    "rate\nmm/s": lambda study, trial, row: _rate(row),
     "rate\n%": lambda study, trial, row: _change(study, trial, "rate_of_penetration"),
     "period\n%": lambda study, trial, row: _change(study, trial, "blow_period"),
     "peak\n%": lambda study, trial, row: _change(study, trial, "peak_bit_force"),
@@ -78,7 +80,7 @@ def table_of(found: EffectsStudy) -> tuple[list[str], list[list[str]], dict[str,
     rows, reasons = [], {}
     for trial in (found.base, *found.trials):
         numbers = trial.numbers()
-        name = f"{trial.turn.effect} {trial.turn.turned}".strip()
+        name = trial.variant.name
         rows.append([name, *(show(found, trial, numbers) for show in _COLUMNS.values())])
         if trial.reason:
             reasons[name] = trial.reason
@@ -103,7 +105,7 @@ def show_effects(found: EffectsStudy) -> None:
     for k, heading in enumerate(headings):
         table.add_column(heading, justify="right" if k else "left", no_wrap=True)
     for name, *cells in rows:
-        table.add_row(_broken(name), *cells)
+        table.add_row(_two_lines(name), *cells)
     console = Console()
     # In a narrow terminal lines are broken rather than numbers cut short.
     whole = Console(width=ENDLESS).measure(table).maximum
@@ -113,7 +115,7 @@ def show_effects(found: EffectsStudy) -> None:
         console.print(f"[yellow]{escape(names)}:[/yellow] {escape(reason)}", highlight=False)
 
 
-def rate(row: dict[str, Any]) -> str:
+def _rate(row: dict[str, Any]) -> str:
     """Rate of penetration [mm/s], with its standard error where it matters."""
     value, error = row["rate_of_penetration"], row["rate_of_penetration_standard_error"]
     if value is None:
@@ -131,7 +133,7 @@ def with_error(value: float, error: float) -> str:
     return f"{round(value, -place):.{digits}f} ± {round(error, -place):.{digits}f}"
 
 
-def _broken(name: str) -> str:
+def _two_lines(name: str) -> str:
     """Two lines of a long name."""
     first, _, last = name.partition(" ")
     return f"{first}\n  {last}" if len(name) > LONGEST_NAME else name

@@ -1,4 +1,4 @@
-"""The figures and statements of the paper, one after the other."""
+"""Command `paper`: the figures and statements of the paper, one after the other."""
 
 from __future__ import annotations
 
@@ -8,18 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from percussion_model.interface.commands.common import (
-    JsonFile,
-    check_outputs,
-    needs_plot_extra,
-    refusal,
-    write_json,
-)
+from percussion_model.interface.commands import common
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from percussion_model.analysis.comparison import Comparison
     from percussion_model.analysis.study import Study
 
 
@@ -28,34 +21,35 @@ def paper(
     processes: Annotated[
         int | None, typer.Option("--processes", min=1, help="For the sweeps; default: all cores.")
     ] = None,
-    json_file: JsonFile = None,
+    json_file: common.JsonFile = None,
 ) -> None:
     """Reproduce figures 6 to 9 of the paper, and check what it says one by one."""
-    from percussion_model.interface.commands.tables import show_statements
-    from percussion_model.interface.quick_start import load_numba
+    from percussion_model.interface.terminal import progress_bar, show_statements
 
-    check_outputs(out, json_file)
-    load_numba()
+    common.check_outputs(out, json_file)
+    common.load_numba()
     try:
         from percussion_model.interface.plotting.activation import draw_activation
-        from percussion_model.interface.plotting.comparison import draw_comparison
+        from percussion_model.interface.plotting.compared_blows import draw_comparison
         from percussion_model.interface.plotting.motion import draw_motion
         from percussion_model.interface.plotting.paper import draw_drops, draw_sweeps
         from percussion_model.interface.plotting.style import save_figures
         from percussion_model.interface.plotting.window import last_blow_window
     except ImportError as error:
-        raise refusal(needs_plot_extra(error)) from None
-    from percussion_model.verification.paper import paper_scene
-    from percussion_model.verification.paper.drop import run_drops
+        raise common.refusal(common.needs_plot_extra(error)) from None
+    from percussion_model.analysis.comparison import compare
+    from percussion_model.verification.paper.runs import paper_scene, run_drops
     from percussion_model.verification.paper.statements import (
         about_cycle,
         about_drops,
         about_sweeps,
     )
 
-    drops = run_drops(paper_scene())
+    scene = paper_scene()
+    drops = run_drops(scene)
     sweeps = _sweeps(out, processes)
-    both = _cycle()
+    with progress_bar(2 * scene.run.duration) as progress:
+        both = compare(scene, ("wave", "fem"), progress=progress)
     windows = {name: last_blow_window(result) for name, result in both.results.items()}
 
     def figures() -> Iterator[tuple[str, Figure]]:
@@ -67,32 +61,20 @@ def paper(
         yield "figure9", draw_sweeps(sweeps)
 
     save_figures(figures, out)
-    said = list(about_drops(drops))
+    statements = list(about_drops(drops))
     for name, window in windows.items():
-        said += about_cycle(both.results[name], window.samples, window.origin)
-    said += about_sweeps(sweeps)
-    statements = {"statements": [one.to_dict() for one in said]}
-    write_json(json_file, statements)
-    write_json(str(out / "statements.json"), statements)
+        statements += about_cycle(both.results[name], window.samples, window.origin)
+    statements += about_sweeps(sweeps)
+    tree = {"statements": [one.to_dict() for one in statements]}
+    common.write_json(json_file, tree)
+    common.write_json(str(out / "statements.json"), tree)
     if json_file != "-":
-        show_statements(said)
-
-
-def _cycle() -> Comparison:
-    """Run the paper's scene by waves and by finite elements."""
-    from percussion_model.analysis.comparison import compare
-    from percussion_model.interface.terminal import progress_bar
-    from percussion_model.verification.paper import paper_scene
-
-    scene = paper_scene()
-    with progress_bar(2 * scene.run.duration) as progress:
-        return compare(scene, ("wave", "fem"), progress=progress)
+        show_statements(statements)
 
 
 def _sweeps(out: Path, processes: int | None) -> dict[str, Study]:
     from percussion_model.interface.terminal import count_bar
-    from percussion_model.verification.paper import paper_scene
-    from percussion_model.verification.paper.sweeps import SWEEPS, run_sweep
+    from percussion_model.verification.paper.runs import SWEEPS, paper_scene, run_sweep
 
     found = {}
     for sweep in SWEEPS:

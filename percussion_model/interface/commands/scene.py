@@ -1,4 +1,4 @@
-"""Run a scene, draw it, tell about it, write a new one."""
+"""Commands on one scene: run, settled, explain, plot, new."""
 
 from __future__ import annotations
 
@@ -54,8 +54,29 @@ def run(
     if json_file != "-":
         show_summary(result)
     if interrupted:
-        common.complain(result.warnings[-1])
+        common.print_message(result.warnings[-1])
         raise typer.Exit(common.INTERRUPTED)
+
+
+def settled(
+    scene: common.SceneFile,
+    solver: common.SolverName = None,
+    cells: common.Cells = None,
+    settings: common.Settings = None,
+    tolerance: common.Tolerance = 1e-4,
+    json_file: common.JsonFile = None,
+) -> None:
+    """Run until the blows repeat: rate, period, order and stability of the cycle."""
+    from percussion_model.analysis.stationary import settled as run_until_settled
+    from percussion_model.interface.terminal import progress_bar, show_settled
+
+    common.check_json(json_file)
+    chosen = common.load_scene(scene, solver, cells, settings)
+    with progress_bar(0.0):
+        found = run_until_settled(chosen, tolerance)
+    common.write_json(json_file, found.summary())
+    if json_file != "-":
+        show_settled(found)
 
 
 def explain(
@@ -69,13 +90,13 @@ def explain(
 ) -> None:
     """Tell what a scene computes, how, and what the run will cost; makes no blow map."""
     from percussion_model.analysis.cost import explained, forecast
-    from percussion_model.interface.terminal import show_explanation, waiting_bar
+    from percussion_model.interface.terminal import progress_bar, show_explanation
 
     chosen = common.load_scene(scene, solver, cells, settings, accuracy, check)
     common.check_json(json_file)
     if chosen.solver_name == "blow-map":
         warn_of_outside(chosen)
-    with waiting_bar():
+    with progress_bar(0.0):
         found = forecast(chosen)
     common.write_json(json_file, explained(chosen, found))
     if json_file != "-":
@@ -132,10 +153,9 @@ def new(
 def _draw(result: Result, folder: Path) -> None:
     """Write figures and report; the results are safe already."""
     with common.if_drawable():
-        from percussion_model.interface.page import without_zoom
         from percussion_model.interface.plotting import figures
-        from percussion_model.interface.report import write_report
+        from percussion_model.interface.report import why_not_interactive, write_report
 
-        if remark := without_zoom():
-            common.complain(remark)
+        if remark := why_not_interactive():
+            common.print_message(remark)
         write_report(result, folder, figures(result, folder))

@@ -1,4 +1,4 @@
-"""The hard cases by every solver."""
+"""Command `stability`: the hard cases by every solver."""
 
 from __future__ import annotations
 
@@ -7,14 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from percussion_model.interface.commands.common import (
-    JsonFile,
-    Out,
-    check_outputs,
-    if_drawable,
-    tell_files,
-    write_json,
-)
+from percussion_model.interface.commands import common
 
 if TYPE_CHECKING:
     from percussion_model.verification.hard_cases import Collection
@@ -38,19 +31,18 @@ def stability(
     workers: Annotated[
         int | None, typer.Option("--workers", min=0, help="Processes; 0: none but this one.")
     ] = None,
-    out: Out = None,
-    json_file: JsonFile = None,
+    out: common.Out = None,
+    json_file: common.JsonFile = None,
 ) -> None:
     """Run the hard cases by every solver: what must hold, and where solvers disagree."""
-    from percussion_model.interface.commands.tables import show_stability
-    from percussion_model.interface.terminal import count_bar
+    from percussion_model.interface.terminal import count_bar, show_stability
     from percussion_model.verification.hard_cases import run_collection
 
-    check_outputs(out, json_file)
+    common.check_outputs(out, json_file)
     names = [name.strip() for name in solvers.split(",")]
     with count_bar("runs of hard cases") as progress:
         found = run_collection(cases or None, names, share, refined, workers, progress)
-    write_json(json_file, found.to_dict())
+    common.write_json(json_file, found.to_dict())
     if json_file != "-":
         show_stability(found)
     if out is not None:
@@ -62,12 +54,16 @@ def stability(
 def _write(found: Collection, folder: Path) -> None:
     """Write the page and its figure into a folder."""
     from percussion_model.simulation.files import staged_text
-    from percussion_model.verification.hard_cases.page import page
+    from percussion_model.verification.hard_cases.stability_page import page
 
     picture = None
-    with if_drawable():
-        from percussion_model.interface.plotting.stability import save_stability
+    with common.if_drawable():
+        from percussion_model.interface.plotting.stability_map import draw_stability
+        from percussion_model.interface.plotting.style import save_figures
 
-        picture = save_stability(found, folder / "images").relative_to(folder).as_posix()
+        save_figures(
+            lambda: [("stability", draw_stability(found))], folder / "images", kinds=("png",)
+        )
+        picture = "images/stability.png"
     staged_text(folder / "stability.md", page(found, picture))
-    tell_files([folder / "stability.md"])
+    common.list_files([folder / "stability.md"])

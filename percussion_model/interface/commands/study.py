@@ -1,4 +1,4 @@
-"""The stationary response over a grid or a sample of parameters."""
+"""Command `study`: the stationary response over a grid or a sample of parameters."""
 
 from __future__ import annotations
 
@@ -8,29 +8,17 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from percussion_model.interface.commands.common import (
-    BAD_INPUT,
-    INTERRUPTED,
-    Cells,
-    SceneFile,
-    Settings,
-    SolverName,
-    Tolerance,
-    check_outputs,
-    complain,
-    load_scene,
-    needs_plot_extra,
-)
+from percussion_model.interface.commands import common
 
 if TYPE_CHECKING:
     from percussion_model.analysis.study import Study
 
-# What writes tables and grids; asked for before hours of work, not after.
+# Packages that write tables and grids; checked before hours of work, not after.
 NEEDED = ("pandas", "pyarrow", "xarray", "h5netcdf", "h5py", "threadpoolctl")
 
 
 def study(
-    scene: SceneFile,
+    scene: common.SceneFile,
     over: Annotated[
         list[str],
         typer.Option(
@@ -41,20 +29,22 @@ def study(
         ),
     ],
     out: Annotated[
-        Path, typer.Option("--out", metavar="DIR", help="Folder; an interrupted study goes on.")
+        Path, typer.Option("--out", metavar="DIR", help="Folder; an interrupted study continues.")
     ],
     samples: Annotated[
         int | None,
         typer.Option("--samples", help="So many points of a Latin hypercube instead of the grid."),
     ] = None,
     seed: Annotated[int, typer.Option("--seed", help="Of the Latin hypercube.")] = 0,
-    solver: SolverName = None,
-    cells: Cells = None,
-    settings: Settings = None,
-    tolerance: Tolerance = 1e-4,
+    solver: common.SolverName = None,
+    cells: common.Cells = None,
+    settings: common.Settings = None,
+    tolerance: common.Tolerance = 1e-4,
     scatter: Annotated[
         float,
-        typer.Option("--scatter", help="Relative standard error that will do for aperiodic rates."),
+        typer.Option(
+            "--scatter", help="Relative standard error that is enough for aperiodic rates."
+        ),
     ] = 1e-3,
     report: Annotated[bool, typer.Option(help="Write report.html as well.")] = True,
     processes: Annotated[
@@ -72,22 +62,23 @@ def study(
 
     missing = [name for name in NEEDED if importlib.util.find_spec(name) is None]
     if missing:
-        words = f"a study needs {', '.join(missing)}: pip install 'percussion_model[study]'"
-        raise typer.Exit(complain(words, BAD_INPUT))
+        raise common.refusal(
+            f"a study needs {', '.join(missing)}: pip install 'percussion_model[study]'"
+        )
     axes = dict(read_axis(text) for text in over)
     if len(axes) < len(over):
-        raise typer.Exit(complain("--over: a key stands there twice", BAD_INPUT))
+        raise common.refusal("--over: a key is given twice")
     for text in settings or ():
         if text.partition("=")[0] in axes:
-            raise typer.Exit(complain(f"--set {text}: --over varies this key", BAD_INPUT))
+            raise common.refusal(f"--set {text}: --over varies this key")
     if samples is None:
         points = grid(axes)
     else:
         logarithmic = [text.partition("=")[0] for text in over if text.endswith("log")]
         ends = {key: (float(min(values)), float(max(values))) for key, values in axes.items()}
         points = latin_hypercube(ends, samples, seed, logarithmic)
-    check_outputs(out, None)
-    chosen = load_scene(scene, solver, cells, settings)
+    common.check_outputs(out, None)
+    chosen = common.load_scene(scene, solver, cells, settings)
     try:
         with count_bar("points") as progress:
             found = run_study(
@@ -101,19 +92,18 @@ def study(
                 progress=progress,
             )
     except KeyboardInterrupt:
-        words = f"interrupted; finished points are kept in {out}, the same command goes on"
-        raise typer.Exit(complain(words, INTERRUPTED)) from None
+        words = f"interrupted; finished points are kept in {out}, the same command continues"
+        raise typer.Exit(common.print_message(words, common.INTERRUPTED)) from None
     show_study(found, [*found.save(out), *(_report(found, out) if report else ())])
 
 
 def _report(found: Study, folder: Path) -> list[Path]:
     """Write the report; the results are safe already."""
     try:
-        from percussion_model.interface.page import without_zoom
-        from percussion_model.interface.study_report import write_study_report
+        from percussion_model.interface.report import why_not_interactive, write_study_report
     except ImportError as error:
-        complain(needs_plot_extra(error))
+        common.print_message(common.needs_plot_extra(error))
         return []
-    if remark := without_zoom():
-        complain(remark)
+    if remark := why_not_interactive():
+        common.print_message(remark)
     return [write_study_report(found, folder)]

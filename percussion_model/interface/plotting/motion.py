@@ -21,13 +21,18 @@ def draw_motion(window: Window) -> Figure:
     axes = fig.subplots(3, 2)
     zoom = window.active_until
     has_zoom = zoom < WORTH_A_ZOOM * window.length
+    position = window.since_start("bit_position") * MM
+    force = window.samples["bit_force"] / KN
     whole = "One blow" if window.is_blow else "After first contact"
     for column, (end, name) in enumerate(
         ((window.length, whole), (zoom, f"First {zoom * MS:.2g} ms"))
     ):
         ends = (min(0.0, window.time[0]) if column else 0.0, end)
-        _position(axes[0, column], window, ends, f"{name}: mean bit motion")
-        _force(axes[1, column], window, ends, f"{name}: force on the rock")
+        for ax, values, y, title in (
+            (axes[0, column], position, "mean bit displacement [mm]", "mean bit motion"),
+            (axes[1, column], force, "bit force [kN]", "force on the rock"),
+        ):
+            _over_time(ax, window, ends, values, y, f"{name}: {title}")
     if has_zoom:
         _settled_force(axes[1, 0], window)
     _phase_portrait(axes[2, 0], window)
@@ -39,29 +44,14 @@ def draw_motion(window: Window) -> Figure:
     return fig
 
 
-def _position(ax: Axes, window: Window, ends: tuple[float, float], title: str) -> None:
+def _over_time(
+    ax: Axes, window: Window, ends: tuple[float, float], values: np.ndarray, y: str, title: str
+) -> None:
     shown = window.time <= ends[1]
     style.shade_contacts(ax, [c for c in window.contacts if c[0] < ends[1]], MS)
-    style.draw_by_mode(
-        ax,
-        window.time[shown] * MS,
-        window.since_start("bit_position")[shown] * MM,
-        window.samples["drilling_mode"][shown],
-    )
-    style.label(ax, "time [ms]", "mean bit displacement [mm]", title)
-    ax.set_xlim(ends[0] * MS, ends[1] * MS)
-
-
-def _force(ax: Axes, window: Window, ends: tuple[float, float], title: str) -> None:
-    shown = window.time <= ends[1]
-    style.shade_contacts(ax, [c for c in window.contacts if c[0] < ends[1]], MS)
-    style.draw_by_mode(
-        ax,
-        window.time[shown] * MS,
-        window.samples["bit_force"][shown] / KN,
-        window.samples["drilling_mode"][shown],
-    )
-    style.label(ax, "time [ms]", "bit force [kN]", title)
+    mode = window.samples["drilling_mode"]
+    style.draw_by_mode(ax, window.time[shown] * MS, values[shown], mode[shown])
+    style.label(ax, "time [ms]", y, title)
     ax.set_xlim(ends[0] * MS, ends[1] * MS)
 
 

@@ -1,4 +1,4 @@
-"""A whole run, blow by blow."""
+"""Figure of a whole run, blow by blow."""
 
 from __future__ import annotations
 
@@ -25,12 +25,15 @@ def draw_overview(result: Result) -> Figure:
     axes = fig.subplots(3, 2, sharex=True)
     blows = result.blows
     time = blows["time"]
-    _depth(axes[0, 0], result)
+    axes[0, 0].plot(time, blows["bit_position"] * MM, color=style.BIT_COLOUR, **_marks(len(blows)))
+    style.label(axes[0, 0], "time [s]", "depth gained [mm]", "Mean bit position at each blow")
     rate = blows["penetration"] / blows["period"]
     _series(axes[0, 1], time, rate * MM, "rate [mm/s]", "Rate of penetration of each blow")
     mean = result.summary()["rate_of_penetration"]
     if mean is not None:
-        _rule(axes[0, 1], mean * MM, f"settled mean {mean * MM:.2f} mm/s")
+        text = f"settled mean {mean * MM:.2f} mm/s"
+        axes[0, 1].axhline(mean * MM, color=style.MEAN_COLOUR, lw=1.0, ls="--", label=text)
+        axes[0, 1].legend(loc="best")
     _series(
         axes[1, 0],
         time,
@@ -76,18 +79,6 @@ def _keep_flat(ax: Axes, values: np.ndarray) -> None:
     if room > 0:
         ax.set_ylim(low - room, high + room)
     ax.ticklabel_format(axis="y", useOffset=False)
-
-
-def _rule(ax: Axes, value: float, text: str) -> None:
-    ax.axhline(value, color=style.MEAN_COLOUR, linewidth=1.0, linestyle="--", label=text)
-    ax.legend(loc="best")
-
-
-def _depth(ax: Axes, result: Result) -> None:
-    blows = result.blows
-    depth = blows["bit_position"] * MM
-    ax.plot(blows["time"], depth, color=style.BIT_COLOUR, **_marks(len(blows)))
-    style.label(ax, "time [s]", "depth gained [mm]", "Mean bit position at each blow")
 
 
 def _counts(ax: Axes, blows: np.ndarray) -> None:

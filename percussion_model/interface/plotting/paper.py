@@ -12,10 +12,12 @@ from matplotlib.lines import Line2D
 from percussion_model.analysis.study import Study
 from percussion_model.interface.plotting import style
 from percussion_model.interface.plotting.style import KN, MM, MS
-from percussion_model.verification.paper.drop import DAMPINGS, ENERGIES, Drop
-from percussion_model.verification.paper.sweeps import (
+from percussion_model.verification.paper.runs import (
+    DAMPINGS,
+    ENERGIES,
     PAPER_LEAST_DISTANCE,
     PAPER_LEAST_FEED,
+    Drop,
     along,
     power_law,
     straight_line,

@@ -1,4 +1,4 @@
-"""One look for all figures: colours, units, lines coloured by drilling mode, saving."""
+"""Common style of all figures: colours, units, lines coloured by drilling mode, saving."""
 
 from __future__ import annotations
 
@@ -32,6 +32,8 @@ MODE_NAMES = {
     Mode.BC: "BC backward contact",
     Mode.SS: "SS standstill",
 }
+# The short modes are drawn on top.
+_DRAWING_ORDER = (Mode.FF, Mode.SS, Mode.BC, Mode.FC, Mode.DFC)
 PISTON_COLOUR = "#CC79A7"
 BIT_COLOUR = "#0072B2"
 CONTACT_COLOUR = "#CC79A7"
@@ -92,7 +94,7 @@ def draw_by_mode(ax: Axes, x: np.ndarray, y: np.ndarray, mode: np.ndarray) -> No
     one line with gaps, so that matplotlib can thin it out.
     """
     for value, xs, ys in by_mode(x, y, mode):
-        ax.plot(xs, ys, color=MODE_COLOURS[value], zorder=2 + 0.1 * _rank(value))
+        ax.plot(xs, ys, color=MODE_COLOURS[value], zorder=2 + 0.1 * _DRAWING_ORDER.index(value))
 
 
 def by_mode(
@@ -106,11 +108,6 @@ def by_mode(
             shown = mine.copy()
             shown[1:] |= mine[:-1]
             yield mode, *_with_gaps(x, y, shown)
-
-
-def _rank(mode: Mode) -> int:
-    """Drawing order: the short modes on top."""
-    return (Mode.FF, Mode.SS, Mode.BC, Mode.FC, Mode.DFC).index(mode)
 
 
 def _with_gaps(x: np.ndarray, y: np.ndarray, shown: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

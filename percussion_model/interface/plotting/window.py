@@ -1,4 +1,4 @@
-"""The stretch of a run that the figures show in detail, computed again at full rate.
+"""Window of a run that the figures show in detail, computed again at full rate.
 
 The run is repeated up to the last whole blow after settling, which costs less
 than keeping every sample of every run. Without blows, the first contact is shown.

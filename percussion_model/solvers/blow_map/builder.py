@@ -32,7 +32,7 @@ _log = logging.getLogger("percussion_model")
 Progress = Callable[[int, int], None]
 
 
-# fmu_src/runtime/start.py finds its folder in the same way: it runs before anything that an
+# fmu_src/slave/start.py finds its folder in the same way: it runs before anything that an
 # FMU brings along can be imported.
 def cache_folder() -> Path:
     """Folder for tables: that of the environment variable PERCUSSION_CACHE, or the user's."""

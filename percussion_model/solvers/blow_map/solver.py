@@ -53,21 +53,20 @@ def map_parameters(numbers: Numbers, nodes: Nodes) -> np.ndarray:
     return par
 
 
-def fill_map_start(state: np.ndarray, par: np.ndarray, values: Any) -> None:
+def fill_map_start(state: np.ndarray, par: np.ndarray, numbers: Numbers) -> None:
     """Fill a record at time zero, but for the plan of the first flight.
 
     Parameters
     ----------
     state : MAP_STATE array of length 1
     par : MAP_PAR array of length 1
-    values : Values
-        As in `Numbers`.
+    numbers : Numbers
     """
     s: Any = state[0]
     p: Any = par[0]
-    fill_start(s, values)
+    fill_start(s, numbers)
     s["p"] = 0.0
-    s["y"] = -values.start_gap
+    s["y"] = -numbers.values.start_gap
     static = s["feed"] + p["mass_b"] * p["gravity"]
     s["e_start"] = 0.5 * p["mass_p"] * s["v_p"] ** 2
     s["e_start"] += static**2 / (2.0 * p["gamma"] * s["k_r"])
@@ -126,7 +125,7 @@ class BlowMapSolver(Solver):
     def new_state(self) -> State:
         """State at time zero: the bit stands on the rock, the piston flies."""
         state = State(MAP_STATE)
-        fill_map_start(state.record, self._par, self._numbers.values)
+        fill_map_start(state.record, self._par, self._numbers)
         self._plan(self._par, state.record)
         return state
 

@@ -49,10 +49,11 @@ from percussion_model.solvers.state import State
 MOST_EVENTS = 64
 
 
-def loss_time(values: Any, bit: BarMesh) -> float:
+def loss_time(numbers: Numbers, bit: BarMesh) -> float:
     """Kelvin-Voigt time [s]: that of the scene, or 2 zeta_K / omega_cr (eq. 55 of the paper)."""
+    values = numbers.values
     if not values.effects_loss or math.isnan(values.fem_damping_ratio):
-        return kelvin_voigt_time(values)
+        return kelvin_voigt_time(numbers)
     return 2.0 * float(values.fem_damping_ratio) / critical_frequency(bit)
 
 
@@ -85,7 +86,7 @@ def fem_parameters(numbers: Numbers, bars: BarMeshes) -> np.ndarray:
     p["mu_re"], p["mu_im"] = mu.real, mu.imag
     p["dissipation"] = defect(values.fem_spectral_radius)
     p["k_c"] = values.fem_contact_stiffness
-    p["eta"] = loss_time(values, bars.bit)
+    p["eta"] = loss_time(numbers, bars.bit)
     p["q_tol"], p["t_tol"] = values.fem_event_tolerance, values.fem_time_tolerance
     p["start_gap"] = values.start_gap
     p["n_p"] = 0 if bars.piston is None else bars.piston.n + 1
@@ -96,7 +97,7 @@ def fem_parameters(numbers: Numbers, bars: BarMeshes) -> np.ndarray:
     return par
 
 
-def fill_fem_start(state: np.ndarray, w: np.ndarray, n_p: int, values: Any) -> None:
+def fill_fem_start(state: np.ndarray, w: np.ndarray, n_p: int, numbers: Numbers) -> None:
     """Fill record and nodes at time zero, but for what `read_all` derives of them.
 
     Parameters
@@ -105,11 +106,11 @@ def fill_fem_start(state: np.ndarray, w: np.ndarray, n_p: int, values: Any) -> N
     w : float array, shape (len(Node), n)
     n_p : int
         Nodes of the piston.
-    values : Values
-        As in `Numbers`.
+    numbers : Numbers
     """
     s: Any = state[0]
-    fill_start(s, values)
+    values = numbers.values
+    fill_start(s, numbers)
     if ROCKS[values.effects_rock] == RockKind.WALL:
         s["k_r"] = s["next_k_r"] = values.fem_contact_stiffness
     s["fresh"] = 1
@@ -160,7 +161,7 @@ class FemSolver(Solver):
         """State at time zero."""
         state = State(FEM_STATE, ((len(Node), self._mesh.shape[1]),))
         (w,), n_p = state.arrays, int(self._par[0]["n_p"])
-        fill_fem_start(state.record, w, n_p, self._numbers.values)
+        fill_fem_start(state.record, w, n_p, self._numbers)
         self.refresh(state)
         return state
 

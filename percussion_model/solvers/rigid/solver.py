@@ -86,18 +86,17 @@ def rigid_parameters(numbers: Numbers) -> np.ndarray:
     return par
 
 
-def fill_rigid_start(state: np.ndarray, values: Any) -> None:
+def fill_rigid_start(state: np.ndarray, numbers: Numbers) -> None:
     """Fill a record at time zero, but for what `begin` derives of it.
 
     Parameters
     ----------
     state : RIGID_STATE array of length 1
-    values : Values
-        As in `Numbers`.
+    numbers : Numbers
     """
     s: Any = state[0]
-    fill_start(s, values)
-    if PISTONS[values.piston_model] == Piston.ABSENT:
+    fill_start(s, numbers)
+    if PISTONS[numbers.values.piston_model] == Piston.ABSENT:
         s["gap"] = 0.0
     s["start_gap"] = s["gap"]
     s["ss_force"] = math.nan
@@ -123,7 +122,7 @@ class RigidSolver(Solver):
     def new_state(self) -> State:
         """State at time zero."""
         state = State(RIGID_STATE)
-        fill_rigid_start(state.record, self._numbers.values)
+        fill_rigid_start(state.record, self._numbers)
         kernels.begin(self._par, state.record)
         return state
 

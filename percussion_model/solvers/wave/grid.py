@@ -380,7 +380,7 @@ def cut_bars(numbers: Numbers, cells: int) -> CutBars:
         As for `choose_time_step`.
     """
     sections = [bar.tobytes() for bar in elastic_bars(numbers)]
-    return _cut_bars(cells, kelvin_voigt_time(numbers.values), *sections)
+    return _cut_bars(cells, kelvin_voigt_time(numbers), *sections)
 
 
 @lru_cache(MOST_KEPT)

@@ -66,14 +66,14 @@ def wave_parameters(numbers: Numbers, bars: CutBars) -> np.ndarray:
         p["z_f"], p["z_p"] = piston.grid.impedance[[0, -1]]
         p["kappa_f"], p["kappa_p"] = piston.kappa
         p["bound_p"] = piston.bound[1]
-    rock = rock_numbers(numbers.values)
+    rock = rock_numbers(numbers)
     p["ss_stiffness"] = rock.gamma * rock.k_r
     p["ss_loading"] = rock.k_r
     p["ss_damping"] = rock.c_r
     return par
 
 
-def fill_wave_start(state: np.ndarray, wp: np.ndarray, wb: np.ndarray, values: Any) -> None:
+def fill_wave_start(state: np.ndarray, wp: np.ndarray, wb: np.ndarray, numbers: Numbers) -> None:
     """Fill record and waves at time zero, but for what `begin` derives of them.
 
     Parameters
@@ -81,14 +81,13 @@ def fill_wave_start(state: np.ndarray, wp: np.ndarray, wb: np.ndarray, values: A
     state : WAVE_STATE array of length 1
     wp, wb : float array, shape (len(Row), n + 1)
         Waves of piston and bit.
-    values : Values
-        As in `Numbers`.
+    numbers : Numbers
     """
     s: Any = state[0]
-    fill_start(s, values)
+    fill_start(s, numbers)
     s["leap_end"] = -1
-    wb[Row.DOWN : Row.UP + 1, :-1] = 0.5 * values.start_bit_velocity
-    wp[Row.DOWN : Row.UP + 1, :-1] = 0.5 * values.start_piston_velocity
+    wb[Row.DOWN : Row.UP + 1, :-1] = 0.5 * numbers.values.start_bit_velocity
+    wp[Row.DOWN : Row.UP + 1, :-1] = 0.5 * numbers.values.start_piston_velocity
 
 
 class WaveSolver(Solver):
@@ -149,7 +148,7 @@ class WaveSolver(Solver):
         shapes = tuple((len(Row), self.cells.get(name, 0) + 1) for name in self._grids)
         state = State(WAVE_STATE, shapes)
         wp, wb = state.arrays
-        fill_wave_start(state.record, wp, wb, self._numbers.values)
+        fill_wave_start(state.record, wp, wb, self._numbers)
         entry_of(begin)(self._par, state.record, self._bars(state))
         return state
 

@@ -1,4 +1,4 @@
-"""References that need no solver: motions with a closed form (docs/model.md, section 12)."""
+"""Motions with a closed form: references without a solver (docs/model.md, section 12)."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from percussion_model.scene.scene import Scene
 from percussion_model.simulation.simulate import Simulation
 
-__all__ = ["ClosedForm", "closed_forms", "found_by"]
+__all__ = ["ClosedForm", "closed_forms", "solver_error"]
 
 _BARE = {
     "effects.gravity": False,
@@ -30,11 +30,11 @@ class ClosedForm:
     name : str
     scene : Scene
     time : float
-        When to look [s].
+        At which the answer is known [s].
     column : str
-        What at, of `SAMPLE_FIELDS`.
+        The quantity, of `SAMPLE_FIELDS`.
     value : float
-        What is to be seen there, SI units.
+        Its value then, SI units.
     """
 
     name: str
@@ -87,7 +87,7 @@ def closed_forms() -> list[ClosedForm]:
     ]
 
 
-def found_by(case: ClosedForm, solver: str, cells: int) -> float:
+def solver_error(case: ClosedForm, solver: str, cells: int) -> float:
     """Relative error of a solver at a closed form.
 
     Parameters

@@ -1,4 +1,4 @@
-"""One blow by scipy's `solve_ivp`; each event starts the integrator anew."""
+"""General integrators: one blow by scipy's `solve_ivp`, restarted at each event."""
 
 from __future__ import annotations
 
@@ -13,8 +13,14 @@ from percussion_model.physics.records import READING, Mode
 from percussion_model.scene.scene import Scene
 from percussion_model.simulation.simulate import Simulation
 from percussion_model.solvers.fem.records import Node
-from percussion_model.verification.accuracy.problems import AHEAD, DROP, SETTLING_BLOWS, Problem
-from percussion_model.verification.accuracy.quantities import RATE, Answer
+from percussion_model.verification.accuracy.problems import (
+    AHEAD,
+    DROP,
+    RATE,
+    SETTLING_BLOWS,
+    Answer,
+    Problem,
+)
 from percussion_model.verification.accuracy.semidiscrete import DRIVE, GAP, Drill
 
 __all__ = ["INTEGRATORS", "Course", "GeneralRun", "integrate"]
@@ -24,14 +30,14 @@ INTEGRATORS = ("LSODA", "DOP853", "RK45", "RK23", "Radau", "BDF")
 ABSOLUTE = (1e-5, 10.0, 1e-2, 1.0)
 # An implicit method must not pass over a contact: steps of at most so many bar transits.
 LONGEST = 2.0
-# After an event the state goes on by so much before the integrator starts anew [s].
+# After an event the state advances by so much before the integrator starts anew [s].
 NUDGE = 1e-9
 _IMPLICIT = ("Radau", "BDF", "LSODA")
 
 
 @dataclass
 class Course:
-    """What an integrator found.
+    """Result of an integration.
 
     Attributes
     ----------
@@ -115,7 +121,7 @@ def integrate(
     began = time.process_time()
     noted = 0
     while found.time < end:
-        watched = drill.watch()
+        candidates = drill.event_functions()
         here = times[noted:]
         here = here[(here >= found.time) & (here <= end)]
         step = solve_ivp(
@@ -124,7 +130,7 @@ def integrate(
             drill.y,
             method,
             t_eval=np.append(here, end) if len(here) and here[-1] < end else [*here, end],
-            events=[look for _, look in watched],
+            events=[function for _, function in candidates],
             **options,
         )
         if step.status < 0:
@@ -139,9 +145,9 @@ def integrate(
         which = next(k for k, hits in enumerate(step.t_events) if len(hits))
         found.time = float(step.t_events[which][-1])
         drill.y = step.y_events[which][-1].copy()
-        events = [watched[which][0]]
-        drill.change(events[0])
-        events += drill.nudge(found.time, NUDGE)
+        events = [candidates[which][0]]
+        drill.process_event(events[0])
+        events += drill.step_off(found.time, NUDGE)
         found.events += len(events)
         if GAP in events and drill.closed and armed:
             if not np.isnan(found.started):
@@ -161,8 +167,8 @@ def integrate(
     return found
 
 
-def settled(drill: Drill, problem: Problem) -> None:
-    """Put a drill into the periodic motion of the finite elements on the same mesh.
+def start_periodic(drill: Drill, problem: Problem) -> None:
+    """Start a drill in the periodic motion of the finite elements on the same mesh.
 
     Some time before a blow; what the mesh does to the motion is in it already.
     """
@@ -210,7 +216,7 @@ class GeneralRun:
         drill = Drill(scene)
         drop = problem.kind == DROP
         if not drop:
-            settled(drill, problem)
+            start_periodic(drill, problem)
         self.setup_time = time.process_time() - began
         end = problem.duration if drop else (1.0 + 2.0 * AHEAD) * problem.period
         self.course = integrate(drill, method, relative, end, problem.offsets, patience)

@@ -1,7 +1,7 @@
-"""Ladders: a method at rising effort.
+"""Ladders of methods: each method at rising effort.
 
-Along a ladder one knob turns; where two must turn together, as the penalty of the finite
-elements with their mesh, it is said in the ladder's note.
+Along a ladder one setting changes; where two must change together, as the penalty of the
+finite elements with their mesh, the ladder's note says so.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import Any
 
 from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.verification.accuracy.problems import APERIODIC, Problem
-from percussion_model.verification.accuracy.semidiscrete import refuse
+from percussion_model.verification.accuracy.semidiscrete import refusal
 
 __all__ = ["LADDERS", "Ladder", "Rung", "chosen_ladders", "fem_scene", "ladders"]
 
@@ -29,13 +29,12 @@ STEPS = (20.0, 10.0, 5.0, 3.0, 2.0, 1.0)
 COURANT = 2.0
 # A bar has at most so many elements in a ladder; a long rod gets coarser ones.
 MOST_ELEMENTS = 400
-DROP_CELLS = 92  # in the bit of a drop, where the finest of the pistons has 80
-DURATIONS = (4.0, 16.0, 64.0, 256.0)  # of aperiodic runs, by the scene's duration, over 16
+DURATIONS = (4.0, 16.0, 64.0, 256.0)  # of aperiodic runs, in sixteenths of the scene's
 
 
 @dataclass(frozen=True)
 class Ladder:
-    """A method and its knob.
+    """A method and the setting that is refined.
 
     Attributes
     ----------
@@ -43,7 +42,7 @@ class Ladder:
     title : str
         For tables and legends.
     knob : str
-        What turns, and what the order is measured against.
+        What is refined, and what the order is measured against.
     note : str
         What else there is to know.
     """
@@ -172,19 +171,19 @@ def ladders(problem: Problem, full: bool = False) -> list[Rung]:
     ----------
     problem : Problem
     full : bool
-        Whether to take the dear rungs as well.
+        Whether to take the costly rungs as well.
     """
     if problem.kind == APERIODIC:
-        return list(_longer_and_longer(problem, full))
+        return list(_rising_durations(problem, full))
     rungs = [*_waves(problem, full), *_elements(problem, full)]
     rungs.append(Rung("rigid", "", 1.0, problem.scene.computed_by("rigid")))
-    if not refuse(problem.scene):
+    if not refusal(problem.scene):
         rungs += _general(problem, full)
     return rungs
 
 
-def reach(scene: Scene) -> float:
-    """Length of all bars by that of the one whose cells are counted."""
+def total_length(scene: Scene) -> float:
+    """Length of all bars in lengths of the one whose cells are counted."""
     if scene.piston.model == "absent":
         return 1.0
     return 1.0 + scene.bit.transit_time / scene.piston.transit_time
@@ -192,7 +191,7 @@ def reach(scene: Scene) -> float:
 
 def _affordable(scene: Scene, counts: tuple[int, ...], most: float) -> list[int]:
     """Numbers of cells that do not make more than `most` in all bars."""
-    chosen = [count for count in counts if count * reach(scene) <= most]
+    chosen = [count for count in counts if count * total_length(scene) <= most]
     return chosen if len(chosen) > 3 else list(FEW)
 
 
@@ -229,7 +228,7 @@ def _general(problem: Problem, full: bool) -> Iterator[Rung]:
         if name in _FULL_ONLY and not full:
             continue
         for count in meshes:
-            if count * reach(scene) > MOST_ELEMENTS / 3:
+            if count * total_length(scene) > MOST_ELEMENTS / 3:
                 continue
             chosen = fem_scene(scene, count, COURANT, stiffness_of(count))
             for tolerance in tolerances:
@@ -239,7 +238,7 @@ def _general(problem: Problem, full: bool) -> Iterator[Rung]:
                 yield Rung(name, label, size, chosen, method, tolerance)
 
 
-def _longer_and_longer(problem: Problem, full: bool) -> Iterator[Rung]:
+def _rising_durations(problem: Problem, full: bool) -> Iterator[Rung]:
     """Aperiodic motion: what costs is the length of the run."""
     scene = problem.scene
     solvers = {

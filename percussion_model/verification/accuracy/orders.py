@@ -1,4 +1,4 @@
-"""Orders that are measured, and what a wanted accuracy costs."""
+"""Measured orders of convergence, and the cost of a wanted accuracy."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""References with error bars: made by two solvers that share no motion, stored as JSON.
+"""References with error bars, made by two solvers that share no motion, stored as JSON.
 
 Each solver is refined three times and extrapolated (Richardson). A number is called a
 reference where the two limits agree within their bars.
@@ -6,26 +6,39 @@ reference where the two limits agree within their bars.
 
 from __future__ import annotations
 
+import hashlib
+import json
 import math
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, field
 from importlib.metadata import version
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from percussion_model.scene.scene import Scene
-from percussion_model.verification.accuracy.ladders import fem_scene, reach, stiffness_of
-from percussion_model.verification.accuracy.problems import APERIODIC, Problem, Run
-from percussion_model.verification.accuracy.quantities import HISTORY, Answer
-from percussion_model.verification.accuracy.reference_store import (
-    Bar,
-    Reference,
-    fingerprint,
-    stored,
-)
+from percussion_model.simulation.files import staged_text
+from percussion_model.verification.accuracy.ladders import fem_scene, stiffness_of, total_length
+from percussion_model.verification.accuracy.problems import APERIODIC, HISTORY, Answer, Problem, Run
 
-__all__ = ["find_reference", "make_reference"]
+__all__ = [
+    "Bar",
+    "Reference",
+    "find_reference",
+    "fingerprint",
+    "load_references",
+    "make_reference",
+    "package_store",
+    "save_references",
+]
 
+STORE = "references.json"
+FORMAT = 1
+# Digits of a stored history.
+DIGITS = 7
 # Order that extrapolation assumes: the least that was ever measured for the waves; the
 # elements' mesh, with a penalty that goes along, is of second order.
 WAVE_ORDER, FEM_ORDER = 1.0, 2.0
@@ -39,21 +52,149 @@ LONG_CELLS = 40
 CLOSE = 2e-5
 
 
+@dataclass(frozen=True)
+class Bar:
+    """A number with its bar: value, what the two solvers say, and whether it is a reference.
+
+    Attributes
+    ----------
+    value, error : float
+        Reference and its bar, SI units.
+    wave, wave_error, fem, fem_error : float
+        Limits of the two solvers and their bars.
+    agreed : bool
+        Whether the limits lie within their bars of each other.
+    """
+
+    value: float
+    error: float
+    wave: float
+    wave_error: float
+    fem: float
+    fem_error: float
+    agreed: bool
+
+
+@dataclass(frozen=True)
+class Reference:
+    """Reference answer of a scene.
+
+    Attributes
+    ----------
+    title : str
+    kind : str
+        Of the problem.
+    bars : dict of Bar
+        By the names of `QUANTITIES`.
+    history : ndarray or None
+        Force on the rock at the problem's offsets, by the finest waves [N].
+    made : dict
+        How, with which versions, when.
+    """
+
+    title: str
+    kind: str
+    bars: dict[str, Bar]
+    history: np.ndarray | None
+    made: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Values that are references."""
+        return {name: bar.value for name, bar in self.bars.items() if bar.agreed}
+
+    def floor(self, key: str) -> float:
+        """Relative bar: errors near it are not resolved. NaN where there is no reference."""
+        bar = self.bars.get(key)
+        if bar is None or not bar.agreed or not bar.value:
+            return math.nan
+        return abs(bar.error / bar.value)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values for JSON."""
+        history = None
+        if self.history is not None:
+            history = [float(f"{value:.{DIGITS}g}") for value in self.history]
+        bars = {name: asdict(bar) for name, bar in self.bars.items()}
+        return {
+            "title": self.title,
+            "kind": self.kind,
+            "bars": bars,
+            "history": history,
+            "made": self.made,
+        }
+
+    @classmethod
+    def from_dict(cls, tree: dict[str, Any]) -> Reference:
+        """Read what `to_dict` gave."""
+        history = tree["history"]
+        return cls(
+            tree["title"],
+            tree["kind"],
+            {name: Bar(**bar) for name, bar in tree["bars"].items()},
+            None if history is None else np.array(history),
+            tree["made"],
+        )
+
+
+def fingerprint(scene: Scene) -> str:
+    """Tell scenes apart by what changes their motion: values that are not the defaults.
+
+    Title, solver and, but for a drop, run times do not count; so parameters that come
+    later, at their defaults, leave the fingerprint as it is.
+    """
+    tree, usual = (asdict(one) for one in (scene, Scene()))
+    apart = {"title", "solver", "fem"}
+    if scene.piston.model != "absent":
+        apart.add("run")
+    found = {
+        f"{group}.{key}": value
+        for group, entries in tree.items()
+        if group not in apart
+        for key, value in entries.items()
+        if value != usual[group][key] and value is not None
+    }
+    return hashlib.sha256(json.dumps(found, sort_keys=True).encode()).hexdigest()[:16]
+
+
+def load_references(path: Path | None = None) -> dict[str, Reference]:
+    """References of a file, by fingerprint; those of the package if left out."""
+    path = package_store() if path is None else path
+    if not path.exists():
+        return {}
+    tree = json.loads(path.read_text(encoding="utf-8"))
+    return {key: Reference.from_dict(entry) for key, entry in tree["references"].items()}
+
+
+def package_store() -> Path:
+    """Where the references of the package are kept."""
+    return Path(str(files("percussion_model.verification.accuracy").joinpath(STORE)))
+
+
+def save_references(path: Path, references: dict[str, Reference]) -> None:
+    """Write references to a file."""
+    tree = {
+        "format": FORMAT,
+        "references": {key: one.to_dict() for key, one in sorted(references.items())},
+    }
+    staged_text(path, json.dumps(tree, indent=1, allow_nan=True) + "\n")
+
+
 def find_reference(
-    problem: Problem, scene: Scene, say: Callable[[str], None] = lambda text: None
+    problem: Problem, scene: Scene, progress: Callable[[str], None] = lambda text: None
 ) -> Reference:
     """Return the stored reference of a scene, or make a quicker one now."""
-    known = stored().get(fingerprint(scene))
+    known = load_references().get(fingerprint(scene))
     if known is not None:
         return known
-    return make_reference(problem, scene, quick=True, say=say)
+    return make_reference(problem, scene, quick=True, progress=progress)
 
 
 def make_reference(
     problem: Problem,
     scene: Scene,
     quick: bool = False,
-    say: Callable[[str], None] = lambda text: None,
+    progress: Callable[[str], None] = lambda text: None,
 ) -> Reference:
     """Refine both solvers on a problem and extrapolate.
 
@@ -64,21 +205,22 @@ def make_reference(
         The scene that the problem was made of.
     quick : bool
         Whether coarser levels will do.
-    say : callable
-        Told what is being computed.
+    progress : callable
+        Called with what is being computed.
     """
     wave, fem = _scenes(problem, quick)
     answers: dict[str, list[Answer]] = {"wave": [], "fem": []}
     for name, chosen in (("wave", wave), ("fem", fem)):
         for level in chosen:
-            say(f"reference: {_level_name(level)}")
+            progress(f"reference: {_level_name(level)}")
             answers[name].append(_answer(problem, level, name))
     bars = {}
     for key in problem.quantities:
         if key == HISTORY:
             continue
         if problem.kind == APERIODIC:
-            limits = [_statistical(answers[name][-1], key) for name in ("wave", "fem")]
+            last = [answers[name][-1] for name in ("wave", "fem")]
+            limits = [(answer.values[key], answer.errors[key]) for answer in last]
         else:
             limits = [
                 _limit(answers["wave"], wave, key, WAVE_ORDER),
@@ -108,12 +250,12 @@ def _scenes(problem: Problem, quick: bool) -> tuple[list[Scene], list[Scene]]:
             [scene.computed_by("wave", **{"solver.cells": LONG_CELLS})],
             [fem_scene(scene, LONG_CELLS, 2.0, stiffness_of(LONG_CELLS))],
         )
-    by = reach(scene)
+    lengths = total_length(scene)
     waves, elements = (WAVE_LEVELS_QUICK, FEM_LEVELS_QUICK) if quick else (WAVE_LEVELS, FEM_LEVELS)
-    counts = [max(2, _rounded(level / by)) for level in waves]
+    counts = [max(2, _rounded(level / lengths)) for level in waves]
     wave = [scene.computed_by("wave", **{"solver.cells": count}) for count in counts]
-    meshes = [max(3, round(level / by)) for level in elements]
-    finest = FEM_LEVELS[0] / by
+    meshes = [max(3, round(level / lengths)) for level in elements]
+    finest = FEM_LEVELS[0] / lengths
     fem = [fem_scene(scene, count, 1.0, 2.5e13 * (count / finest) ** 2) for count in meshes]
     return wave, fem
 
@@ -149,8 +291,8 @@ def _limit(
     values = [answer.values[key] for answer in answers]
     limits = []
     for k in range(len(values) - 1):
-        by = (sizes[k] / sizes[k + 1]) ** order - 1.0
-        limits.append(values[k + 1] + (values[k + 1] - values[k]) / by)
+        ratio = (sizes[k] / sizes[k + 1]) ** order - 1.0
+        limits.append(values[k + 1] + (values[k + 1] - values[k]) / ratio)
     change = abs(values[-1] - values[-2])
     return limits[-1], max(abs(limits[-1] - limits[-2]), 0.5 * change)
 
@@ -159,10 +301,6 @@ def _count(scene: Scene) -> float:
     if scene.solver_name == "fem":
         return float(scene.fem.elements)
     return float(scene.solver.cells or math.nan)
-
-
-def _statistical(answer: Answer, key: str) -> tuple[float, float]:
-    return answer.values[key], answer.errors[key]
 
 
 def _agree(wave: tuple[float, float], fem: tuple[float, float]) -> Bar:

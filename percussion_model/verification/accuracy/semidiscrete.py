@@ -17,22 +17,22 @@ from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.solvers.fem.mesh import assemble, cut_bar
 from percussion_model.solvers.fem.records import Mesh
 
-__all__ = ["Drill", "OutOfTime", "refuse"]
+__all__ = ["Drill", "OutOfTime", "refusal"]
 
 # Dead band of the velocity of the bit's end [m/s]; docs/model.md, section 6.
 REST = 1e-9
-# What an event function may tell of.
+# Events by what they change.
 GAP, DRIVE, ROCK = "gap", "drive", "rock"
 
-Look = Callable[[float, np.ndarray], float]
+EventFunction = Callable[[float, np.ndarray], float]
 
 
 class OutOfTime(Exception):
     """A method that takes too long."""
 
 
-def refuse(scene: Scene) -> str:
-    """Why these equations cannot do a scene; empty where they can."""
+def refusal(scene: Scene) -> str:
+    """Return why these equations cannot do a scene; empty where they can."""
     if scene.piston.model == "rigid" or scene.bit.model == "rigid":
         return "a bar is rigid"
     if scene.effects.drive == "external":
@@ -68,7 +68,7 @@ class Drill:
     """
 
     def __init__(self, scene: Scene) -> None:
-        reason = refuse(scene)
+        reason = refusal(scene)
         if reason:
             raise SceneError(f"general integrators cannot do this scene: {reason}")
         self.scene, rock = scene, scene.rock
@@ -176,7 +176,7 @@ class Drill:
         part = slice(self.n_p, None) if bit else slice(0, self.n_p)
         return float(self.share[part] @ values[part] / self.share[part].sum())
 
-    def apart(self, y: np.ndarray) -> float:
+    def relative_displacement(self, y: np.ndarray) -> float:
         """Mean displacement of the piston relative to the bit, u_r [m]."""
         u = y[: self.n]
         return self.mean(u, False) - self.mean(u, True)
@@ -186,42 +186,37 @@ class Drill:
         v = y[self.n + self.n_p : 2 * self.n]
         return 0.5 * float(v @ self.mass[self.n_p :, self.n_p :] @ v)
 
-    def watch(self) -> list[tuple[str, Look]]:
-        """Functions that are positive until their event, and what they tell of."""
+    def event_functions(self) -> list[tuple[str, EventFunction]]:
+        """Functions that are positive until their event, each with the name of the event."""
         n, n_p = self.n, self.n_p
         end = self.x_r + self.p_u
-        looks: list[tuple[str, Look]] = []
+        found: list[tuple[str, EventFunction]] = []
         if n_p:
             sign = -1.0 if self.closed else 1.0
-            looks.append((GAP, lambda t, y: sign * (y[n_p] - y[n_p - 1])))
+            found.append((GAP, lambda t, y: sign * (y[n_p] - y[n_p - 1])))
         if self.push:
             level = 0.0 if self.alpha > 0 else self.scene.drive.reversal_distance
             way = -float(self.alpha)
-            looks.append(
-                (
-                    DRIVE,
-                    lambda t, y: way * self.apart(y) + level,
-                )
-            )
+            found.append((DRIVE, lambda t, y: way * self.relative_displacement(y) + level))
         if self.mode == Mode.FF:
-            looks.append((ROCK, lambda t, y: end - y[n - 1]))
+            found.append((ROCK, lambda t, y: end - y[n - 1]))
         elif self.mode == Mode.DFC:
-            looks.append((ROCK + " full", lambda t, y: self.w_r - y[-2]))
-            looks.append((ROCK, lambda t, y: y[2 * n - 1] + REST))
+            found.append((ROCK + " full", lambda t, y: self.w_r - y[-2]))
+            found.append((ROCK, lambda t, y: y[2 * n - 1] + REST))
         elif self.mode == Mode.FC:
-            looks.append((ROCK, lambda t, y: y[2 * n - 1] + REST))
+            found.append((ROCK, lambda t, y: y[2 * n - 1] + REST))
         elif self.mode == Mode.BC:
-            looks.append((ROCK + " free", lambda t, y: y[n - 1] - end))
-            looks.append((ROCK, lambda t, y: REST - y[2 * n - 1]))
+            found.append((ROCK + " free", lambda t, y: y[n - 1] - end))
+            found.append((ROCK, lambda t, y: REST - y[2 * n - 1]))
         else:
-            looks.append((ROCK, lambda t, y: self.w_r - self.kinetic(y)))
-            looks.append((ROCK + " free", lambda t, y: float(self.bit_force(y))))
-        for _, look in looks:
-            look.terminal, look.direction = True, -1.0  # type: ignore[attr-defined]
-        return looks
+            found.append((ROCK, lambda t, y: self.w_r - self.kinetic(y)))
+            found.append((ROCK + " free", lambda t, y: float(self.bit_force(y))))
+        for _, function in found:
+            function.terminal, function.direction = True, -1.0  # type: ignore[attr-defined]
+        return found
 
-    def nudge(self, t: float, step: float) -> list[str]:
-        """Go a little on by Heun's method, off the zero of an event just made.
+    def step_off(self, t: float, step: float) -> list[str]:
+        """Advance a little by Heun's method, off the zero of an event just processed.
 
         Interpolants of multistep methods need not vanish where the state does; a
         second event at the same instant would be lost.
@@ -229,21 +224,21 @@ class Drill:
         Returns
         -------
         list of str
-            What happened meanwhile, see `watch`; it has been made.
+            Events of `event_functions` meanwhile; they have been processed.
         """
         first = self.slope(t, self.y)
         second = self.slope(t, self.y + step * first)
         self.y = self.y + 0.5 * step * (first + second)
-        made = []
-        for what, look in self.watch():
-            if look(t, self.y) < 0.0:
-                self.change(what)
-                made.append(what)
+        processed = []
+        for what, function in self.event_functions():
+            if function(t, self.y) < 0.0:
+                self.process_event(what)
+                processed.append(what)
                 break
-        return made
+        return processed
 
-    def change(self, what: str) -> None:
-        """Make the change of an event of `watch`: table 1 of docs/model.md."""
+    def process_event(self, what: str) -> None:
+        """Process an event of `event_functions`: table 1 of docs/model.md."""
         y = self.y
         p = float(y[self.n - 1]) - self.x_r
         if what == GAP:

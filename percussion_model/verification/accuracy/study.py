@@ -1,4 +1,4 @@
-"""All ladders on one scene: error against time, orders, and what to take."""
+"""Accuracy study: all ladders on one scene, error against time, orders, advice."""
 
 from __future__ import annotations
 
@@ -8,16 +8,22 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from percussion_model.scene.scene import Scene
+from percussion_model.simulation.files import plain
+from percussion_model.simulation.simulate import Simulation
 from percussion_model.verification.accuracy.integrators import GeneralRun
 from percussion_model.verification.accuracy.ladders import LADDERS, Rung, chosen_ladders, ladders
-from percussion_model.verification.accuracy.machine import machine
 from percussion_model.verification.accuracy.orders import Order, cost_at, fitted_order
-from percussion_model.verification.accuracy.problems import APERIODIC, Problem, Run, pose
-from percussion_model.verification.accuracy.quantities import Answer, relative_error
-from percussion_model.verification.accuracy.reference_store import Reference
-from percussion_model.verification.accuracy.references import find_reference
+from percussion_model.verification.accuracy.problems import (
+    APERIODIC,
+    Answer,
+    Problem,
+    Run,
+    pose,
+    relative_error,
+)
+from percussion_model.verification.accuracy.references import Reference, find_reference
 from percussion_model.verification.accuracy.semidiscrete import OutOfTime
-from percussion_model.verification.accuracy.timing import interleaved
+from percussion_model.verification.accuracy.timing import interleaved, machine
 
 __all__ = ["WANTED", "Point", "Study", "study"]
 
@@ -153,7 +159,7 @@ class Study:
         for name in self.names:
             found = {key: self.order(name, key) for key in self.problem.quantities}
             orders[name] = {key: asdict(one) for key, one in found.items() if one is not None}
-        return _plain(
+        tree: dict[str, Any] = plain(
             {
                 "title": self.title,
                 "kind": self.problem.kind,
@@ -171,6 +177,7 @@ class Study:
                 "advice": [self.advice(wanted) for wanted in WANTED],
             }
         )
+        return tree
 
 
 def study(
@@ -185,7 +192,7 @@ def study(
     ----------
     scene : Scene
     full : bool
-        Whether to take the dear rungs as well.
+        Whether to take the costly rungs as well.
     methods : sequence of str, optional
         Names of `LADDERS`, or "scipy" for all general integrators.
     progress : callable
@@ -198,7 +205,10 @@ def study(
     """
     names = chosen_ladders(methods)
     progress(0.0, "pilot run (the first compiles, about a minute)")
-    compilation = _compile(scene)
+    # make each solver once: compile, or load what was compiled before
+    compilation = {
+        name: Simulation(scene.computed_by(name)).setup_time for name in ("wave", "fem", "rigid")
+    }
     problem = pose(scene)
     reference = find_reference(problem, scene, lambda text: progress(0.02, text))
     rungs = [rung for rung in ladders(problem, full) if rung.ladder in names]
@@ -218,15 +228,6 @@ def study(
         duration, blows = run.problem.duration, points[k].blow
         points[k] = replace(points[k], second=cost / duration, blow=cost / blows, repeats=repeats)
     return Study(scene.title, problem, reference, points, compilation, machine())
-
-
-def _compile(scene: Scene) -> dict[str, float]:
-    """Make each solver once: compile, or load what was compiled before."""
-    from percussion_model.simulation.simulate import Simulation
-
-    return {
-        name: Simulation(scene.computed_by(name)).setup_time for name in ("wave", "fem", "rigid")
-    }
 
 
 def _measured(
@@ -273,14 +274,3 @@ def _errors(answer: Answer, problem: Problem, reference: Reference) -> dict[str,
     values = reference.values
     history = reference.history if reference.bars.get("bit_force_history") else None
     return {key: relative_error(answer, values, history, key) for key in problem.quantities}
-
-
-def _plain(value: Any) -> Any:
-    """None for what is not finite, as JSON has no name for it."""
-    if isinstance(value, dict):
-        return {str(name): _plain(entry) for name, entry in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(entry) for entry in value]
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    return value

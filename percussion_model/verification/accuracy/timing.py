@@ -1,11 +1,17 @@
-"""Processor times, turn by turn: a machine that slows down slows all methods."""
+"""Timing: processor times taken in turn, and the machine that they were taken on."""
 
 from __future__ import annotations
 
+import os
+import platform
 import statistics
+import time
 from collections.abc import Callable, Sequence
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
 
-__all__ = ["interleaved"]
+__all__ = ["interleaved", "machine"]
 
 # A method is repeated as long as its repeats take less than this together [s].
 ENOUGH = 1.5
@@ -15,7 +21,7 @@ REPEATS = 5
 def interleaved(
     costs: Sequence[Callable[[], float]], turn: Callable[[int], None] | None = None
 ) -> list[tuple[float, int]]:
-    """Take times turn by turn.
+    """Take times turn by turn: a machine that slows down slows all methods.
 
     Parameters
     ----------
@@ -38,3 +44,23 @@ def interleaved(
                 turn(k)
             found[k].append(cost())
     return [(statistics.median(times), len(times)) for times in found]
+
+
+def machine() -> dict[str, Any]:
+    """Processor, load, system and versions that figures are taken with."""
+    name = platform.processor() or platform.machine()
+    cpuinfo = Path("/proc/cpuinfo")
+    if cpuinfo.exists():
+        lines = cpuinfo.read_text(encoding="utf-8").splitlines()
+        named = (line.split(":", 1)[1].strip() for line in lines if line.startswith("model name"))
+        name = next(named, name)
+    packages = ("numba", "numpy", "scipy", "percussion_model")
+    return {
+        "processor": name,
+        "cores": os.cpu_count(),
+        "load": os.getloadavg()[0] if hasattr(os, "getloadavg") else None,
+        "system": platform.system(),
+        "python": platform.python_version(),
+        "date": time.strftime("%Y-%m-%d"),
+        **{package: version(package) for package in packages},
+    }

@@ -1,4 +1,4 @@
-"""The nastiest scenes that the model has, and what every solver makes of them."""
+"""Hard cases: the nastiest scenes of the model, run by every solver."""
 
 from percussion_model.verification.hard_cases.cases import SOLVERS, HardCase, hard_cases
 from percussion_model.verification.hard_cases.collection import Collection, run_collection

@@ -1,4 +1,4 @@
-"""The hard cases, as they are stored beside this file: one table each.
+"""Hard cases, stored beside this file as TOML: one table each.
 
 Keys of a table: `hard` and `holds`, in words; `scene`, what differs from the
 reference scene; `script`, inputs that change during the run; `duration` and

@@ -1,4 +1,4 @@
-"""All hard cases by all solvers, on several processes, and where solvers disagree."""
+"""Collection of all hard cases by all solvers: runs, failures, disagreements."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ CHANCE_REASON = "within {sigmas:.1f} standard errors of the two rates: too few b
 
 @dataclass(frozen=True)
 class Collection:
-    """What the solvers made of the cases.
+    """Measures of all cases by all solvers.
 
     Attributes
     ----------
@@ -46,7 +46,9 @@ class Collection:
     def failures(self) -> list[str]:
         """What does not hold, a line each; empty where all is well."""
         return [
-            f"{row['case']}, {row['solver']}: {text}" for row in self.rows for text in wrong(row)
+            f"{row['case']}, {row['solver']}: {text}"
+            for row in self.rows
+            for text in violations(row)
         ]
 
     def disagreements(self) -> list[dict[str, Any]]:
@@ -79,8 +81,8 @@ class Collection:
         }
 
 
-def wrong(row: dict[str, Any]) -> list[str]:
-    """What of a row does not hold."""
+def violations(row: dict[str, Any]) -> list[str]:
+    """Return what does not hold of a row."""
     found = [row["error"]] if row["error"] else []
     for name, most in (
         ("residual", MOST_RESIDUAL),
@@ -159,11 +161,14 @@ def run_collection(
     SimulationError
         If there is no such case or solver, or nothing to run.
     """
-    wanted = list(solvers)
-    jobs = [
+    wanted, chosen = list(solvers), list(hard_cases() if names is None else names)
+    for name in chosen:
+        if name not in hard_cases():
+            raise SimulationError(f"unknown case {name}: there are {', '.join(hard_cases())}")
+    jobs: list[tuple[Any, ...]] = [
         (name, solver, share, refined)
-        for name in (hard_cases() if names is None else names)
-        for solver in _case(name).solvers
+        for name in chosen
+        for solver in hard_cases()[name].solvers
         if solver in wanted
     ]
     for solver in wanted:
@@ -173,27 +178,15 @@ def run_collection(
         raise SimulationError(f"none of these cases is computed by {', '.join(wanted)}")
     order = {(job[0], job[1]): k for k, job in enumerate(jobs)}
     rows = []
-    for row in _rows(jobs, workers):
+    processes = (os.cpu_count() or 1) if workers is None else max(workers, 1)
+    # the costliest first, so that no long run is left at the end
+    jobs.sort(key=lambda job: job[1] != "fem")
+    for _, row in on_this_machine(_row, jobs, processes):
         rows.append(row)
         if progress is not None:
             progress(len(rows), len(jobs))
     rows.sort(key=lambda row: order[row["case"], row["solver"]])
     return Collection(rows, share)
-
-
-def _case(name: str) -> HardCase:
-    if name not in hard_cases():
-        raise SimulationError(f"unknown case {name}: there are {', '.join(hard_cases())}")
-    return hard_cases()[name]
-
-
-def _rows(jobs: list[tuple[str, str, float, bool]], workers: int | None) -> Iterable[dict]:
-    """Rows as they become ready."""
-    count = (os.cpu_count() or 1) if workers is None else max(workers, 1)
-    # the dearest first, so that no long run is left at the end
-    jobs = sorted(jobs, key=lambda job: job[1] != "fem")
-    for _, row in on_this_machine(_row, jobs, count):
-        yield row
 
 
 def _row(name: str, solver: str, share: float, refined: bool) -> dict[str, Any]:

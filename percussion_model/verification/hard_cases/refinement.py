@@ -1,4 +1,4 @@
-"""What a finer grid changes: trajectories where motion is periodic, else statistics."""
+"""Change on a finer grid: of trajectories where motion is periodic, else of statistics."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import ks_2samp
 
+from percussion_model.simulation.files import plain
 from percussion_model.verification.hard_cases.cases import HardCase
 from percussion_model.verification.hard_cases.measures import Measures, measure
 
@@ -23,16 +24,16 @@ SIGMAS, LEAST_CHANCE = 3.0, 1e-3
 
 @dataclass(frozen=True)
 class Refinement:
-    """What a grid of twice as many cells changes; NaN where there is nothing to compare.
+    """Change on a grid of twice as many cells; NaN where there is nothing to compare.
 
     Attributes
     ----------
     rate_change : float
-        Of the rate of penetration, by the finer one.
+        Of the rate of penetration, divided by the finer one.
     rate_sigmas : float
         The same, in standard errors of both.
     path_change : float
-        Greatest change of the bit's path through the first contact, by its length.
+        Greatest change of the bit's path through the first contact, divided by its length.
     periods_chance : float
         Chance of two samples of periods that differ as much (Kolmogorov-Smirnov).
     converged : bool or None
@@ -48,28 +49,22 @@ class Refinement:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON; None where a figure is not defined."""
-        return {
-            f"refined_{key}": None if isinstance(v, float) and not math.isfinite(v) else v
-            for key, v in asdict(self).items()
-        }
+        found: dict[str, Any] = plain({f"refined_{key}": v for key, v in asdict(self).items()})
+        return found
 
 
 def refine(case: HardCase, found: Measures, share: float = 1.0) -> Refinement:
     """Compare with a run on a finer grid; rigid bodies have none and are exact."""
     if found.solver == "rigid" or found.error:
         return Refinement()
-    fine = measure(case, found.solver, share, again=False, **finer(case, found))
-    return compare(case, found, fine)
-
-
-def finer(case: HardCase, found: Measures) -> dict[str, Any]:
-    """Values of the finer grid by dotted key."""
+    grid = {"solver.cells": FINER * found.cells}
     if found.solver == "fem":
-        return {"fem.elements": FINER * case.scene.fem.elements}
-    return {"solver.cells": FINER * found.cells}
+        grid = {"fem.elements": FINER * case.scene.fem.elements}
+    fine = measure(case, found.solver, share, again=False, **grid)
+    return _compare(case, found, fine)
 
 
-def compare(case: HardCase, coarse: Measures, fine: Measures) -> Refinement:
+def _compare(case: HardCase, coarse: Measures, fine: Measures) -> Refinement:
     """Differences of a run and of a finer one."""
     change = coarse.rate - fine.rate
     error = math.hypot(coarse.rate_error, fine.rate_error)

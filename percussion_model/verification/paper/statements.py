@@ -1,4 +1,4 @@
-"""What the paper says in words and numbers, beside what this program finds."""
+"""Statements of the paper in words and numbers, beside the findings of this program."""
 
 from __future__ import annotations
 
@@ -11,11 +11,13 @@ import numpy as np
 from percussion_model.analysis.study import Study
 from percussion_model.physics.records import Mode
 from percussion_model.simulation.result import Result
-from percussion_model.verification.paper.drop import DAMPINGS, ENERGIES, Drop
-from percussion_model.verification.paper.sweeps import (
+from percussion_model.verification.paper.runs import (
+    DAMPINGS,
+    ENERGIES,
     PAPER_CHATTER,
     PAPER_LEAST_DISTANCE,
     PAPER_LEAST_FEED,
+    Drop,
     along,
     maxima,
     power_law,
@@ -34,7 +36,7 @@ AT_REST = 1e-3
 
 @dataclass(frozen=True)
 class Statement:
-    """One statement of the paper and what becomes of it."""
+    """One statement of the paper, and whether it holds."""
 
     place: str
     says: str

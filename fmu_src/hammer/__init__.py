@@ -1,0 +1,1 @@
+"""The hammer: its variables and their readers, its motion, the slave around it."""

@@ -1,0 +1,18 @@
+"""The hammer's inputs, and what they are for the solver."""
+
+from __future__ import annotations
+
+from percussion_model.scene.inputs import INPUTS
+
+# The solver's inputs as hosts know them: by keys of the parameter table, but for these.
+NAMES_OUTSIDE = {name: one.key for name, one in INPUTS.items()} | {
+    "feed_force": "feed_force",
+    "drive_force": "supply_pressure",
+    "external_force": "piston_force",
+}
+# Inputs from which the drive's forces follow.
+DRIVE_INPUTS = ("percussion_on", "supply_pressure", "drive.effective_area", "piston_force")
+# Inputs that are inputs of the solver as they are.
+PLAIN_INPUTS = {
+    outside: inner for inner, outside in NAMES_OUTSIDE.items() if outside not in DRIVE_INPUTS
+}

@@ -1,0 +1,227 @@
+"""The percussive hammer as a slave of a co-simulation."""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+from weakref import WeakValueDictionary
+
+import numpy as np
+
+from fmu_src.hammer.blow_map import read_blow_map
+from fmu_src.hammer.inputs import DRIVE_INPUTS, NAMES_OUTSIDE, PLAIN_INPUTS
+from fmu_src.hammer.motion import Gauge, Motion
+from fmu_src.hammer.outputs import OUTPUTS
+from fmu_src.hammer.warnings import Warnings
+from fmu_src.slave.slave import STEPPING, Phase, Read, Slave
+from fmu_src.slave.states import fingerprint
+from fmu_src.variables import closed_bounds
+from percussion_model.scene.inputs import INPUTS, why_without_effect
+from percussion_model.scene.numbers import section_numbers
+from percussion_model.scene.rows import refuse_value
+from percussion_model.scene.scene import Scene
+from percussion_model.solvers.base import Solver
+from percussion_model.solvers.wave.grid import cell_at
+
+# Solvers hold no state: instances of equal parameters share one.
+_SOLVERS: WeakValueDictionary[bytes, Solver] = WeakValueDictionary()
+
+# Numbers of an instance in a saved state.
+NUMBERS = struct.Struct("<BBdddQd")  # phase, 1, start, now, time, blows, step size
+
+
+class PercussiveHammer(Slave):
+    """Percussive drill: drive, piston, bit and rock."""
+
+    def __init__(self, **arguments: Any) -> None:
+        super().__init__(**arguments)
+        self.folder = str(arguments["resources"])
+        text = (Path(self.folder) / "scene.json").read_text(encoding="utf-8")
+        scene = json.loads(text)
+        self.baked = Scene(**scene["given"])
+        self.identity = scene["identity"]
+        self._drive_row = self.baked.row_of("drive.force")
+        self._drive_bounds = closed_bounds(self._drive_row)
+        self._drive_inputs = frozenset(DRIVE_INPUTS)
+        self._warnings = Warnings()
+        self.reset()
+
+    def reset(self) -> None:
+        """Make the solver anew when it is needed."""
+        self.motion: Motion | None = None
+        self.given_inputs: list[Any] = []  # values of the inputs when the solver was made
+        self.acting: dict[str, float] = {}  # inputs as the solver has them
+        self._fingerprint: bytes | None = None
+
+    # parameters and inputs
+
+    def check(self, names: Iterable[str]) -> None:
+        """Check bounds; before the first step the drive force and contradictions as well."""
+        super().check(names)
+        if self.phase < STEPPING:
+            self._check_drive(self.drive_forces()["drive_force"])
+            self.make_scene()
+
+    def _check_drive(self, force: float) -> None:
+        low, high = self._drive_bounds
+        if not low <= force <= high and not self._drive_row.allows(force):
+            name = "supply_pressure * drive.effective_area"
+            raise ValueError(refuse_value(self._drive_row, name, force))
+
+    def drive_forces(self) -> dict[str, float]:
+        """Forces of the drive as the solver takes them [N]."""
+        on, pressure, area, force = (self.values[name] for name in DRIVE_INPUTS)
+        return {
+            "drive_force": pressure * area if on else 0.0,
+            "external_force": force if on else 0.0,
+        }
+
+    def solver_inputs(self) -> dict[str, float]:
+        """Inputs as the solver takes them."""
+        found = {inner: self.values[name] for name, inner in PLAIN_INPUTS.items()}
+        return found | self.drive_forces()
+
+    def make_scene(self) -> Scene:
+        """Scene of the present values; raises `SceneError` if they contradict each other."""
+        values: dict[str, Any] = {}
+        for one in self.parameters:
+            if one.key is None:
+                continue
+            value = self.values[one.name]
+            if value == one.left_out:
+                value = None
+            elif one.type == "Enumeration":
+                value = self.choice(one.name)
+            values[one.key] = value
+        values |= {INPUTS[name].key: value for name, value in self.solver_inputs().items()}
+        changes = {key: value for key, value in values.items() if value != self.baked[key]}
+        return self.baked.replace(**changes)
+
+    # stepping
+
+    def initialise(self) -> Motion:
+        """Solver and state; made at time zero for the present values where there are none."""
+        if self.motion is None:
+            scene = self.make_scene()
+            self.given_inputs = [self.values[one.name] for one in self.inputs]
+            key = fingerprint(self.fingerprint().hex(), self.given_inputs)
+            self.motion = Motion(scene, _SOLVERS.get(key) or self._map_solver(scene))
+            _SOLVERS[key] = self.motion.solver
+            self.motion.gauge = self._find_gauge(scene, self.motion.solver)
+            self.acting = self.solver_inputs()
+            self._acts: dict[str, bool] = {}
+            self.new.clear()
+        return self.motion
+
+    def _map_solver(self, scene: Scene) -> Solver | None:
+        """Solver on the table that the FMU brings along, if the scene wants that."""
+        if scene.solver_name != "blow-map":
+            return None
+        # its kernels are loaded where they are needed only
+        from percussion_model.solvers.blow_map.solver import BlowMapSolver
+
+        return BlowMapSolver(scene, read_blow_map(self.folder))
+
+    def _find_gauge(self, scene: Scene, solver: Solver) -> Gauge | None:
+        """Cell at the place of the gauge, None in a bar without cells."""
+        name = self.choice("gauge.bar")
+        bar, place = scene[name], self.values["gauge.position"]
+        if place == self.by_name["gauge.position"].left_out:
+            place = 0.5 * bar.length
+        if place > bar.length:
+            raise ValueError(
+                f"gauge.position = {place!r} m: lies below the {name}, "
+                f"which is {bar.length!r} m long"
+            )
+        grid = solver.grid_of(name)
+        return None if grid is None else Gauge(name, *cell_at(section_numbers(bar), grid, place))
+
+    def step(self, time: float, step_size: float) -> None:
+        """Pass on changed inputs, then advance."""
+        motion = self.motion or self.initialise()
+        motion.advance_to(time, step_size, self._changed_inputs(motion) if self.new else {})
+        for text in self._warnings.new(motion, self.acting["loading_stiffness"]):
+            self.warn(f"at t = {time:.6g} s: {text}")
+
+    def _changed_inputs(self, motion: Motion) -> dict[str, float]:
+        """Inputs of the solver that have changed, and act."""
+        values, acting, new = self.values, self.acting, self.new
+        wanted = {PLAIN_INPUTS[name]: values[name] for name in new if name in PLAIN_INPUTS}
+        if not self._drive_inputs.isdisjoint(new):
+            forces = self.drive_forces()
+            self._check_drive(forces["drive_force"])
+            wanted |= forces
+        new.clear()
+        changed = {name: value for name, value in wanted.items() if value != acting[name]}
+        acting |= changed
+        return {name: value for name, value in changed.items() if self.acts(motion.scene, name)}
+
+    def acts(self, scene: Scene, name: str) -> bool:
+        """Whether an input has an effect in the scene; says so in the log where not."""
+        acts = self._acts.get(name)
+        if acts is None:
+            acts = self._acts[name] = not why_without_effect(scene, name)
+        if not acts:
+            self.warn(f"a new {NAMES_OUTSIDE[name]} has no effect in this scene")
+        return acts
+
+    # outputs
+
+    def reader(self, names: list[str]) -> Read:
+        """What gives the present values of these outputs; 0 before there are any."""
+        reads = [OUTPUTS[name].read for name in names]
+
+        def read(hammer: PercussiveHammer) -> list[Any]:
+            motion = hammer.motion
+            if motion is None:
+                if hammer.phase != Phase.INITIALISING:
+                    return [0] * len(reads)
+                motion = hammer.initialise()
+            return [one(motion) for one in reads]
+
+        return read
+
+    # states
+
+    def fingerprint(self) -> bytes:
+        """Hash of sources, variables and parameters."""
+        if self._fingerprint is None:
+            parameters = [self.values[one.name] for one in self.parameters]
+            self._fingerprint = fingerprint(self.identity, parameters)
+        return self._fingerprint
+
+    def save(self) -> bytes:
+        """Numbers of the instance, its inputs, its motion."""
+        motion = self.motion
+        if self.phase == Phase.INSTANTIATED or motion is None:
+            raise ValueError("there is no state to save before the initialisation has ended")
+        solver = motion.save()  # reads, and so fills the row
+        numbers = NUMBERS.pack(
+            self.phase, 1, self.start_time, self.now, motion.time,
+            motion.blow_count, motion.step_size,
+        )  # fmt: skip
+        inputs = [self.values[one.name] for one in self.inputs]
+        acting = [self.acting[name] for name in INPUTS]
+        floats = np.array([*self.given_inputs, *inputs, *acting], float)
+        return numbers + floats.tobytes() + solver
+
+    def restore(self, body: bytes) -> None:
+        """Go back to a state."""
+        phase, _, start, now, time, blows, step_size = NUMBERS.unpack_from(body)
+        count = len(self.inputs)
+        floats = np.frombuffer(body, np.float64, 2 * count + len(INPUTS), NUMBERS.size)
+        self._set_inputs(floats[:count])
+        if [self.values[one.name] for one in self.inputs] != self.given_inputs:
+            self.motion = None  # the solver was made with other inputs
+        motion = self.initialise()
+        self._set_inputs(floats[count : 2 * count])
+        motion.restore((time, step_size), blows, body[NUMBERS.size + floats.nbytes :])
+        self.acting = dict(zip(INPUTS, floats[2 * count :].tolist(), strict=True))
+        self.phase, self.start_time, self.now = Phase(phase), start, now
+
+    def _set_inputs(self, values: np.ndarray) -> None:
+        for one, value in zip(self.inputs, values, strict=True):
+            self.values[one.name] = bool(value) if one.type == "Boolean" else float(value)

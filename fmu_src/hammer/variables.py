@@ -1,0 +1,290 @@
+"""The hammer's variables: parameters from the one table, inputs and outputs of an FMU.
+
+`interface-1.json` holds names and value references: an interface, given once and kept. New
+variables get the next free number of their kind by `python -m fmu_src.interface`; entries are
+never changed or taken out. What cannot keep to that is version 2.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from fmu_src.hammer.inputs import NAMES_OUTSIDE
+from fmu_src.hammer.outputs import MODES, OUTPUTS
+from fmu_src.units import fmi_unit
+from fmu_src.variables import Variable, magnitude, number_row
+from percussion_model.scene.inputs import INPUTS
+from percussion_model.scene.parameters import find_row, parameter_table
+from percussion_model.scene.rows import Row
+from percussion_model.scene.scene import Scene
+
+VERSION = 1
+INTERFACE = Path(__file__).with_name(f"interface-{VERSION}.json")
+# Sections of a bar: this, plus SECTION for each, plus the place of the field in it.
+FIRST_SECTION = {"piston": 10_000, "bit": 20_000}
+SECTION = 10
+
+# Gauge pressure at which the drive gives the force of the scene [Pa].
+SUPPLY_PRESSURE = 20e5
+# Displays that people expect, by unit of the interface.
+DISPLAYS = {"m": "mm", "N": "kN", "Pa": "bar", "m2": "mm2", "Hz": "1/min", "N/m": "kN/mm"}
+DISPLAYS_OF = {"youngs_modulus": "MPa"}
+
+# What an input of the FMU stands for in the table, rock before drive; the rest of a scene
+# is a parameter. The drive force is the product of two numbers.
+TABLE_INPUTS = {
+    NAMES_OUTSIDE[name]: one
+    for name, one in sorted(INPUTS.items(), key=lambda item: item[1].at_once)
+    if name != "drive_force"
+}
+PRESSURE_ROW = number_row(
+    "supply_pressure", "Pa", 0.0, 1e9,
+    "gauge supply pressure; drive force F_0 = pressure * drive.effective_area",
+)  # fmt: skip
+AREA_ROW = number_row(
+    "drive.effective_area", "m^2", 0.0, 10.0, "area on which the supply pressure acts"
+)
+PLACE_ROW = number_row(
+    "gauge.position", "m", 0.0, 1e5, "place of the gauge, from the top of its bar"
+)
+
+# Numbers that may be left out, and what the FMU takes for "left out".
+LEFT_OUT = {
+    "solver.cells": (0, "0: by the solver"),
+    "solver.accuracy": (0.0, "0: none is asked for"),
+    "contact.restitution": (-1.0, "-1: St Venant"),
+    "gauge.position": (-1.0, "-1: the middle"),
+    "fem.damping_ratio": (-1.0, "-1: by loss.time"),
+}
+
+
+def hammer_variables(scene: Scene) -> list[Variable]:
+    """Return the variables of an FMU that bakes in a scene, inputs first."""
+    return [*_inputs(scene), *_outputs(), *_parameters(scene)]
+
+
+@cache
+def interface_entries() -> dict[str, dict[str, Any]]:
+    """Entries of the interface by name; those of sections follow a rule instead."""
+    found: dict[str, dict[str, Any]] = json.loads(INTERFACE.read_text(encoding="utf-8"))
+    return found
+
+
+@cache
+def reference(name: str, kind: str) -> int:
+    """Value reference of a variable; a free one for what is not in the file yet."""
+    entries = interface_entries()
+    if name in entries:
+        return int(entries[name]["reference"])
+    fresh = _fresh.setdefault(kind, [])
+    fresh.append(name)
+    used = [entry["reference"] for entry in entries.values() if entry["kind"] == kind]
+    return int(max(used)) + len(fresh)
+
+
+_fresh: dict[str, list[str]] = {}  # names that are not in the file yet, by kind
+
+
+def split_drive_force(force: float) -> tuple[float, float]:
+    """Pressure [Pa] and area [m2] whose floating-point product is exactly the force [N]."""
+    pressure = SUPPLY_PRESSURE
+    for _ in range(64):
+        area = force / pressure
+        for near in (area, math.nextafter(area, 0.0), math.nextafter(area, math.inf)):
+            if pressure * near == force:
+                return pressure, near
+        pressure = math.nextafter(pressure, math.inf)
+    raise ArithmeticError(f"no pressure and area give {force!r} N")
+
+
+def _inputs(scene: Scene) -> Iterator[Variable]:
+    pressure, _ = split_drive_force(scene.drive.force)
+    starts: dict[str, Any] = {name: scene[one.key] for name, one in TABLE_INPUTS.items()}
+    starts |= {"supply_pressure": pressure, "percussion_on": True}
+    order = ["feed_force", "supply_pressure", "piston_force", "percussion_on"]
+    order += [name for name in TABLE_INPUTS if name not in order]
+    for name in order:
+        if name == "percussion_on":
+            yield Variable(
+                name=name,
+                reference=reference(name, "input"),
+                type="Boolean",
+                causality="input",
+                description="whether the drive gets pressure, or passes piston_force on",
+                variability="discrete",
+                start=True,
+            )
+            continue
+        one = TABLE_INPUTS.get(name)
+        row, note = PRESSURE_ROW if one is None else _row(one.key), ""
+        if name == "piston_force":
+            note = "; acts while effects.drive = external and percussion_on"
+        elif one is not None and not one.at_once:
+            note = "; acts from the next drilling cycle on"
+        yield _number(name, reference(name, "input"), row, starts[name], "input", note)
+
+
+def _outputs() -> Iterator[Variable]:
+    for name, one in OUTPUTS.items():
+        real = one.type == "Real"
+        unit = one.unit or ""
+        display = {"rate_of_penetration": "mm/s", "gauge_stress": "MPa"}.get(name)
+        modes: dict[str, Any] = {
+            "enumeration": "DrillingMode",
+            "items": tuple((mode.name, int(mode), text) for mode, text in MODES.items()),
+        }
+        yield Variable(
+            name=name,
+            reference=reference(name, "output" if real else "discrete output"),
+            type=one.type,
+            causality="output",
+            description=one.description,
+            variability="continuous" if real else "discrete",
+            unit=one.unit,
+            display=display or DISPLAYS.get(unit),
+            lower=one.lower,
+            upper=one.upper,
+            nominal=one.nominal,
+            **(modes if one.type == "Enumeration" else {}),
+        )
+
+
+def _parameters(scene: Scene) -> Iterator[Variable]:
+    replaced = {one.key for one in INPUTS.values()}
+    for row in parameter_table():
+        group = row.key.partition(".")[0]
+        if row.kind == "sections":
+            yield from _sections(scene, group)
+        if row.kind == "sections" or "*" in row.key or group in ("blow_map", "run"):
+            continue
+        if row.key not in replaced:
+            yield _parameter(row.key, row, scene[row.key])
+    _, area = split_drive_force(scene.drive.force)
+    yield _number(
+        "drive.effective_area",
+        reference("drive.effective_area", "parameter"),
+        AREA_ROW,
+        area,
+        "parameter",
+    )
+    bars = tuple((name, k + 1, f"the {name}") for k, name in enumerate(FIRST_SECTION))
+    yield Variable(
+        name="gauge.bar",
+        reference=reference("gauge.bar", "parameter"),
+        type="Enumeration",
+        causality="parameter",
+        description="bar that carries the gauge",
+        variability="fixed",
+        start=2,
+        row=_choice_row("gauge.bar", tuple(FIRST_SECTION)),
+        enumeration="Bar",
+        items=bars,
+        lower=1,
+        upper=len(bars),
+    )
+    yield _number(
+        "gauge.position",
+        reference("gauge.position", "parameter"),
+        PLACE_ROW,
+        0.5 * scene.bit.length,
+        "parameter",
+    )
+
+
+def _sections(scene: Scene, bar: str) -> Iterator[Variable]:
+    fields = ("length", "area", "youngs_modulus", "density")
+    for i in range(len(scene[f"{bar}.sections"])):
+        for k, field in enumerate(fields):
+            key = f"{bar}.sections.{i}.{field}"
+            name = f"{bar}.sections[{i + 1}].{field}"
+            yield _number(
+                name,
+                FIRST_SECTION[bar] + SECTION * i + k,
+                _row(key),
+                scene[key],
+                "parameter",
+                key=key,
+            )
+
+
+def _parameter(key: str, row: Row, value: Any) -> Variable:
+    if row.kind == "number" or row.kind == "whole number":
+        return _number(key, reference(key, "parameter"), row, value, "parameter", key=key)
+    common: dict[str, Any] = {
+        "name": key, "reference": reference(key, "parameter"),
+        "causality": "parameter", "variability": "fixed",
+        "description": _described(row), "row": row, "key": key,
+    }  # fmt: skip
+    if row.kind == "flag":
+        return Variable(type="Boolean", start=value, **common)
+    if isinstance(row.choices[0], int):
+        items = tuple(({1: "down", -1: "up"}[choice], choice, "") for choice in sorted(row.choices))
+        start = value
+    else:
+        items = tuple((word, k + 1, "") for k, word in enumerate(row.choices))
+        start = row.choices.index(value) + 1
+    return Variable(
+        type="Enumeration",
+        start=start,
+        enumeration="".join(part.capitalize() for part in key.replace(".", "_").split("_")),
+        items=items,
+        lower=min(number for _, number, _ in items),
+        upper=max(number for _, number, _ in items),
+        **common,
+    )
+
+
+def _number(
+    name: str,
+    number: int,
+    row: Row,
+    value: Any,
+    causality: Any,
+    note: str = "",
+    key: str | None = None,
+) -> Variable:
+    """A number with the unit and the bounds of its row."""
+    left_out, meaning = LEFT_OUT.get(row.key, (None, ""))
+    lower = row.lower if left_out is None else min(left_out, row.lower or 0.0)
+    whole = row.kind == "whole number"
+    unit = fmi_unit(row.unit)
+    start: Any = left_out if value is None else value
+    return Variable(
+        name=name,
+        reference=number,
+        type="Integer" if whole else "Real",
+        causality=causality,
+        description=_described(row) + note + (f" ({meaning})" if meaning else ""),
+        variability="continuous" if causality == "input" else "fixed",
+        unit=None if whole else unit,
+        display=None if whole else DISPLAYS_OF.get(row.key.split(".")[-1], DISPLAYS.get(unit)),
+        lower=int(lower) if whole and lower is not None else lower,
+        upper=int(row.upper) if whole and row.upper is not None else row.upper,
+        nominal=None if whole else magnitude(start),
+        start=start if whole else float(start),
+        row=row,
+        key=key,
+        left_out=left_out,
+    )
+
+
+def _described(row: Row) -> str:
+    return row.description + (f"; has an effect where {row.effect}" if row.needs else "")
+
+
+def _choice_row(key: str, choices: tuple[str, ...]) -> Row:
+    row = number_row(key, "", 0.0, 0.0, "bar that carries the gauge")
+    return replace(row, kind="choice", choices=choices)
+
+
+def _row(key: str) -> Row:
+    row = find_row(key)
+    if row is None:
+        raise KeyError(key)
+    return row

@@ -1,1 +1,0 @@
-"""What runs inside an FMU. Needs numpy and numba alone; pythonfmu comes along."""

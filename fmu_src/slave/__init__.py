@@ -1,0 +1,1 @@
+"""What every slave is made of; runs inside FMUs."""

@@ -1,0 +1,432 @@
+"""The slave of a co-simulation: variables by reference, calling sequence, steps, states, errors.
+
+Hosts ask for the same variables and set the same inputs again and again, in the same order.
+What such a list of references needs is found once and kept; new values of inputs are checked
+when they are needed, which is in the next step.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+import sys
+from collections.abc import Callable, Iterable
+from enum import IntEnum
+from math import inf
+from pathlib import Path
+from typing import Any
+
+from pythonfmu import Fmi2Slave
+from pythonfmu.enums import Fmi2Status
+
+from fmu_src.slave.states import pack, unpack
+from fmu_src.variables import closed_bounds, read_variables
+from percussion_model.scene.rows import refuse_value
+
+# Communication points may differ from the present time by rounding: this share
+# of a step, and some units in the last place of the time.
+SHARE_OF_STEP = 1e-3
+LAST_PLACES = 8 * sys.float_info.epsilon
+
+# Types that share a getter and a setter.
+REAL, INTEGER, BOOLEAN, STRING = ("Real",), ("Integer", "Enumeration"), ("Boolean",), ("String",)
+
+# Gives values of a slave; holds none itself, so that an instance is free as soon as it is left.
+Read = Callable[[Any], list[Any]]
+
+
+class FmuError(ValueError):
+    """An error that the host must see; the text has its percent signs doubled."""
+
+
+class Phase(IntEnum):
+    """Where an instance is in the calling sequence of FMI 2.0."""
+
+    INSTANTIATED = 0
+    INITIALISING = 1
+    STEPPING = 2
+    TERMINATED = 3
+
+
+# Looked up by name, a member of an enumeration takes as long as setting ten inputs.
+STEPPING = Phase.STEPPING
+
+
+def guarded(method: Callable) -> Callable:
+    """Let an error end the call as a fatal one in the host, without a crash."""
+
+    @functools.wraps(method)
+    def call(self: Any, *arguments: Any) -> Any:
+        try:
+            return method(self, *arguments)
+        except Exception as error:
+            raise self.fatal(error) from None
+
+    return call
+
+
+@functools.cache
+def finalise_in_time(folder: str) -> None:
+    """Let the export library end before its own static variables do (Linux).
+
+    Left alone, it finalises the same pointer twice at the end of the process.
+    """
+    if not sys.platform.startswith("linux"):
+        return
+    libraries = sorted((Path(folder).parent / "binaries" / "linux64").glob("*.so"))
+    if not libraries:
+        return
+    library = ctypes.CDLL(str(libraries[0]))
+    # by getattr, since a class would mangle a name of two underscores
+    at_exit = getattr(ctypes.CDLL(None), "__cxa_atexit")
+    at_exit(ctypes.cast(library.finalizePythonInterpreter, ctypes.c_void_p), None, None)
+
+
+class Slave(Fmi2Slave):
+    """Base of the slaves.
+
+    A slave gives `reset`, `initialise`, `step`, a `reader` of outputs, and its state by
+    `fingerprint`, `save` and `restore`.
+
+    Attributes
+    ----------
+    variables : dict
+        Variables by reference.
+    values : dict
+        Of parameters and inputs by name, but for inputs that are `pending`.
+    pending : dict
+        Values of inputs that were set since the last step, by references, the newest last.
+    new : set of str
+        Inputs that have changed, for the slave to take and to clear.
+    unchecked : list of str
+        Inputs whose new values may be out of bounds.
+    """
+
+    def __init__(self, **arguments: Any) -> None:
+        super().__init__(**arguments)
+        folder = arguments["resources"]
+        # The export library adds the folder for each instance; once loaded it is not needed.
+        while folder in sys.path:
+            sys.path.remove(folder)
+        finalise_in_time(folder)
+        self.phase = Phase.INSTANTIATED
+        self.start_time = 0.0
+        self.now = 0.0  # time of the host [s]
+        self.variables = {one.reference: one for one in read_variables(folder)}
+        self.by_name = {one.name: one for one in self.variables.values()}
+        self.inputs = [one for one in self.by_name.values() if one.causality == "input"]
+        self.parameters = [one for one in self.by_name.values() if one.causality == "parameter"]
+        self.values = {one.name: one.start for one in (*self.inputs, *self.parameters)}
+        self.pending: dict[tuple[int, ...], list[float]] = {}
+        self.new: set[str] = set()
+        self.unchecked: list[str] = []
+        self._bounds = {name: closed_bounds(one.row) for name, one in self.by_name.items()}
+        # by references, for each type
+        self._reads: dict[Any, dict[tuple[int, ...], Read]] = {
+            types: {} for types in (REAL, INTEGER, BOOLEAN, STRING)
+        }
+        self._real_reads = self._reads[REAL]
+        # lists of Real inputs: name and bounds of each
+        self._input_lists: dict[tuple[int, ...], list[tuple[str, float, float]]] = {}
+
+    # what a slave does
+
+    def reset(self) -> None:
+        """Drop what was made of values that have changed before the first step."""
+
+    def initialise(self) -> Any:
+        """Make everything ready for the first step."""
+
+    def step(self, time: float, step_size: float) -> None:
+        """Advance; `time` is the end of the step since the start [s]."""
+        raise NotImplementedError
+
+    def reader(self, names: list[str]) -> Read:
+        """What gives the present values of these outputs; asked for once."""
+        raise NotImplementedError
+
+    def fingerprint(self) -> bytes:
+        """Hash of what a saved state belongs to."""
+        raise NotImplementedError
+
+    def save(self) -> bytes:
+        """Present state; ValueError before there is one."""
+        raise NotImplementedError
+
+    def restore(self, body: bytes) -> None:
+        """Go back to a state that `save` gave."""
+        raise NotImplementedError
+
+    # values
+
+    def check(self, names: Iterable[str]) -> None:
+        """Raise ValueError if a value is not allowed; names variable, value, bounds."""
+        for name in names:
+            value, one = self.values[name], self.by_name[name]
+            low, high = self._bounds[name]
+            if low <= value <= high:
+                continue
+            if one.row is None or one.type == "Boolean" or value == one.left_out:
+                continue
+            allowed = value in one.row.choices if one.row.choices else one.row.allows(value)
+            if one.type == "Enumeration":
+                allowed = self.choice(name) is not None
+            if not allowed:
+                raise ValueError(refuse_value(one.row, name, value))
+
+    def choice(self, name: str) -> Any:
+        """Word behind the number of an enumeration, None where there is none."""
+        row = self.by_name[name].row
+        choices = row.choices if row is not None else ()
+        value = self.values[name]
+        if choices and isinstance(choices[0], int):
+            return value if value in choices else None
+        return choices[value - 1] if 1 <= value <= len(choices) else None
+
+    def take_pending(self) -> None:
+        """Take inputs that were set since the last step into `values`."""
+        held = self.values
+        for references, values in self.pending.items():
+            plan = self._input_lists[references]
+            for (name, low, high), value in zip(plan, values, strict=True):
+                if held[name] != value:
+                    held[name] = value
+                    self.new.add(name)
+                    if not low <= value <= high:
+                        self.unchecked.append(name)
+        self.pending.clear()
+
+    def renew_inputs(self) -> None:
+        """Take all inputs as new in the next step."""
+        self.unchecked = [one.name for one in self.inputs]
+        self.new.update(self.unchecked)
+
+    def _reader_of(self, references: list[int], types: tuple[str, ...]) -> Read:
+        """What reads these variables; raises ValueError if there is one that is not known."""
+        found = [self._variable(reference, types) for reference in references]
+        outputs = [one.name for one in found if one.causality == "output"]
+        if len(outputs) == len(found):
+            return self.reader(outputs)
+        names = [one.name for one in found]
+        reads = {name: self.reader([name]) for name in outputs}
+
+        def read(slave: Slave) -> list[Any]:
+            slave.take_pending()
+            return [
+                reads[name](slave)[0] if name in reads else slave.values[name] for name in names
+            ]
+
+        return read
+
+    def _variable(self, reference: int, types: tuple[str, ...]) -> Any:
+        one = self.variables.get(reference)
+        if one is None or one.type not in types:
+            raise ValueError(f"there is no {types[0]} variable of reference {reference}")
+        return one
+
+    def _get(self, references: list[int], types: tuple[str, ...]) -> list[Any]:
+        """Present values."""
+        reads, key = self._reads[types], tuple(references)
+        if key not in reads:
+            reads[key] = self._reader_of(references, types)
+        return reads[key](self)
+
+    def _set(self, references: list[int], values: list[Any], types: tuple[str, ...]) -> None:
+        """Set parameters and inputs."""
+        self.take_pending()
+        found = []
+        for reference, value in zip(references, values, strict=True):
+            one = self._variable(reference, types)
+            if one.causality == "output":
+                raise ValueError(f"{one.name} is an output: it cannot be set")
+            if one.causality == "parameter" and self.phase > Phase.INITIALISING:
+                raise ValueError(f"{one.name} is fixed: it can be set before the first step only")
+            found.append(one)
+            if self.values[one.name] == value:
+                continue
+            self.values[one.name] = value
+            if self.phase < STEPPING:
+                self.reset()
+            else:
+                self.new.add(one.name)
+                self.unchecked.append(one.name)
+        if types is REAL and all(one.causality == "input" for one in found):
+            self._input_lists[tuple(references)] = [
+                (one.name, *self._bounds[one.name]) for one in found
+            ]
+
+    # the calls of a host: variables
+
+    def get_real(self, vrs: list[int]) -> list[float]:
+        """Values of Real variables."""
+        # as `guarded`, without a call more: this is called often, as are `set_real` and `do_step`
+        try:
+            read = self._real_reads.get(tuple(vrs))
+            return self._get(vrs, REAL) if read is None else read(self)
+        except Exception as error:
+            raise self.fatal(error) from None
+
+    @guarded
+    def get_integer(self, vrs: list[int]) -> list[int]:
+        """Values of Integer variables and enumerations."""
+        return self._get(vrs, INTEGER)
+
+    @guarded
+    def get_boolean(self, vrs: list[int]) -> list[bool]:
+        """Values of Boolean variables."""
+        return self._get(vrs, BOOLEAN)
+
+    @guarded
+    def get_string(self, vrs: list[int]) -> list[str]:
+        """Values of String variables: there are none."""
+        return self._get(vrs, STRING)
+
+    def set_real(self, vrs: list[int], values: list[float]) -> None:
+        """Set Real variables."""
+        try:
+            references = tuple(vrs)
+            if references in self._input_lists and self.phase is STEPPING:
+                pending = self.pending
+                pending.pop(references, None)  # the newest goes last
+                pending[references] = values
+            else:
+                self._set(vrs, values, REAL)
+        except Exception as error:
+            raise self.fatal(error) from None
+
+    @guarded
+    def set_integer(self, vrs: list[int], values: list[int]) -> None:
+        """Set Integer variables and enumerations."""
+        self._set(vrs, values, INTEGER)
+
+    @guarded
+    def set_boolean(self, vrs: list[int], values: list[bool]) -> None:
+        """Set Boolean variables."""
+        self._set(vrs, [bool(value) for value in values], BOOLEAN)
+
+    @guarded
+    def set_string(self, vrs: list[int], values: list[str]) -> None:
+        """Set String variables: there are none."""
+        self._set(vrs, values, STRING)
+
+    # the calls of a host: sequence
+
+    @guarded
+    def setup_experiment(
+        self, start_time: float, stop_time: float | None, tolerance: float | None
+    ) -> None:
+        """Take the start time."""
+        self._require(Phase.INSTANTIATED)
+        if not abs(start_time) < inf:
+            raise ValueError(f"startTime = {start_time!r}: must be a finite time in s")
+        self.start_time = self.now = start_time
+
+    @guarded
+    def enter_initialization_mode(self) -> None:
+        """Check all values."""
+        self._require(Phase.INSTANTIATED)
+        self.check(self.values)
+        self.phase = Phase.INITIALISING
+
+    @guarded
+    def exit_initialization_mode(self) -> None:
+        """Check again what may have changed, and make everything ready."""
+        self._require(Phase.INITIALISING)
+        self.check(self.values)
+        self.initialise()
+        self.phase = STEPPING
+
+    def do_step(self, current_time: float, step_size: float) -> bool:
+        """Advance by a communication step."""
+        try:
+            if self.phase is not STEPPING:
+                self._require(STEPPING)
+            if not 0.0 < step_size < inf:
+                raise ValueError(f"communicationStepSize = {step_size!r}: must be above 0 s")
+            if current_time != self.now:
+                self._check_time(current_time, step_size)
+            if self.pending:
+                self.take_pending()
+            if self.unchecked:
+                self.check(self.unchecked)
+                self.unchecked.clear()
+            end = current_time + step_size
+            self.step(end - self.start_time, step_size)
+            self.now = end
+            return True
+        except Exception as error:
+            raise self.fatal(error) from None
+
+    def _check_time(self, current_time: float, step_size: float) -> None:
+        """Raise ValueError if a step does not begin where the last one has ended."""
+        slack = SHARE_OF_STEP * step_size + LAST_PLACES * abs(self.now)
+        if not abs(current_time - self.now) <= slack:
+            where = "before" if current_time < self.now else "after"
+            raise ValueError(
+                f"currentCommunicationPoint = {current_time!r} s lies {where} the present time "
+                f"of {self.now!r} s: steps must follow each other; to go back, restore a state"
+            )
+
+    @guarded
+    def terminate(self) -> None:
+        """No further steps."""
+        self.phase = Phase.TERMINATED
+
+    def _require(self, phase: Phase) -> None:
+        """Raise ValueError if a call comes out of order."""
+        if self.phase != phase:
+            raise ValueError(
+                f"call out of order: allowed while {phase.name.lower()}, "
+                f"but the instance is {self.phase.name.lower()}"
+            )
+
+    # the calls of a host: states, which are bytes
+
+    @guarded
+    def _get_fmu_state(self) -> bytes:
+        self.take_pending()
+        body = self.save()
+        return pack(self.fingerprint(), body)
+
+    @guarded
+    def _set_fmu_state(self, state: bytes) -> None:
+        body = unpack(self.fingerprint(), state)
+        self.pending.clear()
+        self.restore(body)
+        self.renew_inputs()
+
+    @staticmethod
+    def _fmu_state_to_bytes(state: bytes) -> bytes:
+        return state
+
+    @staticmethod
+    def _fmu_state_from_bytes(state: bytes) -> bytes:
+        return state
+
+    # messages
+
+    def log(
+        self,
+        msg: str,
+        status: Fmi2Status = Fmi2Status.ok,
+        category: str | None = None,
+        debug: bool | None = None,
+    ) -> None:
+        """Log a message; hosts take it for a printf format, so percent signs are doubled."""
+        super().log(msg.replace("%", "%%"), status, category)
+
+    def warn(self, message: str) -> None:
+        """Log a warning."""
+        self.log(f"{self.instance_name}: {message}", Fmi2Status.warning, "logStatusWarning")
+
+    def fatal(self, error: Exception) -> FmuError:
+        """Log an error and return what is to be raised.
+
+        After an exception the export library gives the instance, its class and its
+        message queue back twice: one reference more to each keeps the heap whole.
+        """
+        for held in (self, type(self), self.log_queue):
+            ctypes.pythonapi.Py_IncRef(ctypes.py_object(held))
+        text = str(error) if isinstance(error, ValueError) else f"{type(error).__name__}: {error}"
+        self.log(f"{self.instance_name}: {text}", Fmi2Status.error, "logStatusError")
+        return FmuError(text.replace("%", "%%"))

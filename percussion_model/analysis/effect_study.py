@@ -1,0 +1,373 @@
+"""Study of effects: a scene with one effect at a time turned off, or on."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from percussion_model.analysis.comparison import relative_change
+from percussion_model.scene.scene import Scene, SceneError
+from percussion_model.simulation.result import LEAST_BLOWS, Result
+from percussion_model.simulation.simulate import Simulation, simulate
+
+__all__ = [
+    "NOISE",
+    "EffectsStudy",
+    "Trial",
+    "Variant",
+    "effect_variants",
+    "step_costs",
+    "study_effects",
+]
+
+# A step whose cost differs by this much from the scene's differs by more than noise.
+NOISE = 1.05
+
+# Free flight, in which a step meets nothing: gaps that are not crossed in so
+# many steps [m], however short the stroke.
+FLIGHT: dict[str, Any] = {
+    "start.gap": 100.0,
+    "start.rock_gap": 100.0,
+    "start.piston_velocity": 0.0,
+    "start.bit_velocity": 0.0,
+    "solver.leaps": False,
+}
+FLIGHT_STEPS = 4_000
+# Measurements of a step; noise only adds, so the least is taken.
+ROUNDS = 40
+# A run shorter than this is timed again, so often at most [s].
+SHORT_RUN = 1.5
+MOST_RUNS = 7
+
+# A rate whose standard error is a larger share of it than this tells no change.
+UNDECIDED = 0.25
+
+# Numbers of a summary whose change is shown.
+CHANGED = ("rate_of_penetration", "blow_period", "peak_bit_force")
+_BY_BLOWS = ("rate_of_penetration_standard_error", "drilling_cycles_per_blow")
+
+_NO_ROCK = "the bit meets no rock: it flies, and drills nothing"
+_NO_DRIVE = "nothing throws the piston: what moves is left from the start and comes to rest"
+_NO_CRUSHING = "a linear spring gives all back: nothing is crushed"
+_BARRIER = ("rock.barrier_energy", "rock.barrier_damping")
+
+
+@dataclass(frozen=True)
+class Variant:
+    """One effect changed.
+
+    Attributes
+    ----------
+    effect : str
+        Its name; empty for the scene as it is.
+    setting : str
+        "off", "on", or what takes its place.
+    changes : dict
+        Values by dotted key.
+    off : bool
+        Whether something is left out, so that nothing may cost more.
+    no_penetration : str
+        Why the rate of penetration means nothing then; may be empty.
+    no_blows : str
+        Why nothing that is counted by blows means anything; may be empty.
+    """
+
+    effect: str
+    setting: str
+    changes: dict[str, Any] = field(default_factory=dict)
+    off: bool = False
+    no_penetration: str = ""
+    no_blows: str = ""
+
+    @property
+    def name(self) -> str:
+        """Effect and setting."""
+        return f"{self.effect} {self.setting}".strip()
+
+    def apply(self, scene: Scene) -> Scene:
+        """Return the scene with the effect changed; `SceneError` where it cannot be."""
+        if self.changes.get("solver.name") == "rigid":
+            rest = {key: value for key, value in self.changes.items() if key != "solver.name"}
+            return scene.computed_by("rigid", **rest)
+        return scene.replace(**self.changes)
+
+
+def effect_variants(scene: Scene) -> Iterator[Variant]:
+    """Go through the scene as it is, then one effect after the other."""
+    effects = scene.effects
+    yield Variant("", "as it is", no_penetration=_NO_CRUSHING if effects.rock == "spring" else "")
+    for name in ("gravity", "feed"):
+        is_on = getattr(effects, name)
+        yield Variant(name, "off" if is_on else "on", {f"effects.{name}": not is_on}, off=is_on)
+    yield from _drive(scene)
+    yield from _rock(scene)
+    yield from _bars(scene)
+    if scene.solver_name == "wave":
+        is_on = scene.solver.leaps
+        # Leaps are no effect but an accelerator: a step without them is the same step.
+        yield Variant("leaps", "off" if is_on else "on", {"solver.leaps": not is_on})
+
+
+def _drive(scene: Scene) -> Iterator[Variant]:
+    if scene.effects.drive != "none":
+        yield Variant("drive", "off", {"effects.drive": "none"}, off=True, no_blows=_NO_DRIVE)
+    elif scene.piston.model != "absent":
+        yield Variant("drive", "on", {"effects.drive": "pressure"})
+
+
+def _rock(scene: Scene) -> Iterator[Variant]:
+    rock = scene.effects.rock
+    if rock == "bilinear":
+        if scene.barrier_on:
+            yield Variant("barrier", "off", {"effects.barrier": False}, off=True)
+        else:
+            yield Variant("barrier", "on", {"effects.barrier": True, **_not_zero(scene, _BARRIER)})
+        other = "paper" if scene.effects.standstill_tension == "release" else "release"
+        yield Variant("standstill tension", other, {"effects.standstill_tension": other})
+        yield Variant(
+            "bilinear law",
+            "spring",
+            {"effects.rock": "spring", "effects.barrier": False},
+            off=True,
+            no_penetration=_NO_CRUSHING,
+        )
+    if rock == "none":
+        yield Variant("rock", "on", {"effects.rock": "bilinear"})
+    else:
+        changes = {"effects.rock": "none", "effects.barrier": False}
+        yield Variant("rock", "off", changes, off=True, no_blows=_NO_ROCK)
+
+
+def _bars(scene: Scene) -> Iterator[Variant]:
+    if scene.bit.model == "elastic":
+        if scene.loss_on:
+            yield Variant("loss", "off", {"effects.loss": False}, off=True)
+        else:
+            changes = {"effects.loss": True, **_not_zero(scene, ("loss.time",))}
+            yield Variant("loss", "on", changes)
+        if scene.piston.model == "elastic":
+            yield Variant("elastic piston", "rigid", {"piston.model": "rigid"}, off=True)
+        elif scene.piston.model == "rigid":
+            yield Variant("elastic piston", "on", {"piston.model": "elastic"})
+        yield Variant("elastic bars", "rigid", {"solver.name": "rigid"}, off=True)
+        return
+    changes = {"bit.model": "elastic", "solver.name": "auto"}
+    if scene.piston.model == "rigid":
+        changes["piston.model"] = "elastic"
+    yield Variant("elastic bars", "on", changes)
+
+
+def _not_zero(scene: Scene, keys: tuple[str, ...]) -> dict[str, Any]:
+    """Defaults for what the scene sets to zero, which would keep the effect off."""
+    return {key: scene.row_of(key).default for key in keys if scene[key] == 0}
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One variant of a scene.
+
+    Attributes
+    ----------
+    variant : Variant
+        What was changed; that of the scene itself changes nothing.
+    result : Result
+        Of the whole run.
+    wall_time : float
+        Time of the whole run, the least of several, without compilation and
+        set-up [s].
+    step : float or None
+        Processor time of a time step in free flight, without leaps [s]; None
+        where the solver has no step.
+    """
+
+    variant: Variant
+    result: Result
+    wall_time: float
+    step: float | None
+
+    @property
+    def reason(self) -> str:
+        """Why there is no rate of penetration, or why it must not be trusted; may be empty."""
+        if self.variant.no_blows or self.variant.no_penetration:
+            return self.variant.no_blows or self.variant.no_penetration
+        reasons = [text for text in self.result.warnings if "trusted" in text]
+        if len(self.result.counted) < LEAST_BLOWS:
+            reasons += [text for text in self.result.warnings if "whole blow" in text][:1]
+        elif self.undecided:
+            reasons += [
+                "the motion is aperiodic, and the run too short to tell its rate of penetration"
+            ]
+        return "; ".join(reasons)
+
+    @property
+    def undecided(self) -> bool:
+        """Whether scatter hides the rate of penetration."""
+        rate = self.result.rate_of_penetration
+        return self.result.rate_of_penetration_standard_error > UNDECIDED * abs(rate)
+
+    def numbers(self) -> dict[str, Any]:
+        """What was found, as plain values; None is what is not defined."""
+        summary = self.result.summary()
+        blows = summary["blows"]
+        found = {name: summary[name] for name in (*CHANGED, *_BY_BLOWS)}
+        if self.variant.no_penetration:
+            found["rate_of_penetration"] = found["rate_of_penetration_standard_error"] = None
+        if self.variant.no_blows:
+            found = dict.fromkeys(found)
+            blows = None
+        return {
+            "effect": self.variant.effect,
+            "turned": self.variant.setting,
+            "step_time": self.step,
+            "wall_time": self.wall_time,
+            "blow_time": self.wall_time / blows if blows else None,
+            "events": summary["events"],
+            "blows": blows,
+            "steps": summary["statistics"].get("steps"),
+            **found,
+            "reason": self.reason,
+            "warnings": summary["warnings"],
+        }
+
+
+@dataclass(frozen=True)
+class EffectsStudy:
+    """A scene and its variants, one effect changed in each.
+
+    Attributes
+    ----------
+    scene : Scene
+    base : Trial
+        The scene as it is.
+    trials : list of Trial
+    refused : dict of str
+        Effects that cannot be changed in this scene, and why.
+    """
+
+    scene: Scene
+    base: Trial
+    trials: list[Trial]
+    refused: dict[str, str]
+
+    def changes(self, trial: Trial) -> dict[str, float | None]:
+        """Relative change of each number of `CHANGED` against the scene itself."""
+        here, base = trial.numbers(), self.base.numbers()
+        found = {name: relative_change(here[name], base[name]) for name in CHANGED}
+        if trial.undecided or self.base.undecided:
+            found["rate_of_penetration"] = None
+        return found
+
+    def is_costlier(self, trial: Trial) -> bool:
+        """Whether turning an effect off made a step costlier, beyond noise."""
+        if not trial.variant.off or trial.step is None or self.base.step is None:
+            return False
+        return trial.step > NOISE * self.base.step
+
+    def to_dict(self) -> dict[str, Any]:
+        """All numbers as plain values for JSON, SI units."""
+        return {
+            "title": self.scene.title,
+            "solver": self.base.result.solver,
+            "cells": self.base.result.cells or None,
+            "duration": self.base.result.duration,
+            "settle": self.base.result.settle,
+            "scene": self.base.numbers(),
+            "effects": [
+                {
+                    **trial.numbers(),
+                    "changes": self.changes(trial),
+                    "step_dearer": self.is_costlier(trial),
+                }
+                for trial in self.trials
+            ],
+            "refused": self.refused,
+        }
+
+
+def study_effects(
+    scene: Scene,
+    duration: float | None = None,
+    settle: float | None = None,
+    progress: Callable[[str, float], None] | None = None,
+) -> EffectsStudy:
+    """Turn each effect of a scene off, or on where it is off, and run all of them.
+
+    Parameters
+    ----------
+    scene : Scene
+    duration, settle : float, optional
+        Simulated time, and the time before blows count [s]; default those of
+        the scene.
+    progress : callable, optional
+        Called with what is done next and the share of the whole that is done.
+
+    Returns
+    -------
+    EffectsStudy
+
+    Raises
+    ------
+    SceneError, SimulationError
+        If the scene itself cannot be computed.
+    """
+    base, *rest = effect_variants(scene)
+    cases = [(base, scene)]
+    refused = {}
+    for variant in rest:
+        try:
+            cases.append((variant, variant.apply(scene)))
+        except SceneError as error:
+            refused[variant.name] = str(error)
+    found = []
+    for k, (variant, changed) in enumerate(cases):
+        if progress is not None:
+            progress(variant.name, k / (len(cases) + 1))
+        found.append(_best_run(changed, duration, settle))
+    if progress is not None:
+        progress("time steps", len(cases) / (len(cases) + 1))
+    steps = step_costs([changed for _, changed in cases])
+    trials = [
+        Trial(variant, result, wall, step)
+        for (variant, _), (result, wall), step in zip(cases, found, steps, strict=True)
+    ]
+    return EffectsStudy(scene, trials[0], trials[1:], refused)
+
+
+def _best_run(scene: Scene, duration: float | None, settle: float | None) -> tuple[Result, float]:
+    """Run a scene, a short one several times; the least wall time [s]."""
+    result = simulate(scene, duration, settle)
+    walls = [result.wall_time]
+    while sum(walls) < SHORT_RUN and len(walls) < MOST_RUNS:
+        walls.append(simulate(scene, duration, settle).wall_time)
+    return result, min(walls)
+
+
+def step_costs(scenes: Sequence[Scene], rounds: int = ROUNDS) -> list[float | None]:
+    """Processor time of one time step in free flight, without leaps, of each scene [s].
+
+    Short stretches taken in turn, so that a machine that slows down slows all
+    of them. None where a solver goes from event to event and has no step.
+    """
+    flights = []
+    for scene in scenes:
+        changes = {key: value for key, value in FLIGHT.items() if scene.matters(key)}
+        flights.append(Simulation(scene.replace(**changes), record_events=False))
+    best = [math.inf if flight.solver.time_step else None for flight in flights]
+    for _ in range(rounds):
+        for k, flight in enumerate(flights):
+            step, least = flight.solver.time_step, best[k]
+            if step is not None and least is not None:
+                best[k] = min(least, _cost_of_step(flight, FLIGHT_STEPS * step))
+    return best
+
+
+def _cost_of_step(simulation: Simulation, duration: float) -> float:
+    """Advance a simulation; processor time by the steps that it took [s]."""
+    before = simulation.statistics()["steps"]
+    began = time.process_time()
+    simulation.advance(simulation.time + duration)
+    cost = time.process_time() - began
+    return cost / (simulation.statistics()["steps"] - before)

@@ -1,0 +1,96 @@
+"""Figure of the cost and change of each effect, as bars."""
+
+from __future__ import annotations
+
+import math
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from percussion_model.analysis.effect_study import EffectsStudy
+from percussion_model.interface.plotting import style
+
+COST_COLOUR, MORE_COLOUR, LESS_COLOUR = "#0072B2", "#D55E00", "#009E73"
+# Axes are made for changes up to this [%].
+WIDEST = 60.0
+# Bars beyond this multiple of it have no room for their number, and are cut off.
+UNCUT = 1.4
+# Room beside the longest bar for its number, as a factor on its length.
+ROOM = 1.75
+# Changes below this are none [%].
+NOTHING = 5e-3
+
+
+def draw_effects(found: EffectsStudy) -> Figure:
+    """Draw cost of a step, of a blow, and change in rate, period and peak force."""
+    trials = found.trials
+    names = [f"{trial.variant.effect}: {trial.variant.setting}" for trial in trials]
+    height = 1.6 + 0.32 * len(trials)
+    fig = Figure(figsize=(12.0, height), layout="constrained")
+    axes = fig.subplots(1, 5, sharey=True)
+    base = found.base.numbers()
+    for ax, key, title in (
+        (axes[0], "step_time", "a time step"),
+        (axes[1], "blow_time", "a blow"),
+    ):
+        costs = [trial.numbers()[key] for trial in trials]
+        values = [c / base[key] if c is not None and base[key] else None for c in costs]
+        _costs(ax, values)
+        style.label(ax, "by the scene's own", "", f"Cost of {title}")
+    for ax, key, title in (
+        (axes[2], "rate_of_penetration", "Rate of penetration"),
+        (axes[3], "blow_period", "Blow period"),
+        (axes[4], "peak_bit_force", "Peak bit force"),
+    ):
+        _changes(ax, [found.changes(trial)[key] for trial in trials])
+        style.label(ax, "change [%], hatched: beyond", "", title)
+    axes[0].set_yticks(range(len(trials)), names)
+    axes[0].invert_yaxis()
+    for ax in axes:
+        ax.grid(visible=False, axis="y")
+        ax.tick_params(axis="y", length=0)
+    title = found.scene.title
+    style.head(fig, "One effect turned at a time" + (f" — {title}" if title else ""))
+    return fig
+
+
+def _costs(ax: Axes, values: list[float | None]) -> None:
+    """Bars from 1, on a logarithmic axis."""
+    known = [value for value in values if value is not None]
+    least, most = min([0.5, *known]), max([2.0, *known])
+    ax.set_xscale("log")
+    ax.set_xlim(least / 20.0, most * 9.0)
+    for y, value in enumerate(values):
+        if value is None:
+            ax.text(1.0, y, " –", va="center")
+            continue
+        ax.barh(y, value - 1.0, left=1.0, height=0.62, color=COST_COLOUR)
+        side = 1.08 if value >= 1.0 else 1.0 / 1.08
+        align = "left" if value >= 1.0 else "right"
+        ax.text(value * side, y, f"{value:.2g}", va="center", ha=align, fontsize=8.0)
+    ax.axvline(1.0, color=style.RULE_COLOUR, linewidth=0.8)
+
+
+def _changes(ax: Axes, values: list[float | None]) -> None:
+    """Bars from 0 in per cent."""
+    shares = [None if value is None else 100.0 * value for value in values]
+    known = [abs(share) for share in shares if share is not None]
+    end = min(max([1.0, *known]), WIDEST)
+    ax.set_xlim(-ROOM * end, ROOM * end)
+    for y, share in enumerate(shares):
+        if share is None:
+            ax.text(0.0, y, " –", va="center")
+            continue
+        cut = abs(share) > UNCUT * end
+        # a cut bar leaves the picture, and says so within it
+        shown = math.copysign(ROOM * end, share) if cut else share
+        colour = MORE_COLOUR if share >= 0.0 else LESS_COLOUR
+        ax.barh(y, shown, height=0.62, color=colour, hatch="///" if cut else None, edgecolor="w")
+        align = "left" if share >= 0.0 else "right"
+        text = f" {share:+.2g} " if abs(share) < 100.0 else f" {share:+.0f} "
+        text = " 0 " if abs(share) < NOTHING else text
+        if cut:
+            align = "right" if share >= 0.0 else "left"
+        box = {"facecolor": "white", "edgecolor": "none", "pad": 0.8} if cut else None
+        ax.text(shown, y, text, va="center", ha=align, fontsize=8.0, bbox=box)
+    ax.axvline(0.0, color=style.RULE_COLOUR, linewidth=0.8)

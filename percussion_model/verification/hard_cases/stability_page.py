@@ -1,0 +1,181 @@
+"""Page of the hard cases (docs/stability.md): runs, verdict, disagreements of solvers."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from percussion_model.verification.hard_cases.cases import hard_cases
+from percussion_model.verification.hard_cases.collection import (
+    DISAGREE,
+    MOST_MOMENTUM,
+    MOST_RESIDUAL,
+    Collection,
+)
+from percussion_model.verification.hard_cases.refinement import LEAST_CHANCE, RATE_WITHIN, SIGMAS
+
+GROUPS = {
+    "rock": "The rock law",
+    "drive": "Drive, feed and weight",
+    "bars": "Bars and their cells",
+    "contact": "Starts that graze, rest or bounce",
+    "inputs": "Inputs that change during the run",
+}
+
+_INTRODUCTION = """# Stability
+
+What the solvers make of the nastiest scenes that this model has. This page is written by
+`percussion stability --out docs`; the cases are stored in
+`percussion_model/verification/hard_cases/*.toml`, each with what makes it hard and what must hold.
+How guards act and what they warn of is told in [numerics.md](numerics.md), section 12.
+
+**What must hold of every run**: it ends, with finite numbers; the energy residual is below
+{residual:g} of the ledger's denominator; momentum equals impulses within {momentum:g}; nothing
+pulls between piston and bit, nor on the rock with `release`; piston and bit do not interpenetrate
+(waves, rigid bodies), or by no more than the penalty holds when it takes all energy put in
+(finite elements); there are no more events a second than the case's ceiling; and the same run in
+other calls gives the same bits.
+"""
+
+_COLUMNS = """**Columns.** *rate*: rate of penetration with its standard error where that is above
+1 %; *residual* and *numerical*: entries of the energy ledger divided by its denominator;
+*momentum*: its greatest difference to the impulses, divided by the greatest impulse; *events*: per
+simulated second; *guards*: how often one acted; *refined*: change of the rate on a grid of twice as
+many cells or elements, of aperiodic cases in standard errors; *speed*: simulated time divided by
+time to compute, readings included.
+"""
+
+
+def page(found: Collection, picture: str | None) -> str:
+    """Text of the page.
+
+    Parameters
+    ----------
+    found : Collection
+    picture : str, optional
+        Path of the figure from the page.
+    """
+    parts = [_INTRODUCTION.format(residual=MOST_RESIDUAL, momentum=MOST_MOMENTUM)]
+    parts.append(_verdict(found))
+    if picture:
+        parts.append(f"![Residual, events, momentum and speed of every case]({picture})\n")
+    parts.append(_disagreements(found))
+    if _is_refined(found):
+        parts.append(_unresolved(found))
+    parts.append("## All runs\n\n" + _COLUMNS)
+    parts += [text for group in GROUPS if (text := _group(found, group))]
+    return "\n".join(parts)
+
+
+def _is_refined(found: Collection) -> bool:
+    return any("refined_converged" in row for row in found.rows)
+
+
+def _verdict(found: Collection) -> str:
+    failures = found.failures()
+    guarded = [row for row in found.rows if row["guards"]]
+    worst = max(found.rows, key=lambda row: abs(row["residual"] or 0.0))
+    busiest = max(found.rows, key=lambda row: row["events_per_second"] or 0.0)
+    lines = [
+        f"**Result**: {len({row['case'] for row in found.rows})} cases, {len(found.rows)} runs; "
+        + ("all of this holds for all of them." if not failures else "this does not hold:"),
+        *(f"- {text}" for text in failures),
+        "",
+        f"Each case ran for {found.share:.0%} of its duration"
+        + (", and on a finer grid as well. " if _is_refined(found) else ". ")
+        + f"The greatest residual is {abs(worst['residual'] or 0.0):.1e} ({worst['case']}, "
+        f"{worst['solver']}), the most events {_plain(busiest['events_per_second'], 3)} a second "
+        f"({busiest['case']}, {busiest['solver']}). Guards acted in "
+        + (", ".join(f"{row['case']} ({row['solver']})" for row in guarded) or "none")
+        + ".\n",
+    ]
+    return "\n".join(lines)
+
+
+def _disagreements(found: Collection) -> str:
+    lines = [
+        "## Where solvers disagree",
+        "",
+        f"Every case whose mean rate differs by more than {DISAGREE:.0%} from that of the first "
+        "solver, with the reason.",
+        "",
+        "| case | solver | rate, mm/s | first solver, mm/s | off | reason |",
+        "|---|---|---|---|---|---|",
+    ]
+    for entry in found.disagreements():
+        off = entry["difference"]
+        lines.append(
+            f"| {entry['case']} | {entry['solver']} | {1e3 * entry['rate']:.4g} "
+            f"| {1e3 * entry['other_rate']:.4g} ({entry['compared_with']}) "
+            f"| {'-' if off is None else f'{100 * off:+.1f} %'} "
+            f"| {entry['reason'] or '**not known**'} |"
+        )
+    return "\n".join([*lines, ""])
+
+
+def _unresolved(found: Collection) -> str:
+    lines = [
+        "## What a finer grid changes",
+        "",
+        f"Rates that change by more than {RATE_WITHIN:.0%} and by more than {SIGMAS:g} standard "
+        "errors on a grid of twice as many cells, or (aperiodic cases) whose distribution of "
+        f"periods changes with a chance below {LEAST_CHANCE:g}: not resolved at the default. All "
+        "others are.",
+        "",
+        "| case | solver | rate changes by | standard errors | chance of the periods |",
+        "|---|---|---|---|---|",
+    ]
+    lines += [
+        f"| {row['case']} | {row['solver']} | {_percent(row['refined_rate_change'])} "
+        f"| {_plain(row['refined_rate_sigmas'])} | {_plain(row['refined_periods_chance'])} |"
+        for row in found.unresolved()
+    ]
+    return "\n".join([*lines, ""])
+
+
+def _group(found: Collection, group: str) -> str:
+    cases = {name: case for name, case in hard_cases().items() if case.group == group}
+    rows = [row for row in found.rows if row["case"] in cases]
+    if not rows:
+        return ""
+    lines = [f"### {GROUPS[group]}", ""]
+    shown = {row["case"] for row in rows}
+    lines += [f"- **{n}**: {c.hard}. Holds: {c.holds}." for n, c in cases.items() if n in shown]
+    lines += [
+        "",
+        "| case | solver | rate, mm/s | residual | numerical | momentum | events | guards "
+        "| refined | speed |",
+        "|---|---|---|---|---|---|---|---|---|---|",
+        *(_row(row, cases[row["case"]].aperiodic) for row in rows),
+        "",
+    ]
+    return "\n".join(lines)
+
+
+def _row(row: dict[str, Any], aperiodic: bool) -> str:
+    rate = "-"
+    if row["rate"] is not None:
+        rate = f"{1e3 * row['rate']:.4g}"
+        if row["rate_error"] and row["rate_error"] > 0.01 * abs(row["rate"]):
+            rate += f" ± {1e3 * row['rate_error']:.2g}"
+    refined = _percent(row.get("refined_rate_change"))
+    if aperiodic and row.get("refined_rate_sigmas") is not None:
+        refined = f"{row['refined_rate_sigmas']:.1f} σ"
+    speed = row["duration"] / row["wall_time"] if row["wall_time"] else None
+    return (
+        f"| {row['case']} | {row['solver']} | {rate} | {_small(row['residual'])} "
+        f"| {_small(row['numerical'])} | {_small(row['momentum'])} "
+        f"| {_plain(row['events_per_second'], 3)} | {row['guards'] or ''} | {refined} "
+        f"| {_plain(speed)} |"
+    )
+
+
+def _small(value: float | None) -> str:
+    return "-" if value is None else "0" if value == 0.0 else f"{value:.0e}"
+
+
+def _plain(value: float | None, digits: int = 2) -> str:
+    return "-" if value is None else f"{value:.{digits}g}"
+
+
+def _percent(value: float | None) -> str:
+    return "-" if value is None else f"{100.0 * value:.2g} %"

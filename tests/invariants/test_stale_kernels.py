@@ -1,0 +1,73 @@
+"""Compiled kernels that are kept from an earlier start must not outlive an edit."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import percussion_model
+
+# The force of the drive as a kernel of each solver sees it: 7 N from outside, masses of 1 kg.
+FORCES = """
+import json
+import numpy as np
+from percussion_model.physics.records import DriveKind, Piston
+from percussion_model.solvers.blow_map.flight import move
+from percussion_model.solvers.blow_map.records import MAP_PAR, MAP_STATE
+from percussion_model.solvers.fem.records import FEM_PAR, FEM_STATE, Mesh, Node, Trial
+from percussion_model.solvers.fem.scheme import load
+from percussion_model.solvers.rigid.forces import contact_force
+from percussion_model.solvers.rigid.records import RIGID_PAR, RIGID_STATE
+from percussion_model.solvers.wave.leaps.dormant import mean_motion
+from percussion_model.solvers.wave.records import WAVE_PAR, WAVE_STATE, Coef, Row
+
+def records(par, state):
+    par, state = np.zeros(1, par), np.zeros(1, state)
+    par["mass_p"] = par["mass_b"] = 1.0
+    par["drive"], state["external"] = DriveKind.EXTERNAL, 7.0
+    return par, state
+
+found = {}
+par, state = records(WAVE_PAR, WAVE_STATE)
+par["dt"], state["step"] = 1.0, 1
+bar = np.zeros((len(Row), 1)), np.zeros((len(Coef), 1))
+found["wave"] = mean_motion(par[0], state[0], *bar)[1]
+par, state = records(FEM_PAR, FEM_STATE)
+par["n_p"], par["n_b"] = 1, 2
+nodes, mesh, x = np.zeros((len(Node), 3)), np.ones((len(Mesh), 3)), np.zeros((len(Trial), 3))
+load(par[0], state[0], nodes, mesh, x, 1.0)
+found["fem"] = x[Trial.RE, 0]
+par, state = records(RIGID_PAR, RIGID_STATE)
+found["rigid"] = contact_force(par[0], state[0], 0.0)
+par, state = records(MAP_PAR, MAP_STATE)
+move(par[0], state[0], 1.0)
+found["blow-map"] = state["i_drive"][0]
+print(json.dumps(found))
+"""
+
+
+def test_every_solver_sees_an_edit_of_a_function_that_its_kernels_call(tmp_path):
+    source = Path(percussion_model.__file__).parent
+    package = tmp_path / source.name
+    shutil.copytree(source, package, ignore=shutil.ignore_patterns("__pycache__"))
+
+    def forces() -> dict[str, float]:
+        kept = {key: value for key, value in os.environ.items() if key != "NUMBA_CACHE_DIR"}
+        run = subprocess.run(
+            [sys.executable, "-c", FORCES], cwd=tmp_path, env=kept | {"PYTHONPATH": str(tmp_path)},
+            capture_output=True, text=True, check=True,
+        )  # fmt: skip
+        return json.loads(run.stdout)
+
+    assert forces() == dict.fromkeys(("wave", "fem", "rigid", "blow-map"), 7.0)
+    compiled = {path.parent.parent.name for path in package.rglob("*.nbi")}
+    assert {"leaps", "fem", "rigid", "blow_map"} <= compiled  # kept, so that they could be stale
+    callee = package / "physics" / "drive.py"
+    text = callee.read_text(encoding="utf-8")
+    assert "return s.external\n" in text
+    callee.write_text(text.replace("return s.external\n", "return s.external + 1000.0\n"))
+    assert forces() == dict.fromkeys(("wave", "fem", "rigid", "blow-map"), 1007.0)
