@@ -72,7 +72,7 @@ class BarMeshes(NamedTuple):
 
 def section_count(section: np.ndarray, element: float) -> int:
     """Elements of about the length `element` [m] that a section gets, half a one for one."""
-    return max(1, math.floor(section[LENGTH] / element + 0.5 + ROUNDING))
+    return max(1, math.floor(float(section[LENGTH]) / element + 0.5 + ROUNDING))
 
 
 def cut_bar(sections: np.ndarray, element: float, elastic: bool = True) -> BarMesh:
@@ -91,18 +91,18 @@ def cut_bar(sections: np.ndarray, element: float, elastic: bool = True) -> BarMe
     if not elastic:
         none = np.zeros(0)
         return BarMesh(none, none, none, none, total)
-    counts = np.array([section_count(section, element) for section in sections])
-    masses = np.array([section_mass(section) for section in sections])
-    transits = np.array([section_transit_time(section) for section in sections])
-    length = sections[:, LENGTH] / counts
-    stiffness = sections[:, YOUNGS_MODULUS] * sections[:, AREA] / length
-    return BarMesh(
-        np.repeat(length, counts),
-        np.repeat(stiffness, counts),
-        np.repeat(masses / counts, counts),
-        np.repeat(transits / counts, counts),
-        total,
-    )
+    counts = np.zeros(len(sections), np.int64)
+    each = np.zeros((4, len(sections)))
+    for k, section in enumerate(sections):
+        count = section_count(section, element)
+        length = float(section[LENGTH]) / count
+        counts[k] = count
+        each[0, k] = length
+        each[1, k] = float(section[YOUNGS_MODULUS]) * float(section[AREA]) / length
+        each[2, k] = section_mass(section) / count
+        each[3, k] = section_transit_time(section) / count
+    lengths, stiffness, mass, transit_time = [np.repeat(row, counts) for row in each]
+    return BarMesh(lengths, stiffness, mass, transit_time, total)
 
 
 def cut_bars(numbers: Numbers) -> BarMeshes:

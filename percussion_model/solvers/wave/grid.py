@@ -81,11 +81,16 @@ def cut(sections: np.ndarray, time_step: float) -> Grid:
     time_step : float
         Transit time of a cell [s].
     """
-    counts = np.array([section_count(section, time_step) for section in sections])
-    masses = np.array([section_mass(section) for section in sections])
+    counts = np.zeros(len(sections), np.int64)
+    impedance, mass = np.zeros(len(sections)), np.zeros(len(sections))
+    for k, section in enumerate(sections):
+        count = section_count(section, time_step)
+        counts[k] = count
+        impedance[k] = section_mass(section) / (count * time_step)
+        mass[k] = section_mass(section) / count
     return Grid(
-        np.repeat(masses / (counts * time_step), counts),
-        np.repeat(masses / counts, counts),
+        np.repeat(impedance, counts),
+        np.repeat(mass, counts),
         time_step,
         misfit(sections, time_step),
     )
