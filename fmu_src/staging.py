@@ -7,6 +7,7 @@ and equal code is loaded and compiled once.
 from __future__ import annotations
 
 import hashlib
+import importlib
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +16,8 @@ import pythonfmu
 
 import fmu_src
 import percussion_model
+from percussion_model.scene.solver_names import BODIES
+from percussion_model.solvers.base import added_solvers
 
 PLACEHOLDER = "__BUNDLE__"
 MODEL = Path(percussion_model.__file__).parent
@@ -44,6 +47,9 @@ SLAVE_FILES = ("__init__.py", "variables.py", "slave/*.py")
 START = "slave/start.py"
 # Files of a model's folder that make its FMU and do not run in it.
 BUILD_FILES = ("build.py", "variables.py")
+
+# Where a bundle registers solvers that are not a part of the package.
+SOLVERS = "percussion_model/solvers/__init__.py"
 
 _IMPORT = re.compile(
     r"^(?P<before>\s*(?:from|import) )(?P<package>percussion_model|fmu_src|pythonfmu)\b",
@@ -89,6 +95,8 @@ def stage(prefix: str, folder: str, with_model: bool) -> Bundle:
     for pattern in patterns:
         for source in sorted(MODEL.glob(pattern)):
             inner[f"percussion_model/{source.relative_to(MODEL).as_posix()}"] = _read(source)
+    if with_model:
+        inner |= _added_solvers(inner[SOLVERS])
     inner["pythonfmu/__init__.py"] = "from .fmi2slave import Fmi2Slave\n"
     for name in LIBRARY_FILES:
         inner[f"pythonfmu/{name}"] = _read(LIBRARY / name)
@@ -104,6 +112,26 @@ def stage(prefix: str, folder: str, with_model: bool) -> Bundle:
     files = {f"{name}/{path}": text for path, text in inner.items()}
     files[f"{name}_start.py"] = start
     return Bundle(name, {path: text.replace(PLACEHOLDER, name) for path, text in files.items()})
+
+
+def _added_solvers(text: str) -> dict[str, str]:
+    """Sources of solvers that were registered from outside, and what registers them again.
+
+    Parameters
+    ----------
+    text : str
+        Of the module that does so.
+    """
+    found = {}
+    for name, entry in added_solvers().items():
+        source = Path(importlib.import_module(entry.module).__file__ or "")
+        found[f"{Path(SOLVERS).parent.as_posix()}/{source.name}"] = _read(source)
+        text += (
+            "from percussion_model.solvers.base import register\n"
+            f'register("{name}", __name__ + ".{source.stem}", "{entry.factory}", '
+            f"{BODIES.get(name)!r})\n"
+        )
+    return found | {SOLVERS: text}
 
 
 def script(bundle: Bundle, slave: type) -> tuple[str, str]:

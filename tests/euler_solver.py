@@ -22,8 +22,8 @@ from percussion_model.solvers.base import Solver
 from percussion_model.solvers.setup import fill_parameters, fill_start
 from percussion_model.solvers.state import State
 
-PAR = np.dtype([*COMMON_PARAMETERS, ("dt", "f8")], align=True)
-STATE = np.dtype([*COMMON_STATE, ("time", "f8")], align=True)
+PAR = np.dtype([("dt", "f8"), *COMMON_PARAMETERS], align=True)
+STATE = np.dtype([("time", "f8"), *COMMON_STATE], align=True)
 
 
 @kernel
@@ -33,7 +33,7 @@ def advance(pars, states, t, blows, events):
     while s.time + par.dt <= t:
         if s.n_blows == len(blows):
             return Status.BLOWS_FULL
-        if s.n_events + 4 > len(events):
+        if s.events_on == 1 and s.n_events + 4 > len(events):
             return Status.EVENTS_FULL
         force = spring_force(s) + damping(s) * s.v_b if s.mode != Mode.FF else 0.0
         s.v_b += par.dt * (bit_acceleration(par, s) - force / par.mass_b)
@@ -43,6 +43,7 @@ def advance(pars, states, t, blows, events):
         s.gap += par.dt * (s.v_b - s.v_p)
         u_before, s.u_r = s.u_r, -s.gap
         s.time += par.dt
+        s.count_steps += 1
         if s.gap <= 0.0 and s.v_p > s.v_b:
             if s.armed == 1:
                 start_blow(s, blows, s.time, s.v_p, s.x_r + s.p, math.nan, par.mass_p)
@@ -69,6 +70,7 @@ class EulerSolver(Solver):
 
     name = "euler"
     time_step = 2e-6
+    COUNTS = ("steps", "events", "blows")
 
     def new_state(self):
         """State at time zero."""

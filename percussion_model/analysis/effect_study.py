@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from percussion_model.analysis.comparison import relative_change
+from percussion_model.physics.effects import EFFECTS
 from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.simulation.result import LEAST_BLOWS, Result
 from percussion_model.simulation.simulate import Simulation, simulate
@@ -99,7 +100,7 @@ def effect_variants(scene: Scene) -> Iterator[Variant]:
     """Go through the scene as it is, then one effect after the other."""
     effects = scene.effects
     yield Variant("", "as it is", no_penetration=_NO_CRUSHING if effects.rock == "spring" else "")
-    for name in ("gravity", "feed"):
+    for name in ("gravity", "feed", *(effect.name for effect in EFFECTS)):
         is_on = getattr(effects, name)
         yield Variant(name, "off" if is_on else "on", {f"effects.{name}": not is_on}, off=is_on)
     yield from _drive(scene)

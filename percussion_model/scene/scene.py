@@ -375,6 +375,11 @@ def _refuse_fidelity(scene: Scene) -> None:
             raise SceneError(
                 f'solver.fidelity = "blow-map" needs {key} = "{wanted}", not "{scene[key]}"'
             )
+    for effect in EFFECTS:
+        if scene[f"effects.{effect.name}"]:
+            raise SceneError(
+                f'solver.fidelity = "blow-map" knows no effects.{effect.name}: set it to false'
+            )
     for name in _RANGES:
         low, high = scene[f"blow_map.{name}_from"], scene[f"blow_map.{name}_to"]
         if not low < high:

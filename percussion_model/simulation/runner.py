@@ -135,7 +135,7 @@ class Runner:
         )
         if n_blows or n_events:
             self._keep(room[:n_blows], self._event_room[:n_events])
-        if status == _DONE or status in _FULL:
+        if status == _DONE or (status in _FULL and (n_blows or n_events)):
             return status, n_blows
         where = f"at t = {self.solver.time(self._state)!r} s"
         if status == Status.REFUSED:

@@ -41,7 +41,8 @@ class Solver(ABC):
     name : str
     scene : Scene
     time_step : float or None
-        Distance of grid points [s]; None where there are none.
+        Distance of grid points [s]; None where there are none. A solver that has it
+        counts its steps.
     cells : dict of int
         Cells in each elastic bar, by its name.
     wave_speed_error : float

@@ -22,6 +22,9 @@ BIT = {
 }
 SPRING = {**BIT, "effects.rock": "spring", "rock.loading_stiffness": 2e9}
 
+# For the rows of a blow, and none of events.
+ROOM = np.zeros(1, BLOW), np.zeros(1, EVENT), False
+
 
 def order(steps, errors):
     """Slope of error against step, both logarithmic."""
@@ -75,7 +78,7 @@ def test_order_in_time_with_damping_and_forcing(radius, declared):
         nodes = state.workspace.reshape(len(Node), -1)
         nodes[Node.U], nodes[Node.V] = u, v
         solver.refresh(state)
-        solver.commit(state, t)
+        solver.commit(state, t, *ROOM)
         assert solver.statistics(state)["steps"] == count
         off = np.concatenate([(nodes[Node.U] - u_end) / 1e-4, (nodes[Node.V] - v_end) / 2.0])
         errors.append(np.abs(off).max())
@@ -144,7 +147,7 @@ def test_order_of_the_mesh():
         shape = np.cos(wave * np.linspace(0.0, section.length, n + 1))
         nodes[Node.V] = shape
         solver.refresh(state)
-        solver.commit(state, t)
+        solver.commit(state, t, *ROOM)
         fade = np.exp(-rate * t)
         closed = fade * (np.cos(swing * t) - rate / swing * np.sin(swing * t)) * shape
         errors.append(np.abs(nodes[Node.V] - closed).max())
@@ -176,9 +179,8 @@ def test_stable_at_fifty_times_the_cfl_step(radius):
     nodes[Node.V] = np.random.default_rng(1).uniform(-1.0, 1.0, nodes.shape[1])
     solver.refresh(state)
     stored, reading = [], np.zeros(1, READING)
-    room = np.zeros(1, BLOW), np.zeros(1, EVENT), False
     for k in range(400):
-        solver.commit(state, (k + 1) * solver.time_step, *room)
+        solver.commit(state, (k + 1) * solver.time_step, *ROOM)
         solver.read(state, (k + 1) * solver.time_step, reading)
         ledger = energies(reading)
         stored.append(sum(ledger[name] for name in ("kinetic", "elastic", "recoverable")))

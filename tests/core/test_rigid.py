@@ -142,10 +142,10 @@ def test_barrier_drop():
     starts = kinds(events, EventKind.MODE_DFC)["time"]
     assert len(starts) >= 4
     v = look(solver, solver.new_state(), starts)["bit_velocity"]
-    energy = 0.5 * M_B * v**2
+    moving = 0.5 * M_B * v**2
     spent = len(kinds(events, EventKind.MODE_FC))
     for n in range(min(spent, len(starts) - 1)):
-        assert energy[n + 1] == pytest.approx((energy[n] - w_r) / gamma, rel=1e-9)
+        assert moving[n + 1] == pytest.approx((moving[n] - w_r) / gamma, rel=1e-9)
     assert energy(solver, state, 0.1)["barrier"] == pytest.approx(spent * w_r, rel=0.2)
 
 

@@ -134,7 +134,7 @@ def test_same_events_as_an_ode_solver():
     end = 0.1
     solver = RigidSolver(scene)
     blows, events = np.zeros(10, BLOW), np.zeros(1000, EVENT)
-    _, n_blows, n_events = solver.advance(solver.new_state(), end, blows, events)
+    _, n_blows, n_events = solver.advance(solver.new_state(), end, blows, events, True)
     rows = Stepped(scene).run(end)
     events = events[:n_events]
     assert n_blows == 2

@@ -69,13 +69,13 @@ class Refusal(IntEnum):
 # Parameters: what stays fixed during a run.
 MAP_PAR = np.dtype(
     [
-        *COMMON_PARAMETERS,
         ("start_gap", "f8"),  # g_0 [m]
         ("gamma", "f8"),
         ("lowest", "f8", (len(Axis),)),  # of K_R, v, F_S and F_0: what is answered
         ("highest", "f8", (len(Axis),)),
         ("origin", "f8", (len(Axis),)),  # of the axes of the table
         ("step", "f8", (len(Axis),)),
+        *COMMON_PARAMETERS,
     ],
     align=True,
 )
@@ -83,7 +83,6 @@ MAP_PAR = np.dtype(
 # The bit's datum x_r is where it stood before the blow, and p its way since then.
 MAP_STATE = np.dtype(
     [
-        *COMMON_STATE,
         # the present piece of the flight
         ("t", "f8"),  # its start [s]
         ("y", "f8"),  # piston from where it struck the resting bit last, at t [m]
@@ -97,6 +96,7 @@ MAP_STATE = np.dtype(
         ("path", "f8", (len(PATH_TIMES),)),  # [m]
         ("refusal", "i8"),  # Refusal of the last call
         ("refused_value", "f8"),
+        *COMMON_STATE,
     ],
     align=True,
 )

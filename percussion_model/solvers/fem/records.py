@@ -93,7 +93,6 @@ class FemTask(IntEnum):
 
 FEM_PAR = np.dtype(
     [
-        *COMMON_PARAMETERS,
         ("dt", "f8"),  # time step [s]
         ("mu_re", "f8"),  # eigenvalue of the scheme, docs/numerics.md
         ("mu_im", "f8"),
@@ -107,13 +106,13 @@ FEM_PAR = np.dtype(
         ("n_b", "i8"),
         ("most_changes", "i8"),  # changes of mode at one instant; more are a loop
         ("most_events", "i8"),  # steps cut short by events within a whole one; more are a storm
+        *COMMON_PARAMETERS,
     ],
     align=True,
 )
 
 FEM_STATE = np.dtype(
     [
-        *COMMON_STATE,
         ("time", "f8"),  # [s]
         ("v_end", "f8"),  # velocity of the bit's rock end [m/s]
         ("gap_rate", "f8"),  # opening velocity of the gap [m/s]
@@ -130,6 +129,7 @@ FEM_STATE = np.dtype(
         ("crowd", "i8"),  # steps cut short by events since `crowd_from`
         ("crowd_from", "f8"),  # [s]
         ("count_storms", "i8"),
+        *COMMON_STATE,
     ],
     align=True,
 )

@@ -32,10 +32,10 @@ ROWS_AN_EVENT = 4
 
 RIGID_PAR = np.dtype(
     [
-        *COMMON_PARAMETERS,
         ("restitution", "f8"),  # of piston and bit
         ("window", "f8"),  # events are counted over this time [s]
         ("most_events", "i8"),  # more within it are a storm
+        *COMMON_PARAMETERS,
     ],
     align=True,
 )
@@ -43,7 +43,6 @@ RIGID_PAR = np.dtype(
 # The state sits at the last event.
 RIGID_STATE = np.dtype(
     [
-        *COMMON_STATE,
         ("time", "f8"),  # [s]
         ("next_time", "f8"),  # of the next event [s]
         ("next_tau", "f8"),  # the same, from `time` [s]
@@ -61,6 +60,7 @@ RIGID_STATE = np.dtype(
         ("ss_force", "f8"),  # mean bit force at the end of the last standstill [N]
         ("start_gap", "f8"),  # g_0 [m]
         ("count_storms", "i8"),
+        *COMMON_STATE,
     ],
     align=True,
 )

@@ -126,7 +126,6 @@ def no_operators() -> LeapOperators:
 # Parameters: what stays fixed during a run.
 WAVE_PAR = np.dtype(
     [
-        *COMMON_PARAMETERS,
         ("dt", "f8"),  # time step = transit time of a cell [s]
         # ends that meet something: piston bottom (p), bit top (t), bit bottom (b)
         ("z_p", "f8"),  # impedance of the end cell [N s/m]
@@ -151,13 +150,13 @@ WAVE_PAR = np.dtype(
         ("most_crossings", "i8"),  # of the rock law within a step; more are a loop
         ("size_p", "i8"),  # padded size of the leap operators: piston
         ("size_r", "i8"),  # bit on the rock
+        *COMMON_PARAMETERS,
     ],
     align=True,
 )
 
 WAVE_STATE = np.dtype(
     [
-        *COMMON_STATE,
         ("step", "i8"),  # number of steps done
         ("leap_end", "i8"),  # step at which the pending leap ends, or -1
         ("leap_kind", "i8"),  # LeapKind of it
@@ -177,6 +176,7 @@ WAVE_STATE = np.dtype(
         ("x_dormant", "f8"),  # datum of p when it began to wait [m]
         ("u_start", "f8"),  # u_r - u_p + u_b at the start [m]
         ("offset_start", "f8"),  # (bottom end - mean) of the bit at the start [m]
+        *COMMON_STATE,
     ],
     align=True,
 )
