@@ -17,8 +17,9 @@ from percussion_model.physics.rock import (
     spring_force,
 )
 from percussion_model.physics.state import COMMON_PARAMETERS, COMMON_STATE
+from percussion_model.scene.numbers import numbers_of
 from percussion_model.solvers.base import Solver
-from percussion_model.solvers.setup import fill_parameters, fill_start, rock_numbers
+from percussion_model.solvers.setup import fill_parameters, fill_start
 from percussion_model.solvers.state import State
 
 PAR = np.dtype([("dt", "f8"), *COMMON_PARAMETERS], align=True)
@@ -74,10 +75,11 @@ class EulerSolver(Solver):
     def new_state(self):
         """State at time zero."""
         self._par = np.zeros(1, PAR)
-        fill_parameters(self._par[0], self.scene, with_piston=True)
+        numbers = numbers_of(self.scene)
+        fill_parameters(self._par[0], numbers, with_piston=True)
         self._par["dt"] = self.time_step
         state = State(STATE)
-        fill_start(state.record[0], self.scene, rock_numbers(self.scene))
+        fill_start(state.record[0], numbers)
         return state
 
     def time(self, state):

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from percussion_model import Scene, simulate
+from percussion_model.scene.numbers import numbers_of
 from percussion_model.simulation.accuracy_control import planned_cells
 from percussion_model.simulation.result import Result
-from percussion_model.solvers.wave.grid import fitting_cells
-from percussion_model.solvers.wave.resolution import elastic_bars
+from percussion_model.solvers.wave.grid import elastic_bars, fitting_cells
 
 LONG = os.environ.get("PERCUSSION_LONG") == "1"
 RIGID = {"piston.model": "rigid", "bit.model": "rigid"}
@@ -109,7 +109,7 @@ def truth(scene, levels):
     """
     results = []
     for fewest in levels:
-        cells, fit = fitting_cells(elastic_bars(scene), fewest, int(1.4 * fewest), 1e-5)
+        cells, fit = fitting_cells(elastic_bars(numbers_of(scene)), fewest, int(1.4 * fewest), 1e-5)
         results.append(simulate(scene.replace(**{"solver.cells": cells}), record_events=False))
     coarse, fine = (result.rate_of_penetration for result in results)
     scatter = results[-1].rate_of_penetration_standard_error

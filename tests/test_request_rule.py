@@ -10,6 +10,7 @@ import pytest
 
 from percussion_model import Scene, SceneError, simulate
 from percussion_model.physics.records import BLOW
+from percussion_model.scene.numbers import numbers_of, section_numbers
 from percussion_model.simulation.accuracy_control import (
     GROWTH,
     Grid,
@@ -43,27 +44,27 @@ def test_rule_passes_through_its_calibration_and_rises():
 def test_rule_finds_cells_that_fit_the_lengths():
     scene = Scene()
     for accuracy in (1e-2, 1e-3, 1e-4):
-        cells, fit = cells_for(scene, accuracy)
+        cells, fit = cells_for(numbers_of(scene), accuracy)
         assert cells % 20 == 0  # L_b/L_p = 23/20: nothing else fits
         assert fit < 1e-12
         assert cells_by_rule(accuracy) <= cells <= 2 * cells_by_rule(accuracy) + 1
-    assert coarser_cells(scene, 60) == 40
+    assert coarser_cells(numbers_of(scene), 60) == 40
 
 
 def test_rule_counts_the_cells_of_the_shorter_bar():
     long_bit = Scene().replace(**{"bit.sections.0.length": 1.75})
     short_bit = Scene().replace(**{"bit.sections.0.length": 0.0875})
-    assert cells_for(long_bit, 1e-3)[0] == 56
-    assert cells_for(short_bit, 1e-3)[0] == 112
+    assert cells_for(numbers_of(long_bit), 1e-3)[0] == 56
+    assert cells_for(numbers_of(short_bit), 1e-3)[0] == 112
     rigid_piston = Scene().replace(**{"piston.model": "rigid"})
-    assert cells_for(rigid_piston, 1e-3)[0] == 56
+    assert cells_for(numbers_of(rigid_piston), 1e-3)[0] == 56
 
 
 def test_rule_says_how_well_lengths_fit():
     odd = Scene().replace(**{"bit.sections.0.length": 0.175 * 0.996})
-    cells, fit = cells_for(odd, 1e-3)
+    cells, fit = cells_for(numbers_of(odd), 1e-3)
     time_step = odd.piston.transit_time / cells
-    assert fit == pytest.approx(cut(odd.bit, time_step).fit)
+    assert fit == pytest.approx(cut(section_numbers(odd.bit), time_step).fit)
     assert fit > FIT_SHARE * 1e-3
 
 

@@ -8,6 +8,7 @@ import pytest
 
 from percussion_model import Scene, SceneError, Simulation, SimulationError, simulate
 from percussion_model.physics.records import SAMPLE_FIELDS
+from percussion_model.scene.numbers import numbers_of
 from percussion_model.simulation.simulate import sampling_times, stop_on_interrupt
 from percussion_model.solvers.wave.advance import run
 from percussion_model.solvers.wave.grid import cut_bars
@@ -90,13 +91,13 @@ def test_all_kinds_of_scenes_have_arguments_of_the_same_types(monkeypatch):
 
 def test_scenes_on_the_same_steel_share_their_cells_and_leave_them_alone():
     scenes = [Scene().replace(**{"rock.loading_stiffness": k}) for k in (7.5e8, 2e9)]
-    bars = cut_bars(scenes[0], None)
-    assert cut_bars(scenes[1], None) is bars
+    bars = cut_bars(numbers_of(scenes[0]), 0)
+    assert cut_bars(numbers_of(scenes[1]), 0) is bars
     before = [bar.coefficients.copy() for bar in bars.both]
     alone = one_go(scenes[0])
     for scene in (scenes[1], Scene().replace(**{"loss.time": 3e-7})):
         one_go(scene, end=0.06)
-    assert cut_bars(scene, None) is not bars
+    assert cut_bars(numbers_of(scene), 0) is not bars
     assert all(
         np.array_equal(bar.coefficients, c) for bar, c in zip(bars.both, before, strict=True)
     )

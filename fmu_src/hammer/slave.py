@@ -20,6 +20,7 @@ from fmu_src.slave.slave import STEPPING, Phase, Read, Slave
 from fmu_src.slave.states import fingerprint
 from fmu_src.variables import closed_bounds
 from percussion_model.scene.inputs import INPUTS, why_without_effect
+from percussion_model.scene.numbers import section_numbers
 from percussion_model.scene.rows import refuse_value
 from percussion_model.scene.scene import Scene
 from percussion_model.solvers.base import Solver
@@ -136,7 +137,7 @@ class PercussiveHammer(Slave):
                 f"which is {bar.length!r} m long"
             )
         grid = solver.grid_of(name)
-        return None if grid is None else Gauge(name, *cell_at(bar, grid, place))
+        return None if grid is None else Gauge(name, *cell_at(section_numbers(bar), grid, place))
 
     def step(self, time: float, step_size: float) -> None:
         """Pass on changed inputs, then advance."""

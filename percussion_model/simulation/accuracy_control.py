@@ -9,6 +9,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+from percussion_model.scene.numbers import numbers_of
 from percussion_model.scene.scene import Scene
 from percussion_model.simulation.result import LEAST_BLOWS, Result
 from percussion_model.solvers.wave.resolution import cells_for, coarser_cells
@@ -123,8 +124,9 @@ def planned_cells(scene: Scene) -> list[int]:
     """Cells of the runs that a wanted accuracy takes: to compare with, by rule, to verify."""
     wanted = scene.solver.accuracy
     assert wanted is not None
-    cells, _ = cells_for(scene, wanted)
-    plan = [coarser_cells(scene, cells), cells]
+    numbers = numbers_of(scene)
+    cells, _ = cells_for(numbers, wanted)
+    plan = [coarser_cells(numbers, cells), cells]
     if scene.run.check and 2 * cells <= FINEST:
         plan.append(_halved(scene, wanted, cells))
     return plan
@@ -137,7 +139,7 @@ def with_cells(scene: Scene, cells: int) -> Scene:
 
 def _halved(scene: Scene, wanted: float, cells: int) -> int:
     """Cells of a run at half the step that fit the lengths."""
-    return cells_for(scene, wanted, fewest=2 * cells, most=FINEST)[0]
+    return cells_for(numbers_of(scene), wanted, fewest=2 * cells, most=FINEST)[0]
 
 
 def _run(scene: Scene, cells: int, run_once: RunOnce, extend: bool = True) -> Grid:

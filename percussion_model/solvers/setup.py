@@ -1,14 +1,15 @@
-"""From a scene to the fields that the records of all solvers have in common."""
+"""From the numbers of a scene to the fields that the records of all solvers have in common."""
 
 from __future__ import annotations
 
-from typing import Any
-
-import numpy as np
+import math
+from enum import IntEnum
+from typing import Any, NamedTuple
 
 from percussion_model.physics.effects import EFFECTS
 from percussion_model.physics.records import DriveKind, Mode, Piston, RockKind
-from percussion_model.scene.scene import Scene
+from percussion_model.scene.bars import bar_mass, bar_transit_time
+from percussion_model.scene.numbers import Numbers
 
 # An open gap of this many transits of the slower bar ends a blow where no
 # pressure law does (docs/model.md, section 7).
@@ -17,83 +18,122 @@ REARM_TRANSITS = 20.0
 # DFC, FC, BC and again; more would be a loop.
 MOST_CHANGES = 12
 
+# What the choices of the parameter table mean, in their order.
+PISTONS = (Piston.ELASTIC, Piston.RIGID, Piston.ABSENT)
+DRIVES = (DriveKind.PRESSURE, DriveKind.EXTERNAL, DriveKind.NONE)
+ROCKS = (RockKind.BILINEAR, RockKind.SPRING, RockKind.WALL, RockKind.NONE)
+DIRECTIONS = (1, -1)
 
-def fill_parameters(p: Any, scene: Scene, with_piston: bool) -> float:
+
+class Bit(IntEnum):
+    """How the bit is modelled: choices of `bit.model`."""
+
+    ELASTIC = 0
+    RIGID = 1
+
+
+class StandstillTension(IntEnum):
+    """What ends standstill: choices of `effects.standstill_tension`."""
+
+    RELEASE = 0
+    PAPER = 1
+
+
+class RockNumbers(NamedTuple):
+    """Rock law as the kernels take it: K_R [N/m], gamma, C_R [N s/m] and W_R [J]."""
+
+    k_r: float
+    gamma: float
+    c_r: float
+    w_r: float
+
+
+def barrier_on(numbers: Numbers) -> bool:
+    """Whether the rock law has an energy barrier (mode DFC)."""
+    values = numbers.values
+    if not values.effects_barrier or ROCKS[values.effects_rock] != RockKind.BILINEAR:
+        return False
+    return bool(values.rock_barrier_energy > 0.0 and values.rock_barrier_damping > 0.0)
+
+
+def kelvin_voigt_time(numbers: Numbers) -> float:
+    """Kelvin-Voigt time of elastic bars, 0 without loss [s]."""
+    return float(numbers.values.loss_time) if numbers.values.effects_loss else 0.0
+
+
+def rock_numbers(numbers: Numbers) -> RockNumbers:
+    """Numbers of the rock law."""
+    values, barrier = numbers.values, barrier_on(numbers)
+    kind = ROCKS[values.effects_rock]
+    return RockNumbers(
+        values.rock_loading_stiffness if kind != RockKind.NONE else 0.0,
+        values.rock_unloading_ratio if kind == RockKind.BILINEAR else 1.0,
+        values.rock_barrier_damping if barrier else 0.0,
+        values.rock_barrier_energy if barrier else 0.0,
+    )
+
+
+def fill_parameters(p: Any, numbers: Numbers, with_piston: bool) -> None:
     """Fill `COMMON_PARAMETERS`.
 
     Parameters
     ----------
     p : record
         Changed in place.
+    numbers : Numbers
     with_piston : bool
         Whether waves go through the piston too, or would if it were not rigid.
-
-    Returns
-    -------
-    float
-        Transit time of the slower bar [s].
     """
-    effects = scene.effects
-    slowest = scene.bit.transit_time
+    values = numbers.values
+    slowest = bar_transit_time(numbers.bit)
     if with_piston:
-        slowest = max(slowest, scene.piston.transit_time)
+        slowest = max(slowest, bar_transit_time(numbers.piston))
     p["rearm_time"] = REARM_TRANSITS * slowest
-    p["gravity"] = scene.gravity.acceleration if effects.gravity else 0.0
-    p["mass_b"] = scene.bit.mass
-    p["mass_p"] = scene.piston.mass
-    p["piston"] = Piston[scene.piston.model.upper()]
-    p["drive"] = DriveKind[effects.drive.upper()]
-    p["rock"] = RockKind[effects.rock.upper()]
-    p["barrier"] = scene.barrier_on
-    p["release"] = effects.standstill_tension == "release"
+    p["gravity"] = values.gravity_acceleration if values.effects_gravity else 0.0
+    p["mass_b"] = bar_mass(numbers.bit)
+    p["mass_p"] = bar_mass(numbers.piston)
+    p["piston"] = PISTONS[values.piston_model]
+    p["drive"] = DRIVES[values.effects_drive]
+    p["rock"] = ROCKS[values.effects_rock]
+    p["barrier"] = barrier_on(numbers)
+    p["release"] = values.effects_standstill_tension == StandstillTension.RELEASE
     for effect in EFFECTS:
-        if scene[f"effects.{effect.name}"]:
+        if getattr(values, f"effects_{effect.name}"):
             p["effects"] = 1
             for name in effect.parameters:
-                p[f"{effect.name}_{name}"] = scene[f"{effect.name}.{name}"]
-    return float(slowest)
+                p[f"{effect.name}_{name}"] = getattr(values, f"{effect.name}_{name}")
 
 
-def rock_numbers(scene: Scene) -> dict[str, float]:
-    """Numbers of the rock law as the kernels take them."""
-    rock, kind = scene.rock, scene.effects.rock
-    barrier = scene.barrier_on
-    return {
-        "k_r": rock.loading_stiffness if kind != "none" else 0.0,
-        "gamma": rock.unloading_ratio if kind == "bilinear" else 1.0,
-        "c_r": rock.barrier_damping if barrier else 0.0,
-        "w_r": rock.barrier_energy if barrier else 0.0,
-    }
-
-
-def fill_start(s: Any, scene: Scene, rock: dict[str, float]) -> None:
+def fill_start(s: Any, numbers: Numbers) -> None:
     """Fill what states have in common (`COMMON_STATE`) at time zero.
 
     Parameters
     ----------
     s : record
         Changed in place.
-    rock : dict of float
-        From `rock_numbers`.
+    numbers : Numbers
     """
-    start, has_piston = scene.start, scene.piston.model != "absent"
+    values, rock = numbers.values, rock_numbers(numbers)
+    has_piston = PISTONS[values.piston_model] != Piston.ABSENT
+    direction = DIRECTIONS[values.start_drive_direction]
     s["live"] = 1
     s["mode"] = Mode.FF
-    s["alpha"] = start.drive_direction
-    s["armed"] = scene.effects.drive != "pressure" or start.drive_direction > 0
-    s["feed"] = scene.feed.force if scene.effects.feed else 0.0
-    s["drive_force"] = scene.drive.force
-    s["reversal"] = scene.drive.reversal_distance
-    s["external"] = scene.drive.external_force
-    for key, value in rock.items():
-        s[key] = value
-        s[f"next_{key}"] = value
-    s["p"] = -start.rock_gap
-    s["x_r"] = start.rock_gap
-    s["v_b"] = start.bit_velocity
-    s["v_p"] = start.piston_velocity if has_piston else 0.0
-    s["gap"] = start.gap if has_piston else np.inf
-    s["t_open"] = -np.inf
-    s["peak_from"] = np.inf
-    s["b_rebound"] = np.nan
-    s["b_standstill"] = np.nan
+    s["alpha"] = direction
+    s["armed"] = DRIVES[values.effects_drive] != DriveKind.PRESSURE or direction > 0
+    s["feed"] = values.feed_force if values.effects_feed else 0.0
+    s["drive_force"] = values.drive_force
+    s["reversal"] = values.drive_reversal_distance
+    s["external"] = values.drive_external_force
+    s["k_r"] = s["next_k_r"] = rock.k_r
+    s["gamma"] = s["next_gamma"] = rock.gamma
+    s["c_r"] = s["next_c_r"] = rock.c_r
+    s["w_r"] = s["next_w_r"] = rock.w_r
+    s["p"] = -values.start_rock_gap
+    s["x_r"] = values.start_rock_gap
+    s["v_b"] = values.start_bit_velocity
+    s["v_p"] = values.start_piston_velocity if has_piston else 0.0
+    s["gap"] = values.start_gap if has_piston else math.inf
+    s["t_open"] = -math.inf
+    s["peak_from"] = math.inf
+    s["b_rebound"] = math.nan
+    s["b_standstill"] = math.nan

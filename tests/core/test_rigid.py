@@ -17,9 +17,10 @@ from percussion_model.physics.records import (
     EventKind,
     Status,
 )
+from percussion_model.scene.numbers import numbers_of
 from percussion_model.scene.scene import Scene
 from percussion_model.solvers.rigid.motion import fall_time, oscillate, oscillate_with_loss
-from percussion_model.solvers.rigid.solver import RigidSolver, st_venant_restitution
+from percussion_model.solvers.rigid.solver import RigidSolver, restitution, st_venant_restitution
 
 RIGID = {"piston": {"model": "rigid"}, "bit": {"model": "rigid"}}
 BIT_ONLY = {
@@ -228,7 +229,7 @@ def test_reference_scene():
     solver = make()
     state, blows, events = run(solver, 4.0)
     settled = blows[blows["time"] > 1.0]
-    assert solver.restitution == pytest.approx(20 / 23, rel=1e-14)
+    assert restitution(numbers_of(solver.scene)) == pytest.approx(20 / 23, rel=1e-14)
     assert st_venant_restitution(2.0, 1.0, 1.0, 1.0) == pytest.approx(1.0)
     assert np.all(settled["contacts"] == 2)
     np.testing.assert_allclose(settled["standstill_force"], 2586.9, rtol=1e-4)

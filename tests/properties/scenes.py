@@ -10,6 +10,7 @@ import numpy as np
 
 from percussion_model import Scene
 from percussion_model.scene.inputs import INPUTS, why_without_effect
+from percussion_model.scene.numbers import section_numbers
 from percussion_model.scene.parameters import find_row
 from percussion_model.solvers.wave.grid import choose_time_step, section_count
 from tests.properties.source import Source, chance, decades
@@ -199,7 +200,8 @@ def with_cells(source: Source, scene: Scene, solver: str) -> Scene:
 
 
 def bars_of(scene: Scene) -> list[Any]:
-    return [scene.piston, scene.bit] if scene.piston.model == "elastic" else [scene.bit]
+    bars = [scene.piston, scene.bit] if scene.piston.model == "elastic" else [scene.bit]
+    return [section_numbers(bar) for bar in bars]
 
 
 def step_of(scene: Scene, wanted: int) -> float:
@@ -208,7 +210,7 @@ def step_of(scene: Scene, wanted: int) -> float:
 
 def cells_of(scene: Scene, wanted: int) -> int:
     step = step_of(scene, wanted)
-    return sum(section_count(one, step) for bar in bars_of(scene) for one in bar.sections)
+    return sum(section_count(one, step) for bar in bars_of(scene) for one in bar)
 
 
 def draw_length(source: Source, scene: Scene) -> float:

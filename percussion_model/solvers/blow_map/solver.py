@@ -9,6 +9,7 @@ import numpy as np
 
 from percussion_model.physics.kernel import entry_of
 from percussion_model.physics.records import READING, Status
+from percussion_model.scene.numbers import Numbers, numbers_of
 from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.solvers.base import Solver
 from percussion_model.solvers.blow_map import advance as kernels
@@ -16,8 +17,8 @@ from percussion_model.solvers.blow_map import flight
 from percussion_model.solvers.blow_map.builder import get_table
 from percussion_model.solvers.blow_map.records import ENTRIES, MAP_PAR, MAP_STATE
 from percussion_model.solvers.blow_map.refusals import explain_refusal
-from percussion_model.solvers.blow_map.table import BlowTable, fixed_values
-from percussion_model.solvers.setup import fill_parameters, fill_start, rock_numbers
+from percussion_model.solvers.blow_map.table import BlowTable, Nodes, fixed_values
+from percussion_model.solvers.setup import fill_parameters, fill_start
 from percussion_model.solvers.state import State, words_of
 
 _WORD = words_of(MAP_STATE)
@@ -33,6 +34,42 @@ _FIXED = {
 }
 # A bit that hangs further above the rock at the start does not stand on it [m].
 MOST_ROCK_GAP = 1e-3
+
+
+def map_parameters(numbers: Numbers, nodes: Nodes) -> np.ndarray:
+    """Parameter record of a scene and of the nodes of its table.
+
+    Returns
+    -------
+    MAP_PAR array of length 1
+    """
+    par = np.zeros(1, MAP_PAR)
+    p: Any = par[0]
+    fill_parameters(p, numbers, with_piston=True)
+    p["gamma"] = numbers.values.rock_unloading_ratio
+    p["start_gap"] = numbers.values.start_gap
+    p["lowest"], p["highest"] = nodes.lowest, nodes.highest
+    p["origin"], p["step"] = nodes.origin, nodes.step
+    return par
+
+
+def fill_map_start(state: np.ndarray, par: np.ndarray, numbers: Numbers) -> None:
+    """Fill a record at time zero, but for the plan of the first flight.
+
+    Parameters
+    ----------
+    state : MAP_STATE array of length 1
+    par : MAP_PAR array of length 1
+    numbers : Numbers
+    """
+    s: Any = state[0]
+    p: Any = par[0]
+    fill_start(s, numbers)
+    s["p"] = 0.0
+    s["y"] = -numbers.values.start_gap
+    static = s["feed"] + p["mass_b"] * p["gravity"]
+    s["e_start"] = 0.5 * p["mass_p"] * s["v_p"] ** 2
+    s["e_start"] += static**2 / (2.0 * p["gamma"] * s["k_r"])
 
 
 class BlowMapSolver(Solver):
@@ -66,13 +103,8 @@ class BlowMapSolver(Solver):
         self.cells = dict(table.cells)
         self.wave_speed_error = table.wave_speed_error
         self._values = table.values
-        self._par = np.zeros(1, MAP_PAR)
-        p: Any = self._par[0]
-        fill_parameters(p, scene, with_piston=True)
-        p["gamma"] = scene.rock.unloading_ratio
-        p["start_gap"] = scene.start.gap
-        p["lowest"], p["highest"] = table.lowest, table.highest
-        p["origin"], p["step"] = table.origin, table.step
+        self._numbers = numbers_of(scene)
+        self._par = map_parameters(self._numbers, table.nodes)
         self._found = np.zeros(ENTRIES)
         self._advance: Callable[..., int] = kernels.advance
         self._read: Callable[..., None] = flight.read
@@ -92,15 +124,8 @@ class BlowMapSolver(Solver):
 
     def new_state(self) -> State:
         """State at time zero: the bit stands on the rock, the piston flies."""
-        scene, start, par = self.scene, self.scene.start, self._par[0]
         state = State(MAP_STATE)
-        s: Any = state.record[0]
-        fill_start(s, scene, rock_numbers(scene))
-        s["x_r"], s["p"] = start.rock_gap, 0.0
-        s["y"] = -start.gap
-        static = s["feed"] + par["mass_b"] * par["gravity"]
-        s["e_start"] = 0.5 * par["mass_p"] * s["v_p"] ** 2
-        s["e_start"] += static**2 / (2.0 * par["gamma"] * s["k_r"])
+        fill_map_start(state.record, self._par, self._numbers)
         self._plan(self._par, state.record)
         return state
 

@@ -3,19 +3,29 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from percussion_model.scene.parameters import Bar, Section
+from percussion_model.physics.records import Piston
+from percussion_model.scene.bars import (
+    AREA,
+    LENGTH,
+    YOUNGS_MODULUS,
+    bar_length,
+    bar_mass,
+    section_mass,
+    section_transit_time,
+)
+from percussion_model.scene.numbers import Numbers
 from percussion_model.solvers.fem.records import Mesh
+from percussion_model.solvers.setup import PISTONS
 
 # A length this close to half an element is half an element.
 ROUNDING = 1e-9
 
 
-@dataclass(frozen=True)
-class BarMesh:
+class BarMesh(NamedTuple):
     """Elements of one bar, top to bottom; none where it is rigid.
 
     Attributes
@@ -38,38 +48,72 @@ class BarMesh:
         return len(self.mass)
 
 
-def section_count(section: Section, element: float) -> int:
+class BarMeshes(NamedTuple):
+    """Elements of a scene.
+
+    Attributes
+    ----------
+    element : float
+        About their length [m].
+    piston : BarMesh or None
+        None where it is absent.
+    bit : BarMesh
+    """
+
+    element: float
+    piston: BarMesh | None
+    bit: BarMesh
+
+    @property
+    def both(self) -> list[BarMesh]:
+        """The bars, top to bottom."""
+        return [self.bit] if self.piston is None else [self.piston, self.bit]
+
+
+def section_count(section: np.ndarray, element: float) -> int:
     """Elements of about the length `element` [m] that a section gets, half a one for one."""
-    return max(1, math.floor(section.length / element + 0.5 + ROUNDING))
+    return max(1, math.floor(float(section[LENGTH]) / element + 0.5 + ROUNDING))
 
 
-def cut_bar(bar: Bar, element: float, elastic: bool = True) -> BarMesh:
+def cut_bar(sections: np.ndarray, element: float, elastic: bool = True) -> BarMesh:
     """Cut the sections of a bar into elements of about one length.
 
     Parameters
     ----------
-    bar : Bar
+    sections : float array, shape (n, 4)
+        As from `section_numbers`.
     element : float
         Wanted length [m].
     elastic : bool
         Whether the bar has elements at all.
     """
+    total = bar_mass(sections)
     if not elastic:
         none = np.zeros(0)
-        return BarMesh(none, none, none, none, bar.mass)
-    rows = []
-    for section in bar.sections:
+        return BarMesh(none, none, none, none, total)
+    counts = np.zeros(len(sections), np.int64)
+    each = np.zeros((4, len(sections)))
+    for k, section in enumerate(sections):
         count = section_count(section, element)
-        length = section.length / count
-        row = (
-            length,
-            section.youngs_modulus * section.area / length,
-            section.mass / count,
-            section.transit_time / count,
-        )
-        rows += [row] * count
-    length, stiffness, mass, transit = np.array(rows).T
-    return BarMesh(length, stiffness, mass, transit, bar.mass)
+        length = float(section[LENGTH]) / count
+        counts[k] = count
+        each[0, k] = length
+        each[1, k] = float(section[YOUNGS_MODULUS]) * float(section[AREA]) / length
+        each[2, k] = section_mass(section) / count
+        each[3, k] = section_transit_time(section) / count
+    lengths, stiffness, mass, transit_time = [np.repeat(row, counts) for row in each]
+    return BarMesh(lengths, stiffness, mass, transit_time, total)
+
+
+def cut_bars(numbers: Numbers) -> BarMeshes:
+    """Cut the elastic bars of a scene into elements of about one length."""
+    values, kind = numbers.values, PISTONS[numbers.values.piston_model]
+    first = numbers.piston if kind == Piston.ELASTIC else numbers.bit
+    element = bar_length(first) / values.fem_elements
+    piston = None
+    if kind != Piston.ABSENT:
+        piston = cut_bar(numbers.piston, element, kind == Piston.ELASTIC)
+    return BarMeshes(element, piston, cut_bar(numbers.bit, element))
 
 
 def assemble(bars: list[BarMesh]) -> np.ndarray:

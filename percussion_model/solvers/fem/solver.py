@@ -7,7 +7,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from percussion_model.physics.records import RockKind
+from percussion_model.physics.records import Piston, RockKind
+from percussion_model.scene.numbers import Numbers, numbers_of, section_numbers
 from percussion_model.scene.parameters import Bar
 from percussion_model.scene.scene import Scene
 from percussion_model.solvers.base import Solver
@@ -15,9 +16,10 @@ from percussion_model.solvers.fem.advance import run
 from percussion_model.solvers.fem.bars import read_all, stored_energy
 from percussion_model.solvers.fem.mesh import (
     BarMesh,
+    BarMeshes,
     assemble,
     critical_frequency,
-    cut_bar,
+    cut_bars,
     section_count,
 )
 from percussion_model.solvers.fem.records import (
@@ -34,9 +36,11 @@ from percussion_model.solvers.fem.records import (
 )
 from percussion_model.solvers.setup import (
     MOST_CHANGES,
+    PISTONS,
+    ROCKS,
     fill_parameters,
     fill_start,
-    rock_numbers,
+    kelvin_voigt_time,
 )
 from percussion_model.solvers.state import State
 
@@ -45,13 +49,12 @@ from percussion_model.solvers.state import State
 MOST_EVENTS = 64
 
 
-def loss_time(scene: Scene, bit: BarMesh) -> float:
+def loss_time(numbers: Numbers, bit: BarMesh) -> float:
     """Kelvin-Voigt time [s]: that of the scene, or 2 zeta_K / omega_cr (eq. 55 of the paper)."""
-    if not scene.effects.loss:
-        return 0.0
-    if scene.fem.damping_ratio is None:
-        return float(scene.loss.time)
-    return 2.0 * float(scene.fem.damping_ratio) / critical_frequency(bit)
+    values = numbers.values
+    if not values.effects_loss or math.isnan(values.fem_damping_ratio):
+        return kelvin_voigt_time(numbers)
+    return 2.0 * float(values.fem_damping_ratio) / critical_frequency(bit)
 
 
 def eigenvalue(spectral_radius: float) -> complex:
@@ -64,6 +67,57 @@ def eigenvalue(spectral_radius: float) -> complex:
 def defect(spectral_radius: float) -> float:
     """Defect of the scheme's energy identity (docs/numerics.md, section 10)."""
     return (1.0 - spectral_radius) / (36.0 * (1.0 + spectral_radius))
+
+
+def fem_parameters(numbers: Numbers, bars: BarMeshes) -> np.ndarray:
+    """Parameter record of a scene on its mesh.
+
+    Returns
+    -------
+    FEM_PAR array of length 1
+    """
+    values = numbers.values
+    par = np.zeros(1, FEM_PAR)
+    p: Any = par[0]
+    fill_parameters(p, numbers, with_piston=PISTONS[values.piston_model] == Piston.ELASTIC)
+    shortest = min([float(bar.transit_time.min()) for bar in bars.both if bar.n])
+    p["dt"] = values.fem_courant * shortest
+    mu = eigenvalue(values.fem_spectral_radius)
+    p["mu_re"], p["mu_im"] = mu.real, mu.imag
+    p["dissipation"] = defect(values.fem_spectral_radius)
+    p["k_c"] = values.fem_contact_stiffness
+    p["eta"] = loss_time(numbers, bars.bit)
+    p["q_tol"], p["t_tol"] = values.fem_event_tolerance, values.fem_time_tolerance
+    p["start_gap"] = values.start_gap
+    p["n_p"] = 0 if bars.piston is None else bars.piston.n + 1
+    p["n_b"] = bars.bit.n + 1
+    if p["rock"] == RockKind.WALL:
+        p["rock"] = RockKind.SPRING  # a wall is met like the piston: by a penalty
+    p["most_changes"], p["most_events"] = MOST_CHANGES, MOST_EVENTS
+    return par
+
+
+def fill_fem_start(state: np.ndarray, w: np.ndarray, n_p: int, numbers: Numbers) -> None:
+    """Fill record and nodes at time zero, but for what `read_all` derives of them.
+
+    Parameters
+    ----------
+    state : FEM_STATE array of length 1
+    w : float array, shape (len(Node), n)
+    n_p : int
+        Nodes of the piston.
+    numbers : Numbers
+    """
+    s: Any = state[0]
+    values = numbers.values
+    fill_start(s, numbers)
+    if ROCKS[values.effects_rock] == RockKind.WALL:
+        s["k_r"] = s["next_k_r"] = values.fem_contact_stiffness
+    s["fresh"] = 1
+    w[Node.U] = -values.start_rock_gap
+    w[Node.U, :n_p] -= values.start_gap
+    w[Node.V, :n_p] = values.start_piston_velocity
+    w[Node.V, n_p:] = values.start_bit_velocity
 
 
 class FemSolver(Solver):
@@ -90,63 +144,24 @@ class FemSolver(Solver):
 
     def __init__(self, scene: Scene) -> None:
         super().__init__(scene)
-        elastic_piston = scene.piston.model == "elastic"
-        first = scene.piston if elastic_piston else scene.bit
-        element = self._element = first.length / scene.fem.elements
-        self._bit = cut_bar(scene.bit, element)
-        self._piston: BarMesh | None = None
-        if scene.piston.model != "absent":
-            self._piston = cut_bar(scene.piston, element, elastic_piston)
-        bars = [bar for bar in (self._piston, self._bit) if bar is not None]
-        self._mesh = assemble(bars)
-        shortest = min(float(bar.transit_time.min()) for bar in bars if bar.n)
-        self.time_step = scene.fem.courant * shortest
-        self.loss_time = loss_time(scene, self._bit)
-        self.cells = {"bit": self._bit.n}
-        if elastic_piston and self._piston is not None:
-            self.cells = {"piston": self._piston.n, **self.cells}
-        self._par = self._parameters()
+        self._numbers = numbers = numbers_of(scene)
+        bars = cut_bars(numbers)
+        self._element, self._piston, self._bit = bars
+        self._mesh = assemble(bars.both)
+        self._par = fem_parameters(numbers, bars)
+        self.time_step, self.loss_time = float(self._par[0]["dt"]), float(self._par[0]["eta"])
+        grids = {name: self.grid_of(name) for name in ("piston", "bit")}
+        self.cells = {name: grid.n for name, grid in grids.items() if grid is not None}
         n = self._mesh.shape[1]
         self._factors = np.zeros((2 * len(Factor), max(n, len(Key))))
         self._trial = np.zeros((len(Trial), n))
         self._looks = np.zeros((len(Look), len(Column)))
 
-    def _parameters(self) -> np.ndarray:
-        scene, options = self.scene, self.scene.fem
-        par = np.zeros(1, FEM_PAR)
-        p: Any = par[0]
-        fill_parameters(p, scene, with_piston=scene.piston.model == "elastic")
-        p["dt"] = self.time_step
-        mu = eigenvalue(options.spectral_radius)
-        p["mu_re"], p["mu_im"] = mu.real, mu.imag
-        p["dissipation"] = defect(options.spectral_radius)
-        p["k_c"] = options.contact_stiffness
-        p["eta"] = self.loss_time
-        p["q_tol"], p["t_tol"] = options.event_tolerance, options.time_tolerance
-        p["start_gap"] = scene.start.gap
-        p["n_p"] = 0 if self._piston is None else self._piston.n + 1
-        p["n_b"] = self._bit.n + 1
-        if p["rock"] == RockKind.WALL:
-            p["rock"] = RockKind.SPRING  # a wall is met like the piston: by a penalty
-        p["most_changes"], p["most_events"] = MOST_CHANGES, MOST_EVENTS
-        return par
-
     def new_state(self) -> State:
         """State at time zero."""
-        scene, start = self.scene, self.scene.start
-        rock = rock_numbers(scene)
-        if scene.effects.rock == "wall":
-            rock["k_r"] = scene.fem.contact_stiffness
         state = State(FEM_STATE, ((len(Node), self._mesh.shape[1]),))
-        s: Any = state.record[0]
-        fill_start(s, scene, rock)
-        s["fresh"] = 1
         (w,), n_p = state.arrays, int(self._par[0]["n_p"])
-        w[Node.U] = -start.rock_gap
-        w[Node.V, n_p:] = start.bit_velocity
-        if n_p:
-            w[Node.U, :n_p] -= start.gap
-            w[Node.V, :n_p] = start.piston_velocity
+        fill_fem_start(state.record, w, n_p, self._numbers)
         self.refresh(state)
         return state
 
@@ -226,4 +241,4 @@ class FemSolver(Solver):
 
     def section_cells(self, bar: Bar) -> list[int]:
         """Elements in each section of an elastic bar."""
-        return [section_count(section, self._element) for section in bar.sections]
+        return [section_count(section, self._element) for section in section_numbers(bar)]

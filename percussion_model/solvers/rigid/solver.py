@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, ClassVar
 
 import numpy as np
 
 from percussion_model.physics.records import Piston, Status
+from percussion_model.scene.bars import bar_mass, bar_transit_time
+from percussion_model.scene.numbers import Numbers, numbers_of
 from percussion_model.scene.scene import Scene
 from percussion_model.solvers.base import Solver
 from percussion_model.solvers.rigid import advance as kernels
 from percussion_model.solvers.rigid.records import RIGID_PAR, RIGID_STATE, ROWS_AN_EVENT
 from percussion_model.solvers.setup import (
+    PISTONS,
     REARM_TRANSITS,
+    Bit,
     fill_parameters,
     fill_start,
-    rock_numbers,
 )
 from percussion_model.solvers.state import State
 
@@ -52,18 +56,50 @@ def st_venant_restitution(
     return min(max(e, 0.0), 1.0)
 
 
-def restitution(scene: Scene) -> float:
+def restitution(numbers: Numbers) -> float:
     """Coefficient of restitution of piston and bit, NaN without a piston."""
-    if scene.piston.model == "absent":
-        return float("nan")
-    if scene.bit.model == "rigid" and scene.contact.restitution is not None:
-        return float(scene.contact.restitution)
+    values, piston, bit = numbers
+    if PISTONS[values.piston_model] == Piston.ABSENT:
+        return math.nan
+    if values.bit_model == Bit.RIGID and not math.isnan(values.contact_restitution):
+        return float(values.contact_restitution)
     return st_venant_restitution(
-        scene.piston.mass,
-        scene.piston.transit_time,
-        scene.bit.mass,
-        scene.bit.transit_time,
+        bar_mass(piston), bar_transit_time(piston), bar_mass(bit), bar_transit_time(bit)
     )
+
+
+def rigid_parameters(numbers: Numbers) -> np.ndarray:
+    """Parameter record of a scene whose bars are rigid.
+
+    Returns
+    -------
+    RIGID_PAR array of length 1
+    """
+    par = np.zeros(1, RIGID_PAR)
+    p: Any = par[0]
+    has_piston = PISTONS[numbers.values.piston_model] != Piston.ABSENT
+    fill_parameters(p, numbers, with_piston=has_piston)
+    p["piston"] = Piston.RIGID if has_piston else Piston.ABSENT
+    p["restitution"] = restitution(numbers)
+    p["window"] = max(p["rearm_time"] / REARM_TRANSITS, SHORTEST_WINDOW)
+    p["most_events"] = MOST_EVENTS
+    return par
+
+
+def fill_rigid_start(state: np.ndarray, numbers: Numbers) -> None:
+    """Fill a record at time zero, but for what `begin` derives of it.
+
+    Parameters
+    ----------
+    state : RIGID_STATE array of length 1
+    numbers : Numbers
+    """
+    s: Any = state[0]
+    fill_start(s, numbers)
+    if PISTONS[numbers.values.piston_model] == Piston.ABSENT:
+        s["gap"] = 0.0
+    s["start_gap"] = s["gap"]
+    s["ss_force"] = math.nan
 
 
 class RigidSolver(Solver):
@@ -80,30 +116,13 @@ class RigidSolver(Solver):
 
     def __init__(self, scene: Scene) -> None:
         super().__init__(scene)
-        has_piston = scene.piston.model != "absent"
-        self._par = np.zeros(1, RIGID_PAR)
-        p: Any = self._par[0]
-        fill_parameters(p, scene, with_piston=has_piston)
-        p["piston"] = Piston.RIGID if has_piston else Piston.ABSENT
-        p["restitution"] = self.restitution
-        p["window"] = max(p["rearm_time"] / REARM_TRANSITS, SHORTEST_WINDOW)
-        p["most_events"] = MOST_EVENTS
-
-    @property
-    def restitution(self) -> float:
-        """Coefficient of restitution of piston and bit, NaN without a piston."""
-        return restitution(self.scene)
+        self._numbers = numbers_of(scene)
+        self._par = rigid_parameters(self._numbers)
 
     def new_state(self) -> State:
         """State at time zero."""
-        scene = self.scene
         state = State(RIGID_STATE)
-        s: Any = state.record[0]
-        fill_start(s, scene, rock_numbers(scene))
-        if scene.piston.model == "absent":
-            s["gap"] = 0.0
-        s["start_gap"] = s["gap"]
-        s["ss_force"] = np.nan
+        fill_rigid_start(state.record, self._numbers)
         kernels.begin(self._par, state.record)
         return state
 

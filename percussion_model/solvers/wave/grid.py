@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Sequence
-from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
-from percussion_model.scene.parameters import Bar, Section
-from percussion_model.scene.scene import Scene
+from percussion_model.physics.records import Piston
+from percussion_model.scene.bars import (
+    AREA,
+    LENGTH,
+    bar_transit_time,
+    section_mass,
+    section_transit_time,
+)
+from percussion_model.scene.numbers import Numbers
 from percussion_model.solvers.base import Cells
+from percussion_model.solvers.setup import PISTONS, Bit, kelvin_voigt_time
 from percussion_model.solvers.wave.records import Coef
 
 # Cells in the piston (or the only elastic bar) where the scene names none.
@@ -31,8 +39,7 @@ MOST_KEPT = 16
 MOST_VISCOUS = 0.5
 
 
-@dataclass(frozen=True)
-class Grid:
+class Grid(NamedTuple):
     """Cells of one bar.
 
     Attributes
@@ -56,29 +63,49 @@ class Grid:
         return len(self.mass)
 
 
-def section_count(section: Section, time_step: float) -> int:
+def section_count(section: np.ndarray, time_step: float) -> int:
     """Cells that a section gets."""
-    return max(1, round(section.transit_time / time_step))
+    return max(1, round(section_transit_time(section) / time_step))
 
 
-def cut(bar: Bar, time_step: float) -> Grid:
+def cut(sections: np.ndarray, time_step: float) -> Grid:
     """Cut a bar into cells of one transit time.
 
     Length and mass of each section stay as they are; where its transit time
     is no whole number of steps, the wave speed takes the error.
+
+    Parameters
+    ----------
+    sections : float array, shape (n, 4)
+        As from `section_numbers`.
+    time_step : float
+        Transit time of a cell [s].
     """
-    impedance: list[float] = []
-    mass: list[float] = []
-    fit = 0.0
-    for section in bar.sections:
+    counts = np.zeros(len(sections), np.int64)
+    impedance, mass = np.zeros(len(sections)), np.zeros(len(sections))
+    for k, section in enumerate(sections):
         count = section_count(section, time_step)
-        fit = max(fit, abs(section.transit_time / (count * time_step) - 1.0))
-        impedance += [section.mass / (count * time_step)] * count
-        mass += [section.mass / count] * count
-    return Grid(np.array(impedance), np.array(mass), time_step, fit)
+        counts[k] = count
+        impedance[k] = section_mass(section) / (count * time_step)
+        mass[k] = section_mass(section) / count
+    return Grid(
+        np.repeat(impedance, counts),
+        np.repeat(mass, counts),
+        time_step,
+        misfit(sections, time_step),
+    )
 
 
-def cell_at(bar: Bar, grid: Cells, place: float) -> tuple[int, float]:
+def misfit(sections: np.ndarray, time_step: float) -> float:
+    """Largest relative error of a section's wave speed in cells of one transit time."""
+    found = 0.0
+    for section in sections:
+        cells = section_count(section, time_step) * time_step
+        found = max(found, abs(section_transit_time(section) / cells - 1.0))
+    return found
+
+
+def cell_at(sections: np.ndarray, grid: Cells, place: float) -> tuple[int, float]:
     """Cell at a place along a bar.
 
     Parameters
@@ -93,41 +120,51 @@ def cell_at(bar: Bar, grid: Cells, place: float) -> tuple[int, float]:
         Cross-section there [m2].
     """
     above = 0.0
-    for section in bar.sections:
-        if place <= section.length:
+    for section in sections:
+        if place <= section[LENGTH]:
             break
-        above += section.mass
-        place -= section.length
-    mass = above + section.mass * min(place / section.length, 1.0)
+        above += section_mass(section)
+        place -= section[LENGTH]
+    mass = above + section_mass(section) * min(place / section[LENGTH], 1.0)
     cell = int(np.searchsorted(np.cumsum(grid.mass), mass, side="right"))
-    return min(cell, grid.n - 1), section.area
+    return min(cell, grid.n - 1), float(section[AREA])
 
 
-def choose_time_step(bars: list[Bar], cells: int | None) -> float:
+def elastic_bars(numbers: Numbers) -> list[np.ndarray]:
+    """Sections of the bars that get cells, the one first whose cells are counted."""
+    if numbers.values.bit_model != Bit.ELASTIC:
+        return []
+    if PISTONS[numbers.values.piston_model] == Piston.ELASTIC:
+        return [numbers.piston, numbers.bit]
+    return [numbers.bit]
+
+
+def choose_time_step(bars: Sequence[np.ndarray], cells: int) -> float:
     """Transit time of a cell that suits all bars.
 
     Parameters
     ----------
-    bars : list of Bar
-        The elastic bars; `cells` counts those of the first.
-    cells : int or None
-        Wanted number. None means `DEFAULT_CELLS` or, where the lengths do not
+    bars : sequence of float array
+        Sections of the elastic bars; `cells` counts those of the first.
+    cells : int
+        Wanted number. 0 means `DEFAULT_CELLS` or, where the lengths do not
         fit it, the smallest number above that does better.
     """
-    first = bars[0].transit_time
-    if cells is not None:
-        return first / cells
-    most = int(MOST_REFINED * DEFAULT_CELLS)
-    return first / fitting_cells(bars, DEFAULT_CELLS, most, WANTED_FIT)[0]
+    if not cells:
+        most = int(MOST_REFINED * DEFAULT_CELLS)
+        cells = fitting_cells(bars, DEFAULT_CELLS, most, WANTED_FIT)[0]
+    return bar_transit_time(bars[0]) / cells
 
 
-def fitting_cells(bars: Sequence[Bar], fewest: int, most: int, wanted: float) -> tuple[int, float]:
+def fitting_cells(
+    bars: Sequence[np.ndarray], fewest: int, most: int, wanted: float
+) -> tuple[int, float]:
     """Cells in the first bar that suit the lengths of all.
 
     Parameters
     ----------
-    bars : sequence of Bar
-        The elastic bars.
+    bars : sequence of float array
+        Sections of the elastic bars.
     fewest, most : int
         Numbers to choose from.
     wanted : float
@@ -140,10 +177,10 @@ def fitting_cells(bars: Sequence[Bar], fewest: int, most: int, wanted: float) ->
     fit : float
         Its error.
     """
-    first = bars[0].transit_time
+    first = bar_transit_time(bars[0])
     best, best_fit = fewest, np.inf
     for count in range(fewest, most + 1):
-        fit = max(cut(bar, first / count).fit for bar in bars)
+        fit = max([misfit(bar, first / count) for bar in bars])
         if fit < best_fit - 1e-12:
             best, best_fit = count, fit
         if best_fit < wanted:
@@ -292,16 +329,13 @@ def place_of_closure(variance: float) -> float:
     return 0.0 if variance == 0.0 else float(0.5 * (1.0 - np.sqrt(1.0 - 4.0 * width)))
 
 
-@dataclass(frozen=True)
-class CutBar:
+class CutBar(NamedTuple):
     """An elastic bar in cells; arrays are shared and must not be changed.
 
     Attributes
     ----------
     grid : Grid
     coefficients : ndarray, shape (len(Coef), n + 1)
-    transit_time : float
-        Of the whole bar [s].
     kappa : tuple of float
         Viscous numbers of the top and the bottom end cell.
     bound : tuple of float
@@ -310,21 +344,17 @@ class CutBar:
 
     grid: Grid
     coefficients: np.ndarray
-    transit_time: float
     kappa: tuple[float, float]
     bound: tuple[float, float]
 
 
-@dataclass(frozen=True, eq=False)
-class CutBars:
-    """The bars of a scene in cells of one transit time; equal if the same object.
+class CutBars(NamedTuple):
+    """The bars of a scene in cells of one transit time.
 
     Attributes
     ----------
     time_step : float
         Transit time of a cell [s].
-    loss_time : float
-        Kelvin-Voigt time [s], 0 without loss.
     substeps : int
         Of the loss operator in a step, 0 without loss.
     front : float
@@ -335,7 +365,6 @@ class CutBars:
     """
 
     time_step: float
-    loss_time: float
     substeps: int
     front: float
     piston: CutBar | None
@@ -347,55 +376,39 @@ class CutBars:
         return (self.bit,) if self.piston is None else (self.piston, self.bit)
 
 
-_kept: dict[tuple, CutBars] = {}
-_lock = threading.Lock()
-
-
-def elastic_bars(scene: Scene) -> list[Bar]:
-    """The bars that get cells, the one first whose cells are counted."""
-    if scene.bit.model != "elastic":
-        return []
-    return [scene.piston, scene.bit] if scene.piston.model == "elastic" else [scene.bit]
-
-
-def cut_bars(scene: Scene, cells: int | None) -> CutBars:
+def cut_bars(numbers: Numbers, cells: int) -> CutBars:
     """Cut the elastic bars of a scene, or find them cut.
 
     Parameters
     ----------
-    cells : int or None
+    cells : int
         As for `choose_time_step`.
     """
-    bars = elastic_bars(scene)
-    loss_time = scene.loss.time if scene.loss_on else 0.0
-    sections = [tuple((part.transit_time, part.mass) for part in bar.sections) for bar in bars]
-    key = (cells, loss_time, *sections)
-    with _lock:  # hosts may make instances in threads
-        found = _kept.get(key)
-        if found is None:
-            while len(_kept) >= MOST_KEPT:
-                del _kept[next(iter(_kept))]
-            time_step = choose_time_step(bars, cells)
-            *above, bit = [_cut_bar(bar, time_step, loss_time) for bar in bars]
-            shortest = min(bar.grid.n for bar in (*above, bit))
-            found = CutBars(
-                time_step,
-                loss_time,
-                substeps(loss_time, time_step),
-                place_of_closure(loss_time / time_step * shortest),
-                above[0] if above else None,
-                bit,
-            )
-            _kept[key] = found
-    return found
+    sections = [bar.tobytes() for bar in elastic_bars(numbers)]
+    return _cut_bars(cells, kelvin_voigt_time(numbers), *sections)
 
 
-def _cut_bar(bar: Bar, time_step: float, loss_time: float) -> CutBar:
-    grid = cut(bar, time_step)
+@lru_cache(MOST_KEPT)
+def _cut_bars(cells: int, loss_time: float, *sections: bytes) -> CutBars:
+    bars = [np.frombuffer(one).reshape(-1, 4) for one in sections]
+    time_step = choose_time_step(bars, cells)
+    found = [_cut_bar(bar, time_step, loss_time) for bar in bars]
+    shortest = min([bar.grid.n for bar in found])
+    return CutBars(
+        time_step,
+        substeps(loss_time, time_step),
+        place_of_closure(loss_time / time_step * shortest),
+        found[0] if len(found) > 1 else None,
+        found[-1],
+    )
+
+
+def _cut_bar(sections: np.ndarray, time_step: float, loss_time: float) -> CutBar:
+    grid = cut(sections, time_step)
     c = coefficients(grid, loss_time)
     kappa = end_viscosity(c, grid, loss_time)
     bound = _offset_bound(c, grid, Coef.TOP), _offset_bound(c, grid, Coef.BOTTOM)
-    return CutBar(grid, c, bar.transit_time, kappa, bound)
+    return CutBar(grid, c, kappa, bound)
 
 
 def _offset_bound(c: np.ndarray, grid: Grid, row: Coef) -> float:

@@ -6,9 +6,9 @@ The rule only knows the scene. What it cannot know, such as chatter, shows in th
 from __future__ import annotations
 
 import math
-from itertools import pairwise
 
-from percussion_model.scene.scene import Scene
+from percussion_model.scene.bars import bar_transit_time
+from percussion_model.scene.numbers import Numbers
 from percussion_model.solvers.wave.grid import elastic_bars, fitting_cells
 
 # Relative error of the rate of penetration, and the cells of the bar with the shortest
@@ -23,22 +23,25 @@ MOST_REFINED = 2.0
 COARSER = (0.5, 0.75)
 
 
-def asked_cells(scene: Scene) -> int | None:
-    """Cells in the first elastic bar for the accuracy that a scene asks for, if it asks."""
-    if scene.solver.accuracy is None:
-        return None
-    return cells_for(scene, scene.solver.accuracy)[0]
+def asked_cells(numbers: Numbers) -> int:
+    """Cells in the first elastic bar that a scene asks for, itself or by an accuracy; or 0."""
+    values = numbers.values
+    if not math.isnan(values.solver_cells):
+        return int(values.solver_cells)
+    if not math.isnan(values.solver_accuracy):
+        return cells_for(numbers, values.solver_accuracy)[0]
+    return 0
 
 
 def cells_for(
-    scene: Scene, accuracy: float, fewest: int = 1, most: int | None = None
+    numbers: Numbers, accuracy: float, fewest: int = 1, most: int | None = None
 ) -> tuple[int, float]:
     """Cells in the first elastic bar for a wanted accuracy.
 
     Parameters
     ----------
-    scene : Scene
-        With an elastic bit.
+    numbers : Numbers
+        Of a scene with an elastic bit.
     accuracy : float
         Wanted relative error of the rate of penetration.
     fewest, most : int, optional
@@ -50,28 +53,28 @@ def cells_for(
     fit : float
         Relative error of the wave speed.
     """
-    bars = elastic_bars(scene)
-    shortest = min(bar.transit_time for bar in bars)
-    first = bars[0].transit_time
-    least = max(fewest, math.ceil(cells_by_rule(accuracy) * first / shortest - 1e-9))
+    bars = elastic_bars(numbers)
+    first, bit = bar_transit_time(bars[0]), bar_transit_time(bars[-1])
+    least = max(fewest, math.ceil(cells_by_rule(accuracy) * first / min(first, bit) - 1e-9))
     end = math.floor(MOST_REFINED * least)
-    end = end if most is None else max(least, min(end, most))
+    if most is not None:
+        end = max(least, min(end, most))
     return fitting_cells(bars, least, end, FIT_SHARE * accuracy)
 
 
-def coarser_cells(scene: Scene, cells: int) -> int:
+def coarser_cells(numbers: Numbers, cells: int) -> int:
     """Cells of a coarser run that fit the lengths best."""
     low, high = COARSER
     fewest = max(1, math.ceil(low * cells))
     most = max(fewest, math.floor(high * cells))
-    return fitting_cells(elastic_bars(scene), fewest, most, 0.0)[0]
+    return fitting_cells(elastic_bars(numbers), fewest, most, 0.0)[0]
 
 
 def cells_by_rule(accuracy: float) -> float:
     """Cells of the bar with the shortest transit, a power law between calibrated points."""
-    points = list(pairwise(CALIBRATED))
-    (loose, few), (tight, many) = next(
-        (pair for pair in points if accuracy >= pair[1][0]), points[-1]
-    )
+    k = 1
+    while k < len(CALIBRATED) - 1 and accuracy < CALIBRATED[k][0]:
+        k += 1
+    (loose, few), (tight, many) = CALIBRATED[k - 1], CALIBRATED[k]
     slope = math.log(many / few) / math.log(loose / tight)
     return few * (loose / accuracy) ** slope

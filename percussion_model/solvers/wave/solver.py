@@ -9,6 +9,7 @@ import numpy as np
 
 from percussion_model.physics.kernel import entry_of
 from percussion_model.physics.records import Status
+from percussion_model.scene.numbers import Numbers, numbers_of, section_numbers
 from percussion_model.scene.parameters import Bar
 from percussion_model.scene.scene import Scene
 from percussion_model.solvers.base import Solver
@@ -42,8 +43,8 @@ EVENTS_ON, N_BLOWS, N_EVENTS = _WORD["events_on"], _WORD["n_blows"], _WORD["n_ev
 PARITY, PEAK_FROM = _WORD["parity"], _WORD["peak_from"]
 
 
-def wave_parameters(scene: Scene, bars: CutBars) -> np.ndarray:
-    """Parameter record of a scene on its grid.
+def wave_parameters(numbers: Numbers, bars: CutBars) -> np.ndarray:
+    """Parameter record of a scene on its grid, without leaps.
 
     Returns
     -------
@@ -51,7 +52,7 @@ def wave_parameters(scene: Scene, bars: CutBars) -> np.ndarray:
     """
     par = np.zeros(1, WAVE_PAR)
     p: Any = par[0]
-    fill_parameters(p, scene, with_piston=bars.piston is not None)
+    fill_parameters(p, numbers, with_piston=bars.piston is not None)
     bit, piston = bars.bit, bars.piston
     p["dt"] = bars.time_step
     p["most_crossings"] = MOST_CHANGES
@@ -65,11 +66,28 @@ def wave_parameters(scene: Scene, bars: CutBars) -> np.ndarray:
         p["z_f"], p["z_p"] = piston.grid.impedance[[0, -1]]
         p["kappa_f"], p["kappa_p"] = piston.kappa
         p["bound_p"] = piston.bound[1]
-    rock = rock_numbers(scene)
-    p["ss_stiffness"] = rock["gamma"] * rock["k_r"]
-    p["ss_loading"] = rock["k_r"]
-    p["ss_damping"] = rock["c_r"]
+    rock = rock_numbers(numbers)
+    p["ss_stiffness"] = rock.gamma * rock.k_r
+    p["ss_loading"] = rock.k_r
+    p["ss_damping"] = rock.c_r
     return par
+
+
+def fill_wave_start(state: np.ndarray, wp: np.ndarray, wb: np.ndarray, numbers: Numbers) -> None:
+    """Fill record and waves at time zero, but for what `begin` derives of them.
+
+    Parameters
+    ----------
+    state : WAVE_STATE array of length 1
+    wp, wb : float array, shape (len(Row), n + 1)
+        Waves of piston and bit.
+    numbers : Numbers
+    """
+    s: Any = state[0]
+    fill_start(s, numbers)
+    s["leap_end"] = -1
+    wb[Row.DOWN : Row.UP + 1, :-1] = 0.5 * numbers.values.start_bit_velocity
+    wp[Row.DOWN : Row.UP + 1, :-1] = 0.5 * numbers.values.start_piston_velocity
 
 
 class WaveSolver(Solver):
@@ -96,7 +114,8 @@ class WaveSolver(Solver):
 
     def __init__(self, scene: Scene) -> None:
         super().__init__(scene)
-        bars = cut_bars(scene, scene.solver.cells or asked_cells(scene))
+        self._numbers = numbers = numbers_of(scene)
+        bars = cut_bars(numbers, asked_cells(numbers))
         self.time_step = bars.time_step
         self._grids: dict[str, Grid | None] = {
             "piston": None if bars.piston is None else bars.piston.grid,
@@ -106,10 +125,10 @@ class WaveSolver(Solver):
         self.wave_speed_error = max(bar.grid.fit for bar in bars.both)
         self._cb = bars.bit.coefficients
         self._cp = np.zeros((len(Coef), 1)) if bars.piston is None else bars.piston.coefficients
-        self._par = wave_parameters(scene, bars)
+        self._par = wave_parameters(numbers, bars)
         self._operators = no_operators()
         # forces that change from step to step leave no step a constant map
-        if scene.solver.leaps and not self._par[0]["effects"]:
+        if numbers.values.solver_leaps and not self._par[0]["effects"]:
             found = leap_operators(
                 self._par, self._grids["piston"], self._cp, bars.bit.grid, self._cb
             )
@@ -126,16 +145,10 @@ class WaveSolver(Solver):
 
     def new_state(self) -> State:
         """State at time zero."""
-        scene, start = self.scene, self.scene.start
-        n_p, n_b = self.cells.get("piston", 0), self.cells["bit"]
-        state = State(WAVE_STATE, ((len(Row), n_p + 1), (len(Row), n_b + 1)))
-        s: Any = state.record[0]
-        fill_start(s, scene, rock_numbers(scene))
-        s["leap_end"] = -1
+        shapes = tuple((len(Row), self.cells.get(name, 0) + 1) for name in self._grids)
+        state = State(WAVE_STATE, shapes)
         wp, wb = state.arrays
-        wb[Row.DOWN : Row.UP + 1, :n_b] = 0.5 * start.bit_velocity
-        if n_p:
-            wp[Row.DOWN : Row.UP + 1, :n_p] = 0.5 * start.piston_velocity
+        fill_wave_start(state.record, wp, wb, self._numbers)
         entry_of(begin)(self._par, state.record, self._bars(state))
         return state
 
@@ -245,4 +258,4 @@ class WaveSolver(Solver):
 
     def section_cells(self, bar: Bar) -> list[int]:
         """Cells in each section of an elastic bar."""
-        return [section_count(section, self.time_step) for section in bar.sections]
+        return [section_count(section, self.time_step) for section in section_numbers(bar)]

@@ -12,6 +12,7 @@ from collections.abc import Callable
 import numpy as np
 
 from percussion_model.physics.records import Mode
+from percussion_model.scene.numbers import section_numbers
 from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.solvers.fem.mesh import assemble, cut_bar
 from percussion_model.solvers.fem.records import Mesh
@@ -73,9 +74,9 @@ class Drill:
         self.scene, rock = scene, scene.rock
         first = scene.bit if scene.piston.model == "absent" else scene.piston
         element = first.length / scene.fem.elements
-        bars = [cut_bar(scene.bit, element)]
+        bars = [cut_bar(section_numbers(scene.bit), element)]
         if scene.piston.model != "absent":
-            bars.insert(0, cut_bar(scene.piston, element))
+            bars.insert(0, cut_bar(section_numbers(scene.piston), element))
         mesh = assemble(bars)
         self.n_p, self.n = bars[0].n + 1 if len(bars) > 1 else 0, mesh.shape[1]
         off = mesh[Mesh.COUPLING, :-1]
