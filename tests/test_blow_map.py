@@ -13,14 +13,9 @@ from percussion_model import Scene, SceneError, Simulation, SimulationError, sim
 from percussion_model.analysis.blow_maps import make_map
 from percussion_model.solvers.blow_map.records import Axis, Entry
 from percussion_model.solvers.blow_map.solver import BlowMapSolver
+from tests.state_bits import run_bits
 
 LONG = bool(os.environ.get("PERCUSSION_LONG"))
-
-
-def bits(simulation):
-    """State, blow table and events as bytes."""
-    state = simulation.save().state
-    return state.numbers.tobytes(), simulation.blows.tobytes(), simulation.events.tobytes()
 
 
 @pytest.fixture(scope="module")
@@ -139,7 +134,7 @@ def test_calls_and_readings_change_no_bit(table):
             divided.energy()
             divided.fields()
     divided.advance(1.0)
-    assert bits(divided) == bits(whole)
+    assert run_bits(divided) == run_bits(whole)
 
 
 def test_restored_runs_repeat_with_inputs_changed(table):
@@ -148,7 +143,7 @@ def test_restored_runs_repeat_with_inputs_changed(table):
     def go_on():
         simulation.set_inputs(feed_force=3000.0, drive_force=3300.0, loading_stiffness=8e8)
         simulation.advance(1.5)
-        return bits(simulation)
+        return run_bits(simulation)
 
     simulation.advance(0.73)
     saved = simulation.save()

@@ -87,10 +87,11 @@ def test_a_scene_has_the_groups_that_effects_bring(tmp_path):
     code = """
 import pickle
 import sys
+from percussion_model.physics import effects
 from percussion_model.scene import parameters
 friction = {"force": (50.0, "N", "F", 0.0, 1e6)}
-parameters.EFFECTS = (parameters.Effect("friction", "rub", friction, max),)
-parameters.GROUPS.update(parameters.groups_with(parameters.EFFECTS))
+effects.EFFECTS = (effects.Effect("friction", "rub", friction, max),)
+parameters.GROUPS.update(parameters.groups_with(effects.EFFECTS))
 from percussion_model.scene.scene import Scene
 scene = Scene().replace(**{"friction.force": 60.0})
 assert scene.unused == ("friction.force",) and "friction" in scene.effects_off

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from percussion_model import Scene, Simulation
+from tests.state_bits import run_bits
 
 SOLVERS = {
     "wave": {"solver.name": "wave"},
@@ -13,15 +14,6 @@ SOLVERS = {
     "rigid": {"solver.name": "rigid", "piston.model": "rigid", "bit.model": "rigid"},
 }
 SCENES = {"reference": {}, "short stroke": {"drive.reversal_distance": 0.004}}
-
-
-def bits(simulation):
-    """State, blow table and events as bytes."""
-    state = simulation.save().state
-    record = state.record.copy()
-    record["n_blows"] = record["n_events"] = 0  # rows filled in the last call
-    plain = record.tobytes() + state.workspace.tobytes()
-    return plain, simulation.blows.tobytes(), simulation.events.tobytes()
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -39,7 +31,7 @@ def test_ten_thousand_calls_give_the_same_bits_as_one(solver, name):
             divided.energy()
             divided.fields()
     divided.advance(end)
-    assert bits(divided) == bits(whole)
+    assert run_bits(divided) == run_bits(whole)
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
@@ -51,12 +43,12 @@ def test_saved_and_restored_runs_repeat(solver):
         simulation.advance(float(t))
         saved.append(simulation.save())
     simulation.advance(0.3)
-    last = bits(simulation)
+    last = run_bits(simulation)
     for snapshot in saved:
         again = Simulation(simulation.scene)
         again.restore(snapshot)
         again.advance(0.3)
-        assert bits(again) == last
+        assert run_bits(again) == last
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
@@ -66,7 +58,7 @@ def test_depth_changes_no_bit(solver):
     for simulation in (shallow, deep):
         simulation.advance(1.0)
     assert len(shallow.blows) > 15
-    assert bits(shallow) == bits(deep)
+    assert run_bits(shallow) == run_bits(deep)
 
 
 LIMITS = {

@@ -11,6 +11,7 @@ import numpy as np
 from percussion_model import Simulation
 from percussion_model.physics.records import SAMPLE_FIELDS, EventKind, Mode
 from tests.properties.scenes import Case
+from tests.state_bits import run_bits
 
 # Of the ledger's denominator, for every solver.
 MOST_RESIDUAL = 1e-6
@@ -126,23 +127,14 @@ class Watch:
     def repeat(self) -> None:
         """Go back to the start and take another way: the bits must be the same."""
         simulation = self.simulation
-        last = bits_of(simulation)
+        last = run_bits(simulation)
         simulation.restore(self.start)
         for time, values in self.given:
             simulation.advance(0.5 * (simulation.time + time))
             simulation.advance(time)
             simulation.set_inputs(**values)
         simulation.advance(self.case.length)
-        assert bits_of(simulation) == last, "other calls gave other bits"
-
-
-def bits_of(simulation: Simulation) -> tuple[bytes, ...]:
-    """State, blow table and events as bytes."""
-    state = simulation.save().state
-    record = state.record.copy()
-    record["n_blows"] = record["n_events"] = 0  # rows filled in the last call
-    plain = record.tobytes() + state.workspace.tobytes()
-    return plain, simulation.blows.tobytes(), simulation.events.tobytes()
+        assert run_bits(simulation) == last, "other calls gave other bits"
 
 
 def check_case(case: Case) -> dict[str, Any]:
