@@ -41,10 +41,6 @@ def by_hand(scene, **entries):
 
 def run_by_hand(scene, end, **entries):
     """Run a scene on such a table."""
-    simulation = Simulation.__new__(Simulation)
-    Simulation.__bases__[0].__init__(
-        simulation, scene, True, BlowMapSolver(scene, by_hand(scene, **entries))
-    )
-    simulation.scene, simulation._blows, simulation._events = scene, (), ()
+    simulation = Simulation(scene, solver=BlowMapSolver(scene, by_hand(scene, **entries)))
     simulation.advance(end)
     return simulation

@@ -95,11 +95,11 @@ class Motion(Runner):
             else:
                 self._spare.take(self._state)
             self._left = (self._spare, self.time)
-        self.solver.watch_peaks(self._state, self.time)
+        self.solver.reset_peaks(self._state, self.time)
         if inputs:
             self._commit_inputs(inputs)
         t = max(t, self.time)
-        self._commit_up_to(t)
+        self._advance_solver(t)
         self._time = t
         self.step_size = step_size
         self._is_read = False

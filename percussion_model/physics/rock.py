@@ -68,7 +68,7 @@ def recoverable(s):
 @inlined
 def barrier_off(par, s):
     """Whether a blow of any energy starts a drilling cycle."""
-    return par.barrier == 0 or s.next_c_r == 0.0 or s.next_w_r == 0.0
+    return par.barrier == 0 or s.next_c_r == 0.0 or s.next_w_r == 0.0 or s.w_r == 0.0
 
 
 @kernel
@@ -92,7 +92,7 @@ def start_cycle(s, barrier, p):
 @kernel
 def resume_cycle(s, barrier):
     """Begin a cycle from contact: the elastic part of the force stays the same."""
-    force = s.gamma * s.k_r * (s.p - s.p_u)
+    force = s.gamma * s.k_r * (s.p - s.p_u)  # that of the spring, in BC and SS
     before = recoverable(s)
     start_cycle(s, barrier, force / s.next_k_r)
     # With other rock than before, what can be recovered changes at once.

@@ -261,7 +261,7 @@ class Scene:
     @property
     def loss_on(self) -> bool:
         """Whether bars lose energy to structural loss."""
-        elastic = BODIES.get(self.solver_name) != "rigid"
+        elastic = self.bit.model == "elastic" and BODIES.get(self.solver_name) != "rigid"
         return self.effects.loss and elastic and self.loss.time > 0
 
     @property

@@ -46,7 +46,7 @@ class Runner:
         self.record_events = record_events
         self.solver = solver or make_solver(scene)
         self.wall_time = 0.0
-        self._scene_rules = scene
+        self.scene = scene
         self._state = self.solver.new_state()
         self._time = 0.0
         self._blow_room = np.zeros(_BLOW_ROOM, BLOW)
@@ -83,7 +83,7 @@ class Runner:
         """
         self._check_time(t)
         began = time.perf_counter()
-        self._commit_up_to(float(t))
+        self._advance_solver(float(t))
         self._time = float(t)
         self.wall_time += time.perf_counter() - began
 
@@ -104,7 +104,7 @@ class Runner:
         began = time.perf_counter()
         while count > 0:
             room = self._blow_room[:count]
-            status, found = self._go(self.solver.advance, float(t), room)
+            status, found = self._call(self.solver.advance, float(t), room)
             count -= found
             if status == _DONE:
                 break
@@ -118,19 +118,19 @@ class Runner:
         if t < self._time:
             raise SimulationError(f"t = {t!r} s: lies before the present time {self._time!r} s")
 
-    def _commit_up_to(self, t: float) -> None:
-        self._let(self.solver.advance, t)
+    def _advance_solver(self, t: float) -> None:
+        self._call_until_done(self.solver.advance, t)
 
-    def _let(self, solver_goes: Callable[..., tuple[int, int, int]], t: float) -> None:
-        """Let the solver go on to `t`, and read its rows out whenever they are full."""
-        while self._go(solver_goes, t, self._blow_room)[0] != _DONE:
+    def _call_until_done(self, method: Callable[..., tuple[int, int, int]], t: float) -> None:
+        """Call the solver until it has reached `t`; its rows are kept whenever they are full."""
+        while self._call(method, t, self._blow_room)[0] != _DONE:
             pass
 
-    def _go(
-        self, solver_goes: Callable[..., tuple[int, int, int]], t: float, room: np.ndarray
+    def _call(
+        self, method: Callable[..., tuple[int, int, int]], t: float, room: np.ndarray
     ) -> tuple[int, int]:
-        """Let the solver go on until its rows are full; `Status`, and how many blows."""
-        status, n_blows, n_events = solver_goes(
+        """Call the solver and keep its rows; `Status`, and how many blows."""
+        status, n_blows, n_events = method(
             self._state, t, room, self._event_room, self.record_events
         )
         if n_blows or n_events:
@@ -162,13 +162,13 @@ class Runner:
         began = time.perf_counter()
         done = 0
         while done < len(times):
-            self._commit_up_to(float(times[done]))
+            self._advance_solver(float(times[done]))
             horizon = self.solver.readable_until(self._state)
             end = max(done + 1, int(np.searchsorted(times, horizon, side="right")))
             self._read(times[done:end], rows[done:end])
             done = end
         if len(times):
-            self._commit_up_to(float(times[-1]))
+            self._advance_solver(float(times[-1]))
             self._time = float(times[-1])
         self.wall_time += time.perf_counter() - began
         return rows
@@ -194,7 +194,7 @@ class Runner:
             distance act at once, the rock from the next drilling cycle on. Units
             and bounds are those of the parameter table.
         """
-        values = {name: check_input(self._scene_rules, name, v) for name, v in inputs.items()}
+        values = {name: check_input(self.scene, name, v) for name, v in inputs.items()}
         if not values:
             return
         began = time.perf_counter()
@@ -204,6 +204,6 @@ class Runner:
     def _commit_inputs(self, values: dict[str, float]) -> None:
         """Commit the state at its next grid point, and give it inputs that are checked."""
         t = self.solver.grid_point_after(self._state, self._time)
-        self._commit_up_to(t)
-        self._let(self.solver.commit, t)
+        self._advance_solver(t)
+        self._call_until_done(self.solver.commit, t)
         self.solver.set_inputs(self._state, **values)

@@ -22,6 +22,7 @@ from percussion_model.simulation.accuracy_control import LONGEST, run_to_accurac
 from percussion_model.simulation.result import Result
 from percussion_model.simulation.runner import Runner
 from percussion_model.simulation.warnings import find_warnings
+from percussion_model.solvers.base import Solver
 from percussion_model.solvers.state import State
 
 __all__ = ["Simulation", "SimulationError", "Snapshot", "simulate"]
@@ -67,11 +68,14 @@ class Simulation(Runner):
     scene : Scene
     record_events : bool
         Whether to keep the event list.
+    solver : Solver, optional
+        One that was made for an equal scene; solvers hold no state.
     """
 
-    def __init__(self, scene: Scene, record_events: bool = True) -> None:
-        super().__init__(scene, record_events)
-        self.scene = scene
+    def __init__(
+        self, scene: Scene, record_events: bool = True, solver: Solver | None = None
+    ) -> None:
+        super().__init__(scene, record_events, solver)
         self._blows: tuple[np.ndarray, ...] = ()  # bytes of the rows
         self._events: tuple[np.ndarray, ...] = ()
 

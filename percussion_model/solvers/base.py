@@ -134,7 +134,7 @@ class Solver(ABC):
         """Time up to which `read` answers without advancing the state far [s]."""
         return self.time(state)
 
-    def watch_peaks(self, state: State, t: float) -> None:
+    def reset_peaks(self, state: State, t: float) -> None:
         """Count the peak forces of `read` from `t` on [s]."""
         words, numbers = words_of(state.dtype), state.numbers
         numbers[words["peak_from"]] = t

@@ -44,7 +44,7 @@ def run(scene, factor):
     """Run with thresholds multiplied by a factor."""
     simulation = Simulation(scene)
     par = simulation.solver._par
-    for name in ("most_crossings", "most_changes", "most_events"):
+    for name in ("most_changes", "most_changes", "most_events"):
         if name in par.dtype.names:
             par[name] *= factor
     simulation.advance(DURATION[scene.solver_name])
@@ -67,7 +67,7 @@ def test_guards_never_act_in_the_papers_ranges_and_their_thresholds_do_not_matte
 
 def test_the_thresholds_of_the_test_above_are_those_of_the_kernels():
     """A threshold of one step or event does change the run, so that ten times it could."""
-    thresholds = {"wave": "most_crossings", "fem": "most_events", "rigid": "most_events"}
+    thresholds = {"wave": "most_changes", "fem": "most_events", "rigid": "most_events"}
     for solver, name in thresholds.items():
         simulation = Simulation(REFERENCE.computed_by(solver, **{"run.settle": 0.0}))
         simulation.solver._par[name] = 1

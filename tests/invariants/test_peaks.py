@@ -24,7 +24,7 @@ def peaks(scene, points):
     found = []
     for begin, end in pairwise(points):
         simulation.advance(float(begin))
-        simulation.solver.watch_peaks(simulation._state, float(begin))
+        simulation.solver.reset_peaks(simulation._state, float(begin))
         simulation.advance(float(end))
         simulation.solver.read(simulation._state, float(end), reading)
         found.append((reading["peak_bit_force"][0], reading["peak_contact_force"][0]))

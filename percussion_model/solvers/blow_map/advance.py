@@ -14,17 +14,15 @@ from percussion_model.physics.body import (
 from percussion_model.physics.drive import drive_force, turn_drive
 from percussion_model.physics.kernel import kernel
 from percussion_model.physics.records import Status
-from percussion_model.solvers.blow_map.flight import bit_at, move, plan
+from percussion_model.solvers.blow_map.flight import PIECES, bit_at, move, plan
 from percussion_model.solvers.blow_map.records import (
     ENTRIES,
-    PATH_TIMES,
     Axis,
     Entry,
     Next,
     Refusal,
 )
 
-PIECES = len(PATH_TIMES)
 # Rows of the event list that one event can fill.
 ROWS = 3
 

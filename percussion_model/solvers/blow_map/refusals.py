@@ -1,4 +1,4 @@
-"""What is said where the blow map does not answer."""
+"""Messages of a blow map that does not answer."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def explain_refusal(table: BlowTable, s: Any) -> str:
     ----------
     table : BlowTable
     s : record
-        State, of BLOW_STATE.
+        State, of MAP_STATE.
     """
     reason, value = Refusal(int(s["refusal"])), float(s["refused_value"])
     if reason in _NAMES:

@@ -30,13 +30,13 @@ CHECKPOINT_STEPS = 64
 @merged
 def guard_events(par, s):
     """Zeno guard: count a step cut short by an event; after too many the next looks for none."""
-    if s.time - s.crowd_from > par.dt:
-        s.crowd_from = s.time
-        s.crowd = 0
-    s.crowd += 1
-    if s.crowd >= par.most_events:
-        s.crowd = 0
-        s.stuck = 1
+    if s.time - s.window_from > par.dt:
+        s.window_from = s.time
+        s.window_events = 0
+    s.window_events += 1
+    if s.window_events >= par.most_events:
+        s.window_events = 0
+        s.skip_events = 1
         s.count_storms += 1
 
 
@@ -46,8 +46,8 @@ def advance_to(par, s, w, c, f, x, q, time, whole, blows, events):
     s.n_blows = 0
     s.n_events = 0
     grain = GRID_ROUNDING * par.dt
-    if s.fresh == 1:
-        s.fresh = 0
+    if s.inputs_changed == 1:
+        s.inputs_changed = 0
         change_modes(par, s, w, c, blows, events)
     while True:
         rest = time - s.time
@@ -107,6 +107,7 @@ def read_here(par, s, w, c, time, row):
     row.drive_impulse = s.i_drive
     if par.n_p == 0:
         row.piston_position = math.nan
+        row.piston_velocity = math.nan
         row.gap = math.nan
         row.relative_displacement = math.nan
 
@@ -129,7 +130,7 @@ def run(task, par_, state, w, c, f, x, q, time, blows, events, reading):
         Factorisations, kept from call to call; zero at first.
     x : float array, shape (len(Trial), n)
         Scratch.
-    q : float array, shape (len(Look), len(Column))
+    q : float array, shape (len(Probe), len(Column))
         Scratch.
     time : float
         [s]

@@ -103,7 +103,7 @@ def dissipated_in_nodes(par, w):
 
 
 @kernel
-def read_nodes(par, s, w, c):
+def read_nodes(par, s, w):
     """Derive from nodes and sums what the modes look at: gap, penetration, mean motion."""
     last = par.n_p + par.n_b - 1
     s.p = w[Node.U, last]
@@ -131,7 +131,7 @@ def read_ahead(par, s, a, c):
 def read_all(par, s, w, c):
     """Derive from the nodes all that modes and ledger look at."""
     read_ahead(par, s, w, c)
-    read_nodes(par, s, w, c)
+    read_nodes(par, s, w)
 
 
 @kernel

@@ -11,11 +11,11 @@ from percussion_model.physics.kernel import inlined, kernel, merged
 from percussion_model.physics.records import DriveKind, Mode, RockKind
 from percussion_model.physics.rock import REST_VELOCITY, damping, origin, stiffness
 from percussion_model.solvers.fem.bars import relative_motion
-from percussion_model.solvers.fem.records import Column, Look, Mesh, Node
+from percussion_model.solvers.fem.records import Column, Mesh, Node, Probe
 from percussion_model.solvers.fem.scheme import acceleration, try_step
 from percussion_model.solvers.fem.step import dashpot_work
 
-LOOKS = len(Look)
+PROBES = len(Probe)
 
 # Steps tried for one event; bisection takes over half-way.
 MOST_TRIALS = 60
@@ -47,7 +47,7 @@ def rock_value(par, s, p, v, work):
     if s.mode == Mode.FF:
         if par.rock == RockKind.NONE:
             return NEVER
-        return -v if s.springing == 1 else s.p_u - p
+        return -v if s.rebounding == 1 else s.p_u - p
     if par.rock == RockKind.SPRING:
         return p
     if s.mode == Mode.DFC:
@@ -88,27 +88,27 @@ def power(par, c, a, x, end):
 @inlined
 def fill_low(par, s, q):
     """Values at the start of the step, from what the state knows."""
-    q[Look.CONTACT, Column.LOW] = NEVER
-    q[Look.DRIVE, Column.LOW] = NEVER
+    q[Probe.CONTACT, Column.LOW] = NEVER
+    q[Probe.DRIVE, Column.LOW] = NEVER
     if par.n_p > 0:
-        q[Look.CONTACT, Column.LOW] = -s.gap if s.closed == 1 else s.gap
-        q[Look.DRIVE, Column.LOW] = drive_value(par, s, s.u_r)
-    q[Look.ROCK, Column.LOW] = rock_value(par, s, s.p, s.v_end, 0.0)
-    q[Look.TURN, Column.LOW] = turn_value(par, s, s.v_end, s.kinetic)
+        q[Probe.CONTACT, Column.LOW] = -s.gap if s.closed == 1 else s.gap
+        q[Probe.DRIVE, Column.LOW] = drive_value(par, s, s.u_r)
+    q[Probe.ROCK, Column.LOW] = rock_value(par, s, s.p, s.v_end, 0.0)
+    q[Probe.TURN, Column.LOW] = turn_value(par, s, s.v_end, s.kinetic)
 
 
 @inlined
-def fill_values(par, s, w, c, x, h, q, column):
+def fill_values(par, s, w, x, h, q, column):
     """Values at the end of a tried step of length `h`."""
     last = par.n_p + par.n_b - 1
-    q[Look.CONTACT, column] = NEVER
-    q[Look.DRIVE, column] = NEVER
+    q[Probe.CONTACT, column] = NEVER
+    q[Probe.DRIVE, column] = NEVER
     if par.n_p > 0:
-        q[Look.CONTACT, column] = contact_value(par, s, x)
-        q[Look.DRIVE, column] = drive_value(par, s, s.next_p - s.next_b)
+        q[Probe.CONTACT, column] = contact_value(par, s, x)
+        q[Probe.DRIVE, column] = drive_value(par, s, s.next_p - s.next_b)
     work = dashpot_work(par, s, x, w, h) if s.mode == Mode.DFC else 0.0
-    q[Look.ROCK, column] = rock_value(par, s, x[Node.U, last], x[Node.V, last], work)
-    q[Look.TURN, column] = turn_value(par, s, x[Node.V, last], s.next_kinetic)
+    q[Probe.ROCK, column] = rock_value(par, s, x[Node.U, last], x[Node.V, last], work)
+    q[Probe.TURN, column] = turn_value(par, s, x[Node.V, last], s.next_kinetic)
 
 
 @merged
@@ -117,28 +117,28 @@ def fill_slopes(par, s, c, a, x, end, h, q, column):
     n_p = par.n_p
     last = n_p + par.n_b - 1
     v = a[Node.V, last]
-    for k in range(LOOKS):
+    for k in range(PROBES):
         q[k, column] = 0.0
     if n_p > 0:
         rate = a[Node.V, n_p] - a[Node.V, n_p - 1]
-        q[Look.CONTACT, column] = h * (-rate if s.closed == 1 else rate)
+        q[Probe.CONTACT, column] = h * (-rate if s.closed == 1 else rate)
         rate = relative_motion(par, c, a, Node.V)
-        q[Look.DRIVE, column] = h * (-rate if s.alpha > 0 else rate)
+        q[Probe.DRIVE, column] = h * (-rate if s.alpha > 0 else rate)
     turn = acceleration(par, x, last, end)
     if s.mode == Mode.FF:
-        q[Look.ROCK, column] = -h * (turn if s.springing == 1 else v)
+        q[Probe.ROCK, column] = -h * (turn if s.rebounding == 1 else v)
     elif par.rock == RockKind.SPRING or s.mode == Mode.BC:
-        q[Look.ROCK, column] = h * v
+        q[Probe.ROCK, column] = h * v
     elif s.mode == Mode.DFC:
-        q[Look.ROCK, column] = -h * s.c_r * v * v
+        q[Probe.ROCK, column] = -h * s.c_r * v * v
     elif s.mode == Mode.SS:
-        q[Look.ROCK, column] = h * (stiffness(s) * v + damping(s) * turn)
+        q[Probe.ROCK, column] = h * (stiffness(s) * v + damping(s) * turn)
     if s.mode == Mode.SS:
-        q[Look.TURN, column] = -h * power(par, c, a, x, end)
+        q[Probe.TURN, column] = -h * power(par, c, a, x, end)
     elif s.mode == Mode.BC:
-        q[Look.TURN, column] = -h * turn
+        q[Probe.TURN, column] = -h * turn
     else:
-        q[Look.TURN, column] = h * turn
+        q[Probe.TURN, column] = h * turn
 
 
 @inlined
@@ -195,9 +195,9 @@ def next_guess(par, q, width):
     lies past the event.
     """
     first = 2.0
-    for k in range(LOOKS):
+    for k in range(PROBES):
         if q[k, Column.LOW] < 0.0 or (
-            q[k, Column.HIGH] >= 0.0 and k != Look.CONTACT and k != Look.ROCK
+            q[k, Column.HIGH] >= 0.0 and k != Probe.CONTACT and k != Probe.ROCK
         ):
             continue
         past = 0.5 * par.q_tol * q[k, Column.SCALE]
@@ -217,7 +217,7 @@ def next_guess(par, q, width):
 def past_by(q, column):
     """How far the functions are past their events, by their scales; -1 where none is."""
     most = -1.0
-    for k in range(LOOKS):
+    for k in range(PROBES):
         if q[k, Column.LOW] >= 0.0 and q[k, column] < 0.0:
             most = max(most, -q[k, column] / q[k, Column.SCALE])
     return most
@@ -226,7 +226,7 @@ def past_by(q, column):
 @inlined
 def may_cross(par, s, x, q):
     """Whether a function may have crossed zero within the step."""
-    for k in range(LOOKS):
+    for k in range(PROBES):
         if q[k, Column.HIGH] < 0.0 and q[k, Column.LOW] >= 0.0:
             return True
     if par.n_p > 0:
@@ -250,7 +250,7 @@ def end_of_step(par, s, w, c, f, x, q, h):
     par, s : record
     w, c, f, x : float array
         Nodes, mesh, factorisations, scratch.
-    q : float array, shape (len(Look), len(Column))
+    q : float array, shape (len(Probe), len(Column))
         Scratch.
     h : float
         Longest step [s].
@@ -261,11 +261,11 @@ def end_of_step(par, s, w, c, f, x, q, h):
         Length of the step that `x` holds [s].
     """
     try_step(par, s, w, c, f, x, h)
-    if s.stuck == 1:
-        s.stuck = 0
+    if s.skip_events == 1:
+        s.skip_events = 0
         return h
     fill_low(par, s, q)
-    fill_values(par, s, w, c, x, h, q, Column.HIGH)
+    fill_values(par, s, w, x, h, q, Column.HIGH)
     if not may_cross(par, s, x, q):
         return h
     return locate(par, s, w, c, f, x, q, h)
@@ -274,7 +274,7 @@ def end_of_step(par, s, w, c, f, x, q, h):
 @kernel
 def locate(par, s, w, c, f, x, q, h):
     """Shrink a bracket around the first event of a step; see `end_of_step`."""
-    for k in range(LOOKS):
+    for k in range(PROBES):
         q[k, Column.SCALE] = abs(q[k, Column.LOW]) + abs(q[k, Column.HIGH])
     fill_slopes(par, s, c, w, x, 0, h, q, Column.LOW_SLOPE)
     fill_slopes(par, s, c, x, x, 1, h, q, Column.HIGH_SLOPE)
@@ -295,7 +295,7 @@ def locate(par, s, w, c, f, x, q, h):
         if tried <= low or tried >= high:
             break
         try_step(par, s, w, c, f, x, tried * h)
-        fill_values(par, s, w, c, x, tried * h, q, Column.TRIED)
+        fill_values(par, s, w, x, tried * h, q, Column.TRIED)
         fill_slopes(par, s, c, x, x, 1, h, q, Column.TRIED_SLOPE)
         column = Column.LOW
         if past_by(q, Column.TRIED) >= 0.0:
@@ -303,7 +303,7 @@ def locate(par, s, w, c, f, x, q, h):
             high = tried
         else:
             low = tried
-        for k in range(LOOKS):
+        for k in range(PROBES):
             q[k, column] = q[k, Column.TRIED]
             q[k, column + 1] = q[k, Column.TRIED_SLOPE]
     if tried != high:

@@ -57,11 +57,11 @@ def change_contact(par, s, w, c, blows, events):
 @merged
 def close_on_rock(par, s, energy):
     """The flying bit meets the rock."""
-    springing = s.springing
+    rebounding = s.rebounding
     standstill = s.e_standstill + recoverable(s)
     close_interface(par, s, energy)
-    s.springing = 0
-    if springing == 0:
+    s.rebounding = 0
+    if rebounding == 0:
         # what flight and law take for rock still pressed in is overshoot
         s.e_standstill = standstill
         s.e_overshoot -= recoverable(s)
@@ -73,7 +73,7 @@ def lift_off(s):
     left = recoverable(s)
     s.mode = Mode.FF
     if s.p > s.p_u:
-        s.springing = 1
+        s.rebounding = 1
     else:
         s.e_overshoot += left
 
@@ -86,9 +86,9 @@ def change_rock(par, s, w, c):
     if s.mode != Mode.SS and par.rock == RockKind.BILINEAR:
         energy = kinetic_energy(c, w, par.n_p, par.n_b)
     if s.mode == Mode.FF:
-        if s.springing == 1 and s.p <= s.p_u:
-            s.springing = 0
-        if s.springing == 1:
+        if s.rebounding == 1 and s.p <= s.p_u:
+            s.rebounding = 0
+        if s.rebounding == 1:
             if v <= 0.0:
                 return 0
         elif s.p <= s.p_u:
@@ -146,7 +146,7 @@ def change_modes(par, s, w, c, blows, events):
                 s.kinetic = kinetic_energy(c, w, par.n_p, par.n_b)
             push_event(s, events, s.time, s.mode, spring_force(s))
         if changed == 0:
-            s.stuck = 0
+            s.skip_events = 0
             return
-    s.stuck = 1
+    s.skip_events = 1
     s.count_locked += 1

@@ -62,7 +62,7 @@ class Key(IntEnum):
     DAMPING = 2  # [N s/m]
 
 
-class Look(IntEnum):
+class Probe(IntEnum):
     """Event functions that are watched; each is positive until its event."""
 
     CONTACT = 0  # gap, or its negative while it is closed [m]
@@ -122,12 +122,12 @@ FEM_STATE = np.dtype(
         ("next_kinetic", "f8"),  # the same three at the end of the step tried last
         ("next_p", "f8"),
         ("next_b", "f8"),
-        ("springing", "i8"),  # 1: in flight, rock still pressed in
-        ("fresh", "i8"),  # 1: inputs were changed, modes may have to follow
-        ("stuck", "i8"),  # modes did not settle: no events in the next step
+        ("rebounding", "i8"),  # 1: in flight, rock still pressed in
+        ("inputs_changed", "i8"),  # 1: inputs were changed, modes may have to follow
+        ("skip_events", "i8"),  # modes did not settle: no events in the next step
         ("count_trials", "i8"),
-        ("crowd", "i8"),  # steps cut short by events since `crowd_from`
-        ("crowd_from", "f8"),  # [s]
+        ("window_events", "i8"),  # steps cut short by events since `window_from`
+        ("window_from", "f8"),  # [s]
         ("count_storms", "i8"),
         *COMMON_STATE,
     ],

@@ -29,9 +29,9 @@ from percussion_model.solvers.fem.records import (
     Factor,
     FemTask,
     Key,
-    Look,
     Mesh,
     Node,
+    Probe,
     Trial,
 )
 from percussion_model.solvers.setup import (
@@ -113,7 +113,7 @@ def fill_fem_start(state: np.ndarray, w: np.ndarray, n_p: int, numbers: Numbers)
     fill_start(s, numbers)
     if ROCKS[values.effects_rock] == RockKind.WALL:
         s["k_r"] = s["next_k_r"] = values.fem_contact_stiffness
-    s["fresh"] = 1
+    s["inputs_changed"] = 1
     w[Node.U] = -values.start_rock_gap
     w[Node.U, :n_p] -= values.start_gap
     w[Node.V, :n_p] = values.start_piston_velocity
@@ -155,7 +155,7 @@ class FemSolver(Solver):
         n = self._mesh.shape[1]
         self._factors = np.zeros((2 * len(Factor), max(n, len(Key))))
         self._trial = np.zeros((len(Trial), n))
-        self._looks = np.zeros((len(Look), len(Column)))
+        self._probes = np.zeros((len(Probe), len(Column)))
 
     def new_state(self) -> State:
         """State at time zero."""
@@ -178,7 +178,7 @@ class FemSolver(Solver):
         """Call the kernels; see `solvers.fem.advance.run`."""
         status = run(
             int(task), self._par, state.record, *state.arrays, self._mesh, self._factors,
-            self._trial, self._looks, time, blows, events, reading,
+            self._trial, self._probes, time, blows, events, reading,
         )  # fmt: skip
         s = state.record[0]
         return status, int(s["n_blows"]), int(s["n_events"])
@@ -220,7 +220,7 @@ class FemSolver(Solver):
     def set_inputs(self, state: State, **inputs: float) -> None:
         """Change inputs of a committed state; modes may have to follow."""
         super().set_inputs(state, **inputs)
-        state.record[0]["fresh"] = 1
+        state.record[0]["inputs_changed"] = 1
 
     def grid_of(self, bar: str) -> BarMesh | None:
         """Elements of "piston" or "bit", None where it has none."""

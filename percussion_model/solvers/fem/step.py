@@ -140,9 +140,9 @@ def take_step(par, s, w, c, x, h):
     for i in range(n_p + par.n_b):
         w[Node.U, i] = x[Node.U, i]
         w[Node.V, i] = x[Node.V, i]
-    read_nodes(par, s, w, c)
+    read_nodes(par, s, w)
     if s.mode == Mode.FF:
-        # a rock that was still springing back relaxes without doing work
+        # a rock that was still rebounding back relaxes without doing work
         s.e_standstill += before - recoverable(s)
     else:
         crush(par, s, p_before)

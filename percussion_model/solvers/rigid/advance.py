@@ -133,6 +133,7 @@ def read(par_, state, t, blows, events, reading):
     status = advance(par_, state, t, blows, events)
     if t > s.time:
         move(par, s, t - s.time)
+        s.time = t
     here = s.x_r + s.p
     row.time = t
     row.piston_position = here + s.start_gap - s.gap

@@ -166,5 +166,8 @@ def process_event(par, s, blows, events):
         mark_standstill(s)
     elif kind == Next.SWITCH:
         turn_drive(s, events, s.time, -s.gap)
-    elif kind != Next.HOLD:
+    elif kind == Next.HOLD:
+        note_standstill_force(par, s)
+        mark_standstill(s)
+    else:
         change_mode(par, s, events, kind, s.next_tau > 0.0 and s.late == 0)

@@ -10,7 +10,6 @@ from percussion_model.physics.drive import drive_force
 from percussion_model.physics.kernel import kernel
 from percussion_model.physics.records import Mode, Piston, RockKind
 from percussion_model.physics.rock import (
-    barrier_off,
     damping,
     enter_standstill,
     origin,
@@ -92,12 +91,6 @@ def bit_force(par, s, p, v):
         return F
     K, C, P = rock_terms(par, s)
     return K * (p - P) + C * v
-
-
-@kernel
-def overcomes_barrier(par, s):
-    """Whether the bit is fast enough to start a drilling cycle."""
-    return barrier_off(par, s) or 0.5 * par.mass_b * s.v_b * s.v_b > s.w_r
 
 
 @kernel

@@ -53,7 +53,7 @@ def touch_event(par, s):
 
 
 @kernel
-def loading_event(par, s, y, acc, beta, k, M):
+def loading_event(s, y, acc, beta, k, M):
     """End of DFC or FC: the barrier is spent, or the bit turns upward."""
     v = s.v_b
     if v < 0.0 or (v == 0.0 and acc < -ROUNDING * k * abs(s.p)):
@@ -166,10 +166,10 @@ def piston_event(par, s, y, acc, beta, k, tau, kind):
     if s.held == 1 and par.drive == DriveKind.PRESSURE and s.alpha > 0:
         return 0.0, Next.SWITCH  # a start in contact: u_r = 0 is reached
     if s.held == 1:
-        let_go = release_time(a_p, acc, jerk, doubt, beta, k)
-        let_go = postponed(par, s, let_go, Next.RELEASE)
-        if let_go < tau:
-            return let_go, Next.RELEASE
+        t_release = release_time(a_p, acc, jerk, doubt, beta, k)
+        t_release = postponed(par, s, t_release, Next.RELEASE)
+        if t_release < tau:
+            return t_release, Next.RELEASE
         return tau, kind
     lift = par.drive == DriveKind.PRESSURE and s.alpha < 0
     if k > 0.0:
@@ -221,7 +221,7 @@ def schedule(par, s):
         if par.rock == RockKind.SPRING:
             tau, kind = fall_time(y, s.v_b, 0.0, k, -F / K), Next.LIFT
         elif s.mode == Mode.DFC or s.mode == Mode.FC:
-            tau, kind = loading_event(par, s, y, acc, beta, k, M)
+            tau, kind = loading_event(s, y, acc, beta, k, M)
         elif s.mode == Mode.BC:
             tau, kind = unloading_event(s, y, acc, k, -F / K)
         else:

@@ -50,7 +50,7 @@ def plan(par, s, bars, ops, scratch):
         most = longest_leap(par)
         if s.dormant == 1:
             most = min(most, s.wake - s.step)
-        plan_leap(par, s, bars.wb, bars.cb, ops.watch, scratch, most)
+        plan_leap(par, s, bars.wb, bars.cb, ops.lookahead, scratch, most)
 
 
 @merged
@@ -67,7 +67,7 @@ def advance_to(par, s, bars, ops, scratch, time, blows, events):
     while ends_by(par, s, s.step + 1, time):
         if s.n_blows >= blows.shape[0]:
             return Status.BLOWS_FULL
-        if s.events_on == 1 and s.n_events + par.most_crossings + OTHER_EVENTS > events.shape[0]:
+        if s.events_on == 1 and s.n_events + par.most_changes + OTHER_EVENTS > events.shape[0]:
             return Status.EVENTS_FULL
         if not math.isfinite(s.p + s.v_b + s.v_p + s.u_r):
             return Status.NOT_FINITE

@@ -274,7 +274,7 @@ def meet(par, s, bars, tau, blows, events):
         if par.piston == Piston.ELASTIC:
             d_p = half * (2.0 * (s.v_p + a_p * half) - impulse / par.mass_p)
         s.u_r += d_p - half * (v_b + s.v_b)
-        move_piston(par, s, bars.wp, push, impulse, u_before, time, tau, events)
+        move_piston(par, s, push, impulse, u_before, time, tau, events)
     return top, bottom, top_p, bottom_p, tau
 
 
@@ -288,7 +288,7 @@ def move_bit(par, s, a_b, impulse, half):
 
 
 @merged
-def move_piston(par, s, wp, push, impulse, u_before, time, tau, events):
+def move_piston(par, s, push, impulse, u_before, time, tau, events):
     """The same for the piston, with a switch of the drive inside the step.
 
     The second half of the body force makes up for what the first half, given

@@ -95,7 +95,7 @@ class LeapOperators(NamedTuple):
         Powers 1, 4, 16, ... of the free piston's step map.
     bit : ndarray, shape (5, LEVELS, size, size)
         The same for the bit by `Mode`.
-    watch : ndarray, shape (5, size, LOOKAHEAD)
+    lookahead : ndarray, shape (5, size, LOOKAHEAD)
         By mode: strain offset of the rock end at the end of the next steps in
         FF, its velocity at their start in DFC, FC, BC and SS.
     sums : ndarray, shape (5, size)
@@ -111,7 +111,7 @@ class LeapOperators(NamedTuple):
 
     piston: np.ndarray
     bit: np.ndarray
-    watch: np.ndarray
+    lookahead: np.ndarray
     sums: np.ndarray
     top: np.ndarray
     bottom: np.ndarray
@@ -147,7 +147,7 @@ WAVE_PAR = np.dtype(
         ("n_b", "i8"),
         ("loss", "i8"),  # sub-steps of the loss operator, 0: no loss
         ("leaps", "i8"),  # levels of the leap operators, four to one: 0: no leaps
-        ("most_crossings", "i8"),  # of the rock law within a step; more are a loop
+        ("most_changes", "i8"),  # of the rock law within a step; more are a loop
         ("size_p", "i8"),  # padded size of the leap operators: piston
         ("size_r", "i8"),  # bit on the rock
         *COMMON_PARAMETERS,

@@ -178,7 +178,7 @@ def rock_step(par, s, w, c, v_free, z, tau, time, events):
     rest = tau
     d = 0.0
     q = 0.0
-    for _ in range(par.most_crossings):
+    for _ in range(par.most_changes):
         here = time + (tau - rest)
         if s.mode == Mode.FF:
             t, closes = flight_stretch(par, s, v_free, rest)

@@ -55,7 +55,7 @@ def wave_parameters(numbers: Numbers, bars: CutBars) -> np.ndarray:
     fill_parameters(p, numbers, with_piston=bars.piston is not None)
     bit, piston = bars.bit, bars.piston
     p["dt"] = bars.time_step
-    p["most_crossings"] = MOST_CHANGES
+    p["most_changes"] = MOST_CHANGES
     p["loss"], p["front"] = bars.substeps, bars.front
     p["n_b"] = bit.grid.n
     p["z_t"], p["z_b"] = bit.grid.impedance[[0, -1]]

@@ -145,7 +145,7 @@ def steps_with_lookahead(par, s, bars, ops, scratch):
     steps = min(quiet_steps(par, s, bars.wb, bars.cb, math.inf, s.u_r, s.v_p), LOOKAHEAD)
     if steps < FEWEST_STEPS:
         return 0
-    plan_leap(par, s, bars.wb, bars.cb, ops.watch, scratch, steps)
+    plan_leap(par, s, bars.wb, bars.cb, ops.lookahead, scratch, steps)
     if s.leap_end < 0:
         s.no_dormancy = s.no_plan
         return 0

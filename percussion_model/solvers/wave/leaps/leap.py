@@ -106,12 +106,12 @@ def keeps_contact(par, s, energy):
 
 
 @merged
-def plan_flight(par, s, wb, cb, watch, scratch, most):
+def plan_flight(par, s, wb, cb, lookahead, scratch, most):
     """Steps of free flight before the rock can be met, at most `most`."""
     if par.rock == RockKind.NONE:
         return most
     if s.p >= s.p_u:  # let go while the rock still springs back
-        return steps_in_flight(par, s, wb, cb, watch, scratch, most)
+        return steps_in_flight(par, s, wb, cb, lookahead, scratch, most)
     energy = deviation_energy(wb, cb, par.n_b, 2 * s.parity, s.v_b, 0.0)
     a = bit_acceleration(par, s)
     room = s.p_u - s.p - 2.0 * par.bound_b * math.sqrt(2.0 * energy)
@@ -121,12 +121,12 @@ def plan_flight(par, s, wb, cb, watch, scratch, most):
     steps = int(limit / par.dt) - 1
     if steps < LOOKAHEAD and par.rock == RockKind.BILINEAR:
         # the bound is too coarse so close to the rock: look
-        steps = max(steps, steps_in_flight(par, s, wb, cb, watch, scratch, most))
+        steps = max(steps, steps_in_flight(par, s, wb, cb, lookahead, scratch, most))
     return steps
 
 
 @kernel
-def plan_leap(par, s, wb, cb, watch, scratch, most):
+def plan_leap(par, s, wb, cb, lookahead, scratch, most):
     """Decide how far the bit may leap next, at most `most` steps.
 
     s.leap_end says where to, or -1.
@@ -137,7 +137,7 @@ def plan_leap(par, s, wb, cb, watch, scratch, most):
     if s.mode == Mode.FF:
         s.leap_kind = LeapKind.FLIGHT
         if par.rock == RockKind.NONE or par.rock == RockKind.BILINEAR or s.p < s.p_u:
-            steps = plan_flight(par, s, wb, cb, watch, scratch, most)
+            steps = plan_flight(par, s, wb, cb, lookahead, scratch, most)
             looked = par.rock == RockKind.BILINEAR
     elif par.rock == RockKind.BILINEAR and has_operators(par, s):
         s.leap_kind = LeapKind.CONTACT
@@ -149,7 +149,7 @@ def plan_leap(par, s, wb, cb, watch, scratch, most):
                 s.leap_kind = LeapKind.STANDSTILL
                 steps = most
         if s.leap_kind == LeapKind.CONTACT and most >= FEWEST_STEPS:
-            steps = steps_in_contact(par, s, wb, cb, watch, scratch, most)
+            steps = steps_in_contact(par, s, wb, cb, lookahead, scratch, most)
             looked = True
     if steps >= FEWEST_STEPS:
         s.leap_end = s.step + steps - steps % GRAIN
@@ -288,7 +288,7 @@ def note_standstill_peak(par, s, wb, cb, ops, steps, scratch):
         carry(ops.bit[Mode.SS], done, x, y, par.size_r)
     while done < steps:
         count = min(LOOKAHEAD, steps - done)
-        look_ahead(ops.watch[Mode.SS], par.size_r, x, v, count, False)
+        look_ahead(ops.lookahead[Mode.SS], par.size_r, x, v, count, False)
         spring = level + K * x[2 * par.n_b]
         begin = time + done * par.dt
         swing = note_steps(s, begin, par.dt, spring, v, count, K, C, z, fade, d, level)
@@ -401,7 +401,7 @@ def leap(par, s, wb, cb, ops, scratch, planned):
         path = leap_standstill(par, s, wb, cb, ops, steps, scratch)
     else:
         if not planned:
-            steps_in_contact(par, s, wb, cb, ops.watch, scratch, steps)
+            steps_in_contact(par, s, wb, cb, ops.lookahead, scratch, steps)
         path = leap_contact(par, s, wb, cb, ops, steps, scratch)
     book_bit_load(par, s, path)
     s.step = s.leap_end

@@ -89,12 +89,12 @@ def step_constants(par, s):
 
 
 @kernel
-def steps_in_contact(par, s, wb, cb, watch, scratch, most):
+def steps_in_contact(par, s, wb, cb, lookahead, scratch, most):
     """Number of steps before the one in which the contact mode ends.
 
     Parameters
     ----------
-    watch : float array, shape (modes, size, LOOKAHEAD)
+    lookahead : float array, shape (modes, size, LOOKAHEAD)
     scratch : Scratch
         Its v receives the end velocity at the start of each step.
     most : int
@@ -102,7 +102,7 @@ def steps_in_contact(par, s, wb, cb, watch, scratch, most):
     """
     x, v = scratch.x, scratch.v
     load_contact(par, s, wb, cb, x)
-    look_ahead(watch[s.mode], par.size_r, x, v, most, False)
+    look_ahead(lookahead[s.mode], par.size_r, x, v, most, False)
     K, C, z, fade, d, q = step_constants(par, s)
     y = s.p - origin(s)
     most = min(most, LOOKAHEAD)
@@ -126,7 +126,7 @@ def steps_in_contact(par, s, wb, cb, watch, scratch, most):
 
 
 @kernel
-def steps_in_flight(par, s, wb, cb, watch, scratch, most):
+def steps_in_flight(par, s, wb, cb, lookahead, scratch, most):
     """Number of steps of free flight before the one in which the rock is met.
 
     The mean motion is a parabola; what the vibration adds at the rock end is
@@ -134,7 +134,7 @@ def steps_in_flight(par, s, wb, cb, watch, scratch, most):
 
     Parameters
     ----------
-    watch : float array, shape (modes, size, LOOKAHEAD)
+    lookahead : float array, shape (modes, size, LOOKAHEAD)
     scratch : Scratch
         Its v receives the strain offset at the end of each step.
     most : int
@@ -143,7 +143,7 @@ def steps_in_flight(par, s, wb, cb, watch, scratch, most):
     x, v = scratch.x, scratch.v
     load(x, wb, cb, par.n_b, 2 * s.parity, s.v_b, 0.0)
     pad(x, 2 * par.n_b, par.size_r)
-    look_ahead(watch[0], par.size_r, x, v, most, False)
+    look_ahead(lookahead[0], par.size_r, x, v, most, False)
     a = bit_acceleration(par, s)
     mean = s.p + strain_offset(wb, cb, par.n_b, 2 * s.parity, Coef.BOTTOM)
     most = min(most, LOOKAHEAD)

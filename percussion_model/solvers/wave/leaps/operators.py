@@ -122,12 +122,12 @@ def _free(
         )
     size = int(alone["size_r"][0])
     powers = np.zeros((len(Mode), LEVELS, size, size))
-    watch, top = np.zeros((2, len(Mode), size, LOOKAHEAD))
+    lookahead, top = np.zeros((2, len(Mode), size, LOOKAHEAD))
     by_column = step_map(Configuration(alone, bit, cb))
     powers[Mode.FF] = _powers(by_column, LEVELS, size)
-    for rows, row in ((watch, Coef.BOTTOM), (top, Coef.TOP)):
+    for rows, row in ((lookahead, Coef.BOTTOM), (top, Coef.TOP)):
         rows[Mode.FF] = _lookahead(powers[Mode.FF], by_column @ _offset(cb, bit.n, row))
-    return found | {"bit": powers, "watch": watch, "top": top}
+    return found | {"bit": powers, "lookahead": lookahead, "top": top}
 
 
 def _loads(par: np.ndarray) -> dict[Mode, tuple[float, float]]:
@@ -144,7 +144,7 @@ def _loads(par: np.ndarray) -> dict[Mode, tuple[float, float]]:
 
 
 def _offset(c: np.ndarray, n: int, row: Coef) -> np.ndarray:
-    """Strain offset of an end as a row over the waves, see `core.bar.strain_offset`."""
+    """Strain offset of an end as a row over the waves, see `solvers.wave.bar.strain_offset`."""
     return np.concatenate([c[row, :n], -c[row, :n]])
 
 
@@ -169,7 +169,7 @@ def _of_loaded_bit(
     loads: dict[Mode, tuple[float, float]],
 ) -> dict[str, np.ndarray]:
     """Operators of the bit, those of `free` among them, in all modes."""
-    powers, watch, top = (free[name].copy() for name in ("bit", "watch", "top"))
+    powers, lookahead, top = (free[name].copy() for name in ("bit", "lookahead", "top"))
     size = powers.shape[-1]
     sums, forms = np.zeros((len(Mode), size)), np.zeros((2, size, size))
     rock = alone.copy()
@@ -180,12 +180,12 @@ def _of_loaded_bit(
         by_column = step_map(configuration)
         levels = LEVELS if mode == Mode.SS else LOOKAHEAD_LEVELS
         powers[mode, :levels] = _powers(by_column, levels, size)
-        watch[mode] = _lookahead(powers[mode], end_row(configuration, by_column))
+        lookahead[mode] = _lookahead(powers[mode], end_row(configuration, by_column))
         top[mode] = _lookahead(powers[mode], by_column @ way)
         sums[mode, : len(by_column)] = _path_to_rest(configuration, by_column)
         if mode == Mode.SS:
             forms = _ever_lost(by_column, step_forms(configuration, by_column)[1:], size)
-    return {"bit": powers, "watch": watch, "sums": sums, "top": top, "forms": forms}
+    return {"bit": powers, "lookahead": lookahead, "sums": sums, "top": top, "forms": forms}
 
 
 def _lookahead(powers: np.ndarray, row: np.ndarray) -> np.ndarray:
