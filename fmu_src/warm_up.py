@@ -1,4 +1,4 @@
-"""Compile the kernels of the package and of its FMU once, so that later starts only load them.
+"""Compilation of all kernels, those of the FMU too, so that later starts only load them.
 
 `python -m fmu_src.warm_up` is a part of the installation from a clone. The FMU brings
 its own copy of the sources along, so its kernels are compiled for themselves.

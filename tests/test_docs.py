@@ -91,3 +91,18 @@ def test_links_lead_somewhere(page):
 def test_pictures_are_small():
     for path in (ROOT / "docs" / "images").iterdir():
         assert path.stat().st_size < 300_000, path.name
+
+
+def test_every_equation_has_its_place_and_every_place_its_functions():
+    text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    placed = set()
+    for line in text.splitlines():
+        row = re.fullmatch(r"\| ([\d, ]+) [^|]* \| ([^|]+) \| ([^|]+) \|", line)
+        if row:
+            placed |= {int(n) for n in re.findall(r"\d+", row[1])}
+            files = re.findall(r"`([^`]+)`", row[2])
+            code = "".join((ROOT / "percussion_model" / f).read_text("utf-8") for f in files)
+            for name in re.findall(r"`([^`]+)`", row[3]):
+                assert f"def {name}(" in code, (name, files)
+    model = (ROOT / "docs" / "model.md").read_text(encoding="utf-8")
+    assert placed == {int(n) for n in re.findall(r"\\tag\{(\d+)\}", model)}

@@ -1,1 +1,1 @@
-"""What every slave is made of; runs inside FMUs."""
+"""Common base of all slaves; runs inside FMUs."""

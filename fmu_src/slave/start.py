@@ -1,4 +1,4 @@
-"""Loads the sources that an FMU brings along, from a place where compiled kernels last.
+"""Loader of the sources that an FMU brings along, from a place where compiled kernels last.
 
 Numba keeps compiled kernels beside the sources, but hosts unpack an FMU into a new
 folder each time. So the sources are copied once into the user's cache folder, under

@@ -10,6 +10,7 @@ from __future__ import annotations
 import ctypes
 import math
 from collections.abc import Mapping, Sequence
+from enum import IntEnum
 from typing import Any
 
 import numpy as np
@@ -82,6 +83,15 @@ def do_step(
     ), _called((_BYTE, _DOUBLE, _DOUBLE, _INT), (True, False, False, False))
 
 
+class At(IntEnum):
+    """Where the calls of a run are."""
+
+    STEP = 0  # number of the present step
+    STEPS = 1  # in all
+    FAILED_CALL = 2  # the call that did not succeed, `DONE` where all did
+    STATUS = 3  # of that call
+
+
 @nogil
 def make_calls(
     calls: np.ndarray,
@@ -104,16 +114,15 @@ def make_calls(
         Present outputs of all parts.
     reals, integers : ndarray
         What the calls read and write.
-    at : ndarray of int64, shape (4,)
-        Number of the step, number of steps in all, and, on the way back, the call that did
-        not succeed and its status.
+    at : ndarray of int64, shape (len(At),)
+        Where the run is, and what did not succeed (`At`).
     time, step : float
         [s]
     """
-    is_last = at[0] == at[1] - 1
+    is_last = at[At.STEP] == at[At.STEPS] - 1
     for k in range(len(calls)):
         call = calls[k]
-        since = at[0] % call.every + 1
+        since = at[At.STEP] % call.every + 1
         if since != call.every and not is_last:
             continue
         status = 0
@@ -152,10 +161,10 @@ def make_calls(
                     if not math.isfinite(value):
                         status = NOT_FINITE
         if status > WARNING or status < 0:
-            at[2] = k
-            at[3] = status
+            at[At.FAILED_CALL] = k
+            at[At.STATUS] = status
             return
-    at[2] = DONE
+    at[At.FAILED_CALL] = DONE
 
 
 class CompiledStep:
@@ -244,9 +253,9 @@ class CompiledStep:
         """Let all parts do a communication step [s]."""
         at = self._at
         self._make(*self._arrays, time, step)
-        if at[2] != DONE:
-            self._fail(int(at[2]), int(at[3]))
-        at[0] += 1
+        if at[At.FAILED_CALL] != DONE:
+            self._fail(int(at[At.FAILED_CALL]), int(at[At.STATUS]))
+        at[At.STEP] += 1
 
     def _fail(self, call: int, status: int) -> None:
         port = self.ports[self._all[call]["port"]]

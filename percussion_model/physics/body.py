@@ -57,13 +57,13 @@ def bit_load(par, s):
 
 @inlined
 def bit_acceleration(par, s):
-    """Acceleration that its body forces give the bit [m/s^2]."""
+    """Acceleration that its body forces give the bit [m/s^2], docs/model.md, eq. 3."""
     return par.gravity + (s.feed + s.f_held) / par.mass_b
 
 
 @inlined
 def piston_acceleration(par, push):
-    """Acceleration of a free piston under a force of the drive [m/s^2], eq. 3 of docs/model.md."""
+    """Acceleration of a free piston under a force of the drive [m/s^2], docs/model.md, eq. 3."""
     return par.gravity + push / par.mass_p
 
 

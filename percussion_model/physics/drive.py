@@ -1,4 +1,4 @@
-"""The drive: switching pressure law on the mean relative motion, eq. 11-16 of the paper."""
+"""The drive: switching pressure law on the mean relative motion, docs/model.md, eqs 12-13."""
 
 from __future__ import annotations
 

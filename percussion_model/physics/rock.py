@@ -44,13 +44,13 @@ def origin(s):
 
 @inlined
 def spring_force(s):
-    """Force of the rock without its damping [N]."""
+    """Force of the rock without its damping, K (p - P_R) of docs/model.md, eq. 15 [N]."""
     return stiffness(s) * (s.p - origin(s))
 
 
 @inlined
 def recoverable_at(s, p):
-    """Energy that the rock would give back on unloading from `p` in the present mode [J]."""
+    """Energy that the rock would give back from `p` in this mode (docs/model.md, eq. 21) [J]."""
     if s.mode == Mode.DFC or s.mode == Mode.FC:
         return 0.5 * s.k_r * p * p / s.gamma
     if s.mode == Mode.FF and p <= s.p_u:
@@ -73,7 +73,7 @@ def barrier_off(par, s):
 
 @kernel
 def start_cycle(s, barrier, p):
-    """Begin a drilling cycle whose penetration starts at `p` (eqs 18-19 of the paper)."""
+    """Begin a drilling cycle whose penetration starts at `p` (docs/model.md, eq. 19)."""
     s.x_r += s.p - p
     s.p = p
     s.w = 0.0
@@ -91,7 +91,7 @@ def start_cycle(s, barrier, p):
 
 @kernel
 def resume_cycle(s, barrier):
-    """Begin a cycle from contact: the elastic part of the force stays the same."""
+    """Begin a cycle from contact: the elastic force stays the same (docs/model.md, eq. 19)."""
     force = s.gamma * s.k_r * (s.p - s.p_u)  # that of the spring, in BC and SS
     before = recoverable(s)
     start_cycle(s, barrier, force / s.next_k_r)
@@ -101,7 +101,7 @@ def resume_cycle(s, barrier):
 
 @inlined
 def end_loading(s):
-    """Unloading begins at the peak of a drilling cycle (eq. 22 of the paper)."""
+    """Unloading begins at the peak of a drilling cycle (docs/model.md, eq. 20)."""
     s.p_u = s.p * (s.gamma - 1.0) / s.gamma
     s.mode = Mode.BC
 

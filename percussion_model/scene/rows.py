@@ -1,4 +1,4 @@
-"""What is known of a parameter: how it is declared, what is allowed, and how faults are told.
+"""Rows of the parameter table: declaration, what is allowed, and the wording of faults.
 
 Standard library only: every FMU takes this module along.
 """

@@ -20,7 +20,8 @@ from percussion_model.physics.records import (
 from percussion_model.scene.numbers import numbers_of
 from percussion_model.scene.scene import Scene
 from percussion_model.solvers.rigid.motion import fall_time, oscillate, oscillate_with_loss
-from percussion_model.solvers.rigid.solver import RigidSolver, restitution, st_venant_restitution
+from percussion_model.solvers.rigid.restitution import restitution, st_venant_restitution
+from percussion_model.solvers.rigid.solver import RigidSolver
 from tests.state_bits import state_bits
 
 RIGID = {"piston": {"model": "rigid"}, "bit": {"model": "rigid"}}

@@ -1,4 +1,4 @@
-"""Makes the table of a blow map, keeps it on disk, and finds it again."""
+"""Construction of the table of a blow map, kept on disk and found again."""
 
 from __future__ import annotations
 

@@ -41,8 +41,9 @@ def guard_events(par, s):
 
 
 @merged
-def advance_to(par, s, w, c, f, x, q, time, whole, blows, events):
+def advance_to(par, s, elements, time, whole, blows, events):
     """Advance by whole steps, or up to `time` where `whole` is False; a `Status`."""
+    w, c, x = elements.w, elements.c, elements.x
     s.n_blows = 0
     s.n_events = 0
     grain = GRID_ROUNDING * par.dt
@@ -68,7 +69,7 @@ def advance_to(par, s, w, c, f, x, q, time, whole, blows, events):
             read_means(par, s, w, c)
             hold_effects(par, s)
         tried = h
-        h = end_of_step(par, s, w, c, f, x, q, h)
+        h = end_of_step(par, s, elements, h)
         take_step(par, s, w, c, x, h)
         change_modes(par, s, w, c, blows, events)
         if h < tried:
@@ -113,7 +114,7 @@ def read_here(par, s, w, c, time, row):
 
 
 @kernel
-def run(task, par_, state, w, c, f, x, q, time, blows, events, reading):
+def run(task, par_, state, elements, time, blows, events, reading):
     """Do one `FemTask` with a state; the only entry into the finite-element kernels.
 
     Parameters
@@ -123,15 +124,7 @@ def run(task, par_, state, w, c, f, x, q, time, blows, events, reading):
         COMMIT: commit up to `time`, with a part of a step at the end.
         READ: as COMMIT, then tell what is seen; spoils the state, so give a copy.
     par_, state : FEM_PAR, FEM_STATE array of length 1
-    w : float array, shape (len(Node), n)
-        What changes at each node.
-    c : float array, shape (len(Mesh), n)
-    f : float array, shape (2 len(Factor), at least n)
-        Factorisations, kept from call to call; zero at first.
-    x : float array, shape (len(Trial), n)
-        Scratch.
-    q : float array, shape (len(Probe), len(Column))
-        Scratch.
+    elements : Elements
     time : float
         [s]
     blows, events : BLOW, EVENT array
@@ -147,7 +140,7 @@ def run(task, par_, state, w, c, f, x, q, time, blows, events, reading):
     s = state[0]
     if task == FemTask.READ:
         s.live = 0
-    status = advance_to(par, s, w, c, f, x, q, time, task == FemTask.ADVANCE, blows, events)
+    status = advance_to(par, s, elements, time, task == FemTask.ADVANCE, blows, events)
     if task == FemTask.READ:
-        read_here(par, s, w, c, time, reading[0])
+        read_here(par, s, elements.w, elements.c, time, reading[0])
     return status

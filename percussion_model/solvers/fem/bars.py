@@ -29,7 +29,7 @@ def moment(c, a, row, first, count):
 
 @inlined
 def relative_motion(par, c, a, row):
-    """Mean of the piston less mean of the bit, u_r of eq. 12 of docs/model.md or its rate."""
+    """Mean of the piston less mean of the bit, u_r of docs/model.md, eq. 12 or its rate."""
     bit = moment(c, a, row, par.n_p, par.n_b) / par.mass_b
     return moment(c, a, row, 0, par.n_p) / par.mass_p - bit
 

@@ -242,16 +242,13 @@ def may_cross(par, s, x, q):
 
 
 @kernel
-def end_of_step(par, s, w, c, f, x, q, h):
+def end_of_step(par, s, elements, h):
     """Try a step of length `h`, or up to just past the first event within it.
 
     Parameters
     ----------
     par, s : record
-    w, c, f, x : float array
-        Nodes, mesh, factorisations, scratch.
-    q : float array, shape (len(Probe), len(Column))
-        Scratch.
+    elements : Elements
     h : float
         Longest step [s].
 
@@ -260,6 +257,7 @@ def end_of_step(par, s, w, c, f, x, q, h):
     float
         Length of the step that `x` holds [s].
     """
+    w, c, f, x, q = elements
     try_step(par, s, w, c, f, x, h)
     if s.skip_events == 1:
         s.skip_events = 0
@@ -268,12 +266,13 @@ def end_of_step(par, s, w, c, f, x, q, h):
     fill_values(par, s, w, x, h, q, Column.HIGH)
     if not may_cross(par, s, x, q):
         return h
-    return locate(par, s, w, c, f, x, q, h)
+    return locate(par, s, elements, h)
 
 
 @kernel
-def locate(par, s, w, c, f, x, q, h):
+def locate(par, s, elements, h):
     """Shrink a bracket around the first event of a step; see `end_of_step`."""
+    w, c, f, x, q = elements
     for k in range(PROBES):
         q[k, Column.SCALE] = abs(q[k, Column.LOW]) + abs(q[k, Column.HIGH])
     fill_slopes(par, s, c, w, x, 0, h, q, Column.LOW_SLOPE)

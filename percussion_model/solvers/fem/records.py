@@ -8,6 +8,7 @@ between the nodes `i` and `i + 1`; between piston and bit there is none.
 from __future__ import annotations
 
 from enum import IntEnum
+from typing import NamedTuple
 
 import numpy as np
 
@@ -89,6 +90,29 @@ class FemTask(IntEnum):
     ADVANCE = 0  # commit whole steps
     COMMIT = 1  # the same, and a part of a step up to the time given
     READ = 2  # COMMIT without writing rows, then tell what is seen
+
+
+class Elements(NamedTuple):
+    """Arrays of the elements.
+
+    Attributes
+    ----------
+    w : float array, shape (len(Node), n)
+        What changes at each node.
+    c : float array, shape (len(Mesh), n)
+    f : float array, shape (2 len(Factor), at least n)
+        Factorisations, kept from call to call; zero at first.
+    x : float array, shape (len(Trial), n)
+        Scratch: a step that is tried.
+    q : float array, shape (len(Probe), len(Column))
+        Scratch: the event functions.
+    """
+
+    w: np.ndarray
+    c: np.ndarray
+    f: np.ndarray
+    x: np.ndarray
+    q: np.ndarray
 
 
 FEM_PAR = np.dtype(

@@ -19,7 +19,7 @@ from percussion_model.solvers.fem.solve import factors, substitute
 
 @fused
 def load(par, s, w, c, x, h):
-    """Right-hand side of the stage equation into rows RE, IM."""
+    """Right-hand side of the stage equation into rows RE, IM (docs/model.md, eqs 1-2)."""
     n_p = par.n_p
     n = n_p + par.n_b
     h_re = h * par.mu_re

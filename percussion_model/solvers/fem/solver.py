@@ -26,6 +26,7 @@ from percussion_model.solvers.fem.records import (
     FEM_PAR,
     FEM_STATE,
     Column,
+    Elements,
     Factor,
     FemTask,
     Key,
@@ -153,9 +154,11 @@ class FemSolver(Solver):
         grids = {name: self.grid_of(name) for name in ("piston", "bit")}
         self.cells = {name: grid.n for name, grid in grids.items() if grid is not None}
         n = self._mesh.shape[1]
-        self._factors = np.zeros((2 * len(Factor), max(n, len(Key))))
-        self._trial = np.zeros((len(Trial), n))
-        self._probes = np.zeros((len(Probe), len(Column)))
+        self._scratch = (
+            np.zeros((2 * len(Factor), max(n, len(Key)))),
+            np.zeros((len(Trial), n)),
+            np.zeros((len(Probe), len(Column))),
+        )
 
     def new_state(self) -> State:
         """State at time zero."""
@@ -176,9 +179,9 @@ class FemSolver(Solver):
         reading: np.ndarray,
     ) -> tuple[int, int, int]:  # fmt: skip
         """Call the kernels; see `solvers.fem.advance.run`."""
+        elements = Elements(state.arrays[0], self._mesh, *self._scratch)
         status = run(
-            int(task), self._par, state.record, *state.arrays, self._mesh, self._factors,
-            self._trial, self._probes, time, blows, events, reading,
+            int(task), self._par, state.record, elements, time, blows, events, reading,
         )  # fmt: skip
         s = state.record[0]
         return status, int(s["n_blows"]), int(s["n_events"])

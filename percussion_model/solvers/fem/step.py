@@ -1,4 +1,4 @@
-"""Taking a step that was tried, with every entry of its ledger.
+"""Accepted step of the scheme, with every entry of its ledger.
 
 The stages' velocities are linear in the stage, so each integral of the scheme
 is one of a mean and a bend (docs/numerics.md, section 10).

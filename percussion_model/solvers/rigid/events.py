@@ -62,7 +62,7 @@ def release_piston(s, events):
 
 @kernel
 def impact(par, s, blows, events):
-    """The gap closes: an impact with restitution, or the piston stays on the bit."""
+    """The gap closes: an impact (docs/model.md, eq. 22), or the piston stays on the bit."""
     note_standstill_force(par, s)
     if starts_blow(par, s, s.time):
         start_blow(s, blows, s.time, s.v_p, s.x_r + s.p, s.ss_force, par.mass_p)

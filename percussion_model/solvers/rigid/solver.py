@@ -8,16 +8,15 @@ from typing import Any, ClassVar
 import numpy as np
 
 from percussion_model.physics.records import Piston, Status
-from percussion_model.scene.bars import bar_mass, bar_transit_time
 from percussion_model.scene.numbers import Numbers, numbers_of
 from percussion_model.scene.scene import Scene
 from percussion_model.solvers.base import Solver
 from percussion_model.solvers.rigid import advance as kernels
 from percussion_model.solvers.rigid.records import RIGID_PAR, RIGID_STATE, ROWS_AN_EVENT
+from percussion_model.solvers.rigid.restitution import restitution
 from percussion_model.solvers.setup import (
     PISTONS,
     REARM_TRANSITS,
-    Bit,
     fill_parameters,
     fill_start,
 )
@@ -27,45 +26,6 @@ from percussion_model.solvers.state import State
 # no more than 13. What rigid bodies do within a transit is not theirs to tell anyway.
 MOST_EVENTS = 200
 SHORTEST_WINDOW = 1e-6  # of a very short bar [s]
-
-
-def st_venant_restitution(
-    piston_mass: float, piston_transit: float, bit_mass: float, bit_transit: float
-) -> float:
-    """Restitution of two free elastic bars after their first contact (docs/model.md, sec. 9).
-
-    The shorter bar sends a rectangular wave of force Z_c v into the longer one for twice
-    its own transit time. With equal impedances this is the ratio of the lengths.
-
-    Parameters
-    ----------
-    piston_mass, bit_mass : float
-        Masses [kg].
-    piston_transit, bit_transit : float
-        Times that a wave takes from end to end [s].
-
-    Returns
-    -------
-    float
-        Between 0 and 1.
-    """
-    z_p = piston_mass / piston_transit
-    z_b = bit_mass / bit_transit
-    impulse = 2.0 * min(piston_transit, bit_transit) * z_p * z_b / (z_p + z_b)
-    e = impulse * (1.0 / piston_mass + 1.0 / bit_mass) - 1.0
-    return min(max(e, 0.0), 1.0)
-
-
-def restitution(numbers: Numbers) -> float:
-    """Coefficient of restitution of piston and bit, NaN without a piston."""
-    values, piston, bit = numbers
-    if PISTONS[values.piston_model] == Piston.ABSENT:
-        return math.nan
-    if values.bit_model == Bit.RIGID and not math.isnan(values.contact_restitution):
-        return float(values.contact_restitution)
-    return st_venant_restitution(
-        bar_mass(piston), bar_transit_time(piston), bar_mass(bit), bar_transit_time(bit)
-    )
 
 
 def rigid_parameters(numbers: Numbers) -> np.ndarray:

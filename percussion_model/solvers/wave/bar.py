@@ -36,7 +36,7 @@ def face_velocities(w, c, n, r, kick):
 
 @inlined
 def send_waves(w, n, r):
-    """Write the waves after the step from the interface velocities.
+    """Write the waves after the step from the interface velocities (docs/model.md, eq. 7).
 
     What leaves an interface is its velocity less the wave that came in from
     the other side; the rows 2 - r and 3 - r receive the result.

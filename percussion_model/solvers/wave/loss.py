@@ -1,4 +1,4 @@
-"""Structural loss: Kelvin-Voigt forces, stress = E (strain + eta strain rate).
+"""Structural loss: Kelvin-Voigt forces, docs/model.md, eq. 2.
 
 Velocities are smoothed, never stresses, so nothing creeps under a static load.
 Half of the loss acts between interfaces in the middle of a step, half between
