@@ -10,10 +10,12 @@ from pathlib import Path
 from numba import njit
 
 STAMP = "kernels.sha256"
+# Folders with functions that kernels of other files call.
+CALLEES = ("physics", "solvers")
 
 
 def drop_stale_kernels(folder: Path) -> None:
-    """Delete compiled kernels below `folder` where one of the sources there has changed.
+    """Delete compiled kernels below `folder` where a source in `CALLEES` has changed.
 
     Numba's cache looks at the file of a function alone, not at those of the
     functions that it calls; after an edit or an update it would go on with
@@ -22,7 +24,7 @@ def drop_stale_kernels(folder: Path) -> None:
     if os.environ.get("NUMBA_CACHE_DIR"):
         return
     digest = hashlib.sha256()
-    for source in sorted(folder.rglob("*.py")):
+    for source in sorted(path for name in CALLEES for path in (folder / name).rglob("*.py")):
         digest.update(source.read_bytes())
     stamp = Path(__file__).parent / "__pycache__" / STAMP
     try:
