@@ -4,10 +4,11 @@ import math
 
 import numpy as np
 
-from percussion_model.physics.blows import close_gap, fill_ledger, start_blow
+from percussion_model.physics.blows import close_gap, start_blow
 from percussion_model.physics.body import bit_acceleration, piston_acceleration
 from percussion_model.physics.drive import drive_force, switch_drive
 from percussion_model.physics.kernel import kernel
+from percussion_model.physics.readings import fill_ledger, fill_motion
 from percussion_model.physics.records import Mode, Status
 from percussion_model.physics.rock import (
     close_interface,
@@ -97,6 +98,5 @@ class EulerSolver(Solver):
         """The state as it is after its last step."""
         s, row = state.record[0], reading[0]
         fill_ledger(s, row, 0.5 * self.scene.bit.mass * s["v_b"] ** 2, 0.0, recoverable(s))
-        row["time"], row["bit_position"], row["bit_velocity"] = t, s["x_r"] + s["p"], s["v_b"]
-        row["drilling_mode"], row["bit_impulse"] = s["mode"], s["i_bit"]
+        fill_motion(self._par[0], s, row, t, s["x_r"] + s["p"] - s["gap"], s["x_r"] + s["p"])
         return state

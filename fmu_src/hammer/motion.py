@@ -90,10 +90,7 @@ class Motion(Runner):
         if self._is_read:
             self._before, self._left = self._impulses(self.row), None
         else:
-            if self._spare is None:
-                self._spare = self._state.copy()
-            else:
-                self._spare.take(self._state)
+            self._spare = self._state.copy(self._spare)
             self._left = (self._spare, self.time)
         self.solver.reset_peaks(self._state, self.time)
         if inputs:

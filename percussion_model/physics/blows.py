@@ -1,4 +1,4 @@
-"""Rows of blows, events and readings, which every solver writes alike.
+"""Rows of blows and events, which every solver writes alike.
 
 A blow starts at the first closure of the piston/bit gap after the downward
 switch of the drive; without a switching drive, after the gap was open for 20
@@ -9,23 +9,12 @@ from __future__ import annotations
 
 import math
 
-from numba import literal_unroll
-
 from percussion_model.physics.kernel import inlined, kernel, merged
-from percussion_model.physics.records import (
-    LEDGER_ENTRIES,
-    PEAK_FIELDS,
-    DriveKind,
-    EventKind,
-    Mode,
-)
+from percussion_model.physics.records import DriveKind, EventKind, Mode
 from percussion_model.physics.state import CHECKPOINTS
 
 # The standstill force is the mean over this last share of the standstill.
 LAST_SHARE = 0.1
-
-# What a reading takes over from a state as it is.
-_KEPT = (*LEDGER_ENTRIES, *PEAK_FIELDS)
 
 
 @inlined
@@ -162,20 +151,3 @@ def open_gap(s, events, time, approach):
     s.b_rebound = s.v_p
     s.t_open = time
     push_event(s, events, time, EventKind.CONTACT_OPENED, approach)
-
-
-@merged
-def fill_ledger(s, reading, kinetic, elastic, recoverable):
-    """Write the energies of a state and the peaks that its observer asked for.
-
-    Parameters
-    ----------
-    reading : record of READING
-    kinetic, elastic, recoverable : float
-        Stored energies [J].
-    """
-    for name in literal_unroll(_KEPT):
-        reading[name] = s[name]
-    reading.kinetic = kinetic
-    reading.elastic = elastic
-    reading.recoverable = recoverable

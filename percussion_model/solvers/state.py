@@ -57,14 +57,13 @@ class State:
             arrays.append(workspace[start:end].reshape(rows, columns))
         self.arrays = tuple(arrays)
 
-    def copy(self) -> State:
-        """An independent copy."""
-        return State(self.dtype, self.shapes, self.words.copy(), self.workspace.copy())
-
-    def take(self, other: State) -> None:
-        """Become a copy of another state of the same solver."""
-        self.words[:] = other.words
-        self.workspace[:] = other.workspace
+    def copy(self, spare: State | None = None) -> State:
+        """An independent copy, in the memory of an old one where that is given."""
+        if spare is None:
+            return State(self.dtype, self.shapes, self.words.copy(), self.workspace.copy())
+        spare.words[:] = self.words
+        spare.workspace[:] = self.workspace
+        return spare
 
     def __reduce__(self) -> tuple[object, ...]:
         return State, (self.dtype, self.shapes, self.words, self.workspace)

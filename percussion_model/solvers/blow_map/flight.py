@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import math
 
-from percussion_model.physics.blows import fill_ledger
 from percussion_model.physics.body import bit_load, book_piston_load, piston_acceleration
 from percussion_model.physics.drive import drive_force
 from percussion_model.physics.kernel import inlined, kernel
+from percussion_model.physics.readings import fill_ledger
 from percussion_model.physics.records import Mode
 from percussion_model.solvers.blow_map.records import PATH_TIMES, Next
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 
-from percussion_model.physics.blows import fill_ledger, push_checkpoint
+from percussion_model.physics.blows import push_checkpoint
 from percussion_model.physics.body import hold_effects
-from percussion_model.physics.drive import drive_force
 from percussion_model.physics.kernel import kernel, merged
+from percussion_model.physics.readings import fill_ledger, fill_motion
 from percussion_model.physics.records import Mode, Status
 from percussion_model.solvers.fem.bars import (
     bit_position,
@@ -88,29 +88,11 @@ def read_here(par, s, w, c, time, row):
     fill_ledger(s, row, kinetic, elastic, rock)
     row.e_loss += loss
     row.e_numerical += numerical
-    row.time = time
-    row.piston_position = s.x_r + s.mean_p + par.start_gap
-    row.piston_velocity = s.v_p
-    row.bit_position = bit_position(s)
-    row.bit_velocity = s.v_b
-    row.bit_end_position = s.x_r + s.p
+    fill_motion(par, s, row, time, s.x_r + s.mean_p + par.start_gap, bit_position(s))
     row.bit_end_velocity = s.v_end
-    row.gap = s.gap
-    row.relative_displacement = s.u_r
-    row.penetration = s.p
     row.bit_force = bit_force(s)
     row.contact_force = contact_force(par, s)
-    row.drive_force = drive_force(par, s)
-    row.drilling_mode = s.mode
     row.bit_kinetic_energy = kinetic_energy(c, w, par.n_p, par.n_b)
-    row.bit_impulse = s.i_bit
-    row.contact_impulse = s.i_contact
-    row.drive_impulse = s.i_drive
-    if par.n_p == 0:
-        row.piston_position = math.nan
-        row.piston_velocity = math.nan
-        row.gap = math.nan
-        row.relative_displacement = math.nan
 
 
 @kernel

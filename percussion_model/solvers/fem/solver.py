@@ -213,10 +213,7 @@ class FemSolver(Solver):
         peaks: bool = True,
     ) -> State:  # fmt: skip
         """Evaluate at `t`; a copy at that time. As in `Solver`."""
-        if spare is None:
-            spare = state.copy()
-        else:
-            spare.take(state)
+        spare = state.copy(spare)
         self._run(FemTask.READ, spare, t, self._no_blows, self._no_events, reading)
         return spare
 

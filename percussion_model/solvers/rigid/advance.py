@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import math
-
-from percussion_model.physics.blows import fill_ledger, starts_blow
-from percussion_model.physics.drive import drive_force
+from percussion_model.physics.blows import starts_blow
 from percussion_model.physics.kernel import kernel
+from percussion_model.physics.readings import fill_ledger, fill_motion
 from percussion_model.physics.records import Piston, Status
 from percussion_model.physics.rock import recoverable
 from percussion_model.solvers.rigid.events import process_event
@@ -134,31 +132,14 @@ def read(par_, state, t, blows, events, reading):
     if t > s.time:
         move(par, s, t - s.time)
         s.time = t
+    s.u_r = -s.gap
     here = s.x_r + s.p
-    row.time = t
-    row.piston_position = here + s.start_gap - s.gap
-    row.piston_velocity = s.v_p
-    row.bit_position = here
-    row.bit_velocity = s.v_b
-    row.bit_end_position = here
+    fill_motion(par, s, row, t, here + s.start_gap - s.gap, here)
     row.bit_end_velocity = s.v_b
-    row.gap = s.gap
-    row.relative_displacement = -s.gap
-    row.penetration = s.p
     row.bit_force = bit_force(par, s, s.p, s.v_b)
     row.contact_force = 0.0
     if s.held == 1:
         row.contact_force = contact_force(par, s, acceleration(par, s))
-    row.drive_force = drive_force(par, s)
-    row.drilling_mode = s.mode
     row.bit_kinetic_energy = 0.5 * par.mass_b * s.v_b * s.v_b
-    row.bit_impulse = s.i_bit
-    row.contact_impulse = s.i_contact
-    row.drive_impulse = s.i_drive
-    if par.piston == Piston.ABSENT:
-        row.piston_position = math.nan
-        row.piston_velocity = math.nan
-        row.gap = math.nan
-        row.relative_displacement = math.nan
     fill_ledger(s, row, kinetic_energy(par, s.v_p, s.v_b), 0.0, recoverable(s))
     return status

@@ -120,10 +120,7 @@ class RigidSolver(Solver):
         peaks: bool = True,
     ) -> State:  # fmt: skip
         """Evaluate at `t`; a copy at that time. As in `Solver`."""
-        if spare is None:
-            spare = state.copy()
-        else:
-            spare.take(state)
+        spare = state.copy(spare)
         t = max(t, self.time(state))
         status = kernels.read(
             self._par, spare.record, t, self._no_blows, self._no_events, reading

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 
-from percussion_model.physics.blows import fill_ledger
-from percussion_model.physics.drive import drive_force
 from percussion_model.physics.kernel import kernel, merged
+from percussion_model.physics.readings import fill_ledger, fill_motion
 from percussion_model.physics.records import Piston, Status
 from percussion_model.solvers.wave.bar import kinetic_energy
 from percussion_model.solvers.wave.leaps.dormant import make_dormant, stays_dormant, wake_piston
@@ -113,30 +112,14 @@ def read_at(par, s, bars, time, blows, events, row):
     s.i_contact = 0.0
     step(par, s, bars, tau, blows, events)
     here = before + 0.5 * (v_before + s.v_b) * tau
-    row.time = time
-    row.piston_position = s.u_r - s.u_start + here
-    row.piston_velocity = s.v_p
-    row.bit_position = here
-    row.bit_velocity = s.v_b
-    row.bit_end_position = s.x_r + s.p
+    fill_motion(par, s, row, time, s.u_r - s.u_start + here, here)
     row.bit_end_velocity = bars.wb[Row.FACE, par.n_b]
-    row.gap = s.gap
-    row.relative_displacement = s.u_r
-    row.penetration = s.p
     row.bit_force = s.i_bit / tau
     row.contact_force = s.i_contact / tau
-    row.drive_force = drive_force(par, s)
-    row.drilling_mode = s.mode
     row.bit_impulse = bit + s.i_bit
     row.contact_impulse = contact + s.i_contact
-    row.drive_impulse = s.i_drive
     row.peak_bit_force = s.peak_bit_force
     row.peak_contact_force = s.peak_contact_force
-    if par.piston == Piston.ABSENT:
-        row.piston_position = math.nan
-        row.piston_velocity = math.nan
-        row.gap = math.nan
-        row.relative_displacement = math.nan
 
 
 @kernel

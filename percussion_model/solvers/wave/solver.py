@@ -200,10 +200,7 @@ class WaveSolver(Solver):
         peaks: bool = True,
     ) -> State:  # fmt: skip
         """Evaluate at `t`; a copy with the waves of the last grid point. As in `Solver`."""
-        if spare is None:
-            spare = state.copy()
-        else:
-            spare.take(state)
+        spare = state.copy(spare)
         if not peaks:
             spare.numbers[PEAK_FROM] = np.inf
         self._run(Task.READ, spare, t, self._no_blows, self._no_events, reading)

@@ -1,0 +1,66 @@
+"""Readings of a state: what every solver tells of it at a time."""
+
+from __future__ import annotations
+
+import math
+
+from numba import literal_unroll
+
+from percussion_model.physics.drive import drive_force
+from percussion_model.physics.kernel import merged
+from percussion_model.physics.records import LEDGER_ENTRIES, PEAK_FIELDS, Piston
+
+# What a reading takes over from a state as it is.
+_KEPT = (*LEDGER_ENTRIES, *PEAK_FIELDS)
+
+
+@merged
+def fill_motion(par, s, reading, time, piston_position, bit_position):
+    """Write what the common fields of a state tell of motion, modes and impulses.
+
+    Forces, kinetic energy and velocity of the bit's end are left to the solver.
+
+    Parameters
+    ----------
+    reading : record of READING
+    time : float
+        [s]
+    piston_position, bit_position : float
+        Mean displacements since the start of the run [m].
+    """
+    reading.time = time
+    reading.piston_position = piston_position
+    reading.piston_velocity = s.v_p
+    reading.bit_position = bit_position
+    reading.bit_velocity = s.v_b
+    reading.bit_end_position = s.x_r + s.p
+    reading.gap = s.gap
+    reading.relative_displacement = s.u_r
+    reading.penetration = s.p
+    reading.drive_force = drive_force(par, s)
+    reading.drilling_mode = s.mode
+    reading.bit_impulse = s.i_bit
+    reading.contact_impulse = s.i_contact
+    reading.drive_impulse = s.i_drive
+    if par.piston == Piston.ABSENT:
+        reading.piston_position = math.nan
+        reading.piston_velocity = math.nan
+        reading.gap = math.nan
+        reading.relative_displacement = math.nan
+
+
+@merged
+def fill_ledger(s, reading, kinetic, elastic, recoverable):
+    """Write the energies of a state and the peaks that its observer asked for.
+
+    Parameters
+    ----------
+    reading : record of READING
+    kinetic, elastic, recoverable : float
+        Stored energies [J].
+    """
+    for name in literal_unroll(_KEPT):
+        reading[name] = s[name]
+    reading.kinetic = kinetic
+    reading.elastic = elastic
+    reading.recoverable = recoverable
