@@ -205,7 +205,7 @@ class Motion(Runner):
         residual, scale = unexplained(dict(zip(LEDGER, self.read()[-len(LEDGER) :], strict=True)))
         return residual / scale if scale > 0.0 else 0.0
 
-    def fading(self) -> float:
+    def rate_decay(self) -> float:
         """Share of the last blow's rate that holds now; falls when blows fail to come."""
         blow = self.blow
         if self.blow_count == 0 or blow["period"] <= 0.0:

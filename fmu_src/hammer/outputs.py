@@ -44,12 +44,12 @@ def _blow(name: str) -> Callable[[Motion], float]:
 
 
 def _rate(motion: Motion) -> float:
-    share = motion.fading()
+    share = motion.rate_decay()
     return share * motion.blow["penetration"] / motion.blow["period"] if share else 0.0
 
 
 def _frequency(motion: Motion) -> float:
-    share = motion.fading()
+    share = motion.rate_decay()
     return share / motion.blow["period"] if share else 0.0
 
 

@@ -19,7 +19,7 @@ from fmu_src.hammer.warnings import Warnings
 from fmu_src.slave.slave import STEPPING, Phase, Read, Slave
 from fmu_src.slave.states import fingerprint
 from fmu_src.variables import closed_bounds
-from percussion_model.scene.inputs import INPUTS, why_without_effect
+from percussion_model.scene.inputs import INPUTS, no_effect_reason
 from percussion_model.scene.numbers import section_numbers
 from percussion_model.scene.rows import refuse_value
 from percussion_model.scene.scene import Scene
@@ -163,7 +163,7 @@ class PercussiveHammer(Slave):
         """Whether an input has an effect in the scene; says so in the log where not."""
         acts = self._acts.get(name)
         if acts is None:
-            acts = self._acts[name] = not why_without_effect(scene, name)
+            acts = self._acts[name] = not no_effect_reason(scene, name)
         if not acts:
             self.warn(f"a new {NAMES_OUTSIDE[name]} has no effect in this scene")
         return acts

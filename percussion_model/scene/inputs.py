@@ -42,7 +42,7 @@ INPUTS = {
 }
 
 
-def why_without_effect(scene: Scene, name: str) -> str:
+def no_effect_reason(scene: Scene, name: str) -> str:
     """Say why an input has no effect in a scene; empty if it has one."""
     row = scene.row_of(INPUTS[name].key)
     if not scene.matters(row.key):
@@ -63,7 +63,7 @@ def check_input(scene: Scene, name: str, value: Any) -> float:
     """
     if name not in INPUTS:
         raise SimulationError(f"unknown input {name}: there are {', '.join(INPUTS)}")
-    reason = why_without_effect(scene, name)
+    reason = no_effect_reason(scene, name)
     if reason:
         raise SimulationError(f"{name} has no effect in this scene: {reason}")
     row = scene.row_of(INPUTS[name].key)

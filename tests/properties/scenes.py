@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from percussion_model import Scene
-from percussion_model.scene.inputs import INPUTS, why_without_effect
+from percussion_model.scene.inputs import INPUTS, no_effect_reason
 from percussion_model.scene.numbers import section_numbers
 from percussion_model.scene.parameters import find_row
 from percussion_model.solvers.wave.grid import choose_time_step, section_count
@@ -234,7 +234,7 @@ READS = ("observe", "energy", "fields", "statistics", "result", "blows", "events
 
 def draw_calls(source: Source, scene: Scene, reach: str) -> list[tuple[float, str, Any]]:
     """What is called and when, as shares of the length."""
-    inputs = [name for name in INPUTS if not why_without_effect(scene, name)]
+    inputs = [name for name in INPUTS if not no_effect_reason(scene, name)]
     calls: list[tuple[float, str, Any]] = []
     for _ in range(source.count(1, 8)):
         share = source.between(0.0, 1.0)

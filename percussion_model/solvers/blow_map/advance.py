@@ -28,7 +28,7 @@ ROWS = 3
 
 
 @kernel
-def place(par, axis, value, count):
+def cell_and_share(par, axis, value, count):
     """Cell of an axis that holds a value, and the share of it that lies before."""
     at = (math.log(value) - par.origin[axis]) / par.step[axis]
     cell = min(max(int(at), 0), count - 2)
@@ -50,10 +50,10 @@ def find_blow(par, table, found, k_r, v, load, drive):
     k_r, v, load, drive : float
         Coordinates (`Axis`).
     """
-    i, a = place(par, Axis.STIFFNESS, k_r, table.shape[0])
-    j, b = place(par, Axis.VELOCITY, v, table.shape[1])
-    k, c = place(par, Axis.LOAD, load, table.shape[2])
-    m, d = place(par, Axis.DRIVE, drive, table.shape[3])
+    i, a = cell_and_share(par, Axis.STIFFNESS, k_r, table.shape[0])
+    j, b = cell_and_share(par, Axis.VELOCITY, v, table.shape[1])
+    k, c = cell_and_share(par, Axis.LOAD, load, table.shape[2])
+    m, d = cell_and_share(par, Axis.DRIVE, drive, table.shape[3])
     for e in range(ENTRIES):
         found[e] = 0.0
     rest = 0.0
@@ -91,7 +91,7 @@ def refuse(s, reason, value):
 
 
 @kernel
-def outside(par, s, v):
+def check_range(par, s, v):
     """Look whether an impact lies in the table; `REFUSED` if not."""
     if not par.lowest[Axis.VELOCITY] <= v <= par.highest[Axis.VELOCITY]:
         return refuse(s, Refusal.VELOCITY, v)
@@ -105,7 +105,7 @@ def outside(par, s, v):
 
 
 @kernel
-def take_blow(par, s, found, v):
+def apply_blow(par, s, found, v):
     """Let the blow of `found` act on bit, piston and ledger from the present time on."""
     s.t_blow = s.t
     s.penetration = v * found[Entry.PENETRATION]
@@ -143,7 +143,7 @@ def take_blow(par, s, found, v):
 def strike(par, s, table, found, t):
     """Find the blow of the piston that strikes the bit at `t`, or refuse."""
     v = s.v_p + piston_acceleration(par, drive_force(par, s)) * (t - s.t)
-    status = outside(par, s, v)
+    status = check_range(par, s, v)
     if status != Status.DONE:
         return status
     if not t - s.t_blow >= s.rest:
@@ -173,7 +173,7 @@ def process_event(par, s, table, found, blows, events):
         s.x_r += s.penetration
         s.p = 0.0
         start_blow(s, blows, t, v, s.x_r, bit_load(par, s), par.mass_p)
-        take_blow(par, s, found, v)
+        apply_blow(par, s, found, v)
         turn_drive(s, events, t, 0.0)
         close_gap(s, events, t, v)
         s.b_contacts = int(found[Entry.CONTACTS])

@@ -104,7 +104,7 @@ def run(task, par_, state, elements, time, blows, events, reading):
     task : int
         ADVANCE: commit the whole steps up to `time`.
         COMMIT: commit up to `time`, with a part of a step at the end.
-        READ: as COMMIT, then tell what is seen; spoils the state, so give a copy.
+        READ: as COMMIT, then read it; spoils the state, so give a copy.
     par_, state : FEM_PAR, FEM_STATE array of length 1
     elements : Elements
     time : float

@@ -89,7 +89,7 @@ class FemTask(IntEnum):
 
     ADVANCE = 0  # commit whole steps
     COMMIT = 1  # the same, and a part of a step up to the time given
-    READ = 2  # COMMIT without writing rows, then tell what is seen
+    READ = 2  # COMMIT without writing rows, then read it
 
 
 class Elements(NamedTuple):

@@ -27,10 +27,10 @@ from percussion_model.solvers.rigid.forces import (
     bit_force,
     contact_force,
     in_storm,
-    in_worst_storm,
     lift_off,
     mark_standstill,
     note_standstill_force,
+    storm_persists,
 )
 from percussion_model.solvers.rigid.records import Next
 
@@ -90,7 +90,7 @@ def impact(par, s, blows, events):
         pressed = contact_force(par, s, acc) > par.mass_p * acceleration_doubt(par, s, acc)
         s.v_p = v_p
         s.v_b = v_b
-        if pressed or s.standing_events > RESTING_EVENTS or in_worst_storm(par, s):
+        if pressed or s.standing_events > RESTING_EVENTS or storm_persists(par, s):
             give_impulse(par, s, mass * w, rests)
             s.v_b = common
             s.v_p = common

@@ -147,12 +147,12 @@ def kinetic_energy(par, v_p, v_b):
 
 @kernel
 def in_storm(par, s):
-    """Whether more events came within a window than rigid bodies can tell."""
+    """Whether more events came within a window than rigid bodies can resolve."""
     return s.window_events >= par.most_events
 
 
 @kernel
-def in_worst_storm(par, s):
+def storm_persists(par, s):
     """Whether the storm went on although impacts no longer rebound."""
     return s.window_events >= WORST_STORM * par.most_events
 

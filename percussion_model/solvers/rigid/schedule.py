@@ -14,10 +14,10 @@ from percussion_model.solvers.rigid.forces import (
     acceleration,
     acceleration_doubt,
     in_storm,
-    in_worst_storm,
     loads,
     on_wall,
     rock_terms,
+    storm_persists,
 )
 from percussion_model.solvers.rigid.motion import NEVER, fall_time, zero_time
 from percussion_model.solvers.rigid.records import Next
@@ -152,7 +152,7 @@ def postponed(par, s, tau, kind):
         or kind == Next.NOTHING
     ):
         return tau
-    if kind != Next.SWITCH and not in_worst_storm(par, s):
+    if kind != Next.SWITCH and not storm_persists(par, s):
         return tau
     return max(tau, par.window / par.most_events - (s.time - s.last_event))
 

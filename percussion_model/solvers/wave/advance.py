@@ -98,7 +98,7 @@ def commit_to(par, s, bars, ops, scratch, time):
 
 @merged
 def read_at(par, s, bars, time, blows, events, row):
-    """Tell the ledger of the grid point, then let the ends meet up to `time` and tell the rest."""
+    """Read the ledger at the grid point, then let the ends meet up to `time` and read the rest."""
     kinetic, elastic, rock = stored_energy(par, s, bars)
     fill_ledger(s, row, kinetic, elastic, rock)
     row.e_loss += lost_in_faces(par, bars)

@@ -245,11 +245,11 @@ def end_viscosity(c: np.ndarray, grid: Grid, loss_time: float) -> tuple[float, f
     z = grid.impedance
     if top[-2] > 0.0:
         # reached: the form of the step's loss in both forces must not be negative
-        later = _half_later(c, grid.n, parts, bottom)
+        later = _half_step_later(c, grid.n, parts, bottom)
         cross = abs(_pairing(c, grid.n, top, later))
         spare = 1.0 / (kappa * z[-1]) + mean_bottom - _pairing(c, grid.n, bottom, later)
         mean_bottom += max(cross - spare, 0.0)
-        later = _half_later(c, grid.n, parts, top)
+        later = _half_step_later(c, grid.n, parts, top)
         spare = 1.0 / (kappa * z[0]) + mean_top - _pairing(c, grid.n, top, later)
         mean_top += max(cross - spare, 0.0)
     return kappa / (1.0 + kappa * z[0] * mean_top), kappa / (1.0 + kappa * z[-1] * mean_bottom)
@@ -260,7 +260,7 @@ def _pairing(c: np.ndarray, n: int, one: np.ndarray, other: np.ndarray) -> float
     return float(np.sum(one[1:n] * other[1:n] / (2.0 * c[Coef.INV_Z, 1:n])))
 
 
-def _half_later(c: np.ndarray, n: int, parts: int, v: np.ndarray) -> np.ndarray:
+def _half_step_later(c: np.ndarray, n: int, parts: int, v: np.ndarray) -> np.ndarray:
     """Solve x + S x = v, where S is a step's sub-steps of diffusion.
 
     By the series in (1 - S)/2, whose terms fall by half at least.

@@ -132,13 +132,13 @@ def plan_leap(par, s, wb, cb, lookahead, scratch, most):
     s.leap_end says where to, or -1.
     """
     steps = 0
-    looked = False
+    predicted = False
     s.v_b = mean_velocity(wb, cb, par.n_b, 2 * s.parity, par.mass_b)
     if s.mode == Mode.FF:
         s.leap_kind = LeapKind.FLIGHT
         if par.rock == RockKind.NONE or par.rock == RockKind.BILINEAR or s.p < s.p_u:
             steps = plan_flight(par, s, wb, cb, lookahead, scratch, most)
-            looked = par.rock == RockKind.BILINEAR
+            predicted = par.rock == RockKind.BILINEAR
     elif par.rock == RockKind.BILINEAR and has_operators(par, s):
         s.leap_kind = LeapKind.CONTACT
         if s.mode == Mode.SS:
@@ -150,10 +150,10 @@ def plan_leap(par, s, wb, cb, lookahead, scratch, most):
                 steps = most
         if s.leap_kind == LeapKind.CONTACT and most >= FEWEST_STEPS:
             steps = steps_in_contact(par, s, wb, cb, lookahead, scratch, most)
-            looked = True
+            predicted = True
     if steps >= FEWEST_STEPS:
         s.leap_end = s.step + steps - steps % GRAIN
-    elif looked:
+    elif predicted:
         s.no_plan = s.step + steps + 1  # just past the event
     else:
         s.no_plan = s.step + FEWEST_STEPS
@@ -259,15 +259,15 @@ def note_steps(s, time, dt, spring, v, steps, K, C, z, fade, d, level):
         Greatest distance of the force from `level` at the start of a step [N].
     """
     rate = K / (z + C)
-    swing = 0.0
+    amplitude = 0.0
     for k in range(steps):
         first = spring + C * v[k]
         begin = time + k * dt
         if begin + dt > s.peak_from:
             note_peak(s, begin, first, z * v[k], rate, first + z * v[k] * fade)
         spring += K * d * v[k]
-        swing = max(swing, abs(first - level))
-    return swing
+        amplitude = max(amplitude, abs(first - level))
+    return amplitude
 
 
 @kernel
@@ -291,8 +291,8 @@ def note_standstill_peak(par, s, wb, cb, ops, steps, scratch):
         look_ahead(ops.lookahead[Mode.SS], par.size_r, x, v, count, False)
         spring = level + K * x[2 * par.n_b]
         begin = time + done * par.dt
-        swing = note_steps(s, begin, par.dt, spring, v, count, K, C, z, fade, d, level)
-        if swing < STILL_SHARE * abs(level):
+        amplitude = note_steps(s, begin, par.dt, spring, v, count, K, C, z, fade, d, level)
+        if amplitude < STILL_SHARE * abs(level):
             s.peak_bit_force = max(s.peak_bit_force, level)
             return
         carry(ops.bit[Mode.SS], LOOKAHEAD, x, y, par.size_r)

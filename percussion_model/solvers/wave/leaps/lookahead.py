@@ -19,7 +19,7 @@ from percussion_model.solvers.wave.bar import strain_offset
 from percussion_model.solvers.wave.leaps.linear import PADDING, load, multiply, pad
 from percussion_model.solvers.wave.records import Coef
 
-# Steps looked at in one go, a power of four.
+# Steps predicted at in one go, a power of four.
 LOOKAHEAD = 64
 # Leaps end on multiples of this: the few steps more are cheaper than the
 # products that they would save.
