@@ -71,6 +71,12 @@ def barrier_off(par, s):
     return par.barrier == 0 or s.next_c_r == 0.0 or s.next_w_r == 0.0 or s.w_r == 0.0
 
 
+@inlined
+def overcomes_barrier(par, s, energy):
+    """Whether a bit of that kinetic energy [J] starts a drilling cycle."""
+    return barrier_off(par, s) or energy > s.w_r
+
+
 @kernel
 def start_cycle(s, barrier, p):
     """Begin a drilling cycle whose penetration starts at `p` (docs/model.md, eq. 19)."""
@@ -109,7 +115,7 @@ def end_loading(s):
 @merged
 def end_unloading(par, s, energy):
     """The bit turns downward while unloading: a new cycle, or standstill."""
-    if barrier_off(par, s) or energy > s.w_r:
+    if overcomes_barrier(par, s, energy):
         resume_cycle(s, par.barrier)
     else:
         s.mode = Mode.SS
@@ -151,7 +157,7 @@ def close_interface(par, s, energy):
         s.mode = Mode.FC
     elif par.rock == RockKind.WALL:
         s.mode = Mode.SS
-    elif barrier_off(par, s) or energy > s.w_r:
+    elif overcomes_barrier(par, s, energy):
         s.e_standstill += recoverable(s)
         start_cycle(s, par.barrier, 0.0)
     else:

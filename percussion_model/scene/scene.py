@@ -259,10 +259,14 @@ class Scene:
         return "wave" if self.bit.model == "elastic" else "rigid"
 
     @property
+    def has_waves(self) -> bool:
+        """Whether the bit is computed as an elastic bar."""
+        return self.bit.model == "elastic" and BODIES.get(self.solver_name) != "rigid"
+
+    @property
     def loss_on(self) -> bool:
         """Whether bars lose energy to structural loss."""
-        elastic = self.bit.model == "elastic" and BODIES.get(self.solver_name) != "rigid"
-        return self.effects.loss and elastic and self.loss.time > 0
+        return self.effects.loss and self.has_waves and self.loss.time > 0
 
     @property
     def barrier_on(self) -> bool:

@@ -35,7 +35,7 @@ def _about_scene(result: Result) -> Iterator[str]:
     scene = result.scene
     if scene.unused:
         yield unused_note(scene.unused)
-    if scene.solver_name != "rigid" and not scene.loss_on:
+    if scene.has_waves and not scene.loss_on:
         if scene.barrier_on:
             yield (
                 "structural loss is off: vibration trapped in the bit keeps its kinetic energy "

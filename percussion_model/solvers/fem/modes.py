@@ -18,12 +18,12 @@ from percussion_model.physics.drive import switch_drive
 from percussion_model.physics.kernel import kernel, merged
 from percussion_model.physics.records import Mode, RockKind
 from percussion_model.physics.rock import (
-    barrier_off,
     close_interface,
     damping,
     enter_standstill,
     leave_by_velocity,
     leave_standstill,
+    overcomes_barrier,
     recoverable,
     spring_force,
 )
@@ -107,7 +107,7 @@ def change_rock(par, s, w, c):
         lift_off(s)
         return 1
     if s.mode == Mode.SS:
-        if barrier_off(par, s) or s.kinetic > s.w_r:
+        if overcomes_barrier(par, s, s.kinetic):
             leave_standstill(par, s, v)
             return 1
         if par.release == 1 and spring_force(s) + damping(s) * v < 0.0:

@@ -14,7 +14,6 @@ from percussion_model.physics.kernel import inlined, kernel, merged
 from percussion_model.physics.records import Mode, RockKind
 from percussion_model.physics.rock import (
     REST_VELOCITY,
-    barrier_off,
     book_dashpot,
     close_interface,
     crush,
@@ -23,6 +22,7 @@ from percussion_model.physics.rock import (
     leave_by_velocity,
     leave_standstill,
     origin,
+    overcomes_barrier,
     recoverable,
     spring_force,
     stiffness,
@@ -170,8 +170,7 @@ def rock_step(par, s, w, c, v_free, z, tau, time, events):
     """
     r = 2 * s.parity
     if s.mode == Mode.SS and par.rock == RockKind.BILINEAR:
-        energy = kinetic_energy(w, c, par.n_b, r)
-        if barrier_off(par, s) or energy > s.w_r:
+        if overcomes_barrier(par, s, kinetic_energy(w, c, par.n_b, r)):
             force = spring_force(s)
             leave_standstill(par, s, (z * v_free - force) / (z + s.c_r))
             push_event(s, events, time, s.mode, force)
