@@ -136,7 +136,7 @@ def _relative_motion(ax: Axes, window: Window) -> None:
             va="top",
         )
     title = "Relative mean motion over the whole blow" if window.is_blow else "Relative mean motion"
-    style.label(ax, "piston relative to bit, $u_r$ [mm]", "velocity of that, $v_r$ [m/s]", title)
+    style.label(ax, "piston relative to bit, $u_r$ [mm]", "relative velocity, $v_r$ [m/s]", title)
 
 
 def _near_zero(ax: Axes, window: Window, contacts: list[tuple[float, float]]) -> None:
@@ -153,7 +153,7 @@ def _near_zero(ax: Axes, window: Window, contacts: list[tuple[float, float]]) ->
     ax.axvline(0.0, color=style.RULE_COLOUR, linewidth=0.6)
     ax.margins(0.08)
     title = "The same near zero" + (": A, C closing, B, D parting" if len(contacts) == 2 else "")
-    style.label(ax, "piston relative to bit, $u_r$ [mm]", "velocity of that, $v_r$ [m/s]", title)
+    style.label(ax, "piston relative to bit, $u_r$ [mm]", "relative velocity, $v_r$ [m/s]", title)
 
 
 def _draw_relative(
