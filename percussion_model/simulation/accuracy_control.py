@@ -11,8 +11,16 @@ from dataclasses import dataclass, replace
 
 from percussion_model.scene.numbers import numbers_of
 from percussion_model.scene.scene import Scene
+from percussion_model.simulation.error_estimate import Estimate, GridRun, estimate_error, size
 from percussion_model.simulation.result import LEAST_BLOWS, Result
-from percussion_model.solvers.wave.resolution import cells_for, coarser_cells
+from percussion_model.solvers.wave.resolution import (
+    FIT_SHARE,
+    cells_for,
+    coarser_cells,
+    finer_cells,
+    misfits,
+    promised_error,
+)
 
 # Aperiodic motion runs on for at most this multiple of the duration.
 LONGEST = 100.0
@@ -23,43 +31,42 @@ GROWTH, MARGIN = 4.0, 1.1
 FEWEST_BLOWS, FAR_BELOW = 10, 0.1
 
 # With more drilling cycles a blow than this the rate jumps from grid to grid, and
-# two grids agree by chance: they must do so within this share of what is wanted.
+# grids agree by chance: they must do so within this share of what is wanted.
 MOST_CYCLES, CHATTER_SHARE = 8.0, 0.5
-# What an error of the wave speed does to the rate, by that error.
-FIT_EFFECT = 5.0
-# Two aperiodic runs differ if they do by more than so many standard errors.
-CONFIDENCE = 2.0
 # More cells in the first bar are not tried: leaps end there, and a run without
 # them takes minutes for a second.
 FINEST = 256
+# Share of a wanted error that the misfit of a finer run may make, by what is known of it.
+LEFT_TO_FIT = 0.5
 
 # Runs a scene; the second argument: whether for as long as aperiodic motion needs.
 RunOnce = Callable[[Scene, bool], Result]
 
 
 @dataclass(frozen=True)
-class Grid:
-    """A run at one resolution.
+class Step:
+    """A run that may answer a request, and what is thought of it.
 
     Attributes
     ----------
-    result : Result
-    fit_error : float
-        What the error of the wave speed may do to the rate, relative to it.
+    cells : int
+        In the first elastic bar.
+    run : GridRun
+    estimate : Estimate
+    doubt : float
+        Relative error that the run before was thought to have by its cells: there was
+        reason not to trust that one, and two runs that agree by chance are not rare then.
     """
 
-    result: Result
-    fit_error: float
+    cells: int
+    run: GridRun
+    estimate: Estimate
+    doubt: float = 0.0
 
     @property
-    def rate(self) -> float:
-        """Rate of penetration [m/s]."""
-        return self.result.rate_of_penetration
-
-    @property
-    def scatter(self) -> float:
-        """Standard error of the rate [m/s]."""
-        return self.result.rate_of_penetration_standard_error
+    def error(self) -> float:
+        """Estimated error of the rate, relative to it."""
+        return max(self.estimate.total, self.doubt)
 
 
 def time_needed(result: Result, accuracy: float) -> float:
@@ -94,42 +101,46 @@ def run_to_accuracy(scene: Scene, run_once: RunOnce) -> Result:
     -------
     Result
         The finest of the runs, with `rate_of_penetration_relative_error` where
-        two of them could be compared. Its times are those of all runs.
+        it could be estimated. Its times are those of all runs.
     """
     wanted = scene.solver.accuracy
     assert wanted is not None
     if scene.solver_name != "wave":  # rigid bodies move in closed form
-        return _finished(scene, [Grid(run_once(scene, True), 0.0)], wanted)
-    coarse, cells = planned_cells(scene)[:2]
-    grids = [_run(scene, coarse, run_once, extend=False)]
-    if grids[0].result.cut_short:
-        return _finished(scene, grids, wanted)
-    grids.append(_run(scene, cells, run_once))
-    if not scene.run.check and _trusted(grids, wanted):
-        return _finished(scene, grids, wanted)
-    while _useful(grids) and 2 * cells <= FINEST:
-        cells = _halved(scene, wanted, cells)
-        finer = _run(scene, cells, run_once)
-        if finer.result.cut_short:
-            note = "interrupted while it was verified: this is the run before"
-            grids[-1].result.warnings.append(note)
+        return _finished(scene, [GridRun.exact(run_once(scene, True))], None)
+    runs: list[GridRun] = []
+    *coarser, cells = planned_cells(scene)
+    for count in coarser:
+        runs.append(_run(scene, count, run_once, extend=False))
+        if runs[-1].result.cut_short:
+            return _finished(scene, runs, None)
+    runs.append(_run(scene, cells, run_once))
+    if not runs[-1].useful:
+        return _finished(scene, runs, None)
+    step = Step(cells, runs[-1], estimate_error(runs[-1], runs[:-1]))
+    if not scene.run.check and _trusted(step, wanted):
+        return _finished(scene, runs, step)
+    while (finer := _finer(scene, step, wanted)) is not None:
+        runs.append(_run(scene, finer, run_once))
+        if runs[-1].result.cut_short:
+            step.run.result.warnings.append("interrupted while it was verified: this is the run before")
             break
-        grids.append(finer)
-        if _verified(grids, wanted):
+        if not runs[-1].useful:
+            return _finished(scene, runs, None)
+        step = Step(
+            finer, runs[-1], estimate_error(runs[-1], runs[:-1]), doubt=step.estimate.cells
+        )
+        if step.error <= wanted:
             break
-    return _finished(scene, grids, wanted)
+    return _finished(scene, runs, step)
 
 
 def planned_cells(scene: Scene) -> list[int]:
-    """Cells of the runs that a wanted accuracy takes: to compare with, by rule, to verify."""
+    """Cells of the runs that a wanted accuracy takes at least: to compare with, and by rule."""
     wanted = scene.solver.accuracy
     assert wanted is not None
     numbers = numbers_of(scene)
     cells, _ = cells_for(numbers, wanted)
-    plan = [coarser_cells(numbers, cells), cells]
-    if scene.run.check and 2 * cells <= FINEST:
-        plan.append(_halved(scene, wanted, cells))
-    return plan
+    return [*coarser_cells(numbers, cells), cells]
 
 
 def with_cells(scene: Scene, cells: int) -> Scene:
@@ -137,98 +148,72 @@ def with_cells(scene: Scene, cells: int) -> Scene:
     return scene.replace(**{"solver.accuracy": None, "run.check": False, "solver.cells": cells})
 
 
-def _halved(scene: Scene, wanted: float, cells: int) -> int:
-    """Cells of a run at half the step that fit the lengths."""
-    return cells_for(numbers_of(scene), wanted, fewest=2 * cells, most=FINEST)[0]
+def grid_run(result: Result, cells: int) -> GridRun:
+    """A result of the waves with what its grid is known for."""
+    numbers = numbers_of(result.scene)
+    return GridRun(result, misfits(numbers, cells), promised_error(numbers, cells))
 
 
-def _run(scene: Scene, cells: int, run_once: RunOnce, extend: bool = True) -> Grid:
-    result = run_once(with_cells(scene, cells), extend)
-    return Grid(result, FIT_EFFECT * result.wave_speed_error)
+def _run(scene: Scene, cells: int, run_once: RunOnce, extend: bool = True) -> GridRun:
+    return grid_run(run_once(with_cells(scene, cells), extend), cells)
 
 
-def _useful(grids: list[Grid]) -> bool:
-    """Whether a finer run could tell more."""
-    last = grids[-1]
-    return not last.result.cut_short and math.isfinite(last.rate) and last.rate != 0.0
-
-
-def _difference(coarse: Grid, fine: Grid) -> float:
-    """Relative difference of two runs; 0 where scatter alone explains it."""
-    off = abs(fine.rate - coarse.rate)
-    if off <= CONFIDENCE * math.hypot(fine.scatter, coarse.scatter):
-        return 0.0
-    return off / abs(fine.rate)
-
-
-def _trusted(grids: list[Grid], wanted: float) -> bool:
-    """Whether a coarser run gives no reason to doubt the one that the rule chose."""
-    coarse, fine = grids
-    if not _useful(grids):
-        return True  # nothing to verify
-    cycles = fine.result.summary()["drilling_cycles_per_blow"]
+def _trusted(step: Step, wanted: float) -> bool:
+    """Whether coarser runs give no reason to doubt the one that the rule chose."""
+    cycles = step.run.result.summary()["drilling_cycles_per_blow"]
     share = CHATTER_SHARE if cycles > MOST_CYCLES else 1.0
-    close = _difference(coarse, fine) <= share * wanted
-    return close and estimated_error(grids) <= wanted
+    by_grid = step.estimate.cells + step.estimate.fit
+    return by_grid <= share * wanted and step.error <= wanted
 
 
-def _verified(grids: list[Grid], wanted: float) -> bool:
-    """Whether three runs agree: two that do so by chance are not rare once there is doubt."""
-    return not _useful(grids) or _error_of_three(grids) <= wanted
+def _finer(scene: Scene, step: Step, wanted: float) -> int | None:
+    """Cells of the next run; None where a finer one is not tried or would not help."""
+    estimate = step.estimate
+    by_grid = max(estimate.cells + estimate.fit, estimate.floor, step.doubt)
+    if step.error > wanted and by_grid <= CHATTER_SHARE * wanted:
+        return None  # scatter is all that is left
+    fit = FIT_SHARE * wanted
+    misfit = size(step.run.misfit)
+    if estimate.fit > 0.0:
+        fit = min(LEFT_TO_FIT * wanted / estimate.fit, LEFT_TO_FIT) * misfit
+    return finer_cells(numbers_of(scene), step.cells, fit, FINEST)
 
 
-def _error_of_three(grids: list[Grid]) -> float:
-    """Estimated error that heeds what the last run but one was off by, misfit apart."""
-    before, coarse, _ = grids[-3:]
-    earlier = max(_difference(before, coarse) - before.fit_error, 0.0)
-    return max(earlier, estimated_error(grids))
-
-
-def estimated_error(grids: list[Grid]) -> float:
-    """Estimated relative error of the rate of the last run, from the one before.
-
-    Their difference bounds the error of the finer one if errors at least halve
-    with the step; scatter and a misfit of lengths, which both may share, add to it.
-    """
-    coarse, fine = grids[-2:]
-    return max(_difference(coarse, fine), fine.scatter / abs(fine.rate)) + fine.fit_error
-
-
-def _finished(scene: Scene, grids: list[Grid], wanted: float) -> Result:
+def _finished(scene: Scene, runs: list[GridRun], step: Step | None) -> Result:
     """The last result as that of the scene, with its estimated error and what to warn of."""
-    last = grids[-1].result
+    wanted = scene.solver.accuracy
+    assert wanted is not None
+    last = (step.run if step else runs[-1]).result
     error = math.nan
-    if _useful(grids):
-        scatter = grids[-1].scatter / abs(grids[-1].rate)
-        error = estimated_error(grids) if len(grids) > 1 else scatter
-        if len(grids) > 2 and not _verified(grids, wanted):
-            error = _error_of_three(grids)
+    if step is not None:
+        error = step.error
+    elif len(runs) == 1 and runs[0].useful:
+        error = runs[0].scatter / abs(runs[0].rate)
     result = replace(
         last,
         scene=scene,
         rate_of_penetration_relative_error=error,
-        wall_time=sum(grid.result.wall_time for grid in grids),
-        setup_time=sum(grid.result.setup_time for grid in grids),
+        wall_time=sum(run.result.wall_time for run in runs),
+        setup_time=sum(run.result.setup_time for run in runs),
     )
     if not error <= wanted and not last.cut_short:
-        result.warnings.append(_missed(grids, wanted, error))
+        result.warnings.append(_missed(result, step, wanted, error))
     return result
 
 
-def _missed(grids: list[Grid], wanted: float, error: float) -> str:
+def _missed(result: Result, step: Step | None, wanted: float, error: float) -> str:
     """Say that the wanted accuracy was not reached, and why."""
-    last = grids[-1]
     if not math.isfinite(error):
         return f"solver.accuracy = {wanted!r} cannot be judged without a rate of penetration"
     head = f"solver.accuracy = {wanted!r} was not reached: estimated error {error:.2g}"
-    if last.scatter > wanted * abs(last.rate):
+    if step is None or step.estimate.scatter > wanted:
         return (
-            f"{head}, since the motion is aperiodic and {last.result.duration:.4g} s average "
+            f"{head}, since the motion is aperiodic and {result.duration:.4g} s average "
             "out no more; a longer run.duration allows a longer run"
         )
-    if last.fit_error > wanted:
+    if step.estimate.fit > wanted:
         return f"{head}, since the lengths fit no common cell"
     return (
-        f"{head} with {next(iter(last.result.cells.values()))} cells: the rate jumps from grid "
+        f"{head} with {next(iter(result.cells.values()))} cells: the rate jumps from grid "
         "to grid, since the motion passes close by a threshold"
     )

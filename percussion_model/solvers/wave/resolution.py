@@ -7,20 +7,26 @@ from __future__ import annotations
 
 import math
 
-from percussion_model.scene.bars import bar_transit_time
+import numpy as np
+
+from percussion_model.scene.bars import bar_transit_time, section_transit_time
 from percussion_model.scene.numbers import Numbers
-from percussion_model.solvers.wave.grid import elastic_bars, fitting_cells
+from percussion_model.solvers.wave.grid import elastic_bars, fitting_cells, section_count
 
 # Relative error of the rate of penetration, and the cells of the bar with the shortest
 # transit for which it held with a margin of two or more.
-CALIBRATED = ((1e-1, 14), (1e-2, 28), (1e-3, 56), (1e-4, 128))
-# Errors of the wave speed act some fivefold on the rate: the share of the wanted
-# error that they may be.
+CALIBRATED = ((1e-1, 14), (2e-2, 20), (1e-2, 28), (1e-3, 56), (1e-4, 128))
+# Errors of the wave speed act some fivefold on the rate, up to fortyfold in some scenes:
+# the share of the wanted error that they may be at first.
 FIT_SHARE = 0.1
 # How far above the rule's number cells are looked for that fit the lengths.
 MOST_REFINED = 2.0
-# A run to compare with has between these shares of the cells.
+# Runs to compare with have between these shares of the cells.
 COARSER = (0.5, 0.75)
+# A finer run has between these multiples of the cells.
+FINER = (1.4, 2.8)
+# Below this error of the wave speed lengths fit.
+FITS = 1e-6
 
 
 def asked_cells(numbers: Numbers) -> int:
@@ -62,12 +68,84 @@ def cells_for(
     return fitting_cells(bars, least, end, FIT_SHARE * accuracy)
 
 
-def coarser_cells(numbers: Numbers, cells: int) -> int:
-    """Cells of a coarser run that fit the lengths best."""
-    low, high = COARSER
-    fewest = max(1, math.ceil(low * cells))
-    most = max(fewest, math.floor(high * cells))
-    return fitting_cells(elastic_bars(numbers), fewest, most, 0.0)[0]
+def coarser_cells(numbers: Numbers, cells: int) -> list[int]:
+    """Cells of the coarser runs that a run is compared with, the best last.
+
+    One where the lengths fit; else two, if there are such, whose wave speeds are off to
+    either side.
+    """
+    low, high = (math.ceil(COARSER[0] * cells), math.floor(COARSER[1] * cells))
+    fewest = max(1, low)
+    counts = range(fewest, max(fewest, high) + 1)
+    found = {count: misfits(numbers, count) for count in counts}
+    # of equals the finer, which costs more but is nearer
+    ranked = sorted(counts, key=lambda count: (_size(found[count]), -count))
+    best = ranked[0]
+    if _size(found[best]) <= FITS:
+        return [best]
+    side = np.sum(found[best])
+    across = [count for count in ranked if np.sum(found[count]) * side < 0.0]
+    return [*across[:1], best]
+
+
+def finer_cells(numbers: Numbers, cells: int, wanted_fit: float, most: int) -> int | None:
+    """Cells of a finer run with another misfit, or None where `most` are too few.
+
+    The fewest whose wave speed is off by less than `wanted_fit`; failing that, the best.
+    """
+    fewest, end = math.ceil(FINER[0] * cells), min(math.floor(FINER[1] * cells), most)
+    if fewest > end:
+        return None
+    here = misfits(numbers, cells)
+    sizes = {}
+    for count in range(fewest, end + 1):
+        there = misfits(numbers, count)
+        if _size(here) <= FITS or _size(there - here) > 0.5 * _size(here):
+            sizes[count] = _size(there)
+    if not sizes:
+        return None
+    return next(
+        (count for count in sizes if sizes[count] <= max(wanted_fit, FITS)),
+        min(sizes, key=lambda count: sizes[count]),
+    )
+
+
+def misfits(numbers: Numbers, cells: int) -> np.ndarray:
+    """Relative error of the wave speed in each section, with its sign.
+
+    Parameters
+    ----------
+    numbers : Numbers
+        Of a scene with an elastic bit.
+    cells : int
+        In the first elastic bar.
+    """
+    bars = elastic_bars(numbers)
+    step = bar_transit_time(bars[0]) / cells
+    return np.array(
+        [
+            section_transit_time(section) / (section_count(section, step) * step) - 1.0
+            for bar in bars
+            for section in bar
+        ]
+    )
+
+
+def _size(misfit: np.ndarray) -> float:
+    return float(np.max(np.abs(misfit)))
+
+
+def promised_error(numbers: Numbers, cells: int) -> float:
+    """Relative error of the rate that the rule expects of cells in the first elastic bar."""
+    bars = elastic_bars(numbers)
+    first = bar_transit_time(bars[0])
+    fewest = cells * min(first, bar_transit_time(bars[-1])) / first
+    k = 1
+    while k < len(CALIBRATED) - 1 and fewest > CALIBRATED[k][1]:
+        k += 1
+    (loose, few), (tight, many) = CALIBRATED[k - 1], CALIBRATED[k]
+    slope = math.log(loose / tight) / math.log(many / few)
+    return min(1.0, loose * (few / fewest) ** slope)
 
 
 def cells_by_rule(accuracy: float) -> float:

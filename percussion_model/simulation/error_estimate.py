@@ -1,0 +1,182 @@
+"""Estimated error of a rate of penetration, from runs on grids whose errors differ.
+
+Two things are wrong with a grid: its cells have a size, and lengths that fit no common
+cell let the wave speed take the error, the misfit. Runs that share a misfit agree on the
+same wrong rate, so agreement counts only between grids that do not
+(docs/requested_accuracy.md).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from percussion_model.simulation.result import Result
+from percussion_model.solvers.wave.resolution import FITS
+
+# Two aperiodic runs differ if they do by more than so many standard errors.
+CONFIDENCE = 2.0
+# What a misfit may do to the rate, by that misfit, where no run tells; 43 was seen.
+FIT_EFFECT = 50.0
+# Parts that two coarser grids explain are estimates themselves.
+SAFETY = 2.0
+# The error is not below this share of what the rule of cells promises.
+FLOOR_SHARE = 0.1
+# Runs whose drilling cycles a blow differ by more are of different motions.
+SAME_MOTION = 0.5
+
+
+@dataclass(frozen=True)
+class GridRun:
+    """A run on one grid.
+
+    Attributes
+    ----------
+    result : Result
+    misfit : ndarray
+        Relative error of the wave speed in each section, with its sign.
+    promised : float
+        Relative error of the rate that the rule of cells expects of the grid.
+    """
+
+    result: Result
+    misfit: np.ndarray
+    promised: float
+
+    @classmethod
+    def exact(cls, result: Result) -> GridRun:
+        """A run without a grid."""
+        return cls(result, np.zeros(0), 0.0)
+
+    @property
+    def rate(self) -> float:
+        """Rate of penetration [m/s]."""
+        return self.result.rate_of_penetration
+
+    @property
+    def scatter(self) -> float:
+        """Standard error of the rate [m/s]."""
+        return self.result.rate_of_penetration_standard_error
+
+    @property
+    def useful(self) -> bool:
+        """Whether there is a rate to judge."""
+        return not self.result.cut_short and math.isfinite(self.rate) and self.rate != 0.0
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Parts of an estimated error, relative to the rate.
+
+    Attributes
+    ----------
+    cells, fit, scatter, floor : float
+        What is left of the size of the cells, of a misfit, of the scatter of aperiodic
+        motion, and what is never gone below.
+    """
+
+    cells: float
+    fit: float
+    scatter: float
+    floor: float
+
+    @property
+    def total(self) -> float:
+        """The whole error."""
+        return max(self.scatter, self.cells + self.fit, self.floor)
+
+
+def estimate_error(run: GridRun, others: Sequence[GridRun]) -> Estimate:
+    """Estimate the error of a run from others.
+
+    Parameters
+    ----------
+    run : GridRun
+        With a rate.
+    others : sequence of GridRun
+        On coarser grids, the best last.
+
+    Returns
+    -------
+    Estimate
+    """
+    scatter, floor = run.scatter / abs(run.rate), FLOOR_SHARE * run.promised
+    misfit = size(run.misfit)
+    others = [other for other in others if other.useful]
+    if not others:
+        return Estimate(0.0, FIT_EFFECT * misfit, scatter, floor)
+    fitting = [other for other in others if size(other.misfit) <= FITS]
+    if misfit <= FITS and fitting:
+        return Estimate(_difference(fitting[-1], run), 0.0, scatter, floor)
+    pair = _around(run, others)
+    if pair is None:
+        cells, fit = _by_one(run, others)
+        return Estimate(cells, fit, scatter, floor)
+    if not all(_same_motion(run, other) for other in pair):
+        cells, fit = _spread(run, pair) + floor, 0.0
+    else:
+        cells, fit = _by_two(run, pair)
+    return Estimate(cells, fit, scatter, floor)
+
+
+def size(misfit: np.ndarray) -> float:
+    """Largest misfit of a section."""
+    return float(np.max(np.abs(misfit), initial=0.0))
+
+
+def _difference(other: GridRun, run: GridRun) -> float:
+    """Relative difference of two rates; 0 where scatter alone explains it."""
+    off = abs(run.rate - other.rate)
+    if off <= CONFIDENCE * math.hypot(run.scatter, other.scatter):
+        return 0.0
+    return off / abs(run.rate)
+
+
+def _same_motion(run: GridRun, other: GridRun) -> bool:
+    """Whether two runs have the same number of drilling cycles a blow."""
+    cycles = [float(np.mean(one.result.counted["drilling_cycles"])) for one in (run, other)]
+    return abs(cycles[0] - cycles[1]) <= SAME_MOTION
+
+
+def _around(run: GridRun, others: Sequence[GridRun]) -> tuple[GridRun, GridRun] | None:
+    """The last runs whose misfits lie on both sides of zero, where one number tells a misfit."""
+    if any(np.count_nonzero(np.abs(one.misfit) > FITS) > 1 for one in (run, *others)):
+        return None
+    signed = {id(one): float(np.sum(one.misfit)) for one in (run, *others)}
+    below = [other for other in others if signed[id(other)] < -FITS]
+    above = [other for other in others if signed[id(other)] > FITS]
+    return (below[-1], above[-1]) if below and above else None
+
+
+def _by_two(run: GridRun, pair: tuple[GridRun, GridRun]) -> tuple[float, float]:
+    """Errors by cells and by misfit: a straight line through two runs, and the distance to it."""
+    x, y = ([float(np.sum(one.misfit)), one.rate] for one in pair)
+    slope = (y[1] - x[1]) / (y[0] - x[0])
+    expected = x[1] + slope * (float(np.sum(run.misfit)) - x[0])
+    off = abs(run.rate - expected)
+    if off <= CONFIDENCE * math.hypot(run.scatter, *(one.scatter for one in pair)):
+        off = 0.0
+    return SAFETY * off / abs(run.rate), SAFETY * abs(slope / run.rate) * size(run.misfit)
+
+
+def _spread(run: GridRun, pair: tuple[GridRun, GridRun]) -> float:
+    """Relative width of all rates: any of the motions may be the right one."""
+    rates = [run.rate, *(one.rate for one in pair)]
+    return (max(rates) - min(rates)) / abs(run.rate)
+
+
+def _by_one(run: GridRun, others: Sequence[GridRun]) -> tuple[float, float]:
+    """Errors by cells and by misfit from the run whose misfit differs most."""
+    misfit = size(run.misfit)
+    apart = [size(other.misfit - run.misfit) for other in others]
+    difference = _difference(others[-1], run)
+    if misfit <= FITS:
+        return difference, 0.0
+    best = int(np.argmax(apart))
+    if apart[best] < misfit:
+        return difference, FIT_EFFECT * misfit
+    share = min(SAFETY * misfit / apart[best], 1.0)
+    return difference, share * _difference(others[best], run)
