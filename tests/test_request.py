@@ -13,6 +13,7 @@ from percussion_model.scene.numbers import numbers_of
 from percussion_model.simulation.accuracy_control import planned_cells
 from percussion_model.simulation.result import Result
 from percussion_model.solvers.wave.grid import elastic_bars, fitting_cells
+from percussion_model.solvers.wave.resolution import misfits
 
 LONG = os.environ.get("PERCUSSION_LONG") == "1"
 RIGID = {"piston.model": "rigid", "bit.model": "rigid"}
@@ -155,4 +156,9 @@ def test_the_tightest_request_is_met(seed):
 def test_plan_lists_what_will_be_run():
     scene = Scene().replace(**{"solver.accuracy": 1e-3})
     assert planned_cells(scene) == [40, 60]
-    assert planned_cells(scene.replace(**{"run.check": True})) == [40, 60, 120]
+    assert planned_cells(scene.replace(**{"run.check": True})) == [40, 60, 100]
+    odd = scene.replace(**{"bit.sections.0.length": 0.175 * 1.432})
+    *coarser, cells = planned_cells(odd)
+    sides = [float(np.sum(misfits(numbers_of(odd), count))) for count in coarser]
+    assert sides[0] * sides[1] < 0.0
+    assert cells > max(coarser)

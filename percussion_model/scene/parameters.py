@@ -461,7 +461,10 @@ class RunOptions(Parameters):
     settle: float = quantity(
         1.0, "s", "time before blows count for the rate of penetration", ge=0, le=1e6
     )
-    check: bool = flag(False, "verify solver.accuracy by runs at half the step")
+    check: bool = flag(False, "verify solver.accuracy by a finer run")
+    error_estimate: bool = flag(
+        True, "estimate the error of the rate of penetration by short runs on coarser cells"
+    )
 
 
 # --------------------------------------------------------------------- the whole table

@@ -11,15 +11,19 @@ from dataclasses import dataclass, replace
 
 from percussion_model.scene.numbers import numbers_of
 from percussion_model.scene.scene import Scene
-from percussion_model.simulation.error_estimate import Estimate, GridRun, estimate_error, size
+from percussion_model.simulation.error_estimate import (
+    Estimate,
+    GridRun,
+    estimate_error,
+    grid_run,
+    size,
+)
 from percussion_model.simulation.result import LEAST_BLOWS, Result
 from percussion_model.solvers.wave.resolution import (
     FIT_SHARE,
     cells_for,
     coarser_cells,
     finer_cells,
-    misfits,
-    promised_error,
 )
 
 # Aperiodic motion runs on for at most this multiple of the duration.
@@ -108,8 +112,8 @@ def run_to_accuracy(scene: Scene, run_once: RunOnce) -> Result:
     if scene.solver_name != "wave":  # rigid bodies move in closed form
         return _finished(scene, [GridRun.exact(run_once(scene, True))], None)
     runs: list[GridRun] = []
-    *coarser, cells = planned_cells(scene)
-    for count in coarser:
+    cells, _ = cells_for(numbers_of(scene), wanted)
+    for count in coarser_cells(numbers_of(scene), cells):
         runs.append(_run(scene, count, run_once, extend=False))
         if runs[-1].result.cut_short:
             return _finished(scene, runs, None)
@@ -122,25 +126,29 @@ def run_to_accuracy(scene: Scene, run_once: RunOnce) -> Result:
     while (finer := _finer(scene, step, wanted)) is not None:
         runs.append(_run(scene, finer, run_once))
         if runs[-1].result.cut_short:
-            step.run.result.warnings.append("interrupted while it was verified: this is the run before")
+            step.run.result.warnings.append(
+                "interrupted while it was verified: this is the run before"
+            )
             break
         if not runs[-1].useful:
             return _finished(scene, runs, None)
-        step = Step(
-            finer, runs[-1], estimate_error(runs[-1], runs[:-1]), doubt=step.estimate.cells
-        )
+        step = Step(finer, runs[-1], estimate_error(runs[-1], runs[:-1]), doubt=step.estimate.cells)
         if step.error <= wanted:
             break
     return _finished(scene, runs, step)
 
 
 def planned_cells(scene: Scene) -> list[int]:
-    """Cells of the runs that a wanted accuracy takes at least: to compare with, and by rule."""
+    """Cells of the runs that a wanted accuracy takes: to compare with, by rule, to verify."""
     wanted = scene.solver.accuracy
     assert wanted is not None
     numbers = numbers_of(scene)
     cells, _ = cells_for(numbers, wanted)
-    return [*coarser_cells(numbers, cells), cells]
+    plan = [*coarser_cells(numbers, cells), cells]
+    if scene.run.check:
+        finer = finer_cells(numbers, cells, FIT_SHARE * wanted, FINEST)
+        plan += [] if finer is None else [finer]
+    return plan
 
 
 def with_cells(scene: Scene, cells: int) -> Scene:
@@ -148,14 +156,8 @@ def with_cells(scene: Scene, cells: int) -> Scene:
     return scene.replace(**{"solver.accuracy": None, "run.check": False, "solver.cells": cells})
 
 
-def grid_run(result: Result, cells: int) -> GridRun:
-    """A result of the waves with what its grid is known for."""
-    numbers = numbers_of(result.scene)
-    return GridRun(result, misfits(numbers, cells), promised_error(numbers, cells))
-
-
 def _run(scene: Scene, cells: int, run_once: RunOnce, extend: bool = True) -> GridRun:
-    return grid_run(run_once(with_cells(scene, cells), extend), cells)
+    return grid_run(run_once(with_cells(scene, cells), extend))
 
 
 def _trusted(step: Step, wanted: float) -> bool:

@@ -9,24 +9,38 @@ same wrong rate, so agreement counts only between grids that do not
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from percussion_model.scene.numbers import numbers_of
+from percussion_model.scene.scene import Scene
 from percussion_model.simulation.result import Result
-from percussion_model.solvers.wave.resolution import FITS
+from percussion_model.solvers.wave.resolution import FITS, misfits, promised_error
 
 # Two aperiodic runs differ if they do by more than so many standard errors.
 CONFIDENCE = 2.0
 # What a misfit may do to the rate, by that misfit, where no run tells; 43 was seen.
 FIT_EFFECT = 50.0
+# Beyond this misfit it does at least so much: grids on both sides may have missed the motion.
+GROSS_MISFIT, GROSS_EFFECT = 5e-3, 20.0
 # Parts that two coarser grids explain are estimates themselves.
 SAFETY = 2.0
+# By the rates of runs of different motions: the right one may lie outside of them.
+SPREAD_MARGIN = 1.5
 # The error is not below this share of what the rule of cells promises.
 FLOOR_SHARE = 0.1
-# Runs whose drilling cycles a blow differ by more are of different motions.
-SAME_MOTION = 0.5
+# Runs to compare with may take this share of the work of the run they judge; the time that
+# they take to set up comes on top.
+COMPARISON_WORK = 0.12
+# They last for so many blows at least: to settle and to count.
+FEWEST_BLOWS = 10
+# A rate that cells leave in doubt by more deserves a warning.
+LARGE_ERROR = 1e-2
+# Runs whose drilling cycles a blow differ by more, or by more than this share of them, are
+# of different motions; where there are dozens, one more or less is a smooth change.
+SAME_MOTION, SAME_SHARE = 0.5, 0.05
 
 
 @dataclass(frozen=True)
@@ -89,6 +103,14 @@ class Estimate:
         return max(self.scatter, self.cells + self.fit, self.floor)
 
 
+def grid_run(result: Result) -> GridRun:
+    """A result with what its grid is known for; only waves have a misfit and a rule."""
+    if result.solver != "wave":
+        return GridRun.exact(result)
+    numbers, cells = numbers_of(result.scene), next(iter(result.cells.values()))
+    return GridRun(result, misfits(numbers, cells), promised_error(numbers, cells))
+
+
 def estimate_error(run: GridRun, others: Sequence[GridRun]) -> Estimate:
     """Estimate the error of a run from others.
 
@@ -114,11 +136,12 @@ def estimate_error(run: GridRun, others: Sequence[GridRun]) -> Estimate:
     pair = _around(run, others)
     if pair is None:
         cells, fit = _by_one(run, others)
-        return Estimate(cells, fit, scatter, floor)
-    if not all(_same_motion(run, other) for other in pair):
-        cells, fit = _spread(run, pair) + floor, 0.0
-    else:
+    elif all(_same_motion(run, other) for other in pair):
         cells, fit = _by_two(run, pair)
+    else:
+        cells, fit = SPREAD_MARGIN * _spread(run, pair), 0.0
+    if misfit > GROSS_MISFIT:
+        fit = max(fit, GROSS_EFFECT * misfit)
     return Estimate(cells, fit, scatter, floor)
 
 
@@ -138,7 +161,7 @@ def _difference(other: GridRun, run: GridRun) -> float:
 def _same_motion(run: GridRun, other: GridRun) -> bool:
     """Whether two runs have the same number of drilling cycles a blow."""
     cycles = [float(np.mean(one.result.counted["drilling_cycles"])) for one in (run, other)]
-    return abs(cycles[0] - cycles[1]) <= SAME_MOTION
+    return abs(cycles[0] - cycles[1]) <= max(SAME_MOTION, SAME_SHARE * cycles[0])
 
 
 def _around(run: GridRun, others: Sequence[GridRun]) -> tuple[GridRun, GridRun] | None:
@@ -180,3 +203,77 @@ def _by_one(run: GridRun, others: Sequence[GridRun]) -> tuple[float, float]:
         return difference, FIT_EFFECT * misfit
     share = min(SAFETY * misfit / apart[best], 1.0)
     return difference, share * _difference(others[best], run)
+
+
+def with_error_estimate(
+    result: Result, coarser: Sequence[Scene] | None, run: Callable[[Scene], Result]
+) -> Result:
+    """Tell how far the rate of penetration may be off, by short runs on coarser grids.
+
+    They start as the run did, and rates are compared over the same stretch of time.
+
+    Parameters
+    ----------
+    result : Result
+    coarser : sequence of Scene, or None
+        The scene on coarser grids: none where there is no grid and only scatter is left,
+        None where nothing is known of the solver.
+    run : callable
+        Runs a scene.
+
+    Returns
+    -------
+    Result
+        With `rate_of_penetration_relative_error`, where it could be told.
+    """
+    whole = grid_run(result)
+    if coarser is None or not whole.useful:
+        return result
+    if not coarser:
+        return replace(result, rate_of_penetration_relative_error=whole.scatter / abs(whole.rate))
+    end = _comparison_time(result, coarser)
+    settle = min(result.settle, 0.5 * end)
+    others = [
+        grid_run(run(scene.replace(**{"run.duration": end, "run.settle": settle})))
+        for scene in coarser
+    ]
+    early = result.blows["time"] + result.blows["period"] <= end
+    part = grid_run(replace(result, settle=settle, blows=result.blows[early]))
+    if not part.useful or not any(other.useful for other in others):
+        return result
+    scatter = whole.scatter / abs(whole.rate)
+    if result.solver == "wave":
+        estimate = replace(estimate_error(part, others), scatter=scatter)
+    else:  # each of the others is coarser in another way
+        off = sum(_difference(other, part) for other in others if other.useful)
+        estimate = Estimate(off, 0.0, scatter, 0.0)
+    result.warnings.extend(_large_error(estimate))
+    return replace(result, rate_of_penetration_relative_error=estimate.total)
+
+
+def _large_error(estimate: Estimate) -> Iterator[str]:
+    """Warn of a rate that the cells leave in doubt."""
+    error = max(estimate.cells + estimate.fit, estimate.floor)
+    if error > LARGE_ERROR:
+        yield (
+            f"the cells leave the rate of penetration in doubt by {100.0 * error:.2g} %, as runs "
+            "on coarser ones tell; set solver.accuracy for one that is known better"
+        )
+
+
+def _comparison_time(result: Result, coarser: Sequence[Scene]) -> float:
+    """Until when runs to compare with last [s]; work rises between cells and their square."""
+    work = 0.0
+    for scene in coarser:
+        share = _cells_asked(scene) / next(iter(result.cells.values()))
+        work += 0.5 * (share + share * share)
+    blows = result.blows[:FEWEST_BLOWS]
+    least = float(blows["time"][-1] + blows["period"][-1])
+    return min(result.duration, max(COMPARISON_WORK / work * result.duration, least))
+
+
+def _cells_asked(scene: Scene) -> int:
+    """Cells or elements that a scene names."""
+    count = scene.fem.elements if scene.solver_name == "fem" else scene.solver.cells
+    assert count is not None
+    return count

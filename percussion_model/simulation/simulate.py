@@ -19,6 +19,7 @@ from percussion_model.scene.inputs import SimulationError
 from percussion_model.scene.rows import is_number
 from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.simulation.accuracy_control import LONGEST, run_to_accuracy, time_needed
+from percussion_model.simulation.error_estimate import with_error_estimate
 from percussion_model.simulation.result import Result
 from percussion_model.simulation.runner import Runner
 from percussion_model.simulation.warnings import find_warnings
@@ -214,6 +215,7 @@ def simulate(
     on_interrupt: Literal["raise", "keep"] = "raise",
     accuracy: float | None = None,
     check: bool | None = None,
+    error_estimate: bool | None = None,
 ) -> Result:
     """Run a scene from its start.
 
@@ -240,7 +242,11 @@ def simulate(
         it is the standard error, and the run lasts up to a hundred times as
         long as its duration.
     check : bool, optional
-        Whether to verify it by runs at half the step; default that of the scene.
+        Whether to verify it by a finer run; default that of the scene.
+    error_estimate : bool, optional
+        Whether to estimate the error of the rate of penetration, where no accuracy is
+        wanted, by short runs on coarser cells, which take up to a third as long again;
+        default that of the scene.
 
     Returns
     -------
@@ -251,7 +257,7 @@ def simulate(
     SceneError, SimulationError
         If the arguments make no sense or the run cannot continue.
     """
-    scene, notes = _requested(scene, duration, settle, accuracy, check)
+    scene, notes = _requested(scene, duration, settle, accuracy, check, error_estimate)
     windows = tuple(windows)
     sampling_times(scene.run.duration, None, trace, windows)  # refuses before anything is compiled
     wanted = scene.solver.accuracy
@@ -269,7 +275,9 @@ def simulate(
                 if end <= simulation.time:
                     break
                 run_in_chunks(simulation, end, np.zeros(0), progress, stop)
-        result = simulation.result(trace=_columns(rows) if len(times) else None)
+            result = simulation.result(trace=_columns(rows) if len(times) else None)
+            if wanted is None and chosen.run.error_estimate and not result.cut_short:
+                result = _with_error_estimate(result, simulation.solver, stop)
         if result.cut_short:
             result.warnings.append(f"interrupted at t = {simulation.time:.6g} s")
         return result
@@ -279,12 +287,24 @@ def simulate(
     return result
 
 
+def _with_error_estimate(result: Result, solver: Solver, stop: Callable[[], bool]) -> Result:
+    """Add the estimated error of the rate."""
+
+    def run(scene: Scene) -> Result:
+        simulation = Simulation(scene, record_events=False)
+        run_in_chunks(simulation, scene.run.duration, np.zeros(0), None, stop)
+        return simulation.result()
+
+    return with_error_estimate(result, solver.coarser_scenes(), run)
+
+
 def _requested(
     scene: Scene,
     duration: float | None,
     settle: float | None,
     accuracy: float | None,
     check: bool | None,
+    error_estimate: bool | None,
 ) -> tuple[Scene, list[str]]:
     """Return the scene with the request of a run in it, and what to warn of."""
     changes = {
@@ -292,6 +312,7 @@ def _requested(
         "run.settle": settle,
         "solver.accuracy": accuracy,
         "run.check": check,
+        "run.error_estimate": error_estimate,
     }
     given = {key: value for key, value in changes.items() if value is not None}
     notes = []

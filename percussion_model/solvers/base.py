@@ -163,6 +163,13 @@ class Solver(ABC):
         """Cells of "piston" or "bit", None where it has none."""
         return None
 
+    def coarser_scenes(self) -> list[Scene] | None:
+        """The scene on coarser grids, to tell by runs of them how far off this one may be.
+
+        Empty where there is no grid to coarsen; None where none are known.
+        """
+        return None
+
     def section_cells(self, bar: Any) -> list[int]:
         """Cells or elements in each section of an elastic bar."""
         return []

@@ -121,6 +121,10 @@ def fill_fem_start(state: np.ndarray, w: np.ndarray, n_p: int, numbers: Numbers)
     w[Node.V, n_p:] = values.start_bit_velocity
 
 
+# Elements and contact stiffness of runs to compare with, by those of this one.
+COARSER = 0.5
+
+
 class FemSolver(Solver):
     """Linear finite elements, penalty contact, event-driven third-order steps.
 
@@ -238,6 +242,18 @@ class FemSolver(Solver):
                 out[f"{name}_force"] = -stiffness * np.diff(nodes[Node.U])
                 out[f"{name}_velocity"] = 0.5 * (nodes[Node.V, :-1] + nodes[Node.V, 1:])
         return out
+
+    def coarser_scenes(self) -> list[Scene]:
+        """A coarser mesh with the same loss, and a softer contact: each has an error."""
+        scene = self.scene
+        coarser: dict[str, Any] = {"fem.elements": max(1, round(COARSER * scene.fem.elements))}
+        if scene.matters("fem.damping_ratio") and scene.fem.damping_ratio is not None:
+            coarser |= {"fem.damping_ratio": None, "loss.time": self.loss_time}
+        scenes = [scene.replace(**coarser)]
+        if scene.matters("fem.contact_stiffness"):
+            softer = COARSER * scene.fem.contact_stiffness
+            scenes.append(scene.replace(**{"fem.contact_stiffness": softer}))
+        return scenes
 
     def section_cells(self, bar: Bar) -> list[int]:
         """Elements in each section of an elastic bar."""

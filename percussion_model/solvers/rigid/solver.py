@@ -86,6 +86,10 @@ class RigidSolver(Solver):
         kernels.begin(self._par, state.record)
         return state
 
+    def coarser_scenes(self) -> list[Scene]:
+        """None: rigid bodies move in closed form."""
+        return []
+
     def time(self, state: State) -> float:
         """Time of the last event of a state [s]."""
         return float(state.record["time"][0])

@@ -34,7 +34,7 @@ from percussion_model.solvers.wave.records import (
     Task,
     no_operators,
 )
-from percussion_model.solvers.wave.resolution import asked_cells
+from percussion_model.solvers.wave.resolution import asked_cells, coarser_cells
 from percussion_model.solvers.wave.totals import begin, resync
 
 _WORD = words_of(WAVE_STATE)
@@ -252,6 +252,15 @@ class WaveSolver(Solver):
     def grid_of(self, bar: str) -> Grid | None:
         """Cells of "piston" or "bit", None where it has none."""
         return self._grids[bar]
+
+    def coarser_scenes(self) -> list[Scene]:
+        """One scene where lengths fit, else two that are off to either side."""
+        cells = next(iter(self.cells.values()))
+        changes = {"solver.accuracy": None, "run.check": False}
+        return [
+            self.scene.replace(**changes, **{"solver.cells": count})
+            for count in coarser_cells(self._numbers, cells)
+        ]
 
     def section_cells(self, bar: Bar) -> list[int]:
         """Cells in each section of an elastic bar."""
