@@ -17,6 +17,7 @@ from markupsafe import Markup
 
 from percussion_model.analysis.study import Study
 from percussion_model.interface.plotting import CAPTIONS, figures
+from percussion_model.interface.uncertain import rate_text
 from percussion_model.scene.parameters import find_row, parameter_table
 from percussion_model.scene.scene import Scene
 from percussion_model.simulation.files import staged
@@ -27,6 +28,7 @@ from percussion_model.simulation.result import REPORT, Result
 HEADLINES: tuple[tuple[str, str, str, str, float], ...] = (
     ("rate_of_penetration", "Rate of penetration", "m/s", "mm/s", 1e-3),
     ("rate_of_penetration_standard_error", "… its standard error", "m/s", "mm/s", 1e-3),
+    ("rate_of_penetration_relative_error", "… its estimated relative error", "–", "%", 1e-2),
     ("blow_period", "Blow period", "s", "ms", 1e-3),
     ("blow_frequency", "Blow frequency", "Hz", "blows/min", 1.0 / 60.0),
     ("impact_velocity", "Impact velocity (mean of the piston)", "m/s", "m/s", 1.0),
@@ -172,6 +174,7 @@ def render_report(result: Result, drawings: Sequence[Path]) -> str:
         scene,
         ran,
         summary=summary,
+        rate=rate_text(summary),
         headlines=headline_rows(summary),
         figures=[FigureBlock(blocks[name], text) for name, text in CAPTIONS.items()
                  if name in blocks],

@@ -13,6 +13,8 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from percussion_model.interface.uncertain import rate_text
+
 if TYPE_CHECKING:
     from percussion_model.analysis.comparison import Comparison
     from percussion_model.analysis.cost import Forecast
@@ -26,10 +28,9 @@ if TYPE_CHECKING:
 # A run that ends sooner shows no bar [s].
 _PATIENCE = 2.0
 
-# Rows of the table: name, key of the summary, factor, unit.
+RATE = ("Rate of penetration", "rate_of_penetration", 1e3, "mm/s")
+# Other rows of the table: name, key of the summary, factor, unit.
 SHOWN = (
-    ("Rate of penetration", "rate_of_penetration", 1e3, "mm/s"),
-    ("Rate: estimated error", "rate_of_penetration_relative_error", 100.0, "%"),
     ("Blow period", "blow_period", 1e3, "ms"),
     ("Blow frequency", "blow_frequency", 1.0, "Hz"),
     ("Impact velocity", "impact_velocity", 1.0, "m/s"),
@@ -43,8 +44,6 @@ SHOWN = (
     ("Standstill bit force", "standstill_bit_force", 1e-3, "kN"),
 )
 
-ONLY_WHERE_KNOWN = ("rate_of_penetration_relative_error",)
-
 
 def show_summary(result: Result) -> None:
     """Print the short table of a run, and its warnings."""
@@ -53,10 +52,9 @@ def show_summary(result: Result) -> None:
     table.add_column(justify="left")
     table.add_column(justify="right")
     table.add_column(justify="left")
+    table.add_row(RATE[0], rate_text(summary), RATE[3])
     for name, key, factor, unit in SHOWN:
         value = summary[key]
-        if key in ONLY_WHERE_KNOWN and value is None:
-            continue
         table.add_row(name, "-" if value is None else f"{factor * value:.5g}", unit)
     energy = summary["energy"]
     for key in ("numerical", "residual"):
@@ -167,12 +165,10 @@ def show_comparison(found: Comparison) -> None:
         table.add_column(name, justify="right", no_wrap=True)
         if name in differences:
             table.add_column("off, %", justify="right", no_wrap=True)
-    for label, key, factor, unit in SHOWN:
-        if key in ONLY_WHERE_KNOWN:
-            continue
+    for label, key, factor, unit in (RATE, *SHOWN):
         cells = []
         for name, summary in summaries.items():
-            cells.append(_number(summary[key], factor))
+            cells.append(rate_text(summary) if key == RATE[1] else _number(summary[key], factor))
             if name in differences:
                 off = differences[name].get(key)
                 cells.append("-" if off is None else f"{100.0 * off:+.2f}")

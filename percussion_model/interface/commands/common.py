@@ -40,7 +40,14 @@ Accuracy = Annotated[
     typer.Option("--accuracy", help="Wanted relative error of the rate, in place of cells."),
 ]
 Check = Annotated[
-    bool | None, typer.Option("--check/--no-check", help="Verify --accuracy at half the step.")
+    bool | None, typer.Option("--check/--no-check", help="Verify --accuracy by a finer run.")
+]
+ErrorEstimate = Annotated[
+    bool | None,
+    typer.Option(
+        "--error-estimate/--no-error-estimate",
+        help="Estimate the error of the rate by short runs on coarser cells.",
+    ),
 ]
 Duration = Annotated[float | None, typer.Option("--duration", help="Simulated time, in s.")]
 Settle = Annotated[float | None, typer.Option("--settle", help="Time before blows count, in s.")]

@@ -24,6 +24,7 @@ def run(
     cells: common.Cells = None,
     accuracy: common.Accuracy = None,
     check: common.Check = None,
+    error_estimate: common.ErrorEstimate = None,
     settings: common.Settings = None,
     trace: Annotated[
         float | None,
@@ -44,7 +45,15 @@ def run(
     if chosen.solver_name == "blow-map":
         ready_map(chosen)
     with progress_bar(chosen.run.duration if duration is None else duration) as progress:
-        result = simulate(chosen, duration, settle, trace, progress=progress, on_interrupt="keep")
+        result = simulate(
+            chosen,
+            duration,
+            settle,
+            trace,
+            progress=progress,
+            on_interrupt="keep",
+            error_estimate=error_estimate,
+        )
     interrupted = result.cut_short
     if out is not None:
         result.save(out)

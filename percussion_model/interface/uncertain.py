@@ -1,0 +1,28 @@
+"""Numbers with their errors as text."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+# Digits after the point; smaller errors are shown as one of the last digit.
+MOST_DIGITS = 5
+
+
+def with_error(value: float, error: float) -> str:
+    """Return a number and its error, both to the second digit of the error."""
+    digits = MOST_DIGITS
+    if error > 0.0:
+        digits = min(max(1 - math.floor(math.log10(error)), 0), MOST_DIGITS)
+    return f"{value:.{digits}f} ± {max(error, 10.0**-digits):.{digits}f}"
+
+
+def rate_text(summary: Mapping[str, Any]) -> str:
+    """Rate of penetration in mm/s and, where it is known, how far it may be off."""
+    rate, error = summary["rate_of_penetration"], summary["rate_of_penetration_relative_error"]
+    if rate is None:
+        return "-"
+    if error is None:
+        return f"{1e3 * rate:.5g}"
+    return with_error(1e3 * rate, 1e3 * abs(rate) * error)
