@@ -11,7 +11,7 @@ from typing import NamedTuple
 from percussion_model.scene.bars import bar_compliance
 from percussion_model.scene.scene import Scene
 
-__all__ = ["Scale", "scales"]
+__all__ = ["Scale", "barrier_shares", "scales"]
 
 
 class Scale(NamedTuple):
@@ -54,3 +54,15 @@ def scales(scene: Scene) -> dict[str, Scale]:
             found["barrier_time"] = Scale("T_5", share * piston.mass / rock.barrier_damping, "s")
             found["barrier_share"] = Scale("W_R/(F_0 D_1)", share, "-")
     return dict(sorted(found.items(), key=lambda item: item[1].symbol))
+
+
+def barrier_shares(scene: Scene) -> tuple[float, float]:
+    """Time of the barrier by that of a drilling cycle, T_5/T_4, and its energy by F_0 D_1.
+
+    Eq. 30 of the paper wants both far below 1. Zero where there is no barrier or no blow.
+    """
+    found = scales(scene)
+    if "barrier_time" not in found:
+        return 0.0, 0.0
+    time_share = found["barrier_time"].value / found["drilling_cycle_time"].value
+    return time_share, found["barrier_share"].value

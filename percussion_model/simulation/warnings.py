@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from percussion_model.physics.records import EventKind
-from percussion_model.scene.scales import scales
+from percussion_model.scene.scales import barrier_shares
 from percussion_model.simulation.result import LEAST_BLOWS, Result
 from percussion_model.simulation.validity import (
     barrier_note,
@@ -49,10 +49,7 @@ def _about_scene(result: Result) -> Iterator[str]:
                 "structural loss is off: vibration trapped in the bars never decays, so the "
                 "rate of penetration depends on the cells and must not be trusted"
             )
-    found = scales(scene)
-    if "barrier_time" in found:
-        time_share = found["barrier_time"].value / found["drilling_cycle_time"].value
-        yield from barrier_note(time_share, found["barrier_share"].value)
+    yield from barrier_note(*barrier_shares(scene))
     least = least_loss_time(result)
     if scene.loss_on and scene.solver_name == "wave" and scene.loss.time < least:
         yield (
