@@ -32,9 +32,8 @@ class Jump:
 
     Attributes
     ----------
-    time : float
-    before, after : float
-        Penetration while drilling just before and just after.
+    after : float
+        Penetration while drilling just after; above zero where the bit turns under load.
     jump : float
         Of the datum x_R.
     expected : float
@@ -44,8 +43,6 @@ class Jump:
         Change of x_R since the event before.
     """
 
-    time: float
-    before: float
     after: float
     jump: float
     expected: float
@@ -60,33 +57,23 @@ def datum_jumps(scene: Scene, restart: Snapshot, end: float) -> list[Jump]:
     events = simulation.events
     events = events[(events["time"] > restart.time + MOMENT) & (events["kind"] <= Mode.SS)]
     before, after = _readings(scene, restart, events["time"])
+    datum_before, datum_after = (x["bit_end_position"] - x["penetration"] for x in (before, after))
     gamma, upper = scene.rock.unloading_ratio, math.nan
     found = []
-    for k in range(len(events)):
-        kind = events["kind"][k]
-        was = int(before["drilling_mode"][k])
-        loading = was in (Mode.DFC, Mode.FC)
+    for k, kind in enumerate(events["kind"]):
         p = float(before["penetration"][k])
+        loading = before["drilling_mode"][k] in (Mode.DFC, Mode.FC)
         if kind == EventKind.MODE_BC and loading:
             upper = p * (gamma - 1.0) / gamma
         elif kind in (EventKind.MODE_DFC, EventKind.MODE_FC) and not loading:
-            datum = [
-                float(one["bit_end_position"][k] - one["penetration"][k]) for one in (before, after)
-            ]
-            last = (
-                float(after["bit_end_position"][k - 1] - after["penetration"][k - 1])
-                if k
-                else datum[0]
-            )
+            # F_R/K_R of eq. 19, with F_R of eq. 21, or none in free flight
+            elastic = gamma * max(p - upper, 0.0) if not math.isnan(upper) else math.nan
             found.append(
                 Jump(
-                    time=float(events["time"][k]),
-                    before=p,
                     after=float(after["penetration"][k]),
-                    jump=datum[1] - datum[0],
-                    # p - F_R/K_R of eq. 19, with F_R of eq. 21 or none in free flight
-                    expected=p - gamma * max(p - upper, 0.0) if upper == upper else math.nan,
-                    drift=datum[0] - last,
+                    jump=float(datum_after[k] - datum_before[k]),
+                    expected=p - elastic,
+                    drift=float(datum_before[k] - datum_after[k - 1]) if k else 0.0,
                 )
             )
     return found
@@ -112,7 +99,7 @@ def _readings(
 def about_datum(jumps: Sequence[Jump], advance: float) -> Iterator[Statement]:
     """Go through eqs 18 and 19 with the jumps of a blow in which the bit advanced so far [m]."""
     whole = sum(one.jump for one in jumps)
-    known = [one for one in jumps if one.expected == one.expected]
+    known = [one for one in jumps if not math.isnan(one.expected)]
     off = max(abs(one.jump - one.expected) for one in known)
     drift = max(abs(one.drift) for one in jumps)
     yield Statement(

@@ -151,22 +151,26 @@ def about_cycle(
     yield from _about_backbone(place, samples, origin)
     if result.scene.solver_name == "fem":
         yield from _about_interpenetration(place, samples, result.scene.fem.contact_stiffness)
-    window = result.rate_of_penetration_fixed_window
-    share = 1.0 / len(result.counted)
-    off = window / summary["rate_of_penetration"] - 1.0
-    yield Statement(
-        f"{place}, eq. 58",
-        "the rate is that over 3 s from 1 s on",
-        f"{1e3 * window:.3f} mm/s; over whole blows {1e3 * summary['rate_of_penetration']:.3f}: "
-        f"{100 * off:+.2f} %, within the {100 * share:.2f} % of one blow",
-        abs(off) < share,
-    )
+    yield from _about_fixed_window(place, result)
     flights = _flights(samples, origin)
     yield Statement(
         place,
         "drilling cycles separated by free flights of decreasing amplitude",
         f"flights of {', '.join(f'{1e3 * flight:.2f}' for flight in flights)} ms",
         len(flights) > 1 and all(a > b for a, b in itertools.pairwise(flights)),
+    )
+
+
+def _about_fixed_window(place: str, result: Result) -> Iterator[Statement]:
+    window, whole = result.rate_of_penetration_fixed_window, result.rate_of_penetration
+    share = 1.0 / len(result.counted)
+    off = window / whole - 1.0
+    yield Statement(
+        f"{place}, eq. 58",
+        "the rate is that over 3 s from 1 s on",
+        f"{1e3 * window:.3f} mm/s; over whole blows {1e3 * whole:.3f}: "
+        f"{100 * off:+.2f} %, within the {100 * share:.2f} % of one blow",
+        abs(off) < share,
     )
 
 
