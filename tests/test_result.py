@@ -3,11 +3,12 @@
 import json
 import math
 import os
+import pickle
 
 import numpy as np
 import pytest
 
-from percussion_model import Result, ResultError, Scene, simulate
+from percussion_model import Result, ResultError, Scene, Simulation, simulate
 from percussion_model.interface.plotting import CAPTIONS
 from percussion_model.physics.records import BLOW
 from percussion_model.simulation.files import check_writable, staged
@@ -17,6 +18,7 @@ RIGID = Scene().replace(**{"piston.model": "rigid", "bit.model": "rigid"})
 KEYS = [
     "rate_of_penetration",
     "rate_of_penetration_standard_error",
+    "rate_of_penetration_fixed_window",
     "blow_period",
     "blow_frequency",
     "impact_velocity",
@@ -99,6 +101,30 @@ def test_the_ledger_adds_up(wave):
     rest = e["initial"] + e["input"] - e["stored"] - e["dissipated"] - e["numerical"]
     assert e["residual"] == pytest.approx(rest, abs=1e-9)
     assert abs(e["residual_relative"]) < 1e-9
+
+
+def test_the_fixed_window_is_cut_by_time(rigid):
+    """Eq. 58 of the paper: off the rate over whole blows by less than a blow's share."""
+    simulation = Simulation(rigid.scene)
+    start, end = simulation.sample([rigid.settle, rigid.duration])["bit_position"]
+    rate = rigid.rate_of_penetration_fixed_window
+    assert rate == pytest.approx((end - start) / (rigid.duration - rigid.settle), rel=1e-12)
+    assert 0 < abs(rate / rigid.rate_of_penetration - 1.0) < 1.0 / len(rigid.counted)
+    assert simulation.result().rate_of_penetration_fixed_window == rate
+
+
+def test_a_fixed_window_survives_calls_and_snapshots(rigid):
+    simulation = Simulation(rigid.scene)
+    for t in np.linspace(0.0, rigid.duration, 7):
+        simulation.restore(pickle.loads(pickle.dumps(simulation.save())))
+        simulation.advance(t)
+    found = simulation.result()
+    assert found.rate_of_penetration_fixed_window == rigid.rate_of_penetration_fixed_window
+    # what was not read at that time is not known
+    assert simulation.result(settle=0.1).summary()["rate_of_penetration_fixed_window"] is None
+    short = Simulation(rigid.scene)
+    short.advance(0.5 * rigid.settle)
+    assert math.isnan(short.result().rate_of_penetration_fixed_window)
 
 
 def test_standard_error_of_a_known_scatter(rigid):

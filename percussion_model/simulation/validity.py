@@ -17,6 +17,8 @@ BUTTON_LENGTH = 0.010
 # The fastest percussive drills make 0.1 m/s in the softest rock, and the softest corner of
 # the paper's ranges 0.22 m/s: a rate far beyond is no drilling [m/s].
 MOST_RATE = 0.5
+# What the paper's eq. 30 wants to be much less than 1 is at most this.
+MOST_BARRIER = 0.1
 # A bit that meets no rock for so long, five blows of the reference, is off bottom [s].
 LONGEST_FLIGHT = 0.25
 
@@ -62,6 +64,25 @@ def button_note(peak_bit_force: float, loading_stiffness: float) -> Iterator[str
         yield (
             f"the rock is pressed in by {1e3 * depth:.3g} mm, deeper than the buttons of a bit "
             f"stand out ({1e3 * BUTTON_LENGTH:g} mm): beyond that the model does not hold"
+        )
+
+
+def barrier_note(time_share: float, energy_share: float) -> Iterator[str]:
+    """Say that the energy barrier is no small part of a blow, where it is not.
+
+    Parameters
+    ----------
+    time_share : float
+        T_5/T_4: time that the barrier takes, by that of a drilling cycle.
+    energy_share : float
+        W_R/(F_0 D_1): its energy, by that which the drive gives a blow.
+    """
+    if max(time_share, energy_share) > MOST_BARRIER:
+        yield (
+            f"the energy barrier is not small: it takes {time_share:.2g} of a drilling cycle's "
+            f"time (T_5/T_4) and {energy_share:.2g} of a blow's energy (W_R/(F_0 D_1)), each of "
+            f"which the rock law wants far below 1, at most {MOST_BARRIER:g}: lower "
+            "rock.barrier_energy, or raise rock.barrier_damping for the time"
         )
 
 

@@ -8,8 +8,10 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from percussion_model.physics.records import EventKind
+from percussion_model.scene.scales import barrier_shares
 from percussion_model.simulation.result import LEAST_BLOWS, Result
 from percussion_model.simulation.validity import (
+    barrier_note,
     button_note,
     flight_note,
     guard_notes,
@@ -47,6 +49,7 @@ def _about_scene(result: Result) -> Iterator[str]:
                 "structural loss is off: vibration trapped in the bars never decays, so the "
                 "rate of penetration depends on the cells and must not be trusted"
             )
+    yield from barrier_note(*barrier_shares(scene))
     least = least_loss_time(result)
     if scene.loss_on and scene.solver_name == "wave" and scene.loss.time < least:
         yield (
