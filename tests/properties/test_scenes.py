@@ -80,7 +80,11 @@ def test_cases_cover_solvers_effects_and_parameters():
     scenes = [case.scene for case in drawn]
     assert {scene.solver_name for scene in scenes} == {"wave", "fem", "rigid"}
     for key, row in rows_by_key().items():
-        if row.kind in ("flag", "choice") and key not in ("solver.name", "run.check"):
+        if row.kind in ("flag", "choice") and key not in (
+            "solver.name",
+            "run.check",
+            "run.error_estimate",
+        ):
             found = {scene[key] for scene in scenes}
             allowed = set(row.choices) if row.kind == "choice" else {True, False}
             # a blow map takes a minute to make: tests/test_blow_map.py has its random points
