@@ -41,8 +41,8 @@ def forms_of_a_step(load, cells, loss_time):
     return by_column, loss, (damping * square + numerical) * squares, energy
 
 
-# From none to so much that a step does it in a thousand parts.
-@pytest.mark.parametrize("loss_time", [0.0, 1.937e-7, 8e-7, 1e-5, 1e-3])
+# From none to so much that a step does it in seven hundred parts.
+@pytest.mark.parametrize("loss_time", [0.0, 1.937e-7, 8e-7, 1e-5, 1e-4])
 @pytest.mark.parametrize("load", LOADS)
 @pytest.mark.parametrize("cells", [7, 20, 120])
 def test_forms_of_a_step_are_the_energy_it_takes(load, cells, loss_time):
@@ -55,7 +55,7 @@ def test_forms_of_a_step_are_the_energy_it_takes(load, cells, loss_time):
 
 @pytest.mark.parametrize("steps", [1, 3, 4, 7, 44, 63, 64, 200, 255])
 def test_forms_of_a_leap_are_those_of_its_steps(steps):
-    by_column, loss, squares, energy = forms_of_a_step("SS", 7, 1e-6)
+    by_column, loss, squares, _ = forms_of_a_step("SS", 7, 1e-6)
     size = padded(len(by_column))
     powers = _powers(by_column, 4, size)
     x = np.random.default_rng(steps).normal(size=size)

@@ -35,8 +35,8 @@ def random_scene(rng):
     }
     for name in ("gravity", "feed"):
         changes[f"effects.{name}"] = bool(rng.random() < 0.8)
-    kind = rng.choice(["elastic", "rigid", "absent"], p=[0.6, 0.15, 0.25])
-    changes["piston.model"] = str(kind)
+    kind = str(rng.choice(["elastic", "rigid", "absent"], p=[0.6, 0.15, 0.25]))
+    changes["piston.model"] = kind
     if kind == "absent":
         changes |= {"effects.drive": "none", "start.bit_velocity": float(rng.uniform(0.0, 10.0))}
     else:
@@ -49,8 +49,8 @@ def random_scene(rng):
         changes["drive.reversal_distance"] = float(10.0 ** rng.uniform(-2.5, -1.3))
     if kind == "elastic":
         changes["piston.sections"] = random_sections(rng)
-    rock = rng.choice(["bilinear", "spring", "wall", "none"], p=[0.8, 0.1, 0.05, 0.05])
-    changes["effects.rock"] = str(rock)
+    rock = str(rng.choice(["bilinear", "spring", "wall", "none"], p=[0.8, 0.1, 0.05, 0.05]))
+    changes["effects.rock"] = rock
     changes["effects.barrier"] = bool(rock == "bilinear" and rng.random() < 0.8)
     changes["effects.standstill_tension"] = str(rng.choice(["release", "paper"]))
     changes["rock.loading_stiffness"] = float(10.0 ** rng.uniform(6.0, 10.0))
