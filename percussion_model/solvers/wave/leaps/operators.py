@@ -251,23 +251,20 @@ def _sums(form: np.ndarray, powers: np.ndarray) -> np.ndarray:
         Powers 1, 4, 16, ... of the step map.
     """
     total = np.zeros(powers.shape[1:])
-    total[: len(form), : len(form)] = 0.5 * (form + form.T)
+    total[: len(form), : len(form)] = form
     totals = []
     for level, power in enumerate(powers):
         once = total
         totals.append(once)
         if level == len(powers) - 1:
             break
-        twice = once + _later(power, once)
-        total = twice + _later(power @ power, twice)
+        twice = once + power @ once @ power.T
+        squared = power @ power
+        total = twice + squared @ twice @ squared.T
         if level < SINGLE:
-            totals += [twice, once + _later(power, twice)]
-    # symmetric: column by column, the upper triangle says it all
-    return np.array([2.0 * np.tril(one, -1) + np.diag(np.diag(one)) for one in totals])
-
-
-def _later(power: np.ndarray, form: np.ndarray) -> np.ndarray:
-    """Quadratic form of what a map leads to; symmetric."""
-    found = power @ form @ power.T
-    symmetric: np.ndarray = 0.5 * (found + found.T)
-    return symmetric
+            totals += [twice, once + power @ twice @ power.T]
+    # column by column, the upper triangle says it all
+    both = np.array(totals)
+    both += both.transpose(0, 2, 1).copy()
+    both *= np.tril(np.ones(total.shape), -1) + 0.5 * np.eye(len(total))
+    return both
