@@ -50,8 +50,8 @@ def numerical_note(share: float, solver: str) -> Iterator[str]:
             else ("averaging fronts within cells", "set more solver.cells")
         )
         yield (
-            f"{100 * share:.2g} % of the energy put in is taken by {cause} (numerical in the "
-            f"ledger), not by anything in the equations: peaks and rates suffer; {remedy}"
+            f"{100 * share:.2g} % of the energy put in is taken by {cause} (entry numerical "
+            f"of its balance), not by anything in the equations: peaks and rates suffer; {remedy}"
         )
 
 
