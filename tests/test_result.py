@@ -13,6 +13,7 @@ from percussion_model.interface.plotting import CAPTIONS
 from percussion_model.physics.records import BLOW
 from percussion_model.simulation.files import check_writable, staged
 from percussion_model.simulation.result import FIGURES, REPORT
+from percussion_model.simulation.validity import numerical_note
 
 RIGID = Scene().replace(**{"piston.model": "rigid", "bit.model": "rigid"})
 KEYS = [
@@ -168,11 +169,21 @@ def test_an_undamped_scene_warns_and_says_why():
         ({"drive.external_force": 5.0}, "without effect in this scene: drive.external_force"),
         ({"bit.sections.0.length": 0.2137, "solver.cells": 3}, "fit no common cell"),
         ({"solver.cells": 1}, "is a single cell"),
+        ({"solver.cells": 5, "effects.loss": False}, "is taken by averaging fronts within cells"),
+        ({"solver.name": "fem"}, "is taken by the time scheme"),
     ],
 )
 def test_warnings_about_the_scene(changes, warning):
     result = simulate(Scene().replace(**changes), 0.01, settle=0.0)
     assert any(warning in text for text in result.warnings)
+
+
+def test_what_the_discretisation_takes_is_told_beyond_its_limits():
+    assert not list(numerical_note(0.01, "wave"))
+    assert not list(numerical_note(-1e-10, "wave"))
+    assert not list(numerical_note(-1e-3, "blow-map"))  # interpolated
+    for share, words in ((0.0101, "1 % of the energy"), (-1.1e-9, "error of the solver")):
+        assert words in "".join(numerical_note(share, "wave"))
 
 
 # -------------------------------------------------------------------------- files

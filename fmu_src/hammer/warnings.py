@@ -13,6 +13,7 @@ from percussion_model.simulation.validity import (
     flight_note,
     guard_notes,
     ledger_note,
+    numerical_note,
     rate_note,
 )
 
@@ -79,6 +80,8 @@ class Warnings:
                 yield "barrier", text
         for text in ledger_note(motion.residual(), motion.solver.name):
             yield "ledger", text
+        for text in numerical_note(motion.numerical(), motion.solver.name):
+            yield "numerical", text
         for text in guard_notes(motion.solver.statistics(motion._state)):
             yield "guards", text
         if motion.scene.effects.rock == "none":

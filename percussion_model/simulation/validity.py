@@ -9,6 +9,10 @@ from collections.abc import Iterator, Mapping
 
 # The ledger closes to rounding; more than this is an error of the solver.
 MOST_RESIDUAL = 1e-6
+# What the discretisation takes is never negative, but for the rounding of its sums ...
+LEAST_NUMERICAL = -1e-9
+# ... and above this share of the energy put in it shows in peaks and rates.
+MOST_NUMERICAL = 1e-2
 # Between the nodes of a blow map energy is kept as well as the map is interpolated.
 MOST_MAP_RESIDUAL = 1e-2
 # Buttons of a percussive bit stand out by 5 to 15 mm; deeper in, its face meets the rock,
@@ -31,6 +35,25 @@ def ledger_note(residual: float, solver: str) -> Iterator[str]:
             f"the energy ledger does not close: {residual:.2g} of the energy put in is "
             "unexplained; "
             + ("raise blow_map.density" if mapped else "this is an error of the solver")
+        )
+
+
+def numerical_note(share: float, solver: str) -> Iterator[str]:
+    """Say that the discretisation took too much of the energy put in, or gave some."""
+    if not share >= (-MOST_MAP_RESIDUAL if solver == "blow-map" else LEAST_NUMERICAL):
+        yield (
+            f"numerical is {share:.2g} of the energy put in: the discretisation gives energy, "
+            "which it cannot; this is an error of the solver"
+        )
+    elif share > MOST_NUMERICAL:
+        cause, remedy = (
+            ("the time scheme", "set a smaller fem.courant or more fem.elements")
+            if solver == "fem"
+            else ("averaging fronts within cells", "set more solver.cells")
+        )
+        yield (
+            f"{100 * share:.2g} % of the energy put in is taken by {cause} (entry numerical "
+            f"of its balance), not by anything in the equations: peaks and rates suffer; {remedy}"
         )
 
 

@@ -16,6 +16,7 @@ from percussion_model.simulation.validity import (
     flight_note,
     guard_notes,
     ledger_note,
+    numerical_note,
     rate_note,
 )
 
@@ -113,6 +114,7 @@ def _about_blows(result: Result) -> Iterator[str]:
 def _about_validity(result: Result) -> Iterator[str]:
     if any(result.energy[name] for name in _FLOWS):
         yield from ledger_note(result.energy["residual_relative"], result.solver)
+        yield from numerical_note(result.energy["numerical_relative"], result.solver)
     yield from guard_notes(result.statistics)
     scene = result.scene
     if scene.effects.rock == "none":
