@@ -16,7 +16,6 @@ from percussion_model.simulation.error_estimate import (
     GridRun,
     estimate_error,
     grid_run,
-    size,
 )
 from percussion_model.simulation.result import LEAST_BLOWS, Result
 from percussion_model.solvers.wave.resolution import (
@@ -24,6 +23,7 @@ from percussion_model.solvers.wave.resolution import (
     cells_for,
     coarser_cells,
     finer_cells,
+    size,
 )
 
 # Aperiodic motion runs on for at most this multiple of the duration.

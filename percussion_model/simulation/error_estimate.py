@@ -17,7 +17,7 @@ import numpy as np
 from percussion_model.scene.numbers import numbers_of
 from percussion_model.scene.scene import Scene
 from percussion_model.simulation.result import Result
-from percussion_model.solvers.wave.resolution import FITS, misfits, promised_error
+from percussion_model.solvers.wave.resolution import FITS, misfits, promised_error, size
 
 # Two aperiodic runs differ if they do by more than so many standard errors.
 CONFIDENCE = 2.0
@@ -129,7 +129,7 @@ def estimate_error(run: GridRun, others: Sequence[GridRun]) -> Estimate:
     misfit = size(run.misfit)
     others = [other for other in others if other.useful]
     if not others:
-        return Estimate(0.0, FIT_EFFECT * misfit, scatter, floor)
+        return Estimate(math.inf, 0.0, scatter, floor)  # nothing is known
     fitting = [other for other in others if size(other.misfit) <= FITS]
     if misfit <= FITS and fitting:
         return Estimate(_difference(fitting[-1], run), 0.0, scatter, floor)
@@ -143,11 +143,6 @@ def estimate_error(run: GridRun, others: Sequence[GridRun]) -> Estimate:
     if misfit > GROSS_MISFIT:
         fit = max(fit, GROSS_EFFECT * misfit)
     return Estimate(cells, fit, scatter, floor)
-
-
-def size(misfit: np.ndarray) -> float:
-    """Largest misfit of a section."""
-    return float(np.max(np.abs(misfit), initial=0.0))
 
 
 def _difference(other: GridRun, run: GridRun) -> float:

@@ -96,13 +96,18 @@ def cut(sections: np.ndarray, time_step: float) -> Grid:
     )
 
 
-def misfit(sections: np.ndarray, time_step: float) -> float:
-    """Largest relative error of a section's wave speed in cells of one transit time."""
-    found = 0.0
+def section_misfits(sections: np.ndarray, time_step: float) -> list[float]:
+    """Relative error of each section's wave speed in cells of one transit time, signed."""
+    found = []
     for section in sections:
         cells = section_count(section, time_step) * time_step
-        found = max(found, abs(section_transit_time(section) / cells - 1.0))
+        found.append(section_transit_time(section) / cells - 1.0)
     return found
+
+
+def misfit(sections: np.ndarray, time_step: float) -> float:
+    """Largest relative error of a section's wave speed in cells of one transit time."""
+    return max(map(abs, section_misfits(sections, time_step)))
 
 
 def cell_at(sections: np.ndarray, grid: Cells, place: float) -> tuple[int, float]:

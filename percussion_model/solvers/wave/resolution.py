@@ -9,13 +9,14 @@ import math
 
 import numpy as np
 
-from percussion_model.scene.bars import bar_transit_time, section_transit_time
+from percussion_model.scene.bars import bar_transit_time
 from percussion_model.scene.numbers import Numbers
-from percussion_model.solvers.wave.grid import elastic_bars, fitting_cells, section_count
+from percussion_model.solvers.wave.grid import elastic_bars, fitting_cells, section_misfits
 
 # Relative error of the rate of penetration, and the cells of the bar with the shortest
 # transit for which it held with a margin of two or more.
 CALIBRATED = ((1e-1, 14), (2e-2, 20), (1e-2, 28), (1e-3, 56), (1e-4, 128))
+_LOGARITHMS = np.log(np.array([(1.0 / error, cells) for error, cells in CALIBRATED])).T
 # Errors of the wave speed act some fivefold on the rate, up to fortyfold in some scenes:
 # the share of the wanted error that they may be at first.
 FIT_SHARE = 0.1
@@ -39,9 +40,7 @@ def asked_cells(numbers: Numbers) -> int:
     return 0
 
 
-def cells_for(
-    numbers: Numbers, accuracy: float, fewest: int = 1, most: int | None = None
-) -> tuple[int, float]:
+def cells_for(numbers: Numbers, accuracy: float) -> tuple[int, float]:
     """Cells in the first elastic bar for a wanted accuracy.
 
     Parameters
@@ -50,8 +49,6 @@ def cells_for(
         Of a scene with an elastic bit.
     accuracy : float
         Wanted relative error of the rate of penetration.
-    fewest, most : int, optional
-        Not to be gone below and beyond.
 
     Returns
     -------
@@ -61,11 +58,8 @@ def cells_for(
     """
     bars = elastic_bars(numbers)
     first, bit = bar_transit_time(bars[0]), bar_transit_time(bars[-1])
-    least = max(fewest, math.ceil(cells_by_rule(accuracy) * first / min(first, bit) - 1e-9))
-    end = math.floor(MOST_REFINED * least)
-    if most is not None:
-        end = max(least, min(end, most))
-    return fitting_cells(bars, least, end, FIT_SHARE * accuracy)
+    least = math.ceil(cells_by_rule(accuracy) * first / min(first, bit) - 1e-9)
+    return fitting_cells(bars, least, math.floor(MOST_REFINED * least), FIT_SHARE * accuracy)
 
 
 def coarser_cells(numbers: Numbers, cells: int) -> list[int]:
@@ -79,9 +73,9 @@ def coarser_cells(numbers: Numbers, cells: int) -> list[int]:
     counts = range(fewest, max(fewest, high) + 1)
     found = {count: misfits(numbers, count) for count in counts}
     # of equals the finer, which costs more but is nearer
-    ranked = sorted(counts, key=lambda count: (_size(found[count]), -count))
+    ranked = sorted(counts, key=lambda count: (size(found[count]), -count))
     best = ranked[0]
-    if _size(found[best]) <= FITS:
+    if size(found[best]) <= FITS:
         return [best]
     side = np.sum(found[best])
     across = [count for count in ranked if np.sum(found[count]) * side < 0.0]
@@ -100,8 +94,8 @@ def finer_cells(numbers: Numbers, cells: int, wanted_fit: float, most: int) -> i
     sizes = {}
     for count in range(fewest, end + 1):
         there = misfits(numbers, count)
-        if _size(here) <= FITS or _size(there - here) > 0.5 * _size(here):
-            sizes[count] = _size(there)
+        if size(here) <= FITS or size(there - here) > 0.5 * size(here):
+            sizes[count] = size(there)
     if not sizes:
         return None
     return next(
@@ -122,17 +116,12 @@ def misfits(numbers: Numbers, cells: int) -> np.ndarray:
     """
     bars = elastic_bars(numbers)
     step = bar_transit_time(bars[0]) / cells
-    return np.array(
-        [
-            section_transit_time(section) / (section_count(section, step) * step) - 1.0
-            for bar in bars
-            for section in bar
-        ]
-    )
+    return np.array([error for bar in bars for error in section_misfits(bar, step)])
 
 
-def _size(misfit: np.ndarray) -> float:
-    return float(np.max(np.abs(misfit)))
+def size(misfit: np.ndarray) -> float:
+    """Largest misfit of a section."""
+    return float(np.max(np.abs(misfit), initial=0.0))
 
 
 def promised_error(numbers: Numbers, cells: int) -> float:
@@ -140,19 +129,11 @@ def promised_error(numbers: Numbers, cells: int) -> float:
     bars = elastic_bars(numbers)
     first = bar_transit_time(bars[0])
     fewest = cells * min(first, bar_transit_time(bars[-1])) / first
-    k = 1
-    while k < len(CALIBRATED) - 1 and fewest > CALIBRATED[k][1]:
-        k += 1
-    (loose, few), (tight, many) = CALIBRATED[k - 1], CALIBRATED[k]
-    slope = math.log(loose / tight) / math.log(many / few)
-    return min(1.0, loose * (few / fewest) ** slope)
+    errors, counts = _LOGARITHMS
+    return math.exp(-np.interp(math.log(fewest), counts, errors))
 
 
 def cells_by_rule(accuracy: float) -> float:
     """Cells of the bar with the shortest transit, a power law between calibrated points."""
-    k = 1
-    while k < len(CALIBRATED) - 1 and accuracy < CALIBRATED[k][0]:
-        k += 1
-    (loose, few), (tight, many) = CALIBRATED[k - 1], CALIBRATED[k]
-    slope = math.log(many / few) / math.log(loose / tight)
-    return few * (loose / accuracy) ** slope
+    errors, counts = _LOGARITHMS
+    return math.exp(np.interp(-math.log(accuracy), errors, counts))
