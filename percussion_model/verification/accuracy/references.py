@@ -21,8 +21,21 @@ import numpy as np
 
 from percussion_model.scene.scene import Scene
 from percussion_model.simulation.files import staged_text
-from percussion_model.verification.accuracy.ladders import fem_scene, stiffness_of, total_length
-from percussion_model.verification.accuracy.problems import APERIODIC, HISTORY, Answer, Problem, Run
+from percussion_model.verification.accuracy.ladders import (
+    FITS,
+    best_fitting,
+    fem_scene,
+    misfit_of,
+    stiffness_of,
+    total_length,
+)
+from percussion_model.verification.accuracy.problems import (
+    APERIODIC,
+    HISTORIES,
+    Answer,
+    Problem,
+    Run,
+)
 
 __all__ = [
     "Bar",
@@ -36,15 +49,17 @@ __all__ = [
 ]
 
 STORE = "references.json"
-FORMAT = 1
+FORMAT = 2
 # Digits of a stored history.
-DIGITS = 7
+DIGITS = 6
 # Order that extrapolation assumes: the least that was ever measured for the waves; the
 # elements' mesh, with a penalty that goes along, is of second order.
 WAVE_ORDER, FEM_ORDER = 1.0, 2.0
 # Cells in all bars together, coarse to fine; elements likewise.
 WAVE_LEVELS, WAVE_LEVELS_QUICK = (172.0, 258.0, 430.0), (86.0, 129.0, 172.0)
 FEM_LEVELS, FEM_LEVELS_QUICK = (108.0, 151.0, 215.0), (65.0, 86.0, 108.0)
+# Where these do not fit the lengths, cells that do, up to so many in all bars.
+MOST_CELLS = 900
 # Simulated time of aperiodic references, by the scene's duration.
 LONG = {"wave": 20.0, "fem": 4.0}
 LONG_CELLS = 40
@@ -86,8 +101,8 @@ class Reference:
         Of the problem.
     bars : dict of Bar
         By the names of `QUANTITIES`.
-    history : ndarray or None
-        Force on the rock at the problem's offsets, by the finest waves [N].
+    histories : dict of ndarray
+        As in `Answer`, by the finest waves.
     made : dict
         How, with which versions, when.
     """
@@ -95,7 +110,7 @@ class Reference:
     title: str
     kind: str
     bars: dict[str, Bar]
-    history: np.ndarray | None
+    histories: dict[str, np.ndarray]
     made: dict[str, Any] = field(default_factory=dict)
 
     @property
@@ -112,27 +127,25 @@ class Reference:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON."""
-        history = None
-        if self.history is not None:
-            history = [float(f"{value:.{DIGITS}g}") for value in self.history]
-        bars = {name: asdict(bar) for name, bar in self.bars.items()}
         return {
             "title": self.title,
             "kind": self.kind,
-            "bars": bars,
-            "history": history,
+            "bars": {name: asdict(bar) for name, bar in self.bars.items()},
+            "histories": {
+                name: " ".join(f"{value:.{DIGITS}g}" for value in history)
+                for name, history in self.histories.items()
+            },
             "made": self.made,
         }
 
     @classmethod
     def from_dict(cls, tree: dict[str, Any]) -> Reference:
         """Read what `to_dict` gave."""
-        history = tree["history"]
         return cls(
             tree["title"],
             tree["kind"],
             {name: Bar(**bar) for name, bar in tree["bars"].items()},
-            None if history is None else np.array(history),
+            {name: np.array(text.split(), float) for name, text in tree["histories"].items()},
             tree["made"],
         )
 
@@ -216,7 +229,8 @@ def make_reference(
             answers[name].append(_answer(problem, level, name))
     bars = {}
     for key in problem.quantities:
-        if key == HISTORY:
+        if key in HISTORIES:
+            bars[key] = _history_bar(answers, key)
             continue
         if problem.kind == APERIODIC:
             last = [answers[name][-1] for name in ("wave", "fem")]
@@ -227,9 +241,6 @@ def make_reference(
                 _limit(answers["fem"], fem, key, FEM_ORDER),
             ]
         bars[key] = _agree(*limits)
-    history = answers["wave"][-1].history
-    if history is not None:
-        bars[HISTORY] = _history_bar(answers)
     made = {
         "wave": [_level_name(level) for level in wave],
         "fem": [_level_name(level) for level in fem],
@@ -239,7 +250,7 @@ def make_reference(
         "numba": version("numba"),
         "quick": quick,
     }
-    return Reference(scene.title, problem.kind, bars, history, made)
+    return Reference(scene.title, problem.kind, bars, answers["wave"][-1].histories, made)
 
 
 def _scenes(problem: Problem, quick: bool) -> tuple[list[Scene], list[Scene]]:
@@ -252,7 +263,7 @@ def _scenes(problem: Problem, quick: bool) -> tuple[list[Scene], list[Scene]]:
         )
     lengths = total_length(scene)
     waves, elements = (WAVE_LEVELS_QUICK, FEM_LEVELS_QUICK) if quick else (WAVE_LEVELS, FEM_LEVELS)
-    counts = [max(2, _rounded(level / lengths)) for level in waves]
+    counts = wave_levels(scene, waves, 0 if quick else MOST_CELLS)
     wave = [scene.computed_by("wave", **{"solver.cells": count}) for count in counts]
     meshes = [max(3, round(level / lengths)) for level in elements]
     finest = FEM_LEVELS[0] / lengths
@@ -260,9 +271,20 @@ def _scenes(problem: Problem, quick: bool) -> tuple[list[Scene], list[Scene]]:
     return wave, fem
 
 
-def _rounded(cells: float) -> int:
-    """A multiple of 20 where there are that many: lengths of the reference fit those."""
-    return 20 * round(cells / 20.0) if cells >= 30.0 else round(cells)
+def wave_levels(scene: Scene, targets: Sequence[float], most: int) -> list[int]:
+    """Cells in the first bar, coarse to fine.
+
+    Such as fit the lengths, where up to `most` in all bars there are three; else those near
+    the targets that fit best and, last, the least that fit.
+    """
+    lengths = total_length(scene)
+    best = [best_fitting(scene, max(2.0, target / lengths)) for target in targets]
+    if max(misfit_of(scene, count) for count in best) < FITS:
+        return best
+    fitting = [n for n in range(2, int(most / lengths) + 1) if misfit_of(scene, n) < FITS]
+    if len(fitting) >= len(targets):
+        return fitting[-len(targets) :]
+    return best + [n for n in fitting if n > best[-1]][:1]
 
 
 def _level_name(scene: Scene) -> str:
@@ -284,16 +306,19 @@ def _limit(
 ) -> tuple[float, float]:
     """Extrapolate the last two levels; the bar is what the last two steps of it changed.
 
-    Twice the change from the level before to the finest is a bound as well: where answers
-    jump from level to level, extrapolation would promise too much.
+    Half the change from the level before to the finest is a bound as well: where answers
+    jump from level to level, extrapolation would promise too much. Levels that do not fit
+    the lengths do not fall in order: then the finest is taken, and its change is the bar.
     """
     sizes = [1.0 / _count(scene) for scene in scenes]
     values = [answer.values[key] for answer in answers]
+    change = abs(values[-1] - values[-2])
+    if any(_misfit(scene) >= FITS for scene in scenes):
+        return values[-1], change
     limits = []
     for k in range(len(values) - 1):
         ratio = (sizes[k] / sizes[k + 1]) ** order - 1.0
         limits.append(values[k + 1] + (values[k + 1] - values[k]) / ratio)
-    change = abs(values[-1] - values[-2])
     return limits[-1], max(abs(limits[-1] - limits[-2]), 0.5 * change)
 
 
@@ -301,6 +326,11 @@ def _count(scene: Scene) -> float:
     if scene.solver_name == "fem":
         return float(scene.fem.elements)
     return float(scene.solver.cells or math.nan)
+
+
+def _misfit(scene: Scene) -> float:
+    """Error of the wave speed; elements have none."""
+    return misfit_of(scene, scene.solver.cells or 0) if scene.solver_name == "wave" else 0.0
 
 
 def _agree(wave: tuple[float, float], fem: tuple[float, float]) -> Bar:
@@ -316,16 +346,14 @@ def _agree(wave: tuple[float, float], fem: tuple[float, float]) -> Bar:
     return Bar(value, error if within else max(error, off), *wave, *fem, agreed)
 
 
-def _history_bar(answers: dict[str, list[Answer]]) -> Bar:
+def _history_bar(answers: dict[str, list[Answer]], key: str) -> Bar:
     """L1 distance of the finest histories to those of the level before, and to each other."""
-    finest, before = answers["wave"][-1].history, answers["wave"][-2].history
-    other, coarser = answers["fem"][-1].history, answers["fem"][-2].history
-    if finest is None or before is None or other is None or coarser is None:
-        return Bar(1.0, math.nan, 1.0, math.nan, math.nan, math.nan, False)
+    coarser, finest = (answer.histories[key] for answer in answers["wave"][-2:])
+    before, other = (answer.histories[key] for answer in answers["fem"][-2:])
     whole = float(np.sum(np.abs(finest)))
 
     def apart(a: np.ndarray, b: np.ndarray) -> float:
         return float(np.sum(np.abs(a - b))) / whole
 
-    own, theirs, off = apart(finest, before), apart(other, coarser), apart(finest, other)
+    own, theirs, off = apart(finest, coarser), apart(other, before), apart(finest, other)
     return Bar(1.0, max(own, off), 1.0, own, 1.0 + off, theirs, off <= own + theirs)
