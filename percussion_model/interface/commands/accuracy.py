@@ -42,7 +42,8 @@ def accuracy(
 ) -> None:
     """Measure error against time: waves, their peers, rigid bars.
 
-    Prints tables, of several scenes one that compares waves with the best of their peers; figures, and the numbers as JSON unless --json is given, go to out/accuracy.
+    Prints tables, of several scenes one of waves against the best of their peers as well;
+    figures, and the numbers as JSON unless --json is given, go to out/accuracy.
     """
     from percussion_model.interface.commands.accuracy_tables import (
         show_bars,

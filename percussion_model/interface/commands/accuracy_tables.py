@@ -85,7 +85,7 @@ def show_bars(reference: Reference, console: Console | None = None) -> None:
             label,
             "" if key in HISTORIES else f"{quantity.factor * bar.value:.7g}",
             _number(abs(bar.error / bar.value)),
-            _number(abs(bar.wave - bar.fem) / abs(bar.value)),
+            _number(abs(bar.wave - bar.elements) / abs(bar.value)),
             "" if bar.agreed else "no reference: the limits disagree",
         )
     (console or Console()).print(table)
@@ -149,7 +149,7 @@ def _show_orders(found: Study, console: Console) -> None:
 
 
 def _show_costs(found: Study, console: Console) -> None:
-    """Print the cost of errors of the first quantity, with and without leaps, best of each family."""
+    """Print what errors of the first quantity cost the waves, and the best of each family."""
     table = _table(
         f"ms to compute a simulated second, for an error in {SHORT[found.main]}", "error"
     )

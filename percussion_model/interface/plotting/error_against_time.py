@@ -29,6 +29,7 @@ _WAVE, _FEM, _SCIPY, _RIGID, _PEER = "#0072B2", "#D55E00", "#009E73", "#595959",
 LINES: dict[str, tuple[str, Any, str]] = {
     "wave": (_WAVE, "-", "o"),
     "wave-steps": (_WAVE, (0, (4, 1.5)), "o"),
+    "explicit": (_PEER, "-", "v"),
     "fem": (_FEM, "-", "s"),
     "fem-paper": ("#E69F00", (0, (4, 1.5)), "s"),
     "fem-gauss": (_FEM, (0, (1.2, 1.2)), "D"),
@@ -84,8 +85,10 @@ def draw_misfits(studies: Sequence[Study]) -> Figure:
         ax.plot(x, y, marker=markers[k % 7], color=colours[k % 7], markersize=5.0, linestyle="",
                 label=found.title)  # fmt: skip
     for factor, dashes in ((1.0, "-"), (10.0, (0, (4, 1.5)))):
-        ax.plot(scale, [factor * value for value in scale], color=style.RULE_COLOUR,
-                linestyle=dashes, linewidth=0.9, zorder=1, label=f"{factor:g} times the misfit")  # fmt: skip
+        ax.plot(
+            scale, [factor * value for value in scale], color=style.RULE_COLOUR,
+            linestyle=dashes, linewidth=0.9, zorder=1, label=f"{factor:g} times the misfit",
+        )  # fmt: skip
     _log_axes(ax)
     style.label(ax, "error of the wave speed, relative", "error of the rate, relative")
     style.head(fig, "Lengths that do not fit the cells, at about 40 cells in the piston")

@@ -545,6 +545,8 @@ def run(reads, par_, state, runs, first, second, v, time, blows, events, reading
     row.bit_end_velocity = s.v_end
     row.bit_kinetic_energy = kinetic
     row.contact_force = s.contact_force
+    # the last step is at most half of one away
+    row.contact_impulse += (time - s.time) * s.contact_force
     share = (time - (s.time - 1.5 * par.dt)) / par.dt
     row.bit_force = s.force_before + min(max(share, 0.0), 1.0) * (s.force - s.force_before)
     return status

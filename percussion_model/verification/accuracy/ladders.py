@@ -7,13 +7,16 @@ finite elements with their mesh, the ladder's note says so.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from percussion_model.scene.numbers import numbers_of
 from percussion_model.scene.scene import Scene, SceneError
+from percussion_model.solvers.base import Solver
 from percussion_model.solvers.wave.grid import elastic_bars, fitting_cells
+from percussion_model.verification.accuracy.explicit import ExplicitSolver
 from percussion_model.verification.accuracy.problems import APERIODIC, Problem
 from percussion_model.verification.accuracy.semidiscrete import refusal
 
@@ -42,6 +45,7 @@ MISFIT_CELLS, MISFIT_NEAR, MISFIT_RUNGS = 40, 1.25, 6
 WAVE_CELLS = (3, 5, 7, 10, 13, 20, 28, 40, 60, 80, 120)
 WAVE_CELLS_FULL = (*WAVE_CELLS, 160, 200)
 MESHES, MESHES_FULL = (10, 20, 30, 50, 70), (10, 20, 30, 50, 70, 100)
+EXPLICIT_MESHES, EXPLICIT_MOST = (5, 7, 10, 14, 20, 28, 40, 56, 80, 113, 160), 250.0
 FEW = (3, 5, 10, 20)  # of a bar so long that no four of the others are affordable
 STEPS = (20.0, 10.0, 5.0, 3.0, 2.0, 1.0)
 COURANT = 2.0
@@ -91,6 +95,12 @@ LADDERS = {
             "error of the wave speed",
             "about 40 cells in the piston",
             "wave",
+        ),
+        Ladder(
+            "explicit",
+            "explicit elements",
+            "element size",
+            "elements in the piston, hard contact, leapfrog at nine tenths of the stable step",
         ),
         Ladder(
             "fem",
@@ -165,6 +175,8 @@ class Rung:
         Its tolerance.
     duration : float or None
         Simulated time, where it is not that of the problem [s].
+    peer : callable or None
+        Makes a peer's solver of the scene; None for the solver that the scene names.
     """
 
     ladder: str
@@ -174,6 +186,7 @@ class Rung:
     integrator: str = ""
     relative: float = 0.0
     duration: float | None = None
+    peer: Callable[[Scene], Solver] | None = None
 
 
 def chosen_ladders(words: Sequence[str] | None) -> tuple[str, ...]:
@@ -226,7 +239,7 @@ def ladders(problem: Problem, full: bool = False) -> list[Rung]:
     """
     if problem.kind == APERIODIC:
         return list(_rising_durations(problem, full))
-    rungs = [*_waves(problem, full), *_elements(problem, full)]
+    rungs = [*_waves(problem, full), *_explicit(problem, full), *_elements(problem, full)]
     rungs.append(Rung("rigid", "", 1.0, problem.scene.computed_by("rigid")))
     if not refusal(problem.scene):
         rungs += _general(problem, full)
@@ -300,6 +313,18 @@ def _elements(problem: Problem, full: bool) -> Iterator[Rung]:
     for count in counts[: -1 if len(counts) > 4 else None]:
         chosen = fem_scene(scene, count, 1.0, stiffness_of(count), 1.0)
         yield Rung("fem-gauss", f"{count} elements", 1.0 / count, chosen)
+
+
+def _explicit(problem: Problem, full: bool) -> Iterator[Rung]:
+    scene = problem.scene
+    try:
+        ExplicitSolver(scene, EXPLICIT_MESHES[0])
+    except SceneError:
+        return
+    most = EXPLICIT_MOST * (2.0 if full else 1.0)
+    for count in _affordable(scene, EXPLICIT_MESHES, most):
+        peer = partial(ExplicitSolver, elements=count)
+        yield Rung("explicit", f"{count} elements", 1.0 / count, scene, peer=peer)
 
 
 def _general(problem: Problem, full: bool) -> Iterator[Rung]:

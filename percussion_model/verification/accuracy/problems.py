@@ -16,6 +16,7 @@ from percussion_model.scene.bars import AREA, LENGTH, bar_length, section_mass
 from percussion_model.scene.numbers import section_numbers
 from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.simulation.simulate import Simulation, Snapshot
+from percussion_model.solvers.base import Solver
 
 RATE = "rate_of_penetration"
 HISTORY = "bit_force_history"
@@ -162,9 +163,12 @@ class Problem:
 
     @property
     def contact_edges(self) -> np.ndarray:
-        """Times since the start of a blow between which means of the contact force are taken."""
+        """Times since the start of a blow between which means of the contact force are taken.
+
+        The start itself, where explicit elements have an impulse, lies between two.
+        """
         end = min(HISTORY_LENGTH, 0.5 * self.period)
-        return np.arange(0.0, end + 0.5 * CONTACT_STEP, CONTACT_STEP)
+        return np.arange(-0.5 * CONTACT_STEP, end, CONTACT_STEP)
 
     @property
     def quantities(self) -> tuple[str, ...]:
@@ -227,6 +231,8 @@ class Run:
     problem : Problem
     scene : Scene
         That of the problem, with a solver chosen.
+    solver : Solver, optional
+        A peer, made for the scene; else that which the scene names.
 
     Attributes
     ----------
@@ -234,9 +240,9 @@ class Run:
         Time to make the solver [s]; of the first of a kind compilation included.
     """
 
-    def __init__(self, problem: Problem, scene: Scene) -> None:
+    def __init__(self, problem: Problem, scene: Scene, solver: Solver | None = None) -> None:
         self.problem = problem
-        self.simulation = Simulation(scene, record_events=False)
+        self.simulation = Simulation(scene, record_events=False, solver=solver)
         self.setup_time = self.simulation.setup_time
         self._start = self.simulation.save()
 

@@ -11,16 +11,18 @@ import json
 import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from importlib.metadata import version
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from percussion_model.scene.scene import Scene
+from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.simulation.files import staged_text
+from percussion_model.solvers.base import Solver
+from percussion_model.verification.accuracy.explicit import ExplicitSolver
 from percussion_model.verification.accuracy.ladders import (
     FITS,
     best_fitting,
@@ -52,16 +54,15 @@ STORE = "references.json"
 FORMAT = 2
 # Digits of a stored history.
 DIGITS = 6
-# Order that extrapolation assumes: the least that was ever measured for the waves; the
-# elements' mesh, with a penalty that goes along, is of second order.
-WAVE_ORDER, FEM_ORDER = 1.0, 2.0
+# Order that extrapolation assumes: about the least that was measured.
+ORDER = 1.0
 # Cells in all bars together, coarse to fine; elements likewise.
 WAVE_LEVELS, WAVE_LEVELS_QUICK = (172.0, 258.0, 430.0), (86.0, 129.0, 172.0)
-FEM_LEVELS, FEM_LEVELS_QUICK = (108.0, 151.0, 215.0), (65.0, 86.0, 108.0)
+ELEMENTS_LEVELS, ELEMENTS_LEVELS_QUICK = (215.0, 301.0, 430.0), (108.0, 151.0, 215.0)
 # Where these do not fit the lengths, cells that do, up to so many in all bars.
 MOST_CELLS = 900
 # Simulated time of aperiodic references, by the scene's duration.
-LONG = {"wave": 20.0, "fem": 4.0}
+LONG = 20.0
 LONG_CELLS = 40
 # Limits that are relatively closer than this agree whatever their bars say.
 CLOSE = 2e-5
@@ -75,7 +76,7 @@ class Bar:
     ----------
     value, error : float
         Reference and its bar, SI units.
-    wave, wave_error, fem, fem_error : float
+    wave, wave_error, elements, elements_error : float
         Limits of the two solvers and their bars.
     agreed : bool
         Whether the limits lie within their bars of each other.
@@ -85,8 +86,8 @@ class Bar:
     error: float
     wave: float
     wave_error: float
-    fem: float
-    fem_error: float
+    elements: float
+    elements_error: float
     agreed: bool
 
 
@@ -221,29 +222,24 @@ def make_reference(
     progress : callable
         Called with what is being computed.
     """
-    wave, fem = _scenes(problem, quick)
-    answers: dict[str, list[Answer]] = {"wave": [], "fem": []}
-    for name, chosen in (("wave", wave), ("fem", fem)):
+    levels = _levels(problem, quick)
+    answers: dict[str, list[Answer]] = {}
+    for solver, chosen in levels.items():
+        answers[solver] = []
         for level in chosen:
-            progress(f"reference: {_level_name(level)}")
-            answers[name].append(_answer(problem, level, name))
+            progress(f"reference: {level.name}")
+            answers[solver].append(_answer(problem, level))
     bars = {}
     for key in problem.quantities:
         if key in HISTORIES:
-            bars[key] = _history_bar(answers, key)
-            continue
-        if problem.kind == APERIODIC:
-            last = [answers[name][-1] for name in ("wave", "fem")]
-            limits = [(answer.values[key], answer.errors[key]) for answer in last]
+            bars[key] = _history_bar(levels, answers, key)
+        elif problem.kind == APERIODIC:
+            last = [found[-1] for found in answers.values()]
+            bars[key] = _agree(*((answer.values[key], answer.errors[key]) for answer in last))
         else:
-            limits = [
-                _limit(answers["wave"], wave, key, WAVE_ORDER),
-                _limit(answers["fem"], fem, key, FEM_ORDER),
-            ]
-        bars[key] = _agree(*limits)
+            bars[key] = _agree(*(_limit(answers[name], levels[name], key) for name in levels))
     made = {
-        "wave": [_level_name(level) for level in wave],
-        "fem": [_level_name(level) for level in fem],
+        **{name: [level.name for level in chosen] for name, chosen in levels.items()},
         "date": time.strftime("%Y-%m-%d"),
         "version": version("percussion_model"),
         "numpy": version("numpy"),
@@ -253,22 +249,59 @@ def make_reference(
     return Reference(scene.title, problem.kind, bars, answers["wave"][-1].histories, made)
 
 
-def _scenes(problem: Problem, quick: bool) -> tuple[list[Scene], list[Scene]]:
-    """Levels of both solvers, coarse to fine."""
-    scene = problem.scene
+class Level(NamedTuple):
+    """A solver at one resolution.
+
+    Attributes
+    ----------
+    name : str
+    scene : Scene
+    size : float
+        Of a cell or element, by that of the first bar.
+    fits : bool
+        Whether the cells fit the lengths.
+    peer : Solver or None
+        Explicit elements; None for the solver that the scene names.
+    """
+
+    name: str
+    scene: Scene
+    size: float
+    fits: bool = True
+    peer: Solver | None = None
+
+
+def _levels(problem: Problem, quick: bool) -> dict[str, list[Level]]:
+    """Levels of waves and elements, coarse to fine."""
+    scene, lengths = problem.scene, total_length(problem.scene)
     if problem.kind == APERIODIC:
-        return (
-            [scene.computed_by("wave", **{"solver.cells": LONG_CELLS})],
-            [fem_scene(scene, LONG_CELLS, 2.0, stiffness_of(LONG_CELLS))],
+        counts, meshes = [LONG_CELLS], [LONG_CELLS]
+    else:
+        targets = ELEMENTS_LEVELS_QUICK if quick else ELEMENTS_LEVELS
+        meshes = [max(3, round(target / lengths)) for target in targets]
+        targets = WAVE_LEVELS_QUICK if quick else WAVE_LEVELS
+        counts = wave_levels(scene, targets, 0 if quick else MOST_CELLS)
+    waves = [
+        Level(
+            f"wave, {count} cells",
+            scene.computed_by("wave", **{"solver.cells": count}),
+            1.0 / count,
+            misfit_of(scene, count) < FITS,
         )
-    lengths = total_length(scene)
-    waves, elements = (WAVE_LEVELS_QUICK, FEM_LEVELS_QUICK) if quick else (WAVE_LEVELS, FEM_LEVELS)
-    counts = wave_levels(scene, waves, 0 if quick else MOST_CELLS)
-    wave = [scene.computed_by("wave", **{"solver.cells": count}) for count in counts]
-    meshes = [max(3, round(level / lengths)) for level in elements]
-    finest = FEM_LEVELS[0] / lengths
-    fem = [fem_scene(scene, count, 1.0, 2.5e13 * (count / finest) ** 2) for count in meshes]
-    return wave, fem
+        for count in counts
+    ]
+    return {"wave": waves, "elements": [_elements(scene, count) for count in meshes]}
+
+
+def _elements(scene: Scene, count: int) -> Level:
+    """Explicit elements, or implicit ones where those cannot do the scene."""
+    try:
+        peer = ExplicitSolver(scene, count)
+    except SceneError:
+        stiffness = 10.0 * stiffness_of(count)
+        name = f"fem, {count} elements, CFL 1, K_C {stiffness:.3g} N/m"
+        return Level(name, fem_scene(scene, count, 1.0, stiffness), 1.0 / count)
+    return Level(f"explicit, {count} elements", scene, 1.0 / count, peer=peer)
 
 
 def wave_levels(scene: Scene, targets: Sequence[float], most: int) -> list[int]:
@@ -287,73 +320,59 @@ def wave_levels(scene: Scene, targets: Sequence[float], most: int) -> list[int]:
     return best + [n for n in fitting if n > best[-1]][:1]
 
 
-def _level_name(scene: Scene) -> str:
-    if scene.solver_name == "wave":
-        return f"wave, {scene.solver.cells} cells"
-    fem = scene.fem
-    return f"fem, {fem.elements} elements, CFL {fem.courant:g}, K_C {fem.contact_stiffness:.3g} N/m"
-
-
-def _answer(problem: Problem, scene: Scene, solver: str) -> Answer:
+def _answer(problem: Problem, level: Level) -> Answer:
     if problem.kind == APERIODIC:
-        duration = LONG[solver] * problem.duration
-        problem = Problem(problem.scene, problem.kind, duration, problem.period)
-    return Run(problem, scene).answer()
+        problem = replace(problem, duration=LONG * problem.duration)
+    return Run(problem, level.scene, level.peer).answer()
 
 
-def _limit(
-    answers: Sequence[Answer], scenes: Sequence[Scene], key: str, order: float
-) -> tuple[float, float]:
+def _limit(answers: Sequence[Answer], levels: Sequence[Level], key: str) -> tuple[float, float]:
     """Extrapolate the last two levels; the bar is what the last two steps of it changed.
 
     Half the change from the level before to the finest is a bound as well: where answers
     jump from level to level, extrapolation would promise too much. Levels that do not fit
     the lengths do not fall in order: then the finest is taken, and its change is the bar.
     """
-    sizes = [1.0 / _count(scene) for scene in scenes]
     values = [answer.values[key] for answer in answers]
     change = abs(values[-1] - values[-2])
-    if any(_misfit(scene) >= FITS for scene in scenes):
+    if not all(level.fits for level in levels):
         return values[-1], change
-    limits = []
-    for k in range(len(values) - 1):
-        ratio = (sizes[k] / sizes[k + 1]) ** order - 1.0
-        limits.append(values[k + 1] + (values[k + 1] - values[k]) / ratio)
+    limits = [
+        values[k + 1] + _remains(levels[k : k + 2]) * (values[k + 1] - values[k])
+        for k in range(len(values) - 1)
+    ]
     return limits[-1], max(abs(limits[-1] - limits[-2]), 0.5 * change)
 
 
-def _count(scene: Scene) -> float:
-    if scene.solver_name == "fem":
-        return float(scene.fem.elements)
-    return float(scene.solver.cells or math.nan)
+def _remains(levels: Sequence[Level]) -> float:
+    """Error of the finer of two levels by the change between them."""
+    return 1.0 / ((levels[0].size / levels[1].size) ** ORDER - 1.0)
 
 
-def _misfit(scene: Scene) -> float:
-    """Error of the wave speed; elements have none."""
-    return misfit_of(scene, scene.solver.cells or 0) if scene.solver_name == "wave" else 0.0
-
-
-def _agree(wave: tuple[float, float], fem: tuple[float, float]) -> Bar:
+def _agree(wave: tuple[float, float], elements: tuple[float, float]) -> Bar:
     """Two limits agree within the sum of their bars, or so closely that nobody asks for more.
 
     The one with the smaller bar is taken; where they are further apart than the bars
     say, the bar is their distance.
     """
-    off = abs(wave[0] - fem[0])
-    value, error = min((wave, fem), key=lambda limit: limit[1])
-    within = off <= wave[1] + fem[1]
+    off = abs(wave[0] - elements[0])
+    value, error = min((wave, elements), key=lambda limit: limit[1])
+    within = off <= wave[1] + elements[1]
     agreed = within or off <= CLOSE * abs(value)
-    return Bar(value, error if within else max(error, off), *wave, *fem, agreed)
+    return Bar(value, error if within else max(error, off), *wave, *elements, agreed)
 
 
-def _history_bar(answers: dict[str, list[Answer]], key: str) -> Bar:
-    """L1 distance of the finest histories to those of the level before, and to each other."""
-    coarser, finest = (answer.histories[key] for answer in answers["wave"][-2:])
-    before, other = (answer.histories[key] for answer in answers["fem"][-2:])
-    whole = float(np.sum(np.abs(finest)))
+def _history_bar(levels: dict[str, list[Level]], answers: dict[str, list[Answer]], key: str) -> Bar:
+    """L1 distance of the finest histories to each other, and what is left of their own error."""
+    finest = {name: found[-1].histories[key] for name, found in answers.items()}
+    whole = float(np.sum(np.abs(finest["wave"])))
 
     def apart(a: np.ndarray, b: np.ndarray) -> float:
         return float(np.sum(np.abs(a - b))) / whole
 
-    own, theirs, off = apart(finest, coarser), apart(other, before), apart(finest, other)
+    own, theirs = (
+        _remains(levels[name][-2:]) * apart(finest[name], answers[name][-2].histories[key])
+        for name in ("wave", "elements")
+    )
+    off = apart(finest["wave"], finest["elements"])
     return Bar(1.0, max(own, off), 1.0, own, 1.0 + off, theirs, off <= own + theirs)
