@@ -350,8 +350,10 @@ def _rising_durations(problem: Problem, full: bool) -> Iterator[Rung]:
         "wave": (scene.computed_by("wave", **{"solver.cells": 20}), 1.0),
         "fem": (fem_scene(scene, 20, COURANT, stiffness_of(20)), 0.25),
         "rigid": (scene.computed_by("rigid"), 1.0),
+        "explicit": (scene, 1.0),
     }
     for name, (chosen, share) in solvers.items():
+        peer = partial(ExplicitSolver, elements=20) if name == "explicit" else None
         for factor in DURATIONS:
             duration = share * factor / 16.0 * problem.duration * (4.0 if full else 1.0)
-            yield Rung(name, f"{duration:g} s", duration, chosen, duration=duration)
+            yield Rung(name, f"{duration:g} s", duration, chosen, duration=duration, peer=peer)

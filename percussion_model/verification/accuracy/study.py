@@ -174,7 +174,8 @@ class Study:
             return None
         best = min(known, key=lambda cost: cost.value)
         low = min(cost.low for cost in found if math.isfinite(cost.low))
-        return replace(best, low=low, high=min(cost.high for cost in known))
+        highs = [cost.high for cost in known if math.isfinite(cost.high)]
+        return replace(best, low=low, high=min(highs, default=math.nan))
 
     def advice(self, wanted: float) -> str:
         """The sentence "for 1 % take ..."."""
