@@ -6,11 +6,14 @@ finite elements with their mesh, the ladder's note says so.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from percussion_model.scene.scene import Scene, SceneError
+from percussion_model.solvers.base import Solver
+from percussion_model.verification.accuracy.explicit import ExplicitSolver
 from percussion_model.verification.accuracy.problems import APERIODIC, Problem
 from percussion_model.verification.accuracy.semidiscrete import refusal
 
@@ -24,6 +27,7 @@ PAPER_STIFFNESS = 1e12
 WAVE_CELLS = (3, 4, 5, 7, 10, 13, 20, 40, 60, 80, 120)
 WAVE_CELLS_FULL = (*WAVE_CELLS, 160, 200)
 MESHES, MESHES_FULL = (10, 20, 30, 50, 70), (10, 20, 30, 50, 70, 100)
+EXPLICIT, EXPLICIT_FULL = (10, 15, 20, 25, 30, 40, 60, 80), (10, 15, 20, 25, 30, 40, 60, 80, 120)
 FEW = (3, 5, 10, 20)  # of a bar so long that no four of the others are affordable
 STEPS = (20.0, 10.0, 5.0, 3.0, 2.0, 1.0)
 COURANT = 2.0
@@ -71,6 +75,12 @@ LADDERS = {
             "element size",
             "as fem at CFL 1, with spectral radius 1 (Gauss's scheme)",
         ),
+        Ladder(
+            "explicit",
+            "explicit elements",
+            "element size",
+            "lumped masses, hard contact, leapfrog at 0.9 of the longest stable step",
+        ),
         Ladder("rigid", "rigid", "", "an error of the model: there is nothing to refine"),
         Ladder("lsoda", "scipy LSODA", "element size", "relative tolerance 1e-4, K_C as fem"),
         Ladder("lsoda-tol", "scipy LSODA, tolerance", "tolerance", "30 elements, K_C as fem"),
@@ -114,6 +124,8 @@ class Rung:
         Its tolerance.
     duration : float or None
         Simulated time, where it is not that of the problem [s].
+    peer : callable or None
+        Makes the solver of a scene where it is none that scenes name.
     """
 
     ladder: str
@@ -123,6 +135,7 @@ class Rung:
     integrator: str = ""
     relative: float = 0.0
     duration: float | None = None
+    peer: Callable[[Scene], Solver] | None = None
 
 
 def chosen_ladders(words: Sequence[str] | None) -> tuple[str, ...]:
@@ -175,7 +188,7 @@ def ladders(problem: Problem, full: bool = False) -> list[Rung]:
     """
     if problem.kind == APERIODIC:
         return list(_rising_durations(problem, full))
-    rungs = [*_waves(problem, full), *_elements(problem, full)]
+    rungs = [*_waves(problem, full), *_elements(problem, full), *_explicit(problem, full)]
     rungs.append(Rung("rigid", "", 1.0, problem.scene.computed_by("rigid")))
     if not refusal(problem.scene):
         rungs += _general(problem, full)
@@ -220,6 +233,14 @@ def _elements(problem: Problem, full: bool) -> Iterator[Rung]:
     for count in counts[: -1 if len(counts) > 4 else None]:
         chosen = fem_scene(scene, count, 1.0, stiffness_of(count), 1.0)
         yield Rung("fem-gauss", f"{count} elements", 1.0 / count, chosen)
+
+
+def _explicit(problem: Problem, full: bool) -> Iterator[Rung]:
+    scene = problem.scene
+    meshes = EXPLICIT_FULL if full else EXPLICIT
+    for count in _affordable(scene, meshes, MOST_ELEMENTS if full else MOST_ELEMENTS / 2):
+        peer = partial(ExplicitSolver, elements=count)
+        yield Rung("explicit", f"{count} elements", 1.0 / count, scene, peer=peer)
 
 
 def _general(problem: Problem, full: bool) -> Iterator[Rung]:

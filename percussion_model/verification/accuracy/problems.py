@@ -7,12 +7,14 @@ four seconds; a drop is computed as a whole; an aperiodic scene by statistics.
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.simulation.simulate import Simulation
+from percussion_model.solvers.base import Solver
 
 RATE = "rate_of_penetration"
 HISTORY = "bit_force_history"
@@ -202,6 +204,8 @@ class Run:
     problem : Problem
     scene : Scene
         That of the problem, with a solver chosen.
+    peer : callable, optional
+        Makes a solver that scenes do not name.
 
     Attributes
     ----------
@@ -209,10 +213,14 @@ class Run:
         Time to make the solver [s]; of the first of a kind compilation included.
     """
 
-    def __init__(self, problem: Problem, scene: Scene) -> None:
+    def __init__(
+        self, problem: Problem, scene: Scene, peer: Callable[[Scene], Solver] | None = None
+    ) -> None:
         self.problem = problem
-        self.simulation = Simulation(scene, record_events=False)
-        self.setup_time = self.simulation.setup_time
+        began = time.perf_counter()
+        solver = None if peer is None else peer(scene)
+        self.simulation = Simulation(scene, record_events=False, solver=solver)
+        self.setup_time = time.perf_counter() - began
         self._start = self.simulation.save()
 
     def cost(self, duration: float | None = None) -> float:
