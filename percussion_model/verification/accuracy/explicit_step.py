@@ -406,9 +406,9 @@ def meet(par, s, runs, w, v, upper, blows, events):
 
 
 @inlined
-def move_node(par, old, new, v, i, after, way):
-    """Give a node at an end its velocity, and a position that is `way` further."""
-    new[i] = old[i] + ((par.dt + par.eta) * after - par.eta * v[i]) + way
+def move_node(par, old, new, v, i, after):
+    """Give a node at an end its velocity and its place."""
+    new[i] = old[i] + ((par.dt + par.eta) * after - par.eta * v[i])
     v[i] = after
 
 
@@ -438,24 +438,24 @@ def step(par, s, runs, old, new, v, blows, events):
     end = runs[last].first + runs[last].n
     step_rock_end(par, s, runs, old, v, (runs[last].low - v[end]) / dt, events)
     runs[last].low = s.v_end
+    way = 0.0
     for r in range(first, last):
-        way = 0.0
         if runs[r].joint == Joint.CONTACT:
             way = meet(par, s, runs, old, v, r, blows, events)
         else:
             share_velocity(runs, r)
-        i = runs[r].first + runs[r].n
-        move_node(par, old, new, v, i, runs[r].low, way)
-        move_node(par, old, new, v, i + 1, runs[r + 1].top, 0.0)
-        if way != 0.0:
-            new[i + 1] = new[i]
-    move_node(par, old, new, v, runs[first].first, runs[first].top, 0.0)
-    v[end] = s.v_end
-    new[end] = (s.x_r + s.p) + (0.5 * dt + par.eta) * s.v_end
     for r in range(first, last + 1):
+        i = runs[r].first
+        j = i + runs[r].n
+        move_node(par, old, new, v, i, runs[r].top)
+        move_node(par, old, new, v, j, runs[r].low)
         kick = load if runs[r].bit == 1 else push
-        inner = runs[r].n - 1
-        sweep(old, new, v, runs[r].first, inner, runs[r].kappa, kick, par.eta, dt + par.eta)
+        sweep(old, new, v, i, runs[r].n - 1, runs[r].kappa, kick, par.eta, dt + par.eta)
+    if way != 0.0:
+        i = runs[par.uppers].first
+        new[i - 1] += way
+        new[i] = new[i - 1]
+    new[end] = (s.x_r + s.p) + (0.5 * dt + par.eta) * s.v_end
     if s.quiet_p == 1:
         fly(par, s, push, runs[first].top)
 
@@ -539,10 +539,10 @@ def look(par, s, runs, w, v, events):
             s.v_end = 0.0
             s.force = spring_force(s)
             s.force_before = s.force
-    if s.closed == 0 and s.quiet_p == 0 and par.uppers > 0:
-        if flying_energy(par, s, runs, w, v) < QUIET:
-            s.quiet_p = 1
-            s.u_p = u_p
+    flying = s.closed == 0 and s.quiet_p == 0 and par.uppers > 0
+    if flying and flying_energy(par, s, runs, w, v) < QUIET:
+        s.quiet_p = 1
+        s.u_p = u_p
     if par.mass_p > 0.0:
         s.u_r = u_p - u_b
         turn_pressure(par, s, runs, w, v, events)
