@@ -10,12 +10,13 @@ import math
 import statistics
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from percussion_model import Scene, SceneError, Simulation
-from percussion_model.solvers.base import Solver
+from percussion_model.solvers.base import Solver, make_solver
 from percussion_model.verification.accuracy.explicit import ExplicitSolver
 from percussion_model.verification.accuracy.problems import PERIODIC, RATE, Run, pose
 
@@ -29,22 +30,18 @@ ROCKS = np.geomspace(1e8, 2e9, 6)  # [N/m]
 # Points whose references differ by more are left out; errors above this are counted.
 MOST_APART, GROSS = 3e-3, 1e-2
 
-Way = Callable[[Scene], tuple[Scene, Solver | None]]
+Way = Callable[[Scene], Solver]
 
 
 def waves(cells: int, leaps: bool = True) -> Way:
     """Waves with so many cells in the piston."""
-
-    def way(scene: Scene) -> tuple[Scene, Solver | None]:
-        changes = {"solver.cells": cells, "solver.leaps": leaps}
-        return scene.computed_by("wave", **changes), None
-
-    return way
+    changes = {"solver.cells": cells, "solver.leaps": leaps}
+    return lambda scene: make_solver(scene.computed_by("wave", **changes))
 
 
 def explicit(elements: int) -> Way:
     """Explicit elements, so many in the piston."""
-    return lambda scene: (scene, ExplicitSolver(scene, elements))
+    return partial(ExplicitSolver, elements=elements)
 
 
 METHODS: dict[str, Way] = {
@@ -74,8 +71,7 @@ def hang(way: Way, step: float) -> tuple[float, float]:
     second : float
         Processor time of a simulated second [s].
     """
-    scene, solver = way(Scene())
-    simulation = Simulation(scene, record_events=False, solver=solver)
+    simulation = Simulation(Scene(), record_events=False, solver=way(Scene()))
     simulation.observe()
     began = time.process_time()
     for k in range(round(DURATION / step)):
@@ -152,7 +148,7 @@ def point(scene: Scene) -> tuple[float, dict[str, tuple[float, float]]] | None:
         return None
 
     def rate(way: Way) -> tuple[float, Run]:
-        run = Run(problem, *way(problem.scene))
+        run = Run(problem, problem.scene, way)
         return run.answer().values[RATE], run
 
     limits = [rate(way)[0] for way in REFINED]

@@ -122,6 +122,7 @@ class ExplicitSolver(Solver):
         p["dt"] = self.time_step = courant * min(stable_step(t, eta) for t in transits)
         runs["kappa"] *= p["dt"]
         p["end_mass"] = runs["half"][-1]
+        p["uppers"] = np.sum(runs["bit"] == 0)
         self._par, self._runs, self._nodes = par, runs, node
         self.cells = {
             name: int(runs["n"][runs["bit"] == bit].sum())

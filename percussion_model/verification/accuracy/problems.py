@@ -7,6 +7,7 @@ four seconds; a drop is computed as a whole; an aperiodic scene by statistics.
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -231,8 +232,8 @@ class Run:
     problem : Problem
     scene : Scene
         That of the problem, with a solver chosen.
-    solver : Solver, optional
-        A peer, made for the scene; else that which the scene names.
+    peer : callable, optional
+        Makes a solver that scenes do not name.
 
     Attributes
     ----------
@@ -240,10 +241,14 @@ class Run:
         Time to make the solver [s]; of the first of a kind compilation included.
     """
 
-    def __init__(self, problem: Problem, scene: Scene, solver: Solver | None = None) -> None:
+    def __init__(
+        self, problem: Problem, scene: Scene, peer: Callable[[Scene], Solver] | None = None
+    ) -> None:
         self.problem = problem
+        began = time.perf_counter()
+        solver = None if peer is None else peer(scene)
         self.simulation = Simulation(scene, record_events=False, solver=solver)
-        self.setup_time = self.simulation.setup_time
+        self.setup_time = time.perf_counter() - began
         self._start = self.simulation.save()
 
     def cost(self, duration: float | None = None) -> float:

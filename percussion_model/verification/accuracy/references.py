@@ -12,6 +12,7 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field, replace
+from functools import partial
 from importlib.metadata import version
 from importlib.resources import files
 from pathlib import Path
@@ -260,15 +261,15 @@ class Level(NamedTuple):
         Of a cell or element, by that of the first bar.
     fits : bool
         Whether the cells fit the lengths.
-    peer : Solver or None
-        Explicit elements; None for the solver that the scene names.
+    peer : callable or None
+        Makes explicit elements; None for the solver that the scene names.
     """
 
     name: str
     scene: Scene
     size: float
     fits: bool = True
-    peer: Solver | None = None
+    peer: Callable[[Scene], Solver] | None = None
 
 
 def _levels(problem: Problem, quick: bool) -> dict[str, list[Level]]:
@@ -295,8 +296,9 @@ def _levels(problem: Problem, quick: bool) -> dict[str, list[Level]]:
 
 def _elements(scene: Scene, count: int) -> Level:
     """Explicit elements, or implicit ones where those cannot do the scene."""
+    peer = partial(ExplicitSolver, elements=count)
     try:
-        peer = ExplicitSolver(scene, count)
+        peer(scene)
     except SceneError:
         stiffness = 10.0 * stiffness_of(count)
         name = f"fem, {count} elements, CFL 1, K_C {stiffness:.3g} N/m"

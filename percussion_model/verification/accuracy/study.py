@@ -329,7 +329,7 @@ def _measured(
         if rung.integrator:
             run = GeneralRun(problem, rung.scene, rung.integrator, rung.relative, patience)
         else:
-            run = Run(problem, rung.scene, rung.peer(rung.scene) if rung.peer else None)
+            run = Run(problem, rung.scene, rung.peer)
         answer = run.answer()
     except OutOfTime:
         return replace(empty, note=f"took more than {patience:g} s for a blow"), None

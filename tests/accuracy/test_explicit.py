@@ -1,0 +1,134 @@
+"""Explicit elements against closed forms, stored references and the finite elements."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from percussion_model import Scene, SceneError, Simulation
+from percussion_model.verification.accuracy.explicit import ExplicitSolver, explicit_rate
+from percussion_model.verification.accuracy.ladders import fem_scene, stiffness_of
+from percussion_model.verification.accuracy.problems import HISTORY, RATE, Run, pose, relative_error
+from percussion_model.verification.accuracy.references import find_reference
+
+SCENARIOS = Path(__file__).parents[2] / "scenarios"
+BARE = {
+    "effects.gravity": False,
+    "effects.feed": False,
+    "effects.drive": "none",
+    "effects.loss": False,
+    "run.settle": 0.0,
+    "start.rock_gap": 0.0,
+    "start.gap": 0.0,
+}
+SECTION = Scene().piston.sections[0]
+WAVE_SPEED = math.sqrt(SECTION.youngs_modulus / SECTION.density)
+IMPEDANCE = SECTION.area * math.sqrt(SECTION.youngs_modulus * SECTION.density)
+
+
+def explicit(scene, elements):
+    return Simulation(scene, solver=ExplicitSolver(scene, elements))
+
+
+def test_impact_of_two_bars_of_one_section():
+    """Oracle 1: the force is Z v / 2 for two transits; then the piston is at rest."""
+    scene = Scene().replace(
+        **BARE | {"effects.rock": "none", "effects.loss": True, "start.piston_velocity": 10.0}
+    )
+    simulation = explicit(scene, 80)
+    rows = simulation.sample(np.linspace(10e-6, 100e-6, 91))
+    early = rows["time"] < 50e-6
+    assert rows["contact_force"][early].mean() == pytest.approx(IMPEDANCE * 5.0, rel=2e-3)
+    assert rows["piston_velocity"][-1] == pytest.approx(0.0, abs=0.06)  # loss rounds the front
+    momentum = scene.piston.mass * rows["piston_velocity"] + scene.bit.mass * rows["bit_velocity"]
+    assert momentum == pytest.approx(10.0 * scene.piston.mass, rel=1e-9)
+    closed, opened = simulation.events["time"][:2]
+    transit = scene.piston.length / WAVE_SPEED
+    assert opened - closed == pytest.approx(2.0 * transit, abs=0.1 * transit)
+
+
+def test_piston_drives_bit_into_linear_rock():
+    """Oracle 2: penetration at the end of the incident wave, p = (Z v / K)(1 - exp(-beta))."""
+    scene = Scene().replace(**BARE | {"effects.rock": "spring", "start.piston_velocity": 8.5})
+    end = (scene.bit.length + 2.0 * scene.piston.length) / WAVE_SPEED
+    stiffness = scene.rock.loading_stiffness
+    beta = 2.0 * stiffness * scene.piston.length / (SECTION.youngs_modulus * SECTION.area)
+    wanted = IMPEDANCE * 8.5 / stiffness * -math.expm1(-beta)
+    errors = []
+    for elements in (40, 160):
+        found = explicit(scene, elements).sample(np.array([end]))["bit_end_position"][0]
+        errors.append(abs(found / wanted - 1.0))
+    # the front rings without loss: its place, not its height, converges
+    assert errors[1] < 0.5 * errors[0] < 0.01
+
+
+def test_bit_dropped_on_linear_rock():
+    """Oracle 3: the greatest penetration of an elastic bar, where a rigid one has 0.565084 mm."""
+    scene = Scene().replace(
+        **BARE | {"effects.rock": "spring", "piston.model": "absent", "start.bit_velocity": 5.25}
+    )
+    rows = explicit(scene, 20).sample(np.linspace(1.6e-4, 1.8e-4, 201))
+    peak = rows["bit_force"].max() / scene.rock.loading_stiffness
+    assert peak == pytest.approx(0.554510e-3, rel=1e-4)
+    assert rows["time"][rows["bit_force"].argmax()] == pytest.approx(0.1722e-3, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("name", "elements", "rate", "others"),
+    [("reference", 40, 5e-4, 1e-3), ("stiff_rock", 60, 3e-3, 1e-3), ("chatter", 60, 4e-3, 1e-3)],
+)
+def test_stored_references_are_met(name, elements, rate, others):
+    """All quantities of a periodic motion; measured errors are about half of what is allowed."""
+    scene = Scene.from_toml(SCENARIOS / f"{name}.toml")
+    problem = pose(scene)
+    reference = find_reference(problem, scene)
+    answer = Run(problem, scene, lambda one: ExplicitSolver(one, elements)).answer()
+    for key in problem.quantities:
+        off = relative_error(answer, reference.values, reference.history, key)
+        if key == "rebound_velocity" and abs(reference.values[key]) < 0.1:
+            continue  # next to nothing is left of it
+        allowed = {RATE: rate, HISTORY: 8e-3}.get(key, others)
+        assert off < allowed, key
+
+
+def test_a_drop_keeps_its_resting_place():
+    scene = Scene.from_toml(SCENARIOS / "drop_test.toml")
+    problem = pose(scene)
+    reference = find_reference(problem, scene)
+    answer = Run(problem, scene, lambda one: ExplicitSolver(one, 20)).answer()
+    for key in ("resting_place", "peak_bit_force", "rock_energy"):
+        assert relative_error(answer, reference.values, None, key) < 2e-4, key
+
+
+def test_lengths_that_share_no_cell():
+    """Against the finite elements, whose elements need not fit either."""
+    scene = Scene().replace(**{"piston.sections.0.length": 0.18, "bit.sections.0.length": 0.2113})
+    elements = fem_scene(scene, 60, 2.0, stiffness_of(60))
+    simulation = Simulation(elements, record_events=False)
+    simulation.advance(0.9)
+    rows = simulation.blows[simulation.blows["time"] > 0.4]
+    wanted = rows["penetration"].sum() / rows["period"].sum()
+    assert explicit_rate(scene, 60, 0.9, 0.4) == pytest.approx(wanted, rel=1.5e-3)
+
+
+def test_a_bar_of_two_equal_sections_is_one_bar():
+    half = SECTION.__class__(length=0.5 * SECTION.length, area=SECTION.area)
+    one = Scene()
+    two = one.replace(**{"piston.sections": (half, half)})
+    first, second = explicit(one, 20), explicit(two, 20)
+    for simulation in (first, second):
+        simulation.advance(0.08)
+    for name in ("time", "period", "penetration", "impact_velocity", "rock_energy"):
+        assert second.blows[0][name] == pytest.approx(first.blows[0][name], rel=1e-6)
+
+
+def test_what_explicit_elements_cannot_do_is_refused():
+    with pytest.raises(SceneError, match="must not be 'rigid'"):
+        ExplicitSolver(Scene.from_toml(SCENARIOS / "rigid.toml"), 10)
+    with pytest.raises(SceneError, match="wall"):
+        ExplicitSolver(Scene().replace(**{"effects.rock": "wall"}), 10)
+    with pytest.raises(SceneError, match="blows after"):
+        explicit_rate(Scene(), 5, 0.05, 0.0)
