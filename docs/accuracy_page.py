@@ -370,9 +370,8 @@ def bars(study: Study) -> str:
         one = QUANTITIES[key]
         label = f"{one.label}, {one.unit}" if one.unit else one.label
         value = "–" if key in HISTORIES else f"{one.factor * bar.value:.7g}"
-        apart = abs(bar.wave - bar.elements) / abs(bar.value)
         verdict = "yes" if bar.agreed else "no: the limits disagree"
-        rows.append([label, value, power(abs(bar.error / bar.value)), power(apart), verdict])
+        rows.append([label, value, power(abs(bar.error / bar.value)), power(bar.apart), verdict])
     return table(["quantity", "value", "bar, relative", "solvers apart", "a reference?"], rows)
 
 
@@ -409,7 +408,11 @@ def rungs(study: Study) -> str:
 def scene_page(name: str) -> str:
     """Markdown of the page of a scene."""
     study = load_studies((name,))[name]
-    made = "; ".join(", ".join(study.reference.made[solver]) for solver in ("wave", "elements"))
+    made = "; ".join(
+        ", ".join(study.reference.made[solver])
+        for solver in ("wave", "explicit", "fem")
+        if solver in study.reference.made
+    )
     what = "Relative standard errors" if study.kind == APERIODIC else "Relative errors"
     return f"""# {study.title}
 

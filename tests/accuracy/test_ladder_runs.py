@@ -49,13 +49,13 @@ def found():
 
     def few(problem, full):
         rungs = ladders(problem, full)
-        cells = ("5 cells", "20 cells", "40 cells", "60 cells")
-        return [
-            rung
-            for rung in rungs
-            if (rung.ladder == "wave" and rung.label in cells)
-            or (rung.ladder, rung.label) in (("wave-steps", "20 cells"), ("rigid", ""))
-        ]
+        chosen = {
+            "wave": ("6 cells", "20 cells", "40 cells", "60 cells"),
+            "wave-steps": ("20 cells",),
+            "explicit": ("10 elements", "20 elements", "40 elements"),
+            "rigid": ("",),
+        }
+        return [rung for rung in rungs if rung.label in chosen.get(rung.ladder, ())]
 
     patch.setattr(study_module, "ladders", few)
     said: list[tuple[float, str]] = []
@@ -82,8 +82,8 @@ def test_finer_waves_are_better_and_dearer(found):
 
 
 def test_lengths_that_do_not_fit_are_not_in_the_order(found):
-    assert found.ladder("wave")[0].label == "5 cells"
-    assert "5 cells" not in [point.label for point in found.fitted("wave", RATE)]
+    assert found.ladder("wave")[0].label == "6 cells"
+    assert "6 cells" not in [point.label for point in found.fitted("wave", RATE)]
 
 
 def test_leaps_change_the_time_and_not_the_answer(found):
@@ -223,8 +223,8 @@ def test_the_cells_that_fit_best_are_taken():
 def test_several_scenes_come_in_one_table(found, capsys):
     show_contests([found, found])
     shown = capsys.readouterr().out
-    assert "best peer" in shown
-    assert "scenes" in shown
+    assert "explicit elements" in shown
+    assert "at the worst of 2 scenes" in shown
 
 
 def refused(*arguments: str) -> str:
@@ -247,5 +247,5 @@ def test_too_few_blows_are_refused():
 
 def test_unknown_methods_and_missing_files_are_refused():
     scene = str(SCENARIOS / "reference.toml")
-    assert "'waves' is no method: wave, fem" in refused(scene, "--methods", "waves,fem")
+    assert "'waves' is no method: wave, wave-steps" in refused(scene, "--methods", "waves,fem")
     assert "none.toml" in refused("none.toml")

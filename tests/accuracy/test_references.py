@@ -46,13 +46,15 @@ def reference(name: str) -> Reference:
 @pytest.mark.parametrize("name", SCENES)
 def test_each_scene_has_a_reference_that_says_how_it_was_made(name):
     found = reference(name)
-    assert {"wave", "elements", "date", "version"} <= set(found.made)
+    assert {"wave", "explicit", "date", "version"} <= set(found.made)
     assert not found.made["quick"]
     for key, bar in found.bars.items():
         assert key in QUANTITIES
         assert bar.error > 0
-        off = abs(bar.wave - bar.elements)
-        close = off <= bar.wave_error + bar.elements_error or off <= CLOSE * abs(bar.value)
+        (first, error), (second, error_of_second) = bar.surest
+        off = abs(first - second)
+        close = off <= error + error_of_second or off <= CLOSE * abs(bar.value)
+        assert bar.error >= off
         if key not in HISTORIES:
             assert bar.agreed == close
     for history in found.histories.values():

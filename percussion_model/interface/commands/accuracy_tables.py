@@ -85,7 +85,7 @@ def show_bars(reference: Reference, console: Console | None = None) -> None:
             label,
             "" if key in HISTORIES else f"{quantity.factor * bar.value:.7g}",
             _number(abs(bar.error / bar.value)),
-            _number(abs(bar.wave - bar.elements) / abs(bar.value)),
+            _number(bar.apart),
             "" if bar.agreed else "no reference: the limits disagree",
         )
     (console or Console()).print(table)

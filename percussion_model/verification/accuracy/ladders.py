@@ -144,14 +144,14 @@ LADDERS = {
 
 # Integrator, tolerance and meshes of the general methods; where the third is one, tolerances.
 _GENERAL: dict[str, tuple[str, tuple[float, ...], tuple[int, ...]]] = {
-    "lsoda": ("LSODA", (1e-4,), (5, 10, 20, 30, 50)),
+    "lsoda": ("LSODA", (1e-4,), (5, 10, 20, 30)),
     "lsoda-tol": ("LSODA", (1e-2, 1e-3, 1e-4, 1e-5, 1e-6), (30,)),
-    "radau": ("Radau", (1e-3,), (3, 5, 10, 20)),
+    "radau": ("Radau", (1e-3,), (5, 10, 20)),
     "rk45": ("RK45", (1e-3,), (3, 4, 6, 8)),
     "dop853": ("DOP853", (1e-3,), (3, 4, 6, 8)),
     "bdf": ("BDF", (1e-4,), (3, 5, 10, 20)),
 }
-_FULL_ONLY = ("dop853", "bdf")
+_FULL_ONLY = ("lsoda-tol", "rk45", "dop853", "bdf")
 
 
 @dataclass(frozen=True)

@@ -224,7 +224,7 @@ class Study:
     def from_dict(cls, tree: dict[str, Any]) -> Study:
         """Read what `to_dict` gave; the histories of the reference are not in it."""
         title, kind = tree["title"], tree["kind"]
-        bars = {key: Bar(**_numbers(bar)) for key, bar in tree["reference"]["bars"].items()}
+        bars = {key: Bar.from_dict(_numbers(bar)) for key, bar in tree["reference"]["bars"].items()}
         names = {one.name for one in fields(Point)}
         points = [
             Point(**_numbers({key: value for key, value in point.items() if key in names}))
