@@ -394,7 +394,10 @@ def _agree(limits: dict[str, tuple[float, float]]) -> Bar:
 
 
 def _history_bar(levels: dict[str, list[Level]], answers: dict[str, list[Answer]], key: str) -> Bar:
-    """L1 distance of the finest histories to each other, and what is left of their own error."""
+    """L1 distance of the finest waves to the second solver, or to the waves before.
+
+    The limits carry what is left of their error, which decides whether they agree.
+    """
     finest = {name: found[-1].histories[key] for name, found in answers.items()}
     whole = float(np.sum(np.abs(finest["wave"])))
 
@@ -402,11 +405,11 @@ def _history_bar(levels: dict[str, list[Level]], answers: dict[str, list[Answer]
         return float(np.sum(np.abs(a - b))) / whole
 
     second = next(name for name in levels if name != "wave")
-    own, theirs = (
-        _remains(levels[name][-2:], ORDERS[name])
-        * apart(finest[name], answers[name][-2].histories[key])
-        for name in ("wave", second)
-    )
+    change = {
+        name: apart(finest[name], answers[name][-2].histories[key]) for name in ("wave", second)
+    }
+    left = {n: _remains(levels[n][-2:], ORDERS[n]) * moved for n, moved in change.items()}
     off = apart(finest["wave"], finest[second])
-    limits = {"wave": (1.0, own), second: (1.0 + off, theirs)}
-    return Bar(1.0, max(own, off), limits, off <= max(own + theirs, CLOSE))
+    limits = {"wave": (1.0, left["wave"]), second: (1.0 + off, left[second])}
+    agreed = off <= max(sum(left.values()), CLOSE)
+    return Bar(1.0, max(change["wave"], off), limits, agreed)
