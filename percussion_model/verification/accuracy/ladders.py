@@ -13,6 +13,7 @@ from typing import Any
 
 from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.solvers.base import Solver
+from percussion_model.verification.accuracy.exact_flow import ExactFlowSolver
 from percussion_model.verification.accuracy.explicit import ExplicitSolver
 from percussion_model.verification.accuracy.problems import APERIODIC, Problem
 from percussion_model.verification.accuracy.semidiscrete import refusal
@@ -27,7 +28,9 @@ PAPER_STIFFNESS = 1e12
 WAVE_CELLS = (3, 4, 5, 7, 10, 13, 20, 40, 60, 80, 120)
 WAVE_CELLS_FULL = (*WAVE_CELLS, 160, 200)
 MESHES, MESHES_FULL = (10, 20, 30, 50, 70), (10, 20, 30, 50, 70, 100)
+# Meshes of the peers that are compiled; the matrices of the exact flow are dense.
 EXPLICIT, EXPLICIT_FULL = (10, 15, 20, 25, 30, 40, 60, 80), (10, 15, 20, 25, 30, 40, 60, 80, 120)
+EXACT_FLOW = (5, 7, 10, 15, 20, 30)
 FEW = (3, 5, 10, 20)  # of a bar so long that no four of the others are affordable
 STEPS = (20.0, 10.0, 5.0, 3.0, 2.0, 1.0)
 COURANT = 2.0
@@ -80,6 +83,12 @@ LADDERS = {
             "explicit elements",
             "element size",
             "lumped masses, hard contact, leapfrog at 0.9 of the longest stable step",
+        ),
+        Ladder(
+            "exact-flow",
+            "exact flow",
+            "element size",
+            "elements of mixed mass, hard contact, matrix exponentials between events",
         ),
         Ladder("rigid", "rigid", "", "an error of the model: there is nothing to refine"),
         Ladder("lsoda", "scipy LSODA", "element size", "relative tolerance 1e-4, K_C as fem"),
@@ -188,7 +197,7 @@ def ladders(problem: Problem, full: bool = False) -> list[Rung]:
     """
     if problem.kind == APERIODIC:
         return list(_rising_durations(problem, full))
-    rungs = [*_waves(problem, full), *_elements(problem, full), *_explicit(problem, full)]
+    rungs = [*_waves(problem, full), *_elements(problem, full), *_peers(problem, full)]
     rungs.append(Rung("rigid", "", 1.0, problem.scene.computed_by("rigid")))
     if not refusal(problem.scene):
         rungs += _general(problem, full)
@@ -235,12 +244,15 @@ def _elements(problem: Problem, full: bool) -> Iterator[Rung]:
         yield Rung("fem-gauss", f"{count} elements", 1.0 / count, chosen)
 
 
-def _explicit(problem: Problem, full: bool) -> Iterator[Rung]:
-    scene = problem.scene
-    meshes = EXPLICIT_FULL if full else EXPLICIT
-    for count in _affordable(scene, meshes, MOST_ELEMENTS if full else MOST_ELEMENTS / 2):
-        peer = partial(ExplicitSolver, elements=count)
-        yield Rung("explicit", f"{count} elements", 1.0 / count, scene, peer=peer)
+def _peers(problem: Problem, full: bool) -> Iterator[Rung]:
+    scene, most = problem.scene, MOST_ELEMENTS if full else MOST_ELEMENTS / 2
+    for name, solver, meshes, limit in (
+        ("explicit", ExplicitSolver, EXPLICIT_FULL if full else EXPLICIT, most),
+        ("exact-flow", ExactFlowSolver, EXACT_FLOW, most / 2),
+    ):
+        for count in _affordable(scene, meshes, limit):
+            peer = partial(solver, elements=count)
+            yield Rung(name, f"{count} elements", 1.0 / count, scene, peer=peer)
 
 
 def _general(problem: Problem, full: bool) -> Iterator[Rung]:
