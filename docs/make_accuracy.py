@@ -24,7 +24,7 @@ from percussion_model.verification.accuracy import Study
 IMAGES = DOCS / "images"
 SCENARIOS = DOCS.parent / "scenarios"
 # The methods of each scene; the reference scene gets all of them.
-PEERS = ("wave", "wave-steps", "wave-misfit", "explicit", "fem", "rigid")
+PEERS = ("wave", "wave-steps", "wave-misfit", "explicit", "exact-flow", "fem", "rigid")
 METHODS: dict[str, tuple[str, ...] | None] = {
     **dict.fromkeys((*COMPARED, *OTHERS), PEERS),
     "reference": None,

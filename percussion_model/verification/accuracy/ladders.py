@@ -16,6 +16,7 @@ from percussion_model.scene.numbers import numbers_of
 from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.solvers.base import Solver
 from percussion_model.solvers.wave.grid import elastic_bars, fitting_cells
+from percussion_model.verification.accuracy.exact_flow import ExactFlowSolver
 from percussion_model.verification.accuracy.explicit import ExplicitSolver
 from percussion_model.verification.accuracy.problems import APERIODIC, Problem
 from percussion_model.verification.accuracy.semidiscrete import refusal
@@ -45,7 +46,12 @@ MISFIT_CELLS, MISFIT_NEAR, MISFIT_RUNGS = 40, 1.25, 6
 WAVE_CELLS = (3, 5, 7, 10, 14, 20, 30, 44, 66, 100)
 WAVE_CELLS_FULL = (*WAVE_CELLS, 150, 200)
 MESHES, MESHES_FULL = (10, 20, 30, 50, 70), (10, 20, 30, 50, 70, 100)
-EXPLICIT_MESHES, EXPLICIT_MOST = (5, 7, 10, 15, 20, 25, 30, 40, 60, 80, 120), 260.0
+# Compiled peers, their meshes, and the most elements in all bars: those of the exact flow
+# have dense matrices.
+COMPILED: dict[str, tuple[Callable[..., Solver], tuple[int, ...], float]] = {
+    "explicit": (ExplicitSolver, (5, 7, 10, 15, 20, 25, 30, 40, 60, 80, 120), 260.0),
+    "exact-flow": (ExactFlowSolver, (5, 7, 10, 15, 20, 30), 100.0),
+}
 FEW = (3, 5, 10, 20)  # of a bar so long that no four of the others are affordable
 STEPS = (20.0, 10.0, 5.0, 3.0, 2.0, 1.0)
 COURANT = 2.0
@@ -101,6 +107,12 @@ LADDERS = {
             "explicit elements",
             "element size",
             "lumped masses, hard contact, leapfrog at 0.9 of the longest stable step",
+        ),
+        Ladder(
+            "exact-flow",
+            "exact flow",
+            "element size",
+            "elements of mixed mass, hard contact, matrix exponentials between events",
         ),
         Ladder(
             "fem",
@@ -239,7 +251,7 @@ def ladders(problem: Problem, full: bool = False) -> list[Rung]:
     """
     if problem.kind == APERIODIC:
         return list(_rising_durations(problem, full))
-    rungs = [*_waves(problem, full), *_explicit(problem, full), *_elements(problem, full)]
+    rungs = [*_waves(problem, full), *_compiled(problem, full), *_elements(problem, full)]
     rungs.append(Rung("rigid", "", 1.0, problem.scene.computed_by("rigid")))
     if not refusal(problem.scene):
         rungs += _general(problem, full)
@@ -320,15 +332,16 @@ def _elements(problem: Problem, full: bool) -> Iterator[Rung]:
         yield Rung("fem-gauss", f"{count} elements", 1.0 / count, chosen)
 
 
-def _explicit(problem: Problem, full: bool) -> Iterator[Rung]:
+def _compiled(problem: Problem, full: bool) -> Iterator[Rung]:
     scene = problem.scene
-    try:
-        ExplicitSolver(scene, EXPLICIT_MESHES[0])
-    except SceneError:
-        return
-    for count in _affordable(scene, EXPLICIT_MESHES, EXPLICIT_MOST * (2.0 if full else 1.0)):
-        peer = partial(ExplicitSolver, elements=count)
-        yield Rung("explicit", f"{count} elements", 1.0 / count, scene, peer=peer)
+    for name, (make, meshes, most) in COMPILED.items():
+        try:
+            make(scene, meshes[0])
+        except SceneError:
+            continue
+        for count in _affordable(scene, meshes, most * (2.0 if full else 1.0)):
+            peer = partial(make, elements=count)
+            yield Rung(name, f"{count} elements", 1.0 / count, scene, peer=peer)
 
 
 def _general(problem: Problem, full: bool) -> Iterator[Rung]:

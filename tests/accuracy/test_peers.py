@@ -1,4 +1,4 @@
-"""Explicit elements against closed forms, stored references and the finite elements."""
+"""Peers against closed forms, stored references and the finite elements."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from percussion_model import Scene, SceneError, Simulation
+from percussion_model.verification.accuracy.exact_flow import ExactFlowSolver
 from percussion_model.verification.accuracy.explicit import ExplicitSolver, explicit_rate
 from percussion_model.verification.accuracy.ladders import fem_scene, stiffness_of
 from percussion_model.verification.accuracy.problems import (
@@ -37,16 +38,20 @@ WAVE_SPEED = math.sqrt(SECTION.youngs_modulus / SECTION.density)
 IMPEDANCE = SECTION.area * math.sqrt(SECTION.youngs_modulus * SECTION.density)
 
 
+PEERS = [ExplicitSolver, ExactFlowSolver]
+
+
 def explicit(scene, elements):
     return Simulation(scene, solver=ExplicitSolver(scene, elements))
 
 
-def test_impact_of_two_bars_of_one_section():
+@pytest.mark.parametrize(("peer", "elements"), [(ExplicitSolver, 80), (ExactFlowSolver, 20)])
+def test_impact_of_two_bars_of_one_section(peer, elements):
     """Oracle 1: the force is Z v / 2 for two transits; then the piston is at rest."""
     scene = Scene().replace(
         **BARE | {"effects.rock": "none", "effects.loss": True, "start.piston_velocity": 10.0}
     )
-    simulation = explicit(scene, 80)
+    simulation = Simulation(scene, solver=peer(scene, elements))
     rows = simulation.sample(np.linspace(10e-6, 100e-6, 91))
     early = rows["time"] < 50e-6
     assert rows["contact_force"][early].mean() == pytest.approx(IMPEDANCE * 5.0, rel=2e-3)
@@ -55,7 +60,7 @@ def test_impact_of_two_bars_of_one_section():
     assert momentum == pytest.approx(10.0 * scene.piston.mass, rel=1e-9)
     closed, opened = simulation.events["time"][:2]
     transit = scene.piston.length / WAVE_SPEED
-    assert opened - closed == pytest.approx(2.0 * transit, abs=0.1 * transit)
+    assert opened - closed == pytest.approx(2.0 * transit, abs=0.2 * transit)
 
 
 def test_piston_drives_bit_into_linear_rock():
@@ -73,27 +78,35 @@ def test_piston_drives_bit_into_linear_rock():
     assert errors[1] < 0.5 * errors[0] < 0.01
 
 
-def test_bit_dropped_on_linear_rock():
+@pytest.mark.parametrize("peer", PEERS)
+def test_bit_dropped_on_linear_rock(peer):
     """Oracle 3: the greatest penetration of an elastic bar, where a rigid one has 0.565084 mm."""
     scene = Scene().replace(
         **BARE | {"effects.rock": "spring", "piston.model": "absent", "start.bit_velocity": 5.25}
     )
-    rows = explicit(scene, 20).sample(np.linspace(1.6e-4, 1.8e-4, 201))
+    simulation = Simulation(scene, solver=peer(scene, 20))
+    rows = simulation.sample(np.linspace(1.6e-4, 1.8e-4, 201))
     peak = rows["bit_force"].max() / scene.rock.loading_stiffness
     assert peak == pytest.approx(0.554510e-3, rel=1e-4)
     assert rows["time"][rows["bit_force"].argmax()] == pytest.approx(0.1722e-3, abs=1e-6)
 
 
 @pytest.mark.parametrize(
-    ("name", "elements", "rate", "others"),
-    [("reference", 40, 5e-4, 1e-3), ("stiff_rock", 60, 3e-3, 1e-3), ("chatter", 60, 4e-3, 1e-3)],
+    ("peer", "name", "elements", "rate", "others"),
+    [
+        (ExplicitSolver, "reference", 40, 5e-4, 1e-3),
+        (ExplicitSolver, "stiff_rock", 60, 3e-3, 1e-3),
+        (ExplicitSolver, "chatter", 60, 4e-3, 1e-3),
+        (ExactFlowSolver, "reference", 20, 4e-4, 2e-3),
+        (ExactFlowSolver, "chatter", 15, 2e-3, 2e-3),
+    ],
 )
-def test_stored_references_are_met(name, elements, rate, others):
+def test_stored_references_are_met(peer, name, elements, rate, others):
     """All quantities of a periodic motion; measured errors are about half of what is allowed."""
     scene = Scene.from_toml(SCENARIOS / f"{name}.toml")
     problem = pose(scene)
     reference = find_reference(problem, scene)
-    answer = Run(problem, scene, lambda one: ExplicitSolver(one, elements)).answer()
+    answer = Run(problem, scene, lambda one: peer(one, elements)).answer()
     for key in problem.quantities:
         off = relative_error(answer, reference.values, reference.histories, key)
         if key == "rebound_velocity" and abs(reference.values[key]) < 0.1:
@@ -103,13 +116,29 @@ def test_stored_references_are_met(name, elements, rate, others):
         assert off < allowed, key
 
 
-def test_a_drop_keeps_its_resting_place():
+@pytest.mark.parametrize("peer", PEERS)
+def test_a_drop_keeps_its_resting_place(peer):
     scene = Scene.from_toml(SCENARIOS / "drop_test.toml")
     problem = pose(scene)
     reference = find_reference(problem, scene)
-    answer = Run(problem, scene, lambda one: ExplicitSolver(one, 20)).answer()
+    answer = Run(problem, scene, lambda one: peer(one, 20)).answer()
     for key in ("resting_place", "peak_bit_force", "rock_energy"):
         assert relative_error(answer, reference.values, None, key) < 2e-4, key
+
+
+def test_the_exact_flow_converges_with_the_square_of_its_elements():
+    """Force through a drop: next to nothing but the mesh is wrong."""
+    scene = Scene.from_toml(SCENARIOS / "drop_test.toml")
+    problem = pose(scene)
+    reference = find_reference(problem, scene)
+    answers = [
+        Run(problem, scene, lambda one, n=n: ExactFlowSolver(one, n)).answer() for n in (5, 10)
+    ]
+    coarse, fine = (
+        relative_error(answer, reference.values, None, "resting_place") for answer in answers
+    )
+    assert 3.0 < coarse / fine < 7.0
+    assert fine < 2e-4
 
 
 def test_lengths_that_share_no_cell():
@@ -134,10 +163,14 @@ def test_a_bar_of_two_equal_sections_is_one_bar():
         assert second.blows[0][name] == pytest.approx(first.blows[0][name], rel=1e-6)
 
 
-def test_what_explicit_elements_cannot_do_is_refused():
+@pytest.mark.parametrize("peer", PEERS)
+def test_what_peers_cannot_do_is_refused(peer):
     with pytest.raises(SceneError, match="must not be 'rigid'"):
-        ExplicitSolver(Scene.from_toml(SCENARIOS / "rigid.toml"), 10)
+        peer(Scene.from_toml(SCENARIOS / "rigid.toml"), 10)
     with pytest.raises(SceneError, match="wall"):
-        ExplicitSolver(Scene().replace(**{"effects.rock": "wall"}), 10)
+        peer(Scene().replace(**{"effects.rock": "wall"}), 10)
+
+
+def test_a_rate_needs_blows():
     with pytest.raises(SceneError, match="blows after"):
         explicit_rate(Scene(), 5, 0.05, 0.0)
