@@ -221,7 +221,7 @@ def test_the_cells_that_fit_best_are_taken():
 
 
 def test_several_scenes_come_in_one_table(found, capsys):
-    show_contests([found, found])
+    show_contests({"one": found, "other": found})
     shown = capsys.readouterr().out
     assert "explicit" in shown
     assert "at the worst of 2 scenes" in shown

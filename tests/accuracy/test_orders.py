@@ -86,6 +86,8 @@ def test_a_cost_is_as_sure_as_the_reference_and_the_times():
     assert (sure.value, sure.low, sure.high) == pytest.approx((10.0, 9.0, 11.0))
     blurred = cost_range("wave", rungs, 1e-2, 2e-3)
     assert blurred.low < sure.low < sure.high < blurred.high
+    whole = cost_range("wave", rungs, 3e-3, 1.5e-3)  # the last error may be nothing but bar
+    assert whole.low < whole.value < whole.high
     assert not cost_range("wave", rungs, 1e-3, 5e-4).decided
     missed = cost_range("wave", rungs, 1e-4, 5e-4)
     assert missed.decided

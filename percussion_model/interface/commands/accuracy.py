@@ -76,11 +76,11 @@ def accuracy(
     if figures or json_file is None:
         common.check_outputs(folder, None)
     found: dict[str, dict[str, Any]] = {}
-    studies: list[Study] = []
+    studies: dict[str, Study] = {}
     for name, scene in chosen:
         with _progress() as report:
             result = study(scene, full, words, report)
-        studies.append(result)
+        studies[name] = result
         found[name] = result.to_dict()
         if json_file != "-":
             show_study(result)

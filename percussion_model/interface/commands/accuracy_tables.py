@@ -166,17 +166,18 @@ def _show_costs(found: Study, console: Console) -> None:
     console.print(table)
 
 
-def show_contests(studies: list[Study]) -> None:
+def show_contests(studies: dict[str, Study]) -> None:
     """Print waves against the best of their peers, all scenes in one table, and the ratios."""
     console = Console(width=max(Console().width, LEAST_WIDTH))
     table = _table("The same error in rate: ms to compute a simulated second", "scene")
-    for heading in ("error", "wave", "best peer", "ratio"):
-        table.add_column(heading, justify="right", no_wrap=heading != "best peer")
-    found = [[contest(one, wanted) for wanted in WANTED] for one in studies]
-    for contests in found:
+    for heading in ("error", "wave", "best peer", "", "ratio"):
+        table.add_column(heading, justify="left" if not heading else "right", no_wrap=True)
+    found = [[contest(one, wanted) for wanted in WANTED] for one in studies.values()]
+    for name, contests in zip(studies, found, strict=True):
         for k, one in enumerate(contests):
-            title = escape(one.title[:40]) if k == 0 else ""
-            table.add_row(title, f"{100 * one.wanted:g} %", *contest_cells(one))
+            table.add_row(
+                escape(name) if k == 0 else "", f"{100 * one.wanted:g} %", *_contest_cells(one)
+            )
         table.add_section()
     console.print(table)
     for column in zip(*found, strict=True):
@@ -184,27 +185,33 @@ def show_contests(studies: list[Study]) -> None:
         text = f"{100 * told.wanted:g} %: no scene is decided."
         if isfinite(told.median):
             text = (
-                f"{100 * told.wanted:g} %: ratio {told.luckiest:.3g} at the luckiest, "
-                f"{told.median:.3g} at the median, {told.worst:.3g} at the worst of "
+                f"{100 * told.wanted:g} %: ratio {two(told.luckiest)} at the luckiest, "
+                f"{two(told.median)} at the median, {two(told.worst)} at the worst of "
                 f"{told.scenes - told.undecided} scenes; {told.undecided} undecided."
             )
         console.print(text, highlight=False)
 
 
-def contest_cells(one: Contest) -> tuple[str, str, str]:
-    """Time of the waves, time of the best peer, and the ratio, each with its range."""
-    wave = cost_text(one.wave)
-    peer = "-" if one.peer is None else f"{cost_text(one.peer)} {LADDERS[one.peer.ladder].title}"
-    if one.outcome == MET:
-        return wave, peer, f"{one.ratio:.3g} ({one.low:.3g} to {one.high:.3g})"
-    if one.outcome == PEER_MISSES:
-        return wave, peer, f"above {one.ratio:.3g}"
-    return wave, peer, f"below {one.ratio:.3g}" if one.outcome == MISSED else one.outcome
+def _contest_cells(one: Contest) -> tuple[str, str, str, str]:
+    """Time of the waves, time and name of the best peer, and the ratio, each with its range."""
+    peer, name = "-", ""
+    if one.peer is not None:
+        peer, name = _cost_text(one.peer), LADDERS[one.peer.ladder].title
+    ratio = {
+        MET: f"{two(one.ratio)} ({two(one.low)}-{two(one.high)})",
+        PEER_MISSES: f"above {two(one.ratio)}",
+        MISSED: f"below {two(one.ratio)}",
+    }
+    return _cost_text(one.wave), peer, name, ratio.get(one.outcome, one.outcome)
 
 
-def cost_text(cost: Cost) -> str:
+def _cost_text(cost: Cost) -> str:
     """Milliseconds with their range; what the reference cannot tell is undecided."""
     if isfinite(cost.value) and isfinite(cost.high):
-        low, high = 1e3 * cost.low, 1e3 * cost.high
-        return f"{1e3 * cost.value:.3g} ({low:.3g} to {high:.3g})"
+        return f"{two(1e3 * cost.value)} ({two(1e3 * cost.low)}-{two(1e3 * cost.high)})"
     return "undecided" if isfinite(cost.low) else "not met"
+
+
+def two(value: float) -> str:
+    """Two digits without exponent."""
+    return f"{float(f'{value:.2g}'):.0f}" if value >= 10.0 else f"{value:.2g}"

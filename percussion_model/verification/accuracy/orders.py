@@ -12,6 +12,8 @@ __all__ = ["Cost", "Order", "cost_at", "cost_range", "fitted_order"]
 
 # Fewer points make no order.
 LEAST_POINTS = 3
+# What is left of an error that the bar of the reference may make up whole.
+NOTHING = 1e-3
 
 
 @dataclass(frozen=True)
@@ -141,7 +143,7 @@ def cost_range(
     spreads = [spread for _, spread, _ in rungs if math.isfinite(spread)]
     spread = float(np.median(spreads)) if spreads else 0.0
     value, low, high = (
-        cost_at(costs, [max(error + shift, 0.0) for _, _, error in rungs], wanted)
+        cost_at(costs, [max(error + shift, NOTHING * error) for _, _, error in rungs], wanted)
         for shift in (0.0, -bar, bar)
     )
     dearest = max(costs, default=math.nan)
