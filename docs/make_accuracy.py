@@ -19,7 +19,6 @@ from percussion_model.interface.plotting.error_against_time import (
     draw_misfits,
     draw_quantities,
 )
-from percussion_model.verification.accuracy import Study
 
 IMAGES = DOCS / "images"
 SCENARIOS = DOCS.parent / "scenarios"
@@ -34,7 +33,7 @@ CLOSED_WAVE, CLOSED_FEM = (5, 20, 40), (20, 40, 80)
 
 
 def measure(name: str) -> None:
-    """Study a scene; keep its numbers and its figures."""
+    """Study a scene and keep its numbers."""
     from percussion_model import Scene
     from percussion_model.verification.accuracy import study
 
@@ -42,16 +41,6 @@ def measure(name: str) -> None:
     scene = Scene.from_toml(folder / f"{name}.toml")
     found = study(scene, False, METHODS[name], lambda share, text: say(f"{name}: {text}"))
     keep(name, found.to_dict())
-    draw(name, found)
-
-
-def draw(name: str, found: Study) -> None:
-    """Draw a study, small enough for a page."""
-    with matplotlib.rc_context(style.STYLE):
-        style.save_png(draw_accuracy(found), IMAGES / f"accuracy_{name}.png", DPI)
-        if name == "reference":
-            path = IMAGES / f"accuracy_quantities_{name}.png"
-            style.save_png(draw_quantities(found), path, DPI)
 
 
 def measure_closed_forms() -> None:
@@ -104,12 +93,19 @@ def say(text: str) -> None:
 
 
 def write_pages() -> None:
-    """Write all pages from the data, and the figure of the misfits."""
+    """Write all pages and draw all figures from the data."""
     for path, text in pages().items():
         path.write_text(text, encoding="utf-8")
+    studies = load_studies((*COMPARED, *OTHERS))
     with matplotlib.rc_context(style.STYLE):
-        figure = draw_misfits(list(load_studies().values()))
-        style.save_png(figure, IMAGES / "accuracy_misfit.png", DPI)
+        for name, found in studies.items():
+            style.save_png(draw_accuracy(found), IMAGES / f"accuracy_{name}.png", DPI)
+        figures = {
+            "accuracy_quantities_reference": draw_quantities(studies["reference"]),
+            "accuracy_misfit": draw_misfits([studies[name] for name in COMPARED]),
+        }
+        for name, figure in figures.items():
+            style.save_png(figure, IMAGES / f"{name}.png", DPI)
 
 
 EXTRA = {

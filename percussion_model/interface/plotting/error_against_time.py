@@ -70,7 +70,7 @@ def draw_quantities(found: Study) -> Figure:
 
 def draw_misfits(studies: Sequence[Study]) -> Figure:
     """Draw the error of the waves against the error of their wave speed, scene by scene."""
-    fig = Figure(figsize=(7.6, 4.6), layout="constrained")
+    fig = Figure(figsize=(7.6, 6.0), layout="constrained")
     ax = fig.subplots()
     colours = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#595959")
     markers = "os^DvPX"
@@ -93,7 +93,7 @@ def draw_misfits(studies: Sequence[Study]) -> Figure:
     _log_axes(ax)
     style.label(ax, "error of the wave speed, relative", "error of the rate, relative")
     style.head(fig, "Lengths that do not fit the cells, at about 40 cells in the piston")
-    fig.legend(loc="outside right upper")
+    fig.legend(loc="outside lower center", ncols=2)
     return fig
 
 
@@ -165,37 +165,36 @@ def _pairs(found: Study, points: Iterable[Point], key: str) -> Iterable[tuple[fl
 
 
 def _ladder(ax: Axes, found: Study, name: str, key: str) -> None:
-    """Line through the points that make the order; hollow markers for the others."""
+    """Line through all points; hollow markers where they are not in the order."""
     colour, dashes, marker = LINES[name]
+    x, y = np.array(_points(found, name, key)).T
+    ax.plot(x, y, color=colour, linestyle=dashes, linewidth=1.0, zorder=2)
     fitted = {point.label for point in found.fitted(name, key)}
     full = [point for point in found.ladder(name) if point.label in fitted]
     rest = [point for point in found.ladder(name) if point.label not in fitted]
-    for points, line, face in ((full, dashes, colour), (rest, "", "white")):
+    for points, face in ((full, colour), (rest, "white")):
         pairs = list(_pairs(found, points, key))
         if pairs:
             x, y = np.array(pairs).T
             ax.plot(
-                x, y, color=colour, linestyle=line, marker=marker, markersize=5.0,
-                markerfacecolor=face, zorder=3 if face != "white" else 2,
+                x, y, color=colour, linestyle="", marker=marker, markersize=5.0,
+                markerfacecolor=face, zorder=3,
             )  # fmt: skip
 
 
 def _handles(found: Study) -> list[Any]:
-    """Legend: ladders with their measured order in the first quantity."""
+    """Legend: ladders, and what hollow markers and the shade mean."""
     handles = []
     for name in _drawn(found):
         colour, dashes, marker = LINES[name]
-        order = found.order(name, found.main)
         text = LADDERS[name].title
-        if order is not None:
-            text += f" (order {order.value:.1f} ± {order.error:.1f})"
         handles.append(
             Line2D([], [], color=colour, linestyle=dashes, marker=marker, markersize=5, label=text)
         )
     if found.kind != APERIODIC:
         hollow = Line2D(
             [], [], color=style.RULE_COLOUR, linestyle="", marker="o", markersize=5,
-            markerfacecolor="white", label="not fitted: lengths off, or below the bar",
+            markerfacecolor="white", label="lengths do not fit, or near the bar",
         )  # fmt: skip
         bar = Line2D([], [], color=style.SHADE_COLOUR, linewidth=6, label="bar of the reference")
         handles += [hollow, bar]
