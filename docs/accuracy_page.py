@@ -236,7 +236,7 @@ def misfit() -> str:
         rows.append(
             [
                 name,
-                f"{min(p.size for p in points):.1e} to {max(p.size for p in points):.1e}",
+                f"{power(min(p.size for p in points))} to {power(max(p.size for p in points))}",
                 f"{two(100 * worst.errors[RATE])} % ({worst.label.split(',')[0]})",
                 f"{two(median(each))}, {two(max(each))}",
             ]

@@ -83,8 +83,17 @@ def measure_map() -> None:
 def keep(name: str, tree: dict[str, Any]) -> None:
     """Write a file of data."""
     DATA.mkdir(exist_ok=True)
-    text = json.dumps(tree, indent=1).replace("NaN", "null")
+    text = json.dumps(shortened(tree), indent=1).replace("NaN", "null")
     (DATA / f"{name}.json").write_text(text + "\n", encoding="utf-8")
+
+
+def shortened(tree: Any) -> Any:
+    """Numbers with eight digits, more than anything here is known to."""
+    if isinstance(tree, dict):
+        return {key: shortened(value) for key, value in tree.items()}
+    if isinstance(tree, (list, tuple)):
+        return [shortened(value) for value in tree]
+    return float(f"{tree:.8g}") if isinstance(tree, float) else tree
 
 
 def say(text: str) -> None:
