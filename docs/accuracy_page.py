@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import math
 import re
+import textwrap
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from statistics import median
@@ -52,6 +53,7 @@ STATED, FEW_CELLS = (1e-2, 1e-3), 40
 # Forces and stress that are compared beside the rate, and at which errors.
 FORCES = (HISTORY, CONTACT_HISTORY, STRESS_HISTORY)
 FORCE_ERRORS = (3e-2, 1e-2)
+QUANTITIES_FIGURE = "\n![All quantities](../images/accuracy_quantities_reference.png)\n"
 SHORT = {
     "rate_of_penetration": "rate",
     "blow_period": "period",
@@ -404,13 +406,14 @@ def scene_page(name: str) -> str:
         for solver in ("wave", "explicit", "fem")
         if solver in study.reference.made
     )
+    more = QUANTITIES_FIGURE if name == "reference" else ""
     what = "Relative standard errors" if study.kind == APERIODIC else "Relative errors"
     return f"""# {study.title}
 
 Made by `python -m docs.make_accuracy`; [accuracy.md](../accuracy.md) says what the columns mean.
 
 ![Error against time](../images/accuracy_{name}.png)
-
+{more}
 ## Reference
 
 From {made}.
@@ -429,15 +432,20 @@ From {made}.
 """
 
 
+def wrapped(text: Callable[[], str]) -> Callable[[], str]:
+    """Sentences in lines as long as those that are written by hand."""
+    return lambda: textwrap.fill(text(), 108, break_long_words=False, break_on_hyphens=False)
+
+
 BLOCKS: dict[str, Callable[[], str]] = {
-    "advantage": advantage,
-    "general": general,
+    "advantage": wrapped(advantage),
+    "general": wrapped(general),
     "contests": contest_table,
     "forces": force_table,
     "misfit": misfit,
     "coupled": coupled,
     "map": points_map,
-    "usual": usual,
+    "usual": wrapped(usual),
     "closed": closed,
     "steps": steps,
     "orders": reference_orders,

@@ -28,7 +28,7 @@ METHODS: dict[str, tuple[str, ...] | None] = {
     **dict.fromkeys((*COMPARED, *OTHERS), PEERS),
     "reference": None,
 }
-DPI = 110
+DPI, DPI_OF_MANY = 110, 85
 CLOSED_WAVE, CLOSED_FEM = (5, 20, 40), (20, 40, 80)
 
 
@@ -114,7 +114,7 @@ def write_pages() -> None:
             "accuracy_misfit": draw_misfits([studies[name] for name in COMPARED]),
         }
         for name, figure in figures.items():
-            style.save_png(figure, IMAGES / f"{name}.png", DPI)
+            style.save_png(figure, IMAGES / f"{name}.png", DPI_OF_MANY)
 
 
 EXTRA = {
