@@ -28,7 +28,7 @@ METHODS: dict[str, tuple[str, ...] | None] = {
     **dict.fromkeys((*COMPARED, *OTHERS), PEERS),
     "reference": None,
 }
-DPI, DPI_OF_MANY = 110, 85
+DPI, DPI_OF_MANY = 110, 75
 CLOSED_WAVE, CLOSED_FEM = (5, 20, 40), (20, 40, 80)
 
 

@@ -46,7 +46,7 @@ IN_A_ROW = 4
 def draw_accuracy(found: Study) -> Figure:
     """Draw the first quantity and the force on the rock against time."""
     keys = [found.main] + [HISTORY] * (HISTORY in found.quantities)
-    fig = Figure(figsize=(5.5 * len(keys), 5.6), layout="constrained")
+    fig = Figure(figsize=(11.0 if len(keys) > 1 else 8.0, 5.6), layout="constrained")
     for ax, key in zip(np.atleast_1d(fig.subplots(1, len(keys))), keys, strict=True):
         _panel(ax, found, key)
     _head(fig, _title(found), found)
@@ -72,19 +72,28 @@ def draw_misfits(studies: Sequence[Study]) -> Figure:
     """Draw the error of the waves against the error of their wave speed, scene by scene."""
     fig = Figure(figsize=(7.6, 6.0), layout="constrained")
     ax = fig.subplots()
-    colours = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#595959")
-    markers = "os^DvPX"
-    scale = [math.inf, 0.0]
-    for k, found in enumerate(studies):
-        pairs = [(point.size, point.errors.get(found.main, math.nan)) for point in
-                 found.ladder("wave-misfit")]  # fmt: skip
+    colours = (
+        "#0072B2",
+        "#D55E00",
+        "#009E73",
+        "#CC79A7",
+        "#E69F00",
+        "#56B4E9",
+        "#595959",
+        "#222222",
+    )
+    scale, drawn = [math.inf, 0.0], 0
+    for found in studies:
+        rungs = found.ladder("wave-misfit")
+        pairs = [(point.size, point.errors.get(found.main, math.nan)) for point in rungs]
         pairs = [pair for pair in pairs if pair[1] > 0]
         if not pairs:
             continue
         x, y = np.array(pairs).T
         scale = [min(scale[0], x.min()), max(scale[1], x.max())]
-        ax.plot(x, y, marker=markers[k % 7], color=colours[k % 7], markersize=5.0, linestyle="",
-                label=found.title)  # fmt: skip
+        style_of = {"marker": "os^DvPX*"[drawn % 8], "color": colours[drawn % 8]}
+        ax.plot(x, y, markersize=5.0, linestyle="", label=found.title, **style_of)
+        drawn += 1
     for factor, dashes in ((1.0, "-"), (10.0, (0, (4, 1.5)))):
         ax.plot(
             scale, [factor * value for value in scale], color=style.RULE_COLOUR,

@@ -140,7 +140,8 @@ class Study:
         Where lengths fit at no rung, all count.
         """
         floor = self.reference.floor(key)
-        limit = 0.0 if math.isnan(floor) else RESOLVED * floor
+        # standard errors of an aperiodic motion are no differences to the reference
+        limit = 0.0 if math.isnan(floor) or self.kind == APERIODIC else RESOLVED * floor
         resolved = [point for point in self.ladder(name) if point.errors.get(key, math.nan) > limit]
         if all(point.fit >= FITS for point in self.ladder(name)):
             return resolved
