@@ -91,8 +91,10 @@ def draw_misfits(studies: Sequence[Study]) -> Figure:
             continue
         x, y = np.array(pairs).T
         scale = [min(scale[0], x.min()), max(scale[1], x.max())]
-        style_of = {"marker": "os^DvPX*"[drawn % 8], "color": colours[drawn % 8]}
-        ax.plot(x, y, markersize=5.0, linestyle="", label=found.title, **style_of)
+        ax.plot(
+            x, y, color=colours[drawn % 8], marker="os^DvPX*"[drawn % 8], markersize=5.0,
+            linestyle="", label=found.title,
+        )  # fmt: skip
         drawn += 1
     for factor, dashes in ((1.0, "-"), (10.0, (0, (4, 1.5)))):
         ax.plot(
