@@ -114,7 +114,8 @@ def write_pages() -> None:
             "accuracy_misfit": draw_misfits([studies[name] for name in COMPARED]),
         }
         for name, figure in figures.items():
-            style.save_png(figure, IMAGES / f"{name}.png", DPI_OF_MANY)
+            dpi = DPI if name == "accuracy_misfit" else DPI_OF_MANY
+            style.save_png(figure, IMAGES / f"{name}.png", dpi)
 
 
 EXTRA = {
