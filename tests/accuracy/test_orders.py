@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from percussion_model.verification.accuracy.orders import cost_at, fitted_order
+from percussion_model.verification.accuracy.orders import cost_at, cost_range, fitted_order
 from percussion_model.verification.accuracy.problems import (
     HISTORY,
     Answer,
@@ -72,8 +72,24 @@ def test_what_the_next_blow_takes_back_is_no_scatter():
 
 
 def test_error_of_a_history_is_l1_by_l1():
-    wanted = np.array([0.0, 2.0, 4.0, 2.0])
-    found = Answer({}, history=np.array([0.0, 2.0, 3.0, 3.0]))
+    wanted = {HISTORY: np.array([0.0, 2.0, 4.0, 2.0])}
+    found = Answer({}, histories={HISTORY: np.array([0.0, 2.0, 3.0, 3.0])})
     assert relative_error(found, {}, wanted, HISTORY) == pytest.approx(2.0 / 8.0)
-    assert math.isnan(relative_error(found, {}, wanted[:3], HISTORY))
-    assert math.isnan(relative_error(Answer({}), {"blow_period": 1.0}, None, "blow_period"))
+    assert math.isnan(relative_error(found, {}, {HISTORY: wanted[HISTORY][:3]}, HISTORY))
+    assert math.isnan(relative_error(Answer({}), {"blow_period": 1.0}, {}, "blow_period"))
+
+
+def test_a_cost_is_as_sure_as_the_reference_and_the_times():
+    rungs = [(1.0, 0.1, 1e-1), (10.0, 0.1, 1e-2), (100.0, 0.1, 1e-3)]
+    sure = cost_range("wave", rungs, 1e-2, 0.0)
+    assert sure.decided
+    assert (sure.value, sure.low, sure.high) == pytest.approx((10.0, 9.0, 11.0))
+    blurred = cost_range("wave", rungs, 1e-2, 2e-3)
+    assert blurred.low < sure.low < sure.high < blurred.high
+    whole = cost_range("wave", rungs, 3e-3, 1.5e-3)  # the last error may be nothing but bar
+    assert whole.low < whole.value < whole.high
+    assert not cost_range("wave", rungs, 1e-3, 5e-4).decided
+    missed = cost_range("wave", rungs, 1e-4, 5e-4)
+    assert missed.decided
+    assert math.isnan(missed.value)
+    assert missed.dearest == 100.0

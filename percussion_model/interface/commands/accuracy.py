@@ -40,11 +40,16 @@ def accuracy(
     json_file: common.JsonFile = None,
     figures: Annotated[bool, typer.Option(help="Draw error against time.")] = True,
 ) -> None:
-    """Measure error against time: waves, finite elements, rigid bars, general integrators.
+    """Measure error against time: waves, their peers, rigid bars.
 
-    Prints tables; figures, and the numbers as JSON unless --json is given, go to out/accuracy.
+    Prints tables, of several scenes one of waves against the best of their peers as well;
+    figures, and the numbers as JSON unless --json is given, go to out/accuracy.
     """
-    from percussion_model.interface.commands.accuracy_tables import show_bars, show_study
+    from percussion_model.interface.commands.accuracy_tables import (
+        show_bars,
+        show_contests,
+        show_study,
+    )
     from percussion_model.scene.scene import Scene
     from percussion_model.verification.accuracy import study
     from percussion_model.verification.accuracy.ladders import chosen_ladders
@@ -71,9 +76,11 @@ def accuracy(
     if figures or json_file is None:
         common.check_outputs(folder, None)
     found: dict[str, dict[str, Any]] = {}
+    studies: dict[str, Study] = {}
     for name, scene in chosen:
         with _progress() as report:
             result = study(scene, full, words, report)
+        studies[name] = result
         found[name] = result.to_dict()
         if json_file != "-":
             show_study(result)
@@ -82,6 +89,8 @@ def accuracy(
         if figures:
             with common.if_drawable():
                 common.list_files(_draw(result, folder / name))
+    if len(studies) > 1 and json_file != "-":
+        show_contests(studies)
     common.write_json(json_file, found)
 
 

@@ -10,25 +10,45 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from percussion_model.verification.accuracy.ladders import LADDERS
-from percussion_model.verification.accuracy.problems import APERIODIC, HISTORY, QUANTITIES
+from percussion_model.verification.accuracy.advantage import (
+    MET,
+    MISSED,
+    PEER_MISSES,
+    Contest,
+    contest,
+    summary,
+)
+from percussion_model.verification.accuracy.ladders import FITS, LADDERS
+from percussion_model.verification.accuracy.orders import Cost
+from percussion_model.verification.accuracy.problems import (
+    APERIODIC,
+    CONTACT_HISTORY,
+    HISTORIES,
+    HISTORY,
+    QUANTITIES,
+    STRESS_HISTORY,
+)
 from percussion_model.verification.accuracy.references import Reference
-from percussion_model.verification.accuracy.study import FITS, WANTED, Study
+from percussion_model.verification.accuracy.study import WANTED, Study
 
-_SHORT = {
+SHORT = {
     "rate_of_penetration": "rate",
     "blow_period": "period",
     "impact_velocity": "impact",
     "rebound_velocity": "rebound",
     "rock_energy": "energy",
-    "peak_bit_force": "peak",
+    "peak_bit_force": "bit peak",
+    "peak_contact_force": "contact peak",
+    "peak_stress": "stress peak",
     "resting_place": "rest",
-    HISTORY: "force L1",
+    HISTORY: "bit L1",
+    CONTACT_HISTORY: "contact L1",
+    STRESS_HISTORY: "stress L1",
 }
 # Narrower, and numbers would be cut short.
 LEAST_WIDTH = 98
-_GENERAL = ("lsoda", "lsoda-tol", "radau", "rk45", "dop853", "bdf")
-_ELEMENTS = ("fem", "fem-time", "fem-paper", "fem-gauss")
+# Columns of numbers in one table; more go to a second one.
+MOST_COLUMNS = 6
 
 
 def show_study(found: Study) -> None:
@@ -63,9 +83,9 @@ def show_bars(reference: Reference, console: Console | None = None) -> None:
         label = f"{quantity.label}, {quantity.unit}" if quantity.unit else quantity.label
         table.add_row(
             label,
-            "" if key == HISTORY else f"{quantity.factor * bar.value:.7g}",
+            "" if key in HISTORIES else f"{quantity.factor * bar.value:.7g}",
             _number(abs(bar.error / bar.value)),
-            _number(abs(bar.wave - bar.fem) / abs(bar.value)),
+            _number(bar.apart),
             "" if bar.agreed else "no reference: the limits disagree",
         )
     (console or Console()).print(table)
@@ -86,20 +106,24 @@ def _number(value: float) -> str:
 
 
 def _show_points(found: Study, console: Console) -> None:
-    what = "Relative standard error" if found.problem.kind == APERIODIC else "Relative error"
-    table = _table(f"{what}; ms to compute a simulated second; ms of set-up", "method")
-    for heading in (*(_SHORT[key] for key in found.problem.quantities), "ms/s", "set-up"):
-        table.add_column(heading, justify="right", no_wrap=True)
-    for name in found.names:
-        table.add_row(f"[bold]{LADDERS[name].title}[/bold]")
-        for point in found.ladder(name):
-            label = point.label + (" *" if point.fit > FITS else "")
-            errors = [_number(point.errors.get(key, math.nan)) for key in found.problem.quantities]
-            times = [f"{1e3 * value:.3g}" for value in (point.second, point.setup)]
-            table.add_row(f" {label}", *errors, *times)
-    console.print(table)
-    per_blow = found.problem.period
-    console.print(f"A blow takes {per_blow:.4g} s; its cost is that part of ms/s.", highlight=False)
+    what = "Relative standard error" if found.kind == APERIODIC else "Relative error"
+    keys = found.quantities
+    for start in range(0, len(keys), MOST_COLUMNS):
+        shown = keys[start : start + MOST_COLUMNS]
+        table = _table(f"{what}; ms to compute a simulated second; ms of set-up", "method")
+        for heading in (*(SHORT[key] for key in shown), "ms/s", "set-up"):
+            table.add_column(heading, justify="right", no_wrap=heading not in SHORT.values())
+        for name in found.names:
+            table.add_row(f"[bold]{LADDERS[name].title}[/bold]")
+            for point in found.ladder(name):
+                label = point.label + (" *" if point.fit > FITS else "")
+                errors = [_number(point.errors.get(key, math.nan)) for key in shown]
+                times = [f"{1e3 * value:.3g}" for value in (point.second, point.setup)]
+                table.add_row(f" {label}", *errors, *times)
+        console.print(table)
+    console.print(
+        f"A blow takes {found.period:.4g} s; its cost is that part of ms/s.", highlight=False
+    )
     if any(point.fit > FITS for point in found.points):
         console.print(
             "* Lengths that fit no common cell: the wave speed is off, the rung lies off the "
@@ -109,33 +133,85 @@ def _show_points(found: Study, console: Console) -> None:
 
 
 def _show_orders(found: Study, console: Console) -> None:
-    table = _table("Measured orders, each against what the method refines", "method")
-    for key in found.problem.quantities:
-        table.add_column(_SHORT[key], justify="right", no_wrap=True)
-    for name in found.names:
-        cells = []
-        for key in found.problem.quantities:
-            order = found.order(name, key)
-            cells.append("-" if order is None else f"{order.value:.1f}±{order.error:.1f}")
-        table.add_row(LADDERS[name].title, *cells)
-    console.print(table)
-    if "rigid" in found.names and found.problem.kind != APERIODIC:
+    keys = [key for key in found.quantities if any(found.order(name, key) for name in found.names)]
+    for start in range(0, len(keys), MOST_COLUMNS):
+        shown = keys[start : start + MOST_COLUMNS]
+        table = _table("Measured orders, each against what the method refines", "method")
+        for key in shown:
+            table.add_column(SHORT[key], justify="right")
+        for name in found.names:
+            orders = [found.order(name, key) for key in shown]
+            cells = ["-" if one is None else f"{one.value:.1f}±{one.error:.1f}" for one in orders]
+            table.add_row(LADDERS[name].title, *cells)
+        console.print(table)
+    if "rigid" in found.names and found.kind != APERIODIC:
         console.print(f"rigid: {LADDERS['rigid'].note}.", highlight=False)
 
 
 def _show_costs(found: Study, console: Console) -> None:
-    """Print the cost of accuracies of the first quantity, best of each family."""
-    key = found.problem.main
-    table = _table(f"ms to compute a simulated second, for an error in {_SHORT[key]}", "error")
-    for heading in ("wave", "best fem", "by wave", "best of scipy", "by wave"):
-        table.add_column(heading, justify="right", no_wrap=True)
-    for wanted in (1e-2, 5e-3, 2e-3, 1e-3, 5e-4):
-        wave = found.cost("wave", key, wanted)
-        cells = [f"{1e3 * wave:.3g}" if isfinite(wave) else "-"]
-        for family in (_ELEMENTS, _GENERAL):
-            name, cost = found.cheapest(list(family), key, wanted)
-            known = isfinite(cost)
-            cells.append(f"{1e3 * cost:.3g} ({LADDERS[name].title})" if known else "-")
-            cells.append(f"{cost / wave:.3g}" if known and isfinite(wave) else "-")
+    """Print what errors of the first quantity cost the waves, and the best of each family."""
+    table = _table(
+        f"ms to compute a simulated second, for an error in {SHORT[found.main]}", "error"
+    )
+    for heading in ("wave", "without leaps", "best peer", "best fem", "best of scipy"):
+        table.add_column(heading, justify="right")
+    for wanted in WANTED:
+        costs = [found.cost(name, found.main, wanted) for name in ("wave", "wave-steps")]
+        cells = [f"{1e3 * cost.value:.3g}" if isfinite(cost.value) else "-" for cost in costs]
+        for family in ("peer", "fem", "scipy"):
+            best = found.best((family,), found.main, wanted)
+            title = "" if best is None else LADDERS[best.ladder].title
+            cells.append("-" if best is None else f"{1e3 * best.value:.3g} ({title})")
         table.add_row(f"{100 * wanted:g} %", *cells)
     console.print(table)
+
+
+def show_contests(studies: dict[str, Study]) -> None:
+    """Print waves against the best of their peers, all scenes in one table, and the ratios."""
+    console = Console(width=max(Console().width, LEAST_WIDTH))
+    table = _table("The same error in rate: ms to compute a simulated second", "scene")
+    for heading in ("error", "wave", "best peer", "", "ratio"):
+        table.add_column(heading, justify="left" if not heading else "right", no_wrap=True)
+    found = [[contest(one, wanted) for wanted in WANTED] for one in studies.values()]
+    for name, contests in zip(studies, found, strict=True):
+        for k, one in enumerate(contests):
+            table.add_row(
+                escape(name) if k == 0 else "", f"{100 * one.wanted:g} %", *_contest_cells(one)
+            )
+        table.add_section()
+    console.print(table)
+    for column in zip(*found, strict=True):
+        told = summary(column)
+        text = f"{100 * told.wanted:g} %: no scene is decided."
+        if isfinite(told.median):
+            text = (
+                f"{100 * told.wanted:g} %: ratio {two(told.luckiest)} at the luckiest, "
+                f"{two(told.median)} at the median, {two(told.worst)} at the worst of "
+                f"{told.scenes - told.undecided} scenes; {told.undecided} undecided."
+            )
+        console.print(text, highlight=False)
+
+
+def _contest_cells(one: Contest) -> tuple[str, str, str, str]:
+    """Time of the waves, time and name of the best peer, and the ratio, each with its range."""
+    peer, name = "-", ""
+    if one.peer is not None:
+        peer, name = _cost_text(one.peer), LADDERS[one.peer.ladder].title
+    ratio = {
+        MET: f"{two(one.ratio)} ({two(one.low)}-{two(one.high)})",
+        PEER_MISSES: f"above {two(one.ratio)}",
+        MISSED: f"below {two(one.ratio)}",
+    }
+    return _cost_text(one.wave), peer, name, ratio.get(one.outcome, one.outcome)
+
+
+def _cost_text(cost: Cost) -> str:
+    """Milliseconds with their range; what the reference cannot tell is undecided."""
+    if isfinite(cost.value) and isfinite(cost.high):
+        return f"{two(1e3 * cost.value)} ({two(1e3 * cost.low)}-{two(1e3 * cost.high)})"
+    return "undecided" if isfinite(cost.low) else "not met"
+
+
+def two(value: float) -> str:
+    """Two digits without exponent."""
+    return f"{float(f'{value:.2g}'):.0f}" if value >= 10.0 else f"{value:.2g}"

@@ -1,8 +1,9 @@
-"""Figure of error against computing time: every ladder a line, both axes logarithmic."""
+"""Figures of error: against computing time, and against the misfit of the wave speed."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,24 +14,29 @@ from matplotlib.ticker import LogLocator, NullLocator
 
 from percussion_model.interface.plotting import style
 from percussion_model.verification.accuracy.ladders import LADDERS
-from percussion_model.verification.accuracy.problems import APERIODIC, HISTORY, QUANTITIES
+from percussion_model.verification.accuracy.problems import (
+    APERIODIC,
+    DROP,
+    HISTORIES,
+    HISTORY,
+    QUANTITIES,
+)
 from percussion_model.verification.accuracy.study import Point, Study
 
-# Colour, dashes and marker of each ladder; families share a colour.
-_WAVE, _FEM, _SCIPY, _RIGID = "#0072B2", "#D55E00", "#009E73", "#595959"
+# Colour, dashes and marker of each ladder that is drawn; families share a colour. Ladders
+# that refine something else than cells or elements stand in the tables alone.
+_WAVE, _FEM, _SCIPY, _RIGID, _PEER = "#0072B2", "#D55E00", "#009E73", "#595959", "#CC79A7"
 LINES: dict[str, tuple[str, Any, str]] = {
     "wave": (_WAVE, "-", "o"),
+    "wave-steps": (_WAVE, (0, (4, 1.5)), "o"),
+    "explicit": (_PEER, "-", "v"),
+    "exact-flow": (_PEER, (0, (4, 1.5)), "d"),
     "fem": (_FEM, "-", "s"),
-    "fem-time": (_FEM, (0, (1.2, 1.2)), "v"),
     "fem-paper": ("#E69F00", (0, (4, 1.5)), "s"),
-    "fem-gauss": ("#CC79A7", (0, (4, 1.5)), "D"),
+    "fem-gauss": (_FEM, (0, (1.2, 1.2)), "D"),
     "rigid": (_RIGID, "-", "X"),
     "lsoda": (_SCIPY, "-", "^"),
-    "lsoda-tol": (_SCIPY, (0, (1.2, 1.2)), "<"),
-    "radau": ("#56B4E9", (0, (4, 1.5)), "P"),
-    "rk45": ("#222222", (0, (4, 1.5)), "*"),
-    "dop853": ("#8C6D00", (0, (4, 1.5)), "h"),
-    "bdf": ("#7A5195", (0, (4, 1.5)), "d"),
+    "radau": (_SCIPY, (0, (4, 1.5)), "P"),
 }
 # Errors below this are drawn at it: they are zero within the bar of the reference.
 LEAST = 1e-7
@@ -38,28 +44,67 @@ IN_A_ROW = 4
 
 
 def draw_accuracy(found: Study) -> Figure:
-    """Draw the first quantity against time by second, the last against time by blow."""
-    fig = Figure(figsize=(11.0, 6.2), layout="constrained")
-    left, right = fig.subplots(1, 2)
-    keys = (found.problem.main, found.problem.quantities[-1])
-    for ax, key, by in zip((left, right), keys, ("second", "blow"), strict=True):
-        _panel(ax, found, key, by)
+    """Draw the first quantity and the force on the rock against time."""
+    keys = [found.main] + [HISTORY] * (HISTORY in found.quantities)
+    fig = Figure(figsize=(11.0 if len(keys) > 1 else 8.0, 5.6), layout="constrained")
+    for ax, key in zip(np.atleast_1d(fig.subplots(1, len(keys))), keys, strict=True):
+        _panel(ax, found, key)
     _head(fig, _title(found), found)
     return fig
 
 
 def draw_quantities(found: Study) -> Figure:
-    """Draw every quantity against time by simulated second."""
-    keys = found.problem.quantities
+    """Draw every quantity against time."""
+    keys = found.quantities
     columns = 3 if len(keys) > 4 else 2
     rows = math.ceil(len(keys) / columns)
     fig = Figure(figsize=(11.0, 1.2 + 3.1 * rows), layout="constrained")
     axes = np.atleast_1d(fig.subplots(rows, columns)).ravel()
     for ax, key in zip(axes, keys, strict=False):
-        _panel(ax, found, key, "second")
+        _panel(ax, found, key)
     for ax in axes[len(keys) :]:
         ax.set_visible(False)
     _head(fig, f"{_title(found)}: all quantities", found)
+    return fig
+
+
+def draw_misfits(studies: Sequence[Study]) -> Figure:
+    """Draw the error of the waves against the error of their wave speed, scene by scene."""
+    fig = Figure(figsize=(7.6, 6.0), layout="constrained")
+    ax = fig.subplots()
+    colours = (
+        "#0072B2",
+        "#D55E00",
+        "#009E73",
+        "#CC79A7",
+        "#E69F00",
+        "#56B4E9",
+        "#595959",
+        "#222222",
+    )
+    scale, drawn = [math.inf, 0.0], 0
+    for found in studies:
+        rungs = found.ladder("wave-misfit")
+        pairs = [(point.size, point.errors.get(found.main, math.nan)) for point in rungs]
+        pairs = [pair for pair in pairs if pair[1] > 0]
+        if not pairs:
+            continue
+        x, y = np.array(pairs).T
+        scale = [min(scale[0], x.min()), max(scale[1], x.max())]
+        ax.plot(
+            x, y, color=colours[drawn % 8], marker="os^DvPX*"[drawn % 8], markersize=5.0,
+            linestyle="", label=found.title,
+        )  # fmt: skip
+        drawn += 1
+    for factor, dashes in ((1.0, "-"), (10.0, (0, (4, 1.5)))):
+        ax.plot(
+            scale, [factor * value for value in scale], color=style.RULE_COLOUR,
+            linestyle=dashes, linewidth=0.9, zorder=1, label=f"{factor:g} times the misfit",
+        )  # fmt: skip
+    _log_axes(ax)
+    style.label(ax, "error of the wave speed, relative", "error of the rate, relative")
+    style.head(fig, "Lengths that do not fit the cells, at about 40 cells in the piston")
+    fig.legend(loc="outside lower center", ncols=2)
     return fig
 
 
@@ -70,89 +115,97 @@ def _head(fig: Figure, title: str, found: Study) -> None:
 
 
 def _title(found: Study) -> str:
-    what = "Standard error" if found.problem.kind == APERIODIC else "Error"
+    what = "Standard error" if found.kind == APERIODIC else "Error"
     return f"{what} against time to compute" + (f" — {found.title}" if found.title else "")
 
 
-def _panel(ax: Axes, found: Study, key: str, by: str) -> None:
-    names = [name for name in found.names if _points(found, name, key, by)]
+def _drawn(found: Study) -> list[str]:
+    """Ladders that are drawn."""
+    return [name for name in found.names if name in LINES]
+
+
+def _panel(ax: Axes, found: Study, key: str) -> None:
+    names = [name for name in _drawn(found) if _points(found, name, key)]
     for name in names:
-        _ladder(ax, found, name, key, by)
+        _ladder(ax, found, name, key)
     floor = found.reference.floor(key)
-    if math.isfinite(floor) and found.problem.kind != APERIODIC:
+    known = math.isfinite(floor) and found.kind != APERIODIC
+    if known:
         ax.axhspan(LEAST / 10.0, max(floor, LEAST), color=style.SHADE_COLOUR, linewidth=0, zorder=0)
+    errors = [error for name in names for _, error in _points(found, name, key)]
+    if errors:
+        bottom = min([*errors, floor if known and floor > LEAST else math.inf])
+        ax.set_ylim(0.5 * bottom, 2.0 * max(errors))
+    else:
+        ax.text(0.5, 0.5, "no reference: see the table", ha="center", transform=ax.transAxes)
+    _log_axes(ax)
+    quantity = QUANTITIES[key]
+    unit = {DROP: "the whole drop [s]", APERIODIC: "the run [s]"}.get(
+        found.kind, "a simulated second [s]"
+    )
+    kind = "L1, relative" if key in HISTORIES else "relative"
+    title = quantity.label[0].upper() + quantity.label[1:]
+    style.label(ax, f"processor time of {unit}", f"error, {kind}", title)
+
+
+def _log_axes(ax: Axes) -> None:
     ax.set_xscale("log")
     ax.set_yscale("log")
-    low = [max(error, LEAST) for name in names for _, error in _points(found, name, key, by)]
-    if low:
-        bottom = min([*low, floor if math.isfinite(floor) and floor > LEAST else math.inf])
-        ax.set_ylim(0.5 * bottom, 2.0 * max(low))
     for axis in (ax.xaxis, ax.yaxis):
         axis.set_major_locator(LogLocator(10.0, numticks=12))
         axis.set_minor_locator(NullLocator())  # hundreds of ticks take most of the drawing
-    unit = {"second": "a simulated second", "blow": "a blow"}[by]
-    if by == "blow" and found.problem.kind == "drop":
-        unit = "the whole drop"
-    if found.problem.kind == APERIODIC:
-        unit = "the run"
-    quantity = QUANTITIES[key]
-    kind = "L1, relative" if key == HISTORY else "relative"
-    if not names:
-        ax.text(0.5, 0.5, "no reference: see the table", ha="center", transform=ax.transAxes)
-    title = quantity.label[0].upper() + quantity.label[1:]
-    style.label(ax, f"time to compute {unit} [s]", f"error, {kind}", title)
 
 
-def _cost(found: Study, point: Point, by: str) -> float:
-    """Time of a point; of aperiodic motion that of the whole run, for its length is the effort."""
-    if found.problem.kind == APERIODIC:
+def _cost(found: Study, point: Point) -> float:
+    """Time of a point; of a drop and of aperiodic motion that of the whole run [s]."""
+    if found.kind == APERIODIC:
         return point.second * point.size
-    return float(getattr(point, by))
+    return point.second * (found.duration if found.kind == DROP else 1.0)
 
 
-def _points(found: Study, name: str, key: str, by: str) -> list[tuple[float, float]]:
-    """Time and error of each point of a ladder that has both."""
-    pairs = [(getattr(point, by), point.errors.get(key, math.nan)) for point in found.ladder(name)]
-    return [(cost, error) for cost, error in pairs if cost > 0 and math.isfinite(error)]
+def _points(found: Study, name: str, key: str) -> list[tuple[float, float]]:
+    """Time and error, as drawn, of each point of a ladder that has both."""
+    return list(_pairs(found, found.ladder(name), key))
 
 
-def _ladder(ax: Axes, found: Study, name: str, key: str, by: str) -> None:
-    """Line through the points that make the order; hollow markers for the others."""
-    colour, dashes, marker = LINES[name]
-    fitted = {point.label for point in found.fitted(name, key)}
-    full: list[tuple[float, float]] = []
-    hollow: list[tuple[float, float]] = []
-    for point in found.ladder(name):
-        error, cost = point.errors.get(key, math.nan), _cost(found, point, by)
+def _pairs(found: Study, points: Iterable[Point], key: str) -> Iterable[tuple[float, float]]:
+    for point in points:
+        error, cost = point.errors.get(key, math.nan), _cost(found, point)
         if cost > 0 and math.isfinite(error):
-            (full if point.label in fitted else hollow).append((cost, max(error, LEAST)))
-    if full:
-        x, y = np.array(full).T
-        ax.plot(x, y, color=colour, linestyle=dashes, marker=marker, markersize=5.0, zorder=3)
-    if hollow:
-        x, y = np.array(hollow).T
-        ax.plot(
-            x, y, color=colour, linestyle="", marker=marker, markersize=5.0,
-            markerfacecolor="white", zorder=2,
-        )  # fmt: skip
+            yield cost, max(error, LEAST)
+
+
+def _ladder(ax: Axes, found: Study, name: str, key: str) -> None:
+    """Line through all points; hollow markers where they are not in the order."""
+    colour, dashes, marker = LINES[name]
+    x, y = np.array(_points(found, name, key)).T
+    ax.plot(x, y, color=colour, linestyle=dashes, linewidth=1.0, zorder=2)
+    fitted = {point.label for point in found.fitted(name, key)}
+    full = [point for point in found.ladder(name) if point.label in fitted]
+    rest = [point for point in found.ladder(name) if point.label not in fitted]
+    for points, face in ((full, colour), (rest, "white")):
+        pairs = list(_pairs(found, points, key))
+        if pairs:
+            x, y = np.array(pairs).T
+            ax.plot(
+                x, y, color=colour, linestyle="", marker=marker, markersize=5.0,
+                markerfacecolor=face, zorder=3,
+            )  # fmt: skip
 
 
 def _handles(found: Study) -> list[Any]:
-    """Legend: ladders with their measured order in the first quantity."""
+    """Legend: ladders, and what hollow markers and the shade mean."""
     handles = []
-    for name in found.names:
+    for name in _drawn(found):
         colour, dashes, marker = LINES[name]
-        order = found.order(name, found.problem.main)
         text = LADDERS[name].title
-        if order is not None:
-            text += f" (order {order.value:.1f})"
         handles.append(
             Line2D([], [], color=colour, linestyle=dashes, marker=marker, markersize=5, label=text)
         )
-    if found.problem.kind != APERIODIC:
+    if found.kind != APERIODIC:
         hollow = Line2D(
             [], [], color=style.RULE_COLOUR, linestyle="", marker="o", markersize=5,
-            markerfacecolor="white", label="not fitted: lengths off, or below the bar",
+            markerfacecolor="white", label="lengths do not fit, or near the bar",
         )  # fmt: skip
         bar = Line2D([], [], color=style.SHADE_COLOUR, linewidth=6, label="bar of the reference")
         handles += [hollow, bar]

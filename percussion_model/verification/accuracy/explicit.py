@@ -6,7 +6,7 @@ A peer that methods are compared with, compiled and tuned as its best user would
 from __future__ import annotations
 
 import math
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -52,6 +52,23 @@ def stable_step(transit_time: float, loss_time: float) -> float:
     """
     zeta = loss_time / transit_time
     return transit_time * (math.sqrt(1.0 + zeta * zeta) - zeta)
+
+
+class Elements(NamedTuple):
+    """Elements of one bar, top to bottom.
+
+    Attributes
+    ----------
+    mass : ndarray, shape (n,)
+        Of each [kg].
+    """
+
+    mass: np.ndarray
+
+    @property
+    def n(self) -> int:
+        """Number of elements."""
+        return len(self.mass)
 
 
 class ExplicitSolver(Solver):
@@ -105,6 +122,7 @@ class ExplicitSolver(Solver):
         p["dt"] = self.time_step = courant * min(stable_step(t, eta) for t in transits)
         runs["kappa"] *= p["dt"]
         p["end_mass"] = runs["half"][-1]
+        p["uppers"] = np.sum(runs["bit"] == 0)
         self._par, self._runs, self._nodes = par, runs, node
         self.cells = {
             name: int(runs["n"][runs["bit"] == bit].sum())
@@ -159,6 +177,26 @@ class ExplicitSolver(Solver):
         spare = state.copy(spare)
         self._run(1, spare, t, self._no_blows, self._no_events, reading)
         return spare
+
+    def grid_of(self, bar: str) -> Elements | None:
+        """Elements of "piston" or "bit", None where it has none."""
+        runs = self._runs[self._runs["bit"] == (bar == "bit")]
+        return Elements(np.repeat(2.0 * runs["half"], runs["n"])) if len(runs) else None
+
+    def fields(self, state: State) -> dict[str, np.ndarray]:
+        """Elastic force [N] and velocity [m/s] of each element, top to bottom, by bar."""
+        rows, v = state.arrays[0], state.arrays[0][2]
+        w = rows[int(state.record[0]["flip"])]
+        par, out = self._par[0], dict[str, np.ndarray]()
+        for name in self.cells:
+            parts: dict[str, list[np.ndarray]] = {"force": [], "velocity": []}
+            for row in self._runs[self._runs["bit"] == (name == "bit")]:
+                nodes = slice(int(row["first"]), int(row["first"] + row["n"] + 1))
+                stiffness = 2.0 * row["half"] * row["kappa"] / par["dt"]
+                parts["force"].append(-stiffness * np.diff(w[nodes] - par["eta"] * v[nodes]))
+                parts["velocity"].append(0.5 * (v[nodes][:-1] + v[nodes][1:]))
+            out |= {f"{name}_{what}": np.concatenate(arrays) for what, arrays in parts.items()}
+        return out
 
 
 def explicit_rate(

@@ -42,6 +42,10 @@ LOOK = 64
 FASTER, FASTER_BY = 2.0, 5.0
 # A bit whose energy is below this share of the barrier cannot pass it without a blow.
 SURELY = 0.5
+# Bars with less energy of vibration than this count as rigid [J]; a blow has some 300 J.
+QUIET = 1e-7
+# So many steps before its gap can close a quiet piston has nodes again.
+AHEAD = 4.0
 # Halvings of a step in search of a change of mode.
 HALVINGS = 30
 
@@ -75,6 +79,7 @@ EXPLICIT_PAR = np.dtype(
         ("eta", "f8"),  # Kelvin-Voigt time [s]
         ("end_mass", "f8"),  # at the bit's rock end [kg]
         ("start_gap", "f8"),  # [m]
+        ("uppers", "i8"),  # stretches of the piston
         ("most_changes", "i8"),  # of mode within a step; more are a loop
         *COMMON_PARAMETERS,
     ],
@@ -93,6 +98,9 @@ EXPLICIT_STATE = np.dtype(
         ("p_by_v", "f8"),
         ("v_by_p", "f8"),
         ("v_by_v", "f8"),
+        ("u_p", "f8"),  # mean displacement of a quiet piston [m]
+        ("quiet_p", "i8"),  # 1: the piston moves as a rigid body
+        ("quiet_b", "i8"),  # 1: and the bit stands still
         ("flip", "i8"),  # 1: the second row of positions is the present one
         ("look_in", "i8"),  # steps to the next look at the mean motion
         ("alert", "i8"),  # 1: the bit may have more energy than the barrier of its standstill
@@ -132,7 +140,7 @@ def read_means(par, s, runs, w, v):
     u_b = 0.0
     v_p = 0.0
     v_b = 0.0
-    for r in range(runs.shape[0]):
+    for r in range(par.uppers if s.quiet_p == 1 else 0, runs.shape[0]):
         mass = 2.0 * runs[r].half
         speed = total(v, runs[r].first, runs[r].n)
         place = total(w, runs[r].first, runs[r].n) - par.eta * speed
@@ -143,6 +151,8 @@ def read_means(par, s, runs, w, v):
             u_p += mass * place
             v_p += mass * speed
     s.v_b = v_b / par.mass_b
+    if s.quiet_p == 1:
+        return s.u_p, u_b / par.mass_b
     if par.mass_p > 0.0:
         s.v_p = v_p / par.mass_p
         return u_p / par.mass_p, u_b / par.mass_b
@@ -150,21 +160,18 @@ def read_means(par, s, runs, w, v):
 
 
 @kernel
-def kinetic_energy(par, s, runs, w, v, kick, bit):
-    """Kinetic energy of piston or bit; of the bit when `kick` is a share of a step on [J]."""
+def kinetic_energy(par, s, runs, w, v, share):
+    """Kinetic energy of the bit a share of a step after the velocities [J]."""
     energy = 0.0
-    for r in range(runs.shape[0]):
-        if runs[r].bit != bit:
-            continue
+    for r in range(par.uppers, runs.shape[0]):
         i, n = runs[r].first, runs[r].n
-        share = kick * runs[r].kappa
+        kick = share * runs[r].kappa
         inner = 0.0
         for j in range(i + 1, i + n):
-            speed = v[j] + share * (w[j - 1] - 2.0 * w[j] + w[j + 1])
+            speed = v[j] + kick * ((w[j - 1] - w[j]) + (w[j + 1] - w[j]))
             inner += speed * speed
-        top = v[i] + 2.0 * share * (w[i + 1] - w[i]) if runs[r].joint == Joint.ROCK else v[i]
         low = s.v_end if runs[r].joint == Joint.ROCK else v[i + n]
-        energy += runs[r].half * (inner + 0.5 * (top * top + low * low))
+        energy += runs[r].half * (inner + 0.5 * (v[i] * v[i] + low * low))
     return energy
 
 
@@ -297,7 +304,7 @@ def divide_step(par, s, runs, w, v, a, events):
         p, speed = ride_on_rock(par, s, a, part)
         move_end(par, s, a, p, speed, part)
         h -= part
-        energy = kinetic_energy(par, s, runs, w, v, 1.0 - h / par.dt, 1)
+        energy = kinetic_energy(par, s, runs, w, v, 1.0 - h / par.dt)
         change_mode(par, s, energy, s.time + 0.5 * par.dt - h, events)
     s.count_locked += 1
     p, speed = ride_on_rock(par, s, a, h)
@@ -309,7 +316,7 @@ def step_rock_end(par, s, runs, w, v, a, events):
     """Move the rock end from the middle of the last step to the middle of this one."""
     s.force_before = s.force
     if s.mode == Mode.SS and s.alert == 1:
-        energy = kinetic_energy(par, s, runs, w, v, 0.0, 1)
+        energy = kinetic_energy(par, s, runs, w, v, 0.0)
         if overcomes_barrier(par, s, energy):
             leave_standstill(par, s, s.v_end)
             prepare_mode(par, s)
@@ -399,10 +406,18 @@ def meet(par, s, runs, w, v, upper, blows, events):
 
 
 @inlined
-def move_node(par, old, new, v, i, after, way):
-    """Give a node at an end its velocity, and a position that is `way` further."""
-    new[i] = old[i] + ((par.dt + par.eta) * after - par.eta * v[i]) + way
+def move_node(par, old, new, v, i, after):
+    """Give a node at an end its velocity and its place."""
+    new[i] = old[i] + ((par.dt + par.eta) * after - par.eta * v[i])
     v[i] = after
+
+
+@inlined
+def fly(par, s, push, top):
+    """One step of a quiet piston over a bit whose upper end has the velocity `top`."""
+    s.v_p += push
+    s.u_p += par.dt * s.v_p
+    s.gap -= par.dt * (s.v_p - top)
 
 
 @kernel
@@ -411,8 +426,9 @@ def step(par, s, runs, old, new, v, blows, events):
     dt = par.dt
     push = dt * piston_acceleration(par, drive_force(par, s)) if par.mass_p > 0.0 else 0.0
     load = dt * bit_acceleration(par, s)
+    first = par.uppers if s.quiet_p == 1 else 0
     last = runs.shape[0] - 1
-    for r in range(last + 1):
+    for r in range(first, last + 1):
         i = runs[r].first
         j = i + runs[r].n
         kick = load if runs[r].bit == 1 else push
@@ -422,26 +438,26 @@ def step(par, s, runs, old, new, v, blows, events):
     end = runs[last].first + runs[last].n
     step_rock_end(par, s, runs, old, v, (runs[last].low - v[end]) / dt, events)
     runs[last].low = s.v_end
-    for r in range(last):
-        way = 0.0
+    way = 0.0
+    for r in range(first, last):
         if runs[r].joint == Joint.CONTACT:
             way = meet(par, s, runs, old, v, r, blows, events)
         else:
             share_velocity(runs, r)
-        i = runs[r].first + runs[r].n
-        move_node(par, old, new, v, i, runs[r].low, way)
-        move_node(par, old, new, v, i + 1, runs[r + 1].top, 0.0)
-        if way != 0.0:
-            new[i + 1] = new[i]
-    move_node(par, old, new, v, 0, runs[0].top, 0.0)
-    v[end] = s.v_end
-    new[end] = (s.x_r + s.p) + (0.5 * dt + par.eta) * s.v_end
-    for r in range(last + 1):
+    for r in range(first, last + 1):
+        i = runs[r].first
+        j = i + runs[r].n
+        move_node(par, old, new, v, i, runs[r].top)
+        move_node(par, old, new, v, j, runs[r].low)
         kick = load if runs[r].bit == 1 else push
-        inner = runs[r].n - 1
-        sweep(old, new, v, runs[r].first, inner, runs[r].kappa, kick, par.eta, dt + par.eta)
-    s.time += dt
-    s.count_steps += 1
+        sweep(old, new, v, i, runs[r].n - 1, runs[r].kappa, kick, par.eta, dt + par.eta)
+    if way != 0.0:
+        i = runs[par.uppers].first
+        new[i - 1] += way
+        new[i] = new[i - 1]
+    new[end] = (s.x_r + s.p) + (0.5 * dt + par.eta) * s.v_end
+    if s.quiet_p == 1:
+        fly(par, s, push, runs[first].top)
 
 
 @merged
@@ -457,38 +473,20 @@ def turn_pressure(par, s, runs, w, v, events):
         return
     change = piston_acceleration(par, drive_force(par, s)) - before
     kick = change * (0.5 - share) * par.dt
-    for r in range(runs.shape[0]):
-        if runs[r].bit == 0:
-            for i in range(runs[r].first, runs[r].first + runs[r].n + 1):
-                v[i] += kick
-                w[i] += par.eta * kick
+    s.v_p += kick
+    if s.quiet_p == 0:
+        for i in range(runs[par.uppers].first):
+            v[i] += kick
+            w[i] += par.eta * kick
 
 
 @kernel
-def look(par, s, runs, w, v, events):
-    """Look at the mean motion: turn the drive, and say when to look again."""
-    u_p, u_b = read_means(par, s, runs, w, v)
-    s.look_in = LOOK
-    if s.alert == 1 and s.mode == Mode.SS and s.closed == 0:
-        # the energy of what is left to itself does not rise
-        s.alert = 1 if moving_energy(par, s, runs, w, v) > SURELY * s.w_r else 0
-    if par.mass_p > 0.0:
-        s.u_r = u_p - u_b
-        turn_pressure(par, s, runs, w, v, events)
-        room = -s.u_r if s.alpha > 0 else s.u_r + s.reversal
-        speed = FASTER * abs(s.v_p - s.v_b) + FASTER_BY
-        s.look_in = int(min(float(LOOK), max(0.0, room / (speed * par.dt))))
-
-
-@kernel
-def moving_energy(par, s, runs, w, v):
+def standing_energy(par, s, runs, w, v):
     """Energy of a bit that stands on the rock, less what it would have at rest [J]."""
-    energy = kinetic_energy(par, s, runs, w, v, 0.0, 1)
+    energy = kinetic_energy(par, s, runs, w, v, 0.0)
     load = bit_acceleration(par, s)
     above = 0.0
-    for r in range(runs.shape[0]):
-        if runs[r].bit == 0:
-            continue
+    for r in range(par.uppers, runs.shape[0]):
         mass = 2.0 * runs[r].half
         stiff = runs[r].kappa * mass / par.dt
         for i in range(runs[r].first, runs[r].first + runs[r].n):
@@ -497,6 +495,60 @@ def moving_energy(par, s, runs, w, v):
             above += mass
     off = spring_force(s) - load * par.mass_b
     return energy + 0.5 * off * off / stiffness(s)
+
+
+@kernel
+def flying_energy(par, s, runs, w, v):
+    """Energy of vibration of a piston that touches nothing [J]."""
+    energy = 0.0
+    for r in range(par.uppers):
+        mass = 2.0 * runs[r].half
+        stiff = runs[r].kappa * mass / par.dt
+        for i in range(runs[r].first, runs[r].first + runs[r].n):
+            stretch = w[i + 1] - w[i]
+            speed = 0.5 * (v[i] + v[i + 1]) - s.v_p
+            energy += 0.5 * (stiff * stretch * stretch + mass * speed * speed)
+    return energy
+
+
+@kernel
+def wake(par, s, runs, w, v):
+    """Give a quiet piston its nodes again."""
+    s.quiet_p = 0
+    s.quiet_b = 0
+    s.look_in = 0
+    for i in range(runs[par.uppers].first):
+        v[i] = s.v_p
+        w[i] = s.u_p + par.eta * s.v_p
+
+
+@kernel
+def look(par, s, runs, w, v, events):
+    """Look at the mean motion: turn the drive, and say when to look again."""
+    u_p, u_b = read_means(par, s, runs, w, v)
+    s.look_in = LOOK
+    if s.mode == Mode.SS and s.closed == 0 and s.quiet_b == 0:
+        # the energy of what is left to itself does not rise
+        energy = standing_energy(par, s, runs, w, v)
+        s.alert = 1 if energy > SURELY * s.w_r else 0
+        if s.quiet_p == 1 and energy < QUIET:
+            s.quiet_b = 1
+            for i in range(runs[par.uppers].first, v.shape[0]):
+                w[i] -= par.eta * v[i]
+                v[i] = 0.0
+            s.v_end = 0.0
+            s.force = spring_force(s)
+            s.force_before = s.force
+    flying = s.closed == 0 and s.quiet_p == 0 and par.uppers > 0
+    if flying and flying_energy(par, s, runs, w, v) < QUIET:
+        s.quiet_p = 1
+        s.u_p = u_p
+    if par.mass_p > 0.0:
+        s.u_r = u_p - u_b
+        turn_pressure(par, s, runs, w, v, events)
+        room = -s.u_r if s.alpha > 0 else s.u_r + s.reversal
+        speed = FASTER * abs(s.v_p - s.v_b) + FASTER_BY
+        s.look_in = int(min(float(LOOK), max(0.0, room / (speed * par.dt))))
 
 
 @merged
@@ -510,11 +562,20 @@ def advance_to(par, s, runs, first, second, v, time, blows, events):
                 return Status.BLOWS_FULL
             if s.events_on == 1 and s.n_events + 3 * par.most_changes > events.shape[0]:
                 return Status.EVENTS_FULL
-        if s.flip == 0:
-            step(par, s, runs, first, second, v, blows, events)
+        if s.quiet_p == 1:
+            top = v[runs[par.uppers].first]
+            if s.gap <= AHEAD * par.dt * (abs(s.v_p) + abs(top)):
+                wake(par, s, runs, second if s.flip == 1 else first, v)
+        if s.quiet_b == 1:
+            fly(par, s, par.dt * piston_acceleration(par, drive_force(par, s)), 0.0)
         else:
-            step(par, s, runs, second, first, v, blows, events)
-        s.flip = 1 - s.flip
+            if s.flip == 0:
+                step(par, s, runs, first, second, v, blows, events)
+            else:
+                step(par, s, runs, second, first, v, blows, events)
+            s.flip = 1 - s.flip
+        s.time += par.dt
+        s.count_steps += 1
         s.look_in -= 1
         if s.look_in < 0:
             look(par, s, runs, second if s.flip == 1 else first, v, events)
@@ -539,12 +600,15 @@ def run(reads, par_, state, runs, first, second, v, time, blows, events, reading
     u_p, u_b = read_means(par, s, runs, w, v)
     s.u_r = u_p - u_b
     row = reading[0]
-    kinetic = kinetic_energy(par, s, runs, w, v, 0.0, 1)
+    kinetic = kinetic_energy(par, s, runs, w, v, 0.0)
     fill_ledger(s, row, kinetic, 0.0, recoverable(s))
     fill_motion(par, s, row, time, u_p + par.start_gap, u_b)
+    row.bit_end_position = s.x_r + s.p + (time - s.time + 0.5 * par.dt) * s.v_end
     row.bit_end_velocity = s.v_end
     row.bit_kinetic_energy = kinetic
     row.contact_force = s.contact_force
+    # the last step is at most half of one away
+    row.contact_impulse += (time - s.time) * s.contact_force
     share = (time - (s.time - 1.5 * par.dt)) / par.dt
     row.bit_force = s.force_before + min(max(share, 0.0), 1.0) * (s.force - s.force_before)
     return status

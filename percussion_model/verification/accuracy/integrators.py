@@ -16,6 +16,7 @@ from percussion_model.solvers.fem.records import Node
 from percussion_model.verification.accuracy.problems import (
     AHEAD,
     DROP,
+    HISTORY,
     RATE,
     SETTLING_BLOWS,
     Answer,
@@ -235,7 +236,7 @@ class GeneralRun:
         if self.problem.kind == DROP:
             place = float(drill.y[n - 1])
             values = {"resting_place": place, "peak_bit_force": peak, "rock_energy": drill.y[-1]}
-            return Answer(values, history=course.samples)
+            return Answer(values, histories={HISTORY: course.samples})
         period = course.time - course.started
         advance = drill.mean(drill.y[:n], True) - course.start_position
         values = {
@@ -246,4 +247,4 @@ class GeneralRun:
             "rock_energy": float(drill.y[-1]) - course.start_energy,
             "peak_bit_force": peak,
         }
-        return Answer(values, history=course.samples, blows=1.0)
+        return Answer(values, histories={HISTORY: course.samples}, blows=1.0)

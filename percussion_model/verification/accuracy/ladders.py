@@ -6,24 +6,52 @@ finite elements with their mesh, the ladder's note says so.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import math
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
+from percussion_model.scene.numbers import numbers_of
 from percussion_model.scene.scene import Scene, SceneError
+from percussion_model.solvers.base import Solver
+from percussion_model.solvers.wave.grid import elastic_bars, fitting_cells
+from percussion_model.verification.accuracy.exact_flow import ExactFlowSolver
+from percussion_model.verification.accuracy.explicit import ExplicitSolver
 from percussion_model.verification.accuracy.problems import APERIODIC, Problem
 from percussion_model.verification.accuracy.semidiscrete import refusal
 
-__all__ = ["LADDERS", "Ladder", "Rung", "chosen_ladders", "fem_scene", "ladders"]
+__all__ = [
+    "FITS",
+    "LADDERS",
+    "Ladder",
+    "Rung",
+    "best_fitting",
+    "chosen_ladders",
+    "fem_scene",
+    "ladders",
+    "misfit_of",
+]
 
 # K_C that goes with ten elements in the piston [N/m]; it rises with the square of their
 # number, so that the error of the penalty falls like that of the mesh.
 STIFFNESS_OF_TEN = 1e12
 PAPER_STIFFNESS = 1e12
-# Mean transit time of a cell: the finite elements of a long bar get as many as the waves.
-WAVE_CELLS = (3, 4, 5, 7, 10, 13, 20, 40, 60, 80, 120)
-WAVE_CELLS_FULL = (*WAVE_CELLS, 160, 200)
+# Lengths fit the cells of the waves if their speed is off by less.
+FITS = 1e-6
+# Near a number of cells, up to this factor off it, the one that fits the lengths best is taken.
+NEAR = 1.25
+# Cells about which a ladder of misfits lies, up to which factor, and how many rungs it has.
+MISFIT_CELLS, MISFIT_NEAR, MISFIT_RUNGS = 40, 1.25, 6
+WAVE_CELLS = (3, 5, 7, 10, 14, 20, 30, 44, 66, 100)
+WAVE_CELLS_FULL = (*WAVE_CELLS, 150, 200)
 MESHES, MESHES_FULL = (10, 20, 30, 50, 70), (10, 20, 30, 50, 70, 100)
+# Compiled peers, their meshes, and the most elements in all bars: those of the exact flow
+# have dense matrices.
+COMPILED: dict[str, tuple[Callable[..., Solver], tuple[int, ...], float]] = {
+    "explicit": (ExplicitSolver, (5, 7, 10, 15, 20, 25, 30, 40, 60, 80, 120), 260.0),
+    "exact-flow": (ExactFlowSolver, (5, 7, 10, 15, 20, 30), 100.0),
+}
 FEW = (3, 5, 10, 20)  # of a bar so long that no four of the others are affordable
 STEPS = (20.0, 10.0, 5.0, 3.0, 2.0, 1.0)
 COURANT = 2.0
@@ -45,52 +73,97 @@ class Ladder:
         What is refined, and what the order is measured against.
     note : str
         What else there is to know.
+    family : {"wave", "fem", "peer", "scipy", "rigid"}
+        Methods of a family share a colour; the last has another model.
     """
 
     name: str
     title: str
     knob: str
     note: str
+    family: str = "peer"
 
 
 LADDERS = {
     one.name: one
     for one in (
-        Ladder("wave", "wave", "cell size", "cells in the piston"),
+        Ladder(
+            "wave",
+            "wave",
+            "cell size",
+            "cells in the piston that fit the lengths better than fewer do",
+            "wave",
+        ),
+        Ladder("wave-steps", "wave, without leaps", "cell size", "every step made", "wave"),
+        Ladder(
+            "wave-misfit",
+            "wave, lengths that do not fit",
+            "error of the wave speed",
+            "about 40 cells in the piston",
+            "wave",
+        ),
+        Ladder(
+            "explicit",
+            "explicit elements",
+            "element size",
+            "lumped masses, hard contact, leapfrog at 0.9 of the longest stable step",
+        ),
+        Ladder(
+            "exact-flow",
+            "exact flow",
+            "element size",
+            "elements of mixed mass, hard contact, matrix exponentials between events",
+        ),
         Ladder(
             "fem",
             "fem",
             "element size",
             "elements in the piston, CFL 2, K_C raised with the square of the mesh",
+            "fem",
         ),
-        Ladder("fem-time", "fem, time step", "time step", "50 elements, K_C 2.5e13 N/m"),
-        Ladder("fem-paper", "fem, paper's K_C", "element size", "CFL 2, K_C 1e12 N/m throughout"),
+        Ladder("fem-time", "fem, time step", "time step", "50 elements, K_C 2.5e13 N/m", "fem"),
+        Ladder(
+            "fem-paper",
+            "fem, paper's K_C",
+            "element size",
+            "CFL 2, K_C 1e12 N/m throughout",
+            "fem",
+        ),
         Ladder(
             "fem-gauss",
             "fem, fourth order",
             "element size",
             "as fem at CFL 1, with spectral radius 1 (Gauss's scheme)",
+            "fem",
         ),
-        Ladder("rigid", "rigid", "", "an error of the model: there is nothing to refine"),
-        Ladder("lsoda", "scipy LSODA", "element size", "relative tolerance 1e-4, K_C as fem"),
-        Ladder("lsoda-tol", "scipy LSODA, tolerance", "tolerance", "30 elements, K_C as fem"),
-        Ladder("radau", "scipy Radau", "element size", "relative tolerance 1e-3, K_C as fem"),
-        Ladder("rk45", "scipy RK45", "element size", "relative tolerance 1e-3, K_C as fem"),
-        Ladder("dop853", "scipy DOP853", "element size", "relative tolerance 1e-3, K_C as fem"),
-        Ladder("bdf", "scipy BDF", "element size", "relative tolerance 1e-4, K_C as fem"),
+        Ladder("rigid", "rigid", "", "an error of the model: there is nothing to refine", "rigid"),
+        Ladder(
+            "lsoda", "scipy LSODA", "element size", "relative tolerance 1e-4, K_C as fem", "scipy"
+        ),
+        Ladder("lsoda-tol", "scipy LSODA, tolerance", "tolerance", "30 elements", "scipy"),
+        Ladder(
+            "radau", "scipy Radau", "element size", "relative tolerance 1e-3, K_C as fem", "scipy"
+        ),
+        Ladder(
+            "rk45", "scipy RK45", "element size", "relative tolerance 1e-3, K_C as fem", "scipy"
+        ),
+        Ladder(
+            "dop853", "scipy DOP853", "element size", "relative tolerance 1e-3, K_C as fem", "scipy"
+        ),
+        Ladder("bdf", "scipy BDF", "element size", "tolerance 1e-4, K_C as fem", "scipy"),
     )
 }
 
 # Integrator, tolerance and meshes of the general methods; where the third is one, tolerances.
 _GENERAL: dict[str, tuple[str, tuple[float, ...], tuple[int, ...]]] = {
-    "lsoda": ("LSODA", (1e-4,), (5, 10, 20, 30, 50)),
+    "lsoda": ("LSODA", (1e-4,), (5, 10, 20, 30)),
     "lsoda-tol": ("LSODA", (1e-2, 1e-3, 1e-4, 1e-5, 1e-6), (30,)),
-    "radau": ("Radau", (1e-3,), (3, 5, 10, 20)),
+    "radau": ("Radau", (1e-3,), (5, 10, 20)),
     "rk45": ("RK45", (1e-3,), (3, 4, 6, 8)),
     "dop853": ("DOP853", (1e-3,), (3, 4, 6, 8)),
     "bdf": ("BDF", (1e-4,), (3, 5, 10, 20)),
 }
-_FULL_ONLY = ("dop853", "bdf")
+_FULL_ONLY = ("lsoda-tol", "rk45", "dop853", "bdf")
 
 
 @dataclass(frozen=True)
@@ -114,6 +187,8 @@ class Rung:
         Its tolerance.
     duration : float or None
         Simulated time, where it is not that of the problem [s].
+    peer : callable or None
+        Makes a peer's solver of the scene; None for the solver that the scene names.
     """
 
     ladder: str
@@ -123,6 +198,7 @@ class Rung:
     integrator: str = ""
     relative: float = 0.0
     duration: float | None = None
+    peer: Callable[[Scene], Solver] | None = None
 
 
 def chosen_ladders(words: Sequence[str] | None) -> tuple[str, ...]:
@@ -135,7 +211,7 @@ def chosen_ladders(words: Sequence[str] | None) -> tuple[str, ...]:
     """
     if words is None:
         return tuple(LADDERS)
-    general = tuple(name for name in LADDERS if LADDERS[name].title.startswith("scipy"))
+    general = tuple(name for name in LADDERS if LADDERS[name].family == "scipy")
     chosen: list[str] = []
     for word in words:
         if word != "scipy" and word not in LADDERS:
@@ -175,7 +251,7 @@ def ladders(problem: Problem, full: bool = False) -> list[Rung]:
     """
     if problem.kind == APERIODIC:
         return list(_rising_durations(problem, full))
-    rungs = [*_waves(problem, full), *_elements(problem, full)]
+    rungs = [*_waves(problem, full), *_compiled(problem, full), *_elements(problem, full)]
     rungs.append(Rung("rigid", "", 1.0, problem.scene.computed_by("rigid")))
     if not refusal(problem.scene):
         rungs += _general(problem, full)
@@ -195,12 +271,46 @@ def _affordable(scene: Scene, counts: tuple[int, ...], most: float) -> list[int]
     return chosen if len(chosen) > 3 else list(FEW)
 
 
+def misfit_of(scene: Scene, cells: int) -> float:
+    """Relative error of the wave speed with so many cells in the first elastic bar."""
+    return fitting_cells(elastic_bars(numbers_of(scene)), cells, cells, 0.0)[1]
+
+
+def best_fitting(scene: Scene, about: float) -> int:
+    """Number of cells near `about` whose wave speed is off least; of equals the nearest."""
+    counts = range(math.ceil(about / NEAR - 1e-9), math.floor(about * NEAR + 1e-9) + 1)
+    return min(
+        counts or [round(about)],
+        key=lambda count: (max(misfit_of(scene, count), FITS), abs(count - about)),
+    )
+
+
 def _waves(problem: Problem, full: bool) -> Iterator[Rung]:
     scene = problem.scene
-    counts = WAVE_CELLS_FULL if full else WAVE_CELLS
-    for cells in _affordable(scene, counts, 450.0 if full else 270.0):
+    wished = _affordable(scene, WAVE_CELLS_FULL if full else WAVE_CELLS, 450.0 if full else 270.0)
+    counts: list[int] = []
+    for count in sorted({best_fitting(scene, count) for count in wished}):
+        # nobody pays for cells that fit worse than fewer do
+        fits = [max(misfit_of(scene, one), FITS) for one in (count, *counts)]
+        if fits[0] <= min(fits) * (1.0 + 1e-9):
+            counts.append(count)
+    for name, leaps in (("wave", True), ("wave-steps", False)):
+        for cells in counts:
+            changes = {"solver.cells": cells, "solver.leaps": leaps}
+            yield Rung(name, f"{cells} cells", 1.0 / cells, scene.computed_by("wave", **changes))
+    for cells, misfit in _rising_misfits(scene):
         chosen = scene.computed_by("wave", **{"solver.cells": cells})
-        yield Rung("wave", f"{cells} cells", 1.0 / cells, chosen)
+        yield Rung("wave-misfit", f"{cells} cells, {misfit:.1e}", misfit, chosen)
+
+
+def _rising_misfits(scene: Scene) -> list[tuple[int, float]]:
+    """About the same number of cells, and misfits of the wave speed evenly from least to most."""
+    about = min(MISFIT_CELLS, MOST_ELEMENTS / total_length(scene))
+    counts = range(math.ceil(about / MISFIT_NEAR), math.floor(about * MISFIT_NEAR) + 1)
+    pairs = sorted((misfit_of(scene, count), count) for count in counts)
+    pairs = [pair for pair in pairs if pair[0] >= FITS]
+    places = {round(k * (len(pairs) - 1) / (MISFIT_RUNGS - 1)) for k in range(MISFIT_RUNGS)}
+    return [(pairs[place][1], pairs[place][0]) for place in sorted(places) if pairs]
 
 
 def _elements(problem: Problem, full: bool) -> Iterator[Rung]:
@@ -220,6 +330,18 @@ def _elements(problem: Problem, full: bool) -> Iterator[Rung]:
     for count in counts[: -1 if len(counts) > 4 else None]:
         chosen = fem_scene(scene, count, 1.0, stiffness_of(count), 1.0)
         yield Rung("fem-gauss", f"{count} elements", 1.0 / count, chosen)
+
+
+def _compiled(problem: Problem, full: bool) -> Iterator[Rung]:
+    scene = problem.scene
+    for name, (make, meshes, most) in COMPILED.items():
+        try:
+            make(scene, meshes[0])
+        except SceneError:
+            continue
+        for count in _affordable(scene, meshes, most * (2.0 if full else 1.0)):
+            peer = partial(make, elements=count)
+            yield Rung(name, f"{count} elements", 1.0 / count, scene, peer=peer)
 
 
 def _general(problem: Problem, full: bool) -> Iterator[Rung]:
@@ -245,8 +367,10 @@ def _rising_durations(problem: Problem, full: bool) -> Iterator[Rung]:
         "wave": (scene.computed_by("wave", **{"solver.cells": 20}), 1.0),
         "fem": (fem_scene(scene, 20, COURANT, stiffness_of(20)), 0.25),
         "rigid": (scene.computed_by("rigid"), 1.0),
+        "explicit": (scene, 1.0),
     }
     for name, (chosen, share) in solvers.items():
+        peer = partial(ExplicitSolver, elements=20) if name == "explicit" else None
         for factor in DURATIONS:
             duration = share * factor / 16.0 * problem.duration * (4.0 if full else 1.0)
-            yield Rung(name, f"{duration:g} s", duration, chosen, duration=duration)
+            yield Rung(name, f"{duration:g} s", duration, chosen, duration=duration, peer=peer)

@@ -8,10 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-__all__ = ["Order", "cost_at", "fitted_order"]
+__all__ = ["Cost", "Order", "cost_at", "cost_range", "fitted_order"]
 
 # Fewer points make no order.
 LEAST_POINTS = 3
+# What is left of an error that the bar of the reference may make up whole.
+NOTHING = 1e-3
 
 
 @dataclass(frozen=True)
@@ -33,6 +35,35 @@ class Order:
     error: float
     scale: float
     points: int
+
+
+@dataclass(frozen=True)
+class Cost:
+    """What a wanted error costs, with its range.
+
+    Attributes
+    ----------
+    ladder : str
+    value : float
+        Least time, NaN where no rung meets the error [s].
+    low, high : float
+        Range: errors are as sure as the reference's bar, times as the usual spread of the
+        ladder's repeats. `low` is NaN where the error is surely missed, `high` where it is
+        not surely met.
+    dearest : float
+        Time of the dearest rung that was tried [s].
+    """
+
+    ladder: str
+    value: float
+    low: float
+    high: float
+    dearest: float
+
+    @property
+    def decided(self) -> bool:
+        """Whether the reference tells that the error is met, or that it is missed."""
+        return math.isnan(self.low) or (math.isfinite(self.value) and math.isfinite(self.high))
 
 
 def fitted_order(sizes: Sequence[float], errors: Sequence[float]) -> Order | None:
@@ -90,3 +121,30 @@ def cost_at(costs: Sequence[float], errors: Sequence[float], wanted: float) -> f
         return high
     share = math.log(bad / wanted) / math.log(bad / good)
     return low * (high / low) ** share
+
+
+def cost_range(
+    ladder: str, rungs: Sequence[tuple[float, float, float]], wanted: float, bar: float
+) -> Cost:
+    """Cost at which a ladder meets an error for good, and how sure it is.
+
+    Parameters
+    ----------
+    ladder : str
+        Its name.
+    rungs : sequence of (float, float, float)
+        Time [s], its relative spread (NaN: not known), and error of each rung.
+    wanted : float
+        Error.
+    bar : float
+        Of the reference: each error may be off by it.
+    """
+    costs = [cost for cost, _, _ in rungs]
+    spreads = [spread for _, spread, _ in rungs if math.isfinite(spread)]
+    spread = float(np.median(spreads)) if spreads else 0.0
+    value, low, high = (
+        cost_at(costs, [max(error + shift, NOTHING * error) for _, _, error in rungs], wanted)
+        for shift in (0.0, -bar, bar)
+    )
+    dearest = max(costs, default=math.nan)
+    return Cost(ladder, value, low * (1.0 - spread), high * (1.0 + spread), dearest)

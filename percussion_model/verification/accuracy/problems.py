@@ -7,15 +7,22 @@ four seconds; a drop is computed as a whole; an aperiodic scene by statistics.
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
 
+from percussion_model.physics.records import READING
+from percussion_model.scene.bars import AREA, LENGTH, bar_length, section_mass
+from percussion_model.scene.numbers import section_numbers
 from percussion_model.scene.scene import Scene, SceneError
-from percussion_model.simulation.simulate import Simulation
+from percussion_model.simulation.simulate import Simulation, Snapshot
+from percussion_model.solvers.base import Solver
 
 RATE = "rate_of_penetration"
 HISTORY = "bit_force_history"
+CONTACT_HISTORY, STRESS_HISTORY = "contact_force_history", "stress_history"
+HISTORIES = (HISTORY, CONTACT_HISTORY, STRESS_HISTORY)
 # Parts of an aperiodic run whose means are taken as independent.
 BATCHES = 16
 PERIODIC, APERIODIC, DROP = "periodic", "aperiodic", "drop"
@@ -25,8 +32,10 @@ SETTLING_BLOWS, COUNTED_BLOWS = 7, 2
 PERIODIC_WITHIN = 1e-2
 # Fewer blows of the pilot run tell nothing.
 LEAST_BLOWS = 6
-# The history of the force: after the start of a blow or of a drop [s].
+# Histories: after the start of a blow or of a drop [s].
 HISTORY_LENGTH, HISTORY_STEP = 2e-3, 2e-6
+# The contact force is a mean over so long: hard contact has impulses, a penalty rings [s].
+CONTACT_STEP = 1e-5
 # Where before a blow a method of lines begins, as a share of the period.
 AHEAD = 0.2
 _MEANS = ("impact_velocity", "rebound_velocity", "rock_energy")
@@ -50,9 +59,13 @@ QUANTITIES = {
         Quantity("impact_velocity", "impact velocity", 1.0, "m/s"),
         Quantity("rebound_velocity", "rebound velocity", 1.0, "m/s"),
         Quantity("peak_bit_force", "peak bit force", 1e-3, "kN"),
+        Quantity("peak_contact_force", "peak contact force", 1e-3, "kN"),
+        Quantity("peak_stress", "peak stress, mid-bit", 1e-6, "MPa"),
         Quantity("rock_energy", "energy into rock, a blow", 1.0, "J"),
         Quantity("resting_place", "resting place of the bit", 1e3, "mm"),
         Quantity(HISTORY, "bit force through a blow (L1)", 1.0, ""),
+        Quantity(CONTACT_HISTORY, "contact force through a blow (L1)", 1.0, ""),
+        Quantity(STRESS_HISTORY, "stress, mid-bit, through a blow (L1)", 1.0, ""),
     )
 }
 
@@ -67,29 +80,33 @@ class Answer:
         By the names of `QUANTITIES`, SI units.
     errors : dict of float
         Standard errors, where the motion is aperiodic.
-    history : ndarray or None
-        Force on the rock [N] at the problem's offsets from the start of a blow.
+    histories : dict of ndarray
+        By the names of `HISTORIES`, from the start of a blow, positive in compression: force
+        on the rock [N] and elastic stress in the middle of the bit [Pa] at the problem's
+        offsets, force between piston and bit [N] as means between its `contact_edges`. What
+        a method does not tell is left out.
     blows : float
         Blows that the timed run went through.
     """
 
     values: dict[str, float]
     errors: dict[str, float] = field(default_factory=dict)
-    history: np.ndarray | None = None
+    histories: dict[str, np.ndarray] = field(default_factory=dict)
     blows: float = 1.0
 
 
 def relative_error(
-    answer: Answer, values: dict[str, float], history: np.ndarray | None, key: str
+    answer: Answer, values: dict[str, float], histories: dict[str, np.ndarray], key: str
 ) -> float:
-    """Error of a quantity relative to a reference; of the history, the ratio of L1 norms.
+    """Error of a quantity relative to a reference; of a history, the ratio of L1 norms.
 
     NaN where one of the two does not have it.
     """
-    if key == HISTORY:
-        if answer.history is None or history is None or len(answer.history) != len(history):
+    if key in HISTORIES:
+        seen, meant = answer.histories.get(key), histories.get(key)
+        if seen is None or meant is None or len(seen) != len(meant):
             return float("nan")
-        return float(np.sum(np.abs(answer.history - history)) / np.sum(np.abs(history)))
+        return float(np.sum(np.abs(seen - meant)) / np.sum(np.abs(meant)))
     found, wanted = answer.values.get(key), values.get(key)
     if found is None or not wanted:
         return float("nan")
@@ -146,17 +163,30 @@ class Problem:
         return np.arange(0.5 * HISTORY_STEP, min(HISTORY_LENGTH, 0.5 * self.period), HISTORY_STEP)
 
     @property
-    def quantities(self) -> tuple[str, ...]:
-        """Names of what is compared."""
-        if self.kind == DROP:
-            return ("resting_place", "peak_bit_force", "rock_energy", HISTORY)
-        means = (RATE, "blow_period", *_MEANS)
-        return means if self.kind == APERIODIC else (*means, "peak_bit_force", HISTORY)
+    def contact_edges(self) -> np.ndarray:
+        """Times since the start of a blow between which means of the contact force are taken.
+
+        The start itself, where explicit elements have an impulse, lies between two.
+        """
+        end = min(HISTORY_LENGTH, 0.5 * self.period)
+        return np.arange(-0.5 * CONTACT_STEP, end, CONTACT_STEP)
 
     @property
-    def main(self) -> str:
-        """Name of the quantity that comes first."""
-        return self.quantities[0]
+    def quantities(self) -> tuple[str, ...]:
+        """Names of what is compared."""
+        return quantities(self.kind)
+
+
+def quantities(kind: str) -> tuple[str, ...]:
+    """Names of what is compared on a kind of problem, the main one first."""
+    stress = ("peak_stress", HISTORY, STRESS_HISTORY)
+    if kind == DROP:
+        return ("resting_place", "rock_energy", "peak_bit_force", *stress)
+    means = (RATE, "blow_period", *_MEANS)
+    if kind == APERIODIC:
+        return means
+    peaks = ("peak_bit_force", "peak_contact_force", "peak_stress")
+    return (*means, *peaks, HISTORY, CONTACT_HISTORY, STRESS_HISTORY)
 
 
 def pose(scene: Scene) -> Problem:
@@ -202,6 +232,8 @@ class Run:
     problem : Problem
     scene : Scene
         That of the problem, with a solver chosen.
+    peer : callable, optional
+        Makes a solver that scenes do not name.
 
     Attributes
     ----------
@@ -209,10 +241,14 @@ class Run:
         Time to make the solver [s]; of the first of a kind compilation included.
     """
 
-    def __init__(self, problem: Problem, scene: Scene) -> None:
+    def __init__(
+        self, problem: Problem, scene: Scene, peer: Callable[[Scene], Solver] | None = None
+    ) -> None:
         self.problem = problem
-        self.simulation = Simulation(scene, record_events=False)
-        self.setup_time = self.simulation.setup_time
+        began = time.perf_counter()
+        solver = None if peer is None else peer(scene)
+        self.simulation = Simulation(scene, record_events=False, solver=solver)
+        self.setup_time = time.perf_counter() - began
         self._start = self.simulation.save()
 
     def cost(self, duration: float | None = None) -> float:
@@ -241,15 +277,32 @@ class Run:
         values = {
             RATE: float(rows["penetration"].sum() / rows["period"].sum()),
             "blow_period": float(rows["period"].mean()),
-            **{name: float(rows[name].mean()) for name in _MEANS},
-            "peak_bit_force": float(rows["peak_bit_force"].mean()),
+            **{name: float(rows[name].mean()) for name in (*_MEANS, "peak_bit_force")},
         }
         last = blows[-1]
         starts = [float(last["time"]), float(last["time"] + last["period"])]
         start = next((t for t in starts if t > before.time), starts[-1])
+        histories = self._histories(before, start)
+        if STRESS_HISTORY in histories:
+            values["peak_contact_force"] = float(histories[CONTACT_HISTORY].max())
+            values["peak_stress"] = float(histories[STRESS_HISTORY].max())
+        blows_run = problem.duration / problem.period
+        return Answer(values, histories=histories, blows=blows_run)
+
+    def _histories(self, before: Snapshot, start: float) -> dict[str, np.ndarray]:
+        """Histories from a time on [s]; of rigid bars that of the force on the rock alone."""
+        simulation, times = self.simulation, start + self.problem.offsets
         simulation.restore(before)
-        history = simulation.sample(start + problem.offsets)["bit_force"]
-        return Answer(values, history=history, blows=problem.duration / problem.period)
+        sample = simulation.sample(times)
+        found = {HISTORY: sample["bit_force"]}
+        if simulation.solver.grid_of("bit") is not None:
+            if simulation.scene.piston.model != "absent":
+                simulation.restore(before)
+                impulse = simulation.sample(start + self.problem.contact_edges)["contact_impulse"]
+                found[CONTACT_HISTORY] = np.diff(impulse) / CONTACT_STEP
+            simulation.restore(before)
+            found[STRESS_HISTORY] = stress_in_middle(simulation, times)
+        return found
 
     def _statistics(self) -> Answer:
         simulation, scene = self.simulation, self.problem.scene
@@ -270,13 +323,55 @@ class Run:
 
     def _drop(self) -> Answer:
         simulation = self.simulation
-        history = simulation.sample(self.problem.offsets)["bit_force"]
+        histories = self._histories(self._start, 0.0)
         simulation.advance(self.problem.duration)
         ledger = simulation.energy()
         into_rock = ("crushing", "barrier", "standstill", "recoverable")
         values = {
             "resting_place": simulation.observe()["bit_end_position"],
-            "peak_bit_force": float(history.max()),
+            "peak_bit_force": float(histories[HISTORY].max()),
             "rock_energy": sum(ledger[name] for name in into_rock),
         }
-        return Answer(values, history=history)
+        if STRESS_HISTORY in histories:
+            values["peak_stress"] = float(histories[STRESS_HISTORY].max())
+        return Answer(values, histories=histories)
+
+
+def stress_in_middle(simulation: Simulation, times: np.ndarray) -> np.ndarray:
+    """Elastic stress in the middle of the bit, as a strain gauge there shows it [Pa].
+
+    Between the centres of cells, and between grid points in time, it is taken as linear.
+
+    Parameters
+    ----------
+    simulation : Simulation
+        Of an elastic bit; is advanced through the times.
+    times : ndarray
+        Rising [s].
+    """
+    solver, grid = simulation.solver, simulation.solver.grid_of("bit")
+    assert grid is not None
+    middle, area = middle_of(section_numbers(simulation.scene.bit))
+    centres = np.cumsum(grid.mass) - 0.5 * grid.mass
+    reading, seen, stress = np.zeros(1, READING), [], []
+    # a solver may tell the state of its last grid point: so read a step later as well
+    later = np.concatenate([times, times + (solver.time_step or 0.0)])
+    for t in np.unique(later):
+        simulation.advance(float(t))
+        state = solver.read(simulation.save().state, float(t), reading, peaks=False)
+        seen.append(solver.time(state))
+        stress.append(np.interp(middle, centres, solver.fields(state)["bit_force"]) / area)
+    known, first = np.unique(seen, return_index=True)
+    return np.interp(times, known, np.array(stress)[first])
+
+
+def middle_of(sections: np.ndarray) -> tuple[float, float]:
+    """Mass of a bar above its middle [kg], and the area there [m2]."""
+    above, place = 0.0, 0.5 * bar_length(sections)
+    for section in sections:
+        length = float(section[LENGTH])
+        if place <= length:
+            break
+        above += section_mass(section)
+        place -= length
+    return above + section_mass(section) * place / length, float(section[AREA])

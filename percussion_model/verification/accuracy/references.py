@@ -1,7 +1,8 @@
-"""References with error bars, made by two solvers that share no motion, stored as JSON.
+"""References with error bars, made by solvers that share no motion, stored as JSON.
 
-Each solver is refined three times and extrapolated (Richardson). A number is called a
-reference where the two limits agree within their bars.
+Waves, explicit and implicit elements are each refined three times and extrapolated
+(Richardson). A number is called a reference where the two surest limits agree within their
+bars or nearly so; its bar covers the distance of the two.
 """
 
 from __future__ import annotations
@@ -11,18 +12,34 @@ import json
 import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
+from functools import partial
 from importlib.metadata import version
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from percussion_model.scene.scene import Scene
+from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.simulation.files import staged_text
-from percussion_model.verification.accuracy.ladders import fem_scene, stiffness_of, total_length
-from percussion_model.verification.accuracy.problems import APERIODIC, HISTORY, Answer, Problem, Run
+from percussion_model.solvers.base import Solver
+from percussion_model.verification.accuracy.explicit import ExplicitSolver
+from percussion_model.verification.accuracy.ladders import (
+    FITS,
+    best_fitting,
+    fem_scene,
+    misfit_of,
+    total_length,
+)
+from percussion_model.verification.accuracy.problems import (
+    APERIODIC,
+    CONTACT_HISTORY,
+    HISTORIES,
+    Answer,
+    Problem,
+    Run,
+)
 
 __all__ = [
     "Bar",
@@ -36,43 +53,62 @@ __all__ = [
 ]
 
 STORE = "references.json"
-FORMAT = 1
+FORMAT = 2
 # Digits of a stored history.
-DIGITS = 7
-# Order that extrapolation assumes: the least that was ever measured for the waves; the
-# elements' mesh, with a penalty that goes along, is of second order.
-WAVE_ORDER, FEM_ORDER = 1.0, 2.0
+DIGITS = 6
+# Orders that extrapolation assumes: about the least that was measured; the mesh of the
+# implicit elements, with a penalty that goes along, is of second order.
+ORDERS = {"wave": 1.0, "explicit": 1.0, "fem": 2.0}
 # Cells in all bars together, coarse to fine; elements likewise.
 WAVE_LEVELS, WAVE_LEVELS_QUICK = (172.0, 258.0, 430.0), (86.0, 129.0, 172.0)
+EXPLICIT_LEVELS, EXPLICIT_LEVELS_QUICK = (215.0, 301.0, 430.0), (108.0, 151.0, 215.0)
 FEM_LEVELS, FEM_LEVELS_QUICK = (108.0, 151.0, 215.0), (65.0, 86.0, 108.0)
+# A penalty rings: its contact force is no witness.
+RINGING = {"fem": ("peak_contact_force", CONTACT_HISTORY)}
+# Where these do not fit the lengths, cells that do, up to so many in all bars.
+MOST_CELLS = 900
 # Simulated time of aperiodic references, by the scene's duration.
-LONG = {"wave": 20.0, "fem": 4.0}
+LONG = 20.0
 LONG_CELLS = 40
-# Limits that are relatively closer than this agree whatever their bars say.
-CLOSE = 2e-5
+# Limits that are relatively closer than this make a reference whatever their bars say.
+CLOSE = 2e-3
 
 
 @dataclass(frozen=True)
 class Bar:
-    """A number with its bar: value, what the two solvers say, and whether it is a reference.
+    """A number with its bar.
 
     Attributes
     ----------
     value, error : float
-        Reference and its bar, SI units.
-    wave, wave_error, fem, fem_error : float
-        Limits of the two solvers and their bars.
+        Reference and its bar, SI units; of a history 1 and the bar of its L1 norm.
+    limits : dict of (float, float)
+        Limit of each solver and its own bar; of a history by L1 distance to the waves.
     agreed : bool
-        Whether the limits lie within their bars of each other.
+        Whether it is a reference.
     """
 
     value: float
     error: float
-    wave: float
-    wave_error: float
-    fem: float
-    fem_error: float
+    limits: dict[str, tuple[float, float]]
     agreed: bool
+
+    @classmethod
+    def from_dict(cls, tree: dict[str, Any]) -> Bar:
+        """Read plain values."""
+        limits = {name: (limit[0], limit[1]) for name, limit in tree["limits"].items()}
+        return cls(tree["value"], tree["error"], limits, tree["agreed"])
+
+    @property
+    def apart(self) -> float:
+        """Distance of the two surest limits, relative."""
+        first, second = self.surest
+        return abs(first[0] - second[0]) / abs(self.value)
+
+    @property
+    def surest(self) -> list[tuple[float, float]]:
+        """The two limits with the smallest bars, the surest first."""
+        return sorted(self.limits.values(), key=lambda limit: limit[1])[:2]
 
 
 @dataclass(frozen=True)
@@ -86,8 +122,8 @@ class Reference:
         Of the problem.
     bars : dict of Bar
         By the names of `QUANTITIES`.
-    history : ndarray or None
-        Force on the rock at the problem's offsets, by the finest waves [N].
+    histories : dict of ndarray
+        As in `Answer`, by the finest waves.
     made : dict
         How, with which versions, when.
     """
@@ -95,7 +131,7 @@ class Reference:
     title: str
     kind: str
     bars: dict[str, Bar]
-    history: np.ndarray | None
+    histories: dict[str, np.ndarray]
     made: dict[str, Any] = field(default_factory=dict)
 
     @property
@@ -112,27 +148,25 @@ class Reference:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON."""
-        history = None
-        if self.history is not None:
-            history = [float(f"{value:.{DIGITS}g}") for value in self.history]
-        bars = {name: asdict(bar) for name, bar in self.bars.items()}
         return {
             "title": self.title,
             "kind": self.kind,
-            "bars": bars,
-            "history": history,
+            "bars": {name: asdict(bar) for name, bar in self.bars.items()},
+            "histories": {
+                name: " ".join(f"{value:.{DIGITS}g}" for value in history)
+                for name, history in self.histories.items()
+            },
             "made": self.made,
         }
 
     @classmethod
     def from_dict(cls, tree: dict[str, Any]) -> Reference:
         """Read what `to_dict` gave."""
-        history = tree["history"]
         return cls(
             tree["title"],
             tree["kind"],
-            {name: Bar(**bar) for name, bar in tree["bars"].items()},
-            None if history is None else np.array(history),
+            {name: Bar.from_dict(bar) for name, bar in tree["bars"].items()},
+            {name: np.array(text.split(), float) for name, text in tree["histories"].items()},
             tree["made"],
         )
 
@@ -208,124 +242,174 @@ def make_reference(
     progress : callable
         Called with what is being computed.
     """
-    wave, fem = _scenes(problem, quick)
-    answers: dict[str, list[Answer]] = {"wave": [], "fem": []}
-    for name, chosen in (("wave", wave), ("fem", fem)):
+    levels = _levels(problem, quick)
+    answers: dict[str, list[Answer]] = {}
+    for solver, chosen in levels.items():
+        answers[solver] = []
         for level in chosen:
-            progress(f"reference: {_level_name(level)}")
-            answers[name].append(_answer(problem, level, name))
+            progress(f"reference: {level.name}")
+            answers[solver].append(_answer(problem, level))
     bars = {}
     for key in problem.quantities:
-        if key == HISTORY:
-            continue
-        if problem.kind == APERIODIC:
-            last = [answers[name][-1] for name in ("wave", "fem")]
-            limits = [(answer.values[key], answer.errors[key]) for answer in last]
+        heard = [name for name in levels if key not in RINGING.get(name, ())]
+        if key in HISTORIES:
+            bars[key] = _history_bar(levels, answers, key)
+        elif problem.kind == APERIODIC:
+            last = {name: answers[name][-1] for name in heard}
+            bars[key] = _agree({n: (one.values[key], one.errors[key]) for n, one in last.items()})
         else:
-            limits = [
-                _limit(answers["wave"], wave, key, WAVE_ORDER),
-                _limit(answers["fem"], fem, key, FEM_ORDER),
-            ]
-        bars[key] = _agree(*limits)
-    history = answers["wave"][-1].history
-    if history is not None:
-        bars[HISTORY] = _history_bar(answers)
+            bars[key] = _agree({n: _limit(answers[n], levels[n], key, ORDERS[n]) for n in heard})
     made = {
-        "wave": [_level_name(level) for level in wave],
-        "fem": [_level_name(level) for level in fem],
+        **{name: [level.name for level in chosen] for name, chosen in levels.items()},
         "date": time.strftime("%Y-%m-%d"),
         "version": version("percussion_model"),
         "numpy": version("numpy"),
         "numba": version("numba"),
         "quick": quick,
     }
-    return Reference(scene.title, problem.kind, bars, history, made)
+    return Reference(scene.title, problem.kind, bars, answers["wave"][-1].histories, made)
 
 
-def _scenes(problem: Problem, quick: bool) -> tuple[list[Scene], list[Scene]]:
-    """Levels of both solvers, coarse to fine."""
-    scene = problem.scene
+class Level(NamedTuple):
+    """A solver at one resolution.
+
+    Attributes
+    ----------
+    name : str
+    scene : Scene
+    size : float
+        Of a cell or element, by that of the first bar.
+    fits : bool
+        Whether the cells fit the lengths.
+    peer : callable or None
+        Makes explicit elements; None for the solver that the scene names.
+    """
+
+    name: str
+    scene: Scene
+    size: float
+    fits: bool = True
+    peer: Callable[[Scene], Solver] | None = None
+
+
+def _levels(problem: Problem, quick: bool) -> dict[str, list[Level]]:
+    """Levels of each solver, coarse to fine."""
+    scene, lengths = problem.scene, total_length(problem.scene)
+    waves = WAVE_LEVELS_QUICK if quick else WAVE_LEVELS
+    explicit = EXPLICIT_LEVELS_QUICK if quick else EXPLICIT_LEVELS
+    fem = FEM_LEVELS_QUICK if quick else FEM_LEVELS
     if problem.kind == APERIODIC:
-        return (
-            [scene.computed_by("wave", **{"solver.cells": LONG_CELLS})],
-            [fem_scene(scene, LONG_CELLS, 2.0, stiffness_of(LONG_CELLS))],
-        )
-    lengths = total_length(scene)
-    waves, elements = (WAVE_LEVELS_QUICK, FEM_LEVELS_QUICK) if quick else (WAVE_LEVELS, FEM_LEVELS)
-    counts = [max(2, _rounded(level / lengths)) for level in waves]
-    wave = [scene.computed_by("wave", **{"solver.cells": count}) for count in counts]
-    meshes = [max(3, round(level / lengths)) for level in elements]
+        counts, meshes = [LONG_CELLS], [LONG_CELLS]
+    else:
+        counts = wave_levels(scene, waves, 0 if quick else MOST_CELLS)
+        meshes = [max(3, round(target / lengths)) for target in explicit]
+    found = {"wave": [_wave_level(scene, count) for count in counts]}
+    try:
+        ExplicitSolver(scene, meshes[0])
+        found["explicit"] = [_explicit_level(scene, count) for count in meshes]
+        if quick or problem.kind == APERIODIC:
+            return found
+    except SceneError:
+        pass
     finest = FEM_LEVELS[0] / lengths
-    fem = [fem_scene(scene, count, 1.0, 2.5e13 * (count / finest) ** 2) for count in meshes]
-    return wave, fem
+    found["fem"] = [
+        _fem_level(scene, count, 2.5e13 * (count / finest) ** 2)
+        for count in (max(3, round(target / lengths)) for target in fem)
+    ]
+    return found
 
 
-def _rounded(cells: float) -> int:
-    """A multiple of 20 where there are that many: lengths of the reference fit those."""
-    return 20 * round(cells / 20.0) if cells >= 30.0 else round(cells)
+def _wave_level(scene: Scene, count: int) -> Level:
+    chosen = scene.computed_by("wave", **{"solver.cells": count})
+    return Level(f"wave, {count} cells", chosen, 1.0 / count, misfit_of(scene, count) < FITS)
 
 
-def _level_name(scene: Scene) -> str:
-    if scene.solver_name == "wave":
-        return f"wave, {scene.solver.cells} cells"
-    fem = scene.fem
-    return f"fem, {fem.elements} elements, CFL {fem.courant:g}, K_C {fem.contact_stiffness:.3g} N/m"
+def _explicit_level(scene: Scene, count: int) -> Level:
+    peer = partial(ExplicitSolver, elements=count)
+    return Level(f"explicit, {count} elements", scene, 1.0 / count, peer=peer)
 
 
-def _answer(problem: Problem, scene: Scene, solver: str) -> Answer:
+def _fem_level(scene: Scene, count: int, stiffness: float) -> Level:
+    name = f"fem, {count} elements, CFL 1, K_C {stiffness:.3g} N/m"
+    return Level(name, fem_scene(scene, count, 1.0, stiffness), 1.0 / count)
+
+
+def wave_levels(scene: Scene, targets: Sequence[float], most: int) -> list[int]:
+    """Cells in the first bar, coarse to fine.
+
+    Such as fit the lengths, where up to `most` in all bars there are three; else those near
+    the targets that fit best and, last, the least that fit.
+    """
+    lengths = total_length(scene)
+    best = [best_fitting(scene, max(2.0, target / lengths)) for target in targets]
+    if max(misfit_of(scene, count) for count in best) < FITS:
+        return best
+    fitting = [n for n in range(2, int(most / lengths) + 1) if misfit_of(scene, n) < FITS]
+    if len(fitting) >= len(targets):
+        return fitting[-len(targets) :]
+    return best + [n for n in fitting if n > best[-1]][:1]
+
+
+def _answer(problem: Problem, level: Level) -> Answer:
     if problem.kind == APERIODIC:
-        duration = LONG[solver] * problem.duration
-        problem = Problem(problem.scene, problem.kind, duration, problem.period)
-    return Run(problem, scene).answer()
+        problem = replace(problem, duration=LONG * problem.duration)
+    return Run(problem, level.scene, level.peer).answer()
 
 
 def _limit(
-    answers: Sequence[Answer], scenes: Sequence[Scene], key: str, order: float
+    answers: Sequence[Answer], levels: Sequence[Level], key: str, order: float
 ) -> tuple[float, float]:
     """Extrapolate the last two levels; the bar is what the last two steps of it changed.
 
-    Twice the change from the level before to the finest is a bound as well: where answers
-    jump from level to level, extrapolation would promise too much.
+    Half the change from the level before to the finest is a bound as well: where answers
+    jump from level to level, extrapolation would promise too much. Levels that do not fit
+    the lengths do not fall in order: then the finest is taken, and its change is the bar.
     """
-    sizes = [1.0 / _count(scene) for scene in scenes]
     values = [answer.values[key] for answer in answers]
-    limits = []
-    for k in range(len(values) - 1):
-        ratio = (sizes[k] / sizes[k + 1]) ** order - 1.0
-        limits.append(values[k + 1] + (values[k + 1] - values[k]) / ratio)
     change = abs(values[-1] - values[-2])
+    if not all(level.fits for level in levels):
+        return values[-1], change
+    limits = [
+        values[k + 1] + _remains(levels[k : k + 2], order) * (values[k + 1] - values[k])
+        for k in range(len(values) - 1)
+    ]
     return limits[-1], max(abs(limits[-1] - limits[-2]), 0.5 * change)
 
 
-def _count(scene: Scene) -> float:
-    if scene.solver_name == "fem":
-        return float(scene.fem.elements)
-    return float(scene.solver.cells or math.nan)
+def _remains(levels: Sequence[Level], order: float) -> float:
+    """Error of the finer of two levels by the change between them."""
+    return 1.0 / ((levels[0].size / levels[1].size) ** order - 1.0)
 
 
-def _agree(wave: tuple[float, float], fem: tuple[float, float]) -> Bar:
-    """Two limits agree within the sum of their bars, or so closely that nobody asks for more.
+def _agree(limits: dict[str, tuple[float, float]]) -> Bar:
+    """Take the surest limit; the bar is its own, or the distance of the next one to it.
 
-    The one with the smaller bar is taken; where they are further apart than the bars
-    say, the bar is their distance.
+    They agree where they lie within the sum of their bars, or so closely that the distance
+    tells enough.
     """
-    off = abs(wave[0] - fem[0])
-    value, error = min((wave, fem), key=lambda limit: limit[1])
-    within = off <= wave[1] + fem[1]
-    agreed = within or off <= CLOSE * abs(value)
-    return Bar(value, error if within else max(error, off), *wave, *fem, agreed)
+    (value, error), (other, error_of_other) = Bar(1.0, 0.0, limits, True).surest
+    off = abs(value - other)
+    agreed = off <= error + error_of_other or off <= CLOSE * abs(value)
+    return Bar(value, max(error, off), limits, agreed)
 
 
-def _history_bar(answers: dict[str, list[Answer]]) -> Bar:
-    """L1 distance of the finest histories to those of the level before, and to each other."""
-    finest, before = answers["wave"][-1].history, answers["wave"][-2].history
-    other, coarser = answers["fem"][-1].history, answers["fem"][-2].history
-    if finest is None or before is None or other is None or coarser is None:
-        return Bar(1.0, math.nan, 1.0, math.nan, math.nan, math.nan, False)
-    whole = float(np.sum(np.abs(finest)))
+def _history_bar(levels: dict[str, list[Level]], answers: dict[str, list[Answer]], key: str) -> Bar:
+    """L1 distance of the finest waves to the second solver, or to the waves before.
+
+    The limits carry what is left of their error, which decides whether they agree.
+    """
+    finest = {name: found[-1].histories[key] for name, found in answers.items()}
+    whole = float(np.sum(np.abs(finest["wave"])))
 
     def apart(a: np.ndarray, b: np.ndarray) -> float:
         return float(np.sum(np.abs(a - b))) / whole
 
-    own, theirs, off = apart(finest, before), apart(other, coarser), apart(finest, other)
-    return Bar(1.0, max(own, off), 1.0, own, 1.0 + off, theirs, off <= own + theirs)
+    second = next(name for name in levels if name != "wave")
+    change = {
+        name: apart(finest[name], answers[name][-2].histories[key]) for name in ("wave", second)
+    }
+    left = {n: _remains(levels[n][-2:], ORDERS[n]) * moved for n, moved in change.items()}
+    off = apart(finest["wave"], finest[second])
+    limits = {"wave": (1.0, left["wave"]), second: (1.0 + off, left[second])}
+    agreed = off <= max(sum(left.values()), CLOSE)
+    return Bar(1.0, max(change["wave"], off), limits, agreed)

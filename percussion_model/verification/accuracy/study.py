@@ -1,40 +1,47 @@
-"""Accuracy study: all ladders on one scene, error against time, orders, advice."""
+"""Accuracy study: all ladders on one scene, error against time, orders, costs."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, fields, replace
 from typing import Any
 
 from percussion_model.scene.scene import Scene
 from percussion_model.simulation.files import plain
 from percussion_model.simulation.simulate import Simulation
 from percussion_model.verification.accuracy.integrators import GeneralRun
-from percussion_model.verification.accuracy.ladders import LADDERS, Rung, chosen_ladders, ladders
-from percussion_model.verification.accuracy.orders import Order, cost_at, fitted_order
+from percussion_model.verification.accuracy.ladders import (
+    FITS,
+    LADDERS,
+    Rung,
+    chosen_ladders,
+    ladders,
+)
+from percussion_model.verification.accuracy.orders import Cost, Order, cost_range, fitted_order
 from percussion_model.verification.accuracy.problems import (
     APERIODIC,
     Answer,
     Problem,
     Run,
     pose,
+    quantities,
     relative_error,
 )
-from percussion_model.verification.accuracy.references import Reference, find_reference
+from percussion_model.verification.accuracy.references import Bar, Reference, find_reference
 from percussion_model.verification.accuracy.semidiscrete import OutOfTime
 from percussion_model.verification.accuracy.timing import interleaved, machine
 
 __all__ = ["WANTED", "Point", "Study", "study"]
 
-# Accuracies that are asked for in the last lines.
-WANTED = (1e-2, 1e-3)
+# Errors whose cost is told.
+WANTED = (1e-2, 3e-3, 1e-3, 5e-4)
+# Families of ladders that the waves are compared with: the best of them counts.
+PEERS = ("peer", "fem", "scipy")
 # A general integrator gets so long for a blow [s].
 PATIENCE, PATIENCE_FULL = 25.0, 120.0
 # Errors below this multiple of the reference's bar are not resolved.
 RESOLVED = 2.0
-# Lengths fit the cells of the waves if their speed is off by less.
-FITS = 1e-6
 
 
 @dataclass(frozen=True)
@@ -51,6 +58,8 @@ class Point:
     second, blow : float
         Processor time of a simulated second and of a blow [s].
     repeats : int
+    spread : float
+        Half the range of the repeated times by their median; NaN with one.
     values, errors : dict of float
         By quantity: what was found, and the relative error; None where there
         is no reference.
@@ -67,6 +76,7 @@ class Point:
     second: float
     blow: float
     repeats: int
+    spread: float
     values: dict[str, float]
     errors: dict[str, float]
     fit: float = 0.0
@@ -80,7 +90,10 @@ class Study:
     Attributes
     ----------
     title : str
-    problem : Problem
+    kind : str
+        Of the problem.
+    duration, period : float
+        Simulated time of a run, and of a blow [s].
     reference : Reference
     points : list of Point
     compilation : dict of float
@@ -89,11 +102,23 @@ class Study:
     """
 
     title: str
-    problem: Problem
+    kind: str
+    duration: float
+    period: float
     reference: Reference
     points: list[Point]
     compilation: dict[str, float]
     machine: dict[str, Any]
+
+    @property
+    def quantities(self) -> tuple[str, ...]:
+        """Names of what is compared, the main one first."""
+        return quantities(self.kind)
+
+    @property
+    def main(self) -> str:
+        """Name of the quantity that comes first."""
+        return self.quantities[0]
 
     def ladder(self, name: str) -> list[Point]:
         """Points of a ladder, cheap to dear, without those that failed."""
@@ -104,13 +129,19 @@ class Study:
         """Ladders that have a point."""
         return [name for name in LADDERS if self.ladder(name)]
 
+    @property
+    def peers(self) -> list[str]:
+        """Ladders that the waves are compared with."""
+        return [name for name in self.names if LADDERS[name].family in PEERS]
+
     def fitted(self, name: str, key: str) -> list[Point]:
         """Points that an order is fitted to: resolved, and with lengths that fit the cells.
 
         Where lengths fit at no rung, all count.
         """
         floor = self.reference.floor(key)
-        limit = 0.0 if math.isnan(floor) else RESOLVED * floor
+        # standard errors of an aperiodic motion are no differences to the reference
+        limit = 0.0 if math.isnan(floor) or self.kind == APERIODIC else RESOLVED * floor
         resolved = [point for point in self.ladder(name) if point.errors.get(key, math.nan) > limit]
         if all(point.fit >= FITS for point in self.ladder(name)):
             return resolved
@@ -121,27 +152,39 @@ class Study:
         points = self.fitted(name, key)
         return fitted_order([point.size for point in points], [p.errors[key] for p in points])
 
-    def cost(self, name: str, key: str, wanted: float) -> float:
+    def cost(self, name: str, key: str, wanted: float) -> Cost:
         """Time of a simulated second at which a ladder meets an error for good [s]."""
         points = self.ladder(name)
-        errors = [point.errors.get(key, math.nan) for point in points]
-        return cost_at([point.second for point in points], errors, wanted)
+        floor = self.reference.floor(key)
+        return cost_range(
+            name,
+            [(point.second, point.spread, point.errors.get(key, math.nan)) for point in points],
+            wanted,
+            0.0 if math.isnan(floor) else floor,
+        )
 
-    def cheapest(self, names: list[str], key: str, wanted: float) -> tuple[str, float]:
-        """Ladder among `names` that meets an error at the least cost, and that cost [s]."""
-        found = [(self.cost(name, key, wanted), name) for name in names if self.ladder(name)]
-        known = [(cost, name) for cost, name in found if math.isfinite(cost)]
-        cost, name = min(known, default=(math.nan, ""))
-        return name, cost
+    def best(self, families: Sequence[str], key: str, wanted: float) -> Cost | None:
+        """Least cost of an error among the ladders of families; None where none is known to.
+
+        Its range is that of the best in either case: another ladder may be the cheaper one.
+        """
+        names = [name for name in self.names if LADDERS[name].family in families]
+        found = [self.cost(name, key, wanted) for name in names]
+        known = [cost for cost in found if math.isfinite(cost.value)]
+        if not known:
+            return None
+        best = min(known, key=lambda cost: cost.value)
+        low = min(cost.low for cost in found if math.isfinite(cost.low))
+        highs = [cost.high for cost in known if math.isfinite(cost.high)]
+        return replace(best, low=low, high=min(highs, default=math.nan))
 
     def advice(self, wanted: float) -> str:
         """The sentence "for 1 % take ..."."""
-        key = self.problem.main
         good = []
         for name in self.names:
             points = sorted(self.ladder(name), key=lambda point: point.second)
             for k, point in enumerate(points):
-                if all(later.errors.get(key, math.inf) <= wanted for later in points[k:]):
+                if all(later.errors.get(self.main, math.inf) <= wanted for later in points[k:]):
                     good.append(point)
                     break
         if not good:
@@ -150,21 +193,21 @@ class Study:
         return (
             f"For {100 * wanted:g} % take {LADDERS[best.ladder].title}, {best.label}: "
             f"{1e3 * best.second:.3g} ms for a simulated second, "
-            f"off by {100 * best.errors[key]:.2g} %."
+            f"off by {100 * best.errors[self.main]:.2g} %."
         )
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON."""
         orders: dict[str, dict[str, Any]] = {}
         for name in self.names:
-            found = {key: self.order(name, key) for key in self.problem.quantities}
+            found = {key: self.order(name, key) for key in self.quantities}
             orders[name] = {key: asdict(one) for key, one in found.items() if one is not None}
         tree: dict[str, Any] = plain(
             {
                 "title": self.title,
-                "kind": self.problem.kind,
-                "duration": self.problem.duration,
-                "period": self.problem.period,
+                "kind": self.kind,
+                "duration": self.duration,
+                "period": self.period,
                 "machine": self.machine,
                 "compilation": self.compilation,
                 "reference": {
@@ -174,10 +217,37 @@ class Study:
                 "ladders": {name: asdict(LADDERS[name]) for name in self.names},
                 "points": [asdict(point) for point in self.points],
                 "orders": orders,
-                "advice": [self.advice(wanted) for wanted in WANTED],
             }
         )
         return tree
+
+    @classmethod
+    def from_dict(cls, tree: dict[str, Any]) -> Study:
+        """Read what `to_dict` gave; the histories of the reference are not in it."""
+        title, kind = tree["title"], tree["kind"]
+        bars = {key: Bar.from_dict(_numbers(bar)) for key, bar in tree["reference"]["bars"].items()}
+        names = {one.name for one in fields(Point)}
+        points = [
+            Point(**_numbers({key: value for key, value in point.items() if key in names}))
+            for point in tree["points"]
+        ]
+        return cls(
+            title,
+            kind,
+            tree["duration"],
+            tree["period"],
+            Reference(title, kind, bars, {}, tree["reference"]["made"]),
+            points,
+            tree["compilation"],
+            tree["machine"],
+        )
+
+
+def _numbers(tree: Any) -> Any:
+    """NaN where JSON has null."""
+    if isinstance(tree, dict):
+        return {key: _numbers(value) for key, value in tree.items()}
+    return math.nan if tree is None else tree
 
 
 def study(
@@ -224,10 +294,24 @@ def study(
         [run.cost for _, run in runs],
         lambda place: progress(0.7 + 0.3 * place / max(len(runs), 1), "times, turn by turn"),
     )
-    for (k, run), (cost, repeats) in zip(runs, times, strict=True):
-        duration, blows = run.problem.duration, points[k].blow
-        points[k] = replace(points[k], second=cost / duration, blow=cost / blows, repeats=repeats)
-    return Study(scene.title, problem, reference, points, compilation, machine())
+    for (k, run), taken in zip(runs, times, strict=True):
+        points[k] = replace(
+            points[k],
+            second=taken.median / run.problem.duration,
+            blow=taken.median / points[k].blow,
+            repeats=taken.repeats,
+            spread=taken.spread,
+        )
+    return Study(
+        scene.title,
+        problem.kind,
+        problem.duration,
+        problem.period,
+        reference,
+        points,
+        compilation,
+        machine(),
+    )
 
 
 def _measured(
@@ -237,7 +321,7 @@ def _measured(
 
     The blows of its run stand in `blow` until then.
     """
-    empty = Point(rung.ladder, rung.label, rung.size, 0.0, math.nan, math.nan, 0, {}, {})
+    empty = Point(rung.ladder, rung.label, rung.size, 0.0, math.nan, math.nan, 0, math.nan, {}, {})
     if rung.duration is not None:
         problem = replace(problem, duration=rung.duration)
     patience = PATIENCE_FULL if full else PATIENCE
@@ -246,7 +330,7 @@ def _measured(
         if rung.integrator:
             run = GeneralRun(problem, rung.scene, rung.integrator, rung.relative, patience)
         else:
-            run = Run(problem, rung.scene)
+            run = Run(problem, rung.scene, rung.peer)
         answer = run.answer()
     except OutOfTime:
         return replace(empty, note=f"took more than {patience:g} s for a blow"), None
@@ -271,6 +355,5 @@ def _errors(answer: Answer, problem: Problem, reference: Reference) -> dict[str,
     """Relative errors; of aperiodic motion, relative standard errors."""
     if problem.kind == APERIODIC:
         return {key: abs(answer.errors[key] / answer.values[key]) for key in problem.quantities}
-    values = reference.values
-    history = reference.history if reference.bars.get("bit_force_history") else None
-    return {key: relative_error(answer, values, history, key) for key in problem.quantities}
+    values, histories = reference.values, reference.histories
+    return {key: relative_error(answer, values, histories, key) for key in problem.quantities}

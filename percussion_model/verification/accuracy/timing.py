@@ -2,25 +2,52 @@
 
 from __future__ import annotations
 
+import math
 import os
 import platform
 import statistics
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-__all__ = ["interleaved", "machine"]
+__all__ = ["Timing", "interleaved", "machine"]
 
 # A method is repeated as long as its repeats take less than this together [s].
 ENOUGH = 1.5
 REPEATS = 5
 
 
+@dataclass(frozen=True)
+class Timing:
+    """Repeated times.
+
+    Attributes
+    ----------
+    median : float
+        [s]
+    repeats : int
+    spread : float
+        Half their range by the median; NaN with one.
+    """
+
+    median: float
+    repeats: int
+    spread: float
+
+    @classmethod
+    def of(cls, times: Sequence[float]) -> Timing:
+        """Sum up times [s]."""
+        median = statistics.median(times)
+        spread = 0.5 * (max(times) - min(times)) / median if len(times) > 1 else math.nan
+        return cls(median, len(times), spread)
+
+
 def interleaved(
     costs: Sequence[Callable[[], float]], turn: Callable[[int], None] | None = None
-) -> list[tuple[float, int]]:
+) -> list[Timing]:
     """Take times turn by turn: a machine that slows down slows all methods.
 
     Parameters
@@ -32,8 +59,7 @@ def interleaved(
 
     Returns
     -------
-    list of (float, int)
-        Median [s] and number of repeats.
+    list of Timing
     """
     found: list[list[float]] = [[] for _ in costs]
     for _ in range(REPEATS):
@@ -43,7 +69,7 @@ def interleaved(
             if turn is not None:
                 turn(k)
             found[k].append(cost())
-    return [(statistics.median(times), len(times)) for times in found]
+    return [Timing.of(times) for times in found]
 
 
 def machine() -> dict[str, Any]:

@@ -1,0 +1,474 @@
+"""Tables and sentences of docs/accuracy.md and README.md on accuracy, from the stored studies.
+
+Nothing is measured here: what is told follows from docs/accuracy/*.json alone, and
+tests/accuracy/test_accuracy_page.py holds the pages to it.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+import textwrap
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+from percussion_model.interface.commands.accuracy_tables import two
+from percussion_model.verification.accuracy import Study
+from percussion_model.verification.accuracy.advantage import (
+    MET,
+    MISSED,
+    PEER_MISSES,
+    UNDECIDED,
+    Contest,
+    Summary,
+    contest,
+    summary,
+)
+from percussion_model.verification.accuracy.ladders import FITS, LADDERS
+from percussion_model.verification.accuracy.orders import Cost
+from percussion_model.verification.accuracy.problems import (
+    APERIODIC,
+    CONTACT_HISTORY,
+    HISTORIES,
+    HISTORY,
+    QUANTITIES,
+    RATE,
+    STRESS_HISTORY,
+)
+from percussion_model.verification.accuracy.study import WANTED
+
+DOCS = Path(__file__).resolve().parent
+DATA = DOCS / "accuracy"
+# Scenes of the comparison: all shipped ones whose blows are alike, and those drawn by seed.
+COMPARED = (
+    *("reference", "stiff_rock", "chatter", "top_hammer"),
+    *("drawn_1", "drawn_2", "drawn_3", "drawn_4"),
+)
+OTHERS = ("drop_test", "aperiodic")
+# Errors that sentences state, and up to how many cells in the first bar are few.
+STATED, FEW_CELLS = (1e-2, 1e-3), 40
+# Forces and stress that are compared beside the rate, and at which errors.
+FORCES = (HISTORY, CONTACT_HISTORY, STRESS_HISTORY)
+FORCE_ERRORS = (3e-2, 1e-2)
+QUANTITIES_FIGURE = "\n![All quantities](../images/accuracy_quantities_reference.png)\n"
+SHORT = {
+    "rate_of_penetration": "rate",
+    "blow_period": "period",
+    "impact_velocity": "impact",
+    "rebound_velocity": "rebound",
+    "rock_energy": "energy",
+    "peak_bit_force": "peak bit force",
+    "peak_contact_force": "peak contact force",
+    "peak_stress": "peak stress",
+    "resting_place": "resting place",
+    HISTORY: "bit force, L1",
+    CONTACT_HISTORY: "contact force, L1",
+    STRESS_HISTORY: "stress, L1",
+}
+
+
+def load(name: str) -> Any:
+    """Tree of a file of data."""
+    return json.loads((DATA / f"{name}.json").read_text(encoding="utf-8"))
+
+
+def load_studies(names: Sequence[str] = COMPARED) -> dict[str, Study]:
+    """Stored studies, by scene."""
+    return {name: Study.from_dict(load(name)) for name in names}
+
+
+# numbers
+
+
+def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Markdown of a table."""
+    lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
+    return "\n".join(lines + ["| " + " | ".join(row) + " |" for row in rows])
+
+
+def power(value: float) -> str:
+    """Two digits, as 1.2·10⁻³."""
+    if not math.isfinite(value):
+        return "–"
+    if value == 0.0:
+        return "0"
+    digits, exponent = f"{value:.1e}".split("e")
+    raised = str(int(exponent)).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+    return f"{digits}·10{raised}"
+
+
+def percent(wanted: float) -> str:
+    """An error in per cent."""
+    return f"{100 * wanted:g} %"
+
+
+# waves against peers
+
+
+def contests(studies: Sequence[Study], key: str = RATE, waves: str = "wave") -> dict[float, list]:
+    """Contests of all scenes, by error."""
+    errors = WANTED if key == RATE else FORCE_ERRORS
+    return {w: [contest(one, w, key, waves) for one in studies] for w in errors}
+
+
+def contest_cell(one: Contest) -> str:
+    """Ratio with its range, and the two times."""
+    times = f"{milliseconds(one.wave)} / {'–' if one.peer is None else milliseconds(one.peer)}"
+    if one.peer is not None and one.peer.ladder != "explicit":
+        times += f" {LADDERS[one.peer.ladder].title}"
+    if one.outcome == MET:
+        return f"**{two(one.ratio)}** ({two(one.low)} to {two(one.high)})<br>{times}"
+    if one.outcome == UNDECIDED:
+        return f"undecided<br>{times}"
+    sign = {PEER_MISSES: "above", MISSED: "below"}[one.outcome]
+    return f"**{sign} {two(one.ratio)}**<br>{times}"
+
+
+def milliseconds(cost: Cost) -> str:
+    """Time to compute a simulated second, or why there is none."""
+    if math.isfinite(cost.value):
+        return two(1e3 * cost.value)
+    return "?" if math.isfinite(cost.low) else "not met"
+
+
+def contest_table() -> str:
+    """All scenes and errors, and what they come to."""
+    studies = load_studies()
+    found = contests(list(studies.values()))
+    rows = []
+    for k, (name, one) in enumerate(studies.items()):
+        bar = one.reference.floor(RATE)
+        shown = power(bar) if math.isfinite(bar) else "none"
+        cells = [contest_cell(column[k]) for column in found.values()]
+        rows.append([f"[{name}](accuracy/{name}.md)", shown, *cells])
+    sums = [summary(column) for column in found.values()]
+    for label in ("luckiest", "median", "worst"):
+        rows.append([f"**{label}**", "", *(two(getattr(one, label)) for one in sums)])
+    rows.append(["undecided", "", *(f"{one.undecided} of {one.scenes}" for one in sums)])
+    head = ["scene", "bar of the reference", *(percent(wanted) for wanted in found)]
+    return table(head, rows)
+
+
+def force_table() -> str:
+    """Ratios for the forces and the stress, over the same scenes."""
+    studies = list(load_studies().values())
+    rows = []
+    for key in FORCES:
+        for one in (summary(column) for column in contests(studies, key).values()):
+            ratios = [two(value) for value in (one.luckiest, one.median, one.worst)]
+            rows.append(
+                [SHORT[key], percent(one.wanted), *ratios, f"{one.undecided} of {one.scenes}"]
+            )
+    return table(["quantity", "error", "luckiest", "median", "worst", "undecided"], rows)
+
+
+def ratio_text(one: Summary) -> str:
+    """Range and median of a summary."""
+    decided = one.scenes - one.undecided
+    return f"{two(one.worst)} to {two(one.luckiest)}, median {two(one.median)} ({decided} scenes)"
+
+
+def fits(study: Study) -> bool:
+    """Whether few cells fit the lengths."""
+    return any(p.fit < FITS and p.size >= 1.0 / FEW_CELLS for p in study.ladder("wave"))
+
+
+def advantage() -> str:
+    """What the waves gain over the best of their peers, in sentences."""
+    studies = list(load_studies().values())
+
+    def ratios(chosen: Sequence[Study], waves: str = "wave") -> str:
+        found = contests(chosen, waves=waves)
+        told = {wanted: summary(found[wanted]) for wanted in STATED}
+        return "; ".join(
+            f"at {percent(wanted)} {ratio_text(one)}"
+            for wanted, one in told.items()
+            if math.isfinite(one.median)
+        )
+
+    fitting = [study for study in studies if fits(study)]
+    others = [study for study in studies if not fits(study)]
+    return (
+        f"The best of the compiled peers, mostly explicit elements with hard contact, takes the "
+        f"processor time of the waves times a factor, for the same error in the rate of "
+        f"penetration. Where few cells fit the lengths: {ratios(fitting)}. Where they do not: "
+        f"{ratios(others)}; below 1 the peer is the faster one. The advantage is the leaps: "
+        f"without them, over all scenes, {ratios(studies, 'wave-steps')}."
+    )
+
+
+def general() -> str:
+    """What general integrators of scipy need beside the built-in scheme on the same mesh."""
+    study = load_studies(("reference",))["reference"]
+    own = {point.label: point.second for point in study.ladder("fem")}
+    ratios = {
+        LADDERS[name].title: min(
+            point.second / own[point.label] for point in study.ladder(name) if point.label in own
+        )
+        for name in study.names
+        if LADDERS[name].family == "scipy"
+        and any(point.label in own for point in study.ladder(name))
+    }
+    title, least = min(ratios.items(), key=lambda pair: pair[1])
+    return (
+        f"On the finite elements' own equations the fastest method of scipy's `solve_ivp` "
+        f"({title.removeprefix('scipy ')}) needs at least {two(least)} times the time of the "
+        "built-in scheme."
+    )
+
+
+# misfit
+
+
+def misfit() -> str:
+    """Error of the rate by that of the wave speed, scene by scene."""
+    rows, factors = [], []
+    for name, study in load_studies().items():
+        points = [
+            p for p in study.ladder("wave-misfit") if math.isfinite(p.errors.get(RATE, math.nan))
+        ]
+        if not points:
+            continue
+        worst = max(points, key=lambda point: point.errors[RATE])
+        each = [point.errors[RATE] / point.size for point in points]
+        factors += each
+        rows.append(
+            [
+                name,
+                f"{power(min(p.size for p in points))} to {power(max(p.size for p in points))}",
+                f"{two(100 * worst.errors[RATE])} % ({worst.label.split(',')[0]})",
+                f"{two(median(each))}, {two(max(each))}",
+            ]
+        )
+    head = ["scene", "misfit", "greatest error of the rate", "error by misfit: median, greatest"]
+    text = table(head, rows)
+    return (
+        f"{text}\n\nOver all of these the rate is off by {two(median(factors))} times the misfit "
+        f"at the median, by {two(max(factors))} times at most."
+    )
+
+
+# runs that are not ladders
+
+
+def coupled() -> str:
+    """Error and cost of a coupled run, by method and communication step."""
+    tree = load("coupled")
+    methods = list(dict.fromkeys(row["method"] for row in tree["rows"]))
+    steps = list(dict.fromkeys(row["step"] for row in tree["rows"]))
+    by = {(row["method"], row["step"]): row for row in tree["rows"]}
+    rows = []
+    for step in steps:
+        cells = []
+        for method in methods:
+            row = by[method, step]
+            cells.append(f"{bounded(row['error'], tree['bar'])}, {two(row['second'])} s")
+        rows.append([f"{step:.2g} s", *cells])
+    return table(["communication step", *methods], rows) + (
+        f"\n\nErrors of the advance over {tree['duration']:g} s; bar of the reference "
+        f"{power(tree['bar'])}; times are those of a simulated second."
+    )
+
+
+def bounded(error: float, bar: float) -> str:
+    """An error, or that the reference does not resolve it."""
+    return power(error) if error > bar else f"within {power(bar)}"
+
+
+def points_map() -> str:
+    """Error and cost of a map, by method."""
+    tree = load("map")
+    rows = [
+        [
+            row["method"],
+            two(row["core_seconds"]),
+            bounded(row["median"], tree["bar"]),
+            bounded(row["greatest"], tree["bar"]),
+            f"{row['above']} of {row['points']}",
+        ]
+        for row in tree["rows"]
+    ]
+    head = ["method", "core-seconds for the map", "median error", "greatest", "above 1 %"]
+    return table(head, rows) + (
+        f"\n\n{tree['points']} points, {tree['left_out']} of them left out because their blows are "
+        f"not alike or the two references differ by more than {percent(tree['most_apart'])}; "
+        f"median bar of the reference {power(tree['bar'])}."
+    )
+
+
+def usual() -> str:
+    """What 20 cells are worth where they fit the lengths."""
+    tree = load("map")
+    row = next(row for row in tree["rows"] if row["method"] == "wave, 20 cells")
+    study = load_studies(("reference",))["reference"]
+    point = next(p for p in study.ladder("wave") if p.label == "20 cells")
+    return (
+        f"Twenty cells, the default, are off by {power(point.errors[RATE])} in the reference "
+        f"scene. That is luck: over the {row['points']} points of the map of section 7, whose "
+        f"lengths fit as well, the median is {power(row['median'])}, "
+        f"the greatest {power(row['greatest'])}."
+    )
+
+
+def closed() -> str:
+    """Errors at closed forms."""
+    tree = load("closed_forms")
+    rows = [
+        [row["name"], *(power(error) for error in (*row["wave"], *row["fem"]))]
+        for row in tree["rows"]
+    ]
+    head = [f"waves, {count} cells" for count in tree["cells"]]
+    head += [f"elements, {count}" for count in tree["elements"]]
+    return table(["motion", *head], rows)
+
+
+def steps() -> str:
+    """Error and time of the FMU against communication step."""
+    from scenarios.communication_step import table as step_table
+
+    tree = load("communication_step")
+    return step_table(
+        {
+            case: [{k: math.nan if v is None else v for k, v in row.items()} for row in rows]
+            for case, rows in tree.items()
+        }
+    )
+
+
+def reference_orders() -> str:
+    """Orders of the main ladders on the reference scene."""
+    study = load_studies(("reference",))["reference"]
+    return orders(study, [RATE, *FORCES])
+
+
+def machine() -> str:
+    """Where the figures come from."""
+    here = load("reference")["machine"]
+    return (
+        f"{here['date']}, {here['processor']}, {here['cores']} cores, load {here['load']:.0f}; "
+        f"Python {here['python']}, numba {here['numba']}, scipy {here['scipy']}."
+    )
+
+
+# a page for each scene
+
+
+def bars(study: Study) -> str:
+    """Reference with its bars."""
+    rows = []
+    for key, bar in study.reference.bars.items():
+        one = QUANTITIES[key]
+        label = f"{one.label}, {one.unit}" if one.unit else one.label
+        value = "–" if key in HISTORIES else f"{one.factor * bar.value:.7g}"
+        verdict = "yes" if bar.agreed else "no: the limits disagree"
+        rows.append([label, value, power(abs(bar.error / bar.value)), power(bar.apart), verdict])
+    return table(["quantity", "value", "bar, relative", "solvers apart", "a reference?"], rows)
+
+
+def orders(study: Study, keys: Sequence[str]) -> str:
+    """Measured orders."""
+    rows = []
+    for name in study.names:
+        found = [study.order(name, key) for key in keys]
+        if not any(found):
+            continue
+        cells = ["–" if one is None else f"{one.value:.1f} ± {one.error:.1f}" for one in found]
+        knob = "simulated time" if study.kind == APERIODIC else LADDERS[name].knob
+        rows.append([LADDERS[name].title, knob, *cells])
+    return table(["method", "against", *(SHORT[key] for key in keys)], rows)
+
+
+def rungs(study: Study) -> str:
+    """Every rung: errors and times."""
+    rows = []
+    for point in study.points:
+        label = point.label + (" *" if point.fit > FITS else "")
+        title = LADDERS[point.ladder].title
+        if point.note:
+            rows.append([title, label, point.note, *[""] * (len(study.quantities) + 1)])
+            continue
+        errors = [power(point.errors.get(key, math.nan)) for key in study.quantities]
+        spread = f" ± {two(100 * point.spread)} %" if math.isfinite(point.spread) else ""
+        times = [f"{1e3 * point.second:.3g}{spread}", f"{1e3 * point.setup:.3g}"]
+        rows.append([title, label, *errors, *times])
+    head = [*(SHORT[key] for key in study.quantities), "ms a simulated second", "set-up, ms"]
+    return table(["method", "", *head], rows)
+
+
+def scene_page(name: str) -> str:
+    """Markdown of the page of a scene."""
+    study = load_studies((name,))[name]
+    made = "; ".join(
+        ", ".join(study.reference.made[solver])
+        for solver in ("wave", "explicit", "fem")
+        if solver in study.reference.made
+    )
+    more = QUANTITIES_FIGURE if name == "reference" else ""
+    what = "Relative standard errors" if study.kind == APERIODIC else "Relative errors"
+    return f"""# {study.title}
+
+Made by `python -m docs.make_accuracy`; [accuracy.md](../accuracy.md) says what the columns mean.
+
+![Error against time](../images/accuracy_{name}.png)
+{more}
+## Reference
+
+From {made}.
+
+{bars(study)}
+
+## Orders
+
+{orders(study, study.quantities)}
+
+## All rungs
+
+{what}; * lengths that do not fit the cells; ± half the range of repeated times.
+
+{rungs(study)}
+"""
+
+
+def wrapped(text: Callable[[], str]) -> Callable[[], str]:
+    """Sentences in lines as long as those that are written by hand."""
+    return lambda: textwrap.fill(text(), 108, break_long_words=False, break_on_hyphens=False)
+
+
+BLOCKS: dict[str, Callable[[], str]] = {
+    "advantage": wrapped(advantage),
+    "general": wrapped(general),
+    "contests": contest_table,
+    "forces": force_table,
+    "misfit": misfit,
+    "coupled": coupled,
+    "map": points_map,
+    "usual": wrapped(usual),
+    "closed": closed,
+    "steps": steps,
+    "orders": reference_orders,
+    "machine": machine,
+}
+FILLED = (DOCS / "accuracy.md", DOCS.parent / "README.md")
+
+
+def filled(path: Path) -> str:
+    """Text of a page with its blocks made anew, between their marks."""
+
+    def made(found: re.Match[str]) -> str:
+        return f"{found[1]}\n{BLOCKS[found[2]]()}\n{found[3]}"
+
+    return re.sub(
+        r"(<!-- begin (\w+) -->)\n.*?(<!-- end -->)",
+        made,
+        path.read_text(encoding="utf-8"),
+        flags=re.DOTALL,
+    )
+
+
+def pages() -> dict[Path, str]:
+    """All pages that follow from the data, by file."""
+    scenes = {DATA / f"{name}.md": scene_page(name) for name in (*COMPARED, *OTHERS)}
+    return scenes | {path: filled(path) for path in FILLED}
