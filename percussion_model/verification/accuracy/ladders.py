@@ -13,6 +13,7 @@ from typing import Any
 
 from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.solvers.base import Solver
+from percussion_model.verification.accuracy.cvode import CvodeSolver, missing
 from percussion_model.verification.accuracy.exact_flow import ExactFlowSolver
 from percussion_model.verification.accuracy.explicit import ExplicitSolver
 from percussion_model.verification.accuracy.problems import APERIODIC, Problem
@@ -31,6 +32,7 @@ MESHES, MESHES_FULL = (10, 20, 30, 50, 70), (10, 20, 30, 50, 70, 100)
 # Meshes of the peers that are compiled; the matrices of the exact flow are dense.
 EXPLICIT, EXPLICIT_FULL = (10, 15, 20, 25, 30, 40, 60, 80), (10, 15, 20, 25, 30, 40, 60, 80, 120)
 EXACT_FLOW = (5, 7, 10, 15, 20, 30)
+CVODE, TOLERANCE_OF_TEN = (5, 7, 10, 15), 1e-4
 FEW = (3, 5, 10, 20)  # of a bar so long that no four of the others are affordable
 STEPS = (20.0, 10.0, 5.0, 3.0, 2.0, 1.0)
 COURANT = 2.0
@@ -89,6 +91,12 @@ LADDERS = {
             "exact flow",
             "element size",
             "elements of mixed mass, hard contact, matrix exponentials between events",
+        ),
+        Ladder(
+            "cvode",
+            "CVODE",
+            "element size",
+            "as exact flow; tolerance 1e-4 at 10 elements, falling with the square of the mesh",
         ),
         Ladder("rigid", "rigid", "", "an error of the model: there is nothing to refine"),
         Ladder("lsoda", "scipy LSODA", "element size", "relative tolerance 1e-4, K_C as fem"),
@@ -253,6 +261,11 @@ def _peers(problem: Problem, full: bool) -> Iterator[Rung]:
         for count in _affordable(scene, meshes, limit):
             peer = partial(solver, elements=count)
             yield Rung(name, f"{count} elements", 1.0 / count, scene, peer=peer)
+    for count in CVODE[:1] if missing() else CVODE:
+        tolerance = TOLERANCE_OF_TEN * (10.0 / count) ** 2
+        if count * total_length(scene) < MOST_ELEMENTS / 4:
+            general = partial(CvodeSolver, elements=count, tolerance=tolerance)
+            yield Rung("cvode", f"{count} elements", 1.0 / count, scene, peer=general)
 
 
 def _general(problem: Problem, full: bool) -> Iterator[Rung]:
