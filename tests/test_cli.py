@@ -105,7 +105,15 @@ def test_explain(percussion):
         "explain", SCENARIOS / "reference.toml", "--set", "effects.loss=false"
     )
     assert code == 0
-    for text in ("loss", "wave", "20 in the piston", "loss.time", "A blow", "Predicted cost"):
+    for text in (
+        "loss",
+        "wave",
+        "20 in the piston",
+        "loss.time",
+        "A blow",
+        "Predicted cost",
+        "T_2 0.03891",
+    ):
         assert text in out
 
 

@@ -3,20 +3,23 @@
 import json
 import math
 import os
+import pickle
 
 import numpy as np
 import pytest
 
-from percussion_model import Result, ResultError, Scene, simulate
+from percussion_model import Result, ResultError, Scene, Simulation, simulate
 from percussion_model.interface.plotting import CAPTIONS
 from percussion_model.physics.records import BLOW
 from percussion_model.simulation.files import check_writable, staged
 from percussion_model.simulation.result import FIGURES, REPORT
+from percussion_model.simulation.validity import numerical_note
 
 RIGID = Scene().replace(**{"piston.model": "rigid", "bit.model": "rigid"})
 KEYS = [
     "rate_of_penetration",
     "rate_of_penetration_standard_error",
+    "rate_of_penetration_fixed_window",
     "blow_period",
     "blow_frequency",
     "impact_velocity",
@@ -101,6 +104,30 @@ def test_the_ledger_adds_up(wave):
     assert abs(e["residual_relative"]) < 1e-9
 
 
+def test_the_fixed_window_is_cut_by_time(rigid):
+    """Eq. 58 of the paper: off the rate over whole blows by less than a blow's share."""
+    simulation = Simulation(rigid.scene)
+    start, end = simulation.sample([rigid.settle, rigid.duration])["bit_position"]
+    rate = rigid.rate_of_penetration_fixed_window
+    assert rate == pytest.approx((end - start) / (rigid.duration - rigid.settle), rel=1e-12)
+    assert 0 < abs(rate / rigid.rate_of_penetration - 1.0) < 1.0 / len(rigid.counted)
+    assert simulation.result().rate_of_penetration_fixed_window == rate
+
+
+def test_a_fixed_window_survives_calls_and_snapshots(rigid):
+    simulation = Simulation(rigid.scene)
+    for t in np.linspace(0.0, rigid.duration, 7):
+        simulation.restore(pickle.loads(pickle.dumps(simulation.save())))
+        simulation.advance(t)
+    found = simulation.result()
+    assert found.rate_of_penetration_fixed_window == rigid.rate_of_penetration_fixed_window
+    # what was not read at that time is not known
+    assert simulation.result(settle=0.1).summary()["rate_of_penetration_fixed_window"] is None
+    short = Simulation(rigid.scene)
+    short.advance(0.5 * rigid.settle)
+    assert math.isnan(short.result().rate_of_penetration_fixed_window)
+
+
 def test_standard_error_of_a_known_scatter(rigid):
     blows = np.zeros(400, BLOW)
     random = np.random.default_rng(3)
@@ -142,11 +169,21 @@ def test_an_undamped_scene_warns_and_says_why():
         ({"drive.external_force": 5.0}, "without effect in this scene: drive.external_force"),
         ({"bit.sections.0.length": 0.2137, "solver.cells": 3}, "fit no common cell"),
         ({"solver.cells": 1}, "is a single cell"),
+        ({"solver.cells": 5, "effects.loss": False}, "is taken by averaging fronts within cells"),
+        ({"solver.name": "fem"}, "is taken by the time scheme"),
     ],
 )
 def test_warnings_about_the_scene(changes, warning):
     result = simulate(Scene().replace(**changes), 0.01, settle=0.0)
     assert any(warning in text for text in result.warnings)
+
+
+def test_what_the_discretisation_takes_is_told_beyond_its_limits():
+    assert not list(numerical_note(0.01, "wave"))
+    assert not list(numerical_note(-1e-10, "wave"))
+    assert not list(numerical_note(-1e-3, "blow-map"))  # interpolated
+    for share, words in ((0.0101, "1 % of the energy"), (-1.1e-9, "error of the solver")):
+        assert words in "".join(numerical_note(share, "wave"))
 
 
 # -------------------------------------------------------------------------- files

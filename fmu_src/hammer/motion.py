@@ -202,8 +202,17 @@ class Motion(Runner):
 
     def residual(self) -> float:
         """Share of the energy put in that the ledger leaves unexplained."""
-        residual, scale = unexplained(dict(zip(LEDGER, self.read()[-len(LEDGER) :], strict=True)))
+        residual, scale = unexplained(self._entries())
         return residual / scale if scale > 0.0 else 0.0
+
+    def numerical(self) -> float:
+        """Share of the energy put in that the discretisation took."""
+        entries = self._entries()
+        scale = unexplained(entries)[1]
+        return entries["numerical"] / scale if scale > 0.0 else 0.0
+
+    def _entries(self) -> dict[str, float]:
+        return dict(zip(LEDGER, self.read()[-len(LEDGER) :], strict=True))
 
     def rate_decay(self) -> float:
         """Share of the last blow's rate that holds now; falls when blows fail to come."""

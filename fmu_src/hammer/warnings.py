@@ -6,11 +6,14 @@ from collections.abc import Iterator
 
 from fmu_src.hammer.motion import AT, Motion
 from percussion_model.physics.records import Mode
+from percussion_model.scene.scales import barrier_shares
 from percussion_model.simulation.validity import (
+    barrier_note,
     button_note,
     flight_note,
     guard_notes,
     ledger_note,
+    numerical_note,
     rate_note,
 )
 
@@ -23,6 +26,7 @@ class Warnings:
 
     def __init__(self) -> None:
         self._told: set[str] = set()
+        self._scene_seen = False
         self._next = 0.0
         self._blows = 0
         self._pushed = 0.0  # when the rock was last seen to be pushed [s]
@@ -70,8 +74,14 @@ class Warnings:
 
     def _of_state(self, motion: Motion) -> Iterator[tuple[str, str]]:
         """What ledger, counts and forces tell."""
+        if not self._scene_seen:  # it does not change, and a check would cost more than the rest
+            self._scene_seen = True
+            for text in barrier_note(*barrier_shares(motion.scene)):
+                yield "barrier", text
         for text in ledger_note(motion.residual(), motion.solver.name):
             yield "ledger", text
+        for text in numerical_note(motion.numerical(), motion.solver.name):
+            yield "numerical", text
         for text in guard_notes(motion.solver.statistics(motion._state)):
             yield "guards", text
         if motion.scene.effects.rock == "none":

@@ -9,6 +9,7 @@ from itertools import pairwise
 from typing import Any
 
 from percussion_model.analysis.blow_maps import MapCost, kept_map, map_cost
+from percussion_model.scene.scales import scales
 from percussion_model.scene.scene import Scene
 from percussion_model.simulation.accuracy_control import planned_cells, with_cells
 from percussion_model.simulation.simulate import Simulation
@@ -189,6 +190,7 @@ def explained(scene: Scene, found: Forecast) -> dict[str, Any]:
         "effects_on": list(scene.effects_on),
         "effects_off": list(scene.effects_off),
         "without_effect": list(scene.unused),
+        "scales": {name: scale.value for name, scale in scales(scene).items()},
         "solver": scene.solver_name,
         "cells": (solver.cells or None) if solver else None,
         "time_step": solver.time_step if solver else None,

@@ -27,6 +27,7 @@ from percussion_model.simulation.result import REPORT, Result
 HEADLINES: tuple[tuple[str, str, str, str, float], ...] = (
     ("rate_of_penetration", "Rate of penetration", "m/s", "mm/s", 1e-3),
     ("rate_of_penetration_standard_error", "… its standard error", "m/s", "mm/s", 1e-3),
+    ("rate_of_penetration_fixed_window", "… from settling to the end", "m/s", "mm/s", 1e-3),
     ("blow_period", "Blow period", "s", "ms", 1e-3),
     ("blow_frequency", "Blow frequency", "Hz", "blows/min", 1.0 / 60.0),
     ("impact_velocity", "Impact velocity (mean of the piston)", "m/s", "m/s", 1.0),

@@ -125,6 +125,8 @@ def show_explanation(scene: Scene, found: Forecast) -> None:
     effects = scene.effects
     table.add_row("Drive, rock", f"{effects.drive}, {effects.rock}")
     table.add_row("Piston, bit", f"{scene.piston.model}, {scene.bit.model}")
+    for name, text in _scale_rows(scene):
+        table.add_row(name, text)
     table.add_row("Solver", scene.solver_name)
     if scene.solver.accuracy is not None:
         table.add_row("Wanted accuracy of the rate", f"{scene.solver.accuracy:g}")
@@ -155,6 +157,25 @@ def show_explanation(scene: Scene, found: Forecast) -> None:
         )
     table.add_row("To prepare", f"{found.setup_time:.2g} s")
     Console().print(table)
+
+
+# Rows of the scales: name, SI unit, factor, unit shown.
+_SCALE_ROWS = (
+    ("Time scales", "s", 1e3, "ms"),
+    ("Length scales", "m", 1e3, "mm"),
+    ("Ratios", "-", 1.0, ""),
+)
+
+
+def _scale_rows(scene: Scene) -> Iterator[tuple[str, str]]:
+    """Scales of a scene by their symbols, those of a unit in a row."""
+    from percussion_model.scene.scales import scales
+
+    for name, unit, factor, shown in _SCALE_ROWS:
+        alike = [scale for scale in scales(scene).values() if scale.unit == unit]
+        if alike:
+            words = ", ".join(f"{one.symbol} {factor * one.value:.4g}" for one in alike)
+            yield name, f"{words} {shown}".rstrip()
 
 
 def show_comparison(found: Comparison) -> None:

@@ -59,6 +59,11 @@ def bar_transit_time(sections: Any) -> float:
     return total + rest
 
 
+def bar_compliance(sections: Any) -> float:
+    """Shortening by a force that is the same along the bar, sum of length / (E A) [m/N]."""
+    return sum(float(s[LENGTH]) / (float(s[YOUNGS_MODULUS]) * float(s[AREA])) for s in sections)
+
+
 def add(total: float, rest: float, term: float) -> tuple[float, float]:
     """Add to a sum of two floats, the second of which is what the first rounds off."""
     rounded = total + term

@@ -78,6 +78,10 @@ class Result:
     rate_of_penetration_relative_error : float
         Estimated error of the rate, relative to it, where `solver.accuracy` is
         asked for; NaN where it is not.
+    rate_of_penetration_fixed_window : float
+        Advance of the mean bit position from the settling time to the end of the
+        run by that time, wherever in a blow they lie (eq. 58 of the paper) [m/s];
+        NaN where the run was not read at its settling time.
     """
 
     scene: Scene
@@ -96,6 +100,7 @@ class Result:
     setup_time: float
     warnings: list[str]
     rate_of_penetration_relative_error: float = math.nan
+    rate_of_penetration_fixed_window: float = math.nan
 
     @property
     def counted(self) -> np.ndarray:
@@ -160,6 +165,7 @@ class Result:
             "rate_of_penetration": self.rate_of_penetration,
             "rate_of_penetration_standard_error": self.rate_of_penetration_standard_error,
             "rate_of_penetration_relative_error": self.rate_of_penetration_relative_error,
+            "rate_of_penetration_fixed_window": self.rate_of_penetration_fixed_window,
             "blow_period": period,
             "blow_frequency": 1.0 / period,
             **{name: _mean(rows[name]) for name in _MEANS},
@@ -303,8 +309,9 @@ def _read_result(folder: Path) -> dict[str, Any]:
         fields["cells"] = fields["cells"] or {}
         for name, value in fields["energy"].items():
             fields["energy"][name] = math.nan if value is None else value
-        error = summary.get(_ERROR)  # unknown to older files
-        fields[_ERROR] = math.nan if error is None else error
+        for name in _RATES:
+            value = summary.get(name)  # unknown to older files
+            fields[name] = math.nan if value is None else value
         blows = _read_csv(folder / "blows.csv", float)
         events = _read_csv(folder / "events.csv", _number_or_kind)
         tables = {"blows": _rows(blows, BLOW), "events": _rows(events, EVENT)}
@@ -330,7 +337,7 @@ _FROM_SUMMARY = (
 )
 
 
-_ERROR = "rate_of_penetration_relative_error"
+_RATES = ("rate_of_penetration_relative_error", "rate_of_penetration_fixed_window")
 
 
 def _number_or_kind(text: str) -> float:

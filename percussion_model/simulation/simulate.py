@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import signal
 import threading
 import time
@@ -54,6 +55,7 @@ class Snapshot:
     state: State
     blows: tuple[np.ndarray, ...]
     events: tuple[np.ndarray, ...]
+    settled_position: float
 
 
 class Simulation(Runner):
@@ -76,8 +78,21 @@ class Simulation(Runner):
         self, scene: Scene, record_events: bool = True, solver: Solver | None = None
     ) -> None:
         super().__init__(scene, record_events, solver)
+        # of the mean bit when blows begin to count [m], NaN before
+        self._settled_position = math.nan
         self._blows: tuple[np.ndarray, ...] = ()  # bytes of the rows
         self._events: tuple[np.ndarray, ...] = ()
+
+    def _advance_solver(self, t: float) -> None:
+        settle = self.scene.run.settle
+        if self._time <= settle <= t and math.isnan(self._settled_position):
+            super()._advance_solver(settle)
+            self._settled_position = self._bit_position(settle)
+        super()._advance_solver(t)
+
+    def _bit_position(self, t: float) -> float:
+        """Mean bit displacement since the start at a time that the solver has reached [m]."""
+        return float(self._reading_at(t)[0]["bit_position"][0])
 
     def _keep(self, blows: np.ndarray, events: np.ndarray) -> None:
         if len(blows):
@@ -124,7 +139,14 @@ class Simulation(Runner):
 
     def save(self) -> Snapshot:
         """Return a snapshot to go back to; it can be pickled."""
-        return Snapshot(self.scene, self._time, self._state.copy(), self._blows, self._events)
+        return Snapshot(
+            self.scene,
+            self._time,
+            self._state.copy(),
+            self._blows,
+            self._events,
+            self._settled_position,
+        )
 
     def restore(self, snapshot: Snapshot) -> None:
         """Go back to a snapshot; what follows repeats bit for bit."""
@@ -135,6 +157,7 @@ class Simulation(Runner):
         self._time = snapshot.time
         self._state = snapshot.state.copy()
         self._blows, self._events = snapshot.blows, snapshot.events
+        self._settled_position = snapshot.settled_position
 
     def energy(self) -> dict[str, float]:
         """Energy ledger [J] at the present grid point; see `Result.energy`."""
@@ -149,8 +172,11 @@ class Simulation(Runner):
 
     def _read_state(self) -> tuple[np.ndarray, State]:
         """Reading at the present time, and the copy of the state that it was made of."""
+        return self._reading_at(self._time)
+
+    def _reading_at(self, t: float) -> tuple[np.ndarray, State]:
         # after a change of inputs the state may lie a step ahead of the present
-        here = max(self._time, self.solver.time(self._state))
+        here = max(t, self.solver.time(self._state))
         reading = np.zeros(1, READING)
         return reading, self.solver.read(self._state, here, reading, peaks=False)
 
@@ -178,9 +204,18 @@ class Simulation(Runner):
             wall_time=self.wall_time,
             setup_time=self.setup_time,
             warnings=[],
+            rate_of_penetration_fixed_window=self._fixed_window_rate(settle),
         )
         result.warnings.extend(find_warnings(result))
         return result
+
+    def _fixed_window_rate(self, settle: float | None) -> float:
+        """Advance of the bit from settling to the present by that time [m/s]; NaN if unknown."""
+        begin = self.scene.run.settle
+        if settle not in (None, begin) or not self._time > begin:
+            return math.nan
+        advance = self._bit_position(self._time) - self._settled_position
+        return advance / (self._time - begin)
 
 
 def _appended(chunks: tuple[np.ndarray, ...], rows: np.ndarray) -> tuple[np.ndarray, ...]:

@@ -9,6 +9,10 @@ from collections.abc import Iterator, Mapping
 
 # The ledger closes to rounding; more than this is an error of the solver.
 MOST_RESIDUAL = 1e-6
+# What the discretisation takes is never negative, but for the rounding of its sums ...
+LEAST_NUMERICAL = -1e-9
+# ... and above this share of the energy put in it shows in peaks and rates.
+MOST_NUMERICAL = 1e-2
 # Between the nodes of a blow map energy is kept as well as the map is interpolated.
 MOST_MAP_RESIDUAL = 1e-2
 # Buttons of a percussive bit stand out by 5 to 15 mm; deeper in, its face meets the rock,
@@ -17,6 +21,8 @@ BUTTON_LENGTH = 0.010
 # The fastest percussive drills make 0.1 m/s in the softest rock, and the softest corner of
 # the paper's ranges 0.22 m/s: a rate far beyond is no drilling [m/s].
 MOST_RATE = 0.5
+# What the paper's eq. 30 wants to be much less than 1 is at most this.
+MOST_BARRIER = 0.1
 # A bit that meets no rock for so long, five blows of the reference, is off bottom [s].
 LONGEST_FLIGHT = 0.25
 
@@ -29,6 +35,25 @@ def ledger_note(residual: float, solver: str) -> Iterator[str]:
             f"the energy ledger does not close: {residual:.2g} of the energy put in is "
             "unexplained; "
             + ("raise blow_map.density" if mapped else "this is an error of the solver")
+        )
+
+
+def numerical_note(share: float, solver: str) -> Iterator[str]:
+    """Say that the discretisation took too much of the energy put in, or gave some."""
+    if not share >= (-MOST_MAP_RESIDUAL if solver == "blow-map" else LEAST_NUMERICAL):
+        yield (
+            f"numerical is {share:.2g} of the energy put in: the discretisation gives energy, "
+            "which it cannot; this is an error of the solver"
+        )
+    elif share > MOST_NUMERICAL:
+        cause, remedy = (
+            ("the time scheme", "set a smaller fem.courant or more fem.elements")
+            if solver == "fem"
+            else ("averaging fronts within cells", "set more solver.cells")
+        )
+        yield (
+            f"{100 * share:.2g} % of the energy put in is taken by {cause} (entry numerical "
+            f"of its balance), not by anything in the equations: peaks and rates suffer; {remedy}"
         )
 
 
@@ -62,6 +87,25 @@ def button_note(peak_bit_force: float, loading_stiffness: float) -> Iterator[str
         yield (
             f"the rock is pressed in by {1e3 * depth:.3g} mm, deeper than the buttons of a bit "
             f"stand out ({1e3 * BUTTON_LENGTH:g} mm): beyond that the model does not hold"
+        )
+
+
+def barrier_note(time_share: float, energy_share: float) -> Iterator[str]:
+    """Say that the energy barrier is no small part of a blow, where it is not.
+
+    Parameters
+    ----------
+    time_share : float
+        T_5/T_4: time that the barrier takes, by that of a drilling cycle.
+    energy_share : float
+        W_R/(F_0 D_1): its energy, by that which the drive gives a blow.
+    """
+    if max(time_share, energy_share) > MOST_BARRIER:
+        yield (
+            f"the energy barrier is not small: it takes {time_share:.2g} of a drilling cycle's "
+            f"time (T_5/T_4) and {energy_share:.2g} of a blow's energy (W_R/(F_0 D_1)), each of "
+            f"which the rock law wants far below 1, at most {MOST_BARRIER:g}: lower "
+            "rock.barrier_energy, or raise rock.barrier_damping for the time"
         )
 
 

@@ -8,12 +8,15 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from percussion_model.physics.records import EventKind
+from percussion_model.scene.scales import barrier_shares
 from percussion_model.simulation.result import LEAST_BLOWS, Result
 from percussion_model.simulation.validity import (
+    barrier_note,
     button_note,
     flight_note,
     guard_notes,
     ledger_note,
+    numerical_note,
     rate_note,
 )
 
@@ -47,6 +50,7 @@ def _about_scene(result: Result) -> Iterator[str]:
                 "structural loss is off: vibration trapped in the bars never decays, so the "
                 "rate of penetration depends on the cells and must not be trusted"
             )
+    yield from barrier_note(*barrier_shares(scene))
     least = least_loss_time(result)
     if scene.loss_on and scene.solver_name == "wave" and scene.loss.time < least:
         yield (
@@ -110,6 +114,7 @@ def _about_blows(result: Result) -> Iterator[str]:
 def _about_validity(result: Result) -> Iterator[str]:
     if any(result.energy[name] for name in _FLOWS):
         yield from ledger_note(result.energy["residual_relative"], result.solver)
+        yield from numerical_note(result.energy["numerical_relative"], result.solver)
     yield from guard_notes(result.statistics)
     scene = result.scene
     if scene.effects.rock == "none":

@@ -171,6 +171,13 @@ def test_the_log_says_once_where_the_motion_leaves_the_model(make, values, words
     assert "at t = " in said[0]
 
 
+def test_the_log_says_once_that_the_barrier_is_not_small(make):
+    instance = make(rock__barrier_energy=15.0)
+    for _ in range(8):
+        instance.step(0.05)
+    assert len([text for text in instance.messages if "barrier is not small" in text]) == 1
+
+
 def test_the_log_of_the_reference_is_silent(make):
     instance = make()
     for _ in range(40):

@@ -1,19 +1,32 @@
-"""Section 4 of the paper, as `percussion paper` checks it: the cheap part of it."""
+"""Sections 2.3 and 4 of the paper, as `percussion paper` checks it: the cheap part of it."""
 
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from percussion_model import simulate
+from percussion_model import Simulation, simulate
+from percussion_model.interface.plotting.paper_rock_law import draw_force, draw_sinking
 from percussion_model.interface.plotting.window import last_blow_window
+from percussion_model.physics.records import EventKind, Mode
+from percussion_model.verification.paper.rock_law import (
+    about_datum,
+    about_sinking,
+    datum_jumps,
+    run_sinking,
+    sinking_speed,
+)
 from percussion_model.verification.paper.runs import (
+    CALIBRATED,
     SWEEPS,
     Sweep,
     along,
+    drop_scene,
+    exponent_and_error,
     force_at_constant_power,
     maxima,
     paper_scene,
@@ -25,9 +38,29 @@ from percussion_model.verification.paper.runs import (
 from percussion_model.verification.paper.statements import (
     SAME_EXPONENT,
     about_cycle,
+    about_double_impact,
     about_drops,
+    about_scales,
     about_sweeps,
+    scatter_about_line,
 )
+
+
+@pytest.fixture(scope="module")
+def drops():
+    return run_drops(paper_scene())
+
+
+@pytest.fixture(scope="module")
+def sinking():
+    return run_sinking(paper_scene())
+
+
+@pytest.fixture(scope="module")
+def waves():
+    """Return the reference by waves, and its last blow."""
+    result = simulate(paper_scene(), 2.0, 1.0)
+    return result, last_blow_window(result)
 
 
 def test_fits_find_what_was_put_in():
@@ -66,18 +99,29 @@ def test_statements_about_sweeps_are_plain_values(tmp_path):
         few = replace(few, changes={})
         found[sweep.name] = run_sweep(paper_scene(), few, tmp_path / sweep.name, processes=1)
     said = list(about_sweeps(found))
-    assert len(said) == 2 + 3 * 3 + 3 + 3
+    assert len(said) == 2 + 2 + 3 * 3 + 3 + 3 + 4
     json.dumps([one.to_dict() for one in said])
 
 
-def test_drop_tests_show_what_section_4_2_says():
-    agree(list(about_drops(run_drops(paper_scene()))), 4)
+def test_drop_tests_show_what_section_4_2_says(drops):
+    agree(list(about_drops(drops)), 4)
 
 
-def test_the_stationary_blow_is_that_of_section_4_3():
-    result = simulate(paper_scene(), 2.0, 1.0)
+def test_the_stationary_blow_is_that_of_section_4_3(waves, drops):
+    result, window = waves
+    agree(list(about_cycle(result, window.samples, window.origin)), 9)
+    agree(list(about_double_impact(drops, result, window.samples, window.origin)), 1)
+
+
+def test_the_elements_interpenetrate_as_the_paper_says():
+    """By their contact force over K_C, which the penalty makes."""
+    result = simulate(paper_scene().computed_by("fem"), 0.4, 0.2)
     window = last_blow_window(result)
-    agree(list(about_cycle(result, window.samples, window.origin)), 7)
+    said = list(about_cycle(result, window.samples, window.origin))
+    (one,) = (one for one in said if "interpenetration" in one.says)
+    assert one.agrees, one.found
+    depth = -window.samples["gap"].min()
+    assert depth == pytest.approx(window.samples["contact_force"].max() / 1e12, rel=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -91,3 +135,82 @@ def test_exponents_of_section_4_4(key, values, exponent, tmp_path):
     found = run_sweep(paper_scene(), Sweep("x", key, values), tmp_path / "x", processes=1)
     x, rate, _periodic = along(found)
     assert power_law(x, rate)[0] == pytest.approx(exponent, abs=SAME_EXPONENT)
+
+
+def test_an_exponent_is_as_sure_as_its_scatter_says():
+    x = np.geomspace(1.0, 100.0, 400)
+    assert exponent_and_error(x, 3.0 * x**-0.55) == pytest.approx((-0.55, 0.0), abs=1e-12)
+    scatter = 0.1 * np.random.default_rng(7).standard_normal(400)
+    exponent, error = exponent_and_error(x, x**-0.55 * np.exp(scatter))
+    expected = 0.1 / np.sqrt(np.sum((np.log(x) - np.mean(np.log(x))) ** 2))
+    assert error == pytest.approx(expected, rel=0.15)
+    assert abs(exponent + 0.55) < 3.0 * error
+    assert np.isnan(exponent_and_error(x[:2], x[:2])).all()
+
+
+def test_the_scatter_about_the_backbone_is_that_of_the_steepest_contact():
+    """Two contacts: a low one with much scatter, a high one with a known scatter."""
+    time = np.linspace(0.0, 1.0, 401)
+    mode = np.where(time < 0.4, Mode.FC, np.where(time < 0.5, Mode.FF, Mode.FC))
+    low, high = 10.0 * np.sin(40.0 * time), 100.0 * time + np.where(np.arange(401) % 2, 2.0, -2.0)
+    force = np.where(time < 0.4, low, np.where(time < 0.5, 0.0, high))
+    samples = {"time": time, "drilling_mode": mode, "bit_force": force, "bit_position": time}
+    found = scatter_about_line(samples, 0.0, "bit_position")
+    assert found == pytest.approx(2.0 / np.max(high), rel=0.02)
+
+
+@pytest.mark.parametrize(
+    "changes", [{}, {"rock.unloading_ratio": 2.0, "feed.force": 6e3}, {"gravity.acceleration": 3.0}]
+)
+def test_a_rigid_bit_without_barrier_sinks_as_the_closed_form_says(changes):
+    scene = drop_scene(paper_scene().replace(**changes), *CALIBRATED)
+    scene = scene.computed_by("rigid", **{"effects.barrier": False})
+    simulation = Simulation(scene)
+    simulation.advance(1.0)
+    starts = simulation.events[simulation.events["kind"] == EventKind.MODE_FC][-200:]
+    speed = np.ptp(starts["bit_position"]) / np.ptp(starts["time"])
+    assert speed == pytest.approx(sinking_speed(scene), rel=1e-6)
+
+
+def test_sinking_is_told_of_each_bit(sinking):
+    """Rigid and lossless bits sink on, as the paper says; loss stops an elastic one."""
+    rigid, elastic = about_sinking(paper_scene(), sinking)
+    assert rigid.agrees, rigid.found
+    assert not elastic.agrees
+    assert elastic.why
+
+
+def test_the_datum_jumps_by_eq_19(waves):
+    result, window = waves
+    jumps = datum_jumps(result.scene, window.restart, window.origin + window.length)
+    assert len(jumps) >= 5
+    # under force and out of free flight, both ways into a new cycle
+    assert any(one.after > 1e-4 for one in jumps)
+    assert sum(one.after < 1e-8 for one in jumps) >= 3
+    agree(list(about_datum(jumps, result.blows["penetration"][-1])), 1)
+    wrong = [replace(one, expected=1.001 * one.expected) for one in jumps]
+    assert not next(about_datum(wrong, result.blows["penetration"][-1])).agrees
+
+
+def test_table_2_has_a_misprint():
+    printed, misprint, ratio = about_scales(paper_scene())
+    assert printed.agrees, printed.found
+    assert ratio.agrees, ratio.found
+    assert not misprint.agrees
+    assert "200.16 mm" in misprint.why  # 0.0387 ms times sqrt(210e9/7850) m/s
+
+
+def test_the_trend_of_rigid_bodies_has_its_maximum_near_40_and_falls(tmp_path):
+    sweep = Sweep("x", "rock.unloading_ratio", np.geomspace(5.0, 250.0, 24), "rigid")
+    x, rate, _periodic = along(run_sweep(paper_scene(), sweep, tmp_path / "x", processes=1))
+    best = int(np.argmax(rate))
+    assert 30.0 < x[best] < 50.0
+    assert (np.diff(rate[best:]) < 0).all()
+    assert rate[-1] < 0.95 * rate[best]
+
+
+def test_figures_of_the_rock_law_have_axes_with_units(waves, sinking):
+    drawn = [draw_force(waves[1]), draw_sinking(sinking)]
+    for ax in (ax for fig in drawn for ax in fig.axes):
+        assert re.search(r"\[.+\]$", ax.get_xlabel())
+        assert re.search(r"\[.+\]$", ax.get_ylabel())

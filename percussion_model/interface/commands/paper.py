@@ -13,7 +13,13 @@ from percussion_model.interface.commands import common
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from percussion_model.analysis.comparison import Comparison
     from percussion_model.analysis.study import Study
+    from percussion_model.interface.plotting.window import Window
+    from percussion_model.scene.scene import Scene
+    from percussion_model.verification.paper.rock_law import Sinking
+    from percussion_model.verification.paper.runs import Drop
+    from percussion_model.verification.paper.statements import Statement
 
 
 def paper(
@@ -23,7 +29,7 @@ def paper(
     ] = None,
     json_file: common.JsonFile = None,
 ) -> None:
-    """Reproduce figures 6 to 9 of the paper, and check what it says one by one."""
+    """Reproduce figures 4 and 6 to 9 of the paper, and check what it says one by one."""
     from percussion_model.interface.terminal import progress_bar, show_statements
 
     common.check_outputs(out, json_file)
@@ -32,44 +38,67 @@ def paper(
         from percussion_model.interface.plotting.activation import draw_activation
         from percussion_model.interface.plotting.compared_blows import draw_comparison
         from percussion_model.interface.plotting.motion import draw_motion
-        from percussion_model.interface.plotting.paper import draw_drops, draw_sweeps
+        from percussion_model.interface.plotting.paper import draw_drops, draw_scaling, draw_sweeps
+        from percussion_model.interface.plotting.paper_rock_law import draw_force, draw_sinking
         from percussion_model.interface.plotting.style import save_figures
         from percussion_model.interface.plotting.window import last_blow_window
     except ImportError as error:
         raise common.refusal(common.needs_plot_extra(error)) from None
     from percussion_model.analysis.comparison import compare
+    from percussion_model.verification.paper.rock_law import run_sinking
     from percussion_model.verification.paper.runs import paper_scene, run_drops
-    from percussion_model.verification.paper.statements import (
-        about_cycle,
-        about_drops,
-        about_sweeps,
-    )
 
     scene = paper_scene()
-    drops = run_drops(scene)
+    drops, sinking = run_drops(scene), run_sinking(scene)
     sweeps = _sweeps(out, processes)
     with progress_bar(2 * scene.run.duration) as progress:
         both = compare(scene, ("wave", "fem"), progress=progress)
     windows = {name: last_blow_window(result) for name, result in both.results.items()}
 
     def figures() -> Iterator[tuple[str, Figure]]:
+        yield "figures4and7", draw_force(windows["wave"])
+        yield "sinking", draw_sinking(sinking)
         yield "figure6", draw_drops(drops)
         yield "figures7and8", draw_comparison(both)
         for name, window in windows.items():
             yield f"figure7_{name}", draw_motion(window)
             yield f"figure8_{name}", draw_activation(window)
         yield "figure9", draw_sweeps(sweeps)
+        yield "scaling", draw_scaling(sweeps["d"])
 
     save_figures(figures, out)
-    statements = list(about_drops(drops))
-    for name, window in windows.items():
-        statements += about_cycle(both.results[name], window.samples, window.origin)
-    statements += about_sweeps(sweeps)
+    statements = list(_statements(scene, drops, sinking, both, windows, sweeps))
     tree = {"statements": [one.to_dict() for one in statements]}
     common.write_json(json_file, tree)
     common.write_json(str(out / "statements.json"), tree)
     if json_file != "-":
         show_statements(statements)
+
+
+def _statements(
+    scene: Scene,
+    drops: list[Drop],
+    sinking: dict[str, Sinking],
+    both: Comparison,
+    windows: dict[str, Window],
+    sweeps: dict[str, Study],
+) -> Iterator[Statement]:
+    """Go through the paper from section 2.3 on."""
+    from percussion_model.verification.paper import rock_law
+    from percussion_model.verification.paper import statements as section_4
+
+    waves = windows["wave"]
+    jumps = rock_law.datum_jumps(waves.scene, waves.restart, waves.origin + waves.length)
+    advance = float(both.results["wave"].blows["penetration"][-1])
+    yield from rock_law.about_datum(jumps, advance)
+    yield from rock_law.about_sinking(scene, sinking)
+    yield from section_4.about_scales(scene)
+    yield from section_4.about_drops(drops)
+    for name, window in windows.items():
+        result = both.results[name]
+        yield from section_4.about_cycle(result, window.samples, window.origin)
+        yield from section_4.about_double_impact(drops, result, window.samples, window.origin)
+    yield from section_4.about_sweeps(sweeps)
 
 
 def _sweeps(out: Path, processes: int | None) -> dict[str, Study]:

@@ -1,13 +1,15 @@
-"""Figures 6 and 9 of the paper."""
+"""Figures 6 and 9 of the paper, and its scaling laws."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.ticker import LogLocator, NullFormatter, ScalarFormatter
 
 from percussion_model.analysis.study import Study
 from percussion_model.interface.plotting import style
@@ -19,13 +21,14 @@ from percussion_model.verification.paper.runs import (
     PAPER_LEAST_FEED,
     Drop,
     along,
+    exponent_and_error,
     power_law,
     straight_line,
 )
 
 # Colours of the drop tests by barrier energy, light to dark.
 ENERGY_COLOURS = ("#9ECAE1", "#56B4E9", "#0072B2", "#08306B")
-DAMPING_LINES: tuple[object, ...] = ((0, (1.2, 1.2)), "-", (0, (4, 1.5)))
+DAMPING_LINES: tuple[Any, ...] = ((0, (1.2, 1.2)), "-", (0, (4, 1.5)))
 # The part of a drop test worth seeing [s].
 DROP_SHOWN = 45e-3
 # Room above the greatest rate, as a factor on it.
@@ -33,36 +36,44 @@ ROOM = 1.25
 # Error of a rate that is known well enough to set the scale, as a share of it.
 MOST_ERROR = 0.5
 PERIODIC_COLOUR, APERIODIC_COLOUR = "#0072B2", "#D55E00"
+RIGID_COLOUR = "#009E73"
 
 
 def draw_drops(drops: Sequence[Drop]) -> Figure:
     """Draw the drop tests: mean bit motion, and where the bit comes to rest (figure 6)."""
-    fig = Figure(figsize=(10.5, 4.4), layout="constrained")
-    motion, rest = fig.subplots(1, 2)
-    middle = DAMPINGS[len(DAMPINGS) // 2]
+    fig = Figure(figsize=(13.0, 4.6), layout="constrained")
+    motion, close, rest = fig.subplots(1, 3)
     for drop in drops:
         shown = drop.time <= DROP_SHOWN
         colour = ENERGY_COLOURS[ENERGIES.index(drop.energy)]
-        if drop.damping == middle:
-            motion.plot(drop.time[shown] * MS, drop.bit_position[shown] * MM, color=colour)
-    motion.invert_yaxis()
-    title = f"Mean bit motion, $C_R$ = {middle:g} N s/m"
-    style.label(motion, "time [ms]", "mean bit displacement, down [mm]", title)
+        dashes = DAMPING_LINES[DAMPINGS.index(drop.damping)]
+        for ax in (motion, close):
+            x, y = drop.time[shown] * MS, drop.bit_position[shown] * MM
+            ax.plot(x, y, linestyle=dashes, color=colour, linewidth=1.1)
+    ends = [drop.rest * MM for drop in drops]
+    room = ROOM - 1.0
+    close.set_xlim(0.5 * DROP_SHOWN * MS, DROP_SHOWN * MS)
+    close.set_ylim(min(ends) - 2.0 * room * np.ptp(ends), max(ends) + room * np.ptp(ends))
+    for ax, title in ((motion, "(b) Mean bit motion"), (close, "(b) The same near rest")):
+        ax.invert_yaxis()
+        style.label(ax, "time [ms]", "mean bit displacement, down [mm]", title)
     for damping, dashes in zip(DAMPINGS, DAMPING_LINES, strict=True):
         row = [drop for drop in drops if drop.damping == damping]
         energies, ends = [drop.energy for drop in row], [drop.rest * MM for drop in row]
-        name = f"$C_R$ = {damping:g} N s/m"
-        rest.semilogx(energies, ends, linestyle=dashes, color="black", marker="o", label=name)
-    rest.legend()
+        rest.semilogx(energies, ends, linestyle=dashes, color="black", marker="o", markersize=4)
     style.label(
         rest,
         "energy barrier $W_R$ [J]",
         "bit end at rest, down [mm]",
-        "Penetration when the bit has come to rest",
+        "(c) Penetration when the bit has come to rest",
     )
     handles = [
         Line2D([], [], color=colour, linewidth=2.0, label=f"$W_R$ = {energy:g} J")
         for energy, colour in zip(ENERGIES, ENERGY_COLOURS, strict=True)
+    ]
+    handles += [
+        Line2D([], [], color="black", linestyle=dashes, label=f"$C_R$ = {damping:g} N s/m")
+        for damping, dashes in zip(DAMPINGS, DAMPING_LINES, strict=True)
     ]
     style.head(fig, "Drop test of the bit at 5.25 m/s (figure 6)", handles)
     return fig
@@ -73,7 +84,7 @@ def draw_sweeps(found: Mapping[str, Study]) -> Figure:
     fig = Figure(figsize=(10.5, 7.6), layout="constrained")
     axes = fig.subplots(2, 2).ravel()
     _stiffness(axes[0], found["a"])
-    _ratio(axes[1], found["b"], found["b_table"], found["b_text"])
+    _ratio(axes[1], found)
     _feed(axes[2], found["c"])
     _distance(axes[3], found["d"])
     handles = [
@@ -122,15 +133,20 @@ def _stiffness(ax: Axes, found: Study) -> None:
     style.label(ax, "loading stiffness $K_R$ [kN/mm]", RATE, "(a) Loading stiffness of the rock")
 
 
-def _ratio(ax: Axes, found: Study, by_table: Study, by_text: Study) -> None:
-    _points(ax, found)
-    for elements, marker, name in (
-        (by_table, "x", "finite elements, $K_C$ of Table II"),
-        (by_text, "+", "finite elements, $K_C$ of the text"),
+def _ratio(ax: Axes, found: Mapping[str, Study]) -> None:
+    _points(ax, found["b"])
+    for name, line, label in (
+        ("b_table", "x-", "finite elements, $K_C$ of Table II"),
+        ("b_text", "+-", "finite elements, $K_C$ of the text"),
+        ("b_rigid", "-", "rigid body trend"),
     ):
-        x, rate, _ = along(elements)
-        line = f"{marker}-"
-        ax.plot(x, rate * MM, line, color="#444444", markersize=5.0, linewidth=0.8, label=name)
+        x, rate, _ = along(found[name])
+        rigid = name == "b_rigid"
+        colour, width = (RIGID_COLOUR, 1.8) if rigid else ("#444444", 0.8)
+        ax.plot(x, rate * MM, line, color=colour, markersize=5.0, linewidth=width, label=label)
+        if rigid:
+            best = int(np.argmax(rate))
+            ax.plot(x[best], rate[best] * MM, "v", color=colour, markersize=6.0)
     ax.legend(loc="upper left")
     ax.set_xscale("log")
     ax.axvline(40.0, color=style.RULE_COLOUR, linestyle=":")
@@ -160,6 +176,48 @@ def _distance(ax: Axes, found: Study) -> None:
     _paper_limit(ax, PAPER_LEAST_DISTANCE * MM)
     ax.set_xscale("log")
     style.label(ax, "reversal distance $D_1$ [mm]", RATE, "(d) Frequency, at constant power")
+
+
+def draw_scaling(found: Study) -> Figure:
+    """Draw period, impact velocity and rate at constant power against each other (eqs 15, 59)."""
+    fig = Figure(figsize=(10.5, 4.6), layout="constrained")
+    x, rate, periodic = along(found)
+    x, rate = x * MM, rate * MM
+    chosen = periodic & (x >= PAPER_LEAST_DISTANCE * MM)
+    period, velocity = found.rows["blow_period"] * MS, found.rows["impact_velocity"]
+    scales, rates = fig.subplots(1, 2)
+    _power_line(scales, x, period, chosen, PERIODIC_COLOUR, "period $T$ [ms] ~ $D_1$", "2/3")
+    _power_line(scales, x, velocity, chosen, APERIODIC_COLOUR, "velocity $v$ [m/s] ~ $D_1$", "1/3")
+    both = "period [ms], impact velocity [m/s]"
+    style.label(scales, "reversal distance $D_1$ [mm]", both, "Scales of the drive (eq. 15)")
+    _power_line(rates, period, rate, chosen, PERIODIC_COLOUR, "rate ~ $T$", "−1/2")
+    _power_line(rates, velocity, rate, chosen, APERIODIC_COLOUR, "rate ~ $v$", "−1")
+    style.label(rates, both, RATE, "Rate of penetration (eq. 59)")
+    handles = [
+        Line2D([], [], linestyle="", marker="o", color="black", label="periodic, in the fit"),
+        Line2D([], [], linestyle="", marker="o", color="black", mfc="white", label="other"),
+    ]
+    style.head(fig, "Scaling with the reversal distance at constant power", handles)
+    return fig
+
+
+def _power_line(
+    ax: Axes, x: np.ndarray, y: np.ndarray, chosen: np.ndarray, colour: str, words: str, law: str
+) -> None:
+    """Draw points, and the power law through those chosen, beside the exponent of the paper."""
+    exponent, error = exponent_and_error(x[chosen], y[chosen])
+    _, factor = power_law(x[chosen], y[chosen])
+    for shown, face in ((chosen, colour), (~chosen, "white")):
+        ax.plot(x[shown], y[shown], "o", color=colour, mfc=face, markersize=4.0)
+    ends = np.array([np.min(x[chosen]), np.max(x[chosen])])
+    label = f"{words}$^{{{exponent:.3f} \\pm {error:.3f}}}$ (paper: {law})"
+    ax.plot(ends, factor * ends**exponent, color=colour, linewidth=1.0, label=label)
+    ax.set(xscale="log", yscale="log")
+    for axis in (ax.xaxis, ax.yaxis):
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axis.set_major_formatter(ScalarFormatter())
+        axis.set_minor_formatter(NullFormatter())
+    ax.legend()
 
 
 def _paper_limit(ax: Axes, x: float) -> None:

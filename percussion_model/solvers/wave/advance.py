@@ -36,7 +36,7 @@ def plan(par, s, bars, ops, scratch):
     # a leap that ended just short of it is none to wait for
     due = s.dormant == 1 and s.step + FEWEST_STEPS > s.wake and s.leap_end < 0
     if due and not stays_dormant(par, s, bars.wb, bars.cb):
-        wake_piston(par, s, bars, ops.piston, scratch)
+        wake_piston(par, s, bars, ops, scratch)
         s.no_dormancy = s.step
         s.count_wakes += 1
     if par.piston != Piston.ABSENT and s.dormant == 0:
@@ -91,7 +91,7 @@ def commit_to(par, s, bars, ops, scratch, time):
         leap(par, s, bars.wb, bars.cb, ops, scratch, False)
     s.leap_end = -1
     if s.dormant == 1:
-        wake_piston(par, s, bars, ops.piston, scratch)
+        wake_piston(par, s, bars, ops, scratch)
     s.no_plan = s.step
     s.no_dormancy = s.step
 

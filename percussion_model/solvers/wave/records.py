@@ -105,8 +105,14 @@ class LeapOperators(NamedTuple):
         FF its strain offset.
     bottom : ndarray, shape (size, LOOKAHEAD)
         Strain offset of the piston's bottom end.
-    forms : ndarray, shape (2, size, size)
-        What a standstill will ever lose in the dashpot and by averaging [J].
+    piston_loss : ndarray, shape (FORMS, size, size)
+        Structural loss of the free piston over some numbers of steps, those of
+        `carry_and_sum` [J].
+    loss : ndarray, shape (5, FORMS, size, size)
+        The same of the bit by `Mode`.
+    squares : ndarray, shape (FORMS, size, size)
+        In standstill, sum over so many steps of the square of the rock end's
+        velocity at the start of each [m2/s2].
     """
 
     piston: np.ndarray
@@ -115,12 +121,14 @@ class LeapOperators(NamedTuple):
     sums: np.ndarray
     top: np.ndarray
     bottom: np.ndarray
-    forms: np.ndarray
+    piston_loss: np.ndarray
+    loss: np.ndarray
+    squares: np.ndarray
 
 
 def no_operators() -> LeapOperators:
     """Stand-ins where no leaps are made."""
-    return LeapOperators(*(np.zeros((1,) * rank) for rank in (3, 4, 3, 2, 3, 2, 3)))
+    return LeapOperators(*(np.zeros((1,) * rank) for rank in (3, 4, 3, 2, 3, 2, 3, 4, 3)))
 
 
 # Parameters: what stays fixed during a run.

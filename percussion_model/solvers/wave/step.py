@@ -8,7 +8,11 @@ waves to the ends, contact and rock in closed form, loss, the other half
 from __future__ import annotations
 
 from percussion_model.physics.blows import push_checkpoint
-from percussion_model.physics.body import bit_acceleration, piston_acceleration
+from percussion_model.physics.body import (
+    book_bit_load,
+    book_piston_load,
+    piston_acceleration,
+)
 from percussion_model.physics.drive import drive_force
 from percussion_model.physics.kernel import kernel, merged
 from percussion_model.physics.records import Mode, Piston
@@ -63,13 +67,12 @@ def shorten_step(par, s, bars, tau, loss_before, push, dv_p, dv_b):
     rest = 1.0 - share
     s.e_loss -= rest * (lost_in_faces(par, bars) - loss_before)
     s.e_numerical += part_of_step(bars.wb, bars.cb, par.n_b, r, share)
-    # the body forces worked along the whole step's path, not along its part
-    a = bit_acceleration(par, s)
-    s.e_numerical -= 0.5 * par.mass_b * a * par.dt * rest * dv_b
+    # the means move by a share of the whole step's path; half of `tau` is booked already
+    further = 0.5 * par.dt * rest
+    book_bit_load(par, s, further * dv_b)
     if par.piston == Piston.ELASTIC:
         s.e_numerical += part_of_step(bars.wp, bars.cp, par.n_p, r, share)
-        a = piston_acceleration(par, push)
-        s.e_numerical -= 0.5 * par.mass_p * a * par.dt * rest * dv_p
+        book_piston_load(par, s, push, further * dv_p, 0.0)
     s.t_base -= par.dt - tau
 
 

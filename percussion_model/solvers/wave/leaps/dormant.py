@@ -192,7 +192,7 @@ def stays_dormant(par, s, wb, cb):
 
 
 @kernel
-def wake_piston(par, s, bars, powers, scratch):
+def wake_piston(par, s, bars, ops, scratch):
     """Carry the dormant piston to the present step."""
     steps = s.step - s.piston_step
     r = 2 * s.parity
@@ -206,10 +206,10 @@ def wake_piston(par, s, bars, powers, scratch):
             for i in range(n):
                 bars.wp[r, i] = bars.wp[2 - r, i]
                 bars.wp[r + 1, i] = bars.wp[3 - r, i]
-        size = par.size_p
         leap_free_bar(
-            par, s, bars.wp, bars.cp, n, par.mass_p, v0, s.v_p, steps, powers, size, scratch
-        )
+            par, s, bars.wp, bars.cp, n, par.mass_p, v0, s.v_p, steps,
+            ops.piston, ops.piston_loss, par.size_p, scratch,
+        )  # fmt: skip
     s.gap = strain_offset(bars.wb, bars.cb, par.n_b, r, Coef.TOP) - s.u_r
     if par.piston == Piston.ELASTIC:
         s.gap += strain_offset(bars.wp, bars.cp, par.n_p, r, Coef.BOTTOM)

@@ -29,10 +29,10 @@ from percussion_model.solvers.wave.bar import (
 )
 from percussion_model.solvers.wave.leaps.linear import (
     carry,
+    carry_and_sum,
     dot,
     load,
     pad,
-    quadratic,
     remove_mean,
     store,
 )
@@ -58,13 +58,9 @@ QUIET_SHARE = 0.9
 # Standstill is searched until its vibration is below this share of the force at rest.
 STILL_SHARE = 1e-3
 
-# What a vibration of less than this gives to the rock is not booked [J].
-NEGLIGIBLE = 1e-13
-
-# Quadratic forms of what a standstill will ever lose; a leap loses the
-# difference of before and after. So does the structural loss: the energy's,
-# less these two (docs/numerics.md, section 5; tests hold it against every step).
-DASHPOT_FORM, NUMERICAL_FORM = 0, 1
+# What a vibration loses is not booked below this share of the energy put in so far,
+# which changes no digit of the ledger.
+NEGLIGIBLE = 1e-17
 
 
 @merged
@@ -159,24 +155,31 @@ def plan_leap(par, s, wb, cb, lookahead, scratch, most):
         s.no_plan = s.step + FEWEST_STEPS
 
 
+@merged
+def is_booked(s, energy):
+    """Whether what a vibration of that energy [J] loses shows in the ledger."""
+    given = abs(s.e_start) + abs(s.e_drive) + abs(s.e_feed) + abs(s.e_gravity)
+    return energy > NEGLIGIBLE * given
+
+
 @kernel
-def leap_free_bar(par, s, w, c, n, mass, v0, v1, steps, powers, size, scratch):
+def leap_free_bar(par, s, w, c, n, mass, v0, v1, steps, powers, loss, size, scratch):
     """Carry the vibration of a free bar over `steps` steps."""
     x, y = scratch.x, scratch.y
     r = 2 * s.parity
     load(x, w, c, n, r, v0, 0.0)
     pad(x, 2 * n, size)
-    before = deviation_energy(w, c, n, r, v0, 0.0)
-    carry(powers, steps, x, y, size)
+    lossy = par.loss > 0 and is_booked(s, deviation_energy(w, c, n, r, v0, 0.0))
+    lost, _ = carry_and_sum(powers, loss, loss, lossy, False, steps, x, y, size)
+    s.e_loss += lost
     remove_mean(x, c, n, mass)
     store(x, w, c, n, r, v1, 0.0)
-    if par.loss > 0:
-        s.e_loss += before - deviation_energy(w, c, n, r, v1, 0.0)
 
 
 @merged
-def leap_flight(par, s, wb, cb, powers, steps, scratch):
+def leap_flight(par, s, wb, cb, ops, steps, scratch):
     """Carry the bit over `steps` steps of free flight."""
+    powers, loss = ops.bit[Mode.FF], ops.loss[Mode.FF]
     r = 2 * s.parity
     a = bit_acceleration(par, s)
     time = steps * par.dt
@@ -186,7 +189,9 @@ def leap_flight(par, s, wb, cb, powers, steps, scratch):
     s.v_b = v0 + a * time
     path = (v0 + 0.5 * a * time) * time
     size = par.size_r
-    leap_free_bar(par, s, wb, cb, par.n_b, par.mass_b, v0, s.v_b, steps, powers, size, scratch)
+    leap_free_bar(
+        par, s, wb, cb, par.n_b, par.mass_b, v0, s.v_b, steps, powers, loss, size, scratch
+    )
     s.p += path - (strain_offset(wb, cb, par.n_b, r, Coef.BOTTOM) - offset)
     s.e_standstill += unloading - recoverable(s)
     return path
@@ -212,24 +217,20 @@ def leap_standstill(par, s, wb, cb, ops, steps, scratch):
     load(x, wb, cb, n, r, 0.0, a)
     x[2 * n] = s.p - still
     pad(x, 2 * n + 1, size)
-    before = standstill_energy(par, s, wb, cb)
+    booked = is_booked(s, standstill_energy(par, s, wb, cb))
     path = dot(ops.sums[Mode.SS], x, size)
-    damped = 0.0
-    lost = 0.0
-    if before > NEGLIGIBLE:
-        damped += quadratic(ops.forms[DASHPOT_FORM], x, y, size)
-        lost += quadratic(ops.forms[NUMERICAL_FORM], x, y, size)
-    carry(ops.bit[Mode.SS], steps, x, y, size)
+    lost, squares = carry_and_sum(
+        ops.bit[Mode.SS], ops.loss[Mode.SS], ops.squares,
+        booked and par.loss > 0, booked, steps, x, y, size,
+    )  # fmt: skip
     path -= dot(ops.sums[Mode.SS], x, size)
-    if before > NEGLIGIBLE:
-        damped -= quadratic(ops.forms[DASHPOT_FORM], x, y, size)
-        lost -= quadratic(ops.forms[NUMERICAL_FORM], x, y, size)
     store(x, wb, cb, n, r, 0.0, a)
     s.p = still + x[2 * n]
+    _K, C, _z, _fade, d, q = step_constants(par, s)
+    damped = C * q * squares
     s.e_standstill += damped
-    s.e_numerical += lost
-    if par.loss > 0:
-        s.e_loss += before - standstill_energy(par, s, wb, cb) - damped - lost
+    s.e_numerical += par.z_b * (q - d * d / par.dt) * squares
+    s.e_loss += lost
     s.v_b = mean_velocity(wb, cb, n, r, par.mass_b)
     s.i_bit += par.mass_b * (a * steps * par.dt - (s.v_b - v0))
     s.rock_work += 0.5 * K * (s.p - s.p_u) * (s.p - s.p_u) - spring + damped
@@ -329,25 +330,17 @@ def leap_contact(par, s, wb, cb, ops, steps, scratch):
     if begin + steps * par.dt > s.peak_from:
         first = K * (s.p - origin(s))
         note_steps(s, begin, par.dt, first, v, steps, K, C, z, fade, d, 0.0)
-    before = contact_energy(par, s, wb, cb, K, s.p - still)
     path = dot(ops.sums[s.mode], x, par.size_r)
-    carry(ops.bit[s.mode], steps, x, y, par.size_r)
+    loss = ops.loss[s.mode]
+    lost, _ = carry_and_sum(
+        ops.bit[s.mode], loss, loss, par.loss > 0, False, steps, x, y, par.size_r
+    )
+    s.e_loss += lost
     path -= dot(ops.sums[s.mode], x, par.size_r)
     a = bit_acceleration(par, s)
     store(x, wb, cb, par.n_b, 2 * s.parity, 0.0, a)
-    if par.loss > 0:
-        after = contact_energy(par, s, wb, cb, K, x[2 * par.n_b])
-        elsewhere = (C * q + par.z_b * (q - d * d / par.dt)) * squares
-        s.e_loss += before - after - elsewhere
     book_contact(par, s, wb, cb, K, C, still + x[2 * par.n_b], d, q, squares, steps)
     return path
-
-
-@kernel
-def contact_energy(par, s, wb, cb, K, y):
-    """Energy of bit and rock about rest, `y` away from it [J]."""
-    a = bit_acceleration(par, s)
-    return deviation_energy(wb, cb, par.n_b, 2 * s.parity, 0.0, a) + 0.5 * K * y * y
 
 
 @merged
@@ -394,7 +387,7 @@ def leap(par, s, wb, cb, ops, scratch, planned):
     if s.mode == Mode.SS:
         push_checkpoint(s, time_of(par, s))
     if s.leap_kind == LeapKind.FLIGHT:
-        path = leap_flight(par, s, wb, cb, ops.bit[Mode.FF], steps, scratch)
+        path = leap_flight(par, s, wb, cb, ops, steps, scratch)
     elif s.leap_kind == LeapKind.STANDSTILL:
         if time_of(par, s) + steps * par.dt > s.peak_from:
             note_standstill_peak(par, s, wb, cb, ops, steps, scratch)

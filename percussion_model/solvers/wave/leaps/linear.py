@@ -18,6 +18,9 @@ from percussion_model.solvers.wave.records import Coef
 
 # Sizes are padded to a multiple of this, which is what a product takes at a time.
 PADDING = WIDTH
+# Below this level each digit of a number of steps has a form of its own, which spares
+# short leaps most of their forms; from it on each level has one, which spares memory.
+SINGLE = 3
 
 
 @merged
@@ -72,6 +75,14 @@ def multiply(operator, x, y, rows, columns, add):
         store_sum(y, i, even, odd)
 
 
+@inlined
+def apply(power, x, y, size):
+    """x = P x, with P stored column by column."""
+    multiply(power, x, y, size, size, False)
+    for i in range(size):
+        x[i] = y[i]
+
+
 @kernel
 def carry(powers, steps, x, y, size):
     """x = P^steps x from the powers 1, 4, 16, ... of a map.
@@ -87,11 +98,44 @@ def carry(powers, steps, x, y, size):
     level = 0
     while steps > 0:
         for _ in range(steps & 3):
-            multiply(powers[level], x, y, size, size, False)
-            for i in range(size):
-                x[i] = y[i]
+            apply(powers[level], x, y, size)
         steps >>= 2
         level += 1
+
+
+@kernel
+def carry_and_sum(powers, loss, squares, lossy, squared, steps, x, y, size):
+    """As `carry`, with the sums over all steps of up to two quadratic forms.
+
+    Parameters
+    ----------
+    loss, squares : float array, shape (forms, size, size)
+        Forms summed over 1, 2, 3, 4, 8, 12, 16, 32, 48 steps, then over 64, 256, ...
+        (`SINGLE` and what follows), as upper triangles.
+    lossy, squared : bool
+        Which of them are wanted; the other is not looked at.
+
+    Returns
+    -------
+    float, float
+        Sums of `loss` and of `squares`, 0 where they are not wanted.
+    """
+    lost = 0.0
+    square = 0.0
+    level = 0
+    while steps > 0:
+        digit = steps & 3
+        for k in range(digit):
+            if level >= SINGLE or k == 0:
+                form = level + 2 * SINGLE if level >= SINGLE else 3 * level + digit - 1
+                if lossy:
+                    lost += quadratic(loss[form], x, y, size)
+                if squared:
+                    square += quadratic(squares[form], x, y, size)
+            apply(powers[level], x, y, size)
+        steps >>= 2
+        level += 1
+    return lost, square
 
 
 @inlined
@@ -111,7 +155,7 @@ def dot(row, x, size):
 
 @kernel
 def quadratic(operator, x, y, size):
-    """x' A x [J], with A stored as the upper triangle that gives the same."""
+    """x' A x, with A stored as the upper triangle that gives the same."""
     for i in range(0, size, PADDING):
         even = no_lanes()
         odd = no_lanes()

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from percussion_model.physics.records import DriveKind, Mode, Piston, RockKind
 from percussion_model.solvers.wave.grid import Grid
-from percussion_model.solvers.wave.leaps.linear import PADDING
+from percussion_model.solvers.wave.leaps.linear import PADDING, SINGLE
 from percussion_model.solvers.wave.leaps.lookahead import LOOKAHEAD, LOOKAHEAD_LEVELS
 from percussion_model.solvers.wave.leaps.step_map import (
     Configuration,
@@ -25,13 +24,8 @@ LEVELS = 8
 # would cost more memory and set-up time than they save [numbers].
 MOST_NUMBERS = 40_000_000
 
-# What a standstill will ever lose is summed over at most 2^40 steps; what is
-# left then is lost too slowly to tell.
-MOST_DOUBLINGS = 40
-
-
-# What a standstill loses in later steps changes no digit of the sum below this share.
-NEGLIGIBLE = 1e-20
+# Sums of a form, see `carry_and_sum`.
+FORMS = LEVELS + 2 * SINGLE
 
 # Operators of so many scenes are kept [a few MB each on the default grid].
 MOST_KEPT = 4
@@ -115,19 +109,27 @@ def _free(
         of_piston["n_b"], of_piston["mass_b"] = piston.n, piston.mass.sum()
         for end in ("z", "kappa"):
             of_piston[f"{end}_t"], of_piston[f"{end}_b"] = alone[f"{end}_f"], alone[f"{end}_p"]
-        by_column = step_map(Configuration(of_piston, piston, cp))
+        free_piston = Configuration(of_piston, piston, cp)
+        by_column, faces = step_map(free_piston)
         found["piston"] = _powers(by_column, LEVELS, int(alone["size_p"][0]))
+        if alone["loss"][0]:
+            form = step_forms(free_piston, by_column, faces)[0]
+            found["piston_loss"] = _sums(form, found["piston"])
         found["bottom"] = _lookahead(
             found["piston"], by_column @ _offset(cp, piston.n, Coef.BOTTOM)
         )
     size = int(alone["size_r"][0])
     powers = np.zeros((len(Mode), LEVELS, size, size))
     lookahead, top = np.zeros((2, len(Mode), size, LOOKAHEAD))
-    by_column = step_map(Configuration(alone, bit, cb))
+    free_bit = Configuration(alone, bit, cb)
+    by_column, faces = step_map(free_bit)
     powers[Mode.FF] = _powers(by_column, LEVELS, size)
+    loss = np.zeros((len(Mode), FORMS, size, size) if alone["loss"][0] else (len(Mode), 1, 1, 1))
+    if alone["loss"][0]:
+        loss[Mode.FF] = _sums(step_forms(free_bit, by_column, faces)[0], powers[Mode.FF])
     for rows, row in ((lookahead, Coef.BOTTOM), (top, Coef.TOP)):
         rows[Mode.FF] = _lookahead(powers[Mode.FF], by_column @ _offset(cb, bit.n, row))
-    return found | {"bit": powers, "lookahead": lookahead, "top": top}
+    return found | {"bit": powers, "lookahead": lookahead, "top": top, "loss": loss}
 
 
 def _loads(par: np.ndarray) -> dict[Mode, tuple[float, float]]:
@@ -169,23 +171,28 @@ def _of_loaded_bit(
     loads: dict[Mode, tuple[float, float]],
 ) -> dict[str, np.ndarray]:
     """Operators of the bit, those of `free` among them, in all modes."""
-    powers, lookahead, top = (free[name].copy() for name in ("bit", "lookahead", "top"))
+    names = ("bit", "lookahead", "top", "loss")
+    powers, lookahead, top, loss = (free[name].copy() for name in names)
     size = powers.shape[-1]
-    sums, forms = np.zeros((len(Mode), size)), np.zeros((2, size, size))
+    sums, squares = np.zeros((len(Mode), size)), no_operators().squares
     rock = alone.copy()
     rock["rock"] = RockKind.BILINEAR
     way = np.append(_offset(cb, bit.n, Coef.TOP) + _offset(cb, bit.n, Coef.BOTTOM), 1.0)
     for mode, (stiffness, damping) in loads.items():
         configuration = Configuration(rock, bit, cb, float(stiffness), float(damping))
-        by_column = step_map(configuration)
+        by_column, faces = step_map(configuration)
         levels = LEVELS if mode == Mode.SS else LOOKAHEAD_LEVELS
         powers[mode, :levels] = _powers(by_column, levels, size)
         lookahead[mode] = _lookahead(powers[mode], end_row(configuration, by_column))
         top[mode] = _lookahead(powers[mode], by_column @ way)
         sums[mode, : len(by_column)] = _path_to_rest(configuration, by_column)
+        lost, of_end = step_forms(configuration, by_column, faces)
+        if alone["loss"][0]:
+            loss[mode, : levels + 2 * SINGLE] = _sums(lost, powers[mode, :levels])
         if mode == Mode.SS:
-            forms = _ever_lost(by_column, step_forms(configuration, by_column)[1:], size)
-    return {"bit": powers, "lookahead": lookahead, "sums": sums, "top": top, "forms": forms}
+            squares = _sums(of_end, powers[mode])
+    found = {"bit": powers, "lookahead": lookahead, "sums": sums, "top": top}
+    return found | {"loss": loss, "squares": squares}
 
 
 def _lookahead(powers: np.ndarray, row: np.ndarray) -> np.ndarray:
@@ -233,18 +240,31 @@ def _path_to_rest(configuration: Configuration, by_column: np.ndarray) -> np.nda
     return path
 
 
-def _ever_lost(by_column: np.ndarray, of_a_step: Sequence[np.ndarray], size: int) -> np.ndarray:
-    """Sums of quadratic forms over all steps to come, as padded upper triangles."""
-    n = len(by_column)
-    totals = np.array([0.5 * (form + form.T) for form in of_a_step])
-    for _ in range(MOST_DOUBLINGS):
-        more = by_column @ totals @ by_column.T
-        totals += 0.5 * (more + more.swapaxes(1, 2))
-        if np.all(np.abs(more).max(axis=(1, 2)) <= NEGLIGIBLE * np.abs(totals).max(axis=(1, 2))):
+def _sums(form: np.ndarray, powers: np.ndarray) -> np.ndarray:
+    """Sums of a step's quadratic form over many steps, as `carry_and_sum` wants them.
+
+    Parameters
+    ----------
+    form : ndarray
+        Not larger than the padded powers.
+    powers : ndarray, shape (levels, size, size)
+        Powers 1, 4, 16, ... of the step map.
+    """
+    total = np.zeros(powers.shape[1:])
+    total[: len(form), : len(form)] = form
+    totals = []
+    for level, power in enumerate(powers):
+        once = total
+        totals.append(once)
+        if level == len(powers) - 1:
             break
-        by_column = by_column @ by_column
-    out = np.zeros((len(totals), size, size))
-    for k, total in enumerate(totals):
-        # symmetric: column by column, the upper triangle says it all
-        out[k, :n, :n] = 2.0 * np.tril(total, -1) + np.diag(np.diag(total))
-    return out
+        twice = once + power @ once @ power.T
+        squared = power @ power
+        total = twice + squared @ twice @ squared.T
+        if level < SINGLE:
+            totals += [twice, once + power @ twice @ power.T]
+    # column by column, the upper triangle says it all
+    both = np.array(totals)
+    both += both.transpose(0, 2, 1).copy()
+    both *= np.tril(np.ones(total.shape), -1) + 0.5 * np.eye(len(total))
+    return both

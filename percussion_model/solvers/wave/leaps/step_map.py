@@ -46,14 +46,16 @@ class Configuration:
         return 2 * self.grid.n + (1 if self.stiffness else 0)
 
 
-def step_map(configuration: Configuration) -> np.ndarray:
+def step_map(configuration: Configuration) -> tuple[np.ndarray, np.ndarray]:
     """What one step makes of each unit deviation.
 
     Returns
     -------
-    ndarray, shape (size, size)
+    by_column : ndarray, shape (size, size)
         Row k is the state after a step from the k-th unit deviation: down-going
         waves, up-going waves [m/s] and, on the rock, the penetration [m].
+    faces : ndarray, shape (size, n + 1)
+        Row k holds the interface velocities that the step had [m/s].
     """
     n, size = configuration.grid.n, configuration.size
     start = np.zeros(1, WAVE_STATE)
@@ -67,7 +69,7 @@ def step_map(configuration: Configuration) -> np.ndarray:
     start["w_r"] = start["next_w_r"] = NO_WAY_OUT
     none = np.zeros(1)
     unused = np.zeros(1, BLOW), np.zeros(1, EVENT), np.zeros(1, READING)
-    by_column = np.zeros((size, size))
+    by_column, faces = np.zeros((size, size)), np.zeros((size, n + 1))
     state, w = start.copy(), np.zeros((len(Row), n + 1))
     bars = Bars(np.zeros((len(Row), 1)), np.zeros((len(Coef), 1)), w, configuration.c)
     # As bytes, since NumPy copies records field by field.
@@ -87,11 +89,13 @@ def step_map(configuration: Configuration) -> np.ndarray:
             0.0, *unused,
         )  # fmt: skip
         by_column[k, :n], by_column[k, n : 2 * n] = w[Row.DOWN_OTHER, :n], w[Row.UP_OTHER, :n]
+        faces[k] = w[Row.FACE]
         if size > 2 * n:
             by_column[k, -1] = state[0]["p"]
     if size > 2 * n:
         by_column[-1] /= SCALE
-    return by_column
+        faces[-1] /= SCALE
+    return by_column, faces
 
 
 def end_row(configuration: Configuration, by_column: np.ndarray) -> np.ndarray:
@@ -116,72 +120,68 @@ def _reach(configuration: Configuration) -> tuple[float, float]:
 
 
 def step_forms(
-    configuration: Configuration, by_column: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Quadratic forms of what one step loses [J].
+    configuration: Configuration, by_column: np.ndarray, faces: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Quadratic forms of one step, by the formulas of its ledger.
+
+    Parameters
+    ----------
+    by_column, faces : ndarray
+        From `step_map`.
 
     Returns
     -------
-    loss, dashpot, numerical : ndarray, shape (size, size)
-        Structural loss, the rock's dashpot, averaging at the loaded end. They
-        need not be symmetric.
+    loss : ndarray, shape (size, size)
+        Structural loss [J]. It need not be symmetric.
+    squares : ndarray, shape (size, size)
+        Square of the lower end's velocity at the start of the step [m2/s2].
     """
     par, c, n = configuration.par[0], configuration.c, configuration.grid.n
-    size, dt = configuration.size, float(par["dt"])
-    unit = np.eye(size)
+    dt, unit = float(par["dt"]), np.eye(configuration.size)
     down, up = unit[:, :n], unit[:, n : 2 * n]
-    down_after, up_after, cells = _before_smoothing(configuration, by_column)
-    top = down_after[:, 0] + up[:, 0]
-    mean = up_after[:, n - 1] + down[:, n - 1]
-    _path, square = _reach(configuration)
-    end = end_row(configuration, by_column) if configuration.stiffness else mean
-    squared = square * np.outer(end, end)
-    averaged = dt * np.outer(mean, mean)
-    numerical = par["z_b"] * (squared - averaged)
-    dashpot = configuration.damping * squared
-    loss = cells
-    if par["loss"] and n > 1:
-        face = down_after[:, 1:] + up[:, 1:]
-        before = c[Coef.ALPHA, 1:n] * down[:, :-1] + c[Coef.BETA, 1:n] * up[:, 1:]
-        loss -= dt * ((face - before) / c[Coef.INV_Z, 1:n]) @ face.T
-        # what the end cells work against, times their viscous number
-        against = (1.0 + par["kappa_t"]) * top - 2.0 * up[:, 0]
-        loss += par["z_t"] * dt * np.outer(par["kappa_t"] * top - against, top)
-        free = mean
-        if configuration.stiffness:
-            z = par["z_b"] * (1.0 + par["kappa_b"])
-            free = (1.0 + configuration.damping / z) * end
-            free = free + configuration.stiffness / z * unit[:, -1]
-        against = (1.0 + par["kappa_b"]) * free - 2.0 * down[:, n - 1]
-        loss += par["z_b"] * (par["kappa_b"] * squared - dt * np.outer(against, mean))
-    return loss, dashpot, numerical
+    path, square = _reach(configuration)
+    mean = faces[:, n]
+    end = mean * (dt / path)
+    squares = np.outer(end, end)
+    if not par["loss"] or n < 2:
+        return np.zeros_like(squares), squares
+    before = c[Coef.ALPHA, 1:n] * down[:, :-1] + c[Coef.BETA, 1:n] * up[:, 1:]
+    settled = faces.copy()
+    if par["loss"] == 1:  # the step kept them as they were before the loss
+        force = np.diff(c[Coef.VISCOUS, :n] * np.diff(faces, axis=1), axis=1)
+        settled[:, 1:n] = before + c[Coef.INV_Z, 1:n] * force
+    inner = settled[:, 1:n]
+    loss = _taken_by_smoothing(configuration, by_column, settled)
+    loss -= dt * ((inner - before) / c[Coef.INV_Z, 1:n]) @ inner.T
+    # what the end cells work against, times their viscous number
+    top = faces[:, 0]
+    against = (1.0 + par["kappa_t"]) * top - 2.0 * up[:, 0]
+    loss += par["z_t"] * dt * np.outer(par["kappa_t"] * top - against, top)
+    free = mean
+    if configuration.stiffness:
+        z = par["z_b"] * (1.0 + par["kappa_b"])
+        free = (1.0 + configuration.damping / z) * end
+        free = free + configuration.stiffness / z * unit[:, -1]
+    against = (1.0 + par["kappa_b"]) * free - 2.0 * down[:, n - 1]
+    loss += par["z_b"] * (par["kappa_b"] * square * squares - dt * np.outer(against, mean))
+    return loss, squares
 
 
-def _before_smoothing(
-    configuration: Configuration, by_column: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Waves before the last part of a step, the loss between cells, and its form.
+def _taken_by_smoothing(
+    configuration: Configuration, by_column: np.ndarray, faces: np.ndarray
+) -> np.ndarray:
+    """Form of the kinetic energy that the loss between cells takes in a step [J].
 
-    Returns
-    -------
-    down, up : ndarray, shape (size, n)
-        Waves of each unit deviation as the interfaces sent them.
-    form : ndarray, shape (size, size)
-        Kinetic energy that the smoothing takes [J].
+    Parameters
+    ----------
+    faces : ndarray, shape (size, n + 1)
+        Final interface velocities of the step.
     """
-    c, n = configuration.c, configuration.grid.n
-    down, up = by_column[:, :n], by_column[:, n : 2 * n]
-    smoothing = np.eye(n)
-    flow = np.zeros((n, n))
-    for i in range(n - 1):
-        flow[i, i : i + 2] += c[Coef.BETWEEN, i] * np.array([-1.0, 1.0])
-        flow[i + 1, i : i + 2] -= c[Coef.BETWEEN, i] * np.array([-1.0, 1.0])
-    one_part = np.eye(n) + c[Coef.INV_CELL_Z, :n, np.newaxis] * flow
-    for _ in range(int(configuration.par[0]["loss"])):
-        smoothing = one_part @ smoothing
-    after = down + up
-    before = np.linalg.solve(smoothing, after.T).T
-    half = 0.5 * (after - before)
+    n = configuration.grid.n
+    after = by_column[:, :n] + by_column[:, n : 2 * n]
+    unit = np.eye(configuration.size)
+    # what the interfaces sent, less what had come in from the other side
+    before = faces[:, :-1] + faces[:, 1:] - unit[:, :n] - unit[:, n : 2 * n]
     mass = 0.5 * configuration.grid.mass
-    form = (before * mass) @ before.T - (after * mass) @ after.T
-    return down - half, up - half, form
+    form: np.ndarray = (before * mass) @ before.T - (after * mass) @ after.T
+    return form
