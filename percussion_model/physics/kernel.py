@@ -11,7 +11,7 @@ from numba import njit
 
 STAMP = "kernels.sha256"
 # Folders with functions that kernels of other files call.
-CALLEES = ("physics", "solvers")
+CALLEES = ("physics", "solvers", "verification/accuracy")
 
 
 def drop_stale_kernels(folder: Path) -> None:

@@ -49,7 +49,9 @@ class ExactFlowSolver(Solver):
 
     name = "exact-flow"
     time_step: float
-    COUNTS: ClassVar = ("steps", "events", "blows")
+    consistent = 0.5  # of the mass; the rest is lumped
+    levels = LEVELS
+    COUNTS: ClassVar[tuple[str, ...]] = ("steps", "events", "blows")
 
     def __init__(self, scene: Scene, elements: int, watch: int = WATCH) -> None:
         super().__init__(scene)
@@ -70,16 +72,18 @@ class ExactFlowSolver(Solver):
         p["n_p"], p["n_b"] = sum(bar.n + 1 for bar in bars[:-1]), bars[-1].n + 1
         self.cells = dict(zip(("piston", "bit")[-len(bars) :], (b.n for b in bars), strict=True))
         self._par = par
-        self._bars, mesh = dict(zip(self.cells, bars, strict=True)), assemble(bars)
-        self._flow = self._matrices(mesh, kelvin_voigt_time(numbers))
-        self._stiffness = mesh[Mesh.STIFFNESS].copy()
+        self._bars = dict(zip(self.cells, bars, strict=True))
+        p["eta"] = kelvin_voigt_time(numbers)
+        self._mesh = assemble(bars)
+        self._flow = self._matrices(self._mesh, float(p["eta"]))
 
     def _matrices(self, mesh: np.ndarray, eta: float) -> Flow:
         """Exponentials of all modes at all levels."""
         p, scene = self._par[0], self.scene
         n_p, n = int(p["n_p"]), mesh.shape[1]
-        share, off = mesh[Mesh.SHARE], 0.5 * mesh[Mesh.COUPLING, :-1]
-        mass = np.diag(0.5 * (mesh[Mesh.MASS] + share)) + np.diag(off, 1) + np.diag(off, -1)
+        share, off = mesh[Mesh.SHARE], self.consistent * mesh[Mesh.COUPLING, :-1]
+        mass = np.diag(share + self.consistent * (mesh[Mesh.MASS] - share))
+        mass += np.diag(off, 1) + np.diag(off, -1)
         springs = np.diag(mesh[Mesh.SPRINGS])
         springs -= np.diag(mesh[Mesh.STIFFNESS, :-1], 1) + np.diag(mesh[Mesh.STIFFNESS, :-1], -1)
         inverse = np.linalg.inv(mass)
@@ -102,9 +106,9 @@ class ExactFlowSolver(Solver):
             Mode.SS: (ratio * spring, dashpot),
         }
         top, low = np.arange(n_p), np.arange(n_p, n)
-        piston = np.zeros((1, LEVELS, 2 * n_p + 2, 2 * n_p))
-        bit = np.zeros((5, LEVELS, 2 * (n - n_p) + 2, 2 * (n - n_p)))
-        both, force = np.zeros((5, LEVELS, 2 * n + 2, 2 * n)), np.zeros((5, 2 * n + 2))
+        piston = np.zeros((1, self.levels, 2 * n_p + 2, 2 * n_p))
+        bit = np.zeros((5, self.levels, 2 * (n - n_p) + 2, 2 * (n - n_p)))
+        both, force = np.zeros((5, self.levels, 2 * n + 2, 2 * n)), np.zeros((5, 2 * n + 2))
         order = np.r_[top, n + top, low, n + low, 2 * n, 2 * n + 1]
         for mode, (k, c) in of_mode.items():
             a = np.zeros((n, 2 * n + 2))
@@ -144,8 +148,8 @@ class ExactFlowSolver(Solver):
         a *= self.time_step * 0.5**FINE
         square = a @ a
         change = a + square / 2.0 + square @ a / 6.0 + square @ square / 24.0
-        found = np.zeros((LEVELS, 2 * m + 2, 2 * m))
-        for level in range(LEVELS):
+        found = np.zeros((self.levels, 2 * m + 2, 2 * m))
+        for level in range(self.levels):
             found[level] = (change + np.eye(2 * m + 2))[:-2].T
             change = 2.0 * change + change @ change
         return found
@@ -203,7 +207,7 @@ class ExactFlowSolver(Solver):
         for name, bar in self._bars.items():
             nodes = bar.n + 1
             u, v = x[2 * first : 2 * first + nodes], x[2 * first + nodes : 2 * (first + nodes)]
-            out[f"{name}_force"] = -self._stiffness[first : first + bar.n] * np.diff(u)
+            out[f"{name}_force"] = -self._mesh[Mesh.STIFFNESS, first : first + bar.n] * np.diff(u)
             out[f"{name}_velocity"] = 0.5 * (v[:-1] + v[1:])
             first += nodes
         return out

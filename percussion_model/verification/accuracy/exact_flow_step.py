@@ -45,6 +45,7 @@ THIRD = 1.0 / 3.0
 FLOW_PAR = np.dtype(
     [
         ("step", "f8"),  # in which events are looked for [s]
+        ("eta", "f8"),  # Kelvin-Voigt time [s]
         ("start_gap", "f8"),  # [m]
         ("soft", "f8"),  # what two ends that meet give way by an impulse [m/s / N s]
         ("n_p", "i8"),  # nodes
@@ -312,6 +313,14 @@ def change_mode(par, s, f, x, events):
     push_event(s, events, s.time, s.mode, stiffness(s) * x[end])
 
 
+@kernel
+def turn(par, s, f, x, events):
+    """Turn the pressure of the drive."""
+    s.u_r = relative_motion(par, f, x, 0)
+    switch_drive(par, s, s.u_r, s.time, 0.0, events)
+    x[x.shape[0] - 1] = s.alpha
+
+
 @merged
 def longest(par, s, f, x):
     """Level of the longest step that may be taken: long where nothing but the gap can end it."""
@@ -332,7 +341,6 @@ def advance_to(par, s, f, x, y, time, blows, events):
     s.n_blows = 0
     s.n_events = 0
     finest = par.step * 0.5**FINE
-    end = x.shape[0] - 1
     while s.time + finest <= time:
         if s.live == 1:
             if s.n_blows >= blows.shape[0]:
@@ -357,14 +365,25 @@ def advance_to(par, s, f, x, y, time, blows, events):
         if contact:
             change_contact(par, s, f, x, blows, events)
         if drive:
-            s.u_r = relative_motion(par, f, x, 0)
-            switch_drive(par, s, s.u_r, s.time, 0.0, events)
-            x[end] = s.alpha
+            turn(par, s, f, x, events)
         if rock:
             change_mode(par, s, f, x, events)
             if not math.isfinite(s.p):
                 return Status.NOT_FINITE
     return Status.DONE
+
+
+@kernel
+def read_here(par, s, f, x, time, row):
+    """Write what is seen of a state."""
+    u_b = read_means(par, s, f, x)
+    kinetic = kinetic_energy(par, f, x)
+    fill_ledger(s, row, kinetic, 0.0, recoverable(s))
+    fill_motion(par, s, row, time, s.u_r + u_b + par.start_gap, u_b)
+    row.bit_end_velocity = x[2 * par.n_p + 2 * par.n_b - 1]
+    row.bit_kinetic_energy = kinetic
+    row.bit_force = s.force
+    row.contact_force = s.contact_force
 
 
 @kernel
@@ -375,16 +394,6 @@ def run(reads, par_, state, f, x, y, time, blows, events, reading):
     if reads == 1:
         s.live = 0
     status = advance_to(par, s, f, x, y, time, blows, events)
-    if reads == 0:
-        return status
-    end = 2 * par.n_p + par.n_b - 1
-    u_b = read_means(par, s, f, x)
-    row = reading[0]
-    kinetic = kinetic_energy(par, f, x)
-    fill_ledger(s, row, kinetic, 0.0, recoverable(s))
-    fill_motion(par, s, row, time, s.u_r + u_b + par.start_gap, u_b)
-    row.bit_end_velocity = x[end + par.n_b]
-    row.bit_kinetic_energy = kinetic
-    row.bit_force = s.force
-    row.contact_force = s.contact_force
+    if reads == 1:
+        read_here(par, s, f, x, time, reading[0])
     return status
