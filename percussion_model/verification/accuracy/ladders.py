@@ -353,9 +353,10 @@ def _compiled(problem: Problem, full: bool) -> Iterator[Rung]:
     for name, (make, meshes, most) in COMPILED.items():
         try:
             make(scene, meshes[0])
+            counts = _affordable(scene, meshes, most * (2.0 if full else 1.0))
         except SceneError:
-            meshes = meshes[:1]  # its note will tell why
-        for count in _affordable(scene, meshes, most * (2.0 if full else 1.0)):
+            counts = [meshes[0]]  # its note will tell why
+        for count in counts:
             peer = partial(make, elements=count)
             yield Rung(name, f"{count} elements", 1.0 / count, scene, peer=peer)
 
