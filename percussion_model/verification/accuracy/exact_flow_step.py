@@ -38,6 +38,8 @@ FINE, LONG = 14, 8
 LEVELS = FINE + 1 + LONG
 # In the short mode with a dashpot that is counted, steps are so many times halved.
 SHORTER = 2
+# Steps between two looks at the energy of a standing bit.
+LOOK = 32
 # A standing bit with less energy of vibration [J] meets no event by itself.
 CALM_ENERGY = 1e-4
 THIRD = 1.0 / 3.0
@@ -60,9 +62,8 @@ FLOW_STATE = np.dtype(
         ("time", "f8"),  # [s]
         ("force", "f8"),  # on the rock [N]
         ("contact_force", "f8"),
-        ("u_before", "f8"),  # u_r at the start of the last step
         ("calm", "i8"),  # 1: the bit stands, with next to no vibration
-        ("since", "i8"),  # steps since its energy was looked at
+        ("look_in", "i8"),  # steps to the next look at its energy
         *COMMON_STATE,
     ],
     align=True,
@@ -328,9 +329,9 @@ def longest(par, s, f, x):
         return FINE - SHORTER
     if s.mode != Mode.SS or s.closed == 1:
         return FINE
-    s.since -= 1
-    if s.calm == 0 and s.since < 0:
-        s.since = 32
+    s.look_in -= 1
+    if s.calm == 0 and s.look_in < 0:
+        s.look_in = LOOK
         s.calm = 1 if standing_energy(par, s, f, x) < CALM_ENERGY else 0
     return LEVELS - 1 if s.calm == 1 else FINE
 

@@ -136,10 +136,7 @@ def total(a, first, n):
 @merged
 def read_means(par, s, runs, w, v):
     """Mean velocities, and the mean displacements of piston and bit."""
-    u_p = 0.0
-    u_b = 0.0
-    v_p = 0.0
-    v_b = 0.0
+    u_p = u_b = v_p = v_b = 0.0
     for r in range(par.uppers if s.quiet_p == 1 else 0, runs.shape[0]):
         mass = 2.0 * runs[r].half
         speed = total(v, runs[r].first, runs[r].n)
@@ -220,8 +217,7 @@ def work_of_dashpot(par, s, a, p, v):
     """Work of the rock's dashpot on the way from the present state, by the energy law [J]."""
     if damping(s) == 0.0:
         return 0.0
-    middle = 0.5 * (p + s.p) - origin(s)
-    spring = stiffness(s) * middle * (p - s.p)
+    spring = stiffness(s) * (0.5 * (p + s.p) - origin(s)) * (p - s.p)
     return par.end_mass * (a * (p - s.p) - 0.5 * (v - s.v_end) * (v + s.v_end)) - spring
 
 
@@ -232,9 +228,9 @@ def passed(par, s, p, v, work):
         return p > s.p_u and v > 0.0
     if par.rock == RockKind.SPRING:
         return p < 0.0
-    if s.mode == Mode.DFC:
-        return v < -REST_VELOCITY or s.w + work >= s.w_r
-    if s.mode == Mode.FC:
+    if s.mode == Mode.DFC and s.w + work >= s.w_r:
+        return True
+    if s.mode == Mode.DFC or s.mode == Mode.FC:
         return v < -REST_VELOCITY
     if s.mode == Mode.BC:
         return p < s.p_u or v > REST_VELOCITY
@@ -304,8 +300,9 @@ def divide_step(par, s, runs, w, v, a, events):
         p, speed = ride_on_rock(par, s, a, part)
         move_end(par, s, a, p, speed, part)
         h -= part
-        energy = kinetic_energy(par, s, runs, w, v, 1.0 - h / par.dt)
-        change_mode(par, s, energy, s.time + 0.5 * par.dt - h, events)
+        share = 1.0 - h / par.dt
+        energy = kinetic_energy(par, s, runs, w, v, share)
+        change_mode(par, s, energy, s.time + (share - 0.5) * par.dt, events)
     s.count_locked += 1
     p, speed = ride_on_rock(par, s, a, h)
     move_end(par, s, a, p, speed, h)
@@ -315,12 +312,11 @@ def divide_step(par, s, runs, w, v, a, events):
 def step_rock_end(par, s, runs, w, v, a, events):
     """Move the rock end from the middle of the last step to the middle of this one."""
     s.force_before = s.force
-    if s.mode == Mode.SS and s.alert == 1:
-        energy = kinetic_energy(par, s, runs, w, v, 0.0)
-        if overcomes_barrier(par, s, energy):
-            leave_standstill(par, s, s.v_end)
-            prepare_mode(par, s)
-            push_event(s, events, s.time, s.mode, spring_force(s))
+    alert = s.mode == Mode.SS and s.alert == 1
+    if alert and overcomes_barrier(par, s, kinetic_energy(par, s, runs, w, v, 0.0)):
+        leave_standstill(par, s, s.v_end)
+        prepare_mode(par, s)
+        push_event(s, events, s.time - 0.5 * par.dt, s.mode, spring_force(s))
     if s.mode == Mode.FF:
         p = s.p + par.dt * (s.v_end + 0.5 * par.dt * a)
         speed = s.v_end + par.dt * a
@@ -344,8 +340,7 @@ def step_rock_end(par, s, runs, w, v, a, events):
 def begin_contact(par, s, runs, w, v, time, share, approach, blows, events):
     """Note that the gap closes after a share of the step that begins now."""
     _, u_b = read_means(par, s, runs, w, v)
-    push = piston_acceleration(par, drive_force(par, s))
-    s.v_p += (0.5 + share) * par.dt * push
+    s.v_p += (0.5 + share) * par.dt * piston_acceleration(par, drive_force(par, s))
     if starts_blow(par, s, time):
         start_blow(s, blows, time, s.v_p, u_b + share * par.dt * s.v_b, math.nan, par.mass_p)
     s.closed = 1
@@ -359,18 +354,14 @@ def share_velocity(runs, upper):
     """Two ends that touch get their common velocity."""
     heavy, light = runs[upper].half, runs[upper + 1].half
     common = (heavy * runs[upper].low + light * runs[upper + 1].top) / (heavy + light)
-    runs[upper].low = common
-    runs[upper + 1].top = common
+    runs[upper].low = runs[upper + 1].top = common
 
 
 @merged
 def meet(par, s, runs, w, v, upper, blows, events):
-    """Contact of piston and bit: the velocities of their ends, and how far the piston's goes on.
+    """Contact of piston and bit: velocities of their ends, and the way before they met [m].
 
-    Returns
-    -------
-    float
-        Difference between the way of the upper end in this step and that at its velocity [m].
+    It is what the piston's end goes in this step beyond what it does at its new velocity.
     """
     lower = upper + 1
     heavy, light = runs[upper].half, runs[lower].half
@@ -435,8 +426,7 @@ def step(par, s, runs, old, new, v, blows, events):
         pull = 2.0 * runs[r].kappa
         runs[r].top = v[i] + (pull * (old[i + 1] - old[i]) + kick)
         runs[r].low = v[j] + (pull * (old[j - 1] - old[j]) + kick)
-    end = runs[last].first + runs[last].n
-    step_rock_end(par, s, runs, old, v, (runs[last].low - v[end]) / dt, events)
+    step_rock_end(par, s, runs, old, v, (runs[last].low - s.v_end) / dt, events)
     runs[last].low = s.v_end
     way = 0.0
     for r in range(first, last):
@@ -455,7 +445,7 @@ def step(par, s, runs, old, new, v, blows, events):
         i = runs[par.uppers].first
         new[i - 1] += way
         new[i] = new[i - 1]
-    new[end] = (s.x_r + s.p) + (0.5 * dt + par.eta) * s.v_end
+    new[runs[last].first + runs[last].n] = (s.x_r + s.p) + (0.5 * dt + par.eta) * s.v_end
     if s.quiet_p == 1:
         fly(par, s, push, runs[first].top)
 
@@ -467,12 +457,11 @@ def turn_pressure(par, s, runs, w, v, events):
     What the new force did to the piston since then is made good.
     """
     before = piston_acceleration(par, drive_force(par, s))
-    rate = s.v_p - s.v_b
-    share = switch_drive(par, s, s.u_r - rate * par.dt, s.time - par.dt, par.dt, events)
+    u_before = s.u_r - (s.v_p - s.v_b) * par.dt
+    share = switch_drive(par, s, u_before, s.time - par.dt, par.dt, events)
     if share < 0.0:
         return
-    change = piston_acceleration(par, drive_force(par, s)) - before
-    kick = change * (0.5 - share) * par.dt
+    kick = (piston_acceleration(par, drive_force(par, s)) - before) * (0.5 - share) * par.dt
     s.v_p += kick
     if s.quiet_p == 0:
         for i in range(runs[par.uppers].first):
@@ -537,8 +526,7 @@ def look(par, s, runs, w, v, events):
                 w[i] -= par.eta * v[i]
                 v[i] = 0.0
             s.v_end = 0.0
-            s.force = spring_force(s)
-            s.force_before = s.force
+            s.force = s.force_before = spring_force(s)
     flying = s.closed == 0 and s.quiet_p == 0 and par.uppers > 0
     if flying and flying_energy(par, s, runs, w, v) < QUIET:
         s.quiet_p = 1
