@@ -156,30 +156,14 @@ LADDERS = {
         Ladder(
             "lsoda", "scipy LSODA", "element size", "relative tolerance 1e-4, K_C as fem", "scipy"
         ),
-        Ladder("lsoda-tol", "scipy LSODA, tolerance", "tolerance", "30 elements", "scipy"),
         Ladder(
             "radau", "scipy Radau", "element size", "relative tolerance 1e-3, K_C as fem", "scipy"
         ),
-        Ladder(
-            "rk45", "scipy RK45", "element size", "relative tolerance 1e-3, K_C as fem", "scipy"
-        ),
-        Ladder(
-            "dop853", "scipy DOP853", "element size", "relative tolerance 1e-3, K_C as fem", "scipy"
-        ),
-        Ladder("bdf", "scipy BDF", "element size", "tolerance 1e-4, K_C as fem", "scipy"),
     )
 }
 
-# Integrator, tolerance and meshes of the general methods; where the third is one, tolerances.
-_GENERAL: dict[str, tuple[str, tuple[float, ...], tuple[int, ...]]] = {
-    "lsoda": ("LSODA", (1e-4,), (5, 10, 20, 30)),
-    "lsoda-tol": ("LSODA", (1e-2, 1e-3, 1e-4, 1e-5, 1e-6), (30,)),
-    "radau": ("Radau", (1e-3,), (5, 10, 20)),
-    "rk45": ("RK45", (1e-3,), (3, 4, 6, 8)),
-    "dop853": ("DOP853", (1e-3,), (3, 4, 6, 8)),
-    "bdf": ("BDF", (1e-4,), (3, 5, 10, 20)),
-}
-_FULL_ONLY = ("lsoda-tol", "rk45", "dop853", "bdf")
+# Integrator, tolerance and meshes of the general methods. CVODE is the compiled one.
+_GENERAL = {"lsoda": ("LSODA", 1e-4, (5, 10, 20, 30)), "radau": ("Radau", 1e-3, (5, 10, 20))}
 
 
 @dataclass(frozen=True)
@@ -270,7 +254,7 @@ def ladders(problem: Problem, full: bool = False) -> list[Rung]:
     rungs = [*_waves(problem, full), *_compiled(problem, full), *_elements(problem, full)]
     rungs.append(Rung("rigid", "", 1.0, problem.scene.computed_by("rigid")))
     if not refusal(problem.scene):
-        rungs += _general(problem, full)
+        rungs += _general(problem)
     return rungs
 
 
@@ -361,20 +345,13 @@ def _compiled(problem: Problem, full: bool) -> Iterator[Rung]:
             yield Rung(name, f"{count} elements", 1.0 / count, scene, peer=peer)
 
 
-def _general(problem: Problem, full: bool) -> Iterator[Rung]:
+def _general(problem: Problem) -> Iterator[Rung]:
     scene = problem.scene
-    for name, (method, tolerances, meshes) in _GENERAL.items():
-        if name in _FULL_ONLY and not full:
-            continue
+    for name, (method, tolerance, meshes) in _GENERAL.items():
         for count in meshes:
-            if count * total_length(scene) > MOST_ELEMENTS / 3:
-                continue
-            chosen = fem_scene(scene, count, COURANT, stiffness_of(count))
-            for tolerance in tolerances:
-                many = len(tolerances) > 1
-                label = f"rtol {tolerance:g}" if many else f"{count} elements"
-                size = tolerance if many else 1.0 / count
-                yield Rung(name, label, size, chosen, method, tolerance)
+            if count * total_length(scene) <= MOST_ELEMENTS / 3:
+                chosen = fem_scene(scene, count, COURANT, stiffness_of(count))
+                yield Rung(name, f"{count} elements", 1.0 / count, chosen, method, tolerance)
 
 
 def _rising_durations(problem: Problem, full: bool) -> Iterator[Rung]:
