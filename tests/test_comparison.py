@@ -55,6 +55,7 @@ def test_what_another_solver_needs_was_not_given_in_vain(found):
     for result in results.values():
         result.warnings.extend(find_warnings(result))
     told = Comparison(results).warnings()
+    told = [text for text in told if "without effect" in text]
     assert not any("loss.time" in text or "fem.courant" in text for text in told)
 
     first_two = Comparison({name: results[name] for name in ("wave", "fem")}).warnings()

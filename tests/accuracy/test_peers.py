@@ -153,7 +153,7 @@ def test_cvode_and_the_exact_flow_agree_on_one_mesh():
     found = Run(problem, scene, partial(CvodeSolver, elements=5, tolerance=1e-5)).answer()
     for key in ("resting_place", "rock_energy", "peak_bit_force"):
         assert found.values[key] == pytest.approx(exact.values[key], rel=5e-4), key
-    assert relative_error(found, exact.values, exact.history, HISTORY) < 1e-3
+    assert relative_error(found, exact.values, exact.histories, HISTORY) < 1e-3
 
 
 def test_cvode_tells_what_it_needs():
