@@ -13,7 +13,6 @@ import numpy as np
 from percussion_model.physics.records import DriveKind, Mode, RockKind
 from percussion_model.scene.numbers import numbers_of
 from percussion_model.scene.scene import Scene, SceneError
-from percussion_model.solvers.base import Solver
 from percussion_model.solvers.fem.mesh import BarMesh, assemble, cut_bar
 from percussion_model.solvers.fem.records import Mesh
 from percussion_model.solvers.setup import fill_parameters, fill_start, kelvin_voigt_time
@@ -26,6 +25,7 @@ from percussion_model.verification.accuracy.exact_flow_step import (
     Flow,
     run,
 )
+from percussion_model.verification.accuracy.peer import PeerSolver
 
 __all__ = ["ExactFlowSolver"]
 
@@ -34,7 +34,7 @@ __all__ = ["ExactFlowSolver"]
 WATCH = 8
 
 
-class ExactFlowSolver(Solver):
+class ExactFlowSolver(PeerSolver):
     """Exact flow of the semi-discrete bars.
 
     Parameters
@@ -171,31 +171,9 @@ class ExactFlowSolver(Solver):
     def _run(
         self, reads: int, state: State, t: float, blows: np.ndarray, events: np.ndarray,
         reading: np.ndarray,
-    ) -> tuple[int, int, int]:  # fmt: skip
+    ) -> int:  # fmt: skip
         x, y = state.arrays[0]
-        status = run(reads, self._par, state.record, self._flow, x, y, t, blows, events, reading)
-        s = state.record[0]
-        return status, int(s["n_blows"]), int(s["n_events"])
-
-    def time(self, state: State) -> float:
-        """Time up to which the state is committed [s]."""
-        return float(state.record[0]["time"])
-
-    def advance(
-        self, state: State, t: float, blows: np.ndarray, events: np.ndarray, record_events: bool
-    ) -> tuple[int, int, int]:
-        """Advance to `t`; as in `Solver`."""
-        state.record[0]["events_on"] = record_events
-        return self._run(0, state, t, blows, events, self._no_reading)
-
-    def read(
-        self, state: State, t: float, reading: np.ndarray, spare: State | None = None,
-        peaks: bool = True,
-    ) -> State:  # fmt: skip
-        """Evaluate at `t`; a copy at that time. As in `Solver`."""
-        spare = state.copy(spare)
-        self._run(1, spare, t, self._no_blows, self._no_events, reading)
-        return spare
+        return run(reads, self._par, state.record, self._flow, x, y, t, blows, events, reading)
 
     def grid_of(self, bar: str) -> BarMesh | None:
         """Elements of "piston" or "bit", None where it has none."""

@@ -22,7 +22,6 @@ from percussion_model.scene.bars import (
 from percussion_model.scene.numbers import numbers_of
 from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.simulation.simulate import Simulation
-from percussion_model.solvers.base import Solver
 from percussion_model.solvers.setup import (
     MOST_CHANGES,
     fill_parameters,
@@ -38,6 +37,7 @@ from percussion_model.verification.accuracy.explicit_step import (
     prepare_mode,
     run,
 )
+from percussion_model.verification.accuracy.peer import PeerSolver
 
 __all__ = ["ExplicitSolver", "explicit_rate"]
 
@@ -71,7 +71,7 @@ class Elements(NamedTuple):
         return len(self.mass)
 
 
-class ExplicitSolver(Solver):
+class ExplicitSolver(PeerSolver):
     """Explicit elements.
 
     Parameters
@@ -149,34 +149,12 @@ class ExplicitSolver(Solver):
     def _run(
         self, reads: int, state: State, t: float, blows: np.ndarray, events: np.ndarray,
         reading: np.ndarray,
-    ) -> tuple[int, int, int]:  # fmt: skip
+    ) -> int:  # fmt: skip
         rows = state.arrays[0]
-        status = run(
+        return run(
             reads, self._par, state.record, self._runs, rows[0], rows[1], rows[2], t,
             blows, events, reading,
         )  # fmt: skip
-        s = state.record[0]
-        return status, int(s["n_blows"]), int(s["n_events"])
-
-    def time(self, state: State) -> float:
-        """Time up to which the state is committed [s]."""
-        return float(state.record[0]["time"])
-
-    def advance(
-        self, state: State, t: float, blows: np.ndarray, events: np.ndarray, record_events: bool
-    ) -> tuple[int, int, int]:
-        """Take the whole steps up to `t`; as in `Solver`."""
-        state.record[0]["events_on"] = record_events
-        return self._run(0, state, t, blows, events, self._no_reading)
-
-    def read(
-        self, state: State, t: float, reading: np.ndarray, spare: State | None = None,
-        peaks: bool = True,
-    ) -> State:  # fmt: skip
-        """Evaluate at `t`; a copy at about that time. As in `Solver`."""
-        spare = state.copy(spare)
-        self._run(1, spare, t, self._no_blows, self._no_events, reading)
-        return spare
 
     def grid_of(self, bar: str) -> Elements | None:
         """Elements of "piston" or "bit", None where it has none."""
@@ -224,8 +202,7 @@ def explicit_rate(
         scene, record_events=False, solver=ExplicitSolver(scene, elements, courant)
     )
     simulation.advance(duration)
-    blows = simulation.blows
-    rows = blows[blows["time"] >= settle]
-    if len(rows) < 2:
-        raise SceneError(f"explicit elements: {len(rows)} blows after {settle:g} s")
-    return float(rows["penetration"].sum() / rows["period"].sum())
+    rate = simulation.result(settle).rate_of_penetration
+    if not math.isfinite(rate):
+        raise SceneError(f"explicit elements: too few blows after {settle:g} s tell no rate")
+    return rate

@@ -44,10 +44,9 @@ FASTER, FASTER_BY = 2.0, 5.0
 SURELY = 0.5
 # Bars with less energy of vibration than this count as rigid [J]; a blow has some 300 J.
 QUIET = 1e-7
-# So many steps before its gap can close a quiet piston has nodes again.
-AHEAD = 4.0
-# Halvings of a step in search of a change of mode.
-HALVINGS = 30
+# A quiet piston has nodes again so many steps before its gap can close; halvings of a step
+# in search of a change of mode.
+AHEAD, HALVINGS = 4.0, 30
 
 
 class Joint(IntEnum):
@@ -67,8 +66,7 @@ STRETCH = np.dtype(
         ("joint", "i8"),  # Joint
         ("half", "f8"),  # half the mass of an element [kg]
         ("kappa", "f8"),  # time step times stiffness of an element by its mass [1/s]
-        ("top", "f8"),  # scratch: velocities of both ends after a step [m/s]
-        ("low", "f8"),
+        *((name, "f8") for name in ("top", "low")),  # velocities of both ends after a step [m/s]
     ],
     align=True,
 )
