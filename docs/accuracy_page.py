@@ -168,7 +168,9 @@ def force_table() -> str:
 def ratio_text(one: Summary) -> str:
     """Range and median of a summary."""
     decided = one.scenes - one.undecided
-    return f"{two(one.worst)} to {two(one.luckiest)}, median {two(one.median)} ({decided} scenes)"
+    if not math.isfinite(one.median):
+        return f"undecided ({one.scenes} scenes)"
+    return f"{two(one.median)} ({two(one.worst)} to {two(one.luckiest)}; {decided} scenes)"
 
 
 def fits(study: Study) -> bool:
@@ -177,26 +179,30 @@ def fits(study: Study) -> bool:
 
 
 def advantage() -> str:
-    """What the waves gain over the best of their peers, in sentences."""
+    """What the waves gain over the best of their peers."""
     studies = list(load_studies().values())
 
-    def ratios(chosen: Sequence[Study], waves: str = "wave") -> str:
+    def row(name: str, chosen: Sequence[Study], waves: str = "wave") -> str:
         found = contests(chosen, waves=waves)
-        told = {wanted: summary(found[wanted]) for wanted in STATED}
-        return "; ".join(
-            f"at {percent(wanted)} {ratio_text(one)}"
-            for wanted, one in told.items()
-            if math.isfinite(one.median)
-        )
+        cells = (ratio_text(summary(found[wanted])) for wanted in STATED)
+        return f"| {name} | {' | '.join(cells)} |"
 
     fitting = [study for study in studies if fits(study)]
     others = [study for study in studies if not fits(study)]
-    return (
-        f"The best of the compiled peers, mostly explicit elements with hard contact, takes the "
-        f"processor time of the waves times a factor, for the same error in the rate of "
-        f"penetration. Where few cells fit the lengths: {ratios(fitting)}. Where they do not: "
-        f"{ratios(others)}; below 1 the peer is the faster one. The advantage is the leaps: "
-        f"without them, over all scenes, {ratios(studies, 'wave-steps')}."
+    heads = " | ".join(f"error of {percent(wanted)}" for wanted in STATED)
+    return "\n".join(
+        (
+            "Processor time of the best compiled peer, mostly explicit elements with hard",
+            "contact, divided by that of the waves for the same error of the rate: median, range",
+            "and scenes. Below 1 the peer is faster. The advantage is the leaps, as the last row",
+            "shows.",
+            "",
+            f"| | {heads} |",
+            f"|---|{'---|' * len(STATED)}",
+            row("lengths that are whole numbers of cells", fitting),
+            row("other lengths", others),
+            row("all, waves without leaps", studies, "wave-steps"),
+        )
     )
 
 
@@ -438,7 +444,7 @@ def wrapped(text: Callable[[], str]) -> Callable[[], str]:
 
 
 BLOCKS: dict[str, Callable[[], str]] = {
-    "advantage": wrapped(advantage),
+    "advantage": advantage,
     "general": wrapped(general),
     "contests": contest_table,
     "forces": force_table,

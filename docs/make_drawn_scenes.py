@@ -91,6 +91,7 @@ def main() -> None:
             continue
         kept += 1
         text = TEXT.format(seed=SEED, scene=scene)
+        text = text.replace(scene.title, f"Drawn scene {kept}, draw {number}")
         (FOLDER / f"drawn_{kept}.toml").write_text(text, encoding="utf-8")
         if kept == COUNT:
             return

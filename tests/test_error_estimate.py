@@ -27,7 +27,7 @@ def test_the_error_of_a_default_run_covers_the_true_one(changes, rate, unsure):
     off = abs(result.rate_of_penetration - rate)
     assert off + unsure <= stated * result.rate_of_penetration
     assert stated < 0.03
-    doubt = [text for text in result.warnings if "in doubt" in text]
+    doubt = [text for text in result.warnings if "may be off by" in text]
     assert bool(doubt) == (stated > 0.01)
 
 

@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 _PATIENCE = 2.0
 
 RATE = ("Rate of penetration", "rate_of_penetration", 1e3, "mm/s")
+# What its error is: those of rock and model are others.
+NUMERICAL = " (± of the numerics)"
 # Other rows of the table: name, key of the summary, factor, unit.
 SHOWN = (
     ("Blow period", "blow_period", 1e3, "ms"),
@@ -52,7 +54,8 @@ def show_summary(result: Result) -> None:
     table.add_column(justify="left")
     table.add_column(justify="right")
     table.add_column(justify="left")
-    table.add_row(RATE[0], rate_text(summary), RATE[3])
+    rate = rate_text(summary)
+    table.add_row(RATE[0], rate, RATE[3] + NUMERICAL * ("±" in rate))
     for name, key, factor, unit in SHOWN:
         value = summary[key]
         table.add_row(name, "-" if value is None else f"{factor * value:.5g}", unit)
@@ -64,6 +67,11 @@ def show_summary(result: Result) -> None:
     table.add_section()
     table.add_row("Simulated", f"{result.duration:.6g}", "s")
     table.add_row("Whole blows", f"{len(result.blows)}", f"{len(result.counted)} after settling")
+    if result.cells:
+        table.add_row(
+            "Cells", " + ".join(map(str, result.cells.values())), " + ".join(result.cells)
+        )
+    table.add_row("Prepared in", f"{result.setup_time:.3g}", "s")
     table.add_row("Computed in", f"{result.wall_time:.3g}", "s")
     table.add_row("Speed", f"{result.real_time_factor:.3g}", "times real time")
     console = Console()

@@ -6,16 +6,17 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-# Digits after the point; smaller errors are shown as one of the last digit.
+# Digits after the point; smaller errors are not shown.
 MOST_DIGITS = 5
 
 
 def with_error(value: float, error: float) -> str:
     """Return a number and its error, both to the second digit of the error."""
-    digits = MOST_DIGITS
-    if error > 0.0:
-        digits = min(max(1 - math.floor(math.log10(error)), 0), MOST_DIGITS)
-    return f"{value:.{digits}f} ± {max(error, 10.0**-digits):.{digits}f}"
+    if error < 10.0**-MOST_DIGITS:
+        return f"{value:.5g}"
+    digits = min(max(1 - math.floor(math.log10(error)), 0), MOST_DIGITS)
+    text = f"{value:.{digits}f} ± {error:.{digits}f}"
+    return f"undecided, {text}" if error >= abs(value) else text
 
 
 def rate_text(summary: Mapping[str, Any]) -> str:

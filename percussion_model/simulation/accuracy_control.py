@@ -60,12 +60,15 @@ class Step:
     doubt : float
         Relative error that the run before was thought to have by its cells: there was
         reason not to trust that one, and two runs that agree by chance are not rare then.
+    interrupted : bool
+        Whether the run after this one was.
     """
 
     cells: int
     run: GridRun
     estimate: Estimate
     doubt: float = 0.0
+    interrupted: bool = False
 
     @property
     def error(self) -> float:
@@ -126,9 +129,7 @@ def run_to_accuracy(scene: Scene, run_once: RunOnce) -> Result:
     while (finer := _finer(scene, step, wanted)) is not None:
         runs.append(_run(scene, finer, run_once))
         if runs[-1].result.cut_short:
-            step.run.result.warnings.append(
-                "interrupted while it was verified: this is the run before"
-            )
+            step = replace(step, interrupted=True)
             break
         if not runs[-1].useful:
             return _finished(scene, runs, None)
@@ -200,6 +201,8 @@ def _finished(scene: Scene, runs: list[GridRun], step: Step | None) -> Result:
     )
     if not error <= wanted and not last.cut_short:
         result.warnings.append(_missed(result, step, wanted, error))
+    elif step is not None and step.interrupted:
+        result.warnings.append("interrupted while it was verified: this is the run before")
     return result
 
 
@@ -208,6 +211,8 @@ def _missed(result: Result, step: Step | None, wanted: float, error: float) -> s
     if not math.isfinite(error):
         return f"solver.accuracy = {wanted!r} cannot be judged without a rate of penetration"
     head = f"solver.accuracy = {wanted!r} was not reached: estimated error {error:.2g}"
+    if step is not None and step.interrupted:
+        return f"{head}, interrupted in a finer run; this is the run before"
     if step is None or step.estimate.scatter > wanted:
         return (
             f"{head}, since the motion is aperiodic and {result.duration:.4g} s average "

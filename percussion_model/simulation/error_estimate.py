@@ -36,7 +36,7 @@ FLOOR_SHARE = 0.1
 COMPARISON_WORK = 0.12
 # They last for so many blows at least: to settle and to count.
 FEWEST_BLOWS = 10
-# A rate that cells leave in doubt by more deserves a warning.
+# A rate that is known no better than this deserves a warning.
 LARGE_ERROR = 1e-2
 # Runs whose drilling cycles a blow differ by more, or by more than this share of them, are
 # of different motions; where there are dozens, one more or less is a smooth change.
@@ -224,8 +224,9 @@ def with_error_estimate(
     whole = grid_run(result)
     if coarser is None or not whole.useful:
         return result
+    scatter = whole.scatter / abs(whole.rate)
     if not coarser:
-        return replace(result, rate_of_penetration_relative_error=whole.scatter / abs(whole.rate))
+        return _judged(result, Estimate(0.0, 0.0, scatter, 0.0))
     end = _comparison_time(result, coarser)
     settle = min(result.settle, 0.5 * end)
     others = [
@@ -236,23 +237,31 @@ def with_error_estimate(
     part = grid_run(replace(result, settle=settle, blows=result.blows[early]))
     if not part.useful or not any(other.useful for other in others):
         return result
-    scatter = whole.scatter / abs(whole.rate)
     if result.solver == "wave":
-        estimate = replace(estimate_error(part, others), scatter=scatter)
-    else:  # each of the others is coarser in another way
-        off = sum(_difference(other, part) for other in others if other.useful)
-        estimate = Estimate(off, 0.0, scatter, 0.0)
+        return _judged(result, replace(estimate_error(part, others), scatter=scatter))
+    # each of the others is coarser in another way
+    off = sum(_difference(other, part) for other in others if other.useful)
+    return _judged(result, Estimate(off, 0.0, scatter, 0.0))
+
+
+def _judged(result: Result, estimate: Estimate) -> Result:
+    """The result with its error and what to warn of."""
     result.warnings.extend(_large_error(estimate))
     return replace(result, rate_of_penetration_relative_error=estimate.total)
 
 
 def _large_error(estimate: Estimate) -> Iterator[str]:
-    """Warn of a rate that the cells leave in doubt."""
-    error = max(estimate.cells + estimate.fit, estimate.floor)
-    if error > LARGE_ERROR:
+    """Warn of a rate that is not known well, and of why."""
+    by_grid = max(estimate.cells + estimate.fit, estimate.floor)
+    if estimate.scatter > max(LARGE_ERROR, by_grid):
         yield (
-            f"the cells leave the rate of penetration in doubt by {100.0 * error:.2g} %, as runs "
-            "on coarser ones tell; set solver.accuracy for one that is known better"
+            f"blows do not repeat: the rate of penetration has a standard error of "
+            f"{100.0 * estimate.scatter:.2g} %; a longer run.duration (--duration) averages more"
+        )
+    elif by_grid > LARGE_ERROR:
+        yield (
+            f"the rate of penetration may be off by {100.0 * by_grid:.2g} %, as runs on coarser "
+            "cells tell; solver.accuracy (--accuracy) takes as many cells as an error needs"
         )
 
 
