@@ -165,23 +165,18 @@ def show_explanation(scene: Scene, found: Forecast) -> None:
     Console().print(table)
 
 
-# Rows of the scales: name, SI unit, factor, unit shown.
-_SCALE_ROWS = (
-    ("Time scales", "s", 1e3, "ms"),
-    ("Length scales", "m", 1e3, "mm"),
-    ("Ratios", "-", 1.0, ""),
-)
+# Units that scales are shown in, by SI unit.
+_SHOWN_SCALES = {"s": (1e3, " ms"), "m": (1e3, " mm"), "-": (1.0, "")}
 
 
 def _scale_rows(scene: Scene) -> Iterator[tuple[str, str]]:
-    """Scales of a scene by their symbols, those of a unit in a row."""
+    """Scales of a scene by name, with the paper's symbols."""
     from percussion_model.scene.scales import scales
 
-    for name, unit, factor, shown in _SCALE_ROWS:
-        alike = [scale for scale in scales(scene).values() if scale.unit == unit]
-        if alike:
-            words = ", ".join(f"{one.symbol} {factor * one.value:.4g}" for one in alike)
-            yield name, f"{words} {shown}".rstrip()
+    for name, scale in scales(scene).items():
+        factor, unit = _SHOWN_SCALES[scale.unit]
+        label = f"{name.replace('_', ' ').capitalize()} ({scale.symbol})"
+        yield label, f"{factor * scale.value:.4g}{unit}"
 
 
 def show_comparison(found: Comparison) -> None:

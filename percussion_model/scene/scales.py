@@ -41,7 +41,7 @@ def scales(scene: Scene) -> dict[str, Scale]:
         cycle = math.sqrt(bit.mass / rock.loading_stiffness)
         ratio = rock.loading_stiffness * bar_compliance(bit.numbers)
         found["drilling_cycle_time"] = Scale("T_4", cycle, "s")
-        found["stiffness_ratio"] = Scale("eta", ratio, "-")
+        found["stiffness_ratio"] = Scale("eta = K_R L_b/(EA)", ratio, "-")
     energy = drive.force * drive.reversal_distance
     if scene.effects.drive == "pressure" and energy > 0.0:
         flight = math.sqrt(piston.mass * drive.reversal_distance / drive.force)
