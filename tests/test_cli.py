@@ -112,7 +112,7 @@ def test_explain(percussion):
         "loss.time",
         "A blow",
         "Predicted cost",
-        "T_2 0.03891",
+        "Bit transit time (T_2)",
     ):
         assert text in out
 

@@ -9,6 +9,7 @@ import pytest
 from percussion_model import Scene, simulate
 from percussion_model.simulation.error_estimate import FEWEST_BLOWS
 from percussion_model.simulation.result import Result
+from percussion_model.verification.accuracy.explicit import explicit_rate
 
 # Limits of refined runs, waves of 80 to 160 cells and explicit elements of 60 to 120, 2.5 s
 # each: rate [m/s], and by how much these runs differ [m/s].
@@ -89,3 +90,53 @@ def test_without_a_rate_there_is_no_error():
     result = simulate(Scene().replace(**{"run.duration": 0.05, "run.settle": 0.0}))
     assert math.isnan(result.rate_of_penetration)
     assert math.isnan(result.rate_of_penetration_relative_error)
+
+
+def test_what_cannot_be_made_coarser_states_no_error():
+    one_cell = {"bit.sections.0.length": 0.175, "solver.cells": 1}
+    one_element = {"run.duration": 0.5, "run.settle": 0.2, "fem.elements": 1}
+    for scene in (Scene().replace(**one_cell), Scene().computed_by("fem", **one_element)):
+        result = simulate(scene, record_events=False)
+        assert math.isfinite(result.rate_of_penetration)
+        assert math.isnan(result.rate_of_penetration_relative_error)
+
+
+def test_few_elements_state_a_large_error():
+    """Two elements are 11 % off, and the ledger says that a third of the energy is gone."""
+    scene = Scene().computed_by("fem", **{"fem.elements": 2})
+    result = simulate(scene, record_events=False)
+    off = abs(result.rate_of_penetration / REFERENCE[1] - 1.0)
+    assert 0.05 < off <= result.rate_of_penetration_relative_error
+
+
+def test_a_failing_comparison_loses_no_result(monkeypatch):
+    from percussion_model.simulation import simulate as module
+
+    scene = Scene().replace(**{"run.duration": 1.0, "run.settle": 0.2})
+    original = module.run_in_chunks
+
+    def fail(run, end, *rest):
+        if end < 1.0:
+            raise module.SimulationError("planted")
+        return original(run, end, *rest)
+
+    monkeypatch.setattr(module, "run_in_chunks", fail)
+    result = simulate(scene, record_events=False)
+    assert result.rate_of_penetration > 0.0
+    assert math.isnan(result.rate_of_penetration_relative_error)
+    assert any("could not be estimated: planted" in text for text in result.warnings)
+
+
+def test_stepped_bars_state_an_error_that_covers():
+    """Sections that fit no common cell: many misfits, no straight line through them."""
+    sections = {
+        "bit.sections": [
+            {"length": 0.09, "area": 5.5e-3},
+            {"length": 0.117, "area": 4.0e-3},
+        ]
+    }
+    scene = Scene().replace(**sections, **{"run.duration": 2.0, "run.settle": 1.0})
+    result = simulate(scene, record_events=False)
+    rate = explicit_rate(scene, 60, 2.0, 1.0)
+    off = abs(result.rate_of_penetration / rate - 1.0)
+    assert off <= result.rate_of_penetration_relative_error

@@ -25,5 +25,5 @@ def rate_text(summary: Mapping[str, Any]) -> str:
     if rate is None:
         return "-"
     if error is None:
-        return f"{1e3 * rate:.5g}"
+        return f"{1e3 * rate:.5g}, error not estimated"
     return with_error(1e3 * rate, 1e3 * abs(rate) * error)

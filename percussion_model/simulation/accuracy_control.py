@@ -23,7 +23,7 @@ from percussion_model.solvers.wave.resolution import (
     cells_for,
     coarser_cells,
     finer_cells,
-    size,
+    largest_misfit,
 )
 
 # Aperiodic motion runs on for at most this multiple of the duration.
@@ -176,7 +176,7 @@ def _finer(scene: Scene, step: Step, wanted: float) -> int | None:
     if step.error > wanted and by_grid <= CHATTER_SHARE * wanted:
         return None  # scatter is all that is left
     fit = FIT_SHARE * wanted
-    misfit = size(step.run.misfit)
+    misfit = largest_misfit(step.run.misfit)
     if estimate.fit > 0.0:
         fit = min(LEFT_TO_FIT * wanted / estimate.fit, LEFT_TO_FIT) * misfit
     return finer_cells(numbers_of(scene), step.cells, fit, FINEST)
@@ -208,6 +208,8 @@ def _finished(scene: Scene, runs: list[GridRun], step: Step | None) -> Result:
 
 def _missed(result: Result, step: Step | None, wanted: float, error: float) -> str:
     """Say that the wanted accuracy was not reached, and why."""
+    if step is not None and not math.isfinite(error):
+        return f"solver.accuracy = {wanted!r} cannot be judged: no other run has a rate to compare"
     if not math.isfinite(error):
         return f"solver.accuracy = {wanted!r} cannot be judged without a rate of penetration"
     head = f"solver.accuracy = {wanted!r} was not reached: estimated error {error:.2g}"

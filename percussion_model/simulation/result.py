@@ -76,8 +76,8 @@ class Result:
         Time to make the solver, compilation included [s].
     warnings : list of str
     rate_of_penetration_relative_error : float
-        Estimated error of the rate, relative to it, where `solver.accuracy` is
-        asked for; NaN where it is not.
+        Estimated error of the rate, relative to it; NaN where it was not estimated. The
+        short runs that tell it are not in the times, those for `solver.accuracy` are.
     rate_of_penetration_fixed_window : float
         Advance of the mean bit position from the settling time to the end of the
         run by that time, wherever in a blow they lie (eq. 58 of the paper) [m/s];

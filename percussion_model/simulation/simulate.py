@@ -280,8 +280,9 @@ def simulate(
         Whether to verify it by a finer run; default that of the scene.
     error_estimate : bool, optional
         Whether to estimate the error of the rate of penetration, where no accuracy is
-        wanted, by short runs on coarser cells, which take up to a third as long again;
-        default that of the scene.
+        wanted, by short runs on coarser cells. They take about a quarter of the work
+        again for a hundred blows, more for fewer, since ten are the least; default that of
+        the scene.
 
     Returns
     -------

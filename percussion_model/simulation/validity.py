@@ -46,11 +46,10 @@ def numerical_note(share: float, solver: str) -> Iterator[str]:
             "which it cannot; this is an error of the solver"
         )
     elif share > MOST_NUMERICAL:
-        cause, remedy = (
-            ("the time scheme", "set a smaller fem.courant or more fem.elements")
-            if solver == "fem"
-            else ("averaging fronts within cells", "set more solver.cells")
-        )
+        cause, remedy = {
+            "fem": ("the time scheme", "set a smaller fem.courant or more fem.elements"),
+            "wave": ("averaging fronts within cells", "set more solver.cells"),
+        }.get(solver, ("the discretisation", "refine it"))
         yield (
             f"{100 * share:.2g} % of the energy put in is taken by {cause} (entry numerical "
             f"of its balance), not by anything in the equations: peaks and rates suffer; {remedy}"

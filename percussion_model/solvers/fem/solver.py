@@ -243,10 +243,12 @@ class FemSolver(Solver):
                 out[f"{name}_velocity"] = 0.5 * (nodes[Node.V, :-1] + nodes[Node.V, 1:])
         return out
 
-    def coarser_scenes(self) -> list[Scene]:
+    def coarser_scenes(self) -> list[Scene] | None:
         """A coarser mesh with the same loss, and a softer contact: each has an error."""
         scene = self.scene
-        coarser: dict[str, Any] = {"fem.elements": max(1, round(COARSER * scene.fem.elements))}
+        if scene.fem.elements == 1:
+            return None
+        coarser: dict[str, Any] = {"fem.elements": int(COARSER * scene.fem.elements)}
         if scene.matters("fem.damping_ratio") and scene.fem.damping_ratio is not None:
             coarser |= {"fem.damping_ratio": None, "loss.time": self.loss_time}
         scenes = [scene.replace(**coarser)]

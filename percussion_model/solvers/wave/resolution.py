@@ -66,16 +66,17 @@ def coarser_cells(numbers: Numbers, cells: int) -> list[int]:
     """Cells of the coarser runs that a run is compared with, the best last.
 
     One where the lengths fit; else two, if there are such, whose wave speeds are off to
-    either side.
+    either side. None at all below a single cell.
     """
-    low, high = (math.ceil(COARSER[0] * cells), math.floor(COARSER[1] * cells))
-    fewest = max(1, low)
-    counts = range(fewest, max(fewest, high) + 1)
+    low, high = math.ceil(COARSER[0] * cells), math.floor(COARSER[1] * cells)
+    counts = range(low, min(max(low, high) + 1, cells))
+    if not counts:
+        return []
     found = {count: misfits(numbers, count) for count in counts}
     # of equals the finer, which costs more but is nearer
-    ranked = sorted(counts, key=lambda count: (size(found[count]), -count))
+    ranked = sorted(counts, key=lambda count: (largest_misfit(found[count]), -count))
     best = ranked[0]
-    if size(found[best]) <= FITS:
+    if largest_misfit(found[best]) <= FITS:
         return [best]
     side = np.sum(found[best])
     across = [count for count in ranked if np.sum(found[count]) * side < 0.0]
@@ -94,8 +95,10 @@ def finer_cells(numbers: Numbers, cells: int, wanted_fit: float, most: int) -> i
     sizes = {}
     for count in range(fewest, end + 1):
         there = misfits(numbers, count)
-        if size(here) <= FITS or size(there - here) > 0.5 * size(here):
-            sizes[count] = size(there)
+        if largest_misfit(here) <= FITS or largest_misfit(there - here) > 0.5 * largest_misfit(
+            here
+        ):
+            sizes[count] = largest_misfit(there)
     if not sizes:
         return None
     return next(
@@ -119,7 +122,7 @@ def misfits(numbers: Numbers, cells: int) -> np.ndarray:
     return np.array([error for bar in bars for error in section_misfits(bar, step)])
 
 
-def size(misfit: np.ndarray) -> float:
+def largest_misfit(misfit: np.ndarray) -> float:
     """Largest misfit of a section."""
     return float(np.max(np.abs(misfit), initial=0.0))
 

@@ -253,14 +253,13 @@ class WaveSolver(Solver):
         """Cells of "piston" or "bit", None where it has none."""
         return self._grids[bar]
 
-    def coarser_scenes(self) -> list[Scene]:
+    def coarser_scenes(self) -> list[Scene] | None:
         """One scene where lengths fit, else two that are off to either side."""
-        cells = next(iter(self.cells.values()))
+        counts = coarser_cells(self._numbers, next(iter(self.cells.values())))
         changes = {"solver.accuracy": None, "run.check": False}
         return [
-            self.scene.replace(**changes, **{"solver.cells": count})
-            for count in coarser_cells(self._numbers, cells)
-        ]
+            self.scene.replace(**changes, **{"solver.cells": count}) for count in counts
+        ] or None
 
     def section_cells(self, bar: Bar) -> list[int]:
         """Cells in each section of an elastic bar."""

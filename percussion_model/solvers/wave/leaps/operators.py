@@ -27,8 +27,9 @@ MOST_NUMBERS = 40_000_000
 # Sums of a form, see `carry_and_sum`.
 FORMS = LEVELS + 2 * SINGLE
 
-# Operators of so many scenes are kept [a few MB each on the default grid].
-MOST_KEPT = 4
+# Operators of so many scenes are kept [a few MB each on the default grid], as long as they
+# take no more than so many bytes: those of 250 cells have half a gigabyte.
+MOST_KEPT, MOST_BYTES = 4, 400_000_000
 _kept: dict[bytes, LeapOperators | None] = {}
 # Those of free bars, which scenes on other rock share, are kept apart.
 _kept_free: dict[bytes, dict[str, np.ndarray]] = {}
@@ -75,8 +76,15 @@ def _key(par: np.ndarray, cp: np.ndarray, cb: np.ndarray, piston: Grid | None, b
 
 
 def _make_room(kept: dict[bytes, Any]) -> None:
-    while len(kept) >= MOST_KEPT:
+    while len(kept) >= MOST_KEPT or sum(map(_size_of, kept.values())) > MOST_BYTES:
         del kept[next(iter(kept))]
+
+
+def _size_of(arrays: Any) -> int:
+    """Bytes of a set of operators."""
+    if arrays is None:
+        return 0
+    return sum(a.nbytes for a in (arrays.values() if isinstance(arrays, dict) else arrays))
 
 
 def _build(
