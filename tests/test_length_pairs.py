@@ -16,8 +16,8 @@ from percussion_model.verification.accuracy.explicit import explicit_rate
 
 LONG = os.environ.get("PERCUSSION_LONG") == "1"
 DURATION, SETTLE = 2.0, 1.0
-# Elements in the piston and share of the stable step of the runs to compare with.
-MESHES = ((40, 0.9), (60, 0.9), (60, 0.7), (90, 0.9))
+# Elements in the piston and share of the stable step of the runs to compare with, the best last.
+MESHES = ((60, 0.9), (60, 0.6), (90, 0.6))
 # Six that are not dear; the long mode has all twenty.
 QUICK = (2, 3, 4, 7, 10, 11)
 # An estimate may miss the true error by this factor, not more.
@@ -48,14 +48,18 @@ def drawn(seed):
     )
 
 
-def truth(scene, meshes):
-    """Rate by explicit elements, and how far their meshes are apart, relative to it."""
-    rates = [explicit_rate(scene, count, DURATION, SETTLE, step) for count, step in meshes]
-    return rates[-1], (max(rates) - min(rates)) / abs(rates[-1])
+def truth(scene):
+    """Rate by explicit elements, and how far it may be off, relative to it.
+
+    In chatter they answer to the step most, about in proportion: what is left at 0.6 is twice
+    what 0.9 was off by from there. Of the same scene exact flow knows no step, and agrees.
+    """
+    rates = [explicit_rate(scene, count, DURATION, SETTLE, step) for count, step in MESHES]
+    return rates[-1], 2.0 * (max(rates) - min(rates)) / abs(rates[-1])
 
 
 def judge(scene, rate, unsure, **request):
-    """Check one run against the truth; whether it could be judged."""
+    """Check one run against the truth; true and stated error."""
     result = simulate(scene, record_events=False, **request)
     off = abs(result.rate_of_penetration / rate - 1.0)
     stated = result.rate_of_penetration_relative_error
@@ -74,8 +78,8 @@ def test_requests_are_met_or_said_not_to_be(seed, monkeypatch):
     """Finer runs end at 120 cells here, which only makes more of them end with a warning."""
     monkeypatch.setattr("percussion_model.simulation.accuracy_control.FINEST", 120)
     scene = drawn(seed)
-    rate, unsure = truth(scene, MESHES[:2])
-    assert unsure < 0.01
+    rate, unsure = truth(scene)
+    assert unsure < 0.006  # else 1e-2 could not be judged
     for request in ({}, {"accuracy": 1e-2}, {"accuracy": 1e-3}):
         judge(scene, rate, unsure, **request)
 
@@ -84,7 +88,7 @@ def test_requests_are_met_or_said_not_to_be(seed, monkeypatch):
 @pytest.mark.parametrize("seed", range(20))
 def test_requests_are_met_or_said_not_to_be_on_all(seed):
     scene = drawn(seed)
-    rate, unsure = truth(scene, MESHES)
+    rate, unsure = truth(scene)
     for request in ({}, {"accuracy": 1e-2}, {"accuracy": 1e-3}):
         off, stated = judge(scene, rate, unsure, **request)
         print(f"{seed} {request} off {off:.1e} ± {unsure:.0e}, stated {stated:.1e}")
