@@ -9,7 +9,13 @@ from __future__ import annotations
 from percussion_model.physics.drive import drive_force
 from percussion_model.physics.kernel import kernel
 from percussion_model.physics.records import DriveKind, Mode, RockKind
-from percussion_model.physics.rock import REST_VELOCITY, damping, origin, stiffness
+from percussion_model.physics.rock import (
+    REST_VELOCITY,
+    book_dashpot,
+    damping,
+    origin,
+    stiffness,
+)
 from percussion_model.verification.accuracy.exact_flow_step import accept, kinetic_energy, weigh
 
 
@@ -127,11 +133,7 @@ def arrive(par, s, f, x, y, time, work):
     accept(par, s, f, x, y, 0.0)
     s.time = time
     s.rock_work += work
-    if s.mode == Mode.DFC:
-        s.w += work
-        s.e_barrier += work
-    elif s.mode == Mode.SS:
-        s.e_standstill += work
+    book_dashpot(s, work)
 
 
 @kernel
