@@ -108,7 +108,8 @@ def summary(run: CoupledRun) -> dict[str, Any]:
     dict
         depth [m], mean rate over the second half [m/s], greatest residual of the energy
         balance of the string divided by the energy put in and stored at the start; energy that
-        the shoulder took and work of the feed [J]; the former divided by the energy of the blows [1]; the verdict.
+        the shoulder took and work of the feed [J]; the former divided by the energy of the
+        blows [1]; the verdict.
     """
     columns = run.columns
     found: dict[str, Any] = {

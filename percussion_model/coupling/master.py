@@ -30,7 +30,7 @@ from percussion_model.coupling.port import (
     check_pace,
     refuse_remainder,
 )
-from percussion_model.coupling.python_part import PythonPart, Work
+from percussion_model.coupling.python_part import Given, PythonPart
 from percussion_model.coupling.rejection import StepControl
 from percussion_model.coupling.ssp import input_starts, unpack
 from percussion_model.coupling.verdict import Jumps
@@ -56,7 +56,9 @@ class Coupling:
         Values that go before those of the archive, by `component.variable`; enumerations
         by number or by word.
     replaced : mapping, optional
-        Paths of other FMUs, or Python callables, by component.
+        Paths of other FMUs, or Python callables, by component; a class or a factory of them
+        makes one at the begin of the run, and an object that keeps values is reset or copied
+        (`percussion_model.coupling.fresh`).
     order : {"jacobi", "gauss-seidel"}
         Whether a part sees what parts before it in the archive gave in the same step.
     on_way : callable, optional
@@ -71,7 +73,7 @@ class Coupling:
         self,
         path: str | Path,
         parameters: Mapping[str, Any] | None = None,
-        replaced: Mapping[str, str | Path | Work] | None = None,
+        replaced: Mapping[str, str | Path | Given] | None = None,
         order: Order = "jacobi",
         on_way: OnWay | None = None,
         every: Mapping[str, int] | None = None,
@@ -261,6 +263,8 @@ class Coupling:
             if isinstance(part, Component):
                 part.set(self._parameters[name])
                 part.begin(0.0)
+            else:
+                part.begin()
         for _ in range(INITIAL_PASSES):
             for port in self.ports:
                 if isinstance(port.part, Component):
