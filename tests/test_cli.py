@@ -59,7 +59,8 @@ def test_results_and_json_go_to_files(percussion, tmp_path):
     )
     assert (code, err) == (0, "")
     names = {path.name for path in out.iterdir()}
-    assert names == {"summary.json", "blows.csv", "events.csv", "trace.csv", "scene.toml"}
+    files = {"summary.json", "blows.csv", "events.csv", "trace.csv", "scene.toml"}
+    assert names == files | {"made_by.json"}
     assert json.loads(summary.read_text()) == json.loads((out / "summary.json").read_text())
 
 

@@ -52,18 +52,21 @@ def bench_controller(
     ] = None,
     out: common.Out = None,
     json_file: common.JsonFile = None,
+    force: common.Force = False,
 ) -> int:
     """Put a controller of feed and pressure through standard runs: scores, figures, a page."""
     try:
         from percussion_model.coupling.bench import bench, total
     except ImportError as error:
         return common.print_message(common.needs_extra(error, "fmu"), common.BAD_INPUT)
-    from percussion_model.simulation.files import check_writable
-
-    folder = out or Path("out") / "bench-controller"
-    check_writable(folder)
     common.check_json(json_file)
     values = dict(read_value(f"controller.{text}") for text in settings or ())
+    source = None if controller is None else Path(_file_and_name(controller)[0])
+    claimed = common.claim(
+        "bench-controller", out, Path("out") / "bench-controller", force,
+        system=common.digest(system), controller=controller, file=common.digest(source),
+        set=settings, trials=sorted(trials or ()),
+    )  # fmt: skip
     scores: list[Score] = []
     interrupted = False
 
@@ -92,7 +95,9 @@ def bench_controller(
         common.print_message(common.needs_plot_extra(error))
     else:
         title = controller or system.stem
-        print(write_bench_page(scores, points, COLUMNS, folder, title), file=sys.stderr)
+        page = write_bench_page(scores, points, COLUMNS, claimed.folder, title)
+        claimed.sign()
+        print(page, file=sys.stderr)
     if interrupted:
         return common.print_message(
             f"interrupted: the page has the {len(scores)} runs that were done", common.INTERRUPTED
@@ -134,6 +139,12 @@ def _short(value: float) -> str:
     return f"{float(f'{value:.3g}'):.2f}".rstrip("0").rstrip(".")
 
 
+def _file_and_name(controller: str) -> tuple[str, str]:
+    """File and name of FILE.py:NAME; an FMU has no name."""
+    file, _, name = controller.rpartition(":")
+    return (file, name) if file.endswith(".py") else (controller, "")
+
+
 def _load(controller: str | None) -> Any:
     """Path of an FMU, or what loads FILE.py afresh for a run and gives its NAME."""
     from percussion_model.coupling import CouplingError
@@ -141,13 +152,11 @@ def _load(controller: str | None) -> Any:
 
     if controller is None:
         return None
-    file, colon, name = controller.rpartition(":")
-    if not colon or not file.endswith(".py"):
-        if not Path(controller).is_file():
-            raise CouplingError(f"{controller}: no such file")
-        return Path(controller)
+    file, name = _file_and_name(controller)
     if not Path(file).is_file():
         raise CouplingError(f"{file}: no such file")
+    if not name:
+        return Path(file)
 
     def anew() -> Callable[..., Any]:
         # what the file keeps by itself, in globals as well, is left behind with its module

@@ -54,6 +54,7 @@ def couple(
     ] = None,
     out: common.OutOrDefault = None,
     json_file: common.JsonFile = None,
+    force: common.Force = False,
     figures: Annotated[bool, typer.Option(help="Draw the signals.")] = True,
 ) -> int:
     """Run a system of FMUs, an SSP archive: signals as CSV, balances, a figure, a verdict.
@@ -68,14 +69,19 @@ def couple(
         from percussion_model.coupling.coupled_run import known_signals, summary
     except ImportError as error:
         return common.print_message(common.needs_extra(error, "fmu"), common.BAD_INPUT)
-    folder = out or Path("out") / system.stem
-    common.check_outputs(folder, json_file)
+    common.check_json(json_file)
     coupling = Coupling(
         system,
         dict(read_value(text) for text in settings or ()),
         order=order,
         every=dict(_read_pace(text) for text in every or ()),
     )
+    claimed = common.claim(
+        "couple", out, Path("out") / system.stem, force, system=common.digest(system),
+        duration=duration, step=step, interval=interval, order=order, tolerance=tolerance,
+        every=every, set=settings, signals=signals,
+    )  # fmt: skip
+    folder = claimed.folder
     wanted = [*known_signals(coupling.outputs), *(signals or ())]
     rows_every = max(step, duration / ROWS) if interval is None else interval
     with progress_bar(duration) as progress:
@@ -96,6 +102,7 @@ def couple(
             from percussion_model.interface.plotting.coupled_signals import save_signals
 
             common.list_files([save_signals(run, folder / "signals.png", system.stem)])
+    claimed.sign()
     return _tell(run.verdict, common.INTERRUPTED if run.interrupted else FAILED)
 
 
