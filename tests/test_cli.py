@@ -281,7 +281,7 @@ def test_ctrl_c_keeps_finished_work(tmp_path):
     assert summary["warnings"][-1].startswith("interrupted at t = ")
     assert summary["blows"] > 0
     names = {path.name for path in (tmp_path / "out").iterdir()}
-    assert names == {"summary.json", "blows.csv", "events.csv", "scene.toml"}
+    assert names == {"summary.json", "blows.csv", "events.csv", "scene.toml", "made_by.json"}
     assert os.listdir(tmp_path) == ["out"]
 
 
