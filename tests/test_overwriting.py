@@ -44,7 +44,7 @@ def test_another_setting_does_not_replace_what_a_named_folder_holds(percussion):
     code, said = percussion(*RUN, "--no-figures", "--out", "x", "--set", "feed.force=150")
     assert code == 2
     assert said == (
-        "percussion: x holds another result (scene.feed.force 2500.0, now 150.0): "
+        "percussion: x holds another result (feed.force 2500.0, now 150.0): "
         "--force replaces it, another --out keeps it"
     )
     assert contents("x") == before

@@ -103,7 +103,11 @@ def _other_than(folder: Path, origin: Mapping[str, Any]) -> str:
     if found.get("command") != origin.get("command"):
         return f"holds the result of `percussion {found.get('command')}`"
     keys = sorted(key for key in found.keys() | origin.keys() if found.get(key) != origin.get(key))
-    shown = [f"{key} {found.get(key, 'not set')}, now {origin.get(key, 'not set')}" for key in keys]
+    shown = [
+        f"{key.removeprefix('scene.')} {found.get(key, 'not set')}, "
+        f"now {origin.get(key, 'not set')}"
+        for key in keys
+    ]
     more = f", and {len(keys) - SHOWN} more" if len(keys) > SHOWN else ""
     return f"holds another result ({'; '.join(shown[:SHOWN])}{more})"
 

@@ -65,7 +65,7 @@ def bench_controller(
     claimed = common.claim(
         "bench-controller", out, Path("out") / "bench-controller", force,
         system=common.digest(system), controller=controller, file=common.digest(source),
-        set=settings, trials=sorted(trials or ()),
+        set=common.by_name(settings), trials=sorted(trials or ()),
     )  # fmt: skip
     scores: list[Score] = []
     interrupted = False

@@ -167,6 +167,11 @@ def _entries(value: Any) -> Any:
     return tomllib.loads(value.to_toml()) if isinstance(value, Scene) else value
 
 
+def by_name(words: list[str] | None) -> dict[str, str]:
+    """Values by name, of words NAME=VALUE."""
+    return {name: value for name, _, value in (word.partition("=") for word in words or ())}
+
+
 def digest(path: Path | None) -> str | None:
     """What a file holds, in short; nothing where there is no file."""
     if path is None or not path.is_file():

@@ -79,7 +79,7 @@ def couple(
     claimed = common.claim(
         "couple", out, Path("out") / system.stem, force, system=common.digest(system),
         duration=duration, step=step, interval=interval, order=order, tolerance=tolerance,
-        every=every, set=settings, signals=signals,
+        every=common.by_name(every), set=common.by_name(settings), signals=signals,
     )  # fmt: skip
     folder = claimed.folder
     wanted = [*known_signals(coupling.outputs), *(signals or ())]
