@@ -15,14 +15,12 @@ import numpy as np
 from percussion_model.physics.records import BLOW, EVENT, EventKind
 from percussion_model.scene.scene import Scene
 from percussion_model.simulation.files import ResultError, plain, staged, to_json
+from percussion_model.simulation.rate import rate_of_blows
 
 if TYPE_CHECKING:
     import pandas
 
 __all__ = ["Result"]
-
-# Fewer whole blows than this tell no rate.
-LEAST_BLOWS = 3
 
 # A longer trace goes into a compressed NumPy file.
 LONGEST_CSV = 100_000
@@ -109,29 +107,16 @@ class Result:
 
     @property
     def rate_of_penetration(self) -> float:
-        """Bit advance by time between the first and the last blow start after settling [m/s]."""
-        blows = self.counted
-        if len(blows) < LEAST_BLOWS:
-            return math.nan
-        first, last = blows[0], blows[-1]
-        advance = last["bit_position"] + last["penetration"] - first["bit_position"]
-        return float(advance / (last["time"] + last["period"] - first["time"]))
+        """Advance of the hole by time between first and last blow start after settling [m/s]."""
+        return rate_of_blows(self.counted)[0]
 
     @property
     def rate_of_penetration_standard_error(self) -> float:
-        """Standard error of the rate, from the scatter from blow to blow [m/s].
+        """Standard error of the rate, from the scatter of the counted blows [m/s].
 
-        That of a ratio of means, s / (sqrt(n) T): s is the standard deviation
-        of (penetration - rate * period) and T the mean period of the n counted
-        blows, which are taken as independent. Zero where the motion is
-        periodic.
+        See `ratio_of_sums`. Zero where the motion is periodic.
         """
-        blows = self.counted
-        if len(blows) < LEAST_BLOWS:
-            return math.nan
-        off = blows["penetration"] - self.rate_of_penetration * blows["period"]
-        scatter = math.sqrt(float(np.sum(off * off)) / (len(blows) - 1))
-        return scatter / (math.sqrt(len(blows)) * float(np.mean(blows["period"])))
+        return rate_of_blows(self.counted)[1]
 
     @property
     def mean_bit_force(self) -> float:

@@ -9,7 +9,8 @@ import numpy as np
 
 from percussion_model.physics.records import EventKind
 from percussion_model.scene.scales import barrier_shares
-from percussion_model.simulation.result import LEAST_BLOWS, Result
+from percussion_model.simulation.rate import LEAST_BLOWS
+from percussion_model.simulation.result import Result
 from percussion_model.simulation.validity import (
     barrier_note,
     button_note,
@@ -124,8 +125,7 @@ def _about_validity(result: Result) -> Iterator[str]:
         yield from button_note(peak, scene.rock.loading_stiffness)
     if result.solver != "blow-map":  # there the bit stands on the rock between blows
         yield from flight_note(longest_flight(result))
-    rate = result.rate_of_penetration
-    yield from rate_note(rate, result.rate_of_penetration_standard_error)
+    yield from rate_note(result.rate_of_penetration)
     if scene.loss_on and scene.loss.time > scene.bit.transit_time:
         yield (
             f"loss.time = {scene.loss.time:.3g} s is longer than a wave takes through the bit: "
