@@ -120,10 +120,9 @@ def invented(rate, scatter=0.0, blows=50, cells=20, misfit=0.0, duration=4.0):
     rows = np.zeros(blows, BLOW)
     rows["period"] = 0.05
     rows["time"] = 1.0 + 0.05 * np.arange(blows)
-    off = np.where(np.arange(blows) % 2, 1.0, -1.0) * scatter
+    off = np.random.default_rng(blows).standard_normal(blows)
     off -= off.mean()
-    rows["penetration"] = 0.05 * (rate + off)
-    rows["bit_position"] = np.concatenate([[0.0], np.cumsum(rows["penetration"])[:-1]])
+    rows["hole_advance"] = 0.05 * (rate + scatter * off / off.std())
     return Result(
         scene=Scene(),
         solver="wave",

@@ -155,7 +155,7 @@ class Result:
             "blow_frequency": 1.0 / period,
             **{name: _mean(rows[name]) for name in _MEANS},
             "transfer_efficiency": _ratio(rows, "rock_energy", "blow_energy"),
-            "penetration_per_blow": _mean(rows["penetration"]),
+            "penetration_per_blow": _mean(rows["hole_advance"]),
             "contacts_per_blow": _mean(rows["contacts"]),
             "drilling_cycles_per_blow": _mean(rows["drilling_cycles"]),
             "peak_bit_force": _greatest(rows["peak_bit_force"]),
