@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from examples.shared import BLACK, GREEN, GREY
+from percussion_model.simulation.rate import rate_of_blows
 
 # Impact velocities that differ by less, relative, are the same.
 SAME = 1e-3
@@ -53,5 +54,3 @@ def branch_of(values: np.ndarray, rows: list[np.ndarray]) -> Branch:
     velocity = np.array([blows["impact_velocity"] for blows in rows])
     rate, error = np.array([rate_of_blows(blows) for blows in rows]).T
     return Branch(values[up], velocity[up], rate[up], error[up])
-
-

@@ -245,6 +245,16 @@ def test_what_cannot_be_written_is_said_before(rigid, tmp_path):
             rigid.save(folder)
 
 
+def test_an_older_blow_table_tells_no_rate_and_says_so(rigid, tmp_path):
+    rigid.save(tmp_path)
+    table = rigid.to_pandas().drop(columns=["hole_depth", "hole_advance"])
+    table.to_csv(tmp_path / "blows.csv", index=False)
+    loaded = Result.load(tmp_path)
+    assert loaded.summary()["rate_of_penetration"] is None
+    assert "run the scene again" in loaded.warnings[-1]
+    np.testing.assert_array_equal(loaded.blows["penetration"], rigid.blows["penetration"])
+
+
 def test_what_is_no_result_is_refused(tmp_path):
     with pytest.raises(ResultError, match="no such result folder"):
         Result.load(tmp_path / "none")

@@ -80,7 +80,7 @@ OUTPUTS: dict[str, Output] = {
     "blow_energy": Output("J", 0.0, _ENERGY, 1e2, "kinetic energy of the piston's mean motion at the start of the last whole blow", _blow("blow_energy")),
     "transfer_efficiency": Output("1", -1e3, 1e3, 1.0, "energy given to the rock in the last whole blow, divided by blow_energy", _efficiency),
     "blow_frequency": Output("Hz", 0.0, 1e6, 10.0, "blows per time, from the last whole blow; falls towards 0 after two missed periods", _frequency),
-    "penetration_per_blow": Output("m", -_FAR, _FAR, 1e-3, "advance of the bit over the last whole blow", _blow("penetration")),
+    "penetration_per_blow": Output("m", -_FAR, _FAR, 1e-3, "advance of the hole over the last whole blow", _blow("hole_advance")),
     "blow_time": Output("s", 0.0, 1e9, 1.0, "start of the last whole blow, since the start of the simulation", _blow("time")),
     "blow_position": Output("m", -_FAR, _FAR, 1e-2, "bit.position at the start of the last whole blow", _blow("bit_position")),
     "casing_force": Output("N", -_FORCE, _FORCE, 1e3, "reaction of the drive on the casing, down positive", _sample("drive_force", -1.0)),

@@ -298,6 +298,9 @@ def _read_result(folder: Path) -> dict[str, Any]:
             value = summary.get(name)  # unknown to older files
             fields[name] = math.nan if value is None else value
         blows = _read_csv(folder / "blows.csv", float)
+        if not set(blows) >= _HOLE:
+            fields["warnings"].append(_NO_HOLE)
+            blows |= dict.fromkeys(_HOLE, [math.nan] * len(blows["time"]))
         events = _read_csv(folder / "events.csv", _number_or_kind)
         tables = {"blows": _rows(blows, BLOW), "events": _rows(events, EVENT)}
         return {"scene": scene, **fields, **tables, "trace": _read_trace(folder)}
@@ -323,6 +326,12 @@ _FROM_SUMMARY = (
 
 
 _RATES = ("rate_of_penetration_relative_error", "rate_of_penetration_fixed_window")
+# Columns that the blow tables of older files do not have, and what is said then.
+_HOLE = {"hole_depth", "hole_advance"}
+_NO_HOLE = (
+    "saved before results had the depth of the hole: the rate of penetration is undefined; "
+    "run the scene again"
+)
 
 
 def _number_or_kind(text: str) -> float:

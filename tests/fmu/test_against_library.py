@@ -12,7 +12,7 @@ from percussion_model.physics.records import READING
 # Random steps between the shortest and the longest of a master [s].
 SHORTEST, LONGEST = 1e-6, 0.06
 BLOW = ("blow_time", "blow_position", "impact_velocity", "piston.stroke", "penetration_per_blow")
-COLUMNS = ("time", "bit_position", "impact_velocity", "stroke", "penetration")
+COLUMNS = ("time", "bit_position", "impact_velocity", "stroke", "hole_advance")
 RIGID = {"piston.model": "rigid", "bit.model": "rigid"}
 
 
@@ -111,7 +111,8 @@ def test_an_input_of_the_same_value_changes_no_bit(make, library):
 
 def test_outputs_between_the_blows_are_those_of_the_library(make, library):
     names = {
-        "hole_depth": "hole_depth", "bit.position": "bit_position", "bit.velocity": "bit_velocity", "bit.force": "bit_force",
+        "hole_depth": "hole_depth",
+        "bit.position": "bit_position", "bit.velocity": "bit_velocity", "bit.force": "bit_force",
         "contact.force": "contact_force", "piston.position": "piston_position",
         "piston.velocity": "piston_velocity", "bit.impulse": "bit_impulse",
         "contact.impulse": "contact_impulse", "drilling_mode": "drilling_mode",
