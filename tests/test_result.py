@@ -131,6 +131,16 @@ def test_a_fixed_window_survives_calls_and_snapshots(rigid):
 # ----------------------------------------------------------------------- warnings
 
 
+@pytest.mark.parametrize("error_estimate", [False, True])
+def test_a_rate_that_scatters_says_so_once(error_estimate):
+    scene = RIGID.replace(**{"feed.force": 150.0})
+    result = simulate(scene, 3.0, settle=1.0, error_estimate=error_estimate)
+    error = result.rate_of_penetration_standard_error / result.rate_of_penetration
+    assert error > 0.01
+    (warning,) = (text for text in result.warnings if "standard error" in text)
+    assert f"{100.0 * error:.2g} %" in warning
+
+
 def test_few_blows_tell_no_rate():
     result = simulate(RIGID, 0.12, settle=0.0)
     assert result.summary()["rate_of_penetration"] is None
@@ -248,7 +258,7 @@ def test_what_cannot_be_written_is_said_before(rigid, tmp_path):
 def test_an_older_blow_table_tells_no_rate_and_says_so(rigid, tmp_path):
     rigid.save(tmp_path)
     table = rigid.to_pandas().drop(columns=["hole_depth", "hole_advance"])
-    table.to_csv(tmp_path / "blows.csv", index=False)
+    table.to_csv(tmp_path / "blows.csv", index=False, na_rep="nan")
     loaded = Result.load(tmp_path)
     assert loaded.summary()["rate_of_penetration"] is None
     assert "run the scene again" in loaded.warnings[-1]

@@ -11,6 +11,8 @@ import numpy as np
 
 # Fewer whole blows than this tell no rate.
 LEAST_BLOWS = 3
+# A rate that is known no better than this, relative to it, deserves a warning.
+LARGE_ERROR = 1e-2
 # Fewer than this do not tell how they depend on each other: they count as independent.
 FEWEST_DEPENDENT = 20
 # Stretches that tell how scatter grows have this share of all blows. Longer ones are too few,

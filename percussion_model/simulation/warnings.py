@@ -9,7 +9,7 @@ import numpy as np
 
 from percussion_model.physics.records import EventKind
 from percussion_model.scene.scales import barrier_shares
-from percussion_model.simulation.rate import LEAST_BLOWS
+from percussion_model.simulation.rate import LARGE_ERROR, LEAST_BLOWS
 from percussion_model.simulation.result import Result
 from percussion_model.simulation.validity import (
     barrier_note,
@@ -109,6 +109,12 @@ def _about_blows(result: Result) -> Iterator[str]:
         yield (
             f"only {count} whole blow{'s' if count != 1 else ''} after settling, fewer than "
             f"{LEAST_BLOWS}: the rate of penetration is undefined; run longer"
+        )
+    rate, scatter = result.rate_of_penetration, result.rate_of_penetration_standard_error
+    if rate > 0.0 and scatter > LARGE_ERROR * rate:
+        yield (
+            f"blows do not repeat: the rate of penetration has a standard error of "
+            f"{100.0 * scatter / rate:.2g} %; a longer run.duration (--duration) averages more"
         )
 
 
