@@ -67,7 +67,7 @@ def recoverable(s):
 
 @inlined
 def hole_depth(par, s):
-    """Depth of the rock's surface if the bit were unloaded now (docs/model.md, eq. 24) [m]."""
+    """Depth of the rock's surface if the bit were unloaded now (docs/model.md, eq. 20a) [m]."""
     if par.rock != RockKind.BILINEAR:
         return 0.0
     surface = s.p_u
