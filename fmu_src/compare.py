@@ -26,7 +26,7 @@ STEP_SIZE = 0.01  # of the communication [s]
 ROWS = (
     ("start of the last blow", 1.0, "s", "blow_time", "time"),
     ("depth at its start", 1e3, "mm", "blow_position", "bit_position"),
-    ("penetration", 1e3, "mm", "penetration_per_blow", "penetration"),
+    ("penetration", 1e3, "mm", "penetration_per_blow", "hole_advance"),
     ("impact velocity", 1.0, "m/s", "impact_velocity", "impact_velocity"),
     ("blow energy", 1.0, "J", "blow_energy", "blow_energy"),
     ("stroke", 1e3, "mm", "piston.stroke", "stroke"),
@@ -68,10 +68,10 @@ def describe(both: dict[str, Any], settle: float) -> str:
         lines.append(f"{f'{label} [{unit}]':24}{a:16.9g}{b:16.9g}{difference:14.2g}")
 
     rates = [
-        _rate(table, time_name, position, settle)
-        for table, time_name, position in (
-            (fmu, "blow_time", "blow_position"),
-            (library, "time", "bit_position"),
+        _rate(table, time_name, advance, settle)
+        for table, time_name, advance in (
+            (fmu, "blow_time", "penetration_per_blow"),
+            (library, "time", "hole_advance"),
         )
     ]
     a, b = (1e3 * rate for rate in rates)
@@ -87,11 +87,11 @@ def describe(both: dict[str, Any], settle: float) -> str:
     return "\n".join(lines)
 
 
-def _rate(table: Any, time_name: str, position: str, settle: float) -> float:
-    """Bit advance by time from the first to the last blow start after settling [m/s]."""
+def _rate(table: Any, time_name: str, advance: str, settle: float) -> float:
+    """Advance of the hole by time from the first to the last blow start after settling [m/s]."""
     counted = table[table[time_name] >= settle]
-    advance = counted[position][-1] - counted[position][0]
-    return float(advance / (counted[time_name][-1] - counted[time_name][0]))
+    took = counted[time_name][-1] - counted[time_name][0]
+    return float(np.sum(counted[advance][:-1]) / took)
 
 
 def main() -> int:

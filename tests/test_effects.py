@@ -129,7 +129,7 @@ def test_what_an_effect_makes_something_else_is_not_compared(rigid):
 
 def test_a_rate_that_scatter_hides_is_no_change(rigid):
     blows = rigid.base.result.blows.copy()
-    blows["penetration"] *= 1.0 + 40.0 * (-1.0) ** (blows["time"] * 1e6).astype(int)
+    blows["hole_advance"] *= 1.0 + 40.0 * (-1.0) ** (blows["time"] * 1e6).astype(int)
     hidden = replace(rigid.trials[0], result=replace(rigid.base.result, blows=blows))
     assert hidden.undecided
     assert rigid.changes(hidden)["rate_of_penetration"] is None

@@ -16,14 +16,12 @@ from percussion_model.physics.records import BLOW, EVENT, EventKind
 from percussion_model.scene.scene import Scene
 from percussion_model.simulation.files import ResultError, plain, staged, to_json
 from percussion_model.simulation.origin import ORIGIN
+from percussion_model.simulation.rate import rate_of_blows
 
 if TYPE_CHECKING:
     import pandas
 
 __all__ = ["Result"]
-
-# Fewer whole blows than this tell no rate.
-LEAST_BLOWS = 3
 
 # A longer trace goes into a compressed NumPy file.
 LONGEST_CSV = 100_000
@@ -110,29 +108,16 @@ class Result:
 
     @property
     def rate_of_penetration(self) -> float:
-        """Bit advance by time between the first and the last blow start after settling [m/s]."""
-        blows = self.counted
-        if len(blows) < LEAST_BLOWS:
-            return math.nan
-        first, last = blows[0], blows[-1]
-        advance = last["bit_position"] + last["penetration"] - first["bit_position"]
-        return float(advance / (last["time"] + last["period"] - first["time"]))
+        """Advance of the hole by time between first and last blow start after settling [m/s]."""
+        return rate_of_blows(self.counted)[0]
 
     @property
     def rate_of_penetration_standard_error(self) -> float:
-        """Standard error of the rate, from the scatter from blow to blow [m/s].
+        """Standard error of the rate, from the scatter of the counted blows [m/s].
 
-        That of a ratio of means, s / (sqrt(n) T): s is the standard deviation
-        of (penetration - rate * period) and T the mean period of the n counted
-        blows, which are taken as independent. Zero where the motion is
-        periodic.
+        See `ratio_of_sums`. Zero where the motion is periodic.
         """
-        blows = self.counted
-        if len(blows) < LEAST_BLOWS:
-            return math.nan
-        off = blows["penetration"] - self.rate_of_penetration * blows["period"]
-        scatter = math.sqrt(float(np.sum(off * off)) / (len(blows) - 1))
-        return scatter / (math.sqrt(len(blows)) * float(np.mean(blows["period"])))
+        return rate_of_blows(self.counted)[1]
 
     @property
     def mean_bit_force(self) -> float:
@@ -171,7 +156,7 @@ class Result:
             "blow_frequency": 1.0 / period,
             **{name: _mean(rows[name]) for name in _MEANS},
             "transfer_efficiency": _ratio(rows, "rock_energy", "blow_energy"),
-            "penetration_per_blow": _mean(rows["penetration"]),
+            "penetration_per_blow": _mean(rows["hole_advance"]),
             "contacts_per_blow": _mean(rows["contacts"]),
             "drilling_cycles_per_blow": _mean(rows["drilling_cycles"]),
             "peak_bit_force": _greatest(rows["peak_bit_force"]),
@@ -314,6 +299,9 @@ def _read_result(folder: Path) -> dict[str, Any]:
             value = summary.get(name)  # unknown to older files
             fields[name] = math.nan if value is None else value
         blows = _read_csv(folder / "blows.csv", float)
+        if not set(blows) >= _HOLE:
+            fields["warnings"].append(_NO_HOLE)
+            blows |= dict.fromkeys(_HOLE, [math.nan] * len(blows["time"]))
         events = _read_csv(folder / "events.csv", _number_or_kind)
         tables = {"blows": _rows(blows, BLOW), "events": _rows(events, EVENT)}
         return {"scene": scene, **fields, **tables, "trace": _read_trace(folder)}
@@ -339,6 +327,12 @@ _FROM_SUMMARY = (
 
 
 _RATES = ("rate_of_penetration_relative_error", "rate_of_penetration_fixed_window")
+# Columns that the blow tables of older files do not have, and what is said then.
+_HOLE = {"hole_depth", "hole_advance"}
+_NO_HOLE = (
+    "saved before results had the depth of the hole: the rate of penetration is undefined; "
+    "run the scene again"
+)
 
 
 def _number_or_kind(text: str) -> float:
