@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import sys
 from collections.abc import Callable
+from contextlib import nullcontext
 from typing import Annotated, Any
 
 import typer
@@ -26,6 +27,7 @@ from percussion_model.interface.commands.paper import paper
 from percussion_model.interface.commands.scene import explain, new, plot, run, settled
 from percussion_model.interface.commands.stability import stability
 from percussion_model.interface.commands.study import study
+from percussion_model.interface.progress import lines
 
 app = typer.Typer(
     help="Percussive drilling with travelling waves: piston, bit and rock, blow by blow.",
@@ -53,13 +55,17 @@ def _options(
     """Percussive drilling with travelling waves: piston, bit and rock, blow by blow."""
 
 
-def _interruptible(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Let `_guarded` know of Ctrl-C, after which typer would end without a word."""
+def _heard(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Tell on a pipe that a command still runs, and let `_guarded` know of Ctrl-C.
+
+    After Ctrl-C typer would end without a word.
+    """
 
     @functools.wraps(command)
     def call(*words: Any, **options: Any) -> Any:
         try:
-            return command(*words, **options)
+            with nullcontext() if sys.stderr.isatty() else lines("still running"):
+                return command(*words, **options)
         except KeyboardInterrupt:
             raise typer.Abort from None
 
@@ -82,8 +88,8 @@ for _command in (
     bench_controller,
     new,
 ):
-    app.command()(_interruptible(_command))
-app.command("blow-map")(_interruptible(blow_map))
+    app.command()(_heard(_command))
+app.command("blow-map")(_heard(blow_map))
 
 
 def main() -> None:

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import gc
+import os
+import shutil
 import sys
+import textwrap
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -112,7 +115,21 @@ def load_scene(
     if cells is not None:
         key = "fem.elements" if scene.solver_name == "fem" else "solver.cells"
         scene = scene.replace(**{key: cells})
+    tell_of_compiling(scene.solver_name)
     return scene
+
+
+def tell_of_compiling(*solvers: str) -> None:
+    """Say on stderr that kernels are going to be compiled, where numba does not keep them yet."""
+    from percussion_model.solvers.base import place_of_kernels
+
+    places = {name: place_of_kernels(name) for name in solvers}
+    new = {name: place for name, place in places.items() if place is not None}
+    if new:
+        print_message(
+            f"compiling the kernels of the solver {' and '.join(new)}: once, for about half a "
+            f"minute{' each' * (len(new) > 1)}; they are kept in {', '.join(map(str, new.values()))}"
+        )
 
 
 def check_outputs(folder: Path | None, json_file: str | None) -> None:
@@ -143,6 +160,7 @@ def write_json(json_file: str | None, values: dict[str, Any]) -> None:
         typer.echo(to_json(values))
     elif json_file is not None:
         staged_text(Path(json_file), to_json(values) + "\n")
+        list_files([Path(json_file)])
 
 
 @contextmanager
@@ -155,9 +173,19 @@ def if_drawable() -> Iterator[None]:
 
 
 def list_files(paths: Iterable[Path]) -> None:
-    """Name on stderr the files that were written."""
+    """Name on stderr the files that were written, folder by folder."""
+    folders: dict[Path, list[str]] = {}
     for path in paths:
-        print(f"wrote {path}", file=sys.stderr)
+        folders.setdefault(path.parent, []).append(path.name)
+    for folder, names in folders.items():
+        text = f"wrote {folder / names[0]}" if len(names) == 1 else (
+            f"wrote to {folder}{os.sep}: {', '.join(names)}"
+        )  # fmt: skip
+        shown = textwrap.wrap(
+            text, shutil.get_terminal_size().columns, subsequent_indent="  ",
+            break_long_words=False, break_on_hyphens=False,
+        )  # fmt: skip
+        print(*shown, sep="\n", file=sys.stderr)
 
 
 def needs_plot_extra(error: ImportError) -> str:

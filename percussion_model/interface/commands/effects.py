@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -32,11 +31,13 @@ def effects(
     Prints a table, and draws a figure in out/SCENE-effects.
     """
     from percussion_model.analysis.effect_study import study_effects
+    from percussion_model.interface.terminal import progress
 
     chosen = common.load_scene(scene, solver, cells, settings)
     folder = out or Path("out") / f"{scene.stem}-effects"
     common.check_outputs(folder if figures else None, json_file)
-    found = study_effects(chosen, duration, settle, _report)
+    with progress("effects") as report:
+        found = study_effects(chosen, duration, settle, report)
     common.write_json(json_file, found.to_dict())
     if json_file != "-":
         show_effects(found)
@@ -49,16 +50,8 @@ def effects(
             common.list_files(files)
 
 
-def _report(what: str, share: float) -> None:
-    """Say on a terminal what is done next."""
-    if sys.stderr.isatty():
-        print(f"\r\033[K{share:4.0%} {what}", end="" if share < 1.0 else "\n", file=sys.stderr)
-
-
 # A longer name of an effect takes two lines.
 LONGEST_NAME = 15
-# More characters than any table has.
-ENDLESS = 1000
 
 # Columns: heading, and what stands in it.
 _COLUMNS: dict[str, Callable[[EffectsStudy, Trial, dict[str, Any]], str]] = {
@@ -94,6 +87,8 @@ def show_effects(found: EffectsStudy) -> None:
     from rich.markup import escape
     from rich.table import Table
 
+    from percussion_model.interface.tables import print_table
+
     headings, rows, reasons = table_of(found)
     table = Table(
         title=escape(found.scene.title) or None,
@@ -107,9 +102,7 @@ def show_effects(found: EffectsStudy) -> None:
     for name, *cells in rows:
         table.add_row(_two_lines(name), *cells)
     console = Console()
-    # In a narrow terminal lines are broken rather than numbers cut short.
-    whole = Console(width=ENDLESS).measure(table).maximum
-    Console(width=max(console.width, whole)).print(table)
+    print_table(table, console)
     for reason in dict.fromkeys(reasons.values()):
         names = ", ".join(name for name, given in reasons.items() if given == reason)
         console.print(f"[yellow]{escape(names)}:[/yellow] {escape(reason)}", highlight=False)

@@ -53,17 +53,21 @@ def run(
             progress=progress,
             on_interrupt="keep",
             error_estimate=error_estimate,
+            stage=progress.stage,
         )
-    interrupted = result.cut_short
+    files: list[Path] = []
     if out is not None:
-        result.save(out)
-        if figures and not interrupted:
-            _draw(result, out)
-    common.write_json(json_file, result.summary())
+        files += result.save(out)
+        if figures and not result.cut_short:
+            files += _draw(result, out)
     if json_file != "-":
         show_summary(result)
-    if interrupted:
-        common.print_message(result.warnings[-1])
+    if result.interrupted:
+        told = (text for text in result.warnings if text.startswith("interrupted"))
+        common.print_message(next(told, "interrupted before its error was known"))
+    common.list_files(files)
+    common.write_json(json_file, result.summary())
+    if result.interrupted:
         raise typer.Exit(common.INTERRUPTED)
 
 
@@ -77,12 +81,14 @@ def settled(
 ) -> None:
     """Run until the blows repeat: rate, period, order and stability of the cycle."""
     from percussion_model.analysis.stationary import settled as run_until_settled
-    from percussion_model.interface.terminal import progress_bar, show_settled
+    from percussion_model.interface.terminal import progress, show_settled
 
     common.check_json(json_file)
     chosen = common.load_scene(scene, solver, cells, settings)
-    with progress_bar(0.0):
-        found = run_until_settled(chosen, tolerance)
+    with progress("preparing") as report:
+        found = run_until_settled(
+            chosen, tolerance, progress=lambda count: report(f"{count} blows", None)
+        )
     common.write_json(json_file, found.summary())
     if json_file != "-":
         show_settled(found)
@@ -99,13 +105,13 @@ def explain(
 ) -> None:
     """Tell what a scene computes, how, and what the run will cost; makes no blow map."""
     from percussion_model.analysis.cost import explained, forecast
-    from percussion_model.interface.terminal import progress_bar, show_explanation
+    from percussion_model.interface.terminal import progress, show_explanation
 
     chosen = common.load_scene(scene, solver, cells, settings, accuracy, check)
     common.check_json(json_file)
     if chosen.solver_name == "blow-map":
         warn_of_outside(chosen)
-    with progress_bar(0.0):
+    with progress("trying the first blows"):
         found = forecast(chosen)
     common.write_json(json_file, explained(chosen, found))
     if json_file != "-":
@@ -159,12 +165,15 @@ def new(
     typer.echo(f"wrote {file}")
 
 
-def _draw(result: Result, folder: Path) -> None:
+def _draw(result: Result, folder: Path) -> list[Path]:
     """Write figures and report; the results are safe already."""
+    files: list[Path] = []
     with common.if_drawable():
         from percussion_model.interface.plotting import figures
         from percussion_model.interface.report import why_not_interactive, write_report
 
         if remark := why_not_interactive():
             common.print_message(remark)
-        write_report(result, folder, figures(result, folder))
+        files += figures(result, folder)
+        files.append(write_report(result, folder, files))
+    return files
