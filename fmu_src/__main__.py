@@ -10,6 +10,7 @@ from fmu_src.archive import ROOT
 from fmu_src.hammer.build import build_hammer
 from fmu_src.parts import pneumatic_drive
 from fmu_src.parts.build import build_part
+from percussion_model.interface.terminal import progress
 from percussion_model.scene.scene import Scene, SceneError
 
 DEFAULT = ROOT / "dist" / "PercussiveHammer.fmu"
@@ -44,7 +45,8 @@ def main(arguments: list[str]) -> int:
             from percussion_model.interface.commands.blow_map import ready_map
 
             table = ready_map(scene)
-        guid = build_hammer(scene, choice.output, table)
+        with progress("building the FMU"):
+            guid = build_hammer(scene, choice.output, table)
     except (SceneError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 1
@@ -52,7 +54,9 @@ def main(arguments: list[str]) -> int:
     if not choice.no_reference:
         from fmu_src.reference import write_reference
 
-        for path in write_reference(choice.output):
+        with progress("running the FMU; the first run compiles"):
+            files = write_reference(choice.output)
+        for path in files:
             print(path)
     return 0
 

@@ -17,6 +17,7 @@ from fmpy import simulate_fmu
 from fmu_src.__main__ import DEFAULT
 from fmu_src.archive import ROOT
 from fmu_src.hammer.build import build_hammer
+from percussion_model.interface.terminal import progress
 from percussion_model.scene.scene import Scene
 from percussion_model.simulation.simulate import simulate
 
@@ -97,7 +98,8 @@ def _rate(table: Any, time_name: str, position: str, settle: float) -> float:
 def main() -> int:
     """Compare on the reference scene."""
     scene = Scene.from_toml(ROOT / "scenarios" / "reference.toml")
-    both = run_both(scene, DEFAULT)
+    with progress("running the FMU and the library"):
+        both = run_both(scene, DEFAULT)
     print(f"The reference hammer for {scene.run.duration:g} s; the FMU is {DEFAULT}\n")
     print(describe(both, scene.run.settle), flush=True)
     return 0

@@ -16,6 +16,7 @@ from fmu_src.system.archive import (
     read_plan,
     write_system,
 )
+from percussion_model.interface.terminal import progress
 from percussion_model.scene.scene import SceneError
 
 
@@ -31,12 +32,14 @@ def main(arguments: list[str]) -> int:
     checked = set()
     try:
         for plan in [read_plan(path) for path in choice.systems] or plans():
-            fmus = build_fmus(plan, choice.output)
+            with progress(f"building {plan.name}"):
+                fmus = build_fmus(plan, choice.output)
             for fmu in fmus.values():
                 if fmu in checked:
                     continue
                 checked.add(fmu)
-                found = validate_fmu(str(fmu))
+                with progress(f"validating {fmu.name}"):
+                    found = validate_fmu(str(fmu))
                 print(f"{fmu}: {'valid' if not found else '; '.join(found)}", flush=True)
                 problems += len(found)
             print(write_system(plan, fmus, choice.output / f"{plan.name}.ssp"), flush=True)

@@ -45,7 +45,7 @@ class CoupledRun:
         Whether it was Ctrl-C that ended it.
     """
 
-    columns: dict[str, np.ndarray]
+    columns: dict[str, np.ndarray] = field(repr=False)
     step: float
     steps: int
     error: str = ""

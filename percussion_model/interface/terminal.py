@@ -6,7 +6,6 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
@@ -67,10 +66,8 @@ def show_summary(result: Result) -> None:
     rate = rate_text(summary)
     if len(result.blows):
         table.add_row(RATE[0], rate, RATE[3] + NUMERICAL * ("±" in rate))
-        rows, values = SHOWN, summary
-    else:
-        rows, values = WITHOUT_BLOWS, summary["fall"]
-    for name, key, factor, unit in rows:
+    values = summary if len(result.blows) else summary["fall"]
+    for name, key, factor, unit in SHOWN if len(result.blows) else WITHOUT_BLOWS:
         if values.get(key) is not None:
             table.add_row(name, f"{factor * values[key]:.5g}", unit)
     energy = summary["energy"]
@@ -115,18 +112,18 @@ def show_settled(found: Settled) -> None:
     print_table(table)
 
 
-def show_study(found: Study, files: list[Path]) -> None:
-    """Print the headlines of a study, and its files."""
+def show_study(found: Study) -> None:
+    """Print the headlines of a study, and how many of its points failed."""
     table = Table(show_header=False)
     for name, text in found.headlines():
         table.add_row(name, text)
-    table.add_row("Written", ", ".join(str(path) for path in files))
     console = Console()
     print_table(table, console)
     failed = [k for k, text in enumerate(found.failures) if text]
     if failed:
         first = f"{found.points.changes(failed[0])}: {found.failures[failed[0]]}"
-        show_warnings(console, [f"{len(failed)} points failed, the first at {first}"])
+        count = f"{len(failed)} of {len(found.points)} points failed"
+        show_warnings(console, [f"{count}, the first at {first}"])
 
 
 def show_warnings(console: Console, warnings: list[str]) -> None:

@@ -90,6 +90,10 @@ class Scene:
         faults.refuse()
         refuse_contradictions(self)
 
+    def __repr__(self) -> str:
+        own = (key for key in sorted(self.given) if self[key] != self.row_of(key).default)
+        return f"Scene({', '.join([repr(self.title), *(f'{key}={self[key]!r}' for key in own)])})"
+
     @classmethod
     def from_toml(cls, path: str | Path) -> Self:
         """Read a scene file.

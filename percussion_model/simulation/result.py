@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from percussion_model.physics.records import BLOW, EVENT, EventKind, Mode
 from percussion_model.physics.effects import EFFECTS
+from percussion_model.physics.records import BLOW, EVENT, EventKind, Mode
 from percussion_model.scene.scene import Scene
 from percussion_model.simulation.files import ResultError, plain, staged, to_json
 

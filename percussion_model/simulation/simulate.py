@@ -8,7 +8,7 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from types import FrameType
 from typing import Any, Literal
 
@@ -58,9 +58,9 @@ class Snapshot:
 
     scene: Scene
     time: float
-    state: State
-    blows: tuple[np.ndarray, ...]
-    events: tuple[np.ndarray, ...]
+    state: State = field(repr=False)
+    blows: tuple[np.ndarray, ...] = field(repr=False)
+    events: tuple[np.ndarray, ...] = field(repr=False)
     settled_position: float
 
 

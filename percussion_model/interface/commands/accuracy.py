@@ -65,6 +65,7 @@ def accuracy(
     chosen_ladders(words)  # refuses before anything is computed
     folder = out or Path("out") / "accuracy"
     common.check_json(json_file)
+    common.tell_of_compiling("wave", "fem", "rigid")
     if make_references:
         for _, scene in chosen:
             show_bars(_make_reference(scene))

@@ -126,9 +126,10 @@ def tell_of_compiling(*solvers: str) -> None:
     places = {name: place_of_kernels(name) for name in solvers}
     new = {name: place for name, place in places.items() if place is not None}
     if new:
+        long = "half a minute each" if len(new) > 1 else "half a minute"
         print_message(
-            f"compiling the kernels of the solver {' and '.join(new)}: once, for about half a "
-            f"minute{' each' * (len(new) > 1)}; they are kept in {', '.join(map(str, new.values()))}"
+            f"compiling the kernels of the solver {' and '.join(new)}: once, for about {long}; "
+            f"they are kept in {', '.join(map(str, new.values()))}"
         )
 
 

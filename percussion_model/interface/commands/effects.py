@@ -36,6 +36,7 @@ def effects(
     chosen = common.load_scene(scene, solver, cells, settings)
     folder = out or Path("out") / f"{scene.stem}-effects"
     common.check_outputs(folder if figures else None, json_file)
+    common.tell_of_compiling(*(name for name in ("wave", "rigid") if name != chosen.solver_name))
     with progress("effects") as report:
         found = study_effects(chosen, duration, settle, report)
     common.write_json(json_file, found.to_dict())

@@ -48,6 +48,7 @@ def paper(
     from percussion_model.verification.paper.rock_law import run_sinking
     from percussion_model.verification.paper.runs import paper_scene, run_drops
 
+    common.tell_of_compiling("wave", "fem", "rigid")
     scene = paper_scene()
     with progress("drop tests and sinking, figure 6"):
         drops, sinking = run_drops(scene), run_sinking(scene)

@@ -37,14 +37,15 @@ def run(
     ] = True,
 ) -> None:
     """Run a scene; print a short table, write results with --out."""
-    from percussion_model.interface.terminal import progress_bar, show_summary
+    from percussion_model.interface import terminal
     from percussion_model.simulation.simulate import simulate
 
     chosen = common.load_scene(scene, solver, cells, settings, accuracy, check)
     common.check_outputs(out, json_file)
     if chosen.solver_name == "blow-map":
         ready_map(chosen)
-    with progress_bar(chosen.run.duration if duration is None else duration) as progress:
+    end = chosen.run.duration if duration is None else duration
+    with terminal.progress_bar(end) as progress:
         result = simulate(
             chosen,
             duration,
@@ -59,9 +60,10 @@ def run(
     if out is not None:
         files += result.save(out)
         if figures and not result.cut_short:
-            files += _draw(result, out)
+            with terminal.progress("drawing"):
+                files += _draw(result, out)
     if json_file != "-":
-        show_summary(result)
+        terminal.show_summary(result)
     if result.interrupted:
         told = (text for text in result.warnings if text.startswith("interrupted"))
         common.print_message(next(told, "interrupted before its error was known"))
@@ -146,8 +148,9 @@ def plot(
         result = Result.load(source)
     else:
         scene = Scene.from_toml(source)
+        common.tell_of_compiling(scene.solver_name)
         with progress_bar(scene.run.duration if duration is None else duration) as progress:
-            result = simulate(scene, duration, settle, progress=progress)
+            result = simulate(scene, duration, settle, progress=progress, stage=progress.stage)
     for path in figures(result, folder):
         typer.echo(str(path))
 

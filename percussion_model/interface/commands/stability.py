@@ -36,10 +36,11 @@ def stability(
 ) -> None:
     """Run the hard cases by every solver: what must hold, and where solvers disagree."""
     from percussion_model.interface.terminal import count_bar, show_stability
-    from percussion_model.verification.hard_cases import run_collection
+    from percussion_model.verification.hard_cases import SOLVERS, run_collection
 
     common.check_outputs(out, json_file)
     names = [name.strip() for name in solvers.split(",")]
+    common.tell_of_compiling(*(name for name in names if name in SOLVERS))
     with count_bar("runs of hard cases") as progress:
         found = run_collection(cases or None, names, share, refined, workers, progress)
     common.write_json(json_file, found.to_dict())

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from typing import Any
 
 from percussion_model.scene.scene import Scene
@@ -105,10 +105,10 @@ class Study:
     kind: str
     duration: float
     period: float
-    reference: Reference
-    points: list[Point]
-    compilation: dict[str, float]
-    machine: dict[str, Any]
+    reference: Reference = field(repr=False)
+    points: list[Point] = field(repr=False)
+    compilation: dict[str, float] = field(repr=False)
+    machine: dict[str, Any] = field(repr=False)
 
     @property
     def quantities(self) -> tuple[str, ...]:
