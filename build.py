@@ -22,7 +22,7 @@ VENV = ROOT / ".venv"
 STAMP = VENV / "percussion_model.stamp"
 OLDEST_PYTHON = (3, 11)
 INTERRUPTED = 130  # what shells report for Ctrl-C
-EVERY = 4.0  # between lines that say that a silent program still runs [s]
+EVERY = 3.0  # between lines that say that a silent program still runs [s]
 
 # setuptools explains at length what an editable installation is; this text alone is kept still.
 EDITABLE_IS_MEANT = "ignore:Editable installation"

@@ -178,6 +178,7 @@ def test_kernels_of_every_solver_are_looked_for():
     for name in ("wave", "fem", "rigid", "blow-map"):
         base.place_of_kernels(name)  # finds the kernel by its name
 
+
 def test_new_writes_a_scene_that_runs_and_keeps_existing_files(percussion, tmp_path):
     path = tmp_path / "mine.toml"
     assert percussion("new", path)[0] == 0

@@ -33,6 +33,7 @@ app = typer.Typer(
     help="Percussive drilling with travelling waves: piston, bit and rock, blow by blow.",
     no_args_is_help=True,
     add_completion=False,
+    rich_markup_mode=None,  # its help cuts names of options at 80 columns
     pretty_exceptions_enable=False,
 )
 
@@ -72,6 +73,12 @@ def _heard(command: Callable[..., Any]) -> Callable[..., Any]:
     return call
 
 
+def _add(command: Callable[..., Any], name: str | None = None) -> None:
+    """Add a command; its first line stands whole in the list of all."""
+    first = (command.__doc__ or "").partition("\n")[0]
+    app.command(name, short_help=first)(_heard(command))
+
+
 for _command in (
     run,
     settled,
@@ -88,8 +95,8 @@ for _command in (
     bench_controller,
     new,
 ):
-    app.command()(_heard(_command))
-app.command("blow-map")(_heard(blow_map))
+    _add(_command)
+_add(blow_map, "blow-map")
 
 
 def main() -> None:

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 # Time between lines [s]: a reader who sees none for five seconds takes the command for dead.
-EVERY = 4.0
+EVERY = 3.0
 # Below this share of the work the time that is left cannot be told.
 EARLY = 0.05
 

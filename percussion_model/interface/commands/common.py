@@ -21,6 +21,8 @@ BAD_INPUT = 2
 INTERRUPTED = 130  # what shells report for Ctrl-C
 # Starting makes hundreds of thousands of objects that stay [objects].
 COLLECT_AFTER = 100_000
+# So many files of a folder have a line each.
+FEW_FILES = 3
 
 _own_process = False
 
@@ -174,14 +176,16 @@ def if_drawable() -> Iterator[None]:
 
 
 def list_files(paths: Iterable[Path]) -> None:
-    """Name on stderr the files that were written, folder by folder."""
+    """Name on stderr the files that were written; many of one folder together."""
     folders: dict[Path, list[str]] = {}
     for path in paths:
         folders.setdefault(path.parent, []).append(path.name)
     for folder, names in folders.items():
-        text = f"wrote {folder / names[0]}" if len(names) == 1 else (
-            f"wrote to {folder}{os.sep}: {', '.join(names)}"
-        )  # fmt: skip
+        if len(names) <= FEW_FILES:
+            for name in names:
+                print(f"wrote {folder / name}", file=sys.stderr)
+            continue
+        text = f"wrote to {folder}{os.sep}: {', '.join(names)}"
         shown = textwrap.wrap(
             text, shutil.get_terminal_size().columns, subsequent_indent="  ",
             break_long_words=False, break_on_hyphens=False,
