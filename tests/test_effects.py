@@ -23,8 +23,8 @@ from percussion_model.interface.commands.effects import (
     LONGEST_NAME,
     show_effects,
     table_of,
-    with_error,
 )
+from percussion_model.interface.uncertain import with_short_error
 
 RIGID = {"piston.model": "rigid", "bit.model": "rigid"}
 SHORT = {"run.duration": 0.6, "run.settle": 0.1}
@@ -155,7 +155,7 @@ def test_a_short_run_does_not_hide_that_the_rate_cannot_be_trusted():
     ],
 )
 def test_a_value_has_the_digits_that_its_error_leaves(value, error, shown):
-    assert with_error(value, error) == shown
+    assert with_short_error(value, error) == shown
 
 
 def test_the_table_fits_a_terminal_and_cuts_no_number(rigid, monkeypatch, capsys):

@@ -1,4 +1,4 @@
-"""Progress of long commands: lines on a pipe, the runs of a request by name, Ctrl-C in one of them."""
+"""Progress of long commands: lines on a pipe, runs of a request by name, Ctrl-C in one of them."""
 
 from __future__ import annotations
 

@@ -8,13 +8,14 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
+from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
 from percussion_model.interface.progress import Report, lines
 from percussion_model.interface.tables import print_table
-from percussion_model.interface.uncertain import rate_text, with_error
+from percussion_model.interface.uncertain import rate_text, with_error, with_short_error
 
 if TYPE_CHECKING:
     from percussion_model.analysis.comparison import Comparison
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
     from percussion_model.verification.hard_cases import Collection
     from percussion_model.verification.paper.statements import Statement
 
+# An error below this share of a rate does not show in its four digits.
+SMALL_ERROR = 1e-4
 # What ends sooner shows no bar [s].
 _PATIENCE = 2.0
 
@@ -100,7 +103,10 @@ def show_settled(found: Settled) -> None:
     table.add_row("Motion", f"{found.kind}{order}")
     rate, error = summary["rate_of_penetration"], summary["rate_of_penetration_error"]
     if rate is not None:
-        table.add_row("Rate of penetration", f"{with_error(1e3 * rate, 1e3 * error)} mm/s")
+        text = f"{1e3 * rate:.5g}, error not estimated"
+        if error is not None:
+            text = with_error(1e3 * rate, 1e3 * error)
+        table.add_row("Rate of penetration", f"{text} mm/s")
     for name, key, factor, unit in (
         ("Blow period", "blow_period", 1e3, "ms"),
         ("Multiplier of the cycle", "multiplier", 1.0, ""),
@@ -237,7 +243,7 @@ _EFFORT: dict[str, Callable[[dict[str, Any]], float | None]] = {
 
 def show_stability(found: Collection) -> None:
     """Print the measures of each solver on each hard case, and the failures."""
-    table = Table()
+    table = Table(box=SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0))
     for name in ("case", "solver"):
         table.add_column(name, no_wrap=True)
     for name in ("mm/s", "residual", "momentum", "events/s", "guards", "s"):
@@ -246,7 +252,7 @@ def show_stability(found: Collection) -> None:
         table.add_row(
             row["case"],
             row["solver"],
-            _number(row["rate"], 1e3, 4),
+            _rate_cell(row["rate"], row["rate_error"]),
             *(_number(row[key], 1.0, 2) for key in ("residual", "momentum", "events_per_second")),
             str(row["guards"] or ""),
             f"{row['wall_time']:.2g}",
@@ -260,6 +266,15 @@ def show_stability(found: Collection) -> None:
         f"{cases} cases, {len(found.rows)} runs, {failed} failures, "
         f"{len(found.disagreements())} rates more than 2 % off the first solver's"
     )
+
+
+def _rate_cell(rate: float | None, error: float | None) -> str:
+    """Rate [mm/s] with its standard error, in few characters."""
+    if rate is None or error is None or error < SMALL_ERROR * abs(rate):
+        return _number(rate, 1e3, 4)
+    if error >= abs(rate):
+        return "undecided"
+    return with_short_error(1e3 * rate, 1e3 * error).replace(" ", "")
 
 
 def show_statements(statements: list[Statement]) -> None:

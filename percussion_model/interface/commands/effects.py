@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from percussion_model.interface.commands import common
+from percussion_model.interface.uncertain import with_short_error
 
 if TYPE_CHECKING:
     from percussion_model.analysis.effect_study import EffectsStudy, Trial
@@ -117,14 +117,7 @@ def _rate(row: dict[str, Any]) -> str:
     shown = f"{1e3 * value:.4g}"
     if error <= 1e-3 * abs(value):
         return shown
-    return with_error(1e3 * value, 1e3 * error) if error < abs(value) else "undecided"
-
-
-def with_error(value: float, error: float) -> str:
-    """Show a value to the one digit that its error is known to: 17.5 ± 0.4, or 40 ± 30."""
-    place = math.floor(math.log10(float(f"{error:.0e}")))
-    digits = max(-place, 0)
-    return f"{round(value, -place):.{digits}f} ± {round(error, -place):.{digits}f}"
+    return with_short_error(1e3 * value, 1e3 * error) if error < abs(value) else "undecided"
 
 
 def _two_lines(name: str) -> str:
