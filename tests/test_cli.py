@@ -290,7 +290,9 @@ def test_ctrl_c_is_told_whatever_the_command(percussion, monkeypatch):
 # The command itself, which tells on stderr when it has drilled for a second.
 TALKING = """
 import contextlib, sys
+import percussion_model.interface.progress as progress
 import percussion_model.interface.terminal as terminal
+progress.EVERY = 3600.0  # no lines but those of this test
 told = []
 
 def report(t):
