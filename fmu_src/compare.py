@@ -15,10 +15,10 @@ import numpy as np
 from fmpy import simulate_fmu
 
 from fmu_src.__main__ import DEFAULT
-from fmu_src.archive import ROOT
-from fmu_src.hammer.build import build_hammer
+from fmu_src.archive import ROOT, content, state_of
+from fmu_src.hammer.build import build_hammer, refuse_other
 from percussion_model.interface.terminal import progress
-from percussion_model.scene.scene import Scene
+from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.simulation.simulate import simulate
 
 STEP_SIZE = 0.01  # of the communication [s]
@@ -98,9 +98,16 @@ def _rate(table: Any, time_name: str, position: str, settle: float) -> float:
 def main() -> int:
     """Compare on the reference scene."""
     scene = Scene.from_toml(ROOT / "scenarios" / "reference.toml")
+    try:
+        refuse_other(DEFAULT, scene, with_map=False)
+    except SceneError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 1
+    before = content(DEFAULT)
     with progress("running the FMU and the library"):
         both = run_both(scene, DEFAULT)
-    print(f"The reference hammer for {scene.run.duration:g} s; the FMU is {DEFAULT}\n")
+    print(f"{DEFAULT}: {state_of(DEFAULT, before)}")
+    print(f"The reference hammer for {scene.run.duration:g} s, by that FMU and by the library\n")
     print(describe(both, scene.run.settle), flush=True)
     return 0
 

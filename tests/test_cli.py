@@ -61,10 +61,11 @@ def test_results_and_json_go_to_files(percussion, tmp_path):
     assert code == 0
     names = {path.name for path in out.iterdir()}
     told = " ".join(err.split())
+    files = {"summary.json", "blows.csv", "events.csv", "trace.csv", "scene.toml"}
     assert told.startswith(f"wrote to {out}/: ")
-    assert all(name in told for name in names)
+    assert all(name in told for name in files)
     assert told.endswith(f"wrote {summary}")
-    assert names == {"summary.json", "blows.csv", "events.csv", "trace.csv", "scene.toml"}
+    assert names == files | {"made_by.json"}
     assert json.loads(summary.read_text()) == json.loads((out / "summary.json").read_text())
 
 
@@ -330,7 +331,7 @@ def test_ctrl_c_keeps_finished_work(tmp_path):
     assert summary["warnings"][-1].startswith("interrupted at t = ")
     assert summary["blows"] > 0
     names = {path.name for path in (tmp_path / "out").iterdir()}
-    assert names == {"summary.json", "blows.csv", "events.csv", "scene.toml"}
+    assert names == {"summary.json", "blows.csv", "events.csv", "scene.toml", "made_by.json"}
     assert os.listdir(tmp_path) == ["out"]
 
 

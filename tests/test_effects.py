@@ -221,5 +221,7 @@ def test_command_prints_a_table_and_reasons(tmp_path):
     assert shown.exit_code == 0, shown.output
     for text in ("Which are needed", "barrier off", "period", "events", "nothing throws"):
         assert text in shown.output
-    assert sorted(path.name for path in out.iterdir()) == ["effects.png", "effects.svg"]
+    assert sorted(path.name for path in out.iterdir()) == [
+        "effects.png", "effects.svg", "made_by.json",
+    ]  # fmt: skip
     assert json.loads((tmp_path / "found.json").read_text())["solver"] == "rigid"

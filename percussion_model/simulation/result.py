@@ -16,6 +16,7 @@ from percussion_model.physics.effects import EFFECTS
 from percussion_model.physics.records import BLOW, EVENT, EventKind, Mode
 from percussion_model.scene.scene import Scene
 from percussion_model.simulation.files import ResultError, plain, staged, to_json
+from percussion_model.simulation.origin import ORIGIN
 
 if TYPE_CHECKING:
     import pandas
@@ -317,7 +318,7 @@ def _write_result(result: Result, folder: Path) -> list[Path]:
     stand beside numbers that they do not belong to.
     """
     was_result = all((folder / name).is_file() for name in _MARKS)
-    left = (*_TRACES, *_DERIVED) if was_result else _TRACES
+    left = (*_TRACES, ORIGIN, *_DERIVED) if was_result else (*_TRACES, ORIGIN)
     with staged(folder) as draft:
         (draft / "summary.json").write_text(to_json(result.summary()) + "\n", encoding="utf-8")
         (draft / "scene.toml").write_text(result.scene.to_toml(), encoding="utf-8")

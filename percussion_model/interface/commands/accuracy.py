@@ -33,6 +33,7 @@ def accuracy(
     settings: common.Settings = None,
     out: common.OutOrDefault = None,
     json_file: common.JsonFile = None,
+    force: common.Force = False,
     figures: Annotated[bool, typer.Option(help="Draw error against time.")] = True,
 ) -> None:
     """Measure error against time: waves, their peers, rigid bars.
@@ -63,15 +64,18 @@ def accuracy(
         )
     words = None if methods is None else [word.strip() for word in methods.split(",")]
     chosen_ladders(words)  # refuses before anything is computed
-    folder = out or Path("out") / "accuracy"
     common.check_json(json_file)
     common.tell_of_compiling("wave", "fem", "rigid")
     if make_references:
         for _, scene in chosen:
             show_bars(_make_reference(scene))
         return
+    claimed = None
     if figures or json_file is None:
-        common.check_outputs(folder, None)
+        claimed = common.claim(
+            "accuracy", out, Path("out") / "accuracy", force,
+            scenes=dict(chosen), full=full, methods=words,
+        )  # fmt: skip
     found: dict[str, dict[str, Any]] = {}
     studies: dict[str, Study] = {}
     for name, scene in chosen:
@@ -81,11 +85,14 @@ def accuracy(
         found[name] = result.to_dict()
         if json_file != "-":
             show_study(result)
+        if claimed is None:
+            continue
         if json_file is None:
-            common.write_json(str(folder / f"{name}.json"), found[name])
+            common.write_json(str(claimed.folder / f"{name}.json"), found[name])
         if figures:
             with common.if_drawable():
-                common.list_files(_draw(result, folder / name))
+                common.list_files(_draw(result, claimed.folder / name))
+        claimed.sign()
     if len(studies) > 1 and json_file != "-":
         show_contests(studies)
     common.write_json(json_file, found)

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import gc
+import hashlib
 import os
 import shutil
 import sys
 import textwrap
+import tomllib
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -16,6 +18,7 @@ import typer
 
 if TYPE_CHECKING:
     from percussion_model.scene.scene import Scene
+    from percussion_model.simulation.origin import Claim
 
 BAD_INPUT = 2
 INTERRUPTED = 130  # what shells report for Ctrl-C
@@ -65,6 +68,9 @@ Out = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder f
 OutOrDefault = Annotated[
     Path | None,
     typer.Option("--out", metavar="DIR", help="Folder for what is written, in place of that."),
+]
+Force = Annotated[
+    bool, typer.Option("--force", help="Replace what another scene or run has left there.")
 ]
 Tolerance = Annotated[
     float, typer.Option("--tolerance", help="Relative change of a blow that is no change.")
@@ -142,6 +148,61 @@ def check_outputs(folder: Path | None, json_file: str | None) -> None:
     if folder is not None:
         check_writable(folder)
     check_json(json_file)
+
+
+def claim(
+    command: str, out: Path | None, default: Path | None, force: bool, **made_from: Any
+) -> Claim:
+    """Claim the folder of a result: refuse what holds another one, before anything is computed.
+
+    A folder that is not named by the user is numbered instead, which is said.
+
+    Parameters
+    ----------
+    command : str
+    out, default : Path or None
+        Named by the user, and else.
+    force : bool
+        Replace what is there.
+    made_from : dict
+        All that the result follows from: scenes, plain values, lists and tables of them.
+    """
+    from percussion_model.simulation.origin import Claim
+
+    folder = out or default
+    assert folder is not None
+    origin = {"command": command, **{name: _entries(one) for name, one in made_from.items()}}
+    claimed = Claim(folder, origin, force, numbered=out is None)
+    if claimed.moved:
+        print_message(claimed.moved)
+    return claimed
+
+
+def _entries(value: Any) -> Any:
+    """A scene as a tree, and others as they are."""
+    from percussion_model.scene.scene import Scene
+
+    if isinstance(value, dict):
+        return {name: _entries(one) for name, one in value.items()}
+    return tomllib.loads(value.to_toml()) if isinstance(value, Scene) else value
+
+
+def by_name(words: list[str] | None) -> dict[str, str]:
+    """Values by name, of words NAME=VALUE."""
+    return {name: value for name, _, value in (word.partition("=") for word in words or ())}
+
+
+def digest(path: Path | None) -> str | None:
+    """What a file holds, in short; nothing where there is no file."""
+    if path is None or not path.is_file():
+        return None
+    return hashlib.sha256(path.read_bytes()).hexdigest()[:16]
+
+
+def refuse_existing(file: Path, force: bool) -> None:
+    """Refuse a file that is there, unless it is to be replaced."""
+    if file.exists() and not force:
+        raise refusal(f"{file}: exists already; --force overwrites it")
 
 
 def check_json(json_file: str | None) -> None:

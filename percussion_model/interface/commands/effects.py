@@ -24,6 +24,7 @@ def effects(
     settings: common.Settings = None,
     out: common.OutOrDefault = None,
     json_file: common.JsonFile = None,
+    force: common.Force = False,
     figures: Annotated[bool, typer.Option(help="Draw cost and change as bars.")] = True,
 ) -> None:
     """Turn each effect off, or on, in turn: what it costs and what it changes.
@@ -34,8 +35,12 @@ def effects(
     from percussion_model.interface.terminal import progress
 
     chosen = common.load_scene(scene, solver, cells, settings)
-    folder = out or Path("out") / f"{scene.stem}-effects"
-    common.check_outputs(folder if figures else None, json_file)
+    common.check_json(json_file)
+    if figures:
+        claimed = common.claim(
+            "effects", out, Path("out") / f"{scene.stem}-effects", force,
+            scene=chosen, duration=duration, settle=settle,
+        )  # fmt: skip
     common.tell_of_compiling(*(name for name in ("wave", "rigid") if name != chosen.solver_name))
     with progress("effects") as report:
         found = study_effects(chosen, duration, settle, report)
@@ -47,7 +52,8 @@ def effects(
             from percussion_model.interface.plotting.effect_bars import draw_effects
             from percussion_model.interface.plotting.style import save_figures
 
-            files = save_figures(lambda: [("effects", draw_effects(found))], folder)
+            files = save_figures(lambda: [("effects", draw_effects(found))], claimed.folder)
+            claimed.sign()
             common.list_files(files)
 
 

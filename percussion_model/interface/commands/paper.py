@@ -28,6 +28,7 @@ def paper(
         int | None, typer.Option("--processes", min=1, help="For the sweeps; default: all cores.")
     ] = None,
     json_file: common.JsonFile = None,
+    force: common.Force = False,
 ) -> None:
     """Reproduce figures 4 and 6 to 9 of the paper, and check what it says one by one."""
     from percussion_model.interface.terminal import progress, progress_bar, show_statements
@@ -50,6 +51,7 @@ def paper(
 
     common.tell_of_compiling("wave", "fem", "rigid")
     scene = paper_scene()
+    claimed = common.claim("paper", out, None, force, scene=scene)
     with progress("drop tests and sinking, figure 6"):
         drops, sinking = run_drops(scene), run_sinking(scene)
     sweeps = _sweeps(out, processes)
@@ -73,6 +75,7 @@ def paper(
     tree = {"statements": [one.to_dict() for one in statements]}
     common.write_json(json_file, tree)
     common.write_json(str(out / "statements.json"), tree)
+    claimed.sign()
     if json_file != "-":
         show_statements(statements)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -11,6 +11,7 @@ from percussion_model.interface.commands import common
 from percussion_model.interface.commands.blow_map import ready_map, warn_of_outside
 
 if TYPE_CHECKING:
+    from percussion_model.scene.scene import Scene
     from percussion_model.simulation.result import Result
 
 _NEW_TITLE = "A down-the-hole hammer"
@@ -35,6 +36,7 @@ def run(
     figures: Annotated[
         bool, typer.Option(help="With --out, draw figures and write report.html.")
     ] = True,
+    force: common.Force = False,
 ) -> None:
     """Run a scene; print a short table, write results with --out."""
     from percussion_model.interface import terminal
@@ -42,6 +44,9 @@ def run(
 
     chosen = common.load_scene(scene, solver, cells, settings, accuracy, check)
     common.check_outputs(out, json_file)
+    made_from = _made_from(chosen, duration, settle)
+    made_from |= {"trace": trace, "error_estimate": error_estimate}
+    claimed = None if out is None else common.claim("run", out, None, force, **made_from)
     if chosen.solver_name == "blow-map":
         ready_map(chosen)
     end = chosen.run.duration if duration is None else duration
@@ -57,11 +62,16 @@ def run(
             stage=progress.stage,
         )
     files: list[Path] = []
-    if out is not None:
-        files += result.save(out)
+    if claimed is not None:
+        if result.cut_short:  # part of a run does not replace the whole one
+            made_from["until"] = result.duration
+            claimed = common.claim("run", None, out, force, **made_from)
+        files += result.save(claimed.folder)
+        claimed.sign()
         if figures and not result.cut_short:
             with terminal.progress("drawing"):
-                files += _draw(result, out)
+                files += _draw(result, claimed.folder)
+            claimed.sign()
     if json_file != "-":
         terminal.show_summary(result)
     if result.interrupted:
@@ -127,6 +137,7 @@ def plot(
     duration: common.Duration = None,
     settle: common.Settle = None,
     out: common.Out = None,
+    force: common.Force = False,
 ) -> None:
     """Draw the figures of a result, or run a scene and draw them."""
     from percussion_model.interface.terminal import progress_bar
@@ -140,19 +151,27 @@ def plot(
         raise common.refusal(common.needs_plot_extra(error)) from None
     if not source.exists():
         raise common.refusal(f"{source}: there is no such folder or scene file")
-    folder = out or (source if source.is_dir() else Path("out") / source.stem)
-    common.check_outputs(folder, None)
+    claimed = None
     if source.is_dir():
         if duration is not None or settle is not None:
             raise common.refusal(f"{source}: has been run; give its scene file")
+        common.check_outputs(out or source, None)
         result = Result.load(source)
+        if out is not None and out.resolve() != source.resolve():
+            numbers = common.digest(source / "summary.json")
+            claimed = common.claim("plot", out, None, force, result=numbers)
     else:
         scene = Scene.from_toml(source)
         common.tell_of_compiling(scene.solver_name)
+        made_from = _made_from(scene, duration, settle)
+        # its figures belong to the result of that run, and may stand beside it
+        claimed = common.claim("run", out, Path("out") / source.stem, force, **made_from)
         with progress_bar(scene.run.duration if duration is None else duration) as progress:
             result = simulate(scene, duration, settle, progress=progress, stage=progress.stage)
-    for path in figures(result, folder):
+    for path in figures(result, (out or source) if claimed is None else claimed.folder):
         typer.echo(str(path))
+    if claimed is not None:
+        claimed.sign()
 
 
 def new(
@@ -162,10 +181,18 @@ def new(
     """Write a commented scene to start from: the reference hammer."""
     from percussion_model.scene.scene import Scene
 
-    if file.exists() and not force:
-        raise common.refusal(f"{file}: exists already; --force overwrites it")
+    common.refuse_existing(file, force)
     Scene(title=_NEW_TITLE).to_toml(file, comments=True)
     typer.echo(f"wrote {file}")
+
+
+def _made_from(scene: Scene, duration: float | None, settle: float | None) -> dict[str, Any]:
+    """What the result of a run follows from."""
+    return {
+        "scene": scene,
+        "duration": scene.run.duration if duration is None else float(duration),
+        "settle": scene.run.settle if settle is None else float(settle),
+    }
 
 
 def _draw(result: Result, folder: Path) -> list[Path]:
