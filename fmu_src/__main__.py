@@ -10,6 +10,7 @@ from fmu_src.archive import ROOT, content, state_of
 from fmu_src.hammer.build import build_hammer, hammer_name, refuse_other
 from fmu_src.parts import pneumatic_drive
 from fmu_src.parts.build import build_part
+from percussion_model.interface.terminal import progress
 from percussion_model.scene.scene import Scene, SceneError
 
 DIST = ROOT / "dist"
@@ -55,7 +56,8 @@ def main(arguments: list[str]) -> int:
         path = choice.output or DIST / hammer_name(file, "Ladder" if choice.blow_map else "")
         refuse_other(path, scene, table is not None, choice.force)
         before = content(path)
-        guid = build_hammer(scene, path, table)
+        with progress("building the FMU"):
+            guid = build_hammer(scene, path, table)
     except (SceneError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 1
@@ -63,7 +65,9 @@ def main(arguments: list[str]) -> int:
     if not choice.no_reference:
         from fmu_src.reference import write_reference
 
-        for written in write_reference(path):
+        with progress("running the FMU; the first run compiles"):
+            files = write_reference(path)
+        for written in files:
             print(written)
     return 0
 

@@ -17,6 +17,7 @@ from fmpy import simulate_fmu
 from fmu_src.__main__ import DEFAULT
 from fmu_src.archive import ROOT, content, state_of
 from fmu_src.hammer.build import build_hammer, refuse_other
+from percussion_model.interface.terminal import progress
 from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.simulation.simulate import simulate
 
@@ -103,7 +104,8 @@ def main() -> int:
         print(f"error: {error}", file=sys.stderr)
         return 1
     before = content(DEFAULT)
-    both = run_both(scene, DEFAULT)
+    with progress("running the FMU and the library"):
+        both = run_both(scene, DEFAULT)
     print(f"{DEFAULT}: {state_of(DEFAULT, before)}")
     print(f"The reference hammer for {scene.run.duration:g} s, by that FMU and by the library\n")
     print(describe(both, scene.run.settle), flush=True)

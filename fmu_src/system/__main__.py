@@ -16,6 +16,7 @@ from fmu_src.system.archive import (
     read_plan,
     write_system,
 )
+from percussion_model.interface.terminal import progress
 from percussion_model.scene.scene import SceneError
 
 
@@ -33,12 +34,14 @@ def main(arguments: list[str]) -> int:
     try:
         for plan in [read_plan(path) for path in choice.systems] or plans():
             before = {path: content(path) for path in choice.output.glob("*.*")}
-            fmus = build_fmus(plan, choice.output, choice.force)
+            with progress(f"building {plan.name}"):
+                fmus = build_fmus(plan, choice.output, choice.force)
             for fmu in fmus.values():
                 if fmu in checked:
                     continue
                 checked.add(fmu)
-                found = validate_fmu(str(fmu))
+                with progress(f"validating {fmu.name}"):
+                    found = validate_fmu(str(fmu))
                 valid = "valid" if not found else "; ".join(found)
                 print(f"{fmu}: {state_of(fmu, before.get(fmu))}, {valid}", flush=True)
                 problems += len(found)

@@ -250,9 +250,9 @@ class EffectsStudy:
     """
 
     scene: Scene
-    base: Trial
-    trials: list[Trial]
-    refused: dict[str, str]
+    base: Trial = field(repr=False)
+    trials: list[Trial] = field(repr=False)
+    refused: dict[str, str] = field(repr=False)
 
     def changes(self, trial: Trial) -> dict[str, float | None]:
         """Relative change of each number of `CHANGED` against the scene itself."""

@@ -53,7 +53,7 @@ class CoupledRun:
         the greatest force [1].
     """
 
-    columns: dict[str, np.ndarray]
+    columns: dict[str, np.ndarray] = field(repr=False)
     step: float
     steps: int
     error: str = ""

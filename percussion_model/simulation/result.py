@@ -6,13 +6,14 @@ import csv
 import json
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from percussion_model.physics.records import BLOW, EVENT, EventKind
+from percussion_model.physics.effects import EFFECTS
+from percussion_model.physics.records import BLOW, EVENT, EventKind, Mode
 from percussion_model.scene.scene import Scene
 from percussion_model.simulation.files import ResultError, plain, staged, to_json
 from percussion_model.simulation.origin import ORIGIN
@@ -81,6 +82,10 @@ class Result:
         Advance of the mean bit position from the settling time to the end of the
         run by that time, wherever in a blow they lie (eq. 58 of the paper) [m/s];
         NaN where the run was not read at its settling time.
+    end : dict of float
+        Sample at the end of the run, by SAMPLE_FIELDS; empty where that is not known.
+    interrupted : bool
+        Whether Ctrl-C ended this run, or another one that was to tell its error.
     """
 
     scene: Scene
@@ -100,6 +105,14 @@ class Result:
     warnings: list[str]
     rate_of_penetration_relative_error: float = math.nan
     rate_of_penetration_fixed_window: float = math.nan
+    end: dict[str, float] = field(default_factory=dict)
+    interrupted: bool = False
+
+    def __repr__(self) -> str:
+        return (
+            f"Result({self.scene.title!r}, solver={self.solver!r}, duration={self.duration:g}, "
+            f"blows={len(self.blows)}, events={len(self.events)}, warnings={len(self.warnings)})"
+        )
 
     @property
     def counted(self) -> np.ndarray:
@@ -128,6 +141,20 @@ class Result:
     def mean_contact_force(self) -> float:
         """Mean force of the piston on the bit over the counted blows [N]."""
         return _ratio(self.counted, "contact_impulse", "period")
+
+    @property
+    def fall(self) -> dict[str, float]:
+        """How a bit fell that nothing has struck: a drop test. Empty where there are blows.
+
+        Returns
+        -------
+        dict of float
+            `depth` of the bit's end below the rock as it was [m]; `first_contact` with the
+            rock [s]; `rebound_velocity` with which the mean bit leaves it for the first
+            time, upwards [m/s]; `rest_time`, from which it stands still [s]; `crushed`
+            energy [J]. Only what is known.
+        """
+        return {} if len(self.blows) else _fall(self)
 
     @property
     def cut_short(self) -> bool:
@@ -174,6 +201,9 @@ class Result:
             "wall_time": self.wall_time,
             "setup_time": self.setup_time,
             "real_time_factor": self.real_time_factor,
+            "end": self.end,
+            "fall": self.fall,
+            "interrupted": self.interrupted,
             "solver": self.solver,
             "title": self.scene.title,
             "duration": self.duration,
@@ -214,6 +244,40 @@ class Result:
 
 
 _MEANS = ("impact_velocity", "rebound_velocity", "stroke", "blow_energy", "rock_energy")
+
+
+def _fall(result: Result) -> dict[str, float]:
+    """Numbers of a run without blows; see `Result.fall`."""
+    scene, found = result.scene, {}
+    if result.end and scene.effects.rock != "none":
+        found["depth"] = result.end["bit_end_position"] - scene.start.rock_gap
+    modes = result.events[result.events["kind"] <= EventKind.MODE_SS]
+    touching = np.flatnonzero(modes["kind"] != Mode.FF)
+    if len(touching):
+        found["first_contact"] = float(modes["time"][touching[0]])
+        left = np.flatnonzero(modes["kind"][touching[0] :] == Mode.FF) + touching[0]
+        if len(left) and not any(scene[f"effects.{effect.name}"] for effect in EFFECTS):
+            found["rebound_velocity"] = _leaving_velocity(result, modes, int(left[0]))
+        if modes["kind"][-1] == Mode.SS:
+            found["rest_time"] = float(modes["time"][-1])
+    if "crushing" in result.energy:
+        found["crushed"] = result.energy["crushing"]
+    return {name: value for name, value in found.items() if math.isfinite(value)}
+
+
+def _leaving_velocity(result: Result, modes: np.ndarray, k: int) -> float:
+    """Upward mean velocity of the bit at the start of a flight: its mean motion is a parabola."""
+    scene, begin = result.scene, modes[k]
+    if k + 1 < len(modes):
+        time, place = float(modes[k + 1]["time"]), float(modes[k + 1]["bit_position"])
+    else:
+        time, place = result.duration, result.end.get("bit_position", math.nan)
+    taken = time - float(begin["time"])
+    if not taken > 0.0:
+        return math.nan
+    feed = scene.feed.force / scene.bit.mass if scene.effects.feed else 0.0
+    gravity = scene.gravity.acceleration if scene.effects.gravity else 0.0
+    return 0.5 * (feed + gravity) * taken - (place - float(begin["bit_position"])) / taken
 
 
 def _mean(values: np.ndarray) -> float:
@@ -298,6 +362,9 @@ def _read_result(folder: Path) -> dict[str, Any]:
         for name in _RATES:
             value = summary.get(name)  # unknown to older files
             fields[name] = math.nan if value is None else value
+        end = summary.get("end", {})
+        fields["end"] = {name: math.nan if value is None else value for name, value in end.items()}
+        fields["interrupted"] = summary.get("interrupted", False)
         blows = _read_csv(folder / "blows.csv", float)
         if not set(blows) >= _HOLE:
             fields["warnings"].append(_NO_HOLE)

@@ -37,8 +37,8 @@ def find_warnings(result: Result) -> Iterator[str]:
 
 def _about_scene(result: Result) -> Iterator[str]:
     scene = result.scene
-    if scene.unused:
-        yield unused_note(scene.unused)
+    if scene.given_in_vain:
+        yield unused_note(scene.given_in_vain)
     if scene.has_waves and not scene.loss_on:
         if scene.barrier_on:
             yield (

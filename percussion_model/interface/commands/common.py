@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import gc
 import hashlib
+import os
+import shutil
 import sys
+import textwrap
 import tomllib
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -21,6 +24,8 @@ BAD_INPUT = 2
 INTERRUPTED = 130  # what shells report for Ctrl-C
 # Starting makes hundreds of thousands of objects that stay [objects].
 COLLECT_AFTER = 100_000
+# So many files of a folder have a line each.
+FEW_FILES = 3
 
 _own_process = False
 
@@ -118,7 +123,22 @@ def load_scene(
     if cells is not None:
         key = "fem.elements" if scene.solver_name == "fem" else "solver.cells"
         scene = scene.replace(**{key: cells})
+    tell_of_compiling(scene.solver_name)
     return scene
+
+
+def tell_of_compiling(*solvers: str) -> None:
+    """Say on stderr that kernels are going to be compiled, where numba does not keep them yet."""
+    from percussion_model.solvers.base import place_of_kernels
+
+    places = {name: place_of_kernels(name) for name in solvers}
+    new = {name: place for name, place in places.items() if place is not None}
+    if new:
+        long = "half a minute each" if len(new) > 1 else "half a minute"
+        print_message(
+            f"compiling the kernels of the solver {' and '.join(new)}: once, for about {long}; "
+            f"they are kept in {', '.join(map(str, new.values()))}"
+        )
 
 
 def check_outputs(folder: Path | None, json_file: str | None) -> None:
@@ -204,6 +224,7 @@ def write_json(json_file: str | None, values: dict[str, Any]) -> None:
         typer.echo(to_json(values))
     elif json_file is not None:
         staged_text(Path(json_file), to_json(values) + "\n")
+        list_files([Path(json_file)])
 
 
 @contextmanager
@@ -216,9 +237,21 @@ def if_drawable() -> Iterator[None]:
 
 
 def list_files(paths: Iterable[Path]) -> None:
-    """Name on stderr the files that were written."""
+    """Name on stderr the files that were written; many of one folder together."""
+    folders: dict[Path, list[str]] = {}
     for path in paths:
-        print(f"wrote {path}", file=sys.stderr)
+        folders.setdefault(path.parent, []).append(path.name)
+    for folder, names in folders.items():
+        if len(names) <= FEW_FILES:
+            for name in names:
+                print(f"wrote {folder / name}", file=sys.stderr)
+            continue
+        text = f"wrote to {folder}{os.sep}: {', '.join(names)}"
+        shown = textwrap.wrap(
+            text, shutil.get_terminal_size().columns, subsequent_indent="  ",
+            break_long_words=False, break_on_hyphens=False,
+        )  # fmt: skip
+        print(*shown, sep="\n", file=sys.stderr)
 
 
 def needs_plot_extra(error: ImportError) -> str:

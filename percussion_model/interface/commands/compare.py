@@ -39,6 +39,7 @@ def compare(
         )  # fmt: skip
     if "blow-map" in names:
         ready_map(chosen)
+    common.tell_of_compiling(*(name for name in names if name != chosen.solver_name))
     end = chosen.run.duration if duration is None else duration
     with progress_bar(end * len(names)) as progress:
         found = run_all(chosen, names, duration, settle, progress)

@@ -37,10 +37,11 @@ def stability(
 ) -> None:
     """Run the hard cases by every solver: what must hold, and where solvers disagree."""
     from percussion_model.interface.terminal import count_bar, show_stability
-    from percussion_model.verification.hard_cases import run_collection
+    from percussion_model.verification.hard_cases import SOLVERS, run_collection
 
     common.check_outputs(out, json_file)
     names = [name.strip() for name in solvers.split(",")]
+    common.tell_of_compiling(*(name for name in names if name in SOLVERS))
     claimed = None
     if out is not None:
         claimed = common.claim(
