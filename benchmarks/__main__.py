@@ -80,6 +80,7 @@ def reference(repeats: int) -> list[dict[str, Any]]:
                     "fastest": max(factors),
                     "runs": len(factors),
                     "rate_of_penetration": summary["rate_of_penetration"],
+                    "rate_of_penetration_error": summary["rate_of_penetration_error"],
                     "blow_period": summary["blow_period"],
                     "numerical_relative": summary["energy"]["numerical_relative"],
                     "steps": results[0].statistics["steps"],
@@ -168,6 +169,8 @@ def show(found: dict[str, Any]) -> None:
     from rich.console import Console
     from rich.table import Table
 
+    from percussion_model.simulation.uncertain import rate_text
+
     console = Console()
     computer = found["machine"]
     console.print(
@@ -186,7 +189,7 @@ def show(found: dict[str, Any]) -> None:
             "on" if row["leaps"] else "off",
             f"{row['real_time_factor']:.1f}",
             f"{row['slowest']:.0f}-{row['fastest']:.0f} ({row['runs']} runs)",
-            f"{1e3 * row['rate_of_penetration']:.3f}",
+            rate_text(row),
             f"{1e3 * row['blow_period']:.4f}",
         )
     console.print(table)

@@ -20,6 +20,7 @@ from fmu_src.hammer.build import build_hammer, refuse_other
 from percussion_model.interface.terminal import progress
 from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.simulation.simulate import simulate
+from percussion_model.simulation.uncertain import rate_text
 
 STEP_SIZE = 0.01  # of the communication [s]
 
@@ -41,7 +42,7 @@ def run_both(scene: Scene, path: Path) -> dict[str, Any]:
     -------
     dict
         `fmu`: a row for each blow, outputs of the FMU; `library`: its blow table;
-        `seconds` that both took.
+        `rate`: its rate of penetration with its error; `seconds` that both took.
     """
     build_hammer(scene, path)
     began = time.perf_counter()
@@ -55,6 +56,7 @@ def run_both(scene: Scene, path: Path) -> dict[str, Any]:
     return {
         "fmu": found[first[1:]],
         "library": result.blows,
+        "rate": rate_text(result.summary()),
         "seconds": (between - began, ended - between),
     }
 
@@ -81,6 +83,7 @@ def describe(both: dict[str, Any], settle: float) -> str:
         a, b = fmu[output], library[column]
         worst = float(np.max(np.abs(a - b))) if same else float("nan")
         add(label, unit, factor * a[-1], factor * b[-1], factor * worst)
+    lines.append(f"The rate is {both['rate']} mm/s, by grid and scatter, in both of them.")
     lines.append(
         f"{len(fmu)} and {len(library)} whole blows; the difference is the greatest over all of "
         f"them. FMU {both['seconds'][0]:.1f} s, library {both['seconds'][1]:.1f} s."

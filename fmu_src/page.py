@@ -24,6 +24,17 @@ bounds. Outputs belong to the step just finished; none depends on an input at on
 compiled when they are used for the first time (about a minute) and kept in the user's cache
 folder; the environment variable <code>PERCUSSION_FMU_CACHE</code> names another one.</p>
 """
+ERRORS = """
+<p>No output carries an error. {grid} Errors of the rock's parameters and of the model itself come
+on top.</p>
+<p><code>rate_of_penetration</code>, <code>penetration_per_blow</code> and the other numbers of a
+blow are those of one blow. Where all blows are alike that is the mean. Where they differ
+(aperiodic motion) it is one draw, which may be off the mean by more than the mean itself: take
+the rise of <code>hole_depth</code> over many blows, from one rise of <code>blow_count</code> to
+another, and its scatter from stretch to stretch as the error.</p>
+<p>The command <code>percussion run</code> with the scene below tells the mean rate ± its error, of
+grid and scatter, for constant inputs.</p>
+"""
 
 
 def write_page(about: About, variables: Sequence[Variable], scene: Scene | None = None) -> str:
@@ -46,8 +57,28 @@ def write_page(about: About, variables: Sequence[Variable], scene: Scene | None 
         if rows:
             parts.append(f"<h2>{causality.capitalize()}s</h2>{_table(rows)}")
     if scene is not None:
+        parts.append(f"<h2>How sure the outputs are</h2>{_errors(scene)}")
         parts.append(f"<h2>Scene</h2><pre>{escape(scene.to_toml())}</pre>")
     return "\n".join(parts) + "\n</body></html>\n"
+
+
+def _errors(scene: Scene) -> str:
+    """What is known of the errors of the outputs."""
+    name = scene.solver_name
+    if name == "blow-map":
+        grid = "Blows come from a table, whose error comes on top of that of the cells behind it."
+    elif scene.has_waves or name == "fem":
+        what = "elements" if name == "fem" else "cells"
+        count = scene.fem.elements if name == "fem" else scene.solver.cells
+        grid = (
+            f"The solver is {name}, with {'its own number of' if count is None else count} {what}"
+        )
+        grid += " in the piston, or in the bit alone: rates are off by what such a grid leaves."
+        if name != "fem" and scene.solver.accuracy is not None:
+            grid += f" solver.accuracy = {scene.solver.accuracy:g} asks for a relative error."
+    else:
+        grid = "Rigid bodies go from event to event in closed form: there is no error of a grid."
+    return ERRORS.format(grid=escape(grid))
 
 
 def _table(variables: Sequence[Variable]) -> str:

@@ -24,7 +24,7 @@ from percussion_model.interface.commands.effects import (
     show_effects,
     table_of,
 )
-from percussion_model.interface.uncertain import with_short_error
+from percussion_model.simulation.uncertain import with_short_error
 
 RIGID = {"piston.model": "rigid", "bit.model": "rigid"}
 SHORT = {"run.duration": 0.6, "run.settle": 0.1}

@@ -12,9 +12,18 @@ from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.scene.solver_names import SOLVER_NAMES
 from percussion_model.simulation.result import Result
 from percussion_model.simulation.simulate import simulate
+from percussion_model.simulation.uncertain import is_undecided, known_error
 from percussion_model.simulation.warnings import unused_note
 
-__all__ = ["COMPARED", "Comparison", "compare", "read_solvers", "relative_change", "solver_names"]
+__all__ = [
+    "COMPARED",
+    "Comparison",
+    "change_error",
+    "compare",
+    "read_solvers",
+    "relative_change",
+    "solver_names",
+]
 
 # Numbers of a summary that solvers are compared by.
 COMPARED = (
@@ -72,6 +81,32 @@ class Comparison:
             if name != self.first
         }
 
+    def difference_errors(self) -> dict[str, dict[str, float | None]]:
+        """Error of each of `differences`, by solver: the errors of both numbers combined.
+
+        Of the rate by grid and scatter, of other means over blows by scatter alone; None
+        where a difference is, or where no error is known.
+        """
+        summaries = self.summaries()
+        base = summaries[self.first]
+        return {
+            name: {key: _difference_error(summary, base, key) for key in COMPARED}
+            for name, summary in summaries.items()
+            if name != self.first
+        }
+
+    def undecided(self) -> dict[str, list[str]]:
+        """Numbers whose difference to the first solver is within its error, by solver."""
+        differences, errors = self.differences(), self.difference_errors()
+        return {
+            name: [
+                key
+                for key, off in found.items()
+                if is_undecided(_or_nan(off), _or_nan(errors[name][key]))
+            ]
+            for name, found in differences.items()
+        }
+
     def warnings(self) -> list[str]:
         """Warnings of all results, each after the name of its solver.
 
@@ -90,8 +125,13 @@ class Comparison:
         return texts
 
     def to_dict(self) -> dict[str, Any]:
-        """Summaries and differences as plain values for JSON."""
-        return {"solvers": self.summaries(), "differences": self.differences()}
+        """Summaries, differences, their errors and what is undecided as plain values for JSON."""
+        return {
+            "solvers": self.summaries(),
+            "differences": self.differences(),
+            "difference_errors": self.difference_errors(),
+            "undecided": self.undecided(),
+        }
 
 
 def compare(
@@ -165,3 +205,27 @@ def relative_change(value: float | None, base: float | None) -> float | None:
     if value is None or base is None or base == 0 or not math.isfinite(value / base):
         return None
     return value / base - 1.0
+
+
+def change_error(
+    value: float | None, error: float | None, base: float | None, base_error: float | None
+) -> float | None:
+    """Standard error of value / base - 1, whose errors are independent.
+
+    None where that is not defined, or neither error is known.
+    """
+    if value is None or base is None or relative_change(value, base) is None:
+        return None
+    if error is None and base_error is None:
+        return None
+    return math.hypot(error or 0.0, value / base * (base_error or 0.0)) / abs(base)
+
+
+def _difference_error(summary: dict[str, Any], base: dict[str, Any], key: str) -> float | None:
+    """Error of the relative difference of one number of two summaries."""
+    errors = [known_error(one, key) for one in (summary, base)]
+    return change_error(summary[key], errors[0], base[key], errors[1])
+
+
+def _or_nan(value: float | None) -> float:
+    return math.nan if value is None else value

@@ -8,12 +8,13 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from percussion_model.analysis.comparison import relative_change
+from percussion_model.analysis.comparison import change_error, relative_change
 from percussion_model.physics.effects import EFFECTS
 from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.simulation.rate import LEAST_BLOWS
 from percussion_model.simulation.result import Result
 from percussion_model.simulation.simulate import Simulation, simulate
+from percussion_model.simulation.uncertain import known_error
 
 __all__ = [
     "NOISE",
@@ -43,9 +44,6 @@ ROUNDS = 40
 # A run shorter than this is timed again, so often at most [s].
 SHORT_RUN = 1.5
 MOST_RUNS = 7
-
-# A rate whose standard error is a larger share of it than this tells no change.
-UNDECIDED = 0.25
 
 # Numbers of a summary whose change is shown.
 CHANGED = ("rate_of_penetration", "blow_period", "peak_bit_force")
@@ -207,14 +205,15 @@ class Trial:
     @property
     def undecided(self) -> bool:
         """Whether scatter hides the rate of penetration."""
-        rate = self.result.rate_of_penetration
-        return self.result.rate_of_penetration_standard_error > UNDECIDED * abs(rate)
+        return self.result.rate_of_penetration_undecided
 
     def numbers(self) -> dict[str, Any]:
         """What was found, as plain values; None is what is not defined."""
         summary = self.result.summary()
         blows = summary["blows"]
         found = {name: summary[name] for name in (*CHANGED, *_BY_BLOWS)}
+        found["rate_of_penetration_undecided"] = self.undecided
+        found["blow_period_standard_error"] = known_error(summary, "blow_period")
         if self.variant.no_penetration:
             found["rate_of_penetration"] = found["rate_of_penetration_standard_error"] = None
         if self.variant.no_blows:
@@ -262,6 +261,15 @@ class EffectsStudy:
             found["rate_of_penetration"] = None
         return found
 
+    def change_errors(self, trial: Trial) -> dict[str, float | None]:
+        """Errors of `changes`, by the scatter of both runs; None where it is not known."""
+        here, base = trial.numbers(), self.base.numbers()
+        return {
+            name: change_error(here[name], here[error], base[name], base[error])
+            for name in CHANGED
+            if (error := f"{name}_standard_error") in base
+        }
+
     def is_costlier(self, trial: Trial) -> bool:
         """Whether turning an effect off made a step costlier, beyond noise."""
         if not trial.variant.off or trial.step is None or self.base.step is None:
@@ -281,6 +289,7 @@ class EffectsStudy:
                 {
                     **trial.numbers(),
                     "changes": self.changes(trial),
+                    "change_errors": self.change_errors(trial),
                     "step_dearer": self.is_costlier(trial),
                 }
                 for trial in self.trials

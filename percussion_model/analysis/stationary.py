@@ -15,6 +15,7 @@ from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.simulation.files import plain
 from percussion_model.simulation.rate import rate_of_blows
 from percussion_model.simulation.simulate import Simulation
+from percussion_model.simulation.uncertain import is_undecided, rate_text
 
 # A run in which no blow ends for so long [s], and so many periods of the last, has stopped.
 STALLED_AFTER, STALLED_PERIODS = 2.0, 4.0
@@ -84,6 +85,19 @@ class Settled:
     duration: float
     wall_time: float
 
+    def __repr__(self) -> str:
+        known = math.isfinite(self.rate_of_penetration)
+        rate = f"rate='{rate_text(self.summary())} mm/s', " if known else ""
+        return (
+            f"Settled({self.kind!r}, order={self.order}, {rate}"
+            f"blows={len(self.blows)}, duration={self.duration:.4g})"
+        )
+
+    @property
+    def rate_of_penetration_undecided(self) -> bool:
+        """Whether the error is no smaller than the rate."""
+        return is_undecided(self.rate_of_penetration, self.rate_of_penetration_error)
+
     @property
     def counted(self) -> np.ndarray:
         """Blows that means are taken of: the last cycle, or all after settling."""
@@ -101,6 +115,7 @@ class Settled:
             "order": self.order or None,
             "rate_of_penetration": self.rate_of_penetration,
             "rate_of_penetration_error": self.rate_of_penetration_error,
+            "rate_of_penetration_undecided": self.rate_of_penetration_undecided,
             "blow_period": self.blow_period,
             "multiplier": self.multiplier,
             "blows": len(self.blows),

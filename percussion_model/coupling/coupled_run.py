@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,8 @@ import numpy as np
 
 from percussion_model.coupling.verdict import LIMITS, STIFFNESS, Verdict, judge_run
 from percussion_model.simulation.files import staged_text
+from percussion_model.simulation.rate import LEAST_BLOWS, ratio_of_sums
+from percussion_model.simulation.uncertain import is_undecided
 
 STRING_ENERGIES = ("head", "reaction", "weight", "bit", "shoulder", "wall", "stored")
 # Signals that the verdict reads: each run keeps them.
@@ -23,7 +26,7 @@ SIGNALS = (
     "string.head_impulse", "string.bit_impulse", "string.momentum", "string.wall_momentum",
     "string.weight", "string.casing_position", "string.lifted",
     "hammer.bit.impulse", "hammer.contact.impulse", "hammer.bit.velocity",
-    "hammer.piston.velocity", "hammer.off_bottom", "rock.layer",
+    "hammer.piston.velocity", "hammer.off_bottom", "hammer.hole_depth", "rock.layer",
     "controller.mode", "controller.feed_wanted", "rig.energy", "supply.energy",
 )  # fmt: skip
 
@@ -106,7 +109,8 @@ def summary(run: CoupledRun) -> dict[str, Any]:
     Returns
     -------
     dict
-        depth [m], mean rate over the second half [m/s], greatest residual of the energy
+        depth [m], mean rate over the second half with its standard error by the scatter of the
+        blows, and whether that hides it [m/s]; greatest residual of the energy
         balance of the string divided by the energy put in and stored at the start; energy that
         the shoulder took and work of the feed [J]; the former divided by the energy of the
         blows [1]; the verdict.
@@ -117,12 +121,32 @@ def summary(run: CoupledRun) -> dict[str, Any]:
         "error": run.error,
     }  # fmt: skip
     if "hammer.bit.position" in columns:
-        place, time = columns["hammer.bit.position"], columns["time"]
-        half = len(time) // 2
-        found["depth"] = float(place[-1])
-        if len(time) > 2:
-            found["rate_second_half"] = float((place[-1] - place[half]) / (time[-1] - time[half]))
+        found["depth"] = float(columns["hammer.bit.position"][-1])
+        if len(columns["time"]) > 2:
+            found |= _rate_second_half(columns)
     return found | _balances(columns) | {"verdict": run.verdict.to_dict()}
+
+
+def _rate_second_half(columns: dict[str, np.ndarray]) -> dict[str, Any]:
+    """Mean rate over the second half [m/s], by the depth of the hole where that is kept.
+
+    From the start of a blow to that of another, where there are enough blows to tell an error.
+    """
+    time = columns["time"]
+    place = columns.get("hammer.hole_depth", columns["hammer.bit.position"])
+    rows = np.arange(len(time) // 2, len(time))
+    blows = columns.get("hammer.blow_count")
+    error = math.nan
+    rate = float(place[-1] - place[rows[0]]) / float(time[-1] - time[rows[0]])
+    if blows is not None:
+        begun = rows[1:][np.diff(blows[rows]) > 0.0]
+        if len(begun) > LEAST_BLOWS:
+            rate, error = ratio_of_sums(np.diff(place[begun]), np.diff(time[begun]))
+    return {
+        "rate_second_half": rate,
+        "rate_second_half_error": None if math.isnan(error) else error,
+        "rate_second_half_undecided": is_undecided(rate, error),
+    }
 
 
 def _balances(columns: dict[str, np.ndarray]) -> dict[str, float]:

@@ -17,11 +17,18 @@ from markupsafe import Markup
 
 from percussion_model.analysis.study import Study
 from percussion_model.interface.plotting import CAPTIONS, figures
-from percussion_model.interface.uncertain import rate_text
 from percussion_model.scene.parameters import find_row, parameter_table
 from percussion_model.scene.scene import Scene
 from percussion_model.simulation.files import staged
 from percussion_model.simulation.result import REPORT, Result
+from percussion_model.simulation.uncertain import (
+    MOST_DIGITS,
+    SMALL_ERROR,
+    SMALLEST_UNIT,
+    known_error,
+    rate_text,
+    with_error,
+)
 
 # Numbers at the head of the report: key of the summary, what it is called, its
 # SI unit, the unit that people use and SI units in one of those.
@@ -29,7 +36,13 @@ HEADLINES: tuple[tuple[str, str, str, str, float], ...] = (
     ("rate_of_penetration", "Rate of penetration", "m/s", "mm/s", 1e-3),
     ("rate_of_penetration_standard_error", "… its standard error", "m/s", "mm/s", 1e-3),
     ("rate_of_penetration_relative_error", "… its estimated relative error", "–", "%", 1e-2),
-    ("rate_of_penetration_fixed_window", "… from settling to the end", "m/s", "mm/s", 1e-3),
+    (
+        "rate_of_penetration_fixed_window",
+        "… of the bit, from settling to the end",
+        "m/s",
+        "mm/s",
+        1e-3,
+    ),
     ("blow_period", "Blow period", "s", "ms", 1e-3),
     ("blow_frequency", "Blow frequency", "Hz", "blows/min", 1.0 / 60.0),
     ("impact_velocity", "Impact velocity (mean of the piston)", "m/s", "m/s", 1.0),
@@ -48,6 +61,13 @@ HEADLINES: tuple[tuple[str, str, str, str, float], ...] = (
     ("mean_contact_force", "Mean contact force", "N", "kN", 1e3),
 )
 
+# Cards: key of the summary, factor, unit, name.
+CARDS = (
+    ("blow_frequency", 1.0, "Hz", "blow frequency"),
+    ("blow_energy", 1.0, "J", "blow energy"),
+    ("transfer_efficiency", 100.0, "%", "of it given to the rock"),
+    ("penetration_per_blow", 1e3, "mm", "penetration per blow"),
+)
 # Greater numbers are written with an exponent.
 LARGEST_PLAIN = 1e8
 
@@ -87,11 +107,13 @@ LEDGER: tuple[tuple[str, tuple[tuple[str, str], ...]], ...] = (
 STUDY_CAPTIONS = {
     "map": (
         "A map over two parameters and cuts through it; choose what is shown, and values of the "
-        "others by the sliders. Crosses mark points whose motion is not periodic."
+        "others by the sliders. Crosses mark points whose motion is not periodic. Grey and hatched "
+        "is undecided: the error of the rate is no smaller than the rate. The pointer shows ±."
     ),
     "scatter": (
-        "All points over each parameter. Blue is periodic, orange aperiodic. Points that are "
-        "chosen with a box or lasso in one panel stand out in all."
+        "All points over each parameter. Blue is periodic, orange aperiodic, with bars of the "
+        "error of the rate; grey is undecided: the error is no smaller than the rate. Points "
+        "that are chosen with a box or lasso in one panel stand out in all."
     ),
     "points": "All points and what was found there; a click on a heading sorts.",
 }
@@ -176,6 +198,8 @@ def render_report(result: Result, drawings: Sequence[Path]) -> str:
         ran,
         summary=summary,
         rate=rate_text(summary),
+        hourly_rate=rate_text(summary, 3600.0),
+        means=mean_cards(summary),
         headlines=headline_rows(summary),
         figures=[FigureBlock(blocks[name], text) for name, text in CAPTIONS.items()
                  if name in blocks],
@@ -194,14 +218,34 @@ def headline_rows(summary: dict[str, Any]) -> list[tuple[str, str, str]]:
         value = summary.get(key)
         if value is None:
             continue
-        si = f"{_digits(value, 5)} {unit}".removesuffix(" –")
-        everyday = f"{_digits(value / factor, 4)} {other}" if other not in ("", unit) else ""
+        error = known_error(summary, key)
+        si = f"{_digits(value, 5, error, SMALLEST_UNIT)} {unit}".removesuffix(" –")
+        everyday = ""
+        if other not in ("", unit):
+            scaled = _times(1.0 / factor, error)
+            everyday = f"{_digits(value / factor, 4, scaled, MOST_DIGITS)} {other}"
         rows.append((name, si, everyday))
     return rows
 
 
-def _digits(value: float, count: int) -> str:
-    """Write a number with so many digits; large ones without an exponent."""
+def mean_cards(summary: dict[str, Any]) -> list[tuple[str, str]]:
+    """Number with its unit, and name, of the cards beside that of the rate."""
+    return [
+        (f"{_digits(factor * summary[key], 4, _times(factor, error), MOST_DIGITS)} {unit}", name)
+        for key, factor, unit, name in CARDS
+        if summary[key] is not None
+        for error in [known_error(summary, key)]
+    ]
+
+
+def _times(factor: float, value: float | None) -> float | None:
+    return None if value is None else factor * value
+
+
+def _digits(value: float, count: int, error: float | None, most_digits: int) -> str:
+    """Write a number with its error, or with so many digits; large ones without an exponent."""
+    if error is not None and error > SMALL_ERROR * abs(value):
+        return with_error(value, error, most_digits).replace("-", "−")
     text = f"{value:.0f}" if 10**count <= abs(value) < LARGEST_PLAIN else f"{value:.{count}g}"
     return text.replace("-", "−", 1) if value < 0 else text
 

@@ -15,7 +15,12 @@ from rich.table import Table
 
 from percussion_model.interface.progress import Report, lines
 from percussion_model.interface.tables import print_table
-from percussion_model.interface.uncertain import rate_text, with_error, with_short_error
+from percussion_model.simulation.uncertain import (
+    change_text,
+    in_few_characters,
+    mean_text,
+    rate_text,
+)
 
 if TYPE_CHECKING:
     from percussion_model.analysis.comparison import Comparison
@@ -27,14 +32,14 @@ if TYPE_CHECKING:
     from percussion_model.verification.hard_cases import Collection
     from percussion_model.verification.paper.statements import Statement
 
-# An error below this share of a rate does not show in its four digits.
-SMALL_ERROR = 1e-4
 # What ends sooner shows no bar [s].
 _PATIENCE = 2.0
 
 RATE = ("Rate of penetration", "rate_of_penetration", 1e3, "mm/s")
 # What its error is: those of rock and model are others.
 NUMERICAL = " (± of the numerics)"
+# That of means over blows, whose numerical error is not estimated.
+SCATTERED = " (± of their scatter)"
 # Other rows of the table: name, key of the summary, factor, unit.
 SHOWN = (
     ("Blow period", "blow_period", 1e3, "ms"),
@@ -72,7 +77,8 @@ def show_summary(result: Result) -> None:
     values = summary if len(result.blows) else summary["fall"]
     for name, key, factor, unit in SHOWN if len(result.blows) else WITHOUT_BLOWS:
         if values.get(key) is not None:
-            table.add_row(name, f"{factor * values[key]:.5g}", unit)
+            text = mean_text(values, key, factor)
+            table.add_row(name, text, (unit + SCATTERED * ("±" in text)).lstrip())
     energy = summary["energy"]
     for key in ("numerical", "residual"):
         share = energy[f"{key}_relative"]
@@ -101,12 +107,8 @@ def show_settled(found: Settled) -> None:
     table = Table(show_header=False)
     order = {0: "", 1: ", every blow alike"}.get(found.order, f", {found.order} blows a cycle")
     table.add_row("Motion", f"{found.kind}{order}")
-    rate, error = summary["rate_of_penetration"], summary["rate_of_penetration_error"]
-    if rate is not None:
-        text = f"{1e3 * rate:.5g}, error not estimated"
-        if error is not None:
-            text = with_error(1e3 * rate, 1e3 * error)
-        table.add_row("Rate of penetration", f"{text} mm/s")
+    if summary[RATE[1]] is not None:
+        table.add_row(RATE[0], f"{rate_text(summary)} {RATE[3]}")
     for name, key, factor, unit in (
         ("Blow period", "blow_period", 1e3, "ms"),
         ("Multiplier of the cycle", "multiplier", 1.0, ""),
@@ -204,6 +206,7 @@ def _scale_rows(scene: Scene) -> Iterator[tuple[str, str]]:
 def show_comparison(found: Comparison) -> None:
     """Print the numbers of several solvers, each beside its difference to the first."""
     summaries, differences = found.summaries(), found.differences()
+    errors = found.difference_errors()
     title = found.results[found.first].scene.title
     table = Table(title=escape(title) or None)
     table.add_column("")
@@ -214,10 +217,14 @@ def show_comparison(found: Comparison) -> None:
     for label, key, factor, unit in (RATE, *SHOWN):
         cells = []
         for name, summary in summaries.items():
-            cells.append(rate_text(summary) if key == RATE[1] else _number(summary[key], factor))
+            if key == RATE[1]:
+                cells.append(rate_text(summary).replace(", ", "\n"))
+            elif summary[key] is None:
+                cells.append("-")
+            else:
+                cells.append(mean_text(summary, key, factor))
             if name in differences:
-                off = differences[name].get(key)
-                cells.append("-" if off is None else f"{100.0 * off:+.2f}")
+                cells.append(change_text(differences[name].get(key), errors[name].get(key)))
         table.add_row(f"{label}, {unit}" if unit else label, *cells)
     table.add_section()
     for label, value in _EFFORT.items():
@@ -252,7 +259,7 @@ def show_stability(found: Collection) -> None:
         table.add_row(
             row["case"],
             row["solver"],
-            _rate_cell(row["rate"], row["rate_error"]),
+            in_few_characters(_times(1e3, row["rate"]), _times(1e3, row["rate_error"])),
             *(_number(row[key], 1.0, 2) for key in ("residual", "momentum", "events_per_second")),
             str(row["guards"] or ""),
             f"{row['wall_time']:.2g}",
@@ -268,13 +275,9 @@ def show_stability(found: Collection) -> None:
     )
 
 
-def _rate_cell(rate: float | None, error: float | None) -> str:
-    """Rate [mm/s] with its standard error, in few characters."""
-    if rate is None or error is None or error < SMALL_ERROR * abs(rate):
-        return _number(rate, 1e3, 4)
-    if error >= abs(rate):
-        return "undecided"
-    return with_short_error(1e3 * rate, 1e3 * error).replace(" ", "")
+def _times(factor: float, value: float | None) -> float | None:
+    """A number in another unit, None where there is none."""
+    return None if value is None else factor * value
 
 
 def show_statements(statements: list[Statement]) -> None:

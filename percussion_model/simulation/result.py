@@ -17,7 +17,8 @@ from percussion_model.physics.records import BLOW, EVENT, EventKind, Mode
 from percussion_model.scene.scene import Scene
 from percussion_model.simulation.files import ResultError, plain, staged, to_json
 from percussion_model.simulation.origin import ORIGIN
-from percussion_model.simulation.rate import rate_of_blows
+from percussion_model.simulation.rate import rate_of_blows, ratio_of_sums
+from percussion_model.simulation.uncertain import is_undecided, rate_text
 
 if TYPE_CHECKING:
     import pandas
@@ -109,9 +110,12 @@ class Result:
     interrupted: bool = False
 
     def __repr__(self) -> str:
+        known = math.isfinite(self.rate_of_penetration)
+        rate = f"rate='{rate_text(self.summary())} mm/s', " if known else ""
         return (
             f"Result({self.scene.title!r}, solver={self.solver!r}, duration={self.duration:g}, "
-            f"blows={len(self.blows)}, events={len(self.events)}, warnings={len(self.warnings)})"
+            f"{rate}blows={len(self.blows)}, events={len(self.events)}, "
+            f"warnings={len(self.warnings)})"
         )
 
     @property
@@ -131,6 +135,48 @@ class Result:
         See `ratio_of_sums`. Zero where the motion is periodic.
         """
         return rate_of_blows(self.counted)[1]
+
+    @property
+    def rate_of_penetration_error(self) -> float:
+        """How far the rate may be off, by grid and scatter [m/s]; NaN where not estimated."""
+        return abs(self.rate_of_penetration) * self.rate_of_penetration_relative_error
+
+    @property
+    def rate_of_penetration_undecided(self) -> bool:
+        """Whether what is known of its error is no smaller than the rate."""
+        known = self.rate_of_penetration_error, self.rate_of_penetration_standard_error
+        return any(is_undecided(self.rate_of_penetration, error) for error in known)
+
+    @property
+    def rate_of_penetration_fixed_window_error(self) -> float:
+        """How far the rate over the fixed window may be off [m/s].
+
+        By the scatter of the blows, and by the advance of one of them: the window ends
+        wherever in a blow. NaN where the rate is not defined.
+        """
+        rows, window = self.counted, self.duration - self.settle
+        if len(rows) == 0 or not window > 0.0 or math.isnan(self.rate_of_penetration_fixed_window):
+            return math.nan
+        _, scatter = ratio_of_sums(rows["penetration"], rows["period"])
+        return scatter + float(np.max(np.abs(rows["penetration"]))) / window
+
+    @property
+    def standard_errors(self) -> dict[str, float]:
+        """Standard errors of the means over blows, by their names in `summary`, SI units.
+
+        Of the scatter alone: zero where the motion is periodic, NaN for fewer blows than
+        tell one.
+        """
+        rows = self.counted
+        if len(rows) == 0:
+            return {}
+        even = np.ones(len(rows))
+        errors = {name: ratio_of_sums(rows[column], even)[1] for name, column in _SCATTER.items()}
+        errors["blow_frequency"] = errors["blow_period"] / float(np.mean(rows["period"])) ** 2
+        for name, (column, by) in _RATIOS.items():
+            if float(np.sum(rows[by])) > 0.0:
+                errors[name] = ratio_of_sums(rows[column], rows[by])[1]
+        return errors
 
     @property
     def mean_bit_force(self) -> float:
@@ -178,7 +224,10 @@ class Result:
             "rate_of_penetration": self.rate_of_penetration,
             "rate_of_penetration_standard_error": self.rate_of_penetration_standard_error,
             "rate_of_penetration_relative_error": self.rate_of_penetration_relative_error,
+            "rate_of_penetration_error": self.rate_of_penetration_error,
+            "rate_of_penetration_undecided": self.rate_of_penetration_undecided,
             "rate_of_penetration_fixed_window": self.rate_of_penetration_fixed_window,
+            "rate_of_penetration_fixed_window_error": self.rate_of_penetration_fixed_window_error,
             "blow_period": period,
             "blow_frequency": 1.0 / period,
             **{name: _mean(rows[name]) for name in _MEANS},
@@ -191,6 +240,7 @@ class Result:
             "standstill_bit_force": _mean(rows["standstill_force"]),
             "mean_bit_force": self.mean_bit_force,
             "mean_contact_force": self.mean_contact_force,
+            "standard_errors": self.standard_errors,
             "energy": self.energy,
             "blows": len(self.blows),
             "blows_after_settling": len(rows),
@@ -244,6 +294,20 @@ class Result:
 
 
 _MEANS = ("impact_velocity", "rebound_velocity", "stroke", "blow_energy", "rock_energy")
+# Means over blows, and the columns of the blow table behind them.
+_SCATTER = {name: name for name in _MEANS} | {
+    "blow_period": "period",
+    "penetration_per_blow": "hole_advance",
+    "contacts_per_blow": "contacts",
+    "drilling_cycles_per_blow": "drilling_cycles",
+    "standstill_bit_force": "standstill_force",
+}
+# Ratios of sums over blows: numerator and denominator.
+_RATIOS = {
+    "transfer_efficiency": ("rock_energy", "blow_energy"),
+    "mean_bit_force": ("bit_impulse", "period"),
+    "mean_contact_force": ("contact_impulse", "period"),
+}
 
 
 def _fall(result: Result) -> dict[str, float]:

@@ -25,6 +25,7 @@ from percussion_model.analysis.study.store import Store
 from percussion_model.analysis.study.workers import on_a_cluster, on_this_machine
 from percussion_model.scene.scene import Scene
 from percussion_model.simulation.files import ResultError, staged
+from percussion_model.simulation.uncertain import with_error
 from percussion_model.solvers.sources import sources_digest
 
 if TYPE_CHECKING:
@@ -78,13 +79,20 @@ class Study:
         error = self.rows["rate_of_penetration_error"]
         return np.divide(error, rate, out=np.full(len(rate), np.nan), where=rate > 0)
 
+    @property
+    def undecided(self) -> np.ndarray:
+        """Whether the error is no smaller than the rate, for each point."""
+        error = self.rows["rate_of_penetration_error"]
+        return np.asarray((error > 0.0) & (error >= np.abs(self.rows["rate_of_penetration"])))
+
     def headlines(self) -> list[tuple[str, str]]:
         """Motions, lowest and highest rate with their points, errors, cost: names and texts."""
         rows = self.rows
         counts = np.bincount(rows["kind"], minlength=len(KINDS)).tolist()
         motions = [f"{n} {kind}" for n, kind in zip(counts, KINDS, strict=True) if n]
         lines = [("Points", f"{len(self.points)}: {', '.join(motions)}")]
-        rate = rows["rate_of_penetration"]
+        rate, undecided = rows["rate_of_penetration"].copy(), self.undecided
+        rate[undecided] = np.nan
         if np.isfinite(rate).any():
             for name, k in (
                 ("Lowest rate", np.nanargmin(rate)),
@@ -93,7 +101,11 @@ class Study:
                 at = ", ".join(
                     f"{key} = {value:.5g}" for key, value in self.points.changes(int(k)).items()
                 )
-                lines.append((name, f"{1e3 * rate[k]:.5g} mm/s at {at}"))
+                error = float(rows["rate_of_penetration_error"][k])
+                lines.append((name, f"{with_error(1e3 * rate[k], 1e3 * error)} mm/s at {at}"))
+        if undecided.any():
+            words = f"{np.count_nonzero(undecided)} rates, whose errors are no smaller than they"
+            lines.append(("Undecided", words))
         for kind in ("periodic", "aperiodic"):
             error = self.relative_error[rows["kind"] == KINDS.index(kind)]
             if np.isfinite(error).any():
@@ -119,6 +131,7 @@ class Study:
 
         columns: dict[str, Any] = dict(zip(self.points.keys, self.points.values.T, strict=True))
         columns |= {name: self.rows[name] for name in self.rows.dtype.names or ()}
+        columns["undecided"] = self.undecided
         columns["kind"] = np.array(KINDS)[self.rows["kind"]]
         return DataFrame(columns | {"failure": self.failures})
 
@@ -150,6 +163,7 @@ class Study:
             for name in names
         }
         found["kind"].attrs["meaning"] = ", ".join(f"{k}: {kind}" for k, kind in enumerate(KINDS))
+        found["undecided"] = DataArray(self.undecided.reshape(points.shape), dims=dims)
         found["failure"] = DataArray(np.array(self.failures).reshape(points.shape), dims=dims)
         return Dataset(found, coords, {"title": self.scene.title, "scene": self.scene.to_toml()})
 

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import textwrap
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
 from percussion_model.interface.commands import common
+from percussion_model.simulation.uncertain import NOT_ESTIMATED, with_error
 
 if TYPE_CHECKING:
     from percussion_model.coupling.verdict import Verdict
 
 SystemFile = Annotated[Path, typer.Argument(metavar="SYSTEM.ssp", help="A system (SSP 1.0).")]
+RATE = "rate_second_half"
 UNITS = {
-    "time": "s", "step": "s", "depth": "m", "rate_second_half": "m/s", "shoulder_energy": "J",
+    "time": "s", "step": "s", "depth": "m", RATE: "mm/s", "shoulder_energy": "J",
     "feed_work": "J", "hammer_energy_residual": "of the energy put in",
     "string_energy_residual": "of the energy put in or there", "shoulder_by_blows": "of the blows",
 }  # fmt: skip
@@ -92,10 +95,8 @@ def couple(
     path = run.write_csv(folder / "signals.csv")
     common.write_json(json_file, found)
     if json_file != "-":
-        for name, value in found.items():
-            if name not in ("error", "verdict"):  # told at the end
-                number = f"{value:.6g}" if isinstance(value, float) else value
-                typer.echo(f"{name:26s} {number} {UNITS.get(name, '')}".rstrip())
+        for line in _lines(found):
+            typer.echo(line)
     common.list_files([path])
     if figures:
         with common.if_drawable():
@@ -104,6 +105,24 @@ def couple(
             common.list_files([save_signals(run, folder / "signals.png", system.stem)])
     claimed.sign()
     return _tell(run.verdict, common.INTERRUPTED if run.interrupted else FAILED)
+
+
+# Told at the end, or beside the rate.
+ELSEWHERE = ("error", "verdict", f"{RATE}_error", f"{RATE}_undecided")
+
+
+def _lines(found: Mapping[str, Any]) -> Iterator[str]:
+    """Lines of a summary: names, numbers and units."""
+    for name, value in found.items():
+        if name in ELSEWHERE:
+            continue
+        number = f"{value:.6g}" if isinstance(value, float) else value
+        if name == RATE:
+            error = found[f"{RATE}_error"]
+            known = error is not None
+            number = with_error(1e3 * value, 1e3 * error) if known else f"{1e3 * value:.5g}"
+            number += "" if known else f", {NOT_ESTIMATED}"
+        yield f"{name:26s} {number} {UNITS.get(name, '')}".rstrip()
 
 
 def _tell(verdict: Verdict, code: int) -> int:

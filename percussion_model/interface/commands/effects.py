@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from percussion_model.interface.commands import common
-from percussion_model.interface.uncertain import with_short_error
+from percussion_model.simulation.uncertain import UNDECIDED, change_text, in_few_characters
 
 if TYPE_CHECKING:
     from percussion_model.analysis.effect_study import EffectsStudy, Trial
@@ -60,6 +60,10 @@ def effects(
 # A longer name of an effect takes two lines.
 LONGEST_NAME = 15
 
+RATE = "rate_of_penetration"
+# A standard error below this share of a rate is not shown.
+LEAST_ERROR = 1e-3
+
 # Columns: heading, and what stands in it.
 _COLUMNS: dict[str, Callable[[EffectsStudy, Trial, dict[str, Any]], str]] = {
     "step\nns": lambda study, trial, row: (
@@ -69,7 +73,7 @@ _COLUMNS: dict[str, Callable[[EffectsStudy, Trial, dict[str, Any]], str]] = {
     "blow\nms": lambda study, trial, row: _number(row["blow_time"], 1e3, 2),
     "events": lambda study, trial, row: f"{row['events']}",
     "rate\nmm/s": lambda study, trial, row: _rate(row),
-    "rate\n%": lambda study, trial, row: _change(study, trial, "rate_of_penetration"),
+    "rate\n%": lambda study, trial, row: _change(study, trial, RATE),
     "period\n%": lambda study, trial, row: _change(study, trial, "blow_period"),
     "peak\n%": lambda study, trial, row: _change(study, trial, "peak_bit_force"),
 }
@@ -118,12 +122,9 @@ def show_effects(found: EffectsStudy) -> None:
 def _rate(row: dict[str, Any]) -> str:
     """Rate of penetration [mm/s], with its standard error where it matters."""
     value, error = row["rate_of_penetration"], row["rate_of_penetration_standard_error"]
-    if value is None:
+    if value is None or error is None:
         return "-"
-    shown = f"{1e3 * value:.4g}"
-    if error <= 1e-3 * abs(value):
-        return shown
-    return with_short_error(1e3 * value, 1e3 * error) if error < abs(value) else "undecided"
+    return in_few_characters(1e3 * value, 1e3 * error, LEAST_ERROR)
 
 
 def _two_lines(name: str) -> str:
@@ -140,9 +141,7 @@ def _number(value: float | None, factor: float, digits: int) -> str:
 def _change(found: EffectsStudy, trial: Trial, name: str) -> str:
     if trial is found.base:
         return ""
-    change = found.changes(trial)[name]
-    if change is None:
-        return "-"
-    decimals = 2 if abs(change) < 0.1 else 1 if abs(change) < 1.0 else 0
-    shown = f"{100.0 * change:+.{decimals}f}"
-    return "0.00" if float(shown) == 0.0 else shown
+    hidden = trial.undecided or found.base.undecided
+    if name == RATE and hidden and trial.numbers()[name] is not None:
+        return UNDECIDED
+    return change_text(found.changes(trial)[name], found.change_errors(trial).get(name))

@@ -9,8 +9,10 @@ from matplotlib.figure import Figure
 
 from percussion_model.analysis.effect_study import EffectsStudy
 from percussion_model.interface.plotting import style
+from percussion_model.simulation.uncertain import UNDECIDED, change_text, is_undecided
 
 COST_COLOUR, MORE_COLOUR, LESS_COLOUR = "#0072B2", "#D55E00", "#009E73"
+UNDECIDED_COLOUR = "#DDDDDD"
 # Axes are made for changes up to this [%].
 WIDEST = 60.0
 # Bars beyond this multiple of it have no room for their number, and are cut off.
@@ -42,7 +44,8 @@ def draw_effects(found: EffectsStudy) -> Figure:
         (axes[3], "blow_period", "Blow period"),
         (axes[4], "peak_bit_force", "Peak bit force"),
     ):
-        _changes(ax, [found.changes(trial)[key] for trial in trials])
+        errors = [found.change_errors(trial).get(key) for trial in trials]
+        _changes(ax, [found.changes(trial)[key] for trial in trials], errors)
         style.label(ax, "change [%], hatched: beyond", "", title)
     axes[0].set_yticks(range(len(trials)), names)
     axes[0].invert_yaxis()
@@ -71,15 +74,20 @@ def _costs(ax: Axes, values: list[float | None]) -> None:
     ax.axvline(1.0, color=style.RULE_COLOUR, linewidth=0.8)
 
 
-def _changes(ax: Axes, values: list[float | None]) -> None:
-    """Bars from 0 in per cent."""
+def _changes(ax: Axes, values: list[float | None], errors: list[float | None]) -> None:
+    """Bars from 0 in per cent, with their errors; grey where the error hides the change."""
     shares = [None if value is None else 100.0 * value for value in values]
+    unsure = [0.0 if error is None else 100.0 * error for error in errors]
     known = [abs(share) for share in shares if share is not None]
     end = min(max([1.0, *known]), WIDEST)
     ax.set_xlim(-ROOM * end, ROOM * end)
-    for y, share in enumerate(shares):
+    for y, (share, error) in enumerate(zip(shares, unsure, strict=True)):
         if share is None:
             ax.text(0.0, y, " –", va="center")
+            continue
+        if error >= NOTHING and is_undecided(share, error):
+            ax.barh(y, 2.0 * ROOM * end, left=-ROOM * end, height=0.62, color=UNDECIDED_COLOUR)
+            ax.text(0.0, y, UNDECIDED, va="center", ha="center", fontsize=8.0)
             continue
         cut = abs(share) > UNCUT * end
         # a cut bar leaves the picture, and says so within it
@@ -89,6 +97,8 @@ def _changes(ax: Axes, values: list[float | None]) -> None:
         align = "left" if share >= 0.0 else "right"
         text = f" {share:+.2g} " if abs(share) < 100.0 else f" {share:+.0f} "
         text = " 0 " if abs(share) < NOTHING else text
+        if error >= NOTHING:
+            text = f" {change_text(0.01 * share, 0.01 * error)} "
         if cut:
             align = "right" if share >= 0.0 else "left"
         box = {"facecolor": "white", "edgecolor": "none", "pad": 0.8} if cut else None

@@ -9,6 +9,7 @@ import numpy as np
 from bokeh.layouts import column, gridplot
 from bokeh.models import (
     BasicTicker,
+    BoxAnnotation,
     ColorBar,
     HoverTool,
     LayoutDOM,
@@ -30,6 +31,7 @@ from percussion_model.interface.plotting.window import (
 )
 from percussion_model.physics.records import Mode
 from percussion_model.simulation.result import Result
+from percussion_model.simulation.uncertain import known_error, rate_text
 
 # Blue for tension, white, red for compression.
 STRESS_COLOURS = ("#053061", "#4393C3", "#F7F7F7", "#D6604D", "#67001F")
@@ -62,7 +64,7 @@ def _overview(result: Result) -> LayoutDOM:
         ("Mean bit position at each blow", "depth gained [mm]",
          [("", blows["bit_position"] * MM, style.BIT_COLOUR)]),
         ("Rate of penetration of each blow", "rate [mm/s]",
-         [("", blows["penetration"] / blows["period"] * MM, style.BIT_COLOUR)]),
+         [("", blows["hole_advance"] / blows["period"] * MM, style.BIT_COLOUR)]),
         ("Mean piston velocity at impact", "velocity [m/s]",
          [("", blows["impact_velocity"], style.BIT_COLOUR)]),
         ("Period of each blow", "period [ms]", [("", blows["period"] * MS, style.BIT_COLOUR)]),
@@ -74,12 +76,28 @@ def _overview(result: Result) -> LayoutDOM:
           ("piston on bit", blows["peak_contact_force"] / KN, style.PISTON_COLOUR)]),
     ]  # fmt: skip
     panels = [_over_blows(time, *content, shared) for content in contents]
-    mean = result.rate_of_penetration
-    if np.isfinite(mean):
-        rule(panels[1], mean * MM, style.MEAN_COLOUR)
+    _mean(panels[1], result)
     for one in panels:
         shade(one, [(0.0, result.settle)], "#EDEDED")
     return gridplot(panels, ncols=2, sizing_mode="stretch_width", toolbar_location="right")
+
+
+def _mean(to: Any, result: Result) -> None:
+    """Draw the mean rate with a band of its error, and say it in the title."""
+    summary = result.summary()
+    mean, error = summary["rate_of_penetration"], known_error(summary, "rate_of_penetration")
+    if mean is None:
+        return
+    to.title.text += f" — mean {rate_text(summary)} mm/s"
+    if result.rate_of_penetration_undecided:
+        return
+    rule(to, mean * MM, style.MEAN_COLOUR)
+    if error:
+        ends = (mean - error) * MM, (mean + error) * MM
+        to.add_layout(
+            BoxAnnotation(bottom=ends[0], top=ends[1], fill_color=style.MEAN_COLOUR,
+                          fill_alpha=0.2, line_color=None)
+        )  # fmt: skip
 
 
 def _over_blows(

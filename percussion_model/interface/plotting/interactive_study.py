@@ -22,13 +22,15 @@ from bokeh.models import (
     Select,
     Slider,
     TableColumn,
+    Whisker,
 )
 from bokeh.palettes import Viridis256
 
 from percussion_model.analysis.study import Study
 from percussion_model.analysis.study.response import KINDS
 from percussion_model.interface.plotting import style
-from percussion_model.interface.plotting.interactive import TOOLS, panel
+from percussion_model.interface.plotting.interactive import TOOLS, legend, panel
+from percussion_model.simulation.uncertain import UNDECIDED
 
 # Larger studies are thinned evenly where they are no grid, and in the table.
 MOST_SHOWN = 20_000
@@ -44,6 +46,7 @@ EVEN = 1e-6
 # What can be shown: column of the page, name, unit, column of a study, factor from SI.
 QUANTITIES = (
     ("rate", "Rate of penetration", "mm/s", "rate_of_penetration", 1e3),
+    ("off", "Error of the rate", "mm/s", "rate_of_penetration_error", 1e3),
     ("error", "Relative error of the rate", "–", "", 1.0),
     ("period", "Blow period", "ms", "blow_period", 1e3),
     ("impact", "Impact velocity", "m/s", "impact_velocity", 1.0),
@@ -57,6 +60,13 @@ QUANTITIES = (
     ("cycles", "Drilling cycles per blow", "–", "drilling_cycles_per_blow", 1.0),
     ("order", "Blows of a cycle", "–", "order", 1.0),
 )
+# Those that the error of the rate may hide, as a script asks for them.
+HIDDEN = ("rate", "advance")
+UNDECIDED_COLOUR, HATCH_COLOUR = "#DDDDDD", "#666666"
+# What the pointer shows of each point besides.
+RATE_TOOLTIPS = (
+    ("rate", "@rate{0.[00000]} ± @off{0.[00000]} mm/s @verdict"), ("motion", "@motion"),
+)  # fmt: skip
 
 
 def interactive_study(found: Study) -> dict[str, LayoutDOM]:
@@ -78,13 +88,19 @@ def _scatter(found: Study, columns: dict[str, np.ndarray]) -> LayoutDOM:
     """What is shown over each parameter; points chosen in one panel stand out in all."""
     kept = _thinned(len(found.points))
     kinds = [KINDS[kind] for kind in found.rows["kind"][kept].tolist()]
+    undecided = found.undecided[kept]
     shared = ColumnDataSource(
         {
             **{name: values[kept] for name, values in columns.items()},
             **{f"at{k}": found.points.values[kept, k] for k in range(len(found.points.keys))},
             "value": columns["rate"][kept].copy(),
-            "kind": kinds,
-            "colour": [KIND_COLOURS[kind] for kind in kinds],
+            **_bars(columns, kept),
+            "motion": kinds,
+            "verdict": _verdicts(undecided),
+            "colour": [
+                UNDECIDED_COLOUR if hidden else KIND_COLOURS[kind]
+                for kind, hidden in zip(kinds, undecided.tolist(), strict=True)
+            ],
         }
     )
     chosen, names = _selector(), _titles()
@@ -96,16 +112,21 @@ def _scatter(found: Study, columns: dict[str, np.ndarray]) -> LayoutDOM:
             order = np.argsort(found.points.values[kept, 0])
             if np.array_equal(order, np.arange(len(order))):
                 made.line("at0", "value", source=shared, color=style.BIT_COLOUR)
+        made.add_layout(Whisker(base=f"at{k}", lower="lower", upper="upper", source=shared,
+                                line_color="colour", upper_head=None, lower_head=None))  # fmt: skip
         drawn = made.scatter(f"at{k}", "value", source=shared, color="colour", size=5, alpha=0.7,
                              nonselection_alpha=0.06)  # fmt: skip
         made.add_tools(HoverTool(renderers=[drawn], tooltips=[
-            (key, f"@at{k}{{0.[00000]}}"), ("shown", "@value{0.[00000]}"), ("motion", "@kind")
+            (key, f"@at{k}{{0.[00000]}}"), ("shown", "@value{0.[00000]}"), *RATE_TOOLTIPS
         ]))  # fmt: skip
         panels.append(made)
     update = CustomJS(
         args={"all": shared, "choice": chosen, "titles": names,
               "heads": [made.title for made in panels]},
-        code="all.data.value = all.data[choice.value].slice(); all.change.emit();"
+        code="const d = all.data, of_rate = choice.value == 'rate';"
+        "d.value = d[choice.value].slice();"
+        "d.lower = d.value.map((v, k) => of_rate ? v - d.off[k] : v);"
+        "d.upper = d.value.map((v, k) => of_rate ? v + d.off[k] : v); all.change.emit();"
         "for (const head of heads) head.text = titles[choice.value];",
     )  # fmt: skip
     chosen.js_on_change("value", update)
@@ -124,6 +145,8 @@ def _table(found: Study, columns: dict[str, np.ndarray]) -> LayoutDOM:
         title = _label(key, found.scene.row_of(key).unit)
         shown.append(TableColumn(field=f"at{k}", title=title, formatter=number, width=WIDE))
     shown.append(TableColumn(field="kind", title="motion", width=NARROW))
+    data["verdict"] = _verdicts(found.undecided[kept])
+    shown.append(TableColumn(field="verdict", title="rate is", width=NARROW))
     for name, title in _titles().items():
         data[name] = columns[name][kept]
         shown.append(TableColumn(field=name, title=title, formatter=number, width=WIDE))
@@ -141,6 +164,17 @@ def _columns(found: Study) -> dict[str, np.ndarray]:
         )
         for name, _, _, field, factor in QUANTITIES
     }
+
+
+def _bars(columns: dict[str, np.ndarray], kept: np.ndarray) -> dict[str, np.ndarray]:
+    """Ends of the error bars of the rate."""
+    rate, off = columns["rate"][kept], np.nan_to_num(columns["off"][kept])
+    return {"lower": rate - off, "upper": rate + off}
+
+
+def _verdicts(undecided: np.ndarray) -> list[str]:
+    """A word for what must not be read as a rate."""
+    return [UNDECIDED if hidden else "" for hidden in undecided.tolist()]
 
 
 def _label(key: str, unit: str) -> str:
@@ -222,14 +256,14 @@ def _map(found: Study, columns: dict[str, np.ndarray]) -> LayoutDOM:
     offset = (
         np.arange(len(y.values))[:, None] * y.stride + np.arange(len(x.values))[None, :] * x.stride
     )
-    kinds = found.rows["kind"]
-    cells = _cells(x, y, offset, columns["rate"], kinds, base)
+    kinds, undecided = found.rows["kind"], found.undecided
+    cells = _cells(x, y, offset, columns, kinds, undecided, base)
     rows = len(y.values)
     shown = sorted({int(k) for k in np.linspace(0, rows - 1, min(rows, MOST_LINES)).round()})
     lines = ColumnDataSource(
         {
             "xs": [x.values.tolist()] * len(shown),
-            "ys": [columns["rate"][base + offset[k]].tolist() for k in shown],
+            "ys": [_seen(columns["rate"], undecided)[base + offset[k]].tolist() for k in shown],
             "at": [float(y.values[k]) for k in shown],
             "colour": [Viridis256[int(235 * i / max(1, len(shown) - 1))]
                        for i in range(len(shown))],
@@ -241,10 +275,17 @@ def _map(found: Study, columns: dict[str, np.ndarray]) -> LayoutDOM:
     right = panel("", x.label, "", height=400, x_axis_type=x.scale)
     quads = left.quad("left", "right", "bottom", "top", source=cells, line_width=0.6,
                       color={"field": "value", "transform": mapper})  # fmt: skip
+    left.quad("left", "right", "bottom", "top", source=cells, fill_color=UNDECIDED_COLOUR,
+              fill_alpha="grey", hatch_pattern="right_diagonal_line", hatch_alpha="grey",
+              hatch_color=HATCH_COLOUR, hatch_scale=8, line_color=None,
+              legend_label=f"{UNDECIDED}: error ≥ rate", visible=True)  # fmt: skip
     left.scatter("x", "y", size="mark", source=cells, marker="x", color="white", line_width=1.5)
     left.add_tools(HoverTool(renderers=[quads], tooltips=[
-        (x.key, "@x{0.[00000]}"), (y.key, "@y{0.[00000]}"), ("shown", "@value{0.[00000]}")
+        (x.key, "@x{0.[00000]}"), (y.key, "@y{0.[00000]}"), ("shown", "@value{0.[00000]}"),
+        *RATE_TOOLTIPS,
     ]))  # fmt: skip
+    legend(left)
+    left.legend.visible = bool(undecided.any())
     for made, axis in ((left.xaxis, x), (left.yaxis, y), (right.xaxis, x)):
         if axis.scale == "log":
             made.ticker, made.formatter = axis.ticks, CustomJSTickFormatter(code=SHORT)
@@ -255,7 +296,9 @@ def _map(found: Study, columns: dict[str, np.ndarray]) -> LayoutDOM:
         (y.key, "@at{0.[00000]}"), ("shown", "$data_y{0.[0000]}")
     ]))  # fmt: skip
     chosen, sliders = _selector(), [_slider(axis) for axis in others]
-    everything = ColumnDataSource({**columns, "kind": kinds.astype(np.int32)})
+    everything = ColumnDataSource(
+        {**columns, "kind": kinds.astype(np.int32), "hidden": undecided.astype(np.int32)}
+    )
     names = _titles()
     left.title.text = names["rate"]
     low, high = y.values.min(), y.values.max()
@@ -266,7 +309,8 @@ def _map(found: Study, columns: dict[str, np.ndarray]) -> LayoutDOM:
             "all": everything, "cells": cells, "lines": lines, "mapper": mapper,
             "choice": chosen, "sliders": sliders, "titles": names, "left": left.title,
             "strides": [axis.stride for axis in others], "right": right.yaxis[0],
-            "shown": shown, "width": len(x.values),
+            "shown": shown, "width": len(x.values), "hideable": list(HIDDEN),
+            "words": UNDECIDED, "names": list(KINDS),
         },
         code=UPDATE_MAP,
     )  # fmt: skip
@@ -289,12 +333,19 @@ UPDATE_MAP = """
 const from = all.data[choice.value], kind = all.data.kind;
 let base = 0;
 for (let k = 0; k < sliders.length; k++) base += strides[k] * sliders[k].value;
-const {offset, value, mark} = cells.data;
+const {offset, value, mark, grey, rate, off, verdict, motion} = cells.data;
+const may_hide = hideable.includes(choice.value);
 let low = Infinity, high = -Infinity;
 for (let j = 0; j < offset.length; j++) {
-  const v = from[base + offset[j]];
+  const k = base + offset[j], hidden = all.data.hidden[k] == 1;
+  const v = may_hide && hidden ? NaN : from[k];
   value[j] = v;
-  mark[j] = kind[base + offset[j]] == 0 ? 0 : 6;
+  grey[j] = may_hide && hidden ? 1 : 0;
+  rate[j] = all.data.rate[k];
+  off[j] = all.data.off[k];
+  verdict[j] = hidden ? words : "";
+  motion[j] = names[kind[k]];
+  mark[j] = kind[k] == 0 ? 0 : 6;
   if (isFinite(v)) { low = Math.min(low, v); high = Math.max(high, v); }
 }
 if (low > high) { low = 0; high = 1; }
@@ -309,7 +360,13 @@ lines.change.emit();
 
 
 def _cells(
-    x: Axis, y: Axis, offset: np.ndarray, values: np.ndarray, kinds: np.ndarray, base: int
+    x: Axis,
+    y: Axis,
+    offset: np.ndarray,
+    columns: dict[str, np.ndarray],
+    kinds: np.ndarray,
+    undecided: np.ndarray,
+    base: int,
 ) -> ColumnDataSource:
     """Cells of a map, row by row from the lowest value of the vertical axis on."""
     across, up = len(x.values), len(y.values)
@@ -319,11 +376,21 @@ def _cells(
             "left": np.tile(x.edges[:-1], up), "right": np.tile(x.edges[1:], up),
             "bottom": np.repeat(y.edges[:-1], across), "top": np.repeat(y.edges[1:], across),
             "x": np.tile(x.values, up), "y": np.repeat(y.values, across),
-            "offset": offset.ravel().astype(np.int32), "value": values[at],
+            "offset": offset.ravel().astype(np.int32),
+            "value": _seen(columns["rate"], undecided)[at],
+            "grey": undecided[at].astype(np.float32),
+            "rate": columns["rate"][at], "off": columns["off"][at],
+            "verdict": _verdicts(undecided[at]),
+            "motion": [KINDS[kind] for kind in kinds[at].tolist()],
             "mark": np.where(kinds[at] == KINDS.index("periodic"), 0.0, 6.0),
         },
         name="cells",
     )  # fmt: skip
+
+
+def _seen(values: np.ndarray, undecided: np.ndarray) -> np.ndarray:
+    """Values without those that their errors hide."""
+    return np.where(undecided, np.float32(np.nan), values)
 
 
 def _limits(values: Any) -> dict[str, float]:

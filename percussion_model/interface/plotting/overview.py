@@ -12,6 +12,7 @@ from matplotlib.ticker import MaxNLocator
 from percussion_model.interface.plotting import style
 from percussion_model.interface.plotting.style import KN, MM, MS
 from percussion_model.simulation.result import Result
+from percussion_model.simulation.uncertain import known_error, rate_text
 
 # Blows beyond this number are drawn as lines without markers.
 MOST_MARKERS = 150
@@ -27,13 +28,9 @@ def draw_overview(result: Result) -> Figure:
     time = blows["time"]
     axes[0, 0].plot(time, blows["bit_position"] * MM, color=style.BIT_COLOUR, **_marks(len(blows)))
     style.label(axes[0, 0], "time [s]", "depth gained [mm]", "Mean bit position at each blow")
-    rate = blows["penetration"] / blows["period"]
+    rate = blows["hole_advance"] / blows["period"]
     _series(axes[0, 1], time, rate * MM, "rate [mm/s]", "Rate of penetration of each blow")
-    mean = result.summary()["rate_of_penetration"]
-    if mean is not None:
-        text = f"settled mean {mean * MM:.2f} mm/s"
-        axes[0, 1].axhline(mean * MM, color=style.MEAN_COLOUR, lw=1.0, ls="--", label=text)
-        axes[0, 1].legend(loc="best")
+    _mean(axes[0, 1], result)
     _series(
         axes[1, 0],
         time,
@@ -54,6 +51,24 @@ def draw_overview(result: Result) -> Figure:
     if result.settle > 0:
         fig.text(0.99, 0.99, "grey: settling, not averaged", ha="right", va="top", fontsize=8.5)
     return fig
+
+
+def _mean(ax: Axes, result: Result) -> None:
+    """Draw the mean rate with a band of its error; a word alone where that hides it."""
+    summary = result.summary()
+    mean, error = summary["rate_of_penetration"], known_error(summary, "rate_of_penetration")
+    if mean is None:
+        return
+    text, hidden = rate_text(summary), result.rate_of_penetration_undecided
+    words = f"mean {text} mm/s" if hidden else f"settled mean {text} mm/s"
+    if hidden:
+        ax.plot([], [], linestyle="", label=words)
+    else:
+        ax.axhline(mean * MM, color=style.MEAN_COLOUR, lw=1.0, ls="--", label=words)
+        if error:
+            ends = (mean - error) * MM, (mean + error) * MM
+            ax.axhspan(*ends, color=style.MEAN_COLOUR, alpha=0.2, linewidth=0)
+    ax.legend(loc="best")
 
 
 def _marks(count: int) -> dict[str, Any]:

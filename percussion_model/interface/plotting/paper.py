@@ -14,6 +14,7 @@ from matplotlib.ticker import LogLocator, NullFormatter, ScalarFormatter
 from percussion_model.analysis.study import Study
 from percussion_model.interface.plotting import style
 from percussion_model.interface.plotting.style import KN, MM, MS
+from percussion_model.simulation.uncertain import UNDECIDED
 from percussion_model.verification.paper.runs import (
     DAMPINGS,
     ENERGIES,
@@ -33,8 +34,8 @@ DAMPING_LINES: tuple[Any, ...] = ((0, (1.2, 1.2)), "-", (0, (4, 1.5)))
 DROP_SHOWN = 45e-3
 # Room above the greatest rate, as a factor on it.
 ROOM = 1.25
-# Error of a rate that is known well enough to set the scale, as a share of it.
-MOST_ERROR = 0.5
+# The same above the end of the highest error bar.
+ROOM_OF_BAR = 1.05
 PERIODIC_COLOUR, APERIODIC_COLOUR = "#0072B2", "#D55E00"
 RIGID_COLOUR = "#009E73"
 
@@ -91,6 +92,11 @@ def draw_sweeps(found: Mapping[str, Study]) -> Figure:
         Line2D([], [], linestyle="", marker="o", color=colour, label=name)
         for name, colour in (("periodic", PERIODIC_COLOUR), ("aperiodic", APERIODIC_COLOUR))
     ]
+    if any(one.undecided.any() for one in found.values()):
+        words = f"{UNDECIDED}: error ≥ rate"
+        handles.append(
+            Line2D([], [], linestyle="", marker="x", color=style.RULE_COLOUR, label=words)
+        )
     handles.append(Line2D([], [], color=style.RULE_COLOUR, linestyle="--", label="fit"))
     style.head(fig, "Rate of penetration around the reference (figure 9)", handles)
     return fig
@@ -98,8 +104,11 @@ def draw_sweeps(found: Mapping[str, Study]) -> Figure:
 
 def _points(ax: Axes, found: Study, factor: float = 1.0) -> None:
     x, rate, periodic = along(found)
-    error = found.rows["rate_of_penetration_error"]
-    for colour, chosen in ((PERIODIC_COLOUR, periodic), (APERIODIC_COLOUR, ~periodic)):
+    error, undecided = found.rows["rate_of_penetration_error"], found.undecided
+    for colour, chosen in (
+        (PERIODIC_COLOUR, periodic & ~undecided),
+        (APERIODIC_COLOUR, ~periodic & ~undecided),
+    ):
         ax.errorbar(
             x[chosen] * factor,
             rate[chosen] * MM,
@@ -110,9 +119,14 @@ def _points(ax: Axes, found: Study, factor: float = 1.0) -> None:
             color=colour,
             elinewidth=1.0,
         )
-    # What is known no better than that may leave the picture.
-    known = error < MOST_ERROR * np.abs(rate)
-    ax.set_ylim(0.0, ROOM * float(np.max(rate[known])) * MM)
+    # where such a point stands says nothing, so it stands at the foot of the panel
+    foot = np.zeros(int(np.sum(undecided)))
+    ax.plot(x[undecided] * factor, foot, "x", color=style.RULE_COLOUR, clip_on=False)
+    if not undecided.all():
+        known = ~undecided & np.isfinite(rate)
+        top = float(np.max((rate + error)[known]))
+        bottom = min(0.0, float(np.min((rate - error)[known])))
+        ax.set_ylim(bottom * MM, max(ROOM * float(np.max(rate[known])), ROOM_OF_BAR * top) * MM)
 
 
 def _fit(ax: Axes, x: np.ndarray, y: np.ndarray, words: str, at: tuple[float, float]) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from percussion_model.simulation.uncertain import in_few_characters
 from percussion_model.verification.hard_cases.cases import hard_cases
 from percussion_model.verification.hard_cases.collection import (
     DISAGREE,
@@ -152,11 +153,7 @@ def _group(found: Collection, group: str) -> str:
 
 
 def _row(row: dict[str, Any], aperiodic: bool) -> str:
-    rate = "-"
-    if row["rate"] is not None:
-        rate = f"{1e3 * row['rate']:.4g}"
-        if row["rate_error"] and row["rate_error"] > 0.01 * abs(row["rate"]):
-            rate += f" ± {1e3 * row['rate_error']:.2g}"
+    rate = _rate(row["rate"], row["rate_error"])
     refined = _percent(row.get("refined_rate_change"))
     if aperiodic and row.get("refined_rate_sigmas") is not None:
         refined = f"{row['refined_rate_sigmas']:.1f} σ"
@@ -167,6 +164,13 @@ def _row(row: dict[str, Any], aperiodic: bool) -> str:
         f"| {_plain(row['events_per_second'], 3)} | {row['guards'] or ''} | {refined} "
         f"| {_plain(speed)} |"
     )
+
+
+def _rate(rate: float | None, error: float | None) -> str:
+    """Rate [mm/s] with its standard error."""
+    if rate is None:
+        return "-"
+    return in_few_characters(1e3 * rate, None if error is None else 1e3 * error)
 
 
 def _small(value: float | None) -> str:

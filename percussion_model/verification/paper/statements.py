@@ -13,6 +13,7 @@ from percussion_model.physics.records import Mode
 from percussion_model.scene.scales import scales
 from percussion_model.scene.scene import Scene
 from percussion_model.simulation.result import Result
+from percussion_model.simulation.uncertain import SMALL_ERROR, rate_text, with_error
 from percussion_model.verification.paper.runs import (
     CALIBRATED,
     DAMPINGS,
@@ -168,7 +169,7 @@ def _about_fixed_window(place: str, result: Result) -> Iterator[Statement]:
     yield Statement(
         f"{place}, eq. 58",
         "the rate is that over 3 s from 1 s on",
-        f"{1e3 * window:.3f} mm/s; over whole blows {1e3 * whole:.3f}: "
+        f"{1e3 * window:.3f} mm/s; over whole blows {rate_text(result.summary())}: "
         f"{100 * off:+.2f} %, within the {100 * share:.2f} % of one blow",
         abs(off) < share,
     )
@@ -282,12 +283,19 @@ def about_sweeps(found: Mapping[str, Study]) -> Iterator[Statement]:
     yield from _about_scaling(found["d"])
 
 
+def _rate(found: Study, k: int) -> str:
+    """Rate of a point [mm/s] with its error."""
+    row = found.rows[k]
+    rate, error = (1e3 * row[f"rate_of_penetration{end}"] for end in ("", "_error"))
+    return f"{rate:.4g}" if error <= SMALL_ERROR * abs(rate) else with_error(rate, error)
+
+
 def _about_stiffness(found: Study) -> Iterator[Statement]:
     x, rate, _periodic = along(found)
     yield Statement(
         "4.4 a",
         "the rate decreases monotonically with K_R",
-        f"from {1e3 * rate[0]:.1f} to {1e3 * rate[-1]:.2f} mm/s, "
+        f"from {_rate(found, 0)} to {_rate(found, -1)} mm/s, "
         f"{int(np.sum(np.diff(rate) >= 0))} rises",
         bool((np.diff(rate) < 0).all()),
     )
@@ -309,8 +317,8 @@ def _about_rigid_ratio(found: Study) -> Iterator[Statement]:
     yield Statement(
         "4.4 b, rigid bodies",
         "the trend of rigid bodies does not rise again: numerical chatter is that of waves",
-        f"greatest rate {1e3 * rate[best]:.3f} ± {1e3 * error[best]:.1g} mm/s at gamma = "
-        f"{peak:.1f} (± {100 * spacing:.0f} %), {1e3 * rate[-1]:.2f} at {x[-1]:.0f}; "
+        f"greatest rate {_rate(found, best)} mm/s at gamma = "
+        f"{peak:.1f} (± {100 * spacing:.0f} %), {_rate(found, -1)} at {x[-1]:.0f}; "
         f"{int(np.sum(np.diff(after) > error[best:-1]))} rises beyond it",
         abs(peak - 40.0) < 10.0 and bool((np.diff(after) <= error[best:-1]).all()),
     )
@@ -331,13 +339,13 @@ def _about_ratio(found: Study, how: str) -> Iterator[Statement]:
     x, rate, _periodic = along(found)
     onset = chatter_onset(x, rate)
     before = x < onset if onset > x[0] else x <= PAPER_CHATTER
-    peak, greatest = float(x[before][np.argmax(rate[before])]), float(np.max(rate[before]))
-    least = float(rate[x == onset][0])
+    best, lowest = int(np.argmax(np.where(before, rate, -np.inf))), int(np.argmax(x == onset))
+    peak, greatest, least = float(x[best]), float(rate[best]), float(rate[lowest])
     yield Statement(
         place,
         "the rate grows with gamma to a greatest value, falls, and rises again by chatter",
-        f"{1e3 * rate[0]:.2f} mm/s at gamma = {x[0]:g}, {1e3 * greatest:.2f} at {peak:.0f}, "
-        f"{1e3 * least:.2f} at {onset:.0f}, {1e3 * rate[-1]:.2f} at {x[-1]:.0f}",
+        f"{_rate(found, 0)} mm/s at gamma = {x[0]:g}, {_rate(found, best)} at {peak:.0f}, "
+        f"{_rate(found, lowest)} at {onset:.0f}, {_rate(found, -1)} at {x[-1]:.0f}",
         rate[0] < least < 0.99 * greatest and rate[-1] > least,
     )
     yield Statement(

@@ -1,0 +1,134 @@
+"""Numbers with their errors, and differences of them, as text."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+# Digits after the point; smaller errors are not shown.
+MOST_DIGITS = 5
+# An error below this share of a number does not show in the four digits of a narrow column.
+SMALL_ERROR = 1e-4
+# The same where numbers are in SI units, in which rates are some 1e-2.
+SMALLEST_UNIT = 8
+UNDECIDED = "undecided"
+NOT_ESTIMATED = "error not estimated"
+
+
+def is_undecided(value: float, error: float) -> bool:
+    """Whether the error is no smaller than the number, so that not even its sign is known.
+
+    Zero without an error is known, and so is what has no error (NaN) as far as anyone can tell.
+    """
+    return bool(error > 0.0 and error >= abs(value))
+
+
+def with_error(value: float, error: float, most_digits: int = MOST_DIGITS) -> str:
+    """Return a number and its error, both to the second digit of the error."""
+    hidden = is_undecided(value, error)
+    if error < 10.0**-most_digits and not hidden:
+        return f"{value:.5g}"
+    digits = max(1 - math.floor(math.log10(error)), 0)
+    digits = digits if hidden else min(digits, most_digits)
+    text = f"{value:.{digits}f} ± {error:.{digits}f}"
+    return f"{UNDECIDED}, {text}" if hidden else text
+
+
+def with_short_error(value: float, error: float) -> str:
+    """Return a number to the one digit that its error is known to: 17.5 ± 0.4, or 40 ± 30."""
+    place = math.floor(math.log10(float(f"{error:.0e}")))
+    digits = max(-place, 0)
+    return f"{round(value, -place):.{digits}f} ± {round(error, -place):.{digits}f}"
+
+
+def in_few_characters(value: float | None, error: float | None, share: float = SMALL_ERROR) -> str:
+    """Return a number for a narrow column: 16.35, 17.5±0.4, "undecided" or a dash.
+
+    Parameters
+    ----------
+    value, error : float or None
+        None is what is not defined.
+    share : float
+        A smaller error, relative to the number, is not shown.
+    """
+    if value is None:
+        return "-"
+    if error is None or error <= share * abs(value):
+        return f"{value:.4g}"
+    if is_undecided(value, error):
+        return UNDECIDED
+    return with_short_error(value, error).replace(" ", "")
+
+
+def change_text(change: float | None, error: float | None) -> str:
+    """Return a relative change in per cent, with its error, for a narrow column.
+
+    It is undecided where the change is within its error; an error that shows in none of the
+    decimals is left out.
+    """
+    if change is None:
+        return "-"
+    change, error = 100.0 * change, 100.0 * (error or 0.0)
+    if error >= 0.005:
+        if is_undecided(change, error):
+            return UNDECIDED
+        shown = with_short_error(change, error).replace(" ", "")
+        return shown if change < 0.0 else f"+{shown}"
+    decimals = 2 if abs(change) < 10.0 else 1 if abs(change) < 100.0 else 0
+    shown = f"{change:+.{decimals}f}"
+    return "0.00" if float(shown) == 0.0 else shown
+
+
+def known_error(summary: Mapping[str, Any], key: str) -> float | None:
+    """What is known of the error of a number of a summary, SI units.
+
+    Of the rate by grid and scatter, or by scatter alone where that of the grid was not
+    estimated; of means over blows by scatter alone; None where nothing is known.
+    """
+    found: float | None = summary.get(f"{key}_error")
+    if found is None:
+        found = summary.get(f"{key}_standard_error")
+    if found is None:
+        found = (summary.get("standard_errors") or {}).get(key)
+    return found
+
+
+def mean_text(summary: Mapping[str, Any], key: str, factor: float = 1.0, digits: int = 5) -> str:
+    """A number of a summary, with the scatter of the blows where it is a mean and that shows.
+
+    Parameters
+    ----------
+    factor : float
+        From SI to the unit that is shown.
+    digits : int
+        Of what has no error that shows.
+    """
+    value, error = factor * summary[key], known_error(summary, key)
+    shown = error is not None and factor * error > SMALL_ERROR * abs(value)
+    if shown and error is not None:
+        return with_error(value, factor * error, most_digits=SMALLEST_UNIT)
+    return f"{value:.{digits}g}"
+
+
+def rate_text(summary: Mapping[str, Any], factor: float = 1e3) -> str:
+    """Rate of penetration of a summary and, where it is known, how far it may be off.
+
+    Parameters
+    ----------
+    summary : mapping
+        Of a `Result` or a `Settled`.
+    factor : float
+        From m/s to the unit that is shown; default to mm/s.
+    """
+    rate, error = summary["rate_of_penetration"], summary["rate_of_penetration_error"]
+    if rate is None:
+        return "-"
+    if error is not None:
+        return with_error(factor * rate, factor * error)
+    scatter = summary.get("rate_of_penetration_standard_error")
+    if scatter is None:
+        return f"{factor * rate:.5g}, {NOT_ESTIMATED}"
+    # of the two parts of the error one is known, and may be enough to hide the rate
+    text = with_error(factor * rate, factor * scatter)
+    return f"{text} of scatter, rest not estimated" if "±" in text else f"{text}, {NOT_ESTIMATED}"
