@@ -13,7 +13,7 @@ import numpy as np
 from percussion_model.physics.records import BLOW
 from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.simulation.files import plain
-from percussion_model.simulation.rate import rate_of_blows
+from percussion_model.simulation.rate import rate_of_blows, ratio_of_sums
 from percussion_model.simulation.simulate import Simulation
 from percussion_model.simulation.uncertain import is_undecided, rate_text
 
@@ -108,6 +108,14 @@ class Settled:
         """Mean time from blow to blow [s]."""
         return float(np.mean(self.counted["period"])) if len(self.counted) else math.nan
 
+    @property
+    def blow_period_error(self) -> float:
+        """Standard error of the blow period of a motion that is not periodic [s]; else NaN."""
+        counted = self.counted["period"]
+        if self.order or len(counted) == 0:
+            return math.nan
+        return ratio_of_sums(counted, np.ones(len(counted)))[1]
+
     def summary(self) -> dict[str, Any]:
         """Return the numbers as plain values for JSON; None is what is not defined."""
         numbers = {
@@ -117,6 +125,7 @@ class Settled:
             "rate_of_penetration_error": self.rate_of_penetration_error,
             "rate_of_penetration_undecided": self.rate_of_penetration_undecided,
             "blow_period": self.blow_period,
+            "blow_period_error": self.blow_period_error,
             "multiplier": self.multiplier,
             "blows": len(self.blows),
             "duration": self.duration,

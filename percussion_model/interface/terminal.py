@@ -16,6 +16,7 @@ from rich.table import Table
 from percussion_model.interface.progress import Report, lines
 from percussion_model.interface.tables import print_table
 from percussion_model.simulation.uncertain import (
+    UNDECIDED,
     change_text,
     in_few_characters,
     mean_text,
@@ -114,7 +115,7 @@ def show_settled(found: Settled) -> None:
         ("Multiplier of the cycle", "multiplier", 1.0, ""),
     ):
         if summary[key] is not None:
-            table.add_row(name, f"{_number(summary[key], factor)} {unit}".rstrip())
+            table.add_row(name, f"{mean_text(summary, key, factor)} {unit}".rstrip())
     table.add_row("Blows run", f"{len(found.blows)} in {found.duration:.4g} s of simulated time")
     table.add_row("Computed in", f"{found.wall_time:.3g} s")
     print_table(table)
@@ -236,6 +237,11 @@ def show_comparison(found: Comparison) -> None:
         table.add_row(label, *cells)
     console = Console()
     print_table(table, console)
+    console.print(
+        "± of the rate is the error of grid and scatter, of other means that of scatter alone; "
+        f"a difference within the errors of both numbers is {UNDECIDED}.",
+        highlight=False,
+    )
     show_warnings(console, found.warnings())
 
 

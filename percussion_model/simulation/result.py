@@ -170,8 +170,7 @@ class Result:
         rows = self.counted
         if len(rows) == 0:
             return {}
-        even = np.ones(len(rows))
-        errors = {name: ratio_of_sums(rows[column], even)[1] for name, column in _SCATTER.items()}
+        errors = {name: _scatter_of_mean(rows[column]) for name, column in _SCATTER.items()}
         errors["blow_frequency"] = errors["blow_period"] / float(np.mean(rows["period"])) ** 2
         for name, (column, by) in _RATIOS.items():
             if float(np.sum(rows[by])) > 0.0:
@@ -348,6 +347,12 @@ def _mean(values: np.ndarray) -> float:
     """Mean of what is defined."""
     known = values[np.isfinite(values)]
     return float(np.mean(known)) if len(known) else math.nan
+
+
+def _scatter_of_mean(values: np.ndarray) -> float:
+    """Standard error of the mean of what is defined."""
+    known = values[np.isfinite(values)]
+    return ratio_of_sums(known, np.ones(len(known)))[1] if len(known) else math.nan
 
 
 def _greatest(values: np.ndarray) -> float:

@@ -131,4 +131,4 @@ def rate_text(summary: Mapping[str, Any], factor: float = 1e3) -> str:
         return f"{factor * rate:.5g}, {NOT_ESTIMATED}"
     # of the two parts of the error one is known, and may be enough to hide the rate
     text = with_error(factor * rate, factor * scatter)
-    return f"{text} of scatter, rest not estimated" if "±" in text else f"{text}, {NOT_ESTIMATED}"
+    return f"{text} (scatter alone)" if "±" in text else f"{text}, {NOT_ESTIMATED}"

@@ -104,7 +104,7 @@ class Study:
                 error = float(rows["rate_of_penetration_error"][k])
                 lines.append((name, f"{with_error(1e3 * rate[k], 1e3 * error)} mm/s at {at}"))
         if undecided.any():
-            words = f"{np.count_nonzero(undecided)} rates, whose errors are no smaller than they"
+            words = f"{np.count_nonzero(undecided)} rates: their errors are no smaller than they"
             lines.append(("Undecided", words))
         for kind in ("periodic", "aperiodic"):
             error = self.relative_error[rows["kind"] == KINDS.index(kind)]

@@ -61,8 +61,9 @@ def _overview(result: Result) -> LayoutDOM:
     blows, shared = result.blows, Range1d(0.0, result.duration)
     time = blows["time"]
     contents: list[tuple[str, str, list[tuple[str, np.ndarray, str]]]] = [
-        ("Mean bit position at each blow", "depth gained [mm]",
-         [("", blows["bit_position"] * MM, style.BIT_COLOUR)]),
+        ("Depth at each blow", "depth gained [mm]",
+         [("mean bit position", blows["bit_position"] * MM, style.RULE_COLOUR),
+          ("hole", blows["hole_depth"] * MM, style.BIT_COLOUR)]),
         ("Rate of penetration of each blow", "rate [mm/s]",
          [("", blows["hole_advance"] / blows["period"] * MM, style.BIT_COLOUR)]),
         ("Mean piston velocity at impact", "velocity [m/s]",
@@ -88,7 +89,7 @@ def _mean(to: Any, result: Result) -> None:
     mean, error = summary["rate_of_penetration"], known_error(summary, "rate_of_penetration")
     if mean is None:
         return
-    to.title.text += f" — mean {rate_text(summary)} mm/s"
+    to.title.text = f"Rate of each blow — mean {rate_text(summary)} mm/s"
     if result.rate_of_penetration_undecided:
         return
     rule(to, mean * MM, style.MEAN_COLOUR)

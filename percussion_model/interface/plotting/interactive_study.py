@@ -62,7 +62,7 @@ QUANTITIES = (
 )
 # Those that the error of the rate may hide, as a script asks for them.
 HIDDEN = ("rate", "advance")
-UNDECIDED_COLOUR, HATCH_COLOUR = "#DDDDDD", "#666666"
+UNDECIDED_COLOUR, HATCH_COLOUR, GREY_POINT = "#EEEEEE", "#666666", "#BBBBBB"
 # What the pointer shows of each point besides.
 RATE_TOOLTIPS = (
     ("rate", "@rate{0.[00000]} ± @off{0.[00000]} mm/s @verdict"), ("motion", "@motion"),
@@ -98,7 +98,7 @@ def _scatter(found: Study, columns: dict[str, np.ndarray]) -> LayoutDOM:
             "motion": kinds,
             "verdict": _verdicts(undecided),
             "colour": [
-                UNDECIDED_COLOUR if hidden else KIND_COLOURS[kind]
+                GREY_POINT if hidden else KIND_COLOURS[kind]
                 for kind, hidden in zip(kinds, undecided.tolist(), strict=True)
             ],
         }
@@ -277,7 +277,7 @@ def _map(found: Study, columns: dict[str, np.ndarray]) -> LayoutDOM:
                       color={"field": "value", "transform": mapper})  # fmt: skip
     left.quad("left", "right", "bottom", "top", source=cells, fill_color=UNDECIDED_COLOUR,
               fill_alpha="grey", hatch_pattern="right_diagonal_line", hatch_alpha="grey",
-              hatch_color=HATCH_COLOUR, hatch_scale=8, line_color=None,
+              hatch_color=HATCH_COLOUR, hatch_scale=12, line_color=None,
               legend_label=f"{UNDECIDED}: error ≥ rate", visible=True)  # fmt: skip
     left.scatter("x", "y", size="mark", source=cells, marker="x", color="white", line_width=1.5)
     left.add_tools(HoverTool(renderers=[quads], tooltips=[

@@ -26,8 +26,7 @@ def draw_overview(result: Result) -> Figure:
     axes = fig.subplots(3, 2, sharex=True)
     blows = result.blows
     time = blows["time"]
-    axes[0, 0].plot(time, blows["bit_position"] * MM, color=style.BIT_COLOUR, **_marks(len(blows)))
-    style.label(axes[0, 0], "time [s]", "depth gained [mm]", "Mean bit position at each blow")
+    _depths(axes[0, 0], blows)
     rate = blows["hole_advance"] / blows["period"]
     _series(axes[0, 1], time, rate * MM, "rate [mm/s]", "Rate of penetration of each blow")
     _mean(axes[0, 1], result)
@@ -51,6 +50,17 @@ def draw_overview(result: Result) -> Figure:
     if result.settle > 0:
         fig.text(0.99, 0.99, "grey: settling, not averaged", ha="right", va="top", fontsize=8.5)
     return fig
+
+
+def _depths(ax: Axes, blows: np.ndarray) -> None:
+    """Draw how deep the hole is, and where the bit is, which may leap."""
+    for field, colour, name in (
+        ("bit_position", style.RULE_COLOUR, "mean bit position"),
+        ("hole_depth", style.BIT_COLOUR, "hole"),
+    ):
+        ax.plot(blows["time"], blows[field] * MM, color=colour, label=name, **_marks(len(blows)))
+    ax.legend(loc="best")
+    style.label(ax, "time [s]", "depth gained [mm]", "Depth at each blow")
 
 
 def _mean(ax: Axes, result: Result) -> None:
