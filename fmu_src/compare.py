@@ -83,10 +83,10 @@ def describe(both: dict[str, Any], settle: float) -> str:
         a, b = fmu[output], library[column]
         worst = float(np.max(np.abs(a - b))) if same else float("nan")
         add(label, unit, factor * a[-1], factor * b[-1], factor * worst)
-    lines.append(f"The rate is {both['rate']} mm/s, by grid and scatter, in both of them.")
     lines.append(
         f"{len(fmu)} and {len(library)} whole blows; the difference is the greatest over all of "
-        f"them. FMU {both['seconds'][0]:.1f} s, library {both['seconds'][1]:.1f} s."
+        f"them. FMU {both['seconds'][0]:.1f} s, library {both['seconds'][1]:.1f} s. "
+        f"With the error of grid and scatter the rate is {both['rate']} mm/s."
     )
     return "\n".join(lines)
 

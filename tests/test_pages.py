@@ -104,6 +104,26 @@ def test_a_map_shows_the_slice_and_the_quantity_that_are_chosen(found, tmp_path)
 
 
 @needs_browser
+def test_a_map_hides_what_is_undecided_in_each_slice(found, tmp_path):
+    """One point, in the other slice than that shown first."""
+    rows = found.rows.copy()
+    rows["rate_of_penetration_error"][0] = 2.0 * rows["rate_of_penetration"][0]
+    path = write_study_report(Study(found.scene, found.points, rows, found.failures), tmp_path)
+    cells = f"{MODEL}('cells').data"
+    shown = f"[[...{cells}.value].map(v => !isFinite(v)), [...{cells}.grey], [...{cells}.verdict]]"
+    pause = "new Promise(done => setTimeout(done, 300))"
+    slide = f"{MODEL}('drive.reversal_distance').value = 0; {pause}"
+    choose = f"{MODEL}('shown').value = 'impact'; {pause}"
+    first, _, second, _, third = opened(path, tmp_path, shown, slide, shown, choose, shown)
+    assert not any(first[0] + first[1] + first[2])
+    assert (second[0].index(True), sum(second[0])) == (0, 1)
+    assert (second[1].index(1), sum(second[1])) == (0, 1)
+    assert second[2] == ["undecided", *[""] * 11]
+    # an impact velocity is known there
+    assert not any(third[0] + third[1])
+
+
+@needs_browser
 def test_samples_are_scattered_over_each_parameter(tmp_path):
     """One of them fails, and the page says so."""
     points = table({"feed.force": [1e3, 2e3, 4e3], "rock.unloading_ratio": [5.0, 0.5, 8.0]})

@@ -1,0 +1,348 @@
+"""Numbers that say how sure they are: tables, JSON, maps, pages, Python."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from percussion_model import Scene, Settled, compare, settled, simulate
+from percussion_model.analysis.comparison import Comparison, change_error
+from percussion_model.analysis.effect_study import EffectsStudy, Trial, Variant
+from percussion_model.analysis.study import Study, grid, table
+from percussion_model.analysis.study.response import KINDS, ROW
+from percussion_model.coupling.coupled_run import CoupledRun, summary
+from percussion_model.interface.commands.couple import _lines
+from percussion_model.interface.commands.effects import table_of
+from percussion_model.interface.plotting.effect_bars import draw_effects
+from percussion_model.interface.plotting.overview import draw_overview
+from percussion_model.interface.plotting.paper import _points
+from percussion_model.interface.report import headline_rows, render_report
+from percussion_model.interface.terminal import show_comparison, show_settled, show_summary
+from percussion_model.simulation.uncertain import (
+    change_text,
+    in_few_characters,
+    is_undecided,
+    rate_text,
+    with_error,
+)
+
+RIGID = Scene().computed_by("rigid")
+BOUNCING = RIGID.replace(**{"feed.force": 150.0})
+
+
+@pytest.fixture(scope="module")
+def aperiodic():
+    return simulate(BOUNCING, 4.0, settle=1.0)
+
+
+@pytest.fixture(scope="module")
+def periodic():
+    return simulate(RIGID, 4.0, settle=1.0)
+
+
+def hidden_in(result):
+    """The same run with advances of the hole in which nobody sees a rate."""
+    blows = result.blows.copy()
+    blows["hole_advance"] = 0.0
+    blows["hole_advance"][len(blows) // 2 :: len(blows) // 2] = 1e-3
+    found = replace(result, blows=blows, rate_of_penetration_relative_error=math.nan)
+    off = found.rate_of_penetration_standard_error / found.rate_of_penetration
+    return replace(found, rate_of_penetration_relative_error=2.0 * off)
+
+
+@pytest.fixture(scope="module")
+def hidden(aperiodic):
+    return hidden_in(aperiodic)
+
+
+# ------------------------------------------------------------------------------ text
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "shown"),
+    [
+        (13.3, 0.32, "13.30 ± 0.32"),
+        (16.349, 0.0, "16.349"),
+        (0.0, 0.0, "0"),
+        (13.3, 318.0, "undecided, 13 ± 318"),
+        (1e-6, 5e-6, "undecided, 0.0000010 ± 0.0000050"),
+    ],
+)
+def test_a_number_with_its_error(value, error, shown):
+    assert with_error(value, error) == shown
+
+
+def test_what_an_error_hides():
+    assert is_undecided(-41.7, 318.0)
+    assert not is_undecided(0.0, 0.0)  # nothing is crushed, and that is known
+    assert not is_undecided(1.0, math.nan)
+
+
+@pytest.mark.parametrize(
+    ("change", "error", "shown"),
+    [
+        (-0.528, 0.3, "-50±30"),
+        (0.021, 0.003, "+2.1±0.3"),
+        (-0.01, 0.09, "undecided"),
+        (0.0123, None, "+1.23"),
+        (0.0123, 1e-7, "+1.23"),
+        (1e-6, 0.0, "0.00"),
+        (None, None, "-"),
+    ],
+)
+def test_a_change_with_its_error(change, error, shown):
+    assert change_text(change, error) == shown
+
+
+def test_a_number_of_a_narrow_column():
+    assert in_few_characters(16.3494, 1e-7) == "16.35"
+    assert in_few_characters(17.53, 0.412) == "17.5±0.4"
+    assert in_few_characters(1.0, 2.0) == "undecided"
+    assert in_few_characters(None, 1.0) == "-"
+
+
+def test_a_rate_without_estimate_says_what_is_known():
+    base = {"rate_of_penetration": 0.0175, "rate_of_penetration_error": None}
+    assert rate_text(base) == "17.5, error not estimated"
+    scattered = base | {"rate_of_penetration_standard_error": 4e-4}
+    assert rate_text(scattered) == "17.50 ± 0.40 (scatter alone)"
+    assert rate_text(base | {"rate_of_penetration_standard_error": 1.0}).startswith("undecided")
+    assert rate_text(scattered, 3600.0).startswith("63.0 ± 1.4")
+
+
+# -------------------------------------------------------------------------- a run
+
+
+def test_summary_has_the_error_beside_the_rate(aperiodic, periodic, hidden):
+    found = aperiodic.summary()
+    assert found["rate_of_penetration_error"] == pytest.approx(
+        found["rate_of_penetration"] * found["rate_of_penetration_relative_error"]
+    )
+    assert found["rate_of_penetration_undecided"] is False
+    assert hidden.summary()["rate_of_penetration_undecided"] is True
+    json.dumps(found, allow_nan=False)
+    # how far means of other stretches of that many blows lie apart
+    count = len(aperiodic.counted)
+    velocity = simulate(BOUNCING, 120.0, settle=4.0).counted["impact_velocity"]
+    means = velocity[: len(velocity) // count * count].reshape(-1, count).mean(axis=1)
+    assert len(means) > 30
+    stated = found["standard_errors"]["impact_velocity"]
+    assert stated == pytest.approx(np.std(means), rel=0.5)
+    assert periodic.summary()["standard_errors"]["impact_velocity"] < 1e-2 * stated
+
+
+def test_the_window_that_is_fixed_is_known_to_a_blow(periodic, aperiodic):
+    off = periodic.rate_of_penetration_fixed_window - periodic.rate_of_penetration
+    error = periodic.rate_of_penetration_fixed_window_error
+    assert abs(off) <= error <= 0.05 * periodic.rate_of_penetration
+    # the bit bounces by more than it drills
+    assert aperiodic.rate_of_penetration_fixed_window_error > aperiodic.rate_of_penetration
+
+
+def test_tables_of_runs(aperiodic, hidden, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    show_summary(aperiodic)
+    shown = capsys.readouterr().out
+    for name in ("Rate of penetration", "Blow period", "Impact velocity", "Blow energy"):
+        (line,) = [text for text in shown.splitlines() if name in text]
+        assert "±" in line
+    show_summary(hidden)
+    assert "undecided" in capsys.readouterr().out
+    show_settled(settled(BOUNCING, most_blows=60))
+    assert capsys.readouterr().out.count("±") == 2
+
+
+def test_a_rate_in_one_line_of_python(aperiodic, hidden):
+    assert rate_text(aperiodic.summary()) in repr(aperiodic)
+    assert "undecided" in repr(hidden)
+    found = settled(RIGID)
+    assert "rate='1" in repr(found)
+    assert not found.rate_of_penetration_undecided
+    blind = Settled("aperiodic", 0, 1e-3, 2e-3, math.nan, found.cycle[:0], found.blows, 1.0, 1.0)
+    assert blind.summary()["rate_of_penetration_undecided"] is True
+    assert "undecided" in repr(blind)
+
+
+# --------------------------------------------------------------------- comparison
+
+
+def test_an_error_of_a_ratio():
+    rng = np.random.default_rng(3)
+    a, b = rng.normal(5.0, 0.05, 200_000), rng.normal(4.0, 0.08, 200_000)
+    assert change_error(5.0, 0.05, 4.0, 0.08) == pytest.approx(np.std(a / b), rel=0.01)
+    assert change_error(1.0, None, 2.0, None) is None
+    assert change_error(None, 1.0, 2.0, 1.0) is None
+
+
+def test_differences_have_the_errors_of_both(aperiodic, periodic, capsys, monkeypatch):
+    same = simulate(BOUNCING, 4.0, settle=1.5)  # the same motion, and fewer of its blows
+    found = Comparison({"wave": aperiodic, "fem": periodic, "rigid": same})
+    errors = found.difference_errors()["fem"]["rate_of_penetration"]
+    base = aperiodic.rate_of_penetration
+    parts = periodic.rate_of_penetration_error, aperiodic.rate_of_penetration_error
+    ratio = periodic.rate_of_penetration / base
+    assert errors == pytest.approx(math.hypot(parts[0], ratio * parts[1]) / base)
+    assert "rate_of_penetration" in found.undecided()["rigid"]
+    assert "rate_of_penetration" not in found.undecided()["fem"]
+    plain = json.loads(json.dumps(found.to_dict(), allow_nan=False))
+    assert plain["undecided"]["rigid"]
+    monkeypatch.setenv("COLUMNS", "200")
+    show_comparison(found)
+    (line,) = [one for one in capsys.readouterr().out.splitlines() if "Rate of pen" in one]
+    assert line.count("±") == 3  # two rates and a difference; the periodic rate has no scatter
+    assert line.rstrip(" │").endswith("undecided")
+
+
+def test_equal_runs_differ_by_nothing():
+    found = compare(RIGID, ["rigid"], 1.0, 0.2).results["rigid"]
+    assert set(Comparison({"a": found, "b": found}).differences()["b"].values()) <= {0.0, None}
+
+
+def test_effects_tell_changes_with_errors(aperiodic, periodic, hidden):
+    def trial(result, name):
+        return Trial(Variant(name, "off"), result, 1.0, None)
+
+    trials = [trial(periodic, "a"), trial(hidden, "b")]
+    found = EffectsStudy(RIGID, trial(aperiodic, ""), trials, {})
+    headings, rows, _ = table_of(found)
+    place = headings.index("rate\n%")
+    assert "±" in rows[1][place]
+    assert rows[2][place] == "undecided"
+    told = found.to_dict()["effects"]
+    assert told[0]["change_errors"]["rate_of_penetration"] > 0.0
+    assert told[1]["rate_of_penetration_undecided"] is True
+    drawn = [text.get_text() for ax in draw_effects(found).axes for text in ax.texts]
+    assert any("±" in text for text in drawn)
+
+
+# ------------------------------------------------------------------- pages, figures
+
+
+def test_report_says_errors_in_each_unit(aperiodic, hidden):
+    rows = {name: (si, other) for name, si, other in headline_rows(aperiodic.summary())}
+    for text in rows["Rate of penetration"] + rows["Blow period"]:
+        assert "±" in text
+    page = render_report(hidden, [])
+    hour = page[page.index("rate of penetration (") :]
+    assert hour[: hour.index("</span>")].count("undecided") == 1
+    card = page[page.index('<div class="card">') :]
+    assert card.index("undecided") < card.index("</b>")
+
+
+def test_overview_draws_the_mean_with_its_error(aperiodic, hidden):
+    def words(result):
+        ax = draw_overview(result).axes[1]
+        return ax.get_legend().get_texts()[0].get_text(), len(ax.lines)
+
+    text, lines = words(aperiodic)
+    assert rate_text(aperiodic.summary()) in text
+    word, fewer = words(hidden)
+    assert "undecided" in word
+    # the advance of the hole, the mean, and no more; an empty entry of the legend beside it
+    assert (lines, fewer) == (2, 2)
+    ax = draw_overview(aperiodic).axes[1]
+    rate = aperiodic.blows["hole_advance"] / aperiodic.blows["period"]
+    assert ax.lines[0].get_ydata() == pytest.approx(1e3 * rate)
+
+
+def made_study(points, blind):
+    rows = np.zeros(len(points), ROW)
+    rows["rate_of_penetration"] = np.linspace(1e-2, 2e-2, len(points))
+    rows["rate_of_penetration_error"] = np.where(blind, 3e-2, 1e-4)
+    rows["kind"] = KINDS.index("aperiodic")
+    return Study(RIGID, points, rows, [""] * len(points))
+
+
+def test_a_study_knows_what_is_undecided():
+    points = grid({"feed.force": [1e2, 1e3, 2e3], "drive.reversal_distance": [0.01, 0.02]})
+    blind = np.array([True, False, False, False, False, True])
+    found = made_study(points, blind)
+    assert found.undecided.tolist() == blind.tolist()
+    lines = dict(found.headlines())
+    assert "±" in lines["Lowest rate"]
+    assert "feed.force = 100, drive.reversal_distance = 0.02" in lines["Lowest rate"]
+    assert lines["Undecided"].startswith("2 ")
+    assert found.to_pandas()["undecided"].tolist() == blind.tolist()
+    assert found.to_xarray()["undecided"].values.ravel().tolist() == blind.tolist()
+
+
+def test_a_map_does_not_colour_what_it_does_not_know():
+    pytest.importorskip("bokeh", reason="maps need bokeh")
+    from bokeh.models import ColumnDataSource, HoverTool, Legend
+
+    from percussion_model.interface.plotting.interactive_study import interactive_study
+
+    points = grid({"feed.force": [1e2, 1e3, 2e3], "drive.reversal_distance": [0.01, 0.02]})
+    blind = np.array([True, False, False, False, False, True])
+    drawn = interactive_study(made_study(points, blind))["map"]
+    (cells,) = [one for one in drawn.select({"type": ColumnDataSource}) if one.name == "cells"]
+    at = cells.data["offset"]
+    assert np.isnan(cells.data["value"]).tolist() == blind[at].tolist()
+    assert cells.data["grey"].tolist() == blind[at].tolist()
+    assert [bool(word) for word in cells.data["verdict"]] == blind[at].tolist()
+    (legend,) = drawn.select({"type": Legend})
+    assert legend.visible
+    assert "undecided" in legend.items[0].label.value
+    assert any("±" in str(tool.tooltips) for tool in drawn.select({"type": HoverTool}))
+    sure = interactive_study(made_study(points, np.zeros(6, bool)))["map"]
+    assert not any(one.visible for one in sure.select({"type": Legend}))
+
+
+def test_samples_have_error_bars():
+    pytest.importorskip("bokeh", reason="scatter needs bokeh")
+    from bokeh.models import Whisker
+
+    from percussion_model.interface.plotting.interactive_study import interactive_study
+
+    found = made_study(table({"feed.force": [1e2, 1e3, 2e3]}), np.array([True, False, False]))
+    (bars,) = interactive_study(found)["scatter"].select({"type": Whisker})
+    data = bars.source.data
+    width = 0.5 * (data["upper"] - data["lower"])
+    assert width == pytest.approx(1e3 * found.rows["rate_of_penetration_error"], rel=1e-5)
+    assert data["colour"][0] not in data["colour"][1:]
+
+
+def test_error_bars_of_figure_9_stay_in_the_panel():
+    found = made_study(table({"feed.force": [1e2, 1e3, 2e3]}), np.array([True, False, False]))
+    found.rows["rate_of_penetration_error"][1] = 0.99 * found.rows["rate_of_penetration"][1]
+    found.rows["rate_of_penetration_error"][2] = 0.9 * found.rows["rate_of_penetration"][2]
+    ax = Figure().subplots()
+    _points(ax, found)
+    low, high = ax.get_ylim()
+    rate, error = (1e3 * found.rows[f"rate_of_penetration{end}"][1:] for end in ("", "_error"))
+    assert low <= np.min(rate - error)
+    assert high >= np.max(rate + error)
+
+
+# -------------------------------------------------------------------- coupled runs
+
+
+def test_a_coupled_rate_has_its_error():
+    time = np.linspace(0.0, 4.0, 4001)
+    blow = np.floor(time / 0.045)
+    noise = np.random.default_rng(5).normal(1.0, 0.3, len(blow))
+    advance = np.where(np.diff(blow, prepend=0.0) > 0, 7e-4 * noise, 0.0)
+    columns = {
+        "time": time,
+        "hammer.blow_count": blow,
+        "hammer.hole_depth": np.cumsum(advance),
+        "hammer.bit.position": np.cumsum(advance) + 1e-2 * np.sin(time * 40.0),
+    }
+    found = summary(CoupledRun(columns, 1e-3, 4000))
+    rate, error = found["rate_second_half"], found["rate_second_half_error"]
+    assert 0.0 < error < 0.2 * rate
+    # the mean of a blow by its period, and its standard error by the 44 blows of the half
+    assert abs(rate - 7e-4 / 0.045) < 3.0 * error
+    assert error == pytest.approx(0.3 * 7e-4 / 0.045 / math.sqrt(44.0), rel=0.5)
+    assert found["rate_second_half_undecided"] is False
+    (line,) = [text for text in _lines(found) if text.startswith("rate_second_half ")]
+    assert "±" in line
+    assert line.endswith("mm/s")
+    short = summary(CoupledRun({name: column[:99] for name, column in columns.items()}, 1e-3, 98))
+    assert short["rate_second_half_error"] is None
+    assert any("error not estimated" in text for text in _lines(short))
