@@ -14,7 +14,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from examples.shared import BLACK, BLUE, GREEN, GREY, ORANGE, command_line, figure_of
-from percussion_model import Scene, Settled, Simulation, settled
+from percussion_model import Scene, Simulation, settled
 from percussion_model.interface.plotting import style
 from percussion_model.simulation.uncertain import in_few_characters
 
@@ -24,7 +24,6 @@ AT_REST = 20e-3  # when the bit has come to rest [s]
 STIFFNESSES = {2.5e8: GREEN, 7.5e8: BLUE, 2.25e9: ORANGE}  # K_R [N/m]
 REFERENCE = Scene()
 BIT = REFERENCE.bit.sections[0]
-LEAST_ERROR = 1e-3  # of a rate, relative: smaller ones are not shown
 CELLS = 20  # in the bit; the piston gets as many for its length, so that every length fits
 # The piston that is stepped, by the bit's length; its mass stays, so that the speed does.
 STEPPED_RATIO = 2.0
@@ -36,11 +35,7 @@ def design(sections: list[tuple[float, float]], stiffness: float) -> Scene:
     piston = [{"length": x * BIT.length, "area": a * BIT.area} for x, a in sections]
     cells = round(CELLS * sum(x for x, _ in sections))
     return REFERENCE.replace(
-        **{
-            "piston.sections": piston,
-            "rock.loading_stiffness": stiffness,
-            "solver.cells": cells,
-        }
+        **{"piston.sections": piston, "rock.loading_stiffness": stiffness, "solver.cells": cells}
     )
 
 
@@ -98,7 +93,11 @@ def main(out: Path, quick: bool = False) -> dict[str, Any]:
     }
     blows = {name: single_blow(scene) for name, scene in designs.items()}
     motions = {name: settled(scene) for name, scene in designs.items()}
-    rates = {name: motion.rate_of_penetration for name, motion in motions.items()}
+    rates = {name: found.rate_of_penetration for name, found in motions.items()}
+    shown = {
+        name: in_few_characters(1e3 * rates[name], 1e3 * found.rate_of_penetration_error, 1e-3)
+        for name, found in motions.items()
+    }
     stress = {name: contact_stress(scene) for name, scene in designs.items()}
     with figure_of(NAME, Path(out), (12.0, 4.6)) as fig:
         left, middle, right = fig.subplots(1, 3, width_ratios=(1.25, 1.2, 0.9))
@@ -112,7 +111,7 @@ def main(out: Path, quick: bool = False) -> dict[str, Any]:
         middle.grid(False)
         title = f"Piston of {STEPPED_RATIO:g} bit lengths, stepped"
         style.label(middle, "lower section by length [-]", "its area by that above [-]", title)
-        _draw_designs(right, blows, motions, stress)
+        _draw_designs(right, blows, shown, stress)
         style.head(fig, f"Where {ENERGY:g} J of a blow go")
     return {"blows": blows, "rates": rates, "stress": stress, "best": found}
 
@@ -129,17 +128,8 @@ def _draw_lengths(ax: Axes, ratio: np.ndarray, rock: dict[float, np.ndarray]) ->
     style.label(ax, "piston by bit length [-]", "energy in the rock [%]", "Uniform piston")
 
 
-def _rate(found: Settled) -> str:
-    """Rate of penetration [mm/s], with its error where that shows."""
-    rate, error = found.rate_of_penetration, found.rate_of_penetration_error
-    return in_few_characters(1e3 * rate, 1e3 * error, LEAST_ERROR)
-
-
 def _draw_designs(
-    ax: Axes,
-    blows: dict[str, dict[str, float]],
-    motions: dict[str, Settled],
-    stress: dict[str, float],
+    ax: Axes, blows: dict[str, dict[str, float]], rates: dict[str, str], stress: dict[str, float]
 ) -> None:
     base = np.zeros(len(blows))
     for name, colour in SHARES.items():
@@ -148,9 +138,7 @@ def _draw_designs(
         for k, value in enumerate(height):
             ax.text(k, base[k] + value / 2, f"{value:.0f}", ha="center", va="center", color="white")
         base += height
-    words = [
-        f"{name}\n{_rate(motions[name])} mm/s\n{1e-6 * stress[name]:.0f} MPa" for name in blows
-    ]
+    words = [f"{name}\n{rates[name]} mm/s\n{1e-6 * stress[name]:.0f} MPa" for name in blows]
     ax.set_xticks(range(len(blows)), [text.replace(", ", "\n") for text in words])
     ax.grid(axis="x", visible=False)
     ax.set_ylim(0.0, 112.0)

@@ -13,7 +13,7 @@ from percussion_model.interface.plotting.style import save_png
 PANELS = (
     ("K_R [kN/mm]", 1e-6, ("rock.loading_stiffness",)),
     ("bit [mm]", 1e3, ("hammer.bit.position",)),
-    ("rate [mm/s]", 1e3, ("hammer.rate_of_penetration",)),
+    ("rate of a blow [mm/s]", 1e3, ("hammer.rate_of_penetration",)),
     ("feed force [kN]", 1e-3, ("string.feed_force_mean", "controller.feed_wanted")),
     ("rig force [kN]", 1e-3, ("rig.force", "controller.force_command")),
     ("pressure [bar]", 1e-5, ("supply.supply_pressure", "controller.pressure_command")),
