@@ -73,8 +73,11 @@ def change_text(change: float | None, error: float | None) -> str:
     if error >= 0.005:
         if is_undecided(change, error):
             return UNDECIDED
-        shown = with_short_error(change, error).replace(" ", "")
-        return shown if change < 0.0 else f"+{shown}"
+        place = math.floor(math.log10(error))
+        # of an error that begins with 1 one digit would be too coarse
+        place -= error < 2.0 * 10.0**place
+        digits = max(-place, 0)
+        return f"{round(change, -place):+.{digits}f}±{round(error, -place):.{digits}f}"
     decimals = 2 if abs(change) < 10.0 else 1 if abs(change) < 100.0 else 0
     shown = f"{change:+.{decimals}f}"
     return "0.00" if float(shown) == 0.0 else shown

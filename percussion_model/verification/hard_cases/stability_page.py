@@ -105,8 +105,8 @@ def _disagreements(found: Collection) -> str:
     for entry in found.disagreements():
         off = entry["difference"]
         lines.append(
-            f"| {entry['case']} | {entry['solver']} | {1e3 * entry['rate']:.4g} "
-            f"| {1e3 * entry['other_rate']:.4g} ({entry['compared_with']}) "
+            f"| {entry['case']} | {entry['solver']} | {_rate(entry['rate'], entry['rate_error'])} "
+            f"| {_rate(entry['other_rate'], entry['other_rate_error'])} ({entry['compared_with']}) "
             f"| {'-' if off is None else f'{100 * off:+.1f} %'} "
             f"| {entry['reason'] or '**not known**'} |"
         )
