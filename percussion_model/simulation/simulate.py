@@ -155,6 +155,7 @@ class Simulation(Runner):
             raise SimulationError("not a snapshot made by Simulation.save")
         if snapshot.scene is not self.scene and snapshot.scene != self.scene:
             raise SimulationError("the snapshot is of another scene")
+        self._refuse_state(snapshot.state, snapshot.time)
         self._time = snapshot.time
         self._state = snapshot.state.copy()
         self._blows, self._events = snapshot.blows, snapshot.events

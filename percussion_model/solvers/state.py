@@ -2,9 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping
 from functools import lru_cache
 
 import numpy as np
+
+from percussion_model.physics.state import (
+    COMMON_LIMITS,
+    COMMON_STATE,
+    COMMON_UNDEFINED,
+    LARGEST,
+    NUMBER,
+)
 
 
 @lru_cache
@@ -67,3 +76,68 @@ class State:
 
     def __reduce__(self) -> tuple[object, ...]:
         return State, (self.dtype, self.shapes, self.words, self.workspace)
+
+
+class Limits:
+    """What the record and the workspace of a state from outside may hold.
+
+    Parameters
+    ----------
+    dtype : dtype
+        Of the record.
+    limits : mapping
+        Lowest and highest value by field, beside those of `COMMON_LIMITS`.
+    undefined : collection of str
+        Numbers that may be undefined, beside those of `COMMON_UNDEFINED`.
+    own : bool
+        Whether fields that are in no list are looked at: whole numbers must be in one,
+        other numbers have the limits NUMBER.
+    """
+
+    def __init__(
+        self,
+        dtype: np.dtype,
+        limits: Mapping[str, tuple[float, float]],
+        undefined: Collection[str] = (),
+        own: bool = True,
+    ) -> None:
+        limits = {**COMMON_LIMITS, **limits}
+        undefined = {*COMMON_UNDEFINED, *undefined}
+        common = {entry[0] for entry in COMMON_STATE}
+        places = sorted(words_of(dtype).items(), key=lambda item: item[1])
+        ends = [place for _, place in places[1:]] + [dtype.itemsize // 8]
+        found = [
+            (place, name, *limits.get(name, NUMBER), name in undefined)
+            for (name, begin), end in zip(places, ends, strict=True)
+            if own or name in common
+            for place in range(begin, end)
+        ]
+        whole = np.array([dtype[name].base.kind == "i" for _, name, *_ in found])
+        self._names = [name for _, name, *_ in found]
+        self._places = np.array([place for place, *_ in found])
+        self._whole = np.flatnonzero(whole)
+        self._low, self._high = (np.array([one[k] for one in found], float) for k in (2, 3))
+        self._undefined = np.array([one[4] for one in found])
+
+    def fault(self, state: State) -> str:
+        """Which number of a state lies outside its limits; empty where none does."""
+        values = state.numbers[self._places]
+        values[self._whole] = state.words[self._places[self._whole]]
+        good = (values >= self._low) & (values <= self._high)
+        good |= self._undefined & np.isnan(values)
+        if not good.all():
+            k = int(np.argmin(good))
+            return (
+                f"{self._names[k]} = {float(values[k])!r}, "
+                f"which must be from {self._low[k]:g} to {self._high[k]:g}"
+            )
+        workspace = state.workspace
+        if len(workspace) and not max(-workspace.min(), workspace.max()) <= LARGEST:
+            return f"a number of its workspace, which must be from {-LARGEST:g} to {LARGEST:g}"
+        return ""
+
+
+@lru_cache
+def common_limits(dtype: np.dtype) -> Limits:
+    """Limits of the fields that all states have."""
+    return Limits(dtype, {}, own=False)
