@@ -96,9 +96,9 @@ class PercussiveHammer(Slave):
         found = {inner: values[name] for name, inner in PLAIN_INPUTS.items()}
         return found | self.drive_forces(values)
 
-    def make_scene(self, inputs: dict[str, Any]) -> Scene:
-        """Scene of the parameters and these inputs; `SceneError` if they contradict each other."""
-        values: dict[str, Any] = {}
+    def make_scene(self, values: dict[str, Any]) -> Scene:
+        """Scene of these inputs and the parameters; `SceneError` if they contradict each other."""
+        given: dict[str, Any] = {}
         for one in self.parameters:
             if one.key is None:
                 continue
@@ -107,9 +107,9 @@ class PercussiveHammer(Slave):
                 value = None
             elif one.type == "Enumeration":
                 value = self.choice(one.name)
-            values[one.key] = value
-        values |= {INPUTS[name].key: value for name, value in self.solver_inputs(inputs).items()}
-        changes = {key: value for key, value in values.items() if value != self.baked[key]}
+            given[one.key] = value
+        given |= {INPUTS[name].key: value for name, value in self.solver_inputs(values).items()}
+        changes = {key: value for key, value in given.items() if value != self.baked[key]}
         return self.baked.replace(**changes)
 
     # stepping
@@ -123,10 +123,10 @@ class PercussiveHammer(Slave):
         assert self.motion is not None
         return self.motion
 
-    def _make_motion(self, inputs: dict[str, Any]) -> Motion:
-        """Motion from time zero under these inputs."""
-        scene = self.make_scene(inputs)
-        key = fingerprint(self.fingerprint().hex(), [inputs[one.name] for one in self.inputs])
+    def _make_motion(self, values: dict[str, Any]) -> Motion:
+        """Motion from time zero under these inputs and the parameters."""
+        scene = self.make_scene(values)
+        key = fingerprint(self.fingerprint().hex(), [values[one.name] for one in self.inputs])
         motion = Motion(scene, _SOLVERS.get(key) or self._map_solver(scene))
         _SOLVERS[key] = motion.solver
         motion.gauge = self._find_gauge(scene, motion.solver)
@@ -239,7 +239,7 @@ class PercussiveHammer(Slave):
         if [given[one.name] for one in self.inputs] == self.given_inputs and self.motion:
             self.motion.restore(time, step_size, blows, arrays)
         else:  # the solver was made with other inputs
-            motion = self._make_motion(given)
+            motion = self._make_motion(self.values | given)
             motion.restore(time, step_size, blows, arrays)
             self._take_motion(motion, given)
         self.acting = dict(zip(INPUTS, acting, strict=True))

@@ -13,7 +13,7 @@ import sys
 from collections.abc import Callable, Iterable
 from math import inf
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from pythonfmu import Fmi2Slave
 from pythonfmu.enums import Fmi2Status
@@ -101,8 +101,12 @@ class Slave(Fmi2Slave):
         Inputs whose new values may be out of bounds.
     """
 
+    start_notes: ClassVar[list[str]] = []  # of the loader
+
     def __init__(self, **arguments: Any) -> None:
         super().__init__(**arguments)
+        while self.start_notes:
+            self.warn(self.start_notes.pop(0))
         folder = arguments["resources"]
         # The export library adds the folder for each instance; once loaded it is not needed.
         while folder in sys.path:
