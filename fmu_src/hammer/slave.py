@@ -54,7 +54,7 @@ class PercussiveHammer(Slave):
         text = (Path(self.folder) / "scene.json").read_text(encoding="utf-8")
         scene = json.loads(text)
         self.baked = Scene(**scene["given"])
-        self._identity = scene["identity"]
+        self._identity = [scene["identity"], scene["given"]]
         self._drive_row = self.baked.row_of("drive.force")
         self._drive_bounds = closed_bounds(self._drive_row)
         self._drive_inputs = frozenset(DRIVE_INPUTS)
@@ -208,7 +208,7 @@ class PercussiveHammer(Slave):
     # states
 
     def identity(self) -> Any:
-        """Sources and names of the variables."""
+        """Sources, names of the variables, and the scene with what no variable tells."""
         return self._identity
 
     def save(self) -> bytes:

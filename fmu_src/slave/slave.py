@@ -249,7 +249,7 @@ class Slave(Fmi2Slave):
     def _set(self, references: list[int], values: list[Any], types: tuple[str, ...]) -> None:
         """Set parameters and inputs."""
         if self.phase == Phase.TERMINATED:
-            self._require(f"fmi2Set{types[0]}", STEPPING)
+            raise ValueError(f"call out of order: no fmi2Set{types[0]} after fmi2Terminate")
         self.take_pending()
         found = []
         for reference, value in zip(references, values, strict=True):
