@@ -102,35 +102,36 @@ class Limits:
         own: bool = True,
     ) -> None:
         limits = {**COMMON_LIMITS, **limits}
-        undefined = {*COMMON_UNDEFINED, *undefined}
-        common = {entry[0] for entry in COMMON_STATE}
-        places = sorted(words_of(dtype).items(), key=lambda item: item[1])
-        ends = [place for _, place in places[1:]] + [dtype.itemsize // 8]
-        found = [
-            (place, name, *limits.get(name, NUMBER), name in undefined)
-            for (name, begin), end in zip(places, ends, strict=True)
-            if own or name in common
-            for place in range(begin, end)
-        ]
-        whole = np.array([dtype[name].base.kind == "i" for _, name, *_ in found])
-        self._names = [name for _, name, *_ in found]
-        self._places = np.array([place for place, *_ in found])
-        self._whole = np.flatnonzero(whole)
-        self._low, self._high = (np.array([one[k] for one in found], float) for k in (2, 3))
-        self._undefined = np.array([one[4] for one in found])
+        free = {name for name in dtype.names or () if not own} - {one[0] for one in COMMON_STATE}
+        undefined = {*COMMON_UNDEFINED, *undefined, *free}
+        size = dtype.itemsize // 8
+        self._names = [""] * size
+        self._low, self._high = np.full(size, -np.inf), np.full(size, np.inf)
+        self._may_be_nan = np.ones(size, bool)
+        whole: list[int] = []
+        for name, begin in words_of(dtype).items():
+            end = begin + dtype[name].itemsize // 8
+            self._names[begin:end] = [name] * (end - begin)
+            if name not in free:
+                self._low[begin:end], self._high[begin:end] = limits.get(name, NUMBER)
+                self._may_be_nan[begin:end] = name in undefined
+            if dtype[name].base.kind == "i":
+                whole += range(begin, end)
+        self._whole = np.array(whole, np.intp)
 
     def fault(self, state: State) -> str:
         """Which number of a state lies outside its limits; empty where none does."""
-        values = state.numbers[self._places]
-        values[self._whole] = state.words[self._places[self._whole]]
+        values = state.numbers.copy()
+        values[self._whole] = state.words[self._whole]
         good = (values >= self._low) & (values <= self._high)
-        good |= self._undefined & np.isnan(values)
         if not good.all():
+            good |= self._may_be_nan & np.isnan(values)
             k = int(np.argmin(good))
-            return (
-                f"{self._names[k]} = {float(values[k])!r}, "
-                f"which must be from {self._low[k]:g} to {self._high[k]:g}"
-            )
+            if not good[k]:
+                return (
+                    f"{self._names[k]} = {float(values[k])!r}, "
+                    f"which must be from {self._low[k]:g} to {self._high[k]:g}"
+                )
         workspace = state.workspace
         if len(workspace) and not max(-workspace.min(), workspace.max()) <= LARGEST:
             return f"a number of its workspace, which must be from {-LARGEST:g} to {LARGEST:g}"

@@ -43,6 +43,9 @@ _WORD = words_of(WAVE_STATE)
 LEAP_END, STEP, T_BASE = _WORD["leap_end"], _WORD["step"], _WORD["t_base"]
 EVENTS_ON, N_BLOWS, N_EVENTS = _WORD["events_on"], _WORD["n_blows"], _WORD["n_events"]
 PARITY, PEAK_FROM = _WORD["parity"], _WORD["peak_from"]
+LEAP_WORDS = [
+    _WORD[name] for name in ("step", "leap_end", "leap_kind", "dormant", "piston_step", "wake")
+]
 
 
 # A state without a leap is no more than a step, and rounding, behind the present [steps].
@@ -142,6 +145,7 @@ class WaveSolver(Solver):
             if found is not None:
                 self._par["leaps"] = LEVELS
                 self._operators = found
+        self._longest_leap = 4 ** int(self._par[0]["leaps"]) - 1
         size = max(padded(2 * max(self.cells.values()) + 1), LOOKAHEAD)
         self._scratch = Scratch(*np.zeros((3, size)))
         self._entry: Callable[..., int] = entry_of(run)
@@ -191,14 +195,13 @@ class WaveSolver(Solver):
         fault = super().state_fault(state, t)
         if fault:
             return fault
-        s: Any = state.record[0]
-        step, end, longest = int(s["step"]), int(s["leap_end"]), 4 ** int(self._par[0]["leaps"]) - 1
+        step, end, kind, dormant, begin, wake = state.words[LEAP_WORDS].tolist()
+        longest = self._longest_leap
         if end >= 0:
-            most = min(longest, LOOKAHEAD) if s["leap_kind"] == LeapKind.CONTACT else longest
+            most = min(longest, LOOKAHEAD) if kind == LeapKind.CONTACT else longest
             if not step < end <= step + most:
                 return f"leap_end = {end}, at step {step} with leaps of {most} steps at most"
-        if s["dormant"]:
-            begin, wake = int(s["piston_step"]), int(s["wake"])
+        if dormant:
             if not begin <= max(step, end) <= wake <= begin + longest or begin > step:
                 return f"wake = {wake}, at step {step} of a piston that waits from {begin} on"
         behind = t - self._time_of(state, max(end, step + MOST_BEHIND))
