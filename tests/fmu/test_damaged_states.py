@@ -26,7 +26,6 @@ def foreign(folders):
     return first_states(folders)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", KINDS)
 def test_damaged_states_end_in_a_message_and_change_nothing(folders, foreign, name):
     if name not in folders:
