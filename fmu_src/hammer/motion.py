@@ -111,7 +111,9 @@ class Motion(Runner):
         """
         return b"".join(map(np.ndarray.tobytes, self._arrays(self.before(), self.row_of_blow)))
 
-    def restore(self, time: float, step_size: float, blow_count: int, saved: bytes) -> None:
+    def restore(
+        self, time: float, step_size: float, blow_count: int, saved: bytes, own: bool
+    ) -> None:
         """Go back to a state: all of it or, with an error, nothing.
 
         Parameters
@@ -119,7 +121,8 @@ class Motion(Runner):
         time, step_size : float
             Present time, and size of the last step [s].
         saved : bytes
-            From outside: nothing is known of it.
+        own : bool
+            Whether it was made in this process; else nothing is known of it.
         """
         before, row_of_blow = np.zeros(len(IMPULSES)), np.zeros(1, BLOW)
         state = self._state.copy()
@@ -130,8 +133,9 @@ class Motion(Runner):
         for array in arrays:
             array.view(np.uint8)[:] = np.frombuffer(saved, np.uint8, array.nbytes, start)
             start += array.nbytes
-        self._refuse_state(state, time)
-        self._refuse_row(before, row_of_blow)
+        if not own:
+            self._refuse_state(state, time)
+            self._refuse_row(before, row_of_blow)
         self._state, self._before, self.row_of_blow = state, before, row_of_blow
         self._time, self.step_size, self.blow_count = time, step_size, blow_count
         self.blow = self._numbers_of_blow()

@@ -219,7 +219,7 @@ class PercussiveHammer(Slave):
         acting = struct.pack(f"<{len(INPUTS)}d", *(self.acting[name] for name in INPUTS))
         return numbers + pack_values(self.inputs, given) + acting + motion.save()
 
-    def restore(self, values: dict[str, Any], place: Place, saved: bytes) -> None:
+    def restore(self, values: dict[str, Any], place: Place, saved: bytes, own: bool) -> None:
         """Go back to a motion; as in `Slave`."""
         begin = NUMBERS.size + 8 * len(self.inputs)
         given = unpack_values(self.inputs, saved, NUMBERS.size)
@@ -237,9 +237,9 @@ class PercussiveHammer(Slave):
             raise StateError(f"the saved motion has {blows} blows")
         arrays = saved[begin + 8 * len(INPUTS) :]
         if [given[one.name] for one in self.inputs] == self.given_inputs and self.motion:
-            self.motion.restore(time, step_size, blows, arrays)
+            self.motion.restore(time, step_size, blows, arrays, own)
         else:  # the solver was made with other inputs
             motion = self._make_motion(self.values | given)
-            motion.restore(time, step_size, blows, arrays)
+            motion.restore(time, step_size, blows, arrays, own)
             self._take_motion(motion, given)
         self.acting = dict(zip(INPUTS, acting, strict=True))

@@ -159,7 +159,7 @@ class Part(Slave):
         """State of the model."""
         return json.dumps(self.initialise().save()).encode()
 
-    def restore(self, values: dict[str, Any], place: Place, saved: bytes) -> None:
+    def restore(self, values: dict[str, Any], place: Place, saved: bytes, own: bool) -> None:
         """Go back to a motion; as in `Slave`."""
         try:
             found = json.loads(saved)
@@ -169,8 +169,7 @@ class Part(Slave):
         if model is None:
             model = self.MODEL(self._parameters())
             model.begin(values)
-        fault = form_fault(found, model.save()) or model.state_fault(found)
-        if fault:
+        if not own and (fault := form_fault(found, model.save()) or model.state_fault(found)):
             raise StateError(f"the saved state has {fault}")
         model.restore(found)
         self._model, self._found = model, None

@@ -21,6 +21,7 @@ from pythonfmu.enums import Fmi2Status
 from fmu_src.slave.states import (
     PLACE,
     STEPPING,
+    OwnState,
     Phase,
     Place,
     StateError,
@@ -158,7 +159,7 @@ class Slave(Fmi2Slave):
         """Present motion, once the initialisation has ended."""
         raise NotImplementedError
 
-    def restore(self, values: dict[str, Any], place: Place, saved: bytes) -> None:
+    def restore(self, values: dict[str, Any], place: Place, saved: bytes, own: bool) -> None:
         """Go back to a motion that `save` gave: all of it or, with a ValueError, nothing.
 
         Parameters
@@ -168,7 +169,8 @@ class Slave(Fmi2Slave):
         place : Place
             As it will be.
         saved : bytes
-            From outside: nothing is known of it.
+        own : bool
+            Whether it was made in this process; else nothing is known of it.
         """
         raise NotImplementedError
 
@@ -451,7 +453,7 @@ class Slave(Fmi2Slave):
         values = unpack_values(variables, body, PLACE.size)
         motion = body[PLACE.size + 8 * len(variables) :]
         if place.phase >= STEPPING:
-            self.restore(values, place, motion)
+            self.restore(values, place, motion, isinstance(state, OwnState))
         elif motion:
             raise StateError(f"the saved state has {len(motion)} bytes too many")
         else:
@@ -470,6 +472,7 @@ class Slave(Fmi2Slave):
 
     @staticmethod
     def _fmu_state_from_bytes(state: bytes) -> bytes:
+        # looked at when it is set: an error here would bring the export library down
         return state
 
     # messages

@@ -22,7 +22,7 @@ from percussion_model.solvers.state import Limits, State, common_limits, words_o
 
 # A state lies ahead of the present after a step that failed half-way, and after a change of
 # inputs; no further than this [s].
-MOST_AHEAD = 100.0
+MOST_AHEAD = 1e6
 
 
 class Cells(Protocol):
