@@ -140,6 +140,9 @@ class Slave(Fmi2Slave):
     def reset(self) -> None:
         """Drop what was made of values that have changed before the first step."""
 
+    def foretell(self) -> None:
+        """Log what takes long in `initialise`: hosts see messages when a call has ended."""
+
     def initialise(self) -> Any:
         """Make everything ready for the first step."""
 
@@ -356,6 +359,7 @@ class Slave(Fmi2Slave):
                 "call out of order: fmi2EnterInitializationMode needs fmi2SetupExperiment before it"
             )
         self.check(self.values)
+        self.foretell()
         self.phase = Phase.INITIALISING
 
     @guarded
