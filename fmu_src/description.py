@@ -48,6 +48,7 @@ class Described(Fmi2Slave):  # type: ignore[misc]
 
     # What the slaves send; pythonfmu would take "logAll" for one of its own, and be silent.
     log_categories: ClassVar[dict[str, str]] = {
+        "logEvents": "Events: kernels that are compiled.",
         "logStatusWarning": "Warnings: where the motion leaves the model, inputs without effect.",
         "logStatusError": "Errors: why a call was refused.",
     }

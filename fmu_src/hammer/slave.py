@@ -116,11 +116,11 @@ class PercussiveHammer(Slave):
 
     def foretell(self) -> None:
         """Log that kernels are going to be compiled, where they are not kept yet."""
-        solver = self.make_scene().solver_name
+        solver = self.make_scene(self.values).solver_name
         place = place_of_kernels(solver)
         if place is not None:
-            self.log(
-                f"{self.instance_name}: compiling the kernels of the solver {solver}: once, for "
+            self.note(
+                f"compiling the kernels of the solver {solver}: once, for "
                 f"about half a minute; they are kept in {place}"
             )
 

@@ -491,6 +491,10 @@ class Slave(Fmi2Slave):
         """Log a message; hosts take it for a printf format, so percent signs are doubled."""
         super().log(msg.replace("%", "%%"), status, category)
 
+    def note(self, message: str) -> None:
+        """Log what is no warning."""
+        self.log(f"{self.instance_name}: {message}", Fmi2Status.ok, "logEvents")
+
     def warn(self, message: str) -> None:
         """Log a warning."""
         self.log(f"{self.instance_name}: {message}", Fmi2Status.warning, "logStatusWarning")

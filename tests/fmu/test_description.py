@@ -159,7 +159,8 @@ def test_icon_page_and_licence_are_inside(hammer):
     assert model.version
     assert model.license == "BSD-3-Clause"
     # those that messages have: one that none has would make the log of a host silent
-    assert [one.name for one in model.logCategories] == ["logStatusWarning", "logStatusError"]
+    names = [one.name for one in model.logCategories]
+    assert names == ["logEvents", "logStatusWarning", "logStatusError"]
 
 
 def test_a_name_that_is_no_identifier_is_refused(tmp_path):
