@@ -45,6 +45,10 @@ def couple(
         list[str] | None,
         typer.Option("--signal", metavar="COMPONENT.VARIABLE", help="Keep this output too."),
     ] = None,
+    trust: Annotated[
+        bool,
+        typer.Option("--trust", help="Allow any size, and FMUs outside of the archive."),
+    ] = False,
     out: common.OutOrDefault = None,
     json_file: common.JsonFile = None,
     figures: Annotated[bool, typer.Option(help="Draw the signals.")] = True,
@@ -67,6 +71,7 @@ def couple(
         dict(read_value(text) for text in settings or ()),
         order=order,
         every=dict(_read_pace(text) for text in every or ()),
+        trust=trust,
     )
     wanted = [*known_signals(coupling.outputs), *(signals or ())]
     rows_every = max(step, duration / ROWS) if interval is None else interval
