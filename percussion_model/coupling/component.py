@@ -66,8 +66,8 @@ def check_library(name: str, folder: Path, identifier: str) -> None:
     """
     if not (identifier.isascii() and identifier.isidentifier()):
         raise CouplingError(
-            f"{name}: modelIdentifier = {shortened(identifier)!r}: must be a plain name of letters, "
-            "digits and underlines"
+            f"{name}: modelIdentifier = {shortened(identifier)!r}: must be a plain name of "
+            "letters, digits and underlines"
         )
     path = folder / "binaries" / platform / f"{identifier}{sharedLibraryExtension}"
     if not path.is_file():
