@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import tomllib
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,12 +15,23 @@ from fmu_src.hammer.build import build_hammer
 from fmu_src.parts.build import PARTS, build_part
 from fmu_src.units import UNITS
 from percussion_model.interface.commands.blow_map import ready_map
+from percussion_model.scene.rows import show_value, unprintable
 from percussion_model.scene.scene import Scene
+from percussion_model.scene.text import read_toml
 
 SYSTEMS = ROOT / "scenarios" / "systems"
 HAMMER = "PercussiveHammer"
 # Masters find the parameters of all components under one name.
 PARAMETER_SET = "initialValues"
+
+# What a system's file must have.
+_KINDS: dict[str, Any] = {
+    "name": str, "description": str, "hammer": str, "duration": (int, float), "step": (int, float)
+}  # fmt: skip
+_SAID = {str: "text", (int, float): "a number"}
+_TABLES = {"components": str, "connections": str, "parameters": dict}
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,99}")
+MOST_BASES = 5
 
 _SPACES = {
     "ssc": "http://ssp-standard.org/SSP1/SystemStructureCommon",
@@ -71,7 +82,29 @@ def read_plan(path: Path, **changes: Any) -> SystemPlan:
     changes : dict
         Entries that replace those of the file, as `name` or `hammer`.
     """
-    found = _merged(path) | changes
+    try:
+        found = _merged(path) | changes
+    except (TypeError, AttributeError):
+        raise SystemPlanError(f"{path}: a table stands where its base has a value") from None
+    lacking = [key for key in (*_KINDS, *_TABLES) if key not in found]
+    if lacking:
+        raise SystemPlanError(f"{path}: {', '.join(lacking)} missing")
+    for key, kind in _KINDS.items():
+        if not isinstance(found[key], kind) or isinstance(found[key], bool):
+            raise SystemPlanError(
+                f"{path}: {key} = {show_value(found[key])}: must be {_SAID[kind]}"
+            )
+    for key in _TABLES:
+        if not isinstance(found[key], dict):
+            raise SystemPlanError(f"{path}: {key} = {show_value(found[key])}: must be a table")
+    for name in (found["name"], *found["components"]):
+        if not _NAME.fullmatch(name):  # files are named by the system
+            raise SystemPlanError(
+                f"{path}: {show_value(name)}: a name must begin with a letter and go on with "
+                "letters, digits and underlines, 100 in all"
+            )
+    if unprintable(found["description"]):
+        raise SystemPlanError(f"{path}: description has a control character")
     return SystemPlan(
         name=found["name"],
         description=found["description"],
@@ -85,14 +118,19 @@ def read_plan(path: Path, **changes: Any) -> SystemPlan:
     )
 
 
-def _merged(path: Path) -> dict[str, Any]:
-    found = tomllib.loads(path.read_text(encoding="utf-8"))
+def _merged(path: Path, left: int = MOST_BASES) -> dict[str, Any]:
+    found = read_toml(path)
     base = found.pop("base", None)
     if base is None:
         return found
-    below = _merged(path.parent / base)
+    if not isinstance(base, str) or not left:
+        raise SystemPlanError(
+            f"{path}: base = {show_value(base)}: must name a file that has a base of its own at "
+            f"most {MOST_BASES} times"
+        )
+    below = _merged(path.parent / base, left - 1)
     for key, value in found.items():
-        if key == "parameters":
+        if key == "parameters" and isinstance(value, dict):
             both = {**below.get(key, {})}
             for name, values in value.items():
                 both[name] = {**both.get(name, {}), **values}

@@ -48,7 +48,9 @@ def read_toml(path: Path) -> dict[str, Any]:
     except UnicodeDecodeError:
         raise SceneError(f"{path}: not a text file in UTF-8") from None
     if _DEEP_KEY.search(text):
-        raise SceneError(f"{path}: a key has more than {DEEPEST_KEY} parts with points between them")
+        raise SceneError(
+            f"{path}: a key has more than {DEEPEST_KEY} parts with points between them"
+        )
     try:
         return tomllib.loads(text)
     except RecursionError:

@@ -73,6 +73,10 @@ def settled(
     cells: common.Cells = None,
     settings: common.Settings = None,
     tolerance: common.Tolerance = 1e-4,
+    most_time: Annotated[
+        float,
+        typer.Option("--most-time", help="Processor time after which it is given up, in s."),
+    ] = 300.0,
     json_file: common.JsonFile = None,
 ) -> None:
     """Run until the blows repeat: rate, period, order and stability of the cycle."""
@@ -82,7 +86,7 @@ def settled(
     common.check_json(json_file)
     chosen = common.load_scene(scene, solver, cells, settings)
     with progress_bar(0.0):
-        found = run_until_settled(chosen, tolerance)
+        found = run_until_settled(chosen, tolerance, most_time=most_time)
     common.write_json(json_file, found.summary())
     if json_file != "-":
         show_settled(found)

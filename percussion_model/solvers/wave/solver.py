@@ -135,6 +135,7 @@ class WaveSolver(Solver):
             if found is not None:
                 self._par["leaps"] = LEVELS
                 self._operators = found
+                self.operator_bytes = sum(part.nbytes for part in found)
         size = max(padded(2 * max(self.cells.values()) + 1), LOOKAHEAD)
         self._scratch = Scratch(*np.zeros((3, size)))
         self._entry: Callable[..., int] = entry_of(run)
