@@ -127,7 +127,8 @@ def test_who_waits_for_the_compiler_is_told_so(percussion, command, monkeypatch)
     monkeypatch.setattr(module, "forecast", lambda scene: time.sleep(0.3) or work(scene))
     module = importlib.import_module("percussion_model.analysis.stationary")
     settle = module.settled
-    monkeypatch.setattr(module, "settled", lambda *words: time.sleep(0.3) or settle(*words))
+    slow = lambda *words, **more: time.sleep(0.3) or settle(*words, **more)  # noqa: E731
+    monkeypatch.setattr(module, "settled", slow)
     code, _, err = percussion(command, RIGID)
     assert code == 0
     assert "Preparing (the first run compiles" in err

@@ -86,25 +86,7 @@ def read_plan(path: Path, **changes: Any) -> SystemPlan:
         found = _merged(path) | changes
     except (TypeError, AttributeError):
         raise SystemPlanError(f"{path}: a table stands where its base has a value") from None
-    lacking = [key for key in (*_KINDS, *_TABLES) if key not in found]
-    if lacking:
-        raise SystemPlanError(f"{path}: {', '.join(lacking)} missing")
-    for key, kind in _KINDS.items():
-        if not isinstance(found[key], kind) or isinstance(found[key], bool):
-            raise SystemPlanError(
-                f"{path}: {key} = {show_value(found[key])}: must be {_SAID[kind]}"
-            )
-    for key in _TABLES:
-        if not isinstance(found[key], dict):
-            raise SystemPlanError(f"{path}: {key} = {show_value(found[key])}: must be a table")
-    for name in (found["name"], *found["components"]):
-        if not _NAME.fullmatch(name):  # files are named by the system
-            raise SystemPlanError(
-                f"{path}: {show_value(name)}: a name must begin with a letter and go on with "
-                "letters, digits and underlines, 100 in all"
-            )
-    if unprintable(found["description"]):
-        raise SystemPlanError(f"{path}: description has a control character")
+    _check_entries(path, found)
     return SystemPlan(
         name=found["name"],
         description=found["description"],
@@ -116,6 +98,30 @@ def read_plan(path: Path, **changes: Any) -> SystemPlan:
         connections=found["connections"],
         parameters=found["parameters"],
     )
+
+
+def _check_entries(path: Path, found: dict[str, Any]) -> None:
+    """Raise `SystemPlanError` for what is missing or of another kind, and for bad names."""
+    lacking = [key for key in (*_KINDS, *_TABLES) if key not in found]
+    if lacking:
+        raise SystemPlanError(f"{path}: {', '.join(lacking)} missing")
+    for key, kind in _KINDS.items():
+        if not isinstance(found[key], kind) or isinstance(found[key], bool):
+            shown = show_value(found[key])
+            raise SystemPlanError(f"{path}: {key} = {shown}: must be {_SAID[kind]}")
+    for key, kind in _TABLES.items():
+        table = found[key]
+        if not isinstance(table, dict) or not all(isinstance(v, kind) for v in table.values()):
+            what = "of texts" if kind is str else "of tables"
+            raise SystemPlanError(f"{path}: {key} = {show_value(table)}: must be a table {what}")
+    for name in (found["name"], *found["components"]):
+        if not _NAME.fullmatch(name):  # files are named by the system
+            raise SystemPlanError(
+                f"{path}: {show_value(name)}: a name must begin with a letter and go on with "
+                "letters, digits and underlines, 100 in all"
+            )
+    if unprintable(found["description"]):
+        raise SystemPlanError(f"{path}: description has a control character")
 
 
 def _merged(path: Path, left: int = MOST_BASES) -> dict[str, Any]:
@@ -208,10 +214,13 @@ def _check(plan: SystemPlan, variables: dict[str, dict[str, Any]]) -> None:
                 f"connection {sink} = {source}: {kinds[0]} does not fit {kinds[1]}"
             )
     for component, values in plan.parameters.items():
-        for name in values:
+        for name, value in values.items():
             one = variables.get(component, {}).get(name)
             if one is None or one.causality == "output":
                 raise SystemPlanError(f"parameter {component}.{name}: there is no such variable")
+            if not isinstance(value, (bool, int, float)):
+                shown = show_value(value)
+                raise SystemPlanError(f"parameter {component}.{name} = {shown}: must be a number")
 
 
 def _tag(space: str, name: str) -> str:
