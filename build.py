@@ -22,6 +22,7 @@ VENV = ROOT / ".venv"
 STAMP = VENV / "percussion_model.stamp"
 OLDEST_PYTHON = (3, 11)
 INTERRUPTED = 130  # what shells report for Ctrl-C
+EVERY = 3.0  # between lines that say that a silent program still runs [s]
 
 # setuptools explains at length what an editable installation is; this text alone is kept still.
 EDITABLE_IS_MEANT = "ignore:Editable installation"
@@ -90,14 +91,14 @@ def setup() -> int:
     print("Installing percussion_model and what it needs (a minute or two) ...", flush=True)
     silent = ",".join(filter(None, (os.environ.get("PYTHONWARNINGS"), EDITABLE_IS_MEANT)))
     code = call([tool("python"), "-m", "pip", "--disable-pip-version-check", "install", "-q",
-                 "-e", ".[all]"], PYTHONWARNINGS=silent)  # fmt: skip
+                 "-e", ".[all]"], silent="installing", PYTHONWARNINGS=silent)  # fmt: skip
     if code != 0:
         print("The installation failed, see above. Is the network up? Then run this again.",
               file=sys.stderr)  # fmt: skip
         return code
     print("Compiling the kernels, for Python and for the FMU (once, a minute or two) ...",
           flush=True)  # fmt: skip
-    code = call([tool("python"), "-m", WARM_UP])
+    code = call([tool("python"), "-m", WARM_UP], silent="compiling")
     if code != 0:
         return code
     STAMP.write_text(wanted, encoding="utf-8")
@@ -148,7 +149,7 @@ def test(extra: list[str]) -> int:
     code = setup()
     if code != 0:
         return code
-    # pytest comes last, so that its closing line ends the output.
+    # pytest comes last, so that its closing line ends the output; it tells itself how far it is.
     steps: list[tuple[str, list[str | Path]]] = [
         ("ruff check", [tool("ruff"), "check"]),
         ("ruff format", [tool("ruff"), "format", "--check"]),
@@ -163,7 +164,8 @@ def test(extra: list[str]) -> int:
     with tempfile.TemporaryDirectory(prefix="percussion-numba-") as cache:
         for name, command in steps:
             print(f"== {name}", flush=True)
-            code = call(command, NUMBA_CACHE_DIR=cache, MPLBACKEND="Agg",
+            code = call(command, silent="" if name == "pytest" else name,
+                        NUMBA_CACHE_DIR=cache, MPLBACKEND="Agg",
                         PERCUSSION_FMU_CACHE=str(Path(cache) / "percussion_fmu"))  # fmt: skip
             first_failure = first_failure or code
     return first_failure
@@ -175,18 +177,28 @@ def bench(extra: list[str]) -> int:
     if code != 0:
         return code
     with tempfile.TemporaryDirectory(prefix="percussion-numba-") as cache:
-        return call([tool("python"), "-m", "benchmarks", *extra], NUMBA_CACHE_DIR=cache)
+        return call([tool("python"), "-m", "benchmarks", *extra], silent="measuring",
+                    NUMBA_CACHE_DIR=cache)  # fmt: skip
 
 
-def call(command: list[str | Path], folder: Path = ROOT, **variables: str) -> int:
-    """Run a program, from the project's folder unless told otherwise; return its code."""
+def call(command: list[str | Path], folder: Path = ROOT, silent: str = "", **variables: str) -> int:
+    """Run a program, from the project's folder unless told otherwise; return its code.
+
+    `silent` says what a program does that tells nothing itself: lines say that it still runs.
+    """
     words = [str(part) for part in command]
     try:
         child = subprocess.Popen(words, cwd=folder, env={**os.environ, **variables})
     except FileNotFoundError:
         print(f"{words[0]} is missing. Delete .venv and run this again.", file=sys.stderr)
         return 1
+    began = time.monotonic()
     try:
+        while silent:
+            try:
+                return child.wait(EVERY)
+            except subprocess.TimeoutExpired:
+                print(f"{time.monotonic() - began:4.0f} s: {silent}", file=sys.stderr, flush=True)
         return child.wait()
     except KeyboardInterrupt:
         # The program was interrupted too: let it keep its finished work.

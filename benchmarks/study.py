@@ -101,6 +101,7 @@ def main() -> None:
 def compare(found, count: int) -> None:
     """Tell how far a random sample is off long runs, and off a grid of twice the cells."""
     from percussion_model import Simulation, settled
+    from percussion_model.simulation.rate import rate_of_blows
 
     count = min(count, len(found.points))
     chosen = np.random.default_rng(8).choice(len(found.points), count, replace=False)
@@ -112,7 +113,7 @@ def compare(found, count: int) -> None:
         while len(simulation.blows) < LONG:
             simulation.advance(simulation.time + 50 * float(row["blow_period"]))
         blows = simulation.blows[SETTLING:]
-        rate = blows["penetration"].sum() / blows["period"].sum()
+        rate = rate_of_blows(blows)[0]
         off.append(row["rate_of_penetration"] / rate - 1.0)
         fine = settled(scene.replace(**{"solver.cells": 40}), scatter=1e-3).rate_of_penetration
         finer.append(row["rate_of_penetration"] / fine - 1.0)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from examples.shared import BLACK, GREEN, GREY
+from percussion_model.simulation.rate import rate_of_blows
 
 # Impact velocities that differ by less, relative, are the same.
 SAME = 1e-3
@@ -51,12 +52,5 @@ def branch_of(values: np.ndarray, rows: list[np.ndarray]) -> Branch:
     """Blows at each value, and their mean rate; the branch has the values rising."""
     up = np.argsort(values)
     velocity = np.array([blows["impact_velocity"] for blows in rows])
-    rate, error = np.array([mean_rate(blows) for blows in rows]).T
+    rate, error = np.array([rate_of_blows(blows) for blows in rows]).T
     return Branch(values[up], velocity[up], rate[up], error[up])
-
-
-def mean_rate(blows: np.ndarray) -> tuple[float, float]:
-    """Mean rate of some blows and its standard error [m/s] (docs/model.md, section 7)."""
-    rate = np.sum(blows["penetration"]) / np.sum(blows["period"])
-    off = np.std(blows["penetration"] - rate * blows["period"])
-    return float(rate), float(off / np.sqrt(len(blows)) / np.mean(blows["period"]))

@@ -6,13 +6,16 @@ import argparse
 import sys
 from pathlib import Path
 
-from fmu_src.archive import ROOT
-from fmu_src.hammer.build import build_hammer
+from fmu_src.archive import ROOT, content, state_of
+from fmu_src.hammer.build import build_hammer, hammer_name, refuse_other
 from fmu_src.parts import pneumatic_drive
 from fmu_src.parts.build import build_part
+from percussion_model.interface.terminal import progress
 from percussion_model.scene.scene import Scene, SceneError
 
-DEFAULT = ROOT / "dist" / "PercussiveHammer.fmu"
+DIST = ROOT / "dist"
+REFERENCE = ROOT / "scenarios" / "reference.toml"
+DEFAULT = DIST / hammer_name(REFERENCE)
 DEFAULT_DRIVE = ROOT / "dist" / "PneumaticDrive.fmu"
 
 
@@ -22,7 +25,10 @@ def main(arguments: list[str]) -> int:
         prog="build.py fmu", description="Bake a scene into an FMU for co-simulation."
     )
     parser.add_argument("--scene", type=Path, help="a scene file; left out: the reference")
-    parser.add_argument("-o", "--output", type=Path, default=DEFAULT, help="the FMU to write")
+    parser.add_argument(
+        "-o", "--output", type=Path, help="the FMU to write; left out: dist/, by the scene's name"
+    )
+    parser.add_argument("--force", action="store_true", help="replace the FMU of another scene")
     parser.add_argument(
         "--pneumatics", action="store_true", help="write the simple pneumatic drive instead"
     )
@@ -35,25 +41,34 @@ def main(arguments: list[str]) -> int:
     choice = parser.parse_args(arguments)
     try:
         if choice.pneumatics:
-            path = DEFAULT_DRIVE if choice.output == DEFAULT else choice.output
-            print(f"{path} {{{build_part(pneumatic_drive.TABLE, path)}}}")
+            path = choice.output or DEFAULT_DRIVE
+            before = content(path)
+            guid = build_part(pneumatic_drive.TABLE, path)
+            print(f"{path} {{{guid}}}: {state_of(path, before)}")
             return 0
-        scene = Scene.from_toml(choice.scene or ROOT / "scenarios" / "reference.toml")
+        file = choice.scene or REFERENCE
+        scene = Scene.from_toml(file)
         table = None
         if choice.blow_map or scene.solver_name == "blow-map":
             from percussion_model.interface.commands.blow_map import ready_map
 
             table = ready_map(scene)
-        guid = build_hammer(scene, choice.output, table)
+        path = choice.output or DIST / hammer_name(file, "Ladder" if choice.blow_map else "")
+        refuse_other(path, scene, table is not None, choice.force)
+        before = content(path)
+        with progress("building the FMU"):
+            guid = build_hammer(scene, path, table)
     except (SceneError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 1
-    print(f"{choice.output} {{{guid}}}")
+    print(f"{path} {{{guid}}}: {state_of(path, before)}")
     if not choice.no_reference:
         from fmu_src.reference import write_reference
 
-        for path in write_reference(choice.output):
-            print(path)
+        with progress("running the FMU; the first run compiles"):
+            files = write_reference(path)
+        for written in files:
+            print(written)
     return 0
 
 

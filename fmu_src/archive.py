@@ -68,6 +68,24 @@ def write_fmu(
     return guid
 
 
+def state_of(path: Path, before: bytes | None) -> str:
+    """What has become of a file: written, replaced or unchanged.
+
+    Parameters
+    ----------
+    before : bytes or None
+        What it held before (`content`).
+    """
+    if before is None:
+        return "written"
+    return "unchanged" if before == content(path) else "replaced"
+
+
+def content(path: Path) -> bytes | None:
+    """What a file holds; None where there is none."""
+    return path.read_bytes() if path.is_file() else None
+
+
 def write_archive(path: Path, entries: Mapping[str, bytes]) -> None:
     """Write a zip archive whole or not at all; the same entries give the same bytes."""
     path.parent.mkdir(parents=True, exist_ok=True)

@@ -15,9 +15,10 @@ import numpy as np
 from fmpy import simulate_fmu
 
 from fmu_src.__main__ import DEFAULT
-from fmu_src.archive import ROOT
-from fmu_src.hammer.build import build_hammer
-from percussion_model.scene.scene import Scene
+from fmu_src.archive import ROOT, content, state_of
+from fmu_src.hammer.build import build_hammer, refuse_other
+from percussion_model.interface.terminal import progress
+from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.simulation.simulate import simulate
 
 STEP_SIZE = 0.01  # of the communication [s]
@@ -26,7 +27,7 @@ STEP_SIZE = 0.01  # of the communication [s]
 ROWS = (
     ("start of the last blow", 1.0, "s", "blow_time", "time"),
     ("depth at its start", 1e3, "mm", "blow_position", "bit_position"),
-    ("penetration", 1e3, "mm", "penetration_per_blow", "penetration"),
+    ("penetration", 1e3, "mm", "penetration_per_blow", "hole_advance"),
     ("impact velocity", 1.0, "m/s", "impact_velocity", "impact_velocity"),
     ("blow energy", 1.0, "J", "blow_energy", "blow_energy"),
     ("stroke", 1e3, "mm", "piston.stroke", "stroke"),
@@ -68,10 +69,10 @@ def describe(both: dict[str, Any], settle: float) -> str:
         lines.append(f"{f'{label} [{unit}]':24}{a:16.9g}{b:16.9g}{difference:14.2g}")
 
     rates = [
-        _rate(table, time_name, position, settle)
-        for table, time_name, position in (
-            (fmu, "blow_time", "blow_position"),
-            (library, "time", "bit_position"),
+        _rate(table, time_name, advance, settle)
+        for table, time_name, advance in (
+            (fmu, "blow_time", "penetration_per_blow"),
+            (library, "time", "hole_advance"),
         )
     ]
     a, b = (1e3 * rate for rate in rates)
@@ -87,18 +88,26 @@ def describe(both: dict[str, Any], settle: float) -> str:
     return "\n".join(lines)
 
 
-def _rate(table: Any, time_name: str, position: str, settle: float) -> float:
-    """Bit advance by time from the first to the last blow start after settling [m/s]."""
+def _rate(table: Any, time_name: str, advance: str, settle: float) -> float:
+    """Advance of the hole by time from the first to the last blow start after settling [m/s]."""
     counted = table[table[time_name] >= settle]
-    advance = counted[position][-1] - counted[position][0]
-    return float(advance / (counted[time_name][-1] - counted[time_name][0]))
+    took = counted[time_name][-1] - counted[time_name][0]
+    return float(np.sum(counted[advance][:-1]) / took)
 
 
 def main() -> int:
     """Compare on the reference scene."""
     scene = Scene.from_toml(ROOT / "scenarios" / "reference.toml")
-    both = run_both(scene, DEFAULT)
-    print(f"The reference hammer for {scene.run.duration:g} s; the FMU is {DEFAULT}\n")
+    try:
+        refuse_other(DEFAULT, scene, with_map=False)
+    except SceneError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 1
+    before = content(DEFAULT)
+    with progress("running the FMU and the library"):
+        both = run_both(scene, DEFAULT)
+    print(f"{DEFAULT}: {state_of(DEFAULT, before)}")
+    print(f"The reference hammer for {scene.run.duration:g} s, by that FMU and by the library\n")
     print(describe(both, scene.run.settle), flush=True)
     return 0
 

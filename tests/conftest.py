@@ -10,6 +10,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 from percussion_model import Result, Scene, simulate
+from percussion_model.interface import progress
 
 # How long an example takes says nothing on a machine that others use too.
 settings.register_profile("shared", deadline=None, suppress_health_check=[HealthCheck.too_slow])
@@ -20,6 +21,12 @@ os.environ.setdefault(
     "PERCUSSION_CACHE",
     str(Path(os.environ.get("NUMBA_CACHE_DIR") or tempfile.gettempdir()) / "percussion_maps"),
 )
+
+
+@pytest.fixture(autouse=True)
+def no_progress(monkeypatch):
+    """No lines of progress on stderr, however slow the machine; tests of them ask for more."""
+    monkeypatch.setattr(progress, "EVERY", 3600.0)
 
 
 @pytest.fixture(scope="session")

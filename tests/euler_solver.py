@@ -47,7 +47,7 @@ def advance(pars, states, t, blows, events):
         s.count_steps += 1
         if s.gap <= 0.0 and s.v_p > s.v_b:
             if s.armed == 1:
-                start_blow(s, blows, s.time, s.v_p, s.x_r + s.p, math.nan, par.mass_p)
+                start_blow(par, s, blows, s.time, s.v_p, s.x_r + s.p, math.nan)
             impulse = 1.87 * (s.v_p - s.v_b) * par.mass_p * par.mass_b / (par.mass_p + par.mass_b)
             s.v_p -= impulse / par.mass_p
             s.v_b += impulse / par.mass_b

@@ -104,6 +104,23 @@ def test_a_node_answers_with_its_own_blow(table):
     assert blow["contacts"] == entry[Entry.CONTACTS]
 
 
+def test_the_hole_gets_deeper_blow_by_blow(table):
+    """It follows the bit into the rock, but not back, and ends each blow as the table says."""
+    simulation = Simulation(mapped(rock__loading_stiffness=8e8))
+    seen = simulation.sample(np.linspace(0.0, 0.5, 4000))
+    depth, bit = seen["hole_depth"], seen["bit_position"] - simulation.scene.start.rock_gap
+    assert np.diff(depth).min() >= 0.0
+    still = seen["bit_velocity"] == 0.0
+    assert np.count_nonzero(still) > 1000
+    np.testing.assert_allclose(depth[still], bit[still], atol=1e-12)
+    rows = simulation.blows
+    assert np.all(rows["hole_advance"] > 1e-4)
+    np.testing.assert_allclose(rows["hole_advance"], rows["penetration"], rtol=1e-9)
+    np.testing.assert_allclose(np.diff(rows["hole_depth"]), rows["hole_advance"][:-1], rtol=1e-9)
+    starts = np.interp(rows["time"][1:], seen["time"], depth)
+    np.testing.assert_allclose(starts, rows["hole_depth"][1:], rtol=0.02)
+
+
 def test_ledger_and_impulses(table):
     """Momentum to rounding; energy to what is lost between nodes."""
     result = simulate(mapped(), 2.0)

@@ -211,3 +211,28 @@ def test_ctrl_c_lets_the_program_finish_and_returns_130(tmp_path):
     assert process.returncode == 130
     assert errors.strip() == "Interrupted."
     assert (tmp_path / "kept").exists()
+
+
+def test_a_silent_program_is_said_to_run(build, monkeypatch, capsys):
+    assert 0.0 < build.EVERY <= 5.0
+    monkeypatch.setattr(build, "EVERY", 0.01)
+    heard = "import sys; sys.exit(len(sys.stdin.readline()))"  # ends when it is told to
+    sent = []
+
+    class Child(subprocess.Popen):
+        def __init__(self, words, **options):
+            super().__init__(words, stdin=subprocess.PIPE, text=True, **options)
+
+        def wait(self, timeout=None):
+            if timeout is not None and len(sent) == 2:
+                self.stdin.write("end\n")
+                self.stdin.flush()
+                timeout = None
+            sent.append(timeout)
+            return super().wait(timeout)
+
+    monkeypatch.setattr(build.subprocess, "Popen", Child)
+    assert build.call([sys.executable, "-c", heard], silent="compiling") == 4
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 2
+    assert all(line.endswith(" s: compiling") for line in lines)

@@ -13,6 +13,7 @@ import pytest
 
 from percussion_model.interface import terminal
 from percussion_model.interface.cli import BAD_INPUT, INTERRUPTED, _guarded, app
+from percussion_model.solvers import base
 
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
 RIGID = str(SCENARIOS / "rigid.toml")
@@ -57,9 +58,14 @@ def test_results_and_json_go_to_files(percussion, tmp_path):
     code, _, err = percussion(
         "run", RIGID, *SHORT, "--trace", "1e-3", "--out", out, "--json", summary, "--no-figures"
     )
-    assert (code, err) == (0, "")
+    assert code == 0
     names = {path.name for path in out.iterdir()}
-    assert names == {"summary.json", "blows.csv", "events.csv", "trace.csv", "scene.toml"}
+    told = " ".join(err.split())
+    files = {"summary.json", "blows.csv", "events.csv", "trace.csv", "scene.toml"}
+    assert told.startswith(f"wrote to {out}/: ")
+    assert all(name in told for name in files)
+    assert told.endswith(f"wrote {summary}")
+    assert names == files | {"made_by.json"}
     assert json.loads(summary.read_text()) == json.loads((out / "summary.json").read_text())
 
 
@@ -118,7 +124,7 @@ def test_explain(percussion):
 
 
 @pytest.mark.parametrize("command", ["explain", "settled"])
-def test_who_waits_for_the_compiler_is_told_so(percussion, command, monkeypatch):
+def test_a_bar_shows_what_a_command_waits_for(percussion, command, monkeypatch):
     monkeypatch.setattr(terminal, "_PATIENCE", 0.0)
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
     monkeypatch.setenv("TTY_COMPATIBLE", "1")
@@ -127,11 +133,51 @@ def test_who_waits_for_the_compiler_is_told_so(percussion, command, monkeypatch)
     monkeypatch.setattr(module, "forecast", lambda scene: time.sleep(0.3) or work(scene))
     module = importlib.import_module("percussion_model.analysis.stationary")
     settle = module.settled
-    slow = lambda *words, **more: time.sleep(0.3) or settle(*words, **more)  # noqa: E731
-    monkeypatch.setattr(module, "settled", slow)
+    monkeypatch.setattr(
+        module, "settled", lambda *words, **more: time.sleep(0.3) or settle(*words, **more)
+    )
     code, _, err = percussion(command, RIGID)
     assert code == 0
-    assert "Preparing (the first run compiles" in err
+    assert {"explain": "trying the first blows", "settled": "preparing"}[command] in err
+
+
+def test_who_waits_for_the_compiler_is_told_so_once(percussion, monkeypatch):
+    kept: list[Path | None] = [Path("place", "of", "kernels")]
+    monkeypatch.setattr(base, "place_of_kernels", lambda name: kept.pop() if kept else None)
+    _, _, err = percussion("run", RIGID, *SHORT)
+    assert err == (
+        "percussion: compiling the kernels of the solver rigid: once, for about half a minute; "
+        f"they are kept in {Path('place', 'of', 'kernels')}\n"
+    )
+    assert percussion("run", RIGID, *SHORT)[2] == ""
+
+
+def test_kernels_are_looked_for_where_numba_keeps_them(tmp_path):
+    """In a process with an empty cache: a small kernel before and after its first call."""
+    (tmp_path / "small.py").write_text(
+        "from numba import njit\n@njit(cache=True)\ndef advance(x):\n    return x + 1.0\n"
+    )
+    words = [
+        "import small",
+        "from percussion_model.physics.kernel import place_to_compile as place",
+        "print(place(small.advance)); small.advance(1.0); print(place(small.advance))",
+    ]
+    shown = []
+    for _ in range(2):  # the second process finds what the first has compiled
+        done = subprocess.run(
+            [sys.executable, "-c", "\n".join(words)],
+            env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "kept"),
+                 "PYTHONPATH": os.pathsep.join([str(tmp_path), str(SCENARIOS.parent)])},
+            capture_output=True, text=True, check=True,
+        )  # fmt: skip
+        shown += done.stdout.split()
+    assert shown[0].startswith(str(tmp_path / "kept"))
+    assert shown[1:] == ["None"] * 3
+
+
+def test_kernels_of_every_solver_are_looked_for():
+    for name in ("wave", "fem", "rigid", "blow-map"):
+        base.place_of_kernels(name)  # finds the kernel by its name
 
 
 def test_new_writes_a_scene_that_runs_and_keeps_existing_files(percussion, tmp_path):
@@ -245,13 +291,17 @@ def test_ctrl_c_is_told_whatever_the_command(percussion, monkeypatch):
 # The command itself, which tells on stderr when it has drilled for a second.
 TALKING = """
 import contextlib, sys
+import percussion_model.interface.progress as progress
 import percussion_model.interface.terminal as terminal
+progress.EVERY = 3600.0  # no lines but those of this test
 told = []
 
 def report(t):
     if t > 1.0 and not told:
         told.append(t)
         print("drilling", file=sys.stderr, flush=True)
+
+report.stage = lambda name, end: None
 
 @contextlib.contextmanager
 def talk(end):
@@ -281,7 +331,7 @@ def test_ctrl_c_keeps_finished_work(tmp_path):
     assert summary["warnings"][-1].startswith("interrupted at t = ")
     assert summary["blows"] > 0
     names = {path.name for path in (tmp_path / "out").iterdir()}
-    assert names == {"summary.json", "blows.csv", "events.csv", "scene.toml"}
+    assert names == {"summary.json", "blows.csv", "events.csv", "scene.toml", "made_by.json"}
     assert os.listdir(tmp_path) == ["out"]
 
 

@@ -90,7 +90,9 @@ def test_command_prints_a_table_and_writes_the_figure(tmp_path):
     assert shown.exit_code == 0, shown.output
     assert "Two ways" in shown.output
     assert "Rate of penetration" in shown.output
-    assert sorted(path.name for path in out.iterdir()) == ["comparison.png", "comparison.svg"]
+    assert sorted(path.name for path in out.iterdir()) == [
+        "comparison.png", "comparison.svg", "made_by.json",
+    ]  # fmt: skip
     assert f"wrote {out / 'comparison.png'}" in shown.output
 
 

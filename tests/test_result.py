@@ -79,11 +79,11 @@ def test_the_reference_needs_no_warning(wave, rigid):
 
 def test_the_rate_is_taken_between_blow_starts(rigid):
     starts = rigid.blows[rigid.blows["time"] >= 1.0]
-    advance = starts["bit_position"][-1] - starts["bit_position"][0]
+    advance = starts["hole_depth"][-1] - starts["hole_depth"][0]
     took = starts["time"][-1] - starts["time"][0]
     assert rigid.rate_of_penetration == pytest.approx(advance / took, rel=1e-6)
     assert rigid.rate_of_penetration == pytest.approx(
-        starts["penetration"].sum() / starts["period"].sum(), rel=1e-12
+        starts["hole_advance"].sum() / starts["period"].sum(), rel=1e-12
     )
 
 
@@ -128,21 +128,17 @@ def test_a_fixed_window_survives_calls_and_snapshots(rigid):
     assert math.isnan(short.result().rate_of_penetration_fixed_window)
 
 
-def test_standard_error_of_a_known_scatter(rigid):
-    blows = np.zeros(400, BLOW)
-    random = np.random.default_rng(3)
-    blows["period"] = 0.05
-    blows["time"] = 2.0 + 0.05 * np.arange(400)
-    blows["penetration"] = 1e-3 + 1e-4 * random.standard_normal(400)
-    blows["bit_position"] = np.concatenate([[0.0], np.cumsum(blows["penetration"])[:-1]])
-    fields = {name: getattr(rigid, name) for name in rigid.__dataclass_fields__}
-    result = Result(**{**fields, "blows": blows})
-    assert result.rate_of_penetration == pytest.approx(0.02, rel=0.02)
-    wanted = 1e-4 / math.sqrt(400) / 0.05
-    assert result.rate_of_penetration_standard_error == pytest.approx(wanted, rel=0.1)
-
-
 # ----------------------------------------------------------------------- warnings
+
+
+@pytest.mark.parametrize("error_estimate", [False, True])
+def test_a_rate_that_scatters_says_so_once(error_estimate):
+    scene = RIGID.replace(**{"feed.force": 150.0})
+    result = simulate(scene, 3.0, settle=1.0, error_estimate=error_estimate)
+    error = result.rate_of_penetration_standard_error / result.rate_of_penetration
+    assert error > 0.01
+    (warning,) = (text for text in result.warnings if "standard error" in text)
+    assert f"{100.0 * error:.2g} %" in warning
 
 
 def test_few_blows_tell_no_rate():
@@ -257,6 +253,16 @@ def test_what_cannot_be_written_is_said_before(rigid, tmp_path):
             check_writable(folder)
         with pytest.raises(ResultError, match="cannot be written"):
             rigid.save(folder)
+
+
+def test_an_older_blow_table_tells_no_rate_and_says_so(rigid, tmp_path):
+    rigid.save(tmp_path)
+    table = rigid.to_pandas().drop(columns=["hole_depth", "hole_advance"])
+    table.to_csv(tmp_path / "blows.csv", index=False, na_rep="nan")
+    loaded = Result.load(tmp_path)
+    assert loaded.summary()["rate_of_penetration"] is None
+    assert "run the scene again" in loaded.warnings[-1]
+    np.testing.assert_array_equal(loaded.blows["penetration"], rigid.blows["penetration"])
 
 
 def test_what_is_no_result_is_refused(tmp_path):

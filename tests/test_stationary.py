@@ -10,9 +10,10 @@ import pytest
 from typer.testing import CliRunner
 
 from percussion_model import Scene, SceneError, settled, simulate
-from percussion_model.analysis.stationary import COMPARED, batch_means, cycle, cycles_in
+from percussion_model.analysis.stationary import COMPARED, cycle, cycles_in
 from percussion_model.interface.cli import app
 from percussion_model.physics.records import BLOW
+from percussion_model.simulation.rate import rate_of_blows
 
 TOLERANCE = 1e-4
 # Drive force that keeps the power of the reference at another reversal distance.
@@ -25,13 +26,13 @@ def blows(velocity):
     rows = np.zeros(len(velocity), BLOW)
     rows["impact_velocity"] = velocity
     rows["period"] = 0.05 + 1e-3 * (velocity - 8.0)
-    rows["penetration"] = 1e-3 * velocity / 8.0
+    rows["penetration"] = rows["hole_advance"] = 1e-3 * velocity / 8.0
     return rows
 
 
 def rate_of(velocity):
     row = blows([velocity])[0]
-    return row["penetration"] / row["period"]
+    return row["hole_advance"] / row["period"]
 
 
 @pytest.mark.parametrize("multiplier", [0.16, -0.5, 0.7])
@@ -70,7 +71,7 @@ def test_scatter_is_no_cycle_and_its_error_covers_correlated_blows():
             drift[k] = 0.8 * drift[k - 1] + generator.normal(scale=0.1)
         rows = blows(8.0 + drift)
         assert all(cycle(rows, n, TOLERANCE) is None for n in range(1, 9))
-        rate, error = batch_means(rows)
+        rate, error = rate_of_blows(rows)
         errors.append(error)
         off.append(rate - rate_of(8.0))
     assert 0.7 < np.std(off) / np.mean(errors) < 1.4

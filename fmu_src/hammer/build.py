@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import re
+import zipfile
 from importlib.metadata import version
 from pathlib import Path
 
@@ -46,6 +48,41 @@ def build_hammer(scene: Scene, path: Path, blow_map: BlowTable | None = None) ->
         resources["blow_map.npz"] = blow_map.to_bytes()
     page = write_page(about, variables, scene)
     return write_fmu(path, about, variables, bundle, PercussiveHammer, resources, page)
+
+
+def refuse_other(path: Path, scene: Scene, with_map: bool, force: bool = False) -> None:
+    """Raise `SceneError` where a file holds the FMU of another scene, or no FMU of a scene.
+
+    Parameters
+    ----------
+    with_map : bool
+        Whether the new one brings a blow map along.
+    force : bool
+        Let it be replaced.
+    """
+    if force or not path.exists():
+        return
+    try:
+        with zipfile.ZipFile(path) as archive:
+            found = json.loads(archive.read("resources/scene.json"))["given"]
+            same = (found, "resources/blow_map.npz" in archive.namelist()) == (
+                json.loads(to_json(scene.given_values())), with_map
+            )  # fmt: skip
+    except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile):
+        same = False
+    if not same:
+        raise SceneError(
+            f"{path}: holds another FMU than that of this scene; --force replaces it, another -o "
+            "keeps it"
+        )
+
+
+def hammer_name(scene: Path, suffix: str = "") -> str:
+    """Name of the file for the FMU of a scene's file: that of the reference, or of its own."""
+    stem = re.sub(r"\W", "", scene.stem.title().replace("_", "")) + suffix
+    if not stem[:1].isalpha():
+        stem = f"Scene{stem}"  # the name is an identifier
+    return "PercussiveHammer.fmu" if stem == "Reference" else f"{stem}Hammer.fmu"
 
 
 def about_hammer(scene: Scene, path: Path) -> About:

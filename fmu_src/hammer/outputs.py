@@ -45,7 +45,7 @@ def _blow(name: str) -> Callable[[Motion], float]:
 
 def _rate(motion: Motion) -> float:
     share = motion.rate_decay()
-    return share * motion.blow["penetration"] / motion.blow["period"] if share else 0.0
+    return share * motion.blow["hole_advance"] / motion.blow["period"] if share else 0.0
 
 
 def _frequency(motion: Motion) -> float:
@@ -61,7 +61,8 @@ def _efficiency(motion: Motion) -> float:
 _FORCE, _SPEED, _ENERGY, _FAR = 1e12, 1e4, 1e12, 1e6
 # In the order of the model description; value references come from the interface.
 OUTPUTS: dict[str, Output] = {
-    "rate_of_penetration": Output("m/s", -_SPEED, _SPEED, 1e-2, "advance of the bit over the last whole blow by its period; falls towards 0 after two missed periods", _rate),
+    "rate_of_penetration": Output("m/s", -_SPEED, _SPEED, 1e-2, "advance of the hole over the last whole blow by its period; falls towards 0 after two missed periods", _rate),
+    "hole_depth": Output("m", -_FAR, _FAR, 1e-2, "depth of the rock's surface if the bit were unloaded now, since the start; it never falls, and is 0 on a rock that is not crushed", _sample("hole_depth")),
     "bit.position": Output("m", -_FAR, _FAR, 1e-2, "mean displacement of the bit since the start, down positive", _sample("bit_position")),
     "bit.velocity": Output("m/s", -_SPEED, _SPEED, 1.0, "mean velocity of the bit, down positive", _sample("bit_velocity")),
     "bit.force": Output("N", -_FORCE, _FORCE, 1e5, "force of the bit on the rock, compression positive", _sample("bit_force")),
@@ -79,7 +80,7 @@ OUTPUTS: dict[str, Output] = {
     "blow_energy": Output("J", 0.0, _ENERGY, 1e2, "kinetic energy of the piston's mean motion at the start of the last whole blow", _blow("blow_energy")),
     "transfer_efficiency": Output("1", -1e3, 1e3, 1.0, "energy given to the rock in the last whole blow, divided by blow_energy", _efficiency),
     "blow_frequency": Output("Hz", 0.0, 1e6, 10.0, "blows per time, from the last whole blow; falls towards 0 after two missed periods", _frequency),
-    "penetration_per_blow": Output("m", -_FAR, _FAR, 1e-3, "advance of the bit over the last whole blow", _blow("penetration")),
+    "penetration_per_blow": Output("m", -_FAR, _FAR, 1e-3, "advance of the hole over the last whole blow", _blow("hole_advance")),
     "blow_time": Output("s", 0.0, 1e9, 1.0, "start of the last whole blow, since the start of the simulation", _blow("time")),
     "blow_position": Output("m", -_FAR, _FAR, 1e-2, "bit.position at the start of the last whole blow", _blow("bit_position")),
     "casing_force": Output("N", -_FORCE, _FORCE, 1e3, "reaction of the drive on the casing, down positive", _sample("drive_force", -1.0)),

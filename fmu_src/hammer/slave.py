@@ -23,7 +23,7 @@ from percussion_model.scene.inputs import INPUTS, no_effect_reason
 from percussion_model.scene.numbers import section_numbers
 from percussion_model.scene.rows import refuse_value
 from percussion_model.scene.scene import Scene
-from percussion_model.solvers.base import Solver
+from percussion_model.solvers.base import Solver, place_of_kernels
 from percussion_model.solvers.wave.grid import cell_at
 
 # Solvers hold no state: instances of equal parameters share one.
@@ -101,6 +101,16 @@ class PercussiveHammer(Slave):
         return self.baked.replace(**changes)
 
     # stepping
+
+    def foretell(self) -> None:
+        """Log that kernels are going to be compiled, where they are not kept yet."""
+        solver = self.make_scene().solver_name
+        place = place_of_kernels(solver)
+        if place is not None:
+            self.log(
+                f"{self.instance_name}: compiling the kernels of the solver {solver}: once, for "
+                f"about half a minute; they are kept in {place}"
+            )
 
     def initialise(self) -> Motion:
         """Solver and state; made at time zero for the present values where there are none."""

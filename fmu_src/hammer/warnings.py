@@ -68,8 +68,7 @@ class Warnings:
                 yield "button", text
         period = motion.blow["period"]
         if rock != "none" and period > 0.0:
-            rate = motion.blow["penetration"] / period
-            for text in rate_note(rate, abs(rate)):  # a single blow may go up
+            for text in rate_note(motion.blow["hole_advance"] / period):
                 yield "rate", text
 
     def _of_state(self, motion: Motion) -> Iterator[tuple[str, str]]:

@@ -134,6 +134,9 @@ class Slave(Fmi2Slave):
     def reset(self) -> None:
         """Drop what was made of values that have changed before the first step."""
 
+    def foretell(self) -> None:
+        """Log what takes long in `initialise`: hosts see messages when a call has ended."""
+
     def initialise(self) -> Any:
         """Make everything ready for the first step."""
 
@@ -326,6 +329,7 @@ class Slave(Fmi2Slave):
         """Check all values."""
         self._require(Phase.INSTANTIATED)
         self.check(self.values)
+        self.foretell()
         self.phase = Phase.INITIALISING
 
     @guarded

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from fmpy.validation import validate_fmu
 
-from fmu_src.archive import ROOT
+from fmu_src.archive import ROOT, content, state_of
 from fmu_src.system.archive import (
     SystemPlanError,
     build_fmus,
@@ -16,6 +16,7 @@ from fmu_src.system.archive import (
     read_plan,
     write_system,
 )
+from percussion_model.interface.terminal import progress
 from percussion_model.scene.scene import SceneError
 
 
@@ -26,20 +27,26 @@ def main(arguments: list[str]) -> int:
     )
     parser.add_argument("systems", nargs="*", type=Path, help="files; left out: all that ship")
     parser.add_argument("-o", "--output", type=Path, default=ROOT / "dist", help="folder")
+    parser.add_argument("--force", action="store_true", help="replace FMUs of other hammers")
     choice = parser.parse_args(arguments)
     problems = 0
     checked = set()
     try:
         for plan in [read_plan(path) for path in choice.systems] or plans():
-            fmus = build_fmus(plan, choice.output)
+            before = {path: content(path) for path in choice.output.glob("*.*")}
+            with progress(f"building {plan.name}"):
+                fmus = build_fmus(plan, choice.output, choice.force)
             for fmu in fmus.values():
                 if fmu in checked:
                     continue
                 checked.add(fmu)
-                found = validate_fmu(str(fmu))
-                print(f"{fmu}: {'valid' if not found else '; '.join(found)}", flush=True)
+                with progress(f"validating {fmu.name}"):
+                    found = validate_fmu(str(fmu))
+                valid = "valid" if not found else "; ".join(found)
+                print(f"{fmu}: {state_of(fmu, before.get(fmu))}, {valid}", flush=True)
                 problems += len(found)
-            print(write_system(plan, fmus, choice.output / f"{plan.name}.ssp"), flush=True)
+            path = write_system(plan, fmus, choice.output / f"{plan.name}.ssp")
+            print(f"{path}: {state_of(path, before.get(path))}", flush=True)
     except (SystemPlanError, SceneError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 1

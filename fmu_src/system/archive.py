@@ -11,7 +11,7 @@ from xml.etree.ElementTree import Element, SubElement, indent, register_namespac
 from fmpy import read_model_description
 
 from fmu_src.archive import ROOT, write_archive
-from fmu_src.hammer.build import build_hammer
+from fmu_src.hammer.build import build_hammer, hammer_name, refuse_other
 from fmu_src.parts.build import PARTS, build_part
 from fmu_src.units import UNITS
 from percussion_model.interface.commands.blow_map import ready_map
@@ -148,15 +148,21 @@ def _merged(path: Path, left: int = MOST_BASES) -> dict[str, Any]:
     return below
 
 
-def build_fmus(plan: SystemPlan, folder: Path) -> dict[str, Path]:
-    """Write the FMUs of a system into a folder; return their paths by component."""
+def build_fmus(plan: SystemPlan, folder: Path, force: bool = False) -> dict[str, Path]:
+    """Write the FMUs of a system into a folder; return their paths by component.
+
+    Parameters
+    ----------
+    force : bool
+        Replace the FMU of another hammer.
+    """
     found = {}
     for component, name in plan.components.items():
         path = folder / f"{name}.fmu"
         if name in PARTS:
             build_part(PARTS[name], path)
         elif name == HAMMER:
-            path = _hammer(plan, folder)
+            path = _hammer(plan, folder, force)
         else:
             known = ", ".join([HAMMER, *PARTS])
             raise SystemPlanError(f"{component} = {name!r}: must be one of {known}")
@@ -164,16 +170,16 @@ def build_fmus(plan: SystemPlan, folder: Path) -> dict[str, Path]:
     return found
 
 
-def _hammer(plan: SystemPlan, folder: Path) -> Path:
+def _hammer(plan: SystemPlan, folder: Path, force: bool) -> Path:
     """Write the FMU of the hammer; one of another scene or rung has another name."""
-    scene, table = Scene.from_toml(plan.hammer), None
-    stem = plan.hammer.stem.title().replace("_", "")
+    scene, table, suffix = Scene.from_toml(plan.hammer), None, ""
     if plan.fidelity == "blow-map":
-        scene, stem = scene.computed_by("blow-map"), f"{stem}Map"
+        scene, suffix = scene.computed_by("blow-map"), "Map"
         table = ready_map(scene)
     elif plan.fidelity != "wave":
         raise SystemPlanError(f'fidelity = {plan.fidelity!r}: must be "wave" or "blow-map"')
-    path = folder / (f"{HAMMER}.fmu" if stem == "Reference" else f"{stem}Hammer.fmu")
+    path = folder / hammer_name(plan.hammer, suffix)
+    refuse_other(path, scene, table is not None, force)
     build_hammer(scene, path, table)
     return path
 

@@ -47,6 +47,9 @@ class Comparison:
 
     results: dict[str, Result]
 
+    def __repr__(self) -> str:
+        return f"Comparison({', '.join(self.results)}; {self.results[self.first]!r})"
+
     @property
     def first(self) -> str:
         """Name of the solver that the others are compared with."""
@@ -76,11 +79,13 @@ class Comparison:
         """
         scenes = [result.scene for result in self.results.values()]
         unused = [
-            key for key in scenes[0].unused if all(key in scene.unused for scene in scenes[1:])
+            key
+            for key in scenes[0].given_in_vain
+            if all(key in scene.given_in_vain for scene in scenes[1:])
         ]
         texts = [unused_note(unused)] if unused else []
         for name, result in self.results.items():
-            own = unused_note(result.scene.unused)
+            own = unused_note(result.scene.given_in_vain)
             texts += [f"{name}: {text}" for text in result.warnings if text != own]
         return texts
 

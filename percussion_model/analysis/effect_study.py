@@ -11,7 +11,8 @@ from typing import Any
 from percussion_model.analysis.comparison import relative_change
 from percussion_model.physics.effects import EFFECTS
 from percussion_model.scene.scene import Scene, SceneError
-from percussion_model.simulation.result import LEAST_BLOWS, Result
+from percussion_model.simulation.rate import LEAST_BLOWS
+from percussion_model.simulation.result import Result
 from percussion_model.simulation.simulate import Simulation, simulate
 
 __all__ = [
@@ -249,9 +250,9 @@ class EffectsStudy:
     """
 
     scene: Scene
-    base: Trial
-    trials: list[Trial]
-    refused: dict[str, str]
+    base: Trial = field(repr=False)
+    trials: list[Trial] = field(repr=False)
+    refused: dict[str, str] = field(repr=False)
 
     def changes(self, trial: Trial) -> dict[str, float | None]:
         """Relative change of each number of `CHANGED` against the scene itself."""

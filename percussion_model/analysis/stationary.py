@@ -14,6 +14,7 @@ import numpy as np
 from percussion_model.physics.records import BLOW
 from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.simulation.files import plain
+from percussion_model.simulation.rate import rate_of_blows
 from percussion_model.simulation.simulate import Simulation, SimulationError
 
 # A run in which no blow ends for so long [s], and so many periods of the last, has stopped.
@@ -47,8 +48,8 @@ COMPARED = ("impact_velocity", "period", "penetration")
 _COLUMNS = [(BLOW.names or ()).index(name) for name in COMPARED]
 # Differences within a cycle that fall by less than this from one cycle to the next will stay.
 STEADY = 0.9
-# The means of an aperiodic motion are taken over this many batches of blows.
-BATCHES = 16
+# With fewer blows allowed nothing is known of an aperiodic motion.
+LEAST_LIMIT = 32
 # Share of the blows of an aperiodic motion that is left out as settling.
 SETTLING_SHARE = 0.2
 
@@ -66,7 +67,7 @@ class Settled:
         Mean over one cycle, or over the blows of an aperiodic motion [m/s].
     rate_of_penetration_error : float
         Periodic: bound of what convergence would still change, or the scatter
-        of the cycles. Aperiodic: the standard error, from batches [m/s].
+        of the cycles. Aperiodic: the standard error [m/s].
     multiplier : float
         What is left of a deviation after one cycle, from the ratio of the last
         two changes; negative where it alternates. The cycle is stable below 1
@@ -92,7 +93,7 @@ class Settled:
     @property
     def counted(self) -> np.ndarray:
         """Blows that means are taken of: the last cycle, or all after settling."""
-        return self.cycle if self.order else self.blows[int(SETTLING_SHARE * len(self.blows)) :]
+        return self.cycle if self.order else after_settling(self.blows)
 
     @property
     def blow_period(self) -> float:
@@ -190,10 +191,10 @@ def settled(
             return made("periodic", order, *found)
         if scatter and len(blows) >= next_check:
             next_check = NEXT_CHECK * len(blows)
-            rate, error = batch_means(blows)
+            rate, error = rate_of_blows(after_settling(blows))
             if error <= scatter * abs(rate):
                 break
-    return made("aperiodic", 0, *batch_means(blows), math.nan)
+    return made("aperiodic", 0, *rate_of_blows(after_settling(blows)), math.nan)
 
 
 def _advance(simulation: Simulation, count: int, until: float, deadline: float) -> None:
@@ -229,9 +230,9 @@ def check_request(scene: Scene, tolerance: float, most_blows: int, scatter: floa
         raise SceneError(f"tolerance = {tolerance!r}: must be a number above 0 and below 1")
     if not 0 <= scatter < 1:
         raise SceneError(f"scatter = {scatter!r}: must be a number from 0 on and below 1")
-    least = 2 * BATCHES
-    if most_blows < least:
-        raise SceneError(f"most_blows = {most_blows!r}: must be a whole number from {least} on")
+    if most_blows < LEAST_LIMIT:
+        least = f"must be a whole number from {LEAST_LIMIT} on"
+        raise SceneError(f"most_blows = {most_blows!r}: {least}")
 
 
 def cycles_in(blows: np.ndarray, tolerance: float) -> dict[int, tuple[float, float, float]]:
@@ -316,7 +317,7 @@ def _changes(blows: np.ndarray, order: int) -> np.ndarray:
 def _rates(blows: np.ndarray, order: int) -> np.ndarray:
     """Mean rate over each run of `order` blows, one after the other [m/s]."""
     whole = len(blows) // order * order
-    advance = blows["penetration"][-whole:].reshape(-1, order).sum(axis=1)
+    advance = blows["hole_advance"][-whole:].reshape(-1, order).sum(axis=1)
     return np.asarray(advance / blows["period"][-whole:].reshape(-1, order).sum(axis=1))
 
 
@@ -350,13 +351,6 @@ def _scattering(blows: np.ndarray, order: int) -> tuple[float, float, float]:
     return float(np.mean(rates)), float(np.ptp(rates)), math.nan
 
 
-def batch_means(blows: np.ndarray) -> tuple[float, float]:
-    """Mean rate of an aperiodic motion and its standard error [m/s].
-
-    Blows follow from each other, so that their scatter alone would tell too
-    small an error; means over long batches are nearly independent.
-    """
-    rows = blows[int(SETTLING_SHARE * len(blows)) :]
-    rates = _rates(rows, len(rows) // BATCHES)
-    rate = float(np.sum(rows["penetration"]) / np.sum(rows["period"]))
-    return rate, float(np.std(rates, ddof=1) / math.sqrt(len(rates)))
+def after_settling(blows: np.ndarray) -> np.ndarray:
+    """Blows of an aperiodic motion that count."""
+    return blows[int(SETTLING_SHARE * len(blows)) :]

@@ -13,9 +13,10 @@ import numpy as np
 
 from percussion_model.coupling.component import CouplingError
 from percussion_model.coupling.coupled_run import CoupledRun
+from percussion_model.coupling.fresh import REMEDY, kept_values
 from percussion_model.coupling.master import Coupling
 from percussion_model.coupling.port import OnWay
-from percussion_model.coupling.python_part import Work
+from percussion_model.coupling.python_part import Given
 
 STEP = 1e-3  # [s]
 ROWS_EVERY = STEP  # peaks are those of a step
@@ -178,7 +179,7 @@ def _faults(numbers: Mapping[str, float], share: float, error: str) -> list[str]
 
 def bench(
     system: str | Path,
-    controller: str | Path | Work | None = None,
+    controller: str | Path | Given | None = None,
     parameters: Mapping[str, Any] | None = None,
     trials: Sequence[str] = (),
     progress: Callable[[Score], None] | None = None,
@@ -190,7 +191,9 @@ def bench(
     system : str or Path
         Archive of the feed-controlled system.
     controller : optional
-        An FMU, or a callable; the controller of the archive if left out.
+        An FMU, or a Python controller; the one of the archive if left out. Each run has a fresh
+        one: a class and a factory are called, an object with `reset` is reset, any other
+        object is copied. A function may keep nothing.
     parameters : mapping, optional
         Values of the controller, by `controller.variable`.
     trials : sequence of str, optional
@@ -203,6 +206,7 @@ def bench(
         if name not in names:
             raise CouplingError(f"there is no run {name}: there are {', '.join(names)}")
     found = []
+    kept = kept_values(controller)
     for trial in TRIALS:
         if trials and trial.name not in trials:
             continue
@@ -214,9 +218,21 @@ def bench(
         )
         run = coupling.run(trial.duration, STEP, SIGNALS, ROWS_EVERY)
         found.append(judge(trial, run))
+        _refuse_changed(controller, kept)
         if progress is not None:
             progress(found[-1])
     return found
+
+
+def _refuse_changed(controller: Any, before: Mapping[str, bytes]) -> None:
+    """Raise `CouplingError` for a function that carries values from one run to the next."""
+    after = kept_values(controller)
+    changed = sorted(name for name in after if after[name] != before.get(name))
+    if changed:
+        raise CouplingError(
+            f"controller: {controller.__name__} keeps values from one run to the next "
+            f"({', '.join(changed)}): {REMEDY}"
+        )
 
 
 def total(scores: Sequence[Score]) -> float:

@@ -8,17 +8,22 @@ from typing import Any
 
 import numpy as np
 
+from percussion_model.coupling.verdict import LIMITS, STIFFNESS, Verdict, judge_run
 from percussion_model.simulation.files import staged_text
 
-# Signals that the balances read.
 STRING_ENERGIES = ("head", "reaction", "weight", "bit", "shoulder", "wall", "stored")
-SIGNALS = (
+# Signals that the verdict reads: each run keeps them.
+JUDGED = (
     *(f"string.energy.{name}" for name in STRING_ENERGIES),
+    "hammer.blow_energy", "hammer.blow_count", "hammer.energy_residual", STIFFNESS, *LIMITS,
+)  # fmt: skip
+# What the command keeps beside them.
+SIGNALS = (
+    *JUDGED,
     "string.head_impulse", "string.bit_impulse", "string.momentum", "string.wall_momentum",
     "string.weight", "string.casing_position", "string.lifted",
     "hammer.bit.impulse", "hammer.contact.impulse", "hammer.bit.velocity",
-    "hammer.piston.velocity", "hammer.blow_energy", "hammer.blow_count",
-    "hammer.energy_residual", "hammer.off_bottom", "rock.layer",
+    "hammer.piston.velocity", "hammer.off_bottom", "rock.layer",
     "controller.mode", "controller.feed_wanted", "rig.energy", "supply.energy",
 )  # fmt: skip
 
@@ -43,9 +48,12 @@ class CoupledRun:
         Of the stepping [s].
     interrupted : bool
         Whether it was Ctrl-C that ended it.
+    jumps : dict of float
+        Root mean square of the change of what parts exchange in a step, by signal: forces by
+        the greatest force [1].
     """
 
-    columns: dict[str, np.ndarray]
+    columns: dict[str, np.ndarray] = field(repr=False)
     step: float
     steps: int
     error: str = ""
@@ -54,9 +62,18 @@ class CoupledRun:
     wall_time: float = field(default=0.0, compare=False)
     processor_time: float = field(default=0.0, compare=False)
     interrupted: bool = False
+    jumps: dict[str, float] = field(default_factory=dict, compare=False)
 
     def __getitem__(self, signal: str) -> np.ndarray:
         return self.columns[signal]
+
+    @property
+    def verdict(self) -> Verdict:
+        """Whether energies balance, or the step is too long and which one would do."""
+        return judge_run(
+            self.columns, _balances(self.columns), self.jumps, self.step, self.steps, self.error,
+            controlled=self.tried > 0,
+        )  # fmt: skip
 
     def write_csv(self, path: Path) -> Path:
         """Write time and signals as CSV, with all digits."""
@@ -68,8 +85,8 @@ class CoupledRun:
         return path
 
 
-def known_signals(outputs: dict[str, list[str]]) -> list[str]:
-    """Those of SIGNALS that a system has.
+def known_signals(outputs: dict[str, list[str]], among: tuple[str, ...] = SIGNALS) -> list[str]:
+    """Those of SIGNALS, or of others, that a system has.
 
     Parameters
     ----------
@@ -78,7 +95,7 @@ def known_signals(outputs: dict[str, list[str]]) -> list[str]:
     """
     return [
         signal
-        for signal in SIGNALS
+        for signal in among
         if signal.partition(".")[2] in outputs.get(signal.partition(".")[0], ())
     ]
 
@@ -90,8 +107,9 @@ def summary(run: CoupledRun) -> dict[str, Any]:
     -------
     dict
         depth [m], mean rate over the second half [m/s], greatest residual of the energy
-        balance of the string divided by the energy put in; energy that the shoulder took and work
-        of the feed [J]; the former divided by the energy of the blows [1].
+        balance of the string divided by the energy put in and stored at the start; energy that
+        the shoulder took and work of the feed [J]; the former divided by the energy of the
+        blows [1]; the verdict.
     """
     columns = run.columns
     found: dict[str, Any] = {
@@ -104,6 +122,12 @@ def summary(run: CoupledRun) -> dict[str, Any]:
         found["depth"] = float(place[-1])
         if len(time) > 2:
             found["rate_second_half"] = float((place[-1] - place[half]) / (time[-1] - time[half]))
+    return found | _balances(columns) | {"verdict": run.verdict.to_dict()}
+
+
+def _balances(columns: dict[str, np.ndarray]) -> dict[str, float]:
+    """Residuals of hammer and string, as far as their signals are there."""
+    found = {}
     if "hammer.energy_residual" in columns:
         found["hammer_energy_residual"] = float(np.max(np.abs(columns["hammer.energy_residual"])))
     if all(f"string.energy.{name}" in columns for name in STRING_ENERGIES):
@@ -119,6 +143,8 @@ def _energies(columns: dict[str, np.ndarray]) -> dict[str, float]:
     # what is stored at the start was not put in
     residual = put_in - gone - (put_in - gone)[0]
     scale = sum(float(np.max(np.abs(e[name]))) for name in ("head", "reaction", "weight"))
+    # and what is there already has its error too: a short run puts hardly anything in
+    scale += float(e["stored"][0])
     blows = columns.get("hammer.blow_energy")
     found = {
         "string_energy_residual": float(np.max(np.abs(residual))) / (scale or 1.0),
@@ -126,7 +152,8 @@ def _energies(columns: dict[str, np.ndarray]) -> dict[str, float]:
         "feed_work": float(e["bit"][-1]),
     }
     if blows is not None and "hammer.blow_count" in columns:
-        total = float(columns["hammer.blow_count"][-1] * np.mean(blows[len(blows) // 2 :]))
-        if total > 0.0:
+        count, late = columns["hammer.blow_count"], slice(len(blows) // 2, None)
+        known = blows[late][count[late] > 0.0]  # before the first blow it is 0
+        if len(known) and (total := float(count[-1] * np.mean(known))) > 0.0:
             found["shoulder_by_blows"] = found["shoulder_energy"] / total
     return found

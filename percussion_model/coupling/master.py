@@ -21,7 +21,7 @@ import numpy as np
 
 from percussion_model.coupling.compiled import CompiledStep, can_compile
 from percussion_model.coupling.component import Component, CouplingError
-from percussion_model.coupling.coupled_run import CoupledRun
+from percussion_model.coupling.coupled_run import JUDGED, CoupledRun, known_signals
 from percussion_model.coupling.port import (
     OnWay,
     PacedPort,
@@ -29,10 +29,11 @@ from percussion_model.coupling.port import (
     check_pace,
     refuse_remainder,
 )
-from percussion_model.coupling.python_part import PythonPart, Work
+from percussion_model.coupling.python_part import Given, PythonPart
 from percussion_model.coupling.rejection import StepControl
 from percussion_model.coupling.ssp import input_starts, unpack
 from percussion_model.coupling.unpack import Allowance, check_xml, new_folder, unpack_zip
+from percussion_model.coupling.verdict import Jumps
 from percussion_model.simulation.simulate import stop_on_interrupt
 
 Order = Literal["jacobi", "gauss-seidel"]
@@ -56,7 +57,9 @@ class Coupling:
         Values that go before those of the archive, by `component.variable`; enumerations
         by number or by word.
     replaced : mapping, optional
-        Paths of other FMUs, or Python callables, by component.
+        Paths of other FMUs, or Python callables, by component; a class or a factory of them
+        makes one at the begin of the run, and an object that keeps values is reset or copied
+        (`percussion_model.coupling.fresh`).
     order : {"jacobi", "gauss-seidel"}
         Whether a part sees what parts before it in the archive gave in the same step.
     on_way : callable, optional
@@ -73,7 +76,7 @@ class Coupling:
         self,
         path: str | Path,
         parameters: Mapping[str, Any] | None = None,
-        replaced: Mapping[str, str | Path | Work] | None = None,
+        replaced: Mapping[str, str | Path | Given] | None = None,
         order: Order = "jacobi",
         on_way: OnWay | None = None,
         every: Mapping[str, int] | None = None,
@@ -174,7 +177,7 @@ class Coupling:
             raise CouplingError(f"every {self.every} and a tolerance do not go together")
         refuse_remainder(self.every, self.parts, count)
         try:
-            self._connect(list(signals))
+            self._connect([*signals, *known_signals(self.outputs, JUDGED)])
             self._initialise()
             control = None if tolerance is None else StepControl(self.ports, step, tolerance)
             with rare_garbage_collection():
@@ -194,11 +197,13 @@ class Coupling:
         progress: Callable[[float], None] | None,
     ) -> CoupledRun:
         names = [f"{port.name}.{name}" for port in self.ports for name in port.taken + port.kept]
-        rows = [[0.0, *self._row()]]
+        rows, jumps = [[0.0, *self._row()]], Jumps(self.ports, self.every)
         go, error, done, interrupted = self._stepping(count, control), "", 0, False
         began, used = clock.perf_counter(), clock.process_time()
         with stop_on_interrupt(keep=True) as stop:
             for k in range(count):
+                has_row = (k + 1) % every == 0 or k + 1 == count
+                before = self._present() if has_row else None
                 try:
                     go(k * step, step)
                 except CouplingError as failure:
@@ -206,8 +211,10 @@ class Coupling:
                     break
                 done = k + 1
                 interrupted = stop()
-                if done % every == 0 or done == count or interrupted:
+                if has_row or interrupted:
                     rows.append([done * step, *self._row()])
+                    if before is not None:
+                        jumps.add(before, self._present())
                     if progress is not None:
                         progress(done * step)
                 if interrupted:
@@ -216,7 +223,7 @@ class Coupling:
         times = clock.perf_counter() - began, clock.process_time() - used
         table = np.array(rows, dtype=float)
         columns = {name: table[:, k] for k, name in enumerate(["time", *names])}
-        run = CoupledRun(columns, step, done, error, 0, 0, *times, interrupted)
+        run = CoupledRun(columns, step, done, error, 0, 0, *times, interrupted, jumps.by_size())
         if control is not None:
             run.steps, run.tried, run.rejected = control.done, control.tried, control.rejected
         return run
@@ -266,6 +273,8 @@ class Coupling:
             if isinstance(part, Component):
                 part.set(self._parameters[name])
                 part.begin(0.0)
+            else:
+                part.begin()
         for _ in range(INITIAL_PASSES):
             for port in self.ports:
                 if isinstance(port.part, Component):
@@ -294,9 +303,14 @@ class Coupling:
         for port in () if one_after_another else self.ports:
             port.read_outputs()
 
-    def _row(self) -> list[Any]:
+    def _present(self) -> list[Any]:
+        """Present values of all outputs that parts take."""
         if self._compiled_step is not None:
             self._compiled_step.publish()
+        return list(self.ports[0].values)
+
+    def _row(self) -> list[Any]:
+        self._present()
         return [value for port in self.ports for value in port.row()]
 
     def free(self) -> None:

@@ -8,8 +8,11 @@ from pathlib import Path
 from typing import Any
 
 from percussion_model.coupling.component import CouplingError
+from percussion_model.coupling.fresh import fresh
 
 Work = Callable[[dict[str, Any], float, float], Mapping[str, Any]]
+# What a user gives: a `Work`, or what makes one (see `fresh`).
+Given = Callable[..., Any]
 
 
 class Inputs(dict[str, Any]):
@@ -26,18 +29,23 @@ class PythonPart:
     ----------
     name : str
         Of the component.
-    work : callable
-        Reads inputs by name, a time and a step [s]; gives outputs by name.
+    given : callable
+        Reads inputs by name, a time and a step [s]; gives outputs by name. Or a class or a
+        factory of such callables: each run has a fresh one (`fresh`).
     starts : mapping
         Values of inputs that nothing is connected to, and of the others till they have one.
     """
 
     can_save = False
 
-    def __init__(self, name: str, work: Work, starts: Mapping[str, Any]) -> None:
-        self.name, self.work, self.starts = name, work, dict(starts)
+    def __init__(self, name: str, given: Given, starts: Mapping[str, Any]) -> None:
+        self.name, self.given, self.starts = name, given, dict(starts)
         self.inputs: dict[str, Any] = dict(starts)
         self.outputs: dict[str, Any] = {}
+
+    def begin(self) -> None:
+        """Make what works in this run."""
+        self.work: Work = fresh(self.name, self.given)
 
     def step(self, time: float, step: float) -> None:
         """One communication step [s]."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import sys
 from collections.abc import Callable
+from contextlib import nullcontext
 from typing import Annotated, Any
 
 import typer
@@ -26,11 +27,13 @@ from percussion_model.interface.commands.paper import paper
 from percussion_model.interface.commands.scene import explain, new, plot, run, settled
 from percussion_model.interface.commands.stability import stability
 from percussion_model.interface.commands.study import study
+from percussion_model.interface.progress import lines
 
 app = typer.Typer(
     help="Percussive drilling with travelling waves: piston, bit and rock, blow by blow.",
     no_args_is_help=True,
     add_completion=False,
+    rich_markup_mode=None,  # its help cuts names of options at 80 columns
     pretty_exceptions_enable=False,
 )
 
@@ -53,17 +56,27 @@ def _options(
     """Percussive drilling with travelling waves: piston, bit and rock, blow by blow."""
 
 
-def _interruptible(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Let `_guarded` know of Ctrl-C, after which typer would end without a word."""
+def _heard(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Tell on a pipe that a command still runs, and let `_guarded` know of Ctrl-C.
+
+    After Ctrl-C typer would end without a word.
+    """
 
     @functools.wraps(command)
     def call(*words: Any, **options: Any) -> Any:
         try:
-            return command(*words, **options)
+            with nullcontext() if sys.stderr.isatty() else lines("still running"):
+                return command(*words, **options)
         except KeyboardInterrupt:
             raise typer.Abort from None
 
     return call
+
+
+def _add(command: Callable[..., Any], name: str | None = None) -> None:
+    """Add a command; its first line stands whole in the list of all."""
+    first = (command.__doc__ or "").partition("\n")[0]
+    app.command(name, short_help=first)(_heard(command))
 
 
 for _command in (
@@ -82,8 +95,8 @@ for _command in (
     bench_controller,
     new,
 ):
-    app.command()(_interruptible(_command))
-app.command("blow-map")(_interruptible(blow_map))
+    _add(_command)
+_add(blow_map, "blow-map")
 
 
 def main() -> None:

@@ -6,14 +6,16 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from percussion_model.interface.uncertain import rate_text
+from percussion_model.interface.progress import Report, lines
+from percussion_model.interface.tables import print_table
+from percussion_model.interface.uncertain import rate_text, with_error, with_short_error
 
 if TYPE_CHECKING:
     from percussion_model.analysis.comparison import Comparison
@@ -25,7 +27,9 @@ if TYPE_CHECKING:
     from percussion_model.verification.hard_cases import Collection
     from percussion_model.verification.paper.statements import Statement
 
-# A run that ends sooner shows no bar [s].
+# An error below this share of a rate does not show in its four digits.
+SMALL_ERROR = 1e-4
+# What ends sooner shows no bar [s].
 _PATIENCE = 2.0
 
 RATE = ("Rate of penetration", "rate_of_penetration", 1e3, "mm/s")
@@ -45,28 +49,40 @@ SHOWN = (
     ("Peak contact force", "peak_contact_force", 1e-3, "kN"),
     ("Standstill bit force", "standstill_bit_force", 1e-3, "kN"),
 )
+# Instead of them where there are no blows: name, key of `Result.fall`, factor, unit.
+WITHOUT_BLOWS = (
+    ("Depth of the bit's end", "depth", 1e3, "mm"),
+    ("First contact with the rock", "first_contact", 1e3, "ms"),
+    ("First rebound velocity of the bit", "rebound_velocity", 1.0, "m/s"),
+    ("Stands still from", "rest_time", 1e3, "ms"),
+    ("Energy to crush rock", "crushed", 1.0, "J"),
+)
 
 
 def show_summary(result: Result) -> None:
     """Print the short table of a run, and its warnings."""
     summary = result.summary()
     table = Table(title=escape(result.scene.title) or None, show_header=False)
-    table.add_column(justify="left")
-    table.add_column(justify="right")
+    table.add_column(justify="left", no_wrap=True)
+    table.add_column(justify="right", no_wrap=True)
     table.add_column(justify="left")
     rate = rate_text(summary)
-    table.add_row(RATE[0], rate, RATE[3] + NUMERICAL * ("±" in rate))
-    for name, key, factor, unit in SHOWN:
-        value = summary[key]
-        table.add_row(name, "-" if value is None else f"{factor * value:.5g}", unit)
+    if len(result.blows):
+        table.add_row(RATE[0], rate, RATE[3] + NUMERICAL * ("±" in rate))
+    values = summary if len(result.blows) else summary["fall"]
+    for name, key, factor, unit in SHOWN if len(result.blows) else WITHOUT_BLOWS:
+        if values.get(key) is not None:
+            table.add_row(name, f"{factor * values[key]:.5g}", unit)
     energy = summary["energy"]
     for key in ("numerical", "residual"):
         share = energy[f"{key}_relative"]
-        shown = "-" if share is None else f"{share:.2g}"
-        table.add_row(f"Energy ledger: {key}", shown, "of energy put in")
+        if share is not None:
+            table.add_row(f"Energy ledger: {key}", f"{share:.2g}", "of energy put in")
     table.add_section()
     table.add_row("Simulated", f"{result.duration:.6g}", "s")
-    table.add_row("Whole blows", f"{len(result.blows)}", f"{len(result.counted)} after settling")
+    if result.scene.piston.model != "absent":
+        after = f"{len(result.counted)} after settling"
+        table.add_row("Whole blows", f"{len(result.blows)}", after)
     if result.cells:
         table.add_row(
             "Cells", " + ".join(map(str, result.cells.values())), " + ".join(result.cells)
@@ -75,7 +91,7 @@ def show_summary(result: Result) -> None:
     table.add_row("Computed in", f"{result.wall_time:.3g}", "s")
     table.add_row("Speed", f"{result.real_time_factor:.3g}", "times real time")
     console = Console()
-    console.print(table)
+    print_table(table, console, keys=2)
     show_warnings(console, result.warnings)
 
 
@@ -85,29 +101,35 @@ def show_settled(found: Settled) -> None:
     table = Table(show_header=False)
     order = {0: "", 1: ", every blow alike"}.get(found.order, f", {found.order} blows a cycle")
     table.add_row("Motion", f"{found.kind}{order}")
+    rate, error = summary["rate_of_penetration"], summary["rate_of_penetration_error"]
+    if rate is not None:
+        text = f"{1e3 * rate:.5g}, error not estimated"
+        if error is not None:
+            text = with_error(1e3 * rate, 1e3 * error)
+        table.add_row("Rate of penetration", f"{text} mm/s")
     for name, key, factor, unit in (
-        ("Rate of penetration", "rate_of_penetration", 1e3, "mm/s"),
-        ("  error of it", "rate_of_penetration_error", 1e3, "mm/s"),
         ("Blow period", "blow_period", 1e3, "ms"),
         ("Multiplier of the cycle", "multiplier", 1.0, ""),
     ):
-        table.add_row(name, f"{_number(summary[key], factor)} {unit}".rstrip())
-    table.add_row("Blows run", f"{len(found.blows)} in {found.duration:.4g} s")
-    Console().print(table)
+        if summary[key] is not None:
+            table.add_row(name, f"{_number(summary[key], factor)} {unit}".rstrip())
+    table.add_row("Blows run", f"{len(found.blows)} in {found.duration:.4g} s of simulated time")
+    table.add_row("Computed in", f"{found.wall_time:.3g} s")
+    print_table(table)
 
 
-def show_study(found: Study, files: list[Path]) -> None:
-    """Print the headlines of a study, and its files."""
+def show_study(found: Study) -> None:
+    """Print the headlines of a study, and how many of its points failed."""
     table = Table(show_header=False)
     for name, text in found.headlines():
         table.add_row(name, text)
-    table.add_row("Written", ", ".join(str(path) for path in files))
     console = Console()
-    console.print(table)
+    print_table(table, console)
     failed = [k for k, text in enumerate(found.failures) if text]
     if failed:
         first = f"{found.points.changes(failed[0])}: {found.failures[failed[0]]}"
-        show_warnings(console, [f"{len(failed)} points failed, the first at {first}"])
+        count = f"{len(failed)} of {len(found.points)} points failed"
+        show_warnings(console, [f"{count}, the first at {first}"])
 
 
 def show_warnings(console: Console, warnings: list[str]) -> None:
@@ -172,7 +194,7 @@ def show_explanation(scene: Scene, found: Forecast) -> None:
         table.add_row("percussion settled", words)
     if found.refused:
         table.add_row("Ceiling", found.refused)
-    Console().print(table)
+    print_table(table)
 
 
 # Units that scales are shown in, by SI unit.
@@ -194,11 +216,11 @@ def show_comparison(found: Comparison) -> None:
     summaries, differences = found.summaries(), found.differences()
     title = found.results[found.first].scene.title
     table = Table(title=escape(title) or None)
-    table.add_column("", min_width=22)
+    table.add_column("")
     for name in summaries:
         table.add_column(name, justify="right", no_wrap=True)
         if name in differences:
-            table.add_column("off, %", justify="right", no_wrap=True)
+            table.add_column(f"{name}\noff, %", justify="right", no_wrap=True)
     for label, key, factor, unit in (RATE, *SHOWN):
         cells = []
         for name, summary in summaries.items():
@@ -216,7 +238,7 @@ def show_comparison(found: Comparison) -> None:
             cells += [""] * (name in differences)
         table.add_row(label, *cells)
     console = Console()
-    console.print(table)
+    print_table(table, console)
     show_warnings(console, found.warnings())
 
 
@@ -231,7 +253,7 @@ _EFFORT: dict[str, Callable[[dict[str, Any]], float | None]] = {
 
 def show_stability(found: Collection) -> None:
     """Print the measures of each solver on each hard case, and the failures."""
-    table = Table()
+    table = Table(box=SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0))
     for name in ("case", "solver"):
         table.add_column(name, no_wrap=True)
     for name in ("mm/s", "residual", "momentum", "events/s", "guards", "s"):
@@ -240,13 +262,13 @@ def show_stability(found: Collection) -> None:
         table.add_row(
             row["case"],
             row["solver"],
-            _number(row["rate"], 1e3, 4),
+            _rate_cell(row["rate"], row["rate_error"]),
             *(_number(row[key], 1.0, 2) for key in ("residual", "momentum", "events_per_second")),
             str(row["guards"] or ""),
             f"{row['wall_time']:.2g}",
         )
     console = Console()
-    console.print(table)
+    print_table(table, console, keys=2)
     show_warnings(console, found.failures())
     cases = len({row["case"] for row in found.rows})
     failed = len(found.failures())
@@ -256,68 +278,109 @@ def show_stability(found: Collection) -> None:
     )
 
 
+def _rate_cell(rate: float | None, error: float | None) -> str:
+    """Rate [mm/s] with its standard error, in few characters."""
+    if rate is None or error is None or error < SMALL_ERROR * abs(rate):
+        return _number(rate, 1e3, 4)
+    if error >= abs(rate):
+        return "undecided"
+    return with_short_error(1e3 * rate, 1e3 * error).replace(" ", "")
+
+
 def show_statements(statements: list[Statement]) -> None:
     """Print what the paper says beside what was found."""
     table = Table(show_lines=True)
     for heading in ("section", "the paper says", "found here", ""):
-        table.add_column(heading)
+        table.add_column(heading, no_wrap=heading in ("section", ""))
     for one in statements:
         verdict = "[green]agrees[/green]" if one.agrees else "[yellow]differs[/yellow]"
         table.add_row(one.place, escape(one.says), escape(one.found), verdict)
     console = Console()
-    console.print(table)
+    print_table(table, console)
     for one in statements:
         if one.why and not one.agrees:
             console.print(f"{one.place}: {escape(one.why)}", highlight=False)
 
 
+class RunProgress:
+    """Progress of a run, or of several one after the other.
+
+    Parameters
+    ----------
+    report : Report
+    end : float
+        Simulated time of the whole [s].
+    """
+
+    def __init__(self, report: Report, end: float) -> None:
+        self.report = report
+        self.name, self.end = "", end
+
+    def __call__(self, t: float) -> None:
+        """Show the simulated time reached [s]."""
+        name = f"{self.name}, " if self.name else ""
+        end = max(t, self.end)
+        self.report(f"{name}{t:.4g} s of {end:g} s simulated", t / end if end else None)
+
+    def stage(self, name: str, end: float) -> None:
+        """Take the run that begins now, and its simulated time [s]."""
+        self.name, self.end = name, end
+        self(0.0)
+
+
 @contextmanager
-def progress_bar(end: float) -> Iterator[Callable[[float], None] | None]:
-    """Show a bar on stderr once a run in a terminal takes long.
+def progress_bar(end: float) -> Iterator[RunProgress]:
+    """Show how far a run has come; see `progress`.
+
+    Parameters
+    ----------
+    end : float
+        Its simulated time [s].
+    """
+    with progress("preparing") as report:
+        yield RunProgress(report, end)
+
+
+@contextmanager
+def count_bar(what: str) -> Iterator[Callable[[int, int], None]]:
+    """Show how many of a number of things are done; see `progress`.
 
     Yields
     ------
-    callable or None
-        To be called with the simulated time reached [s].
+    callable
+        To be called with the number done and that of all.
+    """
+    with progress(what) as report:
+        yield lambda done, total: report(f"{done} of {total} {what}", done / total)
+
+
+@contextmanager
+def progress(text: str) -> Iterator[Report]:
+    """Show on stderr what a long command does: a bar in a terminal, else lines.
+
+    Parameters
+    ----------
+    text : str
+        What it does until it says more.
     """
     if not sys.stderr.isatty():
-        yield None
+        with lines(text) as report:
+            yield report
         return
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-    columns: list[Any] = [TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn()]
-    bar = Progress(*columns, console=Console(stderr=True), transient=True)
-    task = bar.add_task("Preparing (the first run compiles, about a minute)", total=None)
+    words = TextColumn("{task.description}", markup=False)
+    bar = Progress(BarColumn(), TimeRemainingColumn(), words, console=Console(stderr=True),
+                   transient=True)  # fmt: skip
+    task = bar.add_task(text, total=None)
     starter = threading.Timer(_PATIENCE, bar.start)
     starter.daemon = True
     starter.start()
-
-    def report(t: float) -> None:
-        bar.update(task, completed=t, total=max(t, end), description=f"{t:.4g} s of {end:g} s")
-
     try:
-        yield report
+        yield lambda text, share: bar.update(
+            task, description=text, completed=share or 0.0, total=None if share is None else 1.0
+        )
     finally:
         starter.cancel()
         starter.join()
         bar.stop()
-
-
-@contextmanager
-def count_bar(what: str) -> Iterator[Callable[[int, int], None] | None]:
-    """Show on stderr how many of a number of things are done, in a terminal.
-
-    Yields
-    ------
-    callable or None
-        To be called with the number done and that of all.
-    """
-    if not sys.stderr.isatty():
-        yield None
-        return
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemainingColumn
-
-    columns: list[Any] = [BarColumn(), MofNCompleteColumn(), what, TimeRemainingColumn()]
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("", total=None)
-        yield lambda done, total: bar.update(task, completed=done, total=total)

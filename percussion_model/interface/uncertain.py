@@ -19,6 +19,13 @@ def with_error(value: float, error: float) -> str:
     return f"undecided, {text}" if error >= abs(value) else text
 
 
+def with_short_error(value: float, error: float) -> str:
+    """Return a number to the one digit that its error is known to: 17.5 ± 0.4, or 40 ± 30."""
+    place = math.floor(math.log10(float(f"{error:.0e}")))
+    digits = max(-place, 0)
+    return f"{round(value, -place):.{digits}f} ± {round(error, -place):.{digits}f}"
+
+
 def rate_text(summary: Mapping[str, Any]) -> str:
     """Rate of penetration in mm/s and, where it is known, how far it may be off."""
     rate, error = summary["rate_of_penetration"], summary["rate_of_penetration_relative_error"]

@@ -11,6 +11,7 @@ import math
 
 from percussion_model.physics.kernel import inlined, kernel, merged
 from percussion_model.physics.records import DriveKind, EventKind, Mode
+from percussion_model.physics.rock import hole_depth
 from percussion_model.physics.state import CHECKPOINTS
 
 # The standstill force is the mean over this last share of the standstill.
@@ -72,7 +73,7 @@ def standstill_force(s, time, impulse):
 
 
 @merged
-def finish_blow(s, blows, time, bit_position, mass_p):
+def finish_blow(par, s, blows, time, bit_position):
     """Write the row of the blow that ends at `time`."""
     row = blows[s.n_blows]
     row.time = s.b_time
@@ -80,10 +81,12 @@ def finish_blow(s, blows, time, bit_position, mass_p):
     row.impact_velocity = s.b_impact
     row.rebound_velocity = s.b_rebound
     row.stroke = s.b_stroke
-    row.blow_energy = 0.5 * mass_p * s.b_impact * s.b_impact
+    row.blow_energy = 0.5 * par.mass_p * s.b_impact * s.b_impact
     row.rock_energy = s.rock_work - s.b_rock0
     row.penetration = bit_position - s.b_position
     row.bit_position = s.b_position
+    row.hole_advance = hole_depth(par, s) - s.b_hole
+    row.hole_depth = s.b_hole
     row.peak_contact_force = s.b_peak_contact
     row.peak_bit_force = s.b_peak_bit
     row.standstill_force = s.b_standstill
@@ -96,7 +99,7 @@ def finish_blow(s, blows, time, bit_position, mass_p):
 
 
 @kernel
-def start_blow(s, blows, time, piston_velocity, bit_position, standstill, mass_p):
+def start_blow(par, s, blows, time, piston_velocity, bit_position, standstill):
     """End the blow under way, if any, and start the next at `time`.
 
     Parameters
@@ -109,7 +112,7 @@ def start_blow(s, blows, time, piston_velocity, bit_position, standstill, mass_p
         Mean bit force at the end of the standstill before, NaN where there was none [N].
     """
     if s.live == 1 and s.b_started == 1:
-        finish_blow(s, blows, time, bit_position, mass_p)
+        finish_blow(par, s, blows, time, bit_position)
     s.b_standstill = standstill
     s.b_started = 1
     s.count_blows += 1
@@ -121,6 +124,7 @@ def start_blow(s, blows, time, piston_velocity, bit_position, standstill, mass_p
     s.b_peak_contact = 0.0
     s.b_peak_bit = 0.0
     s.b_position = bit_position
+    s.b_hole = hole_depth(par, s)
     s.b_rock0 = s.rock_work
     s.b_contact0 = s.i_contact
     s.b_bit0 = s.i_bit

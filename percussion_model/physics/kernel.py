@@ -41,6 +41,21 @@ def drop_stale_kernels(folder: Path) -> None:
 drop_stale_kernels(Path(__file__).parents[1])
 
 
+def place_to_compile(function: Callable) -> Path | None:
+    """Folder in which numba will keep a kernel once it is compiled; None where it does so already.
+
+    A kernel counts as kept where numba's index of it is there. None as well where nothing is
+    compiled, or kept.
+    """
+    place = getattr(getattr(function, "stats", None), "cache_path", None)
+    if place is None or getattr(function, "overloads", None):
+        return None
+    module, code = function.__module__.rpartition(".")[2], function.__code__
+    name = f"{module}.{function.__qualname__}-{code.co_firstlineno}."
+    folder = Path(place)
+    return None if any(one.name.startswith(name) for one in folder.glob("*.nbi")) else folder
+
+
 _entries: dict[Callable, Callable] = {}
 
 

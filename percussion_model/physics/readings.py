@@ -9,6 +9,7 @@ from numba import literal_unroll
 from percussion_model.physics.drive import drive_force
 from percussion_model.physics.kernel import merged
 from percussion_model.physics.records import LEDGER_ENTRIES, PEAK_FIELDS, Piston
+from percussion_model.physics.rock import hole_depth
 
 # What a reading takes over from a state as it is.
 _KEPT = (*LEDGER_ENTRIES, *PEAK_FIELDS)
@@ -37,6 +38,7 @@ def fill_motion(par, s, reading, time, piston_position, bit_position):
     reading.gap = s.gap
     reading.relative_displacement = s.u_r
     reading.penetration = s.p
+    reading.hole_depth = hole_depth(par, s)
     reading.drive_force = drive_force(par, s)
     reading.drilling_mode = s.mode
     reading.bit_impulse = s.i_bit

@@ -66,6 +66,17 @@ def recoverable(s):
 
 
 @inlined
+def hole_depth(par, s):
+    """Depth of the rock's surface if the bit were unloaded now (docs/model.md, eq. 20a) [m]."""
+    if par.rock != RockKind.BILINEAR:
+        return 0.0
+    surface = s.p_u
+    if s.mode == Mode.DFC or s.mode == Mode.FC:
+        surface = s.p * (s.gamma - 1.0) / s.gamma
+    return s.x_r - s.hole_start + surface
+
+
+@inlined
 def barrier_off(par, s):
     """Whether a blow of any energy starts a drilling cycle."""
     return par.barrier == 0 or s.next_c_r == 0.0 or s.next_w_r == 0.0 or s.w_r == 0.0
@@ -100,6 +111,8 @@ def resume_cycle(s, barrier):
     """Begin a cycle from contact: the elastic force stays the same (docs/model.md, eq. 19)."""
     force = s.gamma * s.k_r * (s.p - s.p_u)  # that of the spring, in BC and SS
     before = recoverable(s)
+    # Other rock under the same force springs back otherwise, which crushes nothing.
+    s.hole_start += force / (s.gamma * s.k_r) - force / (s.next_gamma * s.next_k_r)
     start_cycle(s, barrier, force / s.next_k_r)
     # With other rock than before, what can be recovered changes at once.
     s.e_crushing += before - recoverable(s)

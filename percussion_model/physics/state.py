@@ -67,6 +67,7 @@ _MOTION = [
     ("p", "f8"),  # penetration while drilling [m]
     ("p_u", "f8"),  # P_u [m]
     ("x_r", "f8"),  # position of the moving datum of p since the start [m]
+    ("hole_start", "f8"),  # surface of the rock from which the depth of the hole counts [m]
     ("w", "f8"),  # work of the barrier dashpot in this cycle [J]
     ("crushed", "f8"),  # by this drilling cycle [J]
     ("v_p", "f8"),  # mean velocities [m/s]
@@ -100,6 +101,7 @@ _BLOW = [  # the blow under way: what it began with, and what it has come to
     ("b_peak_bit", "f8"),
     ("b_standstill", "f8"),
     ("b_position", "f8"),
+    ("b_hole", "f8"),
     ("b_rock0", "f8"),
     ("b_contact0", "f8"),
     ("b_bit0", "f8"),

@@ -54,6 +54,9 @@ class Scene:
         A title, and groups as tables of values or as objects.
     """
 
+    # Given keys that a change of solver has left without effect: nobody has to be warned of them.
+    _set_aside = frozenset[str]()
+
     title: str
     effects: Effects
     piston: PistonBar
@@ -88,6 +91,10 @@ class Scene:
                 faults.add(unknown_key, name)
         faults.refuse()
         refuse_contradictions(self)
+
+    def __repr__(self) -> str:
+        own = (key for key in sorted(self.given) if self[key] != self.row_of(key).default)
+        return f"Scene({', '.join([repr(self.title), *(f'{key}={self[key]!r}' for key in own)])})"
 
     @classmethod
     def from_toml(cls, path: str | Path) -> Self:
@@ -156,7 +163,10 @@ class Scene:
             if key not in ("title", *GROUPS) and find_row(key) is None:
                 raise SceneError(unknown_key(key))
             self._change(tree, key, value)
-        return type(self)(**tree)
+        scene = type(self)(**tree)
+        if self._set_aside:
+            scene.__dict__["_set_aside"] = self._set_aside.difference(changes)
+        return scene
 
     def _change(self, tree: dict[str, Any], key: str, value: Any) -> None:
         """Change a known key in the groups that a scene will be made of."""
@@ -203,7 +213,10 @@ class Scene:
             changes["bit.model"] = "rigid"
             if changes.get("piston.model", self.piston.model) == "elastic":
                 changes["piston.model"] = "rigid"
-        return self.replace(**changes)
+        scene = self.replace(**changes)
+        acted = {key for key in self.given if self.matters(key)}
+        scene.__dict__["_set_aside"] = (self._set_aside | acted).difference(changes)
+        return scene
 
     def __getitem__(self, key: str) -> Any:
         """Return the value of a dotted key."""
@@ -239,6 +252,11 @@ class Scene:
         return tuple(
             row.key for row in _plain_rows() if row.key in given and not self.matters(row.key)
         )
+
+    @property
+    def given_in_vain(self) -> tuple[str, ...]:
+        """Those of `unused` that had no effect either before `computed_by` changed the solver."""
+        return tuple(key for key in self.unused if key not in self._set_aside)
 
     def row_of(self, key: str) -> Row:
         """Row of a dotted key in the parameter table."""

@@ -17,7 +17,8 @@ from percussion_model.simulation.error_estimate import (
     estimate_error,
     grid_run,
 )
-from percussion_model.simulation.result import LEAST_BLOWS, Result
+from percussion_model.simulation.rate import FEWEST_DEPENDENT, LEAST_BLOWS
+from percussion_model.simulation.result import Result
 from percussion_model.solvers.wave.resolution import (
     FIT_SHARE,
     cells_for,
@@ -31,8 +32,8 @@ LONGEST = 100.0
 # A run grows at most by this factor before it is judged again, and a little
 # further than the scatter seen so far asks for.
 GROWTH, MARGIN = 4.0, 1.1
-# The scatter of fewer blows says little, unless it is far below what is wanted.
-FEWEST_BLOWS, FAR_BELOW = 10, 0.1
+# The scatter of few blows says little, unless it is far below what is wanted.
+FAR_BELOW = 0.1
 
 # With more drilling cycles a blow than this the rate jumps from grid to grid, and
 # grids agree by chance: they must do so within this share of what is wanted.
@@ -86,7 +87,7 @@ def time_needed(result: Result, accuracy: float) -> float:
     if len(result.counted) < LEAST_BLOWS or rate == 0.0:
         return result.duration
     excess = scatter / (accuracy * rate)
-    few = len(result.counted) < FEWEST_BLOWS and excess > FAR_BELOW
+    few = len(result.counted) < FEWEST_DEPENDENT and excess > FAR_BELOW
     if excess <= 1.0 and not few:
         return result.duration
     factor = GROWTH if few else min(MARGIN * excess * excess, GROWTH)

@@ -17,6 +17,7 @@ import numpy as np
 from percussion_model.scene.inputs import SimulationError
 from percussion_model.scene.numbers import numbers_of
 from percussion_model.scene.scene import Scene, SceneError
+from percussion_model.simulation.rate import LARGE_ERROR
 from percussion_model.simulation.result import Result
 from percussion_model.solvers.wave.resolution import FITS, largest_misfit, misfits, promised_error
 
@@ -40,8 +41,6 @@ FLOOR_SHARE = 0.1
 COMPARISON_WORK = 0.12
 # They last for so many blows at least: to settle and to count.
 FEWEST_BLOWS = 10
-# A rate that is known no better than this deserves a warning.
-LARGE_ERROR = 1e-2
 # Runs whose drilling cycles a blow differ by more, or by more than this share of them, are
 # of different motions; where there are dozens, one more or less is a smooth change.
 SAME_MOTION, SAME_SHARE = 0.5, 0.05
@@ -267,12 +266,7 @@ def _judged(result: Result, estimate: Estimate) -> Result:
 def _large_error(estimate: Estimate, solver: str) -> Iterator[str]:
     """Warn of a rate that is not known well, and of why."""
     by_grid = max(estimate.cells + estimate.fit, estimate.floor)
-    if estimate.scatter > max(LARGE_ERROR, by_grid):
-        yield (
-            f"blows do not repeat: the rate of penetration has a standard error of "
-            f"{100.0 * estimate.scatter:.2g} %; a longer run.duration (--duration) averages more"
-        )
-    elif by_grid > LARGE_ERROR:
+    if by_grid > max(LARGE_ERROR, estimate.scatter):
         remedy = (
             "solver.accuracy (--accuracy) takes as many cells as an error needs"
             if solver == "wave"

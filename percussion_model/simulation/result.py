@@ -6,13 +6,14 @@ import csv
 import json
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from percussion_model.physics.records import BLOW, EVENT, EventKind
+from percussion_model.physics.effects import EFFECTS
+from percussion_model.physics.records import BLOW, EVENT, EventKind, Mode
 from percussion_model.scene.rows import shortened
 from percussion_model.scene.scene import Scene
 from percussion_model.simulation.files import (
@@ -25,14 +26,13 @@ from percussion_model.simulation.files import (
     staged,
     to_json,
 )
+from percussion_model.simulation.origin import ORIGIN
+from percussion_model.simulation.rate import rate_of_blows
 
 if TYPE_CHECKING:
     import pandas
 
 __all__ = ["Result"]
-
-# Fewer whole blows than this tell no rate.
-LEAST_BLOWS = 3
 
 # A longer trace goes into a compressed NumPy file.
 LONGEST_CSV = 100_000
@@ -92,6 +92,10 @@ class Result:
         Advance of the mean bit position from the settling time to the end of the
         run by that time, wherever in a blow they lie (eq. 58 of the paper) [m/s];
         NaN where the run was not read at its settling time.
+    end : dict of float
+        Sample at the end of the run, by SAMPLE_FIELDS; empty where that is not known.
+    interrupted : bool
+        Whether Ctrl-C ended this run, or another one that was to tell its error.
     """
 
     scene: Scene
@@ -111,6 +115,14 @@ class Result:
     warnings: list[str]
     rate_of_penetration_relative_error: float = math.nan
     rate_of_penetration_fixed_window: float = math.nan
+    end: dict[str, float] = field(default_factory=dict)
+    interrupted: bool = False
+
+    def __repr__(self) -> str:
+        return (
+            f"Result({self.scene.title!r}, solver={self.solver!r}, duration={self.duration:g}, "
+            f"blows={len(self.blows)}, events={len(self.events)}, warnings={len(self.warnings)})"
+        )
 
     @property
     def counted(self) -> np.ndarray:
@@ -119,29 +131,16 @@ class Result:
 
     @property
     def rate_of_penetration(self) -> float:
-        """Bit advance by time between the first and the last blow start after settling [m/s]."""
-        blows = self.counted
-        if len(blows) < LEAST_BLOWS:
-            return math.nan
-        first, last = blows[0], blows[-1]
-        advance = last["bit_position"] + last["penetration"] - first["bit_position"]
-        return float(advance / (last["time"] + last["period"] - first["time"]))
+        """Advance of the hole by time between first and last blow start after settling [m/s]."""
+        return rate_of_blows(self.counted)[0]
 
     @property
     def rate_of_penetration_standard_error(self) -> float:
-        """Standard error of the rate, from the scatter from blow to blow [m/s].
+        """Standard error of the rate, from the scatter of the counted blows [m/s].
 
-        That of a ratio of means, s / (sqrt(n) T): s is the standard deviation
-        of (penetration - rate * period) and T the mean period of the n counted
-        blows, which are taken as independent. Zero where the motion is
-        periodic.
+        See `ratio_of_sums`. Zero where the motion is periodic.
         """
-        blows = self.counted
-        if len(blows) < LEAST_BLOWS:
-            return math.nan
-        off = blows["penetration"] - self.rate_of_penetration * blows["period"]
-        scatter = math.sqrt(float(np.sum(off * off)) / (len(blows) - 1))
-        return scatter / (math.sqrt(len(blows)) * float(np.mean(blows["period"])))
+        return rate_of_blows(self.counted)[1]
 
     @property
     def mean_bit_force(self) -> float:
@@ -152,6 +151,20 @@ class Result:
     def mean_contact_force(self) -> float:
         """Mean force of the piston on the bit over the counted blows [N]."""
         return _ratio(self.counted, "contact_impulse", "period")
+
+    @property
+    def fall(self) -> dict[str, float]:
+        """How a bit fell that nothing has struck: a drop test. Empty where there are blows.
+
+        Returns
+        -------
+        dict of float
+            `depth` of the bit's end below the rock as it was [m]; `first_contact` with the
+            rock [s]; `rebound_velocity` with which the mean bit leaves it for the first
+            time, upwards [m/s]; `rest_time`, from which it stands still [s]; `crushed`
+            energy [J]. Only what is known.
+        """
+        return {} if len(self.blows) else _fall(self)
 
     @property
     def cut_short(self) -> bool:
@@ -180,7 +193,7 @@ class Result:
             "blow_frequency": 1.0 / period,
             **{name: _mean(rows[name]) for name in _MEANS},
             "transfer_efficiency": _ratio(rows, "rock_energy", "blow_energy"),
-            "penetration_per_blow": _mean(rows["penetration"]),
+            "penetration_per_blow": _mean(rows["hole_advance"]),
             "contacts_per_blow": _mean(rows["contacts"]),
             "drilling_cycles_per_blow": _mean(rows["drilling_cycles"]),
             "peak_bit_force": _greatest(rows["peak_bit_force"]),
@@ -198,6 +211,9 @@ class Result:
             "wall_time": self.wall_time,
             "setup_time": self.setup_time,
             "real_time_factor": self.real_time_factor,
+            "end": self.end,
+            "fall": self.fall,
+            "interrupted": self.interrupted,
             "solver": self.solver,
             "title": self.scene.title,
             "duration": self.duration,
@@ -240,6 +256,40 @@ class Result:
 _MEANS = ("impact_velocity", "rebound_velocity", "stroke", "blow_energy", "rock_energy")
 
 
+def _fall(result: Result) -> dict[str, float]:
+    """Numbers of a run without blows; see `Result.fall`."""
+    scene, found = result.scene, {}
+    if result.end and scene.effects.rock != "none":
+        found["depth"] = result.end["bit_end_position"] - scene.start.rock_gap
+    modes = result.events[result.events["kind"] <= EventKind.MODE_SS]
+    touching = np.flatnonzero(modes["kind"] != Mode.FF)
+    if len(touching):
+        found["first_contact"] = float(modes["time"][touching[0]])
+        left = np.flatnonzero(modes["kind"][touching[0] :] == Mode.FF) + touching[0]
+        if len(left) and not any(scene[f"effects.{effect.name}"] for effect in EFFECTS):
+            found["rebound_velocity"] = _leaving_velocity(result, modes, int(left[0]))
+        if modes["kind"][-1] == Mode.SS:
+            found["rest_time"] = float(modes["time"][-1])
+    if "crushing" in result.energy:
+        found["crushed"] = result.energy["crushing"]
+    return {name: value for name, value in found.items() if math.isfinite(value)}
+
+
+def _leaving_velocity(result: Result, modes: np.ndarray, k: int) -> float:
+    """Upward mean velocity of the bit at the start of a flight: its mean motion is a parabola."""
+    scene, begin = result.scene, modes[k]
+    if k + 1 < len(modes):
+        time, place = float(modes[k + 1]["time"]), float(modes[k + 1]["bit_position"])
+    else:
+        time, place = result.duration, result.end.get("bit_position", math.nan)
+    taken = time - float(begin["time"])
+    if not taken > 0.0:
+        return math.nan
+    feed = scene.feed.force / scene.bit.mass if scene.effects.feed else 0.0
+    gravity = scene.gravity.acceleration if scene.effects.gravity else 0.0
+    return 0.5 * (feed + gravity) * taken - (place - float(begin["bit_position"])) / taken
+
+
 def _mean(values: np.ndarray) -> float:
     """Mean of what is defined."""
     known = values[np.isfinite(values)]
@@ -263,7 +313,7 @@ def _write_result(result: Result, folder: Path) -> list[Path]:
     stand beside numbers that they do not belong to.
     """
     was_result = all((folder / name).is_file() for name in _MARKS)
-    left = (*_TRACES, *_DERIVED) if was_result else _TRACES
+    left = (*_TRACES, ORIGIN, *_DERIVED) if was_result else (*_TRACES, ORIGIN)
     with staged(folder) as draft:
         (draft / "summary.json").write_text(to_json(result.summary()) + "\n", encoding="utf-8")
         (draft / "scene.toml").write_text(result.scene.to_toml(), encoding="utf-8")
@@ -325,7 +375,13 @@ def _read_result(folder: Path) -> dict[str, Any]:
         for name in _RATES:
             value = summary.get(name)  # unknown to older files
             fields[name] = math.nan if value is None else value
+        end = summary.get("end", {})
+        fields["end"] = {name: math.nan if value is None else value for name, value in end.items()}
+        fields["interrupted"] = summary.get("interrupted", False)
         blows = _read_csv(folder / "blows.csv", float)
+        if not set(blows) >= _HOLE:
+            fields["warnings"].append(_NO_HOLE)
+            blows |= dict.fromkeys(_HOLE, [math.nan] * len(blows["time"]))
         events = _read_csv(folder / "events.csv", _number_or_kind)
         tables = {"blows": _rows(blows, BLOW), "events": _rows(events, EVENT)}
         return {"scene": scene, **fields, **tables, "trace": _read_trace(folder)}
@@ -355,6 +411,12 @@ _FROM_SUMMARY = (
 
 
 _RATES = ("rate_of_penetration_relative_error", "rate_of_penetration_fixed_window")
+# Columns that the blow tables of older files do not have, and what is said then.
+_HOLE = {"hole_depth", "hole_advance"}
+_NO_HOLE = (
+    "saved before results had the depth of the hole: the rate of penetration is undefined; "
+    "run the scene again"
+)
 
 
 def _number_or_kind(text: str) -> float:

@@ -8,7 +8,7 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from types import FrameType
 from typing import Any, Literal
 
@@ -19,7 +19,12 @@ from percussion_model.physics.records import BLOW, EVENT, READING, SAMPLE_FIELDS
 from percussion_model.scene.inputs import SimulationError
 from percussion_model.scene.rows import is_number
 from percussion_model.scene.scene import Scene, SceneError
-from percussion_model.simulation.accuracy_control import LONGEST, run_to_accuracy, time_needed
+from percussion_model.simulation.accuracy_control import (
+    LONGEST,
+    planned_cells,
+    run_to_accuracy,
+    time_needed,
+)
 from percussion_model.simulation.error_estimate import with_error_estimate
 from percussion_model.simulation.result import Result
 from percussion_model.simulation.runner import Runner
@@ -56,9 +61,9 @@ class Snapshot:
 
     scene: Scene
     time: float
-    state: State
-    blows: tuple[np.ndarray, ...]
-    events: tuple[np.ndarray, ...]
+    state: State = field(repr=False)
+    blows: tuple[np.ndarray, ...] = field(repr=False)
+    events: tuple[np.ndarray, ...] = field(repr=False)
     settled_position: float
 
 
@@ -226,6 +231,7 @@ class Simulation(Runner):
             setup_time=self.setup_time,
             warnings=[],
             rate_of_penetration_fixed_window=self._fixed_window_rate(settle),
+            end=self.observe(),
         )
         result.warnings.extend(find_warnings(result))
         return result
@@ -272,6 +278,7 @@ def simulate(
     accuracy: float | None = None,
     check: bool | None = None,
     error_estimate: bool | None = None,
+    stage: Callable[[str, float], None] | None = None,
 ) -> Result:
     """Run a scene from its start.
 
@@ -304,6 +311,9 @@ def simulate(
         wanted, by short runs on coarser cells. They take about a quarter of the work
         again for a hundred blows, more for fewer, since ten are the least; default that of
         the scene.
+    stage : callable, optional
+        Called with a name and the simulated time [s] of each run that begins, where an
+        accuracy or an estimate takes several; `progress` tells of the last one.
 
     Returns
     -------
@@ -318,11 +328,16 @@ def simulate(
     windows = tuple(windows)
     sampling_times(scene.run.duration, None, trace, windows)  # refuses before anything is compiled
     wanted = scene.solver.accuracy
+    several = wanted is not None and scene.solver_name == "wave"
+    named = _Stages(stage, progress, len(planned_cells(scene)) if several else 1)
+    stopped: list[bool] = []
 
     def run_once(chosen: Scene, extend: bool) -> Result:
         """Run a scene as it is; longer, until the standard error is as wanted, to `extend`."""
         end = chosen.run.duration
         longest = LONGEST * end
+        if wanted is not None:
+            named.next(chosen)
         simulation = Simulation(chosen, record_events)
         times = sampling_times(end, simulation.solver.time_step, trace, windows)
         with stop_on_interrupt(on_interrupt == "keep") as stop:
@@ -331,28 +346,70 @@ def simulate(
                 end = min(time_needed(simulation.result(), wanted), longest)
                 if end <= simulation.time:
                     break
+                named.longer(end)
                 run_in_chunks(simulation, end, np.zeros(0), progress, stop)
             result = simulation.result(trace=_columns(rows) if len(times) else None)
             if wanted is None and chosen.run.error_estimate and not result.cut_short:
-                result = _with_error_estimate(result, simulation.solver, stop)
+                result = _with_error_estimate(result, simulation.solver, stop, named)
+            stopped.append(stop())
         if result.cut_short:
             result.warnings.append(f"interrupted at t = {simulation.time:.6g} s")
         return result
 
     result = run_once(scene, False) if wanted is None else run_to_accuracy(scene, run_once)
     result.warnings.extend(notes)
-    return result
+    return replace(result, interrupted=any(stopped))
 
 
-def _with_error_estimate(result: Result, solver: Solver, stop: Callable[[], bool]) -> Result:
+class _Stages:
+    """Names of the runs that a request takes, told as they begin.
+
+    Parameters
+    ----------
+    stage, progress : callable, optional
+        As in `simulate`.
+    planned : int
+        Runs that there will be, if no doubt adds one.
+    """
+
+    def __init__(
+        self,
+        stage: Callable[[str, float], None] | None,
+        progress: Callable[[float], None] | None,
+        planned: int,
+    ) -> None:
+        self.stage, self.progress, self.planned = stage, progress, planned
+        self.begun, self.name = 0, ""
+
+    def next(self, scene: Scene, purpose: str = "") -> None:
+        """Tell of the next run."""
+        self.begun += 1
+        if purpose or self.planned > 1:
+            count = scene.fem.elements if scene.solver_name == "fem" else scene.solver.cells
+            of = f"{self.begun} of {max(self.planned, self.begun)}"
+            self.name = f"{purpose}run {of}" + (f" with {count} cells" if count else "")
+        self.longer(scene.run.duration)
+
+    def longer(self, end: float) -> None:
+        """Tell that a run lasts until `end` [s]."""
+        if self.stage is not None:
+            self.stage(self.name, end)
+
+
+def _with_error_estimate(
+    result: Result, solver: Solver, stop: Callable[[], bool], named: _Stages
+) -> Result:
     """Add the estimated error of the rate."""
+    scenes = solver.coarser_scenes()
+    named.planned = len(scenes or ())
 
     def run(scene: Scene) -> Result:
+        named.next(scene, "error of the rate, ")
         simulation = Simulation(scene, record_events=False)
-        run_in_chunks(simulation, scene.run.duration, np.zeros(0), None, stop)
+        run_in_chunks(simulation, scene.run.duration, np.zeros(0), named.progress, stop)
         return simulation.result()
 
-    return with_error_estimate(result, solver.coarser_scenes(), run)
+    return with_error_estimate(result, scenes, run)
 
 
 def _requested(

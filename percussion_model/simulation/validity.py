@@ -117,15 +117,10 @@ def flight_note(flight: float) -> Iterator[str]:
         )
 
 
-def rate_note(rate: float, standard_error: float) -> Iterator[str]:
-    """Say that a rate of penetration [m/s] means nothing, where it does not."""
+def rate_note(rate: float) -> Iterator[str]:
+    """Say that a rate of penetration [m/s] is no drilling, where it is not."""
     if rate > MOST_RATE:
         yield (
             f"a rate of penetration of {rate:.3g} m/s is no drilling: above {MOST_RATE:g} m/s "
             "the model does not hold"
-        )
-    elif rate < -3.0 * standard_error and rate < -1e-9:
-        yield (
-            f"the rate of penetration is negative ({rate:.3g} m/s): the bit is lifted off the "
-            "hole's bottom and does not drill"
         )

@@ -9,7 +9,8 @@ import numpy as np
 
 from percussion_model.physics.records import EventKind
 from percussion_model.scene.scales import barrier_shares
-from percussion_model.simulation.result import LEAST_BLOWS, Result
+from percussion_model.simulation.rate import LARGE_ERROR, LEAST_BLOWS
+from percussion_model.simulation.result import Result
 from percussion_model.simulation.validity import (
     barrier_note,
     button_note,
@@ -36,8 +37,8 @@ def find_warnings(result: Result) -> Iterator[str]:
 
 def _about_scene(result: Result) -> Iterator[str]:
     scene = result.scene
-    if scene.unused:
-        yield unused_note(scene.unused)
+    if scene.given_in_vain:
+        yield unused_note(scene.given_in_vain)
     if scene.has_waves and not scene.loss_on:
         if scene.barrier_on:
             yield (
@@ -109,6 +110,12 @@ def _about_blows(result: Result) -> Iterator[str]:
             f"only {count} whole blow{'s' if count != 1 else ''} after settling, fewer than "
             f"{LEAST_BLOWS}: the rate of penetration is undefined; run longer"
         )
+    rate, scatter = result.rate_of_penetration, result.rate_of_penetration_standard_error
+    if rate > 0.0 and scatter > LARGE_ERROR * rate:
+        yield (
+            f"blows do not repeat: the rate of penetration has a standard error of "
+            f"{100.0 * scatter / rate:.2g} %; a longer run.duration (--duration) averages more"
+        )
 
 
 def _about_validity(result: Result) -> Iterator[str]:
@@ -124,8 +131,7 @@ def _about_validity(result: Result) -> Iterator[str]:
         yield from button_note(peak, scene.rock.loading_stiffness)
     if result.solver != "blow-map":  # there the bit stands on the rock between blows
         yield from flight_note(longest_flight(result))
-    rate = result.rate_of_penetration
-    yield from rate_note(rate, result.rate_of_penetration_standard_error)
+    yield from rate_note(result.rate_of_penetration)
     if scene.loss_on and scene.loss.time > scene.bit.transit_time:
         yield (
             f"loss.time = {scene.loss.time:.3g} s is longer than a wave takes through the bit: "

@@ -10,6 +10,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from importlib import import_module
+from pathlib import Path
 from typing import Any, ClassVar, Literal, NamedTuple, Protocol
 
 import numpy as np
@@ -195,18 +196,22 @@ class Entry(NamedTuple):
     module, factory : str
         A class or a function of the scene. Its kernels are loaded only when it is used,
         which is most of a start.
+    kernel : str
+        Name of the kernel that takes longest to compile, in the module `advance` beside
+        that one; empty where there is none.
     """
 
     module: str
     factory: str
+    kernel: str = ""
 
 
 _HERE = __name__.rpartition(".")[0]
 _REGISTRY = {
-    "wave": Entry(f"{_HERE}.wave.solver", "WaveSolver"),
-    "fem": Entry(f"{_HERE}.fem.solver", "FemSolver"),
-    "rigid": Entry(f"{_HERE}.rigid.solver", "RigidSolver"),
-    "blow-map": Entry(f"{_HERE}.blow_map.solver", "make_map_solver"),
+    "wave": Entry(f"{_HERE}.wave.solver", "WaveSolver", "run"),
+    "fem": Entry(f"{_HERE}.fem.solver", "FemSolver", "run"),
+    "rigid": Entry(f"{_HERE}.rigid.solver", "RigidSolver", "advance"),
+    "blow-map": Entry(f"{_HERE}.blow_map.solver", "make_map_solver", "advance"),
 }
 
 
@@ -238,3 +243,17 @@ def make_solver(scene: Scene) -> Solver:
     entry = _REGISTRY[scene.solver_name]
     factory: Callable[[Scene], Solver] = getattr(import_module(entry.module), entry.factory)
     return factory(scene)
+
+
+def place_of_kernels(name: str) -> Path | None:
+    """Folder into which the kernels of a solver will be compiled, which takes half a minute.
+
+    None where they are kept from an earlier time, or where there are none.
+    """
+    from percussion_model.physics.kernel import place_to_compile  # loads numba
+
+    entry = _REGISTRY[name]
+    if not entry.kernel:
+        return None
+    kernels = import_module(f"{entry.module.rpartition('.')[0]}.advance")
+    return place_to_compile(getattr(kernels, entry.kernel))

@@ -142,7 +142,7 @@ def fill_start(s: Any, numbers: Numbers) -> None:
     s["c_r"] = s["next_c_r"] = rock.c_r
     s["w_r"] = s["next_w_r"] = rock.w_r
     s["p"] = -values.start_rock_gap
-    s["x_r"] = values.start_rock_gap
+    s["x_r"] = s["hole_start"] = values.start_rock_gap
     s["v_b"] = values.start_bit_velocity
     s["v_p"] = values.start_piston_velocity if has_piston else 0.0
     s["gap"] = values.start_gap if has_piston else math.inf

@@ -11,7 +11,6 @@ from percussion_model.verification.accuracy.orders import cost_at, cost_range, f
 from percussion_model.verification.accuracy.problems import (
     HISTORY,
     Answer,
-    batch_means,
     relative_error,
 )
 
@@ -53,22 +52,6 @@ def test_cost_of_what_is_never_or_always_met():
     assert math.isnan(cost_at([1.0, 2.0], [1e-1, 1e-2], 1e-3))
     assert math.isnan(cost_at([], [], 1e-3))
     assert cost_at([1.0, 2.0], [1e-5, 1e-6], 1e-3) == 1.0
-
-
-def test_batches_of_independent_numbers_have_the_usual_standard_error():
-    values = np.random.default_rng(3).normal(5.0, 2.0, 16_000)
-    mean, error = batch_means(values)
-    assert mean == pytest.approx(5.0, abs=0.1)
-    assert error == pytest.approx(2.0 / math.sqrt(16_000), rel=0.5)
-
-
-def test_what_the_next_blow_takes_back_is_no_scatter():
-    """Each leap of the bit returns in the blow after it: the advance is certain all the same."""
-    leaps = np.random.default_rng(4).normal(0.0, 10.0, 3201)
-    advance = 1.0 + np.diff(leaps)
-    _, error = batch_means(advance)
-    as_if_independent = np.std(advance) / math.sqrt(len(advance))
-    assert error < 0.3 * as_if_independent
 
 
 def test_error_of_a_history_is_l1_by_l1():

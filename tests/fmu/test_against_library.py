@@ -12,7 +12,7 @@ from percussion_model.physics.records import READING
 # Random steps between the shortest and the longest of a master [s].
 SHORTEST, LONGEST = 1e-6, 0.06
 BLOW = ("blow_time", "blow_position", "impact_velocity", "piston.stroke", "penetration_per_blow")
-COLUMNS = ("time", "bit_position", "impact_velocity", "stroke", "penetration")
+COLUMNS = ("time", "bit_position", "impact_velocity", "stroke", "hole_advance")
 RIGID = {"piston.model": "rigid", "bit.model": "rigid"}
 
 
@@ -49,7 +49,7 @@ def test_four_seconds_of_the_reference_are_identical(hammer, reference):
     efficiency = last["rock_energy"] / last["blow_energy"]
     assert found["transfer_efficiency"][-1] == pytest.approx(efficiency, rel=1e-15)
     assert found["rate_of_penetration"][-1] == pytest.approx(
-        last["penetration"] / last["period"], rel=1e-15
+        last["hole_advance"] / last["period"], rel=1e-15
     )
     assert abs(found["energy_residual"][-1]) < 1e-12
 
@@ -111,6 +111,7 @@ def test_an_input_of_the_same_value_changes_no_bit(make, library):
 
 def test_outputs_between_the_blows_are_those_of_the_library(make, library):
     names = {
+        "hole_depth": "hole_depth",
         "bit.position": "bit_position", "bit.velocity": "bit_velocity", "bit.force": "bit_force",
         "contact.force": "contact_force", "piston.position": "piston_position",
         "piston.velocity": "piston_velocity", "bit.impulse": "bit_impulse",

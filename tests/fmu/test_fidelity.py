@@ -58,11 +58,12 @@ def test_the_map_gives_the_blows_of_the_library(make, scene):
         library.advance(instance.time)
         now = library.observe()
         assert instance.get("bit.position") == now["bit_position"]
+        assert instance.get("hole_depth") == now["hole_depth"]
         assert instance.get("piston.position") == now["piston_position"]
         assert instance.get("bit.impulse") == now["bit_impulse"]
     assert instance.get("blow_count") == len(library.blows) > 10
     blow = library.blows[-1]
-    assert instance.get("penetration_per_blow") == blow["penetration"]
+    assert instance.get("penetration_per_blow") == blow["hole_advance"]
     assert instance.get("impact_velocity") == blow["impact_velocity"]
     assert abs(instance.get("energy_residual")) < 2e-3
 

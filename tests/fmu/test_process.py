@@ -90,3 +90,34 @@ def test_processes_that_start_together_share_one_copy_of_the_sources(fmus, tmp_p
     assert len(set(said)) == 1
     assert [path.name[:16] for path in cache.iterdir()] == ["pneumatic_drive_"]
     assert len(list(cache.glob("*"))) + len(list(cache.glob(".*"))) == 1  # no drafts are left
+
+
+LOGGED = """
+import sys, time
+from fmpy import simulate_fmu
+
+def log(environment, name, status, category, message):
+    print(status, message.decode(), flush=True)
+
+for _ in range(2):
+    simulate_fmu(sys.argv[1], stop_time=0.01, output_interval=0.01, logger=log, debug_logging=True)
+    print("done", flush=True)
+"""
+
+
+@pytest.mark.slow
+def test_the_log_says_once_that_kernels_are_compiled(rigid, tmp_path):
+    """Before they are, in a process with an empty cache; not again where they are kept."""
+    told = []
+    for _ in range(2):
+        done = subprocess.run(
+            [sys.executable, "-c", LOGGED, str(rigid)],
+            cwd=tmp_path, capture_output=True, text=True, check=True,
+            env={**os.environ, "PYTHONPATH": str(ROOT), "NUMBA_CACHE_DIR": "",
+                 "PERCUSSION_FMU_CACHE": str(tmp_path / "kept")},
+        )  # fmt: skip
+        told.append(done.stdout.splitlines())
+    first, again = told
+    assert first[0].startswith("0 RigidHammer: compiling the kernels of the solver rigid: once")
+    assert str(tmp_path / "kept") in first[0]
+    assert first[1:] == again == ["done", "done"]

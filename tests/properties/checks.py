@@ -151,6 +151,7 @@ def check_case(case: Case) -> dict[str, Any]:
     seen = dict(zip(SAMPLE_FIELDS, np.array(watch.rows).T, strict=True))
     check_numbers(seen, scene)
     check_forces(seen, scene)
+    check_hole(watch, seen)
     check_momentum(watch, seen)
     check_blows(simulation.blows, scene)
     check_events(simulation.events, scene)
@@ -198,6 +199,20 @@ def check_forces(seen: dict[str, np.ndarray], scene: Any) -> None:
     if scene.effects.rock == "wall":
         into = (seen["bit_end_position"] - scene.start.rock_gap - give * force).max()
         assert into <= ROUNDING * max(1e-5, reach), f"in the wall: {into} m"
+
+
+def check_hole(watch: Watch, seen: dict[str, np.ndarray]) -> None:
+    """The hole never gets less deep, and there is none where nothing is crushed."""
+    scene, blows, depth = watch.case.scene, watch.simulation.blows, seen["hole_depth"]
+    reach = np.abs(seen["bit_end_position"]).max()
+    if scene.effects.rock != "bilinear":
+        assert not depth.any(), f"a hole of {depth.max()} m"
+    one_way = all(what != "detour" for _, what, _ in watch.case.calls)
+    if one_way and scene.solver_name != "fem":  # elements read between steps by a step of its own
+        back = np.diff(depth[np.argsort(seen["time"], kind="stable")]).min(initial=0.0)
+        assert back >= -ROUNDING * max(1e-5, reach), f"hole: back by {-back} m"
+    back = blows["hole_advance"].min(initial=0.0)
+    assert back >= -ROUNDING * max(1e-5, reach), f"hole: back by {-back} m in a blow"
 
 
 def check_momentum(watch: Watch, seen: dict[str, np.ndarray]) -> None:

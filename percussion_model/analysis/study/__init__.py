@@ -67,6 +67,10 @@ class Study:
     rows: np.ndarray
     failures: list[str]
 
+    def __repr__(self) -> str:
+        failed = sum(map(bool, self.failures))
+        return f"Study({self.scene.title!r}, {self.points!r}, failed={failed})"
+
     @property
     def relative_error(self) -> np.ndarray:
         """Error of the rate divided by the rate, for each point; NaN where there is none."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -37,7 +37,7 @@ class Points:
     """
 
     keys: tuple[str, ...]
-    values: np.ndarray
+    values: np.ndarray = field(repr=False)
     shape: tuple[int, ...]
 
     def __len__(self) -> int:

@@ -57,7 +57,7 @@ _MEANS = {
     "stroke": "stroke",
     "blow_energy": "blow_energy",
     "rock_energy": "rock_energy",
-    "penetration_per_blow": "penetration",
+    "penetration_per_blow": "hole_advance",
     "contacts_per_blow": "contacts",
     "drilling_cycles_per_blow": "drilling_cycles",
 }

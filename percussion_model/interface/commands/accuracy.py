@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -15,8 +12,6 @@ from percussion_model.interface.commands import common
 if TYPE_CHECKING:
     from percussion_model.scene.scene import Scene
     from percussion_model.verification.accuracy import Study
-
-Report = Callable[[float, str], None]
 
 
 def accuracy(
@@ -38,6 +33,7 @@ def accuracy(
     settings: common.Settings = None,
     out: common.OutOrDefault = None,
     json_file: common.JsonFile = None,
+    force: common.Force = False,
     figures: Annotated[bool, typer.Option(help="Draw error against time.")] = True,
 ) -> None:
     """Measure error against time: waves, their peers, rigid bars.
@@ -50,6 +46,7 @@ def accuracy(
         show_contests,
         show_study,
     )
+    from percussion_model.interface.terminal import progress
     from percussion_model.scene.scene import Scene
     from percussion_model.verification.accuracy import study
     from percussion_model.verification.accuracy.ladders import chosen_ladders
@@ -67,28 +64,35 @@ def accuracy(
         )
     words = None if methods is None else [word.strip() for word in methods.split(",")]
     chosen_ladders(words)  # refuses before anything is computed
-    folder = out or Path("out") / "accuracy"
     common.check_json(json_file)
+    common.tell_of_compiling("wave", "fem", "rigid")
     if make_references:
         for _, scene in chosen:
             show_bars(_make_reference(scene))
         return
+    claimed = None
     if figures or json_file is None:
-        common.check_outputs(folder, None)
+        claimed = common.claim(
+            "accuracy", out, Path("out") / "accuracy", force,
+            scenes=dict(chosen), full=full, methods=words,
+        )  # fmt: skip
     found: dict[str, dict[str, Any]] = {}
     studies: dict[str, Study] = {}
     for name, scene in chosen:
-        with _progress() as report:
+        with progress(name) as report:
             result = study(scene, full, words, report)
         studies[name] = result
         found[name] = result.to_dict()
         if json_file != "-":
             show_study(result)
+        if claimed is None:
+            continue
         if json_file is None:
-            common.write_json(str(folder / f"{name}.json"), found[name])
+            common.write_json(str(claimed.folder / f"{name}.json"), found[name])
         if figures:
             with common.if_drawable():
-                common.list_files(_draw(result, folder / name))
+                common.list_files(_draw(result, claimed.folder / name))
+        claimed.sign()
     if len(studies) > 1 and json_file != "-":
         show_contests(studies)
     common.write_json(json_file, found)
@@ -112,6 +116,7 @@ def _draw(found: Study, folder: Path) -> list[Path]:
 
 def _make_reference(scene: Scene) -> Any:
     """Make the reference of a scene and keep it with the package."""
+    from percussion_model.interface.terminal import progress
     from percussion_model.verification.accuracy.problems import pose
     from percussion_model.verification.accuracy.references import (
         fingerprint,
@@ -121,29 +126,7 @@ def _make_reference(scene: Scene) -> Any:
         save_references,
     )
 
-    with _progress() as report:
-        made = make_reference(pose(scene), scene, progress=lambda text: report(0.0, text))
+    with progress("reference") as report:
+        made = make_reference(pose(scene), scene, progress=lambda text: report(text, None))
     save_references(package_store(), {**load_references(), fingerprint(scene): made})
     return made
-
-
-@contextmanager
-def _progress() -> Iterator[Report]:
-    """Show progress on stderr: a bar in a terminal, else a line for each part."""
-    if not sys.stderr.isatty():
-        shown: set[str] = set()
-
-        def line(share: float, text: str) -> None:
-            if text not in shown:
-                shown.add(text)
-                print(f"{100 * share:3.0f} %  {text}", file=sys.stderr, flush=True)
-
-        yield line
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
-    columns: list[Any] = [BarColumn(), TimeElapsedColumn(), TextColumn("{task.description}")]
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("", total=1.0)
-        yield lambda share, text: bar.update(task, completed=share, description=text)

@@ -10,6 +10,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from percussion_model.interface.tables import print_table
 from percussion_model.verification.accuracy.advantage import (
     MET,
     MISSED,
@@ -45,16 +46,11 @@ SHORT = {
     CONTACT_HISTORY: "contact L1",
     STRESS_HISTORY: "stress L1",
 }
-# Narrower, and numbers would be cut short.
-LEAST_WIDTH = 98
-# Columns of numbers in one table; more go to a second one.
-MOST_COLUMNS = 6
 
 
 def show_study(found: Study) -> None:
     """Print reference, points, orders, what accuracies cost, and advice."""
-    # room for all columns, however narrow the terminal
-    console = Console(width=max(Console().width, LEAST_WIDTH))
+    console = Console()
     show_bars(found.reference, console)
     _show_points(found, console)
     _show_orders(found, console)
@@ -88,7 +84,7 @@ def show_bars(reference: Reference, console: Console | None = None) -> None:
             _number(bar.apart),
             "" if bar.agreed else "no reference: the limits disagree",
         )
-    (console or Console()).print(table)
+    print_table(table, console)
 
 
 def _table(title: str, first: str) -> Table:
@@ -108,19 +104,17 @@ def _number(value: float) -> str:
 def _show_points(found: Study, console: Console) -> None:
     what = "Relative standard error" if found.kind == APERIODIC else "Relative error"
     keys = found.quantities
-    for start in range(0, len(keys), MOST_COLUMNS):
-        shown = keys[start : start + MOST_COLUMNS]
-        table = _table(f"{what}; ms to compute a simulated second; ms of set-up", "method")
-        for heading in (*(SHORT[key] for key in shown), "ms/s", "set-up"):
-            table.add_column(heading, justify="right", no_wrap=heading not in SHORT.values())
-        for name in found.names:
-            table.add_row(f"[bold]{LADDERS[name].title}[/bold]")
-            for point in found.ladder(name):
-                label = point.label + (" *" if point.fit > FITS else "")
-                errors = [_number(point.errors.get(key, math.nan)) for key in shown]
-                times = [f"{1e3 * value:.3g}" for value in (point.second, point.setup)]
-                table.add_row(f" {label}", *errors, *times)
-        console.print(table)
+    table = _table(f"{what}; ms to compute a simulated second; ms of set-up", "method")
+    for heading in ("ms/s", "set-up", *(SHORT[key] for key in keys)):
+        table.add_column(heading.replace(" ", "\n"), justify="right", no_wrap=True)
+    for name in found.names:
+        table.add_row(f"[bold]{LADDERS[name].title}[/bold]")
+        for point in found.ladder(name):
+            label = point.label + (" *" if point.fit > FITS else "")
+            errors = [_number(point.errors.get(key, math.nan)) for key in keys]
+            times = [two(1e3 * value) for value in (point.second, point.setup)]
+            table.add_row(f" {label}", *times, *errors)
+    print_table(table, console)
     console.print(
         f"A blow takes {found.period:.4g} s; its cost is that part of ms/s.", highlight=False
     )
@@ -134,16 +128,14 @@ def _show_points(found: Study, console: Console) -> None:
 
 def _show_orders(found: Study, console: Console) -> None:
     keys = [key for key in found.quantities if any(found.order(name, key) for name in found.names)]
-    for start in range(0, len(keys), MOST_COLUMNS):
-        shown = keys[start : start + MOST_COLUMNS]
-        table = _table("Measured orders, each against what the method refines", "method")
-        for key in shown:
-            table.add_column(SHORT[key], justify="right")
-        for name in found.names:
-            orders = [found.order(name, key) for key in shown]
-            cells = ["-" if one is None else f"{one.value:.1f}±{one.error:.1f}" for one in orders]
-            table.add_row(LADDERS[name].title, *cells)
-        console.print(table)
+    table = _table("Measured orders, each against what the method refines", "method")
+    for key in keys:
+        table.add_column(SHORT[key].replace(" ", "\n"), justify="right", no_wrap=True)
+    for name in found.names:
+        orders = [found.order(name, key) for key in keys]
+        cells = ["-" if one is None else f"{one.value:.1f}±{one.error:.1f}" for one in orders]
+        table.add_row(LADDERS[name].title, *cells)
+    print_table(table, console)
     if "rigid" in found.names and found.kind != APERIODIC:
         console.print(f"rigid: {LADDERS['rigid'].note}.", highlight=False)
 
@@ -153,8 +145,8 @@ def _show_costs(found: Study, console: Console) -> None:
     table = _table(
         f"ms to compute a simulated second, for an error in {SHORT[found.main]}", "error"
     )
-    for heading in ("wave", "without leaps", "best peer", "best fem", "best of scipy"):
-        table.add_column(heading, justify="right")
+    for heading in ("wave", "without\nleaps", "best peer", "best fem", "best of scipy"):
+        table.add_column(heading, justify="right", no_wrap=True)
     for wanted in WANTED:
         costs = [found.cost(name, found.main, wanted) for name in ("wave", "wave-steps")]
         cells = [f"{1e3 * cost.value:.3g}" if isfinite(cost.value) else "-" for cost in costs]
@@ -163,15 +155,16 @@ def _show_costs(found: Study, console: Console) -> None:
             title = "" if best is None else LADDERS[best.ladder].title
             cells.append("-" if best is None else f"{1e3 * best.value:.3g} ({title})")
         table.add_row(f"{100 * wanted:g} %", *cells)
-    console.print(table)
+    print_table(table, console)
 
 
 def show_contests(studies: dict[str, Study]) -> None:
     """Print waves against the best of their peers, all scenes in one table, and the ratios."""
-    console = Console(width=max(Console().width, LEAST_WIDTH))
+    console = Console()
     table = _table("The same error in rate: ms to compute a simulated second", "scene")
-    for heading in ("error", "wave", "best peer", "", "ratio"):
-        table.add_column(heading, justify="left" if not heading else "right", no_wrap=True)
+    for heading in ("error", "wave", "best peer", "ratio"):
+        table.add_column(heading, justify="right", no_wrap=True)
+    table.add_column("the peer")
     found = [[contest(one, wanted) for wanted in WANTED] for one in studies.values()]
     for name, contests in zip(studies, found, strict=True):
         for k, one in enumerate(contests):
@@ -179,7 +172,7 @@ def show_contests(studies: dict[str, Study]) -> None:
                 escape(name) if k == 0 else "", f"{100 * one.wanted:g} %", *_contest_cells(one)
             )
         table.add_section()
-    console.print(table)
+    print_table(table, console, keys=2)
     for column in zip(*found, strict=True):
         told = summary(column)
         text = f"{100 * told.wanted:g} %: no scene is decided."
@@ -193,7 +186,7 @@ def show_contests(studies: dict[str, Study]) -> None:
 
 
 def _contest_cells(one: Contest) -> tuple[str, str, str, str]:
-    """Time of the waves, time and name of the best peer, and the ratio, each with its range."""
+    """Times of the waves and of the best peer, the ratio, each with its range; the peer's name."""
     peer, name = "-", ""
     if one.peer is not None:
         peer, name = _cost_text(one.peer), LADDERS[one.peer.ladder].title
@@ -202,7 +195,7 @@ def _contest_cells(one: Contest) -> tuple[str, str, str, str]:
         PEER_MISSES: f"above {two(one.ratio)}",
         MISSED: f"below {two(one.ratio)}",
     }
-    return _cost_text(one.wave), peer, name, ratio.get(one.outcome, one.outcome)
+    return _cost_text(one.wave), peer, ratio.get(one.outcome, one.outcome), name
 
 
 def _cost_text(cost: Cost) -> str:

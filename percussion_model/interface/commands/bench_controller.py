@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -26,14 +26,19 @@ COLUMNS = (
     ("time_off_bottom", "off bottom [s]", 1.0, "time in which the shoulder is off the bit"),
     ("dry_blows", "dry blows", 1.0, "blows in a void with the bit or the shoulder off"),
     ("peak_force", "peak force [kN]", 1e-3, "greatest force of the rock on the bit"),
-    ("violations", "violations [s]", 1.0, "time beyond the limits of feed and torque"),
+    ("violations", "beyond limits [s]", 1.0, "time beyond the limits of feed and torque"),
 )
+# Characters of the first two columns of the table.
+NAME, POINTS = 10, 6
 
 
 def bench_controller(
     controller: Annotated[
         str | None,
-        typer.Argument(metavar="[FMU|FILE.py:FUNCTION]", help="Left out: that of the archive."),
+        typer.Argument(
+            metavar="[FMU|FILE.py:NAME]",
+            help="NAME of a function, a class or a factory. Left out: that of the archive.",
+        ),
     ] = None,
     system: Annotated[
         Path, typer.Option("--system", help="Archive of the feed-controlled system.")
@@ -47,18 +52,21 @@ def bench_controller(
     ] = None,
     out: common.Out = None,
     json_file: common.JsonFile = None,
+    force: common.Force = False,
 ) -> int:
     """Put a controller of feed and pressure through standard runs: scores, figures, a page."""
     try:
         from percussion_model.coupling.bench import bench, total
     except ImportError as error:
         return common.print_message(common.needs_extra(error, "fmu"), common.BAD_INPUT)
-    from percussion_model.simulation.files import check_writable
-
-    folder = out or Path("out") / "bench-controller"
-    check_writable(folder)
     common.check_json(json_file)
     values = dict(read_value(f"controller.{text}") for text in settings or ())
+    source = None if controller is None else Path(_file_and_name(controller)[0])
+    claimed = common.claim(
+        "bench-controller", out, Path("out") / "bench-controller", force,
+        system=common.digest(system), controller=controller, file=common.digest(source),
+        set=common.by_name(settings), trials=sorted(trials or ()),
+    )  # fmt: skip
     scores: list[Score] = []
     interrupted = False
 
@@ -66,6 +74,8 @@ def bench_controller(
         scores.append(score)
         _show(score)
 
+    for line in _heading():
+        print(line, file=sys.stderr)
     try:
         bench(system, _load(controller), values, trials or (), take)
     except KeyboardInterrupt:
@@ -85,7 +95,9 @@ def bench_controller(
         common.print_message(common.needs_plot_extra(error))
     else:
         title = controller or system.stem
-        print(write_bench_page(scores, points, COLUMNS, folder, title), file=sys.stderr)
+        page = write_bench_page(scores, points, COLUMNS, claimed.folder, title)
+        claimed.sign()
+        print(page, file=sys.stderr)
     if interrupted:
         return common.print_message(
             f"interrupted: the page has the {len(scores)} runs that were done", common.INTERRUPTED
@@ -93,32 +105,69 @@ def bench_controller(
     return 1 if any(score.faults for score in scores) else 0
 
 
+def _heading() -> list[str]:
+    """Lines of the heading: words of the columns one below the other, units last."""
+    heads = [head.split() for _, head, _, _ in COLUMNS]
+    depth = max(map(len, heads))
+    lines = []
+    for k in range(depth):
+        words = [head[k - depth + len(head)] if k >= depth - len(head) else "" for head in heads]
+        first = f"{'run':{NAME}s}{'points':>{POINTS}s}" if k == depth - 1 else " " * (NAME + POINTS)
+        lines.append(first + _cells(words))
+    return lines
+
+
+def _cells(texts: Sequence[str]) -> str:
+    """Right-aligned texts, each as wide as the longest word of its heading, and a space."""
+    widths = (max(map(len, head.split())) + 1 for _, head, _, _ in COLUMNS)
+    return "".join(f"{text:>{width}s}" for text, width in zip(texts, widths, strict=True))
+
+
 def _show(score: Score) -> None:
     """One line for a run, and why it has failed."""
-    numbers = "  ".join(f"{text} {factor * score.numbers[name]:.4g}"
-                        for name, text, factor, _ in COLUMNS)  # fmt: skip
-    print(f"{score.trial:10s} {score.points:6.1f}  {numbers}", file=sys.stderr)
+    numbers = [_short(factor * score.numbers[name]) for name, _, factor, _ in COLUMNS]
+    line = f"{score.trial:{NAME}s}{score.points:{POINTS}.1f}{_cells(numbers)}"
+    print(line, file=sys.stderr, flush=True)
     for fault in score.faults:
         common.print_message(f"{score.trial} {'' if score.error else 'failed: '}{fault}")
 
 
+def _short(value: float) -> str:
+    """Three digits, two decimals at most, in five characters."""
+    if abs(value) >= 99999.5:
+        return f"{value:.0e}".replace("e+0", "e").replace("e+", "e")
+    return f"{float(f'{value:.3g}'):.2f}".rstrip("0").rstrip(".")
+
+
+def _file_and_name(controller: str) -> tuple[str, str]:
+    """File and name of FILE.py:NAME; an FMU has no name."""
+    file, _, name = controller.rpartition(":")
+    return (file, name) if file.endswith(".py") else (controller, "")
+
+
 def _load(controller: str | None) -> Any:
-    """Path of an FMU, or the function of FILE.py:FUNCTION."""
+    """Path of an FMU, or what loads FILE.py afresh for a run and gives its NAME."""
     from percussion_model.coupling import CouplingError
+    from percussion_model.coupling.fresh import fresh
 
     if controller is None:
         return None
-    file, colon, name = controller.rpartition(":")
-    if not colon or not file.endswith(".py"):
-        if not Path(controller).is_file():
-            raise CouplingError(f"{controller}: no such file")
-        return Path(controller)
-    spec = importlib.util.spec_from_file_location("bench_controller_of_user", file)
-    if spec is None or spec.loader is None or not Path(file).is_file():
+    file, name = _file_and_name(controller)
+    if not Path(file).is_file():
         raise CouplingError(f"{file}: no such file")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    work: Callable[..., Any] | None = getattr(module, name, None)
-    if not callable(work):
-        raise CouplingError(f"{file} has no function {name}")
-    return work
+    if not name:
+        return Path(file)
+
+    def anew() -> Callable[..., Any]:
+        # what the file keeps by itself, in globals as well, is left behind with its module
+        spec = importlib.util.spec_from_file_location("bench_controller_of_user", file)
+        assert spec is not None
+        assert spec.loader is not None
+        module = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(module)
+        work: Callable[..., Any] | None = getattr(module, name, None)
+        if not callable(work):
+            raise CouplingError(f"{file} has no function or class {name}")
+        return fresh(name, work, is_new=True)
+
+    return anew

@@ -31,6 +31,7 @@ def calibrate(
     out: Annotated[
         Path | None, typer.Option("--out", metavar="SCENE", help="Write the calibrated scene.")
     ] = None,
+    force: common.Force = False,
     span: Annotated[
         float, typer.Option("--span", help="C_R and W_R are searched this factor around the scene.")
     ] = 10.0,
@@ -55,6 +56,7 @@ def calibrate(
         if out.is_dir():
             raise common.refusal(f"--out {str(out)!r}: is a folder; give the file to write")
         check_writable(out.absolute().parent)
+        common.refuse_existing(out, force)
     chosen = common.load_scene(scene, solver, cells, settings)
     found: dict[str, Fit] = {}
     if curve is not None:

@@ -3,7 +3,12 @@
 from __future__ import annotations
 
 import gc
+import hashlib
+import os
+import shutil
 import sys
+import textwrap
+import tomllib
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -13,11 +18,14 @@ import typer
 
 if TYPE_CHECKING:
     from percussion_model.scene.scene import Scene
+    from percussion_model.simulation.origin import Claim
 
 BAD_INPUT = 2
 INTERRUPTED = 130  # what shells report for Ctrl-C
 # Starting makes hundreds of thousands of objects that stay [objects].
 COLLECT_AFTER = 100_000
+# So many files of a folder have a line each.
+FEW_FILES = 3
 
 _own_process = False
 
@@ -60,6 +68,9 @@ Out = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder f
 OutOrDefault = Annotated[
     Path | None,
     typer.Option("--out", metavar="DIR", help="Folder for what is written, in place of that."),
+]
+Force = Annotated[
+    bool, typer.Option("--force", help="Replace what another scene or run has left there.")
 ]
 Tolerance = Annotated[
     float, typer.Option("--tolerance", help="Relative change of a blow that is no change.")
@@ -112,7 +123,22 @@ def load_scene(
     if cells is not None:
         key = "fem.elements" if scene.solver_name == "fem" else "solver.cells"
         scene = scene.replace(**{key: cells})
+    tell_of_compiling(scene.solver_name)
     return scene
+
+
+def tell_of_compiling(*solvers: str) -> None:
+    """Say on stderr that kernels are going to be compiled, where numba does not keep them yet."""
+    from percussion_model.solvers.base import place_of_kernels
+
+    places = {name: place_of_kernels(name) for name in solvers}
+    new = {name: place for name, place in places.items() if place is not None}
+    if new:
+        long = "half a minute each" if len(new) > 1 else "half a minute"
+        print_message(
+            f"compiling the kernels of the solver {' and '.join(new)}: once, for about {long}; "
+            f"they are kept in {', '.join(map(str, new.values()))}"
+        )
 
 
 def check_outputs(folder: Path | None, json_file: str | None) -> None:
@@ -122,6 +148,61 @@ def check_outputs(folder: Path | None, json_file: str | None) -> None:
     if folder is not None:
         check_writable(folder)
     check_json(json_file)
+
+
+def claim(
+    command: str, out: Path | None, default: Path | None, force: bool, **made_from: Any
+) -> Claim:
+    """Claim the folder of a result: refuse what holds another one, before anything is computed.
+
+    A folder that is not named by the user is numbered instead, which is said.
+
+    Parameters
+    ----------
+    command : str
+    out, default : Path or None
+        Named by the user, and else.
+    force : bool
+        Replace what is there.
+    made_from : dict
+        All that the result follows from: scenes, plain values, lists and tables of them.
+    """
+    from percussion_model.simulation.origin import Claim
+
+    folder = out or default
+    assert folder is not None
+    origin = {"command": command, **{name: _entries(one) for name, one in made_from.items()}}
+    claimed = Claim(folder, origin, force, numbered=out is None)
+    if claimed.moved:
+        print_message(claimed.moved)
+    return claimed
+
+
+def _entries(value: Any) -> Any:
+    """A scene as a tree, and others as they are."""
+    from percussion_model.scene.scene import Scene
+
+    if isinstance(value, dict):
+        return {name: _entries(one) for name, one in value.items()}
+    return tomllib.loads(value.to_toml()) if isinstance(value, Scene) else value
+
+
+def by_name(words: list[str] | None) -> dict[str, str]:
+    """Values by name, of words NAME=VALUE."""
+    return {name: value for name, _, value in (word.partition("=") for word in words or ())}
+
+
+def digest(path: Path | None) -> str | None:
+    """What a file holds, in short; nothing where there is no file."""
+    if path is None or not path.is_file():
+        return None
+    return hashlib.sha256(path.read_bytes()).hexdigest()[:16]
+
+
+def refuse_existing(file: Path, force: bool) -> None:
+    """Refuse a file that is there, unless it is to be replaced."""
+    if file.exists() and not force:
+        raise refusal(f"{file}: exists already; --force overwrites it")
 
 
 def check_json(json_file: str | None) -> None:
@@ -143,6 +224,7 @@ def write_json(json_file: str | None, values: dict[str, Any]) -> None:
         typer.echo(to_json(values))
     elif json_file is not None:
         staged_text(Path(json_file), to_json(values) + "\n")
+        list_files([Path(json_file)])
 
 
 @contextmanager
@@ -155,9 +237,21 @@ def if_drawable() -> Iterator[None]:
 
 
 def list_files(paths: Iterable[Path]) -> None:
-    """Name on stderr the files that were written."""
+    """Name on stderr the files that were written; many of one folder together."""
+    folders: dict[Path, list[str]] = {}
     for path in paths:
-        print(f"wrote {path}", file=sys.stderr)
+        folders.setdefault(path.parent, []).append(path.name)
+    for folder, names in folders.items():
+        if len(names) <= FEW_FILES:
+            for name in names:
+                print(f"wrote {folder / name}", file=sys.stderr)
+            continue
+        text = f"wrote to {folder}{os.sep}: {', '.join(names)}"
+        shown = textwrap.wrap(
+            text, shutil.get_terminal_size().columns, subsequent_indent="  ",
+            break_long_words=False, break_on_hyphens=False,
+        )  # fmt: skip
+        print(*shown, sep="\n", file=sys.stderr)
 
 
 def needs_plot_extra(error: ImportError) -> str:

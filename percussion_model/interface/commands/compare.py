@@ -21,6 +21,7 @@ def compare(
     settings: common.Settings = None,
     out: common.OutOrDefault = None,
     json_file: common.JsonFile = None,
+    force: common.Force = False,
     figures: Annotated[bool, typer.Option(help="Draw the last blow of all solvers.")] = True,
 ) -> None:
     """Run a scene with several solvers: a table, and a figure in out/SCENE-compared."""
@@ -30,10 +31,15 @@ def compare(
 
     names = read_solvers(solvers)
     chosen = common.load_scene(scene, settings=settings)
-    folder = out or Path("out") / f"{scene.stem}-compared"
-    common.check_outputs(folder if figures else None, json_file)
+    common.check_json(json_file)
+    if figures:
+        claimed = common.claim(
+            "compare", out, Path("out") / f"{scene.stem}-compared", force,
+            scene=chosen, solvers=names, duration=duration, settle=settle,
+        )  # fmt: skip
     if "blow-map" in names:
         ready_map(chosen)
+    common.tell_of_compiling(*(name for name in names if name != chosen.solver_name))
     end = chosen.run.duration if duration is None else duration
     with progress_bar(end * len(names)) as progress:
         found = run_all(chosen, names, duration, settle, progress)
@@ -45,5 +51,6 @@ def compare(
             from percussion_model.interface.plotting.compared_blows import draw_comparison
             from percussion_model.interface.plotting.style import save_figures
 
-            files = save_figures(lambda: [("comparison", draw_comparison(found))], folder)
+            files = save_figures(lambda: [("comparison", draw_comparison(found))], claimed.folder)
+            claimed.sign()
             common.list_files(files)

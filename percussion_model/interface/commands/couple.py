@@ -2,21 +2,28 @@
 
 from __future__ import annotations
 
+import textwrap
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
 from percussion_model.interface.commands import common
 
+if TYPE_CHECKING:
+    from percussion_model.coupling.verdict import Verdict
+
 SystemFile = Annotated[Path, typer.Argument(metavar="SYSTEM.ssp", help="A system (SSP 1.0).")]
 UNITS = {
     "time": "s", "step": "s", "depth": "m", "rate_second_half": "m/s", "shoulder_energy": "J",
     "feed_work": "J", "hammer_energy_residual": "of the energy put in",
-    "string_energy_residual": "of the energy put in", "shoulder_by_blows": "of the blows",
+    "string_energy_residual": "of the energy put in or there", "shoulder_by_blows": "of the blows",
 }  # fmt: skip
 # Rows of a run without --interval.
 ROWS = 5000
+FAILED = 1
+# Characters of a line, less the name of the command before it.
+WIDTH = 68
 
 
 def couple(
@@ -51,11 +58,13 @@ def couple(
     ] = False,
     out: common.OutOrDefault = None,
     json_file: common.JsonFile = None,
+    force: common.Force = False,
     figures: Annotated[bool, typer.Option(help="Draw the signals.")] = True,
 ) -> int:
-    """Run a system of FMUs, an SSP archive: signals as CSV, balances, a figure.
+    """Run a system of FMUs, an SSP archive: signals as CSV, balances, a figure, a verdict.
 
-    Files go to out/SYSTEM.
+    Ends with 1 where the energies do not balance or the step is too long. Files go to
+    out/SYSTEM.
     """
     from percussion_model.interface.terminal import progress_bar
 
@@ -64,8 +73,7 @@ def couple(
         from percussion_model.coupling.coupled_run import known_signals, summary
     except ImportError as error:
         return common.print_message(common.needs_extra(error, "fmu"), common.BAD_INPUT)
-    folder = out or Path("out") / system.stem
-    common.check_outputs(folder, json_file)
+    common.check_json(json_file)
     coupling = Coupling(
         system,
         dict(read_value(text) for text in settings or ()),
@@ -73,6 +81,12 @@ def couple(
         every=dict(_read_pace(text) for text in every or ()),
         trust=trust,
     )
+    claimed = common.claim(
+        "couple", out, Path("out") / system.stem, force, system=common.digest(system),
+        duration=duration, step=step, interval=interval, order=order, tolerance=tolerance,
+        every=common.by_name(every), set=common.by_name(settings), signals=signals,
+    )  # fmt: skip
+    folder = claimed.folder
     wanted = [*known_signals(coupling.outputs), *(signals or ())]
     rows_every = max(step, duration / ROWS) if interval is None else interval
     with progress_bar(duration) as progress:
@@ -84,7 +98,7 @@ def couple(
     common.write_json(json_file, found)
     if json_file != "-":
         for name, value in found.items():
-            if name != "error":  # told at the end
+            if name not in ("error", "verdict"):  # told at the end
                 number = f"{value:.6g}" if isinstance(value, float) else value
                 typer.echo(f"{name:26s} {number} {UNITS.get(name, '')}".rstrip())
     common.list_files([path])
@@ -93,8 +107,20 @@ def couple(
             from percussion_model.interface.plotting.coupled_signals import save_signals
 
             common.list_files([save_signals(run, folder / "signals.png", system.stem)])
-    code = common.INTERRUPTED if run.interrupted else 1
-    return common.print_message(f"the run ended early, {run.error}", code) if run.error else 0
+    claimed.sign()
+    return _tell(run.verdict, common.INTERRUPTED if run.interrupted else FAILED)
+
+
+def _tell(verdict: Verdict, code: int) -> int:
+    """Say the verdict, in lines that fit; return the exit code."""
+    for remark in verdict.remarks:
+        common.print_message(_wrapped(remark))
+    return common.print_message(_wrapped(verdict.text), code if verdict.is_bad else 0)
+
+
+def _wrapped(text: str) -> str:
+    """Lines of a message."""
+    return textwrap.fill(text, WIDTH, subsequent_indent="  ", break_on_hyphens=False)
 
 
 def read_value(text: str) -> tuple[str, float | bool | str]:

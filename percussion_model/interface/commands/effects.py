@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -11,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from percussion_model.interface.commands import common
+from percussion_model.interface.uncertain import with_short_error
 
 if TYPE_CHECKING:
     from percussion_model.analysis.effect_study import EffectsStudy, Trial
@@ -25,6 +24,7 @@ def effects(
     settings: common.Settings = None,
     out: common.OutOrDefault = None,
     json_file: common.JsonFile = None,
+    force: common.Force = False,
     figures: Annotated[bool, typer.Option(help="Draw cost and change as bars.")] = True,
 ) -> None:
     """Turn each effect off, or on, in turn: what it costs and what it changes.
@@ -32,11 +32,18 @@ def effects(
     Prints a table, and draws a figure in out/SCENE-effects.
     """
     from percussion_model.analysis.effect_study import study_effects
+    from percussion_model.interface.terminal import progress
 
     chosen = common.load_scene(scene, solver, cells, settings)
-    folder = out or Path("out") / f"{scene.stem}-effects"
-    common.check_outputs(folder if figures else None, json_file)
-    found = study_effects(chosen, duration, settle, _report)
+    common.check_json(json_file)
+    if figures:
+        claimed = common.claim(
+            "effects", out, Path("out") / f"{scene.stem}-effects", force,
+            scene=chosen, duration=duration, settle=settle,
+        )  # fmt: skip
+    common.tell_of_compiling(*(name for name in ("wave", "rigid") if name != chosen.solver_name))
+    with progress("effects") as report:
+        found = study_effects(chosen, duration, settle, report)
     common.write_json(json_file, found.to_dict())
     if json_file != "-":
         show_effects(found)
@@ -45,20 +52,13 @@ def effects(
             from percussion_model.interface.plotting.effect_bars import draw_effects
             from percussion_model.interface.plotting.style import save_figures
 
-            files = save_figures(lambda: [("effects", draw_effects(found))], folder)
+            files = save_figures(lambda: [("effects", draw_effects(found))], claimed.folder)
+            claimed.sign()
             common.list_files(files)
-
-
-def _report(what: str, share: float) -> None:
-    """Say on a terminal what is done next."""
-    if sys.stderr.isatty():
-        print(f"\r\033[K{share:4.0%} {what}", end="" if share < 1.0 else "\n", file=sys.stderr)
 
 
 # A longer name of an effect takes two lines.
 LONGEST_NAME = 15
-# More characters than any table has.
-ENDLESS = 1000
 
 # Columns: heading, and what stands in it.
 _COLUMNS: dict[str, Callable[[EffectsStudy, Trial, dict[str, Any]], str]] = {
@@ -94,6 +94,8 @@ def show_effects(found: EffectsStudy) -> None:
     from rich.markup import escape
     from rich.table import Table
 
+    from percussion_model.interface.tables import print_table
+
     headings, rows, reasons = table_of(found)
     table = Table(
         title=escape(found.scene.title) or None,
@@ -107,9 +109,7 @@ def show_effects(found: EffectsStudy) -> None:
     for name, *cells in rows:
         table.add_row(_two_lines(name), *cells)
     console = Console()
-    # In a narrow terminal lines are broken rather than numbers cut short.
-    whole = Console(width=ENDLESS).measure(table).maximum
-    Console(width=max(console.width, whole)).print(table)
+    print_table(table, console)
     for reason in dict.fromkeys(reasons.values()):
         names = ", ".join(name for name, given in reasons.items() if given == reason)
         console.print(f"[yellow]{escape(names)}:[/yellow] {escape(reason)}", highlight=False)
@@ -123,14 +123,7 @@ def _rate(row: dict[str, Any]) -> str:
     shown = f"{1e3 * value:.4g}"
     if error <= 1e-3 * abs(value):
         return shown
-    return with_error(1e3 * value, 1e3 * error) if error < abs(value) else "undecided"
-
-
-def with_error(value: float, error: float) -> str:
-    """Show a value to the one digit that its error is known to: 17.5 ± 0.4, or 40 ± 30."""
-    place = math.floor(math.log10(float(f"{error:.0e}")))
-    digits = max(-place, 0)
-    return f"{round(value, -place):.{digits}f} ± {round(error, -place):.{digits}f}"
+    return with_short_error(1e3 * value, 1e3 * error) if error < abs(value) else "undecided"
 
 
 def _two_lines(name: str) -> str:

@@ -28,9 +28,10 @@ def paper(
         int | None, typer.Option("--processes", min=1, help="For the sweeps; default: all cores.")
     ] = None,
     json_file: common.JsonFile = None,
+    force: common.Force = False,
 ) -> None:
     """Reproduce figures 4 and 6 to 9 of the paper, and check what it says one by one."""
-    from percussion_model.interface.terminal import progress_bar, show_statements
+    from percussion_model.interface.terminal import progress, progress_bar, show_statements
 
     common.check_outputs(out, json_file)
     common.load_numba()
@@ -48,11 +49,14 @@ def paper(
     from percussion_model.verification.paper.rock_law import run_sinking
     from percussion_model.verification.paper.runs import paper_scene, run_drops
 
+    common.tell_of_compiling("wave", "fem", "rigid")
     scene = paper_scene()
-    drops, sinking = run_drops(scene), run_sinking(scene)
+    claimed = common.claim("paper", out, None, force, scene=scene)
+    with progress("drop tests and sinking, figure 6"):
+        drops, sinking = run_drops(scene), run_sinking(scene)
     sweeps = _sweeps(out, processes)
-    with progress_bar(2 * scene.run.duration) as progress:
-        both = compare(scene, ("wave", "fem"), progress=progress)
+    with progress_bar(2 * scene.run.duration) as report:
+        both = compare(scene, ("wave", "fem"), progress=report)
     windows = {name: last_blow_window(result) for name, result in both.results.items()}
 
     def figures() -> Iterator[tuple[str, Figure]]:
@@ -71,6 +75,7 @@ def paper(
     tree = {"statements": [one.to_dict() for one in statements]}
     common.write_json(json_file, tree)
     common.write_json(str(out / "statements.json"), tree)
+    claimed.sign()
     if json_file != "-":
         show_statements(statements)
 

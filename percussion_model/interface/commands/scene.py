@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -11,6 +11,7 @@ from percussion_model.interface.commands import common
 from percussion_model.interface.commands.blow_map import ready_map, warn_of_outside
 
 if TYPE_CHECKING:
+    from percussion_model.scene.scene import Scene
     from percussion_model.simulation.result import Result
 
 _NEW_TITLE = "A down-the-hole hammer"
@@ -35,16 +36,21 @@ def run(
     figures: Annotated[
         bool, typer.Option(help="With --out, draw figures and write report.html.")
     ] = True,
+    force: common.Force = False,
 ) -> None:
     """Run a scene; print a short table, write results with --out."""
-    from percussion_model.interface.terminal import progress_bar, show_summary
+    from percussion_model.interface import terminal
     from percussion_model.simulation.simulate import simulate
 
     chosen = common.load_scene(scene, solver, cells, settings, accuracy, check)
     common.check_outputs(out, json_file)
+    made_from = _made_from(chosen, duration, settle)
+    made_from |= {"trace": trace, "error_estimate": error_estimate}
+    claimed = None if out is None else common.claim("run", out, None, force, **made_from)
     if chosen.solver_name == "blow-map":
         ready_map(chosen)
-    with progress_bar(chosen.run.duration if duration is None else duration) as progress:
+    end = chosen.run.duration if duration is None else duration
+    with terminal.progress_bar(end) as progress:
         result = simulate(
             chosen,
             duration,
@@ -53,17 +59,27 @@ def run(
             progress=progress,
             on_interrupt="keep",
             error_estimate=error_estimate,
+            stage=progress.stage,
         )
-    interrupted = result.cut_short
-    if out is not None:
-        result.save(out)
-        if figures and not interrupted:
-            _draw(result, out)
-    common.write_json(json_file, result.summary())
+    files: list[Path] = []
+    if claimed is not None:
+        if result.cut_short:  # part of a run does not replace the whole one
+            made_from["until"] = result.duration
+            claimed = common.claim("run", None, out, force, **made_from)
+        files += result.save(claimed.folder)
+        claimed.sign()
+        if figures and not result.cut_short:
+            with terminal.progress("drawing"):
+                files += _draw(result, claimed.folder)
+            claimed.sign()
     if json_file != "-":
-        show_summary(result)
-    if interrupted:
-        common.print_message(result.warnings[-1])
+        terminal.show_summary(result)
+    if result.interrupted:
+        told = (text for text in result.warnings if text.startswith("interrupted"))
+        common.print_message(next(told, "interrupted before its error was known"))
+    common.list_files(files)
+    common.write_json(json_file, result.summary())
+    if result.interrupted:
         raise typer.Exit(common.INTERRUPTED)
 
 
@@ -81,12 +97,17 @@ def settled(
 ) -> None:
     """Run until the blows repeat: rate, period, order and stability of the cycle."""
     from percussion_model.analysis.stationary import settled as run_until_settled
-    from percussion_model.interface.terminal import progress_bar, show_settled
+    from percussion_model.interface.terminal import progress, show_settled
 
     common.check_json(json_file)
     chosen = common.load_scene(scene, solver, cells, settings)
-    with progress_bar(0.0):
-        found = run_until_settled(chosen, tolerance, most_time=most_time)
+    with progress("preparing") as report:
+        found = run_until_settled(
+            chosen,
+            tolerance,
+            progress=lambda count: report(f"{count} blows", None),
+            most_time=most_time,
+        )
     common.write_json(json_file, found.summary())
     if json_file != "-":
         show_settled(found)
@@ -103,13 +124,13 @@ def explain(
 ) -> None:
     """Tell what a scene computes, how, and what the run will cost; makes no blow map."""
     from percussion_model.analysis.cost import explained, forecast
-    from percussion_model.interface.terminal import progress_bar, show_explanation
+    from percussion_model.interface.terminal import progress, show_explanation
 
     chosen = common.load_scene(scene, solver, cells, settings, accuracy, check)
     common.check_json(json_file)
     if chosen.solver_name == "blow-map":
         warn_of_outside(chosen)
-    with progress_bar(0.0):
+    with progress("trying the first blows"):
         found = forecast(chosen)
     common.write_json(json_file, explained(chosen, found))
     if json_file != "-":
@@ -123,6 +144,7 @@ def plot(
     duration: common.Duration = None,
     settle: common.Settle = None,
     out: common.Out = None,
+    force: common.Force = False,
 ) -> None:
     """Draw the figures of a result, or run a scene and draw them."""
     from percussion_model.interface.terminal import progress_bar
@@ -136,18 +158,27 @@ def plot(
         raise common.refusal(common.needs_plot_extra(error)) from None
     if not source.exists():
         raise common.refusal(f"{source}: there is no such folder or scene file")
-    folder = out or (source if source.is_dir() else Path("out") / source.stem)
-    common.check_outputs(folder, None)
+    claimed = None
     if source.is_dir():
         if duration is not None or settle is not None:
             raise common.refusal(f"{source}: has been run; give its scene file")
+        common.check_outputs(out or source, None)
         result = Result.load(source)
+        if out is not None and out.resolve() != source.resolve():
+            numbers = common.digest(source / "summary.json")
+            claimed = common.claim("plot", out, None, force, result=numbers)
     else:
         scene = Scene.from_toml(source)
+        common.tell_of_compiling(scene.solver_name)
+        made_from = _made_from(scene, duration, settle)
+        # its figures belong to the result of that run, and may stand beside it
+        claimed = common.claim("run", out, Path("out") / source.stem, force, **made_from)
         with progress_bar(scene.run.duration if duration is None else duration) as progress:
-            result = simulate(scene, duration, settle, progress=progress)
-    for path in figures(result, folder):
+            result = simulate(scene, duration, settle, progress=progress, stage=progress.stage)
+    for path in figures(result, (out or source) if claimed is None else claimed.folder):
         typer.echo(str(path))
+    if claimed is not None:
+        claimed.sign()
 
 
 def new(
@@ -157,18 +188,29 @@ def new(
     """Write a commented scene to start from: the reference hammer."""
     from percussion_model.scene.scene import Scene
 
-    if file.exists() and not force:
-        raise common.refusal(f"{file}: exists already; --force overwrites it")
+    common.refuse_existing(file, force)
     Scene(title=_NEW_TITLE).to_toml(file, comments=True)
     typer.echo(f"wrote {file}")
 
 
-def _draw(result: Result, folder: Path) -> None:
+def _made_from(scene: Scene, duration: float | None, settle: float | None) -> dict[str, Any]:
+    """What the result of a run follows from."""
+    return {
+        "scene": scene,
+        "duration": scene.run.duration if duration is None else float(duration),
+        "settle": scene.run.settle if settle is None else float(settle),
+    }
+
+
+def _draw(result: Result, folder: Path) -> list[Path]:
     """Write figures and report; the results are safe already."""
+    files: list[Path] = []
     with common.if_drawable():
         from percussion_model.interface.plotting import figures
         from percussion_model.interface.report import why_not_interactive, write_report
 
         if remark := why_not_interactive():
             common.print_message(remark)
-        write_report(result, folder, figures(result, folder))
+        files += figures(result, folder)
+        files.append(write_report(result, folder, files))
+    return files

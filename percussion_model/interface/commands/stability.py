@@ -33,20 +33,28 @@ def stability(
     ] = None,
     out: common.Out = None,
     json_file: common.JsonFile = None,
+    force: common.Force = False,
 ) -> None:
     """Run the hard cases by every solver: what must hold, and where solvers disagree."""
     from percussion_model.interface.terminal import count_bar, show_stability
-    from percussion_model.verification.hard_cases import run_collection
+    from percussion_model.verification.hard_cases import SOLVERS, run_collection
 
     common.check_outputs(out, json_file)
     names = [name.strip() for name in solvers.split(",")]
+    common.tell_of_compiling(*(name for name in names if name in SOLVERS))
+    claimed = None
+    if out is not None:
+        claimed = common.claim(
+            "stability", out, None, force, cases=cases, solvers=names, share=share, refined=refined
+        )
     with count_bar("runs of hard cases") as progress:
         found = run_collection(cases or None, names, share, refined, workers, progress)
     common.write_json(json_file, found.to_dict())
     if json_file != "-":
         show_stability(found)
-    if out is not None:
-        _write(found, out)
+    if claimed is not None:
+        _write(found, claimed.folder)
+        claimed.sign()
     if found.failures():
         raise typer.Exit(FAILED)
 

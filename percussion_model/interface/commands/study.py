@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 # Packages that write tables and grids; checked before hours of work, not after.
 NEEDED = ("pandas", "pyarrow", "xarray", "h5netcdf", "h5py", "threadpoolctl")
 
+# Points have failed; what was found of the others is written.
+FAILED = 1
+
 
 def study(
     scene: common.SceneFile,
@@ -58,7 +61,7 @@ def study(
     """Map the stationary response over parameters: points.parquet and points.nc."""
     from percussion_model.analysis.study import grid, latin_hypercube, read_axis
     from percussion_model.analysis.study import study as run_study
-    from percussion_model.interface.terminal import count_bar, show_study
+    from percussion_model.interface.terminal import count_bar, progress, show_study
 
     missing = [name for name in NEEDED if importlib.util.find_spec(name) is None]
     if missing:
@@ -80,7 +83,7 @@ def study(
     common.check_outputs(out, None)
     chosen = common.load_scene(scene, solver, cells, settings)
     try:
-        with count_bar("points") as progress:
+        with count_bar("points") as report_count:
             found = run_study(
                 chosen,
                 points,
@@ -89,12 +92,19 @@ def study(
                 scatter=scatter,
                 processes=processes,
                 cluster=cluster,
-                progress=progress,
+                progress=report_count,
             )
     except KeyboardInterrupt:
         words = f"interrupted; finished points are kept in {out}, the same command continues"
         raise typer.Exit(common.print_message(words, common.INTERRUPTED)) from None
-    show_study(found, [*found.save(out), *(_report(found, out) if report else ())])
+    files = found.save(out)
+    if report:
+        with progress("report"):
+            files += _report(found, out)
+    show_study(found)
+    common.list_files(files)
+    if any(found.failures):
+        raise typer.Exit(FAILED)
 
 
 def _report(found: Study, folder: Path) -> list[Path]:

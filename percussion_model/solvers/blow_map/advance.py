@@ -172,7 +172,7 @@ def process_event(par, s, table, found, blows, events):
         v = s.v_p
         s.x_r += s.penetration
         s.p = 0.0
-        start_blow(s, blows, t, v, s.x_r, bit_load(par, s), par.mass_p)
+        start_blow(par, s, blows, t, v, s.x_r, bit_load(par, s))
         apply_blow(par, s, found, v)
         turn_drive(s, events, t, 0.0)
         close_gap(s, events, t, v)

@@ -42,6 +42,19 @@ def bit_at(s, t):
     return s.penetration, 0.0
 
 
+@kernel
+def hole_depth_at(s, t):
+    """Depth of the hole at `t`: as far as the bit has come, at most where it will rest [m].
+
+    The table does not have how far the rock is crushed within a blow.
+    """
+    deepest = max(bit_at(s, t)[0], 0.0)
+    for k in range(PIECES):
+        if s.t_blow + PATH_TIMES[k] <= t:
+            deepest = max(deepest, s.path[k])
+    return s.x_r - s.hole_start + min(deepest, s.penetration)
+
+
 @inlined
 def first_root(c, b, a, length):
     """First time in [0, length] at which c + b t + a t^2/2 is not above zero, or -1.
@@ -208,6 +221,7 @@ def read(pars, states, t, readings):
     row.gap = -u_r
     row.relative_displacement = u_r
     row.penetration = static / s.next_k_r
+    row.hole_depth = hole_depth_at(s, t)
     row.bit_force = static
     row.contact_force = 0.0
     row.drive_force = push

@@ -7,7 +7,7 @@ import io
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 from zipfile import ZipFile
 
@@ -60,8 +60,8 @@ def fixed_values(scene: Scene) -> dict[str, Any]:
     found = {key: scene[key] for key in FIXED}
     for bar in ("piston", "bit"):
         for k in range(len(scene[f"{bar}.sections"])):
-            for field in _SECTION:
-                key = f"{bar}.sections.{k}.{field}"
+            for name in _SECTION:
+                key = f"{bar}.sections.{k}.{name}"
                 found[key] = scene[key]
     return found
 
@@ -179,9 +179,9 @@ class BlowTable:
         The same.
     """
 
-    nodes: Nodes
-    values: np.ndarray
-    fixed: dict[str, Any]
+    nodes: Nodes = field(repr=False)
+    values: np.ndarray = field(repr=False)
+    fixed: dict[str, Any] = field(repr=False)
     cells: dict[str, int]
     wave_speed_error: float
 

@@ -65,7 +65,7 @@ def impact(par, s, blows, events):
     """The gap closes: an impact (docs/model.md, eq. 22), or the piston stays on the bit."""
     note_standstill_force(par, s)
     if starts_blow(par, s, s.time):
-        start_blow(s, blows, s.time, s.v_p, s.x_r + s.p, s.ss_force, par.mass_p)
+        start_blow(par, s, blows, s.time, s.v_p, s.x_r + s.p, s.ss_force)
         s.b_peak_contact = math.nan  # an impact of rigid bodies has an impulse, no force
         s.ss_force = math.nan
     s.gap = 0.0

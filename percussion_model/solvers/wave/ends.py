@@ -107,7 +107,7 @@ def record_contact(par, s, wb, cb, opened, t_close, approach, peak, time, tau, b
             speed = s.v_p + piston_acceleration(par, drive_force(par, s)) * t_close
             impulse = s.i_bit + s.gamma * s.k_r * (s.p - s.p_u) * t_close
             force = standstill_force(s, closure, impulse)
-            start_blow(s, blows, closure, speed, here, force, par.mass_p)
+            start_blow(par, s, blows, closure, speed, here, force)
         close_gap(s, events, closure, approach)
     if s.closed == 1:
         s.b_peak_contact = max(s.b_peak_contact, peak)

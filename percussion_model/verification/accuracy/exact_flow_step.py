@@ -275,7 +275,7 @@ def change_contact(par, s, f, x, blows, events):
         open_gap(s, events, s.time, approach)
         return
     if starts_blow(par, s, s.time):
-        start_blow(s, blows, s.time, s.v_p, u_b, math.nan, par.mass_p)
+        start_blow(par, s, blows, s.time, s.v_p, u_b, math.nan)
     close_gap(s, events, s.time, approach)
     s.closed = 1
     impulse = approach / par.soft

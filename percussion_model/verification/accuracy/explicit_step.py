@@ -340,7 +340,7 @@ def begin_contact(par, s, runs, w, v, time, share, approach, blows, events):
     _, u_b = read_means(par, s, runs, w, v)
     s.v_p += (0.5 + share) * par.dt * piston_acceleration(par, drive_force(par, s))
     if starts_blow(par, s, time):
-        start_blow(s, blows, time, s.v_p, u_b + share * par.dt * s.v_b, math.nan, par.mass_p)
+        start_blow(par, s, blows, time, s.v_p, u_b + share * par.dt * s.v_b, math.nan)
     s.closed = 1
     s.alert = 1
     s.look_in = 0

@@ -16,6 +16,7 @@ from percussion_model.physics.records import READING
 from percussion_model.scene.bars import AREA, LENGTH, bar_length, section_mass
 from percussion_model.scene.numbers import section_numbers
 from percussion_model.scene.scene import Scene, SceneError
+from percussion_model.simulation.rate import rate_of_blows, ratio_of_sums
 from percussion_model.simulation.simulate import Simulation, Snapshot
 from percussion_model.solvers.base import Solver
 
@@ -23,8 +24,6 @@ RATE = "rate_of_penetration"
 HISTORY = "bit_force_history"
 CONTACT_HISTORY, STRESS_HISTORY = "contact_force_history", "stress_history"
 HISTORIES = (HISTORY, CONTACT_HISTORY, STRESS_HISTORY)
-# Parts of an aperiodic run whose means are taken as independent.
-BATCHES = 16
 PERIODIC, APERIODIC, DROP = "periodic", "aperiodic", "drop"
 # From a start near the periodic motion the reference comes closer by a factor of 4 a blow.
 SETTLING_BLOWS, COUNTED_BLOWS = 7, 2
@@ -111,30 +110,6 @@ def relative_error(
     if found is None or not wanted:
         return float("nan")
     return abs(found / wanted - 1.0)
-
-
-def batch_means(values: np.ndarray, weights: np.ndarray | None = None) -> tuple[float, float]:
-    """Mean of rows, or ratio of two sums, and its standard error from batches.
-
-    Blows of an aperiodic motion are not independent: where the bit leaps far, the next
-    blow takes back most of it. Means over whole stretches of the run are nearly so.
-
-    Parameters
-    ----------
-    values, weights : ndarray, shape (n,)
-        The mean is sum(values) / sum(weights), or / n.
-
-    Returns
-    -------
-    mean, standard_error : float
-    """
-    below = np.ones(len(values)) if weights is None else weights
-    mean = float(np.sum(values) / np.sum(below))
-    parts = np.array_split(np.arange(len(values)), min(BATCHES, len(values)))
-    means = np.array([np.sum(values[part]) / np.sum(below[part]) for part in parts])
-    if len(means) < 2:
-        return mean, float("nan")
-    return mean, float(np.std(means, ddof=1) / np.sqrt(len(means)))
 
 
 @dataclass(frozen=True)
@@ -275,7 +250,7 @@ class Run:
         if len(blows) < COUNTED_BLOWS + 1:
             raise SceneError(f"accuracy: only {len(blows)} blows in {problem.duration:g} s")
         values = {
-            RATE: float(rows["penetration"].sum() / rows["period"].sum()),
+            RATE: ratio_of_sums(rows["hole_advance"], rows["period"])[0],
             "blow_period": float(rows["period"].mean()),
             **{name: float(rows[name].mean()) for name in (*_MEANS, "peak_bit_force")},
         }
@@ -311,10 +286,10 @@ class Run:
         rows = rows[rows["time"] >= scene.run.settle]
         if len(rows) < LEAST_BLOWS:
             raise SceneError(f"accuracy: only {len(rows)} blows in {self.problem.duration:g} s")
-        found = {RATE: batch_means(rows["penetration"], rows["period"])}
+        found = {RATE: rate_of_blows(rows)}
         for name, column in (("blow_period", "period"), *((one, one) for one in _MEANS)):
             known = rows[column][np.isfinite(rows[column])]
-            found[name] = batch_means(known)
+            found[name] = ratio_of_sums(known, np.ones(len(known)))
         return Answer(
             {name: mean for name, (mean, _) in found.items()},
             {name: error for name, (_, error) in found.items()},

@@ -130,9 +130,9 @@ class Reference:
 
     title: str
     kind: str
-    bars: dict[str, Bar]
-    histories: dict[str, np.ndarray]
-    made: dict[str, Any] = field(default_factory=dict)
+    bars: dict[str, Bar] = field(repr=False)
+    histories: dict[str, np.ndarray] = field(repr=False)
+    made: dict[str, Any] = field(default_factory=dict, repr=False)
 
     @property
     def values(self) -> dict[str, float]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from typing import Any
 
 from percussion_model.scene.scene import Scene
@@ -105,10 +105,10 @@ class Study:
     kind: str
     duration: float
     period: float
-    reference: Reference
-    points: list[Point]
-    compilation: dict[str, float]
-    machine: dict[str, Any]
+    reference: Reference = field(repr=False)
+    points: list[Point] = field(repr=False)
+    compilation: dict[str, float] = field(repr=False)
+    machine: dict[str, Any] = field(repr=False)
 
     @property
     def quantities(self) -> tuple[str, ...]:
@@ -254,7 +254,7 @@ def study(
     scene: Scene,
     full: bool = False,
     methods: Sequence[str] | None = None,
-    progress: Callable[[float, str], None] = lambda share, text: None,
+    progress: Callable[[str, float], None] = lambda text, share: None,
 ) -> Study:
     """Measure error against time on one scene.
 
@@ -266,7 +266,7 @@ def study(
     methods : sequence of str, optional
         Names of `LADDERS`, or "scipy" for all general integrators.
     progress : callable
-        Called with the share of the work that is done, and what comes next.
+        Called with what comes next, and the share of the work that is done.
 
     Raises
     ------
@@ -274,25 +274,25 @@ def study(
         If the scene has nothing to refine, or a method is not known.
     """
     names = chosen_ladders(methods)
-    progress(0.0, "pilot run (the first compiles, about a minute)")
+    progress("pilot run", 0.0)
     # make each solver once: compile, or load what was compiled before
     compilation = {
         name: Simulation(scene.computed_by(name)).setup_time for name in ("wave", "fem", "rigid")
     }
     problem = pose(scene)
-    reference = find_reference(problem, scene, lambda text: progress(0.02, text))
+    reference = find_reference(problem, scene, lambda text: progress(text, 0.02))
     rungs = [rung for rung in ladders(problem, full) if rung.ladder in names]
     points: list[Point] = []
     runs: list[tuple[int, Run]] = []
     for k, rung in enumerate(rungs):
-        progress(0.05 + 0.65 * k / len(rungs), f"{LADDERS[rung.ladder].title}, {rung.label}")
+        progress(f"{LADDERS[rung.ladder].title}, {rung.label}", 0.05 + 0.65 * k / len(rungs))
         point, run = _measured(rung, problem, reference, full)
         points.append(point)
         if isinstance(run, Run) and not point.note:
             runs.append((k, run))
     times = interleaved(
         [run.cost for _, run in runs],
-        lambda place: progress(0.7 + 0.3 * place / max(len(runs), 1), "times, turn by turn"),
+        lambda place: progress("times, turn by turn", 0.7 + 0.3 * place / max(len(runs), 1)),
     )
     for (k, run), taken in zip(runs, times, strict=True):
         points[k] = replace(

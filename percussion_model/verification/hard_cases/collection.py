@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from percussion_model.analysis.study.workers import on_this_machine
@@ -40,7 +40,7 @@ class Collection:
         Share of each case's duration that was run.
     """
 
-    rows: list[dict[str, Any]]
+    rows: list[dict[str, Any]] = field(repr=False)
     share: float = 1.0
 
     def failures(self) -> list[str]:

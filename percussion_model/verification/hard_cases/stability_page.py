@@ -24,7 +24,7 @@ GROUPS = {
 _INTRODUCTION = """# Stability
 
 What the solvers make of the nastiest scenes that this model has. This page is written by
-`percussion stability --out docs`; the cases are stored in
+`percussion stability --out out/stability`; the cases are stored in
 `percussion_model/verification/hard_cases/*.toml`, each with what makes it hard and what must hold.
 How guards act and what they warn of is told in [numerics.md](numerics.md), section 12.
 

@@ -1,0 +1,86 @@
+"""Tables that keep to the width of the terminal without cutting a number or a name."""
+
+from __future__ import annotations
+
+from copy import copy
+from typing import NamedTuple
+
+from rich.console import Console
+from rich.table import Column, Table
+
+# More characters than any table has.
+ENDLESS = 10_000
+
+
+class Size(NamedTuple):
+    """Characters that a column needs: with lines broken between words, and in whole lines."""
+
+    least: int
+    most: int
+
+
+def print_table(table: Table, console: Console | None = None, keys: int = 1) -> None:
+    """Print a table; one that is too wide in blocks of columns, one below the other.
+
+    Parameters
+    ----------
+    table : Table
+        Columns with `no_wrap` hold numbers and names, which stay whole; the others hold
+        words, between which lines may be broken.
+    console : Console, optional
+    keys : int
+        So many columns at the left name a row: each block begins with them.
+    """
+    console = console or Console()
+    wide = Console(width=ENDLESS)
+    sizes = [_size(column, wide) for column in table.columns]
+    for places in _blocks(table, sizes, console.width, keys):
+        console.print(_fitted(table, sizes, places, console.width))
+
+
+def _size(column: Column, wide: Console) -> Size:
+    found = [wide.measure(cell) for cell in (column.header, *column.cells)]
+    most = max(one.maximum for one in found)
+    return Size(most if column.no_wrap else max(one.minimum for one in found), most)
+
+
+def _blocks(table: Table, sizes: list[Size], width: int, keys: int) -> list[list[int]]:
+    """Places of the columns of each block: as many as the width allows, but at least one."""
+    names = list(range(keys))
+    blocks = [names]
+    for place in range(keys, len(sizes)):
+        wider = [*blocks[-1], place]
+        if len(wider) > keys + 1 and _room(table, sizes, wider, width) < 0:
+            blocks.append([*names, place])
+        else:
+            blocks[-1] = wider
+    return blocks
+
+
+def _room(table: Table, sizes: list[Size], places: list[int], width: int) -> int:
+    """Characters that are left where these columns are as narrow as they can be."""
+    narrow = _part(table, places, [sizes[place].least for place in places])
+    return width - Console(width=ENDLESS).measure(narrow).maximum
+
+
+def _part(table: Table, places: list[int], widths: list[int]) -> Table:
+    """The table with these columns alone; its title stands above the first block."""
+    part = copy(table)
+    part.columns = []
+    for place, width in zip(places, widths, strict=True):
+        column = copy(table.columns[place])
+        column.width = width
+        part.columns.append(column)
+    if places != list(range(len(places))):
+        part.title = None
+    return part
+
+
+def _fitted(table: Table, sizes: list[Size], places: list[int], width: int) -> Table:
+    """Give what room there is to the columns of words, by what each of them lacks."""
+    chosen = [sizes[place] for place in places]
+    lacking = sum(size.most - size.least for size in chosen)
+    room = min(max(_room(table, sizes, places, width), 0), lacking)
+    share = room / lacking if lacking else 0.0
+    widths = [size.least + int(share * (size.most - size.least)) for size in chosen]
+    return _part(table, places, widths)

@@ -1,0 +1,141 @@
+"""Origin of what a folder holds, so that no result replaces that of another scene or run.
+
+A file in each result folder says which command made it and from what. The same command from
+the same replaces its own files. Anything else is refused, or goes to a numbered folder beside
+it, unless it is forced; then what the other result left is removed.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from percussion_model.simulation.files import ResultError, check_writable, staged_text, to_json
+
+ORIGIN = "made_by.json"
+# Differences that a message shows.
+SHOWN = 2
+
+
+class Claim:
+    """A folder that a result may be written to.
+
+    Parameters
+    ----------
+    folder : Path
+        Wanted.
+    origin : mapping
+        Command and what its result follows from, tables in it by their dotted keys.
+    force : bool
+        Replace what is there, whatever it is.
+    numbered : bool
+        Take a numbered folder beside it, rather than refuse, where it holds something else.
+
+    Attributes
+    ----------
+    folder : Path
+        To be written to.
+    moved : str
+        Why that is not the one that was wanted; empty where it is.
+
+    Raises
+    ------
+    ResultError
+        If the folder holds something else, or cannot be written.
+    """
+
+    def __init__(
+        self, folder: Path, origin: Mapping[str, Any], force: bool = False, numbered: bool = False
+    ) -> None:
+        self.origin = flat(origin)
+        self.folder, self.moved = folder, ""
+        other = _other_than(folder, self.origin)
+        if other and not force:
+            if not numbered:
+                raise ResultError(f"{folder} {other}: --force replaces it, another --out keeps it")
+            self.folder = _free_beside(folder, self.origin)
+            self.moved = f"{folder} {other}: this one goes to {self.folder} (--force replaces it)"
+        check_writable(self.folder)
+        self._left = _read(self.folder).get("files", []) if self.folder.is_dir() else []
+        self._replaces = bool(other and force)
+        self._before = _times(self.folder)
+
+    def sign(self) -> None:
+        """Say in the folder where its files are from; call this when they are written."""
+        now = _times(self.folder)
+        made = [name for name, time in now.items() if self._before.get(name) != time]
+        if self._replaces:
+            for name in set(self._left) - set(made):
+                (self.folder / name).unlink(missing_ok=True)
+        else:
+            made += [name for name in self._left if name in now]
+        tree = {"made_by": self.origin, "files": sorted(set(made) - {ORIGIN})}
+        staged_text(self.folder / ORIGIN, to_json(tree) + "\n")
+
+
+def flat(tree: Mapping[str, Any], above: str = "") -> dict[str, Any]:
+    """Entries of a tree by their dotted keys; what is None is left out."""
+    found: dict[str, Any] = {}
+    for key, value in tree.items():
+        name = f"{above}{key}"
+        if isinstance(value, Mapping):
+            found |= flat(value, f"{name}.")
+        elif isinstance(value, (list, tuple)):
+            found |= flat({str(k): one for k, one in enumerate(value)}, f"{name}.")
+        elif value is not None:
+            found[name] = value if isinstance(value, (str, bool, int)) else repr(value)
+    return found
+
+
+def _other_than(folder: Path, origin: Mapping[str, Any]) -> str:
+    """What else a folder holds, as a clause; nothing where it is free or has this origin."""
+    if not folder.is_dir():
+        return ""
+    files = sorted(one.name for one in folder.iterdir() if one.is_file() and one.name[0] != ".")
+    if ORIGIN not in files:
+        more = ", ..." if len(files) > SHOWN else ""
+        return f"holds files of unknown origin ({', '.join(files[:SHOWN])}{more})" if files else ""
+    found = _read(folder).get("made_by", {})
+    if found == origin:
+        return ""
+    if found.get("command") != origin.get("command"):
+        return f"holds the result of `percussion {found.get('command')}`"
+    keys = sorted(key for key in found.keys() | origin.keys() if found.get(key) != origin.get(key))
+    shown = [
+        f"{key.removeprefix('scene.')} {found.get(key, 'not set')}, "
+        f"now {origin.get(key, 'not set')}"
+        for key in keys
+    ]
+    more = f", and {len(keys) - SHOWN} more" if len(keys) > SHOWN else ""
+    return f"holds another result ({'; '.join(shown[:SHOWN])}{more})"
+
+
+def _free_beside(folder: Path, origin: Mapping[str, Any]) -> Path:
+    """The first numbered folder that is free or has this origin."""
+    number = 2
+    while _other_than(place := folder.with_name(f"{folder.name}-{number}"), origin):
+        number += 1
+    return place
+
+
+def _read(folder: Path) -> dict[str, Any]:
+    """What a folder says of its files; nothing where it does not."""
+    try:
+        found = json.loads((folder / ORIGIN).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
+def _times(folder: Path) -> dict[str, int]:
+    """Times at which the files of a folder were written, by their path in it."""
+    if not folder.is_dir():
+        return {}
+    return {
+        str(one.relative_to(folder)): one.stat().st_mtime_ns
+        for pattern in ("*", "*/*")
+        for one in folder.glob(pattern)
+        if one.is_file()
+    }

@@ -1,0 +1,77 @@
+"""Rate of penetration of some blows and its standard error.
+
+The evidence for the estimate is in docs/requested_accuracy.md.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+# Fewer whole blows than this tell no rate.
+LEAST_BLOWS = 3
+# A rate that is known no better than this, relative to it, deserves a warning.
+LARGE_ERROR = 1e-2
+# Fewer than this do not tell how they depend on each other: they count as independent.
+FEWEST_DEPENDENT = 20
+# Stretches that tell how scatter grows have this share of all blows. Longer ones are too few,
+# shorter ones do not show what blows take back from each other.
+STRETCH = 0.25
+
+
+def rate_of_blows(blows: np.ndarray) -> tuple[float, float]:
+    """Advance of the hole by time over successive blows, and its standard error [m/s].
+
+    Parameters
+    ----------
+    blows : ndarray of BLOW
+        One after the other.
+
+    Returns
+    -------
+    rate, standard_error : float
+        NaN for fewer than `LEAST_BLOWS`.
+    """
+    if len(blows) < LEAST_BLOWS:
+        return math.nan, math.nan
+    return ratio_of_sums(blows["hole_advance"], blows["period"])
+
+
+def ratio_of_sums(values: np.ndarray, weights: np.ndarray) -> tuple[float, float]:
+    """Ratio of the sums of two series of a motion, and its standard error.
+
+    The sum of (value - ratio * weight) over n rows scatters with the variance a n + b: a is
+    that of a random walk, b is what later rows take back. Both follow from stretches of one
+    row and of a quarter of all.
+
+    Parameters
+    ----------
+    values, weights : ndarray, shape (n,)
+        Successive rows, which may depend on each other.
+
+    Returns
+    -------
+    ratio, standard_error : float
+        The error is NaN for fewer than `LEAST_BLOWS` rows.
+    """
+    count, total = len(values), float(np.sum(weights))
+    ratio = float(np.sum(values)) / total
+    if count < LEAST_BLOWS:
+        return ratio, math.nan
+    sums = np.concatenate([[0.0], np.cumsum(values - ratio * weights)])
+
+    def scattered(length: int) -> tuple[float, float]:
+        """Mean square over stretches, and what it would be of a random walk with a = 1."""
+        off = sums[length:] - sums[:-length]
+        return float(np.mean(off * off)), length * (1.0 - length / count)
+
+    short, walk = scattered(1)
+    if count < FEWEST_DEPENDENT:
+        return ratio, math.sqrt(short / walk * count) / total
+    long, longer_walk = scattered(int(STRETCH * count))
+    a = max((long - short) / (longer_walk - walk), 0.0)
+    b = short - a * walk
+    if b < 0.0:
+        a, b = long / longer_walk, 0.0
+    return ratio, math.sqrt(a * count + b) / total

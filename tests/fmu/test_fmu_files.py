@@ -1,0 +1,106 @@
+"""An FMU does not replace that of another scene; who builds it again finds the same bytes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import fmu_src.__main__ as command
+import fmu_src.compare as comparison
+from fmu_src.hammer.build import hammer_name
+from fmu_src.system.archive import SYSTEMS, build_fmus, read_plan
+from percussion_model.scene.scene import Scene, SceneError
+
+RIGID = command.ROOT / "scenarios" / "rigid.toml"
+
+
+@pytest.fixture
+def dist(tmp_path, monkeypatch):
+    """The folder of FMUs, for all that build into it."""
+    monkeypatch.setattr(command, "DIST", tmp_path)
+    monkeypatch.setattr(comparison, "DEFAULT", tmp_path / "PercussiveHammer.fmu")
+    return tmp_path
+
+
+def build(*words):
+    return command.main(["--no-reference", *map(str, words)])
+
+
+def test_all_commands_make_the_same_bytes(dist, monkeypatch, capsys):
+    """`build.py fmu`, `build.py system` and `build.py run`."""
+    assert build() == 0
+    first = (dist / "PercussiveHammer.fmu").read_bytes()
+    assert capsys.readouterr().out.strip().endswith("}: written")
+    build_fmus(read_plan(SYSTEMS / "feed_control.toml"), dist)
+    assert (dist / "PercussiveHammer.fmu").read_bytes() == first
+
+    def only_built(scene, path):
+        comparison.build_hammer(scene, path)
+        return {}
+
+    monkeypatch.setattr(comparison, "run_both", only_built)
+    monkeypatch.setattr(comparison, "describe", lambda both, settle: "")
+    assert comparison.main() == 0
+    assert "PercussiveHammer.fmu: unchanged\n" in capsys.readouterr().out
+    assert (dist / "PercussiveHammer.fmu").read_bytes() == first
+
+
+def test_another_scene_has_a_file_of_its_own(dist, capsys):
+    assert build() == 0
+    assert build("--scene", RIGID) == 0
+    assert sorted(path.name for path in dist.iterdir()) == [
+        "PercussiveHammer.fmu", "RigidHammer.fmu",
+    ]  # fmt: skip
+    plan = read_plan(SYSTEMS / "feed_control.toml", hammer="scenarios/rigid.toml")
+    before = (dist / "RigidHammer.fmu").read_bytes()
+    build_fmus(plan, dist)
+    assert (dist / "RigidHammer.fmu").read_bytes() == before
+
+
+def test_the_fmu_of_another_scene_is_not_replaced(dist, tmp_path, capsys):
+    path = tmp_path / "PercussiveHammer.fmu"
+    assert build("--scene", RIGID, "-o", path) == 0
+    before = path.read_bytes()
+    assert build() == 1
+    said = capsys.readouterr().err
+    assert "PercussiveHammer.fmu: holds another FMU than that of this scene" in said
+    assert "--force" in said
+    assert comparison.main() == 1
+    with pytest.raises(SceneError, match="holds another FMU"):
+        build_fmus(read_plan(SYSTEMS / "feed_control.toml"), dist)
+    assert path.read_bytes() == before
+    assert build("--force") == 0
+    assert capsys.readouterr().out.strip().endswith("}: replaced")
+    assert path.read_bytes() != before
+
+
+def test_a_file_that_is_no_fmu_is_not_replaced(dist, tmp_path):
+    (tmp_path / "PercussiveHammer.fmu").write_text("mine")
+    assert build() == 1
+    assert (tmp_path / "PercussiveHammer.fmu").read_text() == "mine"
+
+
+@pytest.mark.parametrize(
+    ("scene", "name"),
+    [
+        ("reference.toml", "PercussiveHammer.fmu"),
+        ("drop_test.toml", "DropTestHammer.fmu"),
+        ("my scene-2.toml", "MyScene2Hammer.fmu"),
+        ("2kN.toml", "Scene2KnHammer.fmu"),
+    ],
+)
+def test_names_are_identifiers(scene, name):
+    assert hammer_name(Path(scene)) == name
+    assert name.removesuffix(".fmu").isidentifier()
+
+
+def test_a_table_makes_another_fmu(tmp_path):
+    """With and without a blow map are two, though the scene is one."""
+    from fmu_src.hammer.build import build_hammer, refuse_other
+
+    path = tmp_path / "A.fmu"
+    build_hammer(Scene(), path)
+    refuse_other(path, Scene(), with_map=False)
+    with pytest.raises(SceneError, match="holds another FMU"):
+        refuse_other(path, Scene(), with_map=True)

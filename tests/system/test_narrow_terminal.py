@@ -1,0 +1,55 @@
+"""What `couple` and `bench-controller` print fits 80 columns, and says on a pipe that they run."""
+
+from __future__ import annotations
+
+import time
+from types import SimpleNamespace
+
+import pytest
+from narrow import Printed, faults
+
+from percussion_model.coupling.master import Coupling
+from percussion_model.interface import progress
+from percussion_model.interface.cli import INTERRUPTED, _guarded, app
+
+COMMANDS = {
+    "couple": ["--duration", "0.2", "--no-figures", "--out", "out"],
+    "bench-controller": ["--trial", "rod", "--out", "out"],
+}
+
+
+def called(name, archive):
+    system = [str(archive)] if name == "couple" else ["--system", str(archive)]
+    return _guarded(lambda: app([name, *system, *COMMANDS[name]], standalone_mode=False))
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_commands_fit(name, feed_control, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    printed = Printed(monkeypatch)
+    called(name, feed_control)
+    said = capsys.readouterr()
+    assert "depth" in said.out + said.err
+    assert faults(said.out) == []
+    assert faults(said.err) == []
+    assert printed.broken(said.out + said.err) == set()
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_they_say_on_a_pipe_that_they_run(name, feed_control, tmp_path, monkeypatch):
+    """Runs of the system do not come back before two lines have been printed."""
+    monkeypatch.chdir(tmp_path)
+    lines = []
+    pipe = SimpleNamespace(write=lines.append, flush=lambda: None)
+    monkeypatch.setattr(progress, "sys", SimpleNamespace(stderr=pipe))
+    monkeypatch.setattr(progress, "EVERY", 5e-3)
+
+    def run(*words, **options):
+        end = time.monotonic() + 20.0
+        while sum(" s: " in line for line in lines) < 2 and time.monotonic() < end:
+            time.sleep(1e-3)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Coupling, "run", run)
+    assert called(name, feed_control) == INTERRUPTED
+    assert sum(" s: " in line for line in lines) >= 2

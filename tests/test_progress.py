@@ -1,0 +1,236 @@
+"""Progress of long commands: lines on a pipe, runs of a request by name, Ctrl-C in one of them."""
+
+from __future__ import annotations
+
+import importlib
+import io
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from fitting_data import noisy_curve
+
+from percussion_model import Scene, simulate
+from percussion_model.interface import progress
+from percussion_model.interface.cli import BAD_INPUT, INTERRUPTED, _guarded, app
+from percussion_model.interface.terminal import progress_bar
+from percussion_model.simulation.accuracy_control import planned_cells
+from percussion_model.solvers.base import Solver
+
+ROOT = Path(__file__).parents[1]
+BETWEEN_LINES = progress.EVERY  # as it is where no test has changed it
+RIGID = str(ROOT / "scenarios" / "rigid.toml")
+REFERENCE = str(ROOT / "scenarios" / "reference.toml")
+ASKED = Scene().replace(**{"solver.accuracy": 3e-2, "run.check": True})
+# Far longer than two lines take, on any machine [s].
+PATIENCE = 20.0
+
+
+class Heard(io.StringIO):
+    """A pipe in place of stderr."""
+
+    def wait_for(self, count: int) -> None:
+        """Let time pass until there are so many lines of progress."""
+        end = time.monotonic() + PATIENCE
+        while self.progress() < count and time.monotonic() < end:
+            time.sleep(1e-3)
+
+    def progress(self) -> int:
+        """Lines that begin with the time that a command has taken."""
+        words = [line.split() for line in self.getvalue().splitlines()]
+        return sum(len(line) > 2 and line[1] == "s:" for line in words)
+
+
+@pytest.fixture
+def heard(monkeypatch):
+    """Progress comes often, to a stderr that is no terminal."""
+    monkeypatch.setattr(progress, "EVERY", 5e-3)
+    pipe = Heard()
+    # pytest puts its own stderr in place when a test begins
+    monkeypatch.setattr(progress, "sys", SimpleNamespace(stderr=pipe))
+    return pipe
+
+
+def slow(heard):
+    """A piece of work that takes as long as two lines of progress, then ends in Ctrl-C."""
+
+    def work(*words, **options):
+        heard.wait_for(2)
+        raise KeyboardInterrupt
+
+    return work
+
+
+def test_lines_come_before_a_reader_takes_a_command_for_dead():
+    assert 0.0 < BETWEEN_LINES <= 5.0
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["run", RIGID],
+        ["run", REFERENCE, "--accuracy", "1e-3"],
+        ["plot", RIGID, "--out", "out"],
+        ["settled", RIGID],
+        ["explain", RIGID],
+        ["study", RIGID, "--over", "feed.force=1000:5000:3", "--out", "out", "--processes", "1"],
+        ["compare", RIGID, "--solvers", "rigid", "--no-figures"],
+        ["accuracy", REFERENCE, "--no-figures", "--out", "out"],
+        ["effects", RIGID, "--no-figures"],
+        ["paper", "--out", "out", "--processes", "1"],
+        ["stability", "gamma_40", "--workers", "1"],
+        ["blow-map", REFERENCE, "--workers", "1"],
+    ],
+    ids=lambda words: " ".join([words[0], *words[2:3]]),
+)
+def test_every_command_says_on_a_pipe_that_it_runs(arguments, heard, tmp_path, monkeypatch):
+    """Whatever a command does, it makes a solver: which never comes back here."""
+    if arguments[0] in ("paper", "plot", "study"):
+        pytest.importorskip("matplotlib")
+        pytest.importorskip("xarray")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("PERCUSSION_CACHE", str(tmp_path))
+    monkeypatch.setattr(Solver, "__init__", slow(heard))
+    code = _guarded(lambda: app(arguments, standalone_mode=False))
+    assert code == INTERRUPTED, heard.getvalue()
+    assert heard.progress() >= 2
+
+
+def test_a_calibration_says_on_a_pipe_that_it_runs(heard, tmp_path, monkeypatch):
+    """Its work is held up where it reads the curve."""
+    np.savetxt(tmp_path / "slow.csv", np.column_stack(noisy_curve(1)), delimiter=",",
+               header="penetration,force", comments="")  # fmt: skip
+    read = Path.open
+
+    def held(path, *words, **options):
+        if path.name == "slow.csv":
+            heard.wait_for(2)
+        return read(path, *words, **options)
+
+    monkeypatch.setattr(Path, "open", held)
+    words = ["calibrate", str(ROOT / "scenarios" / "drop_test.toml"), "--curve"]
+    code = _guarded(lambda: app([*words, str(tmp_path / "slow.csv")], standalone_mode=False))
+    assert code != BAD_INPUT
+    assert heard.progress() >= 2
+
+
+def test_what_ends_soon_says_nothing(heard, monkeypatch):
+    monkeypatch.setattr(progress, "EVERY", PATIENCE)
+    with progress.lines("short"):
+        pass
+    assert heard.getvalue() == ""
+
+
+def test_a_line_tells_time_share_and_what_is_left():
+    now = iter([0.0, 0.0, 10.0, 12.0, 30.0, 40.0])
+    lines = progress.Lines("preparing", lambda: next(now))
+    assert lines.line() == "  10 s: preparing"
+    lines.begin("run 2")  # at 12 s
+    lines.show("run 2, 3 s of 4 s simulated", 0.75)
+    assert lines.line() == "  30 s: run 2, 3 s of 4 s simulated, 75%, about 6 s left"
+    lines.show("all but done", 0.01)  # too early to tell what is left
+    assert lines.line() == "  40 s: all but done, 1%"
+
+
+def test_what_is_done_within_a_command_is_told_in_its_lines(heard):
+    with progress.lines("outer"):
+        with progress_bar(4.0) as report:
+            report(1.0)
+            count = heard.progress()
+            heard.wait_for(count + 2)
+            report.stage("run 2 of 3 with 40 cells", 2.0)
+            heard.wait_for(count + 4)
+        heard.wait_for(heard.progress() + 2)
+    told = heard.getvalue()
+    assert "1 s of 4 s simulated, 25%" in told
+    assert "run 2 of 3 with 40 cells, 0 s of 2 s simulated, 0%" in told
+    assert told.splitlines()[-1].endswith("outer")
+
+
+# ----------------------------------------------------------------- several runs
+
+
+def test_a_request_names_its_runs():
+    scene = Scene().replace(**{"run.duration": 0.4, "run.settle": 0.1})
+    told, times = [], []
+    simulate(scene, accuracy=3e-2, check=True, progress=times.append,
+             stage=lambda name, end: told.append((name, end, len(times))))  # fmt: skip
+    names = [name for name, *_ in told]
+    assert len(names) >= 2
+    for k, name in enumerate(names, 1):
+        assert name.startswith(f"run {k} of ")
+        assert name.endswith(" cells")
+    assert all(end == 0.4 for _, end, _ in told)
+    places = [place for *_, place in told]  # each run moves the bar
+    assert places == sorted(set(places))
+    assert places[-1] < len(times)
+
+
+def test_the_runs_that_tell_the_error_are_named_and_move_the_bar():
+    scene = Scene().replace(**{"run.duration": 0.6, "run.settle": 0.1})
+    told, times = [], []
+    simulate(scene, progress=times.append, error_estimate=True,
+             stage=lambda name, end: told.append((name, len(times))))  # fmt: skip
+    assert len(told) >= 1
+    assert all(name.startswith("error of the rate, run ") for name, _ in told)
+    assert told[-1][1] < len(times)
+
+
+def interrupt_in(monkeypatch, name_of_run):
+    """Ctrl-C as soon as a run of this name has begun."""
+    module = importlib.import_module("percussion_model.simulation.simulate")
+    work, armed, sent = module.run_in_chunks, [], []
+    longer = module._Stages.longer
+
+    def told(stages, end):
+        if stages.name.startswith(name_of_run):
+            armed.append(stages.name)
+        longer(stages, end)
+
+    def run(simulation, *words):
+        if armed and not sent:
+            sent.append(signal.SIGINT)
+            signal.raise_signal(signal.SIGINT)
+        return work(simulation, *words)
+
+    monkeypatch.setattr(module._Stages, "longer", told)
+    monkeypatch.setattr(module, "run_in_chunks", run)
+
+
+@pytest.mark.parametrize(
+    ("words", "run"),
+    [
+        (["--accuracy", "3e-2", "--check"], f"run {len(planned_cells(ASKED))} of"),
+        ([], "error of the rate"),
+    ],
+    ids=["finer run", "error estimate"],
+)
+def test_ctrl_c_in_another_run_keeps_the_first_and_has_its_code(words, run, monkeypatch, capsys):
+    interrupt_in(monkeypatch, run)
+    call = ["run", REFERENCE, "--duration", "0.6", "--settle", "0.1", *words]
+    code = _guarded(lambda: app(call, standalone_mode=False))
+    said = capsys.readouterr()
+    assert code == INTERRUPTED
+    assert "percussion: interrupted" in said.err
+    assert "Rate of penetration" in said.out
+
+
+def test_a_whole_process_tells_that_it_runs():
+    """A command in a process of its own, whose stderr is a pipe."""
+    script = (
+        "import percussion_model.interface.progress as progress; progress.EVERY = 0.02\n"
+        "from percussion_model.interface.cli import main; main()"
+    )
+    child = subprocess.Popen(
+        [sys.executable, "-c", script, "run", RIGID, "--duration", "1e6"],
+        stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    lines = [child.stderr.readline() for _ in range(3)]
+    child.kill()
+    child.communicate()
+    assert all(" s: " in line for line in lines)

@@ -1,0 +1,157 @@
+"""What a run, a scene and the clone say of themselves: nothing in vain, nothing left out."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import subprocess
+import sys
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import percussion_model
+from percussion_model import Result, Scene, Simulation, compare, settled, simulate
+from percussion_model.analysis.effect_study import EffectsStudy, Trial, Variant
+from percussion_model.analysis.study import Study, grid
+from percussion_model.analysis.study.response import ROW
+from percussion_model.coupling.coupled_run import CoupledRun
+from percussion_model.interface.terminal import show_settled, show_summary
+from percussion_model.verification.hard_cases.collection import Collection
+
+ROOT = Path(__file__).parents[1]
+REFERENCE = Scene.from_toml(ROOT / "scenarios" / "reference.toml")
+RIGID = Scene.from_toml(ROOT / "scenarios" / "rigid.toml")
+DROP = Scene.from_toml(ROOT / "scenarios" / "drop_test.toml")
+
+
+@pytest.fixture(scope="module")
+def drop():
+    return simulate(DROP)
+
+
+def test_a_drop_test_tells_its_depth_and_rebound_in_place_of_dashes(drop, capsys):
+    show_summary(drop)
+    shown = capsys.readouterr().out
+    assert not re.search(r"│\s+-\s+│", shown)
+    for name in ("Depth of the bit's end", "First contact", "rebound velocity", "Stands still"):
+        assert name in shown
+    assert f"{1e3 * drop.fall['depth']:.5g}" in shown
+
+
+@pytest.mark.parametrize("solver", ["wave", "rigid"])
+def test_the_fall_of_a_bit_is_that_of_its_samples(solver):
+    """Rebound: the fastest rise of the bit in a fine trace; contact: where the force begins."""
+    scene = DROP.computed_by(solver, **{"piston.model": "absent"})
+    fall = simulate(scene, trace=1e-6, duration=0.03, settle=0.0)
+    trace, found = fall.trace, fall.fall
+    early = trace["time"] < 2e-3
+    assert found["rebound_velocity"] == pytest.approx(-trace["bit_velocity"][early].min(), rel=1e-3)
+    first = trace["time"][np.argmax(trace["bit_force"] > 0.0)]
+    assert found["first_contact"] == pytest.approx(first, abs=1.1e-6)
+    depth = trace["bit_end_position"][-1] - scene.start.rock_gap
+    assert found["depth"] == pytest.approx(depth, rel=1e-9)
+    assert "rest_time" not in found  # it still bounces
+
+
+def test_a_fall_is_kept_with_a_result(drop, tmp_path):
+    drop.save(tmp_path / "out")
+    again = Result.load(tmp_path / "out")
+    assert again.fall == drop.fall
+    assert again.fall["rest_time"] > again.fall["first_contact"] > 0.0
+    assert simulate(RIGID, 0.5, settle=0.1).fall == {}
+
+
+def test_settled_names_the_time_that_was_simulated_and_the_error_of_its_rate(capsys):
+    found = settled(RIGID)
+    show_settled(found)
+    shown = capsys.readouterr().out
+    assert f"{len(found.blows)} in {found.duration:.4g} s of simulated time" in shown
+    assert re.search(r"Rate of penetration +│ 16\.\d+ ± 0\.0\d+ mm/s", shown)
+
+
+# ------------------------------------------------------------------ in vain
+
+
+def warned(scene):
+    result = simulate(scene, 0.2, settle=0.0, error_estimate=False)
+    return [text for text in result.warnings if "without effect" in text]
+
+
+def test_nobody_is_warned_of_what_a_change_of_solver_leaves_without_effect():
+    for solver in ("rigid", "fem"):
+        scene = REFERENCE.replace(**{"solver.cells": 20}).computed_by(solver)
+        assert "solver.cells" in scene.unused  # which `explain` still tells
+        assert warned(scene) == []
+
+
+def test_what_is_given_for_the_solver_in_vain_is_warned_of():
+    scene = REFERENCE.computed_by("rigid", **{"loss.time": 1e-7})
+    assert warned(scene) == ["given, but without effect in this scene: loss.time"]
+    later = REFERENCE.computed_by("rigid").replace(**{"loss.time": 1e-7})
+    assert warned(later) == warned(scene)
+    before = REFERENCE.replace(**{"drive.external_force": 5.0}).computed_by("rigid")
+    assert warned(before) == ["given, but without effect in this scene: drive.external_force"]
+
+
+# ---------------------------------------------------------- representations
+
+
+def test_public_objects_are_represented_in_a_few_lines(drop):
+    result = simulate(RIGID, 1.0, settle=0.2)
+    points = grid({"feed.force": np.linspace(1e3, 5e3, 300)})
+    trial = Trial(Variant("", "as it is"), result, 1.0, None)
+    simulation = Simulation(RIGID)
+    made = [
+        REFERENCE, DROP, result, drop, compare(RIGID, ["rigid"], 1.0, 0.2), settled(RIGID),
+        simulation.save(), points, Study(RIGID, points, np.zeros(300, ROW), ["oh"] * 300),
+        trial, EffectsStudy(RIGID, trial, [trial] * 12, {"a": "because"}),
+        Collection([{"case": "one", "rate": 1.0}] * 99),
+        CoupledRun({"time": np.zeros(9), "depth": np.zeros(9)}, 1e-3, 9),
+    ]  # fmt: skip
+    for one in made:
+        assert is_dataclass(one)
+        text = repr(one)
+        assert text.startswith(type(one).__name__)
+        assert len(text) < 400, text
+        assert "array" not in text
+    assert {type(one).__name__ for one in made} >= {
+        name for name in percussion_model.__all__
+        if is_dataclass(kind := getattr(percussion_model, name)) and len(fields(kind)) > 0
+    } - {"BitBar", "PistonBar", "Section"}  # fmt: skip
+    assert repr(DROP) == (
+        "Scene('Drop test of the bit', effects.drive='none', piston.model='absent', "
+        "run.duration=0.1, run.settle=0.0, start.bit_velocity=5.25)"
+    )
+
+
+# ---------------------------------------------------------------- the clone
+
+
+def test_files_of_ones_own_are_not_linted():
+    """Names that ruff looks at: all within the folders of the project."""
+    own, ours = ROOT / "notes_of_a_test", ROOT / "tests" / "test_words.py"
+    own.mkdir()
+    try:
+        (own / "mine.py").write_text("import os\n")
+        done = subprocess.run(
+            [sys.executable, "-m", "ruff", "check", "--show-files"],
+            cwd=ROOT, capture_output=True, text=True, check=True,
+        )  # fmt: skip
+    finally:
+        (own / "mine.py").unlink()
+        own.rmdir()
+    files = {Path(line) for line in done.stdout.splitlines()}
+    assert own / "mine.py" not in files
+    assert {ours, ROOT / "build.py", ROOT / "percussion_model" / "__init__.py"} <= files
+
+
+def test_the_communication_step_of_the_readme_is_set_by_an_option_that_sets_it():
+    """fmpy's `--step-size` is of its integrators for model exchange."""
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    (line,) = [line for line in text.splitlines() if "fmpy simulate" in line]
+    words = shlex.split(line)
+    assert "--step-size" not in words
+    assert words[words.index("--output-interval") + 1] == "1e-3"
