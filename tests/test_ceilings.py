@@ -1,5 +1,6 @@
 """Ceilings of memory and work: told before they are met, and when they are."""
 
+import inspect
 import json
 
 import pytest
@@ -8,6 +9,7 @@ from percussion_model import Scene, SceneError, Simulation, SimulationError
 from percussion_model.analysis import stationary
 from percussion_model.analysis.cost import explained, forecast
 from percussion_model.analysis.stationary import settled
+from percussion_model.interface.commands.scene import settled as settled_command
 from percussion_model.simulation import simulate as runs
 from percussion_model.solvers.base import make_solver
 
@@ -69,6 +71,11 @@ def test_settling_is_given_up_at_its_ceiling():
         settled(scene, most_time=1e-9)
     with pytest.raises(SceneError, match="most_time = 0"):
         settled(scene, most_time=0.0)
+
+
+def test_the_command_has_the_same_ceiling():
+    default = inspect.signature(settled_command).parameters["most_time"].default
+    assert default == stationary.MOST_TIME
 
 
 @pytest.mark.parametrize("solver", ["wave", "rigid"])
