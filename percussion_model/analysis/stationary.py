@@ -26,7 +26,7 @@ FEWEST_SCATTERED, NEXT_CHECK = 100, 1.25
 MOST_BLOWS = 400
 # Processor time after which a run that has not settled is given up [s]. It is looked at after
 # so many steps of a cell, or so much simulated time where there are no cells [s].
-MOST_TIME, CELL_STEPS, PIECE = 300.0, 4e6, 1.0
+MOST_TIME, CELL_STEPS, PIECE = 300.0, 1e7, 1.0
 # Longest cycle that is looked for [blows].
 MOST_BLOWS_A_CYCLE = 8
 # Two changes that fall alike take so many blows: looking earlier is in vain.
