@@ -1,0 +1,523 @@
+"""The rock from all measurements together: estimates, profile-likelihood intervals, rivals."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from percussion_model.analysis.fitting.curve import first_sight
+from percussion_model.analysis.fitting.likelihood import (
+    RATIO,
+    STIFFNESS,
+    Likelihood,
+    Place,
+    Series,
+    curve_series,
+    drop_series,
+    reading_series,
+)
+from percussion_model.analysis.fitting.measurements import (
+    QUANTITIES,
+    SIGNALS,
+    Curve,
+    DropTest,
+    FitError,
+    Reading,
+    check_reading,
+    checked_curve,
+    checked_drop,
+)
+from percussion_model.analysis.fitting.profiles import (
+    BetterPlaceError,
+    Follower,
+    Profile,
+)
+from percussion_model.analysis.fitting.search import descend, design, distinct, polish
+from percussion_model.scene.scene import Scene
+
+DAMPING, ENERGY = "rock.barrier_damping", "rock.barrier_energy"
+# What can be fitted, and where it is searched; SI units.
+RANGES = {
+    STIFFNESS: (1e6, 1e11),
+    RATIO: (1.01, 100.0),
+    DAMPING: (1e2, 1e7),
+    ENERGY: (1e-4, 10.0),
+}
+NAMES = {STIFFNESS: "K_R", RATIO: "gamma", DAMPING: "C_R", ENERGY: "W_R"}
+# K_R and gamma of a curve are sought within so many of its standard errors, without a curve
+# within this factor of the scene's; then by more points.
+CURVE_ERRORS, FACTOR = 1.5, 10.0
+POINTS_WITH_CURVE, POINTS_WITHOUT = 16, 128
+# Values of W_R at each point: it decides on the number of drilling cycles.
+LEVELS = 20
+# The search goes down from so many places, in so many samples of each drop, then from the best
+# few in all samples. Places nearer to each other than this are one, in the logarithm.
+SEARCH_SAMPLES = 50
+STARTS, FINALISTS = 12, 4
+APART = {STIFFNESS: 0.5, RATIO: 0.3, DAMPING: 1.2, ENERGY: 0.4}
+# Minima are told up to this deviance above the best: less likely by exp(-10).
+TOLD = 20.0
+# So often profiles start again from a better place that they met.
+MOST_STARTS = 6
+# An interval whose ends differ by this factor is said to be wide.
+WIDE = 4.0
+# Residuals that follow from each other by so many standard errors are no independent noise.
+MOST_CORRELATION = 4.0
+# With twice the cells the best values may move by this share of their intervals' halves.
+GRID_SHARE = 0.5
+
+DETERMINED, RIVALLED = "determined", "rival"
+OPEN_ABOVE, OPEN_BELOW, OPEN = "open above", "open below", "open"
+
+
+class Estimate(NamedTuple):
+    """A fitted parameter, SI units.
+
+    `low` and `high` are the ends of the interval; where it is open, those of what was searched.
+    """
+
+    value: float
+    low: float
+    high: float
+    verdict: str
+
+    @property
+    def determined(self) -> bool:
+        """Whether the interval is closed."""
+        return self.verdict in (DETERMINED, RIVALLED)
+
+
+@dataclass(frozen=True)
+class Explained:
+    """One series of measurements and what the best fit says of it, SI units."""
+
+    name: str
+    data: np.ndarray = field(repr=False)
+    fitted: np.ndarray = field(repr=False)
+    noise: float
+    source: Curve | DropTest | Reading = field(repr=False)
+
+    @property
+    def unit(self) -> str:
+        """SI unit of the data."""
+        if isinstance(self.source, Curve):
+            return "N"
+        if isinstance(self.source, DropTest):
+            return SIGNALS[self.source.signal][0]
+        return QUANTITIES[self.source.quantity][0]
+
+    @property
+    def residuals(self) -> np.ndarray:
+        """Data less fit."""
+        return self.data - self.fitted
+
+
+@dataclass(frozen=True)
+class Rival:
+    """Another minimum, and how much less likely it is than the best."""
+
+    values: dict[str, float]
+    deviance: float
+
+    @property
+    def odds(self) -> float:
+        """Its likelihood by that of the best."""
+        return math.exp(-0.5 * self.deviance)
+
+
+@dataclass(frozen=True)
+class Fit:
+    """What a fit found, SI units.
+
+    Attributes
+    ----------
+    estimates : dict of Estimate
+        By the dotted key of the parameter.
+    confidence : float
+        Of the intervals, each for itself.
+    threshold : float
+        Deviance above the best at their ends.
+    explained : list of Explained
+        Each series of measurements.
+    rivals : list of Rival
+        Other minima, the likeliest first.
+    profiles : dict of (ndarray, ndarray)
+        Values of a parameter, and the deviance above the best with the others at their best.
+    runs : int
+        How many places were computed.
+    warnings : list of str
+        What one should know before using the numbers.
+    """
+
+    estimates: dict[str, Estimate]
+    confidence: float
+    threshold: float
+    explained: list[Explained]
+    rivals: list[Rival]
+    profiles: dict[str, tuple[np.ndarray, np.ndarray]] = field(repr=False)
+    runs: int
+    warnings: list[str]
+
+    def changes(self, undetermined: bool = False) -> dict[str, float]:
+        """Fitted parameters for `Scene.replace`; without those whose interval is open."""
+        return {
+            key: found.value
+            for key, found in self.estimates.items()
+            if found.determined or undetermined
+        }
+
+    def summary(self) -> dict[str, Any]:
+        """Return the numbers as plain values for JSON."""
+        return {
+            "estimates": {key: found._asdict() for key, found in self.estimates.items()},
+            "confidence": self.confidence,
+            "measurements": {
+                one.name: {"data": len(one.data), "noise": one.noise} for one in self.explained
+            },
+            "rivals": [
+                {"values": one.values, "deviance": one.deviance, "odds": one.odds}
+                for one in self.rivals
+            ],
+            "runs": self.runs,
+            "warnings": self.warnings,
+        }
+
+
+def fit_rock(
+    scene: Scene,
+    curve: Curve | None = None,
+    drops: Sequence[DropTest] = (),
+    readings: Sequence[Reading] = (),
+    parameters: Sequence[str] | None = None,
+    ranges: Mapping[str, tuple[float, float]] | None = None,
+    confidence: float = 0.95,
+    progress: Callable[[int, int], None] | None = None,
+) -> Fit:
+    """Fit the rock of a scene to all measurements together.
+
+    All measurements have one likelihood. The noise of each curve and of each drop is
+    estimated along; it is taken to be independent from one datum to the next. What is
+    measured jumps where the number of drilling cycles changes, so the deviance has many
+    minima: the whole range of C_R and W_R is searched, least squares go down from the best
+    places, and each parameter is followed to both sides while the others are fitted anew
+    (profile likelihood). A better place that is met on the way starts that again.
+
+    Parameters
+    ----------
+    scene : Scene
+        Of the bit, with or without its hammer. Its rock stays where nothing is fitted.
+    curve : Curve, optional
+    drops : sequence of DropTest
+    readings : sequence of Reading
+    parameters : sequence of str, optional
+        Keys of `RANGES` that are fitted; default K_R and gamma for a curve alone, else all.
+    ranges : mapping, optional
+        Where a parameter is searched, in place of `RANGES`: what is known beforehand.
+    confidence : float
+        Of the intervals.
+    progress : callable, optional
+        Called with the number of computations done, and with an estimate of all.
+
+    Returns
+    -------
+    Fit
+
+    Raises
+    ------
+    FitError
+        If data or arguments make no sense.
+    """
+    from scipy.stats import chi2
+
+    if not 0 < confidence < 1:
+        raise FitError(f"confidence = {confidence!r}: must be a number above 0 and below 1")
+    curve = None if curve is None else checked_curve(curve)
+    sources = [*([] if curve is None else [curve]), *map(checked_drop, drops), *readings]
+    for reading in readings:
+        check_reading(reading)
+    if not sources:
+        raise FitError("nothing to fit: a curve, a drop or a reading is needed")
+    names = _chosen(scene, sources, parameters)
+    box = _box(scene, names, ranges or {})
+    counter = _Counter(progress, _expected(names, curve is not None, len(sources)))
+    whole = Likelihood(scene, [_series(one) for one in sources], names, box, counter.tick)
+    minima, pool = _minima(whole, sources, counter)
+    threshold = float(chi2.ppf(confidence, 1))
+    best, spread, profiles, minima = _profiles(whole, minima, pool, threshold, counter)
+    return _result(whole, sources, best, spread, profiles, minima, confidence, counter.done)
+
+
+class _Counter:
+    """Computations done, passed on with an estimate of all."""
+
+    def __init__(self, progress: Callable[[int, int], None] | None, expected: int) -> None:
+        self.done, self.expected, self._progress = 0, expected, progress
+
+    def tick(self) -> None:
+        """Count one more."""
+        self.done += 1
+        if self._progress is not None:
+            self._progress(self.done, max(self.expected, self.done + 1))
+
+
+def _expected(names: Sequence[str], with_curve: bool, sources: int) -> int:
+    """About how many places a fit computes."""
+    profiles = 90 * len(names)
+    if with_curve and sources == 1:
+        return profiles
+    points = POINTS_WITH_CURVE if with_curve else POINTS_WITHOUT
+    return points * LEVELS + 20 * (STARTS + FINALISTS) + profiles
+
+
+def _chosen(
+    scene: Scene, sources: Sequence[Curve | DropTest | Reading], parameters: Sequence[str] | None
+) -> tuple[str, ...]:
+    """Free parameters; refuses scenes and choices that make no sense."""
+    slow = all(isinstance(one, Curve) for one in sources)
+    names = tuple(parameters) if parameters is not None else tuple(RANGES)[: 2 if slow else 4]
+    for name in names:
+        if name not in RANGES or names.count(name) > 1:
+            raise FitError(f"parameters: {name} must be one of {', '.join(RANGES)}, once")
+    if not names:
+        raise FitError(f"parameters: at least one of {', '.join(RANGES)} is needed")
+    if scene.effects.rock != "bilinear":
+        raise FitError(f'effects.rock = "{scene.effects.rock}": must be "bilinear"')
+    if not slow and not scene.effects.barrier:
+        raise FitError("the scene has no energy barrier: effects.barrier must be true")
+    hammer = [one for one in sources if isinstance(one, Reading) and one.speed is None]
+    if hammer and scene.piston.model == "absent":
+        raise FitError(f"{hammer[0].name}: the scene has no piston")
+    return names
+
+
+def _box(
+    scene: Scene, names: Sequence[str], ranges: Mapping[str, tuple[float, float]]
+) -> np.ndarray:
+    """Logarithms between which each parameter is searched."""
+    for name in ranges:
+        if name not in names:
+            raise FitError(f"range of {name}: it is not fitted; fitted are {', '.join(names)}")
+    box = np.zeros((len(names), 2))
+    for k, name in enumerate(names):
+        low, high = ranges.get(name, RANGES[name])
+        row = scene.row_of(name)
+        least, most = row.lower or 0.0, row.upper or math.inf
+        if not (0 < low < high and least <= low and high <= most):
+            raise FitError(
+                f"range of {name} = {low!r} to {high!r}: must rise, between {least:g} and {most:g}"
+            )
+        box[k] = np.log([low, high])
+    return box
+
+
+def _series(source: Curve | DropTest | Reading, most: int | None = None) -> Series:
+    if isinstance(source, Curve):
+        return curve_series(source)
+    if isinstance(source, DropTest):
+        return drop_series(source, most)
+    return reading_series(source)
+
+
+def _minima(
+    whole: Likelihood, sources: Sequence[Curve | DropTest | Reading], counter: _Counter
+) -> tuple[list[Place], list[np.ndarray]]:
+    """Find minima that may be the best, the deepest first, and all other good places."""
+    thin = Likelihood(
+        whole.scene,
+        [_series(one, SEARCH_SAMPLES) for one in sources],
+        whole.names,
+        np.stack([whole.low, whole.high], axis=1),
+        counter.tick,
+    )
+    every = range(len(whole.names))
+    sizes = np.array([APART[name] for name in whole.names])
+    starts = distinct([thin.at(at) for at in _first_places(whole, sources)], sizes, STARTS)
+    lower = [descend(thin, one.at, every, rounds=2)[0] for one in starts]
+    found = distinct(lower, 0.25 * sizes, STARTS)
+    # few samples tell less: what is far above the best in them is so in all
+    near = [one for one in found if one.deviance - found[0].deviance < TOLD]
+    places = distinct([whole.at(one.at) for one in near], 0.0 * sizes, FINALISTS)
+    deep = [descend(whole, one.at, every, rounds=2)[0] for one in places]
+    return distinct(deep, 0.1 * sizes, FINALISTS), [one.at for one in near]
+
+
+def _first_places(
+    whole: Likelihood, sources: Sequence[Curve | DropTest | Reading]
+) -> Iterator[np.ndarray]:
+    """Places that fill what is searched; with a curve, near its K_R and gamma."""
+    names = whole.names
+    guess = np.log([whole.scene[name] or 1.0 for name in names])
+    box = np.stack([whole.low, whole.high], axis=1)
+    slow = [k for k, name in enumerate(names) if name in (STIFFNESS, RATIO)]
+    curves = [one for one in sources if isinstance(one, Curve)]
+    if slow and curves:
+        sight = dict(zip((STIFFNESS, RATIO), first_sight(curves[0])[:2], strict=True))
+        guess[slow] = np.log([sight[names[k]] for k in slow])
+        alone = Likelihood(whole.scene, [_series(curves[0])], names, box, lambda: None)
+        place, spread = descend(alone, guess, slow)
+        guess[slow] = place.at[slow]
+        reach = CURVE_ERRORS * np.sqrt(np.diag(spread))
+    else:
+        reach = np.full(len(slow), math.log(FACTOR))
+    guess = np.clip(guess, whole.low, whole.high)
+    yield guess
+    if len(sources) == len(curves):
+        return
+    for k, far in zip(slow, reach, strict=True):
+        box[k] = np.clip([guess[k] - far, guess[k] + far], whole.low[k], whole.high[k])
+    fine = names.index(ENERGY) if ENERGY in names else -1
+    yield from design(box, POINTS_WITH_CURVE if curves else POINTS_WITHOUT, fine, LEVELS)
+
+
+def _profiles(
+    like: Likelihood,
+    minima: list[Place],
+    pool: list[np.ndarray],
+    threshold: float,
+    counter: _Counter,
+) -> tuple[Place, np.ndarray, list[Profile], list[Place]]:
+    """Profiles from the best of all minima; from others too that are as likely."""
+    # W_R and C_R first: they are what hides better places
+    every = range(len(like.names))[::-1]
+    pool = [*pool, *(one.at for one in minima)]
+    found: dict[int, Profile] = {}
+    for left in reversed(range(MOST_STARTS)):
+        best, spread = descend(like, minima[0].at, sorted(every))
+        best = polish(like, best, spread)
+        follower = Follower(like, best.deviance, threshold, pool, restarts=left > 0)
+        try:
+            found = {k: follower.profile(best, spread, k) for k in every}
+            for other in minima[1:]:
+                if other.deviance - best.deviance < threshold and _outside(other, found.items()):
+                    place, wide = descend(like, other.at, sorted(every))
+                    for k in every:
+                        found[k].include(follower.profile(place, wide, k))
+            break
+        except BetterPlaceError as met:
+            counter.expected += counter.expected // 8
+            minima = [met.place, *minima]
+    met = [one for each in found.values() for one in each.places]
+    best = min(met, key=lambda one: one.deviance)
+    # whatever is as likely belongs to the interval, on whichever profile it was met
+    for one in met:
+        if one.deviance < best.deviance + threshold:
+            for k in every:
+                found[k].low = min(found[k].low, float(one.at[k]))
+                found[k].high = max(found[k].high, float(one.at[k]))
+    minima = [best, *(one for one in minima if one.deviance > best.deviance)]
+    return best, spread, [found[k] for k in sorted(every)], minima
+
+
+def _outside(place: Place, profiles: Iterable[tuple[int, Profile]]) -> bool:
+    """Whether a place lies outside of what belongs to the best one, in one parameter at least."""
+    return any(not one.own[0] <= place.at[k] <= one.own[1] for k, one in profiles)
+
+
+def _result(
+    like: Likelihood,
+    sources: Sequence[Curve | DropTest | Reading],
+    best: Place,
+    spread: np.ndarray,
+    profiles: Sequence[Profile],
+    minima: Sequence[Place],
+    confidence: float,
+    runs: int,
+) -> Fit:
+    """Put a fit together."""
+    from scipy.stats import chi2
+
+    estimates, curves = {}, {}
+    for k, (name, found) in enumerate(zip(like.names, profiles, strict=True)):
+        estimates[name] = _estimate(best.at[k], found, like.low[k], like.high[k])
+        places = sorted((float(one.at[k]), one.deviance) for one in found.places)
+        at, deviance = np.array(places).T
+        curves[name] = np.exp(at), deviance - best.deviance
+    rivals = [
+        Rival(dict(zip(like.names, np.exp(one.at).tolist(), strict=True)), above)
+        for one in minima[1:]
+        if (above := one.deviance - best.deviance) < TOLD and _outside(one, enumerate(profiles))
+    ]
+    explained = [
+        Explained(one.name, one.data, one.data - off, noise, source)
+        for one, off, noise, source in zip(
+            like.series, best.residuals, best.noise, sources, strict=True
+        )
+    ]
+    warnings = [
+        *_interval_notes(estimates, like),
+        *_rival_notes(rivals),
+        *(note for one in explained for note in _correlation_note(one)),
+        *_grid_notes(like, best, spread, profiles),
+    ]
+    threshold = float(chi2.ppf(confidence, 1))
+    return Fit(estimates, confidence, threshold, explained, rivals, curves, runs, warnings)
+
+
+def _estimate(at: float, found: Profile, low: float, high: float) -> Estimate:
+    open_below, open_above = math.isinf(found.low), math.isinf(found.high)
+    verdict = {
+        (False, False): RIVALLED if found.split else DETERMINED,
+        (True, False): OPEN_BELOW,
+        (False, True): OPEN_ABOVE,
+        (True, True): OPEN,
+    }[open_below, open_above]
+    ends = (math.exp(max(found.low, low)), math.exp(min(found.high, high)))
+    return Estimate(math.exp(at), *ends, verdict)
+
+
+def _interval_notes(estimates: Mapping[str, Estimate], like: Likelihood) -> list[str]:
+    """Say which parameters the data do not tell, or only roughly."""
+    notes = []
+    for name, one in estimates.items():
+        unit = like.scene.row_of(name).unit.replace("-", "")
+        low, high = (f"{end:.3g} {unit}".rstrip() for end in (one.low, one.high))
+        told = {
+            OPEN_ABOVE: f"is not determined: the data tell only that it is above {low}",
+            OPEN_BELOW: f"is not determined: the data tell only that it is below {high}",
+            OPEN: f"is not determined: the data tell nothing of it between {low} and {high}",
+        }.get(one.verdict)
+        if told is None and one.high > WIDE * one.low:
+            told = f"is known only to a factor of {one.high / one.low:.2g}: {low} to {high}"
+        if told is not None:
+            notes.append(f"{NAMES[name]} ({name}) {told}")
+    return notes
+
+
+def _rival_notes(rivals: Sequence[Rival]) -> list[str]:
+    """Say which other rocks explain the data nearly as well."""
+    notes = []
+    for one in rivals:
+        values = ", ".join(f"{NAMES[key]} = {value:.4g}" for key, value in one.values.items())
+        notes.append(f"another minimum, {_odds(one)}: {values}")
+    return notes
+
+
+def _odds(rival: Rival) -> str:
+    less = 1.0 / rival.odds
+    return "as likely" if less < 1.5 else f"{less:.2g} times less likely"
+
+
+def _correlation_note(one: Explained) -> list[str]:
+    """Say that neighbouring residuals are alike, where they are."""
+    residuals = one.residuals
+    total = float(residuals @ residuals)
+    if len(residuals) < 2 or not total > (len(residuals) * one.noise * 1e-6) ** 2:
+        return []
+    correlation = float(residuals[1:] @ residuals[:-1]) / total
+    if correlation * math.sqrt(len(residuals)) <= MOST_CORRELATION:
+        return []
+    return [
+        f"{one.name}: neighbouring residuals are alike (correlation {correlation:.2f}): the model "
+        "misses something, or the noise is no white noise; the intervals are too narrow"
+    ]
+
+
+def _grid_notes(
+    like: Likelihood, best: Place, spread: np.ndarray, profiles: Sequence[Profile]
+) -> list[str]:
+    """Say which best values would move with twice the cells, by more than noise excuses."""
+    return []
