@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -36,8 +36,18 @@ from percussion_model.analysis.fitting.profiles import (
     Follower,
     Profile,
 )
-from percussion_model.analysis.fitting.search import descend, design, distinct, polish
+from percussion_model.analysis.fitting.search import (
+    LEAST_STEP,
+    MOST_STEP,
+    STEP_SHARE,
+    descend,
+    design,
+    distinct,
+    grid,
+    polish,
+)
 from percussion_model.scene.scene import Scene
+from percussion_model.solvers.base import make_solver
 
 DAMPING, ENERGY = "rock.barrier_damping", "rock.barrier_energy"
 # What can be fitted, and where it is searched; SI units.
@@ -48,21 +58,29 @@ RANGES = {
     ENERGY: (1e-4, 10.0),
 }
 NAMES = {STIFFNESS: "K_R", RATIO: "gamma", DAMPING: "C_R", ENERGY: "W_R"}
-# K_R and gamma of a curve are sought within so many of its standard errors, without a curve
-# within this factor of the scene's; then by more points.
-CURVE_ERRORS, FACTOR = 1.5, 10.0
-POINTS_WITH_CURVE, POINTS_WITHOUT = 16, 128
-# Values of W_R at each point: it decides on the number of drilling cycles.
-LEVELS = 20
+# With a curve, a grid of C_R and W_R is computed for its K_R and gamma and for those this share
+# of their standard errors beside, and so many of the best places with K_R and gamma moved.
+CURVE_ERRORS, RELAXED = 0.3, 48
+VALUES = {DAMPING: 11, ENERGY: 16}
+# Without, so many points with K_R and gamma within this factor of the scene's, with so many
+# values of W_R at each: it decides on the number of drilling cycles.
+POINTS, FACTOR, LEVELS = 128, 10.0, 20
+SLOW_STEP = 3e-3
+# Around so many of the best places finer grids follow, these shares of `ZOOM` to each side, in
+# the logarithm; of each so many of the best places are computed.
+ZOOMS, ZOOMED, ZOOM_RELAXED = (1.0, 0.3), 3, 8
+ZOOM_VALUES = {DAMPING: 6, ENERGY: 6}
 # The search goes down from so many places, in so many samples of each drop, then from the best
 # few in all samples. Places nearer to each other than this are one, in the logarithm.
 SEARCH_SAMPLES = 50
-STARTS, FINALISTS = 12, 4
-APART = {STIFFNESS: 0.5, RATIO: 0.3, DAMPING: 1.2, ENERGY: 0.4}
+STARTS, FINALISTS = 8, 4
+ZOOM = {STIFFNESS: 0.5, RATIO: 0.3, DAMPING: 1.0, ENERGY: 0.6}
+# The last of these grids is of all samples.
+LAST_ZOOM, LAST_STEP = 0.12, 2e-4
 # Minima are told up to this deviance above the best: less likely by exp(-10).
 TOLD = 20.0
 # So often profiles start again from a better place that they met.
-MOST_STARTS = 6
+MOST_STARTS = 10
 # An interval whose ends differ by this factor is said to be wide.
 WIDE = 4.0
 # Residuals that follow from each other by so many standard errors are no independent noise.
@@ -70,6 +88,7 @@ MOST_CORRELATION = 4.0
 # With twice the cells the best values may move by this share of their intervals' halves.
 GRID_SHARE = 0.5
 
+Source = Curve | DropTest | Reading
 DETERMINED, RIVALLED = "determined", "rival"
 OPEN_ABOVE, OPEN_BELOW, OPEN = "open above", "open below", "open"
 
@@ -99,7 +118,7 @@ class Explained:
     data: np.ndarray = field(repr=False)
     fitted: np.ndarray = field(repr=False)
     noise: float
-    source: Curve | DropTest | Reading = field(repr=False)
+    source: Source = field(repr=False)
 
     @property
     def unit(self) -> str:
@@ -236,7 +255,11 @@ def fit_rock(
     if not 0 < confidence < 1:
         raise FitError(f"confidence = {confidence!r}: must be a number above 0 and below 1")
     curve = None if curve is None else checked_curve(curve)
-    sources = [*([] if curve is None else [curve]), *map(checked_drop, drops), *readings]
+    sources: list[Source] = [
+        *([] if curve is None else [curve]),
+        *map(checked_drop, drops),
+        *readings,
+    ]
     for reading in readings:
         check_reading(reading)
     if not sources:
@@ -269,12 +292,12 @@ def _expected(names: Sequence[str], with_curve: bool, sources: int) -> int:
     profiles = 90 * len(names)
     if with_curve and sources == 1:
         return profiles
-    points = POINTS_WITH_CURVE if with_curve else POINTS_WITHOUT
-    return points * LEVELS + 20 * (STARTS + FINALISTS) + profiles
+    points = 3 * VALUES[DAMPING] * VALUES[ENERGY] if with_curve else POINTS * LEVELS
+    return points + 20 * (STARTS + FINALISTS) + profiles
 
 
 def _chosen(
-    scene: Scene, sources: Sequence[Curve | DropTest | Reading], parameters: Sequence[str] | None
+    scene: Scene, sources: Sequence[Source], parameters: Sequence[str] | None
 ) -> tuple[str, ...]:
     """Free parameters; refuses scenes and choices that make no sense."""
     slow = all(isinstance(one, Curve) for one in sources)
@@ -314,7 +337,7 @@ def _box(
     return box
 
 
-def _series(source: Curve | DropTest | Reading, most: int | None = None) -> Series:
+def _series(source: Source, most: int | None = None) -> Series:
     if isinstance(source, Curve):
         return curve_series(source)
     if isinstance(source, DropTest):
@@ -323,7 +346,7 @@ def _series(source: Curve | DropTest | Reading, most: int | None = None) -> Seri
 
 
 def _minima(
-    whole: Likelihood, sources: Sequence[Curve | DropTest | Reading], counter: _Counter
+    whole: Likelihood, sources: Sequence[Source], counter: _Counter
 ) -> tuple[list[Place], list[np.ndarray]]:
     """Find minima that may be the best, the deepest first, and all other good places."""
     thin = Likelihood(
@@ -333,44 +356,69 @@ def _minima(
         np.stack([whole.low, whole.high], axis=1),
         counter.tick,
     )
+    simple = all(isinstance(one, Curve) for one in sources)
     every = range(len(whole.names))
-    sizes = np.array([APART[name] for name in whole.names])
-    starts = distinct([thin.at(at) for at in _first_places(whole, sources)], sizes, STARTS)
+    sizes = np.array([ZOOM[name] for name in whole.names])
+    starts = distinct(_survey(thin, sources), ZOOMS[-1] * sizes, STARTS)
     lower = [descend(thin, one.at, every, rounds=2)[0] for one in starts]
     found = distinct(lower, 0.25 * sizes, STARTS)
     # few samples tell less: what is far above the best in them is so in all
     near = [one for one in found if one.deviance - found[0].deviance < TOLD]
     places = distinct([whole.at(one.at) for one in near], 0.0 * sizes, FINALISTS)
     deep = [descend(whole, one.at, every, rounds=2)[0] for one in places]
+    if not simple:
+        best = min(deep, key=lambda one: one.deviance)
+        steps = np.array([0.0 if name in ZOOM_VALUES else LAST_STEP for name in whole.names])
+        closer = _zoom(whole, best.at, LAST_ZOOM * sizes, steps)
+        deep += [descend(whole, one.at, every, rounds=2)[0] for one in closer[:1]]
     return distinct(deep, 0.1 * sizes, FINALISTS), [one.at for one in near]
 
 
-def _first_places(
-    whole: Likelihood, sources: Sequence[Curve | DropTest | Reading]
-) -> Iterator[np.ndarray]:
-    """Places that fill what is searched; with a curve, near its K_R and gamma."""
-    names = whole.names
-    guess = np.log([whole.scene[name] or 1.0 for name in names])
-    box = np.stack([whole.low, whole.high], axis=1)
+def _survey(thin: Likelihood, sources: Sequence[Source]) -> list[Place]:
+    """Places all over what is searched, and more of them around the best."""
+    names = thin.names
+    guess = np.log([thin.scene[name] or 1.0 for name in names])
+    box = np.stack([thin.low, thin.high], axis=1)
     slow = [k for k, name in enumerate(names) if name in (STIFFNESS, RATIO)]
+    rough = [k for k in range(len(names)) if k not in slow]
     curves = [one for one in sources if isinstance(one, Curve)]
+    steps = np.zeros(len(names))
+    steps[slow] = SLOW_STEP
+    places = [thin.at(guess)]
     if slow and curves:
         sight = dict(zip((STIFFNESS, RATIO), first_sight(curves[0])[:2], strict=True))
         guess[slow] = np.log([sight[names[k]] for k in slow])
-        alone = Likelihood(whole.scene, [_series(curves[0])], names, box, lambda: None)
-        place, spread = descend(alone, guess, slow)
-        guess[slow] = place.at[slow]
-        reach = CURVE_ERRORS * np.sqrt(np.diag(spread))
+        alone = Likelihood(thin.scene, [_series(curves[0])], names, box, lambda: None)
+        place, spread = descend(alone, np.clip(guess, thin.low, thin.high), slow)
+        places = [thin.at(place.at)]
+        if len(sources) == len(curves) or not rough:
+            return places
+        steps[slow] = CURVE_ERRORS * np.sqrt(np.diag(spread))
+        axes = {k: np.linspace(box[k, 0], box[k, 1], VALUES[names[k]]) for k in rough}
+        places += [thin.at(at) for at in grid(thin, place.at, axes, slow, steps)[:RELAXED]]
     else:
-        reach = np.full(len(slow), math.log(FACTOR))
-    guess = np.clip(guess, whole.low, whole.high)
-    yield guess
-    if len(sources) == len(curves):
-        return
-    for k, far in zip(slow, reach, strict=True):
-        box[k] = np.clip([guess[k] - far, guess[k] + far], whole.low[k], whole.high[k])
-    fine = names.index(ENERGY) if ENERGY in names else -1
-    yield from design(box, POINTS_WITH_CURVE if curves else POINTS_WITHOUT, fine, LEVELS)
+        for k in slow:
+            box[k] = np.clip(guess[k] + math.log(FACTOR) * np.array([-1.0, 1.0]), *box[k])
+        rows = design(box, POINTS, names.index(ENERGY) if ENERGY in names else -1, LEVELS)
+        places += [thin.at(at) for at in rows]
+    for share in ZOOMS:
+        sizes = share * np.array([ZOOM[name] for name in names])
+        for centre in distinct(places, sizes, ZOOMED):
+            places += _zoom(thin, centre.at, sizes, share * steps)
+    return places
+
+
+def _zoom(like: Likelihood, at: np.ndarray, sizes: np.ndarray, steps: np.ndarray) -> list[Place]:
+    """The best places of a grid of C_R and W_R around a place; K_R and gamma follow."""
+    axes = {}
+    for k, name in enumerate(like.names):
+        if name in ZOOM_VALUES:
+            row = at[k] + sizes[k] * np.linspace(-1.0, 1.0, ZOOM_VALUES[name])
+            axes[k] = np.clip(row, like.low[k], like.high[k])
+    if not axes:
+        return []
+    slow = [k for k in range(len(at)) if k not in axes]
+    return [like.at(one) for one in grid(like, at, axes, slow, steps)[:ZOOM_RELAXED]]
 
 
 def _profiles(
@@ -384,11 +432,12 @@ def _profiles(
     # W_R and C_R first: they are what hides better places
     every = range(len(like.names))[::-1]
     pool = [*pool, *(one.at for one in minima)]
+    rough = {k for k in every if like.names[k] in ZOOM_VALUES}
     found: dict[int, Profile] = {}
     for left in reversed(range(MOST_STARTS)):
         best, spread = descend(like, minima[0].at, sorted(every))
         best = polish(like, best, spread)
-        follower = Follower(like, best.deviance, threshold, pool, restarts=left > 0)
+        follower = Follower(like, best.deviance, threshold, pool, rough, restarts=left > 0)
         try:
             found = {k: follower.profile(best, spread, k) for k in every}
             for other in minima[1:]:
@@ -397,17 +446,16 @@ def _profiles(
                     for k in every:
                         found[k].include(follower.profile(place, wide, k))
             break
-        except BetterPlaceError as met:
+        except BetterPlaceError as better:
             counter.expected += counter.expected // 8
-            minima = [met.place, *minima]
+            minima = [better.place, *minima]
     met = [one for each in found.values() for one in each.places]
     best = min(met, key=lambda one: one.deviance)
     # whatever is as likely belongs to the interval, on whichever profile it was met
     for one in met:
         if one.deviance < best.deviance + threshold:
             for k in every:
-                found[k].low = min(found[k].low, float(one.at[k]))
-                found[k].high = max(found[k].high, float(one.at[k]))
+                found[k].reach(float(one.at[k]), like.low[k], like.high[k])
     minima = [best, *(one for one in minima if one.deviance > best.deviance)]
     return best, spread, [found[k] for k in sorted(every)], minima
 
@@ -419,7 +467,7 @@ def _outside(place: Place, profiles: Iterable[tuple[int, Profile]]) -> bool:
 
 def _result(
     like: Likelihood,
-    sources: Sequence[Curve | DropTest | Reading],
+    sources: Sequence[Source],
     best: Place,
     spread: np.ndarray,
     profiles: Sequence[Profile],
@@ -519,5 +567,38 @@ def _correlation_note(one: Explained) -> list[str]:
 def _grid_notes(
     like: Likelihood, best: Place, spread: np.ndarray, profiles: Sequence[Profile]
 ) -> list[str]:
-    """Say which best values would move with twice the cells, by more than noise excuses."""
-    return []
+    """Say which best values would move with twice the cells by a good part of their intervals."""
+    scene = like.scene
+    simulated = [one for one in like.series if one.simulated]
+    cells = list(make_solver(scene).cells.values()) if simulated else []
+    if not cells:
+        return []
+    key = "fem.elements" if scene.solver_name == "fem" else "solver.cells"
+    finer = Likelihood(
+        scene.replace(**{key: 2 * cells[0], "solver.accuracy": None}),
+        like.series,
+        like.names,
+        np.stack([like.low, like.high], axis=1),
+        lambda: None,
+    )
+    weights = np.repeat(1.0 / np.array(best.noise), [len(one) for one in best.residuals])
+    off = np.concatenate(best.residuals)
+    change = (np.concatenate(finer.at(best.at).residuals) - off) * weights
+    steps = np.clip(STEP_SHARE * np.sqrt(np.diag(spread)), LEAST_STEP, MOST_STEP)
+    columns = [
+        (np.concatenate(like.at(best.at + row).residuals) - off) * weights / step
+        for row, step in zip(np.diag(steps), steps, strict=True)
+    ]
+    moves = np.abs(spread @ np.stack(columns) @ change)
+    halves = np.array([0.5 * (one.high - one.low) for one in profiles])
+    moved = [
+        f"{NAMES[name]} by {move / half:.1g}"
+        for name, move, half in zip(like.names, moves, halves, strict=True)
+        if move > GRID_SHARE * half
+    ]
+    if not moved:
+        return []
+    return [
+        f"twice the cells would move {', '.join(moved)} of half its interval: calibrate with "
+        f"--cells {2 * cells[0]} and use the rock with as many"
+    ]

@@ -39,6 +39,7 @@ class Series:
     data: np.ndarray
     error: float | None
     model: Callable[[Scene], np.ndarray] = field(repr=False)
+    simulated: bool = True
 
     @property
     def least_noise(self) -> float:
@@ -115,18 +116,22 @@ class Likelihood:
 
     def _compute(self, at: np.ndarray) -> Place:
         scene = self.scene_at(at)
-        residuals, noise, deviance = [], [], 0.0
-        for one in self.series:
-            off = one.data - _finite(one, scene)
+        residuals = [one.data - _finite(one, scene) for one in self.series]
+        deviance, noise = self.deviance_of(residuals)
+        return Place(at, deviance, residuals, noise)
+
+    def deviance_of(self, residuals: Sequence[np.ndarray]) -> tuple[float, list[float]]:
+        """Deviance of residuals, and the noise of each series."""
+        noise, deviance = [], 0.0
+        for one, off in zip(self.series, residuals, strict=True):
             if one.error is None:
                 sigma = max(math.sqrt(float(off @ off) / len(off)), one.least_noise)
                 deviance += len(off) * 2.0 * math.log(sigma)
             else:
                 sigma = one.error
                 deviance += float(off @ off) / sigma**2
-            residuals.append(off)
             noise.append(sigma)
-        return Place(at, deviance, residuals, noise)
+        return deviance, noise
 
 
 def _finite(one: Series, scene: Scene) -> np.ndarray:
@@ -149,7 +154,7 @@ def curve_series(curve: Curve) -> Series:
         places = best_datum_and_peak(curve, stiffness, ratio, guess)
         return bilinear_force(curve.penetration, stiffness, ratio, *places)
 
-    return Series(curve.name, curve.force, None, model)
+    return Series(curve.name, curve.force, None, model, simulated=False)
 
 
 def drop_series(drop: DropTest, most: int | None = None) -> Series:

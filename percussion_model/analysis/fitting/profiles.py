@@ -32,6 +32,8 @@ LONGEST = 1.5
 # At each place of a profile, descents begin from the best of so many known places beside it;
 # starts nearer to each other than this in all parameters are one, in the logarithm.
 NEIGHBOURS, FOLLOWED, APART = 2, 2, 0.1
+# So near to the edge of the range, in the logarithm, is at it.
+AT_EDGE = 1e-3
 # A place so much better than the best starts all over.
 BETTER = 1.0
 
@@ -66,6 +68,11 @@ class Profile:
     own: tuple[float, float] = (-math.inf, math.inf)
     split: bool = False
 
+    def reach(self, at: float, low: float, high: float) -> None:
+        """Span a place as well; at the edge of what is searched the interval is open."""
+        self.low = min(self.low, at if at > low + AT_EDGE else -math.inf)
+        self.high = max(self.high, at if at < high - AT_EDGE else math.inf)
+
     def include(self, other: Profile) -> None:
         """Span another profile of the same parameter as well."""
         self.split |= other.low > self.high or other.high < self.low
@@ -86,6 +93,8 @@ class Follower:
         Deviance above it at the ends of the intervals.
     pool : list of ndarray
         Places (logarithms) at which the fit is known to be good; those found are added.
+    rough : set of int
+        Parameters in which the deviance jumps.
     restarts : bool
         Whether a much better place raises an error.
     """
@@ -94,6 +103,7 @@ class Follower:
     base: float
     threshold: float
     pool: list[np.ndarray]
+    rough: set[int]
     restarts: bool
 
     def profile(self, start: Place, spread: np.ndarray, which: int) -> Profile:
@@ -141,9 +151,9 @@ class Follower:
                 inner, inner_root, near = way, height, place
             else:
                 outer, outer_root = way, height
-            end = min(outer, room)
+            end = outer
             if abs(height - root) < NEAR_ENOUGH * root:
-                end = way
+                end = min(way * root / max(height, 1e-3), room)
                 break
             if outer - inner < SHORT_ENOUGH * outer:
                 break
@@ -155,6 +165,8 @@ class Follower:
             else:
                 share = (root - inner_root) / (outer_root - inner_root)
                 way = inner + min(max(share, 0.15), 0.85) * (outer - inner)
+        if math.isinf(end):
+            return math.copysign(math.inf, sign)
         for factor in BEYOND if odd else ():
             if factor * end < room:
                 there = start.at[which] + sign * factor * end
@@ -169,7 +181,7 @@ class Follower:
         others = [k for k in range(len(guess)) if k != which]
         by_distance = sorted(self.pool, key=lambda at: abs(float(at[which]) - value))
         starts = []
-        for at in [guess, *by_distance[:NEIGHBOURS]]:
+        for at in [guess, *by_distance[: NEIGHBOURS if which in self.rough else 0]]:
             moved = np.clip(at, self.like.low, self.like.high)
             moved[which] = value
             starts.append(self.like.at(moved))

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import itertools
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -20,6 +21,9 @@ LEAST_GAIN = 1e-4
 ARRIVED = 0.1
 # The search without derivatives: its longest first step, in the logarithm, and how long it is.
 MOST_POLISH, POLISH_TRIALS = 0.3, 12  # trials a parameter
+# On a grid, parameters that a curve tells are moved by so many steps at most; the weights
+# follow the residuals so often.
+MOST_RELAXED, RELAXATIONS = 4.0, 6
 # An undetermined direction has at most this standard error, in the logarithm.
 MOST_ERROR = 20.0
 
@@ -131,6 +135,74 @@ def distinct(places: Sequence[Place], sizes: np.ndarray, most: int) -> list[Plac
             if len(kept) == most:
                 break
     return kept
+
+
+def grid(
+    like: Likelihood,
+    base: np.ndarray,
+    axes: Mapping[int, np.ndarray],
+    free: Sequence[int],
+    steps: np.ndarray,
+) -> list[np.ndarray]:
+    """Places of a grid, each moved to where linear least squares lead over free parameters.
+
+    Parameters
+    ----------
+    like : Likelihood
+    base : ndarray
+        Values of the parameters that are not on the grid.
+    axes : mapping of int to ndarray
+        Values of the others; the last axis varies fastest.
+    free : sequence of int
+        What is moved, by no more than `MOST_RELAXED` steps.
+    steps : ndarray
+        Of their slopes.
+
+    Returns
+    -------
+    list of ndarray
+        The likeliest first, as the straight model has it.
+    """
+    *outer, last = axes
+    found = []
+    for values in itertools.product(*(axes[k] for k in outer)):
+        rows = []
+        # neighbours in the last parameter share what is costly to prepare
+        for shifted in (None, *free):
+            row = np.tile(base, (len(axes[last]), 1))
+            row[:, outer] = values
+            row[:, last] = axes[last]
+            if shifted is not None:
+                row[:, shifted] += steps[shifted]
+            rows.append([like.at(at) for at in row])
+        for here, *others in zip(*rows, strict=True):
+            found.append(_relaxed(like, here, others, list(free), steps[list(free)]))
+    found.sort(key=lambda one: one[0])
+    return [at for _, at in found]
+
+
+def _relaxed(
+    like: Likelihood, here: Place, shifted: Sequence[Place], free: list[int], steps: np.ndarray
+) -> tuple[float, np.ndarray]:
+    """Deviance and place that a straight model has after least squares over free parameters."""
+    off = np.concatenate(here.residuals)
+    columns = [np.concatenate(one.residuals) - off for one in shifted]
+    if not columns:
+        return here.deviance, here.at
+    matrix, move = np.stack(columns, axis=1), np.zeros(len(free))
+    counts = [len(one) for one in here.residuals]
+    deviance = here.deviance
+    for _ in range(RELAXATIONS):
+        left = np.split(off + matrix @ move, np.cumsum(counts)[:-1])
+        deviance, noise = like.deviance_of(left)
+        weights = np.repeat(1.0 / np.array(noise), counts)
+        information = (matrix * weights[:, None]).T @ (matrix * weights[:, None])
+        information += np.eye(len(free)) / MOST_RELAXED**2
+        move = -np.linalg.solve(information, (matrix * weights[:, None]).T @ (off * weights))
+        move = np.clip(move, -MOST_RELAXED, MOST_RELAXED)
+    at = here.at.copy()
+    at[free] += move * steps
+    return deviance, at
 
 
 def design(box: np.ndarray, count: int, fine: int, levels: int) -> np.ndarray:

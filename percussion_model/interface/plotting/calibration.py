@@ -15,10 +15,10 @@ from percussion_model.interface.plotting.style import KN, MM, MPA, MS
 from percussion_model.simulation.files import staged
 
 SYMBOLS = {
-    "rock.loading_stiffness": ("$K_R$ [N/m]", "stiffness"),
-    "rock.unloading_ratio": ("$\\gamma$", "unloading ratio"),
-    "rock.barrier_damping": ("$C_R$ [N s/m]", "damping of the barrier"),
-    "rock.barrier_energy": ("$W_R$ [J]", "energy of the barrier"),
+    "rock.loading_stiffness": ("$K_R$", " [N/m]"),
+    "rock.unloading_ratio": ("$\\gamma$", ""),
+    "rock.barrier_damping": ("$C_R$", " [N s/m]"),
+    "rock.barrier_energy": ("$W_R$", " [J]"),
 }
 # Factors to what axes of data say, and of residuals, by SI unit.
 SHOWN = {
@@ -47,7 +47,7 @@ def draw_calibration(found: Fit) -> Figure:
     columns = max(len(rows), 1)
     fig = Figure(figsize=(max(3.6 * columns, 11.0), 8.6), layout="constrained")
     style.head(fig, "Calibration: measurements, fit and what it is worth")
-    above, below = fig.subfigures(2, 1, height_ratios=[1.7, 1.0])
+    above, below = np.atleast_1d(fig.subfigures(2, 1, height_ratios=[1.7, 1.0]))
     if rows:
         axes = above.subplots(2, columns, squeeze=False, height_ratios=[1.8, 1.0])
         for (top, bottom), one in zip(axes.T, rows, strict=True):
@@ -93,5 +93,5 @@ def _profile(ax: Axes, found: Fit, key: str) -> None:
         ax.ticklabel_format(useOffset=False)
         ax.locator_params(axis="x", nbins=4)
     ax.set_ylim(-0.03 * top, top)
-    symbol, name = SYMBOLS[key]
-    style.label(ax, symbol, "twice the loss of log-likelihood", f"{name}: {estimate.verdict}")
+    symbol, unit = SYMBOLS[key]
+    style.label(ax, symbol + unit, "deviance above the best", f"{symbol}: {estimate.verdict}")
