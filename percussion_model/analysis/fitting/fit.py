@@ -40,11 +40,13 @@ from percussion_model.analysis.fitting.search import (
     LEAST_STEP,
     MOST_STEP,
     STEP_SHARE,
+    TINY,
     descend,
     design,
     distinct,
     grid,
     polish,
+    roughness,
 )
 from percussion_model.scene.scene import Scene
 from percussion_model.solvers.base import make_solver
@@ -81,6 +83,9 @@ LAST_ZOOM, LAST_STEP = 0.12, 2e-4
 TOLD = 20.0
 # So often profiles start again from a better place that they met.
 MOST_STARTS = 10
+# The deviance may be off by the roughness at the best place and at the other: the threshold is
+# higher by so many of it. It is told from this size on.
+ROUGH_FACTOR, ROUGH = 2.0, 1.0
 # An interval whose ends differ by this factor is said to be wide.
 WIDE = 4.0
 # Residuals that follow from each other by so many standard errors are no independent noise.
@@ -269,9 +274,11 @@ def fit_rock(
     counter = _Counter(progress, _expected(names, curve is not None, len(sources)))
     whole = Likelihood(scene, [_series(one) for one in sources], names, box, counter.tick)
     minima, pool = _minima(whole, sources, counter)
-    threshold = float(chi2.ppf(confidence, 1))
-    best, spread, profiles, minima = _profiles(whole, minima, pool, threshold, counter)
-    return _result(whole, sources, best, spread, profiles, minima, confidence, counter.done)
+    quantile = float(chi2.ppf(confidence, 1))
+    best, spread, profiles, minima, threshold = _profiles(whole, minima, pool, quantile, counter)
+    return _result(
+        whole, sources, best, spread, profiles, minima, confidence, threshold, counter.done
+    )
 
 
 class _Counter:
@@ -425,10 +432,10 @@ def _profiles(
     like: Likelihood,
     minima: list[Place],
     pool: list[np.ndarray],
-    threshold: float,
+    quantile: float,
     counter: _Counter,
-) -> tuple[Place, np.ndarray, list[Profile], list[Place]]:
-    """Profiles from the best of all minima; from others too that are as likely."""
+) -> tuple[Place, np.ndarray, list[Profile], list[Place], float]:
+    """Profiles from the best of all minima, and others as likely; the threshold last."""
     # W_R and C_R first: they are what hides better places
     every = range(len(like.names))[::-1]
     pool = [*pool, *(one.at for one in minima)]
@@ -437,6 +444,7 @@ def _profiles(
     for left in reversed(range(MOST_STARTS)):
         best, spread = descend(like, minima[0].at, sorted(every))
         best = polish(like, best, spread)
+        threshold = quantile + ROUGH_FACTOR * roughness(like, best)
         follower = Follower(like, best.deviance, threshold, pool, rough, restarts=left > 0)
         try:
             found = {k: follower.profile(best, spread, k) for k in every}
@@ -457,7 +465,7 @@ def _profiles(
             for k in every:
                 found[k].reach(float(one.at[k]), like.low[k], like.high[k])
     minima = [best, *(one for one in minima if one.deviance > best.deviance)]
-    return best, spread, [found[k] for k in sorted(every)], minima
+    return best, spread, [found[k] for k in sorted(every)], minima, threshold
 
 
 def _outside(place: Place, profiles: Iterable[tuple[int, Profile]]) -> bool:
@@ -473,11 +481,10 @@ def _result(
     profiles: Sequence[Profile],
     minima: Sequence[Place],
     confidence: float,
+    threshold: float,
     runs: int,
 ) -> Fit:
     """Put a fit together."""
-    from scipy.stats import chi2
-
     estimates, curves = {}, {}
     for k, (name, found) in enumerate(zip(like.names, profiles, strict=True)):
         estimates[name] = _estimate(best.at[k], found, like.low[k], like.high[k])
@@ -487,7 +494,8 @@ def _result(
     rivals = [
         Rival(dict(zip(like.names, np.exp(one.at).tolist(), strict=True)), above)
         for one in minima[1:]
-        if (above := one.deviance - best.deviance) < TOLD and _outside(one, enumerate(profiles))
+        if (above := one.deviance - best.deviance) < TOLD + threshold
+        and _outside(one, enumerate(profiles))
     ]
     explained = [
         Explained(one.name, one.data, one.data - off, noise, source)
@@ -497,11 +505,11 @@ def _result(
     ]
     warnings = [
         *_interval_notes(estimates, like),
+        *_rough_notes(confidence, threshold),
         *_rival_notes(rivals),
         *(note for one in explained for note in _correlation_note(one)),
         *_grid_notes(like, best, spread, profiles),
     ]
-    threshold = float(chi2.ppf(confidence, 1))
     return Fit(estimates, confidence, threshold, explained, rivals, curves, runs, warnings)
 
 
@@ -533,6 +541,19 @@ def _interval_notes(estimates: Mapping[str, Estimate], like: Likelihood) -> list
         if told is not None:
             notes.append(f"{NAMES[name]} ({name}) {told}")
     return notes
+
+
+def _rough_notes(confidence: float, threshold: float) -> list[str]:
+    """Say that the motion amplifies changes so much that intervals were widened for it."""
+    from scipy.stats import chi2
+
+    rough = (threshold - float(chi2.ppf(confidence, 1))) / ROUGH_FACTOR
+    if rough < ROUGH:
+        return []
+    return [
+        f"the motion is chaotic: changes of {TINY:g} of the parameters change the deviance by "
+        f"{rough:.2g}; intervals are widened for that"
+    ]
 
 
 def _rival_notes(rivals: Sequence[Rival]) -> list[str]:

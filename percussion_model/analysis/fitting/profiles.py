@@ -19,9 +19,11 @@ from percussion_model.analysis.fitting.search import (
 # An end of an interval is found when the square root of the deviance is as near to that of the
 # threshold, or the place as near to the end, as a share of the way.
 NEAR_ENOUGH, SHORT_ENOUGH = 0.1, 0.1
-MOST_TRIALS = 9
+MOST_TRIALS = 16
 # Steps outwards grow by a factor between these.
 LEAST_GROWTH, MOST_GROWTH = 1.25, 4.0
+# and after so many trials at least by this one.
+PATIENT_TRIALS, LATE_GROWTH = 3, 2.5
 # Places as far beyond an end, as a multiple of the way to it, are looked at where the deviance
 # jumps: behind a change in the number of drilling cycles the fit may be good again.
 BEYOND = (1.5, 2.5)
@@ -34,8 +36,8 @@ LONGEST = 1.5
 NEIGHBOURS, FOLLOWED, APART = 2, 2, 0.1
 # So near to the edge of the range, in the logarithm, is at it.
 AT_EDGE = 1e-3
-# A place so much better than the best starts all over.
-BETTER = 1.0
+# A place better than the best by this share of the threshold starts all over.
+BETTER = 0.25
 
 
 class BetterPlaceError(Exception):
@@ -161,7 +163,8 @@ class Follower:
                 if way >= room:
                     return math.copysign(math.inf, sign)
                 growth = 1.05 * root / max(height, 1e-3)
-                way = min(way * min(max(growth, LEAST_GROWTH), MOST_GROWTH), way + LONGEST, room)
+                least = LEAST_GROWTH if trial < PATIENT_TRIALS else LATE_GROWTH
+                way = min(way * min(max(growth, least), MOST_GROWTH), way + LONGEST, room)
             else:
                 share = (root - inner_root) / (outer_root - inner_root)
                 way = inner + min(max(share, 0.15), 0.85) * (outer - inner)
@@ -191,7 +194,7 @@ class Follower:
             firsts = distinct(starts, np.full(len(guess), APART), FOLLOWED)
             lower = [descend(self.like, one.at, others, steps, rounds=2)[0] for one in firsts]
             best = min(lower, key=lambda one: one.deviance)
-        if best.deviance < self.base - BETTER and self.restarts:
+        if best.deviance < self.base - BETTER * self.threshold and self.restarts:
             raise BetterPlaceError(best)
         self.base = min(self.base, best.deviance)
         self.pool.append(best.at)

@@ -11,7 +11,7 @@ from percussion_model.analysis.fitting.likelihood import Likelihood, Place
 
 # First and last steps of slopes, in the logarithm. Events move from cell to cell: far below a
 # standard error there is noise, far above it the number of drilling cycles changes.
-FIRST_STEP, LEAST_STEP, MOST_STEP = 2e-3, 1e-5, 0.05
+FIRST_STEP, LEAST_STEP, MOST_STEP = 2e-3, 5e-5, 0.05
 STEP_SHARE = 0.3  # of a standard error
 # A descent linearises anew up to so many times; in each so many places are tried.
 ROUNDS, TRIALS = 4, 5
@@ -24,6 +24,8 @@ MOST_POLISH, POLISH_TRIALS = 0.3, 12  # trials a parameter
 # On a grid, parameters that a curve tells are moved by so many steps at most; the weights
 # follow the residuals so often.
 MOST_RELAXED, RELAXATIONS = 4.0, 6
+# A bouncing bit may amplify any change: so many changes of this size, in the logarithm, tell.
+TINY, TINY_CHANGES = 1e-5, 8
 # An undetermined direction has at most this standard error, in the logarithm.
 MOST_ERROR = 20.0
 
@@ -118,6 +120,17 @@ def polish(like: Likelihood, start: Place, spread: np.ndarray) -> Place:
     options = {"initial_simplex": corners, "maxfev": POLISH_TRIALS * len(axes), "fatol": ARRIVED}
     minimize(deviance, corners[0], method="Nelder-Mead", options=options)
     return min(met, key=lambda one: one.deviance)
+
+
+def roughness(like: Likelihood, best: Place) -> float:
+    """How much the deviance changes with the parameters by next to nothing.
+
+    Where bounces amplify rounding, places that nobody can tell apart differ in their deviance;
+    then a difference as small tells nothing.
+    """
+    changes = np.random.default_rng(0).normal(0.0, TINY, (TINY_CHANGES, len(best.at)))
+    seen = [best.deviance, *(like.at(best.at + change).deviance for change in changes)]
+    return max(seen) - min(seen)
 
 
 def spread_of(jacobian: np.ndarray) -> np.ndarray:

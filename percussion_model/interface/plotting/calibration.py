@@ -47,7 +47,7 @@ def draw_calibration(found: Fit) -> Figure:
     columns = max(len(rows), 1)
     fig = Figure(figsize=(max(3.6 * columns, 11.0), 8.6), layout="constrained")
     style.head(fig, "Calibration: measurements, fit and what it is worth")
-    above, below = np.atleast_1d(fig.subfigures(2, 1, height_ratios=[1.7, 1.0]))
+    above, below = list(fig.subfigures(2, 1, height_ratios=[1.7, 1.0]))  # type: ignore[arg-type]
     if rows:
         axes = above.subplots(2, columns, squeeze=False, height_ratios=[1.8, 1.0])
         for (top, bottom), one in zip(axes.T, rows, strict=True):
