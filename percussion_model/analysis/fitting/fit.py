@@ -40,7 +40,6 @@ from percussion_model.analysis.fitting.search import (
     LEAST_STEP,
     MOST_STEP,
     STEP_SHARE,
-    TINY,
     descend,
     design,
     distinct,
@@ -444,7 +443,8 @@ def _profiles(
     for left in reversed(range(MOST_STARTS)):
         best, spread = descend(like, minima[0].at, sorted(every))
         best = polish(like, best, spread)
-        threshold = quantile + ROUGH_FACTOR * roughness(like, best)
+        tiny, dips = roughness(like, best, spread)
+        threshold = quantile + ROUGH_FACTOR * max(tiny, dips)
         follower = Follower(like, best.deviance, threshold, pool, rough, restarts=left > 0)
         try:
             found = {k: follower.profile(best, spread, k) for k in every}
@@ -551,8 +551,8 @@ def _rough_notes(confidence: float, threshold: float) -> list[str]:
     if rough < ROUGH:
         return []
     return [
-        f"the motion is chaotic: changes of {TINY:g} of the parameters change the deviance by "
-        f"{rough:.2g}; intervals are widened for that"
+        f"the likelihood is rough: many small dips, of about {rough:.2g} in twice its logarithm; "
+        "intervals are widened for that"
     ]
 
 

@@ -24,8 +24,9 @@ MOST_POLISH, POLISH_TRIALS = 0.3, 12  # trials a parameter
 # On a grid, parameters that a curve tells are moved by so many steps at most; the weights
 # follow the residuals so often.
 MOST_RELAXED, RELAXATIONS = 4.0, 6
-# A bouncing bit may amplify any change: so many changes of this size, in the logarithm, tell.
-TINY, TINY_CHANGES = 1e-5, 8
+# A bouncing bit may amplify any change: so many changes of this size, in the logarithm, and of
+# about so many standard errors tell.
+TINY, DIPS, CHANGES = 1e-5, 1.0, 8
 # An undetermined direction has at most this standard error, in the logarithm.
 MOST_ERROR = 20.0
 
@@ -122,15 +123,27 @@ def polish(like: Likelihood, start: Place, spread: np.ndarray) -> Place:
     return min(met, key=lambda one: one.deviance)
 
 
-def roughness(like: Likelihood, best: Place) -> float:
-    """How much the deviance changes with the parameters by next to nothing.
+def roughness(like: Likelihood, best: Place, spread: np.ndarray) -> tuple[float, float]:
+    """How rough the deviance is: over next to nothing, and over the size of the errors.
 
     Where bounces amplify rounding, places that nobody can tell apart differ in their deviance;
-    then a difference as small tells nothing.
+    and where it has many dips, the deepest of them is deeper by luck.
+
+    Returns
+    -------
+    tiny : float
+        Range of the deviance over changes of `TINY`.
+    dips : float
+        Median departure from a parabola at about `DIPS` standard errors.
     """
-    changes = np.random.default_rng(0).normal(0.0, TINY, (TINY_CHANGES, len(best.at)))
-    seen = [best.deviance, *(like.at(best.at + change).deviance for change in changes)]
-    return max(seen) - min(seen)
+    normal = np.random.default_rng(0).normal(0.0, 1.0, (CHANGES, len(best.at)))
+    seen = [best.deviance, *(like.at(best.at + TINY * one).deviance for one in normal)]
+    factor = DIPS * np.linalg.cholesky(spread)
+    off = [
+        abs(like.at(best.at + factor @ one).deviance - best.deviance - DIPS**2 * float(one @ one))
+        for one in normal
+    ]
+    return max(seen) - min(seen), float(np.median(off))
 
 
 def spread_of(jacobian: np.ndarray) -> np.ndarray:
