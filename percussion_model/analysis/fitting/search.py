@@ -251,12 +251,12 @@ def design(box: np.ndarray, count: int, fine: int, levels: int) -> np.ndarray:
 
     others = [k for k in range(len(box)) if k != fine]
     if not others:
-        return np.linspace(*box[fine], levels)[:, None]
+        return np.linspace(box[fine, 0], box[fine, 1], levels)[:, None]
     unit = Sobol(len(others), seed=0).random(count)
     points = np.zeros((count, len(box)))
     points[:, others] = box[others, 0] + unit * np.diff(box[others], axis=1).T
     if fine < 0:
         return points
     rows = np.repeat(points, levels, axis=0)
-    rows[:, fine] = np.tile(np.linspace(*box[fine], levels), count)
+    rows[:, fine] = np.tile(np.linspace(box[fine, 0], box[fine, 1], levels), count)
     return rows
