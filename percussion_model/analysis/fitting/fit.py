@@ -32,6 +32,7 @@ from percussion_model.analysis.fitting.measurements import (
     checked_drop,
 )
 from percussion_model.analysis.fitting.profiles import (
+    BETTER,
     BetterPlaceError,
     Follower,
     Profile,
@@ -85,6 +86,10 @@ MOST_STARTS = 10
 # The deviance may be off by the roughness at the best place and at the other: the threshold is
 # higher by so many of it. It is told from this size on.
 ROUGH_FACTOR, ROUGH = 2.0, 1.0
+UNSETTLED = (
+    "the search met ever better places and no end of it: the best may not be among them, "
+    "and intervals may be too narrow"
+)
 # An interval whose ends differ by this factor is said to be wide.
 WIDE = 4.0
 # Residuals that follow from each other by so many standard errors are no independent noise.
@@ -274,10 +279,8 @@ def fit_rock(
     whole = Likelihood(scene, [_series(one) for one in sources], names, box, counter.tick)
     minima, pool = _minima(whole, sources, counter)
     quantile = float(chi2.ppf(confidence, 1))
-    best, spread, profiles, minima, threshold = _profiles(whole, minima, pool, quantile, counter)
-    return _result(
-        whole, sources, best, spread, profiles, minima, confidence, threshold, counter.done
-    )
+    found = _profiles(whole, minima, pool, quantile, counter)
+    return _result(whole, sources, found, confidence, counter.done)
 
 
 class _Counter:
@@ -427,14 +430,25 @@ def _zoom(like: Likelihood, at: np.ndarray, sizes: np.ndarray, steps: np.ndarray
     return [like.at(one) for one in grid(like, at, axes, slow, steps)[:ZOOM_RELAXED]]
 
 
+class Explored(NamedTuple):
+    """The best place, its covariance, what was found around, and whether no better place was."""
+
+    best: Place
+    spread: np.ndarray
+    profiles: list[Profile]
+    minima: list[Place]
+    threshold: float
+    settled: bool
+
+
 def _profiles(
     like: Likelihood,
     minima: list[Place],
     pool: list[np.ndarray],
     quantile: float,
     counter: _Counter,
-) -> tuple[Place, np.ndarray, list[Profile], list[Place], float]:
-    """Profiles from the best of all minima, and others as likely; the threshold last."""
+) -> Explored:
+    """Profiles from the best of all minima, and from others as likely."""
     # W_R and C_R first: they are what hides better places
     every = range(len(like.names))[::-1]
     pool = [*pool, *(one.at for one in minima)]
@@ -457,6 +471,7 @@ def _profiles(
         except BetterPlaceError as better:
             counter.expected += counter.expected // 8
             minima = [better.place, *minima]
+    settled = follower.base >= best.deviance - BETTER * threshold
     met = [one for each in found.values() for one in each.places]
     best = min(met, key=lambda one: one.deviance)
     # whatever is as likely belongs to the interval, on whichever profile it was met
@@ -465,7 +480,8 @@ def _profiles(
             for k in every:
                 found[k].reach(float(one.at[k]), like.low[k], like.high[k])
     minima = [best, *(one for one in minima if one.deviance > best.deviance)]
-    return best, spread, [found[k] for k in sorted(every)], minima, threshold
+    profiles = [found[k] for k in sorted(every)]
+    return Explored(best, spread, profiles, minima, threshold, settled)
 
 
 def _outside(place: Place, profiles: Iterable[tuple[int, Profile]]) -> bool:
@@ -476,15 +492,12 @@ def _outside(place: Place, profiles: Iterable[tuple[int, Profile]]) -> bool:
 def _result(
     like: Likelihood,
     sources: Sequence[Source],
-    best: Place,
-    spread: np.ndarray,
-    profiles: Sequence[Profile],
-    minima: Sequence[Place],
+    explored: Explored,
     confidence: float,
-    threshold: float,
     runs: int,
 ) -> Fit:
     """Put a fit together."""
+    best, spread, profiles, minima, threshold, settled = explored
     estimates, curves = {}, {}
     for k, (name, found) in enumerate(zip(like.names, profiles, strict=True)):
         estimates[name] = _estimate(best.at[k], found, like.low[k], like.high[k])
@@ -505,6 +518,7 @@ def _result(
     ]
     warnings = [
         *_interval_notes(estimates, like),
+        *([] if settled else [UNSETTLED]),
         *_rough_notes(confidence, threshold),
         *_rival_notes(rivals),
         *(note for one in explained for note in _correlation_note(one)),

@@ -215,7 +215,8 @@ def _relaxed(
     columns = [np.concatenate(one.residuals) - off for one in shifted]
     if not columns:
         return here.deviance, here.at
-    matrix, move = np.stack(columns, axis=1), np.zeros(len(free))
+    matrix = np.stack(columns, axis=1)
+    move: np.ndarray = np.zeros(len(free))
     counts = [len(one) for one in here.residuals]
     deviance = here.deviance
     for _ in range(RELAXATIONS):
