@@ -6,7 +6,7 @@ import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
-from typing import Any
+from typing import Any, ClassVar
 from uuid import UUID
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
@@ -45,6 +45,13 @@ class Described(Fmi2Slave):  # type: ignore[misc]
     about : About
     variables : sequence of Variable
     """
+
+    # What the slaves send; pythonfmu would take "logAll" for one of its own, and be silent.
+    log_categories: ClassVar[dict[str, str]] = {
+        "logEvents": "Events: kernels that are compiled.",
+        "logStatusWarning": "Warnings: where the motion leaves the model, inputs without effect.",
+        "logStatusError": "Errors: why a call was refused.",
+    }
 
     def __init__(self, about: About, variables: Sequence[Variable]) -> None:
         super().__init__(instance_name="described")

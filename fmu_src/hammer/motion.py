@@ -17,11 +17,14 @@ from percussion_model.physics.records import (
     STORED_FIELDS,
     Mode,
 )
+from percussion_model.physics.state import LARGEST, MOST
 from percussion_model.scene.scene import Scene
 from percussion_model.simulation.runner import Runner
 from percussion_model.solvers.base import Solver
 from percussion_model.solvers.state import State
 
+COUNTS_OF_BLOW = tuple(name for name in BLOW.names or () if BLOW[name].kind == "i")
+NUMBERS_OF_BLOW = tuple(name for name in BLOW.names or () if name not in COUNTS_OF_BLOW)
 AT = {name: k for k, name in enumerate(READING_FIELDS)}
 LEDGER = (*LEDGER_FIELDS, *STORED_FIELDS)  # the last fields of a reading
 PEAKS = slice(AT[PEAK_FIELDS[0]], AT[PEAK_FIELDS[-1]] + 1)
@@ -102,31 +105,57 @@ class Motion(Runner):
         self._is_read = False
 
     def save(self) -> bytes:
-        """What `restore` needs beside times and the number of blows."""
-        self.peaks()
-        floats = np.array([self.stress(), *self.before()])
-        return b"".join(array.tobytes() for array in self._arrays(floats))
+        """What `restore` needs beside times and the number of blows.
 
-    def restore(self, times: tuple[float, float], blow_count: int, saved: bytes) -> None:
-        """Go back to a state; times are the present one and the size of the last step [s]."""
-        floats = np.zeros(1 + len(IMPULSES))
-        arrays = self._arrays(floats)
+        What is read of a state is no part of it: the same state gives the same bits again.
+        """
+        return b"".join(map(np.ndarray.tobytes, self._arrays(self.before(), self.row_of_blow)))
+
+    def restore(
+        self, time: float, step_size: float, blow_count: int, saved: bytes, own: bool
+    ) -> None:
+        """Go back to a state: all of it or, with an error, nothing.
+
+        Parameters
+        ----------
+        time, step_size : float
+            Present time, and size of the last step [s].
+        saved : bytes
+        own : bool
+            Whether it was made in this process; else nothing is known of it.
+        """
+        before, row_of_blow = np.zeros(len(IMPULSES)), np.zeros(1, BLOW)
+        state = self._state.copy()
+        arrays = self._arrays(before, row_of_blow, state)
         if sum(array.nbytes for array in arrays) != len(saved):
             raise StateError("the saved state does not fit the solver")
         start = 0
         for array in arrays:
             array.view(np.uint8)[:] = np.frombuffer(saved, np.uint8, array.nbytes, start)
             start += array.nbytes
-        self._time, self.step_size = times
-        self.blow_count = blow_count
+        if not own:
+            self._refuse_state(state, time)
+            self._refuse_row(before, row_of_blow)
+        self._state, self._before, self.row_of_blow = state, before, row_of_blow
+        self._time, self.step_size, self.blow_count = time, step_size, blow_count
         self.blow = self._numbers_of_blow()
-        self._stress, self._before, self._left = float(floats[0]), floats[1:], None
-        self._take_row()
-        self._has_peaks = True
+        self._left, self._is_read = None, False
 
-    def _arrays(self, floats: np.ndarray) -> list[np.ndarray]:
-        state = self._state
-        return [floats, self.row, self.row_of_blow, state.record, state.workspace]
+    @staticmethod
+    def _refuse_row(before: np.ndarray, row_of_blow: np.ndarray) -> None:
+        row = row_of_blow[0]
+        counts = [int(row[name]) for name in COUNTS_OF_BLOW]
+        found = [float(row[name]) for name in NUMBERS_OF_BLOW]
+        if not np.isfinite(before).all() or not all(abs(x) <= LARGEST or x != x for x in found):
+            raise StateError("the saved state has an impulse or a last blow that is not finite")
+        if not all(0 <= count <= MOST for count in counts):
+            raise StateError(f"the saved state has a last blow with counts of {counts}")
+
+    def _arrays(
+        self, before: np.ndarray, row_of_blow: np.ndarray, state: State | None = None
+    ) -> list[np.ndarray]:
+        state = state or self._state
+        return [before, row_of_blow, state.words, state.workspace]
 
     @staticmethod
     def _impulses(row: np.ndarray) -> np.ndarray:

@@ -3,21 +3,29 @@
 from __future__ import annotations
 
 import json
+import math
 import struct
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 from weakref import WeakValueDictionary
 
-import numpy as np
-
 from fmu_src.hammer.blow_map import read_blow_map
 from fmu_src.hammer.inputs import DRIVE_INPUTS, NAMES_OUTSIDE, PLAIN_INPUTS
 from fmu_src.hammer.motion import Gauge, Motion
 from fmu_src.hammer.outputs import OUTPUTS
 from fmu_src.hammer.warnings import Warnings
-from fmu_src.slave.slave import STEPPING, Phase, Read, Slave
-from fmu_src.slave.states import fingerprint
+from fmu_src.slave.slave import Read, Slave
+from fmu_src.slave.states import (
+    INTEGERS,
+    STEPPING,
+    Phase,
+    Place,
+    StateError,
+    fingerprint,
+    pack_values,
+    unpack_values,
+)
 from fmu_src.variables import closed_bounds
 from percussion_model.scene.inputs import INPUTS, no_effect_reason
 from percussion_model.scene.numbers import section_numbers
@@ -29,8 +37,12 @@ from percussion_model.solvers.wave.grid import cell_at
 # Solvers hold no state: instances of equal parameters share one.
 _SOLVERS: WeakValueDictionary[bytes, Solver] = WeakValueDictionary()
 
-# Numbers of an instance in a saved state.
-NUMBERS = struct.Struct("<BBdddQd")  # phase, 1, start, now, time, blows, step size
+# Numbers of the motion in a saved state, besides its arrays.
+NUMBERS = struct.Struct("<dQd")  # time, blows, step size
+# An output is a whole number of FMI.
+MOST_BLOWS = INTEGERS[1]
+# The host's times come from sums and products of its own; a share of the time.
+CLOCK_ROUNDING = 1e-12
 
 
 class PercussiveHammer(Slave):
@@ -42,7 +54,7 @@ class PercussiveHammer(Slave):
         text = (Path(self.folder) / "scene.json").read_text(encoding="utf-8")
         scene = json.loads(text)
         self.baked = Scene(**scene["given"])
-        self.identity = scene["identity"]
+        self._identity = [scene["identity"], scene["given"]]
         self._drive_row = self.baked.row_of("drive.force")
         self._drive_bounds = closed_bounds(self._drive_row)
         self._drive_inputs = frozenset(DRIVE_INPUTS)
@@ -54,7 +66,6 @@ class PercussiveHammer(Slave):
         self.motion: Motion | None = None
         self.given_inputs: list[Any] = []  # values of the inputs when the solver was made
         self.acting: dict[str, float] = {}  # inputs as the solver has them
-        self._fingerprint: bytes | None = None
 
     # parameters and inputs
 
@@ -62,8 +73,8 @@ class PercussiveHammer(Slave):
         """Check bounds; before the first step the drive force and contradictions as well."""
         super().check(names)
         if self.phase < STEPPING:
-            self._check_drive(self.drive_forces()["drive_force"])
-            self.make_scene()
+            self._check_drive(self.drive_forces(self.values)["drive_force"])
+            self.make_scene(self.values)
 
     def _check_drive(self, force: float) -> None:
         low, high = self._drive_bounds
@@ -71,22 +82,23 @@ class PercussiveHammer(Slave):
             name = "supply_pressure * drive.effective_area"
             raise ValueError(refuse_value(self._drive_row, name, force))
 
-    def drive_forces(self) -> dict[str, float]:
+    @staticmethod
+    def drive_forces(values: dict[str, Any]) -> dict[str, float]:
         """Forces of the drive as the solver takes them [N]."""
-        on, pressure, area, force = (self.values[name] for name in DRIVE_INPUTS)
+        on, pressure, area, force = (values[name] for name in DRIVE_INPUTS)
         return {
             "drive_force": pressure * area if on else 0.0,
             "external_force": force if on else 0.0,
         }
 
-    def solver_inputs(self) -> dict[str, float]:
+    def solver_inputs(self, values: dict[str, Any]) -> dict[str, float]:
         """Inputs as the solver takes them."""
-        found = {inner: self.values[name] for name, inner in PLAIN_INPUTS.items()}
-        return found | self.drive_forces()
+        found = {inner: values[name] for name, inner in PLAIN_INPUTS.items()}
+        return found | self.drive_forces(values)
 
-    def make_scene(self) -> Scene:
-        """Scene of the present values; raises `SceneError` if they contradict each other."""
-        values: dict[str, Any] = {}
+    def make_scene(self, values: dict[str, Any]) -> Scene:
+        """Scene of these inputs and the parameters; `SceneError` if they contradict each other."""
+        given: dict[str, Any] = {}
         for one in self.parameters:
             if one.key is None:
                 continue
@@ -95,36 +107,45 @@ class PercussiveHammer(Slave):
                 value = None
             elif one.type == "Enumeration":
                 value = self.choice(one.name)
-            values[one.key] = value
-        values |= {INPUTS[name].key: value for name, value in self.solver_inputs().items()}
-        changes = {key: value for key, value in values.items() if value != self.baked[key]}
+            given[one.key] = value
+        given |= {INPUTS[name].key: value for name, value in self.solver_inputs(values).items()}
+        changes = {key: value for key, value in given.items() if value != self.baked[key]}
         return self.baked.replace(**changes)
 
     # stepping
 
     def foretell(self) -> None:
         """Log that kernels are going to be compiled, where they are not kept yet."""
-        solver = self.make_scene().solver_name
+        solver = self.make_scene(self.values).solver_name
         place = place_of_kernels(solver)
         if place is not None:
-            self.log(
-                f"{self.instance_name}: compiling the kernels of the solver {solver}: once, for "
+            self.note(
+                f"compiling the kernels of the solver {solver}: once, for "
                 f"about half a minute; they are kept in {place}"
             )
 
     def initialise(self) -> Motion:
         """Solver and state; made at time zero for the present values where there are none."""
         if self.motion is None:
-            scene = self.make_scene()
-            self.given_inputs = [self.values[one.name] for one in self.inputs]
-            key = fingerprint(self.fingerprint().hex(), self.given_inputs)
-            self.motion = Motion(scene, _SOLVERS.get(key) or self._map_solver(scene))
-            _SOLVERS[key] = self.motion.solver
-            self.motion.gauge = self._find_gauge(scene, self.motion.solver)
-            self.acting = self.solver_inputs()
-            self._acts: dict[str, bool] = {}
+            self._take_motion(self._make_motion(self.values), self.values)
+            self.acting = self.solver_inputs(self.values)
             self.new.clear()
+        assert self.motion is not None
         return self.motion
+
+    def _make_motion(self, values: dict[str, Any]) -> Motion:
+        """Motion from time zero under these inputs and the parameters."""
+        scene = self.make_scene(values)
+        key = fingerprint(self.fingerprint().hex(), [values[one.name] for one in self.inputs])
+        motion = Motion(scene, _SOLVERS.get(key) or self._map_solver(scene))
+        _SOLVERS[key] = motion.solver
+        motion.gauge = self._find_gauge(scene, motion.solver)
+        return motion
+
+    def _take_motion(self, motion: Motion, inputs: dict[str, Any]) -> None:
+        self.motion = motion
+        self.given_inputs = [inputs[one.name] for one in self.inputs]
+        self._acts: dict[str, bool] = {}
 
     def _map_solver(self, scene: Scene) -> Solver | None:
         """Solver on the table that the FMU brings along, if the scene wants that."""
@@ -161,7 +182,7 @@ class PercussiveHammer(Slave):
         values, acting, new = self.values, self.acting, self.new
         wanted = {PLAIN_INPUTS[name]: values[name] for name in new if name in PLAIN_INPUTS}
         if not self._drive_inputs.isdisjoint(new):
-            forces = self.drive_forces()
+            forces = self.drive_forces(values)
             self._check_drive(forces["drive_force"])
             wanted |= forces
         new.clear()
@@ -196,42 +217,39 @@ class PercussiveHammer(Slave):
 
     # states
 
-    def fingerprint(self) -> bytes:
-        """Hash of sources, variables and parameters."""
-        if self._fingerprint is None:
-            parameters = [self.values[one.name] for one in self.parameters]
-            self._fingerprint = fingerprint(self.identity, parameters)
-        return self._fingerprint
+    def identity(self) -> Any:
+        """Sources, names of the variables, and the scene with what no variable tells."""
+        return self._identity
 
     def save(self) -> bytes:
-        """Numbers of the instance, its inputs, its motion."""
-        motion = self.motion
-        if self.phase == Phase.INSTANTIATED or motion is None:
-            raise ValueError("there is no state to save before the initialisation has ended")
-        solver = motion.save()  # reads, and so fills the row
-        numbers = NUMBERS.pack(
-            self.phase, 1, self.start_time, self.now, motion.time,
-            motion.blow_count, motion.step_size,
-        )  # fmt: skip
-        inputs = [self.values[one.name] for one in self.inputs]
-        acting = [self.acting[name] for name in INPUTS]
-        floats = np.array([*self.given_inputs, *inputs, *acting], float)
-        return numbers + floats.tobytes() + solver
+        """Numbers of the motion, inputs that it was made with and that act, its arrays."""
+        motion = self.motion or self.initialise()
+        numbers = NUMBERS.pack(motion.time, motion.blow_count, motion.step_size)
+        given = dict(zip((one.name for one in self.inputs), self.given_inputs, strict=True))
+        acting = struct.pack(f"<{len(INPUTS)}d", *(self.acting[name] for name in INPUTS))
+        return numbers + pack_values(self.inputs, given) + acting + motion.save()
 
-    def restore(self, body: bytes) -> None:
-        """Go back to a state."""
-        phase, _, start, now, time, blows, step_size = NUMBERS.unpack_from(body)
-        count = len(self.inputs)
-        floats = np.frombuffer(body, np.float64, 2 * count + len(INPUTS), NUMBERS.size)
-        self._set_inputs(floats[:count])
-        if [self.values[one.name] for one in self.inputs] != self.given_inputs:
-            self.motion = None  # the solver was made with other inputs
-        motion = self.initialise()
-        self._set_inputs(floats[count : 2 * count])
-        motion.restore((time, step_size), blows, body[NUMBERS.size + floats.nbytes :])
-        self.acting = dict(zip(INPUTS, floats[2 * count :].tolist(), strict=True))
-        self.phase, self.start_time, self.now = Phase(phase), start, now
-
-    def _set_inputs(self, values: np.ndarray) -> None:
-        for one, value in zip(self.inputs, values, strict=True):
-            self.values[one.name] = bool(value) if one.type == "Boolean" else float(value)
+    def restore(self, values: dict[str, Any], place: Place, saved: bytes, own: bool) -> None:
+        """Go back to a motion; as in `Slave`."""
+        begin = NUMBERS.size + 8 * len(self.inputs)
+        given = unpack_values(self.inputs, saved, NUMBERS.size)
+        if len(saved) < begin + 8 * len(INPUTS):
+            raise StateError(f"the saved motion has {len(saved)} bytes, too few for its inputs")
+        time, blows, step_size = NUMBERS.unpack_from(saved)
+        acting = struct.unpack_from(f"<{len(INPUTS)}d", saved, begin)
+        if not all(map(math.isfinite, (time, step_size, *acting))):
+            raise StateError("the saved motion has a time or an input that is not finite")
+        # the clock of the motion follows that of the host, within the rounding of a step
+        late = abs(time - (place.now - place.start_time))
+        if not late <= step_size + CLOCK_ROUNDING * abs(place.now):
+            raise StateError(f"the saved motion is at {time!r} s, its instance at {place.now!r} s")
+        if not 0 <= blows <= MOST_BLOWS:
+            raise StateError(f"the saved motion has {blows} blows")
+        arrays = saved[begin + 8 * len(INPUTS) :]
+        if [given[one.name] for one in self.inputs] == self.given_inputs and self.motion:
+            self.motion.restore(time, step_size, blows, arrays, own)
+        else:  # the solver was made with other inputs
+            motion = self._make_motion(self.values | given)
+            motion.restore(time, step_size, blows, arrays, own)
+            self._take_motion(motion, given)
+        self.acting = dict(zip(INPUTS, acting, strict=True))

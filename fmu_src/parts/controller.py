@@ -8,6 +8,7 @@ let the pressure follow the feed.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from copy import copy
 from typing import Any
 
@@ -168,8 +169,18 @@ class DrillController(Model):
         seeker = {name: copy(getattr(self.seeker, name)) for name in Seeker.STATE}
         return super().save() | {"seeker": seeker}
 
+    def state_fault(self, saved: Mapping[str, Any]) -> str:
+        """As in `Model`: modes and lengths of lists."""
+        if saved["mode"] not in (DRILLING, VOID, RETRACT):
+            return f"mode = {saved['mode']!r}, which must be 0, 1 or 2"
+        for name, value in saved["seeker"].items():
+            own = getattr(self.seeker, name)
+            if isinstance(own, list) and len(value) != len(own):
+                return f"{len(value)} numbers in {name}, which must be {len(own)}"
+        return ""
+
     def restore(self, saved: dict[str, Any]) -> None:
-        """Go back to a state."""
+        """Go back to a state, which is right."""
         super().restore(saved)
         for name, value in saved["seeker"].items():
             setattr(self.seeker, name, copy(value))

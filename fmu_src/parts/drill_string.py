@@ -16,6 +16,7 @@ partner; one that swings within a few steps has to lose a few percent a cycle, a
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -33,6 +34,8 @@ SHARE_OF_MASS = 0.1
 ROUNDING = 1e-9
 # Implicit midpoint is stable at any step, but blind to what is faster [s].
 LONGEST_LUMPED_STEP = 2e-3
+# A saved string of more rods is refused: their lumps would need matrices of this size squared.
+MOST_RODS = 2000
 
 
 class Shoulder:
@@ -255,11 +258,25 @@ class DrillString(Model):
         body = {name: plain(getattr(self.body, name)) for name in self.body.STATE}
         return super().save() | {"body": body}
 
+    def state_fault(self, saved: Mapping[str, Any]) -> str:
+        """As in `Model`: the number of rods, what is divided by, and a lag within a cell."""
+        body, count = saved["body"], saved["body"]["count"]
+        if type(count) is not int or not 1 <= count <= MOST_RODS:
+            return f"{count!r} rods, which must be 1 to {MOST_RODS}"
+        for name, length in self.body.lengths(count).items():
+            if len(body[name]) != length:
+                return f"{len(body[name])} numbers in {name}, which must be {length}"
+        if not saved["stiffness"] > 0.0:
+            return f"stiffness = {saved['stiffness']!r}, which must be above 0 N/m"
+        if not 0.0 <= saved["lag"] <= self.body.step:
+            return f"lag = {saved['lag']!r}, which must be from 0 to {self.body.step!r} s"
+        return ""
+
     def restore(self, saved: dict[str, Any]) -> None:
-        """Go back to a state."""
+        """Go back to a state, which is right."""
         super().restore(saved)
         for name, value in saved["body"].items():
-            setattr(self.body, name, np.array(value) if isinstance(value, list) else value)
+            setattr(self.body, name, np.array(value, float) if isinstance(value, list) else value)
         if isinstance(self.body, Lumps):
             self.body.assemble()
 

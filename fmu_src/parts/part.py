@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from operator import itemgetter
 from typing import Any, ClassVar
 
-from fmu_src.slave.slave import Phase, Read, Slave
-from fmu_src.slave.states import StateError, fingerprint
+from fmu_src.slave.slave import Read, Slave
+from fmu_src.slave.states import Phase, Place, StateError
 
 Entries = dict[str, tuple[Any, ...]]
 
@@ -54,10 +54,44 @@ class Model:
         """State as plain values; `restore` takes them back."""
         return {name: plain(getattr(self, name)) for name in self.STATE}
 
+    def state_fault(self, saved: Mapping[str, Any]) -> str:
+        """What is wrong with a state from outside, which is of the right form; empty: nothing."""
+        return ""
+
     def restore(self, saved: dict[str, Any]) -> None:
-        """Go back to a state."""
+        """Go back to a state, which is right."""
         for name in self.STATE:
             setattr(self, name, saved[name])
+
+
+# Numbers in SI stay below this, so that no product of a few of them overflows.
+LARGEST = 1e60
+
+
+def form_fault(saved: Any, own: Any, name: str = "state") -> str:
+    """Where values from outside are not of the form of a model's own; empty: nowhere.
+
+    Flags are flags, numbers are finite numbers, tables have the same names; lists are of
+    numbers, and of any length.
+    """
+    if isinstance(own, dict):
+        if not isinstance(saved, dict) or saved.keys() != own.keys():
+            return f"{name}, which must have {', '.join(own)}"
+        faults = (form_fault(saved[key], own[key], key) for key in own)
+        return next(filter(None, faults), "")
+    if isinstance(own, list):
+        if not isinstance(saved, list) or not all(map(_is_number, saved)):
+            return f"{name}, which must be a list of finite numbers"
+    elif isinstance(own, bool):
+        if not isinstance(saved, bool):
+            return f"{name} = {saved!r:.40}, which must be true or false"
+    elif not _is_number(saved):
+        return f"{name} = {saved!r:.40}, which must be a finite number"
+    return ""
+
+
+def _is_number(value: Any) -> bool:
+    return type(value) in (int, float) and abs(value) <= LARGEST
 
 
 def plain(value: Any) -> Any:
@@ -78,7 +112,6 @@ class Part(Slave):
         """Make the model anew when it is needed."""
         self._model: Model | None = None
         self._found: Mapping[str, Any] | None = None  # outputs that were asked for
-        self._fingerprint: bytes | None = None
 
     def _parameters(self) -> dict[str, Any]:
         """Parameters by name, words for enumerations."""
@@ -118,35 +151,28 @@ class Part(Slave):
 
         return read
 
-    def fingerprint(self) -> bytes:
-        """Hash of the kind of part and its parameters."""
-        if self._fingerprint is None:
-            self._fingerprint = fingerprint(self.MODEL.__name__, self._parameters())
-        return self._fingerprint
+    def identity(self) -> Any:
+        """Sources, whose hash is in the name of the module, and names of the variables."""
+        return [type(self).__module__, type(self).__name__, list(self.by_name)]
 
     def save(self) -> bytes:
-        """Phase, times, inputs, and the state of the model."""
-        if self._model is None:
-            raise ValueError("there is no state to save before the initialisation has ended")
-        body = {
-            "phase": int(self.phase),
-            "times": [self.start_time, self.now],
-            "inputs": {one.name: self.values[one.name] for one in self.inputs},
-            "model": self._model.save(),
-        }
-        return json.dumps(body).encode()
+        """State of the model."""
+        return json.dumps(self.initialise().save()).encode()
 
-    def restore(self, body: bytes) -> None:
-        """Go back to a state."""
+    def restore(self, values: dict[str, Any], place: Place, saved: bytes, own: bool) -> None:
+        """Go back to a motion; as in `Slave`."""
         try:
-            saved = json.loads(body)
-        except json.JSONDecodeError as error:
+            found = json.loads(saved)
+        except (ValueError, RecursionError) as error:
             raise StateError(f"the saved state cannot be read: {error}") from None
-        self.values |= saved["inputs"]
-        self.initialise().restore(saved["model"])
-        self.phase = Phase(saved["phase"])
-        self.start_time, self.now = saved["times"]
-        self._found = None
+        model = self._model
+        if model is None:
+            model = self.MODEL(self._parameters())
+            model.begin(values)
+        if not own and (fault := form_fault(found, model.save()) or model.state_fault(found)):
+            raise StateError(f"the saved state has {fault}")
+        model.restore(found)
+        self._model, self._found = model, None
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ u = 0, down at u = -D_1, where u is the displacement of the piston relative to t
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 from fmu_src.parts.part import Model, Part, PartTable
@@ -77,6 +78,12 @@ class PneumaticDrive(Model):
                 self.used += h * conductance * (supply + AMBIENT - new)
             found.append(new - AMBIENT)
         self.upper, self.lower = found
+
+    def state_fault(self, saved: Mapping[str, Any]) -> str:
+        """As in `Model`: the valve is in one of its two places."""
+        if saved["direction"] not in (1.0, -1.0):
+            return f"direction = {saved['direction']!r}, which must be 1 or -1"
+        return ""
 
     def outputs(self) -> dict[str, Any]:
         """Present values by name."""

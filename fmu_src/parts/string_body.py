@@ -94,6 +94,10 @@ class Lumps(Rods):
         self.velocities = np.zeros(count + 2)
         self.assemble()
 
+    def lengths(self, count: int) -> dict[str, int]:
+        """Lengths of the lists in a state of so many rods."""
+        return {"places": count + 2, "velocities": count + 2}
+
     def assemble(self) -> None:
         """Masses, weights, and springs: half a rod's length beside an end."""
         n = self.count

@@ -51,6 +51,10 @@ class Waves(Rods):
         x = self.impedance * self.step / mass
         return -math.expm1(-x) / x, math.exp(-x)
 
+    def lengths(self, count: int) -> dict[str, int]:
+        """Lengths of the lists in a state of so many rods."""
+        return {"ring": 2 * count * self.cells_of_rod}
+
     @property
     def ring(self) -> np.ndarray:
         """All waves."""

@@ -11,15 +11,28 @@ import ctypes
 import functools
 import sys
 from collections.abc import Callable, Iterable
-from enum import IntEnum
 from math import inf
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from pythonfmu import Fmi2Slave
 from pythonfmu.enums import Fmi2Status
 
-from fmu_src.slave.states import pack, unpack
+from fmu_src.slave.states import (
+    PLACE,
+    STEPPING,
+    OwnState,
+    Phase,
+    Place,
+    StateError,
+    fingerprint,
+    pack,
+    pack_place,
+    pack_values,
+    unpack,
+    unpack_place,
+    unpack_values,
+)
 from fmu_src.variables import closed_bounds, read_variables
 from percussion_model.scene.rows import refuse_value
 
@@ -37,19 +50,6 @@ Read = Callable[[Any], list[Any]]
 
 class FmuError(ValueError):
     """An error that the host must see; the text has its percent signs doubled."""
-
-
-class Phase(IntEnum):
-    """Where an instance is in the calling sequence of FMI 2.0."""
-
-    INSTANTIATED = 0
-    INITIALISING = 1
-    STEPPING = 2
-    TERMINATED = 3
-
-
-# Looked up by name, a member of an enumeration takes as long as setting ten inputs.
-STEPPING = Phase.STEPPING
 
 
 def guarded(method: Callable) -> Callable:
@@ -85,8 +85,8 @@ def finalise_in_time(folder: str) -> None:
 class Slave(Fmi2Slave):
     """Base of the slaves.
 
-    A slave gives `reset`, `initialise`, `step`, a `reader` of outputs, and its state by
-    `fingerprint`, `save` and `restore`.
+    A slave gives `reset`, `initialise`, `step`, a `reader` of outputs, its `identity`, and its
+    motion by `save` and `restore`.
 
     Attributes
     ----------
@@ -102,14 +102,19 @@ class Slave(Fmi2Slave):
         Inputs whose new values may be out of bounds.
     """
 
+    start_notes: ClassVar[list[str]] = []  # of the loader
+
     def __init__(self, **arguments: Any) -> None:
         super().__init__(**arguments)
+        while self.start_notes:
+            self.warn(self.start_notes.pop(0))
         folder = arguments["resources"]
         # The export library adds the folder for each instance; once loaded it is not needed.
         while folder in sys.path:
             sys.path.remove(folder)
         finalise_in_time(folder)
         self.phase = Phase.INSTANTIATED
+        self.is_set_up = False
         self.start_time = 0.0
         self.now = 0.0  # time of the host [s]
         self.variables = {one.reference: one for one in read_variables(folder)}
@@ -120,6 +125,7 @@ class Slave(Fmi2Slave):
         self.pending: dict[tuple[int, ...], list[float]] = {}
         self.new: set[str] = set()
         self.unchecked: list[str] = []
+        self._fingerprint: bytes | None = None  # of what does not change after the first step
         self._bounds = {name: closed_bounds(one.row) for name, one in self.by_name.items()}
         # by references, for each type
         self._reads: dict[Any, dict[tuple[int, ...], Read]] = {
@@ -148,16 +154,27 @@ class Slave(Fmi2Slave):
         """What gives the present values of these outputs; asked for once."""
         raise NotImplementedError
 
-    def fingerprint(self) -> bytes:
-        """Hash of what a saved state belongs to."""
+    def identity(self) -> Any:
+        """Plain values that tell this FMU's sources and variables from all others."""
         raise NotImplementedError
 
     def save(self) -> bytes:
-        """Present state; ValueError before there is one."""
+        """Present motion, once the initialisation has ended."""
         raise NotImplementedError
 
-    def restore(self, body: bytes) -> None:
-        """Go back to a state that `save` gave."""
+    def restore(self, values: dict[str, Any], place: Place, saved: bytes, own: bool) -> None:
+        """Go back to a motion that `save` gave: all of it or, with a ValueError, nothing.
+
+        Parameters
+        ----------
+        values : dict
+            Of the inputs, by name, which the caller takes over afterwards.
+        place : Place
+            As it will be.
+        saved : bytes
+        own : bool
+            Whether it was made in this process; else nothing is known of it.
+        """
         raise NotImplementedError
 
     # values
@@ -236,6 +253,8 @@ class Slave(Fmi2Slave):
 
     def _set(self, references: list[int], values: list[Any], types: tuple[str, ...]) -> None:
         """Set parameters and inputs."""
+        if self.phase == Phase.TERMINATED:
+            raise ValueError(f"call out of order: no fmi2Set{types[0]} after fmi2Terminate")
         self.take_pending()
         found = []
         for reference, value in zip(references, values, strict=True):
@@ -249,6 +268,7 @@ class Slave(Fmi2Slave):
                 continue
             self.values[one.name] = value
             if self.phase < STEPPING:
+                self._fingerprint = None
                 self.reset()
             else:
                 self.new.add(one.name)
@@ -319,15 +339,25 @@ class Slave(Fmi2Slave):
         self, start_time: float, stop_time: float | None, tolerance: float | None
     ) -> None:
         """Take the start time."""
-        self._require(Phase.INSTANTIATED)
+        self._require("fmi2SetupExperiment", Phase.INSTANTIATED)
         if not abs(start_time) < inf:
             raise ValueError(f"startTime = {start_time!r}: must be a finite time in s")
+        if stop_time is not None and not stop_time >= start_time:
+            raise ValueError(
+                f"stopTime = {stop_time!r}: must not lie before startTime = {start_time!r} s"
+            )
         self.start_time = self.now = start_time
+        self.is_set_up = True
 
     @guarded
     def enter_initialization_mode(self) -> None:
         """Check all values."""
-        self._require(Phase.INSTANTIATED)
+        self._require("fmi2EnterInitializationMode", Phase.INSTANTIATED)
+        if not self.is_set_up:
+            # FMI 2.0.4, section 2.1.6: otherwise there is no start time
+            raise ValueError(
+                "call out of order: fmi2EnterInitializationMode needs fmi2SetupExperiment before it"
+            )
         self.check(self.values)
         self.foretell()
         self.phase = Phase.INITIALISING
@@ -335,7 +365,7 @@ class Slave(Fmi2Slave):
     @guarded
     def exit_initialization_mode(self) -> None:
         """Check again what may have changed, and make everything ready."""
-        self._require(Phase.INITIALISING)
+        self._require("fmi2ExitInitializationMode", Phase.INITIALISING)
         self.check(self.values)
         self.initialise()
         self.phase = STEPPING
@@ -344,7 +374,7 @@ class Slave(Fmi2Slave):
         """Advance by a communication step."""
         try:
             if self.phase is not STEPPING:
-                self._require(STEPPING)
+                self._require("fmi2DoStep", STEPPING)
             if not 0.0 < step_size < inf:
                 raise ValueError(f"communicationStepSize = {step_size!r}: must be above 0 s")
             if current_time != self.now:
@@ -374,29 +404,70 @@ class Slave(Fmi2Slave):
     @guarded
     def terminate(self) -> None:
         """No further steps."""
+        self._require("fmi2Terminate", STEPPING)
         self.phase = Phase.TERMINATED
 
-    def _require(self, phase: Phase) -> None:
+    def _require(self, call: str, phase: Phase) -> None:
         """Raise ValueError if a call comes out of order."""
         if self.phase != phase:
             raise ValueError(
-                f"call out of order: allowed while {phase.name.lower()}, "
+                f"call out of order: {call} is allowed while {phase.name.lower()}, "
                 f"but the instance is {self.phase.name.lower()}"
             )
 
     # the calls of a host: states, which are bytes
 
+    def _in_state(self, phase: Phase) -> list[Any]:
+        """Variables whose values a state of this phase brings along.
+
+        Later the parameters are fixed: they are in the hash of what the state belongs to.
+        """
+        return self.inputs if phase >= STEPPING else [*self.parameters, *self.inputs]
+
+    def _owner(self, phase: Phase) -> bytes:
+        """Hash of what a state of this phase belongs to."""
+        if phase < STEPPING:
+            return fingerprint(self.identity())
+        return self.fingerprint()
+
+    def fingerprint(self) -> bytes:
+        """Hash of sources, variables and values of the parameters."""
+        if self._fingerprint is None:
+            parameters = [self.values[one.name] for one in self.parameters]
+            self._fingerprint = fingerprint(self.identity(), parameters)
+        return self._fingerprint
+
     @guarded
     def _get_fmu_state(self) -> bytes:
         self.take_pending()
-        body = self.save()
-        return pack(self.fingerprint(), body)
+        phase = self.phase
+        place = pack_place(Place(phase, self.is_set_up, self.start_time, self.now))
+        values = pack_values(self._in_state(phase), self.values)
+        # before its end the initialisation can be done again from the values
+        motion = self.save() if phase >= STEPPING else b""
+        return pack(self._owner(phase), place + values + motion)
 
     @guarded
     def _set_fmu_state(self, state: bytes) -> None:
-        body = unpack(self.fingerprint(), state)
+        owner, body = unpack(state)
+        place = unpack_place(body)
+        if owner != self._owner(place.phase):
+            raise StateError("the saved state belongs to other parameters or to another FMU")
+        variables = self._in_state(place.phase)
+        values = unpack_values(variables, body, PLACE.size)
+        motion = body[PLACE.size + 8 * len(variables) :]
+        if place.phase >= STEPPING:
+            self.restore(values, place, motion, isinstance(state, OwnState))
+        elif motion:
+            raise StateError(f"the saved state has {len(motion)} bytes too many")
+        else:
+            self._fingerprint = None
+            self.reset()
+        # from here on nothing is refused
         self.pending.clear()
-        self.restore(body)
+        self.values |= values
+        self.phase, self.is_set_up = place.phase, place.is_set_up
+        self.start_time, self.now = place.start_time, place.now
         self.renew_inputs()
 
     @staticmethod
@@ -405,6 +476,7 @@ class Slave(Fmi2Slave):
 
     @staticmethod
     def _fmu_state_from_bytes(state: bytes) -> bytes:
+        # looked at when it is set: an error here would bring the export library down
         return state
 
     # messages
@@ -418,6 +490,10 @@ class Slave(Fmi2Slave):
     ) -> None:
         """Log a message; hosts take it for a printf format, so percent signs are doubled."""
         super().log(msg.replace("%", "%%"), status, category)
+
+    def note(self, message: str) -> None:
+        """Log what is no warning."""
+        self.log(f"{self.instance_name}: {message}", Fmi2Status.ok, "logEvents")
 
     def warn(self, message: str) -> None:
         """Log a warning."""

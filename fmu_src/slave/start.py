@@ -3,7 +3,8 @@
 Numba keeps compiled kernels beside the sources, but hosts unpack an FMU into a new
 folder each time. So the sources are copied once into the user's cache folder, under
 a name that holds a hash of their contents, and imported from there. The environment
-variable PERCUSSION_FMU_CACHE names another folder.
+variable PERCUSSION_FMU_CACHE names another folder. What lies in such a folder is run: it
+has to be the user's, closed to others, and the sources in it those of the FMU.
 """
 
 from __future__ import annotations
@@ -14,12 +15,17 @@ import importlib
 import importlib.util
 import os
 import shutil
+import stat
 import sys
 import tempfile
 from pathlib import Path
 
 PACKAGE = "__BUNDLE__"
 VARIABLE = "PERCUSSION_FMU_CACHE"
+
+
+# Why another folder than the first was taken; the first instance logs it.
+notes: list[str] = []
 
 
 def slave_class(module_globals: dict, module: str, name: str) -> type:
@@ -36,7 +42,9 @@ def slave_class(module_globals: dict, module: str, name: str) -> type:
     ctypes.pythonapi.Py_IncRef(ctypes.py_object(module_globals))
     if PACKAGE not in sys.modules:
         load(Path(module_globals["__file__"]).parent / PACKAGE)
-    return getattr(importlib.import_module(f"{PACKAGE}.{module}"), name)
+    found = getattr(importlib.import_module(f"{PACKAGE}.{module}"), name)
+    found.start_notes = notes
+    return found
 
 
 def load(source: Path) -> None:
@@ -53,38 +61,81 @@ def load(source: Path) -> None:
 
 
 def kept_copy(source: Path) -> Path:
-    """Copy the sources to the cache folder, unless they are there; return where."""
+    """Copy the sources to the cache folder, unless they are there; return where.
+
+    Where that cannot be, a temporary folder serves, and kernels are compiled anew.
+    """
     try:
-        target = cache_folder() / PACKAGE
-        if not complete(target, source):
-            target.parent.mkdir(parents=True, exist_ok=True)
-            draft = Path(tempfile.mkdtemp(prefix=f".{PACKAGE}.", dir=target.parent))
-            try:
-                shutil.copytree(source, draft / PACKAGE, ignore=_NO_CACHE)
-                os.rename(draft / PACKAGE, target)
-            except OSError:
-                if not complete(target, source):  # another process may have been first
-                    raise
-            finally:
-                shutil.rmtree(draft, ignore_errors=True)
-        if not os.access(target, os.W_OK):
-            raise PermissionError(target)
-        return target
-    except OSError:
-        draft = Path(tempfile.mkdtemp(prefix=f"{PACKAGE}-"))
-        atexit.register(shutil.rmtree, draft, ignore_errors=True)
-        shutil.copytree(source, draft / PACKAGE, ignore=_NO_CACHE)
-        return draft / PACKAGE
+        return copy_into(cache_folder(), source)
+    except (OSError, RuntimeError) as error:  # no HOME is a RuntimeError
+        notes.append(f"compiled kernels are not kept ({VARIABLE}): {error}")
+    draft = Path(tempfile.mkdtemp(prefix=f"{PACKAGE}-"))
+    atexit.register(shutil.rmtree, draft, ignore_errors=True)
+    shutil.copytree(source, draft / PACKAGE, ignore=_NO_CACHE)
+    return draft / PACKAGE
+
+
+def copy_into(folder: Path, source: Path) -> Path:
+    """Copy the sources into a cache folder, unless they are there; return where.
+
+    Raises
+    ------
+    OSError
+        If that cannot be done, or if somebody else could change them there.
+    """
+    folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+    refuse_open(folder)
+    target = folder / PACKAGE
+    if not equal(target, source):
+        draft = Path(tempfile.mkdtemp(prefix=f".{PACKAGE}.", dir=folder))
+        try:
+            shutil.copytree(source, draft / PACKAGE, ignore=_NO_CACHE)
+            os.chmod(draft / PACKAGE, 0o700)  # what is put into it later is closed to others too
+            if target.exists() and not equal(target, source):  # files that are not the FMU's
+                os.rename(target, draft / "old")
+            os.rename(draft / PACKAGE, target)
+        except OSError:
+            if not equal(target, source):  # another process may have been first
+                raise
+        finally:
+            shutil.rmtree(draft, ignore_errors=True)
+    refuse_open_tree(target)
+    if not os.access(target, os.W_OK):
+        raise PermissionError(f"{target} cannot be written")
+    return target
 
 
 _NO_CACHE = shutil.ignore_patterns("__pycache__")
 
 
-def complete(target: Path, source: Path) -> bool:
-    """Whether a copy has every file of the sources, in its size."""
+def refuse_open(path: Path) -> None:
+    """Raise PermissionError if somebody else owns a file or folder, or can write to it.
+
+    Windows has no such modes: there the user's profile is closed to others by itself.
+    """
+    if sys.platform == "win32":
+        return
+    for found in (os.lstat(path), os.stat(path)):
+        if found.st_uid != os.geteuid():
+            raise PermissionError(f"{path} belongs to another user")
+        if found.st_mode & 0o022 and not stat.S_ISLNK(found.st_mode):
+            raise PermissionError(f"{path} can be written by others; empty it, then chmod go-w")
+
+
+def refuse_open_tree(folder: Path) -> None:
+    """The same for a folder with all that is in it, which nobody else may reach."""
+    refuse_open(folder)
+    if sys.platform == "win32" or not os.lstat(folder).st_mode & 0o077:
+        return
+    for path in folder.rglob("*"):
+        refuse_open(path)
+
+
+def equal(target: Path, source: Path) -> bool:
+    """Whether a copy has every file of the sources, byte for byte."""
     for path in source.rglob("*.py"):
         copy = target / path.relative_to(source)
-        if not copy.is_file() or copy.stat().st_size != path.stat().st_size:
+        if not copy.is_file() or copy.read_bytes() != path.read_bytes():
             return False
     return True
 

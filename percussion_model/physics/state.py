@@ -8,7 +8,7 @@ puts its own fields first: numba takes a record that only has more at its end fo
 from __future__ import annotations
 
 from percussion_model.physics.effects import EFFECTS
-from percussion_model.physics.records import LEDGER_ENTRIES
+from percussion_model.physics.records import LEDGER_ENTRIES, Mode
 
 # Checkpoints of the running bit impulse during standstill.
 CHECKPOINTS = 32
@@ -114,3 +114,43 @@ _BLOW = [  # the blow under way: what it began with, and what it has come to
 
 # What changes; every field is a word of eight bytes or a row of such.
 COMMON_STATE = [*_SWITCHES, *_INPUTS, *_MOTION, *_SUMS, *_BLOW]
+
+# What a state from outside may hold; kernels index arrays, count and loop by these numbers.
+# Numbers in SI stay below this, so that no product of a few of them overflows.
+LARGEST = 1e60
+MOST = 2**53  # of what is counted
+INFINITE = float("inf")
+
+FLAG = (0, 1)
+COUNT = (0, MOST)
+POSITIVE = (0.0, LARGEST)
+NUMBER = (-LARGEST, LARGEST)
+
+# Lowest and highest value of each field; of a number that is not named, NUMBER.
+COMMON_LIMITS: dict[str, tuple[float, float]] = {
+    "mode": (min(Mode), max(Mode)),
+    "alpha": (-1, 1),
+    "closed": FLAG,
+    "live": (1, 1),
+    "events_on": FLAG,
+    "n_blows": COUNT,
+    "n_events": COUNT,
+    "cycle_counted": FLAG,
+    **{name: COUNT for name, _ in _SWITCHES if name.startswith("count_")},
+    "reversal": POSITIVE,
+    **{
+        name: POSITIVE
+        for symbol in ("k_r", "gamma", "c_r", "w_r")
+        for name in (symbol, f"next_{symbol}")
+    },
+    "gap": (-LARGEST, INFINITE),  # without a piston
+    "t_open": (-INFINITE, LARGEST),
+    "n_check": COUNT,
+    "peak_from": (-LARGEST, INFINITE),
+    "b_contacts": COUNT,
+    "b_cycles": COUNT,
+    "b_started": FLAG,
+    "armed": FLAG,
+}
+# Numbers that may be undefined.
+COMMON_UNDEFINED = ("b_rebound", "b_standstill", "b_peak_contact")

@@ -12,6 +12,7 @@ from percussion_model.scene.inputs import SimulationError, check_input
 from percussion_model.scene.rows import is_number
 from percussion_model.scene.scene import Scene
 from percussion_model.solvers.base import Solver, make_solver
+from percussion_model.solvers.state import State
 
 # Rows that one call of a kernel can fill; a full buffer is read out.
 _BLOW_ROOM = 64
@@ -68,6 +69,16 @@ class Runner:
     def time(self) -> float:
         """Present time [s]."""
         return self._time
+
+    def _refuse_state(self, state: State, t: float) -> None:
+        """Raise SimulationError if kernels cannot go on from a state of time `t` [s]."""
+        here = self._state
+        if state.dtype != here.dtype or state.shapes != here.shapes:
+            raise SimulationError("the saved state does not fit the solver")
+        if not (is_number(t) and t >= 0.0):
+            raise SimulationError(f"the saved state has the time {t!r} s: must be 0 s or later")
+        if fault := self.solver.state_fault(state, t):
+            raise SimulationError(f"the saved state has {fault}")
 
     def _keep(self, blows: np.ndarray, events: np.ndarray) -> None:
         """Take what the kernels have listed; the rows are overwritten afterwards."""

@@ -155,11 +155,18 @@ class Simulation(Runner):
         )
 
     def restore(self, snapshot: Snapshot) -> None:
-        """Go back to a snapshot; what follows repeats bit for bit."""
+        """Go back to a snapshot; what follows repeats bit for bit.
+
+        Raises
+        ------
+        SimulationError
+            If it is of another scene, or holds what no run can have; nothing has changed then.
+        """
         if not isinstance(snapshot, Snapshot):
             raise SimulationError("not a snapshot made by Simulation.save")
         if snapshot.scene is not self.scene and snapshot.scene != self.scene:
             raise SimulationError("the snapshot is of another scene")
+        self._refuse_state(snapshot.state, snapshot.time)
         self._time = snapshot.time
         self._state = snapshot.state.copy()
         self._blows, self._events = snapshot.blows, snapshot.events

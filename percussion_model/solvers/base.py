@@ -19,7 +19,11 @@ from percussion_model.physics.records import BLOW, EVENT, READING, SAMPLE_FIELDS
 from percussion_model.scene.inputs import INPUTS
 from percussion_model.scene.scene import Scene
 from percussion_model.scene.solver_names import register_name
-from percussion_model.solvers.state import State, words_of
+from percussion_model.solvers.state import Limits, State, common_limits, words_of
+
+# A state lies ahead of the present after a step that failed half-way, and after a change of
+# inputs; no further than this [s].
+MOST_AHEAD = 1e6
 
 
 class Cells(Protocol):
@@ -50,12 +54,15 @@ class Solver(ABC):
         Largest relative error of a section's wave speed.
     COUNTS : tuple of str
         Counts of what was done that a state carries, without their `count_`.
+    LIMITS : Limits or None
+        Of a state from outside; None: those of the fields that all states have.
     """
 
     name: str
     time_step: float | None = None
     wave_speed_error = 0.0
     COUNTS: ClassVar[tuple[str, ...]] = ("events", "blows")
+    LIMITS: ClassVar[Limits | None] = None
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
@@ -126,6 +133,16 @@ class Solver(ABC):
         """Change inputs of a committed state; those of the rock wait for the next cycle."""
         for name, value in inputs.items():
             state.record[0][INPUTS[name].field] = value
+
+    def state_fault(self, state: State, t: float) -> str:
+        """What is wrong with a state that comes from outside, of time `t` [s]; empty: nothing.
+
+        Kernels look at no index and bound no loop again.
+        """
+        fault = (self.LIMITS or common_limits(state.dtype)).fault(state)
+        if not fault and not self.time(state) <= t + MOST_AHEAD:
+            return f"its time of {self.time(state)!r} s, far after {t!r} s"
+        return fault
 
     def grid_point_after(self, state: State, t: float) -> float:
         """First time at or after `t` at which inputs can change [s]."""

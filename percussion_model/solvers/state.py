@@ -2,9 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping
 from functools import lru_cache
 
 import numpy as np
+
+from percussion_model.physics.state import (
+    COMMON_LIMITS,
+    COMMON_STATE,
+    COMMON_UNDEFINED,
+    LARGEST,
+    NUMBER,
+)
 
 
 @lru_cache
@@ -67,3 +76,69 @@ class State:
 
     def __reduce__(self) -> tuple[object, ...]:
         return State, (self.dtype, self.shapes, self.words, self.workspace)
+
+
+class Limits:
+    """What the record and the workspace of a state from outside may hold.
+
+    Parameters
+    ----------
+    dtype : dtype
+        Of the record.
+    limits : mapping
+        Lowest and highest value by field, beside those of `COMMON_LIMITS`.
+    undefined : collection of str
+        Numbers that may be undefined, beside those of `COMMON_UNDEFINED`.
+    own : bool
+        Whether fields that are in no list are looked at: whole numbers must be in one,
+        other numbers have the limits NUMBER.
+    """
+
+    def __init__(
+        self,
+        dtype: np.dtype,
+        limits: Mapping[str, tuple[float, float]],
+        undefined: Collection[str] = (),
+        own: bool = True,
+    ) -> None:
+        limits = {**COMMON_LIMITS, **limits}
+        free = {name for name in dtype.names or () if not own} - {one[0] for one in COMMON_STATE}
+        undefined = {*COMMON_UNDEFINED, *undefined, *free}
+        size = dtype.itemsize // 8
+        self._names = [""] * size
+        self._low, self._high = np.full(size, -np.inf), np.full(size, np.inf)
+        self._may_be_nan = np.ones(size, bool)
+        whole: list[int] = []
+        for name, begin in words_of(dtype).items():
+            end = begin + dtype[name].itemsize // 8
+            self._names[begin:end] = [name] * (end - begin)
+            if name not in free:
+                self._low[begin:end], self._high[begin:end] = limits.get(name, NUMBER)
+                self._may_be_nan[begin:end] = name in undefined
+            if dtype[name].base.kind == "i":
+                whole += range(begin, end)
+        self._whole = np.array(whole, np.intp)
+
+    def fault(self, state: State) -> str:
+        """Which number of a state lies outside its limits; empty where none does."""
+        values = state.numbers.copy()
+        values[self._whole] = state.words[self._whole]
+        good = (values >= self._low) & (values <= self._high)
+        if not good.all():
+            good |= self._may_be_nan & np.isnan(values)
+            k = int(np.argmin(good))
+            if not good[k]:
+                return (
+                    f"{self._names[k]} = {float(values[k])!r}, "
+                    f"which must be from {self._low[k]:g} to {self._high[k]:g}"
+                )
+        workspace = state.workspace
+        if len(workspace) and not max(-workspace.min(), workspace.max()) <= LARGEST:
+            return f"a number of its workspace, which must be from {-LARGEST:g} to {LARGEST:g}"
+        return ""
+
+
+@lru_cache
+def common_limits(dtype: np.dtype) -> Limits:
+    """Limits of the fields that all states have."""
+    return Limits(dtype, {}, own=False)

@@ -45,6 +45,31 @@ def test_a_restored_run_repeats_bit_for_bit(make, name):
 
 
 @pytest.mark.parametrize("name", NAMES)
+def test_a_state_that_never_was_bytes_repeats_too(make, name):
+    instance, twin = make(name), make(name)
+    go_on(instance, 15, feed=2600.0)
+    go_on(twin, 4)
+    time, state = instance.time, instance.slave.getFMUstate()
+    seen = instance.values(instance.outputs)
+    first = go_on(instance, 12)
+    for one in (instance, twin, instance):
+        one.slave.setFMUstate(state)
+        one.time = time
+        assert one.values(one.outputs) == seen
+        np.testing.assert_array_equal(go_on(one, 12), first)
+    instance.slave.freeFMUstate(state)
+
+
+def test_a_state_of_another_fmu_of_the_process_is_refused(make):
+    instance, other = make("RigidHammer"), make("PneumaticDrive")
+    state = other.slave.getFMUstate()
+    with pytest.raises(FMICallException):
+        instance.slave.setFMUstate(state)
+    assert any("another FMU" in text for text in instance.messages)
+    other.slave.freeFMUstate(state)
+
+
+@pytest.mark.parametrize("name", NAMES)
 def test_saving_and_reading_change_nothing(make, name):
     quiet, watched = make(name), make(name)
     for _ in range(40):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import atexit
+import functools
 import io
 import logging
 import os
@@ -35,17 +37,31 @@ Progress = Callable[[int, int], None]
 # fmu_src/slave/start.py finds its folder in the same way: it runs before anything that an
 # FMU brings along can be imported.
 def cache_folder() -> Path:
-    """Folder for tables: that of the environment variable PERCUSSION_CACHE, or the user's."""
+    """Folder for tables: that of the environment variable PERCUSSION_CACHE, or the user's.
+
+    A user without a home has one for as long as the process lasts.
+    """
     given = os.environ.get(VARIABLE)
     if given:
         return Path(given)
-    if sys.platform == "win32":
-        base = Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
-    elif sys.platform == "darwin":
-        base = Path.home() / "Library" / "Caches"
-    else:
-        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    try:
+        if sys.platform == "win32":
+            base = Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
+        elif sys.platform == "darwin":
+            base = Path.home() / "Library" / "Caches"
+        else:
+            base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    except RuntimeError as error:
+        base = _folder_of_process(str(error))
     return base / "percussion_model"
+
+
+@functools.cache
+def _folder_of_process(reason: str) -> Path:
+    _log.warning("blow maps are not kept after the end of this process: %s", reason)
+    folder = Path(tempfile.mkdtemp(prefix="percussion_model-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return folder
 
 
 def table_file(scene: Scene) -> Path:

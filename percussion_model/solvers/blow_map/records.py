@@ -6,7 +6,14 @@ from enum import IntEnum
 
 import numpy as np
 
-from percussion_model.physics.state import COMMON_PARAMETERS, COMMON_STATE
+from percussion_model.physics.state import (
+    COMMON_PARAMETERS,
+    COMMON_STATE,
+    INFINITE,
+    LARGEST,
+    POSITIVE,
+)
+from percussion_model.solvers.state import Limits
 
 # Times after the start of a blow at which the table has the bit's position [s].
 PATH_TIMES = (0.5e-3, 1e-3, 1.5e-3, 2e-3, 3e-3, 4e-3, 5e-3, 6.5e-3, 9e-3, 14e-3)
@@ -99,4 +106,17 @@ MAP_STATE = np.dtype(
         *COMMON_STATE,
     ],
     align=True,
+)
+
+MAP_LIMITS = Limits(
+    MAP_STATE,
+    {
+        "t_next": (-LARGEST, INFINITE),
+        "next": (min(Next), max(Next)),
+        "rest": (0.0, INFINITE),
+        "opened": POSITIVE,
+        "refusal": (min(Refusal), max(Refusal)),
+        "refused_value": (-INFINITE, INFINITE),
+    },
+    undefined=("refused_value",),
 )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from percussion_model.solvers.base import Solver
 from percussion_model.solvers.blow_map import advance as kernels
 from percussion_model.solvers.blow_map import flight
 from percussion_model.solvers.blow_map.builder import get_table
-from percussion_model.solvers.blow_map.records import ENTRIES, MAP_PAR, MAP_STATE
+from percussion_model.solvers.blow_map.records import ENTRIES, MAP_LIMITS, MAP_PAR, MAP_STATE
 from percussion_model.solvers.blow_map.refusals import explain_refusal
 from percussion_model.solvers.blow_map.table import BlowTable, Nodes, fixed_values
 from percussion_model.solvers.setup import fill_parameters, fill_start
@@ -89,6 +89,7 @@ class BlowMapSolver(Solver):
     """
 
     name = "blow-map"
+    LIMITS: ClassVar = MAP_LIMITS
 
     def __init__(self, scene: Scene, table: BlowTable) -> None:
         super().__init__(scene)
@@ -137,6 +138,13 @@ class BlowMapSolver(Solver):
     def time(self, state: State) -> float:
         """Start of the present piece of flight [s]."""
         return float(state.numbers[T])
+
+    def state_fault(self, state: State, t: float) -> str:
+        """As in `Solver`; all events up to the present are behind."""
+        fault = super().state_fault(state, t)
+        if not fault and not state.numbers[T_NEXT] > t:
+            return f"its next event at {float(state.numbers[T_NEXT])!r} s, at a present of {t!r} s"
+        return fault
 
     def advance(
         self, state: State, t: float, blows: np.ndarray, events: np.ndarray, record_events: bool

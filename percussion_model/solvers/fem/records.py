@@ -12,7 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from percussion_model.physics.state import COMMON_PARAMETERS, COMMON_STATE
+from percussion_model.physics.state import COMMON_PARAMETERS, COMMON_STATE, COUNT, FLAG
+from percussion_model.solvers.state import Limits
 
 
 class Node(IntEnum):
@@ -156,4 +157,16 @@ FEM_STATE = np.dtype(
         *COMMON_STATE,
     ],
     align=True,
+)
+
+FEM_LIMITS = Limits(
+    FEM_STATE,
+    {
+        "rebounding": FLAG,
+        "inputs_changed": FLAG,
+        "skip_events": FLAG,
+        "count_trials": COUNT,
+        "window_events": COUNT,
+        "count_storms": COUNT,
+    },
 )

@@ -23,6 +23,7 @@ from percussion_model.solvers.fem.mesh import (
     section_count,
 )
 from percussion_model.solvers.fem.records import (
+    FEM_LIMITS,
     FEM_PAR,
     FEM_STATE,
     Column,
@@ -121,6 +122,8 @@ def fill_fem_start(state: np.ndarray, w: np.ndarray, n_p: int, numbers: Numbers)
     w[Node.V, n_p:] = values.start_bit_velocity
 
 
+# A state is no more than a step, and rounding, behind the present [steps].
+MOST_BEHIND = 2.0
 # Elements and contact stiffness of runs to compare with, by those of this one.
 COARSER = 0.5
 
@@ -146,6 +149,7 @@ class FemSolver(Solver):
     name = "fem"
     time_step: float
     COUNTS: ClassVar = ("steps", "trials", "events", "blows", "storms", "locked")
+    LIMITS: ClassVar = FEM_LIMITS
 
     def __init__(self, scene: Scene) -> None:
         super().__init__(scene)
@@ -197,6 +201,13 @@ class FemSolver(Solver):
     def readable_until(self, state: State) -> float:
         """Time up to which `read` answers without advancing the state [s]."""
         return self.time(state) + self.time_step
+
+    def state_fault(self, state: State, t: float) -> str:
+        """As in `Solver`; the state is within a step of the present."""
+        fault = super().state_fault(state, t)
+        if not fault and not self.time(state) >= t - MOST_BEHIND * self.time_step:
+            return f"its time of {self.time(state)!r} s, far before {t!r} s"
+        return fault
 
     def advance(
         self, state: State, t: float, blows: np.ndarray, events: np.ndarray, record_events: bool

@@ -6,7 +6,15 @@ from enum import IntEnum
 
 import numpy as np
 
-from percussion_model.physics.state import COMMON_PARAMETERS, COMMON_STATE
+from percussion_model.physics.state import (
+    COMMON_PARAMETERS,
+    COMMON_STATE,
+    COUNT,
+    FLAG,
+    INFINITE,
+    LARGEST,
+)
+from percussion_model.solvers.state import Limits
 
 
 class Next(IntEnum):
@@ -63,4 +71,20 @@ RIGID_STATE = np.dtype(
         *COMMON_STATE,
     ],
     align=True,
+)
+
+RIGID_LIMITS = Limits(
+    RIGID_STATE,
+    {
+        "next_time": (-LARGEST, INFINITE),
+        "next_tau": (0.0, INFINITE),
+        "next_kind": (min(Next), max(Next)),
+        "scheduled": FLAG,
+        "held": FLAG,
+        "standing_events": COUNT,
+        "window_events": COUNT,
+        "late": FLAG,
+        "count_storms": COUNT,
+    },
+    undefined=("ss_force", "peak_contact_force"),
 )

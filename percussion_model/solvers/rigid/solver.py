@@ -12,7 +12,12 @@ from percussion_model.scene.numbers import Numbers, numbers_of
 from percussion_model.scene.scene import Scene
 from percussion_model.solvers.base import Solver
 from percussion_model.solvers.rigid import advance as kernels
-from percussion_model.solvers.rigid.records import RIGID_PAR, RIGID_STATE, ROWS_AN_EVENT
+from percussion_model.solvers.rigid.records import (
+    RIGID_LIMITS,
+    RIGID_PAR,
+    RIGID_STATE,
+    ROWS_AN_EVENT,
+)
 from percussion_model.solvers.rigid.restitution import restitution
 from percussion_model.solvers.setup import (
     PISTONS,
@@ -73,6 +78,7 @@ class RigidSolver(Solver):
 
     name = "rigid"
     COUNTS: ClassVar = ("events", "contacts", "blows", "cycles", "storms")
+    LIMITS: ClassVar = RIGID_LIMITS
 
     def __init__(self, scene: Scene) -> None:
         super().__init__(scene)
@@ -98,6 +104,16 @@ class RigidSolver(Solver):
         """Time of the next event [s]."""
         s = state.record[0]
         return float(s["next_time"] if s["scheduled"] else s["time"])
+
+    def state_fault(self, state: State, t: float) -> str:
+        """As in `Solver`; all events up to the present are behind."""
+        fault = super().state_fault(state, t)
+        s: Any = state.record[0]
+        if fault or not s["scheduled"]:
+            return fault
+        if s["next_time"] != s["time"] + s["next_tau"] or not s["next_time"] > t:
+            return f"its next event at {float(s['next_time'])!r} s, at a present of {t!r} s"
+        return ""
 
     def advance(
         self, state: State, t: float, blows: np.ndarray, events: np.ndarray, record_events: bool

@@ -12,7 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from percussion_model.physics.state import COMMON_PARAMETERS, COMMON_STATE
+from percussion_model.physics.state import COMMON_PARAMETERS, COMMON_STATE, COUNT, FLAG, MOST
+from percussion_model.solvers.state import Limits
 
 
 class Row(IntEnum):
@@ -187,4 +188,23 @@ WAVE_STATE = np.dtype(
         *COMMON_STATE,
     ],
     align=True,
+)
+
+WAVE_LIMITS = Limits(
+    WAVE_STATE,
+    {
+        "step": COUNT,
+        "leap_end": (-1, MOST),
+        "leap_kind": (min(LeapKind), max(LeapKind)),
+        "no_plan": (-MOST, MOST),
+        "dormant": FLAG,
+        "piston_step": COUNT,
+        "piston_parity": FLAG,
+        "wake": (-MOST, MOST),
+        "no_dormancy": (-MOST, MOST),
+        "parity": FLAG,
+        "count_wakes": COUNT,
+        "count_leaps": COUNT,
+        "count_leap_steps": COUNT,
+    },
 )

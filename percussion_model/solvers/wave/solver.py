@@ -25,10 +25,12 @@ from percussion_model.solvers.wave.grid import CutBars, Grid, cut_bars, section_
 from percussion_model.solvers.wave.leaps.lookahead import LOOKAHEAD
 from percussion_model.solvers.wave.leaps.operators import LEVELS, leap_operators, padded
 from percussion_model.solvers.wave.records import (
+    WAVE_LIMITS,
     WAVE_PAR,
     WAVE_STATE,
     Bars,
     Coef,
+    LeapKind,
     Row,
     Scratch,
     Task,
@@ -41,6 +43,13 @@ _WORD = words_of(WAVE_STATE)
 LEAP_END, STEP, T_BASE = _WORD["leap_end"], _WORD["step"], _WORD["t_base"]
 EVENTS_ON, N_BLOWS, N_EVENTS = _WORD["events_on"], _WORD["n_blows"], _WORD["n_events"]
 PARITY, PEAK_FROM = _WORD["parity"], _WORD["peak_from"]
+LEAP_WORDS = [
+    _WORD[name] for name in ("step", "leap_end", "leap_kind", "dormant", "piston_step", "wake")
+]
+
+
+# A state without a leap is no more than a step, and rounding, behind the present [steps].
+MOST_BEHIND = 2
 
 
 def wave_parameters(numbers: Numbers, bars: CutBars) -> np.ndarray:
@@ -111,6 +120,7 @@ class WaveSolver(Solver):
     name = "wave"
     time_step: float
     COUNTS: ClassVar = ("steps", "leaps", "leap_steps", "wakes", "events", "blows", "locked")
+    LIMITS: ClassVar = WAVE_LIMITS
 
     def __init__(self, scene: Scene) -> None:
         super().__init__(scene)
@@ -135,6 +145,7 @@ class WaveSolver(Solver):
             if found is not None:
                 self._par["leaps"] = LEVELS
                 self._operators = found
+        self._longest_leap = 4 ** int(self._par[0]["leaps"]) - 1
         size = max(padded(2 * max(self.cells.values()) + 1), LOOKAHEAD)
         self._scratch = Scratch(*np.zeros((3, size)))
         self._entry: Callable[..., int] = entry_of(run)
@@ -178,6 +189,25 @@ class WaveSolver(Solver):
         if self._entry is run:  # compiled just now; the types of all these never change
             self._entry = entry_of(run)
         return int(status)
+
+    def state_fault(self, state: State, t: float) -> str:
+        """As in `Solver`; leaps and the waiting piston are within what the operators carry."""
+        fault = super().state_fault(state, t)
+        if fault:
+            return fault
+        step, end, kind, dormant, begin, wake = state.words[LEAP_WORDS].tolist()
+        longest = self._longest_leap
+        if end >= 0:
+            most = min(longest, LOOKAHEAD) if kind == LeapKind.CONTACT else longest
+            if not step < end <= step + most:
+                return f"leap_end = {end}, at step {step} with leaps of {most} steps at most"
+        if dormant:
+            if not begin <= max(step, end) <= wake <= begin + longest or begin > step:
+                return f"wake = {wake}, at step {step} of a piston that waits from {begin} on"
+        behind = t - self._time_of(state, max(end, step + MOST_BEHIND))
+        if not behind <= 0.0:
+            return f"its time of {self.time(state)!r} s, far before {t!r} s"
+        return ""
 
     def advance(
         self, state: State, t: float, blows: np.ndarray, events: np.ndarray, record_events: bool
