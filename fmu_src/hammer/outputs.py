@@ -80,7 +80,7 @@ OUTPUTS: dict[str, Output] = {
     "contact.force": Output("N", -_FORCE, _FORCE, 1e5, "force of the piston on the bit, compression positive", _sample("contact_force"), at_start=ALL),
     "contact.force_mean": Output("N", -_FORCE, _FORCE, 1e3, "mean of the contact force over the last communication step", lambda motion: motion.mean_force(1)),
     "contact.force_peak": Output("N", 0.0, _FORCE, 1e5, "greatest elastic contact force in the last communication step; the impact of two rigid bodies has none", lambda motion: motion.peaks()[1], at_start=ALL),
-    "contact.impulse": Output("N.s", -_FORCE, _FORCE, 1e2, "running integral of the contact force since the start", _sample("contact_impulse")),
+    "contact.impulse": Output("N.s", -_FORCE, _FORCE, 1e2, "running integral of the contact force since the start", _sample("contact_impulse"), at_start=()),
     "piston.position": Output("m", -_FAR, _FAR, 1e-1, "mean displacement of the piston since the start, down positive", _sample("piston_position")),
     "piston.velocity": Output("m/s", -_SPEED, _SPEED, 1.0, "mean velocity of the piston, down positive", _sample("piston_velocity"), at_start=()),
     "piston.stroke": Output("m", 0.0, _FAR, 1e-1, "greatest lift of the piston off the bit in the last whole blow", _blow("stroke")),

@@ -27,11 +27,11 @@ TRIES, TRIES_OF_HAMMER = 200, 10
 
 
 def drawn(rng: random.Random, start, lower, upper):
-    """A value of the kind of a start, within bounds, up to three times as large."""
+    """A value of the kind of a start, half to three times as large, within bounds."""
     if isinstance(start, bool):
         return rng.random() < 0.5
     size = abs(start) or 1.0
-    value = min(max(start + size * rng.uniform(-0.9, 2.0), lower), upper)
+    value = min(max(start + size * rng.uniform(-0.5, 2.0), lower), upper)
     return round(value) if isinstance(start, int) else value
 
 
@@ -98,14 +98,15 @@ def test_a_hammer_depends_on_the_inputs_that_it_names(name, make):
                     constants.setdefault(output, set()).add(new)
             before = after
     assert constants
-    assert all(len(values) == 1 for values in constants.values()), constants
+    moved = {name: values for name, values in constants.items() if len(values) > 1}
+    assert not moved
 
 
 @pytest.mark.parametrize("name", ["PercussiveHammer", "RigidHammer"])
 def test_outputs_at_the_start_are_the_start(name, make):
     instance = make(name, **{"start.bit_velocity": 0.25, "start.piston_velocity": 7.5})
     assert instance.get("bit.velocity") == 0.25
-    assert instance.get("piston.velocity") == 7.5
+    assert instance.get("piston.velocity") == pytest.approx(7.5, rel=1e-15)
     zeros = (
         "bit.position", "piston.position", "hole_depth", "bit.impulse", "contact.impulse",
         "casing.impulse", "rate_of_penetration", "energy_residual",

@@ -122,8 +122,11 @@ def read_at(par, s, bars, time, blows, events, row):
     row.bit_end_velocity = bars.wb[Row.FACE, par.n_b]
     row.bit_force = s.i_bit / tau
     row.contact_force = s.i_contact / tau
-    row.bit_impulse = bit + s.i_bit
-    row.contact_impulse = contact + s.i_contact
+    row.bit_impulse = bit
+    row.contact_impulse = contact
+    if not at_grid_point:
+        row.bit_impulse += s.i_bit
+        row.contact_impulse += s.i_contact
     row.peak_bit_force = s.peak_bit_force
     row.peak_contact_force = s.peak_contact_force
 
