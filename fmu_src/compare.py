@@ -12,11 +12,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from fmpy import simulate_fmu
 
 from fmu_src.__main__ import DEFAULT
 from fmu_src.archive import ROOT, content, state_of
 from fmu_src.hammer.build import build_hammer, refuse_other
+from fmu_src.run import run_fmu
 from percussion_model.interface.terminal import progress
 from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.simulation.simulate import simulate
@@ -45,8 +45,8 @@ def run_both(scene: Scene, path: Path) -> dict[str, Any]:
     """
     build_hammer(scene, path)
     began = time.perf_counter()
-    found = simulate_fmu(
-        str(path), stop_time=scene.run.duration, step_size=STEP_SIZE, output_interval=STEP_SIZE
+    found = run_fmu(
+        path, stop_time=scene.run.duration, step_size=STEP_SIZE, output_interval=STEP_SIZE
     )
     between = time.perf_counter()
     result = simulate(scene)

@@ -5,7 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from fmpy import read_model_description, simulate_fmu
+from fmpy import read_model_description
+
+from fmu_src.run import run_fmu
 
 DURATION = 0.5  # [s]
 STEP_SIZE = 1e-3  # [s]
@@ -24,8 +26,7 @@ def write_reference(path: Path) -> list[Path]:
     names = np.array([one.name for one in inputs])
     starts = [1.0 if one.start == "true" else float(one.start) for one in inputs]
     signals = np.array([[0.0, *starts], [DURATION, *starts]])
-    result = simulate_fmu(str(path), stop_time=DURATION, step_size=STEP_SIZE,
-                          output_interval=STEP_SIZE)  # fmt: skip
+    result = run_fmu(path, stop_time=DURATION, step_size=STEP_SIZE, output_interval=STEP_SIZE)
     inputs_file = path.with_name(f"{path.stem}_in.csv")
     reference_file = path.with_name(f"{path.stem}_ref.csv")
     _write(inputs_file, ["time", *names], signals)

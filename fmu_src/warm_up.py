@@ -11,9 +11,8 @@ from concurrent.futures import Future, ProcessPoolExecutor
 from pathlib import Path
 from typing import Any
 
-from fmpy import simulate_fmu
-
 from fmu_src.hammer.build import build_hammer
+from fmu_src.run import run_fmu
 from percussion_model.scene.scene import Scene
 from percussion_model.simulation.warm_up import (
     COARSE,
@@ -43,7 +42,7 @@ def _run_fmu(scene: Scene, blow_map: BlowTable | None, duration: float) -> None:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "PercussiveHammer.fmu"
         build_hammer(scene, path, blow_map)
-        simulate_fmu(str(path), stop_time=duration, step_size=duration)
+        run_fmu(path, stop_time=duration, step_size=duration)
 
 
 def main() -> None:

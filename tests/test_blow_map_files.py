@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import math
 from pathlib import Path
@@ -25,7 +26,7 @@ from percussion_model.interface.cli import _guarded, app
 from percussion_model.solvers.blow_map import builder
 from percussion_model.solvers.blow_map.builder import build_table, get_table
 from percussion_model.solvers.blow_map.records import Axis
-from percussion_model.solvers.blow_map.table import BlowTable, Nodes, TableError
+from percussion_model.solvers.blow_map.table import BlowTable, Nodes, TableError, _sum
 
 # Nodes so few that a table is made in seconds.
 TINY = {"blow_map__density": 0.1}
@@ -136,6 +137,44 @@ def test_an_fmu_unpacked_over_another_brings_its_own_table(cache, tmp_path):
 def test_bytes_that_are_no_table_are_refused():
     with pytest.raises(TableError):
         BlowTable.from_bytes(b"PK\x03\x04 no archive")
+
+
+def _with(data, change):
+    """A table's file after a change of what it says, with a checksum that fits."""
+    with np.load(io.BytesIO(data)) as parts:
+        about, values = json.loads(str(parts["about"])), parts["values"]
+    values = change(about, values)
+    text, out = json.dumps(about), io.BytesIO()
+    np.savez_compressed(out, about=np.array(text), values=values, sum=_sum(text, values))
+    return out.getvalue()
+
+
+def _fewer_values(about, values):
+    return values[:-1]
+
+
+def _other_counts(about, values):
+    about["counts"][0] += 1000
+    return values
+
+
+def _no_step(about, values):
+    about["nodes"][3][0] = 0.0
+    return values
+
+
+def _words(about, values):
+    about["nodes"] = "words"
+    return values
+
+
+@pytest.mark.parametrize("change", [_fewer_values, _other_counts, _no_step, _words])
+def test_a_table_whose_nodes_are_not_those_of_its_values_is_refused(cache, change):
+    """With a sum that fits: kernels would read beside the values."""
+    data = get_table(mapped(**TINY)).to_bytes()
+    assert BlowTable.from_bytes(_with(data, lambda about, values: values))
+    with pytest.raises(TableError, match="damaged"):
+        BlowTable.from_bytes(_with(data, change))
 
 
 def test_nodes_cover_the_ranges():

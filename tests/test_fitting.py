@@ -3,67 +3,31 @@
 from __future__ import annotations
 
 import math
-import os
 
 import numpy as np
 import pytest
-from fitting_data import BARRIER, CURVE, DATUM, RATIO, STIFFNESS, bit, drops, noisy_curve, way
-from scipy.stats import binom, chi2
+from fitting_data import DATUM, DEPTH, TRUTH, bit, drops, noisy_curve
+from scipy.stats import binom
 
 from percussion_model import Scene
 from percussion_model.analysis.fitting import (
-    ROCK,
+    Curve,
     DropTest,
     FitError,
+    Reading,
     bilinear_force,
-    fit_drop_tests,
-    fit_force_penetration,
+    drop_test_signal,
+    fit_rock,
 )
-from percussion_model.analysis.fitting.least_squares import (
-    CountedModel,
-    profile_intervals,
-    student_width,
-)
+from percussion_model.analysis.fitting.curve import best_datum_and_peak
+from percussion_model.analysis.fitting.fit import DAMPING, ENERGY, RATIO, STIFFNESS
+from percussion_model.analysis.fitting.likelihood import Likelihood, Series
+from percussion_model.analysis.fitting.predictions import predicted_reading
+from percussion_model.analysis.fitting.search import descend, roughness
 
-CONFIDENCE = 0.95
 # Of that many trials so many cover, but for one chance in a thousand on either side.
 CHANCE = 1e-3
-LONG, WHY = "PERCUSSION_LONG" in os.environ, "takes minutes: PERCUSSION_LONG=1 runs it"
-
-
-def plausible(covered, trials):
-    """Whether intervals of the stated confidence cover so often by chance."""
-    low, high = binom.ppf([CHANCE, 1.0 - CHANCE], trials, CONFIDENCE)
-    return low <= covered <= high
-
-
-def right_size(deviations, factor=1.0):
-    """Whether intervals have the width that the scatter of the estimates asks for, but for chance.
-
-    Intervals that are far too wide cover always, which is no rare thing in so few trials. Their
-    widths tell: deviations by them have a variance of one, and their squares sum to chi-square.
-
-    Parameters
-    ----------
-    deviations : sequence of float
-        Of estimates from the truth, in standard errors as the intervals have them.
-    factor : float
-        Takes intervals so many times as wide as they are.
-    """
-    low, high = chi2.ppf([CHANCE, 1.0 - CHANCE], len(deviations))
-    return low <= np.sum(np.square(deviations)) / factor**2 <= high
-
-
-def deviation(fit, key, truth, scale=float):
-    """Estimate less truth by half its interval, in widths of one standard error."""
-    value, low, high = (scale(getattr(fit.estimates[key], n)) for n in ("value", "low", "high"))
-    width = student_width(fit.confidence, len(fit.residuals) - len(fit.estimates))
-    return (value - scale(truth)) / (0.5 * (high - low) / width)
-
-
-def covers(fit, truth):
-    found = fit.estimates
-    return {key: found[key].low <= value <= found[key].high for key, value in truth.items()}
+CURVE = noisy_curve(0)
 
 
 def test_force_rises_with_one_slope_and_falls_with_another():
@@ -72,98 +36,116 @@ def test_force_rises_with_one_slope_and_falls_with_another():
     assert force == pytest.approx([0.0, 0.0, 3e5, 4e5, 2e5, 0.0])
 
 
+def test_datum_and_peak_of_a_curve_without_noise_are_found():
+    curve = noisy_curve(0, noise=0.0)
+    found = best_datum_and_peak(curve, TRUTH[STIFFNESS], TRUTH[RATIO], (0.0, DEPTH))
+    assert found == pytest.approx((DATUM, DATUM + DEPTH), rel=1e-9)
+
+
 def test_a_curve_without_noise_gives_its_parameters_back():
-    p = way()
-    fit = fit_force_penetration(p, bilinear_force(p, STIFFNESS, RATIO, DATUM, peak=8.5e-4))
-    assert {key: fit.estimates[key].value for key in CURVE} == pytest.approx(CURVE, rel=1e-7)
-    assert fit.estimates["peak"].value == pytest.approx(8.5e-4, rel=1e-7)
-    assert fit.changes() == {key: fit.estimates[key].value for key in list(CURVE)[:2]}
+    fit = fit_rock(Scene(), noisy_curve(0, noise=0.0))
+    assert fit.changes() == pytest.approx({key: TRUTH[key] for key in (STIFFNESS, RATIO)}, rel=1e-6)
 
 
 def test_intervals_of_a_curve_cover_as_often_as_they_say():
-    trials = 200
-    counts, halved = dict.fromkeys(CURVE, 0), 0
-    off = {key: [] for key in CURVE}
+    trials, confidence, halved = 60, 0.8, 0
+    counts = dict.fromkeys((STIFFNESS, RATIO), 0)
     for seed in range(trials):
-        fit = fit_force_penetration(*noisy_curve(seed), CONFIDENCE)
-        for key, covered in covers(fit, CURVE).items():
-            counts[key] += covered
-            off[key].append(deviation(fit, key, CURVE[key]))
-        value, _error, low, high = fit.estimates["rock.loading_stiffness"]
-        halved += low + value <= 2.0 * STIFFNESS <= high + value
-    assert all(plausible(count, trials) for count in counts.values()), counts
-    assert not plausible(halved, trials)  # intervals half as wide are found out
-    assert all(right_size(found) for found in off.values()), off
-    assert not any(right_size(found, 1.4) for found in off.values())  # and wider ones
+        fit = fit_rock(Scene(), noisy_curve(seed), confidence=confidence)
+        for key in counts:
+            one = fit.estimates[key]
+            counts[key] += one.low <= TRUTH[key] <= one.high
+        value, low, high, _ = fit.estimates[STIFFNESS]
+        halved += low + value <= 2.0 * TRUTH[STIFFNESS] <= high + value
+    least, most = binom.ppf([CHANCE, 1.0 - CHANCE], trials, confidence)
+    assert all(least <= count <= most for count in counts.values()), counts
+    assert not least <= halved <= most  # intervals half as wide are found out
 
 
-@pytest.mark.parametrize(
-    "solver", ["rigid", pytest.param("wave", marks=pytest.mark.skipif(not LONG, reason=WHY))]
-)
-def test_intervals_of_drop_tests_cover_as_often_as_they_say(solver):
-    trials = 60
-    counts, off = dict.fromkeys(BARRIER, 0), {key: [] for key in BARRIER}
-    scene = bit(solver)
-    guess = scene.replace(**{"rock.barrier_damping": 8.5e3, "rock.barrier_energy": 0.55})
-    for seed in range(trials):
-        fit = fit_drop_tests(guess, drops(scene, seed), span=1.5, steps=5, confidence=CONFIDENCE)
-        for key, covered in covers(fit, BARRIER).items():
-            counts[key] += covered
-            off[key].append(deviation(fit, key, BARRIER[key], math.log))  # as they are fitted
-        assert fit.noise == pytest.approx(1e-5, rel=0.2)
-    assert all(plausible(count, trials) for count in counts.values()), counts
-    assert all(right_size(found) for found in off.values()), off
-    assert not any(right_size(found, 1.7) for found in off.values())  # wider ones are found out
+def test_data_that_say_nothing_of_a_parameter_leave_it_open():
+    """Within 8 ms the bit has bounced once: C_R and W_R took next to nothing of its energy."""
+    tests = drops(bit(), 0, samples=40, end=8e-3, speeds=(5.25,))
+    truth = {key: TRUTH[key] for key in (STIFFNESS, RATIO)}
+    fit = fit_rock(bit(**truth), None, tests, parameters=[DAMPING])
+    assert not fit.estimates[DAMPING].determined
+    assert fit.changes() == {}
+    assert DAMPING in fit.changes(undetermined=True)
+    assert any("C_R" in text and "not determined" in text for text in fit.warnings)
 
 
-def test_the_whole_law_is_found_from_a_far_guess():
-    guess = {"rock.barrier_damping": 3e4, "rock.barrier_energy": 0.2}
-    guess |= {"rock.loading_stiffness": 7.47e8, "rock.unloading_ratio": 5.03}
-    fit = fit_drop_tests(bit().replace(**guess), drops(bit(), 0), ROCK, span=4.0, steps=5)
-    truth = BARRIER | {"rock.loading_stiffness": STIFFNESS, "rock.unloading_ratio": RATIO}
-    assert all(covers(fit, truth).values()), fit.estimates
-    for key, found in fit.estimates.items():
-        assert found.high - found.low < 0.2 * truth[key]
+def test_one_parameter_is_found_in_its_whole_range():
+    truth = {key: TRUTH[key] for key in (STIFFNESS, RATIO, DAMPING)}
+    tests = drops(bit(), 0, samples=60)
+    fit = fit_rock(bit(**truth), None, tests, parameters=[ENERGY])
+    one = fit.estimates[ENERGY]
+    assert one.determined
+    assert one.low <= TRUTH[ENERGY] <= one.high < 1.6 * one.low
+    for explained in fit.explained:
+        assert explained.noise == pytest.approx(1e-5, rel=0.4)  # four standard errors of 60 data
 
 
-def test_data_without_noise_that_the_guess_explains_give_it_back():
-    fit = fit_drop_tests(bit(), drops(bit(), 0, noise=0.0, step=2e-3), span=1.0)
-    for key, found in fit.estimates.items():
-        assert found == pytest.approx((BARRIER[key], 0.0, BARRIER[key], BARRIER[key]), abs=1e-9)
+def test_a_rebound_velocity_tells_the_unloading_ratio():
+    """A rigid bit of this rock rebounds by 1/sqrt(gamma), but for its weight and feed."""
+    scene = bit(**{"effects.barrier": True} | TRUTH)
+    there = predicted_reading(scene, Reading("rebound_velocity", 1.0, 0.1, 5.25))
+    assert there == pytest.approx(5.25 / math.sqrt(TRUTH[RATIO]), rel=0.01)
+    reading = Reading("rebound_velocity", there, 0.01 * there, 5.25)
+    guess = scene.replace(**{RATIO: 9.0})
+    one = fit_rock(guess, readings=[reading], parameters=[RATIO]).estimates[RATIO]
+    assert one.value == pytest.approx(TRUTH[RATIO], rel=1e-3)
+    # 1 % of velocity is 2 % of gamma, 1.96 of them to a side
+    assert one.high / one.low == pytest.approx(math.exp(4.0 * 0.01 * 1.96), rel=0.01)
 
 
-def test_an_elastic_bit_is_fitted_as_well():
-    scene = bit("wave")
-    tests = drops(scene, 1, noise=5e-6, step=5e-4)
-    guess = scene.replace(**{"rock.barrier_damping": 1.03e4, "rock.barrier_energy": 0.48})
-    fit = fit_drop_tests(guess, tests, span=1.0)
-    for key, found in fit.estimates.items():
-        assert abs(found.value - BARRIER[key]) < 4.0 * found.standard_error
+def test_the_force_at_a_gauge_is_read_where_it_is():
+    """Until the wave comes back from the free top, it is that of the rock a transit earlier."""
+    scene = bit("wave", **{"solver.cells": 80})
+    length, speed = scene.bit.length, scene.bit.length / scene.bit.transit_time
+    place = 0.5 * length
+    times = np.linspace(2e-5, 5.5e-5, 9)
+    at_gauge = drop_test_signal(scene, times, 5.25, "gauge_force", place)
+    at_rock = drop_test_signal(scene, times - (length - place) / speed, 5.25, "bit_force")
+    assert at_gauge == pytest.approx(at_rock, abs=0.02 * at_rock.max())
 
 
-def test_an_interval_reaches_to_where_the_misfit_has_grown():
-    """Above 1 the model is as steep as its Jacobian says, below 1 a fifth of it."""
-    x = np.linspace(1.0, 2.0, 20)
-    noise = np.resize([0.05, -0.05], len(x))
-    noise -= x * (noise @ x) / (x @ x)  # so that the minimum is at 1
-    model = CountedModel(lambda at: x * (at[0] if at[0] > 1.0 else 1.0 - 0.2 * (1.0 - at[0])))
-    at, data = np.array([1.0]), x + noise
-    error = np.sqrt(model.misfit(data, at) / (len(x) - 1) / (x @ x))
-    ends, best = profile_intervals(model, data, at, np.array([[error**2]]), 2.0)
-    assert best is at
-    assert ends[0, 1] == pytest.approx(1.0 + 2.0 * error)
-    assert 9.4 * error < 1.0 - ends[0, 0] < 12.0 * error
+def test_least_squares_weigh_each_series_by_its_own_noise():
+    """Of two series of one number the one with less noise decides, as their variances say."""
+    rng = np.random.default_rng(3)
+    noisy, quiet = 1e9 + rng.normal(0.0, 5e7, 400), 1e9 + rng.normal(0.0, 1e6, 100)
+
+    def series(name, data):
+        return Series(name, data, None, lambda scene: np.full(len(data), scene[STIFFNESS]))
+
+    both = [series("noisy", noisy), series("quiet", quiet)]
+    ranges = np.log([[1e8, 1e10]])
+    like = Likelihood(Scene(), both, [STIFFNESS], ranges, lambda: None)
+    best, spread = descend(like, np.log([7e8]), [0])
+    assert math.exp(best.at[0]) == pytest.approx(quiet.mean(), abs=2e4)
+    assert best.noise == pytest.approx([noisy.std(), quiet.std()], rel=0.01)
+    assert max(roughness(like, best, spread)) < 0.1
+
+
+def test_a_deviance_that_jumps_everywhere_is_called_rough():
+    data = np.linspace(-1.0, 1.0, 50)
+
+    def jumpy(scene):
+        return 1e-2 * np.sin(1e9 * scene[STIFFNESS] * np.arange(50))
+
+    like = Likelihood(
+        Scene(), [Series("x", data, 0.01, jumpy)], [STIFFNESS], np.log([[1e8, 1e9]]), lambda: None
+    )
+    assert roughness(like, like.at(np.log([7e8])), np.array([[1e-6]]))[0] > 10.0
 
 
 def test_residuals_that_follow_from_each_other_are_warned_of():
-    p, force = noisy_curve(3)
-    assert fit_force_penetration(p, force).warnings == []
-    drifting = force + 2e4 * np.sin(np.linspace(0.0, 12.0, len(p)))
-    (note,) = fit_force_penetration(p, drifting).warnings
-    assert "neighbouring residuals are alike" in note
+    assert not any("neighbouring" in text for text in fit_rock(Scene(), noisy_curve(3)).warnings)
+    drifting = noisy_curve(3)
+    drift = 2e4 * np.sin(np.linspace(0.0, 12.0, len(drifting.force)))
+    fit = fit_rock(Scene(), Curve(drifting.penetration, drifting.force + drift))
+    assert any("neighbouring residuals are alike" in text for text in fit.warnings)
 
 
-P, F = noisy_curve(0)
+P, F = CURVE.penetration, CURVE.force
 
 
 @pytest.mark.parametrize(
@@ -179,11 +161,14 @@ P, F = noisy_curve(0)
         (np.full(100, 1e-3), F, "penetration: does not change"),
         (P, -np.abs(F), "force: never positive"),
         (P[::-1], F[::-1], "the rows must be in the order of time"),
+        (1e3 * P, F / 1e3, r'perhaps "penetration \[mm\]", "force \[kN\]"'),
+        (P, F / 1e3, r'perhaps "penetration \[m\]", "force \[kN\]"'),
+        (1e3 * P, F, r'perhaps "penetration \[mm\]", "force \[N\]"'),
     ],
 )
 def test_bad_curves_are_refused(penetration, force, words):
     with pytest.raises(FitError, match=words):
-        fit_force_penetration(penetration, force)
+        fit_rock(Scene(), Curve(penetration, force))
 
 
 TIMES = np.linspace(0.0, 0.04, 20)
@@ -192,33 +177,40 @@ TIMES = np.linspace(0.0, 0.04, 20)
 @pytest.mark.parametrize(
     ("scene", "test", "arguments", "words"),
     [
-        (Scene(), None, {}, "a drop test is of a bit alone"),
         ({"effects.barrier": False}, None, {}, "no energy barrier"),
-        ({}, None, {"signal": "gap"}, "signal = 'gap': must be one of bit_position"),
-        ({}, None, {"span": 0.5}, "span = 0.5: must be a factor"),
-        ({}, None, {"steps": 2}, "steps = 2"),
         ({}, None, {"confidence": 95}, "confidence = 95"),
         ({}, None, {"parameters": ["loss.time"]}, "parameters: loss.time must be one of"),
         ({}, None, {"parameters": []}, "parameters: at least one"),
-        ({}, DropTest(TIMES[::-1], TIMES, 5.0), {}, "time of test 0: must rise"),
+        ({}, None, {"ranges": {DAMPING: (1e4, 1e3)}}, "must rise"),
+        ({}, None, {"ranges": {"loss.time": (1, 2)}}, "it is not fitted"),
+        ({}, DropTest(TIMES, TIMES, 5.0, "gap"), {}, "signal = 'gap': must be one of bit_position"),
+        ({}, DropTest(TIMES[::-1], TIMES, 5.0), {}, "time of drop: must rise"),
         ({}, DropTest(TIMES, TIMES[1:], 5.0), {}, "of one length"),
-        ({}, DropTest(TIMES, TIMES, -5.0), {}, "speed of test 0 = -5.0 m/s"),
+        ({}, DropTest(TIMES, TIMES, -5.0), {}, "speed of drop = -5.0 m/s"),
+        ({}, DropTest(1e3 * TIMES, TIMES, 5.0), {}, r'perhaps "time \[ms\]"'),
+        ({}, DropTest(TIMES, 1e3 * TIMES, 5.0), {}, "write its unit into the heading"),
     ],
 )
 def test_senseless_drop_tests_are_refused(scene, test, arguments, words):
-    scene = bit(**scene) if isinstance(scene, dict) else scene
     with pytest.raises(FitError, match=words):
-        fit_drop_tests(scene, [test or DropTest(TIMES, TIMES, 5.0)], **arguments)
+        fit_rock(bit(**scene), None, [test or DropTest(TIMES, TIMES, 5.0)], **arguments)
 
 
-def test_no_drop_test_is_refused():
-    with pytest.raises(FitError, match="at least one drop test"):
-        fit_drop_tests(bit(), [])
+@pytest.mark.parametrize(
+    ("reading", "words"),
+    [
+        (Reading("rebound_velocity", 2100.0, 50.0, 5.25), "possible is 0.001 to 100 m/s"),
+        (Reading("rebound_velocity", 2.1, 0.0, 5.25), "must be above 0"),
+        (Reading("rebound_velocity", 2.1, 0.1), "speed of the drop is needed"),
+        (Reading("penetration_per_blow", 7e-4, 1e-5, 5.0), "is of the hammer"),
+        (Reading("penetration_per_blow", 7e-4, 1e-5), "the scene has no piston"),
+    ],
+)
+def test_senseless_readings_are_refused(reading, words):
+    with pytest.raises(FitError, match=words):
+        fit_rock(bit(), readings=[reading])
 
 
-def test_data_that_tell_nothing_are_refused():
-    """Before it touches the rock the bit falls alike on every rock."""
-    times = np.linspace(0.0, 1e-3, 20)
-    scene = bit(**{"start.rock_gap": 0.1})
-    with pytest.raises(FitError, match=r"rock\.barrier_damping cannot be told from these data"):
-        fit_drop_tests(scene, [DropTest(times, 5.0 * times, 5.0)], span=1.0)
+def test_nothing_is_refused():
+    with pytest.raises(FitError, match="nothing to fit"):
+        fit_rock(bit())

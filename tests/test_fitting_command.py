@@ -3,65 +3,183 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 
+import numpy as np
 import pytest
-from fitting_data import STIFFNESS, bit, drops, noisy_curve
+from fitting_data import KEYS, TRUTH, bit, drawn_truth, drops, noisy_curve
 from typer.testing import CliRunner
 
 from percussion_model import Scene
-from percussion_model.analysis.fitting import ROCK, FitError
+from percussion_model.analysis.fitting import FitError
+from percussion_model.analysis.fitting.fit import DAMPING, NAMES, RATIO, STIFFNESS
 from percussion_model.interface.cli import app
+from percussion_model.interface.measured_files import read_curve, read_drop, read_reading
+
+LONG = "PERCUSSION_LONG" in os.environ
+# Trials: cells of the bit (None: as by default), samples of a drop, seeds.
+SUITE, WHOLE = (10, 60, (3,)), (None, 450, range(30))
+# 95 % intervals of those called determined cover so often at least, as the issue asks.
+LEAST_COVERED = 0.85
+# Nothing is off by more than this without a word.
+OFF = 2.0
 
 
-def written(path, heading, *columns):
-    rows = zip(*(column.tolist() for column in columns), strict=True)
-    lines = [heading, *(",".join(map(repr, row)) for row in rows)]
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+def written(path, heading, *columns, separator=","):
+    rows = zip(*(np.asarray(column).tolist() for column in columns), strict=True)
+    lines = [heading, *(separator.join(map(repr, row)) for row in rows)]
+    text = "\n".join(lines) + "\n"
+    path.write_text(text if separator == "," else text.replace(".", ","), encoding="utf-8")
     return str(path)
 
 
-def test_the_command_writes_a_calibrated_scene(tmp_path):
-    curve = written(tmp_path / "slow.csv", "penetration, force", *noisy_curve(2))
-    drops_of = [
-        written(tmp_path / f"{k}.csv", "time,bit_position", test.time, test.values)
-        + f"@{test.speed}"
-        for k, test in enumerate(drops(bit(), 2, step=1e-3))
-    ]
-    guess = bit().replace(**{"rock.barrier_damping": 9.5e3, "rock.loading_stiffness": 5e8})
-    guess.to_toml(tmp_path / "guess.toml")
-    words = ["calibrate", str(tmp_path / "guess.toml"), "--curve", curve]
-    words += [word for drop in drops_of for word in ("--drop", drop)]
-    out = tmp_path / "found.toml"
-    ended = CliRunner().invoke(app, [*words, "--span", "1", "--out", str(out), "--json", "-"])
+def calibrated(folder, scene, seed, truth, samples):
+    """Run the command on a curve and two drops, from the reference's rock; its JSON."""
+    curve = noisy_curve(seed, truth)
+    slow = written(
+        folder / "slow.csv",
+        "penetration [mm],force [kN]",
+        curve.penetration * 1e3,
+        curve.force / 1e3,
+    )
+    words = ["calibrate", str(folder / "scene.toml"), "--curve", slow, "--json", "-"]
+    for k, test in enumerate(drops(scene, seed, truth, samples)):
+        heading = "time [ms],bit_position [um]"
+        file = written(folder / f"{k}.csv", heading, test.time * 1e3, test.values * 1e6)
+        words += ["--drop", f"{file}@{test.speed}"]
+    scene.to_toml(folder / "scene.toml")
+    ended = CliRunner().invoke(app, [*words, "--out", str(folder / "found.toml")])
     assert ended.exit_code == 0, ended.output
-    found = json.loads(ended.stdout)
-    estimates = found["drop tests"]["estimates"]
-    assert list(estimates) == list(ROCK)
-    scene = Scene.from_toml(out)
-    assert {key: scene[key] for key in ROCK} == {k: v["value"] for k, v in estimates.items()}
-    assert found["curve"]["estimates"]["rock.loading_stiffness"]["low"] < STIFFNESS
+    return json.loads(ended.stdout)
+
+
+@pytest.fixture(scope="module")
+def trials(tmp_path_factory):
+    cells, samples, seeds = WHOLE if LONG else SUITE
+    scene, found = bit("wave", **{"solver.cells": cells}), []
+    for seed in seeds:
+        folder, truth = tmp_path_factory.mktemp(f"trial{seed}"), drawn_truth(seed)
+        fit = calibrated(folder, scene, seed, truth, samples)
+        found.append((truth, fit, scene, Scene.from_toml(folder / "found.toml")))
+    return found
+
+
+def test_intervals_that_are_called_determined_cover_the_truth(trials):
+    for key in KEYS:
+        pairs = [(truth[key], fit["estimates"][key]) for truth, fit, *_ in trials]
+        told = [(x, one) for x, one in pairs if one["verdict"] in ("determined", "rival")]
+        covered = [one["low"] <= x <= one["high"] for x, one in told]
+        assert sum(covered) >= LEAST_COVERED * len(covered), (key, told)
+
+
+def test_nothing_is_far_off_without_a_word(trials):
+    for truth, fit, *_ in trials:
+        for key in KEYS:
+            value = fit["estimates"][key]["value"]
+            if not 1.0 / OFF < value / truth[key] < OFF:
+                assert any(NAMES[key] in text for text in fit["warnings"]), (key, truth, fit)
+
+
+def test_what_is_determined_is_written_and_the_rest_kept(trials):
+    for _truth, fit, before, after in trials:
+        for key, one in fit["estimates"].items():
+            closed = one["verdict"] in ("determined", "rival")
+            assert after[key] == (one["value"] if closed else before[key])
+
+
+def test_what_is_not_determined_is_written_when_asked_alone(tmp_path):
+    scene = bit(**{STIFFNESS: TRUTH[STIFFNESS], RATIO: TRUTH[RATIO]})
+    (test,) = drops(scene, 0, samples=40, end=8e-3, speeds=(5.25,))
+    file = written(tmp_path / "a.csv", "time,bit position", test.time, test.values)
+    scene.to_toml(tmp_path / "scene.toml")
+    words = ["calibrate", str(tmp_path / "scene.toml"), "--drop", f"{file}@5.25", "--only", DAMPING]
+    out = tmp_path / "out.toml"
+    ended = CliRunner().invoke(app, [*words, "--out", str(out)])
+    assert ended.exit_code == 0, ended.output
+    assert Scene.from_toml(out)[DAMPING] == scene[DAMPING]
+    assert "C_R" in ended.output
+    assert f"keeps {DAMPING}" in ended.stderr
+    assert f"wrote {out}" in ended.stderr
+    ended = CliRunner().invoke(app, [*words, "--out", str(out), "--write-undetermined", "--force"])
+    assert ended.exit_code == 0, ended.output
+    assert Scene.from_toml(out)[DAMPING] != scene[DAMPING]
+
+
+def test_the_table_fits_a_narrow_terminal_and_the_figure_is_drawn(tmp_path, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    curve = noisy_curve(2)
+    slow = written(tmp_path / "slow.csv", "penetration,force", curve.penetration, curve.force)
+    bit().to_toml(tmp_path / "scene.toml")
+    words = ["calibrate", str(tmp_path / "scene.toml"), "--curve", slow]
+    ended = CliRunner().invoke(app, [*words, "--figure", str(tmp_path / "fit.png")])
+    assert ended.exit_code == 0, ended.output
+    assert "…" not in ended.output
+    for word in ("K_R", "N/m", "gamma", "determined", "slow.csv"):
+        assert word in ended.output
+    assert (tmp_path / "fit.png").read_bytes().startswith(b"\x89PNG")
+    assert f"wrote {tmp_path / 'fit.png'}" in ended.stderr
+
+
+@pytest.mark.parametrize(
+    ("heading", "separator", "lengths", "forces"),
+    [
+        ("penetration,force", ",", 1.0, 1.0),
+        ("penetration [mm],force [kN]", ",", 1e3, 1e-3),
+        ("Force (kN);Penetration (µm)", ";", 1e6, 1e-3),
+        ("penetration [in]\tforce [lbf]", "\t", 1.0 / 0.0254, 1.0 / 4.4482216152605),
+    ],
+)
+def test_units_and_separators_of_a_curve(tmp_path, heading, separator, lengths, forces):
+    curve = noisy_curve(0)
+    columns = [curve.penetration * lengths, curve.force * forces]
+    if heading.startswith("Force"):
+        columns.reverse()
+    file = tmp_path / "slow.csv"
+    written(file, heading, *columns, separator=separator)
+    found = read_curve(file)
+    assert found.penetration == pytest.approx(curve.penetration, rel=1e-12)
+    assert found.force == pytest.approx(curve.force, rel=1e-12)
+
+
+def test_units_of_a_drop_and_of_a_reading(tmp_path):
+    file = written(tmp_path / "a.csv", "time [us],gauge force [kN]", [1.0, 2.0], [3.0, 4.0])
+    drop = read_drop(f"{file}@5.25", 0.1)
+    assert (drop.signal, drop.speed, drop.gauge) == ("gauge_force", 5.25, 0.1)
+    assert drop.time == pytest.approx([1e-6, 2e-6])
+    assert drop.values == pytest.approx([3e3, 4e3])
+    reading = read_reading("penetration=0.85±0.02 mm @ 3")
+    assert reading.speed == 3.0
+    assert (reading.value, reading.error) == pytest.approx((8.5e-4, 2e-5))
+    assert read_reading("penetration_per_blow=0.7+-0.1mm").speed is None
 
 
 @pytest.mark.parametrize(
     ("words", "says"),
     [
         (["--curve", "none.csv"], "none.csv: cannot be read"),
-        (["--curve", "{swapped}"], "the columns must be penetration, force"),
+        (["--curve", "{swapped}"], "the columns must be of penetration, force"),
         (["--curve", "{ragged}"], "row 2 has 1 columns, the heading 2"),
-        (["--curve", "{words}"], "could not convert string to float: 'much'"),
+        (["--curve", "{mixed}"], "row 1 has 3 columns, the heading 2, separated by ','"),
+        (["--curve", "{words}"], "row 1: 'much' is no number"),
+        (["--curve", "{unit}"], "unit 'kg' must be one of N, kN"),
         (["--curve", "{empty}"], "is empty"),
         (["--drop", "drop.csv"], "--drop drop.csv: must be CSV@SPEED"),
-        (["--drop", "{swapped}@5"], "the columns must be time and one signal"),
-        (["--drop", "{gap}@5"], "signal = 'gap': must be one of"),
+        (["--drop", "{swapped}@5"], "the columns must be of time, bit_position"),
+        (["--drop", "{gap}@5"], "the columns must be of time, bit_position"),
+        (["--measured", "rebound=2+-1@5"], "rebound must be one of rebound_velocity"),
+        (["--measured", "rebound_velocity=2"], "must be QUANTITY=VALUE+-ERROR"),
+        (["--measured", "penetration=2+-1 kg@5"], "unit 'kg' must be one of m, mm"),
     ],
 )
 def test_the_command_refuses_bad_files(words, says, tmp_path):
     texts = {
-        "swapped": "force,penetration\n1,2\n",
+        "swapped": "force,depth\n1,2\n",
         "ragged": "penetration,force\n1,2\n3\n",
+        "mixed": "penetration,force\n0,1;2,5\n",
         "words": "penetration,force\n1,much\n",
-        "gap": "time,gap\n" + "\n".join(f"{k}e-3,0" for k in range(20)),
+        "unit": "penetration,force [kg]\n1,2\n",
+        "gap": "time,gap\n1,2\n",
         "empty": "",
     }
     files = {name: tmp_path / f"{name}.csv" for name in texts}

@@ -31,6 +31,8 @@ class Clock:
     `wall_at` is its exact wall time at any simulated time.
     """
 
+    row_bytes = 0
+
     def __init__(self, period, cost, first=3.0, share=0.9, start=0.0):
         self.period, self.cost, self.first = period, cost, first
         self.share, self.start = share, start

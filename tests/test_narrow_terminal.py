@@ -160,11 +160,12 @@ def test_a_blow_map_that_is_not_made_is_told_of(shown, monkeypatch):
 
 def test_a_calibration_fits(shown, tmp_path):
     curve = tmp_path / "slow.csv"
-    np.savetxt(curve, np.column_stack(noisy_curve(1)), delimiter=",",
+    slow = noisy_curve(1)
+    np.savetxt(curve, np.column_stack([slow.penetration, slow.force]), delimiter=",",
                header="penetration,force", comments="")  # fmt: skip
     code, text = shown("calibrate", DROP, "--curve", "slow.csv")
     assert code == 0, text
-    assert {"rock.loading_stiffness", "rock.unloading_ratio"} <= words(text)
+    assert {"K_R", "gamma", "determined"} <= words(text)
 
 
 @pytest.mark.parametrize("width", [34, 47, 80, 200])

@@ -278,6 +278,56 @@ def test_what_is_no_result_is_refused(tmp_path):
         Result.load(tmp_path)
 
 
+def _saved(rigid, tmp_path):
+    rigid.save(tmp_path / "out")
+    return tmp_path / "out"
+
+
+STRANGE_TRACES = {
+    "pickles": lambda path: np.savez(path, time=np.array([print], dtype=object)),
+    "no archive": lambda path: path.write_bytes(b"PK" + bytes(100)),
+    "an empty file": lambda path: path.write_bytes(b""),
+    "a folder": lambda path: path.mkdir(),
+}
+
+
+@pytest.mark.parametrize("name", STRANGE_TRACES)
+def test_a_strange_trace_is_refused_and_nothing_of_it_is_run(name, rigid, tmp_path):
+    folder = _saved(rigid, tmp_path)
+    (folder / "trace.csv").unlink(missing_ok=True)
+    STRANGE_TRACES[name](folder / "trace.npz")
+    with pytest.raises(ResultError, match=r"trace\.npz: cannot be read"):
+        Result.load(folder)
+
+
+def test_arrays_that_unpack_to_too_much_are_not_unpacked(rigid, tmp_path, monkeypatch):
+    folder = _saved(rigid, tmp_path)
+    np.savez_compressed(folder / "trace.npz", time=np.zeros(10**6))
+    assert (folder / "trace.npz").stat().st_size < 100_000
+    monkeypatch.setattr("percussion_model.simulation.files.LARGEST_TABLE", 10**6)
+    with pytest.raises(ResultError, match="unpacks to 8000128 bytes, more than 1000000"):
+        Result.load(folder)
+
+
+@pytest.mark.parametrize(
+    "text", ["[" * 50_000, "[]", "5", "{}", '{"energy": 5}', '{"energy": {"a": {}}}', "\0"]
+)
+def test_a_strange_summary_is_one_error(text, rigid, tmp_path):
+    folder = _saved(rigid, tmp_path)
+    (folder / "summary.json").write_text(text)
+    with pytest.raises(ResultError, match="not a complete result"):
+        Result.load(folder)
+
+
+@pytest.mark.parametrize("text", ["", "time", "time,kind\n1", "a\n" + "x" * 200_000, "time\n\0"])
+def test_a_strange_table_is_one_error(text, rigid, tmp_path):
+    folder = _saved(rigid, tmp_path)
+    (folder / "blows.csv").write_text(text)
+    with pytest.raises(ResultError, match="not a complete result") as caught:
+        Result.load(folder)
+    assert len(str(caught.value)) < 1000
+
+
 def test_tables_for_pandas(rigid):
     pandas = pytest.importorskip("pandas")
     blows, events = rigid.to_pandas(), rigid.events_to_pandas()

@@ -73,7 +73,9 @@ sections = st.lists(st.builds(Section, length=positive, area=positive), min_size
 
 
 @given(
-    title=st.text(st.characters(exclude_categories=["Cs"])),
+    title=st.text(
+        st.characters(exclude_categories=["Cs", "Cc"], exclude_characters="\ufffe\uffff")
+    ),
     bit=st.builds(BitBar, sections=sections),
     force=st.floats(-1e9, 1e9),
     ratio=st.floats(1, 1e4, exclude_min=True),

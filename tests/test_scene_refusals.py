@@ -29,6 +29,21 @@ BAD = {
     "number for a flag": ("[effects]\nfeed = 1", ("effects.feed = 1", "true or false")),
     "number for a table": ("rock = 5", ("rock = 5", "[rock]")),
     "number for a title": ("title = 5", ("title = 5", "text")),
+    "control character in a title": (
+        'title = "a\\u0001b"',
+        ("title: has the control character", "'\\x01'", "printable"),
+    ),
+    "line in a title": ('title = "a\\nb"', ("title: has the control character", "'\\n'")),
+    "title that XML cannot hold": ('title = "a\\uffff"', ("title: has the control character",)),
+    "endless title": (f'title = "{"t" * 1001}"', ("title = ", "up to 1000 characters")),
+    "too many sections": (
+        "[[bit.sections]]\nlength = 1e-3\narea = 1e-3\n" * 1001,
+        ("bit.sections: 1001 sections: must be at most 1000",),
+    ),
+    "key of many parts": ("a." * 10 + "a = 1", ("a key has more than 10 parts",)),
+    "quoted key of many parts": ("'a' . " * 50_000 + "a = 1", ("a key has more than 10 parts",)),
+    "table of many parts": ("[" + "a." * 10 + "a]", ("a key has more than 10 parts",)),
+    "file of zeros": ("\0" * 1_000_001, ("is larger than 1000000 bytes",)),
     "fraction for a whole number": ("[solver]\ncells = 2.5", ("cells = 2.5", "a whole number")),
     "unknown word": ('[effects]\nrock = "soft"', ('effects.rock = "soft"', '"bilinear", "spring"')),
     "negative length": (
@@ -87,6 +102,17 @@ def test_bad_scenes_get_one_clear_error(scene_from_text, text, words):
     assert len(message.splitlines()) == 1
     for word in words:
         assert word in message
+
+
+def test_a_device_without_end_is_no_scene():
+    with pytest.raises(SceneError, match="is larger than 1000000 bytes"):
+        Scene.from_toml("/dev/zero")
+
+
+def test_points_between_numbers_and_words_are_no_key(scene_from_text):
+    numbers = ", ".join("0.1" for _ in range(20))
+    title = "on feed, i.e. 0.1 to 0.9 kN; see a.b.c.d and fig. 3.1.2"
+    assert scene_from_text(f'# {numbers}\ntitle = "{title}"').title == title
 
 
 def test_every_fault_has_its_line(scene_from_text):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import tomllib
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,12 +15,23 @@ from fmu_src.hammer.build import build_hammer, hammer_name, refuse_other
 from fmu_src.parts.build import PARTS, build_part
 from fmu_src.units import UNITS
 from percussion_model.interface.commands.blow_map import ready_map
+from percussion_model.scene.rows import show_value, unprintable
 from percussion_model.scene.scene import Scene
+from percussion_model.scene.text import read_toml
 
 SYSTEMS = ROOT / "scenarios" / "systems"
 HAMMER = "PercussiveHammer"
 # Masters find the parameters of all components under one name.
 PARAMETER_SET = "initialValues"
+
+# What a system's file must have.
+_KINDS: dict[str, Any] = {
+    "name": str, "description": str, "hammer": str, "duration": (int, float), "step": (int, float)
+}  # fmt: skip
+_SAID = {str: "text", (int, float): "a number"}
+_TABLES = {"components": str, "connections": str, "parameters": dict}
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,99}")
+MOST_BASES = 5
 
 _SPACES = {
     "ssc": "http://ssp-standard.org/SSP1/SystemStructureCommon",
@@ -71,7 +82,11 @@ def read_plan(path: Path, **changes: Any) -> SystemPlan:
     changes : dict
         Entries that replace those of the file, as `name` or `hammer`.
     """
-    found = _merged(path) | changes
+    try:
+        found = _merged(path) | changes
+    except (TypeError, AttributeError):
+        raise SystemPlanError(f"{path}: a table stands where its base has a value") from None
+    _check_entries(path, found)
     return SystemPlan(
         name=found["name"],
         description=found["description"],
@@ -85,14 +100,43 @@ def read_plan(path: Path, **changes: Any) -> SystemPlan:
     )
 
 
-def _merged(path: Path) -> dict[str, Any]:
-    found = tomllib.loads(path.read_text(encoding="utf-8"))
+def _check_entries(path: Path, found: dict[str, Any]) -> None:
+    """Raise `SystemPlanError` for what is missing or of another kind, and for bad names."""
+    lacking = [key for key in (*_KINDS, *_TABLES) if key not in found]
+    if lacking:
+        raise SystemPlanError(f"{path}: {', '.join(lacking)} missing")
+    for key, kind in _KINDS.items():
+        if not isinstance(found[key], kind) or isinstance(found[key], bool):
+            shown = show_value(found[key])
+            raise SystemPlanError(f"{path}: {key} = {shown}: must be {_SAID[kind]}")
+    for key, kind in _TABLES.items():
+        table = found[key]
+        if not isinstance(table, dict) or not all(isinstance(v, kind) for v in table.values()):
+            what = "of texts" if kind is str else "of tables"
+            raise SystemPlanError(f"{path}: {key} = {show_value(table)}: must be a table {what}")
+    for name in (found["name"], *found["components"]):
+        if not _NAME.fullmatch(name):  # files are named by the system
+            raise SystemPlanError(
+                f"{path}: {show_value(name)}: a name must begin with a letter and go on with "
+                "letters, digits and underlines, 100 in all"
+            )
+    if unprintable(found["description"]):
+        raise SystemPlanError(f"{path}: description has a control character")
+
+
+def _merged(path: Path, left: int = MOST_BASES) -> dict[str, Any]:
+    found = read_toml(path)
     base = found.pop("base", None)
     if base is None:
         return found
-    below = _merged(path.parent / base)
+    if not isinstance(base, str) or not left:
+        raise SystemPlanError(
+            f"{path}: base = {show_value(base)}: must name a file that has a base of its own at "
+            f"most {MOST_BASES} times"
+        )
+    below = _merged(path.parent / base, left - 1)
     for key, value in found.items():
-        if key == "parameters":
+        if key == "parameters" and isinstance(value, dict):
             both = {**below.get(key, {})}
             for name, values in value.items():
                 both[name] = {**both.get(name, {}), **values}
@@ -176,10 +220,13 @@ def _check(plan: SystemPlan, variables: dict[str, dict[str, Any]]) -> None:
                 f"connection {sink} = {source}: {kinds[0]} does not fit {kinds[1]}"
             )
     for component, values in plan.parameters.items():
-        for name in values:
+        for name, value in values.items():
             one = variables.get(component, {}).get(name)
             if one is None or one.causality == "output":
                 raise SystemPlanError(f"parameter {component}.{name}: there is no such variable")
+            if not isinstance(value, (bool, int, float)):
+                shown = show_value(value)
+                raise SystemPlanError(f"parameter {component}.{name} = {shown}: must be a number")
 
 
 def _tag(space: str, name: str) -> str:

@@ -9,10 +9,11 @@ from itertools import pairwise
 from typing import Any
 
 from percussion_model.analysis.blow_maps import MapCost, kept_map, map_cost
+from percussion_model.analysis.stationary import MOST_BLOWS
 from percussion_model.scene.scales import scales
 from percussion_model.scene.scene import Scene
 from percussion_model.simulation.accuracy_control import planned_cells, with_cells
-from percussion_model.simulation.simulate import Simulation
+from percussion_model.simulation.simulate import MOST_ROW_BYTES, Simulation
 from percussion_model.solvers.base import Solver
 
 # A probe ends after so many blows once it took so long [s]; a run that is over sooner is
@@ -25,6 +26,9 @@ CEASED = 4.0
 # The first piece of it [s]. Pieces double while they take less than this [s], so that
 # calling costs little beside what is measured, up to a share of the run.
 FIRST_PIECE, QUICK, LARGEST_PIECE = 1e-6, 3e-3, 0.025
+
+# It ends at this share of the rows that a run may have, too.
+ROWS_OF_PROBE = 0.25
 
 COUNTED = ("steps", "leaps", "events")
 
@@ -70,6 +74,8 @@ class Forecast:
         Runs that `setup_time` and `wall_time` are the sum of.
     blow_map : MapCost or None
         Of the blow map that has not been made.
+    row_bytes : float
+        Rows of blows and events of the whole run, as the probe goes on [bytes].
     """
 
     solver: Solver | None
@@ -82,6 +88,22 @@ class Forecast:
     probed: float
     runs: int = 1
     blow_map: MapCost | None = None
+    row_bytes: float = 0.0
+
+    @property
+    def refused(self) -> str:
+        """Say what ceiling the run is going to meet; empty if none is foreseen."""
+        if self.row_bytes <= MOST_ROW_BYTES:
+            return ""
+        return (
+            f"the rows of its blows and events would take about {self.row_bytes:.2g} bytes: the "
+            f"run ends with an error at {MOST_ROW_BYTES:.2g}; shorten run.duration"
+        )
+
+    @property
+    def settled_time(self) -> float | None:
+        """Most that `settled` takes, for all its blows [s]; None where a blow's cost is unknown."""
+        return None if self.per_blow is None else self.per_blow * MOST_BLOWS
 
 
 def forecast(scene: Scene) -> Forecast:
@@ -100,7 +122,9 @@ def forecast(scene: Scene) -> Forecast:
     for chosen in scenes:
         simulation = Simulation(chosen)
         marks = probe(simulation, chosen.run.duration)
-        found.append(predict(simulation.solver, simulation.setup_time, marks, chosen.run.duration))
+        one = predict(simulation.solver, simulation.setup_time, marks, chosen.run.duration)
+        growth = chosen.run.duration / simulation.time
+        found.append(replace(one, row_bytes=growth * simulation.row_bytes))
     return replace(
         found[-1],
         setup_time=sum(one.setup_time for one in found),
@@ -130,7 +154,8 @@ def probe(simulation: Simulation, duration: float) -> list[Mark]:
             piece = min(2.0 * piece, LARGEST_PIECE * duration)
         elif piece > FIRST_PIECE:
             piece *= 0.5
-        if wall > LONGEST_PROBE or (wall > PROBE_WALL and blows >= PROBE_BLOWS):
+        too_many = simulation.row_bytes > ROWS_OF_PROBE * MOST_ROW_BYTES
+        if wall > LONGEST_PROBE or too_many or (wall > PROBE_WALL and blows >= PROBE_BLOWS):
             break
     return marks
 
@@ -197,6 +222,7 @@ def explained(scene: Scene, found: Forecast) -> dict[str, Any]:
         "wave_speed_error": solver.wave_speed_error if solver else None,
         "accuracy": scene.solver.accuracy,
         "setup_time": found.setup_time,
+        "operator_bytes": solver.operator_bytes if solver else None,
         "predicted_wall_time": found.wall_time,
         "duration": found.duration,
         "wall_time_per_second": found.per_second,
@@ -204,5 +230,8 @@ def explained(scene: Scene, found: Forecast) -> dict[str, Any]:
         "per_blow": found.counts,
         "probed": found.probed,
         "runs": found.runs,
+        "row_bytes": found.row_bytes,
+        "refused": found.refused or None,
+        "longest_settled_time": found.settled_time,
         "blow_map_to_make": found.blow_map._asdict() if found.blow_map else None,
     }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -14,13 +15,18 @@ from percussion_model.physics.records import BLOW
 from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.simulation.files import plain
 from percussion_model.simulation.rate import rate_of_blows
-from percussion_model.simulation.simulate import Simulation
+from percussion_model.simulation.simulate import Simulation, SimulationError
 
 # A run in which no blow ends for so long [s], and so many periods of the last, has stopped.
 STALLED_AFTER, STALLED_PERIODS = 2.0, 4.0
 # The standard error is first believed after so many blows, and checked again
 # when there are so many times more.
 FEWEST_SCATTERED, NEXT_CHECK = 100, 1.25
+# A motion is aperiodic that has not settled after so many blows.
+MOST_BLOWS = 400
+# Processor time after which a run that has not settled is given up [s]. It is looked at after
+# so many steps of a cell, or so much simulated time where there are no cells [s].
+MOST_TIME, CELL_STEPS, PIECE = 300.0, 1e7, 1.0
 # Longest cycle that is looked for [blows].
 MOST_BLOWS_A_CYCLE = 8
 # Two changes that fall alike take so many blows: looking earlier is in vain.
@@ -114,9 +120,10 @@ class Settled:
 def settled(
     scene: Scene,
     tolerance: float = 1e-4,
-    most_blows: int = 400,
+    most_blows: int = MOST_BLOWS,
     progress: Callable[[float], None] | None = None,
     scatter: float = 0.0,
+    most_time: float = MOST_TIME,
 ) -> Settled:
     """Run a scene until its blows repeat, or until it is clear that they do not.
 
@@ -141,6 +148,8 @@ def settled(
         Relative standard error of the rate with which a motion that has not
         settled is known well enough, and called aperiodic before `most_blows`.
         0: it never is.
+    most_time : float
+        Processor time after which the run is given up with an error [s].
 
     Returns
     -------
@@ -151,9 +160,12 @@ def settled(
     SceneError
         If the scene has no piston, or an argument makes no sense.
     SimulationError
-        If the run cannot continue.
+        If the run cannot continue, or takes longer than `most_time`.
     """
     check_request(scene, tolerance, most_blows, scatter)
+    if not most_time > 0:
+        raise SceneError(f"most_time = {most_time!r} s: must be above 0 s")
+    began = time.thread_time()
     simulation = Simulation(scene, record_events=False)
     blows, next_check = simulation.blows, float(FEWEST_SCATTERED)
 
@@ -169,7 +181,7 @@ def settled(
             patience += STALLED_PERIODS * float(last["period"])
         before = len(blows)
         until = max(simulation.time, ended + patience)
-        simulation.advance_blows(max(1, FEWEST_BLOWS - before), until)
+        _advance(simulation, max(1, FEWEST_BLOWS - before), until, began + most_time)
         blows = simulation.blows
         if len(blows) == before:
             return made("stalled", 0, math.nan, math.nan, math.nan)
@@ -183,6 +195,31 @@ def settled(
             if error <= scatter * abs(rate):
                 break
     return made("aperiodic", 0, *rate_of_blows(after_settling(blows)), math.nan)
+
+
+def _advance(simulation: Simulation, count: int, until: float, deadline: float) -> None:
+    """Run until so many more blows have ended, or else up to a time [s].
+
+    In pieces, so that it can be given up at the deadline; they depend on the scene alone.
+
+    Parameters
+    ----------
+    deadline : float
+        As `time.thread_time` tells it [s].
+    """
+    piece, solver = PIECE, simulation.solver
+    if solver.time_step is not None:
+        piece = solver.time_step * max(1.0, CELL_STEPS / max(1, sum(solver.cells.values())))
+    wanted = simulation.blow_rows + count
+    while simulation.blow_rows < wanted and simulation.time < until:
+        if time.thread_time() > deadline:
+            raise SimulationError(
+                f"at t = {simulation.time:.6g} s, after {simulation.blow_rows} blows: the run has "
+                "taken all the time that it may (--most-time, most_time) and has not settled: "
+                "`percussion explain` tells what a blow costs; take fewer cells"
+            )
+        left = wanted - simulation.blow_rows
+        simulation.advance_blows(left, min(simulation.time + piece, until))
 
 
 def check_request(scene: Scene, tolerance: float, most_blows: int, scatter: float) -> None:

@@ -6,16 +6,20 @@ again, so arrays are made once here and the functions of the library called with
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import difflib
 import functools
 import struct
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
-from fmpy import read_model_description
+from fmpy import platform, read_model_description, sharedLibraryExtension
 from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
+
+from percussion_model.scene.rows import shortened
 
 # What fmpy calls the types that share a getter, and what their values are in C.
 FAMILIES = {"Real": "Real", "Integer": "Integer", "Enumeration": "Integer", "Boolean": "Boolean"}
@@ -32,6 +36,65 @@ _STATUS = {2: "discard", 3: "error", 4: "fatal", 5: "pending"}
 
 class CouplingError(ValueError):
     """A system that cannot be set up or cannot go on; says which part, when and why."""
+
+
+def read_description(name: str, folder: str) -> Any:
+    """Model description of an unpacked FMU for co-simulation, FMI 2.0.
+
+    Parameters
+    ----------
+    name, folder : str
+        Of the component, and of its unpacked FMU.
+    """
+    try:
+        found = read_model_description(folder, validate=False)
+    except Exception as error:  # fmpy has no errors of its own
+        text = shortened(" ".join(str(error).split()))
+        raise CouplingError(f"{name}: modelDescription.xml cannot be read: {text}") from error
+    if found.fmiVersion != "2.0" or found.coSimulation is None:
+        raise CouplingError(f"{name}: this FMU has no co-simulation by FMI 2.0")
+    return found
+
+
+def check_library(name: str, folder: Path, identifier: str) -> None:
+    """`CouplingError` unless an unpacked FMU has a whole library for this platform.
+
+    Parameters
+    ----------
+    identifier : str
+        Name of the library without its ending, which must be a C identifier.
+    """
+    if not (identifier.isascii() and identifier.isidentifier()):
+        raise CouplingError(
+            f"{name}: modelIdentifier = {shortened(identifier)!r}: must be a plain name of "
+            "letters, digits and underlines"
+        )
+    path = folder / "binaries" / platform / f"{identifier}{sharedLibraryExtension}"
+    if not path.is_file():
+        found = sorted(one.name for one in folder.glob("binaries/*") if one.is_dir())
+        raise CouplingError(
+            f"{name}: its FMU has no library {'/'.join(path.parts[-3:])}, only for "
+            f"{shortened(', '.join(found)) or 'no platform'}"
+        )
+    if not _is_whole(path):
+        raise CouplingError(f"{name}: the library {path.name} of its FMU is cut short")
+
+
+def _is_whole(path: Path) -> bool:
+    """Whether a library holds the segments that it lists; Linux would crash with one cut short."""
+    data = path.read_bytes()
+    if data[:6] != b"\x7fELF\x02\x01":  # others are refused by those that load them
+        return True
+    try:
+        (start,) = struct.unpack_from("<Q", data, 32)
+        size, count = struct.unpack_from("<HH", data, 54)
+        for k in range(count):
+            offset, _, _, length = struct.unpack_from("<4Q", data, start + k * size + 8)
+            if offset + length > len(data):
+                return False
+    except struct.error:
+        return False
+    return True
 
 
 class Group:
@@ -79,7 +142,7 @@ class Exchange:
     def __init__(self, component: Component, names: Sequence[str]) -> None:
         found: dict[str, list[str]] = {}
         for name in names:
-            found.setdefault(FAMILIES[component.find(name).type], []).append(name)
+            found.setdefault(component.family(name), []).append(name)
         self.component = component
         self.names: list[str] = []
         self.groups: list[Group] = []
@@ -150,9 +213,8 @@ class Component:
 
     def __init__(self, name: str, folder: str) -> None:
         self.name = name
-        description = read_model_description(folder, validate=False)
-        if description.coSimulation is None:
-            raise CouplingError(f"{name}: this FMU has no co-simulation")
+        description = read_description(name, folder)
+        check_library(name, Path(folder), description.coSimulation.modelIdentifier)
         self.variables = {one.name: one for one in description.modelVariables}
         self.can_save = bool(description.coSimulation.canGetAndSetFMUstate)
         self.can_vary = bool(description.coSimulation.canHandleVariableCommunicationStepSize)
@@ -161,13 +223,21 @@ class Component:
         self._logger = fmi2CallbackLoggerTYPE(self._note)
         self._callbacks = fmi2CallbackFunctions()
         self._callbacks.logger = self._logger
-        self._slave: Any = FMU2Slave(
-            guid=description.guid,
-            unzipDirectory=folder,
-            modelIdentifier=description.coSimulation.modelIdentifier,
-            instanceName=name,
-        )
-        self._slave.instantiate(callbacks=self._callbacks, loggingOn=True)
+        self._slave: Any = None
+        try:
+            with contextlib.chdir("."):  # fmpy stays in the folder of a library that fails
+                self._slave = FMU2Slave(
+                    guid=description.guid,
+                    unzipDirectory=folder,
+                    modelIdentifier=description.coSimulation.modelIdentifier,
+                    instanceName=name,
+                )
+        except Exception as error:  # fmpy has no errors of its own
+            text = str(error).rpartition(folder)[2].lstrip("/\\")
+            raise CouplingError(
+                f"{name}: the library of its FMU cannot be loaded: {text}"
+            ) from error
+        self._guarded(self._slave.instantiate, callbacks=self._callbacks, loggingOn=True)
         self.pointer = ctypes.c_void_p(self._slave.component)
         self.stepper = self.function(
             "fmi2DoStep", ctypes.c_void_p, ctypes.c_double, ctypes.c_double, ctypes.c_int
@@ -187,16 +257,26 @@ class Component:
     def find(self, name: str) -> Any:
         """A variable by name; the error suggests another one."""
         if name not in self.variables:
+            name = shortened(name)
             near = difflib.get_close_matches(name, self.variables, 1)
             hint = f"; did you mean {near[0]}?" if near else ""
             raise CouplingError(f"{self.name} has no variable {name}{hint}")
         return self.variables[name]
 
+    def family(self, name: str) -> str:
+        """Family of a variable by name: what its getter is called."""
+        kind = self.find(name).type
+        if kind not in FAMILIES:
+            raise CouplingError(
+                f"{self.name}.{name} is a {kind}: must be one of {', '.join(FAMILIES)}"
+            )
+        return FAMILIES[kind]
+
     def set(self, values: Mapping[str, Any]) -> None:
         """Set variables by name; enumerations by number or by word."""
         for name, value in values.items():
             one = self.find(name)
-            family = FAMILIES[one.type]
+            family = self.family(name)
             if isinstance(value, str):
                 value = self._number_of(one, value)
             converted = self._converted(one, family, value)

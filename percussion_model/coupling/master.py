@@ -18,7 +18,6 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from fmpy import extract
 
 from percussion_model.coupling.compiled import CompiledStep, can_compile
 from percussion_model.coupling.component import Component, CouplingError
@@ -33,6 +32,7 @@ from percussion_model.coupling.port import (
 from percussion_model.coupling.python_part import Given, PythonPart
 from percussion_model.coupling.rejection import StepControl
 from percussion_model.coupling.ssp import input_starts, unpack
+from percussion_model.coupling.unpack import Allowance, check_xml, new_folder, unpack_zip
 from percussion_model.coupling.verdict import Jumps
 from percussion_model.simulation.simulate import stop_on_interrupt
 
@@ -41,6 +41,7 @@ Order = Literal["jacobi", "gauss-seidel"]
 INITIAL_PASSES = 4
 # New objects that may be there before garbage is looked for.
 YOUNG = 50_000
+DESCRIPTION = "modelDescription.xml"
 # A number of steps is whole if it misses by no more than this.
 ROUNDING = 1e-9
 
@@ -67,6 +68,8 @@ class Coupling:
         Steps of the loop that a part does as one, by component: for parts that change slowly.
     compiled : bool
         Whether compiled code makes the calls where all parts are FMUs; the bits are the same.
+    trust : bool
+        Whether the archive may be of any size and name FMUs outside of it (docs/trust.md).
     """
 
     def __init__(
@@ -78,32 +81,39 @@ class Coupling:
         on_way: OnWay | None = None,
         every: Mapping[str, int] | None = None,
         compiled: bool = True,
+        trust: bool = False,
     ) -> None:
         self.path = Path(path)
         self.order, self.on_way, self.compiled = order, on_way, compiled
         self._compiled_step: CompiledStep | None = None
-        self._folder = tempfile.mkdtemp(prefix="ssp-")
+        self._folder = new_folder()
         self.parts: dict[str, Any] = {}
         try:
-            self._set_up(dict(parameters or {}), dict(replaced or {}))
+            self._set_up(dict(parameters or {}), dict(replaced or {}), Allowance(trust))
             self.every = check_pace(every or {}, list(self.parts))
         except BaseException:
             self.free()
             raise
 
-    def _set_up(self, given: dict[str, Any], replaced: dict[str, Any]) -> None:
-        archive = unpack(self.path, self._folder)
+    def _set_up(
+        self, given: dict[str, Any], replaced: dict[str, Any], allowance: Allowance
+    ) -> None:
+        inside = tempfile.mkdtemp(prefix="archive-", dir=self._folder)
+        archive = unpack(self.path, inside, allowance)
         for name in replaced.keys() - archive.sources.keys():
             raise CouplingError(f"{self.path.name} has no component {name}")
         self._links = archive.links
         for name, source in archive.sources.items():
             chosen = replaced.get(name, source)
+            fmu = source if callable(chosen) else Path(chosen)
+            folder = tempfile.mkdtemp(prefix="fmu-", dir=self._folder)
+            with _named(name):
+                unpack_zip(fmu, Path(folder), allowance)
+                check_xml(Path(folder) / DESCRIPTION, DESCRIPTION, allowance)
             if callable(chosen):
-                starts = input_starts(source, archive.values.pop(name))
+                starts = input_starts(name, folder, archive.values.pop(name))
                 self.parts[name] = PythonPart(name, chosen, starts)
                 continue
-            folder = tempfile.mkdtemp(prefix=f"{name}-", dir=self._folder)
-            extract(str(chosen), folder)
             self.parts[name] = Component(name, folder)
             if name in replaced:  # another FMU takes what it has
                 known = self.parts[name].variables
@@ -309,6 +319,15 @@ class Coupling:
             if isinstance(part, Component):
                 part.free()
         shutil.rmtree(self._folder, ignore_errors=True)
+
+
+@contextmanager
+def _named(component: str) -> Iterator[None]:
+    """Put the component before what is said of its FMU."""
+    try:
+        yield
+    except CouplingError as error:
+        raise CouplingError(f"{component}: {error}") from error
 
 
 @contextmanager

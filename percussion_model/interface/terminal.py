@@ -145,6 +145,8 @@ def _number(value: float | None, factor: float, digits: int = 5) -> str:
 
 def show_explanation(scene: Scene, found: Forecast) -> None:
     """Print what a scene computes, and its cost estimate."""
+    from percussion_model.analysis.stationary import MOST_TIME
+
     solver = found.solver
     table = Table(title=escape(scene.title) or None, show_header=False)
     table.add_row("Effects on", ", ".join(scene.effects_on) or "none")
@@ -183,7 +185,15 @@ def show_explanation(scene: Scene, found: Forecast) -> None:
         table.add_row(
             "", "the first run makes it, or percussion blow-map; then a run can be predicted"
         )
-    table.add_row("To prepare", f"{found.setup_time:.2g} s")
+    memory = f"; {solver.operator_bytes / 1e6:.2g} MB" if solver and solver.operator_bytes else ""
+    table.add_row("To prepare", f"{found.setup_time:.2g} s{memory}")
+    if found.settled_time is not None and found.settled_time > MOST_TIME:
+        words = (
+            f"up to {found.settled_time:.2g} s, and given up after {MOST_TIME:g} s (--most-time)"
+        )
+        table.add_row("percussion settled", words)
+    if found.refused:
+        table.add_row("Ceiling", found.refused)
     print_table(table)
 
 

@@ -36,6 +36,9 @@ from percussion_model.scene.solver_names import SOLVER_NAMES
 # Below this similarity a guess at a misspelt key misleads more than it helps.
 _SIMILAR_ENOUGH = 0.6
 
+# Sections of a bar; each takes a cell at least.
+MOST_SECTIONS = 1000
+
 # What must hold, key by key, for a parameter to have any influence.
 HAS_PISTON: Needs = {"piston.model": ("elastic", "rigid")}
 HAS_WAVES: Needs = {"bit.model": ("elastic",)}
@@ -121,7 +124,14 @@ def _read_sections(row: Row, key: str, value: Any, faults: Faults) -> tuple[Sect
         found = []
     if not found:
         faults.add(refuse_value, row, key, value)
+    if len(found) > MOST_SECTIONS:
+        faults.add(_refuse_many, key, len(found))
+        found = []
     return tuple(Section.read(one, f"{key}.{k}", faults) for k, one in enumerate(found))
+
+
+def _refuse_many(key: str, count: int) -> str:
+    return f"{key}: {count} sections: must be at most {MOST_SECTIONS}"
 
 
 def _refuse_table(key: str, value: Any, wanted: str) -> str:

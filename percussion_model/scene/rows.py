@@ -10,6 +10,7 @@ import json
 import math
 import numbers
 import reprlib
+import unicodedata
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -21,6 +22,8 @@ Kind = Literal["number", "whole number", "flag", "choice", "sections"]
 _LONGEST_WORDS = 200
 # More faults of one scene than this are counted, not told.
 _MOST_FAULTS = 30
+# No characters by Unicode, and refused by XML.
+NO_XML = "\ufffe\uffff"
 # What `Row.read` returns for a value that is not allowed.
 REFUSED = object()
 
@@ -216,6 +219,11 @@ def toml_value(value: object) -> str:
 def generic_key(key: str) -> str:
     """Replace the numbers of sections in a dotted key by `*`."""
     return ".".join("*" if part.isdecimal() else part for part in key.split("."))
+
+
+def unprintable(text: str) -> str:
+    """First character of a text that neither XML nor a terminal bears; empty if it has none."""
+    return next((c for c in text if unicodedata.category(c) in ("Cc", "Cs") or c in NO_XML), "")
 
 
 def shortened(text: str) -> str:

@@ -29,12 +29,14 @@ from percussion_model.scene.parameters import (
     parameter_table,
     unknown_key,
 )
-from percussion_model.scene.rows import Faults, Row, SceneError, show_value
+from percussion_model.scene.rows import Faults, Row, SceneError, show_value, unprintable
 from percussion_model.scene.solver_names import BODIES
 from percussion_model.scene.text import commented_scene, plain_scene, read_toml, write_text
 
 __all__ = ["Scene", "SceneError"]
 
+# Figures, pages and FMUs carry it [characters].
+LONGEST_TITLE = 1000
 # Groups that nothing was given of; they cannot change, so all scenes share them.
 _DEFAULTS = {name: group() for name, group in GROUPS.items()}
 
@@ -77,7 +79,7 @@ class Scene:
         faults = Faults()
         kept = self.__dict__
         kept["title"] = title = values.get("title", "")
-        if not isinstance(title, str):
+        if not isinstance(title, str) or len(title) > LONGEST_TITLE or unprintable(title):
             faults.add(_refuse_title, title)
         for name, group in GROUPS.items():
             if name in values:
@@ -334,7 +336,9 @@ def _plain_rows() -> tuple[Row, ...]:
 
 
 def _refuse_title(title: Any) -> str:
-    return f"title = {show_value(title)}: must be text"
+    if isinstance(title, str) and len(title) <= LONGEST_TITLE:
+        return f"title: has the control character {unprintable(title)!r}: must be printable text"
+    return f"title = {show_value(title)}: must be text of up to {LONGEST_TITLE} characters"
 
 
 def refuse_contradictions(scene: Scene) -> None:

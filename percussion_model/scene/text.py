@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import re
 import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict
@@ -12,6 +13,13 @@ from typing import Any
 
 from percussion_model.scene.parameters import parameter_table, rows_by_key
 from percussion_model.scene.rows import Row, SceneError, shortened, toml_value
+
+# A scene of a thousand sections has a tenth of it [bytes].
+LARGEST_FILE = 1_000_000
+# `piston.sections.length` has three parts; the time of the parser grows with their square.
+DEEPEST_KEY = 10
+_PART = r"""(?>[\w-]+|"[^"\n]*"|'[^'\n]*')[ \t]*+\.[ \t]*+"""
+_DEEP_KEY = re.compile(rf"(?<![\w-])(?:{_PART}){{{DEEPEST_KEY}}}", re.ASCII)
 
 _HEADER = (
     "# A scene for `percussion run`. SI units; positions and velocities point down,",
@@ -25,13 +33,24 @@ def read_toml(path: Path) -> dict[str, Any]:
     if path.is_dir():
         raise SceneError(f"{path} is a folder: give the scene file in it")
     try:
-        text = path.read_text(encoding="utf-8")
+        with path.open("rb") as file:  # no more than the limit, of a device without end as well
+            content = file.read(LARGEST_FILE + 1)
     except FileNotFoundError:
         raise SceneError(f"{path}: there is no such scene file") from None
-    except UnicodeDecodeError:
-        raise SceneError(f"{path}: not a text file in UTF-8") from None
     except OSError as error:
         raise SceneError(f"{path}: cannot be read: {error.strerror}") from None
+    except ValueError:  # a name with a zero byte
+        raise SceneError(f"{str(path)!r}: no file can have this name") from None
+    if len(content) > LARGEST_FILE:
+        raise SceneError(f"{path}: is larger than {LARGEST_FILE} bytes, which no scene needs")
+    try:
+        text = content.decode("utf-8")
+    except UnicodeDecodeError:
+        raise SceneError(f"{path}: not a text file in UTF-8") from None
+    if _DEEP_KEY.search(text):
+        raise SceneError(
+            f"{path}: a key has more than {DEEPEST_KEY} parts with points between them"
+        )
     try:
         return tomllib.loads(text)
     except RecursionError:

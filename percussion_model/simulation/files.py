@@ -11,6 +11,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+from zipfile import ZipFile
+
+import numpy as np
+
+from percussion_model.scene.rows import shortened
 
 
 class ResultError(ValueError):
@@ -76,6 +81,42 @@ def staged_text(path: Path, text: str) -> None:
     """Write one file in one go, making its folder."""
     with staged(path.absolute().parent) as draft:
         (draft / path.name).write_text(text, encoding="utf-8")
+
+
+# Files of results that are read [bytes]; arrays as they are unpacked.
+LARGEST_TEXT, LARGEST_TABLE = 10_000_000, 1_000_000_000
+
+
+def refuse_large(path: Path, largest: int) -> None:
+    """Raise `ResultError` for a file that is there, and none or larger than that [bytes]."""
+    if path.exists() and not path.is_file():
+        raise ResultError(f"{path}: cannot be read: it is no file")
+    size = path.stat().st_size if path.exists() else 0
+    if size > largest:
+        raise ResultError(f"{path}: cannot be read: {size} bytes are more than {largest}")
+
+
+def load_arrays(path: Path) -> dict[str, np.ndarray]:
+    """Arrays of a file of NumPy (.npz); nothing in it is run, and its size is bounded.
+
+    Raises
+    ------
+    ResultError
+        If it cannot be read.
+    """
+    refuse_large(path, LARGEST_TABLE)
+    try:
+        with ZipFile(path) as archive:
+            size = sum(one.file_size for one in archive.infolist())
+        if size > LARGEST_TABLE:
+            raise ResultError(f"{path}: unpacks to {size} bytes, more than {LARGEST_TABLE}")
+        with np.load(path, allow_pickle=False) as arrays:
+            return {name: arrays[name] for name in arrays.files}
+    except ResultError:
+        raise
+    except Exception as error:  # a damaged archive fails in many ways
+        text = f"{type(error).__name__}: {shortened(str(error))}"
+        raise ResultError(f"{path}: cannot be read: {text}") from error
 
 
 def to_json(summary: dict[str, Any]) -> str:

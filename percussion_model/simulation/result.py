@@ -14,8 +14,18 @@ import numpy as np
 
 from percussion_model.physics.effects import EFFECTS
 from percussion_model.physics.records import BLOW, EVENT, EventKind, Mode
+from percussion_model.scene.rows import shortened
 from percussion_model.scene.scene import Scene
-from percussion_model.simulation.files import ResultError, plain, staged, to_json
+from percussion_model.simulation.files import (
+    LARGEST_TABLE,
+    LARGEST_TEXT,
+    ResultError,
+    load_arrays,
+    plain,
+    refuse_large,
+    staged,
+    to_json,
+)
 from percussion_model.simulation.origin import ORIGIN
 from percussion_model.simulation.rate import rate_of_blows
 
@@ -353,6 +363,9 @@ def _read_result(folder: Path) -> dict[str, Any]:
             "percussion run SCENE --out DIR writes one"
         )
     scene = Scene.from_toml(folder / "scene.toml")
+    refuse_large(folder / "summary.json", LARGEST_TEXT)
+    for name in ("blows.csv", "events.csv", "trace.csv"):
+        refuse_large(folder / name, LARGEST_TABLE)
     try:
         summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
         fields = {name: summary[name] for name in _FROM_SUMMARY}
@@ -374,8 +387,12 @@ def _read_result(folder: Path) -> dict[str, Any]:
         return {"scene": scene, **fields, **tables, "trace": _read_trace(folder)}
     except OSError as error:
         raise ResultError(f"{error.filename}: cannot be read: {error.strerror}") from None
-    except (KeyError, ValueError, TypeError, StopIteration) as error:
-        raise ResultError(f"{folder}: not a complete result: {error!r}") from None
+    except ResultError:
+        raise
+    except (LookupError, ValueError, TypeError, AttributeError, StopIteration, RecursionError,
+            OverflowError, csv.Error) as error:  # fmt: skip
+        text = shortened(repr(error))
+        raise ResultError(f"{folder}: not a complete result: {text}") from None
 
 
 _FROM_SUMMARY = (
@@ -425,8 +442,7 @@ def _rows(columns: dict[str, Sequence[float]], dtype: np.dtype) -> np.ndarray:
 
 def _read_trace(folder: Path) -> dict[str, np.ndarray] | None:
     if (folder / "trace.npz").exists():
-        with np.load(folder / "trace.npz") as arrays:
-            return {name: arrays[name] for name in arrays.files}
+        return load_arrays(folder / "trace.npz")
     if (folder / "trace.csv").exists():
         columns = _read_csv(folder / "trace.csv", float)
         return {name: np.array(column) for name, column in columns.items()}

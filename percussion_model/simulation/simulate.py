@@ -42,6 +42,9 @@ _LONGEST_CHUNK = 50.0
 _FIRST_CHUNK = 1e-6
 _GROWTH = 4.0
 
+# Rows of blows and events of a run: two hours of the reference with its events, a day without.
+MOST_ROW_BYTES = 250_000_000
+_LARGE_CHUNK = 16_000_000  # [bytes]
 # More samples than this would fill the memory of a common computer.
 _MOST_SAMPLES = 20_000_000
 # Samples in a window where the solver has no time step.
@@ -105,6 +108,23 @@ class Simulation(Runner):
             self._blows = _appended(self._blows, blows)
         if len(events):
             self._events = _appended(self._events, events)
+        if self.row_bytes > MOST_ROW_BYTES:
+            n_events = sum(map(len, self._events)) // EVENT.itemsize
+            raise SimulationError(
+                f"at t = {self.solver.time(self._state):.6g} s the rows of {self.blow_rows} blows "
+                f"and {n_events} events take more than {MOST_ROW_BYTES} bytes: shorten "
+                "run.duration, or leave the events out (record_events = False)"
+            )
+
+    @property
+    def blow_rows(self) -> int:
+        """Number of blows finished so far."""
+        return sum(map(len, self._blows)) // BLOW.itemsize
+
+    @property
+    def row_bytes(self) -> int:
+        """Size of the rows of blows and events so far; a run ends at `MOST_ROW_BYTES`."""
+        return sum(map(len, self._blows)) + sum(map(len, self._events))
 
     @property
     def blows(self) -> np.ndarray:
@@ -235,10 +255,11 @@ class Simulation(Runner):
 def _appended(chunks: tuple[np.ndarray, ...], rows: np.ndarray) -> tuple[np.ndarray, ...]:
     """Add a copy of rows, as bytes; chunks halve in size from one to the next.
 
-    NumPy copies records field by field, which took a fifth of a whole run.
+    NumPy copies records field by field, which took a fifth of a whole run. Large chunks
+    stay apart, since for a moment joining takes as much memory again.
     """
     kept = [*chunks, rows.view(np.uint8).copy()]
-    while len(kept) > 1 and len(kept[-2]) <= len(kept[-1]):
+    while len(kept) > 1 and len(kept[-2]) <= len(kept[-1]) < _LARGE_CHUNK:
         kept[-2:] = [np.concatenate(kept[-2:])]
     return tuple(kept)
 

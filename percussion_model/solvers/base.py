@@ -52,6 +52,8 @@ class Solver(ABC):
         Cells in each elastic bar, by its name.
     wave_speed_error : float
         Largest relative error of a section's wave speed.
+    operator_bytes : int
+        Memory of matrices that were made for it.
     COUNTS : tuple of str
         Counts of what was done that a state carries, without their `count_`.
     LIMITS : Limits or None
@@ -61,6 +63,7 @@ class Solver(ABC):
     name: str
     time_step: float | None = None
     wave_speed_error = 0.0
+    operator_bytes = 0
     COUNTS: ClassVar[tuple[str, ...]] = ("events", "blows")
     LIMITS: ClassVar[Limits | None] = None
 

@@ -10,6 +10,7 @@ from percussion_model.physics.effects import EFFECTS
 from percussion_model.physics.records import DriveKind, Mode, Piston, RockKind
 from percussion_model.scene.bars import bar_mass, bar_transit_time
 from percussion_model.scene.numbers import Numbers
+from percussion_model.scene.rows import SceneError
 
 # An open gap of this many transits of the slower bar ends a blow where no
 # pressure law does (docs/model.md, section 7).
@@ -17,6 +18,9 @@ REARM_TRANSITS = 20.0
 # Changes of mode that the rock law can make within one step or at one instant: FF, SS, FF,
 # DFC, FC, BC and again; more would be a loop.
 MOST_CHANGES = 12
+
+# Cells or elements of all bars; a hundred times what any result here needed.
+MOST_CELLS = 1_000_000
 
 # What the choices of the parameter table mean, in their order.
 PISTONS = (Piston.ELASTIC, Piston.RIGID, Piston.ABSENT)
@@ -46,6 +50,15 @@ class RockNumbers(NamedTuple):
     gamma: float
     c_r: float
     w_r: float
+
+
+def refuse_many(name: str, count: float) -> None:
+    """Raise `SceneError` for more cells or elements than can be set up."""
+    if not count <= MOST_CELLS:
+        raise SceneError(
+            f"the bars would have {count:.3g} {name}, more than {MOST_CELLS}: ask for fewer, or "
+            "make the bars more alike in length"
+        )
 
 
 def barrier_on(numbers: Numbers) -> bool:

@@ -1,29 +1,32 @@
-"""Fits to measurements: parameters of the rock, with confidence intervals."""
+"""Fits to measurements: parameters of the rock, with profile-likelihood intervals."""
 
 from __future__ import annotations
 
-from percussion_model.analysis.fitting.drop_test import (
-    BARRIER,
-    ROCK,
+from percussion_model.analysis.fitting.curve import bilinear_force
+from percussion_model.analysis.fitting.fit import RANGES, Estimate, Explained, Fit, Rival, fit_rock
+from percussion_model.analysis.fitting.measurements import (
+    QUANTITIES,
+    SIGNALS,
+    Curve,
     DropTest,
-    drop_test_signal,
-    fit_drop_tests,
+    FitError,
+    Reading,
 )
-from percussion_model.analysis.fitting.force_penetration import (
-    bilinear_force,
-    fit_force_penetration,
-)
-from percussion_model.analysis.fitting.least_squares import Estimate, Fit, FitError
+from percussion_model.analysis.fitting.predictions import drop_test_signal
 
 __all__ = [
-    "BARRIER",
-    "ROCK",
+    "QUANTITIES",
+    "RANGES",
+    "SIGNALS",
+    "Curve",
     "DropTest",
     "Estimate",
+    "Explained",
     "Fit",
     "FitError",
+    "Reading",
+    "Rival",
     "bilinear_force",
     "drop_test_signal",
-    "fit_drop_tests",
-    "fit_force_penetration",
+    "fit_rock",
 ]

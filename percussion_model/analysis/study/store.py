@@ -5,12 +5,11 @@ from __future__ import annotations
 import json
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile
 
 import numpy as np
 
 from percussion_model.analysis.study.response import ROW
-from percussion_model.simulation.files import ResultError, staged, to_json
+from percussion_model.simulation.files import ResultError, load_arrays, staged, to_json
 
 PLAN = "study.json"
 PARTS = "parts"
@@ -71,11 +70,11 @@ class Store:
         done = np.zeros(count, bool)
         for path in sorted((self.folder / PARTS).glob("*.npz")):
             try:
-                with np.load(path) as arrays:
-                    part, found = arrays["part"], arrays["rows"]
-                    words = json.loads(str(arrays["failures"]))
+                arrays = load_arrays(path)
+                part, found = arrays["part"], arrays["rows"]
+                words = json.loads(str(arrays["failures"]))
                 rows[part], done[part] = found, True
-            except (OSError, ValueError, KeyError, IndexError, BadZipFile) as error:
+            except (OSError, ValueError, LookupError, RecursionError) as error:
                 raise ResultError(
                     f"{path}: cannot be read ({error}): delete it, and its points run again"
                 ) from None

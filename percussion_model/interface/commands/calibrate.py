@@ -10,130 +10,153 @@ import typer
 from percussion_model.interface.commands import common
 
 if TYPE_CHECKING:
-    from percussion_model.analysis.fitting import DropTest, Fit
+    from percussion_model.analysis.fitting import Fit
 
 
 def calibrate(
     scene: common.SceneFile,
     curve: Annotated[
         Path | None,
-        typer.Option("--curve", metavar="CSV", help="Slow test: columns penetration, force."),
+        typer.Option("--curve", metavar="CSV", help="Slow test: penetration [mm], force [kN]."),
     ] = None,
     drop: Annotated[
         list[str] | None,
         typer.Option(
             "--drop",
             metavar="CSV@SPEED",
-            help="Drop test at a speed in m/s: columns time and a signal, as bit_position. "
+            help="Drop test at a speed in m/s: time [ms] and one signal, as bit_position [mm]. "
             "May be repeated.",
+        ),
+    ] = None,
+    measured: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--measured",
+            metavar="QUANTITY=VALUE+-ERROR UNIT @SPEED",
+            help="A single number: rebound_velocity or penetration of a drop at a speed in m/s, "
+            "penetration_per_blow of the hammer. May be repeated.",
+        ),
+    ] = None,
+    gauge: Annotated[
+        float | None,
+        typer.Option("--gauge", help="Gauge, in m from the bit's top; else in its middle."),
+    ] = None,
+    only: Annotated[
+        list[str] | None,
+        typer.Option("--only", metavar="KEY", help="Fit this parameter; may be repeated."),
+    ] = None,
+    ranges: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--range", metavar="KEY=LOW:HIGH", help="Search a parameter there only, SI units."
         ),
     ] = None,
     out: Annotated[
         Path | None, typer.Option("--out", metavar="SCENE", help="Write the calibrated scene.")
     ] = None,
     force: common.Force = False,
-    span: Annotated[
-        float, typer.Option("--span", help="C_R and W_R are searched this factor around the scene.")
-    ] = 10.0,
+    write_undetermined: Annotated[
+        bool,
+        typer.Option("--write-undetermined", help="Write values into it that are not determined."),
+    ] = False,
+    figure: Annotated[
+        Path | None,
+        typer.Option("--figure", metavar="PNG", help="Draw data, fit, residuals and profiles."),
+    ] = None,
     solver: common.SolverName = None,
     cells: common.Cells = None,
     settings: common.Settings = None,
     json_file: common.JsonFile = None,
 ) -> None:
-    """Fit the rock of a scene: K_R, gamma to a slow test, all four to drop tests; SI units."""
-    from percussion_model.analysis.fitting import (
-        ROCK,
-        FitError,
-        fit_drop_tests,
-        fit_force_penetration,
-    )
-    from percussion_model.simulation.files import check_writable
+    """Fit the rock of a scene to a slow test, drop tests and single numbers, all together.
 
-    if curve is None and not drop:
-        raise common.refusal("nothing to fit: give --curve, --drop or both")
+    CSV headings may carry units, as in "penetration [mm]"; without one they are in SI. Separators
+    are commas, semicolons or tabs; beside the last two a decimal comma is read as well.
+    """
+    from percussion_model.analysis.fitting import fit_rock
+    from percussion_model.interface.measured_files import read_curve, read_drop, read_reading
+    from percussion_model.interface.terminal import count_bar
+
+    if curve is None and not drop and not measured:
+        raise common.refusal("nothing to fit: give --curve, --drop or --measured")
     common.check_json(json_file)
-    if out is not None:
-        if out.is_dir():
-            raise common.refusal(f"--out {str(out)!r}: is a folder; give the file to write")
-        check_writable(out.absolute().parent)
-        common.refuse_existing(out, force)
+    for option, path in (("--out", out), ("--figure", figure)):
+        _check_file(option, path, force)
     chosen = common.load_scene(scene, solver, cells, settings)
-    found: dict[str, Fit] = {}
-    if curve is not None:
-        names, columns = _read(curve)
-        if names != ["penetration", "force"]:
-            raise FitError(f"{curve}: the columns must be penetration, force, not {names}")
-        found["curve"] = fit_force_penetration(columns[0], columns[1])
-        chosen = chosen.replace(**found["curve"].changes())
-    if drop:
-        signal, tests = _drop_tests(drop)
-        bit_alone = chosen.replace(**{"piston.model": "absent", "effects.drive": "none"})
-        found["drop tests"] = fit_drop_tests(bit_alone, tests, ROCK, signal=signal, span=span)
-        chosen = chosen.replace(**found["drop tests"].changes())
-    common.write_json(json_file, {name: fit.summary() for name, fit in found.items()})
+    slow = None if curve is None else read_curve(curve)
+    drops = [read_drop(word, gauge) for word in drop or ()]
+    numbers = [read_reading(word) for word in measured or ()]
+    limits = dict(_read_range(word) for word in ranges or ())
+    with count_bar("computations") as progress:
+        found = fit_rock(chosen, slow, drops, numbers, only, limits, progress=progress)
+    common.write_json(json_file, found.summary())
+    written = [] if json_file in (None, "-") else [Path(str(json_file))]
     if json_file != "-":
         _show(found)
     if out is not None:
-        chosen.to_toml(out)
+        changes = found.changes(write_undetermined)
+        chosen.replace(**changes).to_toml(out)
+        written.append(out)
+        left = [key for key in found.estimates if key not in changes]
+        if left:
+            common.print_message(
+                f"{out} keeps {', '.join(left)} of {scene}: not determined "
+                "(--write-undetermined writes the best value)"
+            )
+    if figure is not None:
+        with common.if_drawable():
+            from percussion_model.interface.plotting.calibration import save_calibration
+
+            written.append(save_calibration(found, figure))
+    common.list_files(written)
 
 
-def _drop_tests(words: list[str]) -> tuple[str, list[DropTest]]:
-    from percussion_model.analysis.fitting import DropTest, FitError
+def _check_file(option: str, path: Path | None, force: bool) -> None:
+    """Refuse a file that could not be written, before anything is computed."""
+    from percussion_model.simulation.files import check_writable
 
-    tests, signals = [], set()
-    for word in words:
-        file, at, speed = word.rpartition("@")
-        try:
-            if not at:
-                raise ValueError
-            fast = float(speed)
-        except ValueError:
-            raise FitError(f"--drop {word}: must be CSV@SPEED, as in drop.csv@5.25") from None
-        names, columns = _read(Path(file))
-        if names[0] != "time" or len(names) != 2:
-            raise FitError(f"{file}: the columns must be time and one signal, not {names}")
-        signals.add(names[1])
-        tests.append(DropTest(columns[0], columns[1], fast))
-    if len(signals) > 1:
-        raise FitError(f"--drop: all tests must be of one signal, not {sorted(signals)}")
-    return signals.pop(), tests
+    if path is None:
+        return
+    if path.is_dir():
+        raise common.refusal(f"{option} {str(path)!r}: is a folder; give the file to write")
+    check_writable(path.absolute().parent)
+    common.refuse_existing(path, force)
 
 
-def _read(path: Path) -> tuple[list[str], list[list[float]]]:
-    """Names and columns of a CSV file with a heading."""
-    import csv
-
+def _read_range(word: str) -> tuple[str, tuple[float, float]]:
     from percussion_model.analysis.fitting import FitError
 
+    key, _, ends = word.partition("=")
+    low, colon, high = ends.partition(":")
     try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            heading, *rows = [[word.strip() for word in row] for row in csv.reader(file) if row]
-    except (OSError, UnicodeDecodeError) as error:
-        raise FitError(f"{path}: cannot be read ({error})") from None
+        if not colon:
+            raise ValueError
+        return key.strip(), (float(low), float(high))
     except ValueError:
-        raise FitError(f"{path}: is empty") from None
-    for number, row in enumerate(rows, 1):
-        if len(row) != len(heading):
-            raise FitError(
-                f"{path}: row {number} has {len(row)} columns, the heading {len(heading)}"
-            )
-    try:
-        columns = [[float(word) for word in column] for column in zip(*rows, strict=True)]
-    except ValueError as error:
-        raise FitError(f"{path}: {error}") from None
-    return heading, columns or [[] for _ in heading]
+        raise FitError(f"--range {word}: must be KEY=LOW:HIGH, SI units") from None
 
 
-def _show(found: dict[str, Fit]) -> None:
+def _show(found: Fit) -> None:
     from rich.console import Console
     from rich.table import Table
 
+    from percussion_model.analysis.fitting.fit import NAMES
+    from percussion_model.interface.tables import print_table
     from percussion_model.interface.terminal import show_warnings
+    from percussion_model.scene.scene import Scene
 
-    table = Table("from", "", "value, SI", "standard error", "interval of 95 %")
-    for name, fit in found.items():
-        for key, (value, error, low, high) in fit.estimates.items():
-            table.add_row(name, key, f"{value:.5g}", f"{error:.2g}", f"{low:.5g} to {high:.5g}")
+    plain = Scene()
+    table = Table()
+    for heading in ("", "unit", "value", f"interval, {100 * found.confidence:g} %", "verdict"):
+        table.add_column(heading, no_wrap=True, justify="right" if heading == "value" else "left")
+    for key, one in found.estimates.items():
+        unit = plain.row_of(key).unit
+        interval = f"{one.low:.4g} to {one.high:.4g}"
+        table.add_row(NAMES[key], unit, f"{one.value:.4g}", interval, one.verdict)
     console = Console()
-    console.print(table)
-    show_warnings(console, [note for fit in found.values() for note in fit.warnings])
+    print_table(table, console)
+    noises = Table("measurement", "data", "noise, estimated", box=None)
+    for source in found.explained:
+        noises.add_row(source.name, str(len(source.data)), f"{source.noise:.3g} {source.unit}")
+    print_table(noises, console)
+    show_warnings(console, found.warnings)

@@ -52,6 +52,10 @@ def couple(
         list[str] | None,
         typer.Option("--signal", metavar="COMPONENT.VARIABLE", help="Keep this output too."),
     ] = None,
+    trust: Annotated[
+        bool,
+        typer.Option("--trust", help="Allow any size, and FMUs outside of the archive."),
+    ] = False,
     out: common.OutOrDefault = None,
     json_file: common.JsonFile = None,
     force: common.Force = False,
@@ -75,6 +79,7 @@ def couple(
         dict(read_value(text) for text in settings or ()),
         order=order,
         every=dict(_read_pace(text) for text in every or ()),
+        trust=trust,
     )
     claimed = common.claim(
         "couple", out, Path("out") / system.stem, force, system=common.digest(system),

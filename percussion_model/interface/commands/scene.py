@@ -89,6 +89,10 @@ def settled(
     cells: common.Cells = None,
     settings: common.Settings = None,
     tolerance: common.Tolerance = 1e-4,
+    most_time: Annotated[
+        float,
+        typer.Option("--most-time", help="Processor time after which it is given up, in s."),
+    ] = 300.0,
     json_file: common.JsonFile = None,
 ) -> None:
     """Run until the blows repeat: rate, period, order and stability of the cycle."""
@@ -99,7 +103,10 @@ def settled(
     chosen = common.load_scene(scene, solver, cells, settings)
     with progress("preparing") as report:
         found = run_until_settled(
-            chosen, tolerance, progress=lambda count: report(f"{count} blows", None)
+            chosen,
+            tolerance,
+            progress=lambda count: report(f"{count} blows", None),
+            most_time=most_time,
         )
     common.write_json(json_file, found.summary())
     if json_file != "-":

@@ -9,6 +9,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
+from zipfile import ZipFile
 
 import numpy as np
 
@@ -21,6 +22,9 @@ FORMAT = 1
 # wave up and down along the stiffness with the bit's vibration, and are smooth along the
 # rest (docs/fidelity.md).
 RATIOS = {Axis.STIFFNESS: 1.03, Axis.VELOCITY: 1.3, Axis.LOAD: 1.33, Axis.DRIVE: 1.35}
+# Nodes of a table, of some 300 bytes while it is made; the default one has a twentieth.
+MOST_NODES = 1_000_000
+LARGEST_FILE = 200_000_000  # unpacked [bytes]
 # Parameters that a table is made for, besides the sections of the bars.
 FIXED = (
     "effects.gravity",
@@ -115,6 +119,11 @@ class Nodes:
             origin.append(low)
             step.append((high - low) / max(pieces, 1))
             counts.append(max(pieces, 1) + 1)
+        if math.prod(counts) > MOST_NODES:
+            raise SceneError(
+                f"the blow map would have {math.prod(counts):.3g} nodes, more than {MOST_NODES}: "
+                "narrow the ranges of [blow_map], or lower blow_map.density"
+            )
         return cls(
             tuple(low for low, _ in ranges),
             tuple(high for _, high in ranges),
@@ -242,6 +251,9 @@ class BlowTable:
             If the bytes are damaged, cut short or of another format.
         """
         try:
+            with ZipFile(io.BytesIO(data)) as archive:
+                if sum(one.file_size for one in archive.infolist()) > LARGEST_FILE:
+                    raise TableError(f"it unpacks to more than {LARGEST_FILE} bytes")
             with np.load(io.BytesIO(data), allow_pickle=False) as parts:
                 text, values = str(parts["about"]), parts["values"]
                 intact = str(parts["sum"]) == str(_sum(text, values))
@@ -250,16 +262,22 @@ class BlowTable:
             raise TableError(f"this is no table of blows: {error}") from None
         if not intact or about.get("format") != FORMAT or values.shape[-1] != ENTRIES:
             raise TableError("this table of blows is damaged or of another format")
-        lowest, highest, origin, step = map(tuple, about["nodes"])
-        counts = tuple(about["counts"])
-        nodes = Nodes(lowest, highest, origin, step, counts, about["weight"])
-        return cls(
-            nodes,
-            np.ascontiguousarray(values, dtype=np.float64),
-            about["fixed"],
-            about["cells"],
-            about["wave_speed_error"],
-        )
+        try:
+            found = np.array(about["nodes"], float)
+            counts = tuple(int(n) for n in about["counts"])
+            fits = found.shape == (4, len(Axis)) and values.shape == (*counts, ENTRIES)
+            if not (fits and np.isfinite(found).all() and min(counts) > 1 and min(found[3]) > 0):
+                raise ValueError("its nodes are not those of its values")
+            lowest, highest, origin, step = map(tuple, found.tolist())
+            return cls(
+                Nodes(lowest, highest, origin, step, counts, float(about["weight"])),
+                np.ascontiguousarray(values, dtype=np.float64),
+                about["fixed"],
+                dict(about["cells"]),
+                float(about["wave_speed_error"]),
+            )
+        except (LookupError, TypeError, ValueError, AttributeError) as error:
+            raise TableError(f"this table of blows is damaged: {error}") from None
 
 
 def table_key(scene: Scene) -> str:

@@ -19,7 +19,7 @@ from percussion_model.scene.bars import (
 )
 from percussion_model.scene.numbers import Numbers
 from percussion_model.solvers.fem.records import Mesh
-from percussion_model.solvers.setup import PISTONS
+from percussion_model.solvers.setup import PISTONS, refuse_many
 
 # A length this close to half an element is half an element.
 ROUNDING = 1e-9
@@ -110,6 +110,8 @@ def cut_bars(numbers: Numbers) -> BarMeshes:
     values, kind = numbers.values, PISTONS[numbers.values.piston_model]
     first = numbers.piston if kind == Piston.ELASTIC else numbers.bit
     element = bar_length(first) / values.fem_elements
+    elastic = [numbers.bit] if first is numbers.bit else [first, numbers.bit]
+    refuse_many("elements", sum(max(bar_length(bar) / element, len(bar)) for bar in elastic))
     piston = None
     if kind != Piston.ABSENT:
         piston = cut_bar(numbers.piston, element, kind == Piston.ELASTIC)

@@ -17,8 +17,9 @@ from percussion_model.scene.bars import (
     section_transit_time,
 )
 from percussion_model.scene.numbers import Numbers
+from percussion_model.scene.rows import SceneError
 from percussion_model.solvers.base import Cells
-from percussion_model.solvers.setup import PISTONS, Bit, kelvin_voigt_time
+from percussion_model.solvers.setup import PISTONS, Bit, kelvin_voigt_time, refuse_many
 from percussion_model.solvers.wave.records import Coef
 
 # Cells in the piston (or the only elastic bar) where the scene names none.
@@ -35,6 +36,8 @@ HALVINGS = 30
 HARMONICS = 200
 # Bars of so many scenes are kept [some ten kB each on the default grid].
 MOST_KEPT = 16
+# Cells times sub-steps: a step takes some ten milliseconds then, the set-up a second.
+MOST_WORK = 5e6
 # Explicit loss stays free of overshoot up to this viscous number a sub-step.
 MOST_VISCOUS = 0.5
 
@@ -334,6 +337,18 @@ def place_of_closure(variance: float) -> float:
     return 0.0 if variance == 0.0 else float(0.5 * (1.0 - np.sqrt(1.0 - 4.0 * width)))
 
 
+def refuse_cells(bars: Sequence[np.ndarray], time_step: float, loss_time: float) -> None:
+    """Raise `SceneError` for more cells than can be set up, or more work in a step."""
+    count = sum(max(bar_transit_time(bar) / time_step, len(bar)) for bar in bars)
+    refuse_many("cells", count)
+    work = count * max(1.0, loss_time / time_step / MOST_VISCOUS)
+    if work > MOST_WORK:
+        raise SceneError(
+            f"{count:.3g} cells, each with {work / count:.3g} sub-steps of the loss: the product "
+            f"must be at most {MOST_WORK:.3g}: lower solver.cells or loss.time"
+        )
+
+
 class CutBar(NamedTuple):
     """An elastic bar in cells; arrays are shared and must not be changed.
 
@@ -397,6 +412,7 @@ def cut_bars(numbers: Numbers, cells: int) -> CutBars:
 def _cut_bars(cells: int, loss_time: float, *sections: bytes) -> CutBars:
     bars = [np.frombuffer(one).reshape(-1, 4) for one in sections]
     time_step = choose_time_step(bars, cells)
+    refuse_cells(bars, time_step, loss_time)
     found = [_cut_bar(bar, time_step, loss_time) for bar in bars]
     shortest = min([bar.grid.n for bar in found])
     return CutBars(

@@ -11,6 +11,7 @@ import numpy as np
 
 from percussion_model.scene.bars import bar_transit_time
 from percussion_model.scene.numbers import Numbers
+from percussion_model.solvers.setup import refuse_many
 from percussion_model.solvers.wave.grid import elastic_bars, fitting_cells, section_misfits
 
 # Relative error of the rate of penetration, and the cells of the bar with the shortest
@@ -59,6 +60,7 @@ def cells_for(numbers: Numbers, accuracy: float) -> tuple[int, float]:
     bars = elastic_bars(numbers)
     first, bit = bar_transit_time(bars[0]), bar_transit_time(bars[-1])
     least = math.ceil(cells_by_rule(accuracy) * first / min(first, bit) - 1e-9)
+    refuse_many("cells", least * sum(map(len, bars)))
     return fitting_cells(bars, least, math.floor(MOST_REFINED * least), FIT_SHARE * accuracy)
 
 

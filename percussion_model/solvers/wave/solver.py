@@ -145,6 +145,7 @@ class WaveSolver(Solver):
             if found is not None:
                 self._par["leaps"] = LEVELS
                 self._operators = found
+                self.operator_bytes = sum(part.nbytes for part in found)
         self._longest_leap = 4 ** int(self._par[0]["leaps"]) - 1
         size = max(padded(2 * max(self.cells.values()) + 1), LOOKAHEAD)
         self._scratch = Scratch(*np.zeros((3, size)))

@@ -12,10 +12,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from percussion_model.physics.records import READING
-from percussion_model.scene.bars import AREA, LENGTH, bar_length, section_mass
-from percussion_model.scene.numbers import section_numbers
 from percussion_model.scene.scene import Scene, SceneError
+from percussion_model.simulation.gauge import gauge_stress
 from percussion_model.simulation.rate import rate_of_blows, ratio_of_sums
 from percussion_model.simulation.simulate import Simulation, Snapshot
 from percussion_model.solvers.base import Solver
@@ -276,7 +274,7 @@ class Run:
                 impulse = simulation.sample(start + self.problem.contact_edges)["contact_impulse"]
                 found[CONTACT_HISTORY] = np.diff(impulse) / CONTACT_STEP
             simulation.restore(before)
-            found[STRESS_HISTORY] = stress_in_middle(simulation, times)
+            found[STRESS_HISTORY] = gauge_stress(simulation, times)
         return found
 
     def _statistics(self) -> Answer:
@@ -310,43 +308,3 @@ class Run:
         if STRESS_HISTORY in histories:
             values["peak_stress"] = float(histories[STRESS_HISTORY].max())
         return Answer(values, histories=histories)
-
-
-def stress_in_middle(simulation: Simulation, times: np.ndarray) -> np.ndarray:
-    """Elastic stress in the middle of the bit, as a strain gauge there shows it [Pa].
-
-    Between the centres of cells, and between grid points in time, it is taken as linear.
-
-    Parameters
-    ----------
-    simulation : Simulation
-        Of an elastic bit; is advanced through the times.
-    times : ndarray
-        Rising [s].
-    """
-    solver, grid = simulation.solver, simulation.solver.grid_of("bit")
-    assert grid is not None
-    middle, area = middle_of(section_numbers(simulation.scene.bit))
-    centres = np.cumsum(grid.mass) - 0.5 * grid.mass
-    reading, seen, stress = np.zeros(1, READING), [], []
-    # a solver may tell the state of its last grid point: so read a step later as well
-    later = np.concatenate([times, times + (solver.time_step or 0.0)])
-    for t in np.unique(later):
-        simulation.advance(float(t))
-        state = solver.read(simulation.save().state, float(t), reading, peaks=False)
-        seen.append(solver.time(state))
-        stress.append(np.interp(middle, centres, solver.fields(state)["bit_force"]) / area)
-    known, first = np.unique(seen, return_index=True)
-    return np.interp(times, known, np.array(stress)[first])
-
-
-def middle_of(sections: np.ndarray) -> tuple[float, float]:
-    """Mass of a bar above its middle [kg], and the area there [m2]."""
-    above, place = 0.0, 0.5 * bar_length(sections)
-    for section in sections:
-        length = float(section[LENGTH])
-        if place <= length:
-            break
-        above += section_mass(section)
-        place -= length
-    return above + section_mass(section) * place / length, float(section[AREA])

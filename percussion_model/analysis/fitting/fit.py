@@ -1,0 +1,639 @@
+"""The rock from all measurements together: estimates, profile-likelihood intervals, rivals."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from percussion_model.analysis.fitting.curve import first_sight
+from percussion_model.analysis.fitting.likelihood import (
+    RATIO,
+    STIFFNESS,
+    Likelihood,
+    Place,
+    Series,
+    curve_series,
+    drop_series,
+    reading_series,
+)
+from percussion_model.analysis.fitting.measurements import (
+    QUANTITIES,
+    SIGNALS,
+    Curve,
+    DropTest,
+    FitError,
+    Reading,
+    check_reading,
+    checked_curve,
+    checked_drop,
+)
+from percussion_model.analysis.fitting.profiles import (
+    BETTER,
+    BetterPlaceError,
+    Follower,
+    Profile,
+)
+from percussion_model.analysis.fitting.search import (
+    LEAST_STEP,
+    MOST_STEP,
+    STEP_SHARE,
+    descend,
+    design,
+    distinct,
+    grid,
+    polish,
+    roughness,
+)
+from percussion_model.scene.scene import Scene
+from percussion_model.solvers.base import make_solver
+
+DAMPING, ENERGY = "rock.barrier_damping", "rock.barrier_energy"
+# What can be fitted, and where it is searched; SI units.
+RANGES = {
+    STIFFNESS: (1e6, 1e11),
+    RATIO: (1.01, 100.0),
+    DAMPING: (1e2, 1e7),
+    ENERGY: (1e-4, 10.0),
+}
+NAMES = {STIFFNESS: "K_R", RATIO: "gamma", DAMPING: "C_R", ENERGY: "W_R"}
+# With a curve, a grid of C_R and W_R is computed for its K_R and gamma and for those this share
+# of their standard errors beside, and so many of the best places with K_R and gamma moved.
+CURVE_ERRORS, RELAXED = 0.3, 48
+VALUES = {DAMPING: 11, ENERGY: 16}
+# Without, so many points with K_R and gamma within this factor of the scene's, with so many
+# values of W_R at each: it decides on the number of drilling cycles.
+POINTS, FACTOR, LEVELS = 128, 10.0, 20
+SLOW_STEP = 3e-3
+# Around so many of the best places finer grids follow, these shares of `ZOOM` to each side, in
+# the logarithm; of each so many of the best places are computed.
+ZOOMS, ZOOMED, ZOOM_RELAXED = (1.0, 0.3), 3, 8
+ZOOM_VALUES = {DAMPING: 6, ENERGY: 6}
+# The search goes down from so many places, in so many samples of each drop, then from the best
+# few in all samples. Places nearer to each other than this are one, in the logarithm.
+SEARCH_SAMPLES = 50
+STARTS, FINALISTS = 8, 4
+ZOOM = {STIFFNESS: 0.5, RATIO: 0.3, DAMPING: 1.0, ENERGY: 0.6}
+# The last of these grids is of all samples.
+LAST_ZOOM, LAST_STEP = 0.12, 2e-4
+# Minima are told up to this deviance above the best: less likely by exp(-10).
+TOLD = 20.0
+# So often profiles start again from a better place that they met.
+MOST_STARTS = 10
+# The deviance may be off by the roughness at the best place and at the other: the threshold is
+# higher by so many of it. It is told from this size on.
+ROUGH_FACTOR, ROUGH = 2.0, 1.0
+UNSETTLED = (
+    "the search met ever better places and no end of it: the best may not be among them, "
+    "and intervals may be too narrow"
+)
+# An interval whose ends differ by this factor is said to be wide.
+WIDE = 4.0
+# Residuals that follow from each other by so many standard errors are no independent noise.
+MOST_CORRELATION = 4.0
+# With twice the cells the best values may move by this share of their intervals' halves.
+GRID_SHARE = 0.5
+
+Source = Curve | DropTest | Reading
+DETERMINED, RIVALLED = "determined", "rival"
+OPEN_ABOVE, OPEN_BELOW, OPEN = "open above", "open below", "open"
+
+
+class Estimate(NamedTuple):
+    """A fitted parameter, SI units.
+
+    `low` and `high` are the ends of the interval; where it is open, those of what was searched.
+    """
+
+    value: float
+    low: float
+    high: float
+    verdict: str
+
+    @property
+    def determined(self) -> bool:
+        """Whether the interval is closed."""
+        return self.verdict in (DETERMINED, RIVALLED)
+
+
+@dataclass(frozen=True)
+class Explained:
+    """One series of measurements and what the best fit says of it, SI units."""
+
+    name: str
+    data: np.ndarray = field(repr=False)
+    fitted: np.ndarray = field(repr=False)
+    noise: float
+    source: Source = field(repr=False)
+
+    @property
+    def unit(self) -> str:
+        """SI unit of the data."""
+        if isinstance(self.source, Curve):
+            return "N"
+        if isinstance(self.source, DropTest):
+            return SIGNALS[self.source.signal][0]
+        return QUANTITIES[self.source.quantity][0]
+
+    @property
+    def residuals(self) -> np.ndarray:
+        """Data less fit."""
+        return self.data - self.fitted
+
+
+@dataclass(frozen=True)
+class Rival:
+    """Another minimum, and how much less likely it is than the best."""
+
+    values: dict[str, float]
+    deviance: float
+
+    @property
+    def odds(self) -> float:
+        """Its likelihood by that of the best."""
+        return math.exp(-0.5 * self.deviance)
+
+
+@dataclass(frozen=True)
+class Fit:
+    """What a fit found, SI units.
+
+    Attributes
+    ----------
+    estimates : dict of Estimate
+        By the dotted key of the parameter.
+    confidence : float
+        Of the intervals, each for itself.
+    threshold : float
+        Deviance above the best at their ends.
+    explained : list of Explained
+        Each series of measurements.
+    rivals : list of Rival
+        Other minima, the likeliest first.
+    profiles : dict of (ndarray, ndarray)
+        Values of a parameter, and the deviance above the best with the others at their best.
+    runs : int
+        How many places were computed.
+    warnings : list of str
+        What one should know before using the numbers.
+    """
+
+    estimates: dict[str, Estimate]
+    confidence: float
+    threshold: float
+    explained: list[Explained]
+    rivals: list[Rival]
+    profiles: dict[str, tuple[np.ndarray, np.ndarray]] = field(repr=False)
+    runs: int
+    warnings: list[str]
+
+    def changes(self, undetermined: bool = False) -> dict[str, float]:
+        """Fitted parameters for `Scene.replace`; without those whose interval is open."""
+        return {
+            key: found.value
+            for key, found in self.estimates.items()
+            if found.determined or undetermined
+        }
+
+    def summary(self) -> dict[str, Any]:
+        """Return the numbers as plain values for JSON."""
+        return {
+            "estimates": {key: found._asdict() for key, found in self.estimates.items()},
+            "confidence": self.confidence,
+            "measurements": {
+                one.name: {"data": len(one.data), "noise": one.noise} for one in self.explained
+            },
+            "rivals": [
+                {"values": one.values, "deviance": one.deviance, "odds": one.odds}
+                for one in self.rivals
+            ],
+            "runs": self.runs,
+            "warnings": self.warnings,
+        }
+
+
+def fit_rock(
+    scene: Scene,
+    curve: Curve | None = None,
+    drops: Sequence[DropTest] = (),
+    readings: Sequence[Reading] = (),
+    parameters: Sequence[str] | None = None,
+    ranges: Mapping[str, tuple[float, float]] | None = None,
+    confidence: float = 0.95,
+    progress: Callable[[int, int], None] | None = None,
+) -> Fit:
+    """Fit the rock of a scene to all measurements together.
+
+    All measurements have one likelihood. The noise of each curve and of each drop is
+    estimated along; it is taken to be independent from one datum to the next. What is
+    measured jumps where the number of drilling cycles changes, so the deviance has many
+    minima: the whole range of C_R and W_R is searched, least squares go down from the best
+    places, and each parameter is followed to both sides while the others are fitted anew
+    (profile likelihood). A better place that is met on the way starts that again.
+
+    Parameters
+    ----------
+    scene : Scene
+        Of the bit, with or without its hammer. Its rock stays where nothing is fitted.
+    curve : Curve, optional
+    drops : sequence of DropTest
+    readings : sequence of Reading
+    parameters : sequence of str, optional
+        Keys of `RANGES` that are fitted; default K_R and gamma for a curve alone, else all.
+    ranges : mapping, optional
+        Where a parameter is searched, in place of `RANGES`: what is known beforehand.
+    confidence : float
+        Of the intervals.
+    progress : callable, optional
+        Called with the number of computations done, and with an estimate of all.
+
+    Returns
+    -------
+    Fit
+
+    Raises
+    ------
+    FitError
+        If data or arguments make no sense.
+    """
+    from scipy.stats import chi2
+
+    if not 0 < confidence < 1:
+        raise FitError(f"confidence = {confidence!r}: must be a number above 0 and below 1")
+    curve = None if curve is None else checked_curve(curve)
+    sources: list[Source] = [
+        *([] if curve is None else [curve]),
+        *map(checked_drop, drops),
+        *readings,
+    ]
+    for reading in readings:
+        check_reading(reading)
+    if not sources:
+        raise FitError("nothing to fit: a curve, a drop or a reading is needed")
+    names = _chosen(scene, sources, parameters)
+    box = _box(scene, names, ranges or {})
+    counter = _Counter(progress, _expected(names, curve is not None, len(sources)))
+    whole = Likelihood(scene, [_series(one) for one in sources], names, box, counter.tick)
+    minima, pool = _minima(whole, sources, counter)
+    quantile = float(chi2.ppf(confidence, 1))
+    found = _profiles(whole, minima, pool, quantile, counter)
+    return _result(whole, sources, found, confidence, counter.done)
+
+
+class _Counter:
+    """Computations done, passed on with an estimate of all."""
+
+    def __init__(self, progress: Callable[[int, int], None] | None, expected: int) -> None:
+        self.done, self.expected, self._progress = 0, expected, progress
+
+    def tick(self) -> None:
+        """Count one more."""
+        self.done += 1
+        if self._progress is not None:
+            self._progress(self.done, max(self.expected, self.done + 1))
+
+
+def _expected(names: Sequence[str], with_curve: bool, sources: int) -> int:
+    """About how many places a fit computes."""
+    profiles = 90 * len(names)
+    if with_curve and sources == 1:
+        return profiles
+    points = 3 * VALUES[DAMPING] * VALUES[ENERGY] if with_curve else POINTS * LEVELS
+    return points + 20 * (STARTS + FINALISTS) + profiles
+
+
+def _chosen(
+    scene: Scene, sources: Sequence[Source], parameters: Sequence[str] | None
+) -> tuple[str, ...]:
+    """Free parameters; refuses scenes and choices that make no sense."""
+    slow = all(isinstance(one, Curve) for one in sources)
+    names = tuple(parameters) if parameters is not None else tuple(RANGES)[: 2 if slow else 4]
+    for name in names:
+        if name not in RANGES or names.count(name) > 1:
+            raise FitError(f"parameters: {name} must be one of {', '.join(RANGES)}, once")
+    if not names:
+        raise FitError(f"parameters: at least one of {', '.join(RANGES)} is needed")
+    if scene.effects.rock != "bilinear":
+        raise FitError(f'effects.rock = "{scene.effects.rock}": must be "bilinear"')
+    if not slow and not scene.effects.barrier:
+        raise FitError("the scene has no energy barrier: effects.barrier must be true")
+    hammer = [one for one in sources if isinstance(one, Reading) and one.speed is None]
+    if hammer and scene.piston.model == "absent":
+        raise FitError(f"{hammer[0].name}: the scene has no piston")
+    return names
+
+
+def _box(
+    scene: Scene, names: Sequence[str], ranges: Mapping[str, tuple[float, float]]
+) -> np.ndarray:
+    """Logarithms between which each parameter is searched."""
+    for name in ranges:
+        if name not in names:
+            raise FitError(f"range of {name}: it is not fitted; fitted are {', '.join(names)}")
+    box = np.zeros((len(names), 2))
+    for k, name in enumerate(names):
+        low, high = ranges.get(name, RANGES[name])
+        row = scene.row_of(name)
+        least, most = row.lower or 0.0, row.upper or math.inf
+        if not (0 < low < high and least <= low and high <= most):
+            raise FitError(
+                f"range of {name} = {low!r} to {high!r}: must rise, between {least:g} and {most:g}"
+            )
+        box[k] = np.log([low, high])
+    return box
+
+
+def _series(source: Source, most: int | None = None) -> Series:
+    if isinstance(source, Curve):
+        return curve_series(source)
+    if isinstance(source, DropTest):
+        return drop_series(source, most)
+    return reading_series(source)
+
+
+def _minima(
+    whole: Likelihood, sources: Sequence[Source], counter: _Counter
+) -> tuple[list[Place], list[np.ndarray]]:
+    """Find minima that may be the best, the deepest first, and all other good places."""
+    thin = Likelihood(
+        whole.scene,
+        [_series(one, SEARCH_SAMPLES) for one in sources],
+        whole.names,
+        np.stack([whole.low, whole.high], axis=1),
+        counter.tick,
+    )
+    simple = all(isinstance(one, Curve) for one in sources)
+    every = range(len(whole.names))
+    sizes = np.array([ZOOM[name] for name in whole.names])
+    starts = distinct(_survey(thin, sources), ZOOMS[-1] * sizes, STARTS)
+    lower = [descend(thin, one.at, every, rounds=2)[0] for one in starts]
+    found = distinct(lower, 0.25 * sizes, STARTS)
+    # few samples tell less: what is far above the best in them is so in all
+    near = [one for one in found if one.deviance - found[0].deviance < TOLD]
+    places = distinct([whole.at(one.at) for one in near], 0.0 * sizes, FINALISTS)
+    deep = [descend(whole, one.at, every, rounds=2)[0] for one in places]
+    if not simple:
+        best = min(deep, key=lambda one: one.deviance)
+        steps = np.array([0.0 if name in ZOOM_VALUES else LAST_STEP for name in whole.names])
+        closer = _zoom(whole, best.at, LAST_ZOOM * sizes, steps)
+        deep += [descend(whole, one.at, every, rounds=2)[0] for one in closer[:1]]
+    return distinct(deep, 0.1 * sizes, FINALISTS), [one.at for one in near]
+
+
+def _survey(thin: Likelihood, sources: Sequence[Source]) -> list[Place]:
+    """Places all over what is searched, and more of them around the best."""
+    names = thin.names
+    guess = np.log([thin.scene[name] or 1.0 for name in names])
+    box = np.stack([thin.low, thin.high], axis=1)
+    slow = [k for k, name in enumerate(names) if name in (STIFFNESS, RATIO)]
+    rough = [k for k in range(len(names)) if k not in slow]
+    curves = [one for one in sources if isinstance(one, Curve)]
+    steps = np.zeros(len(names))
+    steps[slow] = SLOW_STEP
+    places = [thin.at(guess)]
+    if slow and curves:
+        sight = dict(zip((STIFFNESS, RATIO), first_sight(curves[0])[:2], strict=True))
+        guess[slow] = np.log([sight[names[k]] for k in slow])
+        alone = Likelihood(thin.scene, [_series(curves[0])], names, box, lambda: None)
+        place, spread = descend(alone, np.clip(guess, thin.low, thin.high), slow)
+        places = [thin.at(place.at)]
+        if len(sources) == len(curves) or not rough:
+            return places
+        steps[slow] = CURVE_ERRORS * np.sqrt(np.diag(spread))
+        axes = {k: np.linspace(box[k, 0], box[k, 1], VALUES[names[k]]) for k in rough}
+        places += [thin.at(at) for at in grid(thin, place.at, axes, slow, steps)[:RELAXED]]
+    else:
+        for k in slow:
+            box[k] = np.clip(guess[k] + math.log(FACTOR) * np.array([-1.0, 1.0]), *box[k])
+        rows = design(box, POINTS, names.index(ENERGY) if ENERGY in names else -1, LEVELS)
+        places += [thin.at(at) for at in rows]
+    for share in ZOOMS:
+        sizes = share * np.array([ZOOM[name] for name in names])
+        for centre in distinct(places, sizes, ZOOMED):
+            places += _zoom(thin, centre.at, sizes, share * steps)
+    return places
+
+
+def _zoom(like: Likelihood, at: np.ndarray, sizes: np.ndarray, steps: np.ndarray) -> list[Place]:
+    """The best places of a grid of C_R and W_R around a place; K_R and gamma follow."""
+    axes = {}
+    for k, name in enumerate(like.names):
+        if name in ZOOM_VALUES:
+            row = at[k] + sizes[k] * np.linspace(-1.0, 1.0, ZOOM_VALUES[name])
+            axes[k] = np.clip(row, like.low[k], like.high[k])
+    if not axes:
+        return []
+    slow = [k for k in range(len(at)) if k not in axes]
+    return [like.at(one) for one in grid(like, at, axes, slow, steps)[:ZOOM_RELAXED]]
+
+
+class Explored(NamedTuple):
+    """The best place, its covariance, what was found around, and whether no better place was."""
+
+    best: Place
+    spread: np.ndarray
+    profiles: list[Profile]
+    minima: list[Place]
+    threshold: float
+    settled: bool
+
+
+def _profiles(
+    like: Likelihood,
+    minima: list[Place],
+    pool: list[np.ndarray],
+    quantile: float,
+    counter: _Counter,
+) -> Explored:
+    """Profiles from the best of all minima, and from others as likely."""
+    # W_R and C_R first: they are what hides better places
+    every = range(len(like.names))[::-1]
+    pool = [*pool, *(one.at for one in minima)]
+    rough = {k for k in every if like.names[k] in ZOOM_VALUES}
+    found: dict[int, Profile] = {}
+    for left in reversed(range(MOST_STARTS)):
+        best, spread = descend(like, minima[0].at, sorted(every))
+        best = polish(like, best, spread)
+        tiny, dips = roughness(like, best, spread)
+        threshold = quantile + ROUGH_FACTOR * max(tiny, dips)
+        follower = Follower(like, best.deviance, threshold, pool, rough, restarts=left > 0)
+        try:
+            found = {k: follower.profile(best, spread, k) for k in every}
+            for other in minima[1:]:
+                if other.deviance - best.deviance < threshold and _outside(other, found.items()):
+                    place, wide = descend(like, other.at, sorted(every))
+                    for k in every:
+                        found[k].include(follower.profile(place, wide, k))
+            break
+        except BetterPlaceError as better:
+            counter.expected += counter.expected // 8
+            minima = [better.place, *minima]
+    settled = follower.base >= best.deviance - BETTER * threshold
+    met = [one for each in found.values() for one in each.places]
+    best = min(met, key=lambda one: one.deviance)
+    # whatever is as likely belongs to the interval, on whichever profile it was met
+    for one in met:
+        if one.deviance < best.deviance + threshold:
+            for k in every:
+                found[k].reach(float(one.at[k]), like.low[k], like.high[k])
+    minima = [best, *(one for one in minima if one.deviance > best.deviance)]
+    profiles = [found[k] for k in sorted(every)]
+    return Explored(best, spread, profiles, minima, threshold, settled)
+
+
+def _outside(place: Place, profiles: Iterable[tuple[int, Profile]]) -> bool:
+    """Whether a place lies outside of what belongs to the best one, in one parameter at least."""
+    return any(not one.own[0] <= place.at[k] <= one.own[1] for k, one in profiles)
+
+
+def _result(
+    like: Likelihood,
+    sources: Sequence[Source],
+    explored: Explored,
+    confidence: float,
+    runs: int,
+) -> Fit:
+    """Put a fit together."""
+    best, spread, profiles, minima, threshold, settled = explored
+    estimates, curves = {}, {}
+    for k, (name, found) in enumerate(zip(like.names, profiles, strict=True)):
+        estimates[name] = _estimate(best.at[k], found, like.low[k], like.high[k])
+        places = sorted((float(one.at[k]), one.deviance) for one in found.places)
+        at, deviance = np.array(places).T
+        curves[name] = np.exp(at), deviance - best.deviance
+    rivals = [
+        Rival(dict(zip(like.names, np.exp(one.at).tolist(), strict=True)), above)
+        for one in minima[1:]
+        if (above := one.deviance - best.deviance) < TOLD + threshold
+        and _outside(one, enumerate(profiles))
+    ]
+    explained = [
+        Explained(one.name, one.data, one.data - off, noise, source)
+        for one, off, noise, source in zip(
+            like.series, best.residuals, best.noise, sources, strict=True
+        )
+    ]
+    warnings = [
+        *_interval_notes(estimates, like),
+        *([] if settled else [UNSETTLED]),
+        *_rough_notes(confidence, threshold),
+        *_rival_notes(rivals),
+        *(note for one in explained for note in _correlation_note(one)),
+        *_grid_notes(like, best, spread, profiles),
+    ]
+    return Fit(estimates, confidence, threshold, explained, rivals, curves, runs, warnings)
+
+
+def _estimate(at: float, found: Profile, low: float, high: float) -> Estimate:
+    open_below, open_above = math.isinf(found.low), math.isinf(found.high)
+    verdict = {
+        (False, False): RIVALLED if found.split else DETERMINED,
+        (True, False): OPEN_BELOW,
+        (False, True): OPEN_ABOVE,
+        (True, True): OPEN,
+    }[open_below, open_above]
+    ends = (math.exp(max(found.low, low)), math.exp(min(found.high, high)))
+    return Estimate(math.exp(at), *ends, verdict)
+
+
+def _interval_notes(estimates: Mapping[str, Estimate], like: Likelihood) -> list[str]:
+    """Say which parameters the data do not tell, or only roughly."""
+    notes = []
+    for name, one in estimates.items():
+        unit = like.scene.row_of(name).unit.replace("-", "")
+        low, high = (f"{end:.3g} {unit}".rstrip() for end in (one.low, one.high))
+        told = {
+            OPEN_ABOVE: f"is not determined: the data tell only that it is above {low}",
+            OPEN_BELOW: f"is not determined: the data tell only that it is below {high}",
+            OPEN: f"is not determined: the data tell nothing of it between {low} and {high}",
+        }.get(one.verdict)
+        if told is None and one.high > WIDE * one.low:
+            told = f"is known only to a factor of {one.high / one.low:.2g}: {low} to {high}"
+        if told is not None:
+            notes.append(f"{NAMES[name]} ({name}) {told}")
+    return notes
+
+
+def _rough_notes(confidence: float, threshold: float) -> list[str]:
+    """Say that the motion amplifies changes so much that intervals were widened for it."""
+    from scipy.stats import chi2
+
+    rough = (threshold - float(chi2.ppf(confidence, 1))) / ROUGH_FACTOR
+    if rough < ROUGH:
+        return []
+    return [
+        f"the likelihood is rough: many small dips, of about {rough:.2g} in twice its logarithm; "
+        "intervals are widened for that"
+    ]
+
+
+def _rival_notes(rivals: Sequence[Rival]) -> list[str]:
+    """Say which other rocks explain the data nearly as well."""
+    notes = []
+    for one in rivals:
+        values = ", ".join(f"{NAMES[key]} = {value:.4g}" for key, value in one.values.items())
+        notes.append(f"another minimum, {_odds(one)}: {values}")
+    return notes
+
+
+def _odds(rival: Rival) -> str:
+    less = 1.0 / rival.odds
+    return "as likely" if less < 1.5 else f"{less:.2g} times less likely"
+
+
+def _correlation_note(one: Explained) -> list[str]:
+    """Say that neighbouring residuals are alike, where they are."""
+    residuals = one.residuals
+    total = float(residuals @ residuals)
+    if len(residuals) < 2 or not total > (len(residuals) * one.noise * 1e-6) ** 2:
+        return []
+    correlation = float(residuals[1:] @ residuals[:-1]) / total
+    if correlation * math.sqrt(len(residuals)) <= MOST_CORRELATION:
+        return []
+    return [
+        f"{one.name}: neighbouring residuals are alike (correlation {correlation:.2f}): the model "
+        "misses something, or the noise is no white noise; the intervals are too narrow"
+    ]
+
+
+def _grid_notes(
+    like: Likelihood, best: Place, spread: np.ndarray, profiles: Sequence[Profile]
+) -> list[str]:
+    """Say which best values would move with twice the cells by a good part of their intervals."""
+    scene = like.scene
+    simulated = [one for one in like.series if one.simulated]
+    cells = list(make_solver(scene).cells.values()) if simulated else []
+    if not cells:
+        return []
+    key = "fem.elements" if scene.solver_name == "fem" else "solver.cells"
+    finer = Likelihood(
+        scene.replace(**{key: 2 * cells[0], "solver.accuracy": None}),
+        like.series,
+        like.names,
+        np.stack([like.low, like.high], axis=1),
+        lambda: None,
+    )
+    weights = np.repeat(1.0 / np.array(best.noise), [len(one) for one in best.residuals])
+    off = np.concatenate(best.residuals)
+    change = (np.concatenate(finer.at(best.at).residuals) - off) * weights
+    steps = np.clip(STEP_SHARE * np.sqrt(np.diag(spread)), LEAST_STEP, MOST_STEP)
+    columns = [
+        (np.concatenate(like.at(best.at + row).residuals) - off) * weights / step
+        for row, step in zip(np.diag(steps), steps, strict=True)
+    ]
+    moves = np.abs(spread @ np.stack(columns) @ change)
+    halves = np.array([0.5 * (one.high - one.low) for one in profiles])
+    moved = [
+        f"{NAMES[name]} by {move / half:.1g}"
+        for name, move, half in zip(like.names, moves, halves, strict=True)
+        if move > GRID_SHARE * half
+    ]
+    if not moved:
+        return []
+    return [
+        f"twice the cells would move {', '.join(moved)} of half its interval: calibrate with "
+        f"--cells {2 * cells[0]} and use the rock with as many"
+    ]

@@ -1,0 +1,182 @@
+"""The joint likelihood of all measurements of a rock, each with a noise of its own."""
+
+from __future__ import annotations
+
+import math
+from collections import OrderedDict
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from percussion_model.analysis.fitting.curve import (
+    best_datum_and_peak,
+    bilinear_force,
+    first_sight,
+)
+from percussion_model.analysis.fitting.measurements import Curve, DropTest, Reading
+from percussion_model.analysis.fitting.predictions import (
+    bit_alone,
+    predicted_drop,
+    predicted_reading,
+)
+from percussion_model.scene.inputs import SimulationError
+from percussion_model.scene.scene import Scene
+
+STIFFNESS, RATIO = "rock.loading_stiffness", "rock.unloading_ratio"
+# No noise is taken to be smaller than this share of the data's spread: data of a model
+# without noise would have an infinite likelihood.
+LEAST_NOISE = 1e-8
+# Points that are not computed again.
+KEPT = 256
+
+
+@dataclass(frozen=True)
+class Series:
+    """Measurements whose common noise is unknown (`error` None), or one with a known error."""
+
+    name: str
+    data: np.ndarray
+    error: float | None
+    model: Callable[[Scene], np.ndarray] = field(repr=False)
+    simulated: bool = True
+
+    @property
+    def least_noise(self) -> float:
+        """What the estimated noise is at least."""
+        size = float(np.ptp(self.data)) or float(np.abs(self.data).max())
+        return LEAST_NOISE * size
+
+
+@dataclass(frozen=True)
+class Place:
+    """Parameters and how well they explain the data.
+
+    Attributes
+    ----------
+    at : ndarray
+        Logarithms of the parameters.
+    deviance : float
+        Twice the negative logarithm of the likelihood, noise at its best, but for a constant.
+    residuals : list of ndarray
+        Data less model of each series.
+    noise : list of float
+        Standard deviation of each series.
+    """
+
+    at: np.ndarray
+    deviance: float
+    residuals: list[np.ndarray] = field(repr=False)
+    noise: list[float]
+
+
+class Likelihood:
+    """Deviance of parameters of the rock; counts how often the model is computed.
+
+    Parameters
+    ----------
+    scene : Scene
+    series : sequence of Series
+    names : sequence of str
+        Dotted keys of the free parameters.
+    ranges : ndarray, shape (parameters, 2)
+        Logarithms between which they lie.
+    tick : callable
+        Called once for each place that is computed.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        series: Sequence[Series],
+        names: Sequence[str],
+        ranges: np.ndarray,
+        tick: Callable[[], None],
+    ) -> None:
+        self.scene, self.series, self.names = scene, series, tuple(names)
+        self.low, self.high = ranges.T
+        self._tick = tick
+        self._known: OrderedDict[bytes, Place] = OrderedDict()
+
+    def at(self, at: np.ndarray) -> Place:
+        """Compute the place of parameters (logarithms), within their ranges."""
+        at = np.clip(at, self.low, self.high)
+        key = at.tobytes()
+        if key not in self._known:
+            self._known[key] = self._compute(at)
+            self._tick()
+            if len(self._known) > KEPT:
+                self._known.popitem(last=False)
+        return self._known[key]
+
+    def scene_at(self, at: np.ndarray) -> Scene:
+        """Scene with these parameters."""
+        values = np.exp(at).tolist()
+        return self.scene.replace(**dict(zip(self.names, values, strict=True)))
+
+    def _compute(self, at: np.ndarray) -> Place:
+        scene = self.scene_at(at)
+        residuals = [one.data - _finite(one, scene) for one in self.series]
+        deviance, noise = self.deviance_of(residuals)
+        return Place(at, deviance, residuals, noise)
+
+    def deviance_of(self, residuals: Sequence[np.ndarray]) -> tuple[float, list[float]]:
+        """Deviance of residuals, and the noise of each series."""
+        noise, deviance = [], 0.0
+        for one, off in zip(self.series, residuals, strict=True):
+            if one.error is None:
+                sigma = max(math.sqrt(float(off @ off) / len(off)), one.least_noise)
+                deviance += len(off) * 2.0 * math.log(sigma)
+            else:
+                sigma = one.error
+                deviance += float(off @ off) / sigma**2
+            noise.append(sigma)
+        return deviance, noise
+
+
+def _finite(one: Series, scene: Scene) -> np.ndarray:
+    """What the model says, or what no data agree with where it says nothing."""
+    try:
+        found = one.model(scene)
+    except SimulationError:
+        found = np.array([math.nan])
+    if np.isfinite(found).all():
+        return found
+    return one.data + 10.0 * (float(np.ptp(one.data)) or float(np.abs(one.data).max()))
+
+
+def curve_series(curve: Curve) -> Series:
+    """Series of a slow curve; its datum and peak are at their best for any K_R and gamma."""
+    guess = first_sight(curve)[2:]
+
+    def model(scene: Scene) -> np.ndarray:
+        stiffness, ratio = scene[STIFFNESS], scene[RATIO]
+        places = best_datum_and_peak(curve, stiffness, ratio, guess)
+        return bilinear_force(curve.penetration, stiffness, ratio, *places)
+
+    return Series(curve.name, curve.force, None, model, simulated=False)
+
+
+def drop_series(drop: DropTest, most: int | None = None) -> Series:
+    """Series of a drop test, or of at most so many of its samples, evenly taken."""
+    count = len(drop.time)
+    kept = np.arange(count)
+    if most is not None and count > most:
+        kept = np.unique(np.linspace(0, count - 1, most).round().astype(int))
+    times = drop.time[kept]
+    return Series(
+        drop.name,
+        drop.values[kept],
+        None,
+        lambda scene: predicted_drop(bit_alone(scene), drop, times),
+    )
+
+
+def reading_series(reading: Reading) -> Series:
+    """Series of a single number with a known error."""
+
+    def model(scene: Scene) -> np.ndarray:
+        whole = scene if reading.speed is None else bit_alone(scene)
+        return np.array([predicted_reading(whole, reading)])
+
+    return Series(reading.name, np.array([reading.value]), reading.error, model)

@@ -1,0 +1,241 @@
+"""Measurements of the rock: a slow curve, drops of the bit, single numbers; and their checks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+LEAST_DATA = 10
+# Signals that can be measured on a bit that falls: unit, and how large they are at most.
+SIGNALS = {
+    "bit_position": ("m", 1.0),
+    "bit_velocity": ("m/s", 200.0),
+    "bit_end_position": ("m", 1.0),
+    "bit_end_velocity": ("m/s", 200.0),
+    "bit_force": ("N", 1e8),
+    "gauge_force": ("N", 1e8),
+    "gauge_stress": ("Pa", 3e9),
+}
+# Single numbers that can be measured: unit, and the least and greatest that can be.
+QUANTITIES = {
+    "rebound_velocity": ("m/s", 1e-3, 100.0),
+    "penetration": ("m", 1e-6, 0.5),
+    "penetration_per_blow": ("m", 1e-6, 0.5),
+}
+OF_A_DROP = ("rebound_velocity", "penetration")
+# What is possible in a slow test [m], in a drop [s], [m/s].
+PENETRATIONS = (5e-6, 0.05)
+DURATIONS = (1e-5, 5.0)
+SPEEDS = (0.01, 100.0)
+# Loading stiffness of rocks under a bit, from the softest to far above the hardest [N/m].
+STIFFNESSES = (1e6, 1e11)
+
+
+class FitError(ValueError):
+    """Data that nothing can be fitted to, or a fit that went wrong; the message says why."""
+
+
+@dataclass(frozen=True)
+class Curve:
+    """One slow loading and unloading of the rock, SI units.
+
+    Attributes
+    ----------
+    penetration : array_like
+        In the order of time: rising, then falling; any zero [m].
+    force : array_like
+        On the rock, compression positive [N].
+    """
+
+    penetration: Any
+    force: Any
+    name: str = "curve"
+
+
+@dataclass(frozen=True)
+class DropTest:
+    """One measured fall of the bit, SI units.
+
+    Attributes
+    ----------
+    time : array_like
+        Since the bit was `start.rock_gap` above the rock; rising [s].
+    values : array_like
+        What was measured.
+    speed : float
+        At time zero, downward [m/s].
+    signal : str
+        What it is, one of `SIGNALS`.
+    gauge : float, optional
+        Distance of the gauge from the top of the bit [m]; default its middle.
+    """
+
+    time: Any
+    values: Any
+    speed: float
+    signal: str = "bit_position"
+    gauge: float | None = None
+    name: str = "drop"
+
+
+@dataclass(frozen=True)
+class Reading:
+    """One measured number with its standard error, SI units.
+
+    Attributes
+    ----------
+    quantity : {"rebound_velocity", "penetration", "penetration_per_blow"}
+        Greatest upward mean velocity of the bit after a drop [m/s]; what a drop leaves of
+        penetration at the end of the scene's duration [m]; mean penetration per blow of the
+        scene's hammer after settling [m].
+    value, error : float
+        Error: its standard deviation.
+    speed : float, optional
+        Of the drop [m/s]; None for the hammer.
+    """
+
+    quantity: Literal["rebound_velocity", "penetration", "penetration_per_blow"]
+    value: float
+    error: float
+    speed: float | None = None
+
+    @property
+    def name(self) -> str:
+        """How messages and tables call it."""
+        return self.quantity + ("" if self.speed is None else f" at {self.speed:g} m/s")
+
+
+def checked_curve(curve: Curve) -> Curve:
+    """Return a curve as arrays of numbers that can be.
+
+    Raises
+    ------
+    FitError
+    """
+    p, force = checked_columns({"penetration": curve.penetration, "force": curve.force})
+    span = float(np.ptp(p))
+    if not span > 0:
+        raise FitError("penetration: does not change")
+    if not force.max() > 0:
+        raise FitError("force: never positive; compression counts positive")
+    slope = float(force.max()) / span
+    scales = []
+    if not PENETRATIONS[0] <= span <= PENETRATIONS[1]:
+        scales.append(("penetration", f"{span:.3g} m", PENETRATIONS, "m"))
+    if not STIFFNESSES[0] <= slope <= STIFFNESSES[1]:
+        scales.append(("force over penetration", f"{slope:.3g} N/m", STIFFNESSES, "N/m"))
+    if scales:
+        words = "; ".join(
+            f"{name} spans {seen}, possible is {low:g} to {high:g} {unit}"
+            for name, seen, (low, high), unit in scales
+        )
+        raise FitError(
+            f"{curve.name}: {words}. A heading without a unit is in SI: is it perhaps "
+            f"{_likely_units(span, float(force.max()))}?"
+        )
+    return Curve(p, force, curve.name)
+
+
+def _likely_units(span: float, force: float) -> str:
+    """Headings under which a curve would be possible."""
+    middle = np.log(np.sqrt(STIFFNESSES[0] * STIFFNESSES[1]))
+    best = []
+    for length, metres in (("m", 1.0), ("mm", 1e-3), ("um", 1e-6)):
+        for load, newtons in (("N", 1.0), ("kN", 1e3), ("MN", 1e6)):
+            if PENETRATIONS[0] <= span * metres <= PENETRATIONS[1]:
+                off = abs(np.log(force * newtons / (span * metres)) - middle)
+                best.append((float(off), f'"penetration [{length}]", "force [{load}]"'))
+    return min(best)[1] if best else "in another unit"
+
+
+def checked_drop(drop: DropTest) -> DropTest:
+    """Return a drop as arrays of numbers that can be.
+
+    Raises
+    ------
+    FitError
+    """
+    name = drop.name
+    time, values = checked_columns({f"time of {name}": drop.time, f"values of {name}": drop.values})
+    if time[0] < 0 or np.any(np.diff(time) <= 0):
+        raise FitError(f"time of {name}: must rise, and start at 0 s or later")
+    if drop.signal not in SIGNALS:
+        raise FitError(f"signal = {drop.signal!r}: must be one of {', '.join(SIGNALS)}")
+    if not DURATIONS[0] <= time[-1] <= DURATIONS[1]:
+        raise FitError(
+            f"{name}: time runs to {time[-1]:g} s, possible is {DURATIONS[0]:g} to "
+            f"{DURATIONS[1]:g} s. A heading without a unit is in SI: is it perhaps "
+            f'"time [{"ms" if time[-1] < 1e3 * DURATIONS[1] else "us"}]"?'
+        )
+    unit, most = SIGNALS[drop.signal]
+    if not np.ptp(values) <= most:
+        raise FitError(
+            f"{name}: {drop.signal} spans {np.ptp(values):.3g} {unit}, more than {most:g} {unit} "
+            f'cannot be: write its unit into the heading, as in "{drop.signal} [m{unit}]"'
+        )
+    check_speed(f"speed of {name}", drop.speed)
+    return DropTest(time, values, float(drop.speed), drop.signal, drop.gauge, name)
+
+
+def check_reading(reading: Reading) -> None:
+    """Raise `FitError` unless a single number can be."""
+    if reading.quantity not in QUANTITIES:
+        raise FitError(f"{reading.quantity!r}: must be one of {', '.join(QUANTITIES)}")
+    unit, low, high = QUANTITIES[reading.quantity]
+    if not low <= reading.value <= high:
+        raise FitError(
+            f"{reading.quantity} = {reading.value!r} {unit}: possible is {low:g} to {high:g} {unit}"
+        )
+    if not 0 < reading.error < reading.value:
+        raise FitError(
+            f"error of {reading.quantity} = {reading.error!r} {unit}: must be above 0 and below "
+            f"the value of {reading.value!r} {unit}"
+        )
+    of_a_drop = reading.quantity in OF_A_DROP
+    if of_a_drop and reading.speed is None:
+        raise FitError(f"{reading.quantity}: the speed of the drop is needed")
+    if not of_a_drop and reading.speed is not None:
+        raise FitError(f"{reading.quantity}: is of the hammer, without the speed of a drop")
+    if reading.speed is not None:
+        check_speed(f"speed of {reading.quantity}", reading.speed)
+
+
+def check_speed(name: str, speed: float) -> None:
+    """Raise `FitError` unless a bit may fall so fast."""
+    if not (np.isfinite(speed) and SPEEDS[0] <= speed <= SPEEDS[1]):
+        raise FitError(
+            f"{name} = {speed!r} m/s: must be a number from {SPEEDS[0]:g} to {SPEEDS[1]:g} m/s"
+        )
+
+
+def checked_columns(columns: dict[str, Any]) -> list[np.ndarray]:
+    """Return columns of data as arrays.
+
+    Raises
+    ------
+    FitError
+        If one is no row of finite numbers, or they differ in length, or are short.
+    """
+    found = []
+    for name, values in columns.items():
+        try:
+            column = np.asarray(values, dtype=float)
+        except (TypeError, ValueError):
+            raise FitError(f"{name}: must be numbers") from None
+        if column.ndim != 1:
+            raise FitError(f"{name}: must be one row of numbers, not of shape {column.shape}")
+        bad = np.flatnonzero(~np.isfinite(column))
+        if len(bad):
+            raise FitError(f"{name}: number {bad[0]} of the row (from 0) is {column[bad[0]]}")
+        found.append(column)
+    lengths = [len(column) for column in found]
+    if len(set(lengths)) > 1:
+        words = ", ".join(f"{name} {n}" for name, n in zip(columns, lengths, strict=True))
+        raise FitError(f"columns must be of one length: {words}")
+    if lengths[0] < LEAST_DATA:
+        raise FitError(
+            f"{' and '.join(columns)}: {lengths[0]} data, at least {LEAST_DATA} are needed"
+        )
+    return found

@@ -1,0 +1,42 @@
+"""Files of systems that come from strangers: one error, and no file outside of the folder."""
+
+import pytest
+
+from fmu_src.system.__main__ import main
+from fmu_src.system.archive import SYSTEMS, read_plan
+
+PLAIN = (SYSTEMS / "feed_control.toml").read_text()
+NAME = 'name = "FeedControl"'
+NASTY = {
+    "name above": (PLAIN.replace(NAME, 'name = "../evil"'), "must begin with a letter"),
+    "absolute name": (PLAIN.replace(NAME, 'name = "/tmp/evil"'), "must begin with a letter"),
+    "no name": (PLAIN.replace(NAME, ""), "name missing"),
+    "number for a name": (PLAIN.replace(NAME, "name = 5"), "name = 5: must be text"),
+    "control character": (PLAIN.replace("Feed-controlled", "a\\u0000"), "control character"),
+    "component above": (PLAIN.replace("[components]", '[components]\n"../x" = "a"'), "letter"),
+    "unknown FMU": (PLAIN.replace("[components]", '[components]\nx = "Evil"'), "must be one of"),
+    "list of FMUs": (PLAIN.replace("[components]", "[components]\nx = []"), "a table of texts"),
+    "base of itself": ('base = "system.toml"', "base = "),
+    "base that is a number": ("base = 5", "base = 5"),
+    "table over value": ('base = "plain.toml"\nparameters = 5', "parameters = 5: must be a table"),
+    "value over table": ('base = "plain.toml"\n[parameters]\nrig = 5', "stands where its base"),
+    "no TOML": ("[", "not valid TOML"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", NASTY)
+def test_a_nasty_plan_is_one_line(name, tmp_path, capsys):
+    text, said = NASTY[name]
+    (tmp_path / "plain.toml").write_text(PLAIN)
+    path = tmp_path / "system.toml"
+    path.write_text(text)
+    assert main([str(path), "-o", str(tmp_path / "out")]) == 1
+    lines = capsys.readouterr().err.strip().splitlines()
+    assert len(lines) == 1
+    assert said in lines[0]
+    assert not list(tmp_path.rglob("*.ssp"))
+
+
+def test_plans_that_ship_are_read():
+    for path in SYSTEMS.glob("*.toml"):
+        assert read_plan(path).components
