@@ -145,15 +145,22 @@ def _type_definitions(variables: Sequence[Variable]) -> Element:
 
 
 def _complete_structure(root: Element, variables: Sequence[Variable]) -> None:
-    """No output depends on an input at once; all are unknown at the start."""
+    """No output depends on an input at once; at the start some do, and on parameters."""
     structure = root.find("ModelStructure")
     assert structure is not None
     for unknown in structure.iter("Unknown"):
         unknown.set("dependencies", "")
     unknowns = SubElement(structure, "InitialUnknowns")
     for index, variable in enumerate(variables, start=1):
-        if variable.causality == "output":
-            SubElement(unknowns, "Unknown", {"index": str(index)})
+        if variable.causality != "output":
+            continue
+        known = [
+            str(at)
+            for at, one in enumerate(variables, start=1)
+            if variable.at_start is not None
+            and (one.causality == "parameter" or one.name in variable.at_start)
+        ]
+        SubElement(unknowns, "Unknown", {"index": str(index), "dependencies": " ".join(known)})
 
 
 def write_description(

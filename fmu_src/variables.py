@@ -25,7 +25,9 @@ class Variable:
     """A variable of an FMU.
 
     Bounds are inclusive; those of a row that leave out the bound itself are checked
-    when the value is used. `items` are those of an enumeration, by name.
+    when the value is used. `items` are those of an enumeration, by name. `at_start` tells
+    of an output at the start of a simulation: the inputs that it depends on beside the
+    parameters, or None where it is the same in every simulation.
     """
 
     name: str
@@ -43,6 +45,7 @@ class Variable:
     row: Row | None = None  # bounds of a parameter or an input
     key: str | None = None  # of the scene
     left_out: Any = None  # value that stands for "left out"
+    at_start: tuple[str, ...] | None = None
     enumeration: str | None = None
     items: tuple[tuple[str, int, str], ...] = ()  # name, value, description
 

@@ -151,6 +151,7 @@ def _outputs() -> Iterator[Variable]:
             lower=one.lower,
             upper=one.upper,
             nominal=one.nominal,
+            at_start=one.at_start,
             **(modes if one.type == "Enumeration" else {}),
         )
 

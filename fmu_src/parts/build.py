@@ -47,6 +47,7 @@ def _output(
     unit, *bounds, text = entry
     common: dict[str, Any] = {
         "name": name, "reference": reference, "causality": causality, "description": text,
+        "at_start": part.at_start.get(name),
     }  # fmt: skip
     if unit is False:
         return Variable(type="Boolean", variability="discrete", **common)

@@ -256,4 +256,11 @@ TABLE = PartTable(
         "seek.pressure_lowest": ("Pa", 1.0, 1e9, 8e5, "lowest pressure of the seeker"),
         "seek.pressure_highest": ("Pa", 1.0, 1e9, 3e6, "highest pressure of the seeker"),
     },
+    at_start={
+        "force_command": (),
+        "pressure_command": ("pressure_setpoint",),
+        "feed_wanted": ("feed_setpoint",),
+        "seek.centre": ("feed_setpoint",),
+        "seek.pressure_centre": ("pressure_setpoint",),
+    },
 )  # fmt: skip

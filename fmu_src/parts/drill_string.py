@@ -349,4 +349,11 @@ TABLE = PartTable(
         "gravity": ("m/s^2", -100.0, 100.0, 10.0, "acceleration, down positive"),
         "feed_filter": ("s", 1e-4, 100.0, 0.1, "time of the filter of feed_force_mean"),
     },
+    at_start=dict.fromkeys(
+        (
+            "feed_force", "feed_force_mean", "length", "weight", "rod_wanted", "lifted",
+            "shoulder_stiffness", "momentum", "energy.stored", "rod_count",
+        ),
+        (),
+    ),
 )  # fmt: skip

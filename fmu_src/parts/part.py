@@ -191,6 +191,9 @@ class PartTable:
         Of the FMU.
     slave : type
         What runs in it.
+    at_start : dict of tuple
+        Inputs that an output depends on at the start, beside parameters; outputs that are
+        left out are the same at every start.
     first : dict of int
         First value reference by causality.
     displays : dict of str
@@ -207,6 +210,7 @@ class PartTable:
     inputs: Entries
     outputs: Entries
     parameters: Entries
+    at_start: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     first: Mapping[str, int] = field(
         default_factory=lambda: {"input": 1, "output": 100, "parameter": 200}
     )

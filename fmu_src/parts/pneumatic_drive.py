@@ -131,6 +131,7 @@ TABLE = PartTable(
         "conductance": ("m s", 0.0, 1.0, 1e-6, "mass flow of a port by its pressure difference"),
         "temperature": ("K", 1.0, 5000.0, 293.0, "temperature of the gas"),
     },
+    at_start={"piston_force": ("supply_pressure",), "upper.pressure": ("supply_pressure",)},
     first={"input": 0, "output": 10, "parameter": 20},
     displays={"Pa": "bar", "m": "mm", "N": "kN"},
     stop_time=1.0,

@@ -105,4 +105,5 @@ TABLE = PartTable(
         "slide.friction": ("N s/m", 0.0, 1e7, 2e3, "viscous friction of the slide"),
         "start.force": ("N", -1e6, 1e6, 0.0, "force at the start"),
     },
+    at_start={"force": ("head_velocity",), "pressure": ()},
 )  # fmt: skip

@@ -172,4 +172,12 @@ TABLE = PartTable(
         "torque_arm": ("m", 0.0, 10.0, 0.04, "torque by feed force in sound rock"),
         "void_stiffness": ("N/m", 0.0, 1e13, 1e7, "K_R up to which a layer counts as a void"),
     },
+    at_start={
+        "loading_stiffness": ("bit_position", "feed_force", "supply_pressure"),
+        "unloading_ratio": ("bit_position",),
+        "depth": ("bit_position",),
+        "rotation_torque": ("bit_position", "feed_force"),
+        "in_void": ("bit_position",),
+        "layer": ("bit_position",),
+    },
 )

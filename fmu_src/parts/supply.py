@@ -118,4 +118,5 @@ TABLE = PartTable(
         "relief_pressure": ("Pa", 0.0, 1e9, 3.2e6, "pressure at which the relief valve opens"),
         "start.pressure": ("Pa", 0.0, 1e9, 2e6, "pressure at the start"),
     },
+    at_start={"supply_pressure": (), "hose_pressure": (), "relief_open": ()},
 )  # fmt: skip

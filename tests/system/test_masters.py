@@ -1,9 +1,10 @@
-"""The same archive in two masters that are not ours: the same depth."""
+"""The same archive in masters that are not ours: the same depth."""
 
 from __future__ import annotations
 
 import importlib.util
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -50,6 +51,36 @@ for part, name in (("hammer", "bit.position"), ("string", "feed_force_mean"),
 print("FOUND", json.dumps(found))
 """
 
+# Its library, wherever it was built or installed.
+OMSIMULATOR = os.environ.get("PERCUSSION_OMSIMULATOR", "")
+OMS = """
+import ctypes, json, re, sys, zipfile
+oms = ctypes.CDLL(sys.argv[4])
+number, model = ctypes.c_double, ctypes.c_char_p()
+with zipfile.ZipFile(sys.argv[1]) as archive:
+    plan = archive.read("SystemStructure.ssd").decode()
+def call(name, *arguments):
+    status = getattr(oms, name)(*arguments)
+    assert status <= 1, (name, status)  # ok, or a warning
+call("oms_setTempDirectory", b".")
+call("oms_importFile", sys.argv[1].encode(), ctypes.byref(model))
+system = model.value + b"." + re.search('<ssd:System [^>]*name="([^"]+)"', plan)[1].encode()
+call("oms_setResultFile", model, b"", 0)
+step = float(sys.argv[2])
+call("oms_setStopTime", model, number(step * int(sys.argv[3])))
+call("oms_setFixedStepSize", system, number(step))
+for name in ("oms_instantiate", "oms_initialize", "oms_simulate"):
+    call(name, model)
+found = []
+for name in (b"hammer.bit.position", b"string.feed_force_mean", b"controller.feed_wanted"):
+    value = number()
+    call("oms_getReal", system + b"." + name, ctypes.byref(value))
+    found.append(value.value)
+print("FOUND", json.dumps(found), flush=True)
+call("oms_terminate", model)
+call("oms_delete", model)
+"""
+
 
 @pytest.fixture(scope="module")
 def ours(feed_control):
@@ -69,9 +100,22 @@ def test_another_master_drills_as_deep(feed_control, ours, package, script, tmp_
         pytest.skip(f"{package} is not installed (the extra `hosts` has it on Linux, x86-64)")
     if package == "ecospy" and not list(Path(sys.prefix, "lib").glob("libtbb.so.*")):
         pytest.skip("ecospy needs libtbb.so, which the package tbb brings along")
+    check(script, feed_control, ours, tmp_path)
+
+
+@pytest.mark.skipif(
+    not OMSIMULATOR, reason="PERCUSSION_OMSIMULATOR names no library of OMSimulator (docs/hosts.md)"
+)
+def test_omsimulator_drills_as_deep(feed_control, ours, tmp_path):
+    """It orders its calls by the description: outputs that may depend on all inputs are a loop."""
+    check(OMS, feed_control, ours, tmp_path, OMSIMULATOR)
+
+
+def check(script, archive, ours, folder, *more):
+    """Run a master in a process of its own, and compare."""
     done = subprocess.run(
-        [sys.executable, "-c", script, str(feed_control), repr(STEP), str(COUNT)],
-        capture_output=True, text=True, check=False, cwd=tmp_path,
+        [sys.executable, "-c", script, str(archive), repr(STEP), str(COUNT), *more],
+        capture_output=True, text=True, check=False, cwd=folder,
     )  # fmt: skip
     assert done.returncode == 0, done.stdout + done.stderr
     (said,) = [line for line in done.stdout.splitlines() if line.startswith("FOUND")]

@@ -26,7 +26,7 @@ OTHER_EVENTS = 4
 # A time this close below a grid point is that grid point [steps].
 GRID_ROUNDING = 1e-6
 
-# At a grid point itself, forces are those of the first instant after it [steps].
+# At a grid point itself, forces and mode are those of the first instant after it [steps].
 SHORTEST = 1e-6
 
 
@@ -110,14 +110,23 @@ def read_at(par, s, bars, time, blows, events, row):
     bit, contact = s.i_bit, s.i_contact
     s.i_bit = 0.0
     s.i_contact = 0.0
+    at_grid_point = time - time_of(par, s) <= SHORTEST * par.dt
+    if at_grid_point:  # nothing has moved in that instant
+        fill_motion(par, s, row, time, s.u_r - s.u_start + before, before)
     step(par, s, bars, tau, blows, events)
-    here = before + 0.5 * (v_before + s.v_b) * tau
-    fill_motion(par, s, row, time, s.u_r - s.u_start + here, here)
+    if at_grid_point:
+        row.drilling_mode = s.mode
+    else:
+        here = before + 0.5 * (v_before + s.v_b) * tau
+        fill_motion(par, s, row, time, s.u_r - s.u_start + here, here)
     row.bit_end_velocity = bars.wb[Row.FACE, par.n_b]
     row.bit_force = s.i_bit / tau
     row.contact_force = s.i_contact / tau
-    row.bit_impulse = bit + s.i_bit
-    row.contact_impulse = contact + s.i_contact
+    row.bit_impulse = bit
+    row.contact_impulse = contact
+    if not at_grid_point:
+        row.bit_impulse += s.i_bit
+        row.contact_impulse += s.i_contact
     row.peak_bit_force = s.peak_bit_force
     row.peak_contact_force = s.peak_contact_force
 
