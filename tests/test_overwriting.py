@@ -169,3 +169,28 @@ def test_an_interrupted_run_does_not_replace_the_whole_one(percussion, monkeypat
     assert contents("x") == before
     assert "goes to x-2" in said
     assert json.loads(Path("x-2/summary.json").read_text())["duration"] == 0.2
+
+
+def test_forcing_removes_nothing_outside_of_the_folder(tmp_path):
+    """A list of files may come from elsewhere, as the whole folder may."""
+    (tmp_path / "kept").touch()
+    claimed = Claim(tmp_path / "x", {"command": "run"})
+    claimed.folder.mkdir()
+    (claimed.folder / "old").touch()
+    files = ["old", "../kept", str(tmp_path / "kept"), 3]
+    (claimed.folder / ORIGIN).write_text(json.dumps({"made_by": {"command": "a"}, "files": files}))
+    Claim(tmp_path / "x", {"command": "run"}, force=True).sign()
+    assert sorted(path.name for path in tmp_path.rglob("*")) == ["kept", ORIGIN, "x"]
+
+
+@pytest.mark.parametrize("text", ["[]", '{"made_by": 3, "files": []}', '{"made_by": {}}', "{"])
+def test_a_damaged_origin_is_unknown(tmp_path, text):
+    (tmp_path / ORIGIN).write_text(text)
+    with pytest.raises(ResultError, match="holds"):
+        Claim(tmp_path, {"command": "run"})
+
+
+def test_a_summary_that_is_replaced_is_said_to_be(percussion):
+    words = (*RUN, "--json", "numbers.json")
+    assert "wrote numbers.json" in percussion(*words)[1]
+    assert "replaced numbers.json" in percussion(*words)[1]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import zipfile
+import zlib
 from importlib.metadata import version
 from pathlib import Path
 
@@ -68,7 +69,15 @@ def refuse_other(path: Path, scene: Scene, with_map: bool, force: bool = False) 
             same = (found, "resources/blow_map.npz" in archive.namelist()) == (
                 json.loads(to_json(scene.given_values())), with_map
             )  # fmt: skip
-    except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile):
+    except (
+        OSError,
+        ValueError,
+        LookupError,
+        TypeError,
+        RuntimeError,
+        zipfile.BadZipFile,
+        zlib.error,
+    ):
         same = False
     if not same:
         raise SceneError(

@@ -183,6 +183,7 @@ def bench(
     parameters: Mapping[str, Any] | None = None,
     trials: Sequence[str] = (),
     progress: Callable[[Score], None] | None = None,
+    trust: bool = False,
 ) -> list[Score]:
     """Put a controller through the standard runs.
 
@@ -200,6 +201,8 @@ def bench(
         Names of runs; all if left out.
     progress : callable, optional
         Called with each score.
+    trust : bool
+        As for `Coupling`.
     """
     names = [trial.name for trial in TRIALS]
     for name in trials:
@@ -215,6 +218,7 @@ def bench(
             {**trial.parameters, **(parameters or {})},
             replaced=None if controller is None else {"controller": controller},
             on_way=None if trial.on_way is None else trial.on_way(),
+            trust=trust,
         )
         run = coupling.run(trial.duration, STEP, SIGNALS, ROWS_EVERY)
         found.append(judge(trial, run))

@@ -170,13 +170,9 @@ class Coupling:
         CoupledRun
             With what there is, and the reason, where a part failed on the way.
         """
-        count, every = whole_steps(duration, step, interval)
-        if tolerance is not None and self.on_way is not None:
-            raise CouplingError("on_way cannot be taken back with a step: leave the tolerance out")
-        if tolerance is not None and self.every:
-            raise CouplingError(f"every {self.every} and a tolerance do not go together")
-        refuse_remainder(self.every, self.parts, count)
         try:
+            count, every = whole_steps(duration, step, interval)
+            self._refuse_contradictions(count, tolerance)
             self._connect([*signals, *known_signals(self.outputs, JUDGED)])
             self._initialise()
             control = None if tolerance is None else StepControl(self.ports, step, tolerance)
@@ -187,6 +183,13 @@ class Coupling:
             return run
         finally:
             self.free()
+
+    def _refuse_contradictions(self, count: int, tolerance: float | None) -> None:
+        if tolerance is not None and self.on_way is not None:
+            raise CouplingError("on_way cannot be taken back with a step: leave the tolerance out")
+        if tolerance is not None and self.every:
+            raise CouplingError(f"every {self.every} and a tolerance do not go together")
+        refuse_remainder(self.every, self.parts, count)
 
     def _loop(
         self,

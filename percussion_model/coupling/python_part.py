@@ -45,15 +45,23 @@ class PythonPart:
 
     def begin(self) -> None:
         """Make what works in this run."""
-        self.work: Work = fresh(self.name, self.given)
+        try:
+            self.work: Work = fresh(self.name, self.given)
+        except CouplingError:
+            raise
+        except Exception as error:
+            raise self._failure(error) from error
 
     def step(self, time: float, step: float) -> None:
         """One communication step [s]."""
         try:
             self.outputs = dict(self.work(Inputs(self.inputs), time, step))
         except Exception as error:
-            kind = "" if isinstance(error, CouplingError) else f"{type(error).__name__}: "
-            raise CouplingError(f"{self.name}: {kind}{error}{_source_place(error)}") from error
+            raise self._failure(error) from error
+
+    def _failure(self, error: Exception) -> CouplingError:
+        kind = "" if isinstance(error, CouplingError) else f"{type(error).__name__}: "
+        return CouplingError(f"{self.name}: {kind}{error}{_source_place(error)}")
 
     def reader(self, names: Sequence[str]) -> PythonSignals:
         """Return a reader of outputs."""
@@ -82,6 +90,8 @@ class PythonSignals:
 
 
 def _source_place(error: Exception) -> str:
-    """File and line of a fault in a callable."""
+    """File and line of a fault in a callable; faults of syntax have them in their text."""
+    if isinstance(error, SyntaxError):
+        return ""
     frames = [at for at in traceback.extract_tb(error.__traceback__) if at.filename != __file__]
     return f" ({Path(frames[-1].filename).name}, line {frames[-1].lineno})" if frames else ""

@@ -94,7 +94,7 @@ def _mapped(file: Any) -> mmap.mmap:
 
 
 def _too_much(text: str) -> CouplingError:
-    return CouplingError(f"{text}: if you trust its source, say so (couple --trust, trust=True)")
+    return CouplingError(f"{text}: if you trust its source, say so (--trust, or trust=True)")
 
 
 def unpack_zip(path: Path, folder: Path, allowance: Allowance) -> None:

@@ -232,20 +232,21 @@ def _softening(columns: Mapping[str, np.ndarray], step: float) -> list[Finding]:
     if STIFFNESS not in columns or not len(columns[STIFFNESS]):
         return []
     given, least = float(columns[STIFFNESS][0]), float(np.min(columns[STIFFNESS]))
-    share = least / given
-    if share >= STIFF_ENOUGH:
+    share = least / given if given > 0.0 else math.nan
+    if not share < STIFF_ENOUGH:
         return []
     text = (
         f"it leaves the shoulder {_percent(share)} of its stiffness ({STIFFNESS} "
         f"{1e-3 * least:.3g} in place of {1e-3 * given:.3g} kN/m)"
     )
     # what a step can bear goes by the inverse square of the step
-    return [Finding(STIFFNESS, text, share, STIFF_ENOUGH, step * math.sqrt(share))]
+    shorter = step * (math.sqrt(share) if share > 0.0 else MUCH_SHORTER)
+    return [Finding(STIFFNESS, text, share, STIFF_ENOUGH, shorter)]
 
 
 def _jump(signal: str, value: float, step: float) -> list[Finding]:
     """A signal that changes too much while a part does not see it."""
-    if value <= LARGEST_JUMP:
+    if not value > LARGEST_JUMP:
         return []
     text = f"{signal} changes by {_percent(value)} of the greatest value in each step"
     # held values have an error of first order

@@ -120,8 +120,8 @@ def load_arrays(path: Path) -> dict[str, np.ndarray]:
 
 
 def to_json(summary: dict[str, Any]) -> str:
-    """Write a summary as JSON."""
-    return json.dumps(summary, indent=2, allow_nan=False)
+    """Write a summary as JSON; numbers that are not finite become null."""
+    return json.dumps(plain(summary), indent=2, allow_nan=False)
 
 
 def plain(value: Any) -> Any:

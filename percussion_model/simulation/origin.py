@@ -58,9 +58,10 @@ class Claim:
             self.folder = _free_beside(folder, self.origin)
             self.moved = f"{folder} {other}: this one goes to {self.folder} (--force replaces it)"
         check_writable(self.folder)
-        self._left = _read(self.folder).get("files", []) if self.folder.is_dir() else []
-        self._replaces = bool(other and force)
         self._before = _times(self.folder)
+        # a list from elsewhere may name what lies outside, which is never removed
+        self._left = [name for name in _read(self.folder)[1] if name in self._before]
+        self._replaces = bool(other and force)
 
     def sign(self) -> None:
         """Say in the folder where its files are from; call this when they are written."""
@@ -97,7 +98,7 @@ def _other_than(folder: Path, origin: Mapping[str, Any]) -> str:
     if ORIGIN not in files:
         more = ", ..." if len(files) > SHOWN else ""
         return f"holds files of unknown origin ({', '.join(files[:SHOWN])}{more})" if files else ""
-    found = _read(folder).get("made_by", {})
+    found = _read(folder)[0]
     if found == origin:
         return ""
     if found.get("command") != origin.get("command"):
@@ -120,13 +121,16 @@ def _free_beside(folder: Path, origin: Mapping[str, Any]) -> Path:
     return place
 
 
-def _read(folder: Path) -> dict[str, Any]:
-    """What a folder says of its files; nothing where it does not."""
+def _read(folder: Path) -> tuple[dict[str, Any], list[str]]:
+    """Origin of what a folder holds, and its files; nothing where it does not say so."""
     try:
         found = json.loads((folder / ORIGIN).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return {}
-    return found if isinstance(found, dict) else {}
+        origin, files = found["made_by"], found["files"]
+    except (OSError, ValueError, LookupError, TypeError):
+        return {}, []
+    if not isinstance(origin, dict) or not isinstance(files, list):
+        return {}, []
+    return origin, [name for name in files if isinstance(name, str)]
 
 
 def _times(folder: Path) -> dict[str, int]:

@@ -289,6 +289,8 @@ class Result:
     def save(self, folder: str | Path) -> list[Path]:
         """Write summary, blows, events, trace and scene to a folder, in one go.
 
+        Trace, figures and report of a result that was there are removed.
+
         Returns
         -------
         list of Path

@@ -107,6 +107,17 @@ def test_what_makes_no_controller_is_refused(feed_control, controller, text):
         bench(feed_control, controller, trials=ALONE)
 
 
+def test_a_class_that_fails_is_told_with_its_place(feed_control):
+    class Broken(PI):
+        def __init__(self):
+            {}["gain"]
+
+    line = Broken.__init__.__code__.co_firstlineno + 1
+    text = rf"controller: KeyError: 'gain' \(test_fresh_controllers.py, line {line}\)"
+    with pytest.raises(CouplingError, match=text):
+        bench(feed_control, Broken, trials=ALONE)
+
+
 def test_a_class_that_needs_arguments_is_refused(feed_control):
     class Tuned(PI):
         def __init__(self, gain):

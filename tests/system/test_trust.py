@@ -6,6 +6,7 @@ import shutil
 import stat
 import subprocess
 import sys
+import tempfile
 import zipfile
 from pathlib import Path
 
@@ -13,7 +14,8 @@ import pytest
 
 from percussion_model.coupling import Coupling, CouplingError
 from percussion_model.coupling import unpack as limits
-from percussion_model.interface.cli import BAD_INPUT, _guarded, app
+from percussion_model.coupling.bench import bench
+from percussion_model.interface.cli import BAD_INPUT, _guarded, app, main
 from tests.properties.hostile import campaign, pack, unpacked
 
 COUNT = 500 if "PERCUSSION_LONG" in os.environ else 40
@@ -192,6 +194,29 @@ def test_trust_allows_any_size(entries, tmp_path, monkeypatch):
     with pytest.raises(CouplingError, match="unpacks to more than 1000000 bytes"):
         Coupling(path)
     Coupling(path, trust=True).free()
+
+
+def test_the_bench_takes_trust_too(feed_control, monkeypatch):
+    monkeypatch.setattr(limits, "MOST_BYTES", 1_000_000)
+    with pytest.raises(CouplingError, match="unpacks to more than 1000000 bytes"):
+        bench(feed_control, trials=["collaring"])
+    (score,) = bench(feed_control, trials=["collaring"], trust=True)
+    assert score.run.error == ""
+
+
+def test_what_is_refused_leaves_nothing_unpacked(feed_control, tmp_path, monkeypatch):
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    monkeypatch.setattr(tempfile, "tempdir", None)
+    with pytest.raises(CouplingError, match="must be above 0 s"):
+        Coupling(feed_control).run(0.01, 0.0)
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "file").touch()
+    words = ["percussion", "couple", str(feed_control), "--out", str(tmp_path / "mine")]
+    monkeypatch.setattr("sys.argv", words)
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code == 2
+    assert [one.name for one in tmp_path.iterdir()] == ["mine"]
 
 
 @pytest.mark.parametrize("name", ["Bücher", "a#b", "a b"])

@@ -10,6 +10,7 @@ import pytest
 
 from percussion_model.coupling import Coupling
 from percussion_model.coupling.coupled_run import STRING_ENERGIES, CoupledRun
+from percussion_model.coupling.verdict import judge_run
 from percussion_model.interface.cli import main
 
 # A shoulder whose own time is a fortieth of the usual one; docs/system.md, section 4, has its
@@ -169,3 +170,12 @@ def test_the_command_ends_with_its_verdict(feed_control, tmp_path, monkeypatch, 
     else:
         assert "energies balance" in said.err
         assert verdict["word"] == "balanced"
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, 0.0, -1.0])
+def test_a_stiffness_or_a_jump_that_is_no_number_is_judged(value):
+    """FMUs of others may say anything."""
+    columns = {"time": np.arange(3.0), "string.shoulder_stiffness": np.array([1e5, value, 1e5])}
+    verdict = judge_run(columns, {}, {"a.b": value}, 1e-3, 100, "", controlled=False)
+    assert verdict.is_bad, verdict.text
+    assert ("is no number" in verdict.text) == (not math.isfinite(value))

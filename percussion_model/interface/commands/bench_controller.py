@@ -50,6 +50,7 @@ def bench_controller(
         list[str] | None,
         typer.Option("--set", metavar="VARIABLE=VALUE", help="Set a variable of the controller."),
     ] = None,
+    trust: common.Trust = False,
     out: common.Out = None,
     json_file: common.JsonFile = None,
     force: common.Force = False,
@@ -77,7 +78,7 @@ def bench_controller(
     for line in _heading():
         print(line, file=sys.stderr)
     try:
-        bench(system, _load(controller), values, trials or (), take)
+        bench(system, _load(controller), values, trials or (), take, trust)
     except KeyboardInterrupt:
         if not scores:
             raise

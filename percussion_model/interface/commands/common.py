@@ -72,6 +72,9 @@ OutOrDefault = Annotated[
 Force = Annotated[
     bool, typer.Option("--force", help="Replace what another scene or run has left there.")
 ]
+Trust = Annotated[
+    bool, typer.Option("--trust", help="Allow any size, and FMUs outside of the archive.")
+]
 Tolerance = Annotated[
     float, typer.Option("--tolerance", help="Relative change of a blow that is no change.")
 ]
@@ -196,7 +199,8 @@ def digest(path: Path | None) -> str | None:
     """What a file holds, in short; nothing where there is no file."""
     if path is None or not path.is_file():
         return None
-    return hashlib.sha256(path.read_bytes()).hexdigest()[:16]
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()[:16]
 
 
 def refuse_existing(file: Path, force: bool) -> None:
@@ -223,8 +227,10 @@ def write_json(json_file: str | None, values: dict[str, Any]) -> None:
     if json_file == "-":
         typer.echo(to_json(values))
     elif json_file is not None:
-        staged_text(Path(json_file), to_json(values) + "\n")
-        list_files([Path(json_file)])
+        file = Path(json_file)
+        word = "replaced" if file.exists() else "wrote"
+        staged_text(file, to_json(values) + "\n")
+        print(f"{word} {file}", file=sys.stderr)
 
 
 @contextmanager

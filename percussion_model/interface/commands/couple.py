@@ -55,10 +55,7 @@ def couple(
         list[str] | None,
         typer.Option("--signal", metavar="COMPONENT.VARIABLE", help="Keep this output too."),
     ] = None,
-    trust: Annotated[
-        bool,
-        typer.Option("--trust", help="Allow any size, and FMUs outside of the archive."),
-    ] = False,
+    trust: common.Trust = False,
     out: common.OutOrDefault = None,
     json_file: common.JsonFile = None,
     force: common.Force = False,
@@ -77,6 +74,11 @@ def couple(
     except ImportError as error:
         return common.print_message(common.needs_extra(error, "fmu"), common.BAD_INPUT)
     common.check_json(json_file)
+    claimed = common.claim(
+        "couple", out, Path("out") / system.stem, force, system=common.digest(system),
+        duration=duration, step=step, interval=interval, order=order, tolerance=tolerance,
+        every=common.by_name(every), set=common.by_name(settings), signals=signals,
+    )  # fmt: skip
     coupling = Coupling(
         system,
         dict(read_value(text) for text in settings or ()),
@@ -84,11 +86,6 @@ def couple(
         every=dict(_read_pace(text) for text in every or ()),
         trust=trust,
     )
-    claimed = common.claim(
-        "couple", out, Path("out") / system.stem, force, system=common.digest(system),
-        duration=duration, step=step, interval=interval, order=order, tolerance=tolerance,
-        every=common.by_name(every), set=common.by_name(settings), signals=signals,
-    )  # fmt: skip
     folder = claimed.folder
     wanted = [*known_signals(coupling.outputs), *(signals or ())]
     rows_every = max(step, duration / ROWS) if interval is None else interval
