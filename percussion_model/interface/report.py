@@ -27,6 +27,7 @@ from percussion_model.simulation.uncertain import (
     SMALLEST_UNIT,
     known_error,
     rate_text,
+    scaled,
     with_error,
 )
 
@@ -222,8 +223,8 @@ def headline_rows(summary: dict[str, Any]) -> list[tuple[str, str, str]]:
         si = f"{_digits(value, 5, error, SMALLEST_UNIT)} {unit}".removesuffix(" –")
         everyday = ""
         if other not in ("", unit):
-            scaled = _times(1.0 / factor, error)
-            everyday = f"{_digits(value / factor, 4, scaled, MOST_DIGITS)} {other}"
+            shown = _digits(value / factor, 4, scaled(1.0 / factor, error), MOST_DIGITS)
+            everyday = f"{shown} {other}"
         rows.append((name, si, everyday))
     return rows
 
@@ -231,15 +232,11 @@ def headline_rows(summary: dict[str, Any]) -> list[tuple[str, str, str]]:
 def mean_cards(summary: dict[str, Any]) -> list[tuple[str, str]]:
     """Number with its unit, and name, of the cards beside that of the rate."""
     return [
-        (f"{_digits(factor * summary[key], 4, _times(factor, error), MOST_DIGITS)} {unit}", name)
+        (f"{_digits(factor * summary[key], 4, scaled(factor, error), MOST_DIGITS)} {unit}", name)
         for key, factor, unit, name in CARDS
         if summary[key] is not None
         for error in [known_error(summary, key)]
     ]
-
-
-def _times(factor: float, value: float | None) -> float | None:
-    return None if value is None else factor * value
 
 
 def _digits(value: float, count: int, error: float | None, most_digits: int) -> str:

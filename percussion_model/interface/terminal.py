@@ -21,6 +21,7 @@ from percussion_model.simulation.uncertain import (
     in_few_characters,
     mean_text,
     rate_text,
+    scaled,
 )
 
 if TYPE_CHECKING:
@@ -275,7 +276,7 @@ def show_stability(found: Collection) -> None:
         table.add_row(
             row["case"],
             row["solver"],
-            in_few_characters(_times(1e3, row["rate"]), _times(1e3, row["rate_error"])),
+            in_few_characters(scaled(1e3, row["rate"]), scaled(1e3, row["rate_error"])),
             *(_number(row[key], 1.0, 2) for key in ("residual", "momentum", "events_per_second")),
             str(row["guards"] or ""),
             f"{row['wall_time']:.2g}",
@@ -289,11 +290,6 @@ def show_stability(found: Collection) -> None:
         f"{cases} cases, {len(found.rows)} runs, {failed} failures, "
         f"{len(found.disagreements())} rates more than 2 % off the first solver's"
     )
-
-
-def _times(factor: float, value: float | None) -> float | None:
-    """A number in another unit, None where there is none."""
-    return None if value is None else factor * value
 
 
 def show_statements(statements: list[Statement]) -> None:

@@ -24,6 +24,11 @@ def is_undecided(value: float, error: float) -> bool:
     return bool(error > 0.0 and error >= abs(value))
 
 
+def scaled(factor: float, value: float | None) -> float | None:
+    """A number in another unit, None where there is none."""
+    return None if value is None else factor * value
+
+
 def with_error(value: float, error: float, most_digits: int = MOST_DIGITS) -> str:
     """Return a number and its error, both to the second digit of the error."""
     hidden = is_undecided(value, error)
