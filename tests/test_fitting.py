@@ -20,8 +20,8 @@ from percussion_model.analysis.fitting import (
     fit_rock,
 )
 from percussion_model.analysis.fitting.curve import best_datum_and_peak
-from percussion_model.analysis.fitting.fit import DAMPING, ENERGY, RATIO, STIFFNESS
-from percussion_model.analysis.fitting.likelihood import Likelihood, Series
+from percussion_model.analysis.fitting.found import DAMPING, ENERGY
+from percussion_model.analysis.fitting.likelihood import RATIO, STIFFNESS, Likelihood, Series
 from percussion_model.analysis.fitting.predictions import predicted_reading
 from percussion_model.analysis.fitting.search import descend, roughness
 

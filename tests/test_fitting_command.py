@@ -13,7 +13,8 @@ from typer.testing import CliRunner
 
 from percussion_model import Scene
 from percussion_model.analysis.fitting import FitError
-from percussion_model.analysis.fitting.fit import DAMPING, NAMES, RATIO, STIFFNESS
+from percussion_model.analysis.fitting.found import DAMPING, NAMES
+from percussion_model.analysis.fitting.likelihood import RATIO, STIFFNESS
 from percussion_model.interface.cli import app
 from percussion_model.interface.measured_files import read_curve, read_drop, read_reading
 
