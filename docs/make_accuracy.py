@@ -39,7 +39,7 @@ def measure(name: str) -> None:
 
     folder = SCENARIOS / "drawn" if name.startswith("drawn") else SCENARIOS
     scene = Scene.from_toml(folder / f"{name}.toml")
-    found = study(scene, False, METHODS[name], lambda share, text: say(f"{name}: {text}"))
+    found = study(scene, False, METHODS[name], lambda text, share: say(f"{name}: {text}"))
     keep(name, found.to_dict())
 
 

@@ -103,7 +103,9 @@ def test_every_command_says_on_a_pipe_that_it_runs(arguments, heard, tmp_path, m
 
 def test_a_calibration_says_on_a_pipe_that_it_runs(heard, tmp_path, monkeypatch):
     """Its work is held up where it reads the curve."""
-    np.savetxt(tmp_path / "slow.csv", np.column_stack(noisy_curve(1)), delimiter=",",
+    curve = noisy_curve(1)
+    columns = np.column_stack([curve.penetration, curve.force])
+    np.savetxt(tmp_path / "slow.csv", columns, delimiter=",",
                header="penetration,force", comments="")  # fmt: skip
     read = Path.open
 

@@ -58,13 +58,14 @@ def found():
         return [rung for rung in rungs if rung.label in chosen.get(rung.ladder, ())]
 
     patch.setattr(study_module, "ladders", few)
-    said: list[tuple[float, str]] = []
+    said: list[tuple[str, float]] = []
     result = study(
         Scene.from_toml(SCENARIOS / "reference.toml"),
-        progress=lambda share, text: said.append((share, text)),
+        progress=lambda text, share: said.append((text, share)),
     )
     patch.undo()
-    assert [share for share, _ in said[:3]] == sorted(share for share, _ in said[:3])
+    shares = [share for _, share in said[:3]]
+    assert shares == sorted(shares)
     return result
 
 

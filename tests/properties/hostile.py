@@ -285,6 +285,16 @@ def warm_up(system: Path) -> None:
         simulation.observe()
 
 
+def peak_memory() -> int:
+    """Greatest resident size of this process [B]; `ru_maxrss` may be that of its parent."""
+    status = Path("/proc/self/status")
+    if status.exists():
+        for line in status.read_text(encoding="ascii").splitlines():
+            if line.startswith("VmHWM:"):
+                return int(line.split()[1]) * 1024
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+
+
 def work(seed: int, first: int, last: int, system: Path, watched: Path) -> None:
     """Run the cases one after the other, with a line of JSON for each."""
     base = unpacked(system.read_bytes())
@@ -293,8 +303,7 @@ def work(seed: int, first: int, last: int, system: Path, watched: Path) -> None:
     for index in range(first, last):
         used = time.process_time()
         told = run_case(index, seed, base, watched)
-        peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
-        numbers = {"index": index, "time": time.process_time() - used, "memory": peak}
+        numbers = {"index": index, "time": time.process_time() - used, "memory": peak_memory()}
         print(json.dumps(told | numbers), flush=True)
 
 
