@@ -44,6 +44,7 @@ from percussion_model.analysis.fitting.measurements import (
 )
 from percussion_model.analysis.fitting.notes import (
     COARSE,
+    DAMPING_MISSED,
     UNSETTLED,
     correlation_note,
     grid_notes,
@@ -420,6 +421,7 @@ def _result(
     ]
     warnings = [
         *interval_notes(estimates, like),
+        *([DAMPING_MISSED] if _claims_damping(estimates) else []),
         *([] if settled else [UNSETTLED]),
         *([COARSE] if runs > MOST_COMPUTED else []),
         *rough_notes((threshold - _quantile(confidence, len(like.names))) / ROUGH_FACTOR),
@@ -428,6 +430,10 @@ def _result(
         *grid_notes(like, best, spread, profiles),
     ]
     return Fit(estimates, confidence, threshold, explained, rivals, curves, runs, warnings)
+
+
+def _claims_damping(estimates: Mapping[str, Estimate]) -> bool:
+    return DAMPING in estimates and estimates[DAMPING].determined
 
 
 def _estimate(at: float, found: Profile, low: float, high: float) -> Estimate:

@@ -27,6 +27,10 @@ UNSETTLED = (
     "the search met ever better places and no end of it: the best may not be among them, "
     "and intervals may be too narrow"
 )
+DAMPING_MISSED = (
+    "C_R: in trials with known rocks such intervals missed it in a quarter of the cases; another "
+    "drop at another speed is a check (docs/gallery.md)"
+)
 COARSE = (
     "the likelihood has too many dips to follow all of them in the computations allowed: ends of "
     "intervals are coarse"

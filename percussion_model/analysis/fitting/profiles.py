@@ -38,7 +38,7 @@ NEIGHBOURS, FOLLOWED, APART = 2, 2, 0.1
 # So near to the edge of the range, in the logarithm, is at it.
 AT_EDGE = 1e-3
 # A place better than the best by this share of the threshold starts all over.
-BETTER = 0.25
+BETTER = 0.1
 
 
 class BetterPlaceError(Exception):
