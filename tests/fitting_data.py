@@ -6,7 +6,8 @@ import numpy as np
 
 from percussion_model import Scene
 from percussion_model.analysis.fitting import Curve, DropTest, bilinear_force, drop_test_signal
-from percussion_model.analysis.fitting.fit import DAMPING, ENERGY, RATIO, STIFFNESS
+from percussion_model.analysis.fitting.found import DAMPING, ENERGY
+from percussion_model.analysis.fitting.likelihood import RATIO, STIFFNESS
 
 KEYS = (STIFFNESS, RATIO, DAMPING, ENERGY)
 TRUTH = dict(zip(KEYS, (6e8, 6.0, 1.5e4, 0.1), strict=True))

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from percussion_model.analysis.fitting.curve import bilinear_force
-from percussion_model.analysis.fitting.fit import RANGES, Estimate, Explained, Fit, Rival, fit_rock
+from percussion_model.analysis.fitting.fit import RANGES, fit_rock
+from percussion_model.analysis.fitting.found import Estimate, Explained, Fit, Rival
 from percussion_model.analysis.fitting.measurements import (
     QUANTITIES,
     SIGNALS,

@@ -4,12 +4,25 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from percussion_model.analysis.fitting.curve import first_sight
+from percussion_model.analysis.fitting.found import (
+    DAMPING,
+    DETERMINED,
+    ENERGY,
+    OPEN,
+    OPEN_ABOVE,
+    OPEN_BELOW,
+    RIVALLED,
+    Estimate,
+    Explained,
+    Fit,
+    Rival,
+    Source,
+)
 from percussion_model.analysis.fitting.likelihood import (
     RATIO,
     STIFFNESS,
@@ -21,8 +34,6 @@ from percussion_model.analysis.fitting.likelihood import (
     reading_series,
 )
 from percussion_model.analysis.fitting.measurements import (
-    QUANTITIES,
-    SIGNALS,
     Curve,
     DropTest,
     FitError,
@@ -31,6 +42,16 @@ from percussion_model.analysis.fitting.measurements import (
     checked_curve,
     checked_drop,
 )
+from percussion_model.analysis.fitting.notes import (
+    COARSE,
+    DAMPING_MISSED,
+    UNSETTLED,
+    correlation_note,
+    grid_notes,
+    interval_notes,
+    rival_notes,
+    rough_notes,
+)
 from percussion_model.analysis.fitting.profiles import (
     BETTER,
     BetterPlaceError,
@@ -38,9 +59,6 @@ from percussion_model.analysis.fitting.profiles import (
     Profile,
 )
 from percussion_model.analysis.fitting.search import (
-    LEAST_STEP,
-    MOST_STEP,
-    STEP_SHARE,
     descend,
     design,
     distinct,
@@ -49,9 +67,7 @@ from percussion_model.analysis.fitting.search import (
     roughness,
 )
 from percussion_model.scene.scene import Scene
-from percussion_model.solvers.base import make_solver
 
-DAMPING, ENERGY = "rock.barrier_damping", "rock.barrier_energy"
 # What can be fitted, and where it is searched; SI units.
 RANGES = {
     STIFFNESS: (1e6, 1e11),
@@ -59,7 +75,6 @@ RANGES = {
     DAMPING: (1e2, 1e7),
     ENERGY: (1e-4, 10.0),
 }
-NAMES = {STIFFNESS: "K_R", RATIO: "gamma", DAMPING: "C_R", ENERGY: "W_R"}
 # With a curve, a grid of C_R and W_R is computed for its K_R and gamma and for those this share
 # of their standard errors beside, and so many of the best places with K_R and gamma moved.
 CURVE_ERRORS, RELAXED = 0.3, 48
@@ -81,138 +96,12 @@ ZOOM = {STIFFNESS: 0.5, RATIO: 0.3, DAMPING: 1.0, ENERGY: 0.6}
 LAST_ZOOM, LAST_STEP = 0.12, 2e-4
 # Minima are told up to this deviance above the best: less likely by exp(-10).
 TOLD = 20.0
-# So often profiles start again from a better place that they met.
-MOST_STARTS = 10
+# So often profiles start again from a better place that they met. After so many computations
+# they do not, and their ends are taken as they come: a curve and two drops take a minute.
+MOST_STARTS, MOST_COMPUTED = 10, 2600
 # The deviance may be off by the roughness at the best place and at the other: the threshold is
-# higher by so many of it. It is told from this size on.
-ROUGH_FACTOR, ROUGH = 2.0, 1.0
-UNSETTLED = (
-    "the search met ever better places and no end of it: the best may not be among them, "
-    "and intervals may be too narrow"
-)
-# An interval whose ends differ by this factor is said to be wide.
-WIDE = 4.0
-# Residuals that follow from each other by so many standard errors are no independent noise.
-MOST_CORRELATION = 4.0
-# With twice the cells the best values may move by this share of their intervals' halves.
-GRID_SHARE = 0.5
-
-Source = Curve | DropTest | Reading
-DETERMINED, RIVALLED = "determined", "rival"
-OPEN_ABOVE, OPEN_BELOW, OPEN = "open above", "open below", "open"
-
-
-class Estimate(NamedTuple):
-    """A fitted parameter, SI units.
-
-    `low` and `high` are the ends of the interval; where it is open, those of what was searched.
-    """
-
-    value: float
-    low: float
-    high: float
-    verdict: str
-
-    @property
-    def determined(self) -> bool:
-        """Whether the interval is closed."""
-        return self.verdict in (DETERMINED, RIVALLED)
-
-
-@dataclass(frozen=True)
-class Explained:
-    """One series of measurements and what the best fit says of it, SI units."""
-
-    name: str
-    data: np.ndarray = field(repr=False)
-    fitted: np.ndarray = field(repr=False)
-    noise: float
-    source: Source = field(repr=False)
-
-    @property
-    def unit(self) -> str:
-        """SI unit of the data."""
-        if isinstance(self.source, Curve):
-            return "N"
-        if isinstance(self.source, DropTest):
-            return SIGNALS[self.source.signal][0]
-        return QUANTITIES[self.source.quantity][0]
-
-    @property
-    def residuals(self) -> np.ndarray:
-        """Data less fit."""
-        return self.data - self.fitted
-
-
-@dataclass(frozen=True)
-class Rival:
-    """Another minimum, and how much less likely it is than the best."""
-
-    values: dict[str, float]
-    deviance: float
-
-    @property
-    def odds(self) -> float:
-        """Its likelihood by that of the best."""
-        return math.exp(-0.5 * self.deviance)
-
-
-@dataclass(frozen=True)
-class Fit:
-    """What a fit found, SI units.
-
-    Attributes
-    ----------
-    estimates : dict of Estimate
-        By the dotted key of the parameter.
-    confidence : float
-        Of the intervals, each for itself.
-    threshold : float
-        Deviance above the best at their ends.
-    explained : list of Explained
-        Each series of measurements.
-    rivals : list of Rival
-        Other minima, the likeliest first.
-    profiles : dict of (ndarray, ndarray)
-        Values of a parameter, and the deviance above the best with the others at their best.
-    runs : int
-        How many places were computed.
-    warnings : list of str
-        What one should know before using the numbers.
-    """
-
-    estimates: dict[str, Estimate]
-    confidence: float
-    threshold: float
-    explained: list[Explained]
-    rivals: list[Rival]
-    profiles: dict[str, tuple[np.ndarray, np.ndarray]] = field(repr=False)
-    runs: int
-    warnings: list[str]
-
-    def changes(self, undetermined: bool = False) -> dict[str, float]:
-        """Fitted parameters for `Scene.replace`; without those whose interval is open."""
-        return {
-            key: found.value
-            for key, found in self.estimates.items()
-            if found.determined or undetermined
-        }
-
-    def summary(self) -> dict[str, Any]:
-        """Return the numbers as plain values for JSON."""
-        return {
-            "estimates": {key: found._asdict() for key, found in self.estimates.items()},
-            "confidence": self.confidence,
-            "measurements": {
-                one.name: {"data": len(one.data), "noise": one.noise} for one in self.explained
-            },
-            "rivals": [
-                {"values": one.values, "deviance": one.deviance, "odds": one.odds}
-                for one in self.rivals
-            ],
-            "runs": self.runs,
-            "warnings": self.warnings,
-        }
+# higher by so many of it.
+ROUGH_FACTOR = 2.0
 
 
 def fit_rock(
@@ -246,7 +135,7 @@ def fit_rock(
     ranges : mapping, optional
         Where a parameter is searched, in place of `RANGES`: what is known beforehand.
     confidence : float
-        Of the intervals.
+        Of the intervals together: they span the region of that confidence of all parameters.
     progress : callable, optional
         Called with the number of computations done, and with an estimate of all.
 
@@ -259,8 +148,6 @@ def fit_rock(
     FitError
         If data or arguments make no sense.
     """
-    from scipy.stats import chi2
-
     if not 0 < confidence < 1:
         raise FitError(f"confidence = {confidence!r}: must be a number above 0 and below 1")
     curve = None if curve is None else checked_curve(curve)
@@ -278,9 +165,20 @@ def fit_rock(
     counter = _Counter(progress, _expected(names, curve is not None, len(sources)))
     whole = Likelihood(scene, [_series(one) for one in sources], names, box, counter.tick)
     minima, pool = _minima(whole, sources, counter)
-    quantile = float(chi2.ppf(confidence, 1))
+    quantile = _quantile(confidence, len(names))
     found = _profiles(whole, minima, pool, quantile, counter)
     return _result(whole, sources, found, confidence, counter.done)
+
+
+def _quantile(confidence: float, free: int) -> float:
+    """Deviance above the best to which the region of all free parameters together reaches.
+
+    The best is the deepest of many dips, and so likelier by luck than the truth: by more than
+    a single parameter's interval allows for.
+    """
+    from scipy.stats import chi2
+
+    return float(chi2.ppf(confidence, free))
 
 
 class _Counter:
@@ -454,15 +352,20 @@ def _profiles(
     pool = [*pool, *(one.at for one in minima)]
     rough = {k for k in every if like.names[k] in ZOOM_VALUES}
     found: dict[int, Profile] = {}
+
+    def hurry() -> bool:
+        return counter.done > MOST_COMPUTED
+
     for left in reversed(range(MOST_STARTS)):
         best, spread = descend(like, minima[0].at, sorted(every))
         best = polish(like, best, spread)
         tiny, dips = roughness(like, best, spread)
         threshold = quantile + ROUGH_FACTOR * max(tiny, dips)
-        follower = Follower(like, best.deviance, threshold, pool, rough, restarts=left > 0)
+        restarts = left > 0 and not hurry()
+        follower = Follower(like, best.deviance, threshold, pool, rough, restarts, hurry)
         try:
             found = {k: follower.profile(best, spread, k) for k in every}
-            for other in minima[1:]:
+            for other in () if hurry() else minima[1:]:
                 if other.deviance - best.deviance < threshold and _outside(other, found.items()):
                     place, wide = descend(like, other.at, sorted(every))
                     for k in every:
@@ -472,7 +375,7 @@ def _profiles(
             counter.expected += counter.expected // 8
             minima = [better.place, *minima]
     settled = follower.base >= best.deviance - BETTER * threshold
-    met = [one for each in found.values() for one in each.places]
+    met = [*minima, *(one for each in found.values() for one in each.places)]
     best = min(met, key=lambda one: one.deviance)
     # whatever is as likely belongs to the interval, on whichever profile it was met
     for one in met:
@@ -517,14 +420,20 @@ def _result(
         )
     ]
     warnings = [
-        *_interval_notes(estimates, like),
+        *interval_notes(estimates, like),
+        *([DAMPING_MISSED] if _claims_damping(estimates) else []),
         *([] if settled else [UNSETTLED]),
-        *_rough_notes(confidence, threshold),
-        *_rival_notes(rivals),
-        *(note for one in explained for note in _correlation_note(one)),
-        *_grid_notes(like, best, spread, profiles),
+        *([COARSE] if runs > MOST_COMPUTED else []),
+        *rough_notes((threshold - _quantile(confidence, len(like.names))) / ROUGH_FACTOR),
+        *rival_notes(rivals),
+        *(note for one in explained for note in correlation_note(one)),
+        *grid_notes(like, best, spread, profiles),
     ]
     return Fit(estimates, confidence, threshold, explained, rivals, curves, runs, warnings)
+
+
+def _claims_damping(estimates: Mapping[str, Estimate]) -> bool:
+    return DAMPING in estimates and estimates[DAMPING].determined
 
 
 def _estimate(at: float, found: Profile, low: float, high: float) -> Estimate:
@@ -537,103 +446,3 @@ def _estimate(at: float, found: Profile, low: float, high: float) -> Estimate:
     }[open_below, open_above]
     ends = (math.exp(max(found.low, low)), math.exp(min(found.high, high)))
     return Estimate(math.exp(at), *ends, verdict)
-
-
-def _interval_notes(estimates: Mapping[str, Estimate], like: Likelihood) -> list[str]:
-    """Say which parameters the data do not tell, or only roughly."""
-    notes = []
-    for name, one in estimates.items():
-        unit = like.scene.row_of(name).unit.replace("-", "")
-        low, high = (f"{end:.3g} {unit}".rstrip() for end in (one.low, one.high))
-        told = {
-            OPEN_ABOVE: f"is not determined: the data tell only that it is above {low}",
-            OPEN_BELOW: f"is not determined: the data tell only that it is below {high}",
-            OPEN: f"is not determined: the data tell nothing of it between {low} and {high}",
-        }.get(one.verdict)
-        if told is None and one.high > WIDE * one.low:
-            told = f"is known only to a factor of {one.high / one.low:.2g}: {low} to {high}"
-        if told is not None:
-            notes.append(f"{NAMES[name]} ({name}) {told}")
-    return notes
-
-
-def _rough_notes(confidence: float, threshold: float) -> list[str]:
-    """Say that the motion amplifies changes so much that intervals were widened for it."""
-    from scipy.stats import chi2
-
-    rough = (threshold - float(chi2.ppf(confidence, 1))) / ROUGH_FACTOR
-    if rough < ROUGH:
-        return []
-    return [
-        f"the likelihood is rough: many small dips, of about {rough:.2g} in twice its logarithm; "
-        "intervals are widened for that"
-    ]
-
-
-def _rival_notes(rivals: Sequence[Rival]) -> list[str]:
-    """Say which other rocks explain the data nearly as well."""
-    notes = []
-    for one in rivals:
-        values = ", ".join(f"{NAMES[key]} = {value:.4g}" for key, value in one.values.items())
-        notes.append(f"another minimum, {_odds(one)}: {values}")
-    return notes
-
-
-def _odds(rival: Rival) -> str:
-    less = 1.0 / rival.odds
-    return "as likely" if less < 1.5 else f"{less:.2g} times less likely"
-
-
-def _correlation_note(one: Explained) -> list[str]:
-    """Say that neighbouring residuals are alike, where they are."""
-    residuals = one.residuals
-    total = float(residuals @ residuals)
-    if len(residuals) < 2 or not total > (len(residuals) * one.noise * 1e-6) ** 2:
-        return []
-    correlation = float(residuals[1:] @ residuals[:-1]) / total
-    if correlation * math.sqrt(len(residuals)) <= MOST_CORRELATION:
-        return []
-    return [
-        f"{one.name}: neighbouring residuals are alike (correlation {correlation:.2f}): the model "
-        "misses something, or the noise is no white noise; the intervals are too narrow"
-    ]
-
-
-def _grid_notes(
-    like: Likelihood, best: Place, spread: np.ndarray, profiles: Sequence[Profile]
-) -> list[str]:
-    """Say which best values would move with twice the cells by a good part of their intervals."""
-    scene = like.scene
-    simulated = [one for one in like.series if one.simulated]
-    cells = list(make_solver(scene).cells.values()) if simulated else []
-    if not cells:
-        return []
-    key = "fem.elements" if scene.solver_name == "fem" else "solver.cells"
-    finer = Likelihood(
-        scene.replace(**{key: 2 * cells[0], "solver.accuracy": None}),
-        like.series,
-        like.names,
-        np.stack([like.low, like.high], axis=1),
-        lambda: None,
-    )
-    weights = np.repeat(1.0 / np.array(best.noise), [len(one) for one in best.residuals])
-    off = np.concatenate(best.residuals)
-    change = (np.concatenate(finer.at(best.at).residuals) - off) * weights
-    steps = np.clip(STEP_SHARE * np.sqrt(np.diag(spread)), LEAST_STEP, MOST_STEP)
-    columns = [
-        (np.concatenate(like.at(best.at + row).residuals) - off) * weights / step
-        for row, step in zip(np.diag(steps), steps, strict=True)
-    ]
-    moves = np.abs(spread @ np.stack(columns) @ change)
-    halves = np.array([0.5 * (one.high - one.low) for one in profiles])
-    moved = [
-        f"{NAMES[name]} by {move / half:.1g}"
-        for name, move, half in zip(like.names, moves, halves, strict=True)
-        if move > GRID_SHARE * half
-    ]
-    if not moved:
-        return []
-    return [
-        f"twice the cells would move {', '.join(moved)} of half its interval: calibrate with "
-        f"--cells {2 * cells[0]} and use the rock with as many"
-    ]

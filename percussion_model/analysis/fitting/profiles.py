@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -37,7 +38,7 @@ NEIGHBOURS, FOLLOWED, APART = 2, 2, 0.1
 # So near to the edge of the range, in the logarithm, is at it.
 AT_EDGE = 1e-3
 # A place better than the best by this share of the threshold starts all over.
-BETTER = 0.25
+BETTER = 0.1
 
 
 class BetterPlaceError(Exception):
@@ -99,6 +100,9 @@ class Follower:
         Parameters in which the deviance jumps.
     restarts : bool
         Whether a much better place raises an error.
+    hurry : callable
+        Whether so much was computed that ends are not narrowed down any more: the first
+        place beyond one is it, and one descent leads to it.
     """
 
     like: Likelihood
@@ -107,6 +111,7 @@ class Follower:
     pool: list[np.ndarray]
     rough: set[int]
     restarts: bool
+    hurry: Callable[[], bool] = lambda: False
 
     def profile(self, start: Place, spread: np.ndarray, which: int) -> Profile:
         """Follow the profile of one parameter to both sides of a minimum.
@@ -154,6 +159,8 @@ class Follower:
             else:
                 outer, outer_root = way, height
             end = outer
+            if self.hurry() and math.isfinite(outer):
+                break
             if abs(height - root) < NEAR_ENOUGH * root:
                 end = min(way * root / max(height, 1e-3), room)
                 break
@@ -170,7 +177,7 @@ class Follower:
                 way = inner + min(max(share, 0.15), 0.85) * (outer - inner)
         if math.isinf(end):
             return math.copysign(math.inf, sign)
-        for factor in BEYOND if odd else ():
+        for factor in BEYOND if odd and not self.hurry() else ():
             if factor * end < room:
                 there = start.at[which] + sign * factor * end
                 place = self._best_at(which, there, near.at, spread)
@@ -182,17 +189,19 @@ class Follower:
     def _best_at(self, which: int, value: float, guess: np.ndarray, spread: np.ndarray) -> Place:
         """Best place with one parameter at a value, from a guess and from the nearest known."""
         others = [k for k in range(len(guess)) if k != which]
+        hurry = self.hurry()
         by_distance = sorted(self.pool, key=lambda at: abs(float(at[which]) - value))
         starts = []
-        for at in [guess, *by_distance[: NEIGHBOURS if which in self.rough else 0]]:
+        for at in [guess, *by_distance[: NEIGHBOURS if which in self.rough and not hurry else 0]]:
             moved = np.clip(at, self.like.low, self.like.high)
             moved[which] = value
             starts.append(self.like.at(moved))
         steps = np.clip(STEP_SHARE * np.sqrt(np.diag(spread)), LEAST_STEP, MOST_STEP)
         best = min(starts, key=lambda one: one.deviance)
         if others:
-            firsts = distinct(starts, np.full(len(guess), APART), FOLLOWED)
-            lower = [descend(self.like, one.at, others, steps, rounds=2)[0] for one in firsts]
+            firsts = distinct(starts, np.full(len(guess), APART), 1 if hurry else FOLLOWED)
+            rounds = 1 if hurry else 2
+            lower = [descend(self.like, one.at, others, steps, rounds)[0] for one in firsts]
             best = min(lower, key=lambda one: one.deviance)
         if best.deviance < self.base - BETTER * self.threshold and self.restarts:
             raise BetterPlaceError(best)

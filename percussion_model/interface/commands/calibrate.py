@@ -140,7 +140,7 @@ def _show(found: Fit) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from percussion_model.analysis.fitting.fit import NAMES
+    from percussion_model.analysis.fitting.found import NAMES
     from percussion_model.interface.tables import print_table
     from percussion_model.interface.terminal import show_warnings
     from percussion_model.scene.scene import Scene

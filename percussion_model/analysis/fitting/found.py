@@ -1,0 +1,138 @@
+"""What a fit of the rock found: estimates, intervals, rivals, and what they explain."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from percussion_model.analysis.fitting.likelihood import RATIO, STIFFNESS
+from percussion_model.analysis.fitting.measurements import (
+    QUANTITIES,
+    SIGNALS,
+    Curve,
+    DropTest,
+    Reading,
+)
+
+DAMPING, ENERGY = "rock.barrier_damping", "rock.barrier_energy"
+NAMES = {STIFFNESS: "K_R", RATIO: "gamma", DAMPING: "C_R", ENERGY: "W_R"}
+
+Source = Curve | DropTest | Reading
+DETERMINED, RIVALLED = "determined", "rival"
+OPEN_ABOVE, OPEN_BELOW, OPEN = "open above", "open below", "open"
+
+
+class Estimate(NamedTuple):
+    """A fitted parameter, SI units.
+
+    `low` and `high` are the ends of the interval; where it is open, those of what was searched.
+    """
+
+    value: float
+    low: float
+    high: float
+    verdict: str
+
+    @property
+    def determined(self) -> bool:
+        """Whether the interval is closed."""
+        return self.verdict in (DETERMINED, RIVALLED)
+
+
+@dataclass(frozen=True)
+class Explained:
+    """One series of measurements and what the best fit says of it, SI units."""
+
+    name: str
+    data: np.ndarray = field(repr=False)
+    fitted: np.ndarray = field(repr=False)
+    noise: float
+    source: Source = field(repr=False)
+
+    @property
+    def unit(self) -> str:
+        """SI unit of the data."""
+        if isinstance(self.source, Curve):
+            return "N"
+        if isinstance(self.source, DropTest):
+            return SIGNALS[self.source.signal][0]
+        return QUANTITIES[self.source.quantity][0]
+
+    @property
+    def residuals(self) -> np.ndarray:
+        """Data less fit."""
+        return self.data - self.fitted
+
+
+@dataclass(frozen=True)
+class Rival:
+    """Another minimum, and how much less likely it is than the best."""
+
+    values: dict[str, float]
+    deviance: float
+
+    @property
+    def odds(self) -> float:
+        """Its likelihood by that of the best."""
+        return math.exp(-0.5 * self.deviance)
+
+
+@dataclass(frozen=True)
+class Fit:
+    """What a fit found, SI units.
+
+    Attributes
+    ----------
+    estimates : dict of Estimate
+        By the dotted key of the parameter.
+    confidence : float
+        Of the intervals, all of them together.
+    threshold : float
+        Deviance above the best at their ends.
+    explained : list of Explained
+        Each series of measurements.
+    rivals : list of Rival
+        Other minima, the likeliest first.
+    profiles : dict of (ndarray, ndarray)
+        Values of a parameter, and the deviance above the best with the others at their best.
+    runs : int
+        How many places were computed.
+    warnings : list of str
+        What one should know before using the numbers.
+    """
+
+    estimates: dict[str, Estimate]
+    confidence: float
+    threshold: float
+    explained: list[Explained]
+    rivals: list[Rival]
+    profiles: dict[str, tuple[np.ndarray, np.ndarray]] = field(repr=False)
+    runs: int
+    warnings: list[str]
+
+    def changes(self, undetermined: bool = False) -> dict[str, float]:
+        """Fitted parameters for `Scene.replace`; without those whose interval is open."""
+        return {
+            key: found.value
+            for key, found in self.estimates.items()
+            if found.determined or undetermined
+        }
+
+    def summary(self) -> dict[str, Any]:
+        """Return the numbers as plain values for JSON."""
+        return {
+            "estimates": {key: found._asdict() for key, found in self.estimates.items()},
+            "confidence": self.confidence,
+            "measurements": {
+                one.name: {"data": len(one.data), "noise": one.noise} for one in self.explained
+            },
+            "rivals": [
+                {"values": one.values, "deviance": one.deviance, "odds": one.odds}
+                for one in self.rivals
+            ],
+            "runs": self.runs,
+            "warnings": self.warnings,
+        }

@@ -1,0 +1,140 @@
+"""What one should know before using the numbers of a fit."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from percussion_model.analysis.fitting.found import (
+    NAMES,
+    OPEN,
+    OPEN_ABOVE,
+    OPEN_BELOW,
+    Estimate,
+    Explained,
+    Rival,
+)
+from percussion_model.analysis.fitting.likelihood import Likelihood, Place
+from percussion_model.analysis.fitting.profiles import Profile
+from percussion_model.analysis.fitting.search import LEAST_STEP, MOST_STEP, STEP_SHARE
+from percussion_model.solvers.base import make_solver
+
+# A rough likelihood is told from dips of this size on, in twice its logarithm.
+ROUGH = 1.0
+UNSETTLED = (
+    "the search met ever better places and no end of it: the best may not be among them, "
+    "and intervals may be too narrow"
+)
+DAMPING_MISSED = (
+    "C_R: in trials with known rocks such intervals missed it in a quarter of the cases; another "
+    "drop at another speed is a check (docs/gallery.md)"
+)
+COARSE = (
+    "the likelihood has too many dips to follow all of them in the computations allowed: ends of "
+    "intervals are coarse"
+)
+# An interval whose ends differ by this factor is said to be wide.
+WIDE = 4.0
+# Residuals that follow from each other by so many standard errors are no independent noise.
+MOST_CORRELATION = 4.0
+# With twice the cells the best values may move by this share of their intervals' halves.
+GRID_SHARE = 0.5
+
+
+def interval_notes(estimates: Mapping[str, Estimate], like: Likelihood) -> list[str]:
+    """Say which parameters the data do not tell, or only roughly."""
+    notes = []
+    for name, one in estimates.items():
+        unit = like.scene.row_of(name).unit.replace("-", "")
+        low, high = (f"{end:.3g} {unit}".rstrip() for end in (one.low, one.high))
+        told = {
+            OPEN_ABOVE: f"is not determined: the data tell only that it is above {low}",
+            OPEN_BELOW: f"is not determined: the data tell only that it is below {high}",
+            OPEN: f"is not determined: the data tell nothing of it between {low} and {high}",
+        }.get(one.verdict)
+        if told is None and one.high > WIDE * one.low:
+            told = f"is known only to a factor of {one.high / one.low:.2g}: {low} to {high}"
+        if told is not None:
+            notes.append(f"{NAMES[name]} ({name}) {told}")
+    return notes
+
+
+def rough_notes(rough: float) -> list[str]:
+    """Say that the motion amplifies changes so much that intervals were widened for it."""
+    if rough < ROUGH:
+        return []
+    return [
+        f"the likelihood is rough: many small dips, of about {rough:.2g} in twice its logarithm; "
+        "intervals are widened for that"
+    ]
+
+
+def rival_notes(rivals: Sequence[Rival]) -> list[str]:
+    """Say which other rocks explain the data nearly as well."""
+    notes = []
+    for one in rivals:
+        values = ", ".join(f"{NAMES[key]} = {value:.4g}" for key, value in one.values.items())
+        notes.append(f"another minimum, {_odds(one)}: {values}")
+    return notes
+
+
+def _odds(rival: Rival) -> str:
+    less = 1.0 / rival.odds
+    return "as likely" if less < 1.5 else f"{less:.2g} times less likely"
+
+
+def correlation_note(one: Explained) -> list[str]:
+    """Say that neighbouring residuals are alike, where they are."""
+    residuals = one.residuals
+    total = float(residuals @ residuals)
+    if len(residuals) < 2 or not total > (len(residuals) * one.noise * 1e-6) ** 2:
+        return []
+    correlation = float(residuals[1:] @ residuals[:-1]) / total
+    if correlation * math.sqrt(len(residuals)) <= MOST_CORRELATION:
+        return []
+    return [
+        f"{one.name}: neighbouring residuals are alike (correlation {correlation:.2f}): the model "
+        "misses something, or the noise is no white noise; the intervals are too narrow"
+    ]
+
+
+def grid_notes(
+    like: Likelihood, best: Place, spread: np.ndarray, profiles: Sequence[Profile]
+) -> list[str]:
+    """Say which best values would move with twice the cells by a good part of their intervals."""
+    scene = like.scene
+    simulated = [one for one in like.series if one.simulated]
+    cells = list(make_solver(scene).cells.values()) if simulated else []
+    if not cells:
+        return []
+    key = "fem.elements" if scene.solver_name == "fem" else "solver.cells"
+    finer = Likelihood(
+        scene.replace(**{key: 2 * cells[0], "solver.accuracy": None}),
+        like.series,
+        like.names,
+        np.stack([like.low, like.high], axis=1),
+        lambda: None,
+    )
+    weights = np.repeat(1.0 / np.array(best.noise), [len(one) for one in best.residuals])
+    off = np.concatenate(best.residuals)
+    change = (np.concatenate(finer.at(best.at).residuals) - off) * weights
+    steps = np.clip(STEP_SHARE * np.sqrt(np.diag(spread)), LEAST_STEP, MOST_STEP)
+    columns = [
+        (np.concatenate(like.at(best.at + row).residuals) - off) * weights / step
+        for row, step in zip(np.diag(steps), steps, strict=True)
+    ]
+    moves = np.abs(spread @ np.stack(columns) @ change)
+    halves = np.array([0.5 * (one.high - one.low) for one in profiles])
+    moved = [
+        f"{NAMES[name]} by {move / half:.1g}"
+        for name, move, half in zip(like.names, moves, halves, strict=True)
+        if move > GRID_SHARE * half
+    ]
+    if not moved:
+        return []
+    return [
+        f"twice the cells would move {', '.join(moved)} of half its interval: calibrate with "
+        f"--cells {2 * cells[0]} and use the rock with as many"
+    ]
