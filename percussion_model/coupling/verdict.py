@@ -17,8 +17,9 @@ LARGEST_JUMP = 0.05
 # Greatest residual of the string by the energy put in: up to 0.9 % in the shipped systems at any
 # step that is short enough, for the cells of the string.
 LARGEST_STRING_RESIDUAL = 0.02
-# Of a hammer's own ledger, which closes to rounding.
-LARGEST_HAMMER_RESIDUAL = 1e-9
+# Of a hammer's own ledger: solvers close it to rounding, the blow map to 0.03 %, since energies
+# between the blows of its table are interpolated.
+LARGEST_HAMMER_RESIDUAL = 5e-3
 # Energy that the shoulder may make, and take, by that of the blows: right is 1 %, and the
 # sampled one has -0.2 to 1 % (docs/system.md, section 4).
 MADE_BY_SHOULDER, TAKEN_BY_SHOULDER = 0.01, 0.1

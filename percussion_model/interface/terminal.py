@@ -39,7 +39,9 @@ _PATIENCE = 2.0
 
 RATE = ("Rate of penetration", "rate_of_penetration", 1e3, "mm/s")
 # What its error is: those of rock and model are others.
-NUMERICAL = " (± of the numerics)"
+NUMERICAL = " (± of grid and scatter)"
+# That of a settled motion is of its convergence.
+SETTLING = " (± of convergence; that of the grid is not in it)"
 # That of means over blows, whose numerical error is not estimated.
 SCATTERED = " (± of their scatter)"
 # Other rows of the table: name, key of the summary, factor, unit.
@@ -110,7 +112,7 @@ def show_settled(found: Settled) -> None:
     order = {0: "", 1: ", every blow alike"}.get(found.order, f", {found.order} blows a cycle")
     table.add_row("Motion", f"{found.kind}{order}")
     if summary[RATE[1]] is not None:
-        table.add_row(RATE[0], f"{rate_text(summary)} {RATE[3]}")
+        table.add_row(RATE[0], f"{rate_text(summary)} {RATE[3]}{SETTLING}")
     for name, key, factor, unit in (
         ("Blow period", "blow_period", 1e3, "ms"),
         ("Multiplier of the cycle", "multiplier", 1.0, ""),
@@ -131,7 +133,9 @@ def show_study(found: Study) -> None:
     print_table(table, console)
     failed = [k for k, text in enumerate(found.failures) if text]
     if failed:
-        first = f"{found.points.changes(failed[0])}: {found.failures[failed[0]]}"
+        at = found.points.changes(failed[0]).items()
+        place = ", ".join(f"{key} = {value:.5g}" for key, value in at)
+        first = f"{place}: {found.failures[failed[0]]}"
         count = f"{len(failed)} of {len(found.points)} points failed"
         show_warnings(console, [f"{count}, the first at {first}"])
 

@@ -113,6 +113,9 @@ class Study:
                 words = f"{count} of them above {100 * LARGE_ERROR:g} %" if count else ""
                 largest = f"at most {100 * np.nanmax(error):.3g} % of the rate"
                 lines.append((f"Error, {kind}", ", ".join(filter(None, (largest, words)))))
+        lines.append(
+            ("These errors", "are of convergence and scatter; that of the grid is not in them")
+        )
         lines.append(("Computed in", f"{rows['wall_time'].sum():.3g} s of one core"))
         return lines
 

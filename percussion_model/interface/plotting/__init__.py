@@ -26,7 +26,7 @@ __all__ = ["CAPTIONS", "draw_figures", "figures"]
 CAPTIONS = {
     "overview": (
         "The whole run, one point for each blow. The rate of penetration is the advance of the "
-        "mean bit position over a blow, divided by the blow's period."
+        "hole over a blow, divided by the blow's period."
     ),
     "bit_motion": (
         "Mean motion of the bit and its force on the rock. Colours tell the drilling mode; grey "

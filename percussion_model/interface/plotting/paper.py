@@ -120,8 +120,9 @@ def _points(ax: Axes, found: Study, factor: float = 1.0) -> None:
             elinewidth=1.0,
         )
     # where such a point stands says nothing, so it stands at the foot of the panel
-    foot = np.zeros(int(np.sum(undecided)))
-    ax.plot(x[undecided] * factor, foot, "x", color=style.RULE_COLOUR, clip_on=False)
+    if undecided.any():  # a line without points that is not clipped would break the layout
+        foot = np.zeros(int(np.sum(undecided)))
+        ax.plot(x[undecided] * factor, foot, "x", color=style.RULE_COLOUR, clip_on=False)
     if not undecided.all():
         known = ~undecided & np.isfinite(rate)
         top = float(np.max((rate + error)[known]))
