@@ -99,8 +99,8 @@ def test_a_bad_controller_fails_visibly(feed_control, tmp_path, monkeypatch, cap
 def test_an_interrupted_bench_keeps_the_runs_that_are_done(
     feed_control, tmp_path, monkeypatch, capsys
 ):
-    def interrupted(system, controller, values, trials, watch):
-        bench(system, controller, values, ["rod"], watch)
+    def interrupted(system, controller, values, trials, watch, trust):
+        bench(system, controller, values, ["rod"], watch, trust)
         raise KeyboardInterrupt
 
     monkeypatch.setattr("percussion_model.coupling.bench.bench", interrupted)
