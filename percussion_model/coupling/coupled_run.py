@@ -54,6 +54,8 @@ class CoupledRun:
     jumps : dict of float
         Root mean square of the change of what parts exchange in a step, by signal: forces by
         the greatest force [1].
+    by_map : bool
+        Whether the hammer takes its blows out of a blow map.
     """
 
     columns: dict[str, np.ndarray] = field(repr=False)
@@ -66,6 +68,7 @@ class CoupledRun:
     processor_time: float = field(default=0.0, compare=False)
     interrupted: bool = False
     jumps: dict[str, float] = field(default_factory=dict, compare=False)
+    by_map: bool = False
 
     def __getitem__(self, signal: str) -> np.ndarray:
         return self.columns[signal]
@@ -75,7 +78,7 @@ class CoupledRun:
         """Whether energies balance, or the step is too long and which one would do."""
         return judge_run(
             self.columns, _balances(self.columns), self.jumps, self.step, self.steps, self.error,
-            controlled=self.tried > 0,
+            controlled=self.tried > 0, by_map=self.by_map,
         )  # fmt: skip
 
     def write_csv(self, path: Path) -> Path:

@@ -112,11 +112,16 @@ def test_no_number_in_a_signal_that_is_kept(feed_control):
 
 
 def test_a_ledger_that_is_open_at_any_step():
-    """A blow map closes to 3e-4, so that is not open."""
-    assert made_up(hammer__energy_residual=late(3e-4)).verdict.word == "balanced"
-    verdict = made_up(hammer__energy_residual=late(1e-2)).verdict
+    verdict = made_up(hammer__energy_residual=late(1e-6)).verdict
     assert (verdict.word, verdict.step) == ("not balanced", None)
     assert "whatever the step" in verdict.text
+
+
+def test_a_ledger_of_a_blow_map_is_interpolated():
+    run = made_up(hammer__energy_residual=late(3e-4))
+    assert run.verdict.word == "not balanced"
+    run.by_map = True
+    assert run.verdict.word == "balanced"
 
 
 def test_a_balance_of_nan_is_no_balance():
