@@ -16,7 +16,7 @@ from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.simulation.files import plain
 from percussion_model.simulation.rate import rate_of_blows, ratio_of_sums
 from percussion_model.simulation.simulate import Simulation, SimulationError
-from percussion_model.simulation.uncertain import is_undecided, rate_text
+from percussion_model.simulation.uncertain import is_undecided, rate_field
 
 # A run in which no blow ends for so long [s], and so many periods of the last, has stopped.
 STALLED_AFTER, STALLED_PERIODS = 2.0, 4.0
@@ -92,8 +92,7 @@ class Settled:
     wall_time: float
 
     def __repr__(self) -> str:
-        known = math.isfinite(self.rate_of_penetration)
-        rate = f"rate='{rate_text(self.summary())} mm/s', " if known else ""
+        rate = rate_field(self.summary())
         return (
             f"Settled({self.kind!r}, order={self.order}, {rate}"
             f"blows={len(self.blows)}, duration={self.duration:.4g})"

@@ -28,7 +28,7 @@ from percussion_model.simulation.files import (
 )
 from percussion_model.simulation.origin import ORIGIN
 from percussion_model.simulation.rate import rate_of_blows, ratio_of_sums
-from percussion_model.simulation.uncertain import is_undecided, rate_text
+from percussion_model.simulation.uncertain import is_undecided, rate_field
 
 if TYPE_CHECKING:
     import pandas
@@ -120,8 +120,7 @@ class Result:
     interrupted: bool = False
 
     def __repr__(self) -> str:
-        known = math.isfinite(self.rate_of_penetration)
-        rate = f"rate='{rate_text(self.summary())} mm/s', " if known else ""
+        rate = rate_field(self.summary())
         return (
             f"Result({self.scene.title!r}, solver={self.solver!r}, duration={self.duration:g}, "
             f"{rate}blows={len(self.blows)}, events={len(self.events)}, "

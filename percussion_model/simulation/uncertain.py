@@ -119,6 +119,13 @@ def mean_text(summary: Mapping[str, Any], key: str, factor: float = 1.0, digits:
     return f"{value:.{digits}g}"
 
 
+def rate_field(summary: Mapping[str, Any]) -> str:
+    """Rate of penetration as a field of a short representation; nothing where there is none."""
+    if summary["rate_of_penetration"] is None:
+        return ""
+    return f"rate='{rate_text(summary)} mm/s', "
+
+
 def rate_text(summary: Mapping[str, Any], factor: float = 1e3) -> str:
     """Rate of penetration of a summary and, where it is known, how far it may be off.
 
