@@ -240,8 +240,9 @@ class Coupling:
             return False
         one = known[FIDELITY]
         value = self._parameters.get("hammer", {}).get(FIDELITY, one.start)
-        words = {int(item.value): item.name for item in one.declaredType.items}
-        return words[int(value)] == "blow-map"
+        words = {str(item.value): item.name for item in one.declaredType.items}
+        key = value if isinstance(value, str) else str(int(value))
+        return words.get(key, key) == "blow-map"  # values are words or their numbers
 
     def _stepping(self, count: int, control: StepControl | None) -> Callable[[float, float], None]:
         """Return what does a step: compiled code where that is possible, else Python."""

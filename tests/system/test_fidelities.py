@@ -62,6 +62,8 @@ def test_rate_and_feed_agree_within_the_map_s_accuracy(runs):
 def test_energy_and_momentum_balance(runs, word):
     run = runs[word]
     found = summary(run)
+    assert run.by_map == (word == "blow-map")
+    assert run.verdict.word == "balanced"
     assert found["string_energy_residual"] < 0.01
     assert found["hammer_energy_residual"] < 0.01
     assert found["shoulder_by_blows"] > -0.005
