@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 
@@ -174,15 +175,35 @@ class Runner:
         done = 0
         while done < len(times):
             self._advance_solver(float(times[done]))
-            horizon = self.solver.readable_until(self._state)
-            end = max(done + 1, int(np.searchsorted(times, horizon, side="right")))
-            self._read(times[done:end], rows[done:end])
-            done = end
+            end = max(done + 1, int(np.searchsorted(times, self._next_stop(), side="right")))
+            done += self._sample_ahead(times[done:end], rows[done:end])
+        rows[:, 0] = times
         if len(times):
             self._advance_solver(float(times[-1]))
             self._time = float(times[-1])
         self.wall_time += time.perf_counter() - began
         return rows
+
+    def _next_stop(self) -> float:
+        """Time beyond which `_advance_solver` has to be asked [s]."""
+        return math.inf
+
+    def _sample_ahead(self, times: np.ndarray, rows: np.ndarray) -> int:
+        """Fill rows of the first of rising times; how many."""
+        filled = 0
+
+        def advance(
+            state: State, t: float, blows: np.ndarray, events: np.ndarray, record_events: bool
+        ) -> tuple[int, int, int]:
+            nonlocal filled
+            *found, filled = self.solver.sample_ahead(
+                state, times, rows, blows, events, record_events
+            )
+            status, n_blows, n_events = found
+            return status, n_blows, n_events
+
+        self._call(advance, float(times[-1]), self._blow_room)
+        return filled
 
     def _read(self, times: np.ndarray, rows: np.ndarray) -> None:
         # After a change of inputs the state may lie a step ahead of the present.

@@ -99,6 +99,9 @@ class Simulation(Runner):
             self._settled_position = self._bit_position(settle)
         super()._advance_solver(t)
 
+    def _next_stop(self) -> float:
+        return self.scene.run.settle if math.isnan(self._settled_position) else math.inf
+
     def _bit_position(self, t: float) -> float:
         """Mean bit displacement since the start at a time that the solver has reached [m]."""
         return float(self._reading_at(t)[0]["bit_position"][0])

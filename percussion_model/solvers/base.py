@@ -15,7 +15,7 @@ from typing import Any, ClassVar, Literal, NamedTuple, Protocol
 
 import numpy as np
 
-from percussion_model.physics.records import BLOW, EVENT, READING, SAMPLE_FIELDS
+from percussion_model.physics.records import BLOW, EVENT, READING, SAMPLE_FIELDS, Status
 from percussion_model.scene.inputs import INPUTS
 from percussion_model.scene.scene import Scene
 from percussion_model.scene.solver_names import register_name
@@ -170,6 +170,28 @@ class Solver(ABC):
             if spare is state:
                 spare = None
             out[k] = row
+
+    def sample_ahead(
+        self, state: State, times: np.ndarray, out: np.ndarray, blows: np.ndarray,
+        events: np.ndarray, record_events: bool,
+    ) -> tuple[int, int, int, int]:  # fmt: skip
+        """Advance through rising `times` and evaluate at each, as far as one call does it.
+
+        Returns
+        -------
+        status, n_blows, n_events : int
+            As of `advance`.
+        count : int
+            Rows of `out` that were filled.
+        """
+        status, n_blows, n_events = self.advance(
+            state, float(times[0]), blows, events, record_events
+        )
+        if status != Status.DONE:
+            return status, n_blows, n_events, 0
+        end = max(1, int(np.searchsorted(times, self.readable_until(state), side="right")))
+        self.sample(state, np.maximum(times[:end], self.time(state)), out[:end])
+        return status, n_blows, n_events, end
 
     def fields(self, state: State) -> dict[str, np.ndarray]:
         """Force [N] and velocity [m/s] in each cell of the elastic bars, top to bottom."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -43,8 +43,6 @@ from percussion_model.analysis.fitting.measurements import (
     checked_drop,
 )
 from percussion_model.analysis.fitting.notes import (
-    COARSE,
-    DAMPING_MISSED,
     UNSETTLED,
     correlation_note,
     grid_notes,
@@ -52,11 +50,12 @@ from percussion_model.analysis.fitting.notes import (
     rival_notes,
     rough_notes,
 )
-from percussion_model.analysis.fitting.profiles import (
-    BETTER,
-    BetterPlaceError,
-    Follower,
+from percussion_model.analysis.fitting.sampling import (
     Profile,
+    Walk,
+    profiles_of,
+    steps_wanted,
+    walk,
 )
 from percussion_model.analysis.fitting.search import (
     descend,
@@ -96,9 +95,9 @@ ZOOM = {STIFFNESS: 0.5, RATIO: 0.3, DAMPING: 1.0, ENERGY: 0.6}
 LAST_ZOOM, LAST_STEP = 0.12, 2e-4
 # Minima are told up to this deviance above the best: less likely by exp(-10).
 TOLD = 20.0
-# So often profiles start again from a better place that they met. After so many computations
-# they do not, and their ends are taken as they come: a curve and two drops take a minute.
-MOST_STARTS, MOST_COMPUTED = 10, 2600
+# Walks in turn, each from the best so far: shares of all steps. The search met all there is
+# where the last one finds nothing better by this share of the threshold.
+ROUNDS, BETTER = (0.4, 0.6), 0.25
 # The deviance may be off by the roughness at the best place and at the other: the threshold is
 # higher by so many of it.
 ROUGH_FACTOR = 2.0
@@ -120,8 +119,8 @@ def fit_rock(
     estimated along; it is taken to be independent from one datum to the next. What is
     measured jumps where the number of drilling cycles changes, so the deviance has many
     minima: the whole range of C_R and W_R is searched, least squares go down from the best
-    places, and each parameter is followed to both sides while the others are fitted anew
-    (profile likelihood). A better place that is met on the way starts that again.
+    places, and a random walk from there visits all that the data allow. An interval holds
+    all values of its parameter with which it found the data likely enough.
 
     Parameters
     ----------
@@ -164,9 +163,8 @@ def fit_rock(
     box = _box(scene, names, ranges or {})
     counter = _Counter(progress, _expected(names, curve is not None, len(sources)))
     whole = Likelihood(scene, [_series(one) for one in sources], names, box, counter.tick)
-    minima, pool = _minima(whole, sources, counter)
-    quantile = _quantile(confidence, len(names))
-    found = _profiles(whole, minima, pool, quantile, counter)
+    minima = _minima(whole, sources, counter)
+    found = _explored(whole, minima, _quantile(confidence, len(names)))
     return _result(whole, sources, found, confidence, counter.done)
 
 
@@ -196,11 +194,11 @@ class _Counter:
 
 def _expected(names: Sequence[str], with_curve: bool, sources: int) -> int:
     """About how many places a fit computes."""
-    profiles = 90 * len(names)
+    steps = steps_wanted(len(names))
     if with_curve and sources == 1:
-        return profiles
+        return steps
     points = 3 * VALUES[DAMPING] * VALUES[ENERGY] if with_curve else POINTS * LEVELS
-    return points + 20 * (STARTS + FINALISTS) + profiles
+    return points + 20 * (STARTS + FINALISTS) + steps
 
 
 def _chosen(
@@ -252,10 +250,8 @@ def _series(source: Source, most: int | None = None) -> Series:
     return reading_series(source)
 
 
-def _minima(
-    whole: Likelihood, sources: Sequence[Source], counter: _Counter
-) -> tuple[list[Place], list[np.ndarray]]:
-    """Find minima that may be the best, the deepest first, and all other good places."""
+def _minima(whole: Likelihood, sources: Sequence[Source], counter: _Counter) -> list[Place]:
+    """Find minima that may be the best, the deepest first."""
     thin = Likelihood(
         whole.scene,
         [_series(one, SEARCH_SAMPLES) for one in sources],
@@ -278,7 +274,7 @@ def _minima(
         steps = np.array([0.0 if name in ZOOM_VALUES else LAST_STEP for name in whole.names])
         closer = _zoom(whole, best.at, LAST_ZOOM * sizes, steps)
         deep += [descend(whole, one.at, every, rounds=2)[0] for one in closer[:1]]
-    return distinct(deep, 0.1 * sizes, FINALISTS), [one.at for one in near]
+    return distinct(deep, 0.1 * sizes, FINALISTS)
 
 
 def _survey(thin: Likelihood, sources: Sequence[Source]) -> list[Place]:
@@ -339,57 +335,31 @@ class Explored(NamedTuple):
     settled: bool
 
 
-def _profiles(
-    like: Likelihood,
-    minima: list[Place],
-    pool: list[np.ndarray],
-    quantile: float,
-    counter: _Counter,
-) -> Explored:
-    """Profiles from the best of all minima, and from others as likely."""
-    # W_R and C_R first: they are what hides better places
-    every = range(len(like.names))[::-1]
-    pool = [*pool, *(one.at for one in minima)]
-    rough = {k for k in every if like.names[k] in ZOOM_VALUES}
-    found: dict[int, Profile] = {}
-
-    def hurry() -> bool:
-        return counter.done > MOST_COMPUTED
-
-    for left in reversed(range(MOST_STARTS)):
-        best, spread = descend(like, minima[0].at, sorted(every))
+def _explored(like: Likelihood, minima: list[Place], quantile: float) -> Explored:
+    """Walk from the best of all minima, and from others as likely."""
+    every, rng = range(len(like.names)), np.random.default_rng(0)
+    walked: Walk | None = None
+    for share in ROUNDS:
+        best, spread = descend(like, minima[0].at, every)
         best = polish(like, best, spread)
-        tiny, dips = roughness(like, best, spread)
-        threshold = quantile + ROUGH_FACTOR * max(tiny, dips)
-        restarts = left > 0 and not hurry()
-        follower = Follower(like, best.deviance, threshold, pool, rough, restarts, hurry)
-        try:
-            found = {k: follower.profile(best, spread, k) for k in every}
-            for other in () if hurry() else minima[1:]:
-                if other.deviance - best.deviance < threshold and _outside(other, found.items()):
-                    place, wide = descend(like, other.at, sorted(every))
-                    for k in every:
-                        found[k].include(follower.profile(place, wide, k))
-            break
-        except BetterPlaceError as better:
-            counter.expected += counter.expected // 8
-            minima = [better.place, *minima]
-    settled = follower.base >= best.deviance - BETTER * threshold
-    met = [*minima, *(one for each in found.values() for one in each.places)]
-    best = min(met, key=lambda one: one.deviance)
-    # whatever is as likely belongs to the interval, on whichever profile it was met
-    for one in met:
-        if one.deviance < best.deviance + threshold:
-            for k in every:
-                found[k].reach(float(one.at[k]), like.low[k], like.high[k])
-    minima = [best, *(one for one in minima if one.deviance > best.deviance)]
-    profiles = [found[k] for k in sorted(every)]
-    return Explored(best, spread, profiles, minima, threshold, settled)
+        threshold = quantile + ROUGH_FACTOR * max(roughness(like, best, spread))
+        minima = [best, *(one for one in minima if one.deviance > best.deviance)]
+        starts = [one for one in minima if one.deviance < best.deviance + threshold]
+        for start in starts:
+            steps = round(share * steps_wanted(len(every)) / len(starts))
+            new = walk(like, start, spread, threshold, steps, rng)
+            walked = new if walked is None else walked.joined(new)
+        place = like.at(walked.best)
+        settled = place.deviance > best.deviance - BETTER * threshold
+        if place.deviance < best.deviance:
+            minima = [place, *minima]
+    profiles = profiles_of(like, walked, threshold)
+    return Explored(minima[0], spread, profiles, minima, threshold, settled)
 
 
-def _outside(place: Place, profiles: Iterable[tuple[int, Profile]]) -> bool:
-    """Whether a place lies outside of what belongs to the best one, in one parameter at least."""
-    return any(not one.own[0] <= place.at[k] <= one.own[1] for k, one in profiles)
+def _outside(place: Place, profiles: Sequence[Profile]) -> bool:
+    """Whether a place lies outside of an interval, in one parameter at least."""
+    return any(not one.low <= at <= one.high for at, one in zip(place.at, profiles, strict=True))
 
 
 def _result(
@@ -404,14 +374,11 @@ def _result(
     estimates, curves = {}, {}
     for k, (name, found) in enumerate(zip(like.names, profiles, strict=True)):
         estimates[name] = _estimate(best.at[k], found, like.low[k], like.high[k])
-        places = sorted((float(one.at[k]), one.deviance) for one in found.places)
-        at, deviance = np.array(places).T
-        curves[name] = np.exp(at), deviance - best.deviance
+        curves[name] = np.exp(found.values), found.deviance
     rivals = [
         Rival(dict(zip(like.names, np.exp(one.at).tolist(), strict=True)), above)
         for one in minima[1:]
-        if (above := one.deviance - best.deviance) < TOLD + threshold
-        and _outside(one, enumerate(profiles))
+        if (above := one.deviance - best.deviance) < TOLD + threshold and _outside(one, profiles)
     ]
     explained = [
         Explained(one.name, one.data, one.data - off, noise, source)
@@ -421,19 +388,13 @@ def _result(
     ]
     warnings = [
         *interval_notes(estimates, like),
-        *([DAMPING_MISSED] if _claims_damping(estimates) else []),
         *([] if settled else [UNSETTLED]),
-        *([COARSE] if runs > MOST_COMPUTED else []),
         *rough_notes((threshold - _quantile(confidence, len(like.names))) / ROUGH_FACTOR),
         *rival_notes(rivals),
         *(note for one in explained for note in correlation_note(one)),
         *grid_notes(like, best, spread, profiles),
     ]
     return Fit(estimates, confidence, threshold, explained, rivals, curves, runs, warnings)
-
-
-def _claims_damping(estimates: Mapping[str, Estimate]) -> bool:
-    return DAMPING in estimates and estimates[DAMPING].determined
 
 
 def _estimate(at: float, found: Profile, low: float, high: float) -> Estimate:

@@ -158,17 +158,22 @@ def curve_series(curve: Curve) -> Series:
 
 
 def drop_series(drop: DropTest, most: int | None = None) -> Series:
-    """Series of a drop test, or of at most so many of its samples, evenly taken."""
+    """Series of a drop test, or of at most so many of its samples, evenly taken.
+
+    The few are for a search along W_R, where leaps pay. Else nearly every place has another
+    K_R, gamma or C_R, and to prepare its leaps takes longer than they save.
+    """
     count = len(drop.time)
     kept = np.arange(count)
     if most is not None and count > most:
         kept = np.unique(np.linspace(0, count - 1, most).round().astype(int))
     times = drop.time[kept]
+    changes = {} if most is not None else {"solver.leaps": False}
     return Series(
         drop.name,
         drop.values[kept],
         None,
-        lambda scene: predicted_drop(bit_alone(scene), drop, times),
+        lambda scene: predicted_drop(bit_alone(scene).replace(**changes), drop, times),
     )
 
 

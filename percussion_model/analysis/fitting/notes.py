@@ -17,7 +17,7 @@ from percussion_model.analysis.fitting.found import (
     Rival,
 )
 from percussion_model.analysis.fitting.likelihood import Likelihood, Place
-from percussion_model.analysis.fitting.profiles import Profile
+from percussion_model.analysis.fitting.sampling import Profile
 from percussion_model.analysis.fitting.search import LEAST_STEP, MOST_STEP, STEP_SHARE
 from percussion_model.solvers.base import make_solver
 
@@ -27,16 +27,8 @@ UNSETTLED = (
     "the search met ever better places and no end of it: the best may not be among them, "
     "and intervals may be too narrow"
 )
-DAMPING_MISSED = (
-    "C_R: in trials with known rocks such intervals missed it in a quarter of the cases; another "
-    "drop at another speed is a check (docs/gallery.md)"
-)
-COARSE = (
-    "the likelihood has too many dips to follow all of them in the computations allowed: ends of "
-    "intervals are coarse"
-)
 # An interval whose ends differ by this factor is said to be wide.
-WIDE = 4.0
+WIDE = 2.0
 # Residuals that follow from each other by so many standard errors are no independent noise.
 MOST_CORRELATION = 4.0
 # With twice the cells the best values may move by this share of their intervals' halves.

@@ -29,6 +29,8 @@ GRID_ROUNDING = 1e-6
 # At a grid point itself, forces and mode are those of the first instant after it [steps].
 SHORTEST = 1e-6
 
+ADVANCE, READ = int(Task.ADVANCE), int(Task.READ)
+
 
 @merged
 def plan(par, s, bars, ops, scratch):
@@ -170,3 +172,48 @@ def run(task, par_, state, bars, ops, scratch, time, blows, events, reading):
         s.live = 0
         read_at(par, s, bars, time, blows, events, reading[0])
     return Status.DONE
+
+
+@kernel
+def sample(par_, state, bars, memory, spare, spare_bars, spare_memory, ops, scratch, times, blows,
+           events, reading, row, out):  # fmt: skip
+    """Advance through rising times and read at each, as `run` does it call by call.
+
+    Parameters
+    ----------
+    par_, state, bars, ops, scratch, blows, events : as for `run`
+    memory : (int64 array, float64 array)
+        All of the state: the words of its record, and its waves.
+    spare, spare_bars, spare_memory : as state, bars, memory
+        Of a copy that readings may spoil.
+    times : float64 array
+        [s]
+    reading : READING array of length 1
+    row : float64 array
+        Its beginning, of which each row of `out` is a copy.
+    out : float64 array, shape (times, numbers of a row)
+
+    Returns
+    -------
+    status : int
+        Of the last advance, a `Status`.
+    count : int
+        Times that were read: fewer than all where blows or events were listed.
+    """
+    for k in range(len(times)):
+        status = run(ADVANCE, par_, state, bars, ops, scratch, times[k], blows, events, reading)
+        if status != Status.DONE:
+            return status, k
+        listed = state[0].n_blows + state[0].n_events
+        for i in range(len(memory[0])):
+            spare_memory[0][i] = memory[0][i]
+        for i in range(len(memory[1])):
+            spare_memory[1][i] = memory[1][i]
+        spare[0].peak_from = math.inf  # nobody asks for peaks here, and in standstill they are dear
+        here = max(times[k], time_of(par_[0], state[0]))
+        run(READ, par_, spare, spare_bars, ops, scratch, here, blows, events, reading)
+        for i in range(out.shape[1]):
+            out[k, i] = row[i]
+        if listed:
+            return status, k + 1
+    return Status.DONE, len(times)

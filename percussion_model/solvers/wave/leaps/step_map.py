@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from percussion_model.physics.kernel import entry_of
 from percussion_model.physics.records import BLOW, EVENT, READING, Mode
 from percussion_model.solvers.wave.advance import run
 from percussion_model.solvers.wave.grid import Grid
@@ -28,6 +29,7 @@ from percussion_model.solvers.wave.records import (
 SCALE = 1e-6
 # A barrier that nothing passes, to hold a configuration in standstill [J].
 NO_WAY_OUT = 1e300
+TASK = int(Task.STEP)
 
 
 @dataclass(frozen=True)
@@ -68,6 +70,7 @@ def step_map(configuration: Configuration) -> tuple[np.ndarray, np.ndarray]:
     start["next_c_r"] = 1.0  # a barrier stands, so that standstill lasts
     start["w_r"] = start["next_w_r"] = NO_WAY_OUT
     none = np.zeros(1)
+    scratch, operators, step = Scratch(none, none, none), no_operators(), entry_of(run)
     unused = np.zeros(1, BLOW), np.zeros(1, EVENT), np.zeros(1, READING)
     by_column, faces = np.zeros((size, size)), np.zeros((size, n + 1))
     state, w = start.copy(), np.zeros((len(Row), n + 1))
@@ -83,11 +86,7 @@ def step_map(configuration: Configuration) -> tuple[np.ndarray, np.ndarray]:
             w[Row.UP, k - n] = 1.0
         else:
             state["p"] = SCALE
-        run(
-            int(Task.STEP), configuration.par, state, bars, no_operators(),
-            Scratch(none, none, none),
-            0.0, *unused,
-        )  # fmt: skip
+        step(TASK, configuration.par, state, bars, operators, scratch, 0.0, *unused)
         by_column[k, :n], by_column[k, n : 2 * n] = w[Row.DOWN_OTHER, :n], w[Row.UP_OTHER, :n]
         faces[k] = w[Row.FACE]
         if size > 2 * n:

@@ -1,0 +1,180 @@
+"""Random walk over all rocks that the data allow, across the many dips of their deviance."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from percussion_model.analysis.fitting.likelihood import Likelihood, Place
+
+# Steps of a walk, for one parameter and as often again for each further one.
+STEPS_OF_ONE = 250
+# Lengths of steps by the spread of the places so far, evenly in the logarithm: long ones lead
+# over ridges, short ones along them.
+SHORTEST, LONGEST = 0.05, 3.0
+# From so many steps on, and again after so many, the spread is that of the later part.
+FIRST_LOOK, NEXT_LOOK = 200, 100
+EARLY = 0.25
+# So near to the edge of the range, in the logarithm, an interval is open.
+AT_EDGE = 0.1
+# Of the width of an interval: a gap this wide without any place parts two minima.
+PARTED = 0.33
+# Values of a parameter at which its profile is given.
+POINTS = 40
+
+
+@dataclass
+class Walk:
+    """Places that were looked at.
+
+    Attributes
+    ----------
+    at : ndarray, shape (places, parameters)
+        Logarithms.
+    deviance : ndarray, shape (places,)
+    """
+
+    at: np.ndarray
+    deviance: np.ndarray
+
+    def joined(self, other: Walk) -> Walk:
+        """Both together."""
+        return Walk(np.vstack([self.at, other.at]), np.append(self.deviance, other.deviance))
+
+    @property
+    def best(self) -> np.ndarray:
+        """The likeliest place."""
+        best: np.ndarray = self.at[self.deviance.argmin()]
+        return best
+
+
+@dataclass(frozen=True)
+class Profile:
+    """What the walk says of one parameter, in the logarithm.
+
+    Attributes
+    ----------
+    low, high : float
+        Ends of the interval; infinite where it is open within the range.
+    split : bool
+        Whether there is a wide gap within: minima apart are as likely.
+    values, deviance : ndarray
+        Lowest deviance that was found at these values.
+    """
+
+    low: float
+    high: float
+    split: bool
+    values: np.ndarray = field(repr=False)
+    deviance: np.ndarray = field(repr=False)
+
+
+def steps_wanted(free: int) -> int:
+    """Steps of a walk with so many parameters."""
+    return int(STEPS_OF_ONE * 2**free)
+
+
+def walk(
+    like: Likelihood,
+    start: Place,
+    spread: np.ndarray,
+    threshold: float,
+    steps: int,
+    rng: np.random.Generator,
+) -> Walk:
+    """Walk about so that places lie about as far above the best as a threshold.
+
+    An adaptive Metropolis walk [1]_ with the deviance divided by a temperature. Dips that
+    are less deep than the threshold do not hold it.
+
+    Parameters
+    ----------
+    like : Likelihood
+    start : Place
+    spread : ndarray
+        Covariance of the first steps, in the logarithm.
+    threshold : float
+        In the deviance.
+    steps : int
+    rng : Generator
+
+    Returns
+    -------
+    Walk
+        All places that were computed, whether the walk went there or not.
+
+    References
+    ----------
+    .. [1] H. Haario, E. Saksman, J. Tamminen, "An adaptive Metropolis algorithm",
+       Bernoulli 7 (2001) 223-242.
+    """
+    free = len(start.at)
+    # where the deviance is a parabola, its mean above the best is a temperature a parameter
+    temperature = threshold / free
+    here, factor = start, _root(spread)
+    passed, seen, deviance = [start.at], [start.at], [start.deviance]
+    for step in range(1, steps + 1):
+        if step >= FIRST_LOOK and step % NEXT_LOOK == 0:
+            factor = _root(np.cov(np.array(passed[int(EARLY * step) :]).T))
+        length = math.exp(rng.uniform(math.log(SHORTEST), math.log(LONGEST)))
+        at = here.at + length * factor @ rng.standard_normal(free)
+        there = like.at(_reflected(at, like.low, like.high))
+        if 0.5 * (there.deviance - here.deviance) < temperature * rng.exponential():
+            here = there
+        passed.append(here.at)
+        seen.append(there.at)
+        deviance.append(there.deviance)
+    return Walk(np.array(seen), np.array(deviance))
+
+
+def _root(covariance: np.ndarray) -> np.ndarray:
+    """A square root of a covariance that may be singular."""
+    variances, directions = np.linalg.eigh(np.atleast_2d(covariance))
+    root: np.ndarray = directions * np.sqrt(np.maximum(variances, 0.0))
+    return root
+
+
+def _reflected(at: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """Place as far within the range as it was beyond."""
+    at = np.where(at > high, 2.0 * high - at, at)
+    return np.where(at < low, 2.0 * low - at, at)
+
+
+def profiles_of(like: Likelihood, walked: Walk, threshold: float) -> list[Profile]:
+    """Interval and profile of each parameter: ends of what lies below a threshold.
+
+    Parameters
+    ----------
+    like : Likelihood
+    walked : Walk
+    threshold : float
+        Deviance above the best.
+    """
+    above = walked.deviance - walked.deviance.min()
+    inside = above < threshold
+    found = []
+    for k, values in enumerate(walked.at.T):
+        allowed = np.sort(values[inside])
+        low, high = allowed[[0, -1]]
+        split = bool(np.diff(allowed).max(initial=0.0) > PARTED * (high - low))
+        shown = above < 2.0 * threshold
+        found.append(
+            Profile(
+                low if low > like.low[k] + AT_EDGE else -math.inf,
+                high if high < like.high[k] - AT_EDGE else math.inf,
+                split and len(allowed) > POINTS,
+                *_lowest(values[shown], above[shown]),
+            )
+        )
+    return found
+
+
+def _lowest(values: np.ndarray, above: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Lowest points in intervals of equal width."""
+    bins = np.linspace(values.min(), values.max(), POINTS)
+    which = np.digitize(values, bins)
+    order = np.lexsort((above, which))
+    first = order[np.append(True, np.diff(which[order]) > 0)]
+    return values[first], above[first]
