@@ -128,6 +128,23 @@ def test_a_sample_does_not_depend_on_its_neighbours(scene):
         np.testing.assert_array_equal(list(alone.observe().values()), row)
 
 
+@pytest.mark.parametrize("leaps", [True, False])
+def test_many_samples_leave_blows_and_settling_as_they_are(leaps):
+    """One kernel reads them all; it gives way at blows, and where settling ends."""
+    scene = Scene().replace(**{"solver.leaps": leaps, "run.duration": END, "run.settle": 0.07})
+    times = np.linspace(0.0, END, 700)
+    sampled, alone = Simulation(scene), Simulation(scene)
+    together = sampled.sample_rows(times)
+    for t, row in zip(times, together, strict=True):
+        alone.advance(float(t))
+        np.testing.assert_array_equal(list(alone.observe().values()), row)
+    assert bits(sampled) == bits(alone)
+    assert len(sampled.blows) == 2
+    rates = [one.result().rate_of_penetration_fixed_window for one in (sampled, alone)]
+    assert rates[0] == rates[1]
+    assert np.isfinite(rates[0])
+
+
 def test_observe_names_every_field(scene):
     simulation = Simulation(scene)
     seen = simulation.observe()

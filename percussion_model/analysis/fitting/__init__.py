@@ -1,4 +1,4 @@
-"""Fits to measurements: parameters of the rock, with profile-likelihood intervals."""
+"""Fits to measurements: parameters of the rock, with intervals."""
 
 from __future__ import annotations
 

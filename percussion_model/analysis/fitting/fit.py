@@ -1,4 +1,4 @@
-"""The rock from all measurements together: estimates, profile-likelihood intervals, rivals."""
+"""The rock from all measurements together: estimates, intervals and rivals."""
 
 from __future__ import annotations
 
@@ -338,7 +338,7 @@ class Explored(NamedTuple):
 def _explored(like: Likelihood, minima: list[Place], quantile: float) -> Explored:
     """Walk from the best of all minima, and from others as likely."""
     every, rng = range(len(like.names)), np.random.default_rng(0)
-    walked: Walk | None = None
+    walked = Walk.of(minima)
     for share in ROUNDS:
         best, spread = descend(like, minima[0].at, every)
         best = polish(like, best, spread)
@@ -347,14 +347,15 @@ def _explored(like: Likelihood, minima: list[Place], quantile: float) -> Explore
         starts = [one for one in minima if one.deviance < best.deviance + threshold]
         for start in starts:
             steps = round(share * steps_wanted(len(every)) / len(starts))
-            new = walk(like, start, spread, threshold, steps, rng)
-            walked = new if walked is None else walked.joined(new)
+            walked = walked.joined(walk(like, start, spread, threshold, steps, rng))
         place = like.at(walked.best)
         settled = place.deviance > best.deviance - BETTER * threshold
         if place.deviance < best.deviance:
             minima = [place, *minima]
+    best, spread = descend(like, minima[0].at, every)
+    walked, minima = walked.joined(Walk.of([best])), [best, *minima[1:]]
     profiles = profiles_of(like, walked, threshold)
-    return Explored(minima[0], spread, profiles, minima, threshold, settled)
+    return Explored(best, spread, profiles, minima, threshold, settled)
 
 
 def _outside(place: Place, profiles: Sequence[Profile]) -> bool:

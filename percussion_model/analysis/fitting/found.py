@@ -97,7 +97,7 @@ class Fit:
     rivals : list of Rival
         Other minima, the likeliest first.
     profiles : dict of (ndarray, ndarray)
-        Values of a parameter, and the deviance above the best with the others at their best.
+        Values of a parameter, and the lowest deviance above the best that was found there.
     runs : int
         How many places were computed.
     warnings : list of str

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -42,6 +43,11 @@ class Walk:
     def joined(self, other: Walk) -> Walk:
         """Both together."""
         return Walk(np.vstack([self.at, other.at]), np.append(self.deviance, other.deviance))
+
+    @classmethod
+    def of(cls, places: Sequence[Place]) -> Walk:
+        """Places that are known already."""
+        return cls(np.array([one.at for one in places]), np.array([one.deviance for one in places]))
 
     @property
     def best(self) -> np.ndarray:
@@ -173,7 +179,7 @@ def profiles_of(like: Likelihood, walked: Walk, threshold: float) -> list[Profil
 
 def _lowest(values: np.ndarray, above: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Lowest points in intervals of equal width."""
-    bins = np.linspace(values.min(), values.max(), POINTS)
+    bins = np.linspace(values.min(), values.max(), POINTS + 1)[1:-1]
     which = np.digitize(values, bins)
     order = np.lexsort((above, which))
     first = order[np.append(True, np.diff(which[order]) > 0)]

@@ -29,7 +29,9 @@ SHOWN = {
 }
 DATA, FIT, RIVAL = "#222222", "#0072B2", "#D55E00"
 # Profiles are drawn up to this multiple of the threshold.
-HIGHEST = 4.0
+HIGHEST = 2.0
+# Axes of intervals wider than this factor are logarithmic.
+LOGARITHMIC = 10.0
 DPI = 130
 
 
@@ -87,7 +89,7 @@ def _profile(ax: Axes, found: Fit, key: str) -> None:
     ax.plot([estimate.value], [0.0], "o", color=FIT, markersize=5)
     for rival in found.rivals:
         ax.plot([rival.values[key]], [rival.deviance], "x", color=RIVAL, markersize=6)
-    if estimate.high > 1.5 * estimate.low:
+    if estimate.high > LOGARITHMIC * estimate.low:
         ax.set_xscale("log")
     else:
         ax.ticklabel_format(useOffset=False)
