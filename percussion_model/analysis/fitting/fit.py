@@ -336,18 +336,19 @@ class Explored(NamedTuple):
 
 
 def _explored(like: Likelihood, minima: list[Place], quantile: float) -> Explored:
-    """Walk from the best of all minima, and from others as likely."""
+    """Walk from the best of all minima, twice: the second knows how wide the first went."""
     every, rng = range(len(like.names)), np.random.default_rng(0)
     walked = Walk.of(minima)
+    wide: np.ndarray | None = None
     for share in ROUNDS:
         best, spread = descend(like, minima[0].at, every)
         best = polish(like, best, spread)
         threshold = quantile + ROUGH_FACTOR * max(roughness(like, best, spread))
         minima = [best, *(one for one in minima if one.deviance > best.deviance)]
-        starts = [one for one in minima if one.deviance < best.deviance + threshold]
-        for start in starts:
-            steps = round(share * steps_wanted(len(every)) / len(starts))
-            walked = walked.joined(walk(like, start, spread, threshold, steps, rng))
+        steps = round(share * steps_wanted(len(every)))
+        first = spread if wide is None else wide
+        walked = walked.joined(walk(like, best, first, threshold, steps, rng))
+        wide = walked.spread(threshold)
         place = like.at(walked.best)
         settled = place.deviance > best.deviance - BETTER * threshold
         if place.deviance < best.deviance:

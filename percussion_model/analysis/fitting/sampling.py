@@ -55,6 +55,11 @@ class Walk:
         best: np.ndarray = self.at[self.deviance.argmin()]
         return best
 
+    def spread(self, threshold: float) -> np.ndarray | None:
+        """Covariance of the places less than a threshold above the best; None of too few."""
+        inside = self.at[self.deviance < self.deviance.min() + threshold]
+        return None if len(inside) <= inside.shape[1] else np.atleast_2d(np.cov(inside.T))
+
 
 @dataclass(frozen=True)
 class Profile:
