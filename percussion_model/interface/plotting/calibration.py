@@ -57,6 +57,8 @@ def draw_calibration(found: Fit) -> Figure:
     panels = np.atleast_1d(below.subplots(1, len(found.estimates)))
     for ax, key in zip(panels, found.estimates, strict=True):
         _profile(ax, found, key)
+    handles, labels = panels[0].get_legend_handles_labels()
+    below.legend(handles, labels, loc="outside lower center", ncols=len(handles))
     return fig
 
 
@@ -83,12 +85,16 @@ def _profile(ax: Axes, found: Fit, key: str) -> None:
     estimate, (values, deviance) = found.estimates[key], found.profiles[key]
     top = HIGHEST * found.threshold
     shown = deviance < 2.0 * top
-    ax.plot(values[shown], deviance[shown], ".-", color=FIT, lw=0.9, markersize=4)
-    ax.axhline(found.threshold, color=style.RULE_COLOUR, lw=1.0, ls="--")
-    ax.axvspan(estimate.low, estimate.high, color=FIT, alpha=0.12, lw=0)
+    where, height = values[shown], deviance[shown]
+    ax.plot(where, height, ".-", color=FIT, lw=0.9, markersize=4, label="lowest deviance found")
+    limit = "limit of the region"
+    ax.axhline(found.threshold, color=style.RULE_COLOUR, lw=1.0, ls="--", label=limit)
+    share = f"{100.0 * found.confidence:g} % interval"
+    ax.axvspan(estimate.low, estimate.high, color=FIT, alpha=0.12, lw=0, label=share)
     ax.plot([estimate.value], [0.0], "o", color=FIT, markersize=5)
-    for rival in found.rivals:
-        ax.plot([rival.values[key]], [rival.deviance], "x", color=RIVAL, markersize=6)
+    rivals = [(one.values[key], one.deviance) for one in found.rivals]
+    if rivals:
+        ax.plot(*zip(*rivals, strict=True), "x", color=RIVAL, markersize=6, label="other minimum")
     if estimate.high > LOGARITHMIC * estimate.low:
         ax.set_xscale("log")
     else:
