@@ -27,6 +27,7 @@ from percussion_model.interface.commands.paper import paper
 from percussion_model.interface.commands.scene import explain, new, plot, run, settled
 from percussion_model.interface.commands.stability import stability
 from percussion_model.interface.commands.study import study
+from percussion_model.interface.messages import usage_text
 from percussion_model.interface.progress import lines
 
 app = typer.Typer(
@@ -119,6 +120,8 @@ def _guarded(work: Callable[[], Any]) -> int:
         show = getattr(error, "show", None)
         if show is None:
             raise
+        if "\n" not in error.format_message():  # else it is the help, for no words at all
+            return print_message(usage_text(error), BAD_INPUT)
         show()
         return BAD_INPUT
 

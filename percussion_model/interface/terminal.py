@@ -12,7 +12,9 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
+from rich.text import Text
 
+from percussion_model.interface.messages import wrapped
 from percussion_model.interface.progress import Report, lines
 from percussion_model.interface.tables import print_table
 from percussion_model.simulation.uncertain import (
@@ -143,7 +145,14 @@ def show_study(found: Study) -> None:
 def show_warnings(console: Console, warnings: list[str]) -> None:
     """Print warnings, if there are any."""
     for text in warnings:
-        console.print(f"[yellow]warning:[/yellow] {escape(text)}", highlight=False)
+        show_note(console, "warning", text)
+
+
+def show_note(console: Console, name: str, text: str) -> None:
+    """Print a text behind its name in yellow, in lines that fit."""
+    lines = Text(wrapped(f"{name}: {text}"))
+    lines.stylize("yellow", 0, len(name) + 1)
+    console.print(lines, soft_wrap=True)
 
 
 def _number(value: float | None, factor: float, digits: int = 5) -> str:
@@ -308,7 +317,7 @@ def show_statements(statements: list[Statement]) -> None:
     print_table(table, console)
     for one in statements:
         if one.why and not one.agrees:
-            console.print(f"{one.place}: {escape(one.why)}", highlight=False)
+            console.print(wrapped(f"{one.place}: {one.why}"), markup=False, highlight=False)
 
 
 class RunProgress:

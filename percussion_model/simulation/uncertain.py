@@ -123,11 +123,10 @@ def mean_text(summary: Mapping[str, Any], key: str, factor: float = 1.0) -> str:
 
 
 def in_digits(value: float, digits: int = UNSURE_DIGITS) -> str:
-    """Return a number with so many digits; what is large without an exponent: 1020, 594000."""
+    """Return a number with so many digits; what is large without an exponent: 1020, 595000."""
     rounded = float(f"{value:.{digits}g}")
-    return (
-        f"{rounded:.0f}" if 10**digits <= abs(rounded) < LARGEST_PLAIN else f"{rounded:.{digits}g}"
-    )
+    large = 10**digits <= abs(rounded) < LARGEST_PLAIN
+    return f"{rounded:.0f}" if large else f"{rounded:.{digits}g}"
 
 
 def rate_field(summary: Mapping[str, Any]) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import textwrap
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -25,8 +24,6 @@ UNITS = {
 # Rows of a run without --interval.
 ROWS = 5000
 FAILED = 1
-# Characters of a line, less the name of the command before it.
-WIDTH = 68
 
 
 def couple(
@@ -128,15 +125,10 @@ def _lines(found: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _tell(verdict: Verdict, code: int) -> int:
-    """Say the verdict, in lines that fit; return the exit code."""
+    """Say the verdict; return the exit code."""
     for remark in verdict.remarks:
-        common.print_message(_wrapped(remark))
-    return common.print_message(_wrapped(verdict.text), code if verdict.is_bad else 0)
-
-
-def _wrapped(text: str) -> str:
-    """Lines of a message."""
-    return textwrap.fill(text, WIDTH, subsequent_indent="  ", break_on_hyphens=False)
+        common.print_message(remark)
+    return common.print_message(verdict.text, code if verdict.is_bad else 0)
 
 
 def read_value(text: str) -> tuple[str, float | bool | str]:

@@ -99,6 +99,7 @@ def show_effects(found: EffectsStudy) -> None:
     from rich.table import Table
 
     from percussion_model.interface.tables import print_table
+    from percussion_model.interface.terminal import show_note
 
     headings, rows, reasons = table_of(found)
     table = Table(
@@ -116,7 +117,7 @@ def show_effects(found: EffectsStudy) -> None:
     print_table(table, console)
     for reason in dict.fromkeys(reasons.values()):
         names = ", ".join(name for name, given in reasons.items() if given == reason)
-        console.print(f"[yellow]{escape(names)}:[/yellow] {escape(reason)}", highlight=False)
+        show_note(console, names, reason)
 
 
 def _rate(row: dict[str, Any]) -> str:
