@@ -396,8 +396,10 @@ def progress(text: str) -> Iterator[Report]:
     starter.start()
     try:
         yield lambda text, share: bar.update(
-            task, description=text, completed=share or 0.0, total=None if share is None else 1.0
-        )
+            # where all is done but the end, how long that takes is not known
+            task, description=text, completed=share or 0.0,
+            total=None if share is None or share >= 1.0 else 1.0,
+        )  # fmt: skip
     finally:
         starter.cancel()
         starter.join()

@@ -63,7 +63,7 @@ def couple(
     Ends with 1 where the energies do not balance or the step is too long. Files go to
     out/SYSTEM.
     """
-    from percussion_model.interface.terminal import progress_bar
+    from percussion_model.interface.terminal import progress, progress_bar
 
     try:
         from percussion_model.coupling import Coupling
@@ -86,10 +86,8 @@ def couple(
     folder = claimed.folder
     wanted = [*known_signals(coupling.outputs), *(signals or ())]
     rows_every = max(step, duration / ROWS) if interval is None else interval
-    with progress_bar(duration) as progress:
-        run = coupling.run(
-            duration, step, wanted, rows_every, tolerance, progress, on_interrupt="keep"
-        )
+    with progress_bar(duration) as bar:
+        run = coupling.run(duration, step, wanted, rows_every, tolerance, bar, on_interrupt="keep")
     found = summary(run)
     path = run.write_csv(folder / "signals.csv")
     common.write_json(json_file, found)
@@ -101,7 +99,9 @@ def couple(
         with common.if_drawable():
             from percussion_model.interface.plotting.coupled_signals import save_signals
 
-            common.list_files([save_signals(run, folder / "signals.png", system.stem)])
+            with progress("drawing the figure"):
+                figure = save_signals(run, folder / "signals.png", system.stem)
+            common.list_files([figure])
     claimed.sign()
     return _tell(run.verdict, common.INTERRUPTED if run.interrupted else FAILED)
 

@@ -52,7 +52,8 @@ def effects(
             from percussion_model.interface.plotting.effect_bars import draw_effects
             from percussion_model.interface.plotting.style import save_figures
 
-            files = save_figures(lambda: [("effects", draw_effects(found))], claimed.folder)
+            with progress("drawing the figure"):
+                files = save_figures(lambda: [("effects", draw_effects(found))], claimed.folder)
             claimed.sign()
             common.list_files(files)
 
