@@ -343,9 +343,14 @@ def test_a_coupled_rate_has_its_error():
     assert abs(rate - 7e-4 / 0.045) < 3.0 * error
     assert error == pytest.approx(0.3 * 7e-4 / 0.045 / math.sqrt(44.0), rel=0.5)
     assert found["rate_second_half_undecided"] is False
-    (line,) = [text for text in _lines(found) if text.startswith("rate_second_half ")]
+    (line,) = [text for text in _lines(found) if text.startswith("Rate in the second half ")]
     assert "±" in line
     assert line.endswith("mm/s")
+    # names are words, and what has no error has three digits
+    shown = list(_lines(found | {"shoulder_by_blows": -0.000718548, "shoulder_energy": -4.0144}))
+    assert not any("_" in text for text in shown)
+    assert any(text.endswith(" -0.000719 of the energy of the blows") for text in shown)
+    assert any(text.split()[-2:] == ["-4.01", "J"] for text in shown)
     short = summary(CoupledRun({name: column[:99] for name, column in columns.items()}, 1e-3, 98))
     assert short["rate_second_half_error"] is None
     assert any("error not estimated" in text for text in _lines(short))

@@ -117,7 +117,7 @@ def show_settled(found: Settled) -> None:
         table.add_row(RATE[0], f"{rate_text(summary)} {RATE[3]}{SETTLING}")
     for name, key, factor, unit in (
         ("Blow period", "blow_period", 1e3, "ms"),
-        ("Multiplier of the cycle", "multiplier", 1.0, ""),
+        ("Deviation after a cycle", "multiplier", 1.0, "of what it was"),
     ):
         if summary[key] is not None:
             table.add_row(name, f"{mean_text(summary, key, factor)} {unit}".rstrip())

@@ -9,18 +9,28 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from percussion_model.interface.commands import common
-from percussion_model.simulation.uncertain import NOT_ESTIMATED, with_error
+from percussion_model.simulation.uncertain import NOT_ESTIMATED, in_digits, with_error
 
 if TYPE_CHECKING:
     from percussion_model.coupling.verdict import Verdict
 
 SystemFile = Annotated[Path, typer.Argument(metavar="SYSTEM.ssp", help="A system (SSP 1.0).")]
 RATE = "rate_second_half"
-UNITS = {
-    "time": "s", "step": "s", "depth": "m", RATE: "mm/s", "shoulder_energy": "J",
-    "feed_work": "J", "hammer_energy_residual": "of the energy put in",
-    "string_energy_residual": "of the energy put in or there", "shoulder_by_blows": "of the blows",
-}  # fmt: skip
+# Numbers of a summary as they are shown: key, name, factor, unit.
+SHOWN = (
+    ("time", "Simulated", 1.0, "s"),
+    ("step", "Communication step", 1e3, "ms"),
+    ("steps", "Steps", 1, ""),
+    ("depth", "Depth of the bit", 1e3, "mm"),
+    (RATE, "Rate in the second half", 1e3, "mm/s"),
+    ("hammer_energy_residual", "Hammer: energy unexplained", 1.0, "of the energy put in"),
+    ("string_energy_residual", "String: energy unexplained", 1.0, "of the energy put in or there"),
+    ("shoulder_energy", "Energy taken by the shoulder", 1.0, "J"),
+    ("feed_work", "Work of the feed on the bit", 1.0, "J"),
+    ("shoulder_by_blows", "Share taken by the shoulder", 1.0, "of the energy of the blows"),
+)
+# Those that are given, and have all their digits.
+GIVEN = ("time", "step", "steps")
 # Rows of a run without --interval.
 ROWS = 5000
 FAILED = 1
@@ -106,22 +116,18 @@ def couple(
     return _tell(run.verdict, common.INTERRUPTED if run.interrupted else FAILED)
 
 
-# Told at the end, or beside the rate.
-ELSEWHERE = ("error", "verdict", f"{RATE}_error", f"{RATE}_undecided")
-
-
 def _lines(found: Mapping[str, Any]) -> Iterator[str]:
     """Lines of a summary: names, numbers and units."""
-    for name, value in found.items():
-        if name in ELSEWHERE:
+    for key, name, factor, unit in SHOWN:
+        if key not in found:
             continue
-        number = f"{value:.6g}" if isinstance(value, float) else value
-        if name == RATE:
-            error = found[f"{RATE}_error"]
-            known = error is not None
-            number = with_error(1e3 * value, 1e3 * error) if known else f"{1e3 * value:.5g}"
-            number += "" if known else f", {NOT_ESTIMATED}"
-        yield f"{name:26s} {number} {UNITS.get(name, '')}".rstrip()
+        value, error = factor * found[key], found.get(f"{key}_error")
+        number = f"{value:.6g}" if key in GIVEN else in_digits(value)
+        if error is not None:
+            number = with_error(value, factor * error)
+        elif key == RATE:
+            number += f", {NOT_ESTIMATED}"
+        yield f"{name:29s} {number} {unit}".rstrip()
 
 
 def _tell(verdict: Verdict, code: int) -> int:
