@@ -27,8 +27,10 @@ from percussion_model.simulation.uncertain import (
     SMALLEST_UNIT,
     SURE_DIGITS,
     UNSURE_DIGITS,
+    depends_on_cells,
     in_digits,
     known_error,
+    of_the_cells,
     rate_text,
     scaled,
     with_error,
@@ -227,6 +229,10 @@ def headline_rows(summary: dict[str, Any]) -> list[tuple[str, str, str]]:
         if key in ERRORS:
             rows.append((name, _error(value, 1.0, unit), _error(value, factor, other)))
             continue
+        if depends_on_cells(summary, key):
+            rows.append((name, *(f"{of_the_cells(value / by)} {called}"
+                                 for by, called in ((1.0, unit), (factor, other)))))  # fmt: skip
+            continue
         error = known_error(summary, key)
         # what is exact to its error has all digits, where that of means is of scatter alone
         digits = UNSURE_DIGITS if summary.get(f"{key}_error") is None else SURE_DIGITS
@@ -250,11 +256,18 @@ def _error(value: float, factor: float, unit: str) -> str:
 def mean_cards(summary: dict[str, Any]) -> list[tuple[str, str]]:
     """Number with its unit, and name, of the cards beside that of the rate."""
     return [
-        (f"{_digits(factor * summary[key], UNSURE_DIGITS, error, MOST_DIGITS)} {unit}", name)
+        (f"{_card(summary, key, factor)} {unit}", name)
         for key, factor, unit, name in CARDS
         if summary[key] is not None
-        for error in [scaled(factor, known_error(summary, key))]
     ]
+
+
+def _card(summary: dict[str, Any], key: str, factor: float) -> str:
+    """Write the number of a card."""
+    value, error = factor * summary[key], scaled(factor, known_error(summary, key))
+    if depends_on_cells(summary, key):
+        return of_the_cells(value)
+    return _digits(value, UNSURE_DIGITS, error, MOST_DIGITS)
 
 
 def _digits(value: float, count: int, error: float | None, most_digits: int) -> str:

@@ -111,6 +111,8 @@ def show_settled(found: Settled) -> None:
     """Print the stationary response of a scene."""
     summary = found.summary()
     table = Table(show_header=False)
+    table.add_column(no_wrap=True)
+    table.add_column()
     order = {0: "", 1: ", every blow alike"}.get(found.order, f", {found.order} blows a cycle")
     table.add_row("Motion", f"{found.kind}{order}")
     if summary[RATE[1]] is not None:
@@ -247,9 +249,11 @@ def show_comparison(found: Comparison) -> None:
             elif summary[key] is None:
                 cells.append("-")
             else:
-                cells.append(mean_text(summary, key, factor))
+                cells.append(mean_text(summary, key, factor).replace(", ", "\n"))
             if name in differences:
-                cells.append(change_text(differences[name].get(key), errors[name].get(key)))
+                change, error = differences[name].get(key), errors[name].get(key)
+                hidden = change is not None and found.is_of_cells(name, key)
+                cells.append(UNDECIDED if hidden else change_text(change, error))
         table.add_row(f"{label}, {unit}" if unit else label, *cells)
     table.add_section()
     for label, value in _EFFORT.items():

@@ -18,6 +18,9 @@ SMALLEST_UNIT = 8
 # Greater numbers are written with an exponent.
 LARGEST_PLAIN = 1e8
 UNDECIDED = "undecided"
+# Numbers that depend on the cells where waves are not damped, and the flag of a summary for it.
+OF_THE_CELLS = ("rate_of_penetration", "rate_of_penetration_fixed_window", "penetration_per_blow")
+BY_CELLS = "rate_of_penetration_depends_on_cells"
 NOT_ESTIMATED = "error not estimated"
 
 
@@ -43,6 +46,16 @@ def with_error(value: float, error: float, most_digits: int = MOST_DIGITS) -> st
     digits = digits if hidden else min(digits, most_digits)
     text = f"{value:.{digits}f} ± {error:.{digits}f}"
     return f"{UNDECIDED}, {text}" if hidden else text
+
+
+def depends_on_cells(summary: Mapping[str, Any], key: str) -> bool:
+    """Whether a number of a summary, if there is any, is one of the cells and of nothing else."""
+    return bool(summary.get(BY_CELLS) and key in OF_THE_CELLS and summary.get(key))
+
+
+def of_the_cells(value: float) -> str:
+    """Return a number that depends on the cells."""
+    return f"{UNDECIDED}, with these cells {in_digits(value)}"
 
 
 def with_short_error(value: float, error: float) -> str:
@@ -116,6 +129,8 @@ def mean_text(summary: Mapping[str, Any], key: str, factor: float = 1.0) -> str:
         From SI to the unit that is shown.
     """
     value, error = factor * summary[key], known_error(summary, key)
+    if depends_on_cells(summary, key):
+        return of_the_cells(value)
     shown = error is not None and factor * error > SMALL_ERROR * abs(value)
     if shown and error is not None:
         return with_error(value, factor * error, most_digits=SMALLEST_UNIT)
@@ -149,6 +164,8 @@ def rate_text(summary: Mapping[str, Any], factor: float = 1e3) -> str:
     rate, error = summary["rate_of_penetration"], summary["rate_of_penetration_error"]
     if rate is None:
         return "-"
+    if depends_on_cells(summary, "rate_of_penetration"):
+        return of_the_cells(factor * rate)
     if error is not None:
         return with_error(factor * rate, factor * error)
     scatter = summary.get("rate_of_penetration_standard_error")

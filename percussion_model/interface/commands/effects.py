@@ -126,6 +126,8 @@ def _rate(row: dict[str, Any]) -> str:
     value, error = row["rate_of_penetration"], row["rate_of_penetration_standard_error"]
     if value is None or error is None:
         return "-"
+    if row["rate_of_penetration_undecided"]:
+        return UNDECIDED
     return in_few_characters(1e3 * value, 1e3 * error, LEAST_ERROR)
 
 
