@@ -7,6 +7,7 @@ import math
 from dataclasses import replace
 
 import pytest
+from matplotlib.figure import Figure
 from typer.testing import CliRunner
 
 from percussion_model import Scene, simulate
@@ -24,6 +25,7 @@ from percussion_model.interface.commands.effects import (
     show_effects,
     table_of,
 )
+from percussion_model.interface.plotting import effect_bars
 from percussion_model.simulation.uncertain import with_short_error
 
 RIGID = {"piston.model": "rigid", "bit.model": "rigid"}
@@ -225,3 +227,27 @@ def test_command_prints_a_table_and_reasons(tmp_path):
         "effects.png", "effects.svg", "made_by.json",
     ]  # fmt: skip
     assert json.loads((tmp_path / "found.json").read_text())["solver"] == "rigid"
+
+
+def test_bars_and_numbers_of_the_figure_stay_within_their_panels():
+    """Long bars are cut off before the axis ends; numbers stand beside or within theirs."""
+    changes = [0.52, 5.33, -0.81, 0.6, 1.25, -0.217, 0.0, None, 0.3, 0.2]
+    errors = [0.0006, 0.06, 0.002, 0.0, None, 0.016, 0.0, None, 0.4, None]
+    hidden = [False] * 9 + [True]
+    fig = Figure(figsize=(12.0, 4.6), layout="constrained")
+    axes = fig.subplots(1, 5, sharey=True)
+    for ax in axes:
+        effect_bars._changes(ax, changes, errors, hidden)
+    axes[0].set_yticks(range(10), [f"a long name of {k}" for k in range(10)])
+    fig.draw_without_rendering()
+    for ax in axes:
+        frame = ax.get_window_extent()
+        for bar in ax.patches:
+            drawn = bar.get_window_extent()
+            assert frame.x0 + 2.0 < drawn.x0
+            assert drawn.x1 < frame.x1 - 2.0
+        for text in ax.texts:
+            drawn = text.get_window_extent()
+            assert frame.x0 <= drawn.x0, text.get_text()
+            assert drawn.x1 <= frame.x1, text.get_text()
+        assert [text.get_text() for text in ax.texts[-2:]] == ["undecided"] * 2
