@@ -21,8 +21,8 @@ UNCUT = 1.4
 # Room beside the longest bar for its number, as a factor on its length; what is cut off, and
 # what is undecided, ends before the axis does.
 ROOM, WITHIN = 1.75, 0.92
-# Width of a character by that of a panel.
-CHARACTER = 0.042
+# Width of a character by that of half a panel.
+CHARACTER = 0.076
 # An error below this share of a change does not show in its two digits.
 SMALL = 0.01
 # Changes below this are none [%].
@@ -115,10 +115,12 @@ def _changes(
         text = " 0 " if abs(share) < NOTHING else text
         if error >= max(NOTHING, SMALL * abs(share)):
             text = f" {change_text(0.01 * share, 0.01 * error)} "
-        # what has no room beside its bar stands within it
-        within = cut or abs(share) + 2.0 * ROOM * end * CHARACTER * len(text) > ROOM * end
-        if within:
+        # what has no room beside its bar stands within it, or else on the other side of zero
+        length, room = CHARACTER * (len(text) - 1), abs(share) / (ROOM * end)
+        within = cut or (room + length > 1.0 and room > length)
+        if within or room + length > 1.0:
             align = "right" if share >= 0.0 else "left"
         box = {"facecolor": "white", "edgecolor": "none", "pad": 0.8} if within else None
-        ax.text(shown, y, text, va="center", ha=align, fontsize=8.0, bbox=box)
+        place = shown if within or room + length <= 1.0 else 0.0
+        ax.text(place, y, text, va="center", ha=align, fontsize=8.0, bbox=box)
     ax.axvline(0.0, color=style.RULE_COLOUR, linewidth=0.8)
