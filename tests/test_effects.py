@@ -20,6 +20,7 @@ from percussion_model.analysis.effect_study import (
     study_effects,
 )
 from percussion_model.interface.cli import app
+from percussion_model.interface.commands import effects
 from percussion_model.interface.commands.effects import (
     LONGEST_NAME,
     show_effects,
@@ -175,7 +176,23 @@ def test_the_table_fits_a_terminal_and_cuts_no_number(rigid, monkeypatch, capsys
         assert max(len(line) for line in shown.splitlines()) <= columns
 
 
-def test_a_dearer_step_is_marked_where_something_was_turned_off(rigid):
+def test_the_table_of_a_wide_scene_is_one_block(rigid, monkeypatch, capsys):
+    """Rows of the reference, whose numbers are as wide as those of any scene that ships."""
+    headings, _, _ = table_of(rigid)
+    rows = [
+        ["standstill tension paper", "68.5*", "280", "7200", "261825", "undecided",
+         "+52.00±0.06", "+0.107±0.008", "-17.0"],
+        ["elastic piston rigid", "123", "0.91", "10", "9457", "12.8±0.3", "-21.9±1.6", "", "+125"],
+    ]  # fmt: skip
+    monkeypatch.setattr(effects, "table_of", lambda found: (headings, rows, {}))
+    monkeypatch.setenv("COLUMNS", "80")
+    effects.show_effects(rigid)
+    lines = capsys.readouterr().out.splitlines()
+    assert sum("standstill" in line for line in lines) == 1
+    assert all(any(word in line for line in lines) for row in rows for word in row[1:])
+
+
+def test_a_dearer_step_is_marked_where_something_was_turned_off(rigid, capsys):
     scene = Scene()
     base = replace(rigid.base, step=1e-7)
     off, tension = variant_of(scene, "feed"), variant_of(scene, "standstill tension")
@@ -183,6 +200,9 @@ def test_a_dearer_step_is_marked_where_something_was_turned_off(rigid):
     study = EffectsStudy(scene, base, [trial], {})
     assert study.is_costlier(trial)
     assert study.to_dict()["effects"][0]["step_dearer"]
+    assert table_of(study)[1][1][1].endswith("*")
+    show_effects(study)
+    assert "*: turning the effect off made a time step dearer" in capsys.readouterr().out
     assert not study.is_costlier(replace(trial, step=0.99 * NOISE * 1e-7))
     assert not study.is_costlier(replace(trial, variant=tension))
     assert not study.is_costlier(replace(trial, step=None))

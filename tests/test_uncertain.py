@@ -239,7 +239,7 @@ def test_differences_have_the_errors_of_both(aperiodic, periodic, capsys, monkey
     assert "rate_of_penetration" not in found.undecided()["fem"]
     plain = json.loads(json.dumps(found.to_dict(), allow_nan=False))
     assert plain["undecided"]["rigid"]
-    monkeypatch.setenv("COLUMNS", "200")
+    monkeypatch.setenv("COLUMNS", "80")
     show_comparison(found)
     (line,) = [one for one in capsys.readouterr().out.splitlines() if "Rate of pen" in one]
     assert line.count("±") == 3  # two rates and a difference; the periodic rate has no scatter

@@ -235,7 +235,9 @@ def show_comparison(found: Comparison) -> None:
     summaries, differences = found.summaries(), found.differences()
     errors = found.difference_errors()
     title = found.results[found.first].scene.title
-    table = Table(title=escape(title) or None)
+    table = Table(
+        title=escape(title) or None, box=SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=0
+    )
     table.add_column("")
     for name in summaries:
         table.add_column(name, justify="right", no_wrap=True)
@@ -245,11 +247,11 @@ def show_comparison(found: Comparison) -> None:
         cells = []
         for name, summary in summaries.items():
             if key == RATE[1]:
-                cells.append(rate_text(summary).replace(", ", "\n"))
+                cells.append(_narrow(rate_text(summary)))
             elif summary[key] is None:
                 cells.append("-")
             else:
-                cells.append(mean_text(summary, key, factor).replace(", ", "\n"))
+                cells.append(_narrow(mean_text(summary, key, factor)))
             if name in differences:
                 change, error = differences[name].get(key), errors[name].get(key)
                 hidden = change is not None and found.is_of_cells(name, key)
@@ -264,13 +266,19 @@ def show_comparison(found: Comparison) -> None:
             cells += [""] * (name in differences)
         table.add_row(label, *cells)
     console = Console()
-    print_table(table, console)
+    # a solver and its differences stay together
+    print_table(table, console, groups=[1, *[2] * len(differences)])
     console.print(
         "± of the rate is the error of grid and scatter, of other means that of scatter alone; "
         f"a difference within the errors of both numbers is {UNDECIDED}.",
         highlight=False,
     )
     show_warnings(console, found.warnings())
+
+
+def _narrow(text: str) -> str:
+    """A number with its error in few characters, words in a line of their own."""
+    return text.replace(", ", "\n").replace(" ± ", "±")
 
 
 # Cost of a run and closure of its ledger: name, and where in a summary.
@@ -311,17 +319,18 @@ def show_stability(found: Collection) -> None:
 
 def show_statements(statements: list[Statement]) -> None:
     """Print what the paper says beside what was found."""
-    table = Table(show_lines=True)
-    for heading in ("section", "the paper says", "found here", ""):
-        table.add_column(heading, no_wrap=heading in ("section", ""))
+    table = Table(box=None, show_header=False, padding=(0, 1, 0, 0))
+    table.add_column(no_wrap=True)
+    table.add_column()
     for one in statements:
         verdict = "[green]agrees[/green]" if one.agrees else "[yellow]differs[/yellow]"
-        table.add_row(one.place, escape(one.says), escape(one.found), verdict)
-    console = Console()
-    print_table(table, console)
-    for one in statements:
+        table.add_row(verdict, f"[bold]{escape(one.place)}[/bold]")
+        table.add_row("", f"the paper says: {escape(one.says)}")
+        table.add_row("", f"found here: {escape(one.found)}")
         if one.why and not one.agrees:
-            console.print(wrapped(f"{one.place}: {one.why}"), markup=False, highlight=False)
+            table.add_row("", f"why: {escape(one.why)}")
+        table.add_row("", "")
+    print_table(table)
 
 
 class RunProgress:

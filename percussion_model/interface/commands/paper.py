@@ -58,7 +58,7 @@ def paper(
         drops, sinking = run_drops(scene), run_sinking(scene)
     sweeps = _sweeps(out, processes, part)
     with progress_bar(2 * scene.run.duration) as bar:
-        bar.stage(f"{next(part)}, the last blow, figures 7 and 8", bar.end)
+        bar.stage(f"{next(part)}, figures 7 and 8", bar.end)
         both = compare(scene, ("wave", "fem"), progress=bar)
     windows = {name: last_blow_window(result) for name, result in both.results.items()}
 
@@ -128,8 +128,9 @@ def _sweeps(out: Path, processes: int | None, part: Iterator[str]) -> dict[str, 
 
     found = {}
     for sweep in SWEEPS:
-        with count_bar(f"points of figure 9{sweep.name}, {next(part)}") as progress:
+        name = sweep.name.replace("_", ", ")
+        with count_bar(f"points of figure 9{name}, {next(part)}") as progress:
             folder = out / f"figure9{sweep.name}"
             found[sweep.name] = run_sweep(paper_scene(), sweep, folder, processes, progress)
-        found[sweep.name].save(folder)
+            found[sweep.name].save(folder)
     return found
