@@ -116,14 +116,14 @@ def _guarded(work: Callable[[], Any]) -> int:
     except Exception as error:
         if type(error).__module__.startswith("percussion_model."):
             return print_message(str(error), BAD_INPUT)
-        # Bad arguments: typer hides the class of its errors, which show themselves.
-        show = getattr(error, "show", None)
-        if show is None:
+        # Bad arguments: typer hides the class of its errors.
+        told = getattr(error, "format_message", None)
+        if told is None:
             raise
-        if "\n" not in error.format_message():  # else it is the help, for no words at all
-            return print_message(usage_text(error), BAD_INPUT)
-        show()
-        return BAD_INPUT
+        if "\n" in told():  # the help, for no words at all
+            print(told(), file=sys.stderr)
+            return BAD_INPUT
+        return print_message(usage_text(error), BAD_INPUT)
 
 
 if __name__ == "__main__":

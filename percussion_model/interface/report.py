@@ -230,8 +230,8 @@ def headline_rows(summary: dict[str, Any]) -> list[tuple[str, str, str]]:
             rows.append((name, _error(value, 1.0, unit), _error(value, factor, other)))
             continue
         if depends_on_cells(summary, key):
-            rows.append((name, *(f"{of_the_cells(value / by)} {called}"
-                                 for by, called in ((1.0, unit), (factor, other)))))  # fmt: skip
+            here = f"{of_the_cells(value)} {unit}", f"{of_the_cells(value / factor)} {other}"
+            rows.append((name, *here))
             continue
         error = known_error(summary, key)
         # what is exact to its error has all digits, where that of means is of scatter alone
