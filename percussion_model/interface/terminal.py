@@ -79,11 +79,11 @@ def show_summary(result: Result) -> None:
     table.add_column(justify="left")
     rate = rate_text(summary)
     if len(result.blows):
-        table.add_row(RATE[0], rate, RATE[3] + NUMERICAL * ("±" in rate))
+        table.add_row(RATE[0], _in_two_lines(rate), RATE[3] + NUMERICAL * ("±" in rate))
     values = summary if len(result.blows) else summary["fall"]
     for name, key, factor, unit in SHOWN if len(result.blows) else WITHOUT_BLOWS:
         if values.get(key) is not None:
-            text = mean_text(values, key, factor)
+            text = _in_two_lines(mean_text(values, key, factor))
             table.add_row(name, text, (unit + SCATTERED * ("±" in text)).lstrip())
     energy = summary["energy"]
     for key in ("numerical", "residual"):
@@ -278,7 +278,12 @@ def show_comparison(found: Comparison) -> None:
 
 def _narrow(text: str) -> str:
     """A number with its error in few characters, words in a line of their own."""
-    return text.replace(", ", "\n").replace(" ± ", "±")
+    return _in_two_lines(text).replace(" ± ", "±")
+
+
+def _in_two_lines(text: str) -> str:
+    """A number, and in a line of its own the word that stands before or behind it."""
+    return text.replace(", ", "\n")
 
 
 # Cost of a run and closure of its ledger: name, and where in a summary.
