@@ -29,7 +29,7 @@ def test_commands_fit(name, feed_control, tmp_path, monkeypatch, capsys):
     printed = Printed(monkeypatch)
     called(name, feed_control)
     said = capsys.readouterr()
-    assert "depth" in said.out + said.err
+    assert "depth" in (said.out + said.err).lower()
     assert faults(said.out) == []
     assert faults(said.err) == []
     assert printed.broken(said.out + said.err) == set()
