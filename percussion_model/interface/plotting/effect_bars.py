@@ -22,7 +22,7 @@ UNCUT = 1.4
 # what is undecided, ends before the axis does.
 ROOM, WITHIN = 1.75, 0.92
 # Width of a character by that of half a panel.
-CHARACTER = 0.076
+CHARACTER = 0.072
 # An error below this share of a change does not show in its two digits.
 SMALL = 0.01
 # Changes below this are none [%].
