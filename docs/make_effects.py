@@ -35,13 +35,14 @@ READING = """
   stretches, all scenes in turn. *run*, *blow*: wall time of the whole run with leaps, and by its
   blows. *events*: closures, openings and changes of mode in the whole run. The rest are changes
   against the scene as it is, in rate of penetration, blow period and peak bit force.
-- **No step gets dearer by turning an effect off**; one that does by more than 5 % is marked. A
-  whole run may well get dearer, since an effect that is off can leave more to happen. Without loss
-  or barrier the bit runs through many more events; without feed, drive or rock there is little of
-  the standstill that leaps cross at once. That is why events stand beside the time.
+- **No step gets dearer by turning an effect off**; one that does by more than 5 % has an asterisk.
+  A whole run may well get dearer, since an effect that is off can leave more to happen. Without
+  loss or barrier the bit runs through many more events; without feed, drive or rock there is little
+  of the standstill that leaps cross at once. That is why events stand beside the time.
 - *Leaps* are no effect but a way to compute: they change the cost and nothing else.
 - A dash is a number that would mean nothing, and the reason is told. *undecided* is a rate that its
-  standard error hides, or a change within the errors of both numbers; ± is that of scatter.
+  standard error hides or that depends on the cells, or a change within the errors of both numbers;
+  ± is that of scatter.
 """
 
 

@@ -6,7 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from fmu_src.archive import ROOT, content, state_of
+from fmu_src.archive import ROOT, content, fault, state_of
 from fmu_src.hammer.build import build_hammer, hammer_name, refuse_other
 from fmu_src.parts import pneumatic_drive
 from fmu_src.parts.build import build_part
@@ -59,7 +59,7 @@ def main(arguments: list[str]) -> int:
         with progress("building the FMU"):
             guid = build_hammer(scene, path, table)
     except (SceneError, OSError) as error:
-        print(f"error: {error}", file=sys.stderr)
+        print(f"error: {fault(error)}", file=sys.stderr)
         return 1
     print(f"{path} {{{guid}}}: {state_of(path, before)}")
     if not choice.no_reference:

@@ -81,6 +81,13 @@ def state_of(path: Path, before: bytes | None) -> str:
     return "unchanged" if before == content(path) else "replaced"
 
 
+def fault(error: Exception) -> str:
+    """Words of an error, which for files begin with the number of the operating system's."""
+    if isinstance(error, OSError) and error.filename:
+        return f"{error.filename}: {error.strerror}"
+    return str(error)
+
+
 def content(path: Path) -> bytes | None:
     """What a file holds; None where there is none."""
     return path.read_bytes() if path.is_file() else None

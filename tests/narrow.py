@@ -9,17 +9,14 @@ from rich.console import Console
 from rich.table import Table
 
 WIDTH = 80
-# Messages of one line each, which terminals break and programs search.
-MESSAGE = "percussion: "
 
 
 def faults(text: str) -> list[str]:
-    """Lines that are too long, or in which something was cut off."""
+    """Lines that are too long, but for one word like a path, or in which something was cut off."""
     return [
         line
         for line in text.splitlines()
-        if not line.startswith(MESSAGE)
-        and (len(line.rstrip()) > WIDTH or re.search(r"…|\w\.\.\.", line))
+        if (len(line.rstrip()) > WIDTH and len(line.split()) > 1) or re.search(r"…|\w\.\.\.", line)
     ]
 
 

@@ -7,6 +7,7 @@ import math
 from dataclasses import replace
 
 import pytest
+from matplotlib.figure import Figure
 from typer.testing import CliRunner
 
 from percussion_model import Scene, simulate
@@ -19,11 +20,13 @@ from percussion_model.analysis.effect_study import (
     study_effects,
 )
 from percussion_model.interface.cli import app
+from percussion_model.interface.commands import effects
 from percussion_model.interface.commands.effects import (
     LONGEST_NAME,
     show_effects,
     table_of,
 )
+from percussion_model.interface.plotting import effect_bars
 from percussion_model.simulation.uncertain import with_short_error
 
 RIGID = {"piston.model": "rigid", "bit.model": "rigid"}
@@ -173,7 +176,23 @@ def test_the_table_fits_a_terminal_and_cuts_no_number(rigid, monkeypatch, capsys
         assert max(len(line) for line in shown.splitlines()) <= columns
 
 
-def test_a_dearer_step_is_marked_where_something_was_turned_off(rigid):
+def test_the_table_of_a_wide_scene_is_one_block(rigid, monkeypatch, capsys):
+    """Rows of the reference, whose numbers are as wide as those of any scene that ships."""
+    headings, _, _ = table_of(rigid)
+    rows = [
+        ["standstill tension paper", "68.5*", "280", "7200", "261825", "undecided",
+         "+52.00±0.06", "+0.107±0.008", "-17.0"],
+        ["elastic piston rigid", "123", "0.91", "10", "9457", "12.8±0.3", "-21.9±1.6", "", "+125"],
+    ]  # fmt: skip
+    monkeypatch.setattr(effects, "table_of", lambda found: (headings, rows, {}))
+    monkeypatch.setenv("COLUMNS", "80")
+    effects.show_effects(rigid)
+    lines = capsys.readouterr().out.splitlines()
+    assert sum("standstill" in line for line in lines) == 1
+    assert all(any(word in line for line in lines) for row in rows for word in row[1:])
+
+
+def test_a_dearer_step_is_marked_where_something_was_turned_off(rigid, capsys):
     scene = Scene()
     base = replace(rigid.base, step=1e-7)
     off, tension = variant_of(scene, "feed"), variant_of(scene, "standstill tension")
@@ -181,6 +200,9 @@ def test_a_dearer_step_is_marked_where_something_was_turned_off(rigid):
     study = EffectsStudy(scene, base, [trial], {})
     assert study.is_costlier(trial)
     assert study.to_dict()["effects"][0]["step_dearer"]
+    assert table_of(study)[1][1][1].endswith("*")
+    show_effects(study)
+    assert "*: turning the effect off made a time step dearer" in capsys.readouterr().out
     assert not study.is_costlier(replace(trial, step=0.99 * NOISE * 1e-7))
     assert not study.is_costlier(replace(trial, variant=tension))
     assert not study.is_costlier(replace(trial, step=None))
@@ -225,3 +247,29 @@ def test_command_prints_a_table_and_reasons(tmp_path):
         "effects.png", "effects.svg", "made_by.json",
     ]  # fmt: skip
     assert json.loads((tmp_path / "found.json").read_text())["solver"] == "rigid"
+
+
+def test_bars_and_numbers_of_the_figure_stay_within_their_panels():
+    """Long bars are cut off before the axis ends; numbers stand beside or within theirs."""
+    changes = [0.52, 5.33, -0.81, 0.6, 1.25, -0.217, 0.0, None, 0.3, 0.2]
+    errors = [0.0006, 0.06, 0.002, 0.0, None, 0.016, 0.0, None, 0.4, None]
+    hidden = [False] * 9 + [True]
+    fig = Figure(figsize=(12.0, 4.6), layout="constrained")
+    axes = fig.subplots(1, 5, sharey=True)
+    for ax in axes:
+        effect_bars._changes(ax, changes, errors, hidden)
+    axes[0].set_yticks(range(10), [f"a long name of {k}" for k in range(10)])
+    fig.draw_without_rendering()
+    for ax in axes:
+        frame = ax.get_window_extent()
+        for bar in ax.patches:
+            drawn = bar.get_window_extent()
+            assert frame.x0 + 2.0 < drawn.x0
+            assert drawn.x1 < frame.x1 - 2.0
+        for text in ax.texts:
+            drawn = text.get_window_extent()
+            assert frame.x0 <= drawn.x0, text.get_text()
+            assert drawn.x1 <= frame.x1, text.get_text()
+        assert [text.get_text() for text in ax.texts[-2:]] == ["undecided"] * 2
+        assert ax.texts[5].get_text() == " -21.7±1.6 "
+        assert ax.texts[5].get_window_extent().x1 <= ax.patches[5].get_window_extent().x0

@@ -142,7 +142,7 @@ def test_statements_of_the_paper_fit(shown, monkeypatch):
         ("run_sinking", "percussion_model.verification.paper.rock_law"),
         ("save_figures", "percussion_model.interface.plotting.style"),
     ):
-        monkeypatch.setattr(importlib.import_module(place), name, lambda *words: None)
+        monkeypatch.setattr(importlib.import_module(place), name, lambda *words, **more: None)
     window = importlib.import_module("percussion_model.interface.plotting.window")
     monkeypatch.setattr(window, "last_blow_window", lambda result: None)
 
@@ -154,6 +154,9 @@ def test_statements_of_the_paper_fit(shown, monkeypatch):
     code, text = shown("paper", "--out", "out")
     assert code == 0
     assert "differs" in text
+    # three lines of a long text, not a column of words
+    found = text[text.index("found here: K_R^-0.5432") :]
+    assert found[: found.index("why: ")].count("\n") <= 2
 
 
 def test_a_blow_map_that_is_not_made_is_told_of(shown, monkeypatch):

@@ -11,7 +11,9 @@ import pytest
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 
+from percussion_model.coupling.coupled_run import CoupledRun
 from percussion_model.interface.plotting import CAPTIONS, draw_figures, figures
+from percussion_model.interface.plotting.coupled_signals import PANELS, draw_signals
 from percussion_model.interface.plotting.style import MODE_COLOURS, STYLE, draw_by_mode, save_png
 from percussion_model.interface.plotting.window import (
     closed_contacts,
@@ -171,3 +173,28 @@ def test_a_single_figure_is_written_whole_or_not_at_all(tmp_path):
         save_png(_TornFigure(), path, dpi=50)
     assert path.read_bytes() == before
     assert [file.name for file in path.parent.iterdir()] == ["one.png"]
+
+
+def test_signals_of_a_coupled_run_are_named_in_words():
+    """Symbols stand behind words; names of signals stand behind what they are."""
+    time = np.linspace(0.0, 1.0, 11)
+    columns = {name: time for panel in PANELS for name in panel.signals}
+    axes = draw_signals(CoupledRun({"time": time, **columns}, 1e-3, 10), "A system").axes
+    titles = [ax.get_title(loc="left") for ax in axes]
+    assert len(titles) == len(PANELS)
+    assert all(re.match(r"[A-Z][a-z]+ [a-z]+ ", title) for title in titles)
+    assert "loading stiffness $K_R$" in titles[0]
+    assert titles[0].endswith(" [kN/mm]")
+    assert titles[-1] == "What the controller does"
+    assert [text.get_text() for text in axes[-1].get_yticklabels()] == [
+        "drills", "in a void", "retracts",
+    ]  # fmt: skip
+    labels = [text.get_text() for ax in axes if ax.get_legend() for text in ax.get_legend().texts]
+    assert len(labels) == 6
+    assert all(re.match(r"[a-z ]+: \w+\.\w+$", label) for label in labels)
+
+
+def test_a_system_without_usual_signals_shows_what_it_has():
+    time = np.linspace(0.0, 1.0, 11)
+    (ax,) = draw_signals(CoupledRun({"time": time, "a.b": time}, 1e-3, 10), "A system").axes
+    assert [text.get_text() for text in ax.get_legend().texts] == ["signal: a.b"]

@@ -129,14 +129,31 @@ def test_what_ends_soon_says_nothing(heard, monkeypatch):
 
 
 def test_a_line_tells_time_share_and_what_is_left():
-    now = iter([0.0, 0.0, 10.0, 12.0, 30.0, 40.0])
-    lines = progress.Lines("preparing", lambda: next(now))
+    clock = SimpleNamespace(now=0.0)
+    lines = progress.Lines("preparing", lambda: clock.now)
+    clock.now = 10.0
     assert lines.line() == "  10 s: preparing"
-    lines.begin("run 2")  # at 12 s
+    clock.now = 12.0
+    lines.begin("run 2")
+    clock.now = 30.0
     lines.show("run 2, 3 s of 4 s simulated", 0.75)
     assert lines.line() == "  30 s: run 2, 3 s of 4 s simulated, 75%, about 6 s left"
+    clock.now = 40.0
     lines.show("all but done", 0.01)  # too early to tell what is left
     assert lines.line() == "  40 s: all but done, 1%"
+
+
+def test_what_goes_on_is_neither_all_done_nor_about_to_end():
+    clock = SimpleNamespace(now=0.0)
+    lines = progress.Lines("runs", lambda: clock.now)
+    clock.now = 400.0
+    lines.show("278 of 279 runs", 278 / 279)
+    assert lines.line() == " 400 s: 278 of 279 runs, 99%, a few s left"
+    clock.now = 430.0  # the last one takes its time
+    assert lines.line() == " 430 s: 278 of 279 runs, 99%, about 30 s left"
+    lines.show("279 of 279 runs", 1.0)
+    clock.now = 440.0
+    assert lines.line() == " 440 s: 279 of 279 runs, finishing"
 
 
 def test_what_is_done_within_a_command_is_told_in_its_lines(heard):
@@ -152,6 +169,51 @@ def test_what_is_done_within_a_command_is_told_in_its_lines(heard):
     assert "1 s of 4 s simulated, 25%" in told
     assert "run 2 of 3 with 40 cells, 0 s of 2 s simulated, 0%" in told
     assert told.splitlines()[-1].endswith("outer")
+
+
+def test_figures_are_told_one_by_one(heard, tmp_path, monkeypatch):
+    """Each is held up until two lines have been printed meanwhile."""
+    pytest.importorskip("matplotlib")
+    plotting = importlib.import_module("percussion_model.interface.plotting")
+    for name in ("overview", "motion", "activation", "stress"):
+        monkeypatch.setattr(plotting, f"draw_{name}", waiting(heard, f"draw_{name}", plotting))
+    monkeypatch.chdir(tmp_path)
+    words = ["plot", REFERENCE, "--out", "out", "--duration", "0.3", "--settle", "0.1"]
+    assert not _guarded(lambda: app(words, standalone_mode=False))
+    for k, name in enumerate(plotting.CAPTIONS, 1):
+        assert f"drawing figure {k} of 4, {name}" in heard.getvalue()
+
+
+def waiting(heard, name, module):
+    """That function of a module, which begins after two more lines."""
+    work = getattr(module, name)
+
+    def wait(*words):
+        heard.wait_for(heard.progress() + 2)
+        return work(*words)
+
+    return wait
+
+
+def test_the_parts_of_the_paper_are_told(heard, tmp_path, monkeypatch):
+    """The first part and the first sweep are held up; the sweep ends in Ctrl-C."""
+    pytest.importorskip("matplotlib")
+    runs = importlib.import_module("percussion_model.verification.paper.runs")
+    law = importlib.import_module("percussion_model.verification.paper.rock_law")
+    monkeypatch.setattr(runs, "run_drops", lambda scene: heard.wait_for(2))
+    monkeypatch.setattr(law, "run_sinking", lambda scene: {})
+
+    def sweep(scene, sweep, folder, processes, report):
+        report(3, 31)
+        heard.wait_for(heard.progress() + 2)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(runs, "run_sweep", sweep)
+    words = ["paper", "--out", str(tmp_path / "out")]
+    assert _guarded(lambda: app(words, standalone_mode=False)) == INTERRUPTED
+    count = 4 + len(runs.SWEEPS)
+    assert f"part 1 of {count}, drop tests and sinking, figure 6" in heard.getvalue()
+    assert f"3 of 31 points of figure 9a, part 2 of {count}, 9%" in heard.getvalue()
 
 
 # ----------------------------------------------------------------- several runs

@@ -104,12 +104,35 @@ def test_ledger_of_the_report_balances(case):
 
 def test_headlines_are_in_both_units():
     rows = headline_rows({key: None for key, *_ in HEADLINES} | {"rate_of_penetration": 0.0163934})
-    assert rows == [("Rate of penetration", "0.016393 m/s", "16.39 mm/s")]
+    assert rows == [("Rate of penetration", "0.0164 m/s", "16.4 mm/s")]
     rows = headline_rows({"peak_bit_force": 594760.6, "rebound_velocity": -3.38})
     assert rows == [
         ("Rebound velocity (mean of the piston)", "−3.38 m/s", ""),
-        ("Greatest bit force", "594761 N", "594.8 kN"),
+        ("Greatest bit force", "595000 N", "595 kN"),
     ]
+
+
+def test_digits_that_nobody_knows_are_not_on_the_page(case):
+    """Three of means and peaks, five of a rate whose error is known; an error has two."""
+    name, result, _ = case
+    summary = result.summary()
+    sure = summary["rate_of_penetration_error"] is not None
+    for what, si, other in headline_rows(summary):
+        for text in filter(None, (si, other)):
+            number = text.split(" ")[0].replace("−", "")
+            if "±" in text or "below" in text:
+                continue
+            digits = number.partition("e")[0].replace(".", "").lstrip("0").rstrip("0")
+            most = 5 if sure and what.startswith("Rate") else 3
+            assert len(digits) <= most, (name, what, text)
+
+
+def test_an_error_that_is_rounding_is_told_as_such():
+    rows = headline_rows({"rate_of_penetration_standard_error": 5.1e-17,
+                          "rate_of_penetration_relative_error": 2.0234e-3})  # fmt: skip
+    assert [row[1:] for row in rows] == [
+        ("below 1e-9 m/s", "below 1e-6 mm/s"), ("0.002", "0.2 %"),
+    ]  # fmt: skip
 
 
 def test_the_folder_holds_no_drafts(tmp_path):

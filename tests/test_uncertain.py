@@ -171,6 +171,51 @@ def test_a_rate_in_one_line_of_python(aperiodic, hidden):
     assert "undecided" in repr(blind)
 
 
+@pytest.fixture(scope="module")
+def undamped():
+    return simulate(Scene().replace(**{"effects.loss": False}), 0.8, settle=0.2)
+
+
+def test_a_rate_of_the_cells_is_undecided_wherever_it_is_shown(undamped, capsys, monkeypatch):
+    """Without loss it must not be trusted, as a warning says, however small its error is."""
+    monkeypatch.setenv("COLUMNS", "80")
+    error = undamped.rate_of_penetration_standard_error
+    assert 0.0 < error < 0.5 * undamped.rate_of_penetration
+    summary = undamped.summary()
+    assert summary["rate_of_penetration_undecided"] is True
+    assert rate_text(summary).startswith("undecided, with these cells ")
+    assert "undecided" in repr(undamped)
+    show_summary(undamped)
+    shown = capsys.readouterr().out
+    assert [line.split("│")[1].strip() for line in shown.splitlines() if "undecided" in line] == [
+        "Rate of penetration",
+        "Penetration per blow",
+    ]
+    rows = {name: texts for name, *texts in headline_rows(summary)}
+    for name in ("Rate of penetration", "Penetration per blow"):
+        assert all(text.startswith("undecided") for text in rows[name])
+    page = render_report(undamped, [])
+    card = page[page.index('<div class="card">') :]
+    assert card.index("undecided, with these cells") < card.index("</b>")
+    label = draw_overview(undamped).axes[1].get_legend().get_texts()[0].get_text()
+    assert "undecided" in label
+
+
+def test_differences_to_a_rate_of_the_cells_are_undecided(undamped, periodic, capsys):
+    found = Comparison({"wave": undamped, "rigid": periodic})
+    assert {"rate_of_penetration", "penetration_per_blow"} <= set(found.undecided()["rigid"])
+    show_comparison(found)
+    lines = capsys.readouterr().out.splitlines()
+    (line,) = [one for one in lines if "Rate of penetration" in one]
+    assert line.rstrip(" │").endswith("undecided")
+
+
+def test_a_stationary_rate_of_the_cells_is_undecided():
+    found = settled(Scene().replace(**{"effects.loss": False}), most_blows=40)
+    assert found.summary()["rate_of_penetration_undecided"] is True
+    assert "undecided, with these cells" in repr(found)
+
+
 # --------------------------------------------------------------------- comparison
 
 
@@ -194,7 +239,7 @@ def test_differences_have_the_errors_of_both(aperiodic, periodic, capsys, monkey
     assert "rate_of_penetration" not in found.undecided()["fem"]
     plain = json.loads(json.dumps(found.to_dict(), allow_nan=False))
     assert plain["undecided"]["rigid"]
-    monkeypatch.setenv("COLUMNS", "200")
+    monkeypatch.setenv("COLUMNS", "80")
     show_comparison(found)
     (line,) = [one for one in capsys.readouterr().out.splitlines() if "Rate of pen" in one]
     assert line.count("±") == 3  # two rates and a difference; the periodic rate has no scatter
@@ -343,9 +388,14 @@ def test_a_coupled_rate_has_its_error():
     assert abs(rate - 7e-4 / 0.045) < 3.0 * error
     assert error == pytest.approx(0.3 * 7e-4 / 0.045 / math.sqrt(44.0), rel=0.5)
     assert found["rate_second_half_undecided"] is False
-    (line,) = [text for text in _lines(found) if text.startswith("rate_second_half ")]
+    (line,) = [text for text in _lines(found) if text.startswith("Rate in the second half ")]
     assert "±" in line
     assert line.endswith("mm/s")
+    # names are words, and what has no error has three digits
+    shown = list(_lines(found | {"shoulder_by_blows": -0.000718548, "shoulder_energy": -4.0144}))
+    assert not any("_" in text for text in shown)
+    assert any(text.endswith(" -0.000719 of the energy of the blows") for text in shown)
+    assert any(text.split()[-2:] == ["-4.01", "J"] for text in shown)
     short = summary(CoupledRun({name: column[:99] for name, column in columns.items()}, 1e-3, 98))
     assert short["rate_second_half_error"] is None
     assert any("error not estimated" in text for text in _lines(short))

@@ -38,7 +38,22 @@ def test_a_drop_test_tells_its_depth_and_rebound_in_place_of_dashes(drop, capsys
     assert not re.search(r"│\s+-\s+│", shown)
     for name in ("Depth of the bit's end", "First contact", "rebound velocity", "Stands still"):
         assert name in shown
-    assert f"{1e3 * drop.fall['depth']:.5g}" in shown
+    assert f" {1e3 * drop.fall['depth']:.3g} " in shown
+
+
+def test_a_table_shows_no_more_digits_than_are_known(capsys, monkeypatch):
+    """Five where an error stands beside it, and three where nothing is known of it."""
+    monkeypatch.setenv("COLUMNS", "80")
+    show_summary(simulate(REFERENCE, 1.0, settle=0.2))
+    seen = 0
+    for line in capsys.readouterr().out.splitlines():
+        _, name, number, *_ = [*line.split("│"), "", ""]
+        if "±" in number or not re.fullmatch(r"[\d.e+-]+", number.strip()):
+            continue
+        digits = number.strip().partition("e")[0].replace(".", "").strip("0")
+        assert len(digits) <= 3, line
+        seen += "Blow" in name or "Peak" in name
+    assert seen >= 4
 
 
 @pytest.mark.parametrize("solver", ["wave", "rigid"])
@@ -68,6 +83,8 @@ def test_settled_names_the_time_that_was_simulated_and_the_error_of_its_rate(cap
     found = settled(RIGID)
     show_settled(found)
     shown = capsys.readouterr().out
+    assert "Multiplier" not in shown
+    assert re.search(r"Deviation after a cycle +│ -?[\d.e-]+ of what it was", shown)
     assert f"{len(found.blows)} in {found.duration:.4g} s of simulated time" in shown
     assert re.search(r"Rate of penetration +│ 16\.\d+ ± 0\.0\d+ mm/s", shown)
 

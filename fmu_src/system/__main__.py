@@ -8,7 +8,7 @@ from pathlib import Path
 
 from fmpy.validation import validate_fmu
 
-from fmu_src.archive import ROOT, content, state_of
+from fmu_src.archive import ROOT, content, fault, state_of
 from fmu_src.system.archive import (
     SystemPlanError,
     build_fmus,
@@ -48,7 +48,7 @@ def main(arguments: list[str]) -> int:
             path = write_system(plan, fmus, choice.output / f"{plan.name}.ssp")
             print(f"{path}: {state_of(path, before.get(path))}", flush=True)
     except (SystemPlanError, SceneError, OSError) as error:
-        print(f"error: {error}", file=sys.stderr)
+        print(f"error: {fault(error)}", file=sys.stderr)
         return 1
     return 1 if problems else 0
 

@@ -12,7 +12,7 @@ from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.scene.solver_names import SOLVER_NAMES
 from percussion_model.simulation.result import Result
 from percussion_model.simulation.simulate import simulate
-from percussion_model.simulation.uncertain import is_undecided, known_error
+from percussion_model.simulation.uncertain import depends_on_cells, is_undecided, known_error
 from percussion_model.simulation.warnings import unused_note
 
 __all__ = [
@@ -96,16 +96,24 @@ class Comparison:
         }
 
     def undecided(self) -> dict[str, list[str]]:
-        """Numbers whose difference to the first solver is within its error, by solver."""
+        """Numbers whose difference to the first solver is within its error, by solver.
+
+        And those that depend on the cells in one of the two.
+        """
         differences, errors = self.differences(), self.difference_errors()
         return {
             name: [
                 key
                 for key, off in found.items()
                 if is_undecided(_or_nan(off), _or_nan(errors[name][key]))
+                or (off is not None and self.is_of_cells(name, key))
             ]
             for name, found in differences.items()
         }
+
+    def is_of_cells(self, name: str, key: str) -> bool:
+        """Whether a number depends on the cells, that of this solver or that of the first."""
+        return any(depends_on_cells(self.results[one].summary(), key) for one in (name, self.first))
 
     def warnings(self) -> list[str]:
         """Warnings of all results, each after the name of its solver.

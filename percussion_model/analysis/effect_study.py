@@ -196,7 +196,7 @@ class Trial:
         reasons = [text for text in self.result.warnings if "trusted" in text]
         if len(self.result.counted) < LEAST_BLOWS:
             reasons += [text for text in self.result.warnings if "whole blow" in text][:1]
-        elif self.undecided:
+        elif self.undecided and not reasons:
             reasons += [
                 "the motion is aperiodic, and the run too short to tell its rate of penetration"
             ]
@@ -204,7 +204,7 @@ class Trial:
 
     @property
     def undecided(self) -> bool:
-        """Whether scatter hides the rate of penetration."""
+        """Whether scatter hides the rate of penetration, or it is one of the cells."""
         return self.result.rate_of_penetration_undecided
 
     def numbers(self) -> dict[str, Any]:

@@ -16,7 +16,7 @@ from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.simulation.files import plain
 from percussion_model.simulation.rate import rate_of_blows, ratio_of_sums
 from percussion_model.simulation.simulate import Simulation, SimulationError
-from percussion_model.simulation.uncertain import is_undecided, rate_field
+from percussion_model.simulation.uncertain import BY_CELLS, is_undecided, rate_field
 
 # A run in which no blow ends for so long [s], and so many periods of the last, has stopped.
 STALLED_AFTER, STALLED_PERIODS = 2.0, 4.0
@@ -90,6 +90,7 @@ class Settled:
     blows: np.ndarray = field(repr=False)
     duration: float
     wall_time: float
+    depends_on_cells: bool = False
 
     def __repr__(self) -> str:
         rate = rate_field(self.summary())
@@ -100,7 +101,9 @@ class Settled:
 
     @property
     def rate_of_penetration_undecided(self) -> bool:
-        """Whether the error is no smaller than the rate."""
+        """Whether the error is no smaller than the rate, or it is one of the cells."""
+        if self.depends_on_cells and abs(self.rate_of_penetration) > 0.0:
+            return True
         return is_undecided(self.rate_of_penetration, self.rate_of_penetration_error)
 
     @property
@@ -129,6 +132,7 @@ class Settled:
             "rate_of_penetration": self.rate_of_penetration,
             "rate_of_penetration_error": self.rate_of_penetration_error,
             "rate_of_penetration_undecided": self.rate_of_penetration_undecided,
+            BY_CELLS: self.depends_on_cells,
             "blow_period": self.blow_period,
             "blow_period_error": self.blow_period_error,
             "multiplier": self.multiplier,
@@ -194,7 +198,8 @@ def settled(
 
     def made(kind: str, order: int, rate: float, error: float, multiplier: float) -> Settled:
         cycle, times = blows[len(blows) - order :], (simulation.time, simulation.wall_time)
-        return Settled(kind, order, rate, error, multiplier, cycle, blows, *times)
+        values = kind, order, rate, error, multiplier, cycle, blows, *times
+        return Settled(*values, depends_on_cells=scene.is_undamped)
 
     while len(blows) < most_blows:
         ended, patience = 0.0, STALLED_AFTER

@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -177,6 +177,16 @@ def _faults(numbers: Mapping[str, float], share: float, error: str) -> list[str]
     return found
 
 
+class Watch(Protocol):
+    """What is told how far a bench has come."""
+
+    def stage(self, name: str, end: float) -> None:
+        """Take the run that begins, and its simulated time [s]."""
+
+    def __call__(self, t: float) -> None:
+        """Take the time that it has reached [s]."""
+
+
 def bench(
     system: str | Path,
     controller: str | Path | Given | None = None,
@@ -184,6 +194,7 @@ def bench(
     trials: Sequence[str] = (),
     progress: Callable[[Score], None] | None = None,
     trust: bool = False,
+    watch: Watch | None = None,
 ) -> list[Score]:
     """Put a controller through the standard runs.
 
@@ -203,6 +214,9 @@ def bench(
         Called with each score.
     trust : bool
         As for `Coupling`.
+    watch : optional
+        Is told by its `stage` which run begins, and its simulated time, and called with the
+        time reached [s].
     """
     names = [trial.name for trial in TRIALS]
     for name in trials:
@@ -210,9 +224,10 @@ def bench(
             raise CouplingError(f"there is no run {name}: there are {', '.join(names)}")
     found = []
     kept = kept_values(controller)
-    for trial in TRIALS:
-        if trials and trial.name not in trials:
-            continue
+    chosen = [trial for trial in TRIALS if not trials or trial.name in trials]
+    for k, trial in enumerate(chosen, 1):
+        if watch is not None:
+            watch.stage(f"run {k} of {len(chosen)}, {trial.name}", trial.duration)
         coupling = Coupling(
             system,
             {**trial.parameters, **(parameters or {})},
@@ -220,7 +235,7 @@ def bench(
             on_way=None if trial.on_way is None else trial.on_way(),
             trust=trust,
         )
-        run = coupling.run(trial.duration, STEP, SIGNALS, ROWS_EVERY)
+        run = coupling.run(trial.duration, STEP, SIGNALS, ROWS_EVERY, progress=watch)
         found.append(judge(trial, run))
         _refuse_changed(controller, kept)
         if progress is not None:

@@ -27,6 +27,7 @@ from percussion_model.interface.commands.paper import paper
 from percussion_model.interface.commands.scene import explain, new, plot, run, settled
 from percussion_model.interface.commands.stability import stability
 from percussion_model.interface.commands.study import study
+from percussion_model.interface.messages import usage_text
 from percussion_model.interface.progress import lines
 
 app = typer.Typer(
@@ -115,12 +116,14 @@ def _guarded(work: Callable[[], Any]) -> int:
     except Exception as error:
         if type(error).__module__.startswith("percussion_model."):
             return print_message(str(error), BAD_INPUT)
-        # Bad arguments: typer hides the class of its errors, which show themselves.
-        show = getattr(error, "show", None)
-        if show is None:
+        # Bad arguments: typer hides the class of its errors.
+        told = getattr(error, "format_message", None)
+        if told is None:
             raise
-        show()
-        return BAD_INPUT
+        if "\n" in told():  # the help, for no words at all
+            print(told(), file=sys.stderr)
+            return BAD_INPUT
+        return print_message(usage_text(error), BAD_INPUT)
 
 
 if __name__ == "__main__":

@@ -16,6 +16,7 @@ from percussion_model.analysis.fitting import (
     FitError,
     Reading,
 )
+from percussion_model.simulation.files import reason
 
 # SI unit, and units that may stand for it with their factors to it.
 UNITS: dict[str, dict[str, float]] = {
@@ -119,7 +120,7 @@ def _table(path: Path) -> tuple[list[str], list[list[str]], str]:
     try:
         text = path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
-        raise FitError(f"{path}: cannot be read ({error})") from None
+        raise FitError(f"{path}: cannot be read: {reason(error)}") from None
     lines = [line for line in text.splitlines() if line.strip()]
     if not lines:
         raise FitError(f"{path}: is empty")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 import threading
 import time
@@ -12,6 +13,8 @@ from contextlib import contextmanager
 EVERY = 3.0
 # Below this share of the work the time that is left cannot be told.
 EARLY = 0.05
+# Shorter times that are left are no number: they are as long as those between lines [s].
+A_FEW = 3.0
 
 # Takes what is being done, and the share that is done of it; None where that is not known.
 Report = Callable[[str, float | None], None]
@@ -42,18 +45,25 @@ class Lines:
 
     def show(self, text: str, share: float | None) -> None:
         """Take what is done now, and the share that is done since `begin`."""
-        self.told = text, share
+        self.told, self.changed = (text, share), self.clock()
 
     def line(self) -> str:
-        """Time since the start, what is done, its share, and the time that it will still take."""
+        """Time since the start, what is done, its share, and the time that it will still take.
+
+        While work goes on it is never all of it, nor is there nothing left: as long as nothing
+        has changed by now, it may well take once more.
+        """
         now = self.clock()
         text, share = self.told
         parts = [text]
-        if share is not None:
-            parts.append(f"{share:.0%}")
-            if EARLY <= share < 1.0:
+        if share is not None and share >= 1.0:
+            parts.append("finishing")
+        elif share is not None:
+            parts.append(f"{math.floor(100.0 * share)}%")
+            if share >= EARLY:
                 left = (now - self.begun) * (1.0 - share) / share
-                parts.append(f"about {left:.0f} s left")
+                left = max(left, now - self.changed)
+                parts.append(f"about {left:.0f} s left" if left > A_FEW else "a few s left")
         return f"{now - self.started:4.0f} s: {', '.join(parts)}"
 
 
@@ -68,12 +78,12 @@ def lines(text: str) -> Iterator[Report]:
     """
     if _running:
         (outer,) = _running
-        before = outer.told, outer.begun
+        before = outer.told, outer.begun, outer.changed
         outer.begin(text)
         try:
             yield outer.show
         finally:
-            outer.told, outer.begun = before
+            outer.told, outer.begun, outer.changed = before
         return
     own = Lines(text)
     over = threading.Event()

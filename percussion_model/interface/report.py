@@ -25,7 +25,12 @@ from percussion_model.simulation.uncertain import (
     MOST_DIGITS,
     SMALL_ERROR,
     SMALLEST_UNIT,
+    SURE_DIGITS,
+    UNSURE_DIGITS,
+    depends_on_cells,
+    in_digits,
     known_error,
+    of_the_cells,
     rate_text,
     scaled,
     with_error,
@@ -62,6 +67,10 @@ HEADLINES: tuple[tuple[str, str, str, str, float], ...] = (
     ("mean_contact_force", "Mean contact force", "N", "kN", 1e3),
 )
 
+# Those that are errors themselves; below this they are rounding [SI].
+ERRORS = ("rate_of_penetration_standard_error", "rate_of_penetration_relative_error")
+ROUNDING = 1e-9
+
 # Cards: key of the summary, factor, unit, name.
 CARDS = (
     ("blow_frequency", 1.0, "Hz", "blow frequency"),
@@ -69,8 +78,6 @@ CARDS = (
     ("transfer_efficiency", 100.0, "%", "of it given to the rock"),
     ("penetration_per_blow", 1e3, "mm", "penetration per blow"),
 )
-# Greater numbers are written with an exponent.
-LARGEST_PLAIN = 1e8
 
 # Entries of the ledger in the order of the balance: initial + work = the rest.
 LEDGER: tuple[tuple[str, tuple[tuple[str, str], ...]], ...] = (
@@ -219,31 +226,55 @@ def headline_rows(summary: dict[str, Any]) -> list[tuple[str, str, str]]:
         value = summary.get(key)
         if value is None:
             continue
+        if key in ERRORS:
+            rows.append((name, _error(value, 1.0, unit), _error(value, factor, other)))
+            continue
+        if depends_on_cells(summary, key):
+            here = f"{of_the_cells(value)} {unit}", f"{of_the_cells(value / factor)} {other}"
+            rows.append((name, *here))
+            continue
         error = known_error(summary, key)
-        si = f"{_digits(value, 5, error, SMALLEST_UNIT)} {unit}".removesuffix(" –")
+        # what is exact to its error has all digits, where that of means is of scatter alone
+        digits = UNSURE_DIGITS if summary.get(f"{key}_error") is None else SURE_DIGITS
+        si = f"{_digits(value, digits, error, SMALLEST_UNIT)} {unit}".removesuffix(" –")
         everyday = ""
         if other not in ("", unit):
-            shown = _digits(value / factor, 4, scaled(1.0 / factor, error), MOST_DIGITS)
+            shown = _digits(value / factor, digits, scaled(1.0 / factor, error), MOST_DIGITS)
             everyday = f"{shown} {other}"
         rows.append((name, si, everyday))
     return rows
 
 
+def _error(value: float, factor: float, unit: str) -> str:
+    """Write an error with two digits; of rounding only that it is no more."""
+    small = value < ROUNDING
+    least = f"{ROUNDING / factor:.0e}".replace("e-0", "e-")
+    text = f"below {least}" if small else in_digits(value / factor, 2)
+    return f"{text} {unit}".removesuffix(" –")
+
+
 def mean_cards(summary: dict[str, Any]) -> list[tuple[str, str]]:
     """Number with its unit, and name, of the cards beside that of the rate."""
     return [
-        (f"{_digits(factor * summary[key], 4, scaled(factor, error), MOST_DIGITS)} {unit}", name)
+        (f"{_card(summary, key, factor)} {unit}", name)
         for key, factor, unit, name in CARDS
         if summary[key] is not None
-        for error in [known_error(summary, key)]
     ]
 
 
+def _card(summary: dict[str, Any], key: str, factor: float) -> str:
+    """Write the number of a card."""
+    value, error = factor * summary[key], scaled(factor, known_error(summary, key))
+    if depends_on_cells(summary, key):
+        return of_the_cells(value)
+    return _digits(value, UNSURE_DIGITS, error, MOST_DIGITS)
+
+
 def _digits(value: float, count: int, error: float | None, most_digits: int) -> str:
-    """Write a number with its error, or with so many digits; large ones without an exponent."""
+    """Write a number with its error, or with so many digits."""
     if error is not None and error > SMALL_ERROR * abs(value):
         return with_error(value, error, most_digits).replace("-", "−")
-    text = f"{value:.0f}" if 10**count <= abs(value) < LARGEST_PLAIN else f"{value:.{count}g}"
+    text = in_digits(value, count)
     return text.replace("-", "−", 1) if value < 0 else text
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from copy import copy
+from itertools import islice
 from typing import NamedTuple
 
 from rich.console import Console
@@ -19,7 +21,9 @@ class Size(NamedTuple):
     most: int
 
 
-def print_table(table: Table, console: Console | None = None, keys: int = 1) -> None:
+def print_table(
+    table: Table, console: Console | None = None, keys: int = 1, groups: Sequence[int] = ()
+) -> None:
     """Print a table; one that is too wide in blocks of columns, one below the other.
 
     Parameters
@@ -30,11 +34,14 @@ def print_table(table: Table, console: Console | None = None, keys: int = 1) -> 
     console : Console, optional
     keys : int
         So many columns at the left name a row: each block begins with them.
+    groups : sequence of int
+        So many of the other columns belong together, one group after the other, and stay in one
+        block where that is wide enough; those that are left are each by themselves.
     """
     console = console or Console()
     wide = Console(width=ENDLESS)
     sizes = [_size(column, wide) for column in table.columns]
-    for places in _blocks(table, sizes, console.width, keys):
+    for places in _blocks(table, sizes, console.width, keys, groups):
         console.print(_fitted(table, sizes, places, console.width))
 
 
@@ -44,16 +51,26 @@ def _size(column: Column, wide: Console) -> Size:
     return Size(most if column.no_wrap else max(one.minimum for one in found), most)
 
 
-def _blocks(table: Table, sizes: list[Size], width: int, keys: int) -> list[list[int]]:
+def _blocks(
+    table: Table, sizes: list[Size], width: int, keys: int, groups: Sequence[int]
+) -> list[list[int]]:
     """Places of the columns of each block: as many as the width allows, but at least one."""
     names = list(range(keys))
+    rest = iter(range(keys, len(sizes)))
+    parts = [list(islice(rest, count)) for count in groups] + [[place] for place in rest]
     blocks = [names]
-    for place in range(keys, len(sizes)):
-        wider = [*blocks[-1], place]
-        if len(wider) > keys + 1 and _room(table, sizes, wider, width) < 0:
-            blocks.append([*names, place])
-        else:
+    for part in parts:
+        wider = [*blocks[-1], *part]
+        if _room(table, sizes, wider, width) >= 0:
             blocks[-1] = wider
+            continue
+        # a group that is too wide by itself is broken
+        alone = _room(table, sizes, [*names, *part], width) < 0
+        for piece in [[place] for place in part] if alone else [part]:
+            if len(blocks[-1]) > keys:
+                blocks.append([*names, *piece])
+            else:
+                blocks[-1] = [*names, *piece]
     return blocks
 
 

@@ -12,7 +12,9 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
+from rich.text import Text
 
+from percussion_model.interface.messages import wrapped
 from percussion_model.interface.progress import Report, lines
 from percussion_model.interface.tables import print_table
 from percussion_model.simulation.uncertain import (
@@ -77,11 +79,11 @@ def show_summary(result: Result) -> None:
     table.add_column(justify="left")
     rate = rate_text(summary)
     if len(result.blows):
-        table.add_row(RATE[0], rate, RATE[3] + NUMERICAL * ("±" in rate))
+        table.add_row(RATE[0], _in_two_lines(rate), RATE[3] + NUMERICAL * ("±" in rate))
     values = summary if len(result.blows) else summary["fall"]
     for name, key, factor, unit in SHOWN if len(result.blows) else WITHOUT_BLOWS:
         if values.get(key) is not None:
-            text = mean_text(values, key, factor)
+            text = _in_two_lines(mean_text(values, key, factor))
             table.add_row(name, text, (unit + SCATTERED * ("±" in text)).lstrip())
     energy = summary["energy"]
     for key in ("numerical", "residual"):
@@ -109,13 +111,15 @@ def show_settled(found: Settled) -> None:
     """Print the stationary response of a scene."""
     summary = found.summary()
     table = Table(show_header=False)
+    table.add_column(no_wrap=True)
+    table.add_column()
     order = {0: "", 1: ", every blow alike"}.get(found.order, f", {found.order} blows a cycle")
     table.add_row("Motion", f"{found.kind}{order}")
     if summary[RATE[1]] is not None:
         table.add_row(RATE[0], f"{rate_text(summary)} {RATE[3]}{SETTLING}")
     for name, key, factor, unit in (
         ("Blow period", "blow_period", 1e3, "ms"),
-        ("Multiplier of the cycle", "multiplier", 1.0, ""),
+        ("Deviation after a cycle", "multiplier", 1.0, "of what it was"),
     ):
         if summary[key] is not None:
             table.add_row(name, f"{mean_text(summary, key, factor)} {unit}".rstrip())
@@ -143,7 +147,14 @@ def show_study(found: Study) -> None:
 def show_warnings(console: Console, warnings: list[str]) -> None:
     """Print warnings, if there are any."""
     for text in warnings:
-        console.print(f"[yellow]warning:[/yellow] {escape(text)}", highlight=False)
+        show_note(console, "warning", text)
+
+
+def show_note(console: Console, name: str, text: str) -> None:
+    """Print a text behind its name in yellow, in lines that fit."""
+    lines = Text(wrapped(f"{name}: {text}"))
+    lines.stylize("yellow", 0, len(name) + 1)
+    console.print(lines, soft_wrap=True)
 
 
 def _number(value: float | None, factor: float, digits: int = 5) -> str:
@@ -224,7 +235,9 @@ def show_comparison(found: Comparison) -> None:
     summaries, differences = found.summaries(), found.differences()
     errors = found.difference_errors()
     title = found.results[found.first].scene.title
-    table = Table(title=escape(title) or None)
+    table = Table(
+        title=escape(title) or None, box=SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=0
+    )
     table.add_column("")
     for name in summaries:
         table.add_column(name, justify="right", no_wrap=True)
@@ -234,13 +247,15 @@ def show_comparison(found: Comparison) -> None:
         cells = []
         for name, summary in summaries.items():
             if key == RATE[1]:
-                cells.append(rate_text(summary).replace(", ", "\n"))
+                cells.append(_narrow(rate_text(summary)))
             elif summary[key] is None:
                 cells.append("-")
             else:
-                cells.append(mean_text(summary, key, factor))
+                cells.append(_narrow(mean_text(summary, key, factor)))
             if name in differences:
-                cells.append(change_text(differences[name].get(key), errors[name].get(key)))
+                change, error = differences[name].get(key), errors[name].get(key)
+                hidden = change is not None and found.is_of_cells(name, key)
+                cells.append(UNDECIDED if hidden else change_text(change, error))
         table.add_row(f"{label}, {unit}" if unit else label, *cells)
     table.add_section()
     for label, value in _EFFORT.items():
@@ -251,13 +266,24 @@ def show_comparison(found: Comparison) -> None:
             cells += [""] * (name in differences)
         table.add_row(label, *cells)
     console = Console()
-    print_table(table, console)
+    # a solver and its differences stay together
+    print_table(table, console, groups=[1, *[2] * len(differences)])
     console.print(
         "± of the rate is the error of grid and scatter, of other means that of scatter alone; "
         f"a difference within the errors of both numbers is {UNDECIDED}.",
         highlight=False,
     )
     show_warnings(console, found.warnings())
+
+
+def _narrow(text: str) -> str:
+    """A number with its error in few characters, words in a line of their own."""
+    return _in_two_lines(text).replace(" ± ", "±")
+
+
+def _in_two_lines(text: str) -> str:
+    """A number, and in a line of its own the word that stands before or behind it."""
+    return text.replace(", ", "\n")
 
 
 # Cost of a run and closure of its ledger: name, and where in a summary.
@@ -298,17 +324,18 @@ def show_stability(found: Collection) -> None:
 
 def show_statements(statements: list[Statement]) -> None:
     """Print what the paper says beside what was found."""
-    table = Table(show_lines=True)
-    for heading in ("section", "the paper says", "found here", ""):
-        table.add_column(heading, no_wrap=heading in ("section", ""))
+    table = Table(box=None, show_header=False, padding=(0, 1, 0, 0))
+    table.add_column(no_wrap=True)
+    table.add_column()
     for one in statements:
         verdict = "[green]agrees[/green]" if one.agrees else "[yellow]differs[/yellow]"
-        table.add_row(one.place, escape(one.says), escape(one.found), verdict)
-    console = Console()
-    print_table(table, console)
-    for one in statements:
+        table.add_row(verdict, f"[bold]{escape(one.place)}[/bold]")
+        table.add_row("", f"the paper says: {escape(one.says)}")
+        table.add_row("", f"found here: {escape(one.found)}")
         if one.why and not one.agrees:
-            console.print(f"{one.place}: {escape(one.why)}", highlight=False)
+            table.add_row("", f"why: {escape(one.why)}")
+        table.add_row("", "")
+    print_table(table)
 
 
 class RunProgress:
@@ -387,8 +414,10 @@ def progress(text: str) -> Iterator[Report]:
     starter.start()
     try:
         yield lambda text, share: bar.update(
-            task, description=text, completed=share or 0.0, total=None if share is None else 1.0
-        )
+            # where all is done but the end, how long that takes is not known
+            task, description=text, completed=share or 0.0,
+            total=None if share is None or share >= 1.0 else 1.0,
+        )  # fmt: skip
     finally:
         starter.cancel()
         starter.join()

@@ -289,6 +289,11 @@ class Scene:
         return self.effects.loss and self.has_waves and self.loss.time > 0
 
     @property
+    def is_undamped(self) -> bool:
+        """Whether waves run without loss: then the rate of penetration depends on the cells."""
+        return self.has_waves and not self.loss_on
+
+    @property
     def barrier_on(self) -> bool:
         """Whether the rock law has an energy barrier (mode DFC)."""
         wanted = self.effects.barrier and self.effects.rock == "bilinear"

@@ -87,6 +87,15 @@ def staged_text(path: Path, text: str) -> None:
 LARGEST_TEXT, LARGEST_TABLE = 10_000_000, 1_000_000_000
 
 
+def reason(error: Exception) -> str:
+    """Why a file could not be read or written, without the number of the error and its name."""
+    if isinstance(error, FileNotFoundError):
+        return "no such file"
+    if isinstance(error, UnicodeDecodeError):
+        return "not a text file in UTF-8"
+    return (isinstance(error, OSError) and error.strerror) or str(error)
+
+
 def refuse_large(path: Path, largest: int) -> None:
     """Raise `ResultError` for a file that is there, and none or larger than that [bytes]."""
     if path.exists() and not path.is_file():

@@ -28,7 +28,7 @@ from percussion_model.simulation.files import (
 )
 from percussion_model.simulation.origin import ORIGIN
 from percussion_model.simulation.rate import rate_of_blows, ratio_of_sums
-from percussion_model.simulation.uncertain import is_undecided, rate_field
+from percussion_model.simulation.uncertain import BY_CELLS, is_undecided, rate_field
 
 if TYPE_CHECKING:
     import pandas
@@ -152,7 +152,9 @@ class Result:
 
     @property
     def rate_of_penetration_undecided(self) -> bool:
-        """Whether what is known of its error is no smaller than the rate."""
+        """Whether what is known of its error is no smaller than the rate, or it is of the cells."""
+        if self.scene.is_undamped and abs(self.rate_of_penetration) > 0.0:
+            return True
         known = self.rate_of_penetration_error, self.rate_of_penetration_standard_error
         return any(is_undecided(self.rate_of_penetration, error) for error in known)
 
@@ -234,6 +236,7 @@ class Result:
             "rate_of_penetration_relative_error": self.rate_of_penetration_relative_error,
             "rate_of_penetration_error": self.rate_of_penetration_error,
             "rate_of_penetration_undecided": self.rate_of_penetration_undecided,
+            BY_CELLS: self.scene.is_undamped,
             "rate_of_penetration_fixed_window": self.rate_of_penetration_fixed_window,
             "rate_of_penetration_fixed_window_error": self.rate_of_penetration_fixed_window_error,
             "blow_period": period,

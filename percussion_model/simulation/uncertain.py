@@ -8,11 +8,19 @@ from typing import Any
 
 # Digits after the point; smaller errors are not shown.
 MOST_DIGITS = 5
+# Digits of a number whose error is known and does not show in them, and of one of whose
+# error nothing is known: coarse grids are off by some per mille.
+SURE_DIGITS, UNSURE_DIGITS = 5, 3
 # An error below this share of a number does not show in the four digits of a narrow column.
 SMALL_ERROR = 1e-4
 # The same where numbers are in SI units, in which rates are some 1e-2.
 SMALLEST_UNIT = 8
+# Greater numbers are written with an exponent.
+LARGEST_PLAIN = 1e8
 UNDECIDED = "undecided"
+# Numbers that depend on the cells where waves are not damped, and the flag of a summary for it.
+OF_THE_CELLS = ("rate_of_penetration", "rate_of_penetration_fixed_window", "penetration_per_blow")
+BY_CELLS = "rate_of_penetration_depends_on_cells"
 NOT_ESTIMATED = "error not estimated"
 
 
@@ -33,11 +41,21 @@ def with_error(value: float, error: float, most_digits: int = MOST_DIGITS) -> st
     """Return a number and its error, both to the second digit of the error."""
     hidden = is_undecided(value, error)
     if error < 10.0**-most_digits and not hidden:
-        return f"{value:.5g}"
+        return f"{value:.{SURE_DIGITS}g}"
     digits = max(1 - math.floor(math.log10(error)), 0)
     digits = digits if hidden else min(digits, most_digits)
     text = f"{value:.{digits}f} ± {error:.{digits}f}"
     return f"{UNDECIDED}, {text}" if hidden else text
+
+
+def depends_on_cells(summary: Mapping[str, Any], key: str) -> bool:
+    """Whether a number of a summary, if there is any, is one of the cells and of nothing else."""
+    return bool(summary.get(BY_CELLS) and key in OF_THE_CELLS and summary.get(key))
+
+
+def of_the_cells(value: float) -> str:
+    """Return a number that depends on the cells."""
+    return f"{UNDECIDED}, with these cells {in_digits(value)}"
 
 
 def with_short_error(value: float, error: float) -> str:
@@ -102,21 +120,28 @@ def known_error(summary: Mapping[str, Any], key: str) -> float | None:
     return found
 
 
-def mean_text(summary: Mapping[str, Any], key: str, factor: float = 1.0, digits: int = 5) -> str:
+def mean_text(summary: Mapping[str, Any], key: str, factor: float = 1.0) -> str:
     """A number of a summary, with the scatter of the blows where it is a mean and that shows.
 
     Parameters
     ----------
     factor : float
         From SI to the unit that is shown.
-    digits : int
-        Of what has no error that shows.
     """
     value, error = factor * summary[key], known_error(summary, key)
+    if depends_on_cells(summary, key):
+        return of_the_cells(value)
     shown = error is not None and factor * error > SMALL_ERROR * abs(value)
     if shown and error is not None:
         return with_error(value, factor * error, most_digits=SMALLEST_UNIT)
-    return f"{value:.{digits}g}"
+    return in_digits(value)
+
+
+def in_digits(value: float, digits: int = UNSURE_DIGITS) -> str:
+    """Return a number with so many digits; what is large without an exponent: 1020, 595000."""
+    rounded = float(f"{value:.{digits}g}")
+    large = 10**digits <= abs(rounded) < LARGEST_PLAIN
+    return f"{rounded:.0f}" if large else f"{rounded:.{digits}g}"
 
 
 def rate_field(summary: Mapping[str, Any]) -> str:
@@ -139,11 +164,12 @@ def rate_text(summary: Mapping[str, Any], factor: float = 1e3) -> str:
     rate, error = summary["rate_of_penetration"], summary["rate_of_penetration_error"]
     if rate is None:
         return "-"
+    if depends_on_cells(summary, "rate_of_penetration"):
+        return of_the_cells(factor * rate)
     if error is not None:
         return with_error(factor * rate, factor * error)
     scatter = summary.get("rate_of_penetration_standard_error")
-    if scatter is None:
-        return f"{factor * rate:.5g}, {NOT_ESTIMATED}"
     # of the two parts of the error one is known, and may be enough to hide the rate
-    text = with_error(factor * rate, factor * scatter)
-    return f"{text} (scatter alone)" if "±" in text else f"{text}, {NOT_ESTIMATED}"
+    if scatter is not None and "±" in (text := with_error(factor * rate, factor * scatter)):
+        return f"{text} (scatter alone)"
+    return f"{in_digits(factor * rate)}, {NOT_ESTIMATED}"

@@ -39,7 +39,7 @@ def _about_scene(result: Result) -> Iterator[str]:
     scene = result.scene
     if scene.given_in_vain:
         yield unused_note(scene.given_in_vain)
-    if scene.has_waves and not scene.loss_on:
+    if scene.is_undamped:
         if scene.barrier_on:
             yield (
                 "structural loss is off: vibration trapped in the bit keeps its kinetic energy "

@@ -56,7 +56,7 @@ def test_a_crash_has_no_points_and_a_page(feed_control, tmp_path, monkeypatch, c
     with pytest.raises(SystemExit) as ended:
         main()
     assert ended.value.code == 1
-    said = capsys.readouterr().err
+    said = " ".join(capsys.readouterr().err.split())
     assert "rod ended early, at 0.051 s controller: RuntimeError: no idea what to do" in said
     page = (out / "index.html").read_text(encoding="utf-8")
     assert "no idea what to do" in page
@@ -99,8 +99,8 @@ def test_a_bad_controller_fails_visibly(feed_control, tmp_path, monkeypatch, cap
 def test_an_interrupted_bench_keeps_the_runs_that_are_done(
     feed_control, tmp_path, monkeypatch, capsys
 ):
-    def interrupted(system, controller, values, trials, watch, trust):
-        bench(system, controller, values, ["rod"], watch, trust)
+    def interrupted(system, controller, values, trials, take, trust, watch):
+        bench(system, controller, values, ["rod"], take, trust, watch)
         raise KeyboardInterrupt
 
     monkeypatch.setattr("percussion_model.coupling.bench.bench", interrupted)

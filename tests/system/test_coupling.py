@@ -203,7 +203,7 @@ def test_the_command_runs_a_system(feed_control, tmp_path, monkeypatch, capsys):
         main()
     said = capsys.readouterr()
     assert ended.value.code == 0, said.err
-    assert "depth" in said.out
+    assert "Depth of the bit" in said.out
     table = np.genfromtxt(out / "signals.csv", delimiter=",", names=True)
     assert table["time"][-1] == 0.1
     assert (out / "signals.png").stat().st_size > 20_000

@@ -29,10 +29,30 @@ def test_commands_fit(name, feed_control, tmp_path, monkeypatch, capsys):
     printed = Printed(monkeypatch)
     called(name, feed_control)
     said = capsys.readouterr()
-    assert "depth" in said.out + said.err
+    assert "depth" in (said.out + said.err).lower()
     assert faults(said.out) == []
     assert faults(said.err) == []
     assert printed.broken(said.out + said.err) == set()
+
+
+def test_a_table_of_a_bench_is_whole_and_its_runs_are_told_elsewhere(
+    feed_control, tmp_path, monkeypatch, capsys
+):
+    """Lines of progress come by the hundred; none of them stands in the table."""
+    monkeypatch.chdir(tmp_path)
+    lines = []
+    pipe = SimpleNamespace(write=lines.append, flush=lambda: None)
+    monkeypatch.setattr(progress, "sys", SimpleNamespace(stderr=pipe))
+    monkeypatch.setattr(progress, "EVERY", 5e-3)
+    words = ["--trial", "rod", "--trial", "soft", "--out", "out"]
+    _guarded(lambda: app(["bench-controller", "--system", str(feed_control), *words],
+                         standalone_mode=False))  # fmt: skip
+    told = "".join(lines)
+    assert "run 1 of 2, soft, " in told
+    assert "run 2 of 2, rod, " in told
+    rows = capsys.readouterr().out.splitlines()
+    assert [row.split()[0] for row in rows[-4:]] == ["run", "soft", "rod", "total"]
+    assert all(row.startswith(" ") for row in rows[:-4])
 
 
 @pytest.mark.parametrize("name", COMMANDS)

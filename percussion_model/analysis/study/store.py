@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from percussion_model.analysis.study.response import ROW
-from percussion_model.simulation.files import ResultError, load_arrays, staged, to_json
+from percussion_model.simulation.files import ResultError, load_arrays, reason, staged, to_json
 
 PLAN = "study.json"
 PARTS = "parts"
@@ -76,7 +76,7 @@ class Store:
                 rows[part], done[part] = found, True
             except (OSError, ValueError, LookupError, RecursionError) as error:
                 raise ResultError(
-                    f"{path}: cannot be read ({error}): delete it, and its points run again"
+                    f"{path}: cannot be read ({reason(error)}): delete it, and its points run again"
                 ) from None
             for k, text in zip(part.tolist(), words, strict=True):
                 failures[k] = text

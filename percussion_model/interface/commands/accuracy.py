@@ -104,14 +104,16 @@ def _draw(found: Study, folder: Path) -> list[Path]:
         draw_quantities,
     )
     from percussion_model.interface.plotting.style import save_figures
+    from percussion_model.interface.terminal import progress
 
-    return save_figures(
-        lambda: [
-            ("accuracy", draw_accuracy(found)),
-            ("accuracy_quantities", draw_quantities(found)),
-        ],
-        folder,
-    )
+    with progress("drawing the figures"):
+        return save_figures(
+            lambda: [
+                ("accuracy", draw_accuracy(found)),
+                ("accuracy_quantities", draw_quantities(found)),
+            ],
+            folder,
+        )
 
 
 def _make_reference(scene: Scene) -> Any:

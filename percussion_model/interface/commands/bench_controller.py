@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib.util
-import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -56,6 +55,8 @@ def bench_controller(
     force: common.Force = False,
 ) -> int:
     """Put a controller of feed and pressure through standard runs: scores, figures, a page."""
+    from percussion_model.interface.terminal import progress, progress_bar
+
     try:
         from percussion_model.coupling.bench import bench, total
     except ImportError as error:
@@ -71,14 +72,9 @@ def bench_controller(
     scores: list[Score] = []
     interrupted = False
 
-    def take(score: Score) -> None:
-        scores.append(score)
-        _show(score)
-
-    for line in _heading():
-        print(line, file=sys.stderr)
     try:
-        bench(system, _load(controller), values, trials or (), take, trust)
+        with progress_bar(0.0) as bar:
+            bench(system, _load(controller), values, trials or (), scores.append, trust, watch=bar)
     except KeyboardInterrupt:
         if not scores:
             raise
@@ -89,21 +85,36 @@ def bench_controller(
         for s in scores
     ]
     common.write_json(json_file, {"points": points, "trials": listed})
-    print(f"{'total':10s} {points:6.1f}", file=sys.stderr)
+    if json_file != "-":
+        for line in _table(scores, points):
+            typer.echo(line)
+    for score in scores:
+        for fault in score.faults:
+            common.print_message(f"{score.trial} {'' if score.error else 'failed: '}{fault}")
     try:
         from percussion_model.interface.bench_page import write_bench_page
     except ImportError as error:
         common.print_message(common.needs_plot_extra(error))
     else:
         title = controller or system.stem
-        page = write_bench_page(scores, points, COLUMNS, claimed.folder, title)
+        with progress("drawing the page"):
+            page = write_bench_page(scores, points, COLUMNS, claimed.folder, title)
         claimed.sign()
-        print(page, file=sys.stderr)
+        common.list_files([page])
     if interrupted:
         return common.print_message(
             f"interrupted: the page has the {len(scores)} runs that were done", common.INTERRUPTED
         )
     return 1 if any(score.faults for score in scores) else 0
+
+
+def _table(scores: Sequence[Score], points: float) -> list[str]:
+    """Lines of the table: heading, runs, total."""
+    lines = _heading()
+    for score in scores:
+        numbers = [_short(factor * score.numbers[name]) for name, _, factor, _ in COLUMNS]
+        lines.append(f"{score.trial:{NAME}s}{score.points:{POINTS}.1f}{_cells(numbers)}")
+    return [*lines, f"{'total':{NAME}s}{points:{POINTS}.1f}"]
 
 
 def _heading() -> list[str]:
@@ -122,15 +133,6 @@ def _cells(texts: Sequence[str]) -> str:
     """Right-aligned texts, each as wide as the longest word of its heading, and a space."""
     widths = (max(map(len, head.split())) + 1 for _, head, _, _ in COLUMNS)
     return "".join(f"{text:>{width}s}" for text, width in zip(texts, widths, strict=True))
-
-
-def _show(score: Score) -> None:
-    """One line for a run, and why it has failed."""
-    numbers = [_short(factor * score.numbers[name]) for name, _, factor, _ in COLUMNS]
-    line = f"{score.trial:{NAME}s}{score.points:{POINTS}.1f}{_cells(numbers)}"
-    print(line, file=sys.stderr, flush=True)
-    for fault in score.faults:
-        common.print_message(f"{score.trial} {'' if score.error else 'failed: '}{fault}")
 
 
 def _short(value: float) -> str:

@@ -5,9 +5,7 @@ from __future__ import annotations
 import gc
 import hashlib
 import os
-import shutil
 import sys
-import textwrap
 import tomllib
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -15,6 +13,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
+
+from percussion_model.interface.messages import wrapped
 
 if TYPE_CHECKING:
     from percussion_model.scene.scene import Scene
@@ -252,12 +252,7 @@ def list_files(paths: Iterable[Path]) -> None:
             for name in names:
                 print(f"wrote {folder / name}", file=sys.stderr)
             continue
-        text = f"wrote to {folder}{os.sep}: {', '.join(names)}"
-        shown = textwrap.wrap(
-            text, shutil.get_terminal_size().columns, subsequent_indent="  ",
-            break_long_words=False, break_on_hyphens=False,
-        )  # fmt: skip
-        print(*shown, sep="\n", file=sys.stderr)
+        print(wrapped(f"wrote to {folder}{os.sep}: {', '.join(names)}"), file=sys.stderr)
 
 
 def needs_plot_extra(error: ImportError) -> str:
@@ -276,6 +271,10 @@ def refusal(message: str) -> typer.Exit:
 
 
 def print_message(message: str, code: int = 0) -> int:
-    """Print one message on stderr; return the exit code."""
-    print(f"percussion: {message}", file=sys.stderr)
+    """Print one message on stderr; return the exit code.
+
+    What refuses bad input is one line, for scripts; others are broken to fit.
+    """
+    text = f"percussion: {message}"
+    print(text if code == BAD_INPUT else wrapped(text), file=sys.stderr)
     return code

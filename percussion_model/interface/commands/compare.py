@@ -27,7 +27,7 @@ def compare(
     """Run a scene with several solvers: a table, and a figure in out/SCENE-compared."""
     from percussion_model.analysis.comparison import compare as run_all
     from percussion_model.analysis.comparison import read_solvers
-    from percussion_model.interface.terminal import progress_bar, show_comparison
+    from percussion_model.interface.terminal import progress, progress_bar, show_comparison
 
     names = read_solvers(solvers)
     chosen = common.load_scene(scene, settings=settings)
@@ -41,8 +41,8 @@ def compare(
         ready_map(chosen)
     common.tell_of_compiling(*(name for name in names if name != chosen.solver_name))
     end = chosen.run.duration if duration is None else duration
-    with progress_bar(end * len(names)) as progress:
-        found = run_all(chosen, names, duration, settle, progress)
+    with progress_bar(end * len(names)) as bar:
+        found = run_all(chosen, names, duration, settle, bar)
     common.write_json(json_file, found.to_dict())
     if json_file != "-":
         show_comparison(found)
@@ -51,6 +51,9 @@ def compare(
             from percussion_model.interface.plotting.compared_blows import draw_comparison
             from percussion_model.interface.plotting.style import save_figures
 
-            files = save_figures(lambda: [("comparison", draw_comparison(found))], claimed.folder)
+            with progress("drawing the figure"):
+                files = save_figures(
+                    lambda: [("comparison", draw_comparison(found))], claimed.folder
+                )
             claimed.sign()
             common.list_files(files)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import textwrap
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -10,23 +9,31 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from percussion_model.interface.commands import common
-from percussion_model.simulation.uncertain import NOT_ESTIMATED, with_error
+from percussion_model.simulation.uncertain import NOT_ESTIMATED, in_digits, with_error
 
 if TYPE_CHECKING:
     from percussion_model.coupling.verdict import Verdict
 
 SystemFile = Annotated[Path, typer.Argument(metavar="SYSTEM.ssp", help="A system (SSP 1.0).")]
 RATE = "rate_second_half"
-UNITS = {
-    "time": "s", "step": "s", "depth": "m", RATE: "mm/s", "shoulder_energy": "J",
-    "feed_work": "J", "hammer_energy_residual": "of the energy put in",
-    "string_energy_residual": "of the energy put in or there", "shoulder_by_blows": "of the blows",
-}  # fmt: skip
+# Numbers of a summary as they are shown: key, name, factor, unit.
+SHOWN = (
+    ("time", "Simulated", 1.0, "s"),
+    ("step", "Communication step", 1e3, "ms"),
+    ("steps", "Steps", 1, ""),
+    ("depth", "Depth of the bit", 1e3, "mm"),
+    (RATE, "Rate in the second half", 1e3, "mm/s"),
+    ("hammer_energy_residual", "Hammer: energy unexplained", 1.0, "of the energy put in"),
+    ("string_energy_residual", "String: energy unexplained", 1.0, "of the energy put in or there"),
+    ("shoulder_energy", "Energy taken by the shoulder", 1.0, "J"),
+    ("feed_work", "Work of the feed on the bit", 1.0, "J"),
+    ("shoulder_by_blows", "Share taken by the shoulder", 1.0, "of the energy of the blows"),
+)
+# Those that are given, and have all their digits.
+GIVEN = ("time", "step", "steps")
 # Rows of a run without --interval.
 ROWS = 5000
 FAILED = 1
-# Characters of a line, less the name of the command before it.
-WIDTH = 68
 
 
 def couple(
@@ -66,7 +73,7 @@ def couple(
     Ends with 1 where the energies do not balance or the step is too long. Files go to
     out/SYSTEM.
     """
-    from percussion_model.interface.terminal import progress_bar
+    from percussion_model.interface.terminal import progress, progress_bar
 
     try:
         from percussion_model.coupling import Coupling
@@ -89,10 +96,8 @@ def couple(
     folder = claimed.folder
     wanted = [*known_signals(coupling.outputs), *(signals or ())]
     rows_every = max(step, duration / ROWS) if interval is None else interval
-    with progress_bar(duration) as progress:
-        run = coupling.run(
-            duration, step, wanted, rows_every, tolerance, progress, on_interrupt="keep"
-        )
+    with progress_bar(duration) as bar:
+        run = coupling.run(duration, step, wanted, rows_every, tolerance, bar, on_interrupt="keep")
     found = summary(run)
     path = run.write_csv(folder / "signals.csv")
     common.write_json(json_file, found)
@@ -104,39 +109,32 @@ def couple(
         with common.if_drawable():
             from percussion_model.interface.plotting.coupled_signals import save_signals
 
-            common.list_files([save_signals(run, folder / "signals.png", system.stem)])
+            with progress("drawing the figure"):
+                figure = save_signals(run, folder / "signals.png", system.stem)
+            common.list_files([figure])
     claimed.sign()
     return _tell(run.verdict, common.INTERRUPTED if run.interrupted else FAILED)
 
 
-# Told at the end, or beside the rate.
-ELSEWHERE = ("error", "verdict", f"{RATE}_error", f"{RATE}_undecided")
-
-
 def _lines(found: Mapping[str, Any]) -> Iterator[str]:
     """Lines of a summary: names, numbers and units."""
-    for name, value in found.items():
-        if name in ELSEWHERE:
+    for key, name, factor, unit in SHOWN:
+        if key not in found:
             continue
-        number = f"{value:.6g}" if isinstance(value, float) else value
-        if name == RATE:
-            error = found[f"{RATE}_error"]
-            known = error is not None
-            number = with_error(1e3 * value, 1e3 * error) if known else f"{1e3 * value:.5g}"
-            number += "" if known else f", {NOT_ESTIMATED}"
-        yield f"{name:26s} {number} {UNITS.get(name, '')}".rstrip()
+        value, error = factor * found[key], found.get(f"{key}_error")
+        number = f"{value:.6g}" if key in GIVEN else in_digits(value)
+        if error is not None:
+            number = with_error(value, factor * error)
+        elif key == RATE:
+            number += f", {NOT_ESTIMATED}"
+        yield f"{name:29s} {number} {unit}".rstrip()
 
 
 def _tell(verdict: Verdict, code: int) -> int:
-    """Say the verdict, in lines that fit; return the exit code."""
+    """Say the verdict; return the exit code."""
     for remark in verdict.remarks:
-        common.print_message(_wrapped(remark))
-    return common.print_message(_wrapped(verdict.text), code if verdict.is_bad else 0)
-
-
-def _wrapped(text: str) -> str:
-    """Lines of a message."""
-    return textwrap.fill(text, WIDTH, subsequent_indent="  ", break_on_hyphens=False)
+        common.print_message(remark)
+    return common.print_message(verdict.text, code if verdict.is_bad else 0)
 
 
 def read_value(text: str) -> tuple[str, float | bool | str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -52,13 +53,16 @@ def effects(
             from percussion_model.interface.plotting.effect_bars import draw_effects
             from percussion_model.interface.plotting.style import save_figures
 
-            files = save_figures(lambda: [("effects", draw_effects(found))], claimed.folder)
+            with progress("drawing the figure"):
+                files = save_figures(lambda: [("effects", draw_effects(found))], claimed.folder)
             claimed.sign()
             common.list_files(files)
 
 
-# A longer name of an effect takes two lines.
-LONGEST_NAME = 15
+# A longer name of an effect takes several lines.
+LONGEST_NAME = 14
+# Behind a step that turning an effect off made dearer.
+DEARER = "*"
 
 RATE = "rate_of_penetration"
 # A standard error below this share of a rate is not shown.
@@ -67,10 +71,10 @@ LEAST_ERROR = 1e-3
 # Columns: heading, and what stands in it.
 _COLUMNS: dict[str, Callable[[EffectsStudy, Trial, dict[str, Any]], str]] = {
     "step\nns": lambda study, trial, row: (
-        _number(row["step_time"], 1e9, 3) + (" dearer" if study.is_costlier(trial) else "")
+        _number(row["step_time"], 1e9, 3) + DEARER * study.is_costlier(trial)
     ),
-    "run\ns": lambda study, trial, row: _number(row["wall_time"], 1.0, 2),
-    "blow\nms": lambda study, trial, row: _number(row["blow_time"], 1e3, 2),
+    "run\nms": lambda study, trial, row: _number(row["wall_time"], 1e3, 2),
+    "blow\nµs": lambda study, trial, row: _number(row["blow_time"], 1e6, 2),
     "events": lambda study, trial, row: f"{row['events']}",
     "rate\nmm/s": lambda study, trial, row: _rate(row),
     "rate\n%": lambda study, trial, row: _change(study, trial, RATE),
@@ -99,6 +103,7 @@ def show_effects(found: EffectsStudy) -> None:
     from rich.table import Table
 
     from percussion_model.interface.tables import print_table
+    from percussion_model.interface.terminal import show_note
 
     headings, rows, reasons = table_of(found)
     table = Table(
@@ -106,17 +111,20 @@ def show_effects(found: EffectsStudy) -> None:
         title_justify="left",
         box=SIMPLE_HEAD,
         show_edge=False,
-        padding=(0, 1, 0, 0),
+        pad_edge=False,
+        padding=0,
     )
     for k, heading in enumerate(headings):
         table.add_column(heading, justify="right" if k else "left", no_wrap=True)
     for name, *cells in rows:
-        table.add_row(_two_lines(name), *cells)
+        table.add_row(_in_lines(name), *cells)
     console = Console()
     print_table(table, console)
+    if any(map(found.is_costlier, found.trials)):
+        show_note(console, DEARER, "turning the effect off made a time step dearer")
     for reason in dict.fromkeys(reasons.values()):
         names = ", ".join(name for name, given in reasons.items() if given == reason)
-        console.print(f"[yellow]{escape(names)}:[/yellow] {escape(reason)}", highlight=False)
+        show_note(console, names, reason)
 
 
 def _rate(row: dict[str, Any]) -> str:
@@ -124,13 +132,14 @@ def _rate(row: dict[str, Any]) -> str:
     value, error = row["rate_of_penetration"], row["rate_of_penetration_standard_error"]
     if value is None or error is None:
         return "-"
+    if row["rate_of_penetration_undecided"]:
+        return UNDECIDED
     return in_few_characters(1e3 * value, 1e3 * error, LEAST_ERROR)
 
 
-def _two_lines(name: str) -> str:
-    """Two lines of a long name."""
-    first, _, last = name.partition(" ")
-    return f"{first}\n  {last}" if len(name) > LONGEST_NAME else name
+def _in_lines(name: str) -> str:
+    """Lines of a long name."""
+    return textwrap.fill(name, LONGEST_NAME, subsequent_indent="  ", break_long_words=False)
 
 
 def _number(value: float | None, factor: float, digits: int) -> str:

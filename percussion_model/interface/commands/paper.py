@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -47,31 +48,41 @@ def paper(
         raise common.refusal(common.needs_plot_extra(error)) from None
     from percussion_model.analysis.comparison import compare
     from percussion_model.verification.paper.rock_law import run_sinking
-    from percussion_model.verification.paper.runs import paper_scene, run_drops
+    from percussion_model.verification.paper.runs import SWEEPS, paper_scene, run_drops
 
     common.tell_of_compiling("wave", "fem", "rigid")
     scene = paper_scene()
     claimed = common.claim("paper", out, None, force, scene=scene)
-    with progress("drop tests and sinking, figure 6"):
+    part = _parts(4 + len(SWEEPS))
+    with progress(f"{next(part)}, drop tests and sinking, figure 6"):
         drops, sinking = run_drops(scene), run_sinking(scene)
-    sweeps = _sweeps(out, processes)
-    with progress_bar(2 * scene.run.duration) as report:
-        both = compare(scene, ("wave", "fem"), progress=report)
+    sweeps = _sweeps(out, processes, part)
+    with progress_bar(2 * scene.run.duration) as bar:
+        bar.stage(f"{next(part)}, figures 7 and 8", bar.end)
+        both = compare(scene, ("wave", "fem"), progress=bar)
     windows = {name: last_blow_window(result) for name, result in both.results.items()}
 
-    def figures() -> Iterator[tuple[str, Figure]]:
-        yield "figures4and7", draw_force(windows["wave"])
-        yield "sinking", draw_sinking(sinking)
-        yield "figure6", draw_drops(drops)
-        yield "figures7and8", draw_comparison(both)
-        for name, window in windows.items():
-            yield f"figure7_{name}", draw_motion(window)
-            yield f"figure8_{name}", draw_activation(window)
-        yield "figure9", draw_sweeps(sweeps)
-        yield "scaling", draw_scaling(sweeps["d"])
-
-    save_figures(figures, out)
-    statements = list(_statements(scene, drops, sinking, both, windows, sweeps))
+    figures: dict[str, Callable[[], Figure]] = {
+        "figures4and7": lambda: draw_force(windows["wave"]),
+        "sinking": lambda: draw_sinking(sinking),
+        "figure6": lambda: draw_drops(drops),
+        "figures7and8": lambda: draw_comparison(both),
+    }
+    for name, window in windows.items():
+        figures[f"figure7_{name}"] = partial(draw_motion, window)
+        figures[f"figure8_{name}"] = partial(draw_activation, window)
+    figures |= {
+        "figure9": lambda: draw_sweeps(sweeps),
+        "scaling": lambda: draw_scaling(sweeps["d"]),
+    }
+    here = next(part)
+    with progress(f"{here}, drawing") as report:
+        save_figures(
+            lambda: ((name, draw()) for name, draw in figures.items()), out, names=list(figures),
+            report=lambda text, share: report(f"{here}, {text}", share),
+        )  # fmt: skip
+    with progress(f"{next(part)}, statements of the paper"):
+        statements = list(_statements(scene, drops, sinking, both, windows, sweeps))
     tree = {"statements": [one.to_dict() for one in statements]}
     common.write_json(json_file, tree)
     common.write_json(str(out / "statements.json"), tree)
@@ -106,14 +117,20 @@ def _statements(
     yield from section_4.about_sweeps(sweeps)
 
 
-def _sweeps(out: Path, processes: int | None) -> dict[str, Study]:
+def _parts(count: int) -> Iterator[str]:
+    """Names of the parts of the work, one after the other."""
+    return (f"part {k} of {count}" for k in range(1, count + 1))
+
+
+def _sweeps(out: Path, processes: int | None, part: Iterator[str]) -> dict[str, Study]:
     from percussion_model.interface.terminal import count_bar
     from percussion_model.verification.paper.runs import SWEEPS, paper_scene, run_sweep
 
     found = {}
     for sweep in SWEEPS:
-        with count_bar(f"points of figure 9{sweep.name}") as progress:
+        name = sweep.name.replace("_", ", ")
+        with count_bar(f"points of figure 9{name}, {next(part)}") as progress:
             folder = out / f"figure9{sweep.name}"
             found[sweep.name] = run_sweep(paper_scene(), sweep, folder, processes, progress)
-        found[sweep.name].save(folder)
+            found[sweep.name].save(folder)
     return found

@@ -11,6 +11,7 @@ from percussion_model.interface.commands import common
 from percussion_model.interface.commands.blow_map import ready_map, warn_of_outside
 
 if TYPE_CHECKING:
+    from percussion_model.interface.progress import Report
     from percussion_model.scene.scene import Scene
     from percussion_model.simulation.result import Result
 
@@ -69,8 +70,8 @@ def run(
         files += result.save(claimed.folder)
         claimed.sign()
         if figures and not result.cut_short:
-            with terminal.progress("drawing"):
-                files += _draw(result, claimed.folder)
+            with terminal.progress("drawing") as report:
+                files += _draw(result, claimed.folder, report)
             claimed.sign()
     if json_file != "-":
         terminal.show_summary(result)
@@ -147,7 +148,7 @@ def plot(
     force: common.Force = False,
 ) -> None:
     """Draw the figures of a result, or run a scene and draw them."""
-    from percussion_model.interface.terminal import progress_bar
+    from percussion_model.interface.terminal import progress, progress_bar
     from percussion_model.scene.scene import Scene
     from percussion_model.simulation.result import Result
     from percussion_model.simulation.simulate import simulate
@@ -173,9 +174,11 @@ def plot(
         made_from = _made_from(scene, duration, settle)
         # its figures belong to the result of that run, and may stand beside it
         claimed = common.claim("run", out, Path("out") / source.stem, force, **made_from)
-        with progress_bar(scene.run.duration if duration is None else duration) as progress:
-            result = simulate(scene, duration, settle, progress=progress, stage=progress.stage)
-    for path in figures(result, (out or source) if claimed is None else claimed.folder):
+        with progress_bar(scene.run.duration if duration is None else duration) as bar:
+            result = simulate(scene, duration, settle, progress=bar, stage=bar.stage)
+    with progress("drawing") as report:
+        files = figures(result, (out or source) if claimed is None else claimed.folder, report)
+    for path in files:
         typer.echo(str(path))
     if claimed is not None:
         claimed.sign()
@@ -202,7 +205,7 @@ def _made_from(scene: Scene, duration: float | None, settle: float | None) -> di
     }
 
 
-def _draw(result: Result, folder: Path) -> list[Path]:
+def _draw(result: Result, folder: Path, report: Report) -> list[Path]:
     """Write figures and report; the results are safe already."""
     files: list[Path] = []
     with common.if_drawable():
@@ -211,6 +214,7 @@ def _draw(result: Result, folder: Path) -> list[Path]:
 
         if remark := why_not_interactive():
             common.print_message(remark)
-        files += figures(result, folder)
+        files += figures(result, folder, report)
+        report("writing the report", None)
         files.append(write_report(result, folder, files))
     return files

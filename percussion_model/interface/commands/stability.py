@@ -61,6 +61,7 @@ def stability(
 
 def _write(found: Collection, folder: Path) -> None:
     """Write the page and its figure into a folder."""
+    from percussion_model.interface.terminal import progress
     from percussion_model.simulation.files import staged_text
     from percussion_model.verification.hard_cases.stability_page import page
 
@@ -69,9 +70,10 @@ def _write(found: Collection, folder: Path) -> None:
         from percussion_model.interface.plotting.stability_map import draw_stability
         from percussion_model.interface.plotting.style import save_figures
 
-        save_figures(
-            lambda: [("stability", draw_stability(found))], folder / "images", kinds=("png",)
-        )
+        with progress("drawing the figure"):
+            save_figures(
+                lambda: [("stability", draw_stability(found))], folder / "images", kinds=("png",)
+            )
         picture = "images/stability.png"
     staged_text(folder / "stability.md", page(found, picture))
     common.list_files([folder / "stability.md"])

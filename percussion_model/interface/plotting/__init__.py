@@ -18,6 +18,7 @@ from percussion_model.interface.plotting.window import (
     last_blow_window,
     stress_fields,
 )
+from percussion_model.interface.progress import Report
 from percussion_model.simulation.result import Result
 
 __all__ = ["CAPTIONS", "draw_figures", "figures"]
@@ -48,7 +49,7 @@ CAPTIONS = {
 FEWEST_BLOWS = 2
 
 
-def figures(result: Result, folder: str | Path) -> list[Path]:
+def figures(result: Result, folder: str | Path, report: Report | None = None) -> list[Path]:
     """Draw all figures that a result supports, each as PNG and as SVG.
 
     Parameters
@@ -56,13 +57,25 @@ def figures(result: Result, folder: str | Path) -> list[Path]:
     result : Result
     folder : str or Path
         Made if it is not there; all figures are written, or none.
+    report : callable, optional
+        Is told which figure is drawn, and the share that is done.
 
     Returns
     -------
     list of Path
         The files, in the order of `CAPTIONS`, PNG before SVG.
     """
-    return save_figures(lambda: draw_figures(result), folder)
+    return save_figures(lambda: draw_figures(result), folder, names=_names(result), report=report)
+
+
+def _names(result: Result) -> list[str]:
+    """Names of the figures that a result supports, of one that can be run again."""
+    lacking = {
+        "overview": len(result.blows) < FEWEST_BLOWS,
+        "activation": result.scene.piston.model == "absent",
+        "stress_waves": not result.cells,
+    }
+    return [name for name in CAPTIONS if not lacking.get(name)]
 
 
 def draw_figures(result: Result) -> Iterator[tuple[str, Figure]]:

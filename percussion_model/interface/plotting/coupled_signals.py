@@ -3,46 +3,71 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import NamedTuple
 
 from matplotlib.figure import Figure
 
 from percussion_model.coupling.coupled_run import CoupledRun
 from percussion_model.interface.plotting.style import save_png
 
-# Label, factor, signals; a panel is drawn where the run has one of its signals.
+
+class Panel(NamedTuple):
+    """What a panel shows: its title, unit, SI units in one of those, and names of its signals."""
+
+    title: str
+    unit: str
+    factor: float
+    signals: dict[str, str]
+
+
+MODE = "controller.mode"
+# A panel is drawn where the run has one of its signals.
 PANELS = (
-    ("K_R [kN/mm]", 1e-6, ("rock.loading_stiffness",)),
-    ("bit [mm]", 1e3, ("hammer.bit.position",)),
-    ("rate of a blow [mm/s]", 1e3, ("hammer.rate_of_penetration",)),
-    ("feed force [kN]", 1e-3, ("string.feed_force_mean", "controller.feed_wanted")),
-    ("rig force [kN]", 1e-3, ("rig.force", "controller.force_command")),
-    ("pressure [bar]", 1e-5, ("supply.supply_pressure", "controller.pressure_command")),
-    ("mode", 1.0, ("controller.mode",)),
-)
-MODES = ("drilling", "void", "retract")  # of the controller, by number
+    Panel("Stiffness of the rock under the bit (loading stiffness $K_R$)", "kN/mm", 1e-6,
+          {"rock.loading_stiffness": ""}),
+    Panel("Depth of the bit", "mm", 1e3, {"hammer.bit.position": ""}),
+    Panel("Rate of penetration by the last blow", "mm/s", 1e3,
+          {"hammer.rate_of_penetration": ""}),
+    Panel("Feed force on the bit", "kN", 1e-3,
+          {"string.feed_force_mean": "filtered", "controller.feed_wanted": "wanted"}),
+    Panel("Force of the rig on the head of the string", "kN", 1e-3,
+          {"rig.force": "as it is", "controller.force_command": "asked for"}),
+    Panel("Pressure of the supply", "bar", 1e-5,
+          {"supply.supply_pressure": "as it is",
+           "controller.pressure_command": "asked for"}),
+    Panel("What the controller does", "", 1.0, {MODE: ""}),
+)  # fmt: skip
+# By the number of its mode.
+MODES = ("drills", "in a void", "retracts")
 
 
 def save_signals(run: CoupledRun, path: Path, title: str) -> Path:
     """Draw what a drilling system has of the usual signals; return the PNG file."""
-    panels = [
-        (label, factor, [name for name in names if name in run.columns])
-        for label, factor, names in PANELS
-    ]
-    panels = [panel for panel in panels if panel[2]] or [("", 1.0, list(run.columns)[1:5])]
-    figure = Figure(figsize=(8.0, 1.0 + 1.5 * len(panels)))
+    return save_png(draw_signals(run, title), path, dpi=110)
+
+
+def draw_signals(run: CoupledRun, title: str) -> Figure:
+    """Draw a panel for each of the usual signals, or the first four of a system that has none."""
+    kept = set(run.columns)
+    panels = [panel for panel in PANELS if kept & set(panel.signals)]
+    if not panels:
+        panels = [Panel("", "", 1.0, dict.fromkeys(list(run.columns)[1:5], "signal"))]
+    figure = Figure(figsize=(8.0, 1.0 + 1.7 * len(panels)))
     axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)
-    for ax, (label, factor, names) in zip(axes[:, 0], panels, strict=True):
+    for ax, panel in zip(axes[:, 0], panels, strict=True):
+        names = [name for name in panel.signals if name in kept]
         for name in names:
-            ax.plot(run["time"], factor * run[name], linewidth=1.1, label=name)
-        ax.set_ylabel(label)
-        if names == ["controller.mode"]:
+            label = f"{panel.signals[name]}: {name}"
+            ax.plot(run["time"], panel.factor * run[name], linewidth=1.1, label=label)
+        unit = f" [{panel.unit}]" if panel.unit else ""
+        ax.set_title(panel.title + unit, loc="left", fontsize="medium")
+        if names == [MODE]:
             ax.set_yticks(range(len(MODES)), MODES)
             ax.set_ylim(-0.4, len(MODES) - 0.6)
         ax.grid(alpha=0.3)
-        if len(names) > 1:
+        if any(panel.signals.values()):
             ax.legend(fontsize="small", loc="best")
     axes[-1, 0].set_xlabel("time [s]")
-    axes[0, 0].set_title(title)
-    figure.align_ylabels()
+    figure.suptitle(title)
     figure.tight_layout()
-    return save_png(figure, path, dpi=110)
+    return figure

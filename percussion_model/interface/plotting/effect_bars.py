@@ -7,18 +7,24 @@ import math
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from percussion_model.analysis.effect_study import EffectsStudy
+from percussion_model.analysis.effect_study import EffectsStudy, Trial
 from percussion_model.interface.plotting import style
 from percussion_model.simulation.uncertain import UNDECIDED, change_text, is_undecided
 
+RATE = "rate_of_penetration"
 COST_COLOUR, MORE_COLOUR, LESS_COLOUR = "#0072B2", "#D55E00", "#009E73"
 UNDECIDED_COLOUR = "#DDDDDD"
 # Axes are made for changes up to this [%].
 WIDEST = 60.0
 # Bars beyond this multiple of it have no room for their number, and are cut off.
 UNCUT = 1.4
-# Room beside the longest bar for its number, as a factor on its length.
-ROOM = 1.75
+# Room beside the longest bar for its number, as a factor on its length; what is cut off, and
+# what is undecided, ends before the axis does.
+ROOM, WITHIN = 1.75, 0.92
+# Width of a character by that of half a panel.
+CHARACTER = 0.072
+# An error below this share of a change does not show in its two digits.
+SMALL = 0.01
 # Changes below this are none [%].
 NOTHING = 5e-3
 
@@ -40,13 +46,14 @@ def draw_effects(found: EffectsStudy) -> Figure:
         _costs(ax, values)
         style.label(ax, "by the scene's own", "", f"Cost of {title}")
     for ax, key, title in (
-        (axes[2], "rate_of_penetration", "Rate of penetration"),
+        (axes[2], RATE, "Rate of penetration"),
         (axes[3], "blow_period", "Blow period"),
         (axes[4], "peak_bit_force", "Peak bit force"),
     ):
         errors = [found.change_errors(trial).get(key) for trial in trials]
-        _changes(ax, [found.changes(trial)[key] for trial in trials], errors)
-        style.label(ax, "change [%], hatched: beyond", "", title)
+        hidden = [key == RATE and _is_hidden(found, trial) for trial in trials]
+        _changes(ax, [found.changes(trial)[key] for trial in trials], errors, hidden)
+        style.label(ax, "change [%], hatched: cut off", "", title)
     axes[0].set_yticks(range(len(trials)), names)
     axes[0].invert_yaxis()
     for ax in axes:
@@ -55,6 +62,13 @@ def draw_effects(found: EffectsStudy) -> Figure:
     title = found.scene.title
     style.head(fig, "One effect turned at a time" + (f" — {title}" if title else ""))
     return fig
+
+
+def _is_hidden(found: EffectsStudy, trial: Trial) -> bool:
+    """Whether there are two rates, but their difference is not known."""
+    pair = found.base, trial
+    rates = [one.numbers()[RATE] for one in pair]
+    return None not in rates and any(one.undecided for one in pair)
 
 
 def _costs(ax: Axes, values: list[float | None]) -> None:
@@ -74,33 +88,39 @@ def _costs(ax: Axes, values: list[float | None]) -> None:
     ax.axvline(1.0, color=style.RULE_COLOUR, linewidth=0.8)
 
 
-def _changes(ax: Axes, values: list[float | None], errors: list[float | None]) -> None:
-    """Bars from 0 in per cent, with their errors; grey where the error hides the change."""
+def _changes(
+    ax: Axes, values: list[float | None], errors: list[float | None], hidden: list[bool]
+) -> None:
+    """Bars from 0 in per cent, with their errors; grey where the change is not known."""
     shares = [None if value is None else 100.0 * value for value in values]
     unsure = [0.0 if error is None else 100.0 * error for error in errors]
     known = [abs(share) for share in shares if share is not None]
     end = min(max([1.0, *known]), WIDEST)
     ax.set_xlim(-ROOM * end, ROOM * end)
-    for y, (share, error) in enumerate(zip(shares, unsure, strict=True)):
+    longest = WITHIN * ROOM * end
+    for y, (share, error, unknown) in enumerate(zip(shares, unsure, hidden, strict=True)):
+        if unknown or (share is not None and error >= NOTHING and is_undecided(share, error)):
+            ax.barh(y, 2.0 * longest, left=-longest, height=0.62, color=UNDECIDED_COLOUR)
+            ax.text(0.0, y, UNDECIDED, va="center", ha="center", fontsize=8.0)
+            continue
         if share is None:
             ax.text(0.0, y, " –", va="center")
             continue
-        if error >= NOTHING and is_undecided(share, error):
-            ax.barh(y, 2.0 * ROOM * end, left=-ROOM * end, height=0.62, color=UNDECIDED_COLOUR)
-            ax.text(0.0, y, UNDECIDED, va="center", ha="center", fontsize=8.0)
-            continue
         cut = abs(share) > UNCUT * end
-        # a cut bar leaves the picture, and says so within it
-        shown = math.copysign(ROOM * end, share) if cut else share
+        shown = math.copysign(longest, share) if cut else share
         colour = MORE_COLOUR if share >= 0.0 else LESS_COLOUR
         ax.barh(y, shown, height=0.62, color=colour, hatch="///" if cut else None, edgecolor="w")
         align = "left" if share >= 0.0 else "right"
         text = f" {share:+.2g} " if abs(share) < 100.0 else f" {share:+.0f} "
         text = " 0 " if abs(share) < NOTHING else text
-        if error >= NOTHING:
+        if error >= max(NOTHING, SMALL * abs(share)):
             text = f" {change_text(0.01 * share, 0.01 * error)} "
-        if cut:
+        # what has no room beside its bar stands within it, or else on the other side of zero
+        length, room = CHARACTER * (len(text) - 1), abs(share) / (ROOM * end)
+        within = cut or (room + length > 1.0 and room > length)
+        if within or room + length > 1.0:
             align = "right" if share >= 0.0 else "left"
-        box = {"facecolor": "white", "edgecolor": "none", "pad": 0.8} if cut else None
-        ax.text(shown, y, text, va="center", ha=align, fontsize=8.0, bbox=box)
+        box = {"facecolor": "white", "edgecolor": "none", "pad": 0.8} if within else None
+        place = shown if within or room + length <= 1.0 else 0.0
+        ax.text(place, y, text, va="center", ha=align, fontsize=8.0, bbox=box)
     ax.axvline(0.0, color=style.RULE_COLOUR, linewidth=0.8)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
@@ -14,6 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from percussion_model.interface.progress import Report
 from percussion_model.physics.records import Mode
 from percussion_model.simulation.files import staged
 
@@ -157,6 +159,8 @@ def save_figures(
     draw: Callable[[], Iterable[tuple[str, Figure]]],
     folder: str | Path,
     kinds: Sequence[str] = ("png", "svg"),
+    names: Sequence[str] = (),
+    report: Report | None = None,
 ) -> list[Path]:
     """Draw figures in this style and write all of them into a folder, or none.
 
@@ -168,6 +172,10 @@ def save_figures(
         Made if it is not there.
     kinds : sequence of str
         Endings of the files that are written of each figure.
+    names : sequence of str
+        Of the figures that are to come, for `report`.
+    report : callable, optional
+        Is told which figure is drawn.
 
     Returns
     -------
@@ -180,11 +188,25 @@ def save_figures(
         If the folder cannot be written.
     """
     folder = Path(folder)
-    names: list[str] = []
+    files: list[str] = []
     with staged(folder) as draft, rc_context(STYLE):
-        for name, fig in draw():
-            names += save(fig, draft, name, kinds)
-    return [folder / name for name in names]
+        for name, fig in _each_told(draw(), names, report):
+            files += save(fig, draft, name, kinds)
+    return [folder / name for name in files]
+
+
+def _each_told(
+    drawn: Iterable[tuple[str, Figure]], names: Sequence[str], report: Report | None
+) -> Iterator[tuple[str, Figure]]:
+    """Go through figures, and say which it is before each of them is drawn."""
+    waiting, count = iter(drawn), len(names)
+    for k in itertools.count():
+        if report is not None and k < count:
+            report(f"drawing figure {k + 1} of {count}, {names[k]}", k / count)
+        one = next(waiting, None)
+        if one is None:
+            return
+        yield one
 
 
 def save(fig: Figure, folder: Path, name: str, kinds: Sequence[str] = ("png", "svg")) -> list[str]:

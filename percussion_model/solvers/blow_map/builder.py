@@ -103,7 +103,7 @@ def get_table(scene: Scene, progress: Progress | None = None, workers: int = 1) 
     try:
         write_whole(path, table.to_bytes())
     except OSError as error:
-        _log.warning("the blow map is not kept: %s", error)
+        _log.warning("the blow map is not kept: %s: %s", path, error.strerror)
     return table
 
 
