@@ -49,7 +49,7 @@ def test_ends_are_those_of_the_ellipsoid_where_the_deviance_is_a_parabola(free):
         ends = np.array([found.low, found.high]) - CENTRE[k]
         assert 0.8 * exact[k] < -ends[0] < 1.02 * exact[k]
         assert 0.8 * exact[k] < ends[1] < 1.02 * exact[k]
-        assert not found.split
+        assert found.gap is None
 
 
 def test_dips_that_are_less_deep_than_the_threshold_do_not_hold_the_walk():
@@ -70,15 +70,16 @@ def test_dips_that_are_less_deep_than_the_threshold_do_not_hold_the_walk():
     assert found.high - CENTRE[0] == pytest.approx(allowed[-1], rel=0.2)
 
 
-def test_minima_apart_are_told_as_split():
+def test_a_wide_gap_between_minima_is_told():
     def residuals(x):
         return np.array([(abs(x[0]) - 1.0) / 0.01])
 
     like = likelihood(residuals, 1)
     both = [walked_from(like, np.array([side]), np.array([[1e-4]]), 4.0) for side in (-1.0, 1.0)]
     (found,) = profiles_of(like, both[0].joined(both[1]), 4.0)
-    assert found.split
-    assert not profiles_of(like, both[0], 4.0)[0].split
+    ends = np.array(found.gap) - CENTRE[0]
+    assert ends == pytest.approx([-0.98, 0.98], abs=0.01)
+    assert profiles_of(like, both[0], 4.0)[0].gap is None
 
 
 def test_what_reaches_the_edge_of_the_range_is_open_there():

@@ -45,6 +45,7 @@ from percussion_model.analysis.fitting.measurements import (
 from percussion_model.analysis.fitting.notes import (
     UNSETTLED,
     correlation_note,
+    gap_notes,
     grid_notes,
     interval_notes,
     rival_notes,
@@ -392,6 +393,7 @@ def _result(
         *interval_notes(estimates, like),
         *([] if settled else [UNSETTLED]),
         *rough_notes((threshold - _quantile(confidence, len(like.names))) / ROUGH_FACTOR),
+        *gap_notes(like, profiles),
         *rival_notes(rivals),
         *(note for one in explained for note in correlation_note(one)),
         *grid_notes(like, best, spread, profiles),
@@ -402,7 +404,7 @@ def _result(
 def _estimate(at: float, found: Profile, low: float, high: float) -> Estimate:
     open_below, open_above = math.isinf(found.low), math.isinf(found.high)
     verdict = {
-        (False, False): RIVALLED if found.split else DETERMINED,
+        (False, False): RIVALLED if found.gap else DETERMINED,
         (True, False): OPEN_BELOW,
         (False, True): OPEN_ABOVE,
         (True, True): OPEN,

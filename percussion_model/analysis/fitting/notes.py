@@ -63,6 +63,20 @@ def rough_notes(rough: float) -> list[str]:
     ]
 
 
+def gap_notes(like: Likelihood, profiles: Sequence[Profile]) -> list[str]:
+    """Say which parameters lie in one of two ranges."""
+    notes = []
+    for name, one in zip(like.names, profiles, strict=True):
+        if one.gap is not None:
+            unit = like.scene.row_of(name).unit.replace("-", "")
+            low, high = (f"{math.exp(end):.3g} {unit}".rstrip() for end in one.gap)
+            notes.append(
+                f"{NAMES[name]} ({name}) lies below {low} or above {high}: "
+                "what lies between explains the data less well"
+            )
+    return notes
+
+
 def rival_notes(rivals: Sequence[Rival]) -> list[str]:
     """Say which other rocks explain the data nearly as well."""
     notes = []

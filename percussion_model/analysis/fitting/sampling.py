@@ -69,15 +69,15 @@ class Profile:
     ----------
     low, high : float
         Ends of the interval; infinite where it is open within the range.
-    split : bool
-        Whether there is a wide gap within: minima apart are as likely.
+    gap : (float, float) or None
+        Ends of a wide gap within: minima apart are as likely.
     values, deviance : ndarray
         Lowest deviance that was found at these values.
     """
 
     low: float
     high: float
-    split: bool
+    gap: tuple[float, float] | None
     values: np.ndarray = field(repr=False)
     deviance: np.ndarray = field(repr=False)
 
@@ -169,17 +169,25 @@ def profiles_of(like: Likelihood, walked: Walk, threshold: float) -> list[Profil
     for k, values in enumerate(walked.at.T):
         allowed = np.sort(values[inside])
         low, high = allowed[[0, -1]]
-        split = bool(np.diff(allowed).max(initial=0.0) > PARTED * (high - low))
         shown = above < 2.0 * threshold
         found.append(
             Profile(
                 low if low > like.low[k] + AT_EDGE else -math.inf,
                 high if high < like.high[k] - AT_EDGE else math.inf,
-                split and len(allowed) > POINTS,
+                _gap(allowed),
                 *_lowest(values[shown], above[shown]),
             )
         )
     return found
+
+
+def _gap(allowed: np.ndarray) -> tuple[float, float] | None:
+    """Ends of the widest gap between rising values, where there are many and it is wide."""
+    if len(allowed) <= POINTS:
+        return None
+    last = int(np.diff(allowed).argmax())
+    low, high = float(allowed[last]), float(allowed[last + 1])
+    return (low, high) if high - low > PARTED * (allowed[-1] - allowed[0]) else None
 
 
 def _lowest(values: np.ndarray, above: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
