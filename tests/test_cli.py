@@ -13,6 +13,7 @@ import pytest
 
 from percussion_model.interface import terminal
 from percussion_model.interface.cli import BAD_INPUT, INTERRUPTED, _guarded, app
+from percussion_model.interface.commands import common
 from percussion_model.interface.commands.common import print_message
 from percussion_model.solvers import base
 
@@ -143,8 +144,9 @@ def test_a_bar_shows_what_a_command_waits_for(percussion, command, monkeypatch):
 
 
 def test_who_waits_for_the_compiler_is_told_so_once(percussion, monkeypatch):
-    kept: list[Path | None] = [Path("place", "of", "kernels")]
-    monkeypatch.setattr(base, "place_of_kernels", lambda name: kept.pop() if kept else None)
+    """Not before each of the scenes that are read before the compiler begins."""
+    monkeypatch.setattr(common, "_told", set())
+    monkeypatch.setattr(base, "place_of_kernels", lambda name: Path("place", "of", "kernels"))
     _, _, err = percussion("run", RIGID, *SHORT)
     assert " ".join(err.split()) == (
         "percussion: compiling the kernels of the solver rigid: once, for about half a minute; "

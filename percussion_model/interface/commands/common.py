@@ -130,13 +130,18 @@ def load_scene(
     return scene
 
 
+# Solvers of whose compilation this process has told: many scenes may be read before it begins.
+_told: set[str] = set()
+
+
 def tell_of_compiling(*solvers: str) -> None:
     """Say on stderr that kernels are going to be compiled, where numba does not keep them yet."""
     from percussion_model.solvers.base import place_of_kernels
 
-    places = {name: place_of_kernels(name) for name in solvers}
+    places = {name: place_of_kernels(name) for name in solvers if name not in _told}
     new = {name: place for name, place in places.items() if place is not None}
     if new:
+        _told.update(new)
         long = "half a minute each" if len(new) > 1 else "half a minute"
         print_message(
             f"compiling the kernels of the solver {' and '.join(new)}: once, for about {long}; "
