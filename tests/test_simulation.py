@@ -145,6 +145,21 @@ def test_many_samples_leave_blows_and_settling_as_they_are(leaps):
     assert np.isfinite(rates[0])
 
 
+def test_a_state_that_lies_far_in_the_past_is_refused():
+    """The time of rigid bodies is that of an event; steps from there would never arrive."""
+    simulation = Simulation(SCENES["rigid"])
+    good = simulation.save()
+    bad = simulation.save()
+    bad.state.record["time"] = -1e59
+    with pytest.raises(SimulationError, match=r"its time of -1e\+59 s, before the present of 0"):
+        simulation.restore(bad)
+    simulation.restore(good)
+    simulation.advance(0.03)
+    simulation.set_inputs(feed_force=3e3)  # the state is committed, its next event unknown
+    simulation.restore(simulation.save())
+    simulation.advance(0.05)
+
+
 def test_observe_names_every_field(scene):
     simulation = Simulation(scene)
     seen = simulation.observe()

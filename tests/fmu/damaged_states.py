@@ -182,6 +182,8 @@ class Damager:
                 if k > start:
                     parts.append((start, k))
                 start = k + 1
+        if not parts:  # nothing is left to be replaced
+            return body
         start, end = self.rng.choice(parts)
         return body[:begin] + (text[:start] + self.rng.choice(LITERALS) + text[end:]).encode()
 

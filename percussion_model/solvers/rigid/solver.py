@@ -109,8 +109,11 @@ class RigidSolver(Solver):
         """As in `Solver`; all events up to the present are behind."""
         fault = super().state_fault(state, t)
         s: Any = state.record[0]
-        if fault or not s["scheduled"]:
+        if fault:
             return fault
+        if not s["scheduled"]:  # its inputs have just been set, or it has not begun
+            behind = f"its time of {float(s['time'])!r} s, before the present of {t!r} s"
+            return "" if s["time"] >= t else behind
         if s["next_time"] != s["time"] + s["next_tau"] or not s["next_time"] > t:
             return f"its next event at {float(s['next_time'])!r} s, at a present of {t!r} s"
         return ""
