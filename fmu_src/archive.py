@@ -15,6 +15,7 @@ from pathlib import Path
 from fmu_src.description import About, write_description
 from fmu_src.staging import LIBRARY, Bundle, script
 from fmu_src.variables import Variable
+from percussion_model.simulation.files import reason
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent
@@ -82,10 +83,9 @@ def state_of(path: Path, before: bytes | None) -> str:
 
 
 def fault(error: Exception) -> str:
-    """Words of an error, which for files begin with the number of the operating system's."""
-    if isinstance(error, OSError) and error.filename:
-        return f"{error.filename}: {error.strerror}"
-    return str(error)
+    """Words of an error; of one of the operating system the file and the reason."""
+    name = getattr(error, "filename", None)
+    return f"{name}: {reason(error)}" if name else reason(error)
 
 
 def content(path: Path) -> bytes | None:

@@ -142,9 +142,11 @@ class Runner:
         self, method: Callable[..., tuple[int, int, int]], t: float, room: np.ndarray
     ) -> tuple[int, int]:
         """Call the solver and keep its rows; `Status`, and how many blows."""
-        status, n_blows, n_events = method(
-            self._state, t, room, self._event_room, self.record_events
-        )
+        found = method(self._state, t, room, self._event_room, self.record_events)
+        return self._take(*found, room)
+
+    def _take(self, status: int, n_blows: int, n_events: int, room: np.ndarray) -> tuple[int, int]:
+        """Keep the rows of a call, and raise what went wrong; as `_call`."""
         if n_blows or n_events:
             self._keep(room[:n_blows], self._event_room[:n_events])
         if status == _DONE or (status in _FULL and (n_blows or n_events)):
@@ -190,19 +192,10 @@ class Runner:
 
     def _sample_ahead(self, times: np.ndarray, rows: np.ndarray) -> int:
         """Fill rows of the first of rising times; how many."""
-        filled = 0
-
-        def advance(
-            state: State, t: float, blows: np.ndarray, events: np.ndarray, record_events: bool
-        ) -> tuple[int, int, int]:
-            nonlocal filled
-            *found, filled = self.solver.sample_ahead(
-                state, times, rows, blows, events, record_events
-            )
-            status, n_blows, n_events = found
-            return status, n_blows, n_events
-
-        self._call(advance, float(times[-1]), self._blow_room)
+        status, n_blows, n_events, filled = self.solver.sample_ahead(
+            self._state, times, rows, self._blow_room, self._event_room, self.record_events
+        )
+        self._take(status, n_blows, n_events, self._blow_room)
         return filled
 
     def _read(self, times: np.ndarray, rows: np.ndarray) -> None:

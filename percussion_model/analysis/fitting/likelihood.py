@@ -168,12 +168,11 @@ def drop_series(drop: DropTest, most: int | None = None) -> Series:
     if most is not None and count > most:
         kept = np.unique(np.linspace(0, count - 1, most).round().astype(int))
     times = drop.time[kept]
-    changes = {} if most is not None else {"solver.leaps": False}
     return Series(
         drop.name,
         drop.values[kept],
         None,
-        lambda scene: predicted_drop(bit_alone(scene).replace(**changes), drop, times),
+        lambda scene: predicted_drop(bit_alone(scene), drop, times, leaps=most is not None),
     )
 
 

@@ -30,6 +30,7 @@ def drop_test_signal(
     speed: float,
     signal: str = "bit_position",
     gauge: float | None = None,
+    leaps: bool = True,
 ) -> np.ndarray:
     """Compute what would be measured in a drop test.
 
@@ -45,13 +46,15 @@ def drop_test_signal(
         One of `SIGNALS`.
     gauge : float, optional
         Distance of the gauge from the top of the bit [m]; default its middle.
+    leaps : bool
+        False: without them, even where the scene has them.
 
     Returns
     -------
     ndarray
         SI units.
     """
-    simulation = _falling(scene, speed)
+    simulation = _falling(scene, speed, **({} if leaps else {"solver.leaps": False}))
     if signal == "gauge_force":
         return gauge_force(simulation, times, gauge)
     if signal == "gauge_stress":
@@ -59,9 +62,11 @@ def drop_test_signal(
     return simulation.sample(times)[signal]
 
 
-def predicted_drop(scene: Scene, drop: DropTest, times: np.ndarray) -> np.ndarray:
-    """What a drop would show at given times."""
-    return drop_test_signal(scene, times, drop.speed, drop.signal, drop.gauge)
+def predicted_drop(
+    scene: Scene, drop: DropTest, times: np.ndarray, leaps: bool = True
+) -> np.ndarray:
+    """What a drop would show at given times; see `drop_test_signal`."""
+    return drop_test_signal(scene, times, drop.speed, drop.signal, drop.gauge, leaps)
 
 
 def predicted_reading(scene: Scene, reading: Reading) -> float:
@@ -100,5 +105,5 @@ def _rebound_velocity(scene: Scene, speed: float) -> float:
     return float(-_falling(scene, speed).sample(times)["bit_velocity"].min())
 
 
-def _falling(scene: Scene, speed: float, record_events: bool = False) -> Simulation:
-    return Simulation(scene.replace(**{"start.bit_velocity": speed}), record_events)
+def _falling(scene: Scene, speed: float, record_events: bool = False, **changes: Any) -> Simulation:
+    return Simulation(scene.replace(**{"start.bit_velocity": speed}, **changes), record_events)

@@ -29,7 +29,7 @@ from percussion_model.solvers.wave.records import (
 SCALE = 1e-6
 # A barrier that nothing passes, to hold a configuration in standstill [J].
 NO_WAY_OUT = 1e300
-TASK = int(Task.STEP)
+STEP = int(Task.STEP)
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ def step_map(configuration: Configuration) -> tuple[np.ndarray, np.ndarray]:
     start["next_c_r"] = 1.0  # a barrier stands, so that standstill lasts
     start["w_r"] = start["next_w_r"] = NO_WAY_OUT
     none = np.zeros(1)
-    scratch, operators, step = Scratch(none, none, none), no_operators(), entry_of(run)
+    scratch, operators, advance = Scratch(none, none, none), no_operators(), entry_of(run)
     unused = np.zeros(1, BLOW), np.zeros(1, EVENT), np.zeros(1, READING)
     by_column, faces = np.zeros((size, size)), np.zeros((size, n + 1))
     state, w = start.copy(), np.zeros((len(Row), n + 1))
@@ -86,7 +86,7 @@ def step_map(configuration: Configuration) -> tuple[np.ndarray, np.ndarray]:
             w[Row.UP, k - n] = 1.0
         else:
             state["p"] = SCALE
-        step(TASK, configuration.par, state, bars, operators, scratch, 0.0, *unused)
+        advance(STEP, configuration.par, state, bars, operators, scratch, 0.0, *unused)
         by_column[k, :n], by_column[k, n : 2 * n] = w[Row.DOWN_OTHER, :n], w[Row.UP_OTHER, :n]
         faces[k] = w[Row.FACE]
         if size > 2 * n:
