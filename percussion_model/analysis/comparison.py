@@ -84,8 +84,8 @@ class Comparison:
     def difference_errors(self) -> dict[str, dict[str, float | None]]:
         """Error of each of `differences`, by solver: the errors of both numbers combined.
 
-        Of the rate by grid and scatter, of other means over blows by scatter alone; None
-        where a difference is, or where no error is known.
+        By grid and scatter; None where a difference is, or where one of the errors is not
+        known.
         """
         summaries = self.summaries()
         base = summaries[self.first]
@@ -220,13 +220,13 @@ def change_error(
 ) -> float | None:
     """Standard error of value / base - 1, whose errors are independent.
 
-    None where that is not defined, or neither error is known.
+    None where that is not defined, or one of the errors is not known.
     """
     if value is None or base is None or relative_change(value, base) is None:
         return None
-    if error is None and base_error is None:
+    if error is None or base_error is None:
         return None
-    return math.hypot(error or 0.0, value / base * (base_error or 0.0)) / abs(base)
+    return math.hypot(error, value / base * base_error) / abs(base)
 
 
 def _difference_error(summary: dict[str, Any], base: dict[str, Any], key: str) -> float | None:

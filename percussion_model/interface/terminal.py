@@ -18,7 +18,10 @@ from percussion_model.interface.messages import wrapped
 from percussion_model.interface.progress import Report, lines
 from percussion_model.interface.tables import print_table
 from percussion_model.simulation.uncertain import (
+    ABOUT,
+    PLUS_MINUS,
     UNDECIDED,
+    WITHOUT_ESTIMATE,
     change_text,
     in_few_characters,
     mean_text,
@@ -40,12 +43,8 @@ if TYPE_CHECKING:
 _PATIENCE = 2.0
 
 RATE = ("Rate of penetration", "rate_of_penetration", 1e3, "mm/s")
-# What its error is: those of rock and model are others.
-NUMERICAL = " (± of grid and scatter)"
 # That of a settled motion is of its convergence.
 SETTLING = " (± of convergence; that of the grid is not in it)"
-# That of means over blows, whose numerical error is not estimated.
-SCATTERED = " (± of their scatter)"
 # Other rows of the table: name, key of the summary, factor, unit.
 SHOWN = (
     ("Blow period", "blow_period", 1e3, "ms"),
@@ -77,14 +76,12 @@ def show_summary(result: Result) -> None:
     table.add_column(justify="left", no_wrap=True)
     table.add_column(justify="right", no_wrap=True)
     table.add_column(justify="left")
-    rate = rate_text(summary)
     if len(result.blows):
-        table.add_row(RATE[0], _in_two_lines(rate), RATE[3] + NUMERICAL * ("±" in rate))
+        table.add_row(RATE[0], _in_two_lines(rate_text(summary)), RATE[3])
     values = summary if len(result.blows) else summary["fall"]
     for name, key, factor, unit in SHOWN if len(result.blows) else WITHOUT_BLOWS:
         if values.get(key) is not None:
-            text = _in_two_lines(mean_text(values, key, factor))
-            table.add_row(name, text, (unit + SCATTERED * ("±" in text)).lstrip())
+            table.add_row(name, _in_two_lines(mean_text(values, key, factor)), unit)
     energy = summary["energy"]
     for key in ("numerical", "residual"):
         share = energy[f"{key}_relative"]
@@ -104,6 +101,8 @@ def show_summary(result: Result) -> None:
     table.add_row("Speed", f"{result.real_time_factor:.3g}", "times real time")
     console = Console()
     print_table(table, console, keys=2)
+    if len(result.counted):
+        console.print(wrapped(PLUS_MINUS if result.errors else WITHOUT_ESTIMATE), highlight=False)
     show_warnings(console, result.warnings)
 
 
@@ -255,7 +254,8 @@ def show_comparison(found: Comparison) -> None:
             if name in differences:
                 change, error = differences[name].get(key), errors[name].get(key)
                 hidden = change is not None and found.is_of_cells(name, key)
-                cells.append(UNDECIDED if hidden else change_text(change, error))
+                doubt = ABOUT if change and error is None else ""
+                cells.append(UNDECIDED if hidden else doubt + change_text(change, error))
         table.add_row(f"{label}, {unit}" if unit else label, *cells)
     table.add_section()
     for label, value in _EFFORT.items():
@@ -269,8 +269,10 @@ def show_comparison(found: Comparison) -> None:
     # a solver and its differences stay together
     print_table(table, console, groups=[1, *[2] * len(differences)])
     console.print(
-        "± of the rate is the error of grid and scatter, of other means that of scatter alone; "
-        f"a difference within the errors of both numbers is {UNDECIDED}.",
+        wrapped(
+            f"{PLUS_MINUS} A difference within the errors of both numbers is {UNDECIDED}; "
+            f"{ABOUT} stands where one of them has none."
+        ),
         highlight=False,
     )
     show_warnings(console, found.warnings())
