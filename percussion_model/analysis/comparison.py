@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 from percussion_model.scene.scene import Scene, SceneError
@@ -176,7 +175,7 @@ def compare(
     end = scene.run.duration if duration is None else duration
     results = {}
     for k, (name, chosen) in enumerate(scenes.items()):
-        report = None if progress is None else partial(_add_time, progress, k * end)
+        report = None if progress is None else _after(k * end, progress)
         results[name] = simulate(chosen, duration, settle, progress=report)
     return Comparison(results)
 
@@ -204,8 +203,17 @@ def read_solvers(text: str) -> tuple[str, ...]:
     return names
 
 
-def _add_time(progress: Callable[[float], None], start: float, t: float) -> None:
-    progress(start + t)
+def _after(start: float, progress: Callable[[float], None]) -> Callable[[float], None]:
+    """Report of a run that begins at a time; the short runs that tell its error report nothing."""
+    reached = start
+
+    def report(t: float) -> None:
+        nonlocal reached
+        if start + t > reached:
+            reached = start + t
+            progress(reached)
+
+    return report
 
 
 def relative_change(value: float | None, base: float | None) -> float | None:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from percussion_model.scene.inputs import SimulationError
 from percussion_model.scene.numbers import numbers_of
 from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.simulation.means import COUNTS, numbers_over, scatter_over
-from percussion_model.simulation.rate import LARGE_ERROR, LEAST_BLOWS
+from percussion_model.simulation.rate import LARGE_ERROR, LEAST_BLOWS, rate_of_blows
 from percussion_model.simulation.result import Result
 from percussion_model.solvers.wave.resolution import FITS, largest_misfit, misfits, promised_error
 
@@ -74,17 +75,38 @@ class GridRun:
         """A run without a grid."""
         return cls(result, np.zeros(0), 0.0)
 
+    @cached_property
+    def _number(self) -> tuple[float, float]:
+        """What is judged, and its standard error."""
+        if self.number is not None:
+            return self.number
+        return rate_of_blows(self.result.counted)
+
     @property
     def value(self) -> float:
         """Rate of penetration [m/s], or the other number."""
-        return self.result.rate_of_penetration if self.number is None else self.number[0]
+        return self._number[0]
 
     @property
     def scatter(self) -> float:
         """Its standard error."""
-        if self.number is None:
-            return self.result.rate_of_penetration_standard_error
-        return self.number[1]
+        return self._number[1]
+
+    @cached_property
+    def cycles(self) -> float:
+        """Drilling cycles a blow."""
+        return float(np.mean(self.result.counted["drilling_cycles"]))
+
+    @cached_property
+    def largest(self) -> float:
+        """Largest misfit of a section."""
+        return largest_misfit(self.misfit)
+
+    @cached_property
+    def signed(self) -> float | None:
+        """Misfit with its sign; None where more than one section has any."""
+        several = np.count_nonzero(np.abs(self.misfit) > FITS) > 1
+        return None if several else float(np.sum(self.misfit))
 
     @property
     def useful(self) -> bool:
@@ -94,11 +116,13 @@ class GridRun:
     def numbers(self) -> dict[str, GridRun]:
         """The run with each of its numbers over blows in place of the rate, by name."""
         blows = self.result.counted
-        scatter = scatter_over(blows)
-        return {
-            name: replace(self, number=(value, scatter.get(name, math.nan)))
-            for name, value in numbers_over(blows).items()
-        }
+        scatter, found = scatter_over(blows), {}
+        # what is the same for all numbers is found once
+        shared = {name: getattr(self, name) for name in ("cycles", "largest", "signed")}
+        for name, value in numbers_over(blows).items():
+            found[name] = replace(self, number=(value, scatter.get(name, math.nan)))
+            vars(found[name]).update(shared)
+        return found
 
 
 @dataclass(frozen=True)
@@ -146,11 +170,11 @@ def estimate_error(run: GridRun, others: Sequence[GridRun]) -> Estimate:
     Estimate
     """
     scatter, floor = run.scatter / abs(run.value), FLOOR_SHARE * run.promised
-    misfit = largest_misfit(run.misfit)
+    misfit = run.largest
     others = [other for other in others if other.useful]
     if not others:
         return Estimate(math.inf, 0.0, scatter, floor)  # nothing is known
-    fitting = [other for other in others if largest_misfit(other.misfit) <= FITS]
+    fitting = [other for other in others if other.largest <= FITS]
     if misfit <= FITS and fitting:
         other = fitting[-1]
         cells = _difference(other, run)
@@ -179,31 +203,28 @@ def _difference(other: GridRun, run: GridRun) -> float:
 
 def _same_motion(run: GridRun, other: GridRun) -> bool:
     """Whether two runs have the same number of drilling cycles a blow."""
-    cycles = [float(np.mean(one.result.counted["drilling_cycles"])) for one in (run, other)]
-    return abs(cycles[0] - cycles[1]) <= max(SAME_MOTION, SAME_SHARE * cycles[0])
+    off = abs(run.cycles - other.cycles)
+    return off <= max(SAME_MOTION, SAME_SHARE * run.cycles)
 
 
 def _around(run: GridRun, others: Sequence[GridRun]) -> tuple[GridRun, GridRun] | None:
     """The last runs whose misfits lie on both sides of zero, where one number tells a misfit."""
-    if any(np.count_nonzero(np.abs(one.misfit) > FITS) > 1 for one in (run, *others)):
+    if run.signed is None or any(other.signed is None for other in others):
         return None
-    signed = {id(one): float(np.sum(one.misfit)) for one in (run, *others)}
-    below = [other for other in others if signed[id(other)] < -FITS]
-    above = [other for other in others if signed[id(other)] > FITS]
+    below = [other for other in others if (other.signed or 0.0) < -FITS]
+    above = [other for other in others if (other.signed or 0.0) > FITS]
     return (below[-1], above[-1]) if below and above else None
 
 
 def _by_two(run: GridRun, pair: tuple[GridRun, GridRun]) -> tuple[float, float]:
     """Errors by cells and by misfit: a straight line through two runs, and the distance to it."""
-    x, y = ([float(np.sum(one.misfit)), one.value] for one in pair)
+    x, y = ([one.signed or 0.0, one.value] for one in pair)
     slope = (y[1] - x[1]) / (y[0] - x[0])
-    expected = x[1] + slope * (float(np.sum(run.misfit)) - x[0])
+    expected = x[1] + slope * ((run.signed or 0.0) - x[0])
     off = abs(run.value - expected)
     if off <= CONFIDENCE * math.hypot(run.scatter, *(one.scatter for one in pair)):
         off = 0.0
-    return SAFETY * off / abs(run.value), SAFETY * abs(slope / run.value) * largest_misfit(
-        run.misfit
-    )
+    return SAFETY * off / abs(run.value), SAFETY * abs(slope / run.value) * run.largest
 
 
 def _spread(run: GridRun, pair: tuple[GridRun, GridRun]) -> float:
@@ -214,7 +235,7 @@ def _spread(run: GridRun, pair: tuple[GridRun, GridRun]) -> float:
 
 def _by_one(run: GridRun, others: Sequence[GridRun]) -> tuple[float, float]:
     """Errors by cells and by misfit from the run whose misfit differs most."""
-    misfit = largest_misfit(run.misfit)
+    misfit = run.largest
     apart = [largest_misfit(other.misfit - run.misfit) for other in others]
     difference = _difference(others[-1], run)
     if misfit <= FITS:

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from percussion_model.simulation.rate import LEAST_BLOWS, ratio_of_sums
+from percussion_model.simulation.rate import LEAST_BLOWS, ratio_of_sums, ratios_of_sums
 
 # Means over blows, and the columns of the blow table behind them.
 _MEANS = {
@@ -45,7 +45,13 @@ def numbers_over(blows: np.ndarray) -> dict[str, float]:
     dict of float
         Means, ratios of sums and greatest values, by their names in a summary.
     """
-    found = {name: _mean(blows[column]) for name, column in _MEANS.items()}
+    found = dict.fromkeys(_MEANS, math.nan)
+    if len(blows):
+        means = np.mean([blows[column] for column in _MEANS.values()], axis=1).tolist()
+        found = dict(zip(_MEANS, means, strict=True))
+    for name, column in _MEANS.items():
+        if math.isnan(found[name]):
+            found[name] = _mean_of_known(blows[column])
     found["blow_frequency"] = 1.0 / found["blow_period"]
     found |= {name: _ratio(blows, *columns) for name, columns in _RATIOS.items()}
     return found | {name: _greatest(blows[name]) for name in _GREATEST}
@@ -68,22 +74,28 @@ def scatter_over(blows: np.ndarray) -> dict[str, float]:
     """
     if len(blows) == 0:
         return {}
-    found = {name: _scatter_of_mean(blows[column]) for name, column in _MEANS.items()}
-    found["blow_frequency"] = found["blow_period"] / float(np.mean(blows["period"])) ** 2
+    ones = np.ones(len(blows))
+    pairs = {name: (blows[column], ones) for name, column in _MEANS.items()}
     for name, (column, by) in _RATIOS.items():
         if float(np.sum(blows[by])) > 0.0:
-            found[name] = ratio_of_sums(blows[column], blows[by])[1]
+            pairs[name] = blows[column], blows[by]
+    _, errors = ratios_of_sums(*(np.array(series) for series in zip(*pairs.values(), strict=True)))
+    found = dict(zip(pairs, errors.tolist(), strict=True))
+    for name, column in _MEANS.items():
+        if math.isnan(found[name]):
+            found[name] = _scatter_of_known(blows[column])
+    found["blow_frequency"] = found["blow_period"] / float(np.mean(blows["period"])) ** 2
     return found | {name: _scatter_of_greatest(blows[name]) for name in _GREATEST}
 
 
-def _mean(values: np.ndarray) -> float:
-    """Mean of what is defined."""
+def _mean_of_known(values: np.ndarray) -> float:
+    """Mean of what is defined, where not all is."""
     known = values[np.isfinite(values)]
     return float(np.mean(known)) if len(known) else math.nan
 
 
-def _scatter_of_mean(values: np.ndarray) -> float:
-    """Standard error of the mean of what is defined."""
+def _scatter_of_known(values: np.ndarray) -> float:
+    """Standard error of the mean of what is defined, where not all is."""
     known = values[np.isfinite(values)]
     return ratio_of_sums(known, np.ones(len(known)))[1] if len(known) else math.nan
 

@@ -129,6 +129,12 @@ def known_scatter(summary: Mapping[str, Any], key: str) -> float | None:
     return (summary.get("standard_errors") or {}).get(key) if error is None else error
 
 
+def shown_error(summary: Mapping[str, Any], key: str) -> float | None:
+    """What a number of a summary is known to be off: by grid and scatter, or by scatter alone."""
+    error = known_error(summary, key)
+    return known_scatter(summary, key) if error is None else error
+
+
 def mean_text(
     summary: Mapping[str, Any], key: str, factor: float = 1.0, most_digits: int = SMALLEST_UNIT
 ) -> str:
