@@ -270,7 +270,7 @@ def interrupt_in(monkeypatch, name_of_run):
     ("words", "run"),
     [
         (["--accuracy", "3e-2", "--check"], f"run {len(planned_cells(ASKED))} of"),
-        ([], "error of the rate"),
+        ([], "error of the means"),
     ],
     ids=["finer run", "error estimate"],
 )
