@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
@@ -49,6 +50,8 @@ MOST_RUNS = 7
 
 # Name of the variant of an accelerator, which changes no number.
 LEAPS = "leaps"
+# Words of warnings of what stands beside a rate as its error.
+OF_THE_ERROR = (LARGE, "standard error")
 # Numbers of a summary whose change is shown.
 CHANGED = ("rate_of_penetration", "blow_period", "peak_bit_force")
 
@@ -290,12 +293,18 @@ class EffectsStudy:
         Not those of a large error, which stands beside the rate, and what `reason` says.
         """
         texts = list(self.base.result.warnings)
+        said = {_words(text) for text in texts}
         for trial in self.trials:
-            said = (*texts, *trial.reasons, unused_note(trial.result.scene.given_in_vain))
+            if trial.variant.no_blows:
+                continue
+            known = said | {
+                *map(_words, trial.reasons),
+                _words(unused_note(trial.result.scene.given_in_vain)),
+            }
             texts += [
                 f"{trial.variant.name}: {text}"
                 for text in trial.result.warnings
-                if text not in said and not trial.variant.no_blows and LARGE not in text
+                if _words(text) not in known and not any(word in text for word in OF_THE_ERROR)
             ]
         return texts
 
@@ -325,6 +334,11 @@ class EffectsStudy:
             ],
             "refused": self.refused,
         }
+
+
+def _words(text: str) -> str:
+    """A text without its numbers."""
+    return re.sub(r"[\d.e+-]*\d", "", text)
 
 
 def study_effects(

@@ -138,7 +138,8 @@ def show_effects(found: EffectsStudy) -> None:
     for reason in dict.fromkeys(reasons.values()):
         names = ", ".join(name for name, given in reasons.items() if given == reason)
         show_note(console, names, reason)
-    console.print(wrapped(NOTE), highlight=False)
+    if len(found.base.result.counted):
+        console.print(wrapped(NOTE), highlight=False)
     show_warnings(console, found.warnings())
 
 
