@@ -111,11 +111,12 @@ STUDY_CAPTIONS = {
     "map": (
         "A map over two parameters and cuts through it; choose what is shown, and values of the "
         "others by the sliders. Crosses mark points whose motion is not periodic. Grey and hatched "
-        "is undecided: the error of the rate is no smaller than the rate. The pointer shows ±."
+        "is undecided: the error of the rate is no smaller than the rate, or without loss in the "
+        "bars it depends on the cells. The pointer shows ±."
     ),
     "scatter": (
         "All points over each parameter. Blue is periodic, orange aperiodic, with bars of the "
-        "error of the rate; grey is undecided: the error is no smaller than the rate. Points "
+        "error of the rate; grey is undecided, as in maps. Points "
         "that are chosen with a box or lasso in one panel stand out in all."
     ),
     "points": "All points and what was found there; a click on a heading sorts.",

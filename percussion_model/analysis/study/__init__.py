@@ -81,9 +81,18 @@ class Study:
 
     @property
     def undecided(self) -> np.ndarray:
-        """Whether the error is no smaller than the rate, for each point."""
-        error = self.rows["rate_of_penetration_error"]
-        return np.asarray((error > 0.0) & (error >= np.abs(self.rows["rate_of_penetration"])))
+        """Whether the error is no smaller than the rate, or it is of the cells, for each point."""
+        error, rate = self.rows["rate_of_penetration_error"], self.rows["rate_of_penetration"]
+        hidden = (error > 0.0) & (error >= np.abs(rate))
+        return np.asarray(hidden | (self.depends_on_cells & (rate != 0.0) & np.isfinite(rate)))
+
+    @property
+    def depends_on_cells(self) -> np.ndarray:
+        """Whether waves run without loss, so that the rate is one of the cells, for each point."""
+        key, points = "loss.time", self.points
+        if key not in points.keys or not self.scene.effects.loss:
+            return np.full(len(points), self.scene.is_undamped)
+        return np.asarray(self.scene.has_waves & (points.values[:, points.keys.index(key)] == 0.0))
 
     def headlines(self) -> list[tuple[str, str]]:
         """Motions, lowest and highest rate with their points, errors, cost: names and texts."""
@@ -104,8 +113,14 @@ class Study:
                 error = float(rows["rate_of_penetration_error"][k])
                 lines.append((name, f"{with_error(1e3 * rate[k], 1e3 * error)} mm/s at {at}"))
         if undecided.any():
-            words = f"{np.count_nonzero(undecided)} rates: their errors are no smaller than they"
-            lines.append(("Undecided", words))
+            of_cells = np.count_nonzero(undecided & self.depends_on_cells)
+            hidden = np.count_nonzero(undecided) - of_cells
+            for count, why in (
+                (hidden, "their errors are no smaller than they"),
+                (of_cells, "without loss in the bars they depend on the cells"),
+            ):
+                if count:
+                    lines.append(("Undecided", f"{count} rates: {why}"))
         for kind in ("periodic", "aperiodic"):
             error = self.relative_error[rows["kind"] == KINDS.index(kind)]
             if np.isfinite(error).any():
