@@ -113,8 +113,8 @@ class Study:
                 error = float(rows["rate_of_penetration_error"][k])
                 lines.append((name, f"{with_error(1e3 * rate[k], 1e3 * error)} mm/s at {at}"))
         if undecided.any():
-            of_cells = np.count_nonzero(undecided & self.depends_on_cells)
-            hidden = np.count_nonzero(undecided) - of_cells
+            of_cells = int(np.count_nonzero(undecided & self.depends_on_cells))
+            hidden = int(np.count_nonzero(undecided)) - of_cells
             for count, why in (
                 (hidden, "their errors are no smaller than they"),
                 (of_cells, "without loss in the bars they depend on the cells"),
