@@ -91,7 +91,8 @@ class Variant:
     @property
     def name(self) -> str:
         """Effect and setting."""
-        return f"{self.effect} {self.setting}".strip()
+        between = " " if self.setting in ("on", "off") or not self.effect else ": "
+        return f"{self.effect}{between}{self.setting}".strip()
 
     def apply(self, scene: Scene) -> Scene:
         """Return the scene with the effect changed; `SceneError` where it cannot be."""
@@ -132,10 +133,11 @@ def _rock(scene: Scene) -> Iterator[Variant]:
         else:
             yield Variant("barrier", "on", {"effects.barrier": True, **_not_zero(scene, _BARRIER)})
         other = "paper" if scene.effects.standstill_tension == "release" else "release"
-        yield Variant("standstill tension", other, {"effects.standstill_tension": other})
+        words = "as in the paper" if other == "paper" else "released"
+        yield Variant("standstill tension", words, {"effects.standstill_tension": other})
         yield Variant(
-            "bilinear law",
-            "spring",
+            "rock law",
+            "linear spring",
             {"effects.rock": "spring", "effects.barrier": False},
             off=True,
             no_penetration=_NO_CRUSHING,
@@ -155,15 +157,15 @@ def _bars(scene: Scene) -> Iterator[Variant]:
             changes = {"effects.loss": True, **_not_zero(scene, ("loss.time",))}
             yield Variant("loss", "on", changes)
         if scene.piston.model == "elastic":
-            yield Variant("elastic piston", "rigid", {"piston.model": "rigid"}, off=True)
+            yield Variant("piston", "rigid", {"piston.model": "rigid"}, off=True)
         elif scene.piston.model == "rigid":
-            yield Variant("elastic piston", "on", {"piston.model": "elastic"})
-        yield Variant("elastic bars", "rigid", {"solver.name": "rigid"}, off=True)
+            yield Variant("piston", "elastic", {"piston.model": "elastic"})
+        yield Variant("piston and bit", "rigid", {"solver.name": "rigid"}, off=True)
         return
     changes = {"bit.model": "elastic", "solver.name": "auto"}
     if scene.piston.model == "rigid":
         changes["piston.model"] = "elastic"
-    yield Variant("elastic bars", "on", changes)
+    yield Variant("piston and bit", "elastic", changes)
 
 
 def _not_zero(scene: Scene, keys: tuple[str, ...]) -> dict[str, Any]:
