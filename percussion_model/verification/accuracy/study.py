@@ -285,14 +285,15 @@ def study(
     points: list[Point] = []
     runs: list[tuple[int, Run]] = []
     for k, rung in enumerate(rungs):
-        progress(f"{LADDERS[rung.ladder].title}, {rung.label}", 0.05 + 0.65 * k / len(rungs))
+        title = ", ".join(filter(None, (LADDERS[rung.ladder].title, rung.label)))
+        progress(title, 0.05 + 0.65 * k / len(rungs))
         point, run = _measured(rung, problem, reference, full)
         points.append(point)
         if isinstance(run, Run) and not point.note:
             runs.append((k, run))
     times = interleaved(
         [run.cost for _, run in runs],
-        lambda place: progress("times, turn by turn", 0.7 + 0.3 * place / max(len(runs), 1)),
+        lambda done: progress("times, turn by turn", 0.7 + 0.3 * done),
     )
     for (k, run), taken in zip(runs, times, strict=True):
         points[k] = replace(
