@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 
@@ -155,6 +156,37 @@ def test_table_and_figures(found, tmp_path, capsys):
     assert path.stat().st_size > 10_000
     titles = [ax.get_title() for ax in draw_quantities(found).axes]
     assert "Rate of penetration" in titles
+
+
+def test_an_error_below_the_bar_of_the_reference_is_said_to_be_below_it(found, capsys):
+    point = found.ladder("wave")[-1]
+    floor = found.reference.floor(RATE)
+    good = replace(point, errors=point.errors | {RATE: 0.1 * floor})
+    better = replace(found, points=[good])
+    show_study(better)
+    shown = capsys.readouterr().out
+    assert f"<{floor:.1e}".replace("e-0", "e-") in shown
+    assert f"off by less than {100 * floor:.2g} %" in better.advice(1e-2)
+
+
+def test_times_have_their_spread(found, capsys):
+    point = replace(found.ladder("wave")[1], spread=0.13)
+    once = replace(found, points=[replace(point, spread=np.nan)])
+    found = replace(found, points=[point])
+    assert "ms (± 13 %)" in found.advice(1e-2)
+    assert "±" not in once.advice(1e-2)
+    for one, spread in ((found, "13"), (once, "-")):
+        show_study(one)
+        row = next(line for line in capsys.readouterr().out.splitlines() if "20 cells" in line)
+        assert row.split()[3] == spread
+
+
+def test_titles_of_narrow_tables_stay_whole(found, capsys):
+    show_study(replace(found, points=found.ladder("rigid")))
+    shown = capsys.readouterr().out
+    assert "Relative error; ms to compute a simulated second; ms of set-up" in shown
+    assert "Measured orders: none" in shown
+    assert "at an error in rate" not in shown  # no method here has a cost to tell
 
 
 def test_every_ladder_is_described_and_full_runs_have_more_rungs():
