@@ -157,6 +157,15 @@ def test_what_is_left_is_told_of_each_part_and_only_where_its_pace_is_even():
     assert lines.line() == " 117 s: run 2 of 2, 50%"
 
 
+def test_a_slow_start_is_not_taken_for_the_pace():
+    clock = SimpleNamespace(now=0.0)
+    lines = progress.Lines("runs", lambda: clock.now)
+    for k in range(20_001):  # told often, as a coupled run is
+        clock.now = 18.0 + 6.0 * k / 20_000
+        lines.show("runs", 0.35 * k / 20_000)
+    assert lines.line() == "  24 s: runs, 35%"
+
+
 def test_what_begins_late_is_judged_by_what_is_done_since():
     clock = SimpleNamespace(now=0.0)
     lines = progress.Lines("scenes", lambda: clock.now)

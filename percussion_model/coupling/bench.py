@@ -257,6 +257,6 @@ def _refuse_changed(controller: Any, before: Mapping[str, bytes]) -> None:
         )
 
 
-def total(scores: Sequence[Score]) -> float:
+def mean_points(scores: Sequence[Score]) -> float:
     """Mean of the points."""
     return float(np.mean([score.points for score in scores])) if scores else 0.0

@@ -16,8 +16,8 @@ EVERY = 3.0
 EARLY = 0.05
 # Nor where the pace of the later half of the time differs from that of all by more than this.
 EVEN = 1.5
-# So many places of the way are remembered; every other one is left out where there are more.
-MOST_MARKS = 1000
+# Shares that differ by less are one place of the way.
+SAME_PLACE = 1e-3
 # Shorter times that are left are no number: they are as long as those between lines [s].
 A_FEW = 3.0
 
@@ -57,9 +57,8 @@ class Lines:
         # the thread that prints may read them meanwhile: they are replaced, never changed
         if share < self.marks[-1][1]:
             self.marks = [(now, share)]
-        elif share > self.marks[-1][1]:
-            kept = self.marks if len(self.marks) < MOST_MARKS else self.marks[::2]
-            self.marks = [*kept, (now, share)]
+        elif share >= self.marks[-1][1] + SAME_PLACE:
+            self.marks = [*self.marks, (now, share)]
 
     def line(self) -> str:
         """Time since the start, what is done, its share, and the time that it will still take.

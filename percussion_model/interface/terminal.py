@@ -322,8 +322,8 @@ def show_stability(found: Collection) -> None:
     )
 
 
-def show_statements(statements: list[Statement]) -> None:
-    """Print what the paper says beside what was found."""
+def show_statements(statements: list[Statement], errors: str) -> None:
+    """Print what the paper says beside what was found, and what its errors are."""
     table = Table(box=None, show_header=False, padding=(0, 1, 0, 0))
     table.add_column(no_wrap=True)
     table.add_column()
@@ -335,7 +335,9 @@ def show_statements(statements: list[Statement]) -> None:
         if one.why and not one.agrees:
             table.add_row("", f"why: {escape(one.why)}")
         table.add_row("", "")
-    print_table(table)
+    console = Console()
+    print_table(table, console)
+    console.print(errors, highlight=False)
 
 
 class RunProgress:
@@ -436,14 +438,14 @@ def progress(text: str, done: float = 0.0) -> Iterator[Report]:
     starter.daemon = True
     starter.start()
 
-    def report(text: str, share: float | None) -> None:
+    def show(text: str, share: float | None) -> None:
         told.show(text, share)
         # where all is done but the end, how long that takes is not known
         total = None if share is None or share >= 1.0 else 1.0
         bar.update(task, description=text, completed=share or 0.0, total=total)
 
     try:
-        yield report
+        yield show
     finally:
         starter.cancel()
         starter.join()

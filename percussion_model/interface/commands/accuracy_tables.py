@@ -149,8 +149,8 @@ def _show_points(found: Study, console: Console) -> None:
         console.print("< Below the bar of the reference, which tells no more.", highlight=False)
     if any(point.fit > FITS for point in found.points):
         console.print(
-            "* Lengths that fit no common cell: the wave speed is off, and the setting is not in the "
-            "order of its method.",
+            "* Lengths that fit no common cell: the wave speed is off, and the setting is not in "
+            "the order of its method.",
             highlight=False,
         )
 
