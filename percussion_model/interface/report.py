@@ -15,7 +15,7 @@ import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from percussion_model.analysis.study import Study
+from percussion_model.analysis.study import KNOWN_ERRORS, Study
 from percussion_model.interface.plotting import CAPTIONS, figures
 from percussion_model.scene.parameters import find_row, parameter_table
 from percussion_model.scene.scene import Scene
@@ -119,7 +119,10 @@ STUDY_CAPTIONS = {
         "error of the rate; grey is undecided, as in maps. Points "
         "that are chosen with a box or lasso in one panel stand out in all."
     ),
-    "points": "All points and what was found there; a click on a heading sorts.",
+    "points": (
+        "All points and what was found there; a click on a heading sorts. The errors of the rate "
+        f"{KNOWN_ERRORS}."
+    ),
 }
 # So many failed points are listed.
 MOST_FAILURES = 10
