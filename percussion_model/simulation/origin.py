@@ -65,8 +65,8 @@ class Claim:
         self._left = [name for name in _read(self.folder)[1] if name in self._before]
         self._replaces = bool(other and force)
 
-    def sign(self) -> None:
-        """Say in the folder where its files are from; call this when they are written."""
+    def sign(self) -> Path:
+        """Say in the folder where its files are from, when they are written; return the file."""
         now = _times(self.folder)
         made = [name for name, time in now.items() if self._before.get(name) != time]
         if self._replaces:
@@ -80,6 +80,7 @@ class Claim:
             "files": sorted(set(made) - {ORIGIN}),
         }
         staged_text(self.folder / ORIGIN, to_json(tree) + "\n")
+        return self.folder / ORIGIN
 
 
 def flat(tree: Mapping[str, Any], above: str = "") -> dict[str, Any]:

@@ -95,7 +95,7 @@ def accuracy(
         if figures:
             with common.if_drawable():
                 common.list_files(_draw(result, claimed.folder / name))
-        claimed.sign()
+        common.list_files([claimed.sign()])
     if len(studies) > 1 and json_file != "-":
         show_contests(studies)
     common.write_json(json_file, found)

@@ -99,8 +99,7 @@ def bench_controller(
         title = controller or system.stem
         with progress("drawing the page"):
             page = write_bench_page(scores, points, COLUMNS, claimed.folder, title)
-        claimed.sign()
-        common.list_files([page])
+        common.list_files([page, claimed.sign()])
     if interrupted:
         return common.print_message(
             f"interrupted: the page has the {len(scores)} runs that were done", common.INTERRUPTED

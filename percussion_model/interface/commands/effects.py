@@ -62,8 +62,7 @@ def effects(
 
             with progress("drawing the figure"):
                 files = save_figures(lambda: [("effects", draw_effects(found))], claimed.folder)
-            claimed.sign()
-            common.list_files(files)
+            common.list_files([*files, claimed.sign()])
 
 
 # A longer name of an effect takes several lines.

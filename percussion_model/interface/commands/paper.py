@@ -87,7 +87,7 @@ def paper(
     tree = {"errors": ERRORS, "statements": [one.to_dict() for one in statements]}
     common.write_json(json_file, tree)
     common.write_json(str(out / "statements.json"), tree)
-    claimed.sign()
+    common.list_files([claimed.sign()])
     if json_file != "-":
         show_statements(statements, ERRORS)
 
