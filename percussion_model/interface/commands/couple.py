@@ -81,6 +81,7 @@ def couple(
     out/SYSTEM.
     """
     from percussion_model.interface.terminal import progress, progress_bar
+    from percussion_model.simulation.files import ResultError
 
     try:
         from percussion_model.coupling import Coupling
@@ -95,11 +96,15 @@ def couple(
         every=dict(_read_pace(text) for text in every or ()),
         trust=trust,
     )
-    claimed = common.claim(
-        "couple", out, Path("out") / system.stem, force, system=common.digest(system),
-        duration=duration, step=step, interval=interval, order=order, tolerance=tolerance,
-        every=common.by_name(every), set=common.by_name(settings), signals=signals,
-    )  # fmt: skip
+    try:
+        claimed = common.claim(
+            "couple", out, Path("out") / system.stem, force, system=common.digest(system),
+            duration=duration, step=step, interval=interval, order=order, tolerance=tolerance,
+            every=common.by_name(every), set=common.by_name(settings), signals=signals,
+        )  # fmt: skip
+    except ResultError:
+        coupling.free()
+        raise
     folder = claimed.folder
     wanted = [*known_signals(coupling.outputs), *(signals or ())]
     rows_every = max(step, duration / ROWS) if interval is None else interval
