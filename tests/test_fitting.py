@@ -181,7 +181,7 @@ TIMES = np.linspace(0.0, 0.04, 20)
     [
         ({"effects.barrier": False}, None, {}, "no energy barrier"),
         ({}, None, {"confidence": 95}, "confidence = 95"),
-        ({}, None, {"parameters": ["loss.time"]}, "parameters: loss.time must be one of"),
+        ({}, None, {"parameters": ["loss.time"]}, "loss.time cannot be fitted: must be one of"),
         ({}, None, {"parameters": []}, "parameters: at least one"),
         ({}, None, {"ranges": {DAMPING: (1e4, 1e3)}}, "must rise"),
         ({}, None, {"ranges": {"loss.time": (1, 2)}}, "it is not fitted"),

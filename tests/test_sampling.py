@@ -11,7 +11,13 @@ from scipy.stats import chi2
 from percussion_model import Scene
 from percussion_model.analysis.fitting.found import DAMPING, ENERGY
 from percussion_model.analysis.fitting.likelihood import RATIO, STIFFNESS, Likelihood, Series
-from percussion_model.analysis.fitting.sampling import Walk, profiles_of, steps_wanted, walk
+from percussion_model.analysis.fitting.sampling import (
+    Walk,
+    profiles_of,
+    pushed_out,
+    steps_wanted,
+    walk,
+)
 
 KEYS = (STIFFNESS, RATIO, DAMPING, ENERGY)
 CENTRE = np.log([1e9, 5.0, 1e4, 0.1])
@@ -68,6 +74,23 @@ def test_dips_that_are_less_deep_than_the_threshold_do_not_hold_the_walk():
     allowed = x[deviance < threshold]
     assert found.low - CENTRE[0] == pytest.approx(allowed[0], rel=0.2)
     assert found.high - CENTRE[0] == pytest.approx(allowed[-1], rel=0.2)
+
+
+@pytest.mark.parametrize(("half", "is_open"), [(2.0, False), (9.0, True)])
+def test_an_end_where_the_walk_stopped_is_pushed_to_where_the_data_end(half, is_open):
+    """Flat within half a width; the walk has seen the middle of it only."""
+    like = likelihood(lambda x: np.array([10.0 * max(abs(x[0]) - half, 0.0)]), 1)
+    walked = Walk.of([like.at(CENTRE[:1] + x) for x in np.linspace(-0.5, 0.5, 50)])
+    threshold = 4.0
+    beyond = pushed_out(like, walked, threshold, lambda at, free: like.at(at))
+    (found,) = profiles_of(like, walked.joined(Walk.of(beyond)), threshold)
+    if is_open:
+        assert (found.low, found.high) == (-math.inf, math.inf)
+    else:
+        # steps double, so the end is met within a factor of two of the way
+        assert 1.0 < CENTRE[0] - found.low <= half + 0.2
+        assert 1.0 < found.high - CENTRE[0] <= half + 0.2
+        assert beyond[-1].deviance > threshold
 
 
 def test_a_wide_gap_between_minima_is_told():

@@ -319,9 +319,15 @@ def show_stability(found: Collection) -> None:
     cases = len({row["case"] for row in found.rows})
     failed = len(found.failures())
     console.print(
-        f"{cases} cases, {len(found.rows)} runs, {failed} failures, "
-        f"{len(found.disagreements())} rates more than 2 % off the first solver's"
+        f"{_counted(cases, 'case')}, {_counted(len(found.rows), 'run')}, "
+        f"{_counted(failed, 'failure')}, {_counted(len(found.disagreements()), 'rate')} "
+        "more than 2 % off the first solver's"
     )
+
+
+def _counted(count: int, what: str) -> str:
+    """Number and word, in the plural where it is not one."""
+    return f"{count} {what}" if count == 1 else f"{count} {what}s"
 
 
 def show_statements(statements: list[Statement], errors: str) -> None:

@@ -17,6 +17,7 @@ from percussion_model.analysis.fitting.found import (
     OPEN_ABOVE,
     OPEN_BELOW,
     RIVALLED,
+    WIDE,
     Estimate,
     Explained,
     Fit,
@@ -48,6 +49,7 @@ from percussion_model.analysis.fitting.notes import (
     gap_notes,
     grid_notes,
     interval_notes,
+    kept_notes,
     rival_notes,
     rough_notes,
 )
@@ -55,6 +57,7 @@ from percussion_model.analysis.fitting.sampling import (
     Profile,
     Walk,
     profiles_of,
+    pushed_out,
     steps_wanted,
     walk,
 )
@@ -99,6 +102,8 @@ TOLD = 20.0
 # Walks in turn, each from the best so far: shares of all steps. The search met all there is
 # where the last one finds nothing better by this share of the threshold.
 ROUNDS, BETTER = (0.4, 0.6), 0.25
+# A parameter whose interval is wider than this factor is not called determined.
+MOST_WIDTH = 10.0
 # The deviance may be off by the roughness at the best place and at the other: the threshold is
 # higher by so many of it.
 ROUGH_FACTOR = 2.0
@@ -209,8 +214,10 @@ def _chosen(
     slow = all(isinstance(one, Curve) for one in sources)
     names = tuple(parameters) if parameters is not None else tuple(RANGES)[: 2 if slow else 4]
     for name in names:
-        if name not in RANGES or names.count(name) > 1:
-            raise FitError(f"parameters: {name} must be one of {', '.join(RANGES)}, once")
+        if name not in RANGES:
+            raise FitError(f"{name} cannot be fitted: must be one of {', '.join(RANGES)}")
+        if names.count(name) > 1:
+            raise FitError(f"{name} is to be fitted {names.count(name)} times: name it once")
     if not names:
         raise FitError(f"parameters: at least one of {', '.join(RANGES)} is needed")
     if scene.effects.rock != "bilinear":
@@ -355,7 +362,14 @@ def _explored(like: Likelihood, minima: list[Place], quantile: float) -> Explore
         if place.deviance < best.deviance:
             minima = [place, *minima]
     best, spread = descend(like, minima[0].at, every)
-    walked, minima = walked.joined(Walk.of([best])), [best, *minima[1:]]
+    walked = walked.joined(Walk.of([best]))
+    beyond = pushed_out(like, walked, threshold, lambda at, free: descend(like, at, free)[0])
+    walked = walked.joined(Walk.of([best, *beyond]))
+    deepest = min([best, *beyond], key=lambda one: one.deviance)
+    if deepest is not best:
+        settled = settled and deepest.deviance > best.deviance - BETTER * threshold
+        best, spread = deepest, descend(like, deepest.at, every)[1]
+    minima = [best, *minima[1:]]
     profiles = profiles_of(like, walked, threshold)
     return Explored(best, spread, profiles, minima, threshold, settled)
 
@@ -391,6 +405,7 @@ def _result(
     ]
     warnings = [
         *interval_notes(estimates, like),
+        *kept_notes(like, all(isinstance(one, Curve) for one in sources)),
         *([] if settled else [UNSETTLED]),
         *rough_notes((threshold - _quantile(confidence, len(like.names))) / ROUGH_FACTOR),
         *gap_notes(like, profiles),
@@ -410,4 +425,6 @@ def _estimate(at: float, found: Profile, low: float, high: float) -> Estimate:
         (True, True): OPEN,
     }[open_below, open_above]
     ends = (math.exp(max(found.low, low)), math.exp(min(found.high, high)))
+    if verdict in (DETERMINED, RIVALLED) and ends[1] > MOST_WIDTH * ends[0]:
+        verdict = WIDE
     return Estimate(math.exp(at), *ends, verdict)

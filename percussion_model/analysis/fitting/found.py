@@ -23,6 +23,7 @@ NAMES = {STIFFNESS: "K_R", RATIO: "gamma", DAMPING: "C_R", ENERGY: "W_R"}
 Source = Curve | DropTest | Reading
 DETERMINED, RIVALLED = "determined", "rival"
 OPEN_ABOVE, OPEN_BELOW, OPEN = "open above", "open below", "open"
+WIDE = "not determined"
 
 
 class Estimate(NamedTuple):
@@ -38,7 +39,7 @@ class Estimate(NamedTuple):
 
     @property
     def determined(self) -> bool:
-        """Whether the interval is closed."""
+        """Whether the interval is closed, and no wider than `fit.MOST_WIDTH`."""
         return self.verdict in (DETERMINED, RIVALLED)
 
 
@@ -51,6 +52,11 @@ class Explained:
     fitted: np.ndarray = field(repr=False)
     noise: float
     source: Source = field(repr=False)
+
+    @property
+    def noise_is_given(self) -> bool:
+        """Whether the noise came with the data; else it is estimated."""
+        return isinstance(self.source, Reading)
 
     @property
     def unit(self) -> str:
@@ -114,7 +120,7 @@ class Fit:
     warnings: list[str]
 
     def changes(self, undetermined: bool = False) -> dict[str, float]:
-        """Fitted parameters for `Scene.replace`; without those whose interval is open."""
+        """Fitted parameters for `Scene.replace`; without those that are not determined."""
         return {
             key: found.value
             for key, found in self.estimates.items()

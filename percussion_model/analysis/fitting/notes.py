@@ -8,10 +8,13 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from percussion_model.analysis.fitting.found import (
+    DAMPING,
+    ENERGY,
     NAMES,
     OPEN,
     OPEN_ABOVE,
     OPEN_BELOW,
+    WIDE,
     Estimate,
     Explained,
     Rival,
@@ -28,7 +31,7 @@ UNSETTLED = (
     "and intervals may be too narrow"
 )
 # An interval whose ends differ by this factor is said to be wide.
-WIDE = 2.0
+ROUGHLY = 2.0
 # Residuals that follow from each other by so many standard errors are no independent noise.
 MOST_CORRELATION = 4.0
 # With twice the cells the best values may move by this share of their intervals' halves.
@@ -41,16 +44,40 @@ def interval_notes(estimates: Mapping[str, Estimate], like: Likelihood) -> list[
     for name, one in estimates.items():
         unit = like.scene.row_of(name).unit.replace("-", "")
         low, high = (f"{end:.3g} {unit}".rstrip() for end in (one.low, one.high))
+        factor = f"a factor of {one.high / one.low:.2g}"
         told = {
             OPEN_ABOVE: f"is not determined: the data tell only that it is above {low}",
             OPEN_BELOW: f"is not determined: the data tell only that it is below {high}",
             OPEN: f"is not determined: the data tell nothing of it between {low} and {high}",
+            WIDE: f"is not determined: {factor}, {low} to {high}, explains the data",
         }.get(one.verdict)
-        if told is None and one.high > WIDE * one.low:
-            told = f"is known only to a factor of {one.high / one.low:.2g}: {low} to {high}"
+        if told is None and one.high > ROUGHLY * one.low:
+            told = f"is determined only to {factor}: {low} to {high}"
         if told is not None:
             notes.append(f"{NAMES[name]} ({name}) {told}")
     return notes
+
+
+def kept_notes(like: Likelihood, slow: bool) -> list[str]:
+    """Say what is kept as the scene has it: not told by the data, or taken to be right."""
+    kept = [key for key in NAMES if key not in like.names]
+    silent = [key for key in kept if slow and key in (DAMPING, ENERGY)]
+    given = [key for key in kept if key not in silent and like.scene[key] is not None]
+    notes = []
+    if silent:
+        notes.append(f"{_values_of(like, silent)} kept: a slow test does not tell them")
+    if given:
+        notes.append(f"{_values_of(like, given)} kept: the intervals hold only if that is right")
+    return notes
+
+
+def _values_of(like: Likelihood, keys: Sequence[str]) -> str:
+    """What the scene has of some parameters."""
+    shown = []
+    for key in keys:
+        unit = like.scene.row_of(key).unit.replace("-", "")
+        shown.append(f"{NAMES[key]} = {like.scene[key]:.4g} {unit}".rstrip())
+    return ", ".join(shown)
 
 
 def rough_notes(rough: float) -> list[str]:

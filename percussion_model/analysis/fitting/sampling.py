@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -22,6 +22,9 @@ EARLY = 0.25
 AT_EDGE = 0.1
 # Of the width of an interval: a gap this wide without any place parts two minima.
 PARTED = 0.33
+# Ends of intervals wider than this, in the logarithm, are pushed out by this share of the width
+# and twice as far each time, until nothing there explains the data.
+WORTH_A_PUSH, PUSH = math.log(2.0), 0.1
 # Values of a parameter at which its profile is given.
 POINTS = 40
 
@@ -151,6 +154,49 @@ def _reflected(at: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
     """Place as far within the range as it was beyond."""
     at = np.where(at > high, 2.0 * high - at, at)
     return np.where(at < low, 2.0 * low - at, at)
+
+
+def pushed_out(
+    like: Likelihood,
+    walked: Walk,
+    threshold: float,
+    lowest: Callable[[np.ndarray, list[int]], Place],
+) -> list[Place]:
+    """Places beyond the ends of wide intervals: a walk may have stopped short of the true ends.
+
+    Parameters
+    ----------
+    like : Likelihood
+    walked : Walk
+    threshold : float
+        Deviance above the best at which an interval ends.
+    lowest : callable
+        Goes down from a place, over some of its parameters.
+
+    Returns
+    -------
+    list of Place
+        The last one of each end lies outside of the interval, or at the edge of the range.
+    """
+    inside = walked.at[walked.deviance < walked.deviance.min() + threshold]
+    limit = walked.deviance.min() + threshold
+    found: list[Place] = []
+    for k in range(inside.shape[1]):
+        width = float(np.ptp(inside[:, k]))
+        if width < WORTH_A_PUSH:
+            continue
+        others = [j for j in range(inside.shape[1]) if j != k]
+        for row, sign in ((inside[:, k].argmin(), -1.0), (inside[:, k].argmax(), 1.0)):
+            at, step = inside[row], PUSH * width
+            while like.low[k] + AT_EDGE < at[k] < like.high[k] - AT_EDGE:
+                at = at.copy()
+                at[k] = np.clip(at[k] + sign * step, like.low[k], like.high[k])
+                place = lowest(at, others) if others else like.at(at)
+                found.append(place)
+                if place.deviance >= limit:
+                    break
+                at, step = place.at, 2.0 * step
+    return found
 
 
 def profiles_of(like: Likelihood, walked: Walk, threshold: float) -> list[Profile]:

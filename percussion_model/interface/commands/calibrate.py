@@ -11,6 +11,7 @@ from percussion_model.interface.commands import common
 
 if TYPE_CHECKING:
     from percussion_model.analysis.fitting import Fit
+    from percussion_model.scene.scene import Scene
 
 
 def calibrate(
@@ -74,8 +75,10 @@ def calibrate(
     are commas, semicolons or tabs; beside the last two a decimal comma is read as well.
     """
     from percussion_model.analysis.fitting import fit_rock
+    from percussion_model.interface.calibrated_scene import commented_fit
     from percussion_model.interface.measured_files import read_curve, read_drop, read_reading
     from percussion_model.interface.terminal import count_bar
+    from percussion_model.simulation.files import staged_text
 
     if curve is None and not drop and not measured:
         raise common.refusal("nothing to fit: give --curve, --drop or --measured")
@@ -90,12 +93,13 @@ def calibrate(
     with count_bar("computations") as progress:
         found = fit_rock(chosen, slow, drops, numbers, only, limits, progress=progress)
     common.write_json(json_file, found.summary())
-    written = [] if json_file in (None, "-") else [Path(str(json_file))]
+    written = []
     if json_file != "-":
-        _show(found)
+        _show(found, chosen)
     if out is not None:
         changes = found.changes(write_undetermined)
-        chosen.replace(**changes).to_toml(out)
+        calibrated = chosen.replace(**changes).to_toml()
+        staged_text(out, commented_fit(found, changes, scene.name) + calibrated)
         written.append(out)
         left = [key for key in found.estimates if key not in changes]
         if left:
@@ -136,27 +140,31 @@ def _read_range(word: str) -> tuple[str, tuple[float, float]]:
         raise FitError(f"--range {word}: must be KEY=LOW:HIGH, SI units") from None
 
 
-def _show(found: Fit) -> None:
+def _show(found: Fit, scene: Scene) -> None:
     from rich.console import Console
     from rich.table import Table
 
     from percussion_model.analysis.fitting.found import NAMES
     from percussion_model.interface.tables import print_table
     from percussion_model.interface.terminal import show_warnings
-    from percussion_model.scene.scene import Scene
 
-    plain = Scene()
     table = Table()
     for heading in ("", "unit", "value", f"interval, {100 * found.confidence:g} %", "verdict"):
         table.add_column(heading, no_wrap=True, justify="right" if heading == "value" else "left")
     for key, one in found.estimates.items():
-        unit = plain.row_of(key).unit
+        unit = scene.row_of(key).unit
         interval = f"{one.low:.4g} to {one.high:.4g}"
         table.add_row(NAMES[key], unit, f"{one.value:.4g}", interval, one.verdict)
+    for key in NAMES:
+        if key not in found.estimates:
+            unit = scene.row_of(key).unit
+            table.add_row(NAMES[key], unit, f"{scene[key]:.4g}", "not fitted", "kept")
     console = Console()
     print_table(table, console)
-    noises = Table("measurement", "data", "noise, estimated", box=None)
+    noises = Table("measurement", "data", "noise", "", box=None)
     for source in found.explained:
-        noises.add_row(source.name, str(len(source.data)), f"{source.noise:.3g} {source.unit}")
+        noise = f"{source.noise:.3g} {source.unit}"
+        word = "given" if source.noise_is_given else "estimated"
+        noises.add_row(source.name, str(len(source.data)), noise, word)
     print_table(noises, console)
     show_warnings(console, found.warnings)
