@@ -42,8 +42,6 @@ _PATIENCE = 2.0
 RATE = ("Rate of penetration", "rate_of_penetration", 1e3, "mm/s")
 # What its error is: those of rock and model are others.
 NUMERICAL = " (± of grid and scatter)"
-# That of a settled motion is of its convergence.
-SETTLING = " (± of convergence; that of the grid is not in it)"
 # That of means over blows, whose numerical error is not estimated.
 SCATTERED = " (± of their scatter)"
 # Other rows of the table: name, key of the summary, factor, unit.
@@ -116,7 +114,8 @@ def show_settled(found: Settled) -> None:
     order = {0: "", 1: ", every blow alike"}.get(found.order, f", {found.order} blows a cycle")
     table.add_row("Motion", f"{found.kind}{order}")
     if summary[RATE[1]] is not None:
-        table.add_row(RATE[0], f"{rate_text(summary)} {RATE[3]}{SETTLING}")
+        text = f"{rate_text(summary)} {RATE[3]}"
+        table.add_row(RATE[0], text + _settled_error(found) * ("±" in text))
     for name, key, factor, unit in (
         ("Blow period", "blow_period", 1e3, "ms"),
         ("Deviation after a cycle", "multiplier", 1.0, "of what it was"),
@@ -126,6 +125,15 @@ def show_settled(found: Settled) -> None:
     table.add_row("Blows run", f"{len(found.blows)} in {found.duration:.4g} s of simulated time")
     table.add_row("Computed in", f"{found.wall_time:.3g} s")
     print_table(table)
+
+
+def _settled_error(found: Settled) -> str:
+    """What the ± of a stationary rate is of, and what is not in it."""
+    if found.grid_error == 0.0:
+        left = "; there is no grid"
+    else:
+        left = "" if found.grid_error > 0.0 else "; that of the grid was not estimated"
+    return f" (± of {found.error_of}{left})"
 
 
 def show_study(found: Study) -> None:
