@@ -9,6 +9,7 @@ import pytest
 from percussion_model import Scene, simulate
 from percussion_model.simulation.error_estimate import FEWEST_BLOWS
 from percussion_model.simulation.result import Result
+from percussion_model.simulation.uncertain import in_digits, mean_text
 from percussion_model.verification.accuracy.explicit import explicit_rate
 
 # Limits of refined runs, waves of 80 to 160 cells and explicit elements of 60 to 120, 2.5 s
@@ -32,6 +33,39 @@ def test_the_error_of_a_default_run_covers_the_true_one(changes, rate, unsure):
     assert bool(doubt) == (stated > 0.01)
 
 
+@pytest.mark.parametrize("changes", [STIFF[0], CHATTER[0], REFERENCE[0]])
+def test_the_errors_of_other_means_cover_the_true_ones(changes):
+    """Limits are between runs of 80 and 112 cells, which differ least."""
+    scene = Scene().replace(**changes)
+    result = simulate(scene, record_events=False)
+    limits = [
+        simulate(scene.replace(**{"solver.cells": cells}), error_estimate=False).summary()
+        for cells in (80, 112)
+    ]
+    summary, judged = result.summary(), 0
+    assert set(result.errors) == set(result.standard_errors)
+    for name, error in result.errors.items():
+        values = [one[name] for one in limits]
+        unsure = 0.5 * abs(values[0] - values[1])
+        assert abs(summary[name] - 0.5 * sum(values)) <= error + unsure, name
+        judged += unsure < 0.3 * error
+    assert judged >= 10
+    # what is said is not just wide
+    assert result.errors["blow_period"] < 0.02 * summary["blow_period"]
+
+
+def test_a_mean_has_an_error_where_its_scatter_has_none():
+    """The grid moves it, and each blow is alike."""
+    scene = Scene().computed_by("fem", **{"run.duration": 0.6, "run.settle": 0.3})
+    result = simulate(scene, record_events=False)
+    name = "peak_contact_force"
+    assert result.errors[name] > 0.01 * result.summary()[name] > 10.0 * result.standard_errors[name]
+    lone = simulate(scene, record_events=False, error_estimate=False)
+    assert lone.errors == {}
+    assert "±" in mean_text(result.summary(), name)
+    assert mean_text(lone.summary(), name, 1e-3) == in_digits(1e-3 * lone.summary()[name], 3)
+
+
 def test_the_estimate_changes_nothing_else_and_can_be_left_out(tmp_path):
     scene = Scene().replace(**{"run.duration": 0.6, "run.settle": 0.2})
     with_it = simulate(scene)
@@ -46,6 +80,7 @@ def test_the_estimate_changes_nothing_else_and_can_be_left_out(tmp_path):
     with_it.save(tmp_path)
     loaded = Result.load(tmp_path)
     assert loaded.rate_of_penetration_relative_error == with_it.rate_of_penetration_relative_error
+    assert loaded.errors == with_it.errors
 
 
 def test_runs_to_compare_with_are_short(monkeypatch):

@@ -241,7 +241,7 @@ def test_the_runs_that_tell_the_error_are_named_and_move_the_bar():
     simulate(scene, progress=times.append, error_estimate=True,
              stage=lambda name, end: told.append((name, len(times))))  # fmt: skip
     assert len(told) >= 1
-    assert all(name.startswith("error of the rate, run ") for name, _ in told)
+    assert all(name.startswith("error of the means, run ") for name, _ in told)
     assert told[-1][1] < len(times)
 
 
@@ -270,7 +270,7 @@ def interrupt_in(monkeypatch, name_of_run):
     ("words", "run"),
     [
         (["--accuracy", "3e-2", "--check"], f"run {len(planned_cells(ASKED))} of"),
-        ([], "error of the rate"),
+        ([], "error of the means"),
     ],
     ids=["finer run", "error estimate"],
 )

@@ -12,6 +12,7 @@ from percussion_model.interface import report
 from percussion_model.interface.report import HEADLINES, headline_rows, ledger_rows, write_report
 from percussion_model.scene.scene import Scene
 from percussion_model.simulation.simulate import simulate
+from percussion_model.simulation.uncertain import known_error
 
 SHORT = Scene(title="A <short> run", run={"duration": 0.2, "settle": 0.0})
 SCENES = {
@@ -113,17 +114,17 @@ def test_headlines_are_in_both_units():
 
 
 def test_digits_that_nobody_knows_are_not_on_the_page(case):
-    """Three of means and peaks, five of a rate whose error is known; an error has two."""
+    """Three where the error is not known, four where it does not show; an error has two."""
     name, result, _ = case
     summary = result.summary()
-    sure = summary["rate_of_penetration_error"] is not None
+    keys = {what: key for key, what, *_ in HEADLINES}
     for what, si, other in headline_rows(summary):
         for text in filter(None, (si, other)):
             number = text.split(" ")[0].replace("−", "")
             if "±" in text or "below" in text:
                 continue
             digits = number.partition("e")[0].replace(".", "").lstrip("0").rstrip("0")
-            most = 5 if sure and what.startswith("Rate") else 3
+            most = 3 if known_error(summary, keys[what]) is None else 4
             assert len(digits) <= most, (name, what, text)
 
 

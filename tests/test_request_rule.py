@@ -237,7 +237,7 @@ def test_two_misfits_tell_the_effect_of_a_misfit():
     runs = [on_grid(1.0 + effect * misfit, 30, misfit) for misfit in (-1e-3, 5e-4, 1e-4)]
     estimate = estimate_error(runs[-1], runs[:-1])
     assert estimate.cells == pytest.approx(0.0, abs=1e-9)
-    assert estimate.fit == pytest.approx(SAFETY * effect * 1e-4 / runs[-1].rate, rel=1e-6)
+    assert estimate.fit == pytest.approx(SAFETY * effect * 1e-4 / runs[-1].value, rel=1e-6)
     # another number of drilling cycles: any of the motions may be the right one
     other = [on_grid(1.03, 30, -1e-3, cycles=4.0), runs[1]]
     assert estimate_error(runs[-1], other).total >= 0.02

@@ -157,7 +157,8 @@ def test_tables_of_runs(aperiodic, hidden, capsys, monkeypatch):
     assert "undecided" in capsys.readouterr().out
     show_settled(settled(BOUNCING, most_blows=60))
     shown = capsys.readouterr().out
-    assert sum("±" in line for line in shown.splitlines()) == 2
+    assert sum("±" in line for line in shown.splitlines()) == 3  # rate, period, what ± is
+    assert "by the scatter of blows alone" in " ".join(shown.split())
 
 
 def test_a_rate_in_one_line_of_python(aperiodic, hidden):
@@ -266,6 +267,31 @@ def test_effects_tell_changes_with_errors(aperiodic, periodic, hidden):
     assert told[1]["rate_of_penetration_undecided"] is True
     drawn = [text.get_text() for ax in draw_effects(found).axes for text in ax.texts]
     assert any("±" in text for text in drawn)
+
+
+def test_effects_know_the_error_that_the_grid_makes():
+    """Lengths that fit no common cell: the rate is known to some per cent, and so is a change."""
+    lengths = {"piston.sections.0.length": 0.287, "bit.sections.0.length": 0.411}
+    scene = Scene().replace(**lengths, **{"run.duration": 1.0, "run.settle": 0.4})
+    result = simulate(scene, record_events=False)
+    base = Trial(Variant("", "as it is"), result, 1.0, None)
+    without = simulate(scene.replace(**{"effects.gravity": False}), record_events=False)
+    found = EffectsStudy(scene, base, [Trial(Variant("gravity", "off"), without, 1.0, None)], {})
+    assert base.numbers()["rate_of_penetration_error"] == result.rate_of_penetration_error
+    headings, rows, _ = table_of(found)
+    assert "±" in rows[0][headings.index("rate\nmm/s")]
+    error = found.change_errors(found.trials[0])["rate_of_penetration"]
+    assert error > 0.9 * result.rate_of_penetration_relative_error > 0.01
+    assert found.warnings() == result.warnings  # and nothing twice
+
+
+def test_a_difference_without_errors_is_no_verdict(aperiodic, capsys):
+    lone = simulate(BOUNCING, 3.0, settle=1.0, error_estimate=False)
+    found = Comparison({"wave": aperiodic, "fem": lone})
+    assert found.difference_errors()["fem"]["blow_period"] is None
+    show_comparison(found)
+    (line,) = [one for one in capsys.readouterr().out.splitlines() if "Blow period" in one]
+    assert "≈" in line
 
 
 # ------------------------------------------------------------------- pages, figures

@@ -42,9 +42,14 @@ def test_a_drop_test_tells_its_depth_and_rebound_in_place_of_dashes(drop, capsys
 
 
 def test_a_table_shows_no_more_digits_than_are_known(capsys, monkeypatch):
-    """Five where an error stands beside it, and three where nothing is known of it."""
+    """Two of the error where it stands beside it, and three where nothing is known of it."""
     monkeypatch.setenv("COLUMNS", "80")
     show_summary(simulate(REFERENCE, 1.0, settle=0.2))
+    told = [line for line in capsys.readouterr().out.splitlines() if "±" in line]
+    assert len(told) >= 10
+    for line in told[:-1]:  # the last is the note
+        assert len(line.split("±")[1].split()[0].replace(".", "").strip("0")) <= 2, line
+    show_summary(simulate(REFERENCE, 1.0, settle=0.2, error_estimate=False))
     seen = 0
     for line in capsys.readouterr().out.splitlines():
         _, name, number, *_ = [*line.split("│"), "", ""]

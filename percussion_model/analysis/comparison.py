@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 from percussion_model.scene.scene import Scene, SceneError
@@ -84,8 +83,8 @@ class Comparison:
     def difference_errors(self) -> dict[str, dict[str, float | None]]:
         """Error of each of `differences`, by solver: the errors of both numbers combined.
 
-        Of the rate by grid and scatter, of other means over blows by scatter alone; None
-        where a difference is, or where no error is known.
+        By grid and scatter; None where a difference is, or where one of the errors is not
+        known.
         """
         summaries = self.summaries()
         base = summaries[self.first]
@@ -176,7 +175,7 @@ def compare(
     end = scene.run.duration if duration is None else duration
     results = {}
     for k, (name, chosen) in enumerate(scenes.items()):
-        report = None if progress is None else partial(_add_time, progress, k * end)
+        report = None if progress is None else _after(k * end, progress)
         results[name] = simulate(chosen, duration, settle, progress=report)
     return Comparison(results)
 
@@ -204,8 +203,17 @@ def read_solvers(text: str) -> tuple[str, ...]:
     return names
 
 
-def _add_time(progress: Callable[[float], None], start: float, t: float) -> None:
-    progress(start + t)
+def _after(start: float, progress: Callable[[float], None]) -> Callable[[float], None]:
+    """Report of a run that begins at a time; the short runs that tell its error report nothing."""
+    reached = start
+
+    def report(t: float) -> None:
+        nonlocal reached
+        if start + t > reached:
+            reached = start + t
+            progress(reached)
+
+    return report
 
 
 def relative_change(value: float | None, base: float | None) -> float | None:
@@ -220,13 +228,13 @@ def change_error(
 ) -> float | None:
     """Standard error of value / base - 1, whose errors are independent.
 
-    None where that is not defined, or neither error is known.
+    None where that is not defined, or one of the errors is not known.
     """
     if value is None or base is None or relative_change(value, base) is None:
         return None
-    if error is None and base_error is None:
+    if error is None or base_error is None:
         return None
-    return math.hypot(error or 0.0, value / base * (base_error or 0.0)) / abs(base)
+    return math.hypot(error, value / base * base_error) / abs(base)
 
 
 def _difference_error(summary: dict[str, Any], base: dict[str, Any], key: str) -> float | None:

@@ -11,10 +11,12 @@ from typing import Any
 from percussion_model.analysis.comparison import change_error, relative_change
 from percussion_model.physics.effects import EFFECTS
 from percussion_model.scene.scene import Scene, SceneError
+from percussion_model.simulation.error_estimate import LARGE
 from percussion_model.simulation.rate import LEAST_BLOWS
 from percussion_model.simulation.result import Result
 from percussion_model.simulation.simulate import Simulation, simulate
-from percussion_model.simulation.uncertain import known_error
+from percussion_model.simulation.uncertain import known_error, known_scatter
+from percussion_model.simulation.warnings import unused_note
 
 __all__ = [
     "NOISE",
@@ -45,9 +47,10 @@ ROUNDS = 40
 SHORT_RUN = 1.5
 MOST_RUNS = 7
 
+# Name of the variant of an accelerator, which changes no number.
+LEAPS = "leaps"
 # Numbers of a summary whose change is shown.
 CHANGED = ("rate_of_penetration", "blow_period", "peak_bit_force")
-_BY_BLOWS = ("rate_of_penetration_standard_error", "drilling_cycles_per_blow")
 
 _NO_ROCK = "the bit meets no rock: it flies, and drills nothing"
 _NO_DRIVE = "nothing throws the piston: what moves is left from the start and comes to rest"
@@ -108,7 +111,7 @@ def effect_variants(scene: Scene) -> Iterator[Variant]:
     if scene.solver_name == "wave":
         is_on = scene.solver.leaps
         # Leaps are no effect but an accelerator: a step without them is the same step.
-        yield Variant("leaps", "off" if is_on else "on", {"solver.leaps": not is_on})
+        yield Variant(LEAPS, "off" if is_on else "on", {"solver.leaps": not is_on})
 
 
 def _drive(scene: Scene) -> Iterator[Variant]:
@@ -191,8 +194,13 @@ class Trial:
     @property
     def reason(self) -> str:
         """Why there is no rate of penetration, or why it must not be trusted; may be empty."""
+        return "; ".join(self.reasons)
+
+    @property
+    def reasons(self) -> list[str]:
+        """Parts of `reason`."""
         if self.variant.no_blows or self.variant.no_penetration:
-            return self.variant.no_blows or self.variant.no_penetration
+            return [self.variant.no_blows or self.variant.no_penetration]
         reasons = [text for text in self.result.warnings if "trusted" in text]
         if len(self.result.counted) < LEAST_BLOWS:
             reasons += [text for text in self.result.warnings if "whole blow" in text][:1]
@@ -200,7 +208,7 @@ class Trial:
             reasons += [
                 "the motion is aperiodic, and the run too short to tell its rate of penetration"
             ]
-        return "; ".join(reasons)
+        return reasons
 
     @property
     def undecided(self) -> bool:
@@ -211,11 +219,12 @@ class Trial:
         """What was found, as plain values; None is what is not defined."""
         summary = self.result.summary()
         blows = summary["blows"]
-        found = {name: summary[name] for name in (*CHANGED, *_BY_BLOWS)}
+        found = {name: summary[name] for name in (*CHANGED, "drilling_cycles_per_blow")}
+        found |= {f"{name}_error": known_error(summary, name) for name in CHANGED}
+        found |= {f"{name}_standard_error": known_scatter(summary, name) for name in CHANGED}
         found["rate_of_penetration_undecided"] = self.undecided
-        found["blow_period_standard_error"] = known_error(summary, "blow_period")
         if self.variant.no_penetration:
-            found["rate_of_penetration"] = found["rate_of_penetration_standard_error"] = None
+            found |= dict.fromkeys(key for key in found if key.startswith(CHANGED[0]))
         if self.variant.no_blows:
             found = dict.fromkeys(found)
             blows = None
@@ -262,13 +271,33 @@ class EffectsStudy:
         return found
 
     def change_errors(self, trial: Trial) -> dict[str, float | None]:
-        """Errors of `changes`, by the scatter of both runs; None where it is not known."""
+        """Errors of `changes`, by grid and scatter of both runs; None where it is not known.
+
+        Leaps go over the same grid: whatever it puts off is in both runs, and scatter is left.
+        """
+        kind = "standard_error" if trial.variant.effect == LEAPS else "error"
         here, base = trial.numbers(), self.base.numbers()
         return {
-            name: change_error(here[name], here[error], base[name], base[error])
+            name: change_error(
+                here[name], here[f"{name}_{kind}"], base[name], base[f"{name}_{kind}"]
+            )
             for name in CHANGED
-            if (error := f"{name}_standard_error") in base
         }
+
+    def warnings(self) -> list[str]:
+        """Warnings of the scene, and others of its variants behind their names.
+
+        Not those of a large error, which stands beside the rate, and what `reason` says.
+        """
+        texts = list(self.base.result.warnings)
+        for trial in self.trials:
+            said = (*texts, *trial.reasons, unused_note(trial.result.scene.given_in_vain))
+            texts += [
+                f"{trial.variant.name}: {text}"
+                for text in trial.result.warnings
+                if text not in said and not trial.variant.no_blows and LARGE not in text
+            ]
+        return texts
 
     def is_costlier(self, trial: Trial) -> bool:
         """Whether turning an effect off made a step costlier, beyond noise."""
@@ -349,7 +378,7 @@ def study_effects(
 
 def _best_run(scene: Scene, duration: float | None, settle: float | None) -> tuple[Result, float]:
     """Run a scene, a short one several times; the least wall time [s]."""
-    result = simulate(scene, duration, settle, error_estimate=False)
+    result = simulate(scene, duration, settle, error_estimate=True)
     walls = [result.wall_time]
     while sum(walls) < SHORT_RUN and len(walls) < MOST_RUNS:
         walls.append(simulate(scene, duration, settle, error_estimate=False).wall_time)

@@ -53,6 +53,8 @@ _COLUMNS = [(BLOW.names or ()).index(name) for name in COMPARED]
 STEADY = 0.9
 # With fewer blows allowed nothing is known of an aperiodic motion.
 LEAST_LIMIT = 32
+# Numbers whose errors by the grid are estimated.
+_RATE, _PERIOD = "rate_of_penetration", "blow_period"
 # Grids are compared over so many blows at least; where the motion is periodic, over the last
 # of them, so that settling does not count as scatter.
 FEWEST_JUDGED, JUDGED_SHARE = 12, 0.5
@@ -86,9 +88,10 @@ class Settled:
         Simulated time and time to compute [s].
     depends_on_cells : bool
         Whether the rate is one of the cells and of nothing else.
-    grid_error : float
-        The other part of the rate's error, as `simulate` estimates it by coarser grids
-        [m/s]; 0 without a grid, NaN where it was not estimated.
+    grid_errors : dict of float
+        The other part of the errors of `rate_of_penetration` [m/s] and `blow_period` [s], as
+        `simulate` estimates it by coarser grids, with what scatter does to these runs; 0
+        without a grid. Of what was not estimated there is none.
     """
 
     kind: str
@@ -101,7 +104,7 @@ class Settled:
     duration: float
     wall_time: float
     depends_on_cells: bool = False
-    grid_error: float = math.nan
+    grid_errors: dict[str, float] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         rate = rate_field(self.summary())
@@ -114,11 +117,13 @@ class Settled:
     @property
     def rate_of_penetration_error(self) -> float:
         """How far the rate may be off, by `error_of` [m/s]."""
-        if math.isnan(self.grid_error):
-            return self.settling_error
-        if self.order:  # the limit of a sequence, and that of its grid
-            return self.settling_error + self.grid_error
-        return max(self.settling_error, self.grid_error)
+        return self._with_grid(_RATE, self.settling_error)
+
+    def _with_grid(self, name: str, settling: float) -> float:
+        """Error of a number by its grid, as far as that is known, and by settling."""
+        grid = self.grid_errors.get(name, 0.0)
+        # the limit of a sequence, and that of its grid; scatter is in the other part as well
+        return settling + grid if self.order else max(settling, grid)
 
     @property
     def error_of(self) -> str:
@@ -126,7 +131,7 @@ class Settled:
         if math.isnan(self.settling_error):
             return ""
         settling = "scatter" if math.isnan(self.multiplier) else "convergence"
-        return f"grid and {settling}" if self.grid_error > 0.0 else settling
+        return f"grid and {settling}" if self.grid_errors.get(_RATE, 0.0) > 0.0 else settling
 
     @property
     def rate_of_penetration_undecided(self) -> bool:
@@ -147,11 +152,16 @@ class Settled:
 
     @property
     def blow_period_error(self) -> float:
-        """Standard error of the blow period of a motion that is not periodic [s]; else NaN."""
+        """How far the blow period may be off, by the same as the rate [s]; else NaN."""
         counted = self.counted["period"]
-        if self.order or len(counted) == 0:
+        if len(counted) == 0:
             return math.nan
-        return ratio_of_sums(counted, np.ones(len(counted)))[1]
+        if self.order:
+            means = self.blows["period"][-2 * self.order :].reshape(2, -1).mean(axis=1)
+            settling = float(abs(means[1] - means[0]))
+        else:
+            settling = ratio_of_sums(counted, np.ones(len(counted)))[1]
+        return self._with_grid(_PERIOD, settling)
 
     def summary(self) -> dict[str, Any]:
         """Return the numbers as plain values for JSON; None is what is not defined."""
@@ -162,7 +172,7 @@ class Settled:
             "rate_of_penetration_error": self.rate_of_penetration_error,
             "rate_of_penetration_error_of": self.error_of or None,
             "rate_of_penetration_settling_error": self.settling_error,
-            "rate_of_penetration_grid_error": self.grid_error,
+            "grid_errors": self.grid_errors,
             "rate_of_penetration_undecided": self.rate_of_penetration_undecided,
             BY_CELLS: self.depends_on_cells,
             "blow_period": self.blow_period,
@@ -238,7 +248,7 @@ def settled(
         found = Settled(*values, depends_on_cells=scene.is_undamped)
         if error_estimate and rate != 0.0 and math.isfinite(rate):
             settling = JUDGED_SHARE if order else SETTLING_SHARE
-            found = replace(found, grid_error=abs(rate) * _grid_error(simulation, settling))
+            found = replace(found, grid_errors=_grid_errors(simulation, settling))
         return found
 
     while len(blows) < most_blows:
@@ -265,24 +275,25 @@ def settled(
     return made("aperiodic", 0, *rate_of_blows(after_settling(blows)), math.nan)
 
 
-def _grid_error(simulation: Simulation, settling: float) -> float:
-    """Estimated error of the rate by the grid, relative to it; NaN where nothing tells.
+def _grid_errors(simulation: Simulation, settling: float) -> dict[str, float]:
+    """Estimated errors of rate and period by the grid, SI units; of what could be told.
 
     A run of few blows is made longer; `settling` is the share of it that does not count.
     """
     coarser = simulation.solver.coarser_scenes()
     if coarser == []:
-        return 0.0
+        return {_RATE: 0.0, _PERIOD: 0.0}
     while simulation.blow_rows < FEWEST_JUDGED:
         before = simulation.blow_rows
         simulation.advance_blows(1, simulation.time + STALLED_AFTER)
         if simulation.blow_rows == before:
-            return math.nan
+            return {}
     end, settle = simulation.time, settling * simulation.time
     whole = simulation.scene.replace(**{"run.duration": end, "run.settle": settle})
     result = replace(simulation.result(settle), scene=whole)
-    judged = with_error_estimate(result, coarser, _run)
-    return judged.rate_of_penetration_relative_error
+    judged = with_error_estimate(result, coarser, _run, whole_time=True)
+    errors = {_RATE: judged.rate_of_penetration_error, **judged.errors}
+    return {name: errors[name] for name in (_RATE, _PERIOD) if errors.get(name, math.nan) >= 0.0}
 
 
 def _run(scene: Scene) -> Result:

@@ -23,17 +23,12 @@ from percussion_model.simulation.files import staged
 from percussion_model.simulation.result import REPORT, Result
 from percussion_model.simulation.uncertain import (
     MOST_DIGITS,
-    SMALL_ERROR,
+    PLUS_MINUS,
     SMALLEST_UNIT,
-    SURE_DIGITS,
-    UNSURE_DIGITS,
-    depends_on_cells,
+    WITHOUT_ESTIMATE,
     in_digits,
-    known_error,
-    of_the_cells,
+    mean_text,
     rate_text,
-    scaled,
-    with_error,
 )
 
 # Numbers at the head of the report: key of the summary, what it is called, its
@@ -209,6 +204,7 @@ def render_report(result: Result, drawings: Sequence[Path]) -> str:
         hourly_rate=rate_text(summary, 3600.0),
         means=mean_cards(summary),
         headlines=headline_rows(summary),
+        about_errors=PLUS_MINUS if result.errors else WITHOUT_ESTIMATE,
         figures=[FigureBlock(blocks[name], text) for name, text in CAPTIONS.items()
                  if name in blocks],
         zoomable=not remark,
@@ -229,19 +225,9 @@ def headline_rows(summary: dict[str, Any]) -> list[tuple[str, str, str]]:
         if key in ERRORS:
             rows.append((name, _error(value, 1.0, unit), _error(value, factor, other)))
             continue
-        if depends_on_cells(summary, key):
-            here = f"{of_the_cells(value)} {unit}", f"{of_the_cells(value / factor)} {other}"
-            rows.append((name, *here))
-            continue
-        error = known_error(summary, key)
-        # what is exact to its error has all digits, where that of means is of scatter alone
-        digits = UNSURE_DIGITS if summary.get(f"{key}_error") is None else SURE_DIGITS
-        si = f"{_digits(value, digits, error, SMALLEST_UNIT)} {unit}".removesuffix(" –")
-        everyday = ""
-        if other not in ("", unit):
-            shown = _digits(value / factor, digits, scaled(1.0 / factor, error), MOST_DIGITS)
-            everyday = f"{shown} {other}"
-        rows.append((name, si, everyday))
+        si = f"{_text(summary, key, 1.0, SMALLEST_UNIT)} {unit}".removesuffix(" –")
+        shown = _text(summary, key, 1.0 / factor, MOST_DIGITS)
+        rows.append((name, si, f"{shown} {other}" if other not in ("", unit) else ""))
     return rows
 
 
@@ -256,26 +242,15 @@ def _error(value: float, factor: float, unit: str) -> str:
 def mean_cards(summary: dict[str, Any]) -> list[tuple[str, str]]:
     """Number with its unit, and name, of the cards beside that of the rate."""
     return [
-        (f"{_card(summary, key, factor)} {unit}", name)
+        (f"{_text(summary, key, factor, MOST_DIGITS)} {unit}", name)
         for key, factor, unit, name in CARDS
         if summary[key] is not None
     ]
 
 
-def _card(summary: dict[str, Any], key: str, factor: float) -> str:
-    """Write the number of a card."""
-    value, error = factor * summary[key], scaled(factor, known_error(summary, key))
-    if depends_on_cells(summary, key):
-        return of_the_cells(value)
-    return _digits(value, UNSURE_DIGITS, error, MOST_DIGITS)
-
-
-def _digits(value: float, count: int, error: float | None, most_digits: int) -> str:
-    """Write a number with its error, or with so many digits."""
-    if error is not None and error > SMALL_ERROR * abs(value):
-        return with_error(value, error, most_digits).replace("-", "−")
-    text = in_digits(value, count)
-    return text.replace("-", "−", 1) if value < 0 else text
+def _text(summary: dict[str, Any], key: str, factor: float, most_digits: int) -> str:
+    """Write a number with its error, with the minus sign of print."""
+    return mean_text(summary, key, factor, most_digits).replace("-", "−")
 
 
 def ledger_rows(energy: dict[str, float]) -> list[tuple[str, list[tuple[str, float, float]]]]:

@@ -18,7 +18,11 @@ from percussion_model.interface.messages import wrapped
 from percussion_model.interface.progress import Report, lines
 from percussion_model.interface.tables import print_table
 from percussion_model.simulation.uncertain import (
+    ABOUT,
+    NOT_THE_MODEL,
+    PLUS_MINUS,
     UNDECIDED,
+    WITHOUT_ESTIMATE,
     change_text,
     in_few_characters,
     mean_text,
@@ -40,10 +44,6 @@ if TYPE_CHECKING:
 _PATIENCE = 2.0
 
 RATE = ("Rate of penetration", "rate_of_penetration", 1e3, "mm/s")
-# What its error is: those of rock and model are others.
-NUMERICAL = " (± of grid and scatter)"
-# That of means over blows, whose numerical error is not estimated.
-SCATTERED = " (± of their scatter)"
 # Other rows of the table: name, key of the summary, factor, unit.
 SHOWN = (
     ("Blow period", "blow_period", 1e3, "ms"),
@@ -75,14 +75,12 @@ def show_summary(result: Result) -> None:
     table.add_column(justify="left", no_wrap=True)
     table.add_column(justify="right", no_wrap=True)
     table.add_column(justify="left")
-    rate = rate_text(summary)
     if len(result.blows):
-        table.add_row(RATE[0], _in_two_lines(rate), RATE[3] + NUMERICAL * ("±" in rate))
+        table.add_row(RATE[0], _in_two_lines(rate_text(summary)), RATE[3])
     values = summary if len(result.blows) else summary["fall"]
     for name, key, factor, unit in SHOWN if len(result.blows) else WITHOUT_BLOWS:
         if values.get(key) is not None:
-            text = _in_two_lines(mean_text(values, key, factor))
-            table.add_row(name, text, (unit + SCATTERED * ("±" in text)).lstrip())
+            table.add_row(name, _in_two_lines(mean_text(values, key, factor)), unit)
     energy = summary["energy"]
     for key in ("numerical", "residual"):
         share = energy[f"{key}_relative"]
@@ -102,6 +100,8 @@ def show_summary(result: Result) -> None:
     table.add_row("Speed", f"{result.real_time_factor:.3g}", "times real time")
     console = Console()
     print_table(table, console, keys=2)
+    if len(result.counted):
+        console.print(wrapped(PLUS_MINUS if result.errors else WITHOUT_ESTIMATE), highlight=False)
     show_warnings(console, result.warnings)
 
 
@@ -114,8 +114,7 @@ def show_settled(found: Settled) -> None:
     order = {0: "", 1: ", every blow alike"}.get(found.order, f", {found.order} blows a cycle")
     table.add_row("Motion", f"{found.kind}{order}")
     if summary[RATE[1]] is not None:
-        text = f"{rate_text(summary)} {RATE[3]}"
-        table.add_row(RATE[0], text + _settled_error(found) * ("±" in text))
+        table.add_row(RATE[0], f"{rate_text(summary)} {RATE[3]}")
     for name, key, factor, unit in (
         ("Blow period", "blow_period", 1e3, "ms"),
         ("Deviation after a cycle", "multiplier", 1.0, "of what it was"),
@@ -124,16 +123,23 @@ def show_settled(found: Settled) -> None:
             table.add_row(name, f"{mean_text(summary, key, factor)} {unit}".rstrip())
     table.add_row("Blows run", f"{len(found.blows)} in {found.duration:.4g} s of simulated time")
     table.add_row("Computed in", f"{found.wall_time:.3g} s")
-    print_table(table)
+    console = Console()
+    print_table(table, console)
+    if found.error_of:
+        console.print(wrapped(_settled_error(found)), highlight=False)
 
 
 def _settled_error(found: Settled) -> str:
-    """What the ± of a stationary rate is of, and what is not in it."""
-    if found.grid_error == 0.0:
-        left = "; there is no grid"
+    """Say what the ± of a stationary response is of, and what is not in it."""
+    settling = "convergence" if found.error_of.endswith("convergence") else "the scatter of blows"
+    grid = found.grid_errors.get(RATE[1])
+    if grid is None:
+        parts = f"{settling} alone, since that by the size of the cells was not estimated"
+    elif grid == 0.0:
+        parts = f"{settling} alone, since this solver has no grid"
     else:
-        left = "" if found.grid_error > 0.0 else "; that of the grid was not estimated"
-    return f" (± of {found.error_of}{left})"
+        parts = f"the size of the cells and {settling}"
+    return f"± is the numerical error, by {parts}. {NOT_THE_MODEL}"
 
 
 def show_study(found: Study) -> None:
@@ -263,7 +269,8 @@ def show_comparison(found: Comparison) -> None:
             if name in differences:
                 change, error = differences[name].get(key), errors[name].get(key)
                 hidden = change is not None and found.is_of_cells(name, key)
-                cells.append(UNDECIDED if hidden else change_text(change, error))
+                doubt = ABOUT if change and error is None else ""
+                cells.append(UNDECIDED if hidden else doubt + change_text(change, error))
         table.add_row(f"{label}, {unit}" if unit else label, *cells)
     table.add_section()
     for label, value in _EFFORT.items():
@@ -277,8 +284,10 @@ def show_comparison(found: Comparison) -> None:
     # a solver and its differences stay together
     print_table(table, console, groups=[1, *[2] * len(differences)])
     console.print(
-        "± of the rate is the error of grid and scatter, of other means that of scatter alone; "
-        f"a difference within the errors of both numbers is {UNDECIDED}.",
+        wrapped(
+            f"{PLUS_MINUS} A difference within the errors of both numbers is {UNDECIDED}; "
+            f"{ABOUT} stands where one of them has none."
+        ),
         highlight=False,
     )
     show_warnings(console, found.warnings())

@@ -14,6 +14,7 @@ from percussion_model.scene.scene import Scene
 from percussion_model.simulation.error_estimate import (
     Estimate,
     GridRun,
+    errors_of_numbers,
     estimate_error,
     grid_run,
 )
@@ -187,15 +188,20 @@ def _finished(scene: Scene, runs: list[GridRun], step: Step | None) -> Result:
     """The last result as that of the scene, with its estimated error and what to warn of."""
     wanted = scene.solver.accuracy
     assert wanted is not None
-    last = (step.run if step else runs[-1]).result
+    judged = step.run if step else runs[-1]
+    last = judged.result
     error = math.nan
     if step is not None:
         error = step.error
     elif len(runs) == 1 and runs[0].useful:
-        error = runs[0].scatter / abs(runs[0].rate)
+        error = runs[0].scatter / abs(runs[0].value)
+    # by place: runs compare by arrays
+    before = runs[: next(k for k, run in enumerate(runs) if run is judged)]
+    known = math.isfinite(error)
     result = replace(
         last,
         scene=scene,
+        errors=errors_of_numbers(judged, judged, before) if known else {},
         rate_of_penetration_relative_error=error,
         wall_time=sum(run.result.wall_time for run in runs),
         setup_time=sum(run.result.setup_time for run in runs),

@@ -1,4 +1,4 @@
-"""Estimated error of a rate of penetration, from runs on grids whose errors differ.
+"""Estimated errors of the rate and of other means, from runs on grids whose errors differ.
 
 Two things are wrong with a grid: its cells have a size, and lengths that fit no common
 cell let the wave speed take the error, the misfit. Runs that share a misfit agree on the
@@ -11,13 +11,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from percussion_model.scene.inputs import SimulationError
 from percussion_model.scene.numbers import numbers_of
 from percussion_model.scene.scene import Scene, SceneError
-from percussion_model.simulation.rate import LARGE_ERROR
+from percussion_model.simulation.means import COUNTS, numbers_over, scatter_over
+from percussion_model.simulation.rate import LARGE_ERROR, LEAST_BLOWS, rate_of_blows
 from percussion_model.simulation.result import Result
 from percussion_model.solvers.wave.resolution import FITS, largest_misfit, misfits, promised_error
 
@@ -41,6 +43,8 @@ FLOOR_SHARE = 0.1
 COMPARISON_WORK = 0.12
 # They last for so many blows at least: to settle and to count.
 FEWEST_BLOWS = 10
+# Words of the warning of a large error.
+LARGE = "may be off by"
 # Runs whose drilling cycles a blow differ by more, or by more than this share of them, are
 # of different motions; where there are dozens, one more or less is a smooth change.
 SAME_MOTION, SAME_SHARE = 0.5, 0.05
@@ -57,31 +61,68 @@ class GridRun:
         Relative error of the wave speed in each section, with its sign.
     promised : float
         Relative error of the rate that the rule of cells expects of the grid.
+    number : tuple of float or None
+        What is judged in place of the rate, and its standard error [SI].
     """
 
     result: Result
     misfit: np.ndarray
     promised: float
+    number: tuple[float, float] | None = None
 
     @classmethod
     def exact(cls, result: Result) -> GridRun:
         """A run without a grid."""
         return cls(result, np.zeros(0), 0.0)
 
+    @cached_property
+    def _number(self) -> tuple[float, float]:
+        """What is judged, and its standard error."""
+        if self.number is not None:
+            return self.number
+        return rate_of_blows(self.result.counted)
+
     @property
-    def rate(self) -> float:
-        """Rate of penetration [m/s]."""
-        return self.result.rate_of_penetration
+    def value(self) -> float:
+        """Rate of penetration [m/s], or the other number."""
+        return self._number[0]
 
     @property
     def scatter(self) -> float:
-        """Standard error of the rate [m/s]."""
-        return self.result.rate_of_penetration_standard_error
+        """Its standard error."""
+        return self._number[1]
+
+    @cached_property
+    def cycles(self) -> float:
+        """Drilling cycles a blow."""
+        return float(np.mean(self.result.counted["drilling_cycles"]))
+
+    @cached_property
+    def largest(self) -> float:
+        """Largest misfit of a section."""
+        return largest_misfit(self.misfit)
+
+    @cached_property
+    def signed(self) -> float | None:
+        """Misfit with its sign; None where more than one section has any."""
+        several = np.count_nonzero(np.abs(self.misfit) > FITS) > 1
+        return None if several else float(np.sum(self.misfit))
 
     @property
     def useful(self) -> bool:
-        """Whether there is a rate to judge."""
-        return not self.result.cut_short and math.isfinite(self.rate) and self.rate != 0.0
+        """Whether there is a number to judge."""
+        return not self.result.cut_short and math.isfinite(self.value) and self.value != 0.0
+
+    def numbers(self) -> dict[str, GridRun]:
+        """The run with each of its numbers over blows in place of the rate, by name."""
+        blows = self.result.counted
+        scatter, found = scatter_over(blows), {}
+        # what is the same for all numbers is found once
+        shared = {name: getattr(self, name) for name in ("cycles", "largest", "signed")}
+        for name, value in numbers_over(blows).items():
+            found[name] = replace(self, number=(value, scatter.get(name, math.nan)))
+            vars(found[name]).update(shared)
+        return found
 
 
 @dataclass(frozen=True)
@@ -128,12 +169,12 @@ def estimate_error(run: GridRun, others: Sequence[GridRun]) -> Estimate:
     -------
     Estimate
     """
-    scatter, floor = run.scatter / abs(run.rate), FLOOR_SHARE * run.promised
-    misfit = largest_misfit(run.misfit)
+    scatter, floor = run.scatter / abs(run.value), FLOOR_SHARE * run.promised
+    misfit = run.largest
     others = [other for other in others if other.useful]
     if not others:
         return Estimate(math.inf, 0.0, scatter, floor)  # nothing is known
-    fitting = [other for other in others if largest_misfit(other.misfit) <= FITS]
+    fitting = [other for other in others if other.largest <= FITS]
     if misfit <= FITS and fitting:
         other = fitting[-1]
         cells = _difference(other, run)
@@ -154,48 +195,47 @@ def estimate_error(run: GridRun, others: Sequence[GridRun]) -> Estimate:
 
 def _difference(other: GridRun, run: GridRun) -> float:
     """Relative difference of two rates; 0 where scatter alone explains it."""
-    off = abs(run.rate - other.rate)
+    off = abs(run.value - other.value)
     if off <= CONFIDENCE * math.hypot(run.scatter, other.scatter):
         return 0.0
-    return off / abs(run.rate)
+    return off / abs(run.value)
 
 
 def _same_motion(run: GridRun, other: GridRun) -> bool:
     """Whether two runs have the same number of drilling cycles a blow."""
-    cycles = [float(np.mean(one.result.counted["drilling_cycles"])) for one in (run, other)]
-    return abs(cycles[0] - cycles[1]) <= max(SAME_MOTION, SAME_SHARE * cycles[0])
+    off = abs(run.cycles - other.cycles)
+    return off <= max(SAME_MOTION, SAME_SHARE * run.cycles)
 
 
 def _around(run: GridRun, others: Sequence[GridRun]) -> tuple[GridRun, GridRun] | None:
     """The last runs whose misfits lie on both sides of zero, where one number tells a misfit."""
-    if any(np.count_nonzero(np.abs(one.misfit) > FITS) > 1 for one in (run, *others)):
+    if run.signed is None or any(other.signed is None for other in others):
         return None
-    signed = {id(one): float(np.sum(one.misfit)) for one in (run, *others)}
-    below = [other for other in others if signed[id(other)] < -FITS]
-    above = [other for other in others if signed[id(other)] > FITS]
+    below = [other for other in others if (other.signed or 0.0) < -FITS]
+    above = [other for other in others if (other.signed or 0.0) > FITS]
     return (below[-1], above[-1]) if below and above else None
 
 
 def _by_two(run: GridRun, pair: tuple[GridRun, GridRun]) -> tuple[float, float]:
     """Errors by cells and by misfit: a straight line through two runs, and the distance to it."""
-    x, y = ([float(np.sum(one.misfit)), one.rate] for one in pair)
+    x, y = ([one.signed or 0.0, one.value] for one in pair)
     slope = (y[1] - x[1]) / (y[0] - x[0])
-    expected = x[1] + slope * (float(np.sum(run.misfit)) - x[0])
-    off = abs(run.rate - expected)
+    expected = x[1] + slope * ((run.signed or 0.0) - x[0])
+    off = abs(run.value - expected)
     if off <= CONFIDENCE * math.hypot(run.scatter, *(one.scatter for one in pair)):
         off = 0.0
-    return SAFETY * off / abs(run.rate), SAFETY * abs(slope / run.rate) * largest_misfit(run.misfit)
+    return SAFETY * off / abs(run.value), SAFETY * abs(slope / run.value) * run.largest
 
 
 def _spread(run: GridRun, pair: tuple[GridRun, GridRun]) -> float:
     """Relative width of all rates: any of the motions may be the right one."""
-    rates = [run.rate, *(one.rate for one in pair)]
-    return (max(rates) - min(rates)) / abs(run.rate)
+    rates = [run.value, *(one.value for one in pair)]
+    return (max(rates) - min(rates)) / abs(run.value)
 
 
 def _by_one(run: GridRun, others: Sequence[GridRun]) -> tuple[float, float]:
     """Errors by cells and by misfit from the run whose misfit differs most."""
-    misfit = largest_misfit(run.misfit)
+    misfit = run.largest
     apart = [largest_misfit(other.misfit - run.misfit) for other in others]
     difference = _difference(others[-1], run)
     if misfit <= FITS:
@@ -208,11 +248,14 @@ def _by_one(run: GridRun, others: Sequence[GridRun]) -> tuple[float, float]:
 
 
 def with_error_estimate(
-    result: Result, coarser: Sequence[Scene] | None, run: Callable[[Scene], Result]
+    result: Result,
+    coarser: Sequence[Scene] | None,
+    run: Callable[[Scene], Result],
+    whole_time: bool = False,
 ) -> Result:
-    """Tell how far the rate of penetration may be off, by short runs on coarser grids.
+    """Tell how far the numbers of a run may be off, by short runs on coarser grids.
 
-    They start as the run did, and rates are compared over the same stretch of time.
+    They start as the run did, and numbers are compared over the same stretch of time.
 
     Parameters
     ----------
@@ -222,43 +265,92 @@ def with_error_estimate(
         None where nothing is known of the solver.
     run : callable
         Runs a scene.
+    whole_time : bool
+        Whether to compare over all of the run, not a part that takes a share of its work.
 
     Returns
     -------
     Result
-        With `rate_of_penetration_relative_error`, where it could be told.
+        With `rate_of_penetration_relative_error` and `errors`, of what could be told.
     """
-    whole = grid_run(result)
-    if coarser is None or not whole.useful:
+    if coarser is None or result.cut_short or len(result.counted) < LEAST_BLOWS:
         return result
-    scatter = whole.scatter / abs(whole.rate)
+    whole = grid_run(result)
     if not coarser:
-        return _judged(result, Estimate(0.0, 0.0, scatter, 0.0))
-    end = _comparison_time(result, coarser)
+        return _judged(whole, whole, [])
+    end = result.duration if whole_time else _comparison_time(result, coarser)
     settle = min(result.settle, 0.5 * end)
     short = {"run.duration": end, "run.settle": settle}
     try:
         others = [grid_run(run(scene.replace(**short))) for scene in coarser]
     except (SceneError, SimulationError) as error:
-        result.warnings.append(f"the error of the rate could not be estimated: {error}")
+        result.warnings.append(f"the errors of the means could not be estimated: {error}")
         return result
     if any(other.result.cut_short for other in others):
-        result.warnings.append("interrupted while the error of the rate was estimated")
+        result.warnings.append("interrupted while the errors of the means were estimated")
         return result
     early = result.blows["time"] + result.blows["period"] <= end
     part = grid_run(replace(result, settle=settle, blows=result.blows[early]))
-    if not part.useful or not any(other.useful for other in others):
-        return result
-    if result.solver == "wave":
-        return _judged(result, replace(estimate_error(part, others), scatter=scatter))
+    return _judged(whole, part, others)
+
+
+def errors_of_numbers(whole: GridRun, part: GridRun, others: Sequence[GridRun]) -> dict[str, float]:
+    """Estimate the errors of the numbers over blows of a run.
+
+    Parameters
+    ----------
+    whole, part : GridRun
+        The run, and the stretch of it that others are compared with.
+    others : sequence of GridRun
+        On coarser grids, the best last; none where there is no grid.
+
+    Returns
+    -------
+    dict of float
+        Of grid and scatter, by name, SI units; only what could be told.
+    """
+    compared = [other.numbers() for other in others]
+    of_part, found = part.numbers(), {}
+    for name, number in whole.numbers().items():
+        if number.useful and of_part[name].useful:
+            estimate = _estimate(of_part[name], [numbers[name] for numbers in compared])
+            estimate = _of_whole(estimate, number)
+            if name in COUNTS:  # grids that agree do so exactly
+                estimate = replace(estimate, floor=0.0)
+            error = abs(number.value) * estimate.total
+            if math.isfinite(error):
+                found[name] = error
+    return found
+
+
+def _estimate(part: GridRun, others: Sequence[GridRun]) -> Estimate:
+    """Estimate the error of a number by what is known of the solver's grids."""
+    scatter = part.scatter / abs(part.value)
+    if not others:
+        return Estimate(0.0, 0.0, scatter, 0.0)
+    if part.result.solver == "wave":
+        return estimate_error(part, others)
+    known = [other for other in others if other.useful]
     # each of the others is coarser in another way
-    off = sum(_difference(other, part) for other in others if other.useful)
-    floor = NUMERICAL_SHARE * abs(result.energy["numerical_relative"])
-    return _judged(result, Estimate(off, 0.0, scatter, floor))
+    off = sum(_difference(other, part) for other in known) if known else math.inf
+    floor = NUMERICAL_SHARE * abs(part.result.energy["numerical_relative"])
+    return Estimate(off, 0.0, scatter, floor)
 
 
-def _judged(result: Result, estimate: Estimate) -> Result:
-    """The result with its error and what to warn of."""
+def _of_whole(estimate: Estimate, whole: GridRun) -> Estimate:
+    """An estimate by a part of a run, with the scatter of all of it."""
+    scatter = whole.scatter / abs(whole.value)
+    return replace(estimate, scatter=scatter if math.isfinite(scatter) else math.inf)
+
+
+def _judged(whole: GridRun, part: GridRun, others: Sequence[GridRun]) -> Result:
+    """The result with its errors and what to warn of."""
+    result = replace(whole.result, errors=errors_of_numbers(whole, part, others))
+    if not whole.useful or not part.useful:
+        return result
+    estimate = _of_whole(_estimate(part, others), whole)
+    if not math.isfinite(estimate.total):
+        return result
     result.warnings.extend(_large_error(estimate, result.solver))
     return replace(result, rate_of_penetration_relative_error=estimate.total)
 
@@ -273,7 +365,7 @@ def _large_error(estimate: Estimate, solver: str) -> Iterator[str]:
             else "more fem.elements and a greater fem.contact_stiffness bring it closer"
         )
         yield (
-            f"the rate of penetration may be off by {100.0 * by_grid:.2g} %, as coarser runs "
+            f"the rate of penetration {LARGE} {100.0 * by_grid:.2g} %, as coarser runs "
             f"tell; {remedy}"
         )
 

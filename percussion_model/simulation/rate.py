@@ -41,9 +41,7 @@ def rate_of_blows(blows: np.ndarray) -> tuple[float, float]:
 def ratio_of_sums(values: np.ndarray, weights: np.ndarray) -> tuple[float, float]:
     """Ratio of the sums of two series of a motion, and its standard error.
 
-    The sum of (value - ratio * weight) over n rows scatters with the variance a n + b: a is
-    that of a random walk, b is what later rows take back. Both follow from stretches of one
-    row and of a quarter of all.
+    See `ratios_of_sums`.
 
     Parameters
     ----------
@@ -55,23 +53,44 @@ def ratio_of_sums(values: np.ndarray, weights: np.ndarray) -> tuple[float, float
     ratio, standard_error : float
         The error is NaN for fewer than `LEAST_BLOWS` rows.
     """
-    count, total = len(values), float(np.sum(weights))
-    ratio = float(np.sum(values)) / total
-    if count < LEAST_BLOWS:
-        return ratio, math.nan
-    sums = np.concatenate([[0.0], np.cumsum(values - ratio * weights)])
+    ratios, errors = ratios_of_sums(values[np.newaxis], weights[np.newaxis])
+    return float(ratios[0]), float(errors[0])
 
-    def scattered(length: int) -> tuple[float, float]:
+
+def ratios_of_sums(values: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Ratios of the sums of pairs of series of a motion, and their standard errors.
+
+    The sum of (value - ratio * weight) over n rows scatters with the variance a n + b: a is
+    that of a random walk, b is what later rows take back. Both follow from stretches of one
+    row and of a quarter of all.
+
+    Parameters
+    ----------
+    values, weights : ndarray, shape (m, n)
+        m series of n successive rows, which may depend on each other.
+
+    Returns
+    -------
+    ratios, standard_errors : ndarray, shape (m,)
+        Errors are NaN for fewer than `LEAST_BLOWS` rows.
+    """
+    count, totals = values.shape[1], np.sum(weights, axis=1)
+    ratios = np.sum(values, axis=1) / totals
+    if count < LEAST_BLOWS:
+        return ratios, np.full(len(ratios), math.nan)
+    off = np.cumsum(values - ratios[:, np.newaxis] * weights, axis=1)
+    sums = np.concatenate([np.zeros((len(ratios), 1)), off], axis=1)
+
+    def scattered(length: int) -> tuple[np.ndarray, float]:
         """Mean square over stretches, and what it would be of a random walk with a = 1."""
-        off = sums[length:] - sums[:-length]
-        return float(np.mean(off * off)), length * (1.0 - length / count)
+        off = sums[:, length:] - sums[:, :-length]
+        return np.mean(off * off, axis=1), length * (1.0 - length / count)
 
     short, walk = scattered(1)
     if count < FEWEST_DEPENDENT:
-        return ratio, math.sqrt(short / walk * count) / total
+        return ratios, np.sqrt(short / walk * count) / totals
     long, longer_walk = scattered(int(STRETCH * count))
-    a = max((long - short) / (longer_walk - walk), 0.0)
+    a = np.maximum((long - short) / (longer_walk - walk), 0.0)
     b = short - a * walk
-    if b < 0.0:
-        a, b = long / longer_walk, 0.0
-    return ratio, math.sqrt(a * count + b) / total
+    a, b = np.where(b < 0.0, long / longer_walk, a), np.maximum(b, 0.0)
+    return ratios, np.sqrt(a * count + b) / totals

@@ -26,6 +26,7 @@ from percussion_model.simulation.files import (
     staged,
     to_json,
 )
+from percussion_model.simulation.means import numbers_over, scatter_over
 from percussion_model.simulation.origin import ORIGIN
 from percussion_model.simulation.rate import rate_of_blows, ratio_of_sums
 from percussion_model.simulation.uncertain import BY_CELLS, is_undecided, rate_field
@@ -89,6 +90,9 @@ class Result:
     rate_of_penetration_relative_error : float
         Estimated error of the rate, relative to it; NaN where it was not estimated. The
         short runs that tell it are not in the times, those for `solver.accuracy` are.
+    errors : dict of float
+        Estimated errors of the other numbers over blows, of grid and scatter as that of the
+        rate, by their names in `summary`, SI units; of what was not estimated there is none.
     rate_of_penetration_fixed_window : float
         Advance of the mean bit position from the settling time to the end of the
         run by that time, wherever in a blow they lie (eq. 58 of the paper) [m/s];
@@ -115,6 +119,7 @@ class Result:
     setup_time: float
     warnings: list[str]
     rate_of_penetration_relative_error: float = math.nan
+    errors: dict[str, float] = field(default_factory=dict)
     rate_of_penetration_fixed_window: float = math.nan
     end: dict[str, float] = field(default_factory=dict)
     interrupted: bool = False
@@ -162,41 +167,33 @@ class Result:
     def rate_of_penetration_fixed_window_error(self) -> float:
         """How far the rate over the fixed window may be off [m/s].
 
-        By the scatter of the blows, and by the advance of one of them: the window ends
-        wherever in a blow. NaN where the rate is not defined.
+        By grid and scatter of the rate, and by the advance of one blow: the window ends
+        wherever in a blow. NaN where the rate is not defined or its error not estimated.
         """
         rows, window = self.counted, self.duration - self.settle
         if len(rows) == 0 or not window > 0.0 or math.isnan(self.rate_of_penetration_fixed_window):
             return math.nan
         _, scatter = ratio_of_sums(rows["penetration"], rows["period"])
-        return scatter + float(np.max(np.abs(rows["penetration"]))) / window
+        by_window = scatter + float(np.max(np.abs(rows["penetration"]))) / window
+        return by_window + self.rate_of_penetration_error
 
     @property
     def standard_errors(self) -> dict[str, float]:
-        """Standard errors of the means over blows, by their names in `summary`, SI units.
+        """Standard errors of the numbers over blows, by their names in `summary`, SI units.
 
-        Of the scatter alone: zero where the motion is periodic, NaN for fewer blows than
-        tell one.
+        Of the scatter alone: see `scatter_over`.
         """
-        rows = self.counted
-        if len(rows) == 0:
-            return {}
-        errors = {name: _scatter_of_mean(rows[column]) for name, column in _SCATTER.items()}
-        errors["blow_frequency"] = errors["blow_period"] / float(np.mean(rows["period"])) ** 2
-        for name, (column, by) in _RATIOS.items():
-            if float(np.sum(rows[by])) > 0.0:
-                errors[name] = ratio_of_sums(rows[column], rows[by])[1]
-        return errors
+        return scatter_over(self.counted)
 
     @property
     def mean_bit_force(self) -> float:
         """Mean force on the rock over the counted blows [N]."""
-        return _ratio(self.counted, "bit_impulse", "period")
+        return numbers_over(self.counted)["mean_bit_force"]
 
     @property
     def mean_contact_force(self) -> float:
         """Mean force of the piston on the bit over the counted blows [N]."""
-        return _ratio(self.counted, "contact_impulse", "period")
+        return numbers_over(self.counted)["mean_contact_force"]
 
     @property
     def fall(self) -> dict[str, float]:
@@ -228,8 +225,6 @@ class Result:
         Numbers of blows are means over the whole blows after settling, peak
         forces the greatest of them; None is what is not defined.
         """
-        rows = self.counted
-        period = _mean(rows["period"])
         numbers = {
             "rate_of_penetration": self.rate_of_penetration,
             "rate_of_penetration_standard_error": self.rate_of_penetration_standard_error,
@@ -239,22 +234,12 @@ class Result:
             BY_CELLS: self.scene.is_undamped,
             "rate_of_penetration_fixed_window": self.rate_of_penetration_fixed_window,
             "rate_of_penetration_fixed_window_error": self.rate_of_penetration_fixed_window_error,
-            "blow_period": period,
-            "blow_frequency": 1.0 / period,
-            **{name: _mean(rows[name]) for name in _MEANS},
-            "transfer_efficiency": _ratio(rows, "rock_energy", "blow_energy"),
-            "penetration_per_blow": _mean(rows["hole_advance"]),
-            "contacts_per_blow": _mean(rows["contacts"]),
-            "drilling_cycles_per_blow": _mean(rows["drilling_cycles"]),
-            "peak_bit_force": _greatest(rows["peak_bit_force"]),
-            "peak_contact_force": _greatest(rows["peak_contact_force"]),
-            "standstill_bit_force": _mean(rows["standstill_force"]),
-            "mean_bit_force": self.mean_bit_force,
-            "mean_contact_force": self.mean_contact_force,
+            **numbers_over(self.counted),
             "standard_errors": self.standard_errors,
+            "errors": self.errors,
             "energy": self.energy,
             "blows": len(self.blows),
-            "blows_after_settling": len(rows),
+            "blows_after_settling": len(self.counted),
             "events": self.statistics.get("events", len(self.events)),
             "cells": self.cells or None,
             "time_step": self.time_step,
@@ -306,23 +291,6 @@ class Result:
         return cls(**_read_result(Path(folder)))
 
 
-_MEANS = ("impact_velocity", "rebound_velocity", "stroke", "blow_energy", "rock_energy")
-# Means over blows, and the columns of the blow table behind them.
-_SCATTER = {name: name for name in _MEANS} | {
-    "blow_period": "period",
-    "penetration_per_blow": "hole_advance",
-    "contacts_per_blow": "contacts",
-    "drilling_cycles_per_blow": "drilling_cycles",
-    "standstill_bit_force": "standstill_force",
-}
-# Ratios of sums over blows: numerator and denominator.
-_RATIOS = {
-    "transfer_efficiency": ("rock_energy", "blow_energy"),
-    "mean_bit_force": ("bit_impulse", "period"),
-    "mean_contact_force": ("contact_impulse", "period"),
-}
-
-
 def _fall(result: Result) -> dict[str, float]:
     """Numbers of a run without blows; see `Result.fall`."""
     scene, found = result.scene, {}
@@ -355,28 +323,6 @@ def _leaving_velocity(result: Result, modes: np.ndarray, k: int) -> float:
     feed = scene.feed.force / scene.bit.mass if scene.effects.feed else 0.0
     gravity = scene.gravity.acceleration if scene.effects.gravity else 0.0
     return 0.5 * (feed + gravity) * taken - (place - float(begin["bit_position"])) / taken
-
-
-def _mean(values: np.ndarray) -> float:
-    """Mean of what is defined."""
-    known = values[np.isfinite(values)]
-    return float(np.mean(known)) if len(known) else math.nan
-
-
-def _scatter_of_mean(values: np.ndarray) -> float:
-    """Standard error of the mean of what is defined."""
-    known = values[np.isfinite(values)]
-    return ratio_of_sums(known, np.ones(len(known)))[1] if len(known) else math.nan
-
-
-def _greatest(values: np.ndarray) -> float:
-    known = values[np.isfinite(values)]
-    return float(np.max(known)) if len(known) else math.nan
-
-
-def _ratio(rows: np.ndarray, name: str, by: str) -> float:
-    below = float(np.sum(rows[by]))
-    return float(np.sum(rows[name])) / below if below > 0 else math.nan
 
 
 def _write_result(result: Result, folder: Path) -> list[Path]:
@@ -450,6 +396,7 @@ def _read_result(folder: Path) -> dict[str, Any]:
             fields[name] = math.nan if value is None else value
         end = summary.get("end", {})
         fields["end"] = {name: math.nan if value is None else value for name, value in end.items()}
+        fields["errors"] = dict(summary.get("errors", {}))
         fields["interrupted"] = summary.get("interrupted", False)
         blows = _read_csv(folder / "blows.csv", float)
         if not set(blows) >= _HOLE:

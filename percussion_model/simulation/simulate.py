@@ -224,7 +224,15 @@ class Simulation(Runner):
         self, settle: float | None = None, trace: dict[str, np.ndarray] | None = None
     ) -> Result:
         """Everything found so far; means begin at `settle`, default that of the scene [s]."""
-        result = Result(
+        result = self._found(settle, trace)
+        result.warnings.extend(find_warnings(result))
+        return result
+
+    def _found(
+        self, settle: float | None = None, trace: dict[str, np.ndarray] | None = None
+    ) -> Result:
+        """Everything found so far, without warnings."""
+        return Result(
             scene=self.scene,
             solver=self.solver.name,
             cells=dict(self.solver.cells),
@@ -243,8 +251,6 @@ class Simulation(Runner):
             rate_of_penetration_fixed_window=self._fixed_window_rate(settle),
             end=self.observe(),
         )
-        result.warnings.extend(find_warnings(result))
-        return result
 
     def _fixed_window_rate(self, settle: float | None) -> float:
         """Advance of the bit from settling to the present by that time [m/s]; NaN if unknown."""
@@ -409,15 +415,15 @@ class _Stages:
 def _with_error_estimate(
     result: Result, solver: Solver, stop: Callable[[], bool], named: _Stages
 ) -> Result:
-    """Add the estimated error of the rate."""
+    """Add the estimated errors of rate and means."""
     scenes = solver.coarser_scenes()
     named.planned = len(scenes or ())
 
     def run(scene: Scene) -> Result:
-        named.next(scene, "error of the rate, ")
+        named.next(scene, "error of the means, ")
         simulation = Simulation(scene, record_events=False)
         run_in_chunks(simulation, scene.run.duration, np.zeros(0), named.progress, stop)
-        return simulation.result()
+        return simulation._found()
 
     return with_error_estimate(result, scenes, run)
 

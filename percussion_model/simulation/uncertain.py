@@ -8,9 +8,9 @@ from typing import Any
 
 # Digits after the point; smaller errors are not shown.
 MOST_DIGITS = 5
-# Digits of a number whose error is known and does not show in them, and of one of whose
-# error nothing is known: coarse grids are off by some per mille.
-SURE_DIGITS, UNSURE_DIGITS = 5, 3
+# Digits of a number that is known to rounding, of one whose error does not show in them, and
+# of one of whose error nothing is known: coarse grids are off by some per mille.
+SURE_DIGITS, SHOWN_DIGITS, UNSURE_DIGITS = 5, 4, 3
 # An error below this share of a number does not show in the four digits of a narrow column.
 SMALL_ERROR = 1e-4
 # The same where numbers are in SI units, in which rates are some 1e-2.
@@ -18,10 +18,19 @@ SMALLEST_UNIT = 8
 # Greater numbers are written with an exponent.
 LARGEST_PLAIN = 1e8
 UNDECIDED = "undecided"
+# Before a number in a narrow column, or a difference, whose error is not known.
+ABOUT = "≈"
 # Numbers that depend on the cells where waves are not damped, and the flag of a summary for it.
 OF_THE_CELLS = ("rate_of_penetration", "rate_of_penetration_fixed_window", "penetration_per_blow")
 BY_CELLS = "rate_of_penetration_depends_on_cells"
 NOT_ESTIMATED = "error not estimated"
+# What stands below tables of means.
+NOT_THE_MODEL = "Whether model and rock are right is not in it."
+PLUS_MINUS = (
+    "± is the numerical error, by the size of the cells and the scatter of the blows; without "
+    f"it a mean is known to its four digits. {NOT_THE_MODEL}"
+)
+WITHOUT_ESTIMATE = "The error by the size of the cells was not estimated: means have three digits."
 
 
 def is_undecided(value: float, error: float) -> bool:
@@ -107,34 +116,50 @@ def change_text(change: float | None, error: float | None) -> str:
 
 
 def known_error(summary: Mapping[str, Any], key: str) -> float | None:
-    """What is known of the error of a number of a summary, SI units.
+    """What a number of a summary may be off by grid and scatter, SI units.
 
-    Of the rate by grid and scatter, or by scatter alone where that of the grid was not
-    estimated; of means over blows by scatter alone; None where nothing is known.
+    None where that was not estimated.
     """
-    found: float | None = summary.get(f"{key}_error")
-    if found is None:
-        found = summary.get(f"{key}_standard_error")
-    if found is None:
-        found = (summary.get("standard_errors") or {}).get(key)
-    return found
+    error: float | None = summary.get(f"{key}_error")
+    return (summary.get("errors") or {}).get(key) if error is None else error
 
 
-def mean_text(summary: Mapping[str, Any], key: str, factor: float = 1.0) -> str:
-    """A number of a summary, with the scatter of the blows where it is a mean and that shows.
+def known_scatter(summary: Mapping[str, Any], key: str) -> float | None:
+    """Standard error of a number of a summary by the scatter of the blows alone, SI units."""
+    error: float | None = summary.get(f"{key}_standard_error")
+    return (summary.get("standard_errors") or {}).get(key) if error is None else error
+
+
+def shown_error(summary: Mapping[str, Any], key: str) -> float | None:
+    """What a number of a summary is known to be off: by grid and scatter, or by scatter alone."""
+    error = known_error(summary, key)
+    return known_scatter(summary, key) if error is None else error
+
+
+def mean_text(
+    summary: Mapping[str, Any], key: str, factor: float = 1.0, most_digits: int = SMALLEST_UNIT
+) -> str:
+    """A number of a summary with its error.
+
+    Four digits where the error does not show in them; where that of the grid was not
+    estimated, the scatter alone, or three digits.
 
     Parameters
     ----------
     factor : float
         From SI to the unit that is shown.
+    most_digits : int
+        Behind the point.
     """
-    value, error = factor * summary[key], known_error(summary, key)
+    value, error, scatter = factor * summary[key], known_error(summary, key), None
     if depends_on_cells(summary, key):
         return of_the_cells(value)
-    shown = error is not None and factor * error > SMALL_ERROR * abs(value)
-    if shown and error is not None:
-        return with_error(value, factor * error, most_digits=SMALLEST_UNIT)
-    return in_digits(value)
+    if error is None:
+        scatter = known_scatter(summary, key)
+    for known, what in ((error, ""), (scatter, " (scatter alone)")):
+        if known is not None and factor * known > SMALL_ERROR * abs(value):
+            return with_error(value, factor * known, most_digits) + what
+    return in_digits(value, UNSURE_DIGITS if error is None else SHOWN_DIGITS)
 
 
 def in_digits(value: float, digits: int = UNSURE_DIGITS) -> str:
@@ -168,7 +193,7 @@ def rate_text(summary: Mapping[str, Any], factor: float = 1e3) -> str:
         return of_the_cells(factor * rate)
     if error is not None:
         return with_error(factor * rate, factor * error)
-    scatter = summary.get("rate_of_penetration_standard_error")
+    scatter = known_scatter(summary, "rate_of_penetration")
     # of the two parts of the error one is known, and may be enough to hide the rate
     if scatter is not None and "±" in (text := with_error(factor * rate, factor * scatter)):
         return f"{text} (scatter alone)"

@@ -10,7 +10,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from percussion_model.interface.commands import common
-from percussion_model.simulation.uncertain import UNDECIDED, change_text, in_few_characters
+from percussion_model.simulation.uncertain import (
+    ABOUT,
+    UNDECIDED,
+    change_text,
+    in_digits,
+    in_few_characters,
+    scaled,
+)
 
 if TYPE_CHECKING:
     from percussion_model.analysis.effect_study import EffectsStudy, Trial
@@ -65,8 +72,13 @@ LONGEST_NAME = 14
 DEARER = "*"
 
 RATE = "rate_of_penetration"
-# A standard error below this share of a rate is not shown.
+# An error below this share of a rate is not shown.
 LEAST_ERROR = 1e-3
+NOTE = (
+    "± is the numerical error, by the size of the cells and the scatter of the blows; a rate "
+    "without it is known to 0.1 %. % is the change against the scene as it is, undecided where "
+    "it is within the errors of both. Times are the least of several."
+)
 
 # Columns: heading, and what stands in it.
 _COLUMNS: dict[str, Callable[[EffectsStudy, Trial, dict[str, Any]], str]] = {
@@ -102,8 +114,9 @@ def show_effects(found: EffectsStudy) -> None:
     from rich.markup import escape
     from rich.table import Table
 
+    from percussion_model.interface.messages import wrapped
     from percussion_model.interface.tables import print_table
-    from percussion_model.interface.terminal import show_note
+    from percussion_model.interface.terminal import show_note, show_warnings
 
     headings, rows, reasons = table_of(found)
     table = Table(
@@ -125,16 +138,18 @@ def show_effects(found: EffectsStudy) -> None:
     for reason in dict.fromkeys(reasons.values()):
         names = ", ".join(name for name, given in reasons.items() if given == reason)
         show_note(console, names, reason)
+    console.print(wrapped(NOTE), highlight=False)
+    show_warnings(console, found.warnings())
 
 
 def _rate(row: dict[str, Any]) -> str:
-    """Rate of penetration [mm/s], with its standard error where it matters."""
-    value, error = row["rate_of_penetration"], row["rate_of_penetration_standard_error"]
-    if value is None or error is None:
-        return "-"
-    if row["rate_of_penetration_undecided"]:
+    """Rate of penetration [mm/s], with its error where it matters."""
+    value, error = row[RATE], row[f"{RATE}_error"]
+    if row["rate_of_penetration_undecided"] and value is not None:
         return UNDECIDED
-    return in_few_characters(1e3 * value, 1e3 * error, LEAST_ERROR)
+    if value is not None and error is None:
+        return ABOUT + in_digits(1e3 * value)
+    return in_few_characters(scaled(1e3, value), scaled(1e3, error), LEAST_ERROR)
 
 
 def _in_lines(name: str) -> str:
@@ -153,4 +168,5 @@ def _change(found: EffectsStudy, trial: Trial, name: str) -> str:
     hidden = trial.undecided or found.base.undecided
     if name == RATE and hidden and trial.numbers()[name] is not None:
         return UNDECIDED
-    return change_text(found.changes(trial)[name], found.change_errors(trial).get(name))
+    change, error = found.changes(trial)[name], found.change_errors(trial)[name]
+    return ABOUT * bool(change and error is None) + change_text(change, error)

@@ -23,9 +23,7 @@ UNCUT = 1.4
 ROOM, WITHIN = 1.75, 0.92
 # Width of a character by that of half a panel.
 CHARACTER = 0.072
-# An error below this share of a change does not show in its two digits.
-SMALL = 0.01
-# Changes below this are none [%].
+# Changes, and errors of them, below this are none [%].
 NOTHING = 5e-3
 
 
@@ -113,7 +111,7 @@ def _changes(
         align = "left" if share >= 0.0 else "right"
         text = f" {share:+.2g} " if abs(share) < 100.0 else f" {share:+.0f} "
         text = " 0 " if abs(share) < NOTHING else text
-        if error >= max(NOTHING, SMALL * abs(share)):
+        if error >= NOTHING:
             text = f" {change_text(0.01 * share, 0.01 * error)} "
         # what has no room beside its bar stands within it, or else on the other side of zero
         length, room = CHARACTER * (len(text) - 1), abs(share) / (ROOM * end)

@@ -31,7 +31,7 @@ from percussion_model.interface.plotting.window import (
 )
 from percussion_model.physics.records import Mode
 from percussion_model.simulation.result import Result
-from percussion_model.simulation.uncertain import known_error, rate_text
+from percussion_model.simulation.uncertain import rate_text, shown_error
 
 # Blue for tension, white, red for compression.
 STRESS_COLOURS = ("#053061", "#4393C3", "#F7F7F7", "#D6604D", "#67001F")
@@ -86,7 +86,7 @@ def _overview(result: Result) -> LayoutDOM:
 def _mean(to: Any, result: Result) -> None:
     """Draw the mean rate with a band of its error, and say it in the title."""
     summary = result.summary()
-    mean, error = summary["rate_of_penetration"], known_error(summary, "rate_of_penetration")
+    mean, error = summary["rate_of_penetration"], shown_error(summary, "rate_of_penetration")
     if mean is None:
         return
     to.title.text = f"Rate of each blow — mean {rate_text(summary)} mm/s"

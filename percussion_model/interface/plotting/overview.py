@@ -12,7 +12,7 @@ from matplotlib.ticker import MaxNLocator
 from percussion_model.interface.plotting import style
 from percussion_model.interface.plotting.style import KN, MM, MS
 from percussion_model.simulation.result import Result
-from percussion_model.simulation.uncertain import known_error, rate_text
+from percussion_model.simulation.uncertain import rate_text, shown_error
 
 # Blows beyond this number are drawn as lines without markers.
 MOST_MARKERS = 150
@@ -66,7 +66,7 @@ def _depths(ax: Axes, blows: np.ndarray) -> None:
 def _mean(ax: Axes, result: Result) -> None:
     """Draw the mean rate with a band of its error; a word alone where that hides it."""
     summary = result.summary()
-    mean, error = summary["rate_of_penetration"], known_error(summary, "rate_of_penetration")
+    mean, error = summary["rate_of_penetration"], shown_error(summary, "rate_of_penetration")
     if mean is None:
         return
     text, hidden = rate_text(summary), result.rate_of_penetration_undecided

@@ -1,0 +1,119 @@
+"""Numbers of a run over its blows, and how far they scatter."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from percussion_model.simulation.rate import LEAST_BLOWS, ratio_of_sums, ratios_of_sums
+
+# Means over blows, and the columns of the blow table behind them.
+_MEANS = {
+    "blow_period": "period",
+    "impact_velocity": "impact_velocity",
+    "rebound_velocity": "rebound_velocity",
+    "stroke": "stroke",
+    "blow_energy": "blow_energy",
+    "rock_energy": "rock_energy",
+    "penetration_per_blow": "hole_advance",
+    "contacts_per_blow": "contacts",
+    "drilling_cycles_per_blow": "drilling_cycles",
+    "standstill_bit_force": "standstill_force",
+}
+# Means of whole numbers.
+COUNTS = ("contacts_per_blow", "drilling_cycles_per_blow")
+# Ratios of sums over blows: numerator and denominator.
+_RATIOS = {
+    "transfer_efficiency": ("rock_energy", "blow_energy"),
+    "mean_bit_force": ("bit_impulse", "period"),
+    "mean_contact_force": ("contact_impulse", "period"),
+}
+# The greatest of all blows.
+_GREATEST = ("peak_bit_force", "peak_contact_force")
+
+
+def numbers_over(blows: np.ndarray) -> dict[str, float]:
+    """Return the numbers over some blows, SI units; NaN is what is not defined.
+
+    Parameters
+    ----------
+    blows : ndarray of BLOW
+
+    Returns
+    -------
+    dict of float
+        Means, ratios of sums and greatest values, by their names in a summary.
+    """
+    found = dict.fromkeys(_MEANS, math.nan)
+    if len(blows):
+        means = np.mean([blows[column] for column in _MEANS.values()], axis=1).tolist()
+        found = dict(zip(_MEANS, means, strict=True))
+    for name, column in _MEANS.items():
+        if math.isnan(found[name]):
+            found[name] = _mean_of_known(blows[column])
+    found["blow_frequency"] = 1.0 / found["blow_period"]
+    found |= {name: _ratio(blows, *columns) for name, columns in _RATIOS.items()}
+    return found | {name: _greatest(blows[name]) for name in _GREATEST}
+
+
+def scatter_over(blows: np.ndarray) -> dict[str, float]:
+    """Return the standard errors of the numbers over some blows, SI units.
+
+    Of the scatter alone: zero where the motion is periodic, NaN for fewer blows than tell
+    one. That of a greatest value is how far those of the two halves of the blows lie apart.
+
+    Parameters
+    ----------
+    blows : ndarray of BLOW
+
+    Returns
+    -------
+    dict of float
+        By their names in a summary; empty without blows.
+    """
+    if len(blows) == 0:
+        return {}
+    ones = np.ones(len(blows))
+    pairs = {name: (blows[column], ones) for name, column in _MEANS.items()}
+    for name, (column, by) in _RATIOS.items():
+        if float(np.sum(blows[by])) > 0.0:
+            pairs[name] = blows[column], blows[by]
+    _, errors = ratios_of_sums(*(np.array(series) for series in zip(*pairs.values(), strict=True)))
+    found = dict(zip(pairs, errors.tolist(), strict=True))
+    for name, column in _MEANS.items():
+        if math.isnan(found[name]):
+            found[name] = _scatter_of_known(blows[column])
+    found["blow_frequency"] = found["blow_period"] / float(np.mean(blows["period"])) ** 2
+    return found | {name: _scatter_of_greatest(blows[name]) for name in _GREATEST}
+
+
+def _mean_of_known(values: np.ndarray) -> float:
+    """Mean of what is defined, where not all is."""
+    known = values[np.isfinite(values)]
+    return float(np.mean(known)) if len(known) else math.nan
+
+
+def _scatter_of_known(values: np.ndarray) -> float:
+    """Standard error of the mean of what is defined, where not all is."""
+    known = values[np.isfinite(values)]
+    return ratio_of_sums(known, np.ones(len(known)))[1] if len(known) else math.nan
+
+
+def _greatest(values: np.ndarray) -> float:
+    known = values[np.isfinite(values)]
+    return float(np.max(known)) if len(known) else math.nan
+
+
+def _scatter_of_greatest(values: np.ndarray) -> float:
+    """How far the greatest value of the first half and that of the rest lie apart."""
+    known = values[np.isfinite(values)]
+    if len(known) < LEAST_BLOWS:
+        return math.nan
+    half = len(known) // 2
+    return float(abs(np.max(known[:half]) - np.max(known[half:])))
+
+
+def _ratio(blows: np.ndarray, name: str, by: str) -> float:
+    below = float(np.sum(blows[by]))
+    return float(np.sum(blows[name])) / below if below > 0 else math.nan
