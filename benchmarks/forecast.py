@@ -13,13 +13,11 @@ from pathlib import Path
 from typing import Any
 
 from percussion_model import Scene, simulate
-from percussion_model.analysis.cost import forecast
+from percussion_model.analysis.cost import FACTOR, forecast
 
 HERE = Path(__file__).resolve().parent
 LATEST = HERE / "latest_forecast.json"
 REFERENCE = HERE.parent / "scenarios" / "reference.toml"
-# What a prediction promises.
-FACTOR = 2.0
 # The middle one of so many is shown.
 REPEATS = 3
 

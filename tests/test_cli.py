@@ -118,8 +118,9 @@ def test_explain(percussion):
         "wave",
         "20 in the piston",
         "loss.time",
-        "A blow",
-        "Predicted cost",
+        "To compute a blow",
+        "Predicted computing time",
+        "within a factor of 2",
         "Bit transit time (T_2)",
     ):
         assert text in out

@@ -12,10 +12,12 @@ from typer.testing import CliRunner
 from percussion_model import Scene, SceneError, settled, simulate
 from percussion_model.analysis.stationary import COMPARED, cycle, cycles_in
 from percussion_model.interface.cli import app
+from percussion_model.interface.terminal import show_settled
 from percussion_model.physics.records import BLOW
 from percussion_model.simulation.rate import rate_of_blows
 
 TOLERANCE = 1e-4
+RIGID = {"piston.model": "rigid", "bit.model": "rigid"}
 # Drive force that keeps the power of the reference at another reversal distance.
 REFERENCE_FORCE, REFERENCE_DISTANCE = 3000.0, 0.040
 
@@ -75,6 +77,35 @@ def test_scatter_is_no_cycle_and_its_error_covers_correlated_blows():
         errors.append(error)
         off.append(rate - rate_of(8.0))
     assert 0.7 < np.std(off) / np.mean(errors) < 1.4
+
+
+def test_a_settled_rate_has_the_error_of_its_grid():
+    """A grid of ten times as many cells lies within it, and not within that of convergence."""
+    coarse, fine = (settled(Scene().replace(**{"solver.cells": n})) for n in (10, 100))
+    judged = settled(Scene().replace(**{"solver.cells": 10}), error_estimate=True)
+    for name in ("rate_of_penetration", "blow_period"):
+        off = abs(getattr(coarse, name) - getattr(fine, name))
+        assert getattr(coarse, f"{name}_error") < off < getattr(judged, f"{name}_error")
+    assert judged.rate_of_penetration == coarse.rate_of_penetration
+    assert len(judged.blows) == len(coarse.blows)
+    assert judged.summary()["rate_of_penetration_error_of"] == "grid and convergence"
+    # where it was not estimated, that is told
+    assert coarse.summary()["rate_of_penetration_error_of"] == "convergence"
+    assert coarse.summary()["grid_errors"] == {}
+    assert "error_of='convergence'" in repr(coarse)
+    rigid = settled(Scene().replace(**RIGID), error_estimate=True)
+    assert rigid.grid_errors == {"rate_of_penetration": 0.0, "blow_period": 0.0}
+
+
+def test_an_aperiodic_rate_has_the_error_of_scatter_and_no_other_name(capsys):
+    scene = Scene().replace(**RIGID, **{"feed.force": 300.0})
+    found = settled(scene, error_estimate=True)
+    assert found.kind == "aperiodic"
+    assert found.summary()["rate_of_penetration_error_of"] == "scatter"
+    show_settled(found)
+    shown = " ".join(capsys.readouterr().out.split())
+    assert "by the scatter of blows alone, since this solver has no grid" in shown
+    assert "convergence" not in shown
 
 
 def test_reference_agrees_with_a_long_run():

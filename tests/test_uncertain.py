@@ -157,7 +157,8 @@ def test_tables_of_runs(aperiodic, hidden, capsys, monkeypatch):
     assert "undecided" in capsys.readouterr().out
     show_settled(settled(BOUNCING, most_blows=60))
     shown = capsys.readouterr().out
-    assert sum("±" in line for line in shown.splitlines()) == 2
+    assert sum("±" in line for line in shown.splitlines()) == 3  # rate, period, what ± is
+    assert "by the scatter of blows alone" in " ".join(shown.split())
 
 
 def test_a_rate_in_one_line_of_python(aperiodic, hidden):

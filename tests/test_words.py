@@ -38,7 +38,7 @@ def test_a_drop_test_tells_its_depth_and_rebound_in_place_of_dashes(drop, capsys
     assert not re.search(r"│\s+-\s+│", shown)
     for name in ("Depth of the bit's end", "First contact", "rebound velocity", "Stands still"):
         assert name in shown
-    assert f" {1e3 * drop.fall['depth']:.3g} " in shown
+    assert f" {1e3 * drop.fall['depth']:.4f} ± " in shown
 
 
 def test_a_table_shows_no_more_digits_than_are_known(capsys, monkeypatch):
@@ -65,7 +65,7 @@ def test_a_table_shows_no_more_digits_than_are_known(capsys, monkeypatch):
 def test_the_fall_of_a_bit_is_that_of_its_samples(solver):
     """Rebound: the fastest rise of the bit in a fine trace; contact: where the force begins."""
     scene = DROP.computed_by(solver, **{"piston.model": "absent"})
-    fall = simulate(scene, trace=1e-6, duration=0.03, settle=0.0)
+    fall = simulate(scene, trace=1e-6, duration=0.05, settle=0.0)
     trace, found = fall.trace, fall.fall
     early = trace["time"] < 2e-3
     assert found["rebound_velocity"] == pytest.approx(-trace["bit_velocity"][early].min(), rel=1e-3)
@@ -74,6 +74,60 @@ def test_the_fall_of_a_bit_is_that_of_its_samples(solver):
     depth = trace["bit_end_position"][-1] - scene.start.rock_gap
     assert found["depth"] == pytest.approx(depth, rel=1e-9)
     assert "rest_time" not in found  # it still bounces
+
+
+def test_a_fall_has_the_errors_of_its_grid(drop, capsys):
+    """A grid of ten times as many cells lies within them."""
+    fine = simulate(DROP.replace(**{"solver.cells": 200}))
+    assert set(drop.errors) == set(drop.fall) == set(fine.fall)
+    for name, value in drop.fall.items():
+        assert 0.0 < drop.errors[name] < 0.01 * value
+        assert abs(value - fine.fall[name]) <= drop.errors[name], name
+    show_summary(drop)
+    shown = capsys.readouterr().out
+    for name in ("Depth of the bit's end in the rock", "First contact", "Energy to crush rock"):
+        (line,) = [text for text in shown.splitlines() if name in text]
+        assert "±" in line
+    assert "by the size of the cells; without it" in " ".join(shown.split())
+    # rigid bodies have no grid
+    exact = simulate(DROP.computed_by("rigid", **{"piston.model": "absent"}))
+    assert set(exact.errors.values()) == {0.0}
+    show_summary(exact)
+    assert "Rigid bodies have no cells" in capsys.readouterr().out
+
+
+def test_a_bit_in_the_air_has_no_depth(drop):
+    def said(result):
+        assert "depth" not in result.fall
+        (text,) = [text for text in result.warnings if "it has no depth" in text]
+        return text
+
+    assert not any("no depth" in text for text in drop.warnings)
+    gone = said(simulate(DROP.replace(**{"feed.force": -9000.0})))
+    assert "moving up" in gone
+    assert "it flew off" in gone
+    rebound = said(simulate(DROP, 0.02))
+    assert "flew off" not in rebound
+    assert "a longer run.duration" in rebound
+
+
+@pytest.mark.parametrize(("duration", "whose"), [(0.1, "this"), (0.15, "these")])
+def test_one_blow_is_no_mean(duration, whose, capsys):
+    result = simulate(REFERENCE, duration, settle=0.025)
+    assert 0 < len(result.counted) < 3
+    (text,) = [text for text in result.warnings if "whole blow" in text]
+    assert f"how far other blows differ from {whose} is not known" in text
+    show_summary(result)
+    shown = " ".join(capsys.readouterr().out.split())
+    assert "so few blows that neither error nor scatter is known" in shown
+
+
+def test_rigid_bodies_are_said_to_have_no_cells(capsys):
+    show_summary(simulate(RIGID, 1.0, settle=0.5))
+    shown = " ".join(capsys.readouterr().out.split())
+    assert "Rigid bodies have no cells" in shown
+    assert "by the size of the cells" not in shown
+    assert "How far rigid bodies are from real ones" in shown
 
 
 def test_a_fall_is_kept_with_a_result(drop, tmp_path):

@@ -30,6 +30,9 @@ FIRST_PIECE, QUICK, LARGEST_PIECE = 1e-6, 3e-3, 0.025
 # It ends at this share of the rows that a run may have, too.
 ROWS_OF_PROBE = 0.25
 
+# Predictions were within this factor of what was measured (benchmarks/RECORD.md).
+FACTOR = 2.0
+
 COUNTED = ("steps", "leaps", "events")
 
 
@@ -224,6 +227,7 @@ def explained(scene: Scene, found: Forecast) -> dict[str, Any]:
         "setup_time": found.setup_time,
         "operator_bytes": solver.operator_bytes if solver else None,
         "predicted_wall_time": found.wall_time,
+        "predicted_within_factor": None if found.wall_time is None else FACTOR,
         "duration": found.duration,
         "wall_time_per_second": found.per_second,
         "wall_time_per_blow": found.per_blow,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Any
 
@@ -13,8 +13,10 @@ import numpy as np
 
 from percussion_model.physics.records import BLOW
 from percussion_model.scene.scene import Scene, SceneError
+from percussion_model.simulation.error_estimate import with_error_estimate
 from percussion_model.simulation.files import plain
 from percussion_model.simulation.rate import rate_of_blows, ratio_of_sums
+from percussion_model.simulation.result import Result
 from percussion_model.simulation.simulate import Simulation, SimulationError
 from percussion_model.simulation.uncertain import BY_CELLS, is_undecided, rate_field
 
@@ -51,6 +53,11 @@ _COLUMNS = [(BLOW.names or ()).index(name) for name in COMPARED]
 STEADY = 0.9
 # With fewer blows allowed nothing is known of an aperiodic motion.
 LEAST_LIMIT = 32
+# Numbers whose errors by the grid are estimated.
+_RATE, _PERIOD = "rate_of_penetration", "blow_period"
+# Grids are compared over so many blows at least; where the motion is periodic, over the last
+# of them, so that settling does not count as scatter.
+FEWEST_JUDGED, JUDGED_SHARE = 12, 0.5
 # Share of the blows of an aperiodic motion that is left out as settling.
 SETTLING_SHARE = 0.2
 
@@ -66,9 +73,9 @@ class Settled:
         Blows in a cycle; 0 where the motion is not periodic.
     rate_of_penetration : float
         Mean over one cycle, or over the blows of an aperiodic motion [m/s].
-    rate_of_penetration_error : float
-        Periodic: bound of what convergence would still change, or the scatter
-        of the cycles. Aperiodic: the standard error [m/s].
+    settling_error : float
+        Part of the rate's error [m/s]. Periodic: bound of what convergence would still
+        change, or the scatter of the cycles. Aperiodic: the standard error.
     multiplier : float
         What is left of a deviation after one cycle, from the ratio of the last
         two changes; negative where it alternates. The cycle is stable below 1
@@ -79,25 +86,52 @@ class Settled:
         All blows of the run.
     duration, wall_time : float
         Simulated time and time to compute [s].
+    depends_on_cells : bool
+        Whether the rate is one of the cells and of nothing else.
+    grid_errors : dict of float
+        The other part of the errors of `rate_of_penetration` [m/s] and `blow_period` [s], as
+        `simulate` estimates it by coarser grids, with what scatter does to these runs; 0
+        without a grid. Of what was not estimated there is none.
     """
 
     kind: str
     order: int
     rate_of_penetration: float
-    rate_of_penetration_error: float
+    settling_error: float
     multiplier: float
     cycle: np.ndarray = field(repr=False)
     blows: np.ndarray = field(repr=False)
     duration: float
     wall_time: float
     depends_on_cells: bool = False
+    grid_errors: dict[str, float] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         rate = rate_field(self.summary())
+        error_of = f"error_of={self.error_of!r}, " if rate else ""
         return (
-            f"Settled({self.kind!r}, order={self.order}, {rate}"
+            f"Settled({self.kind!r}, order={self.order}, {rate}{error_of}"
             f"blows={len(self.blows)}, duration={self.duration:.4g})"
         )
+
+    @property
+    def rate_of_penetration_error(self) -> float:
+        """How far the rate may be off, by `error_of` [m/s]."""
+        return self._with_grid(_RATE, self.settling_error)
+
+    def _with_grid(self, name: str, settling: float) -> float:
+        """Error of a number by its grid, as far as that is known, and by settling."""
+        grid = self.grid_errors.get(name, 0.0)
+        # the limit of a sequence, and that of its grid; scatter is in the other part as well
+        return settling + grid if self.order else max(settling, grid)
+
+    @property
+    def error_of(self) -> str:
+        """What `rate_of_penetration_error` is the error of; empty where there is no rate."""
+        if math.isnan(self.settling_error):
+            return ""
+        settling = "scatter" if math.isnan(self.multiplier) else "convergence"
+        return f"grid and {settling}" if self.grid_errors.get(_RATE, 0.0) > 0.0 else settling
 
     @property
     def rate_of_penetration_undecided(self) -> bool:
@@ -118,11 +152,16 @@ class Settled:
 
     @property
     def blow_period_error(self) -> float:
-        """Standard error of the blow period of a motion that is not periodic [s]; else NaN."""
+        """How far the blow period may be off, by the same as the rate [s]; else NaN."""
         counted = self.counted["period"]
-        if self.order or len(counted) == 0:
+        if len(counted) == 0:
             return math.nan
-        return ratio_of_sums(counted, np.ones(len(counted)))[1]
+        if self.order:
+            means = self.blows["period"][-2 * self.order :].reshape(2, -1).mean(axis=1)
+            settling = float(abs(means[1] - means[0]))
+        else:
+            settling = ratio_of_sums(counted, np.ones(len(counted)))[1]
+        return self._with_grid(_PERIOD, settling)
 
     def summary(self) -> dict[str, Any]:
         """Return the numbers as plain values for JSON; None is what is not defined."""
@@ -131,6 +170,9 @@ class Settled:
             "order": self.order or None,
             "rate_of_penetration": self.rate_of_penetration,
             "rate_of_penetration_error": self.rate_of_penetration_error,
+            "rate_of_penetration_error_of": self.error_of or None,
+            "rate_of_penetration_settling_error": self.settling_error,
+            "grid_errors": self.grid_errors,
             "rate_of_penetration_undecided": self.rate_of_penetration_undecided,
             BY_CELLS: self.depends_on_cells,
             "blow_period": self.blow_period,
@@ -151,6 +193,7 @@ def settled(
     progress: Callable[[float], None] | None = None,
     scatter: float = 0.0,
     most_time: float = MOST_TIME,
+    error_estimate: bool = False,
 ) -> Settled:
     """Run a scene until its blows repeat, or until it is clear that they do not.
 
@@ -177,6 +220,9 @@ def settled(
         0: it never is.
     most_time : float
         Processor time after which the run is given up with an error [s].
+    error_estimate : bool
+        Whether to estimate the error of the grid, by short runs on coarser ones. They are
+        not in the times.
 
     Returns
     -------
@@ -199,7 +245,11 @@ def settled(
     def made(kind: str, order: int, rate: float, error: float, multiplier: float) -> Settled:
         cycle, times = blows[len(blows) - order :], (simulation.time, simulation.wall_time)
         values = kind, order, rate, error, multiplier, cycle, blows, *times
-        return Settled(*values, depends_on_cells=scene.is_undamped)
+        found = Settled(*values, depends_on_cells=scene.is_undamped)
+        if error_estimate and rate != 0.0 and math.isfinite(rate):
+            settling = JUDGED_SHARE if order else SETTLING_SHARE
+            found = replace(found, grid_errors=_grid_errors(simulation, settling))
+        return found
 
     while len(blows) < most_blows:
         ended, patience = 0.0, STALLED_AFTER
@@ -223,6 +273,34 @@ def settled(
             if error <= scatter * abs(rate):
                 break
     return made("aperiodic", 0, *rate_of_blows(after_settling(blows)), math.nan)
+
+
+def _grid_errors(simulation: Simulation, settling: float) -> dict[str, float]:
+    """Estimated errors of rate and period by the grid, SI units; of what could be told.
+
+    A run of few blows is made longer; `settling` is the share of it that does not count.
+    """
+    coarser = simulation.solver.coarser_scenes()
+    if coarser == []:
+        return {_RATE: 0.0, _PERIOD: 0.0}
+    while simulation.blow_rows < FEWEST_JUDGED:
+        before = simulation.blow_rows
+        simulation.advance_blows(1, simulation.time + STALLED_AFTER)
+        if simulation.blow_rows == before:
+            return {}
+    end, settle = simulation.time, settling * simulation.time
+    whole = simulation.scene.replace(**{"run.duration": end, "run.settle": settle})
+    result = replace(simulation.result(settle), scene=whole)
+    judged = with_error_estimate(result, coarser, _run, whole_time=True)
+    errors = {_RATE: judged.rate_of_penetration_error, **judged.errors}
+    return {name: errors[name] for name in (_RATE, _PERIOD) if errors.get(name, math.nan) >= 0.0}
+
+
+def _run(scene: Scene) -> Result:
+    """A whole run, of which blows alone are kept."""
+    simulation = Simulation(scene, record_events=False)
+    simulation.advance(scene.run.duration)
+    return simulation.result()
 
 
 def _advance(simulation: Simulation, count: int, until: float, deadline: float) -> None:

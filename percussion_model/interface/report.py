@@ -23,9 +23,8 @@ from percussion_model.simulation.files import staged
 from percussion_model.simulation.result import REPORT, Result
 from percussion_model.simulation.uncertain import (
     MOST_DIGITS,
-    PLUS_MINUS,
     SMALLEST_UNIT,
-    WITHOUT_ESTIMATE,
+    about_errors,
     in_digits,
     mean_text,
     rate_text,
@@ -208,7 +207,7 @@ def render_report(result: Result, drawings: Sequence[Path]) -> str:
         hourly_rate=rate_text(summary, 3600.0),
         means=mean_cards(summary),
         headlines=headline_rows(summary),
-        about_errors=PLUS_MINUS if result.errors else WITHOUT_ESTIMATE,
+        about_errors=about_errors(summary),
         figures=[FigureBlock(blocks[name], text) for name, text in CAPTIONS.items()
                  if name in blocks],
         zoomable=not remark,

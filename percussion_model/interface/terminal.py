@@ -19,9 +19,10 @@ from percussion_model.interface.progress import Lines, Report, lines
 from percussion_model.interface.tables import print_table
 from percussion_model.simulation.uncertain import (
     ABOUT,
+    NOT_THE_MODEL,
     PLUS_MINUS,
     UNDECIDED,
-    WITHOUT_ESTIMATE,
+    about_errors,
     change_text,
     in_few_characters,
     mean_text,
@@ -43,8 +44,6 @@ if TYPE_CHECKING:
 _PATIENCE = 2.0
 
 RATE = ("Rate of penetration", "rate_of_penetration", 1e3, "mm/s")
-# That of a settled motion is of its convergence.
-SETTLING = " (± of convergence; that of the grid is not in it)"
 # Other rows of the table: name, key of the summary, factor, unit.
 SHOWN = (
     ("Blow period", "blow_period", 1e3, "ms"),
@@ -61,7 +60,7 @@ SHOWN = (
 )
 # Instead of them where there are no blows: name, key of `Result.fall`, factor, unit.
 WITHOUT_BLOWS = (
-    ("Depth of the bit's end", "depth", 1e3, "mm"),
+    ("Depth of the bit's end in the rock", "depth", 1e3, "mm"),
     ("First contact with the rock", "first_contact", 1e3, "ms"),
     ("First rebound velocity of the bit", "rebound_velocity", 1.0, "m/s"),
     ("Stands still from", "rest_time", 1e3, "ms"),
@@ -78,7 +77,7 @@ def show_summary(result: Result) -> None:
     table.add_column(justify="left")
     if len(result.blows):
         table.add_row(RATE[0], _in_two_lines(rate_text(summary)), RATE[3])
-    values = summary if len(result.blows) else summary["fall"]
+    values = summary if len(result.blows) else summary["fall"] | {"errors": summary["errors"]}
     for name, key, factor, unit in SHOWN if len(result.blows) else WITHOUT_BLOWS:
         if values.get(key) is not None:
             table.add_row(name, _in_two_lines(mean_text(values, key, factor)), unit)
@@ -101,8 +100,8 @@ def show_summary(result: Result) -> None:
     table.add_row("Speed", f"{result.real_time_factor:.3g}", "times real time")
     console = Console()
     print_table(table, console, keys=2)
-    if len(result.counted):
-        console.print(wrapped(PLUS_MINUS if result.errors else WITHOUT_ESTIMATE), highlight=False)
+    if len(result.counted) or result.fall:
+        console.print(wrapped(about_errors(summary)), highlight=False)
     show_warnings(console, result.warnings)
 
 
@@ -115,7 +114,7 @@ def show_settled(found: Settled) -> None:
     order = {0: "", 1: ", every blow alike"}.get(found.order, f", {found.order} blows a cycle")
     table.add_row("Motion", f"{found.kind}{order}")
     if summary[RATE[1]] is not None:
-        table.add_row(RATE[0], f"{rate_text(summary)} {RATE[3]}{SETTLING}")
+        table.add_row(RATE[0], f"{rate_text(summary)} {RATE[3]}")
     for name, key, factor, unit in (
         ("Blow period", "blow_period", 1e3, "ms"),
         ("Deviation after a cycle", "multiplier", 1.0, "of what it was"),
@@ -124,7 +123,23 @@ def show_settled(found: Settled) -> None:
             table.add_row(name, f"{mean_text(summary, key, factor)} {unit}".rstrip())
     table.add_row("Blows run", f"{len(found.blows)} in {found.duration:.4g} s of simulated time")
     table.add_row("Computed in", f"{found.wall_time:.3g} s")
-    print_table(table)
+    console = Console()
+    print_table(table, console)
+    if found.error_of:
+        console.print(wrapped(_settled_error(found)), highlight=False)
+
+
+def _settled_error(found: Settled) -> str:
+    """Say what the ± of a stationary response is of, and what is not in it."""
+    settling = "convergence" if found.error_of.endswith("convergence") else "the scatter of blows"
+    grid = found.grid_errors.get(RATE[1])
+    if grid is None:
+        parts = f"{settling} alone, since that by the size of the cells was not estimated"
+    elif grid == 0.0:
+        parts = f"{settling} alone, since this solver has no grid"
+    else:
+        parts = f"the size of the cells and {settling}"
+    return f"± is the numerical error, by {parts}. {NOT_THE_MODEL}"
 
 
 def show_study(found: Study) -> None:
@@ -163,6 +178,7 @@ def _number(value: float | None, factor: float, digits: int = 5) -> str:
 
 def show_explanation(scene: Scene, found: Forecast) -> None:
     """Print what a scene computes, and its cost estimate."""
+    from percussion_model.analysis.cost import FACTOR
     from percussion_model.analysis.stationary import MOST_TIME
 
     solver = found.solver
@@ -189,13 +205,17 @@ def show_explanation(scene: Scene, found: Forecast) -> None:
         table.add_row("Steps", "from event to event, in closed form")
     if found.per_blow is not None:
         counts = ", ".join(f"{value:.3g} {name}" for name, value in found.counts.items())
-        table.add_row("A blow", f"{1e3 * found.per_blow:.3g} ms; {counts}")
+        table.add_row("To compute a blow", f"{1e3 * found.per_blow:.2g} ms; {counts}")
     if found.per_second is not None:
-        table.add_row("A simulated second", f"{found.per_second:.3g} s")
+        table.add_row("To compute a simulated second", f"{found.per_second:.2g} s")
     if found.wall_time is not None:
         runs = f", {found.runs} runs to compare" if found.runs > 1 else ""
         whole = f"about {found.wall_time:.2g} s for {found.duration:g} s simulated{runs}"
-        table.add_row("Predicted cost of the run", whole)
+        aperiodic = " if the motion is periodic" if scene.solver.accuracy is not None else ""
+        within = f"right within a factor of {FACTOR:g}{aperiodic}"
+        if scene.solver.accuracy is None and scene.run.error_estimate:
+            within += "; the short runs that tell its error come on top"
+        table.add_row("Predicted computing time", f"{whole}; {within}")
     if found.blow_map is not None:
         blows, cost = found.blow_map
         words = f"not made yet: {blows:,} blows, about {cost:.2g} s of one processor"
@@ -299,6 +319,8 @@ _EFFORT: dict[str, Callable[[dict[str, Any]], float | None]] = {
 
 def show_stability(found: Collection) -> None:
     """Print the measures of each solver on each hard case, and the failures."""
+    from percussion_model.verification.hard_cases.collection import DISAGREE, numerical_error
+
     table = Table(box=SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0))
     for name in ("case", "solver"):
         table.add_column(name, no_wrap=True)
@@ -308,7 +330,7 @@ def show_stability(found: Collection) -> None:
         table.add_row(
             row["case"],
             row["solver"],
-            in_few_characters(scaled(1e3, row["rate"]), scaled(1e3, row["rate_error"])),
+            in_few_characters(scaled(1e3, row["rate"]), scaled(1e3, numerical_error(row))),
             *(_number(row[key], 1.0, 2) for key in ("residual", "momentum", "events_per_second")),
             str(row["guards"] or ""),
             f"{row['wall_time']:.2g}",
@@ -318,11 +340,16 @@ def show_stability(found: Collection) -> None:
     show_warnings(console, found.failures())
     cases = len({row["case"] for row in found.rows})
     failed = len(found.failures())
-    console.print(
+    decided = [entry["decided"] for entry in found.disagreements()]
+    most = f"{DISAGREE:.0%}".replace("%", " %")
+    verdict = (
         f"{_counted(cases, 'case')}, {_counted(len(found.rows), 'run')}, "
-        f"{_counted(failed, 'failure')}, {_counted(len(found.disagreements()), 'rate')} "
-        "more than 2 % off the first solver's"
+        f"{_counted(failed, 'failure')}. More than {most} off the "
+        f"first solver's rate: {sum(decided)}; undecided, since their errors reach so far: "
+        f"{len(decided) - sum(decided)}."
     )
+    console.print(wrapped(f"{found.about_errors()} {NOT_THE_MODEL}"), highlight=False)
+    console.print(wrapped(verdict), highlight=False)
 
 
 def _counted(count: int, what: str) -> str:

@@ -94,8 +94,9 @@ class GridRun:
 
     @cached_property
     def cycles(self) -> float:
-        """Drilling cycles a blow."""
-        return float(np.mean(self.result.counted["drilling_cycles"]))
+        """Drilling cycles a blow; 0 where there are no blows."""
+        counted = self.result.counted["drilling_cycles"]
+        return float(np.mean(counted)) if len(counted) else 0.0
 
     @cached_property
     def largest(self) -> float:
@@ -114,7 +115,13 @@ class GridRun:
         return not self.result.cut_short and math.isfinite(self.value) and self.value != 0.0
 
     def numbers(self) -> dict[str, GridRun]:
-        """The run with each of its numbers over blows in place of the rate, by name."""
+        """The run with each of its numbers in place of the rate, by name.
+
+        They are those over blows, or those of the fall of a bit that nothing has struck.
+        """
+        if not len(self.result.blows):
+            fall = self.result.fall.items()
+            return {name: replace(self, number=(value, 0.0)) for name, value in fall}
         blows = self.result.counted
         scatter, found = scatter_over(blows), {}
         # what is the same for all numbers is found once
@@ -248,7 +255,10 @@ def _by_one(run: GridRun, others: Sequence[GridRun]) -> tuple[float, float]:
 
 
 def with_error_estimate(
-    result: Result, coarser: Sequence[Scene] | None, run: Callable[[Scene], Result]
+    result: Result,
+    coarser: Sequence[Scene] | None,
+    run: Callable[[Scene], Result],
+    whole_time: bool = False,
 ) -> Result:
     """Tell how far the numbers of a run may be off, by short runs on coarser grids.
 
@@ -262,18 +272,22 @@ def with_error_estimate(
         None where nothing is known of the solver.
     run : callable
         Runs a scene.
+    whole_time : bool
+        Whether to compare over all of the run, not a part that takes a share of its work.
 
     Returns
     -------
     Result
         With `rate_of_penetration_relative_error` and `errors`, of what could be told.
     """
-    if coarser is None or result.cut_short or len(result.counted) < LEAST_BLOWS:
+    if coarser is None or result.cut_short:
+        return result
+    if len(result.counted) < LEAST_BLOWS and not result.fall:
         return result
     whole = grid_run(result)
     if not coarser:
         return _judged(whole, whole, [])
-    end = _comparison_time(result, coarser)
+    end = result.duration if whole_time else _comparison_time(result, coarser)
     settle = min(result.settle, 0.5 * end)
     short = {"run.duration": end, "run.settle": settle}
     try:
@@ -290,7 +304,7 @@ def with_error_estimate(
 
 
 def errors_of_numbers(whole: GridRun, part: GridRun, others: Sequence[GridRun]) -> dict[str, float]:
-    """Estimate the errors of the numbers over blows of a run.
+    """Estimate the errors of the numbers over blows of a run, or of its fall.
 
     Parameters
     ----------
@@ -308,7 +322,10 @@ def errors_of_numbers(whole: GridRun, part: GridRun, others: Sequence[GridRun]) 
     of_part, found = part.numbers(), {}
     for name, number in whole.numbers().items():
         if number.useful and of_part[name].useful:
-            estimate = _estimate(of_part[name], [numbers[name] for numbers in compared])
+            known = [numbers[name] for numbers in compared if name in numbers]
+            if others and not known:
+                continue
+            estimate = _estimate(of_part[name], known)
             estimate = _of_whole(estimate, number)
             if name in COUNTS:  # grids that agree do so exactly
                 estimate = replace(estimate, floor=0.0)
@@ -372,6 +389,8 @@ def _comparison_time(result: Result, coarser: Sequence[Scene]) -> float:
         share = _cells_asked(scene) / next(iter(result.cells.values()))
         work += 0.5 * (share + share * share)
     blows = result.blows[:FEWEST_BLOWS]
+    if not len(blows):
+        return result.duration
     least = float(blows["time"][-1] + blows["period"][-1])
     return min(result.duration, max(COMPARISON_WORK / work * result.duration, least))
 

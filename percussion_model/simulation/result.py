@@ -93,6 +93,7 @@ class Result:
     errors : dict of float
         Estimated errors of the other numbers over blows, of grid and scatter as that of the
         rate, by their names in `summary`, SI units; of what was not estimated there is none.
+        Those of `fall` where there are no blows.
     rate_of_penetration_fixed_window : float
         Advance of the mean bit position from the settling time to the end of the
         run by that time, wherever in a blow they lie (eq. 58 of the paper) [m/s];
@@ -202,7 +203,8 @@ class Result:
         Returns
         -------
         dict of float
-            `depth` of the bit's end below the rock as it was [m]; `first_contact` with the
+            `depth` of the bit's end below the rock as it was, unless the bit is in the air at
+            the end of the run [m]; `first_contact` with the
             rock [s]; `rebound_velocity` with which the mean bit leaves it for the first
             time, upwards [m/s]; `rest_time`, from which it stands still [s]; `crushed`
             energy [J]. Only what is known.
@@ -294,7 +296,7 @@ class Result:
 def _fall(result: Result) -> dict[str, float]:
     """Numbers of a run without blows; see `Result.fall`."""
     scene, found = result.scene, {}
-    if result.end and scene.effects.rock != "none":
+    if result.end and scene.effects.rock != "none" and result.end["drilling_mode"] != Mode.FF:
         found["depth"] = result.end["bit_end_position"] - scene.start.rock_gap
     modes = result.events[result.events["kind"] <= EventKind.MODE_SS]
     touching = np.flatnonzero(modes["kind"] != Mode.FF)
@@ -320,9 +322,13 @@ def _leaving_velocity(result: Result, modes: np.ndarray, k: int) -> float:
     taken = time - float(begin["time"])
     if not taken > 0.0:
         return math.nan
+    return 0.5 * flight_acceleration(scene) * taken - (place - float(begin["bit_position"])) / taken
+
+
+def flight_acceleration(scene: Scene) -> float:
+    """Downward acceleration of a bit in flight, by weight and feed [m/s^2]."""
     feed = scene.feed.force / scene.bit.mass if scene.effects.feed else 0.0
-    gravity = scene.gravity.acceleration if scene.effects.gravity else 0.0
-    return 0.5 * (feed + gravity) * taken - (place - float(begin["bit_position"])) / taken
+    return feed + (scene.gravity.acceleration if scene.effects.gravity else 0.0)
 
 
 def _write_result(result: Result, folder: Path) -> list[Path]:

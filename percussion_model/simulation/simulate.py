@@ -421,7 +421,8 @@ def _with_error_estimate(
 
     def run(scene: Scene) -> Result:
         named.next(scene, "error of the means, ")
-        simulation = Simulation(scene, record_events=False)
+        # of what falls, events tell when and how fast
+        simulation = Simulation(scene, record_events=bool(result.fall))
         run_in_chunks(simulation, scene.run.duration, np.zeros(0), named.progress, stop)
         return simulation._found()
 

@@ -6,6 +6,8 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from percussion_model.simulation.rate import LEAST_BLOWS
+
 # Digits after the point; smaller errors are not shown.
 MOST_DIGITS = 5
 # Digits of a number that is known to rounding, of one whose error does not show in them, and
@@ -25,11 +27,33 @@ OF_THE_CELLS = ("rate_of_penetration", "rate_of_penetration_fixed_window", "pene
 BY_CELLS = "rate_of_penetration_depends_on_cells"
 NOT_ESTIMATED = "error not estimated"
 # What stands below tables of means.
+NOT_THE_MODEL = "Whether model and rock are right is not in it."
 PLUS_MINUS = (
     "± is the numerical error, by the size of the cells and the scatter of the blows; without "
-    "it a mean is known to its four digits. Whether model and rock are right is not in it."
+    f"it a mean is known to its four digits. {NOT_THE_MODEL}"
 )
-WITHOUT_ESTIMATE = "The error by the size of the cells was not estimated: means have three digits."
+PLUS_MINUS_OF_FALL = (
+    "± is the numerical error, by the size of the cells; without it a number is known to its "
+    f"four digits. {NOT_THE_MODEL}"
+)
+EXACT = (
+    "Rigid bodies have no cells: ± is the scatter of the blows, and without it a number is exact "
+    "to the digits shown. How far rigid bodies are from real ones is not in it."
+)
+OF_FEW_BLOWS = "The numbers are those of so few blows that neither error nor scatter is known."
+WITHOUT_ESTIMATE = (
+    "The error by the size of the cells was not estimated: numbers have three digits."
+)
+
+
+def about_errors(summary: Mapping[str, Any]) -> str:
+    """What stands below a table of a run: what its ± is, and what is not in it."""
+    if not summary["errors"]:
+        few = 0 < summary["blows_after_settling"] < LEAST_BLOWS
+        return OF_FEW_BLOWS if few else WITHOUT_ESTIMATE
+    if summary["solver"] == "rigid":
+        return EXACT
+    return PLUS_MINUS if summary["blows"] else PLUS_MINUS_OF_FALL
 
 
 def is_undecided(value: float, error: float) -> bool:

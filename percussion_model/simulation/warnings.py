@@ -7,10 +7,10 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from percussion_model.physics.records import EventKind
+from percussion_model.physics.records import EventKind, Mode
 from percussion_model.scene.scales import barrier_shares
 from percussion_model.simulation.rate import LARGE_ERROR, LEAST_BLOWS
-from percussion_model.simulation.result import Result
+from percussion_model.simulation.result import Result, flight_acceleration
 from percussion_model.simulation.validity import (
     barrier_note,
     button_note,
@@ -108,13 +108,35 @@ def _about_blows(result: Result) -> Iterator[str]:
     elif count < LEAST_BLOWS:
         yield (
             f"only {count} whole blow{'s' if count != 1 else ''} after settling, fewer than "
-            f"{LEAST_BLOWS}: the rate of penetration is undefined; run longer"
+            f"{LEAST_BLOWS}: the rate of penetration is undefined"
+            + f", and how far other blows differ from {'this' if count == 1 else 'these'} is "
+            "not known" * (count > 0) + "; run longer"
         )
+    yield from _about_flight(result)
     rate, scatter = result.rate_of_penetration, result.rate_of_penetration_standard_error
     if rate > 0.0 and scatter > LARGE_ERROR * rate:
         yield (
             f"blows do not repeat: the rate of penetration has a standard error of "
             f"{100.0 * scatter / rate:.2g} %; a longer run.duration (--duration) averages more"
+        )
+
+
+def _about_flight(result: Result) -> Iterator[str]:
+    """Say that a bit which nothing has struck is in the air when its run ends."""
+    scene, end = result.scene, result.end
+    if not result.fall or scene.effects.rock == "none" or not end:
+        return
+    if end["drilling_mode"] == Mode.FF:
+        speed, pull = end["bit_velocity"], scene.bit.mass * flight_acceleration(scene)
+        gone = speed <= 0.0 and pull <= 0.0
+        yield (
+            f"at the end of the run the bit is in the air, moving {'up' if speed < 0 else 'down'} "
+            f"at {abs(speed):.3g} m/s: it has no depth"
+            + (
+                f"; it flew off, since weight and feed ({pull:.3g} N) do not bring it back"
+                if gone
+                else "; a longer run.duration (--duration) lets it come to rest"
+            )
         )
 
 

@@ -13,9 +13,14 @@ import pytest
 
 from percussion_model import Scene
 from percussion_model.interface.cli import INTERRUPTED, _guarded, app
+from percussion_model.interface.terminal import show_stability
 from percussion_model.scene.inputs import SimulationError
 from percussion_model.verification.hard_cases import SOLVERS, hard_cases, measure, run_collection
-from percussion_model.verification.hard_cases.collection import Collection, violations
+from percussion_model.verification.hard_cases.collection import (
+    Collection,
+    numerical_error,
+    violations,
+)
 from percussion_model.verification.hard_cases.refinement import refine
 from percussion_model.verification.hard_cases.stability_page import page
 
@@ -128,6 +133,39 @@ def test_disagreements_have_a_reason_or_say_that_none_is_known():
     (entry,) = Collection([ROW, other | {"solver": "rigid"}]).disagreements()
     assert "rigid bodies" in entry["reason"]
     assert Collection([ROW, other | {"rate": 0.0162}]).disagreements() == []
+
+
+def test_a_rate_is_only_off_where_the_errors_of_both_do_not_reach_so_far(capsys):
+    other = ROW | {"solver": "fem", "rate": 0.0166}
+
+    def entry(base, row):
+        (found,) = Collection([ROW | base, other | row]).disagreements()
+        return found
+
+    assert entry({}, {})["decided"] is True  # 3.75 %
+    far = entry({}, {"rate_error": 1.5e-4})  # 4 standard errors, and one is 0.9 %
+    assert far["standard_errors"] == pytest.approx(4.0)
+    assert far["decided"] is False
+    assert far["reason"].startswith("undecided: ")
+    assert entry({}, {"refined_rate_change": 0.02})["decided"] is False
+    assert entry({"refined_rate_change": 0.02}, {})["decided"] is False
+    assert entry({}, {"refined_rate_change": 0.01})["decided"] is True
+    undecided = other | {"solver": "rigid", "rate_error": 1.5e-4}
+    rows = [row | {"wall_time": 0.1} for row in (ROW, other, undecided)]
+    show_stability(Collection(rows))
+    shown = " ".join(capsys.readouterr().out.split())
+    assert "16.6±0.1" in shown
+    assert "± of a rate is its standard error by the scatter of the blows alone" in shown
+    assert "More than 2 % off the first solver's rate: 1; undecided, since their errors" in shown
+    assert shown.endswith("so far: 1.")
+
+
+def test_the_error_of_a_rate_is_of_scatter_and_of_the_grid():
+    assert numerical_error(ROW | {"rate_error": 1e-4}) == 1e-4
+    finer = {"rate_error": 1e-4, "refined_rate_change": 0.05}
+    assert numerical_error(ROW | finer) == pytest.approx(0.05 * ROW["rate"])
+    assert numerical_error(ROW | {"rate_error": 1e-4, "refined_rate_change": None}) == 1e-4
+    assert numerical_error(ROW | {"rate": None}) is None
 
 
 def test_processes_give_the_same_rows_as_this_one():

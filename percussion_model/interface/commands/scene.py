@@ -108,6 +108,7 @@ def settled(
             tolerance,
             progress=lambda count: report(f"{count} blows", None),
             most_time=most_time,
+            error_estimate=True,
         )
     common.write_json(json_file, found.summary())
     if json_file != "-":

@@ -26,6 +26,7 @@ RIGID_REASON = (
     "rigid bodies: no wave takes its time to the rock, none comes back, none stays in the bit"
 )
 CHANCE_REASON = "within {sigmas:.1f} standard errors of the two rates: too few blows to tell"
+REACH_REASON = "undecided: the errors of the two rates reach {reach:.1%} of the first"
 
 
 @dataclass(frozen=True)
@@ -43,6 +44,23 @@ class Collection:
     rows: list[dict[str, Any]] = field(repr=False)
     share: float = 1.0
 
+    @property
+    def is_refined(self) -> bool:
+        """Whether the cases were run on finer grids as well."""
+        return any("refined_converged" in row for row in self.rows)
+
+    def about_errors(self) -> str:
+        """What the ± of a rate is."""
+        if self.is_refined:
+            return (
+                "± of a rate is its standard error by the scatter of the blows, or what a grid "
+                "of twice as many cells changes, whichever is greater."
+            )
+        return (
+            "± of a rate is its standard error by the scatter of the blows alone; what finer "
+            "cells change was not run (--refine)."
+        )
+
     def failures(self) -> list[str]:
         """What does not hold, a line each; empty where all is well."""
         return [
@@ -52,7 +70,10 @@ class Collection:
         ]
 
     def disagreements(self) -> list[dict[str, Any]]:
-        """Where mean rates are further apart than `DISAGREE`, and why."""
+        """Where mean rates are further apart than `DISAGREE`, and why.
+
+        `decided` are those that are so whatever their errors.
+        """
         by_case: dict[str, list[dict[str, Any]]] = {}
         for row in self.rows:
             by_case.setdefault(row["case"], []).append(row)
@@ -103,6 +124,18 @@ def violations(row: dict[str, Any]) -> list[str]:
     return found
 
 
+def numerical_error(row: dict[str, Any]) -> float | None:
+    """Error of a rate, by its scatter and by what a finer grid changes [m/s]; None if unknown."""
+    if row["rate"] is None or row["rate_error"] is None:
+        return None
+    return max(row["rate_error"], _by_grid(row))
+
+
+def _by_grid(row: dict[str, Any]) -> float:
+    """Change of a rate on a finer grid [m/s], 0 where there is none to tell."""
+    return abs(row["rate"]) * (row.get("refined_rate_change") or 0.0)
+
+
 def _disagreement(
     case: HardCase, first: dict[str, Any], row: dict[str, Any]
 ) -> dict[str, Any] | None:
@@ -115,9 +148,13 @@ def _disagreement(
         return None
     error = math.hypot(first["rate_error"] or 0.0, row["rate_error"] or 0.0)
     sigmas = abs(rate - base) / error if error > 0.0 else math.inf
+    reach = SIGMAS * error + _by_grid(first) + _by_grid(row)
+    decided = abs(rate - base) - reach > DISAGREE * abs(base)
     reason = case.differs.get(row["solver"])
     if reason is None and sigmas <= SIGMAS:
         reason = CHANCE_REASON.format(sigmas=sigmas)
+    if reason is None and not decided and base:
+        reason = REACH_REASON.format(reach=reach / abs(base)).replace("%", " %")
     if reason is None and row["solver"] == "rigid":
         reason = RIGID_REASON
     return {
@@ -130,6 +167,7 @@ def _disagreement(
         "other_rate_error": first["rate_error"],
         "difference": off if math.isfinite(off) else None,
         "standard_errors": sigmas if math.isfinite(sigmas) else None,
+        "decided": decided,
         "reason": reason or "",
     }
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
-from percussion_model.simulation.uncertain import in_few_characters
+from percussion_model.simulation.uncertain import UNDECIDED, in_few_characters, scaled
 from percussion_model.verification.hard_cases.cases import hard_cases
 from percussion_model.verification.hard_cases.collection import (
     DISAGREE,
     MOST_MOMENTUM,
     MOST_RESIDUAL,
     Collection,
+    numerical_error,
 )
 from percussion_model.verification.hard_cases.refinement import LEAST_CHANCE, RATE_WITHIN, SIGMAS
 
@@ -37,8 +38,8 @@ pulls between piston and bit, nor on the rock with `release`; piston and bit do 
 other calls gives the same bits.
 """
 
-_COLUMNS = """**Columns.** *rate*: rate of penetration with its standard error where that is above
-1 %; *residual* and *numerical*: entries of the energy ledger divided by its denominator;
+_COLUMNS = """**Columns.** *rate*: rate of penetration. {about_errors}
+*residual* and *numerical*: entries of the energy ledger divided by its denominator;
 *momentum*: its greatest difference to the impulses, divided by the greatest impulse; *events*: per
 simulated second; *guards*: how often one acted; *refined*: change of the rate on a grid of twice as
 many cells or elements, of aperiodic cases in standard errors; *speed*: simulated time divided by
@@ -60,15 +61,11 @@ def page(found: Collection, picture: str | None) -> str:
     if picture:
         parts.append(f"![Residual, events, momentum and speed of every case]({picture})\n")
     parts.append(_disagreements(found))
-    if _is_refined(found):
+    if found.is_refined:
         parts.append(_unresolved(found))
-    parts.append("## All runs\n\n" + _COLUMNS)
+    parts.append("## All runs\n\n" + _COLUMNS.format(about_errors=found.about_errors()))
     parts += [text for group in GROUPS if (text := _group(found, group))]
     return "\n".join(parts)
-
-
-def _is_refined(found: Collection) -> bool:
-    return any("refined_converged" in row for row in found.rows)
 
 
 def _verdict(found: Collection) -> str:
@@ -82,7 +79,7 @@ def _verdict(found: Collection) -> str:
         *(f"- {text}" for text in failures),
         "",
         f"Each case ran for {found.share:.0%} of its duration"
-        + (", and on a finer grid as well. " if _is_refined(found) else ". ")
+        + (", and on a finer grid as well. " if found.is_refined else ". ")
         + f"The greatest residual is {abs(worst['residual'] or 0.0):.1e} ({worst['case']}, "
         f"{worst['solver']}), the most events {_plain(busiest['events_per_second'], 3)} a second "
         f"({busiest['case']}, {busiest['solver']}). Guards acted in "
@@ -97,17 +94,20 @@ def _disagreements(found: Collection) -> str:
         "## Where solvers disagree",
         "",
         f"Every case whose mean rate differs by more than {DISAGREE:.0%} from that of the first "
-        "solver, with the reason.",
+        "solver, with the reason. It is undecided where the errors of both rates, three standard "
+        "errors of their scatter and what finer grids change, reach so far.",
         "",
         "| case | solver | rate, mm/s | first solver, mm/s | off | reason |",
         "|---|---|---|---|---|---|",
     ]
     for entry in found.disagreements():
         off = entry["difference"]
+        rows = {row["solver"]: row for row in found.rows if row["case"] == entry["case"]}
         lines.append(
-            f"| {entry['case']} | {entry['solver']} | {_rate(entry['rate'], entry['rate_error'])} "
-            f"| {_rate(entry['other_rate'], entry['other_rate_error'])} ({entry['compared_with']}) "
-            f"| {'-' if off is None else f'{100 * off:+.1f} %'} "
+            f"| {entry['case']} | {entry['solver']} | {_rate(rows[entry['solver']])} "
+            f"| {_rate(rows[entry['compared_with']])} ({entry['compared_with']}) "
+            f"| {'-' if off is None else f'{100 * off:+.1f} %'}"
+            f"{'' if entry['decided'] else f', {UNDECIDED}'} "
             f"| {entry['reason'] or '**not known**'} |"
         )
     return "\n".join([*lines, ""])
@@ -153,7 +153,7 @@ def _group(found: Collection, group: str) -> str:
 
 
 def _row(row: dict[str, Any], aperiodic: bool) -> str:
-    rate = _rate(row["rate"], row["rate_error"])
+    rate = _rate(row)
     refined = _percent(row.get("refined_rate_change"))
     if aperiodic and row.get("refined_rate_sigmas") is not None:
         refined = f"{row['refined_rate_sigmas']:.1f} σ"
@@ -166,11 +166,9 @@ def _row(row: dict[str, Any], aperiodic: bool) -> str:
     )
 
 
-def _rate(rate: float | None, error: float | None) -> str:
-    """Rate [mm/s] with its standard error."""
-    if rate is None:
-        return "-"
-    return in_few_characters(1e3 * rate, None if error is None else 1e3 * error)
+def _rate(row: dict[str, Any]) -> str:
+    """Rate [mm/s] with its error."""
+    return in_few_characters(scaled(1e3, row["rate"]), scaled(1e3, numerical_error(row)))
 
 
 def _small(value: float | None) -> str:
