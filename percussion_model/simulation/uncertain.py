@@ -74,9 +74,10 @@ def with_error(value: float, error: float, most_digits: int = MOST_DIGITS) -> st
     hidden = is_undecided(value, error)
     if error < 10.0**-most_digits and not hidden:
         return f"{value:.{SURE_DIGITS}g}"
-    digits = max(1 - math.floor(math.log10(error)), 0)
-    digits = digits if hidden else min(digits, most_digits)
-    text = f"{value:.{digits}f} ± {error:.{digits}f}"
+    place = 1 - math.floor(math.log10(error))
+    place = place if hidden else min(place, most_digits)
+    digits = max(place, 0)
+    text = f"{round(value, place):.{digits}f} ± {round(error, place):.{digits}f}"
     return f"{UNDECIDED}, {text}" if hidden else text
 
 
