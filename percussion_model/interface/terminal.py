@@ -205,17 +205,17 @@ def show_explanation(scene: Scene, found: Forecast) -> None:
         table.add_row("Steps", "from event to event, in closed form")
     if found.per_blow is not None:
         counts = ", ".join(f"{value:.3g} {name}" for name, value in found.counts.items())
-        table.add_row("To compute a blow", f"{1e3 * found.per_blow:.2g} ms; {counts}")
+        table.add_row("A blow", f"{1e3 * found.per_blow:.2g} ms to compute; {counts}")
     if found.per_second is not None:
-        table.add_row("To compute a simulated second", f"{found.per_second:.2g} s")
+        table.add_row("A simulated second", f"{found.per_second:.2g} s to compute")
     if found.wall_time is not None:
         runs = f", {found.runs} runs to compare" if found.runs > 1 else ""
-        whole = f"about {found.wall_time:.2g} s for {found.duration:g} s simulated{runs}"
+        whole = f"about {found.wall_time:.2g} s to compute {found.duration:g} s{runs}"
         aperiodic = " if the motion is periodic" if scene.solver.accuracy is not None else ""
         within = f"right within a factor of {FACTOR:g}{aperiodic}"
         if scene.solver.accuracy is None and scene.run.error_estimate:
             within += "; the short runs that tell its error come on top"
-        table.add_row("Predicted computing time", f"{whole}; {within}")
+        table.add_row("Predicted cost of the run", f"{whole}; {within}")
     if found.blow_map is not None:
         blows, cost = found.blow_map
         words = f"not made yet: {blows:,} blows, about {cost:.2g} s of one processor"
