@@ -64,9 +64,9 @@ SHORT = {
     "peak_contact_force": "peak contact force",
     "peak_stress": "peak stress",
     "resting_place": "resting place",
-    HISTORY: "bit force, L1",
-    CONTACT_HISTORY: "contact force, L1",
-    STRESS_HISTORY: "stress, L1",
+    HISTORY: "bit force, history",
+    CONTACT_HISTORY: "contact force, history",
+    STRESS_HISTORY: "stress, history",
 }
 
 
@@ -281,7 +281,7 @@ def coupled() -> str:
 
 def bounded(error: float, bar: float) -> str:
     """An error, or that the reference does not resolve it."""
-    return power(error) if error > bar else f"within {power(bar)}"
+    return f"within {power(bar)}" if error <= bar and bar > 0.0 else power(error)
 
 
 def points_map() -> str:
@@ -371,7 +371,9 @@ def bars(study: Study) -> str:
         value = "–" if key in HISTORIES else f"{one.factor * bar.value:.7g}"
         verdict = "yes" if bar.agreed else "no: the limits disagree"
         rows.append([label, value, power(abs(bar.error / bar.value)), power(bar.apart), verdict])
-    return table(["quantity", "value", "bar, relative", "solvers apart", "a reference?"], rows)
+    return table(
+        ["quantity", "value", "bar, relative", "solvers differ by, relative", "a reference?"], rows
+    )
 
 
 def orders(study: Study, keys: Sequence[str]) -> str:
@@ -396,7 +398,9 @@ def rungs(study: Study) -> str:
         if point.note:
             rows.append([title, label, point.note, *[""] * (len(study.quantities) + 1)])
             continue
-        errors = [power(point.errors.get(key, math.nan)) for key in study.quantities]
+        errors = [
+            bounded(point.errors.get(key, math.nan), study.floor(key)) for key in study.quantities
+        ]
         spread = f" ± {two(100 * point.spread)} %" if math.isfinite(point.spread) else ""
         times = [f"{1e3 * point.second:.3g}{spread}", f"{1e3 * point.setup:.3g}"]
         rows.append([title, label, *errors, *times])
@@ -432,7 +436,8 @@ From {made}.
 
 ## All rungs
 
-{what}; * lengths that do not fit the cells; ± half the range of repeated times.
+{what}; * lengths that do not fit the cells; ± half the range of repeated times; "within" the bar
+of the reference, which tells no more.
 
 {rungs(study)}
 """

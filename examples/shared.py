@@ -13,8 +13,11 @@ import matplotlib
 from matplotlib.figure import Figure
 
 from percussion_model.interface.plotting import style
-from percussion_model.simulation.files import staged, to_json
+from percussion_model.simulation.files import ResultError, staged, staged_text, to_json
+from percussion_model.simulation.origin import Claim
 
+# What an example found, as JSON.
+FOUND = "found.json"
 # Energies and rates are drawn in these, and told apart with any colour vision.
 BLUE, ORANGE, GREEN, BLACK, GREY = "#0072B2", "#D55E00", "#009E73", "#222222", "#8C8C8C"
 PINK = "#CC79A7"
@@ -31,15 +34,38 @@ def figure_of(name: str, out: Path, size: tuple[float, float]) -> Iterator[Figur
 
 
 def arguments(main: Callable[..., Any], name: str, out: Path) -> argparse.Namespace:
-    """Words of the command line of an example: out and quick."""
+    """Words of the command line of an example: out, quick and force."""
     parser = argparse.ArgumentParser(prog=f"python -m examples.{name}", description=main.__doc__)
     parser.add_argument("--out", type=Path, default=out, metavar="DIR")
     parser.add_argument("--quick", action="store_true", help="few points: seconds, not minutes")
+    parser.add_argument("--force", action="store_true", help="replace what else the folder holds")
     return parser.parse_args()
 
 
+def run_example(
+    main: Callable[..., dict[str, Any]], name: str, out: Path, quick: bool, force: bool = False
+) -> list[Path]:
+    """Run an example; its figure and what it found end up in a folder.
+
+    Raises
+    ------
+    ResultError
+        If the folder holds something else, and that is not to be replaced.
+    """
+    origin = {"command": f"examples.{name}", "quick": quick}
+    claimed = Claim(out, origin, force)
+    found = main(claimed.folder, quick)
+    staged_text(out / FOUND, to_json(found) + "\n")
+    claimed.sign()
+    return [out / f"{name}.png", out / FOUND]
+
+
 def command_line(main: Callable[..., dict[str, Any]], name: str) -> None:
-    """Run an example with the words of the command line, and print what it found."""
+    """Run an example with the words of the command line, and say where its files are."""
     words = arguments(main, name, Path("out/examples") / name)
-    print(to_json(main(words.out, words.quick)))
-    print(words.out / f"{name}.png", file=sys.stderr)
+    try:
+        files = run_example(main, name, words.out, words.quick, words.force)
+    except ResultError as error:
+        sys.exit(f"examples.{name}: {error}")
+    for file in files:
+        print("wrote", file)

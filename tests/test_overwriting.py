@@ -63,7 +63,8 @@ def test_the_same_run_replaces_its_own_result(percussion):
     assert sorted(path.name for path in Path().iterdir()) == ["x"]
     found = json.loads(Path("x", ORIGIN).read_text())
     assert found["made_by"]["command"] == "run"
-    assert found["made_by"]["scene.feed.force"] == "2500.0"
+    assert found["made_by"]["scene.feed.force"] == 2500.0
+    assert found["program"].startswith("percussion_model ")
     assert found["files"] == ["blows.csv", "events.csv", "scene.toml", "summary.json"]
 
 

@@ -18,7 +18,7 @@ from fitting_data import noisy_curve
 from percussion_model import Scene, simulate
 from percussion_model.interface import progress
 from percussion_model.interface.cli import BAD_INPUT, INTERRUPTED, _guarded, app
-from percussion_model.interface.terminal import progress_bar
+from percussion_model.interface.terminal import RunProgress, progress_bar
 from percussion_model.simulation.accuracy_control import planned_cells
 from percussion_model.solvers.base import Solver
 
@@ -141,6 +141,47 @@ def test_a_line_tells_time_share_and_what_is_left():
     clock.now = 40.0
     lines.show("all but done", 0.01)  # too early to tell what is left
     assert lines.line() == "  40 s: all but done, 1%"
+
+
+def test_what_is_left_is_told_of_each_part_and_only_where_its_pace_is_even():
+    clock = SimpleNamespace(now=0.0)
+    lines = progress.Lines("runs", lambda: clock.now)
+    for second in range(101):
+        clock.now = float(second)
+        lines.show("run 1 of 2", second / 100.0)
+    lines.show("run 2 of 2", 0.0)
+    clock.now = 110.0
+    lines.show("run 2 of 2", 0.5)  # in ten seconds; the hundred before count no more
+    assert lines.line() == " 110 s: run 2 of 2, 50%, about 10 s left"
+    clock.now = 117.0  # and then it stops: who knows for how long
+    assert lines.line() == " 117 s: run 2 of 2, 50%"
+
+
+def test_a_slow_start_is_not_taken_for_the_pace():
+    clock = SimpleNamespace(now=0.0)
+    lines = progress.Lines("runs", lambda: clock.now)
+    for k in range(20_001):  # told often, as a coupled run is
+        clock.now = 18.0 + 6.0 * k / 20_000
+        lines.show("runs", 0.35 * k / 20_000)
+    assert lines.line() == "  24 s: runs, 35%"
+
+
+def test_what_begins_late_is_judged_by_what_is_done_since():
+    clock = SimpleNamespace(now=0.0)
+    lines = progress.Lines("scenes", lambda: clock.now)
+    clock.now = 100.0
+    lines.begin("scene 2 of 2", 0.5)
+    clock.now = 110.0
+    lines.show("scene 2 of 2", 0.75)
+    assert lines.line() == " 110 s: scene 2 of 2, 75%, about 10 s left"
+
+
+def test_the_place_of_a_run_in_a_long_row_is_known():
+    told = []
+    runs = RunProgress(lambda text, share: told.append((text, share)), 0.0)
+    runs.stage("run 2 of 2", 3.0, before=1.0, whole=4.0)
+    runs(1.0)
+    assert told[-1] == ("run 2 of 2, 1 s of 3 s simulated", 0.5)
 
 
 def test_what_goes_on_is_neither_all_done_nor_about_to_end():

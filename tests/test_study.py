@@ -15,7 +15,7 @@ import pytest
 from typer.testing import CliRunner
 
 from percussion_model import Scene, SceneError, settled
-from percussion_model.analysis.study import grid, study, table, workers
+from percussion_model.analysis.study import Study, grid, study, table, workers
 from percussion_model.analysis.study.response import COMPUTING, KINDS, run_points
 from percussion_model.analysis.study.store import PARTS, PLAN
 from percussion_model.interface.cli import app
@@ -87,14 +87,29 @@ def test_a_study_becomes_tables_and_grids(whole, tmp_path):
     parquet, netcdf = sorted(whole.save(tmp_path / "out"), key=lambda path: path.suffix)[::-1]
     frame = pandas.read_parquet(parquet)
     assert frame.equals(whole.to_pandas())
+    assert "that of the grid is not estimated" in frame.attrs["errors"]
     with xarray.open_dataset(netcdf) as data:
         assert data.rate_of_penetration.dims == ("feed.force", "rock.loading_stiffness")
         assert data.rate_of_penetration.attrs["units"] == "m/s"
+        assert "rate_of_penetration_error" in data.rate_of_penetration.attrs["error"]
+        assert data.impact_velocity.attrs["error"] == "error not estimated"
         here = data.rate_of_penetration.sel({"feed.force": 4000.0, "rock.loading_stiffness": 3e8})
         k = int(np.argmax(np.all(whole.points.values == [4000.0, 3e8], axis=1)))
         assert float(here) == whole.rows["rate_of_penetration"][k]
         (tmp_path / "scene.toml").write_text(data.attrs["scene"])
     assert Scene.from_toml(tmp_path / "scene.toml") == SCENE
+
+
+def test_a_rate_has_its_error_however_small(whole):
+    rows = whole.rows.copy()
+    rows["rate_of_penetration"], rows["rate_of_penetration_error"] = 0.0123456, 1e-12
+    rows["rate_of_penetration_error"][1] = np.nan
+    made = Study(whole.scene, whole.points, rows, whole.failures)
+    assert made.rate_text(0) == "12.34560 ± 0.00001 mm/s"
+    assert made.rate_text(1) == "12.3 mm/s, error not estimated"
+    told = dict(made.headlines())
+    assert "±" in told["Lowest rate"]
+    assert "nor are those of the other numbers" in told["These errors"]
 
 
 def test_an_interrupted_study_goes_on_where_it_was(whole, tmp_path):

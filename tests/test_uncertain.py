@@ -345,6 +345,22 @@ def test_a_study_knows_what_is_undecided():
     assert found.to_xarray()["undecided"].values.ravel().tolist() == blind.tolist()
 
 
+def test_a_study_without_loss_tells_no_rate():
+    """Rates of waves without loss are of the cells; of rigid bodies they are not."""
+    lossy = Scene()
+    bare = lossy.replace(**{"effects.loss": False})
+    points = grid({"feed.force": [1e3, 2e3], "loss.time": [0.0, 5e-6, 1e-5]})
+    sure = made_study(points, np.zeros(6, bool))
+    assert not sure.undecided.any()
+    of_cells = points.values[:, points.keys.index("loss.time")] == 0.0
+    assert np.count_nonzero(of_cells) == 2
+    assert replace(sure, scene=lossy).undecided.tolist() == of_cells.tolist()
+    assert replace(sure, scene=bare).undecided.all()
+    lines = dict(replace(sure, scene=bare).headlines())
+    assert lines["Undecided"] == "6 rates: without loss in the bars they depend on the cells"
+    assert "Lowest rate" not in lines
+
+
 def test_a_map_does_not_colour_what_it_does_not_know():
     pytest.importorskip("bokeh", reason="maps need bokeh")
     from bokeh.models import ColumnDataSource, HoverTool, Legend

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
@@ -49,6 +50,8 @@ MOST_RUNS = 7
 
 # Name of the variant of an accelerator, which changes no number.
 LEAPS = "leaps"
+# Words of warnings of what stands beside a rate as its error.
+OF_THE_ERROR = (LARGE, "standard error")
 # Numbers of a summary whose change is shown.
 CHANGED = ("rate_of_penetration", "blow_period", "peak_bit_force")
 
@@ -88,7 +91,8 @@ class Variant:
     @property
     def name(self) -> str:
         """Effect and setting."""
-        return f"{self.effect} {self.setting}".strip()
+        between = " " if self.setting in ("on", "off") or not self.effect else ": "
+        return f"{self.effect}{between}{self.setting}".strip()
 
     def apply(self, scene: Scene) -> Scene:
         """Return the scene with the effect changed; `SceneError` where it cannot be."""
@@ -129,10 +133,11 @@ def _rock(scene: Scene) -> Iterator[Variant]:
         else:
             yield Variant("barrier", "on", {"effects.barrier": True, **_not_zero(scene, _BARRIER)})
         other = "paper" if scene.effects.standstill_tension == "release" else "release"
-        yield Variant("standstill tension", other, {"effects.standstill_tension": other})
+        words = "as in the paper" if other == "paper" else "released"
+        yield Variant("standstill tension", words, {"effects.standstill_tension": other})
         yield Variant(
-            "bilinear law",
-            "spring",
+            "rock law",
+            "linear spring",
             {"effects.rock": "spring", "effects.barrier": False},
             off=True,
             no_penetration=_NO_CRUSHING,
@@ -152,15 +157,15 @@ def _bars(scene: Scene) -> Iterator[Variant]:
             changes = {"effects.loss": True, **_not_zero(scene, ("loss.time",))}
             yield Variant("loss", "on", changes)
         if scene.piston.model == "elastic":
-            yield Variant("elastic piston", "rigid", {"piston.model": "rigid"}, off=True)
+            yield Variant("piston", "rigid", {"piston.model": "rigid"}, off=True)
         elif scene.piston.model == "rigid":
-            yield Variant("elastic piston", "on", {"piston.model": "elastic"})
-        yield Variant("elastic bars", "rigid", {"solver.name": "rigid"}, off=True)
+            yield Variant("piston", "elastic", {"piston.model": "elastic"})
+        yield Variant("piston and bit", "rigid", {"solver.name": "rigid"}, off=True)
         return
     changes = {"bit.model": "elastic", "solver.name": "auto"}
     if scene.piston.model == "rigid":
         changes["piston.model"] = "elastic"
-    yield Variant("elastic bars", "on", changes)
+    yield Variant("piston and bit", "elastic", changes)
 
 
 def _not_zero(scene: Scene, keys: tuple[str, ...]) -> dict[str, Any]:
@@ -290,12 +295,18 @@ class EffectsStudy:
         Not those of a large error, which stands beside the rate, and what `reason` says.
         """
         texts = list(self.base.result.warnings)
+        said = {_words(text) for text in texts}
         for trial in self.trials:
-            said = (*texts, *trial.reasons, unused_note(trial.result.scene.given_in_vain))
+            if trial.variant.no_blows:
+                continue
+            known = said | {
+                *map(_words, trial.reasons),
+                _words(unused_note(trial.result.scene.given_in_vain)),
+            }
             texts += [
                 f"{trial.variant.name}: {text}"
                 for text in trial.result.warnings
-                if text not in said and not trial.variant.no_blows and LARGE not in text
+                if _words(text) not in known and not any(word in text for word in OF_THE_ERROR)
             ]
         return texts
 
@@ -325,6 +336,11 @@ class EffectsStudy:
             ],
             "refused": self.refused,
         }
+
+
+def _words(text: str) -> str:
+    """A text without its numbers."""
+    return re.sub(r"[\d.e+-]*\d", "", text)
 
 
 def study_effects(

@@ -180,8 +180,8 @@ def _faults(numbers: Mapping[str, float], share: float, error: str) -> list[str]
 class Watch(Protocol):
     """What is told how far a bench has come."""
 
-    def stage(self, name: str, end: float) -> None:
-        """Take the run that begins, and its simulated time [s]."""
+    def stage(self, name: str, end: float, before: float, whole: float) -> None:
+        """Take the run that begins; simulated times of it, of those before it, of all [s]."""
 
     def __call__(self, t: float) -> None:
         """Take the time that it has reached [s]."""
@@ -215,8 +215,8 @@ def bench(
     trust : bool
         As for `Coupling`.
     watch : optional
-        Is told by its `stage` which run begins, and its simulated time, and called with the
-        time reached [s].
+        Is told by its `stage` which run begins, with the simulated times of it, of those before
+        it and of all, and called with the time reached [s].
     """
     names = [trial.name for trial in TRIALS]
     for name in trials:
@@ -225,9 +225,12 @@ def bench(
     found = []
     kept = kept_values(controller)
     chosen = [trial for trial in TRIALS if not trials or trial.name in trials]
+    whole, before = sum(trial.duration for trial in chosen), 0.0
     for k, trial in enumerate(chosen, 1):
         if watch is not None:
-            watch.stage(f"run {k} of {len(chosen)}, {trial.name}", trial.duration)
+            name = f"run {k} of {len(chosen)}, {trial.name}"
+            watch.stage(name, trial.duration, before, whole)
+        before += trial.duration
         coupling = Coupling(
             system,
             {**trial.parameters, **(parameters or {})},
@@ -254,6 +257,6 @@ def _refuse_changed(controller: Any, before: Mapping[str, bytes]) -> None:
         )
 
 
-def total(scores: Sequence[Score]) -> float:
+def mean_points(scores: Sequence[Score]) -> float:
     """Mean of the points."""
     return float(np.mean([score.points for score in scores])) if scores else 0.0

@@ -59,7 +59,7 @@ def write_bench_page(
     parts = [
         f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>{escape(title)}'
         f"</title><style>{STYLE}</style></head><body><h1>Controller bench: {escape(title)}</h1>"
-        f"<p><b>{points:.1f} of 100 points; {verdict}.</b></p>",
+        f"<p><b>{points:.1f} of 100 points, the mean of the runs; {verdict}.</b></p>",
         _rules(),
         _table(scores, columns),
         "<dl>" + "".join(f"<dt>{escape(head)}</dt><dd>{escape(text)}</dd>"

@@ -6,6 +6,7 @@ import math
 import sys
 import threading
 import time
+from bisect import bisect
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
@@ -13,6 +14,10 @@ from contextlib import contextmanager
 EVERY = 3.0
 # Below this share of the work the time that is left cannot be told.
 EARLY = 0.05
+# Nor where the pace of the later half of the time differs from that of all by more than this.
+EVEN = 1.5
+# Shares that differ by less are one place of the way.
+SAME_PLACE = 1e-3
 # Shorter times that are left are no number: they are as long as those between lines [s].
 A_FEW = 3.0
 
@@ -38,54 +43,85 @@ class Lines:
         self.started = clock()
         self.begin(text)
 
-    def begin(self, text: str) -> None:
-        """Take what begins now."""
-        self.begun = self.clock()
+    def begin(self, text: str, done: float = 0.0) -> None:
+        """Take what begins now, and the share that is done already."""
+        self.marks = [(self.clock(), done)]
         self.show(text, None)
 
     def show(self, text: str, share: float | None) -> None:
-        """Take what is done now, and the share that is done since `begin`."""
-        self.told, self.changed = (text, share), self.clock()
+        """Take what is done now, and its share; a smaller one than before begins another part."""
+        now = self.clock()
+        self.told, self.changed = (text, share), now
+        if share is None:
+            return
+        # the thread that prints may read them meanwhile: they are replaced, never changed
+        if share < self.marks[-1][1]:
+            self.marks = [(now, share)]
+        elif share >= self.marks[-1][1] + SAME_PLACE:
+            self.marks = [*self.marks, (now, share)]
 
     def line(self) -> str:
         """Time since the start, what is done, its share, and the time that it will still take.
 
-        While work goes on it is never all of it, nor is there nothing left: as long as nothing
-        has changed by now, it may well take once more.
+        While work goes on it is never all of it.
         """
-        now = self.clock()
         text, share = self.told
         parts = [text]
         if share is not None and share >= 1.0:
             parts.append("finishing")
         elif share is not None:
-            parts.append(f"{math.floor(100.0 * share)}%")
-            if share >= EARLY:
-                left = (now - self.begun) * (1.0 - share) / share
-                left = max(left, now - self.changed)
-                parts.append(f"about {left:.0f} s left" if left > A_FEW else "a few s left")
-        return f"{now - self.started:4.0f} s: {', '.join(parts)}"
+            parts += [f"{math.floor(100.0 * share)}%", *filter(None, [self.left()])]
+        return f"{self.clock() - self.started:4.0f} s: {', '.join(parts)}"
+
+    def left(self) -> str:
+        """The time that it will still take; nothing where it goes too unevenly to tell.
+
+        There is never nothing left: as long as nothing has changed by now, it may well take
+        once more.
+        """
+        now, marks, share = self.clock(), self.marks, self.told[1]
+        (begun, first), elapsed = marks[0], now - marks[0][0]
+        if share is None or not EARLY <= share < 1.0 or share <= first or elapsed <= 0.0:
+            return ""
+        pace = (share - first) / elapsed
+        later = (share - _share_at(begun + 0.5 * elapsed, marks)) / (0.5 * elapsed)
+        if not pace / EVEN <= later <= pace * EVEN:
+            return ""
+        left = max((1.0 - share) / pace, now - self.changed)
+        return f"about {left:.0f} s left" if left > A_FEW else "a few s left"
+
+
+def _share_at(moment: float, marks: list[tuple[float, float]]) -> float:
+    """Share that was done at a moment, between the places of the way that are known."""
+    k = bisect(marks, moment, key=lambda mark: mark[0])
+    if k == len(marks):
+        return marks[-1][1]
+    (t, share), (later, more) = marks[k - 1], marks[k]
+    return share + (more - share) * (moment - t) / (later - t)
 
 
 @contextmanager
-def lines(text: str) -> Iterator[Report]:
+def lines(text: str, done: float = 0.0) -> Iterator[Report]:
     """Print a line every few seconds; within a command that does so, say more of what it does.
 
     Parameters
     ----------
     text : str
         What begins.
+    done : float
+        Share that is done already.
     """
     if _running:
         (outer,) = _running
-        before = outer.told, outer.begun, outer.changed
-        outer.begin(text)
+        before = outer.told, outer.marks, outer.changed
+        outer.begin(text, done)
         try:
             yield outer.show
         finally:
-            outer.told, outer.begun, outer.changed = before
+            outer.told, outer.marks, outer.changed = before
         return
     own = Lines(text)
+    own.begin(text, done)
     over = threading.Event()
     thread = threading.Thread(target=_print, args=(own, over), daemon=True)
     _running.append(own)

@@ -15,7 +15,7 @@ import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from percussion_model.analysis.study import Study
+from percussion_model.analysis.study import KNOWN_ERRORS, Study
 from percussion_model.interface.plotting import CAPTIONS, figures
 from percussion_model.scene.parameters import find_row, parameter_table
 from percussion_model.scene.scene import Scene
@@ -110,14 +110,18 @@ STUDY_CAPTIONS = {
     "map": (
         "A map over two parameters and cuts through it; choose what is shown, and values of the "
         "others by the sliders. Crosses mark points whose motion is not periodic. Grey and hatched "
-        "is undecided: the error of the rate is no smaller than the rate. The pointer shows ±."
+        "is undecided: the error of the rate is no smaller than the rate, or without loss in the "
+        "bars it depends on the cells. The pointer shows ±."
     ),
     "scatter": (
         "All points over each parameter. Blue is periodic, orange aperiodic, with bars of the "
-        "error of the rate; grey is undecided: the error is no smaller than the rate. Points "
+        "error of the rate; grey is undecided, as in maps. Points "
         "that are chosen with a box or lasso in one panel stand out in all."
     ),
-    "points": "All points and what was found there; a click on a heading sorts.",
+    "points": (
+        "All points and what was found there; a click on a heading sorts. The errors of the rate "
+        f"{KNOWN_ERRORS}."
+    ),
 }
 # So many failed points are listed.
 MOST_FAILURES = 10

@@ -15,7 +15,7 @@ from rich.table import Table
 from rich.text import Text
 
 from percussion_model.interface.messages import wrapped
-from percussion_model.interface.progress import Report, lines
+from percussion_model.interface.progress import Lines, Report, lines
 from percussion_model.interface.tables import print_table
 from percussion_model.simulation.uncertain import (
     ABOUT,
@@ -350,8 +350,8 @@ def show_stability(found: Collection) -> None:
     console.print(wrapped(verdict), highlight=False)
 
 
-def show_statements(statements: list[Statement]) -> None:
-    """Print what the paper says beside what was found."""
+def show_statements(statements: list[Statement], errors: str) -> None:
+    """Print what the paper says beside what was found, and what its errors are."""
     table = Table(box=None, show_header=False, padding=(0, 1, 0, 0))
     table.add_column(no_wrap=True)
     table.add_column()
@@ -363,7 +363,9 @@ def show_statements(statements: list[Statement]) -> None:
         if one.why and not one.agrees:
             table.add_row("", f"why: {escape(one.why)}")
         table.add_row("", "")
-    print_table(table)
+    console = Console()
+    print_table(table, console)
+    console.print(errors, highlight=False)
 
 
 class RunProgress:
@@ -379,16 +381,29 @@ class RunProgress:
     def __init__(self, report: Report, end: float) -> None:
         self.report = report
         self.name, self.end = "", end
+        self.before, self.whole = 0.0, 0.0
 
     def __call__(self, t: float) -> None:
         """Show the simulated time reached [s]."""
         name = f"{self.name}, " if self.name else ""
         end = max(t, self.end)
-        self.report(f"{name}{t:.4g} s of {end:g} s simulated", t / end if end else None)
+        whole = self.whole or end
+        share = (self.before + t) / whole if whole else None
+        self.report(f"{name}{t:.4g} s of {end:g} s simulated", share)
 
-    def stage(self, name: str, end: float) -> None:
-        """Take the run that begins now, and its simulated time [s]."""
-        self.name, self.end = name, end
+    def stage(self, name: str, end: float, before: float = 0.0, whole: float = 0.0) -> None:
+        """Take the run that begins now.
+
+        Parameters
+        ----------
+        name : str
+        end : float
+            Its simulated time [s].
+        before, whole : float
+            Simulated time of the runs before it and of all; without it the share is that of
+            this run [s].
+        """
+        self.name, self.end, self.before, self.whole = name, end, before, whole
         self(0.0)
 
 
@@ -419,33 +434,46 @@ def count_bar(what: str) -> Iterator[Callable[[int, int], None]]:
 
 
 @contextmanager
-def progress(text: str) -> Iterator[Report]:
+def progress(text: str, done: float = 0.0) -> Iterator[Report]:
     """Show on stderr what a long command does: a bar in a terminal, else lines.
 
     Parameters
     ----------
     text : str
         What it does until it says more.
+    done : float
+        Share that is done already.
     """
     if not sys.stderr.isatty():
-        with lines(text) as report:
+        with lines(text, done) as report:
             yield report
         return
-    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+    from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn
+
+    told = Lines(text)
+    told.begin(text, done)
+
+    class Left(ProgressColumn):
+        """The time that is left, in the words of the lines."""
+
+        def render(self, task: Task) -> Text:
+            return Text(told.left())
 
     words = TextColumn("{task.description}", markup=False)
-    bar = Progress(BarColumn(), TimeRemainingColumn(), words, console=Console(stderr=True),
-                   transient=True)  # fmt: skip
+    bar = Progress(BarColumn(), Left(), words, console=Console(stderr=True), transient=True)
     task = bar.add_task(text, total=None)
     starter = threading.Timer(_PATIENCE, bar.start)
     starter.daemon = True
     starter.start()
+
+    def show(text: str, share: float | None) -> None:
+        told.show(text, share)
+        # where all is done but the end, how long that takes is not known
+        total = None if share is None or share >= 1.0 else 1.0
+        bar.update(task, description=text, completed=share or 0.0, total=total)
+
     try:
-        yield lambda text, share: bar.update(
-            # where all is done but the end, how long that takes is not known
-            task, description=text, completed=share or 0.0,
-            total=None if share is None or share >= 1.0 else 1.0,
-        )  # fmt: skip
+        yield show
     finally:
         starter.cancel()
         starter.join()

@@ -8,7 +8,9 @@ it, unless it is forced; then what the other result left is removed.
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -63,8 +65,8 @@ class Claim:
         self._left = [name for name in _read(self.folder)[1] if name in self._before]
         self._replaces = bool(other and force)
 
-    def sign(self) -> None:
-        """Say in the folder where its files are from; call this when they are written."""
+    def sign(self) -> Path:
+        """Say in the folder where its files are from, when they are written; return the file."""
         now = _times(self.folder)
         made = [name for name, time in now.items() if self._before.get(name) != time]
         if self._replaces:
@@ -72,8 +74,13 @@ class Claim:
                 (self.folder / name).unlink(missing_ok=True)
         else:
             made += [name for name in self._left if name in now]
-        tree = {"made_by": self.origin, "files": sorted(set(made) - {ORIGIN})}
+        tree = {
+            "made_by": self.origin,
+            "program": f"percussion_model {version('percussion_model')}",
+            "files": sorted(set(made) - {ORIGIN}),
+        }
         staged_text(self.folder / ORIGIN, to_json(tree) + "\n")
+        return self.folder / ORIGIN
 
 
 def flat(tree: Mapping[str, Any], above: str = "") -> dict[str, Any]:
@@ -86,7 +93,10 @@ def flat(tree: Mapping[str, Any], above: str = "") -> dict[str, Any]:
         elif isinstance(value, (list, tuple)):
             found |= flat({str(k): one for k, one in enumerate(value)}, f"{name}.")
         elif value is not None:
-            found[name] = value if isinstance(value, (str, bool, int)) else repr(value)
+            known = isinstance(value, (str, bool, int)) or (
+                isinstance(value, float) and math.isfinite(value)
+            )
+            found[name] = value if known else repr(value)
     return found
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 
@@ -64,7 +65,7 @@ def found():
         progress=lambda text, share: said.append((text, share)),
     )
     patch.undo()
-    shares = [share for _, share in said[:3]]
+    shares = [share for _, share in said]
     assert shares == sorted(shares)
     return result
 
@@ -157,6 +158,37 @@ def test_table_and_figures(found, tmp_path, capsys):
     assert "Rate of penetration" in titles
 
 
+def test_an_error_below_the_bar_of_the_reference_is_said_to_be_below_it(found, capsys):
+    point = found.ladder("wave")[-1]
+    floor = found.reference.floor(RATE)
+    good = replace(point, errors=point.errors | {RATE: 0.1 * floor})
+    better = replace(found, points=[good])
+    show_study(better)
+    shown = capsys.readouterr().out
+    assert f"<{floor:.1e}".replace("e-0", "e-") in shown
+    assert f"off by less than {100 * floor:.2g} %" in better.advice(1e-2)
+
+
+def test_times_have_their_spread(found, capsys):
+    point = replace(found.ladder("wave")[1], spread=0.13)
+    once = replace(found, points=[replace(point, spread=np.nan)])
+    found = replace(found, points=[point])
+    assert "ms (± 13 %)" in found.advice(1e-2)
+    assert "±" not in once.advice(1e-2)
+    for one, spread in ((found, "13"), (once, "-")):
+        show_study(one)
+        row = next(line for line in capsys.readouterr().out.splitlines() if "20 cells" in line)
+        assert row.split()[3] == spread
+
+
+def test_titles_of_narrow_tables_stay_whole(found, capsys):
+    show_study(replace(found, points=found.ladder("rigid")))
+    shown = capsys.readouterr().out
+    assert "Relative error; ms to compute a simulated second; ms of set-up" in shown
+    assert "Measured orders: none" in shown
+    assert "at an error in rate" not in shown  # no method here has a cost to tell
+
+
 def test_every_ladder_is_described_and_full_runs_have_more_rungs():
     problem = pose(Scene())
     usual, full = (ladders(problem, wish) for wish in (False, True))
@@ -198,7 +230,10 @@ def test_times_are_taken_turn_by_turn_and_the_dear_ones_less_often():
         turns.append("dear")
         return 100.0
 
-    often, once = interleaved([cheap, dear])
+    shares: list[float] = []
+    often, once = interleaved([cheap, dear], shares.append)
+    assert shares == sorted(set(shares))
+    assert 0.0 <= min(shares) < 0.5 < max(shares) < 1.0
     assert turns[:3] == ["cheap", "dear", "cheap"]
     assert (often.median, often.spread, once.repeats) == (0.01, 0.0, 1)
     assert often.repeats > once.repeats

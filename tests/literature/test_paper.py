@@ -28,6 +28,7 @@ from percussion_model.verification.paper.runs import (
     drop_scene,
     exponent_and_error,
     force_at_constant_power,
+    line_errors,
     maxima,
     paper_scene,
     power_law,
@@ -67,6 +68,11 @@ def test_fits_find_what_was_put_in():
     x = np.geomspace(1.0, 100.0, 9)
     exponent, factor = power_law(x, 3.0 * x**-0.55)
     assert (exponent, factor) == pytest.approx((-0.55, 3.0))
+    scatter = 0.1 * np.random.default_rng(1).standard_normal(10_000)
+    steps = np.linspace(-1.0, 1.0, 10_000)
+    errors = line_errors(steps, 3.0 * steps + scatter)
+    # of n points: sigma/sqrt(n), and that by the standard deviation of x, 1/sqrt(3)
+    assert errors == pytest.approx((1e-3 * np.sqrt(3.0), 1e-3), rel=0.05)
     slope, intercept, explained = straight_line(x, 2.0 * x + 1.0)
     assert (slope, intercept, explained) == pytest.approx((2.0, 1.0, 1.0))
     assert straight_line(x, np.sin(40.0 * x))[2] < 0.5
@@ -100,6 +106,9 @@ def test_statements_about_sweeps_are_plain_values(tmp_path):
         found[sweep.name] = run_sweep(paper_scene(), few, tmp_path / sweep.name, processes=1)
     said = list(about_sweeps(found))
     assert len(said) == 2 + 2 + 3 * 3 + 3 + 3 + 4
+    for one in said:  # what is compared has its error
+        if any(unit in one.found for unit in ("mm/s", "c1 =", "c4 =", "exponent", "upper half")):
+            assert "±" in one.found, one.found
     json.dumps([one.to_dict() for one in said])
 
 

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 from percussion_model.coupling import CouplingError
-from percussion_model.coupling.bench import TRIALS, bench, judge, total
+from percussion_model.coupling.bench import TRIALS, bench, judge, mean_points
 from percussion_model.coupling.coupled_run import CoupledRun
 from percussion_model.interface.bench_page import write_bench_page
 from percussion_model.interface.cli import main
 from percussion_model.interface.commands.bench_controller import COLUMNS
+from percussion_model.interface.terminal import RunProgress
 
 
 def nothing(inputs, time, step):
@@ -24,12 +25,21 @@ def test_the_bench_ranks_nothing_below_a_bad_pi_below_a_good_one(feed_control):
     """A new rod brings half a kilonewton, which nobody but a controller takes away."""
     bad = {"controller.pi.gain": 0.1, "controller.pi.time": 0.4}
     points = [
-        total(bench(feed_control, controller, values, ["rod"]))
+        mean_points(bench(feed_control, controller, values, ["rod"]))
         for controller, values in ((nothing, {}), (None, bad), (None, {}))
     ]
     assert points[0] > 0.0
     assert points[0] + 1.0 < points[1]
     assert points[1] + 1.0 < points[2] <= 100.0
+
+
+def test_the_share_that_is_done_rises_over_all_runs(feed_control):
+    shares = []
+    watch = RunProgress(lambda text, share: shares.append(share), 0.0)
+    bench(feed_control, trials=["rod", "soft"], watch=watch)
+    assert shares == sorted(shares)
+    assert shares[0] == 0.0
+    assert shares[-1] == pytest.approx(1.0)
 
 
 def test_nothing_fails_where_the_bit_is_held(feed_control):
@@ -171,7 +181,9 @@ def test_a_run_fails_for_a_reason(changes, faults):
 
 def test_the_page_says_what_a_stranger_needs(tmp_path):
     scores = [judge(TRIALS[0], made_up(3000.0)), judge(TRIALS[3], made_up(2000.0))]
-    page = write_bench_page(scores, total(scores), COLUMNS, tmp_path, "<mine>").read_text("utf-8")
+    page = write_bench_page(scores, mean_points(scores), COLUMNS, tmp_path, "<mine>").read_text(
+        "utf-8"
+    )
     assert "Controller bench: &lt;mine&gt;" in page
     assert "1 of 2 runs failed: void" in page
     assert page.count("<img alt=") == 2
@@ -186,12 +198,12 @@ def test_the_page_says_what_a_stranger_needs(tmp_path):
 def test_a_page_that_cannot_be_finished_leaves_the_old_one(tmp_path):
     """Its figures too: they would belong to another run."""
     scores = [judge(TRIALS[0], made_up(3000.0))]
-    write_bench_page(scores, total(scores), COLUMNS, tmp_path, "first")
+    write_bench_page(scores, mean_points(scores), COLUMNS, tmp_path, "first")
     before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
     scores = [judge(TRIALS[0], made_up(2900.0)), judge(TRIALS[3], made_up(2000.0))]
     del scores[1].run.columns["hammer.bit.position"]
     with pytest.raises(KeyError):
-        write_bench_page(scores, total(scores), COLUMNS, tmp_path, "second")
+        write_bench_page(scores, mean_points(scores), COLUMNS, tmp_path, "second")
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
 
 

@@ -172,9 +172,9 @@ def test_the_table_fits_a_terminal(feed_control, tmp_path, monkeypatch, capsys):
         main()
     said = capsys.readouterr()
     assert said.err.splitlines()[-1].endswith("index.html")
-    *heading, first, second, total = said.out.splitlines()
-    assert max(map(len, [*heading, first, second, total])) <= 80
-    assert [line.split()[0] for line in (first, second, total)] == ["collaring", "rod", "total"]
+    *heading, first, second, mean = said.out.splitlines()
+    assert max(map(len, [*heading, first, second, mean])) <= 80
+    assert [line.split()[0] for line in (first, second, mean)] == ["collaring", "rod", "mean"]
     # a number for each column, none of them cut
     assert len([float(word) for word in first.split()[1:]]) == 10
     assert "[MJ/m]" in heading[-1]

@@ -51,7 +51,7 @@ def test_a_table_of_a_bench_is_whole_and_its_runs_are_told_elsewhere(
     assert "run 1 of 2, soft, " in told
     assert "run 2 of 2, rod, " in told
     rows = capsys.readouterr().out.splitlines()
-    assert [row.split()[0] for row in rows[-4:]] == ["run", "soft", "rod", "total"]
+    assert [row.split()[0] for row in rows[-4:]] == ["run", "soft", "rod", "mean"]
     assert all(row.startswith(" ") for row in rows[:-4])
 
 

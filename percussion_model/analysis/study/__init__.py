@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -25,7 +26,12 @@ from percussion_model.analysis.study.store import Store
 from percussion_model.analysis.study.workers import on_a_cluster, on_this_machine
 from percussion_model.scene.scene import Scene
 from percussion_model.simulation.files import ResultError, staged
-from percussion_model.simulation.uncertain import with_error
+from percussion_model.simulation.uncertain import (
+    MOST_DIGITS,
+    NOT_ESTIMATED,
+    in_digits,
+    with_error,
+)
 from percussion_model.solvers.sources import sources_digest
 
 if TYPE_CHECKING:
@@ -47,6 +53,20 @@ MOST_A_PART = 100
 PARTS_A_PROCESS = 8
 # Rates with a larger relative error are counted in the headlines.
 LARGE_ERROR = 1e-3
+# Smaller errors of a rate are shown as this [mm/s].
+LEAST_ERROR = 10.0**-MOST_DIGITS
+# What errors there are, behind "those of the rate".
+KNOWN_ERRORS = (
+    "are of convergence and scatter; that of the grid is not estimated, nor are those of the "
+    "other numbers"
+)
+
+
+def _error_of(name: str) -> str:
+    """What is known of the error of a column, in words."""
+    if name == "rate_of_penetration":
+        return f"in {name}_error; {KNOWN_ERRORS.split(',')[0]}"
+    return "" if name.endswith("_error") else NOT_ESTIMATED
 
 
 @dataclass(frozen=True)
@@ -81,9 +101,26 @@ class Study:
 
     @property
     def undecided(self) -> np.ndarray:
-        """Whether the error is no smaller than the rate, for each point."""
-        error = self.rows["rate_of_penetration_error"]
-        return np.asarray((error > 0.0) & (error >= np.abs(self.rows["rate_of_penetration"])))
+        """Whether the error is no smaller than the rate, or it is of the cells, for each point."""
+        error, rate = self.rows["rate_of_penetration_error"], self.rows["rate_of_penetration"]
+        hidden = (error > 0.0) & (error >= np.abs(rate))
+        return np.asarray(hidden | (self.depends_on_cells & (rate != 0.0) & np.isfinite(rate)))
+
+    @property
+    def depends_on_cells(self) -> np.ndarray:
+        """Whether waves run without loss, so that the rate is one of the cells, for each point."""
+        key, points = "loss.time", self.points
+        if key not in points.keys or not self.scene.effects.loss:
+            return np.full(len(points), self.scene.is_undamped)
+        return np.asarray(self.scene.has_waves & (points.values[:, points.keys.index(key)] == 0.0))
+
+    def rate_text(self, k: int, unit: str = " mm/s") -> str:
+        """Rate of a point [mm/s] with its error of convergence and scatter."""
+        row = self.rows[k]
+        rate, error = (1e3 * float(row[f"rate_of_penetration{end}"]) for end in ("", "_error"))
+        if not math.isfinite(error):
+            return f"{in_digits(rate)}{unit}, {NOT_ESTIMATED}"
+        return f"{with_error(rate, max(error, LEAST_ERROR))}{unit}"
 
     def headlines(self) -> list[tuple[str, str]]:
         """Motions, lowest and highest rate with their points, errors, cost: names and texts."""
@@ -101,11 +138,16 @@ class Study:
                 at = ", ".join(
                     f"{key} = {value:.5g}" for key, value in self.points.changes(int(k)).items()
                 )
-                error = float(rows["rate_of_penetration_error"][k])
-                lines.append((name, f"{with_error(1e3 * rate[k], 1e3 * error)} mm/s at {at}"))
+                lines.append((name, f"{self.rate_text(int(k))} at {at}"))
         if undecided.any():
-            words = f"{np.count_nonzero(undecided)} rates: their errors are no smaller than they"
-            lines.append(("Undecided", words))
+            of_cells = int(np.count_nonzero(undecided & self.depends_on_cells))
+            hidden = int(np.count_nonzero(undecided)) - of_cells
+            for count, why in (
+                (hidden, "their errors are no smaller than they"),
+                (of_cells, "without loss in the bars they depend on the cells"),
+            ):
+                if count:
+                    lines.append(("Undecided", f"{count} rates: {why}"))
         for kind in ("periodic", "aperiodic"):
             error = self.relative_error[rows["kind"] == KINDS.index(kind)]
             if np.isfinite(error).any():
@@ -113,9 +155,7 @@ class Study:
                 words = f"{count} of them above {100 * LARGE_ERROR:g} %" if count else ""
                 largest = f"at most {100 * np.nanmax(error):.3g} % of the rate"
                 lines.append((f"Error, {kind}", ", ".join(filter(None, (largest, words)))))
-        lines.append(
-            ("These errors", "are of convergence and scatter; that of the grid is not in them")
-        )
+        lines.append(("These errors", KNOWN_ERRORS))
         lines.append(("Computed in", f"{rows['wall_time'].sum():.3g} s of one core"))
         return lines
 
@@ -136,7 +176,9 @@ class Study:
         columns |= {name: self.rows[name] for name in self.rows.dtype.names or ()}
         columns["undecided"] = self.undecided
         columns["kind"] = np.array(KINDS)[self.rows["kind"]]
-        return DataFrame(columns | {"failure": self.failures})
+        frame = DataFrame(columns | {"failure": self.failures})
+        frame.attrs["errors"] = f"those of the rate {KNOWN_ERRORS}"
+        return frame
 
     def to_xarray(self) -> xarray.Dataset:
         """Numbers found over the axes of the grid, or over the points; units as attributes."""
@@ -161,7 +203,7 @@ class Study:
             name: DataArray(
                 self.rows[name].reshape(points.shape),
                 dims=dims,
-                attrs={"units": FOUND[name]} if name in FOUND else {},
+                attrs={"units": FOUND[name], "error": _error_of(name)} if name in FOUND else {},
             )
             for name in names
         }

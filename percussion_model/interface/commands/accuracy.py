@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -10,6 +11,7 @@ import typer
 from percussion_model.interface.commands import common
 
 if TYPE_CHECKING:
+    from percussion_model.interface.progress import Report
     from percussion_model.scene.scene import Scene
     from percussion_model.verification.accuracy import Study
 
@@ -78,9 +80,10 @@ def accuracy(
         )  # fmt: skip
     found: dict[str, dict[str, Any]] = {}
     studies: dict[str, Study] = {}
-    for name, scene in chosen:
-        with progress(name) as report:
-            result = study(scene, full, words, report)
+    for k, (name, scene) in enumerate(chosen):
+        place = f"scene {k + 1} of {len(chosen)}, {name}" if len(chosen) > 1 else name
+        with progress(place, k / len(chosen)) as report:
+            result = study(scene, full, words, partial(_tell, report, place, k, len(chosen)))
         studies[name] = result
         found[name] = result.to_dict()
         if json_file != "-":
@@ -92,10 +95,15 @@ def accuracy(
         if figures:
             with common.if_drawable():
                 common.list_files(_draw(result, claimed.folder / name))
-        claimed.sign()
+        common.list_files([claimed.sign()])
     if len(studies) > 1 and json_file != "-":
         show_contests(studies)
     common.write_json(json_file, found)
+
+
+def _tell(report: Report, place: str, done: int, count: int, text: str, share: float) -> None:
+    """Tell what is done at a scene, and the share of all scenes that is done."""
+    report(f"{place}: {text}", (done + share) / count)
 
 
 def _draw(found: Study, folder: Path) -> list[Path]:

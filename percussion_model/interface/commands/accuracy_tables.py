@@ -30,7 +30,7 @@ from percussion_model.verification.accuracy.problems import (
     STRESS_HISTORY,
 )
 from percussion_model.verification.accuracy.references import Reference
-from percussion_model.verification.accuracy.study import WANTED, Study
+from percussion_model.verification.accuracy.study import WANTED, Point, Study
 
 SHORT = {
     "rate_of_penetration": "rate",
@@ -42,9 +42,17 @@ SHORT = {
     "peak_contact_force": "contact peak",
     "peak_stress": "stress peak",
     "resting_place": "rest",
-    HISTORY: "bit L1",
-    CONTACT_HISTORY: "contact L1",
-    STRESS_HISTORY: "stress L1",
+    HISTORY: "bit history",
+    CONTACT_HISTORY: "contact history",
+    STRESS_HISTORY: "stress history",
+}
+
+
+# Families of methods of which the best is shown.
+FAMILIES = {
+    "peer": "best of explicit\nand exact",
+    "fem": "best of implicit\nelements",
+    "scipy": "best of scipy",
 }
 
 
@@ -69,9 +77,10 @@ def show_study(found: Study) -> None:
 
 
 def show_bars(reference: Reference, console: Console | None = None) -> None:
-    """Print a reference with its bars, and how far apart the limits of the two solvers are."""
-    table = _table(f"Reference: {escape(reference.title)}", "quantity")
-    for heading in ("value", "bar", "apart"):
+    """Print a reference with its bars, and by how much the limits of the two solvers differ."""
+    console = console or Console()
+    table = _table("quantity")
+    for heading in ("value", "bar,\nrelative", "solvers differ\nby, relative"):
         table.add_column(heading, justify="right", no_wrap=True)
     table.add_column("")
     for key, bar in reference.bars.items():
@@ -84,14 +93,23 @@ def show_bars(reference: Reference, console: Console | None = None) -> None:
             _number(bar.apart),
             "" if bar.agreed else "no reference: the limits disagree",
         )
-    print_table(table, console)
-
-
-def _table(title: str, first: str) -> Table:
-    """An airy table: the columns of numbers need the room."""
-    table = Table(
-        title=title, title_justify="left", box=SIMPLE_HEAD, padding=(0, 1, 0, 0), show_edge=False
+    _print(f"Reference: {reference.title}", table, console)
+    console.print(
+        "The true value lies within the bar of the reference. Histories, through a blow, have no "
+        "one value: theirs is the mean distance by the mean size.",
+        highlight=False,
     )
+
+
+def _print(title: str, table: Table, console: Console, keys: int = 1) -> None:
+    """Print a table below its title, which may be wider than a table of few columns."""
+    console.print(escape(title), style="italic", highlight=False)
+    print_table(table, console, keys)
+
+
+def _table(first: str) -> Table:
+    """An airy table: the columns of numbers need the room."""
+    table = Table(box=SIMPLE_HEAD, padding=(0, 1, 0, 0), show_edge=False)
     table.add_column(first, no_wrap=True)
     return table
 
@@ -101,67 +119,95 @@ def _number(value: float) -> str:
     return f"{value:.1e}".replace("e-0", "e-").replace("e+0", "e+") if isfinite(value) else "-"
 
 
+def _error(found: Study, point: Point, key: str) -> str:
+    """Error of a point; of one below the bar of the reference only that it is no larger."""
+    error, floor = point.errors.get(key, math.nan), found.floor(key)
+    return f"<{_number(floor)}" if error <= floor and floor > 0.0 else _number(error)
+
+
 def _show_points(found: Study, console: Console) -> None:
     what = "Relative standard error" if found.kind == APERIODIC else "Relative error"
     keys = found.quantities
-    table = _table(f"{what}; ms to compute a simulated second; ms of set-up", "method")
-    for heading in ("ms/s", "set-up", *(SHORT[key] for key in keys)):
+    table = _table("method")
+    for heading in ("ms/s", "±, %", "set-up", *(SHORT[key] for key in keys)):
         table.add_column(heading.replace(" ", "\n"), justify="right", no_wrap=True)
     for name in found.names:
         table.add_row(f"[bold]{LADDERS[name].title}[/bold]")
         for point in found.ladder(name):
             label = point.label + (" *" if point.fit > FITS else "")
-            errors = [_number(point.errors.get(key, math.nan)) for key in keys]
-            times = [two(1e3 * value) for value in (point.second, point.setup)]
+            errors = [_error(found, point, key) for key in keys]
+            spread = two(100 * point.spread) if isfinite(point.spread) else "-"
+            times = [two(1e3 * point.second), spread, two(1e3 * point.setup)]
             table.add_row(f" {label}", *times, *errors)
-    print_table(table, console)
+    _print(f"{what}; ms to compute a simulated second; ms of set-up", table, console)
     console.print(
-        f"A blow takes {found.period:.4g} s; its cost is that part of ms/s.", highlight=False
+        f"A blow takes {found.period:.4g} s; its cost is that part of ms/s. ± is half the range of "
+        "repeated times; what has none, and every set-up, was timed once.",
+        highlight=False,
     )
+    if any(found.floor(key) for key in keys):
+        console.print("< Below the bar of the reference, which tells no more.", highlight=False)
     if any(point.fit > FITS for point in found.points):
         console.print(
-            "* Lengths that fit no common cell: the wave speed is off, the rung lies off the "
-            "ladder and is not in its order.",
+            "* Lengths that fit no common cell: the wave speed is off, and the setting is not in "
+            "the order of its method.",
             highlight=False,
         )
 
 
 def _show_orders(found: Study, console: Console) -> None:
     keys = [key for key in found.quantities if any(found.order(name, key) for name in found.names)]
-    table = _table("Measured orders, each against what the method refines", "method")
+    if not keys:
+        console.print(
+            "Measured orders: none; one takes three settings of a method with errors above the "
+            "bar of the reference.",
+            highlight=False,
+        )
+        return
+    table = _table("method")
     for key in keys:
         table.add_column(SHORT[key].replace(" ", "\n"), justify="right", no_wrap=True)
     for name in found.names:
         orders = [found.order(name, key) for key in keys]
         cells = ["-" if one is None else f"{one.value:.1f}±{one.error:.1f}" for one in orders]
         table.add_row(LADDERS[name].title, *cells)
-    print_table(table, console)
+    _print("Measured orders, each against what the method refines", table, console)
     if "rigid" in found.names and found.kind != APERIODIC:
         console.print(f"rigid: {LADDERS['rigid'].note}.", highlight=False)
 
 
 def _show_costs(found: Study, console: Console) -> None:
     """Print what errors of the first quantity cost the waves, and the best of each family."""
-    table = _table(
-        f"ms to compute a simulated second, for an error in {SHORT[found.main]}", "error"
-    )
-    for heading in ("wave", "without\nleaps", "best peer", "best fem", "best of scipy"):
+    ladders = [name for name in ("wave", "wave-steps") if name in found.names]
+    here = {LADDERS[name].family for name in found.names}
+    families = {family: title for family, title in FAMILIES.items() if family in here}
+    if not ladders and not families:
+        return
+    table = _table("error")
+    for heading in (*(LADDERS[name].title.replace(", ", ",\n") for name in ladders),
+                    *families.values()):  # fmt: skip
         table.add_column(heading, justify="right", no_wrap=True)
     for wanted in WANTED:
-        costs = [found.cost(name, found.main, wanted) for name in ("wave", "wave-steps")]
-        cells = [f"{1e3 * cost.value:.3g}" if isfinite(cost.value) else "-" for cost in costs]
-        for family in ("peer", "fem", "scipy"):
+        cells = [_cost_text(found.cost(name, found.main, wanted)) for name in ladders]
+        for family in families:
             best = found.best((family,), found.main, wanted)
-            title = "" if best is None else LADDERS[best.ladder].title
-            cells.append("-" if best is None else f"{1e3 * best.value:.3g} ({title})")
+            cells.append(
+                "-" if best is None else f"{_cost_text(best)}\n{LADDERS[best.ladder].title}"
+            )
         table.add_row(f"{100 * wanted:g} %", *cells)
-    print_table(table, console)
+    _print(f"ms to compute a simulated second at an error in {SHORT[found.main]}", table, console)
+    console.print(
+        "Read off between the settings above, from where on the error is met for good, with the "
+        "range by the bar of the reference and the spread of the times. What to take is one of "
+        "the settings themselves:",
+        highlight=False,
+    )
 
 
 def show_contests(studies: dict[str, Study]) -> None:
     """Print waves against the best of their peers, all scenes in one table, and the ratios."""
     console = Console()
-    table = _table("The same error in rate: ms to compute a simulated second", "scene")
+    table = _table("scene")
     for heading in ("error", "wave", "best peer", "ratio"):
         table.add_column(heading, justify="right", no_wrap=True)
     table.add_column("the peer")
@@ -172,7 +218,7 @@ def show_contests(studies: dict[str, Study]) -> None:
                 escape(name) if k == 0 else "", f"{100 * one.wanted:g} %", *_contest_cells(one)
             )
         table.add_section()
-    print_table(table, console, keys=2)
+    _print("The same error in rate: ms to compute a simulated second", table, console, keys=2)
     for column in zip(*found, strict=True):
         told = summary(column)
         text = f"{100 * told.wanted:g} %: no scene is decided."

@@ -58,7 +58,7 @@ def bench_controller(
     from percussion_model.interface.terminal import progress, progress_bar
 
     try:
-        from percussion_model.coupling.bench import bench, total
+        from percussion_model.coupling.bench import bench, mean_points
     except ImportError as error:
         return common.print_message(common.needs_extra(error, "fmu"), common.BAD_INPUT)
     common.check_json(json_file)
@@ -79,7 +79,7 @@ def bench_controller(
         if not scores:
             raise
         interrupted = True
-    points = total(scores)
+    points = mean_points(scores)
     listed = [
         {"trial": s.trial, "points": s.points, "error": s.error, "faults": s.faults, **s.numbers}
         for s in scores
@@ -99,8 +99,7 @@ def bench_controller(
         title = controller or system.stem
         with progress("drawing the page"):
             page = write_bench_page(scores, points, COLUMNS, claimed.folder, title)
-        claimed.sign()
-        common.list_files([page])
+        common.list_files([page, claimed.sign()])
     if interrupted:
         return common.print_message(
             f"interrupted: the page has the {len(scores)} runs that were done", common.INTERRUPTED
@@ -109,12 +108,12 @@ def bench_controller(
 
 
 def _table(scores: Sequence[Score], points: float) -> list[str]:
-    """Lines of the table: heading, runs, total."""
+    """Lines of the table: heading, runs, mean."""
     lines = _heading()
     for score in scores:
         numbers = [_short(factor * score.numbers[name]) for name, _, factor, _ in COLUMNS]
         lines.append(f"{score.trial:{NAME}s}{score.points:{POINTS}.1f}{_cells(numbers)}")
-    return [*lines, f"{'total':{NAME}s}{points:{POINTS}.1f}"]
+    return [*lines, f"{'mean':{NAME}s}{points:{POINTS}.1f}"]
 
 
 def _heading() -> list[str]:

@@ -13,6 +13,15 @@ if TYPE_CHECKING:
     from percussion_model.solvers.blow_map.table import BlowTable
 
 
+# Axes of a table, and their units.
+RANGES = {
+    "loading_stiffness": "N/m",
+    "impact_velocity": "m/s",
+    "feed_force": "N",
+    "drive_force": "N",
+}
+
+
 def blow_map(
     scene: common.SceneFile,
     action: Annotated[
@@ -33,7 +42,11 @@ def blow_map(
     if action == "where":
         typer.echo(str(map_file(chosen)))
         return
-    table = ready_map(chosen, workers) if action == "build" else kept_map(chosen)
+    table = kept_map(chosen)
+    if action == "build" and table is None:
+        table = ready_map(chosen, workers)
+    else:
+        warn_of_outside(chosen)
     numbers = _numbers(chosen, table)
     if json_file != "-":
         _show(numbers)
@@ -43,15 +56,15 @@ def blow_map(
 def ready_map(scene: Scene, workers: int | None = None) -> BlowTable:
     """Table of a scene, made with a bar if it is not there yet.
 
-    What of the scene lies outside is listed first: making a table takes minutes.
+    What of the scene lies outside is listed before it is made, which takes minutes.
     """
     from percussion_model.analysis.blow_maps import kept_map, make_map
     from percussion_model.interface.terminal import count_bar
 
-    warn_of_outside(scene)
     kept = kept_map(scene)
     if kept is not None:
         return kept
+    warn_of_outside(scene)
     with count_bar("parts of the blow map") as progress:
         return make_map(scene, progress, workers)
 
@@ -75,8 +88,7 @@ def _numbers(scene: Scene, table: BlowTable | None) -> dict[str, Any]:
         "outside": outside_map(scene),
     }
     if table is not None:
-        names = ("loading_stiffness", "impact_velocity", "feed_force", "drive_force")
-        ranges = zip(names, table.lowest, table.highest, strict=True)
+        ranges = zip(RANGES, table.lowest, table.highest, strict=True)
         found["range"] = {name: [low, high] for name, low, high in ranges}
         found["restless_nodes"] = table.restless
         found["cells"] = table.cells
@@ -88,6 +100,6 @@ def _show(numbers: dict[str, Any]) -> None:
     typer.echo(f"{numbers['nodes']} blows")
     if numbers["made"]:
         for name, (low, high) in numbers["range"].items():
-            typer.echo(f"{name} {low:g} to {high:g} (SI)")
+            typer.echo(f"{name.replace('_', ' ')} {low:g} to {high:g} {RANGES[name]}")
         nodes = numbers["restless_nodes"]
         typer.echo(f"{nodes} of them refused: the bit does not come to rest")

@@ -55,5 +55,4 @@ def compare(
                 files = save_figures(
                     lambda: [("comparison", draw_comparison(found))], claimed.folder
                 )
-            claimed.sign()
-            common.list_files(files)
+            common.list_files([*files, claimed.sign()])

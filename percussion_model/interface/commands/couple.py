@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from percussion_model.interface.commands import common
+from percussion_model.interface.messages import wrapped
 from percussion_model.simulation.uncertain import NOT_ESTIMATED, in_digits, with_error
 
 if TYPE_CHECKING:
@@ -25,12 +26,18 @@ SHOWN = (
     (RATE, "Rate in the second half", 1e3, "mm/s"),
     ("hammer_energy_residual", "Hammer: energy unexplained", 1.0, "of the energy put in"),
     ("string_energy_residual", "String: energy unexplained", 1.0, "of the energy put in or there"),
-    ("shoulder_energy", "Energy taken by the shoulder", 1.0, "J"),
+    ("shoulder_energy", "Energy lost at the bit's shoulder", 1.0, "J"),
     ("feed_work", "Work of the feed on the bit", 1.0, "J"),
-    ("shoulder_by_blows", "Share taken by the shoulder", 1.0, "of the energy of the blows"),
+    ("shoulder_by_blows", "Share lost at the bit's shoulder", 1.0, "of the energy of the blows"),
 )
 # Those that are given, and have all their digits.
 GIVEN = ("time", "step", "steps")
+NOTE = (
+    "± is the scatter of the blows: where feed, drive or rock change within that time, their "
+    "change is in it. Other errors were not estimated: numbers have three digits. The verdict "
+    "says whether the communication step is short enough. The shoulder is where the casing "
+    "rests on the bit."
+)
 # Rows of a run without --interval.
 ROWS = 5000
 FAILED = 1
@@ -74,6 +81,7 @@ def couple(
     out/SYSTEM.
     """
     from percussion_model.interface.terminal import progress, progress_bar
+    from percussion_model.simulation.files import ResultError
 
     try:
         from percussion_model.coupling import Coupling
@@ -81,11 +89,6 @@ def couple(
     except ImportError as error:
         return common.print_message(common.needs_extra(error, "fmu"), common.BAD_INPUT)
     common.check_json(json_file)
-    claimed = common.claim(
-        "couple", out, Path("out") / system.stem, force, system=common.digest(system),
-        duration=duration, step=step, interval=interval, order=order, tolerance=tolerance,
-        every=common.by_name(every), set=common.by_name(settings), signals=signals,
-    )  # fmt: skip
     coupling = Coupling(
         system,
         dict(read_value(text) for text in settings or ()),
@@ -93,6 +96,15 @@ def couple(
         every=dict(_read_pace(text) for text in every or ()),
         trust=trust,
     )
+    try:
+        claimed = common.claim(
+            "couple", out, Path("out") / system.stem, force, system=common.digest(system),
+            duration=duration, step=step, interval=interval, order=order, tolerance=tolerance,
+            every=common.by_name(every), set=common.by_name(settings), signals=signals,
+        )  # fmt: skip
+    except ResultError:
+        coupling.free()
+        raise
     folder = claimed.folder
     wanted = [*known_signals(coupling.outputs), *(signals or ())]
     rows_every = max(step, duration / ROWS) if interval is None else interval
@@ -112,7 +124,7 @@ def couple(
             with progress("drawing the figure"):
                 figure = save_signals(run, folder / "signals.png", system.stem)
             common.list_files([figure])
-    claimed.sign()
+    common.list_files([claimed.sign()])
     return _tell(run.verdict, common.INTERRUPTED if run.interrupted else FAILED)
 
 
@@ -127,7 +139,8 @@ def _lines(found: Mapping[str, Any]) -> Iterator[str]:
             number = with_error(value, factor * error)
         elif key == RATE:
             number += f", {NOT_ESTIMATED}"
-        yield f"{name:29s} {number} {unit}".rstrip()
+        yield f"{name:33s} {number} {unit}".rstrip()
+    yield from wrapped(NOTE).splitlines()
 
 
 def _tell(verdict: Verdict, code: int) -> int:

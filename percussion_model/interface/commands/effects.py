@@ -62,8 +62,7 @@ def effects(
 
             with progress("drawing the figure"):
                 files = save_figures(lambda: [("effects", draw_effects(found))], claimed.folder)
-            claimed.sign()
-            common.list_files(files)
+            common.list_files([*files, claimed.sign()])
 
 
 # A longer name of an effect takes several lines.
@@ -138,7 +137,8 @@ def show_effects(found: EffectsStudy) -> None:
     for reason in dict.fromkeys(reasons.values()):
         names = ", ".join(name for name, given in reasons.items() if given == reason)
         show_note(console, names, reason)
-    console.print(wrapped(NOTE), highlight=False)
+    if len(found.base.result.counted):
+        console.print(wrapped(NOTE), highlight=False)
     show_warnings(console, found.warnings())
 
 

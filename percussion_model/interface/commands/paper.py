@@ -49,6 +49,7 @@ def paper(
     from percussion_model.analysis.comparison import compare
     from percussion_model.verification.paper.rock_law import run_sinking
     from percussion_model.verification.paper.runs import SWEEPS, paper_scene, run_drops
+    from percussion_model.verification.paper.statements import ERRORS
 
     common.tell_of_compiling("wave", "fem", "rigid")
     scene = paper_scene()
@@ -83,12 +84,12 @@ def paper(
         )  # fmt: skip
     with progress(f"{next(part)}, statements of the paper"):
         statements = list(_statements(scene, drops, sinking, both, windows, sweeps))
-    tree = {"statements": [one.to_dict() for one in statements]}
+    tree = {"errors": ERRORS, "statements": [one.to_dict() for one in statements]}
     common.write_json(json_file, tree)
     common.write_json(str(out / "statements.json"), tree)
-    claimed.sign()
+    common.list_files([claimed.sign()])
     if json_file != "-":
-        show_statements(statements)
+        show_statements(statements, ERRORS)
 
 
 def _statements(

@@ -68,7 +68,7 @@ def run(
             made_from["until"] = result.duration
             claimed = common.claim("run", None, out, force, **made_from)
         files += result.save(claimed.folder)
-        claimed.sign()
+        files.append(claimed.sign())
         if figures and not result.cut_short:
             with terminal.progress("drawing") as report:
                 files += _draw(result, claimed.folder, report)

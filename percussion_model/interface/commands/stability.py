@@ -54,7 +54,7 @@ def stability(
         show_stability(found)
     if claimed is not None:
         _write(found, claimed.folder)
-        claimed.sign()
+        common.list_files([claimed.sign()])
     if found.failures():
         raise typer.Exit(FAILED)
 

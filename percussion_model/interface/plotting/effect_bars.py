@@ -30,7 +30,7 @@ NOTHING = 5e-3
 def draw_effects(found: EffectsStudy) -> Figure:
     """Draw cost of a step, of a blow, and change in rate, period and peak force."""
     trials = found.trials
-    names = [f"{trial.variant.effect}: {trial.variant.setting}" for trial in trials]
+    names = [trial.variant.name for trial in trials]
     height = 1.6 + 0.32 * len(trials)
     fig = Figure(figsize=(12.0, height), layout="constrained")
     axes = fig.subplots(1, 5, sharey=True)

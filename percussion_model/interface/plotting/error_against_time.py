@@ -144,7 +144,7 @@ def _panel(ax: Axes, found: Study, key: str) -> None:
     unit = {DROP: "the whole drop [s]", APERIODIC: "the run [s]"}.get(
         found.kind, "a simulated second [s]"
     )
-    kind = "L1, relative" if key in HISTORIES else "relative"
+    kind = "mean over the blow, relative" if key in HISTORIES else "relative"
     title = quantity.label[0].upper() + quantity.label[1:]
     style.label(ax, f"processor time of {unit}", f"error, {kind}", title)
 

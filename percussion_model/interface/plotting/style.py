@@ -202,7 +202,8 @@ def _each_told(
     waiting, count = iter(drawn), len(names)
     for k in itertools.count():
         if report is not None and k < count:
-            report(f"drawing figure {k + 1} of {count}, {names[k]}", k / count)
+            # no share of the time: one may take ten times as long as another
+            report(f"drawing figure {k + 1} of {count}, {names[k]}", None)
         one = next(waiting, None)
         if one is None:
             return

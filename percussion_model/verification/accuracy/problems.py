@@ -60,9 +60,9 @@ QUANTITIES = {
         Quantity("peak_stress", "peak stress, mid-bit", 1e-6, "MPa"),
         Quantity("rock_energy", "energy into rock, a blow", 1.0, "J"),
         Quantity("resting_place", "resting place of the bit's end, from its start", 1e3, "mm"),
-        Quantity(HISTORY, "bit force through a blow (L1)", 1.0, ""),
-        Quantity(CONTACT_HISTORY, "contact force through a blow (L1)", 1.0, ""),
-        Quantity(STRESS_HISTORY, "stress, mid-bit, through a blow (L1)", 1.0, ""),
+        Quantity(HISTORY, "bit force through a blow", 1.0, ""),
+        Quantity(CONTACT_HISTORY, "contact force through a blow", 1.0, ""),
+        Quantity(STRESS_HISTORY, "stress, mid-bit, through a blow", 1.0, ""),
     )
 }
 

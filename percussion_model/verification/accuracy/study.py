@@ -134,14 +134,18 @@ class Study:
         """Ladders that the waves are compared with."""
         return [name for name in self.names if LADDERS[name].family in PEERS]
 
+    def floor(self, key: str) -> float:
+        """Error below which the reference cannot tell; 0 where errors are no differences to it."""
+        floor = self.reference.floor(key)
+        # those of an aperiodic motion are standard errors
+        return 0.0 if math.isnan(floor) or self.kind == APERIODIC else floor
+
     def fitted(self, name: str, key: str) -> list[Point]:
         """Points that an order is fitted to: resolved, and with lengths that fit the cells.
 
         Where lengths fit at no rung, all count.
         """
-        floor = self.reference.floor(key)
-        # standard errors of an aperiodic motion are no differences to the reference
-        limit = 0.0 if math.isnan(floor) or self.kind == APERIODIC else RESOLVED * floor
+        limit = RESOLVED * self.floor(key)
         resolved = [point for point in self.ladder(name) if point.errors.get(key, math.nan) > limit]
         if all(point.fit >= FITS for point in self.ladder(name)):
             return resolved
@@ -190,10 +194,16 @@ class Study:
         if not good:
             return f"For {100 * wanted:g} % there is no method among these."
         best = min(good, key=lambda point: point.second)
+        error, floor = best.errors[self.main], self.floor(self.main)
+        off = (
+            f"off by {100 * error:.2g} %"
+            if error > floor
+            else f"off by less than {100 * floor:.2g} %"
+        )
+        spread = f" (± {100 * best.spread:.2g} %)" if math.isfinite(best.spread) else ""
         return (
-            f"For {100 * wanted:g} % take {LADDERS[best.ladder].title}, {best.label}: "
-            f"{1e3 * best.second:.3g} ms for a simulated second, "
-            f"off by {100 * best.errors[self.main]:.2g} %."
+            f"For {100 * wanted:g} % take {LADDERS[best.ladder].title}, {best.label}, of all that "
+            f"were tried: {1e3 * best.second:.3g} ms{spread} for a simulated second, {off}."
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -285,14 +295,15 @@ def study(
     points: list[Point] = []
     runs: list[tuple[int, Run]] = []
     for k, rung in enumerate(rungs):
-        progress(f"{LADDERS[rung.ladder].title}, {rung.label}", 0.05 + 0.65 * k / len(rungs))
+        title = ", ".join(filter(None, (LADDERS[rung.ladder].title, rung.label)))
+        progress(title, 0.05 + 0.65 * k / len(rungs))
         point, run = _measured(rung, problem, reference, full)
         points.append(point)
         if isinstance(run, Run) and not point.note:
             runs.append((k, run))
     times = interleaved(
         [run.cost for _, run in runs],
-        lambda place: progress("times, turn by turn", 0.7 + 0.3 * place / max(len(runs), 1)),
+        lambda done: progress("times, turn by turn", 0.7 + 0.3 * done),
     )
     for (k, run), taken in zip(runs, times, strict=True):
         points[k] = replace(

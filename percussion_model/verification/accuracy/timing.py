@@ -46,7 +46,7 @@ class Timing:
 
 
 def interleaved(
-    costs: Sequence[Callable[[], float]], turn: Callable[[int], None] | None = None
+    costs: Sequence[Callable[[], float]], turn: Callable[[float], None] | None = None
 ) -> list[Timing]:
     """Take times turn by turn: a machine that slows down slows all methods.
 
@@ -55,19 +55,19 @@ def interleaved(
     costs : sequence of callable
         Each makes one run and returns its time [s].
     turn : callable, optional
-        Called with the place of a run before it.
+        Called with the share that is done, before each run.
 
     Returns
     -------
     list of Timing
     """
     found: list[list[float]] = [[] for _ in costs]
-    for _ in range(REPEATS):
+    for repeat in range(REPEATS):
         for k, cost in enumerate(costs):
             if found[k] and sum(found[k]) + found[k][-1] > ENOUGH:
                 continue
             if turn is not None:
-                turn(k)
+                turn((repeat + k / len(costs)) / REPEATS)
             found[k].append(cost())
     return [Timing.of(times) for times in found]
 

@@ -194,6 +194,15 @@ def straight_line(x: np.ndarray, y: np.ndarray) -> tuple[float, float, float]:
     return float(slope), float(intercept), explained
 
 
+def line_errors(x: np.ndarray, y: np.ndarray) -> tuple[float, float]:
+    """Standard errors of slope and intercept of a straight line, from the scatter about it."""
+    x, y = _known(x, y)
+    if len(x) < 3:
+        return math.nan, math.nan
+    slope, intercept = np.sqrt(np.diag(np.polyfit(x, y, 1, cov=True)[1]))
+    return float(slope), float(intercept)
+
+
 def _known(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Leave out points that failed: one of them must not cost the fit, and all that follows."""
     known = np.isfinite(y)

@@ -8,12 +8,12 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from percussion_model.analysis.study import Study
+from percussion_model.analysis.study import LEAST_ERROR, Study
 from percussion_model.physics.records import Mode
 from percussion_model.scene.scales import scales
 from percussion_model.scene.scene import Scene
 from percussion_model.simulation.result import Result
-from percussion_model.simulation.uncertain import SMALL_ERROR, rate_text, with_error
+from percussion_model.simulation.uncertain import mean_text, rate_text, with_error
 from percussion_model.verification.paper.runs import (
     CALIBRATED,
     DAMPINGS,
@@ -24,6 +24,7 @@ from percussion_model.verification.paper.runs import (
     Drop,
     along,
     exponent_and_error,
+    line_errors,
     maxima,
     straight_line,
 )
@@ -50,6 +51,14 @@ TOLD_APART = 5.0
 CHATTER_FROM = 20.0
 # Convergence to standstill: kinetic energy of the bit below this share of the blow's.
 AT_REST = 1e-3
+
+# What is known of the errors of the numbers found.
+ERRORS = (
+    "± is the error where one is known: of rates and means of the stationary blow (4.3) that by "
+    "grid and scatter, of rates of the sweeps (4.4) that by convergence and scatter, of what is "
+    "fitted the standard error of the fit. Of all other numbers found here the error is not "
+    "estimated, nor is that of the grid in drop tests and sweeps."
+)
 
 
 @dataclass(frozen=True)
@@ -112,7 +121,7 @@ def about_cycle(
     """Go through section 4.3 with the last blow of a reference run, sampled from its start."""
     place = f"4.3, {result.solver}"
     summary = result.summary()
-    period, frequency = summary["blow_period"], summary["blow_frequency"]
+    period = summary["blow_period"]
     velocity = result.counted["impact_velocity"]
     yield Statement(
         place,
@@ -123,7 +132,7 @@ def about_cycle(
     yield Statement(
         place,
         "the activation period is about 45.5 ms, 22 Hz",
-        f"{1e3 * period:.2f} ms, {frequency:.2f} Hz",
+        f"{mean_text(summary, 'blow_period', 1e3)} ms, {mean_text(summary, 'blow_frequency')} Hz",
         abs(period / 45.5e-3 - 1.0) < 0.01,
     )
     contacts = summary["contacts_per_blow"]
@@ -164,12 +173,13 @@ def about_cycle(
 
 def _about_fixed_window(place: str, result: Result) -> Iterator[Statement]:
     window, whole = result.rate_of_penetration_fixed_window, result.rate_of_penetration
-    share = 1.0 / len(result.counted)
+    share, summary = 1.0 / len(result.counted), result.summary()
     off = window / whole - 1.0
     yield Statement(
         f"{place}, eq. 58",
         "the rate is that over 3 s from 1 s on",
-        f"{1e3 * window:.3f} mm/s; over whole blows {rate_text(result.summary())}: "
+        f"{mean_text(summary, 'rate_of_penetration_fixed_window', 1e3)} mm/s; over whole blows "
+        f"{rate_text(summary)}: "
         f"{100 * off:+.2f} %, within the {100 * share:.2f} % of one blow",
         abs(off) < share,
     )
@@ -285,9 +295,7 @@ def about_sweeps(found: Mapping[str, Study]) -> Iterator[Statement]:
 
 def _rate(found: Study, k: int) -> str:
     """Rate of a point [mm/s] with its error."""
-    row = found.rows[k]
-    rate, error = (1e3 * row[f"rate_of_penetration{end}"] for end in ("", "_error"))
-    return f"{rate:.4g}" if error <= SMALL_ERROR * abs(rate) else with_error(rate, error)
+    return found.rate_text(k, "")
 
 
 def _about_stiffness(found: Study) -> Iterator[Statement]:
@@ -371,10 +379,12 @@ def _about_feed(found: Study) -> Iterator[Statement]:
     x, rate, periodic = along(found)
     above = x >= PAPER_LEAST_FEED
     slope, intercept, explained = straight_line(x[above], rate[above])
+    errors = line_errors(x[above], rate[above])
     yield Statement(
         "4.4 c",
         "the rate is linear in the feed above 350 N, c2 F_S + c3",
-        f"c2 = {1e6 * slope:.3g} mm/s per kN, c3 = {1e3 * intercept:.2f} mm/s, "
+        f"c2 = {1e6 * slope:.3f} ± {1e6 * errors[0]:.3f} mm/s per kN, "
+        f"c3 = {1e3 * intercept:.2f} ± {1e3 * errors[1]:.2f} mm/s, "
         f"explaining {100 * explained:.1f} % of the scatter",
         explained > STRAIGHT,
     )
@@ -392,7 +402,7 @@ def _about_feed(found: Study) -> Iterator[Statement]:
     yield Statement(
         "4.4 c",
         "no best feed around the reference",
-        f"rate at 1, 2.5 and 5 kN {_at(x, rate, (1e3, 2.5e3, 5e3))} mm/s",
+        f"rate at 1, 2.5 and 5 kN {_at(found, (1e3, 2.5e3, 5e3))} mm/s",
         bool(np.interp(5e3, x, rate) > np.interp(2.5e3, x, rate) > np.interp(1e3, x, rate)),
     )
 
@@ -438,13 +448,15 @@ def _about_scaling(found: Study) -> Iterator[Statement]:
         ("eq. 59", "R", "v", "-1", RATE_EXPONENT / VELOCITY_EXPONENT),
     ):
         exponent, error = exponent_and_error(columns[by][chosen], columns[what][chosen])
-        upper, _ = exponent_and_error(columns[by][chosen & far], columns[what][chosen & far])
+        upper, upper_error = exponent_and_error(
+            columns[by][chosen & far], columns[what][chosen & far]
+        )
         yield Statement(
             f"4.4 d, {equation}",
             f"{_WORDS[what]} ~ {_WORDS[by]}^({words}) at constant power"
             + (f"{unrounded} {expected:.2f}" if what == "R" else ""),
-            f"{exponent:.3f} ± {error:.3f} over the {np.sum(chosen)} periodic motions, "
-            f"{upper:.3f} in their upper half",
+            f"{exponent:.4f} ± {error:.4f} over the {np.sum(chosen)} periodic motions, "
+            f"{upper:.4f} ± {upper_error:.4f} in their upper half",
             abs(exponent - expected) <= SAME_EXPONENT,
         )
 
@@ -490,5 +502,12 @@ def _list(values: tuple[float, ...], unit: str) -> str:
     return f"{', '.join(f'{value:g}' for value in values)} {unit}"
 
 
-def _at(x: np.ndarray, y: np.ndarray, places: tuple[float, ...]) -> str:
-    return ", ".join(f"{1e3 * np.interp(place, x, y):.2f}" for place in places)
+def _at(found: Study, places: tuple[float, ...]) -> str:
+    """Rates between points [mm/s] with the errors of the points beside them."""
+    x, rate, _periodic = along(found)
+    error = found.rows["rate_of_penetration_error"]
+    texts = []
+    for place in places:
+        value, off = (1e3 * float(np.interp(place, x, y)) for y in (rate, error))
+        texts.append(with_error(value, max(off, LEAST_ERROR)))
+    return ", ".join(texts)
