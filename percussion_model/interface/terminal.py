@@ -24,10 +24,8 @@ from percussion_model.simulation.uncertain import (
     UNDECIDED,
     about_errors,
     change_text,
-    in_few_characters,
     mean_text,
     rate_text,
-    scaled,
 )
 
 if TYPE_CHECKING:
@@ -205,17 +203,18 @@ def show_explanation(scene: Scene, found: Forecast) -> None:
         table.add_row("Steps", "from event to event, in closed form")
     if found.per_blow is not None:
         counts = ", ".join(f"{value:.3g} {name}" for name, value in found.counts.items())
-        table.add_row("To compute a blow", f"{1e3 * found.per_blow:.2g} ms; {counts}")
+        table.add_row("A blow", f"{1e3 * found.per_blow:.2g} ms to compute; {counts}")
     if found.per_second is not None:
-        table.add_row("To compute a simulated second", f"{found.per_second:.2g} s")
+        table.add_row("A simulated second", f"{found.per_second:.2g} s to compute")
     if found.wall_time is not None:
         runs = f", {found.runs} runs to compare" if found.runs > 1 else ""
-        whole = f"about {found.wall_time:.2g} s for {found.duration:g} s simulated{runs}"
-        aperiodic = " if the motion is periodic" if scene.solver.accuracy is not None else ""
-        within = f"right within a factor of {FACTOR:g}{aperiodic}"
+        within = f"within a factor of {FACTOR:g}"
+        if scene.solver.accuracy is not None:
+            within += " if the motion is periodic"
+        whole = f"about {found.wall_time:.2g} s ({within}) for {found.duration:g} s simulated{runs}"
         if scene.solver.accuracy is None and scene.run.error_estimate:
-            within += "; the short runs that tell its error come on top"
-        table.add_row("Predicted computing time", f"{whole}; {within}")
+            whole += "; the short runs that tell its error come on top"
+        table.add_row("Predicted cost of the run", whole)
     if found.blow_map is not None:
         blows, cost = found.blow_map
         words = f"not made yet: {blows:,} blows, about {cost:.2g} s of one processor"
@@ -319,7 +318,7 @@ _EFFORT: dict[str, Callable[[dict[str, Any]], float | None]] = {
 
 def show_stability(found: Collection) -> None:
     """Print the measures of each solver on each hard case, and the failures."""
-    from percussion_model.verification.hard_cases.collection import DISAGREE, numerical_error
+    from percussion_model.verification.hard_cases.collection import DISAGREE, short_rate
 
     table = Table(box=SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0))
     for name in ("case", "solver"):
@@ -330,7 +329,7 @@ def show_stability(found: Collection) -> None:
         table.add_row(
             row["case"],
             row["solver"],
-            in_few_characters(scaled(1e3, row["rate"]), scaled(1e3, numerical_error(row))),
+            short_rate(row),
             *(_number(row[key], 1.0, 2) for key in ("residual", "momentum", "events_per_second")),
             str(row["guards"] or ""),
             f"{row['wall_time']:.2g}",

@@ -282,7 +282,7 @@ def with_error_estimate(
     """
     if coarser is None or result.cut_short:
         return result
-    if len(result.counted) < LEAST_BLOWS and not result.fall:
+    if len(result.counted) < LEAST_BLOWS and not any(result.fall.values()):
         return result
     whole = grid_run(result)
     if not coarser:

@@ -19,6 +19,7 @@ from percussion_model.verification.hard_cases import SOLVERS, hard_cases, measur
 from percussion_model.verification.hard_cases.collection import (
     Collection,
     numerical_error,
+    short_rate,
     violations,
 )
 from percussion_model.verification.hard_cases.refinement import refine
@@ -100,7 +101,7 @@ ROW = {
     "case": "gap_0", "solver": "wave", "error": "", "residual": 0.0, "momentum": 0.0,
     "contact_tension": 0.0, "rock_tension": None, "interpenetration": 0.0,
     "events_per_second": 10.0, "ceiling": 20.0, "guards": 0, "same_bits": True,
-    "rate": 0.016, "rate_error": 0.0,
+    "rate": 0.016, "rate_error": 0.0, "depends_on_cells": False,
 }  # fmt: skip
 
 
@@ -146,7 +147,9 @@ def test_a_rate_is_only_off_where_the_errors_of_both_do_not_reach_so_far(capsys)
     far = entry({}, {"rate_error": 1.5e-4})  # 4 standard errors, and one is 0.9 %
     assert far["standard_errors"] == pytest.approx(4.0)
     assert far["decided"] is False
-    assert far["reason"].startswith("undecided: ")
+    assert "the errors of the two rates reach 2.8 % of the first" in far["reason"]
+    assert entry({"depends_on_cells": True}, {})["decided"] is False
+    assert short_rate(ROW | {"depends_on_cells": True}) == "undecided"
     assert entry({}, {"refined_rate_change": 0.02})["decided"] is False
     assert entry({"refined_rate_change": 0.02}, {})["decided"] is False
     assert entry({}, {"refined_rate_change": 0.01})["decided"] is True

@@ -62,6 +62,8 @@ class Measures:
         same bits as the run that was read several hundred times.
     rate, rate_error, period : float
         Rate of penetration, its standard error [m/s], and mean period of a blow [s].
+    depends_on_cells : bool
+        Whether the rate is one of the cells and of nothing else.
     periods : list of float
         Of the counted blows [s].
     path : list of float
@@ -91,6 +93,7 @@ class Measures:
     same_bits: bool
     rate: float
     rate_error: float
+    depends_on_cells: bool
     period: float
     periods: list[float]
     path: list[float]
@@ -157,6 +160,7 @@ def measure(
         same_bits=not error and (not again or _repeats(run, case, scene, end)),
         rate=result.rate_of_penetration,
         rate_error=result.rate_of_penetration_standard_error,
+        depends_on_cells=scene.is_undamped,
         period=float(np.mean(blows["period"])) if len(blows) else math.nan,
         periods=blows["period"].tolist(),
         path=close,

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
-from percussion_model.simulation.uncertain import UNDECIDED, in_few_characters, scaled
+from percussion_model.simulation.uncertain import UNDECIDED
 from percussion_model.verification.hard_cases.cases import hard_cases
 from percussion_model.verification.hard_cases.collection import (
     DISAGREE,
     MOST_MOMENTUM,
     MOST_RESIDUAL,
     Collection,
-    numerical_error,
+    short_rate,
 )
 from percussion_model.verification.hard_cases.refinement import LEAST_CHANCE, RATE_WITHIN, SIGMAS
 
@@ -104,8 +104,8 @@ def _disagreements(found: Collection) -> str:
         off = entry["difference"]
         rows = {row["solver"]: row for row in found.rows if row["case"] == entry["case"]}
         lines.append(
-            f"| {entry['case']} | {entry['solver']} | {_rate(rows[entry['solver']])} "
-            f"| {_rate(rows[entry['compared_with']])} ({entry['compared_with']}) "
+            f"| {entry['case']} | {entry['solver']} | {short_rate(rows[entry['solver']])} "
+            f"| {short_rate(rows[entry['compared_with']])} ({entry['compared_with']}) "
             f"| {'-' if off is None else f'{100 * off:+.1f} %'}"
             f"{'' if entry['decided'] else f', {UNDECIDED}'} "
             f"| {entry['reason'] or '**not known**'} |"
@@ -153,7 +153,7 @@ def _group(found: Collection, group: str) -> str:
 
 
 def _row(row: dict[str, Any], aperiodic: bool) -> str:
-    rate = _rate(row)
+    rate = short_rate(row)
     refined = _percent(row.get("refined_rate_change"))
     if aperiodic and row.get("refined_rate_sigmas") is not None:
         refined = f"{row['refined_rate_sigmas']:.1f} σ"
@@ -164,11 +164,6 @@ def _row(row: dict[str, Any], aperiodic: bool) -> str:
         f"| {_plain(row['events_per_second'], 3)} | {row['guards'] or ''} | {refined} "
         f"| {_plain(speed)} |"
     )
-
-
-def _rate(row: dict[str, Any]) -> str:
-    """Rate [mm/s] with its error."""
-    return in_few_characters(scaled(1e3, row["rate"]), scaled(1e3, numerical_error(row)))
 
 
 def _small(value: float | None) -> str:
