@@ -13,7 +13,8 @@ import matplotlib
 from matplotlib.figure import Figure
 
 from percussion_model.interface.plotting import style
-from percussion_model.simulation.files import staged, to_json
+from percussion_model.simulation.files import ResultError, staged, staged_text, to_json
+from percussion_model.simulation.origin import Claim
 
 # Energies and rates are drawn in these, and told apart with any colour vision.
 BLUE, ORANGE, GREEN, BLACK, GREY = "#0072B2", "#D55E00", "#009E73", "#222222", "#8C8C8C"
@@ -31,15 +32,38 @@ def figure_of(name: str, out: Path, size: tuple[float, float]) -> Iterator[Figur
 
 
 def arguments(main: Callable[..., Any], name: str, out: Path) -> argparse.Namespace:
-    """Words of the command line of an example: out and quick."""
+    """Words of the command line of an example: out, quick and force."""
     parser = argparse.ArgumentParser(prog=f"python -m examples.{name}", description=main.__doc__)
     parser.add_argument("--out", type=Path, default=out, metavar="DIR")
     parser.add_argument("--quick", action="store_true", help="few points: seconds, not minutes")
+    parser.add_argument("--force", action="store_true", help="replace what else is in DIR")
     return parser.parse_args()
 
 
+def write_example(
+    main: Callable[..., dict[str, Any]],
+    name: str,
+    out: Path,
+    quick: bool,
+    force: bool,
+    numbered: bool = True,
+) -> None:
+    """Run an example; write its figure and what it found where nothing else is replaced."""
+    try:
+        claim = Claim(out, {"command": f"examples.{name}", "quick": quick}, force, numbered)
+    except ResultError as error:
+        sys.exit(f"examples.{name}: {error}")
+    if claim.moved:
+        print(claim.moved, file=sys.stderr)
+    numbers = claim.folder / "found.json"
+    staged_text(numbers, to_json(main(claim.folder, quick)) + "\n")
+    claim.sign()
+    for path in (numbers, claim.folder / f"{name}.png"):
+        print(f"wrote {path}", file=sys.stderr)
+
+
 def command_line(main: Callable[..., dict[str, Any]], name: str) -> None:
-    """Run an example with the words of the command line, and print what it found."""
-    words = arguments(main, name, Path("out/examples") / name)
-    print(to_json(main(words.out, words.quick)))
-    print(words.out / f"{name}.png", file=sys.stderr)
+    """Run an example with the words of the command line, and write what it found."""
+    default = Path("out/examples") / name
+    words = arguments(main, name, default)
+    write_example(main, name, words.out, words.quick, words.force, words.out == default)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from scenarios.harness import FIGURES, Instance, built, plot, run
+from scenarios.harness import Instance, command_line, plot, run
 
 DURATION, STEP = 1.0, 1e-3  # [s]
 
@@ -34,4 +34,4 @@ def draw(found: dict[str, np.ndarray], path: Path) -> Path:
 
 
 if __name__ == "__main__":
-    print(draw(simulate(built()), FIGURES / "constant_reference.png"))
+    command_line("constant_reference", simulate, draw)

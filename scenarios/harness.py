@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import csv
 import difflib
 import shutil
@@ -242,6 +243,21 @@ def plot(
             ax.legend(fontsize="small", loc="upper right")
     figure.tight_layout()
     return save_png(figure, path)
+
+
+def command_line(
+    name: str,
+    simulate: Callable[..., dict[str, np.ndarray]],
+    draw: Callable[[dict[str, np.ndarray], Path], Path],
+    *fmus: str,
+) -> None:
+    """Run a scenario by `python -m scenarios.NAME`, and say what was written or replaced."""
+    parser = argparse.ArgumentParser(prog=f"python -m scenarios.{name}")
+    parser.add_argument("--out", type=Path, default=FIGURES, metavar="DIR", help="of the figure")
+    path = parser.parse_args().out / f"{name}.png"
+    word = "replaced" if path.exists() else "wrote"
+    draw(simulate(*map(built, fmus or ("PercussiveHammer",))), path)
+    print(f"{word} {path}")
 
 
 def built(name: str = "PercussiveHammer") -> Path:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from scenarios.harness import FIGURES, Instance, built, plot, run
+from scenarios.harness import Instance, command_line, plot, run
 
 DURATION, STEP = 2.4, 5e-3  # [s]
 # Switched off near the top of a stroke: in the ideal pressure law nothing but weight
@@ -37,4 +37,4 @@ def draw(found: dict[str, np.ndarray], path: Path) -> Path:
 
 
 if __name__ == "__main__":
-    print(draw(simulate(built()), FIGURES / "percussion_off_on.png"))
+    command_line("percussion_off_on", simulate, draw)

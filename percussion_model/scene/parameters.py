@@ -586,4 +586,8 @@ def unknown_key(key: str) -> str:
         return f"unknown key {key}: did you mean {near[0].replace('.*', '.0')}?"
     if siblings and parent:
         return f"unknown key {key}: [{parent}] has the keys {', '.join(siblings)}"
+    groups = [one for one in GROUPS if one in key.split(".")]
+    if groups:
+        of_group = [one for one in keys if one.startswith(f"{groups[-1]}.") and "*" not in one]
+        return f"unknown key {key}: did you mean one of {', '.join(of_group)}?"
     return f"unknown key {key}: a scene has a title and the tables {', '.join(GROUPS)}"

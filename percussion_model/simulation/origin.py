@@ -8,7 +8,9 @@ it, unless it is forced; then what the other result left is removed.
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -72,7 +74,11 @@ class Claim:
                 (self.folder / name).unlink(missing_ok=True)
         else:
             made += [name for name in self._left if name in now]
-        tree = {"made_by": self.origin, "files": sorted(set(made) - {ORIGIN})}
+        tree = {
+            "made_by": self.origin,
+            "version": version("percussion_model"),
+            "files": sorted(set(made) - {ORIGIN}),
+        }
         staged_text(self.folder / ORIGIN, to_json(tree) + "\n")
 
 
@@ -86,7 +92,9 @@ def flat(tree: Mapping[str, Any], above: str = "") -> dict[str, Any]:
         elif isinstance(value, (list, tuple)):
             found |= flat({str(k): one for k, one in enumerate(value)}, f"{name}.")
         elif value is not None:
-            found[name] = value if isinstance(value, (str, bool, int)) else repr(value)
+            is_plain = isinstance(value, (str, bool, int))
+            is_plain |= isinstance(value, float) and math.isfinite(value)
+            found[name] = value if is_plain else repr(value)
     return found
 
 
@@ -99,6 +107,7 @@ def _other_than(folder: Path, origin: Mapping[str, Any]) -> str:
         more = ", ..." if len(files) > SHOWN else ""
         return f"holds files of unknown origin ({', '.join(files[:SHOWN])}{more})" if files else ""
     found = _read(folder)[0]
+    origin = {key: _number(value) for key, value in origin.items()}
     if found == origin:
         return ""
     if found.get("command") != origin.get("command"):
@@ -130,7 +139,19 @@ def _read(folder: Path) -> tuple[dict[str, Any], list[str]]:
         return {}, []
     if not isinstance(origin, dict) or not isinstance(files, list):
         return {}, []
+    # earlier versions wrote numbers as text
+    origin = {key: _number(value) for key, value in origin.items()}
     return origin, [name for name in files if isinstance(name, str)]
+
+
+def _number(value: Any) -> Any:
+    """The number that a text is the `repr` of; anything else as it is."""
+    try:
+        number = float(value) if isinstance(value, str) else value
+    except ValueError:
+        return value
+    is_number = isinstance(value, str) and math.isfinite(number) and repr(number) == value
+    return number if is_number else value
 
 
 def _times(folder: Path) -> dict[str, int]:

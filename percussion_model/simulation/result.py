@@ -28,7 +28,7 @@ from percussion_model.simulation.files import (
 )
 from percussion_model.simulation.origin import ORIGIN
 from percussion_model.simulation.rate import rate_of_blows, ratio_of_sums
-from percussion_model.simulation.uncertain import BY_CELLS, is_undecided, rate_field
+from percussion_model.simulation.uncertain import BY_CELLS, is_undecided, rate_field, rate_text
 
 if TYPE_CHECKING:
     import pandas
@@ -149,6 +149,11 @@ class Result:
     def rate_of_penetration_error(self) -> float:
         """How far the rate may be off, by grid and scatter [m/s]; NaN where not estimated."""
         return abs(self.rate_of_penetration) * self.rate_of_penetration_relative_error
+
+    @property
+    def rate_text(self) -> str:
+        """Rate of penetration [mm/s] with its error, as the table prints it."""
+        return rate_text(self.summary())
 
     @property
     def rate_of_penetration_undecided(self) -> bool:

@@ -31,6 +31,9 @@ SHOWN = (
 )
 # Those that are given, and have all their digits.
 GIVEN = ("time", "step", "steps")
+# Numbers of whose errors nothing is known, and what is meant where there is a rate's.
+UNKNOWN = ("depth", RATE, "shoulder_energy", "feed_work")
+SCATTER = "scatter of blows, changes of the rock in it"
 # Rows of a run without --interval.
 ROWS = 5000
 FAILED = 1
@@ -81,11 +84,6 @@ def couple(
     except ImportError as error:
         return common.print_message(common.needs_extra(error, "fmu"), common.BAD_INPUT)
     common.check_json(json_file)
-    claimed = common.claim(
-        "couple", out, Path("out") / system.stem, force, system=common.digest(system),
-        duration=duration, step=step, interval=interval, order=order, tolerance=tolerance,
-        every=common.by_name(every), set=common.by_name(settings), signals=signals,
-    )  # fmt: skip
     coupling = Coupling(
         system,
         dict(read_value(text) for text in settings or ()),
@@ -93,6 +91,12 @@ def couple(
         every=dict(_read_pace(text) for text in every or ()),
         trust=trust,
     )
+    # what is wrong with the system is said before any word on folders
+    claimed = common.claim(
+        "couple", out, Path("out") / system.stem, force, system=common.digest(system),
+        duration=duration, step=step, interval=interval, order=order, tolerance=tolerance,
+        every=common.by_name(every), set=common.by_name(settings), signals=signals,
+    )  # fmt: skip
     folder = claimed.folder
     wanted = [*known_signals(coupling.outputs), *(signals or ())]
     rows_every = max(step, duration / ROWS) if interval is None else interval
@@ -123,11 +127,13 @@ def _lines(found: Mapping[str, Any]) -> Iterator[str]:
             continue
         value, error = factor * found[key], found.get(f"{key}_error")
         number = f"{value:.6g}" if key in GIVEN else in_digits(value)
+        note = ""
         if error is not None:
             number = with_error(value, factor * error)
-        elif key == RATE:
-            number += f", {NOT_ESTIMATED}"
-        yield f"{name:29s} {number} {unit}".rstrip()
+            note = SCATTER
+        elif key in UNKNOWN:
+            note = NOT_ESTIMATED
+        yield f"{name:29s} {number} {unit}".rstrip() + (f" ({note})" if note else "")
 
 
 def _tell(verdict: Verdict, code: int) -> int:
