@@ -51,6 +51,7 @@ _BY_BLOWS = ("rate_of_penetration_standard_error", "drilling_cycles_per_blow")
 
 _NO_ROCK = "the bit meets no rock: it flies, and drills nothing"
 _NO_DRIVE = "nothing throws the piston: what moves is left from the start and comes to rest"
+_NO_PISTON = "there is no piston, so no blows that a rate or a period could be taken from"
 _NO_CRUSHING = "a linear spring gives all back: nothing is crushed"
 _BARRIER = ("rock.barrier_energy", "rock.barrier_damping")
 
@@ -193,6 +194,8 @@ class Trial:
         """Why there is no rate of penetration, or why it must not be trusted; may be empty."""
         if self.variant.no_blows or self.variant.no_penetration:
             return self.variant.no_blows or self.variant.no_penetration
+        if self.result.scene.piston.model == "absent":
+            return _NO_PISTON
         reasons = [text for text in self.result.warnings if "trusted" in text]
         if len(self.result.counted) < LEAST_BLOWS:
             reasons += [text for text in self.result.warnings if "whole blow" in text][:1]

@@ -33,7 +33,7 @@ SHOWN = (
 GIVEN = ("time", "step", "steps")
 # Numbers of whose errors nothing is known, and what is meant where there is a rate's.
 UNKNOWN = ("depth", RATE, "shoulder_energy", "feed_work")
-SCATTER = "scatter of blows, changes of the rock in it"
+SCATTER = "scatter, also of the rock"
 # Rows of a run without --interval.
 ROWS = 5000
 FAILED = 1
