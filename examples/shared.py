@@ -38,34 +38,34 @@ def arguments(main: Callable[..., Any], name: str, out: Path) -> argparse.Namesp
     parser = argparse.ArgumentParser(prog=f"python -m examples.{name}", description=main.__doc__)
     parser.add_argument("--out", type=Path, default=out, metavar="DIR")
     parser.add_argument("--quick", action="store_true", help="few points: seconds, not minutes")
-    parser.add_argument("--force", action="store_true", help="replace what else the folder holds")
+    parser.add_argument("--force", action="store_true", help="replace what else is in DIR")
     return parser.parse_args()
 
 
-def run_example(
-    main: Callable[..., dict[str, Any]], name: str, out: Path, quick: bool, force: bool = False
-) -> list[Path]:
-    """Run an example; its figure and what it found end up in a folder.
-
-    Raises
-    ------
-    ResultError
-        If the folder holds something else, and that is not to be replaced.
-    """
-    origin = {"command": f"examples.{name}", "quick": quick}
-    claimed = Claim(out, origin, force)
-    found = main(claimed.folder, quick)
-    staged_text(out / FOUND, to_json(found) + "\n")
-    claimed.sign()
-    return [out / f"{name}.png", out / FOUND]
+def write_example(
+    main: Callable[..., dict[str, Any]],
+    name: str,
+    out: Path,
+    quick: bool,
+    force: bool,
+    numbered: bool = True,
+) -> None:
+    """Run an example; write its figure and what it found where nothing else is replaced."""
+    try:
+        claim = Claim(out, {"command": f"examples.{name}", "quick": quick}, force, numbered)
+    except ResultError as error:
+        sys.exit(f"examples.{name}: {error}")
+    if claim.moved:
+        print(claim.moved, file=sys.stderr)
+    numbers = claim.folder / "found.json"
+    staged_text(numbers, to_json(main(claim.folder, quick)) + "\n")
+    claim.sign()
+    for path in (numbers, claim.folder / f"{name}.png"):
+        print(f"wrote {path}", file=sys.stderr)
 
 
 def command_line(main: Callable[..., dict[str, Any]], name: str) -> None:
-    """Run an example with the words of the command line, and say where its files are."""
-    words = arguments(main, name, Path("out/examples") / name)
-    try:
-        files = run_example(main, name, words.out, words.quick, words.force)
-    except ResultError as error:
-        sys.exit(f"examples.{name}: {error}")
-    for file in files:
-        print("wrote", file)
+    """Run an example with the words of the command line, and write what it found."""
+    default = Path("out/examples") / name
+    words = arguments(main, name, default)
+    write_example(main, name, words.out, words.quick, words.force, words.out == default)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from scenarios.harness import Instance, built, command_line, plot, ramp, run
+from scenarios.harness import Instance, command_line, plot, ramp, run
 
 DURATION, STEP = 2.4, 5e-3  # [s]
 LOW, HIGH = 0.8, 1.6  # the ramp begins and ends [s]
@@ -51,4 +51,4 @@ def draw(found: dict[str, np.ndarray], path: Path) -> Path:
 
 
 if __name__ == "__main__":
-    command_line("collaring_ramp", str(__doc__), lambda: simulate(built()), draw)
+    command_line("collaring_ramp", simulate, draw)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from scenarios.harness import Instance, built, command_line, plot, run
+from scenarios.harness import Instance, command_line, plot, run
 
 DURATION, STEP = 1.0, 1e-3  # [s]
 
@@ -34,4 +34,4 @@ def draw(found: dict[str, np.ndarray], path: Path) -> Path:
 
 
 if __name__ == "__main__":
-    command_line("constant_reference", str(__doc__), lambda: simulate(built()), draw)
+    command_line("constant_reference", simulate, draw)

@@ -245,6 +245,21 @@ def plot(
     return save_png(figure, path)
 
 
+def command_line(
+    name: str,
+    simulate: Callable[..., dict[str, np.ndarray]],
+    draw: Callable[[dict[str, np.ndarray], Path], Path],
+    *fmus: str,
+) -> None:
+    """Run a scenario by `python -m scenarios.NAME`, and say what was written or replaced."""
+    parser = argparse.ArgumentParser(prog=f"python -m scenarios.{name}")
+    parser.add_argument("--out", type=Path, default=FIGURES, metavar="DIR", help="of the figure")
+    path = parser.parse_args().out / f"{name}.png"
+    word = "replaced" if path.exists() else "wrote"
+    draw(simulate(*map(built, fmus or ("PercussiveHammer",))), path)
+    print(f"{word} {path}")
+
+
 def built(name: str = "PercussiveHammer") -> Path:
     """An FMU of `dist`, built now if it is not there."""
     path = ROOT / "dist" / f"{name}.fmu"
@@ -253,30 +268,6 @@ def built(name: str = "PercussiveHammer") -> Path:
 
         main(["--no-reference"] if name == "PercussiveHammer" else ["--pneumatics"])
     return path
-
-
-def command_line(
-    name: str,
-    about: str,
-    simulate: Callable[[], dict[str, np.ndarray]],
-    draw: Callable[[dict[str, np.ndarray], Path], Path],
-) -> None:
-    """Run a scenario and draw it into a folder, by the words of the command line.
-
-    Parameters
-    ----------
-    name : str
-        Of the module and of the figure.
-    about : str
-        What it is, for `--help`.
-    simulate, draw : callable
-        Its run, and its figure in a file.
-    """
-    parser = argparse.ArgumentParser(prog=f"python -m scenarios.{name}", description=about)
-    parser.add_argument("--out", type=Path, default=FIGURES, metavar="DIR", help="of the figure")
-    path = parser.parse_args().out / f"{name}.png"
-    word = "replaced" if path.exists() else "wrote"
-    print(word, draw(simulate(), path))
 
 
 def ramp(*points: tuple[float, float]) -> Callable[[float], float]:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from scenarios.harness import Instance, built, command_line, plot, run
+from scenarios.harness import Instance, command_line, plot, run
 
 DURATION, STEP = 3.0, 1e-2  # [s]
 SOFT, HARD = 3e8, 1.2e9  # K_R [N/m]
@@ -47,4 +47,4 @@ def draw(found: dict[str, np.ndarray], path: Path) -> Path:
 
 
 if __name__ == "__main__":
-    command_line("layered_rock", str(__doc__), lambda: simulate(built()), draw)
+    command_line("layered_rock", simulate, draw)

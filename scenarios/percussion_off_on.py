@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from scenarios.harness import Instance, built, command_line, plot, run
+from scenarios.harness import Instance, command_line, plot, run
 
 DURATION, STEP = 2.4, 5e-3  # [s]
 # Switched off near the top of a stroke: in the ideal pressure law nothing but weight
@@ -37,4 +37,4 @@ def draw(found: dict[str, np.ndarray], path: Path) -> Path:
 
 
 if __name__ == "__main__":
-    command_line("percussion_off_on", str(__doc__), lambda: simulate(built()), draw)
+    command_line("percussion_off_on", simulate, draw)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from scenarios.harness import Instance, built, command_line, plot, ramp, run
+from scenarios.harness import Instance, command_line, plot, ramp, run
 
 DURATION, STEP = 2.4, 5e-3  # [s]
 FULL, LEFT = 20e5, 8e5  # [Pa]
@@ -39,4 +39,4 @@ def draw(found: dict[str, np.ndarray], path: Path) -> Path:
 
 
 if __name__ == "__main__":
-    command_line("pressure_loss", str(__doc__), lambda: simulate(built()), draw)
+    command_line("pressure_loss", simulate, draw)

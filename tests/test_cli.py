@@ -244,6 +244,7 @@ def test_bad_scenes_are_one_message_on_stderr(percussion, tmp_path, text, messag
         (["run", RIGID, "--trace", "0"], "trace"),
         (["run", RIGID, "--set", "feed.force"], "KEY=VALUE"),
         (["run", RIGID, "--set", "feed.farce=1"], "did you mean feed.force?"),
+        (["run", RIGID, "--set", "hammer.feed=1"], "did you mean one of feed.force"),
         (["run", RIGID, "--solver", "wave"], "bit.model"),
         (["run", RIGID, "--solver", "fem"], "fem"),
         (["run", RIGID, "--cells", "many"], "--cells 'many': must be a whole number; see"),

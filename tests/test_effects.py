@@ -273,3 +273,10 @@ def test_bars_and_numbers_of_the_figure_stay_within_their_panels():
         assert [text.get_text() for text in ax.texts[-2:]] == ["undecided"] * 2
         assert ax.texts[5].get_text() == " -21.7±1.6 "
         assert ax.texts[5].get_window_extent().x1 <= ax.patches[5].get_window_extent().x0
+
+
+def test_dashes_of_a_drop_test_have_their_reason():
+    bit = Scene().replace(**{"piston.model": "absent", "effects.drive": "none"})
+    found = study_effects(bit.replace(**{"run.duration": 0.02, "run.settle": 0.0}))
+    assert "there is no piston" in found.base.reason
+    assert all(trial.reason for trial in found.trials)

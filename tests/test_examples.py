@@ -142,3 +142,12 @@ def test_the_first_wave_has_its_known_best():
     ratio = np.linspace(0.5, 30.0, 20_001)
     share = drill_design.first_wave(ratio, 7.5e8)
     assert share.max() == pytest.approx(0.814529 * (1.0 - 1.0 / 5.0), rel=1e-6)
+
+
+def test_an_example_does_not_write_into_the_folder_of_another_result(tmp_path):
+    (tmp_path / "kept.json").write_text("{}")
+    words = [sys.executable, "-m", "examples.drill_design", "--quick", "--out", str(tmp_path)]
+    ended = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert ended.returncode == 1
+    assert "holds files of unknown origin (kept.json)" in ended.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["kept.json"]

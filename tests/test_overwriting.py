@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+import percussion_model
 from percussion_model.interface.cli import main
 from percussion_model.simulation.files import ResultError
 from percussion_model.simulation.origin import ORIGIN, Claim
@@ -64,8 +65,21 @@ def test_the_same_run_replaces_its_own_result(percussion):
     found = json.loads(Path("x", ORIGIN).read_text())
     assert found["made_by"]["command"] == "run"
     assert found["made_by"]["scene.feed.force"] == 2500.0
-    assert found["program"].startswith("percussion_model ")
+    assert found["version"] == percussion_model.__version__
     assert found["files"] == ["blows.csv", "events.csv", "scene.toml", "summary.json"]
+
+
+def test_numbers_that_an_earlier_version_wrote_as_text_are_the_same(percussion):
+    assert percussion(*RUN, "--no-figures", "--out", "x")[0] == 0
+    file = Path("x", ORIGIN)
+    tree = json.loads(file.read_text())
+    del tree["version"]
+    tree["made_by"] = {
+        key: repr(value) if isinstance(value, float) else value
+        for key, value in tree["made_by"].items()
+    }
+    file.write_text(json.dumps(tree))
+    assert percussion(*RUN, "--no-figures", "--out", "x")[0] == 0
 
 
 def test_plot_does_not_draw_over_another_run(percussion):

@@ -57,6 +57,7 @@ CHANGED = ("rate_of_penetration", "blow_period", "peak_bit_force")
 
 _NO_ROCK = "the bit meets no rock: it flies, and drills nothing"
 _NO_DRIVE = "nothing throws the piston: what moves is left from the start and comes to rest"
+_NO_PISTON = "there is no piston, so no blows that a rate or a period could be taken from"
 _NO_CRUSHING = "a linear spring gives all back: nothing is crushed"
 _BARRIER = ("rock.barrier_energy", "rock.barrier_damping")
 
@@ -206,6 +207,8 @@ class Trial:
         """Parts of `reason`."""
         if self.variant.no_blows or self.variant.no_penetration:
             return [self.variant.no_blows or self.variant.no_penetration]
+        if self.result.scene.piston.model == "absent":
+            return [_NO_PISTON]
         reasons = [text for text in self.result.warnings if "trusted" in text]
         if len(self.result.counted) < LEAST_BLOWS:
             reasons += [text for text in self.result.warnings if "whole blow" in text][:1]

@@ -565,10 +565,6 @@ def find_row(key: str) -> Row | None:
     return rows_by_key().get(generic_key(key))
 
 
-# Keys of other tables that a message proposes.
-_SHOWN_KEYS = 3
-
-
 def unknown_key(key: str) -> str:
     """Say that a key is not known, and which known one is nearest."""
     key = shortened(key)
@@ -590,8 +586,8 @@ def unknown_key(key: str) -> str:
         return f"unknown key {key}: did you mean {near[0].replace('.*', '.0')}?"
     if siblings and parent:
         return f"unknown key {key}: [{parent}] has the keys {', '.join(siblings)}"
-    same = [one for one in keys if name in one.split(".")]  # in another table
-    if parent and same:
-        shown = " or ".join(one.replace(".*", ".0") for one in same[:_SHOWN_KEYS])
-        return f"unknown key {key}: did you mean {shown}?"
+    groups = [one for one in GROUPS if one in key.split(".")]
+    if groups:
+        of_group = [one for one in keys if one.startswith(f"{groups[-1]}.") and "*" not in one]
+        return f"unknown key {key}: did you mean one of {', '.join(of_group)}?"
     return f"unknown key {key}: a scene has a title and the tables {', '.join(GROUPS)}"

@@ -76,7 +76,7 @@ class Claim:
             made += [name for name in self._left if name in now]
         tree = {
             "made_by": self.origin,
-            "program": f"percussion_model {version('percussion_model')}",
+            "version": version("percussion_model"),
             "files": sorted(set(made) - {ORIGIN}),
         }
         staged_text(self.folder / ORIGIN, to_json(tree) + "\n")
@@ -93,10 +93,9 @@ def flat(tree: Mapping[str, Any], above: str = "") -> dict[str, Any]:
         elif isinstance(value, (list, tuple)):
             found |= flat({str(k): one for k, one in enumerate(value)}, f"{name}.")
         elif value is not None:
-            known = isinstance(value, (str, bool, int)) or (
-                isinstance(value, float) and math.isfinite(value)
-            )
-            found[name] = value if known else repr(value)
+            is_plain = isinstance(value, (str, bool, int))
+            is_plain |= isinstance(value, float) and math.isfinite(value)
+            found[name] = value if is_plain else repr(value)
     return found
 
 
@@ -109,6 +108,7 @@ def _other_than(folder: Path, origin: Mapping[str, Any]) -> str:
         more = ", ..." if len(files) > SHOWN else ""
         return f"holds files of unknown origin ({', '.join(files[:SHOWN])}{more})" if files else ""
     found = _read(folder)[0]
+    origin = {key: _number(value) for key, value in origin.items()}
     if found == origin:
         return ""
     if found.get("command") != origin.get("command"):
@@ -140,7 +140,19 @@ def _read(folder: Path) -> tuple[dict[str, Any], list[str]]:
         return {}, []
     if not isinstance(origin, dict) or not isinstance(files, list):
         return {}, []
+    # earlier versions wrote numbers as text
+    origin = {key: _number(value) for key, value in origin.items()}
     return origin, [name for name in files if isinstance(name, str)]
+
+
+def _number(value: Any) -> Any:
+    """The number that a text is the `repr` of; anything else as it is."""
+    try:
+        number = float(value) if isinstance(value, str) else value
+    except ValueError:
+        return value
+    is_number = isinstance(value, str) and math.isfinite(number) and repr(number) == value
+    return number if is_number else value
 
 
 def _times(folder: Path) -> dict[str, int]:

@@ -9,6 +9,7 @@ from percussion_model import Scene
 from scenarios import (
     collaring_ramp,
     constant_reference,
+    harness,
     layered_rock,
     percussion_off_on,
     pneumatic_drive,
@@ -151,3 +152,17 @@ def test_signals_come_from_functions_and_from_files(make, tmp_path):
         instance = make(feed_force=1000.0)
         runs.append(run(instance, 0.19, 0.01, inputs, ["bit.position", "blow_count"]))
     assert max(greatest_difference(*runs).values()) == 0.0
+
+
+def test_a_scenario_takes_no_unknown_words_and_says_what_it_replaces(
+    hammer, tmp_path, monkeypatch, capsys
+):
+    monkeypatch.setattr(harness, "built", lambda name: hammer)
+    for word in ("wrote", "replaced"):
+        monkeypatch.setattr("sys.argv", ["scenario", "--out", str(tmp_path)])
+        harness.command_line("pressure_loss", pressure_loss.simulate, pressure_loss.draw)
+        assert capsys.readouterr().out == f"{word} {tmp_path / 'pressure_loss.png'}\n"
+    monkeypatch.setattr("sys.argv", ["scenario", "--fast"])
+    with pytest.raises(SystemExit):
+        harness.command_line("pressure_loss", pressure_loss.simulate, pressure_loss.draw)
+    assert "unrecognized arguments: --fast" in capsys.readouterr().err

@@ -186,3 +186,30 @@ def test_a_stiffness_or_a_jump_that_is_no_number_is_judged(value):
     verdict = judge_run(columns, {}, {"a.b": value}, 1e-3, 100, "", controlled=False)
     assert verdict.is_bad, verdict.text
     assert ("is no number" in verdict.text) == (not math.isfinite(value))
+
+
+def test_the_command_says_of_which_numbers_the_error_is_not_known(
+    feed_control, tmp_path, monkeypatch, capsys
+):
+    words = ["couple", str(feed_control), "--duration", "0.2", "--no-figures"]
+    monkeypatch.setattr("sys.argv", ["percussion", *words, "--out", str(tmp_path)])
+    with pytest.raises(SystemExit):
+        main()
+    lines = capsys.readouterr().out.splitlines()
+    for name in ("Depth of the bit", "Work of the feed on the bit"):
+        (line,) = [one for one in lines if one.startswith(name)]
+        assert line.endswith("(error not estimated)"), line
+
+
+def test_a_system_that_is_refused_claims_no_folder(feed_control, tmp_path, monkeypatch, capsys):
+    """Nothing is said of a numbered folder that is not going to be written."""
+    monkeypatch.chdir(tmp_path)
+    folder = tmp_path / "out" / feed_control.stem
+    folder.mkdir(parents=True)
+    (folder / "kept.txt").write_text("")
+    words = ["couple", str(feed_control), "--set", "nothing.there=1"]
+    monkeypatch.setattr("sys.argv", ["percussion", *words])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code == 2
+    assert "this one goes to" not in capsys.readouterr().err

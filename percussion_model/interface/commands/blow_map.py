@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     from percussion_model.solvers.blow_map.table import BlowTable
 
 
-# Axes of a table, and their units.
-RANGES = {
+# Units of what a table is over, in its order.
+_UNITS = {
     "loading_stiffness": "N/m",
     "impact_velocity": "m/s",
     "feed_force": "N",
@@ -88,7 +88,7 @@ def _numbers(scene: Scene, table: BlowTable | None) -> dict[str, Any]:
         "outside": outside_map(scene),
     }
     if table is not None:
-        ranges = zip(RANGES, table.lowest, table.highest, strict=True)
+        ranges = zip(_UNITS, table.lowest, table.highest, strict=True)
         found["range"] = {name: [low, high] for name, low, high in ranges}
         found["restless_nodes"] = table.restless
         found["cells"] = table.cells
@@ -100,6 +100,6 @@ def _show(numbers: dict[str, Any]) -> None:
     typer.echo(f"{numbers['nodes']} blows")
     if numbers["made"]:
         for name, (low, high) in numbers["range"].items():
-            typer.echo(f"{name.replace('_', ' ')} {low:g} to {high:g} {RANGES[name]}")
+            typer.echo(f"{name.replace('_', ' ')} {low:g} to {high:g} {_UNITS[name]}")
         nodes = numbers["restless_nodes"]
         typer.echo(f"{nodes} of them refused: the bit does not come to rest")

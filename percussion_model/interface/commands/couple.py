@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from percussion_model.interface.commands import common
-from percussion_model.interface.messages import wrapped
 from percussion_model.simulation.uncertain import NOT_ESTIMATED, in_digits, with_error
 
 if TYPE_CHECKING:
@@ -32,12 +31,9 @@ SHOWN = (
 )
 # Those that are given, and have all their digits.
 GIVEN = ("time", "step", "steps")
-NOTE = (
-    "± is the scatter of the blows: where feed, drive or rock change within that time, their "
-    "change is in it. Other errors were not estimated: numbers have three digits. The verdict "
-    "says whether the communication step is short enough. The shoulder is where the casing "
-    "rests on the bit."
-)
+# Numbers of whose errors nothing is known, and what is meant where there is a rate's.
+UNKNOWN = ("depth", RATE, "shoulder_energy", "feed_work")
+SCATTER = "scatter, also of the rock"
 # Rows of a run without --interval.
 ROWS = 5000
 FAILED = 1
@@ -135,12 +131,13 @@ def _lines(found: Mapping[str, Any]) -> Iterator[str]:
             continue
         value, error = factor * found[key], found.get(f"{key}_error")
         number = f"{value:.6g}" if key in GIVEN else in_digits(value)
+        note = ""
         if error is not None:
             number = with_error(value, factor * error)
-        elif key == RATE:
-            number += f", {NOT_ESTIMATED}"
-        yield f"{name:33s} {number} {unit}".rstrip()
-    yield from wrapped(NOTE).splitlines()
+            note = SCATTER
+        elif key in UNKNOWN:
+            note = NOT_ESTIMATED
+        yield f"{name:33s} {number} {unit}".rstrip() + (f" ({note})" if note else "")
 
 
 def _tell(verdict: Verdict, code: int) -> int:
