@@ -433,7 +433,7 @@ def test_a_coupled_rate_has_its_error():
     assert found["rate_second_half_undecided"] is False
     (line,) = [text for text in _lines(found) if text.startswith("Rate in the second half ")]
     assert "±" in line
-    assert line.endswith("mm/s")
+    assert line.endswith("mm/s (scatter, also of the rock)")
     # names are words, and what has no error has three digits
     shown = list(_lines(found | {"shoulder_by_blows": -0.000718548, "shoulder_energy": -4.0144}))
     assert not any("_" in text for text in shown)
