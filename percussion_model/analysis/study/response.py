@@ -10,6 +10,7 @@ import numpy as np
 from percussion_model.analysis.stationary import Settled, settled
 from percussion_model.analysis.study.points import whole_number
 from percussion_model.scene.scene import Scene
+from percussion_model.simulation.means import numbers_over
 from percussion_model.solvers.sources import SOLVING
 
 KINDS = ("periodic", "aperiodic", "stalled", "failed")
@@ -50,17 +51,6 @@ ROW = np.dtype(
         ("wall_time", "f8"),  # [s]
     ]
 )
-# Columns of the blow table behind the means of a point.
-_MEANS = {
-    "impact_velocity": "impact_velocity",
-    "rebound_velocity": "rebound_velocity",
-    "stroke": "stroke",
-    "blow_energy": "blow_energy",
-    "rock_energy": "rock_energy",
-    "penetration_per_blow": "hole_advance",
-    "contacts_per_blow": "contacts",
-    "drilling_cycles_per_blow": "drilling_cycles",
-}
 
 
 def run_points(
@@ -104,11 +94,9 @@ def _fill(row: Any, found: Settled) -> None:
     row["kind"] = KINDS.index(found.kind)
     row["order"], row["blows"] = found.order, len(found.blows)
     row["wall_time"] = found.wall_time
+    for name, value in numbers_over(found.counted).items():
+        if name in FOUND:
+            row[name] = value
     row["rate_of_penetration"] = found.rate_of_penetration
     row["rate_of_penetration_error"] = found.rate_of_penetration_error
     row["blow_period"], row["multiplier"] = found.blow_period, found.multiplier
-    counted = found.counted
-    for name, column in _MEANS.items():
-        row[name] = np.mean(counted[column]) if len(counted) else math.nan
-    for name in ("peak_bit_force", "peak_contact_force"):
-        row[name] = np.max(counted[name]) if len(counted) else math.nan
