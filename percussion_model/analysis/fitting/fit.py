@@ -363,7 +363,12 @@ def _explored(like: Likelihood, minima: list[Place], quantile: float) -> Explore
             minima = [place, *minima]
     best, spread = descend(like, minima[0].at, every)
     walked = walked.joined(Walk.of([best]))
-    beyond = pushed_out(like, walked, threshold, lambda at, free: descend(like, at, free)[0])
+    beyond = pushed_out(
+        like,
+        walked,
+        threshold,
+        lambda at, free, rounds: descend(like, at, free, rounds=rounds)[0],
+    )
     walked = walked.joined(Walk.of([best, *beyond]))
     deepest = min([best, *beyond], key=lambda one: one.deviance)
     if deepest is not best:

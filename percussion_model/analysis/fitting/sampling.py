@@ -25,6 +25,9 @@ PARTED = 0.33
 # Ends of intervals wider than this, in the logarithm, are pushed out by this share of the width
 # and twice as far each time, until nothing there explains the data.
 WORTH_A_PUSH, PUSH = math.log(2.0), 0.1
+# One round of least squares tells most places; those that end above the limit by less than
+# this share of the threshold get more.
+NEAR, MORE_ROUNDS = 2.0, 3
 # Values of a parameter at which its profile is given.
 POINTS = 40
 
@@ -160,7 +163,7 @@ def pushed_out(
     like: Likelihood,
     walked: Walk,
     threshold: float,
-    lowest: Callable[[np.ndarray, list[int]], Place],
+    lowest: Callable[[np.ndarray, list[int], int], Place],
 ) -> list[Place]:
     """Places beyond the ends of wide intervals: a walk may have stopped short of the true ends.
 
@@ -171,7 +174,7 @@ def pushed_out(
     threshold : float
         Deviance above the best at which an interval ends.
     lowest : callable
-        Goes down from a place, over some of its parameters.
+        Goes down from a place, over some of its parameters, in so many rounds.
 
     Returns
     -------
@@ -191,7 +194,9 @@ def pushed_out(
             while like.low[k] + AT_EDGE < at[k] < like.high[k] - AT_EDGE:
                 at = at.copy()
                 at[k] = np.clip(at[k] + sign * step, like.low[k], like.high[k])
-                place = lowest(at, others) if others else like.at(at)
+                place = lowest(at, others, 1) if others else like.at(at)
+                if others and limit <= place.deviance < limit + NEAR * threshold:
+                    place = lowest(place.at, others, MORE_ROUNDS)
                 found.append(place)
                 if place.deviance >= limit:
                     break
