@@ -100,15 +100,17 @@ def test_a_study_becomes_tables_and_grids(whole, tmp_path):
     assert Scene.from_toml(tmp_path / "scene.toml") == SCENE
 
 
-def test_a_rate_has_its_error_however_small(whole):
+def test_a_rate_has_its_error_where_that_shows(whole):
     rows = whole.rows.copy()
     rows["rate_of_penetration"], rows["rate_of_penetration_error"] = 0.0123456, 1e-12
     rows["rate_of_penetration_error"][1] = np.nan
     made = Study(whole.scene, whole.points, rows, whole.failures)
-    assert made.rate_text(0) == "12.34560 ± 0.00001 mm/s"
+    assert made.rate_text(0) == "12.3 mm/s"
     assert made.rate_text(1) == "12.3 mm/s, error not estimated"
     told = dict(made.headlines())
-    assert "±" in told["Lowest rate"]
+    assert "12.3 mm/s" in told["Lowest rate"]
+    rows["rate_of_penetration_error"] = 2e-4
+    assert made.rate_text(0) == "12.35 ± 0.20 mm/s"
     assert "nor are those of the other numbers" in told["These errors"]
 
 

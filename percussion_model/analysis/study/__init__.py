@@ -27,7 +27,6 @@ from percussion_model.analysis.study.workers import on_a_cluster, on_this_machin
 from percussion_model.scene.scene import Scene
 from percussion_model.simulation.files import ResultError, staged
 from percussion_model.simulation.uncertain import (
-    MOST_DIGITS,
     NOT_ESTIMATED,
     in_digits,
     with_error,
@@ -53,8 +52,8 @@ MOST_A_PART = 100
 PARTS_A_PROCESS = 8
 # Rates with a larger relative error are counted in the headlines.
 LARGE_ERROR = 1e-3
-# Smaller errors of a rate are shown as this [mm/s].
-LEAST_ERROR = 10.0**-MOST_DIGITS
+# Smaller errors of a rate, relative to it, do not show in its three digits.
+LEAST_ERROR = 1e-3
 # What errors there are, behind "those of the rate".
 KNOWN_ERRORS = (
     "are of convergence and scatter; that of the grid is not estimated, nor are those of the "
@@ -115,12 +114,14 @@ class Study:
         return np.asarray(self.scene.has_waves & (points.values[:, points.keys.index(key)] == 0.0))
 
     def rate_text(self, k: int, unit: str = " mm/s") -> str:
-        """Rate of a point [mm/s] with its error of convergence and scatter."""
+        """Rate of a point [mm/s] with its error of convergence and scatter, where that shows."""
         row = self.rows[k]
         rate, error = (1e3 * float(row[f"rate_of_penetration{end}"]) for end in ("", "_error"))
         if not math.isfinite(error):
             return f"{in_digits(rate)}{unit}, {NOT_ESTIMATED}"
-        return f"{with_error(rate, max(error, LEAST_ERROR))}{unit}"
+        if error <= LEAST_ERROR * abs(rate):
+            return f"{in_digits(rate)}{unit}"  # what the grid adds is not known
+        return f"{with_error(rate, error)}{unit}"
 
     def headlines(self) -> list[tuple[str, str]]:
         """Motions, lowest and highest rate with their points, errors, cost: names and texts."""
