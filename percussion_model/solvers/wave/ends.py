@@ -109,14 +109,13 @@ def record_contact(par, s, wb, cb, opened, t_close, approach, peak, time, tau, b
             force = standstill_force(s, closure, impulse)
             start_blow(par, s, blows, closure, speed, here, force)
         close_gap(s, events, closure, approach)
-    if s.closed == 1:
-        s.b_peak_contact = max(s.b_peak_contact, peak)
-        if time + tau > s.peak_from:
-            s.peak_contact_force = max(s.peak_contact_force, peak)
+    s.b_peak_contact = max(s.b_peak_contact, peak)
+    if time + tau > s.peak_from:
+        s.peak_contact_force = max(s.peak_contact_force, peak)
 
 
 @inlined
-def meet_piston(par, s, bars, v_p, v_t, in_p, in_t, elastic, tau, time, blows, events):
+def meet_piston(par, s, bars, v_p, v_t, in_p, in_t, peak, tau, time, blows, events):
     """Contact of piston and bit over `tau`.
 
     Parameters
@@ -125,8 +124,8 @@ def meet_piston(par, s, bars, v_p, v_t, in_p, in_t, elastic, tau, time, blows, e
         Free velocities of the piston's lower and the bit's upper end [m/s].
     in_p, in_t : float
         Velocities that their end cells work against [m/s].
-    elastic : float
-        Difference of the free velocities without loss [m/s].
+    peak : float
+        Elastic part of the force, if they touch [N].
 
     Returns
     -------
@@ -141,14 +140,11 @@ def meet_piston(par, s, bars, v_p, v_t, in_p, in_t, elastic, tau, time, blows, e
         book_end(s, par.z_t, par.kappa_t, in_t, d_t, v_t * d_t, tau)
         bars.wb[Row.FACE, 0] = v_t
         return 0.0, 0.0
-    # the elastic part: a viscous front has no peak of its own
-    peak = par.z_t * elastic
     if par.piston == Piston.ELASTIC:
         z_p = par.z_p * (1.0 + par.kappa_p)
         closed, gap, d_p, q_p, d_t, q_t, impulse, t_close, opened = bar_contact(
             s.closed, s.gap, v_p, v_t, z_p, z_t, tau
         )
-        peak *= par.z_p / (par.z_p + par.z_t)
         book_end(s, par.z_p, par.kappa_p, in_p, d_p, q_p, tau)
         bars.wp[Row.FACE, par.n_p] = d_p / tau
     else:
@@ -214,14 +210,15 @@ def meet(par, s, bars, tau, blows, events):
     a_b = bit_acceleration(par, s)
     top, bottom = inner_waves(par, bars.wb, bars.cb, par.n_b, r, a_b * 0.5 * par.dt)
     kick = a_b * 0.5 * par.dt
-    elastic = -(2.0 * bars.wb[r + 1, 0] + kick)
-    v_t = (par.kappa_t * top - elastic) / (1.0 + par.kappa_t)
+    up = 2.0 * bars.wb[r + 1, 0] + kick
+    v_t = (par.kappa_t * top + up) / (1.0 + par.kappa_t)
     v_free = (2.0 * bars.wb[r, par.n_b - 1] + kick + par.kappa_b * bottom) / (1.0 + par.kappa_b)
     top_p = 0.0
     bottom_p = 0.0
     impulse = 0.0
     push = 0.0
     a_p = 0.0
+    peak = 0.0
     awake = par.piston != Piston.ABSENT and s.dormant == 0
     if awake:
         push = drive_force(par, s)
@@ -233,11 +230,12 @@ def meet(par, s, bars, tau, blows, events):
             v_f = (2.0 * bars.wp[r + 1, 0] + kick + par.kappa_f * top_p) / (1.0 + par.kappa_f)
             bars.wp[Row.FACE, 0] = v_f
             v_p = 2.0 * bars.wp[r, n - 1] + kick
-            elastic += v_p
             v_p = (v_p + par.kappa_p * bottom_p) / (1.0 + par.kappa_p)
+            # of the bit's end: waves that come to a viscous front have a peak that is not real
+            peak = s.closed * par.z_t * (bars.wb[r, 0] - bars.wb[r + 1, 0])
         else:
             v_p = s.v_p + kick
-            elastic += v_p
+            peak = par.z_t * (v_p - up)
         tau = time_to_cut(par, s, v_p - v_t, tau, time)
         if par.piston == Piston.ELASTIC:
             book_end(s, par.z_f, par.kappa_f, top_p, v_f * tau, v_f * v_f * tau, tau)
@@ -252,7 +250,7 @@ def meet(par, s, bars, tau, blows, events):
         v_t,
         bottom_p,
         top,
-        elastic,
+        peak,
         tau,
         time,
         blows,

@@ -56,7 +56,7 @@ QUANTITIES = {
         Quantity("impact_velocity", "impact velocity", 1.0, "m/s"),
         Quantity("rebound_velocity", "rebound velocity", 1.0, "m/s"),
         Quantity("peak_bit_force", "peak bit force", 1e-3, "kN"),
-        Quantity("peak_contact_force", "peak contact force", 1e-3, "kN"),
+        Quantity("peak_contact_force", "peak contact force (10 µs means)", 1e-3, "kN"),
         Quantity("peak_stress", "peak stress, mid-bit", 1e-6, "MPa"),
         Quantity("rock_energy", "energy into rock, a blow", 1.0, "J"),
         Quantity("resting_place", "resting place of the bit's end, from its start", 1e3, "mm"),
