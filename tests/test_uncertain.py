@@ -212,6 +212,14 @@ def test_differences_to_a_rate_of_the_cells_are_undecided(undamped, periodic, ca
     assert line.rstrip(" │").endswith("undecided")
 
 
+def test_a_run_without_loss_claims_no_error_by_its_cells(undamped, capsys):
+    assert undamped.errors == {}
+    assert not any("--accuracy" in text for text in undamped.warnings)
+    show_summary(undamped)
+    shown = " ".join(capsys.readouterr().out.split())
+    assert "No error by them is known" in shown
+
+
 def test_a_stationary_rate_of_the_cells_is_undecided():
     found = settled(Scene().replace(**{"effects.loss": False}), most_blows=40)
     assert found.summary()["rate_of_penetration_undecided"] is True
@@ -225,6 +233,8 @@ def test_an_error_of_a_ratio():
     rng = np.random.default_rng(3)
     a, b = rng.normal(5.0, 0.05, 200_000), rng.normal(4.0, 0.08, 200_000)
     assert change_error(5.0, 0.05, 4.0, 0.08) == pytest.approx(np.std(a / b), rel=0.01)
+    # however large the errors: 5 ± 1 and 15 ± 13 are not known to differ
+    assert change_error(5.0, 1.0, 15.0, 13.0) >= abs(5.0 / 15.0 - 1.0)
     assert change_error(1.0, None, 2.0, None) is None
     assert change_error(None, 1.0, 2.0, 1.0) is None
 

@@ -28,6 +28,7 @@ __all__ = [
 COMPARED = (
     "rate_of_penetration",
     "blow_period",
+    "blow_frequency",
     "impact_velocity",
     "rebound_velocity",
     "stroke",
@@ -226,15 +227,17 @@ def relative_change(value: float | None, base: float | None) -> float | None:
 def change_error(
     value: float | None, error: float | None, base: float | None, base_error: float | None
 ) -> float | None:
-    """Standard error of value / base - 1, whose errors are independent.
+    """Error of value / base - 1, where those of both are independent.
 
-    None where that is not defined, or one of the errors is not known.
+    No less than that of value - base, relative to the base: a difference within the errors
+    stays within them, however large they are. None where it is not defined, or one of the
+    errors is not known.
     """
     if value is None or base is None or relative_change(value, base) is None:
         return None
     if error is None or base_error is None:
         return None
-    return math.hypot(error, value / base * base_error) / abs(base)
+    return math.hypot(error, max(abs(value / base), 1.0) * base_error) / abs(base)
 
 
 def _difference_error(summary: dict[str, Any], base: dict[str, Any], key: str) -> float | None:

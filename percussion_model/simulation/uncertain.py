@@ -19,6 +19,8 @@ SMALL_ERROR = 1e-4
 SMALLEST_UNIT = 8
 # Greater numbers are written with an exponent.
 LARGEST_PLAIN = 1e8
+# Errors whose first digits are less are written with two.
+TWO_DIGITS = 3.55
 UNDECIDED = "undecided"
 # Before a number in a narrow column, or a difference, whose error is not known.
 ABOUT = "≈"
@@ -29,11 +31,11 @@ NOT_ESTIMATED = "error not estimated"
 # What stands below tables of means.
 NOT_THE_MODEL = "Whether model and rock are right is not in it."
 PLUS_MINUS = (
-    "± is the numerical error, by the size of the cells and the scatter of the blows; without "
+    "± is the estimated numerical error, by the size of the cells and the scatter of the blows; without "
     f"it a mean is known to its four digits. {NOT_THE_MODEL}"
 )
 PLUS_MINUS_OF_FALL = (
-    "± is the numerical error, by the size of the cells; without it a number is known to its "
+    "± is the estimated numerical error, by the size of the cells; without it a number is known to its "
     f"four digits. {NOT_THE_MODEL}"
 )
 EXACT = (
@@ -41,6 +43,10 @@ EXACT = (
     "to the digits shown. How far rigid bodies are from real ones is not in it."
 )
 OF_FEW_BLOWS = "The numbers are those of so few blows that neither error nor scatter is known."
+UNDAMPED = (
+    "Without structural loss waves never decay, and numbers depend on the cells. No error by them "
+    "is known: numbers have that of their scatter, or three digits."
+)
 WITHOUT_ESTIMATE = (
     "The error by the size of the cells was not estimated: numbers have three digits."
 )
@@ -49,6 +55,8 @@ WITHOUT_ESTIMATE = (
 def about_errors(summary: Mapping[str, Any]) -> str:
     """What stands below a table of a run: what its ± is, and what is not in it."""
     if not summary["errors"]:
+        if summary[BY_CELLS]:
+            return UNDAMPED
         few = 0 < summary["blows_after_settling"] < LEAST_BLOWS
         return OF_FEW_BLOWS if few else WITHOUT_ESTIMATE
     if summary["solver"] == "rigid":
@@ -92,8 +100,12 @@ def of_the_cells(value: float) -> str:
 
 
 def with_short_error(value: float, error: float) -> str:
-    """Return a number to the one digit that its error is known to: 17.5 ± 0.4, or 40 ± 30."""
-    place = math.floor(math.log10(float(f"{error:.0e}")))
+    """Return a number to the digits that its error is known to: 17.5 ± 0.4, or 19.3 ± 2.5.
+
+    One digit of the error, two where one would put it off by more than a seventh.
+    """
+    place = math.floor(math.log10(error))
+    place -= error < TWO_DIGITS * 10.0**place
     digits = max(-place, 0)
     return f"{round(value, -place):.{digits}f} ± {round(error, -place):.{digits}f}"
 
