@@ -31,12 +31,12 @@ NOT_ESTIMATED = "error not estimated"
 # What stands below tables of means.
 NOT_THE_MODEL = "Whether model and rock are right is not in it."
 PLUS_MINUS = (
-    "± is the estimated numerical error, by the size of the cells and the scatter of the blows; without "
-    f"it a mean is known to its four digits. {NOT_THE_MODEL}"
+    "± is the estimated numerical error, by the size of the cells and the scatter of the blows; "
+    f"without it a mean is known to its four digits. {NOT_THE_MODEL}"
 )
 PLUS_MINUS_OF_FALL = (
-    "± is the estimated numerical error, by the size of the cells; without it a number is known to its "
-    f"four digits. {NOT_THE_MODEL}"
+    "± is the estimated numerical error, by the size of the cells; without it a number is known "
+    f"to its four digits. {NOT_THE_MODEL}"
 )
 EXACT = (
     "Rigid bodies have no cells: ± is the scatter of the blows, and without it a number is exact "
