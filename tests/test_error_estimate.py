@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import pytest
 
@@ -175,3 +176,19 @@ def test_stepped_bars_state_an_error_that_covers():
     rate = explicit_rate(scene, 60, 2.0, 1.0)
     off = abs(result.rate_of_penetration / rate - 1.0)
     assert off <= result.rate_of_penetration_relative_error
+
+
+@pytest.mark.parametrize(
+    ("scene", "changes", "rate"),
+    [
+        # blows with five drilling cycles and few with six, which all have on most grids
+        ("stiff_rock", {"solver.cells": 80}, 10.34056e-3),
+        # half of the elements give another number of drilling cycles
+        ("chatter", {"solver.name": "fem"}, 19.16972e-3),
+    ],
+)
+def test_motions_near_a_threshold_have_errors_that_cover(scene, changes, rate):
+    """Rates of docs/accuracy."""
+    whole = Scene.from_toml(Path(__file__).parents[1] / "scenarios" / f"{scene}.toml")
+    result = simulate(whole.replace(**changes), 2.0)
+    assert abs(result.rate_of_penetration - rate) <= result.rate_of_penetration_error < 0.1 * rate

@@ -47,6 +47,9 @@ COMPARISON_WORK = 0.12
 FEWEST_BLOWS = 10
 # Words of the warning of a large error.
 LARGE = "may be off by"
+# Where blows have two numbers of drilling cycles, and one is this rare, the motion is near the
+# threshold between two: on another grid all blows may be of either kind.
+RARE = 0.25
 # Runs whose drilling cycles a blow differ by more, or by more than this share of them, are
 # of different motions; where there are dozens, one more or less is a smooth change.
 SAME_MOTION, SAME_SHARE = 0.5, 0.05
@@ -111,6 +114,12 @@ class GridRun:
         several = np.count_nonzero(np.abs(self.misfit) > FITS) > 1
         return None if several else float(np.sum(self.misfit))
 
+    @cached_property
+    def apart(self) -> float:
+        """Relative distance to the number over blows of one kind, where one of two is rare."""
+        kinds = _two_kinds(self.result.counted)
+        return _apart(self.value, [rate_of_blows(blows)[0] for blows in kinds])
+
     @property
     def useful(self) -> bool:
         """Whether there is a number to judge."""
@@ -128,10 +137,27 @@ class GridRun:
         scatter, found = scatter_over(blows), {}
         # what is the same for all numbers is found once
         shared = {name: getattr(self, name) for name in ("cycles", "largest", "signed")}
+        of_kinds = [numbers_over(kind) for kind in _two_kinds(blows)]
         for name, value in numbers_over(blows).items():
             found[name] = replace(self, number=(value, scatter.get(name, math.nan)))
-            vars(found[name]).update(shared)
+            apart = _apart(value, [numbers[name] for numbers in of_kinds])
+            vars(found[name]).update(shared, apart=apart)
         return found
+
+
+def _two_kinds(blows: np.ndarray) -> list[np.ndarray]:
+    """Blows by their drilling cycles, where these are two numbers and one is rare."""
+    kinds, counts = np.unique(blows["drilling_cycles"], return_counts=True)
+    if len(kinds) != 2 or counts.min() >= RARE * counts.sum():
+        return []
+    return [blows[blows["drilling_cycles"] == kind] for kind in kinds]
+
+
+def _apart(value: float, others: Sequence[float]) -> float:
+    """Greatest relative distance to other values of a number."""
+    if value == 0.0 or not others:
+        return 0.0
+    return float(np.nanmax([0.0, *(abs(other / value - 1.0) for other in others)]))
 
 
 @dataclass(frozen=True)
@@ -330,8 +356,7 @@ def errors_of_numbers(whole: GridRun, part: GridRun, others: Sequence[GridRun]) 
             known = [numbers[name] for numbers in compared if name in numbers]
             if others and not known:
                 continue
-            estimate = _estimate(of_part[name], known)
-            estimate = _of_whole(estimate, number)
+            estimate = _of_whole(_estimate(of_part[name], known), number)
             if name in COUNTS:  # grids that agree do so exactly
                 estimate = replace(estimate, floor=0.0)
             error = abs(number.value) * estimate.total
@@ -357,9 +382,10 @@ def _estimate(part: GridRun, others: Sequence[GridRun]) -> Estimate:
 
 
 def _of_whole(estimate: Estimate, whole: GridRun) -> Estimate:
-    """An estimate by a part of a run, with the scatter of all of it."""
+    """An estimate by a part of a run, with the scatter and the kinds of blows of all of it."""
     scatter = whole.scatter / abs(whole.value)
-    return replace(estimate, scatter=scatter if math.isfinite(scatter) else math.inf)
+    cells = max(estimate.cells, SPREAD_MARGIN * whole.apart) if whole.result.cells else 0.0
+    return replace(estimate, cells=cells, scatter=scatter if math.isfinite(scatter) else math.inf)
 
 
 def _judged(whole: GridRun, part: GridRun, others: Sequence[GridRun]) -> Result:
