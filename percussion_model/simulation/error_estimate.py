@@ -139,18 +139,21 @@ class GridRun:
         shared = {name: getattr(self, name) for name in ("cycles", "largest", "signed")}
         of_kinds = [numbers_over(kind) for kind in _two_kinds(blows)]
         for name, value in numbers_over(blows).items():
-            found[name] = replace(self, number=(value, scatter.get(name, math.nan)))
+            number = value, scatter.get(name, math.nan)
+            found[name] = one = GridRun(self.result, self.misfit, self.promised, number)
             apart = _apart(value, [numbers[name] for numbers in of_kinds])
-            vars(found[name]).update(shared, apart=apart)
+            vars(one).update(shared, _number=number, apart=apart)
         return found
 
 
 def _two_kinds(blows: np.ndarray) -> list[np.ndarray]:
     """Blows by their drilling cycles, where these are two numbers and one is rare."""
-    kinds, counts = np.unique(blows["drilling_cycles"], return_counts=True)
-    if len(kinds) != 2 or counts.min() >= RARE * counts.sum():
+    cycles = blows["drilling_cycles"]
+    few = cycles == (cycles.min() if len(cycles) else 0)
+    if few.all() or np.ptp(cycles[~few]) > 0:
         return []
-    return [blows[blows["drilling_cycles"] == kind] for kind in kinds]
+    kinds = [blows[few], blows[~few]]
+    return kinds if min(map(len, kinds)) < RARE * len(blows) else []
 
 
 def _apart(value: float, others: Sequence[float]) -> float:
@@ -384,8 +387,9 @@ def _estimate(part: GridRun, others: Sequence[GridRun]) -> Estimate:
 def _of_whole(estimate: Estimate, whole: GridRun) -> Estimate:
     """An estimate by a part of a run, with the scatter and the kinds of blows of all of it."""
     scatter = whole.scatter / abs(whole.value)
+    scatter = scatter if math.isfinite(scatter) else math.inf
     cells = max(estimate.cells, SPREAD_MARGIN * whole.apart) if whole.result.cells else 0.0
-    return replace(estimate, cells=cells, scatter=scatter if math.isfinite(scatter) else math.inf)
+    return Estimate(cells, estimate.fit, scatter, estimate.floor)
 
 
 def _judged(whole: GridRun, part: GridRun, others: Sequence[GridRun]) -> Result:
