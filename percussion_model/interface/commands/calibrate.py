@@ -153,7 +153,9 @@ def _show(found: Fit, scene: Scene) -> None:
     from percussion_model.interface.terminal import show_warnings
 
     table = Table()
-    interval = "interval, widened" if found.is_widened else f"interval, {100 * found.confidence:g} %"
+    interval = (
+        "interval, widened" if found.is_widened else f"interval, {100 * found.confidence:g} %"
+    )
     for heading in ("", "unit", "value", interval, "verdict"):
         table.add_column(heading, no_wrap=True, justify="right" if heading == "value" else "left")
     for key, one in found.estimates.items():

@@ -209,7 +209,9 @@ def _try_without_map(scene: Scene, duration: float) -> None:
     with progress("trying the run before the blow map is made"):
         refused = refused_run(scene, duration)
     if refused:
-        raise SimulationError(f"the blow map was not made, since it would refuse the run: {refused}")
+        raise SimulationError(
+            f"the blow map was not made, since it would refuse the run: {refused}"
+        )
 
 
 def _made_from(scene: Scene, duration: float | None, settle: float | None) -> dict[str, Any]:
