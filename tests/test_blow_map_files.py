@@ -21,6 +21,7 @@ from percussion_model.analysis.blow_maps import (
     map_file,
     node_count,
     outside_map,
+    refused_run,
 )
 from percussion_model.interface.cli import _guarded, app
 from percussion_model.solvers.blow_map import builder
@@ -251,12 +252,40 @@ def test_explain_says_what_a_table_would_cost_and_makes_none(cache, tmp_path, ca
     assert before["blow_map_to_make"]["blows"] == node_count(mapped(**TINY))
     assert before["setup_time"] > 0.0
     assert "not made yet" in call()
+    assert refused_run(mapped(**TINY), 1.0) == ""
+    assert list(cache.glob("*.npz")) == []
     make_map(mapped(**TINY), workers=1)
     after = json.loads(call("--json", "-"))
     assert set(after) == set(before)
     assert after["blow_map_to_make"] is None
     assert after["predicted_wall_time"] > 0.0
-    assert "not made yet" not in call()
+    text = " ".join(call().replace("│", " ").split())
+    assert "not made yet" not in text
+    # no coarser table is known: nothing is promised
+    assert "its error is not estimated" in text
+    assert "short runs" not in text
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"rock__unloading_ratio": 40.0}, "the piston falls back on the bit before"),
+        ({"drive__force": 9000.0}, "covers 2500 to 3500 N; blow_map.force_to widens it"),
+        ({"feed__force": 0.0}, "covers 2000 to 3500 N; blow_map.feed_from widens it"),
+    ],
+)
+def test_a_run_that_its_table_would_refuse_is_refused_before(
+    change, words, cache, tmp_path, capsys
+):
+    """What to change is said, and no minutes are spent."""
+    path = tmp_path / "scene.toml"
+    mapped(**change).to_toml(path)
+    code = _guarded(lambda: app(["run", str(path)], standalone_mode=False))
+    told = capsys.readouterr().err
+    assert code != 0
+    assert "the blow map was not made" in told
+    assert words in told
+    assert list(cache.glob("*.npz")) == []
 
 
 def test_the_cost_of_a_table_is_that_of_its_rocks_and_of_its_blows(monkeypatch):

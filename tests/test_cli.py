@@ -128,6 +128,17 @@ def test_explain(percussion):
         assert text in out
 
 
+def test_explain_promises_runs_for_the_error_only_where_there_are_any(percussion):
+    wave, promise = SCENARIOS / "reference.toml", "the short runs that tell its error come on top"
+    rigid = "no short runs on top, since there are no cells whose error they would tell"
+    for words, said in (([wave], promise), ([RIGID], rigid), ([wave, "--solver", "rigid"], rigid)):
+        code, out, _ = percussion("explain", *words)
+        assert code == 0
+        out = " ".join(out.replace("│", " ").split())
+        assert said in out
+        assert (promise in out) == (said == promise)
+
+
 @pytest.mark.parametrize("command", ["explain", "settled"])
 def test_a_bar_shows_what_a_command_waits_for(percussion, command, monkeypatch):
     monkeypatch.setattr(terminal, "_PATIENCE", 0.0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -24,6 +25,8 @@ from percussion_model.analysis.fitting.found import DAMPING, ENERGY
 from percussion_model.analysis.fitting.likelihood import RATIO, STIFFNESS, Likelihood, Series
 from percussion_model.analysis.fitting.predictions import predicted_reading
 from percussion_model.analysis.fitting.search import descend, roughness
+from percussion_model.interface.calibrated_scene import commented_fit
+from percussion_model.interface.plotting.calibration import draw_calibration
 
 # Of that many trials so many cover, but for one chance in a thousand on either side.
 CHANCE = 1e-3
@@ -45,6 +48,34 @@ def test_datum_and_peak_of_a_curve_without_noise_are_found():
 def test_a_curve_without_noise_gives_its_parameters_back():
     fit = fit_rock(Scene(), noisy_curve(0, noise=0.0))
     assert fit.changes() == pytest.approx({key: TRUTH[key] for key in (STIFFNESS, RATIO)}, rel=1e-6)
+
+
+def test_an_interval_that_roughness_widens_is_not_called_by_its_confidence():
+    """In figure, JSON and calibrated scene; chi-square of two reaches 5.99."""
+    pytest.importorskip("matplotlib")
+    fit = fit_rock(Scene(), CURVE)
+    assert fit.quantile == pytest.approx(-2.0 * math.log(0.05))
+    for found, widened in ((fit, False), (replace(fit, threshold=560.0), True)):
+        labels = [
+            text.get_text()
+            for part in draw_calibration(found).subfigs
+            for legend in part.legends
+            for text in legend.get_texts()
+        ]
+        assert ("95 % interval" in labels) == (not widened)
+        assert any("deviance of 560 (95 % alone: 5.99)" in one for one in labels) == widened
+        assert found.summary()["widened"] == widened
+        text = commented_fit(found, {}, "scene.toml")
+        assert ("their widened intervals" in text, "their 95 % intervals" in text) == (
+            widened,
+            not widened,
+        )
+
+
+def test_progress_promises_no_number_of_computations():
+    done = []
+    fit = fit_rock(Scene(), CURVE, progress=done.append)
+    assert done == list(range(1, fit.runs + 1))
 
 
 def test_intervals_of_a_curve_cover_as_often_as_they_say():

@@ -119,6 +119,7 @@ def test_a_calibration_says_on_a_pipe_that_it_runs(heard, tmp_path, monkeypatch)
     code = _guarded(lambda: app([*words, str(tmp_path / "slow.csv")], standalone_mode=False))
     assert code != BAD_INPUT
     assert heard.progress() >= 2
+    assert " of " not in heard.getvalue(), "how many computations there will be is not known"
 
 
 def test_what_ends_soon_says_nothing(heard, monkeypatch):

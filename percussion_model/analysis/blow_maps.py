@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -10,8 +11,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from percussion_model.scene.scene import Scene
+from percussion_model.scene.inputs import SimulationError
+from percussion_model.scene.scene import Scene, SceneError
+from percussion_model.simulation.simulate import Simulation
 from percussion_model.solvers.blow_map.builder import (
+    build_table,
     cache_folder,
     get_table,
     kept_table,
@@ -20,6 +24,7 @@ from percussion_model.solvers.blow_map.builder import (
 from percussion_model.solvers.blow_map.records import Axis
 from percussion_model.solvers.blow_map.refusals import notes_outside
 from percussion_model.solvers.blow_map.single_blow import SingleBlow
+from percussion_model.solvers.blow_map.solver import BlowMapSolver
 from percussion_model.solvers.blow_map.table import BlowTable, Nodes
 
 __all__ = [
@@ -31,10 +36,18 @@ __all__ = [
     "map_file",
     "node_count",
     "outside_map",
+    "refused_run",
 ]
 
 # The cost of a table is that of its blows at so many stiffnesses, so many at each.
 SAMPLED_STIFFNESSES, SAMPLED_BLOWS = 5, 8
+# A run is tried on a table of its own rock, feed and drive, which spans so much around each.
+AROUND = 1.001
+_TRIED = {
+    "stiffness": "rock.loading_stiffness",
+    "feed": "feed.force",
+    "force": "drive.force",
+}
 
 
 class MapCost(NamedTuple):
@@ -97,6 +110,39 @@ def map_file(scene: Scene) -> Path:
 def outside_map(scene: Scene) -> list[str]:
     """What of a scene itself its table would not answer: a text for each such parameter."""
     return notes_outside(mapped(scene))
+
+
+def refused_run(scene: Scene, duration: float) -> str:
+    """Say why the table of a scene would not answer in a run; empty if it would.
+
+    It is tried on a table of the rock, the feed and the drive of the scene alone: some hundred
+    blows, a second, where the whole table takes minutes.
+
+    Parameters
+    ----------
+    scene : Scene
+    duration : float
+        Simulated time [s].
+    """
+    scene = mapped(scene)
+    if outside := notes_outside(scene):
+        return outside[0]
+    changes = {}
+    for name, key in _TRIED.items():
+        ends = sorted((scene[key] / AROUND, scene[key] * AROUND))
+        changes |= {f"blow_map.{name}_from": ends[0], f"blow_map.{name}_to": ends[1]}
+    try:
+        small = scene.replace(**changes)
+    except SceneError:  # of a feed of zero, say, there is nothing around
+        return ""
+    with tempfile.TemporaryDirectory(prefix="percussion-") as folder:
+        table = build_table(small, Path(folder) / "table.part")
+    run = Simulation(small, record_events=False, solver=BlowMapSolver(small, table))
+    try:
+        run.advance(duration)
+    except SimulationError as error:
+        return str(error)
+    return ""
 
 
 def node_count(scene: Scene) -> int:

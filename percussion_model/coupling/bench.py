@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import random
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -18,8 +19,9 @@ from percussion_model.coupling.master import Coupling
 from percussion_model.coupling.port import OnWay
 from percussion_model.coupling.python_part import Given
 
-STEP = 1e-3  # [s]
-ROWS_EVERY = STEP  # peaks are those of a step
+STEP = 1e-3  # of the runs; rows are as often, since peaks are those of a step [s]
+# Held values have an error of first order in the step: twice what half of it changes.
+FINER, ERROR_FACTOR = 0.5, 2.0
 FEED = 3000.0  # what is wanted [N]
 # Limits of the rig: beyond them a second counts as a violation.
 HIGHEST_FEED, HIGHEST_TORQUE = 4000.0, 250.0  # [N], [N m]
@@ -29,7 +31,8 @@ MOST_VIOLATION, MOST_ERROR = 0.1, 0.25
 # Time before the feed is judged: the drill string has to come to rest [s].
 SETTLING = 0.5
 LATE = 1.0  # the last part of a run, in which the swing of the feed is measured [s]
-NOISE, DELAY = 0.05, 0.03  # of the sensors: share of the value, time [s]
+# Of the sensors: share of the value, time, time between samples [s].
+NOISE, DELAY, SAMPLING = 0.05, 0.03, 1e-3
 
 SIGNALS = (
     "string.lifted", "string.bit_impulse", "hammer.bit.force_peak", "hammer.blow_count",
@@ -60,14 +63,20 @@ def _pressure_loss() -> OnWay:
 def _bad_sensors() -> OnWay:
     chance = random.Random(1)
     waiting: dict[str, deque[Any]] = {}
+    sampled: dict[str, tuple[int, Any]] = {}
 
     def change(signal: str, time: float, value: Any) -> Any:
         if not signal.startswith("controller.") or isinstance(value, bool):
             return value
+        # a sensor has its own clock, whatever the communication step
+        count = math.floor(time / SAMPLING + 1e-6)
+        if signal in sampled and sampled[signal][0] == count:
+            return sampled[signal][1]
         queue = waiting.setdefault(signal, deque())
         queue.append(value)
-        late = queue.popleft() if len(queue) > round(DELAY / STEP) else queue[0]
-        return late * (1.0 + NOISE * chance.gauss(0.0, 1.0))
+        late = queue.popleft() if len(queue) > round(DELAY / SAMPLING) else queue[0]
+        sampled[signal] = count, late * (1.0 + NOISE * chance.gauss(0.0, 1.0))
+        return sampled[signal][1]
 
     return change
 
@@ -124,6 +133,12 @@ class Score:
         peak_force [N], violations [s], feed_error [1], swing [1].
     faults : list of str
         Why the run has failed; empty if it has not.
+    points_error : float or None
+        By the communication step; None where that was not estimated.
+    errors : dict
+        The same of the numbers; empty where that was not estimated.
+    doubt : str
+        What half the step does in another way, so that it is not known whether the run fails.
     """
 
     trial: str
@@ -132,6 +147,9 @@ class Score:
     error: str
     run: CoupledRun = field(repr=False)
     faults: list[str] = field(default_factory=list)
+    points_error: float | None = None
+    errors: dict[str, float] = field(default_factory=dict)
+    doubt: str = ""
 
 
 def judge(trial: Trial, run: CoupledRun) -> Score:
@@ -177,6 +195,28 @@ def _faults(numbers: Mapping[str, float], share: float, error: str) -> list[str]
     return found
 
 
+def with_step_error(score: Score, finer: Score) -> Score:
+    """A score with its errors by the communication step.
+
+    Parameters
+    ----------
+    score, finer : Score
+        Of the same run, with the usual step and with `FINER` of it.
+    """
+    changes = {name: abs(finer.numbers[name] - value) for name, value in score.numbers.items()}
+    errors = {name: ERROR_FACTOR * change for name, change in changes.items()}
+    points = abs(finer.points - score.points)
+    if bool(score.faults) == bool(finer.faults):
+        return replace(score, points_error=ERROR_FACTOR * points, errors=errors)
+    failed = "; ".join(finer.faults)
+    doubt = (
+        f"at half the step it fails: {failed}" if failed else "at half the step it does not fail"
+    )
+    # a run that ended early has numbers of another stretch
+    known = {} if score.error or finer.error else errors
+    return replace(score, points_error=points, errors=known, doubt=doubt)
+
+
 class Watch(Protocol):
     """What is told how far a bench has come."""
 
@@ -195,6 +235,7 @@ def bench(
     progress: Callable[[Score], None] | None = None,
     trust: bool = False,
     watch: Watch | None = None,
+    check_step: bool = True,
 ) -> list[Score]:
     """Put a controller through the standard runs.
 
@@ -217,30 +258,39 @@ def bench(
     watch : optional
         Is told by its `stage` which run begins, with the simulated times of it, of those before
         it and of all, and called with the time reached [s].
+    check_step : bool
+        Whether each run is done with half the communication step as well, which tells the
+        error of its score.
     """
     names = [trial.name for trial in TRIALS]
     for name in trials:
         if name not in names:
             raise CouplingError(f"there is no run {name}: there are {', '.join(names)}")
-    found = []
-    kept = kept_values(controller)
     chosen = [trial for trial in TRIALS if not trials or trial.name in trials]
-    whole, before = sum(trial.duration for trial in chosen), 0.0
+    steps = (STEP, FINER * STEP) if check_step else (STEP,)
+    whole = len(steps) * sum(trial.duration for trial in chosen)
+    kept = kept_values(controller)
+    before = 0.0
+    found: list[Score] = []
     for k, trial in enumerate(chosen, 1):
-        if watch is not None:
-            name = f"run {k} of {len(chosen)}, {trial.name}"
-            watch.stage(name, trial.duration, before, whole)
-        before += trial.duration
-        coupling = Coupling(
-            system,
-            {**trial.parameters, **(parameters or {})},
-            replaced=None if controller is None else {"controller": controller},
-            on_way=None if trial.on_way is None else trial.on_way(),
-            trust=trust,
-        )
-        run = coupling.run(trial.duration, STEP, SIGNALS, ROWS_EVERY, progress=watch)
-        found.append(judge(trial, run))
-        _refuse_changed(controller, kept)
+        runs = []
+        for step in steps:
+            if watch is not None:
+                again = "" if step == STEP else ", with half the step"
+                name = f"run {k} of {len(chosen)}, {trial.name}{again}"
+                watch.stage(name, trial.duration, before, whole)
+            before += trial.duration
+            coupling = Coupling(
+                system,
+                {**trial.parameters, **(parameters or {})},
+                replaced=None if controller is None else {"controller": controller},
+                on_way=None if trial.on_way is None else trial.on_way(),
+                trust=trust,
+            )
+            run = coupling.run(trial.duration, step, SIGNALS, step, progress=watch)
+            runs.append(judge(trial, run))
+            _refuse_changed(controller, kept)
+        found.append(with_step_error(*runs) if check_step else runs[0])
         if progress is not None:
             progress(found[-1])
     return found
@@ -260,3 +310,10 @@ def _refuse_changed(controller: Any, before: Mapping[str, bytes]) -> None:
 def mean_points(scores: Sequence[Score]) -> float:
     """Mean of the points."""
     return float(np.mean([score.points for score in scores])) if scores else 0.0
+
+
+def mean_points_error(scores: Sequence[Score]) -> float | None:
+    """Mean of the errors of the points, which are of one cause; None where one is not known."""
+    errors = [score.points_error for score in scores]
+    known = [error for error in errors if error is not None]
+    return float(np.mean(known)) if known and len(known) == len(errors) else None

@@ -214,7 +214,9 @@ def judge_run(
     if not numbers:
         text = "no part keeps a balance and none exchange real numbers, so nothing can be told"
         return Verdict("undecided", text, None, [], remarks, numbers)
-    return Verdict("balanced", _praise(numbers), None, [], remarks, numbers)
+    size = f"steps of at most {_ms(step)} are" if controlled else f"step of {_ms(step)} is"
+    text = f"the communication {size} short enough: {_praise(numbers)}"
+    return Verdict("balanced", text, None, [], remarks, numbers)
 
 
 _BALANCES = ("string_energy_residual", "hammer_energy_residual", "shoulder_by_blows")

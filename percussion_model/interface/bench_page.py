@@ -23,6 +23,13 @@ from percussion_model.coupling.bench import (
     TRIALS,
     Score,
 )
+from percussion_model.interface.bench_text import (
+    COLUMNS,
+    about_errors,
+    cells,
+    mean_text,
+    points_text,
+)
 from percussion_model.interface.plotting.style import save_png
 from percussion_model.simulation.files import staged
 
@@ -35,21 +42,12 @@ STYLE = (
     "dl{display:grid;grid-template-columns:max-content auto;gap:.1em 1em}dd{margin:0}"
 )
 PAGE = "index.html"
-Columns = Sequence[tuple[str, str, float, str]]
 TEXTS = {trial.name: trial.text for trial in TRIALS}
 VOID_COLOUR, LIMIT_COLOUR = "#dddddd", "#bb0000"
 
 
-def write_bench_page(
-    scores: Sequence[Score], points: float, columns: Columns, folder: Path, title: str
-) -> Path:
-    """Write a figure for each run and one page with all, everything or nothing; return the page.
-
-    Parameters
-    ----------
-    columns : sequence of tuple
-        Name of a number, head of its column, factor, and what it is.
-    """
+def write_bench_page(scores: Sequence[Score], folder: Path, title: str) -> Path:
+    """Write a figure for each run and one page with all, everything or nothing; return the page."""
     failed = [score.trial for score in scores if score.faults]
     verdict = (
         f'<span class="bad">{len(failed)} of {len(scores)} runs failed: {", ".join(failed)}</span>'
@@ -59,11 +57,12 @@ def write_bench_page(
     parts = [
         f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>{escape(title)}'
         f"</title><style>{STYLE}</style></head><body><h1>Controller bench: {escape(title)}</h1>"
-        f"<p><b>{points:.1f} of 100 points, the mean of the runs; {verdict}.</b></p>",
+        f"<p><b>{mean_text(scores)} of 100 points, the mean of the runs; {verdict}.</b></p>",
         _rules(),
-        _table(scores, columns),
+        _table(scores),
+        f"<p>{escape(about_errors(scores))}</p>",
         "<dl>" + "".join(f"<dt>{escape(head)}</dt><dd>{escape(text)}</dd>"
-                         for _, head, _, text in columns) + "</dl>",
+                         for _, head, _, text in COLUMNS) + "</dl>",
     ]  # fmt: skip
     with staged(folder) as draft:
         for score in scores:
@@ -78,6 +77,7 @@ def _section(score: Score, figure: Path) -> list[str]:
     return [
         f'<h2 id="{score.trial}">{score.trial}: {escape(TEXTS.get(score.trial, ""))}</h2>',
         *(f'<p class="bad">{escape(fault)}</p>' for fault in score.faults),
+        *([f'<p class="bad">{escape(score.doubt)}</p>'] if score.doubt else []),
         f'<img alt="feed, rig force, depth and torque over time in the run {score.trial}" '
         f'src="data:image/png;base64,{picture}">',
     ]
@@ -96,17 +96,18 @@ def _rules() -> str:
     )
 
 
-def _table(scores: Sequence[Score], columns: Columns) -> str:
+def _table(scores: Sequence[Score]) -> str:
     head = "".join(
-        f'<th title="{escape(text)}">{escape(head)}</th>' for _, head, _, text in columns
+        f'<th title="{escape(text)}">{escape(head)}</th>' for _, head, _, text in COLUMNS
     )
     rows = [f"<table><tr><th>run</th><th>what happens</th><th>points</th>{head}</tr>"]
     for score in scores:
-        cells = "".join(f"<td>{factor * score.numbers[n]:.3g}</td>" for n, _, factor, _ in columns)
+        numbers = "".join(f"<td>{text}</td>" for text in cells(score))
+        points = points_text(score.points, score.points_error)
         kind = ' class="bad"' if score.faults else ""
         rows.append(
             f'<tr{kind}><td><a href="#{score.trial}">{score.trial}</a></td>'
-            f"<td>{escape(TEXTS.get(score.trial, ''))}</td><td>{score.points:.1f}</td>{cells}</tr>"
+            f"<td>{escape(TEXTS.get(score.trial, ''))}</td><td>{points}</td>{numbers}</tr>"
         )
     return "".join([*rows, "</table>"])
 

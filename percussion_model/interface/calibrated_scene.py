@@ -38,7 +38,8 @@ def commented_fit(found: Fit, written: Mapping[str, float], scene: str) -> str:
         kind = "given" if one.noise_is_given else "estimated"
         data = "1 number" if len(one.data) == 1 else f"{len(one.data)} data"
         lines.append(f"  {one.name}: {data}, noise {one.noise:.3g} {one.unit} ({kind})")
-    lines += ["", f"Parameters and their {100 * found.confidence:g} % intervals, all together:"]
+    kind = "widened" if found.is_widened else f"{100 * found.confidence:g} %"
+    lines += ["", f"Parameters and their {kind} intervals, all together:"]
     for key, symbol in NAMES.items():
         estimate, unit = found.estimates.get(key), rows_by_key()[key].unit
         if estimate is None:

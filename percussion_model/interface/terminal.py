@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from percussion_model.analysis.study import Study
     from percussion_model.scene.scene import Scene
     from percussion_model.simulation.result import Result
+    from percussion_model.solvers.base import Solver
     from percussion_model.verification.hard_cases import Collection
     from percussion_model.verification.paper.statements import Statement
 
@@ -212,9 +213,7 @@ def show_explanation(scene: Scene, found: Forecast) -> None:
         if scene.solver.accuracy is not None:
             within += " if the motion is periodic"
         whole = f"about {found.wall_time:.2g} s ({within}) for {found.duration:g} s simulated{runs}"
-        if scene.solver.accuracy is None and scene.run.error_estimate:
-            whole += "; the short runs that tell its error come on top"
-        table.add_row("Predicted cost of the run", whole)
+        table.add_row("Predicted cost of the run", f"{whole}{_cost_of_errors(scene, solver)}")
     if found.blow_map is not None:
         blows, cost = found.blow_map
         words = f"not made yet: {blows:,} blows, about {cost:.2g} s of one processor"
@@ -232,6 +231,25 @@ def show_explanation(scene: Scene, found: Forecast) -> None:
     if found.refused:
         table.add_row("Ceiling", found.refused)
     print_table(table)
+
+
+def _cost_of_errors(scene: Scene, solver: Solver | None) -> str:
+    """Say what the errors of the numbers of a run add to its cost; nothing if they are not asked.
+
+    Parameters
+    ----------
+    scene : Scene
+    solver : Solver or None
+        Of the scene; None where it has not been made.
+    """
+    if solver is None or scene.solver.accuracy is not None or not scene.run.error_estimate:
+        return ""
+    coarser = solver.coarser_scenes()
+    if coarser is None:
+        return "; its error is not estimated: no coarser runs are known for this solver"
+    if not coarser:
+        return "; no short runs on top, since there are no cells whose error they would tell"
+    return "; the short runs that tell its error come on top"
 
 
 # Units that scales are shown in, by SI unit.

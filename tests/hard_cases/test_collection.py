@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -76,6 +77,18 @@ def test_what_must_hold_of_every_run(name, solver):
     found = measure(hard_cases()[name], solver, 1.0 if LONG else SHARES[solver])
     assert violations(found.to_dict()) == []
     assert found.duration > 0.0
+
+
+def test_the_ceiling_of_events_is_one_of_a_blow_and_not_of_its_first_burst():
+    """The first 10 ms have 400 events, the whole 0.5 s 4500, and at most 20 000 a second."""
+    case = hard_cases()["gamma_1000"]
+    short = measure(case, "rigid", 0.02, again=False)
+    assert short.events_per_second > case.ceiling
+    assert violations(short.to_dict()) == []
+    # five times as many would be too many for a blow as well, and whole runs are held as before
+    low = measure(replace(case, ceiling=0.2 * case.ceiling), "rigid", 0.02, again=False)
+    assert any("events_per_second" in text for text in violations(low.to_dict()))
+    assert measure(case, "rigid", 0.1, again=False).ceiling == case.ceiling
 
 
 @pytest.mark.skipif(not LONG, reason="PERCUSSION_LONG=1 runs every case on a finer grid")

@@ -9,12 +9,21 @@ import numpy as np
 import pytest
 
 from percussion_model.coupling import CouplingError
-from percussion_model.coupling.bench import TRIALS, bench, judge, mean_points
+from percussion_model.coupling.bench import (
+    TRIALS,
+    bench,
+    judge,
+    mean_points,
+    mean_points_error,
+    with_step_error,
+)
 from percussion_model.coupling.coupled_run import CoupledRun
 from percussion_model.interface.bench_page import write_bench_page
+from percussion_model.interface.bench_text import COLUMNS, about_errors, cells, points_text
 from percussion_model.interface.cli import main
-from percussion_model.interface.commands.bench_controller import COLUMNS
 from percussion_model.interface.terminal import RunProgress
+
+COLUMN = {name: k for k, (name, *_) in enumerate(COLUMNS)}
 
 
 def nothing(inputs, time, step):
@@ -25,7 +34,7 @@ def test_the_bench_ranks_nothing_below_a_bad_pi_below_a_good_one(feed_control):
     """A new rod brings half a kilonewton, which nobody but a controller takes away."""
     bad = {"controller.pi.gain": 0.1, "controller.pi.time": 0.4}
     points = [
-        mean_points(bench(feed_control, controller, values, ["rod"]))
+        mean_points(bench(feed_control, controller, values, ["rod"], check_step=False))
         for controller, values in ((nothing, {}), (None, bad), (None, {}))
     ]
     assert points[0] > 0.0
@@ -44,10 +53,10 @@ def test_the_share_that_is_done_rises_over_all_runs(feed_control):
 
 def test_nothing_fails_where_the_bit_is_held(feed_control):
     """Something has to be done about a jam; what ships does it in time."""
-    (idle,) = bench(feed_control, nothing, trials=["jam"])
+    (idle,) = bench(feed_control, nothing, trials=["jam"], check_step=False)
     assert idle.points == 0.0
     assert "beyond the limits of feed or torque" in idle.faults[0]
-    (retracting,) = bench(feed_control, trials=["jam"])
+    (retracting,) = bench(feed_control, trials=["jam"], check_step=False)
     assert retracting.faults == []
     assert retracting.numbers["violations"] < 0.6 * idle.numbers["violations"]
 
@@ -109,8 +118,8 @@ def test_a_bad_controller_fails_visibly(feed_control, tmp_path, monkeypatch, cap
 def test_an_interrupted_bench_keeps_the_runs_that_are_done(
     feed_control, tmp_path, monkeypatch, capsys
 ):
-    def interrupted(system, controller, values, trials, take, trust, watch):
-        bench(system, controller, values, ["rod"], take, trust, watch)
+    def interrupted(system, controller, values, trials, take, trust, watch, check_step):
+        bench(system, controller, values, ["rod"], take, trust, watch, check_step)
         raise KeyboardInterrupt
 
     monkeypatch.setattr("percussion_model.coupling.bench.bench", interrupted)
@@ -181,9 +190,7 @@ def test_a_run_fails_for_a_reason(changes, faults):
 
 def test_the_page_says_what_a_stranger_needs(tmp_path):
     scores = [judge(TRIALS[0], made_up(3000.0)), judge(TRIALS[3], made_up(2000.0))]
-    page = write_bench_page(scores, mean_points(scores), COLUMNS, tmp_path, "<mine>").read_text(
-        "utf-8"
-    )
+    page = write_bench_page(scores, tmp_path, "<mine>").read_text("utf-8")
     assert "Controller bench: &lt;mine&gt;" in page
     assert "1 of 2 runs failed: void" in page
     assert page.count("<img alt=") == 2
@@ -198,13 +205,75 @@ def test_the_page_says_what_a_stranger_needs(tmp_path):
 def test_a_page_that_cannot_be_finished_leaves_the_old_one(tmp_path):
     """Its figures too: they would belong to another run."""
     scores = [judge(TRIALS[0], made_up(3000.0))]
-    write_bench_page(scores, mean_points(scores), COLUMNS, tmp_path, "first")
+    write_bench_page(scores, tmp_path, "first")
     before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
     scores = [judge(TRIALS[0], made_up(2900.0)), judge(TRIALS[3], made_up(2000.0))]
     del scores[1].run.columns["hammer.bit.position"]
     with pytest.raises(KeyError):
-        write_bench_page(scores, mean_points(scores), COLUMNS, tmp_path, "second")
+        write_bench_page(scores, tmp_path, "second")
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
+def test_a_score_has_its_error_by_the_step():
+    """Twice the change, as an error of first order has it; none where half the step was not run."""
+    score, finer = judge(TRIALS[3], made_up(2900.0)), judge(TRIALS[3], made_up(2880.0))
+    found = with_step_error(score, finer)
+    assert (found.points, found.numbers) == (score.points, score.numbers)
+    assert found.points_error == pytest.approx(2.0 * 100.0 * 20.0 / 3000.0)
+    assert found.errors["feed_error"] == pytest.approx(2.0 * 20.0 / 3000.0)
+    assert found.errors["peak_force"] == 0.0
+    assert cells(found)[COLUMN["feed_error"]] == "3±1"
+    assert cells(found)[COLUMN["peak_force"]] == "500"
+    assert points_text(found.points, found.points_error) == "97±1"
+    assert "twice what half the step changes" in about_errors([found])
+    assert mean_points_error([found, score]) is None
+    assert points_text(score.points, score.points_error) == "96.7"
+    assert "was not estimated" in about_errors([score])
+
+
+def test_a_run_that_fails_with_one_step_alone_is_in_doubt():
+    good, bad = judge(TRIALS[0], made_up(3000.0)), judge(TRIALS[0], made_up(2000.0))
+    for score, finer, words in ((good, bad, "it fails: the feed is off"), (bad, good, "not fail")):
+        found = with_step_error(score, finer)
+        assert words in found.doubt
+        assert found.points_error == pytest.approx(100.0)
+    assert with_step_error(bad, bad).doubt == ""
+
+
+def test_a_bench_runs_with_half_the_step_too(feed_control, tmp_path, monkeypatch, capsys):
+    """Errors hold what a quarter of the step finds; without them that is said."""
+    words = ["bench-controller", "--system", str(feed_control), "--trial", "rod",
+             "--json", str(tmp_path / "numbers.json"), "--out", str(tmp_path / "out")]  # fmt: skip
+    found = {}
+    for extra in ([], ["--no-step-check", "--force"]):
+        monkeypatch.setattr("sys.argv", ["percussion", *words, *extra])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        assert ended.value.code == 0
+        said = " ".join(capsys.readouterr().out.split())
+        (found[bool(extra)],) = json.loads((tmp_path / "numbers.json").read_text())["trials"]
+        assert ("twice what half the step changes" in said) == (not extra)
+        assert ("by the communication step of 1 ms was not estimated" in said) == bool(extra)
+        page = (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
+        assert ("was not estimated" in page) == bool(extra)
+    checked, bare = found[False], found[True]
+    assert (bare["points_error"], bare["errors"]) == (None, {})
+    assert checked["points"] == bare["points"]
+    monkeypatch.setattr("percussion_model.coupling.bench.STEP", 2.5e-4)
+    (fine,) = bench(feed_control, trials=["rod"], check_step=False)
+    assert 0.0 < abs(fine.points - checked["points"]) <= checked["points_error"]
+    for name in ("depth", "overshoot", "feed_error"):
+        assert abs(fine.numbers[name] - checked[name]) <= checked["errors"][name]
+
+
+def test_sensors_do_not_depend_on_the_step():
+    """They have a clock of their own: half the step sees each sample twice."""
+    (trial,) = (one for one in TRIALS if one.name == "sensors")
+    usual, half = trial.on_way(), trial.on_way()
+    coarse = [usual("controller.feed_force", 1e-3 * k, float(k)) for k in range(100)]
+    fine = [half("controller.feed_force", 5e-4 * k, float(k // 2)) for k in range(200)]
+    assert fine[::2] == coarse
+    assert fine[1::2] == coarse
 
 
 @pytest.mark.parametrize("name", ["nothing", "rods"])

@@ -50,9 +50,15 @@ def test_a_table_of_a_bench_is_whole_and_its_runs_are_told_elsewhere(
     told = "".join(lines)
     assert "run 1 of 2, soft, " in told
     assert "run 2 of 2, rod, " in told
-    rows = capsys.readouterr().out.splitlines()
-    assert [row.split()[0] for row in rows[-4:]] == ["run", "soft", "rod", "mean"]
-    assert all(row.startswith(" ") for row in rows[:-4])
+    rows = [row.split() for row in capsys.readouterr().out.splitlines()]
+    # one block of columns below the other
+    begins = [k for k, row in enumerate(rows) if row[0] == "run"]
+    assert len(begins) == 2
+    for k in begins:
+        assert [row[0] for row in rows[k + 1 : k + 3]] == ["soft", "rod"]
+    assert rows[begins[-1] + 3][:4] == ["mean", "of", "the", "points:"]
+    units = [word for row in rows for word in row if word.startswith("[")]
+    assert units == ["[mm]", "[MJ/m]", "[%]", "[%]", "[%]", "[s]", "[kN]", "[s]"]
 
 
 @pytest.mark.parametrize("name", COMMANDS)

@@ -17,6 +17,7 @@ from percussion_model.analysis.fitting.found import (
     OPEN_ABOVE,
     OPEN_BELOW,
     RIVALLED,
+    ROUGH_FACTOR,
     WIDE,
     Estimate,
     Explained,
@@ -104,9 +105,6 @@ TOLD = 20.0
 ROUNDS, BETTER = (0.4, 0.6), 0.25
 # A parameter whose interval is wider than this factor is not called determined.
 MOST_WIDTH = 10.0
-# The deviance may be off by the roughness at the best place and at the other: the threshold is
-# higher by so many of it.
-ROUGH_FACTOR = 2.0
 
 
 def fit_rock(
@@ -117,7 +115,7 @@ def fit_rock(
     parameters: Sequence[str] | None = None,
     ranges: Mapping[str, tuple[float, float]] | None = None,
     confidence: float = 0.95,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Callable[[int], None] | None = None,
 ) -> Fit:
     """Fit the rock of a scene to all measurements together.
 
@@ -142,7 +140,7 @@ def fit_rock(
     confidence : float
         Of the intervals together: they span the region of that confidence of all parameters.
     progress : callable, optional
-        Called with the number of computations done, and with an estimate of all.
+        Called with the number of computations done. How many there will be is not known.
 
     Returns
     -------
@@ -167,11 +165,12 @@ def fit_rock(
         raise FitError("nothing to fit: a curve, a drop or a reading is needed")
     names = _chosen(scene, sources, parameters)
     box = _box(scene, names, ranges or {})
-    counter = _Counter(progress, _expected(names, curve is not None, len(sources)))
+    counter = _Counter(progress)
     whole = Likelihood(scene, [_series(one) for one in sources], names, box, counter.tick)
     minima = _minima(whole, sources, counter)
-    found = _explored(whole, minima, _quantile(confidence, len(names)))
-    return _result(whole, sources, found, confidence, counter.done)
+    quantile = _quantile(confidence, len(names))
+    found = _explored(whole, minima, quantile)
+    return _result(whole, sources, found, confidence, quantile, counter.done)
 
 
 def _quantile(confidence: float, free: int) -> float:
@@ -186,25 +185,16 @@ def _quantile(confidence: float, free: int) -> float:
 
 
 class _Counter:
-    """Computations done, passed on with an estimate of all."""
+    """Computations done, passed on."""
 
-    def __init__(self, progress: Callable[[int, int], None] | None, expected: int) -> None:
-        self.done, self.expected, self._progress = 0, expected, progress
+    def __init__(self, progress: Callable[[int], None] | None) -> None:
+        self.done, self._progress = 0, progress
 
     def tick(self) -> None:
         """Count one more."""
         self.done += 1
         if self._progress is not None:
-            self._progress(self.done, max(self.expected, self.done + 1))
-
-
-def _expected(names: Sequence[str], with_curve: bool, sources: int) -> int:
-    """About how many places a fit computes."""
-    steps = steps_wanted(len(names))
-    if with_curve and sources == 1:
-        return steps
-    points = 3 * VALUES[DAMPING] * VALUES[ENERGY] if with_curve else POINTS * LEVELS
-    return points + 20 * (STARTS + FINALISTS) + steps
+            self._progress(self.done)
 
 
 def _chosen(
@@ -389,6 +379,7 @@ def _result(
     sources: Sequence[Source],
     explored: Explored,
     confidence: float,
+    quantile: float,
     runs: int,
 ) -> Fit:
     """Put a fit together."""
@@ -412,13 +403,15 @@ def _result(
         *interval_notes(estimates, like),
         *kept_notes(like, all(isinstance(one, Curve) for one in sources)),
         *([] if settled else [UNSETTLED]),
-        *rough_notes((threshold - _quantile(confidence, len(like.names))) / ROUGH_FACTOR),
+        *rough_notes((threshold - quantile) / ROUGH_FACTOR),
         *gap_notes(like, profiles),
         *rival_notes(rivals),
         *(note for one in explained for note in correlation_note(one)),
         *grid_notes(like, best, spread, profiles),
     ]
-    return Fit(estimates, confidence, threshold, explained, rivals, curves, runs, warnings)
+    return Fit(
+        estimates, confidence, quantile, threshold, explained, rivals, curves, runs, warnings
+    )
 
 
 def _estimate(at: float, found: Profile, low: float, high: float) -> Estimate:

@@ -24,6 +24,9 @@ Source = Curve | DropTest | Reading
 DETERMINED, RIVALLED = "determined", "rival"
 OPEN_ABOVE, OPEN_BELOW, OPEN = "open above", "open below", "open"
 WIDE = "not determined"
+# The deviance may be off by the roughness at the best place and at the other: the threshold is
+# higher by so many of it. A roughness from `ROUGH` on is told.
+ROUGH_FACTOR, ROUGH = 2.0, 1.0
 
 
 class Estimate(NamedTuple):
@@ -95,9 +98,12 @@ class Fit:
     estimates : dict of Estimate
         By the dotted key of the parameter.
     confidence : float
-        Of the intervals, all of them together.
+        Of the intervals, all of them together, unless they are widened.
+    quantile : float
+        Deviance above the best to which the region of that confidence reaches.
     threshold : float
-        Deviance above the best at their ends.
+        Deviance above the best at the ends of the intervals: the quantile, and what the
+        roughness of the likelihood adds.
     explained : list of Explained
         Each series of measurements.
     rivals : list of Rival
@@ -112,12 +118,23 @@ class Fit:
 
     estimates: dict[str, Estimate]
     confidence: float
+    quantile: float
     threshold: float
     explained: list[Explained]
     rivals: list[Rival]
     profiles: dict[str, tuple[np.ndarray, np.ndarray]] = field(repr=False)
     runs: int
     warnings: list[str]
+
+    @property
+    def roughness(self) -> float:
+        """Size of the many small dips of the deviance."""
+        return (self.threshold - self.quantile) / ROUGH_FACTOR
+
+    @property
+    def is_widened(self) -> bool:
+        """Whether that makes the intervals wider than those of `confidence`."""
+        return self.roughness >= ROUGH
 
     def changes(self, undetermined: bool = False) -> dict[str, float]:
         """Fitted parameters for `Scene.replace`; without those that are not determined."""
@@ -132,6 +149,9 @@ class Fit:
         return {
             "estimates": {key: found._asdict() for key, found in self.estimates.items()},
             "confidence": self.confidence,
+            "quantile": self.quantile,
+            "threshold": self.threshold,
+            "widened": self.is_widened,
             "measurements": {
                 one.name: {"data": len(one.data), "noise": one.noise} for one in self.explained
             },

@@ -14,6 +14,7 @@ from percussion_model.analysis.fitting.found import (
     OPEN,
     OPEN_ABOVE,
     OPEN_BELOW,
+    ROUGH,
     WIDE,
     Estimate,
     Explained,
@@ -24,8 +25,6 @@ from percussion_model.analysis.fitting.sampling import Profile
 from percussion_model.analysis.fitting.search import LEAST_STEP, MOST_STEP, STEP_SHARE
 from percussion_model.solvers.base import make_solver
 
-# A rough likelihood is told from dips of this size on, in twice its logarithm.
-ROUGH = 1.0
 UNSETTLED = (
     "the search met ever better places and no end of it: the best may not be among them, "
     "and intervals may be too narrow"
@@ -86,7 +85,7 @@ def rough_notes(rough: float) -> list[str]:
         return []
     return [
         f"the likelihood is rough: many small dips, of about {rough:.2g} in twice its logarithm; "
-        "intervals are widened for that"
+        "intervals are widened for that by a rule of thumb, and their confidence is not known"
     ]
 
 

@@ -15,21 +15,6 @@ from percussion_model.interface.commands.couple import read_value
 if TYPE_CHECKING:
     from percussion_model.coupling.bench import Score
 
-# Name, head, factor, and what it is.
-COLUMNS = (
-    ("depth", "depth [mm]", 1e3, "of the bit at the end"),
-    ("energy_per_metre", "energy [MJ/m]", 1e-6, "work of supply and rig by the depth"),
-    ("feed_error", "feed error [%]", 100.0, "mean distance of the feed from what is wanted"),
-    ("overshoot", "overshoot [%]", 100.0, "greatest feed above what is wanted"),
-    ("swing", "swing [%]", 100.0, "half the range of the feed in the last second"),
-    ("time_off_bottom", "off bottom [s]", 1.0, "time in which the shoulder is off the bit"),
-    ("dry_blows", "dry blows", 1.0, "blows in a void with the bit or the shoulder off"),
-    ("peak_force", "peak force [kN]", 1e-3, "greatest force of the rock on the bit"),
-    ("violations", "beyond limits [s]", 1.0, "time beyond the limits of feed and torque"),
-)
-# Characters of the first two columns of the table.
-NAME, POINTS = 10, 6
-
 
 def bench_controller(
     controller: Annotated[
@@ -49,6 +34,12 @@ def bench_controller(
         list[str] | None,
         typer.Option("--set", metavar="VARIABLE=VALUE", help="Set a variable of the controller."),
     ] = None,
+    step_check: Annotated[
+        bool,
+        typer.Option(
+            help="Do each run with half the communication step too, for the errors of the scores."
+        ),
+    ] = True,
     trust: common.Trust = False,
     out: common.Out = None,
     json_file: common.JsonFile = None,
@@ -58,7 +49,7 @@ def bench_controller(
     from percussion_model.interface.terminal import progress, progress_bar
 
     try:
-        from percussion_model.coupling.bench import bench, mean_points
+        from percussion_model.coupling.bench import STEP, bench, mean_points, mean_points_error
     except ImportError as error:
         return common.print_message(common.needs_extra(error, "fmu"), common.BAD_INPUT)
     common.check_json(json_file)
@@ -67,30 +58,37 @@ def bench_controller(
     claimed = common.claim(
         "bench-controller", out, Path("out") / "bench-controller", force,
         system=common.digest(system), controller=controller, file=common.digest(source),
-        set=common.by_name(settings), trials=sorted(trials or ()),
+        set=common.by_name(settings), trials=sorted(trials or ()), step_check=step_check,
     )  # fmt: skip
     scores: list[Score] = []
     interrupted = False
 
     try:
         with progress_bar(0.0) as bar:
-            bench(system, _load(controller), values, trials or (), scores.append, trust, watch=bar)
+            bench(
+                system, _load(controller), values, trials or (), scores.append, trust, bar,
+                check_step=step_check,
+            )  # fmt: skip
     except KeyboardInterrupt:
         if not scores:
             raise
         interrupted = True
-    points = mean_points(scores)
     listed = [
-        {"trial": s.trial, "points": s.points, "error": s.error, "faults": s.faults, **s.numbers}
+        {"trial": s.trial, "points": s.points, "points_error": s.points_error, "error": s.error,
+         "faults": s.faults, "doubt": s.doubt, **s.numbers, "errors": s.errors}
         for s in scores
-    ]
-    common.write_json(json_file, {"points": points, "trials": listed})
+    ]  # fmt: skip
+    found = {"points": mean_points(scores), "points_error": mean_points_error(scores)}
+    common.write_json(json_file, {**found, "step": STEP, "trials": listed})
     if json_file != "-":
-        for line in _table(scores, points):
-            typer.echo(line)
+        _show(scores)
     for score in scores:
         for fault in score.faults:
             common.print_message(f"{score.trial} {'' if score.error else 'failed: '}{fault}")
+        if score.doubt:
+            common.print_message(
+                f"{score.trial}: {score.doubt}, so whether it does is not known with this step"
+            )
     try:
         from percussion_model.interface.bench_page import write_bench_page
     except ImportError as error:
@@ -98,7 +96,7 @@ def bench_controller(
     else:
         title = controller or system.stem
         with progress("drawing the page"):
-            page = write_bench_page(scores, points, COLUMNS, claimed.folder, title)
+            page = write_bench_page(scores, claimed.folder, title)
         common.list_files([page, claimed.sign()])
     if interrupted:
         return common.print_message(
@@ -107,38 +105,33 @@ def bench_controller(
     return 1 if any(score.faults for score in scores) else 0
 
 
-def _table(scores: Sequence[Score], points: float) -> list[str]:
-    """Lines of the table: heading, runs, mean."""
-    lines = _heading()
+def _show(scores: Sequence[Score]) -> None:
+    """Print the table of the runs, their mean, and what the errors are."""
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.table import Table
+
+    from percussion_model.interface.bench_text import (
+        COLUMNS,
+        about_errors,
+        cells,
+        mean_text,
+        points_text,
+    )
+    from percussion_model.interface.messages import wrapped
+    from percussion_model.interface.tables import print_table
+
+    table = Table(box=None, pad_edge=False, header_style="")
+    table.add_column("run", vertical="bottom", no_wrap=True)
+    for head in ("points", *(head for _, head, _, _ in COLUMNS)):
+        words = escape(head.replace(" ", "\n"))
+        table.add_column(words, justify="right", vertical="bottom", no_wrap=True)
     for score in scores:
-        numbers = [_short(factor * score.numbers[name]) for name, _, factor, _ in COLUMNS]
-        lines.append(f"{score.trial:{NAME}s}{score.points:{POINTS}.1f}{_cells(numbers)}")
-    return [*lines, f"{'mean':{NAME}s}{points:{POINTS}.1f}"]
-
-
-def _heading() -> list[str]:
-    """Lines of the heading: words of the columns one below the other, units last."""
-    heads = [head.split() for _, head, _, _ in COLUMNS]
-    depth = max(map(len, heads))
-    lines = []
-    for k in range(depth):
-        words = [head[k - depth + len(head)] if k >= depth - len(head) else "" for head in heads]
-        first = f"{'run':{NAME}s}{'points':>{POINTS}s}" if k == depth - 1 else " " * (NAME + POINTS)
-        lines.append(first + _cells(words))
-    return lines
-
-
-def _cells(texts: Sequence[str]) -> str:
-    """Right-aligned texts, each as wide as the longest word of its heading, and a space."""
-    widths = (max(map(len, head.split())) + 1 for _, head, _, _ in COLUMNS)
-    return "".join(f"{text:>{width}s}" for text, width in zip(texts, widths, strict=True))
-
-
-def _short(value: float) -> str:
-    """Three digits, two decimals at most, in five characters."""
-    if abs(value) >= 99999.5:
-        return f"{value:.0e}".replace("e+0", "e").replace("e+", "e")
-    return f"{float(f'{value:.3g}'):.2f}".rstrip("0").rstrip(".")
+        table.add_row(score.trial, points_text(score.points, score.points_error), *cells(score))
+    console = Console()
+    print_table(table, console)
+    console.print(f"mean of the points: {mean_text(scores)}", highlight=False)
+    console.print(wrapped(about_errors(scores)), highlight=False)
 
 
 def _file_and_name(controller: str) -> tuple[str, str]:

@@ -77,7 +77,7 @@ def calibrate(
     from percussion_model.analysis.fitting import fit_rock
     from percussion_model.interface.calibrated_scene import commented_fit
     from percussion_model.interface.measured_files import read_curve, read_drop, read_reading
-    from percussion_model.interface.terminal import count_bar
+    from percussion_model.interface.terminal import progress
     from percussion_model.simulation.files import staged_text
 
     if curve is None and not drop and not measured:
@@ -90,8 +90,12 @@ def calibrate(
     drops = [read_drop(word, gauge) for word in drop or ()]
     numbers = [read_reading(word) for word in measured or ()]
     limits = dict(_read_range(word) for word in ranges or ())
-    with count_bar("computations") as progress:
-        found = fit_rock(chosen, slow, drops, numbers, only, limits, progress=progress)
+    with progress("preparing") as report:
+        found = fit_rock(
+            chosen, slow, drops, numbers, only, limits,
+            # how many there will be is found by the search itself
+            progress=lambda done: report(f"{done} computations done", None),
+        )  # fmt: skip
     common.write_json(json_file, found.summary())
     written = []
     if json_file != "-":
@@ -149,12 +153,15 @@ def _show(found: Fit, scene: Scene) -> None:
     from percussion_model.interface.terminal import show_warnings
 
     table = Table()
-    for heading in ("", "unit", "value", f"interval, {100 * found.confidence:g} %", "verdict"):
+    interval = (
+        "interval, widened" if found.is_widened else f"interval, {100 * found.confidence:g} %"
+    )
+    for heading in ("", "unit", "value", interval, "verdict"):
         table.add_column(heading, no_wrap=True, justify="right" if heading == "value" else "left")
     for key, one in found.estimates.items():
         unit = scene.row_of(key).unit
-        interval = f"{one.low:.4g} to {one.high:.4g}"
-        table.add_row(NAMES[key], unit, f"{one.value:.4g}", interval, one.verdict)
+        ends = f"{one.low:.4g} to {one.high:.4g}"
+        table.add_row(NAMES[key], unit, f"{one.value:.4g}", ends, one.verdict)
     for key in NAMES:
         if key not in found.estimates:
             unit = scene.row_of(key).unit

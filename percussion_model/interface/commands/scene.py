@@ -48,9 +48,10 @@ def run(
     made_from = _made_from(chosen, duration, settle)
     made_from |= {"trace": trace, "error_estimate": error_estimate}
     claimed = None if out is None else common.claim("run", out, None, force, **made_from)
-    if chosen.solver_name == "blow-map":
-        ready_map(chosen)
     end = chosen.run.duration if duration is None else duration
+    if chosen.solver_name == "blow-map":
+        _try_without_map(chosen, end)
+        ready_map(chosen)
     with terminal.progress_bar(end) as progress:
         result = simulate(
             chosen,
@@ -195,6 +196,22 @@ def new(
     common.refuse_existing(file, force)
     Scene(title=_NEW_TITLE).to_toml(file, comments=True)
     typer.echo(f"wrote {file}")
+
+
+def _try_without_map(scene: Scene, duration: float) -> None:
+    """Refuse a run that its blow map would not answer, before that is made."""
+    from percussion_model.analysis.blow_maps import kept_map, refused_run
+    from percussion_model.interface.terminal import progress
+    from percussion_model.scene.inputs import SimulationError
+
+    if kept_map(scene) is not None:
+        return
+    with progress("trying the run before the blow map is made"):
+        refused = refused_run(scene, duration)
+    if refused:
+        raise SimulationError(
+            f"the blow map was not made, since it would refuse the run: {refused}"
+        )
 
 
 def _made_from(scene: Scene, duration: float | None, settle: float | None) -> dict[str, Any]:

@@ -81,6 +81,17 @@ def _data(top: Axes, bottom: Axes, one: Explained) -> None:
     style.label(bottom, place, f"data - fit [{fine_unit}]", words)
 
 
+def _interval(found: Fit) -> str:
+    """What the shaded interval is."""
+    level = f"{100.0 * found.confidence:g} %"
+    if not found.is_widened:
+        return f"{level} interval"
+    return (
+        f"interval, widened for roughness to a deviance of {found.threshold:.3g} "
+        f"({level} alone: {found.quantile:.3g})"
+    )
+
+
 def _profile(ax: Axes, found: Fit, key: str) -> None:
     estimate, (values, deviance) = found.estimates[key], found.profiles[key]
     top = HIGHEST * found.threshold
@@ -89,8 +100,7 @@ def _profile(ax: Axes, found: Fit, key: str) -> None:
     ax.plot(where, height, ".-", color=FIT, lw=0.9, markersize=4, label="lowest deviance found")
     limit = "limit of the region"
     ax.axhline(found.threshold, color=style.RULE_COLOUR, lw=1.0, ls="--", label=limit)
-    share = f"{100.0 * found.confidence:g} % interval"
-    ax.axvspan(estimate.low, estimate.high, color=FIT, alpha=0.12, lw=0, label=share)
+    ax.axvspan(estimate.low, estimate.high, color=FIT, alpha=0.12, lw=0, label=_interval(found))
     ax.plot([estimate.value], [0.0], "o", color=FIT, markersize=5)
     rivals = [(one.values[key], one.deviance) for one in found.rivals]
     if rivals:

@@ -75,5 +75,6 @@ def explain_refusal(table: BlowTable, s: Any) -> str:
         )
     return (
         f"drive.force = {value:.6g} N: the piston falls back on the bit before "
-        "drive.reversal_distance; the blow map does not know such contacts"
+        "drive.reversal_distance, which the blow map does not know and no range of it changes; "
+        "take solver.fidelity = 'wave'"
     )

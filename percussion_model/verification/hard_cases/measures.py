@@ -31,6 +31,9 @@ ROUNDING_GAP = 1e-12
 STORM_GAP = 1e-10
 # Forces are compared with the greatest push, or with this where there is none [N].
 LEAST_FORCE = 1.0
+# Events come in bursts, one a blow: a ceiling per second is one of the mean over a blow at least,
+# here that of the reference, or over a case that is shorter [s].
+ONE_BLOW = 0.05
 
 
 @dataclass(frozen=True)
@@ -54,7 +57,8 @@ class Measures:
         held by the penalty (finite elements), or rounding (others; in a storm of
         rigid bodies the passing of postponed events).
     events_per_second, ceiling : float
-        [1/s]
+        Mean over the stretch that was run, and the most that it may be: that of the case, or
+        in a stretch shorter than a blow as much more as leaves the blow its events [1/s].
     guards : int
         How often a guard of the solver acted.
     same_bits : bool
@@ -155,7 +159,7 @@ def measure(
         overshoot=energy["overshoot_relative"],
         **{name: figures.get(name, math.nan) for name in MECHANICS},
         events_per_second=counts["events"] / run.time if run.time > 0.0 else math.nan,
-        ceiling=case.ceiling,
+        ceiling=case.ceiling * max(1.0, min(ONE_BLOW, scene.run.duration) / end),
         guards=sum(counts.get(name, 0) for name in GUARDS),
         same_bits=not error and (not again or _repeats(run, case, scene, end)),
         rate=result.rate_of_penetration,

@@ -34,8 +34,8 @@ How guards act and what they warn of is told in [numerics.md](numerics.md), sect
 {residual:g} of the ledger's denominator; momentum equals impulses within {momentum:g}; nothing
 pulls between piston and bit, nor on the rock with `release`; piston and bit do not interpenetrate
 (waves, rigid bodies), or by no more than the penalty holds when it takes all energy put in
-(finite elements); there are no more events a second than the case's ceiling; and the same run in
-other calls gives the same bits.
+(finite elements); there are no more events a second than the case's ceiling, on the mean over
+50 ms at least, since events come in bursts; and the same run in other calls gives the same bits.
 """
 
 _COLUMNS = """**Columns.** *rate*: rate of penetration. {about_errors}
