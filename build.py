@@ -117,7 +117,8 @@ def make_venv(renew: bool) -> int:
     if has_pip and not renew:
         return 0
     print("Making .venv ...", flush=True)
-    code = call([sys.executable, "-m", "venv", *(["--clear"] if renew else []), VENV])
+    code = call([sys.executable, "-m", "venv", *(["--clear"] if renew else []), VENV],
+                silent="making .venv")  # fmt: skip
     if code != 0:
         print(f"No .venv could be made in {ROOT}, see above.", file=sys.stderr)
     return code

@@ -13,7 +13,7 @@ from typing import Any
 import matplotlib
 import numpy as np
 
-from examples.shared import command_line
+from examples.shared import command_line, tell
 from percussion_model import Scene
 from percussion_model.analysis.fitting import (
     Curve,
@@ -71,7 +71,10 @@ def main(out: Path, quick: bool = False) -> dict[str, Any]:
         fit = fit_rock(drop_scene("rigid"), curve)
     else:
         scene = drop_scene("wave")
-        fit = fit_rock(scene, curve, measured_drops(scene, noise, 450))
+        fit = fit_rock(
+            scene, curve, measured_drops(scene, noise, 450),
+            progress=lambda done: tell(f"{done} computations done"),
+        )  # fmt: skip
     with matplotlib.rc_context(style.STYLE):
         save_calibration(fit, Path(out) / f"{NAME}.png")
     return fit.summary() | {"truth": TRUTH}

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from matplotlib.colors import ListedColormap
 
-from examples.shared import GREY, command_line, figure_of
+from examples.shared import GREY, command_line, figure_of, tell
 from percussion_model import Scene
 from percussion_model.analysis.study import Study, grid, study
 from percussion_model.analysis.study.response import KINDS
@@ -55,7 +55,10 @@ def main(out: Path, quick: bool = False) -> dict[str, Any]:
     pressure = np.linspace(5.0 if quick else 2.5, 30.0 if quick else 40.0, pressures) * BAR
     points = grid({"feed.force": feed, "drive.force": pressure * AREA})
     processes = 1 if quick else None
-    found = study(Scene(), points, out / "points", most_blows=MOST_BLOWS, processes=processes)
+    found = study(
+        Scene(), points, out / "points", most_blows=MOST_BLOWS, processes=processes,
+        progress=lambda done, total: tell(f"{done} of {total} points", done / total),
+    )  # fmt: skip
     rows = found.rows.reshape(points.shape)
     share = efficiency(found).reshape(points.shape)
     unknown = ~(rows["rate_of_penetration_error"] < MOST_ERROR * rows["rate_of_penetration"])

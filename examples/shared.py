@@ -13,6 +13,8 @@ import matplotlib
 from matplotlib.figure import Figure
 
 from percussion_model.interface.plotting import style
+from percussion_model.interface.progress import Report
+from percussion_model.interface.terminal import progress
 from percussion_model.simulation.files import ResultError, staged, staged_text, to_json
 from percussion_model.simulation.origin import Claim
 
@@ -21,6 +23,16 @@ FOUND = "found.json"
 # Energies and rates are drawn in these, and told apart with any colour vision.
 BLUE, ORANGE, GREEN, BLACK, GREY = "#0072B2", "#D55E00", "#009E73", "#222222", "#8C8C8C"
 PINK = "#CC79A7"
+
+
+# What takes the words of the example that runs; none where it is called from Python.
+_reports: list[Report] = []
+
+
+def tell(text: str, share: float | None = None) -> None:
+    """Say what an example does at present, and which share of it is done."""
+    for report in _reports:
+        report(text, share)
 
 
 @contextmanager
@@ -58,7 +70,13 @@ def write_example(
     if claim.moved:
         print(claim.moved, file=sys.stderr)
     numbers = claim.folder / "found.json"
-    staged_text(numbers, to_json(main(claim.folder, quick)) + "\n")
+    with progress(f"computing {name}") as report:
+        _reports[:] = [report]
+        try:
+            found = main(claim.folder, quick)
+        finally:
+            _reports.clear()
+    staged_text(numbers, to_json(found) + "\n")
     claim.sign()
     for path in (numbers, claim.folder / f"{name}.png"):
         print(f"wrote {path}", file=sys.stderr)

@@ -20,6 +20,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from percussion_model.interface.terminal import progress
 from scenarios.drawing import save_png
 from scenarios.harness import FIGURES, Instance, built
 
@@ -167,7 +168,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--fmu", type=Path, help="an FMU; that of dist if left out")
     parser.add_argument("--out", type=Path, default=FIGURES, help="folder")
     chosen = parser.parse_args(arguments)
-    found = study(chosen.fmu or built(), say=lambda text: print(text, flush=True))
+    fmu = chosen.fmu or built()
+    with progress("one run with every step"):
+        found = study(fmu, say=lambda text: print(text, flush=True))
     print(table(found))
     figure = draw(found, chosen.out / "communication_step.png")
     text = json.dumps(found, indent=1).replace("NaN", "null")

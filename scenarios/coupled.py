@@ -5,11 +5,18 @@ from __future__ import annotations
 import re
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from math import isnan
 from pathlib import Path
 
 import numpy as np
+from rich.box import SIMPLE_HEAD
+from rich.table import Table
 
 from percussion_model.coupling import CoupledRun, Coupling
+from percussion_model.interface.messages import wrapped
+from percussion_model.interface.tables import print_table
+from percussion_model.interface.terminal import progress, progress_bar
+from percussion_model.simulation.uncertain import in_digits
 from scenarios.drawing import save_png, stacked
 from scenarios.harness import FIGURES, ROOT
 
@@ -29,6 +36,8 @@ ONE_ROCK = {
 }  # fmt: skip
 
 Panel = tuple[str, float, str]
+# Words, factor and unit of a number.
+Quantity = tuple[str, float, str]
 
 
 def archive(name: str = "FeedControlRigid", words: Sequence[str] = ()) -> Path:
@@ -40,7 +49,10 @@ def run(
     system: Path, duration: float, values: Mapping[str, float | bool] | None = None
 ) -> CoupledRun:
     """Run the feed-controlled system, its usual signals kept; an early end is an error."""
-    found = Coupling(system, {**ONE_ROCK, **(values or {})}).run(duration, STEP, SIGNALS, INTERVAL)
+    with progress_bar(duration) as bar:
+        found = Coupling(system, {**ONE_ROCK, **(values or {})}).run(
+            duration, STEP, SIGNALS, INTERVAL, progress=bar
+        )
     if found.error:
         raise RuntimeError(found.error)
     return found
@@ -124,6 +136,7 @@ def write(
     simulate: Callable[[Path], dict[str, CoupledRun]],
     numbers: Callable[[CoupledRun], Mapping[str, float]],
     draw: Callable[[dict[str, CoupledRun], Path], Path],
+    shown: Mapping[str, Quantity],
 ) -> None:
     """Run a scenario on the archive of the command line: write figure and data, print numbers.
 
@@ -133,9 +146,27 @@ def write(
         Of the files.
     simulate, numbers, draw : callable
         Runs of an archive, by what the legend calls them; numbers of one run; their figure.
+    shown : mapping
+        What a number is called, by its name: words, factor and unit.
     """
     runs = simulate(archive(words=sys.argv[1:]))
-    for case, found in runs.items():
-        print(case, {key: round(value, 3) for key, value in numbers(found).items()})
-    for path in (draw(runs, FIGURES / f"{name}.png"), *save_runs(runs, name)):
+    print_numbers({case: numbers(found) for case, found in runs.items()}, shown)
+    with progress("drawing"):
+        paths = [draw(runs, FIGURES / f"{name}.png"), *save_runs(runs, name)]
+    for path in paths:
         print(path)
+
+
+def print_numbers(found: Mapping[str, Mapping[str, float]], shown: Mapping[str, Quantity]) -> None:
+    """Print numbers of runs, a column for each run, and what is known of their errors."""
+    table = Table(box=SIMPLE_HEAD, show_edge=False, pad_edge=False)
+    table.add_column("")
+    for case in found:
+        table.add_column(case, justify="right")
+    table.add_column("unit", no_wrap=True)
+    for key, (words, factor, unit) in shown.items():
+        values = (factor * numbers[key] for numbers in found.values())
+        table.add_row(words, *("never" if isnan(one) else in_digits(one) for one in values), unit)
+    print_table(table)
+    step = f"the communication step of {1e3 * STEP:g} ms"
+    print(wrapped(f"The error by {step} was not estimated: numbers have three digits."))

@@ -18,6 +18,7 @@ import numpy as np
 
 from percussion_model.coupling import Coupling
 from percussion_model.coupling.coupled_run import known_signals, summary
+from percussion_model.interface.terminal import progress
 from scenarios.drawing import save_png
 from scenarios.harness import FIGURES, ROOT
 
@@ -163,10 +164,12 @@ def draw(ones: Sequence[OneBlow], exact: OneBlow, eights: Sequence[EightBlows], 
 
 def main(archive: Path) -> None:
     """Run everything, print the tables, draw the figure."""
-    exact = one_blow(archive, "jacobi", REFERENCE)
-    ones = [one_blow(archive, order, step) for order in ORDERS for step in STEPS]
+    with progress("one blow with every step"):
+        exact = one_blow(archive, "jacobi", REFERENCE)
+        ones = [one_blow(archive, order, step) for order in ORDERS for step in STEPS]
     print(table_of_one(ones, exact), flush=True)
-    eights = [eight_blows(archive, order, step) for order in ORDERS for step in STEPS]
+    with progress("eight blows with every step"):
+        eights = [eight_blows(archive, order, step) for order in ORDERS for step in STEPS]
     print(table_of_eight(eights))
     print(draw(ones, exact, eights, FIGURES / "coupling_step.png"))
 

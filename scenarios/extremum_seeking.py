@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from percussion_model.coupling import CoupledRun, Coupling
+from percussion_model.interface.terminal import progress
 from scenarios.coupled import archive, save_runs, save_table
 from scenarios.drawing import save_png
 from scenarios.harness import FIGURES
@@ -162,8 +163,9 @@ def draw(hill: np.ndarray, runs: Sequence[CoupledRun], path: Path) -> Path:
 def main() -> None:
     """Write figure and data, and print where the top is and where the seeker ends."""
     system = archive("ExtremumSeekingRigid", sys.argv[1:])
-    hill = sweep(system)
-    runs = {f"from {start:.0f} N": seek(system, start) for start in STARTS}
+    with progress("sweeping held feeds, then seeking"):
+        hill = sweep(system)
+        runs = {f"from {start:.0f} N": seek(system, start) for start in STARTS}
     top = top_of(hill)
     print(f"best feed {top.feed:.0f} +- {top.feed_error:.0f} N, "
           f"rate {1e3 * top.rate:.3f} +- {1e3 * top.rate_error:.3f} mm/s")  # fmt: skip

@@ -19,6 +19,7 @@ from fmpy.fmi2 import (
     fmi2CallbackLoggerTYPE,
 )
 
+from percussion_model.interface.terminal import progress
 from scenarios.drawing import save_png, stacked
 
 # A constant, or a function of time.
@@ -256,7 +257,9 @@ def command_line(
     parser.add_argument("--out", type=Path, default=FIGURES, metavar="DIR", help="of the figure")
     path = parser.parse_args().out / f"{name}.png"
     word = "replaced" if path.exists() else "wrote"
-    draw(simulate(*map(built, fmus or ("PercussiveHammer",))), path)
+    paths = list(map(built, fmus or ("PercussiveHammer",)))
+    with progress(f"running {name}"):
+        draw(simulate(*paths), path)
     print(f"{word} {path}")
 
 

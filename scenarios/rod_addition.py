@@ -18,6 +18,14 @@ DURATION = 4.0  # [s]
 WAY = 0.015  # of the head to the new rod [m]
 SHARE = 0.05  # the feed is back within this of what is wanted
 LATE = 0.5  # the last part of a run, for means [s]
+# Numbers as they are printed: words, factor, unit.
+SHOWN = {
+    "added": ("the rod comes at", 1.0, "s"),
+    "weight": ("its weight", 1.0, "N"),
+    "highest": ("highest feed afterwards, above what is wanted", 100.0, "%"),
+    "back_after": ("feed within 5 % after", 1.0, "s"),
+    "late_feed": ("mean feed at the end", 1.0, "N"),
+}
 
 
 def simulate(system: Path, duration: float = DURATION) -> dict[str, CoupledRun]:
@@ -68,4 +76,4 @@ def draw(runs: dict[str, CoupledRun], path: Path) -> Path:
 
 
 if __name__ == "__main__":
-    write(NAME, simulate, numbers, draw)
+    write(NAME, simulate, numbers, draw, SHOWN)

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from percussion_model.coupling import CoupledRun, Coupling
+from percussion_model.interface.terminal import progress
 from scenarios.coupling_step import ONE_BLOW
 from scenarios.harness import ROOT
 
@@ -96,4 +97,6 @@ def measure(
 
 if __name__ == "__main__":
     archive = Path(sys.argv[1]) if sys.argv[1:] else ROOT / "dist" / "FeedControlRigid.ssp"
-    print(table(*measure(archive)))
+    with progress("one blow in every way"):
+        found = measure(archive)
+    print(table(*found))

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from percussion_model.coupling import CoupledRun, Coupling
+from percussion_model.interface.terminal import progress
 from scenarios.coupled import archive
 from scenarios.drawing import save_png
 from scenarios.extremum_seeking import (
@@ -172,8 +173,11 @@ def draw(hill: np.ndarray, runs: Sequence[CoupledRun], path: Path) -> Path:
 def main() -> None:
     """Write figure and data, and print where the top is and where the seeker ends."""
     system = archive("TwoWaySeekingRigid", sys.argv[1:])
-    hill = sweep(system)
-    runs = {f"from {feed:.0f} N {1e-5 * p:.0f} bar": seek(system, (feed, p)) for feed, p in STARTS}
+    with progress("sweeping held feeds and pressures, then seeking"):
+        hill = sweep(system)
+        runs = {
+            f"from {feed:.0f} N {1e-5 * p:.0f} bar": seek(system, (feed, p)) for feed, p in STARTS
+        }
     top, errors = top_of(hill)
     print(f"best feed {top[0]:.0f} +- {errors[0]:.0f} N, pressure {1e-5 * top[1]:.2f} +- "
           f"{1e-5 * errors[1]:.2f} bar, rate {1e3 * top[2]:.3f} +- {1e3 * errors[2]:.3f} mm/s; "

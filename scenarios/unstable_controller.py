@@ -24,6 +24,16 @@ CONTROLLERS = {
     "as it ships: gain 0.5, 0.2 s": PI_ALONE,
     "unstable: gain 2, 0.1 s": {**PI_ALONE, "controller.pi.gain": 2.0, "controller.pi.time": 0.1},
 }
+# Numbers as they are printed: words, factor, unit.
+SHOWN = {
+    "growth": ("growth of the swing of the feed", 1.0, "1/s"),
+    "first_swing": ("first swing", 1.0, "N"),
+    "greatest_swing": ("greatest swing", 1.0, "N"),
+    "points": ("points of the bench", 1.0, "of 100"),
+    "overshoot": ("highest feed, above what is wanted", 100.0, "%"),
+    "time_off_bottom": ("time off the bottom", 1.0, "s"),
+    "violations": ("time beyond the limits of feed and torque", 1.0, "s"),
+}
 
 
 def simulate(system: Path, duration: float = DURATION) -> dict[str, CoupledRun]:
@@ -96,4 +106,4 @@ def draw(runs: dict[str, CoupledRun], path: Path) -> Path:
 
 
 if __name__ == "__main__":
-    write(NAME, simulate, numbers, draw)
+    write(NAME, simulate, numbers, draw, SHOWN)

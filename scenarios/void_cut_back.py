@@ -21,6 +21,18 @@ TOP, FLOOR, FILLING = 0.02, 0.22, 1e6  # of the void [m], K_R of what fills it [
 LOW = 0.5  # cut back: pressure below this share of what is wanted while drilling
 PRESSURE = 2e6  # [Pa]
 SHARE = 0.05  # the feed is back within this of what is wanted
+# Numbers as they are printed: words, factor, unit.
+SHOWN = {
+    "entered": ("the bit enters the void at", 1.0, "s"),
+    "left": ("and leaves it at", 1.0, "s"),
+    "low_after": ("pressure below half after", 1.0, "s"),
+    "dry_blows": ("blows in the void", 1.0, ""),
+    "dry_frequency": ("their frequency", 1.0, "Hz"),
+    "dry_power": ("their power", 1.0, "W"),
+    "speed": ("mean velocity of the head in it", 1e3, "mm/s"),
+    "highest": ("highest feed afterwards, by what is wanted", 100.0, "%"),
+    "back_after": ("feed within 5 % after", 1.0, "s"),
+}
 
 
 def simulate(system: Path, duration: float = DURATION) -> dict[str, CoupledRun]:
@@ -92,4 +104,4 @@ def draw(runs: dict[str, CoupledRun], path: Path) -> Path:
 
 
 if __name__ == "__main__":
-    write(NAME, simulate, numbers, draw)
+    write(NAME, simulate, numbers, draw, SHOWN)

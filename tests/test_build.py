@@ -52,6 +52,14 @@ def test_a_complete_python_is_told_nothing(build):
     assert build.missing_requirement((3, 11, 0), {"venv": True, "ensurepip": True}) == ""
 
 
+def test_making_a_venv_says_that_it_still_runs(build, monkeypatch, capsys):
+    """It takes up to ten seconds, of which the module says nothing itself."""
+    monkeypatch.setattr(build, "EVERY", 1e-3)
+    assert build.make_venv(renew=False) == 0
+    assert "s: making .venv" in capsys.readouterr().err
+    assert build.tool("python").exists()
+
+
 def test_setup_ends_with_an_error_where_venv_is_missing(build, monkeypatch, capsys):
     monkeypatch.setattr(build.importlib.util, "find_spec", lambda name: None)
     assert build.setup() == 1

@@ -7,6 +7,7 @@ import json
 import subprocess
 import sys
 from pathlib import Path
+from threading import Event
 
 import matplotlib.image
 import numpy as np
@@ -14,7 +15,9 @@ import pytest
 
 from examples import bifurcation, drill_design, motions, rate_map
 from examples.all import EXAMPLES
+from examples.shared import tell, write_example
 from percussion_model import Scene, Simulation
+from percussion_model.interface import progress
 from percussion_model.simulation.files import to_json
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -68,6 +71,20 @@ def test_command_line_refuses_what_it_does_not_know():
     ended = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False)
     assert ended.returncode == 2
     assert "unrecognized arguments: --fast" in ended.stderr
+
+
+def test_an_example_says_on_a_pipe_that_it_runs(monkeypatch, tmp_path, capsys):
+    monkeypatch.setattr(progress, "EVERY", 1e-2)
+
+    def slow(out, quick):
+        tell("the first part")
+        Event().wait(0.2)
+        out.mkdir()
+        (out / "example.png").touch()
+        return {}
+
+    write_example(slow, "example", tmp_path / "out", True, False)
+    assert "the first part" in capsys.readouterr().err
 
 
 # ------------------------------------------------------------------------- bifurcation

@@ -53,6 +53,8 @@ def heard(monkeypatch):
     pipe = Heard()
     # pytest puts its own stderr in place when a test begins
     monkeypatch.setattr(progress, "sys", SimpleNamespace(stderr=pipe))
+    monkeypatch.setattr(progress, "LOADING", 0.0)
+    monkeypatch.setattr(progress, "_before", [])
     return pipe
 
 
@@ -120,6 +122,21 @@ def test_a_calibration_says_on_a_pipe_that_it_runs(heard, tmp_path, monkeypatch)
     assert code != BAD_INPUT
     assert heard.progress() >= 2
     assert " of " not in heard.getvalue(), "how many computations there will be is not known"
+
+
+def test_short_pieces_of_work_in_a_row_are_not_silent_together(heard, monkeypatch):
+    """Each ends before a line is due, all of them do not; loading counts as well."""
+    monkeypatch.setattr(progress, "EVERY", 0.2)
+    for k in range(4):
+        with progress.lines(f"piece {k}"):
+            time.sleep(0.15)
+    assert 1 <= heard.progress() <= 3
+    heard.truncate(0)
+    monkeypatch.setattr(progress, "_before", [])
+    monkeypatch.setattr(progress, "LOADING", 0.15)
+    with progress.lines("after loading"):
+        heard.wait_for(1)
+        assert heard.progress() == 1
 
 
 def test_what_ends_soon_says_nothing(heard, monkeypatch):

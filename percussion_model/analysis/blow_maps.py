@@ -127,7 +127,7 @@ def refused_run(scene: Scene, duration: float) -> str:
     scene = mapped(scene)
     if outside := notes_outside(scene):
         return outside[0]
-    changes = {}
+    changes: dict[str, float] = {}
     for name, key in _TRIED.items():
         ends = sorted((scene[key] / AROUND, scene[key] * AROUND))
         changes |= {f"blow_map.{name}_from": ends[0], f"blow_map.{name}_to": ends[1]}

@@ -4,7 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from percussion_model.coupling.bench import STEP, Score, mean_points, mean_points_error
+from percussion_model.coupling.bench import (
+    STEP,
+    WITHIN_A_BLOW,
+    Score,
+    mean_points,
+    mean_points_error,
+)
 from percussion_model.simulation.uncertain import in_digits, scaled, with_short_error
 
 # Name, head, factor, and what it is.
@@ -58,7 +64,8 @@ def about_errors(scores: Sequence[Score]) -> str:
     if all(score.points_error is None for score in scores):
         return f"The error by {step} was not estimated: how many digits are right is not known."
     return (
-        f"± is the error by {step}: twice what half the step changes; without it a number is known "
+        f"± is the error by {step}: twice what half the step changes, and at least "
+        f"{100 * WITHIN_A_BLOW:g} % for what goes on within a blow; without it a number is known "
         "to its digits. The error by the cells of the hammer is not in it, nor whether model and "
         "rock are right."
     )

@@ -12,6 +12,8 @@ from contextlib import contextmanager
 
 # Time between lines [s]: a reader who sees none for five seconds takes the command for dead.
 EVERY = 3.0
+# A command that is not heard of before its first work has loaded modules so long at most [s].
+LOADING = 2.0
 # Below this share of the work the time that is left cannot be told.
 EARLY = 0.05
 # Nor where the pace of the later half of the time differs from that of all by more than this.
@@ -25,6 +27,8 @@ A_FEW = 3.0
 Report = Callable[[str, float | None], None]
 
 _running: list[Lines] = []
+# When the last piece of work ended, and since when nothing has been said [s].
+_before: list[tuple[float, float]] = []
 
 
 class Lines:
@@ -123,7 +127,8 @@ def lines(text: str, done: float = 0.0) -> Iterator[Report]:
     own = Lines(text)
     own.begin(text, done)
     over = threading.Event()
-    thread = threading.Thread(target=_print, args=(own, over), daemon=True)
+    said = [_silent_since(own.started)]
+    thread = threading.Thread(target=_print, args=(own, over, said), daemon=True)
     _running.append(own)
     thread.start()
     try:
@@ -132,10 +137,20 @@ def lines(text: str, done: float = 0.0) -> Iterator[Report]:
         over.set()
         thread.join()
         _running.remove(own)
+        _before[:] = [(time.monotonic(), said[-1])]
 
 
-def _print(told: Lines, over: threading.Event) -> None:
-    while not over.wait(EVERY):
+def _silent_since(now: float) -> float:
+    """Since when nothing has been said: the start, or that of short pieces of work in a row."""
+    if not _before:
+        return now - min(time.process_time(), LOADING)
+    ended, since = _before[-1]
+    return since if now - ended < EVERY else now
+
+
+def _print(told: Lines, over: threading.Event, said: list[float]) -> None:
+    while not over.wait(max(said[-1] + EVERY - time.monotonic(), 0.0)):
+        said.append(time.monotonic())
         try:
             print(told.line(), file=sys.stderr, flush=True)
         except (OSError, ValueError):

@@ -215,15 +215,19 @@ def test_a_page_that_cannot_be_finished_leaves_the_old_one(tmp_path):
 
 
 def test_a_score_has_its_error_by_the_step():
-    """Twice the change, as an error of first order has it; none where half the step was not run."""
+    """Twice the change, as an error of first order has it, and no less than what no step sees."""
     score, finer = judge(TRIALS[3], made_up(2900.0)), judge(TRIALS[3], made_up(2880.0))
     found = with_step_error(score, finer)
     assert (found.points, found.numbers) == (score.points, score.numbers)
     assert found.points_error == pytest.approx(2.0 * 100.0 * 20.0 / 3000.0)
     assert found.errors["feed_error"] == pytest.approx(2.0 * 20.0 / 3000.0)
-    assert found.errors["peak_force"] == 0.0
+    assert found.errors["peak_force"] == pytest.approx(0.02 * 5e5)
+    assert found.errors["dry_blows"] == 0.0
+    same = with_step_error(score, score)
+    assert same.points_error == pytest.approx(0.02 * 100.0 * 100.0 / 3000.0)
     assert cells(found)[COLUMN["feed_error"]] == "3±1"
-    assert cells(found)[COLUMN["peak_force"]] == "500"
+    assert cells(found)[COLUMN["peak_force"]] == "500±10"
+    assert cells(found)[COLUMN["dry_blows"]] == "0"
     assert points_text(found.points, found.points_error) == "97±1"
     assert "twice what half the step changes" in about_errors([found])
     assert mean_points_error([found, score]) is None
@@ -241,7 +245,7 @@ def test_a_run_that_fails_with_one_step_alone_is_in_doubt():
 
 
 def test_a_bench_runs_with_half_the_step_too(feed_control, tmp_path, monkeypatch, capsys):
-    """Errors hold what a quarter of the step finds; without them that is said."""
+    """Errors hold what a tenth of the step finds; without them that is said."""
     words = ["bench-controller", "--system", str(feed_control), "--trial", "rod",
              "--json", str(tmp_path / "numbers.json"), "--out", str(tmp_path / "out")]  # fmt: skip
     found = {}
@@ -259,10 +263,10 @@ def test_a_bench_runs_with_half_the_step_too(feed_control, tmp_path, monkeypatch
     checked, bare = found[False], found[True]
     assert (bare["points_error"], bare["errors"]) == (None, {})
     assert checked["points"] == bare["points"]
-    monkeypatch.setattr("percussion_model.coupling.bench.STEP", 2.5e-4)
+    monkeypatch.setattr("percussion_model.coupling.bench.STEP", 1e-4)
     (fine,) = bench(feed_control, trials=["rod"], check_step=False)
     assert 0.0 < abs(fine.points - checked["points"]) <= checked["points_error"]
-    for name in ("depth", "overshoot", "feed_error"):
+    for name in ("depth", "energy_per_metre", "overshoot", "feed_error", "swing"):
         assert abs(fine.numbers[name] - checked[name]) <= checked["errors"][name]
 
 

@@ -7,7 +7,9 @@ import math
 import numpy as np
 import pytest
 
+from percussion_model.interface import progress
 from scenarios import rod_addition, unstable_controller, void_cut_back
+from scenarios.coupled import print_numbers
 
 BIG = 40_000  # bytes of a figure with five panels
 
@@ -79,3 +81,29 @@ def test_growth_is_a_rate():
     # what comes after saturation does not count
     saturated = np.concatenate([sizes, np.full(8, 0.9 * sizes[-1])])
     assert unstable_controller.growth(saturated) == pytest.approx(1.3)
+
+
+@pytest.mark.parametrize("scenario", [rod_addition, unstable_controller, void_cut_back])
+def test_numbers_are_printed_with_words_and_units(
+    scenario, feed_control, monkeypatch, tmp_path, capsys
+):
+    """As a table that fits; a time that never comes is told so."""
+    monkeypatch.setenv("COLUMNS", "80")
+    runs = {"one": scenario.simulate(feed_control, 2.6).popitem()[1]}
+    numbers = {name: scenario.numbers(run) for name, run in runs.items()}
+    assert set(numbers["one"]) == set(scenario.SHOWN)
+    print_numbers(numbers | {"two": dict.fromkeys(scenario.SHOWN, math.nan)}, scenario.SHOWN)
+    said = capsys.readouterr().out
+    assert "{" not in said
+    assert said.count("never") >= len(scenario.SHOWN)
+    assert max(map(len, said.splitlines())) <= 80
+    for words, _, unit in scenario.SHOWN.values():
+        assert words.split()[0] in said
+        assert unit in said
+    assert "was not estimated" in said
+
+
+def test_a_scenario_says_on_a_pipe_how_far_it_is(feed_control, monkeypatch, tmp_path, capsys):
+    monkeypatch.setattr(progress, "EVERY", 1e-2)
+    rod_addition.run(feed_control, 0.5)
+    assert "s of 0.5 s simulated" in capsys.readouterr().err
