@@ -246,7 +246,7 @@ def settled(
         cycle, times = blows[len(blows) - order :], (simulation.time, simulation.wall_time)
         values = kind, order, rate, error, multiplier, cycle, blows, *times
         found = Settled(*values, depends_on_cells=scene.is_undamped)
-        if error_estimate and rate != 0.0 and math.isfinite(rate):
+        if error_estimate and rate != 0.0 and math.isfinite(rate) and not scene.is_undamped:
             settling = JUDGED_SHARE if order else SETTLING_SHARE
             found = replace(found, grid_errors=_grid_errors(simulation, settling))
         return found
