@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import math
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -95,6 +97,26 @@ def test_a_settled_rate_has_the_error_of_its_grid():
     assert "error_of='convergence'" in repr(coarse)
     rigid = settled(Scene().replace(**RIGID), error_estimate=True)
     assert rigid.grid_errors == {"rate_of_penetration": 0.0, "blow_period": 0.0}
+
+
+def test_what_another_grid_does_not_have_is_not_stated(capsys):
+    path = Path(__file__).parents[1] / "scenarios" / "stiff_rock.toml"
+    found = settled(Scene.from_toml(path), error_estimate=True)
+    assert found.order == 1
+    assert {one.order for one in found.coarser} == {1, 2}
+    assert found.summary()["same_motion_on_coarser_grids"] is False
+    show_settled(found)
+    shown = capsys.readouterr().out
+    assert re.search(r"On coarser grids +│ periodic, 2 blows a cycle", shown)
+    assert re.search(r"Deviation after a cycle +│ undecided", shown)
+    assert "warning: the rate of penetration may be off" in shown
+
+
+def test_a_deviation_has_an_error_that_covers_that_of_finer_grids():
+    coarse = settled(Scene(), error_estimate=True)
+    fine = settled(Scene().replace(**{"solver.cells": 60}))
+    assert 0.0 < abs(coarse.multiplier - fine.multiplier) <= coarse.multiplier_error < 0.05
+    assert math.isnan(fine.multiplier_error)
 
 
 def test_an_aperiodic_rate_has_the_error_of_scatter_and_no_other_name(capsys):

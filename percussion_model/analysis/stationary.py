@@ -92,6 +92,10 @@ class Settled:
         The other part of the errors of `rate_of_penetration` [m/s] and `blow_period` [s], as
         `simulate` estimates it by coarser grids, with what scatter does to these runs; 0
         without a grid. Of what was not estimated there is none.
+    coarser : list of Settled
+        The same on coarser grids, where errors of the grid were asked for.
+    warnings : list of str
+        As of a run; where errors of the grid were asked for.
     """
 
     kind: str
@@ -105,6 +109,8 @@ class Settled:
     wall_time: float
     depends_on_cells: bool = False
     grid_errors: dict[str, float] = field(default_factory=dict)
+    coarser: list[Settled] = field(default_factory=list, repr=False)
+    warnings: list[str] = field(default_factory=list, repr=False)
 
     def __repr__(self) -> str:
         rate = rate_field(self.summary())
@@ -163,6 +169,26 @@ class Settled:
             settling = ratio_of_sums(counted, np.ones(len(counted)))[1]
         return self._with_grid(_PERIOD, settling)
 
+    @property
+    def is_alike(self) -> bool:
+        """Whether the motion is of the same kind and order on coarser grids, as far as known."""
+        return all((one.kind, one.order) == (self.kind, self.order) for one in self.coarser)
+
+    @property
+    def multiplier_error(self) -> float:
+        """How far the multiplier may be off: it changes from cycle to cycle and with the grid.
+
+        Infinite where another grid has no such cycle; NaN where the grid was not looked at.
+        """
+        if math.isnan(self.multiplier) or _RATE not in self.grid_errors:
+            return math.nan
+        if not self.is_alike:
+            return math.inf
+        others = [one.multiplier for one in self.coarser]
+        before = self.blows[: -self.order]
+        others += [_multiplier(before, self.order)] if len(before) > 2 * self.order else []
+        return max([0.0, *(abs(self.multiplier - other) for other in others)])
+
     def summary(self) -> dict[str, Any]:
         """Return the numbers as plain values for JSON; None is what is not defined."""
         numbers = {
@@ -178,6 +204,9 @@ class Settled:
             "blow_period": self.blow_period,
             "blow_period_error": self.blow_period_error,
             "multiplier": self.multiplier,
+            "multiplier_error": self.multiplier_error,
+            "same_motion_on_coarser_grids": self.is_alike if self.coarser else None,
+            "warnings": self.warnings,
             "blows": len(self.blows),
             "duration": self.duration,
             "wall_time": self.wall_time,
@@ -246,10 +275,14 @@ def settled(
         cycle, times = blows[len(blows) - order :], (simulation.time, simulation.wall_time)
         values = kind, order, rate, error, multiplier, cycle, blows, *times
         found = Settled(*values, depends_on_cells=scene.is_undamped)
-        if error_estimate and rate != 0.0 and math.isfinite(rate) and not scene.is_undamped:
-            settling = JUDGED_SHARE if order else SETTLING_SHARE
-            found = replace(found, grid_errors=_grid_errors(simulation, settling))
-        return found
+        if not (error_estimate and rate != 0.0 and math.isfinite(rate)):
+            return found
+        grids = [] if scene.is_undamped else simulation.solver.coarser_scenes() or []
+        coarser = [settled(one, tolerance, most_blows, most_time=most_time) for one in grids]
+        judged = _judged(simulation, JUDGED_SHARE if order else SETTLING_SHARE)
+        # a longer run is not what these ask for
+        texts = [text for text in judged.warnings if "--duration" not in text]
+        return replace(found, grid_errors=_grid_errors(judged), coarser=coarser, warnings=texts)
 
     while len(blows) < most_blows:
         ended, patience = 0.0, STALLED_AFTER
@@ -275,23 +308,28 @@ def settled(
     return made("aperiodic", 0, *rate_of_blows(after_settling(blows)), math.nan)
 
 
-def _grid_errors(simulation: Simulation, settling: float) -> dict[str, float]:
-    """Estimated errors of rate and period by the grid, SI units; of what could be told.
+def _judged(simulation: Simulation, settling: float) -> Result:
+    """The run with its errors by the grid, of what could be told, and its warnings.
 
     A run of few blows is made longer; `settling` is the share of it that does not count.
     """
-    coarser = simulation.solver.coarser_scenes()
-    if coarser == []:
-        return {_RATE: 0.0, _PERIOD: 0.0}
     while simulation.blow_rows < FEWEST_JUDGED:
         before = simulation.blow_rows
         simulation.advance_blows(1, simulation.time + STALLED_AFTER)
         if simulation.blow_rows == before:
-            return {}
+            break
     end, settle = simulation.time, settling * simulation.time
     whole = simulation.scene.replace(**{"run.duration": end, "run.settle": settle})
     result = replace(simulation.result(settle), scene=whole)
-    judged = with_error_estimate(result, coarser, _run, whole_time=True)
+    return with_error_estimate(result, simulation.solver.coarser_scenes(), _run, whole_time=True)
+
+
+def _grid_errors(judged: Result) -> dict[str, float]:
+    """Errors of rate and period, SI units; 0 without a grid, none where it was not estimated."""
+    if not judged.cells:
+        return {_RATE: 0.0, _PERIOD: 0.0}
+    if judged.scene.is_undamped:
+        return {}
     errors = {_RATE: judged.rate_of_penetration_error, **judged.errors}
     return {name: errors[name] for name in (_RATE, _PERIOD) if errors.get(name, math.nan) >= 0.0}
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 import threading
 from collections.abc import Callable, Iterator
@@ -110,15 +111,19 @@ def show_settled(found: Settled) -> None:
     table = Table(show_header=False)
     table.add_column(no_wrap=True)
     table.add_column()
-    order = {0: "", 1: ", every blow alike"}.get(found.order, f", {found.order} blows a cycle")
-    table.add_row("Motion", f"{found.kind}{order}")
+    table.add_row("Motion", _motion(found))
+    if not found.is_alike:
+        others = sorted({_motion(one) for one in found.coarser})
+        table.add_row("On coarser grids", " or ".join(others))
     if summary[RATE[1]] is not None:
         table.add_row(RATE[0], f"{rate_text(summary)} {RATE[3]}")
     for name, key, factor, unit in (
         ("Blow period", "blow_period", 1e3, "ms"),
         ("Deviation after a cycle", "multiplier", 1.0, "of what it was"),
     ):
-        if summary[key] is not None:
+        if key == "multiplier" and math.isinf(found.multiplier_error):
+            table.add_row(name, UNDECIDED)
+        elif summary[key] is not None:
             table.add_row(name, f"{mean_text(summary, key, factor)} {unit}".rstrip())
     table.add_row("Blows run", f"{len(found.blows)} in {found.duration:.4g} s of simulated time")
     table.add_row("Computed in", f"{found.wall_time:.3g} s")
@@ -126,6 +131,13 @@ def show_settled(found: Settled) -> None:
     print_table(table, console)
     if found.error_of:
         console.print(wrapped(_settled_error(found)), highlight=False)
+    show_warnings(console, found.warnings)
+
+
+def _motion(found: Settled) -> str:
+    """Kind and order of a stationary response in words."""
+    order = {0: "", 1: ", every blow alike"}.get(found.order, f", {found.order} blows a cycle")
+    return f"{found.kind}{order}"
 
 
 def _settled_error(found: Settled) -> str:
