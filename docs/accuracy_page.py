@@ -15,7 +15,7 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-from percussion_model.interface.commands.accuracy_tables import two
+from percussion_model.interface.commands.accuracy_tables import two, within_bar
 from percussion_model.verification.accuracy import Study
 from percussion_model.verification.accuracy.advantage import (
     MET,
@@ -368,7 +368,7 @@ def bars(study: Study) -> str:
     for key, bar in study.reference.bars.items():
         one = QUANTITIES[key]
         label = f"{one.label}, {one.unit}" if one.unit else one.label
-        value = "–" if key in HISTORIES else f"{one.factor * bar.value:.7g}"
+        value = "–" if key in HISTORIES else within_bar(one.factor, bar)
         verdict = "yes" if bar.agreed else "no: the limits disagree"
         rows.append([label, value, power(abs(bar.error / bar.value)), power(bar.apart), verdict])
     return table(
@@ -383,7 +383,7 @@ def orders(study: Study, keys: Sequence[str]) -> str:
         found = [study.order(name, key) for key in keys]
         if not any(found):
             continue
-        cells = ["–" if one is None else f"{one.value:.1f} ± {one.error:.1f}" for one in found]
+        cells = ["–" if one is None else str(one) for one in found]
         knob = "simulated time" if study.kind == APERIODIC else LADDERS[name].knob
         rows.append([LADDERS[name].title, knob, *cells])
     return table(["method", "against", *(SHORT[key] for key in keys)], rows)

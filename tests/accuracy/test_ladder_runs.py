@@ -12,7 +12,11 @@ import pytest
 
 from percussion_model import Scene, SceneError
 from percussion_model.interface.cli import app
-from percussion_model.interface.commands.accuracy_tables import show_contests, show_study
+from percussion_model.interface.commands.accuracy_tables import (
+    show_contests,
+    show_study,
+    within_bar,
+)
 from percussion_model.verification.accuracy import Study, study
 from percussion_model.verification.accuracy.integrators import GeneralRun
 from percussion_model.verification.accuracy.ladders import (
@@ -22,6 +26,7 @@ from percussion_model.verification.accuracy.ladders import (
     ladders,
     misfit_of,
 )
+from percussion_model.verification.accuracy.orders import Order
 from percussion_model.verification.accuracy.problems import (
     APERIODIC,
     HISTORIES,
@@ -32,6 +37,8 @@ from percussion_model.verification.accuracy.problems import (
     pose,
     relative_error,
 )
+from percussion_model.verification.accuracy.references import Bar
+from percussion_model.verification.accuracy.study import solvers_of
 from percussion_model.verification.accuracy.timing import interleaved
 
 # The package offers a function of the same name.
@@ -288,3 +295,24 @@ def test_unknown_methods_and_missing_files_are_refused():
     scene = str(SCENARIOS / "reference.toml")
     assert "'waves' is no method: wave, wave-steps" in refused(scene, "--methods", "waves,fem")
     assert "none.toml" in refused("none.toml")
+
+
+def test_an_order_has_the_digits_of_its_error(found, capsys):
+    assert str(Order(1.1739, 0.0197, 1.0, 4)) == "1.174 ± 0.020"
+    assert str(Order(0.2, 0.46, 1.0, 4)) == "0.2 ± 0.5"
+    assert str(Order(2.0, 0.0, 1.0, 3)) == "2.000 ± 0.010"
+    show_study(found)
+    shown = capsys.readouterr().out
+    assert str(found.order("wave", HISTORY)).replace(" ", "") in shown
+    assert "±0.0 " not in shown
+
+
+def test_a_value_of_the_reference_has_the_digits_of_its_bar():
+    bar = Bar(8.631622e-3, 2.0e-7, {}, True)
+    assert within_bar(1e3, bar) == "8.63162"
+
+
+def test_only_methods_that_were_asked_are_set_up():
+    assert solvers_of(("wave", "rigid")) == ["wave", "rigid"]
+    assert solvers_of(("fem-time", "explicit")) == ["wave", "fem"]
+    assert solvers_of(LADDERS) == ["wave", "fem", "rigid"]

@@ -52,6 +52,7 @@ def accuracy(
     from percussion_model.scene.scene import Scene
     from percussion_model.verification.accuracy import study
     from percussion_model.verification.accuracy.ladders import chosen_ladders
+    from percussion_model.verification.accuracy.study import solvers_of
 
     chosen = [(path.stem, common.load_scene(path, settings=settings)) for path in scenes or ()]
     if not chosen:
@@ -65,13 +66,14 @@ def accuracy(
             f"{', '.join(names)}: results take the names of the scene files, which must differ"
         )
     words = None if methods is None else [word.strip() for word in methods.split(",")]
-    chosen_ladders(words)  # refuses before anything is computed
+    ladders = chosen_ladders(words)  # refuses before anything is computed
     common.check_json(json_file)
-    common.tell_of_compiling("wave", "fem", "rigid")
     if make_references:
+        common.tell_of_compiling("wave", "fem")
         for _, scene in chosen:
             show_bars(_make_reference(scene))
         return
+    common.tell_of_compiling(*solvers_of(ladders))
     claimed = None
     if figures or json_file is None:
         claimed = common.claim(

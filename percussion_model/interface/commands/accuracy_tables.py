@@ -11,6 +11,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from percussion_model.interface.tables import print_table
+from percussion_model.simulation.uncertain import with_error
 from percussion_model.verification.accuracy.advantage import (
     MET,
     MISSED,
@@ -29,7 +30,7 @@ from percussion_model.verification.accuracy.problems import (
     QUANTITIES,
     STRESS_HISTORY,
 )
-from percussion_model.verification.accuracy.references import Reference
+from percussion_model.verification.accuracy.references import Bar, Reference
 from percussion_model.verification.accuracy.study import WANTED, Point, Study
 
 SHORT = {
@@ -88,7 +89,7 @@ def show_bars(reference: Reference, console: Console | None = None) -> None:
         label = f"{quantity.label}, {quantity.unit}" if quantity.unit else quantity.label
         table.add_row(
             label,
-            "" if key in HISTORIES else f"{quantity.factor * bar.value:.7g}",
+            "" if key in HISTORIES else within_bar(quantity.factor, bar),
             _number(abs(bar.error / bar.value)),
             _number(bar.apart),
             "" if bar.agreed else "no reference: the limits disagree",
@@ -99,6 +100,11 @@ def show_bars(reference: Reference, console: Console | None = None) -> None:
         "one value: theirs is the mean distance by the mean size.",
         highlight=False,
     )
+
+
+def within_bar(factor: float, bar: Bar) -> str:
+    """A value to the second digit of its bar."""
+    return with_error(factor * bar.value, factor * bar.error).split(" ± ")[0]
 
 
 def _print(title: str, table: Table, console: Console, keys: int = 1) -> None:
@@ -169,7 +175,7 @@ def _show_orders(found: Study, console: Console) -> None:
         table.add_column(SHORT[key].replace(" ", "\n"), justify="right", no_wrap=True)
     for name in found.names:
         orders = [found.order(name, key) for key in keys]
-        cells = ["-" if one is None else f"{one.value:.1f}±{one.error:.1f}" for one in orders]
+        cells = ["-" if one is None else str(one).replace(" ", "") for one in orders]
         table.add_row(LADDERS[name].title, *cells)
     _print("Measured orders, each against what the method refines", table, console)
     if "rigid" in found.names and found.kind != APERIODIC:

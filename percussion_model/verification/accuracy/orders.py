@@ -8,12 +8,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from percussion_model.simulation.uncertain import with_short_error
+
 __all__ = ["Cost", "Order", "cost_at", "cost_range", "fitted_order"]
 
 # Fewer points make no order.
 LEAST_POINTS = 3
 # What is left of an error that the bar of the reference may make up whole.
 NOTHING = 1e-3
+# A smaller error of an order is not shown.
+LEAST_SHOWN = 0.01
 
 
 @dataclass(frozen=True)
@@ -25,7 +29,7 @@ class Order:
     value : float
         Exponent.
     error : float
-        Its standard error; NaN with two degrees of freedom or less left.
+        Its standard error.
     scale : float
         Error at size one.
     points : int
@@ -35,6 +39,9 @@ class Order:
     error: float
     scale: float
     points: int
+
+    def __str__(self) -> str:
+        return with_short_error(self.value, max(self.error, LEAST_SHOWN))
 
 
 @dataclass(frozen=True)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from typing import Any
 
 from percussion_model.scene.scene import Scene
 from percussion_model.simulation.files import plain
 from percussion_model.simulation.simulate import Simulation
+from percussion_model.simulation.uncertain import in_digits
 from percussion_model.verification.accuracy.integrators import GeneralRun
 from percussion_model.verification.accuracy.ladders import (
     FITS,
@@ -203,7 +204,8 @@ class Study:
         spread = f" (± {100 * best.spread:.2g} %)" if math.isfinite(best.spread) else ""
         return (
             f"For {100 * wanted:g} % take {LADDERS[best.ladder].title}, {best.label}, of all that "
-            f"were tried: {1e3 * best.second:.3g} ms{spread} for a simulated second, {off}."
+            f"were tried: {in_digits(1e3 * best.second, 2)} ms{spread} for a simulated second, "
+            f"{off}."
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -287,7 +289,7 @@ def study(
     progress("pilot run", 0.0)
     # make each solver once: compile, or load what was compiled before
     compilation = {
-        name: Simulation(scene.computed_by(name)).setup_time for name in ("wave", "fem", "rigid")
+        name: Simulation(scene.computed_by(name)).setup_time for name in solvers_of(names)
     }
     problem = pose(scene)
     reference = find_reference(problem, scene, lambda text: progress(text, 0.02))
@@ -323,6 +325,12 @@ def study(
         compilation,
         machine(),
     )
+
+
+def solvers_of(names: Iterable[str]) -> list[str]:
+    """Solvers of the package that are run for ladders, and by the pilot run, waves."""
+    needed = {"wave", *(LADDERS[name].family for name in names)}
+    return [name for name in ("wave", "fem", "rigid") if name in needed]
 
 
 def _measured(
