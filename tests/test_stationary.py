@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from percussion_model.interface.terminal import show_settled
 from percussion_model.physics.records import BLOW
 from percussion_model.simulation.rate import rate_of_blows
 
+SCENARIOS = Path(__file__).parents[1] / "scenarios"
 TOLERANCE = 1e-4
 RIGID = {"piston.model": "rigid", "bit.model": "rigid"}
 # Drive force that keeps the power of the reference at another reversal distance.
@@ -95,6 +97,50 @@ def test_a_settled_rate_has_the_error_of_its_grid():
     assert "error_of='convergence'" in repr(coarse)
     rigid = settled(Scene().replace(**RIGID), error_estimate=True)
     assert rigid.grid_errors == {"rate_of_penetration": 0.0, "blow_period": 0.0}
+
+
+def chatter(cells):
+    return Scene.from_toml(SCENARIOS / "chatter.toml").replace(**{"solver.cells": cells})
+
+
+def test_a_deviation_has_the_error_of_convergence_and_grid(capsys):
+    coarse = settled(Scene(), error_estimate=True)
+    fine = settled(Scene().replace(**{"solver.cells": 100}))
+    assert coarse.same_motion is True
+    off = abs(coarse.multiplier - fine.multiplier)
+    assert off <= coarse.multiplier_error < 0.1 * coarse.multiplier
+    show_settled(coarse)
+    (line,) = [one for one in capsys.readouterr().out.splitlines() if "Deviation" in one]
+    assert f"{coarse.multiplier:.4f} ± {coarse.multiplier_error:.4f}" in line
+    rigid = settled(Scene().replace(**RIGID), error_estimate=True)
+    assert rigid.others == ()
+    assert 0.0 < rigid.multiplier_error < 0.01 * rigid.multiplier
+
+
+def test_a_motion_that_changes_with_the_cells_is_said_to(capsys):
+    """On one of the grids that these cells are compared with, blows alternate."""
+    found = settled(chatter(20), error_estimate=True)
+    assert (found.order, found.others[0].order) == (1, 2)
+    assert found.same_motion is False
+    assert math.isnan(found.multiplier_error)
+    assert found.summary()["multiplier_error"] is None
+    show_settled(found)
+    shown = " ".join(capsys.readouterr().out.replace("│", " ").split())
+    assert "not the same on a second grid: periodic, 2 blows a cycle" in shown
+    assert "Deviation after a cycle undecided, with these cells" in shown
+    show_settled(settled(chatter(20)))
+    shown = " ".join(capsys.readouterr().out.replace("│", " ").split())
+    assert "on no second grid tried" in shown
+
+
+def test_a_settled_motion_has_the_warnings_of_a_run(capsys):
+    scene = Scene().replace(**{"effects.loss": False, "solver.cells": 4})
+    found = settled(scene, most_blows=40, error_estimate=True)
+    assert any("structural loss is off" in text for text in found.warnings)
+    assert not any("run.duration" in text for text in found.warnings)
+    show_settled(found)
+    assert "structural loss is off" in " ".join(capsys.readouterr().out.split())
+    assert settled(Scene(), error_estimate=True).warnings == []
 
 
 def test_an_aperiodic_rate_has_the_error_of_scatter_and_no_other_name(capsys):

@@ -7,18 +7,19 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from percussion_model.physics.records import BLOW
 from percussion_model.scene.scene import Scene, SceneError
-from percussion_model.simulation.error_estimate import with_error_estimate
+from percussion_model.simulation.error_estimate import SAFETY, with_error_estimate
 from percussion_model.simulation.files import plain
 from percussion_model.simulation.rate import rate_of_blows, ratio_of_sums
 from percussion_model.simulation.result import Result
 from percussion_model.simulation.simulate import Simulation, SimulationError
 from percussion_model.simulation.uncertain import BY_CELLS, is_undecided, rate_field
+from percussion_model.simulation.warnings import warnings_of_motion
 
 # A run in which no blow ends for so long [s], and so many periods of the last, has stopped.
 STALLED_AFTER, STALLED_PERIODS = 2.0, 4.0
@@ -62,6 +63,18 @@ FEWEST_JUDGED, JUDGED_SHARE = 12, 0.5
 SETTLING_SHARE = 0.2
 
 
+class Motion(NamedTuple):
+    """Kind, blows in a cycle and multiplier of a motion, as those of `Settled`."""
+
+    kind: str
+    order: int
+    multiplier: float
+
+    def __str__(self) -> str:
+        words = {0: "", 1: ", every blow alike"}.get(self.order, f", {self.order} blows a cycle")
+        return f"{self.kind}{words}"
+
+
 @dataclass(frozen=True)
 class Settled:
     """The stationary response of a scene, SI units; NaN is what is not defined.
@@ -79,7 +92,7 @@ class Settled:
     multiplier : float
         What is left of a deviation after one cycle, from the ratio of the last
         two changes; negative where it alternates. The cycle is stable below 1
-        in size.
+        in size. Its error is `multiplier_error`.
     cycle : ndarray of BLOW
         The last cycle; no rows where the motion is not periodic.
     blows : ndarray of BLOW
@@ -92,6 +105,10 @@ class Settled:
         The other part of the errors of `rate_of_penetration` [m/s] and `blow_period` [s], as
         `simulate` estimates it by coarser grids, with what scatter does to these runs; 0
         without a grid. Of what was not estimated there is none.
+    others : tuple of Motion
+        The motions on coarser grids, where errors were estimated.
+    warnings : list of str
+        As of a run, but for those of its length, where errors were estimated.
     """
 
     kind: str
@@ -105,6 +122,8 @@ class Settled:
     wall_time: float
     depends_on_cells: bool = False
     grid_errors: dict[str, float] = field(default_factory=dict)
+    others: tuple[Motion, ...] = ()
+    warnings: list[str] = field(default_factory=list, repr=False)
 
     def __repr__(self) -> str:
         rate = rate_field(self.summary())
@@ -139,6 +158,31 @@ class Settled:
         if self.depends_on_cells and abs(self.rate_of_penetration) > 0.0:
             return True
         return is_undecided(self.rate_of_penetration, self.rate_of_penetration_error)
+
+    @property
+    def motion(self) -> Motion:
+        """Kind, order and multiplier."""
+        return Motion(self.kind, self.order, self.multiplier)
+
+    @property
+    def same_motion(self) -> bool | None:
+        """Whether the motions on coarser grids are of this kind and order; None if not known."""
+        if not self.others:
+            return None
+        return all(other[:2] == (self.kind, self.order) for other in self.others)
+
+    @property
+    def multiplier_error(self) -> float:
+        """How far the multiplier may be off; NaN where that is not known.
+
+        By the cycle before, and by coarser grids where errors were estimated.
+        """
+        earlier = len(self.blows) - self.order
+        if math.isnan(self.multiplier) or self.same_motion is False or earlier <= 2 * self.order:
+            return math.nan
+        before = _multiplier(self.blows[:earlier], self.order)
+        off = [abs(other.multiplier - self.multiplier) for other in self.others]
+        return abs(self.multiplier - before) + SAFETY * float(np.max(off, initial=0.0))
 
     @property
     def counted(self) -> np.ndarray:
@@ -178,9 +222,13 @@ class Settled:
             "blow_period": self.blow_period,
             "blow_period_error": self.blow_period_error,
             "multiplier": self.multiplier,
+            "multiplier_error": self.multiplier_error,
+            "same_motion_on_other_grids": self.same_motion,
+            "motions_on_other_grids": [other._asdict() for other in self.others],
             "blows": len(self.blows),
             "duration": self.duration,
             "wall_time": self.wall_time,
+            "warnings": self.warnings,
         }
         values: dict[str, Any] = plain(numbers)
         return values
@@ -221,8 +269,8 @@ def settled(
     most_time : float
         Processor time after which the run is given up with an error [s].
     error_estimate : bool
-        Whether to estimate the error of the grid, by short runs on coarser ones. They are
-        not in the times.
+        Whether to estimate the error of the grid, and to see whether the motion is that of
+        coarser ones, by runs on these. They are not in the times.
 
     Returns
     -------
@@ -246,7 +294,14 @@ def settled(
         cycle, times = blows[len(blows) - order :], (simulation.time, simulation.wall_time)
         values = kind, order, rate, error, multiplier, cycle, blows, *times
         found = Settled(*values, depends_on_cells=scene.is_undamped)
-        if error_estimate and rate != 0.0 and math.isfinite(rate):
+        if not error_estimate:
+            return found
+        # before other runs make this one longer; a study of thousands would pay for them
+        start = float(found.counted["time"][0]) if len(found.counted) else 0.0
+        found.warnings.extend(warnings_of_motion(simulation.result(start)))
+        others = _other_motions(simulation, tolerance, most_blows, scatter, most_time)
+        found = replace(found, others=others)
+        if rate != 0.0 and math.isfinite(rate):
             settling = JUDGED_SHARE if order else SETTLING_SHARE
             found = replace(found, grid_errors=_grid_errors(simulation, settling))
         return found
@@ -273,6 +328,20 @@ def settled(
             if error <= scatter * abs(rate):
                 break
     return made("aperiodic", 0, *rate_of_blows(after_settling(blows)), math.nan)
+
+
+def _other_motions(
+    simulation: Simulation, tolerance: float, most_blows: int, scatter: float, most_time: float
+) -> tuple[Motion, ...]:
+    """Motions on coarser grids; none where there are no grids, or one cannot be run."""
+    try:
+        found = [
+            settled(scene, tolerance, most_blows, scatter=scatter, most_time=most_time)
+            for scene in simulation.solver.coarser_scenes() or ()
+        ]
+    except (SceneError, SimulationError):
+        return ()
+    return tuple(one.motion for one in found)
 
 
 def _grid_errors(simulation: Simulation, settling: float) -> dict[str, float]:
