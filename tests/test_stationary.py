@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import re
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +17,7 @@ from percussion_model.interface.terminal import show_settled
 from percussion_model.physics.records import BLOW
 from percussion_model.simulation.rate import rate_of_blows
 
+SCENARIOS = Path(__file__).parents[1] / "scenarios"
 TOLERANCE = 1e-4
 RIGID = {"piston.model": "rigid", "bit.model": "rigid"}
 # Drive force that keeps the power of the reference at another reversal distance.
@@ -99,24 +99,48 @@ def test_a_settled_rate_has_the_error_of_its_grid():
     assert rigid.grid_errors == {"rate_of_penetration": 0.0, "blow_period": 0.0}
 
 
-def test_what_another_grid_does_not_have_is_not_stated(capsys):
-    path = Path(__file__).parents[1] / "scenarios" / "stiff_rock.toml"
-    found = settled(Scene.from_toml(path), error_estimate=True)
-    assert found.order == 1
-    assert {one.order for one in found.coarser} == {1, 2}
-    assert found.summary()["same_motion_on_coarser_grids"] is False
-    show_settled(found)
-    shown = capsys.readouterr().out
-    assert re.search(r"On coarser grids +│ periodic, 2 blows a cycle", shown)
-    assert re.search(r"Deviation after a cycle +│ undecided", shown)
-    assert "warning: the rate of penetration may be off" in shown
+def chatter(cells):
+    return Scene.from_toml(SCENARIOS / "chatter.toml").replace(**{"solver.cells": cells})
 
 
-def test_a_deviation_has_an_error_that_covers_that_of_finer_grids():
+def test_a_deviation_has_the_error_of_convergence_and_grid(capsys):
     coarse = settled(Scene(), error_estimate=True)
-    fine = settled(Scene().replace(**{"solver.cells": 60}))
-    assert 0.0 < abs(coarse.multiplier - fine.multiplier) <= coarse.multiplier_error < 0.05
-    assert math.isnan(fine.multiplier_error)
+    fine = settled(Scene().replace(**{"solver.cells": 100}))
+    assert coarse.same_motion is True
+    off = abs(coarse.multiplier - fine.multiplier)
+    assert off <= coarse.multiplier_error < 0.1 * coarse.multiplier
+    show_settled(coarse)
+    (line,) = [one for one in capsys.readouterr().out.splitlines() if "Deviation" in one]
+    assert f"{coarse.multiplier:.4f} ± {coarse.multiplier_error:.4f}" in line
+    rigid = settled(Scene().replace(**RIGID), error_estimate=True)
+    assert rigid.others == ()
+    assert 0.0 < rigid.multiplier_error < 0.01 * rigid.multiplier
+
+
+def test_a_motion_that_changes_with_the_cells_is_said_to(capsys):
+    """On one of the grids that these cells are compared with, blows alternate."""
+    found = settled(chatter(20), error_estimate=True)
+    assert (found.order, found.others[0].order) == (1, 2)
+    assert found.same_motion is False
+    assert math.isnan(found.multiplier_error)
+    assert found.summary()["multiplier_error"] is None
+    show_settled(found)
+    shown = " ".join(capsys.readouterr().out.replace("│", " ").split())
+    assert "not the same on a second grid: periodic, 2 blows a cycle" in shown
+    assert "Deviation after a cycle undecided, with these cells" in shown
+    show_settled(settled(chatter(20)))
+    shown = " ".join(capsys.readouterr().out.replace("│", " ").split())
+    assert "on no second grid tried" in shown
+
+
+def test_a_settled_motion_has_the_warnings_of_a_run(capsys):
+    scene = Scene().replace(**{"effects.loss": False, "solver.cells": 4})
+    found = settled(scene, most_blows=40, error_estimate=True)
+    assert any("structural loss is off" in text for text in found.warnings)
+    assert not any("run.duration" in text for text in found.warnings)
+    show_settled(found)
+    assert "structural loss is off" in " ".join(capsys.readouterr().out.split())
+    assert settled(Scene(), error_estimate=True).warnings == []
 
 
 def test_an_aperiodic_rate_has_the_error_of_scatter_and_no_other_name(capsys):

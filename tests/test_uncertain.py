@@ -18,6 +18,7 @@ from percussion_model.analysis.study.response import KINDS, ROW
 from percussion_model.coupling.coupled_run import CoupledRun, summary
 from percussion_model.interface.commands.couple import _lines
 from percussion_model.interface.commands.effects import table_of
+from percussion_model.interface.plotting.compared_blows import draw_comparison
 from percussion_model.interface.plotting.effect_bars import draw_effects
 from percussion_model.interface.plotting.overview import draw_overview
 from percussion_model.interface.plotting.paper import _points
@@ -303,6 +304,35 @@ def test_a_difference_without_errors_is_no_verdict(aperiodic, capsys):
     show_comparison(found)
     (line,) = [one for one in capsys.readouterr().out.splitlines() if "Blow period" in one]
     assert "≈" in line
+
+
+def test_falls_are_compared_by_their_depth(capsys):
+    drop = Scene().replace(**{"piston.model": "absent", "effects.drive": "none"})
+    drop = drop.replace(**{"start.bit_velocity": 5.25, "run.duration": 0.1, "run.settle": 0.0})
+    found = compare(drop, ["wave", "rigid"])
+    assert set(found.differences()["rigid"]) == set(found.difference_errors()["rigid"])
+    depths = [result.fall["depth"] for result in found.results.values()]
+    off = found.differences()["rigid"]["depth"]
+    assert off == pytest.approx(depths[1] / depths[0] - 1.0)
+    show_comparison(found)
+    shown = capsys.readouterr().out
+    assert "Depth of the bit" in shown
+    assert "Impact velocity" not in shown
+    assert " - " not in shown
+    assert "scatter of the blows, and" in shown.replace("\n ", "")  # what rigid bodies know
+    titles = " ".join(
+        ax.get_title(loc="left") + ax.get_title() for ax in draw_comparison(found).axes
+    )
+    assert "piston" not in titles
+    assert "blow" not in titles
+
+
+def test_what_is_said_of_errors_is_that_of_the_solvers(periodic, aperiodic, capsys):
+    show_comparison(Comparison({"rigid": periodic}))
+    shown = capsys.readouterr().out
+    assert "Rigid bodies have no cells" in shown
+    assert "by the size of the cells and" not in shown
+    assert "stands before a difference" not in shown
 
 
 # ------------------------------------------------------------------- pages, figures

@@ -145,7 +145,7 @@ def test_settled_names_the_time_that_was_simulated_and_the_error_of_its_rate(cap
     show_settled(found)
     shown = capsys.readouterr().out
     assert "Multiplier" not in shown
-    assert re.search(r"Deviation after a cycle +│ -?[\d.e-]+ of what it was", shown)
+    assert re.search(r"Deviation after a cycle +│ -?[\d.]+ ± [\d.]+ of what it was", shown)
     assert f"{len(found.blows)} in {found.duration:.4g} s of simulated time" in shown
     assert re.search(r"Rate of penetration +│ 16\.\d+ ± 0\.0\d+ mm/s", shown)
 

@@ -43,6 +43,9 @@ COMPARED = (
     "mean_bit_force",
 )
 
+# Numbers of the fall of a bit that nothing strikes, of a `Result.fall`.
+OF_FALL = ("depth", "first_contact", "rebound_velocity", "rest_time", "crushed")
+
 
 @dataclass(frozen=True)
 class Comparison:
@@ -68,15 +71,32 @@ class Comparison:
         """Summary of each result, by solver."""
         return {name: result.summary() for name, result in self.results.items()}
 
+    @property
+    def is_fall(self) -> bool:
+        """Whether there are no blows, so that how a bit fell is compared."""
+        return not any(len(result.blows) for result in self.results.values())
+
+    def compared(self) -> dict[str, dict[str, Any]]:
+        """Numbers that are compared, with their errors, by solver: of blows, or of a fall."""
+        summaries = self.summaries()
+        if not self.is_fall:
+            return summaries
+        nothing = dict.fromkeys((*COMPARED, *OF_FALL))
+        return {
+            name: nothing | one["fall"] | {"errors": one["errors"]}
+            for name, one in summaries.items()
+        }
+
     def differences(self) -> dict[str, dict[str, float | None]]:
         """Relative difference of each number to the first solver's, by solver.
 
-        None where a number is not defined, or the first solver's is zero.
+        Of a fall those of `Result.fall`. None where a number is not defined, or the first
+        solver's is zero.
         """
-        summaries = self.summaries()
+        summaries = self.compared()
         base = summaries[self.first]
         return {
-            name: {key: relative_change(summary[key], base[key]) for key in COMPARED}
+            name: {key: relative_change(summary[key], base[key]) for key in self._keys}
             for name, summary in summaries.items()
             if name != self.first
         }
@@ -87,13 +107,18 @@ class Comparison:
         By grid and scatter; None where a difference is, or where one of the errors is not
         known.
         """
-        summaries = self.summaries()
+        summaries = self.compared()
         base = summaries[self.first]
         return {
-            name: {key: _difference_error(summary, base, key) for key in COMPARED}
+            name: {key: _difference_error(summary, base, key) for key in self._keys}
             for name, summary in summaries.items()
             if name != self.first
         }
+
+    @property
+    def _keys(self) -> tuple[str, ...]:
+        """Names of what is compared."""
+        return OF_FALL if self.is_fall else COMPARED
 
     def undecided(self) -> dict[str, list[str]]:
         """Numbers whose difference to the first solver is within its error, by solver.

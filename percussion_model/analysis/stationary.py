@@ -7,18 +7,19 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from percussion_model.physics.records import BLOW
 from percussion_model.scene.scene import Scene, SceneError
-from percussion_model.simulation.error_estimate import with_error_estimate
+from percussion_model.simulation.error_estimate import SAFETY, with_error_estimate
 from percussion_model.simulation.files import plain
 from percussion_model.simulation.rate import rate_of_blows, ratio_of_sums
 from percussion_model.simulation.result import Result
 from percussion_model.simulation.simulate import Simulation, SimulationError
 from percussion_model.simulation.uncertain import BY_CELLS, is_undecided, rate_field
+from percussion_model.simulation.warnings import warnings_of_motion
 
 # A run in which no blow ends for so long [s], and so many periods of the last, has stopped.
 STALLED_AFTER, STALLED_PERIODS = 2.0, 4.0
@@ -62,6 +63,18 @@ FEWEST_JUDGED, JUDGED_SHARE = 12, 0.5
 SETTLING_SHARE = 0.2
 
 
+class Motion(NamedTuple):
+    """Kind, blows in a cycle and multiplier of a motion, as those of `Settled`."""
+
+    kind: str
+    order: int
+    multiplier: float
+
+    def __str__(self) -> str:
+        words = {0: "", 1: ", every blow alike"}.get(self.order, f", {self.order} blows a cycle")
+        return f"{self.kind}{words}"
+
+
 @dataclass(frozen=True)
 class Settled:
     """The stationary response of a scene, SI units; NaN is what is not defined.
@@ -79,7 +92,7 @@ class Settled:
     multiplier : float
         What is left of a deviation after one cycle, from the ratio of the last
         two changes; negative where it alternates. The cycle is stable below 1
-        in size.
+        in size. Its error is `multiplier_error`.
     cycle : ndarray of BLOW
         The last cycle; no rows where the motion is not periodic.
     blows : ndarray of BLOW
@@ -92,10 +105,10 @@ class Settled:
         The other part of the errors of `rate_of_penetration` [m/s] and `blow_period` [s], as
         `simulate` estimates it by coarser grids, with what scatter does to these runs; 0
         without a grid. Of what was not estimated there is none.
-    coarser : list of Settled
-        The same on coarser grids, where errors of the grid were asked for.
+    others : tuple of Motion
+        The motions on coarser grids, where errors were estimated.
     warnings : list of str
-        As of a run; where errors of the grid were asked for.
+        As of a run, but for those of its length, where errors were estimated.
     """
 
     kind: str
@@ -109,7 +122,7 @@ class Settled:
     wall_time: float
     depends_on_cells: bool = False
     grid_errors: dict[str, float] = field(default_factory=dict)
-    coarser: list[Settled] = field(default_factory=list, repr=False)
+    others: tuple[Motion, ...] = ()
     warnings: list[str] = field(default_factory=list, repr=False)
 
     def __repr__(self) -> str:
@@ -147,6 +160,31 @@ class Settled:
         return is_undecided(self.rate_of_penetration, self.rate_of_penetration_error)
 
     @property
+    def motion(self) -> Motion:
+        """Kind, order and multiplier."""
+        return Motion(self.kind, self.order, self.multiplier)
+
+    @property
+    def same_motion(self) -> bool | None:
+        """Whether the motions on coarser grids are of this kind and order; None if not known."""
+        if not self.others:
+            return None
+        return all(other[:2] == (self.kind, self.order) for other in self.others)
+
+    @property
+    def multiplier_error(self) -> float:
+        """How far the multiplier may be off; NaN where that is not known.
+
+        By the cycle before, and by coarser grids where errors were estimated.
+        """
+        earlier = len(self.blows) - self.order
+        if math.isnan(self.multiplier) or self.same_motion is False or earlier <= 2 * self.order:
+            return math.nan
+        before = _multiplier(self.blows[:earlier], self.order)
+        off = [abs(other.multiplier - self.multiplier) for other in self.others]
+        return abs(self.multiplier - before) + SAFETY * float(np.max(off, initial=0.0))
+
+    @property
     def counted(self) -> np.ndarray:
         """Blows that means are taken of: the last cycle, or all after settling."""
         return self.cycle if self.order else after_settling(self.blows)
@@ -169,26 +207,6 @@ class Settled:
             settling = ratio_of_sums(counted, np.ones(len(counted)))[1]
         return self._with_grid(_PERIOD, settling)
 
-    @property
-    def is_alike(self) -> bool:
-        """Whether the motion is of the same kind and order on coarser grids, as far as known."""
-        return all((one.kind, one.order) == (self.kind, self.order) for one in self.coarser)
-
-    @property
-    def multiplier_error(self) -> float:
-        """How far the multiplier may be off: it changes from cycle to cycle and with the grid.
-
-        Infinite where another grid has no such cycle; NaN where the grid was not looked at.
-        """
-        if math.isnan(self.multiplier) or _RATE not in self.grid_errors:
-            return math.nan
-        if not self.is_alike:
-            return math.inf
-        others = [one.multiplier for one in self.coarser]
-        before = self.blows[: -self.order]
-        others += [_multiplier(before, self.order)] if len(before) > 2 * self.order else []
-        return max([0.0, *(abs(self.multiplier - other) for other in others)])
-
     def summary(self) -> dict[str, Any]:
         """Return the numbers as plain values for JSON; None is what is not defined."""
         numbers = {
@@ -205,11 +223,12 @@ class Settled:
             "blow_period_error": self.blow_period_error,
             "multiplier": self.multiplier,
             "multiplier_error": self.multiplier_error,
-            "same_motion_on_coarser_grids": self.is_alike if self.coarser else None,
-            "warnings": self.warnings,
+            "same_motion_on_other_grids": self.same_motion,
+            "motions_on_other_grids": [other._asdict() for other in self.others],
             "blows": len(self.blows),
             "duration": self.duration,
             "wall_time": self.wall_time,
+            "warnings": self.warnings,
         }
         values: dict[str, Any] = plain(numbers)
         return values
@@ -250,8 +269,8 @@ def settled(
     most_time : float
         Processor time after which the run is given up with an error [s].
     error_estimate : bool
-        Whether to estimate the error of the grid, by short runs on coarser ones. They are
-        not in the times.
+        Whether to estimate the error of the grid, and to see whether the motion is that of
+        coarser ones, by runs on these. They are not in the times.
 
     Returns
     -------
@@ -275,14 +294,17 @@ def settled(
         cycle, times = blows[len(blows) - order :], (simulation.time, simulation.wall_time)
         values = kind, order, rate, error, multiplier, cycle, blows, *times
         found = Settled(*values, depends_on_cells=scene.is_undamped)
-        if not (error_estimate and rate != 0.0 and math.isfinite(rate)):
+        if not error_estimate:
             return found
-        grids = [] if scene.is_undamped else simulation.solver.coarser_scenes() or []
-        coarser = [settled(one, tolerance, most_blows, most_time=most_time) for one in grids]
-        judged = _judged(simulation, JUDGED_SHARE if order else SETTLING_SHARE)
-        # a longer run is not what these ask for
-        texts = [text for text in judged.warnings if "--duration" not in text]
-        return replace(found, grid_errors=_grid_errors(judged), coarser=coarser, warnings=texts)
+        # before other runs make this one longer; a study of thousands would pay for them
+        start = float(found.counted["time"][0]) if len(found.counted) else 0.0
+        found.warnings.extend(warnings_of_motion(simulation.result(start)))
+        others = _other_motions(simulation, tolerance, most_blows, scatter, most_time)
+        found = replace(found, others=others)
+        if rate != 0.0 and math.isfinite(rate) and not scene.is_undamped:
+            settling = JUDGED_SHARE if order else SETTLING_SHARE
+            found = replace(found, grid_errors=_grid_errors(simulation, settling))
+        return found
 
     while len(blows) < most_blows:
         ended, patience = 0.0, STALLED_AFTER
@@ -308,28 +330,37 @@ def settled(
     return made("aperiodic", 0, *rate_of_blows(after_settling(blows)), math.nan)
 
 
-def _judged(simulation: Simulation, settling: float) -> Result:
-    """The run with its errors by the grid, of what could be told, and its warnings.
+def _other_motions(
+    simulation: Simulation, tolerance: float, most_blows: int, scatter: float, most_time: float
+) -> tuple[Motion, ...]:
+    """Motions on coarser grids; none where there are no grids, or one cannot be run."""
+    try:
+        found = [
+            settled(scene, tolerance, most_blows, scatter=scatter, most_time=most_time)
+            for scene in simulation.solver.coarser_scenes() or ()
+        ]
+    except (SceneError, SimulationError):
+        return ()
+    return tuple(one.motion for one in found)
+
+
+def _grid_errors(simulation: Simulation, settling: float) -> dict[str, float]:
+    """Estimated errors of rate and period by the grid, SI units; of what could be told.
 
     A run of few blows is made longer; `settling` is the share of it that does not count.
     """
+    coarser = simulation.solver.coarser_scenes()
+    if coarser == []:
+        return {_RATE: 0.0, _PERIOD: 0.0}
     while simulation.blow_rows < FEWEST_JUDGED:
         before = simulation.blow_rows
         simulation.advance_blows(1, simulation.time + STALLED_AFTER)
         if simulation.blow_rows == before:
-            break
+            return {}
     end, settle = simulation.time, settling * simulation.time
     whole = simulation.scene.replace(**{"run.duration": end, "run.settle": settle})
     result = replace(simulation.result(settle), scene=whole)
-    return with_error_estimate(result, simulation.solver.coarser_scenes(), _run, whole_time=True)
-
-
-def _grid_errors(judged: Result) -> dict[str, float]:
-    """Errors of rate and period, SI units; 0 without a grid, none where it was not estimated."""
-    if not judged.cells:
-        return {_RATE: 0.0, _PERIOD: 0.0}
-    if judged.scene.is_undamped:
-        return {}
+    judged = with_error_estimate(result, coarser, _run, whole_time=True)
     errors = {_RATE: judged.rate_of_penetration_error, **judged.errors}
     return {name: errors[name] for name in (_RATE, _PERIOD) if errors.get(name, math.nan) >= 0.0}
 

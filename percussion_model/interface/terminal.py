@@ -21,12 +21,13 @@ from percussion_model.interface.tables import print_table
 from percussion_model.simulation.uncertain import (
     ABOUT,
     NOT_THE_MODEL,
-    PLUS_MINUS,
     UNDECIDED,
     about_errors,
     change_text,
     mean_text,
+    of_the_cells,
     rate_text,
+    with_error,
 )
 
 if TYPE_CHECKING:
@@ -111,20 +112,13 @@ def show_settled(found: Settled) -> None:
     table = Table(show_header=False)
     table.add_column(no_wrap=True)
     table.add_column()
-    table.add_row("Motion", _motion(found))
-    if not found.is_alike:
-        others = sorted({_motion(one) for one in found.coarser})
-        table.add_row("On coarser grids", " or ".join(others))
+    table.add_row("Motion", f"{found.motion}{_on_other_grids(found)}")
     if summary[RATE[1]] is not None:
         table.add_row(RATE[0], f"{rate_text(summary)} {RATE[3]}")
-    for name, key, factor, unit in (
-        ("Blow period", "blow_period", 1e3, "ms"),
-        ("Deviation after a cycle", "multiplier", 1.0, "of what it was"),
-    ):
-        if key == "multiplier" and math.isinf(found.multiplier_error):
-            table.add_row(name, UNDECIDED)
-        elif summary[key] is not None:
-            table.add_row(name, f"{mean_text(summary, key, factor)} {unit}".rstrip())
+    if summary["blow_period"] is not None:
+        table.add_row("Blow period", f"{mean_text(summary, 'blow_period', 1e3)} ms")
+    if summary["multiplier"] is not None:
+        table.add_row("Deviation after a cycle", _deviation(found))
     table.add_row("Blows run", f"{len(found.blows)} in {found.duration:.4g} s of simulated time")
     table.add_row("Computed in", f"{found.wall_time:.3g} s")
     console = Console()
@@ -134,10 +128,23 @@ def show_settled(found: Settled) -> None:
     show_warnings(console, found.warnings)
 
 
-def _motion(found: Settled) -> str:
-    """Kind and order of a stationary response in words."""
-    order = {0: "", 1: ", every blow alike"}.get(found.order, f", {found.order} blows a cycle")
-    return f"{found.kind}{order}"
+def _on_other_grids(found: Settled) -> str:
+    """Say whether a motion is that of coarser grids; nothing where there is no grid."""
+    if found.same_motion is None:
+        has_grid = found.grid_errors.get(RATE[1]) != 0.0
+        return "; on no second grid tried" if has_grid else ""
+    if found.same_motion:
+        return "; the same on a second grid"
+    own = str(found.motion)
+    seen = dict.fromkeys(text for text in map(str, found.others) if text != own)
+    return f"; not the same on a second grid: {' or '.join(seen)}"
+
+
+def _deviation(found: Settled) -> str:
+    """What is left of a deviation after a cycle, as far as that is known."""
+    value, error = found.multiplier, found.multiplier_error
+    text = of_the_cells(value) if math.isnan(error) else with_error(value, error)
+    return f"{text} of what it was"
 
 
 def _settled_error(found: Settled) -> str:
@@ -280,7 +287,7 @@ def _scale_rows(scene: Scene) -> Iterator[tuple[str, str]]:
 
 def show_comparison(found: Comparison) -> None:
     """Print the numbers of several solvers, each beside its difference to the first."""
-    summaries, differences = found.summaries(), found.differences()
+    summaries, differences = found.compared(), found.differences()
     errors = found.difference_errors()
     title = found.results[found.first].scene.title
     table = Table(
@@ -291,13 +298,16 @@ def show_comparison(found: Comparison) -> None:
         table.add_column(name, justify="right", no_wrap=True)
         if name in differences:
             table.add_column(f"{name}\noff, %", justify="right", no_wrap=True)
-    for label, key, factor, unit in (RATE, *SHOWN):
+    shown = []
+    for label, key, factor, unit in WITHOUT_BLOWS if found.is_fall else (RATE, *SHOWN):
+        if all(summary[key] is None for summary in summaries.values()):
+            continue
         cells = []
         for name, summary in summaries.items():
-            if key == RATE[1]:
-                cells.append(_narrow(rate_text(summary)))
-            elif summary[key] is None:
+            if summary[key] is None:
                 cells.append("-")
+            elif key == RATE[1]:
+                cells.append(_narrow(rate_text(summary)))
             else:
                 cells.append(_narrow(mean_text(summary, key, factor)))
             if name in differences:
@@ -306,10 +316,11 @@ def show_comparison(found: Comparison) -> None:
                 doubt = ABOUT if change and error is None else ""
                 cells.append(UNDECIDED if hidden else doubt + change_text(change, error))
         table.add_row(f"{label}, {unit}" if unit else label, *cells)
+        shown += cells
     table.add_section()
     for label, value in _EFFORT.items():
         cells = []
-        for name, summary in summaries.items():
+        for name, summary in found.summaries().items():
             found_here = value(summary)
             cells.append("-" if found_here is None else f"{found_here:.2g}")
             cells += [""] * (name in differences)
@@ -317,14 +328,23 @@ def show_comparison(found: Comparison) -> None:
     console = Console()
     # a solver and its differences stay together
     print_table(table, console, groups=[1, *[2] * len(differences)])
-    console.print(
-        wrapped(
-            f"{PLUS_MINUS} A difference within the errors of both numbers is {UNDECIDED}; "
-            f"{ABOUT} stands where one of them has none."
-        ),
-        highlight=False,
-    )
+    for note in _about_comparison(found, " ".join(shown)):
+        console.print(wrapped(note), highlight=False)
     show_warnings(console, found.warnings())
+
+
+def _about_comparison(found: Comparison, shown: str) -> Iterator[str]:
+    """What the errors are of the numbers that are shown, once for solvers that are alike."""
+    told: dict[str, list[str]] = {}
+    for name, result in found.results.items():
+        if len(result.counted) or result.fall:
+            told.setdefault(about_errors(result.summary()), []).append(name)
+    for note, names in told.items():
+        yield note if len(told) == 1 else f"{', '.join(names)}: {note}"
+    if UNDECIDED in shown:
+        yield f"A difference within the errors of both numbers is {UNDECIDED}."
+    if ABOUT in shown:
+        yield f"{ABOUT} stands before a difference of which one of the numbers has no error."
 
 
 def _narrow(text: str) -> str:

@@ -35,6 +35,13 @@ def find_warnings(result: Result) -> Iterator[str]:
     yield from _about_validity(result)
 
 
+def warnings_of_motion(result: Result) -> Iterator[str]:
+    """Go through those that do not tell how long a run is, and how many of its blows count."""
+    yield from _about_scene(result)
+    yield from _about_grid(result)
+    yield from _about_validity(result)
+
+
 def _about_scene(result: Result) -> Iterator[str]:
     scene = result.scene
     if scene.given_in_vain:

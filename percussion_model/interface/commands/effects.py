@@ -103,7 +103,12 @@ def table_of(found: EffectsStudy) -> tuple[list[str], list[list[str]], dict[str,
         rows.append([name, *(show(found, trial, numbers) for show in _COLUMNS.values())])
         if trial.reason:
             reasons[name] = trial.reason
-    return ["", *_COLUMNS], rows, reasons | found.refused
+    headings = ["", *_COLUMNS]
+    # what no row has is left out: the reasons tell why
+    told = [any(row[k] not in ("", "-") for row in rows) for k in range(len(headings))]
+    rows = [[cell for cell, known in zip(row, told, strict=True) if known] for row in rows]
+    headings = [text for text, known in zip(headings, told, strict=True) if known]
+    return headings, rows, reasons | found.refused
 
 
 def show_effects(found: EffectsStudy) -> None:

@@ -25,15 +25,17 @@ LINES: dict[str, tuple[str, Any, float]] = {
 
 
 def draw_comparison(comparison: Comparison) -> Figure:
-    """Draw the last blow of each solver, just after the impact and as a whole."""
+    """Draw the last blow of each solver, or its fall, at the start and as a whole."""
     windows = {name: last_blow_window(found) for name, found in comparison.results.items()}
     early = CLOSE * CONTACTS_SHARE * max(window.activation_until for window in windows.values())
     whole = max(window.length for window in windows.values())
-    fig = Figure(figsize=(10.5, 8.6), layout="constrained")
-    axes = fig.subplots(3, 2)
-    for column, (end, span) in enumerate(
-        ((early, f"First {early * MS:.2g} ms"), (whole, "One blow"))
-    ):
+    scene = comparison.results[comparison.first].scene
+    alone = scene.piston.model == "absent"
+    rows = 2 if alone else 3
+    fig = Figure(figsize=(10.5, 0.6 + 2.67 * rows), layout="constrained")
+    axes = fig.subplots(rows, 2)
+    words, start = ("The fall", "first contact") if alone else ("One blow", "impact")
+    for column, (end, span) in enumerate(((early, f"First {early * MS:.2g} ms"), (whole, words))):
         for name, window in windows.items():
             shown = (window.time >= 0.0) & (window.time <= end)
             _draw(axes[:, column], name, window, shown)
@@ -41,16 +43,19 @@ def draw_comparison(comparison: Comparison) -> Figure:
             ax.set_xlim(0.0, end * MS)
         style.label(axes[0, column], "", "bit force [kN]", f"{span}: force on the rock")
         style.label(axes[1, column], "", "displacement [mm]", f"{span}: mean bit motion")
-        title = f"{span}: piston relative to bit"
-        style.label(axes[2, column], "time since impact [ms]", "piston − bit, $u_r$ [mm]", title)
+        if rows > 2:
+            title = f"{span}: piston relative to bit"
+            style.label(axes[2, column], "", "piston − bit, $u_r$ [mm]", title)
+        axes[-1, column].set_xlabel(f"time since {start} [ms]")
     handles = [
         Line2D([], [], color=colour, linestyle=dashes, linewidth=2.0, label=name)
         for name, (colour, dashes, _) in LINES.items()
         if name in windows
     ]
-    title = comparison.results[comparison.first].scene.title
-    title = f" — {title}" if title else ""
-    style.head(fig, f"The last blow by {len(windows)} solvers{title}", handles)
+    title = f" — {scene.title}" if scene.title else ""
+    head = "The fall" if alone else "The last blow"
+    count = f"{len(windows)} solver" + "s" * (len(windows) > 1)
+    style.head(fig, f"{head} by {count}{title}", handles)
     return fig
 
 
@@ -62,5 +67,5 @@ def _draw(axes: np.ndarray, name: str, window: Window, shown: np.ndarray) -> Non
         window.since_start("bit_position") * MM,
         window.samples["relative_displacement"] * MM,
     )
-    for ax, values in zip(axes, curves, strict=True):
+    for ax, values in zip(axes, curves, strict=False):  # without a piston there is no third
         ax.plot(time, values[shown], color=colour, linestyle=dashes, linewidth=width)

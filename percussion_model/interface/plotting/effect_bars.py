@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterator
+from functools import partial
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -25,33 +27,32 @@ ROOM, WITHIN = 1.75, 0.92
 CHARACTER = 0.072
 # Changes, and errors of them, below this are none [%].
 NOTHING = 5e-3
+# A figure is as wide as that of so many panels, for its title.
+LEAST_WIDTH = 3
+# Draws a panel.
+Panel = Callable[[Axes], None]
+
+
+# Cost of what, by its key in the numbers of a trial; of the run where there are no blows.
+COSTS = {"step_time": "a time step", "blow_time": "a blow"}
+COST_OF_RUN = {"step_time": "a time step", "wall_time": "the run"}
+CHANGES = {
+    RATE: "Rate of penetration",
+    "blow_period": "Blow period",
+    "peak_bit_force": "Peak bit force",
+}
 
 
 def draw_effects(found: EffectsStudy) -> Figure:
-    """Draw cost of a step, of a blow, and change in rate, period and peak force."""
+    """Draw costs and changes, a panel each; one that has nothing is left out."""
     trials = found.trials
     names = [trial.variant.name for trial in trials]
-    height = 1.6 + 0.32 * len(trials)
-    fig = Figure(figsize=(12.0, height), layout="constrained")
-    axes = fig.subplots(1, 5, sharey=True)
-    base = found.base.numbers()
-    for ax, key, title in (
-        (axes[0], "step_time", "a time step"),
-        (axes[1], "blow_time", "a blow"),
-    ):
-        costs = [trial.numbers()[key] for trial in trials]
-        values = [c / base[key] if c is not None and base[key] else None for c in costs]
-        _costs(ax, values)
-        style.label(ax, "by the scene's own", "", f"Cost of {title}")
-    for ax, key, title in (
-        (axes[2], RATE, "Rate of penetration"),
-        (axes[3], "blow_period", "Blow period"),
-        (axes[4], "peak_bit_force", "Peak bit force"),
-    ):
-        errors = [found.change_errors(trial).get(key) for trial in trials]
-        hidden = [key == RATE and _is_hidden(found, trial) for trial in trials]
-        _changes(ax, [found.changes(trial)[key] for trial in trials], errors, hidden)
-        style.label(ax, "change [%], hatched: cut off", "", title)
+    panels = [*_cost_panels(found), *_change_panels(found)]
+    height, width = 1.6 + 0.32 * len(trials), 2.0 + 2.0 * max(len(panels), LEAST_WIDTH)
+    fig = Figure(figsize=(width, height), layout="constrained")
+    axes = fig.subplots(1, len(panels), sharey=True, squeeze=False)[0]
+    for ax, draw in zip(axes, panels, strict=True):
+        draw(ax)
     axes[0].set_yticks(range(len(trials)), names)
     axes[0].invert_yaxis()
     for ax in axes:
@@ -60,6 +61,43 @@ def draw_effects(found: EffectsStudy) -> Figure:
     title = found.scene.title
     style.head(fig, "One effect turned at a time" + (f" — {title}" if title else ""))
     return fig
+
+
+def _cost_panels(found: EffectsStudy) -> Iterator[Panel]:
+    """Costs by those of the scene as it is."""
+    base = found.base.numbers()
+    for key, title in (COSTS if base["blow_time"] else COST_OF_RUN).items():
+        costs = [trial.numbers()[key] for trial in found.trials]
+        values = [c / base[key] if c is not None and base[key] else None for c in costs]
+        if any(value is not None for value in values):
+            yield partial(_cost_panel, values, title)
+
+
+def _cost_panel(values: list[float | None], title: str, ax: Axes) -> None:
+    _costs(ax, values)
+    style.label(ax, "by the scene's own", "", f"Cost of {title}")
+
+
+def _change_panels(found: EffectsStudy) -> Iterator[Panel]:
+    """Changes of numbers, and which of them are not known."""
+    trials = found.trials
+    for key, title in CHANGES.items():
+        values = [found.changes(trial)[key] for trial in trials]
+        hidden = [key == RATE and _is_hidden(found, trial) for trial in trials]
+        errors = [found.change_errors(trial).get(key) for trial in trials]
+        if any(hidden) or any(value is not None for value in values):
+            yield partial(_change_panel, values, errors, hidden, title)
+
+
+def _change_panel(
+    values: list[float | None],
+    errors: list[float | None],
+    hidden: list[bool],
+    title: str,
+    ax: Axes,
+) -> None:
+    _changes(ax, values, errors, hidden)
+    style.label(ax, "change [%], hatched: cut off", "", title)
 
 
 def _is_hidden(found: EffectsStudy, trial: Trial) -> bool:
