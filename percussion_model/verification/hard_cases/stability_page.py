@@ -116,8 +116,8 @@ def _unresolved(found: Collection) -> str:
         "",
         f"Rates that change by more than {100 * RATE_WITHIN:g} % and by more than {SIGMAS:g} "
         "standard errors on a grid of twice as many cells, or (aperiodic cases) whose "
-        f"distribution of periods changes with a chance below {LEAST_CHANCE:g}: not resolved at the default. All "
-        "others are.",
+        f"distribution of periods changes with a chance below {LEAST_CHANCE:g}: not resolved at "
+        "the default. All others are.",
         "",
         "| case | solver | rate changes by | standard errors | chance of the periods |",
         "|---|---|---|---|---|",
