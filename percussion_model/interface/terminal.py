@@ -416,6 +416,8 @@ def show_statements(statements: list[Statement], errors: str) -> None:
         table.add_row(verdict, f"[bold]{escape(one.place)}[/bold]")
         table.add_row("", f"the paper says: {escape(one.says)}")
         table.add_row("", f"found here: {escape(one.found)}")
+        if one.agrees_if:
+            table.add_row("", f"agrees if: {escape(one.agrees_if)}")
         if one.why and not one.agrees:
             table.add_row("", f"why: {escape(one.why)}")
         table.add_row("", "")

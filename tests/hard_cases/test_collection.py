@@ -20,6 +20,7 @@ from percussion_model.verification.hard_cases import SOLVERS, hard_cases, measur
 from percussion_model.verification.hard_cases.collection import (
     Collection,
     numerical_error,
+    off_text,
     short_rate,
     violations,
 )
@@ -174,6 +175,20 @@ def test_a_rate_is_only_off_where_the_errors_of_both_do_not_reach_so_far(capsys)
     assert "± of a rate is its standard error by the scatter of the blows alone" in shown
     assert "More than 2 % off the first solver's rate: 1; undecided, since their errors" in shown
     assert shown.endswith("so far: 1.")
+
+
+def test_a_disagreement_has_the_digits_that_its_errors_leave():
+    """16 mm/s against 18 ± 0.1, of which the grid makes a part; and against 18 ± 2."""
+    other = ROW | {"solver": "fem", "rate": 0.018, "rate_error": 1e-4, "duration": 1.0}
+    rest = {"numerical": 0.0, "duration": 1.0, "wall_time": 0.1}
+    (entry,) = Collection([ROW, other]).disagreements()
+    assert off_text(entry) == "+12.5±0.6 %"
+    rows = [ROW | rest, other | rest | {"rate_error": 2e-3}]
+    (entry,) = Collection(rows).disagreements()
+    assert off_text(entry) == "undecided"
+    text = page(Collection(rows), None)
+    line, *_ = (one for one in text.splitlines() if one.startswith("| gap_0 | fem | 18±2"))
+    assert "16 (wave) | undecided |" in line
 
 
 def test_the_error_of_a_rate_is_of_scatter_and_of_the_grid():

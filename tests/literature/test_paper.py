@@ -10,8 +10,10 @@ import numpy as np
 import pytest
 
 from percussion_model import Simulation, simulate
+from percussion_model.interface.plotting.paper import draw_sweeps
 from percussion_model.interface.plotting.paper_rock_law import draw_force, draw_sinking
 from percussion_model.interface.plotting.window import last_blow_window
+from percussion_model.interface.terminal import show_statements
 from percussion_model.physics.records import EventKind, Mode
 from percussion_model.verification.paper.rock_law import (
     about_datum,
@@ -97,16 +99,24 @@ def agree(said, count):
     json.dumps([one.to_dict() for one in said])
 
 
-def test_statements_about_sweeps_are_plain_values(tmp_path):
-    """Of short sweeps: whether the paper agrees takes long ones, `percussion paper`."""
-    found = {}
+@pytest.fixture(scope="module")
+def sweeps(tmp_path_factory):
+    """Short sweeps by rigid bodies."""
+    folder, found = tmp_path_factory.mktemp("sweeps"), {}
     for sweep in SWEEPS:
         few = replace(sweep, values=sweep.values[:: len(sweep.values) // 6], solver="rigid")
         few = replace(few, changes={})
-        found[sweep.name] = run_sweep(paper_scene(), few, tmp_path / sweep.name, processes=1)
-    said = list(about_sweeps(found))
+        found[sweep.name] = run_sweep(paper_scene(), few, folder / sweep.name, processes=1)
+    return found
+
+
+def test_statements_about_sweeps_are_plain_values(sweeps):
+    """Of short sweeps: whether the paper agrees takes long ones, `percussion paper`."""
+    said = list(about_sweeps(sweeps))
     assert len(said) == 2 + 2 + 3 * 3 + 3 + 3 + 4
     for one in said:  # what is compared has its error, or three digits where that is smaller
+        if "c1 =" in one.found or "over the" in one.found:
+            assert "whatever the error of the fit" in one.agrees_if
         if any(word in one.found for word in ("c1 =", "c4 =", "exponent", "upper half")):
             assert "±" in one.found, one.found
         elif "mm/s" in one.found and "±" not in one.found:
@@ -122,7 +132,11 @@ def test_drop_tests_show_what_section_4_2_says(drops):
 
 def test_the_stationary_blow_is_that_of_section_4_3(waves, drops):
     result, window = waves
-    agree(list(about_cycle(result, window.samples, window.origin)), 9)
+    *said, rest, backbone, rate, flights = about_cycle(result, window.samples, window.origin)
+    agree([*said, backbone, rate, flights], 8)
+    # in about 10 ms, says the paper: 5.8 ms by energy, and it does not tell what it takes
+    assert not rest.agrees
+    assert "does not tell" in rest.why
     agree(list(about_double_impact(drops, result, window.samples, window.origin)), 1)
 
 
@@ -211,6 +225,26 @@ def test_table_2_has_a_misprint():
     assert ratio.agrees, ratio.found
     assert not misprint.agrees
     assert "200.16 mm" in misprint.why  # 0.0387 ms times sqrt(210e9/7850) m/s
+
+
+def test_what_a_number_must_meet_to_agree_is_told(waves, drops, capsys):
+    """An error may exclude equality with the paper: its digits and words are what counts."""
+    result, window = waves
+    said = [*about_drops(drops), *about_cycle(result, window.samples, window.origin)]
+    told = {one.says: one.agrees_if for one in said}
+    assert told["the activation period is about 45.5 ms, 22 Hz"].startswith("within 1 % of 45.5 ms")
+    assert told["penetration decreases with W_R"] == ""
+    show_statements(said, "")
+    shown = capsys.readouterr().out
+    assert shown.count("agrees if:") == sum(bool(text) for text in told.values())
+
+
+def test_fits_of_figure_9_have_their_errors(sweeps):
+    words = [text.get_text() for ax in draw_sweeps(sweeps).axes for text in ax.texts]
+    fits = [text for text in words if "sim" in text or "F_S" in text]
+    assert len(fits) == 3
+    assert all("\\pm" in text for text in fits)
+    assert [text.count("\\pm") for text in fits if "F_S" in text] == [2]
 
 
 def test_the_trend_of_rigid_bodies_has_its_maximum_near_40_and_falls(tmp_path):

@@ -23,6 +23,7 @@ from percussion_model.verification.paper.runs import (
     Drop,
     along,
     exponent_and_error,
+    line_errors,
     power_law,
     straight_line,
 )
@@ -142,7 +143,8 @@ def _stiffness(ax: Axes, found: Study) -> None:
     _points(ax, found, 1e-6)
     x, rate, _ = along(found)
     exponent, factor = power_law(x, rate)
-    words = f"$\\sim K_R^{{{exponent:.3f}}}$ (paper: −0.55)"
+    _, error = exponent_and_error(x, rate)
+    words = f"$\\sim K_R^{{{exponent:.3f} \\pm {error:.3f}}}$ (paper: −0.55)"
     _fit(ax, x * 1e-6, factor * x**exponent, words, (0.35, 0.8))
     ax.set_xscale("log")
     style.label(ax, "loading stiffness $K_R$ [kN/mm]", RATE, "(a) Loading stiffness of the rock")
@@ -174,7 +176,11 @@ def _feed(ax: Axes, found: Study) -> None:
     x, rate, _ = along(found)
     above = x >= PAPER_LEAST_FEED
     slope, intercept, _explained = straight_line(x[above], rate[above])
-    words = f"${slope * 1e6:.3f}\\,F_S$ [kN] + {intercept * MM:.2f}"
+    errors = line_errors(x[above], rate[above])
+    words = (
+        f"$({slope * 1e6:.3f} \\pm {errors[0] * 1e6:.3f})\\,F_S$ [kN]\n"
+        f"$+\\,{intercept * MM:.2f} \\pm {errors[1] * MM:.2f}$"
+    )
     _fit(ax, x[above] / KN, slope * x[above] + intercept, words, (0.35, 0.8))
     _paper_limit(ax, PAPER_LEAST_FEED / KN)
     ax.set_xscale("log")
@@ -186,7 +192,8 @@ def _distance(ax: Axes, found: Study) -> None:
     x, rate, _ = along(found)
     above = x >= PAPER_LEAST_DISTANCE
     exponent, factor = power_law(x[above], rate[above])
-    words = f"$\\sim D_1^{{{exponent:.3f}}}$ (paper: −0.36)"
+    _, error = exponent_and_error(x[above], rate[above])
+    words = f"$\\sim D_1^{{{exponent:.3f} \\pm {error:.3f}}}$ (paper: −0.36)"
     _fit(ax, x[above] * MM, factor * x[above] ** exponent, words, (0.5, 0.75))
     _paper_limit(ax, PAPER_LEAST_DISTANCE * MM)
     ax.set_xscale("log")

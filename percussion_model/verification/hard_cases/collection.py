@@ -8,9 +8,15 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
+from percussion_model.analysis.comparison import change_error
 from percussion_model.analysis.study.workers import on_this_machine
 from percussion_model.scene.inputs import SimulationError
-from percussion_model.simulation.uncertain import UNDECIDED, in_few_characters, scaled
+from percussion_model.simulation.uncertain import (
+    UNDECIDED,
+    change_text,
+    in_few_characters,
+    scaled,
+)
 from percussion_model.verification.hard_cases.cases import SOLVERS, HardCase, hard_cases
 from percussion_model.verification.hard_cases.measures import measure
 from percussion_model.verification.hard_cases.refinement import SIGMAS, refine
@@ -55,8 +61,9 @@ class Collection:
         if self.is_refined:
             return (
                 "± of a rate is its standard error by the scatter of the blows, or what a grid "
-                "of twice as many cells changes, whichever is greater; without loss in the bars "
-                "a rate depends on the cells, and is undecided."
+                "of twice as many cells changes, whichever is greater; a rate without it is known "
+                "to its four digits, but without loss in the bars a rate depends on the cells, "
+                "and is undecided."
             )
         return (
             "± of a rate is its standard error by the scatter of the blows alone; what finer "
@@ -140,6 +147,13 @@ def short_rate(row: dict[str, Any]) -> str:
     return in_few_characters(scaled(1e3, row["rate"]), scaled(1e3, numerical_error(row)))
 
 
+def off_text(entry: dict[str, Any]) -> str:
+    """Difference of a disagreement in per cent, with its error; undecided where errors reach it."""
+    if not entry["decided"]:
+        return UNDECIDED
+    return change_text(entry["difference"], entry["difference_error"]) + " %"
+
+
 def _by_grid(row: dict[str, Any]) -> float:
     """Change of a rate on a finer grid [m/s], 0 where there is none to tell."""
     return abs(row["rate"]) * (row.get("refined_rate_change") or 0.0)
@@ -176,6 +190,7 @@ def _disagreement(
         "other_rate": base,
         "other_rate_error": first["rate_error"],
         "difference": off if math.isfinite(off) else None,
+        "difference_error": change_error(rate, numerical_error(row), base, numerical_error(first)),
         "standard_errors": sigmas if math.isfinite(sigmas) else None,
         "decided": decided,
         "reason": reason or "",

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
-from percussion_model.simulation.uncertain import UNDECIDED
 from percussion_model.verification.hard_cases.cases import hard_cases
 from percussion_model.verification.hard_cases.collection import (
     DISAGREE,
     MOST_MOMENTUM,
     MOST_RESIDUAL,
     Collection,
+    off_text,
     short_rate,
 )
 from percussion_model.verification.hard_cases.refinement import LEAST_CHANCE, RATE_WITHIN, SIGMAS
@@ -78,7 +78,7 @@ def _verdict(found: Collection) -> str:
         + ("all of this holds for all of them." if not failures else "this does not hold:"),
         *(f"- {text}" for text in failures),
         "",
-        f"Each case ran for {found.share:.0%} of its duration"
+        f"Each case ran for {100 * found.share:g} % of its duration"
         + (", and on a finer grid as well. " if found.is_refined else ". ")
         + f"The greatest residual is {abs(worst['residual'] or 0.0):.1e} ({worst['case']}, "
         f"{worst['solver']}), the most events {_plain(busiest['events_per_second'], 3)} a second "
@@ -93,22 +93,19 @@ def _disagreements(found: Collection) -> str:
     lines = [
         "## Where solvers disagree",
         "",
-        f"Every case whose mean rate differs by more than {DISAGREE:.0%} from that of the first "
-        "solver, with the reason. It is undecided where the errors of both rates, three standard "
-        "errors of their scatter and what finer grids change, reach so far.",
+        f"Every case whose mean rate differs by more than {100 * DISAGREE:g} % from that of the "
+        "first solver, with the reason; ± is by the errors of both rates. It is undecided where "
+        "these, three standard errors of the scatter and what finer grids change, reach so far.",
         "",
         "| case | solver | rate, mm/s | first solver, mm/s | off | reason |",
         "|---|---|---|---|---|---|",
     ]
     for entry in found.disagreements():
-        off = entry["difference"]
         rows = {row["solver"]: row for row in found.rows if row["case"] == entry["case"]}
         lines.append(
             f"| {entry['case']} | {entry['solver']} | {short_rate(rows[entry['solver']])} "
             f"| {short_rate(rows[entry['compared_with']])} ({entry['compared_with']}) "
-            f"| {'-' if off is None else f'{100 * off:+.1f} %'}"
-            f"{'' if entry['decided'] else f', {UNDECIDED}'} "
-            f"| {entry['reason'] or '**not known**'} |"
+            f"| {off_text(entry)} | {entry['reason'] or '**not known**'} |"
         )
     return "\n".join([*lines, ""])
 
@@ -117,10 +114,10 @@ def _unresolved(found: Collection) -> str:
     lines = [
         "## What a finer grid changes",
         "",
-        f"Rates that change by more than {RATE_WITHIN:.0%} and by more than {SIGMAS:g} standard "
-        "errors on a grid of twice as many cells, or (aperiodic cases) whose distribution of "
-        f"periods changes with a chance below {LEAST_CHANCE:g}: not resolved at the default. All "
-        "others are.",
+        f"Rates that change by more than {100 * RATE_WITHIN:g} % and by more than {SIGMAS:g} "
+        "standard errors on a grid of twice as many cells, or (aperiodic cases) whose "
+        f"distribution of periods changes with a chance below {LEAST_CHANCE:g}: not resolved at "
+        "the default. All others are.",
         "",
         "| case | solver | rate changes by | standard errors | chance of the periods |",
         "|---|---|---|---|---|",

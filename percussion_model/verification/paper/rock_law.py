@@ -110,6 +110,7 @@ def about_datum(jumps: Sequence[Jump], advance: float) -> Iterator[Statement]:
         f"{1e3 * whole:.4f} mm, the bit's advance in the blow {1e3 * advance:.4f} mm; off eq. 19 "
         f"by {1e3 * off:.1g} mm at most; between jumps x_R moves by {1e3 * drift:.1g} mm",
         off < SAME_JUMP * advance and abs(whole - advance) < SAME_JUMP * advance and drift < 1e-15,
+        agrees_if=f"within {SAME_JUMP:g} of the advance",
     )
 
 
@@ -196,6 +197,7 @@ def about_sinking(scene: Scene, found: dict[str, Sinking]) -> Iterator[Statement
         f"of the solver; with the barrier the bit moves by {1e3 * held:.1g} mm in the last "
         f"{LATE * SINKING:g} s",
         off < SAME_SPEED and held == 0.0,
+        agrees_if=f"within {SAME_SPEED:g} of the closed form, and at rest with the barrier",
     )
     depth = {name: 1e3 * one.position[-1] for name, one in found.items()}
     yield Statement(
@@ -210,4 +212,5 @@ def about_sinking(scene: Scene, found: dict[str, Sinking]) -> Iterator[Statement
         "at the end of each cycle force and velocity vanish together, so that the least loss "
         "leaves some force; structural loss in the bar thus stops what never stops in a rigid "
         "or lossless bit, but deeper than the barrier does",
+        agrees_if=f"it sinks on by more than 1 % of its depth in the last {LATE * SINKING:g} s",
     )
