@@ -171,7 +171,7 @@ def test_a_rate_is_only_off_where_the_errors_of_both_do_not_reach_so_far(capsys)
     rows = [row | {"wall_time": 0.1} for row in (ROW, other, undecided)]
     show_stability(Collection(rows))
     shown = " ".join(capsys.readouterr().out.split())
-    assert "16.6±0.1" in shown
+    assert "16.60±0.15" in shown
     assert "± of a rate is its standard error by the scatter of the blows alone" in shown
     assert "More than 2 % off the first solver's rate: 1; undecided, since their errors" in shown
     assert shown.endswith("so far: 1.")
@@ -187,7 +187,7 @@ def test_a_disagreement_has_the_digits_that_its_errors_leave():
     (entry,) = Collection(rows).disagreements()
     assert off_text(entry) == "undecided"
     text = page(Collection(rows), None)
-    line, *_ = (one for one in text.splitlines() if one.startswith("| gap_0 | fem | 18±2"))
+    line, *_ = (one for one in text.splitlines() if one.startswith("| gap_0 | fem | 18.0±2.0"))
     assert "16 (wave) | undecided |" in line
 
 
