@@ -24,6 +24,7 @@ from percussion_model.simulation.uncertain import (
     UNDECIDED,
     about_errors,
     change_text,
+    in_digits,
     mean_text,
     of_the_cells,
     rate_text,
@@ -43,6 +44,8 @@ if TYPE_CHECKING:
 
 # What ends sooner shows no bar [s].
 _PATIENCE = 2.0
+# Digits of a time that was taken once, and of what is made of it.
+TIMED = 2
 
 RATE = ("Rate of penetration", "rate_of_penetration", 1e3, "mm/s")
 # Other rows of the table: name, key of the summary, factor, unit.
@@ -96,9 +99,9 @@ def show_summary(result: Result) -> None:
         table.add_row(
             "Cells", " + ".join(map(str, result.cells.values())), " + ".join(result.cells)
         )
-    table.add_row("Prepared in", f"{result.setup_time:.3g}", "s")
-    table.add_row("Computed in", f"{result.wall_time:.3g}", "s")
-    table.add_row("Speed", f"{result.real_time_factor:.3g}", "times real time")
+    table.add_row("Prepared in", in_digits(result.setup_time, TIMED), "s")
+    table.add_row("Computed in", in_digits(result.wall_time, TIMED), "s")
+    table.add_row("Speed", in_digits(result.real_time_factor, TIMED), "times real time")
     console = Console()
     print_table(table, console, keys=2)
     if len(result.counted) or result.fall:
@@ -120,7 +123,7 @@ def show_settled(found: Settled) -> None:
     if summary["multiplier"] is not None:
         table.add_row("Deviation after a cycle", _deviation(found))
     table.add_row("Blows run", f"{len(found.blows)} in {found.duration:.4g} s of simulated time")
-    table.add_row("Computed in", f"{found.wall_time:.3g} s")
+    table.add_row("Computed in", f"{in_digits(found.wall_time, TIMED)} s")
     console = Console()
     print_table(table, console)
     if found.error_of:
@@ -322,7 +325,7 @@ def show_comparison(found: Comparison) -> None:
         cells = []
         for name, summary in found.summaries().items():
             found_here = value(summary)
-            cells.append("-" if found_here is None else f"{found_here:.2g}")
+            cells.append("-" if found_here is None else in_digits(found_here, TIMED))
             cells += [""] * (name in differences)
         table.add_row(label, *cells)
     console = Console()

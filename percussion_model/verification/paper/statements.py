@@ -13,7 +13,7 @@ from percussion_model.physics.records import Mode
 from percussion_model.scene.scales import scales
 from percussion_model.scene.scene import Scene
 from percussion_model.simulation.result import Result
-from percussion_model.simulation.uncertain import mean_text, rate_text, with_error
+from percussion_model.simulation.uncertain import in_digits, mean_text, rate_text, with_error
 from percussion_model.verification.paper.runs import (
     CALIBRATED,
     DAMPINGS,
@@ -562,11 +562,13 @@ def _list(values: tuple[float, ...], unit: str) -> str:
 
 
 def _at(found: Study, places: tuple[float, ...]) -> str:
-    """Rates between points [mm/s] with the errors of the points beside them."""
+    """Rates between points [mm/s], with the errors of the points beside them where these show."""
     x, rate, _periodic = along(found)
     error = found.rows["rate_of_penetration_error"]
     texts = []
     for place in places:
         value, off = (1e3 * float(np.interp(place, x, y)) for y in (rate, error))
-        texts.append(with_error(value, max(off, LEAST_ERROR)))
+        # what the grid adds is not known
+        shows = off > LEAST_ERROR * abs(value)
+        texts.append(with_error(value, off) if shows else in_digits(value))
     return ", ".join(texts)
