@@ -141,7 +141,7 @@ class Comparison:
         return any(depends_on_cells(self.results[one].summary(), key) for one in (name, self.first))
 
     def warnings(self) -> list[str]:
-        """Warnings of all results, each after the name of its solver.
+        """Warnings of all results, each after the name of its solver; once where all have it.
 
         Of the parameters without effect only those that no solver needs are listed, once.
         """
@@ -152,9 +152,17 @@ class Comparison:
             if all(key in scene.given_in_vain for scene in scenes[1:])
         ]
         texts = [unused_note(unused)] if unused else []
-        for name, result in self.results.items():
-            own = unused_note(result.scene.given_in_vain)
-            texts += [f"{name}: {text}" for text in result.warnings if text != own]
+        listed = {
+            name: [text for text in result.warnings if text != unused_note(scene.given_in_vain)]
+            for (name, result), scene in zip(self.results.items(), scenes, strict=True)
+        }
+        several = len(listed) > 1
+        shared = [
+            text for text in listed[self.first] if all(text in own for own in listed.values())
+        ] * several
+        texts += shared
+        for name, own in listed.items():
+            texts += [f"{name}: {text}" for text in own if text not in shared]
         return texts
 
     def to_dict(self) -> dict[str, Any]:

@@ -191,14 +191,16 @@ class Settled:
 
     @property
     def blow_period(self) -> float:
-        """Mean time from blow to blow [s]."""
+        """Mean time from blow to blow [s]; NaN where they have died out."""
+        if self.kind == "stalled":
+            return math.nan
         return float(np.mean(self.counted["period"])) if len(self.counted) else math.nan
 
     @property
     def blow_period_error(self) -> float:
         """How far the blow period may be off, by the same as the rate [s]; else NaN."""
         counted = self.counted["period"]
-        if len(counted) == 0:
+        if len(counted) == 0 or self.kind == "stalled":
             return math.nan
         if self.order:
             means = self.blows["period"][-2 * self.order :].reshape(2, -1).mean(axis=1)

@@ -38,10 +38,12 @@ PLUS_MINUS_OF_FALL = (
     "± is the estimated numerical error, by the size of the cells; without it a number is known "
     f"to its four digits. {NOT_THE_MODEL}"
 )
+NOT_RIGID = "How far rigid bodies are from real ones is not in it."
 EXACT = (
     "Rigid bodies have no cells: ± is the scatter of the blows, and without it a number is exact "
-    "to the digits shown. How far rigid bodies are from real ones is not in it."
+    f"to the digits shown. {NOT_RIGID}"
 )
+EXACT_FALL = f"Rigid bodies have no cells: a number is exact to the digits shown. {NOT_RIGID}"
 OF_FEW_BLOWS = "The numbers are those of so few blows that neither error nor scatter is known."
 UNDAMPED = (
     "Without structural loss waves never decay, and numbers depend on the cells. No error by them "
@@ -60,7 +62,7 @@ def about_errors(summary: Mapping[str, Any]) -> str:
         few = 0 < summary["blows_after_settling"] < LEAST_BLOWS
         return OF_FEW_BLOWS if few else WITHOUT_ESTIMATE
     if summary["solver"] == "rigid":
-        return EXACT
+        return EXACT if summary["blows"] else EXACT_FALL
     return PLUS_MINUS if summary["blows"] else PLUS_MINUS_OF_FALL
 
 
