@@ -225,10 +225,10 @@ def test_a_score_has_its_error_by_the_step():
     assert found.errors["dry_blows"] == 0.0
     same = with_step_error(score, score)
     assert same.points_error == pytest.approx(0.02 * 100.0 * 100.0 / 3000.0)
-    assert cells(found)[COLUMN["feed_error"]] == "3±1"
+    assert cells(found)[COLUMN["feed_error"]] == "3.3±1.3"
     assert cells(found)[COLUMN["peak_force"]] == "500±10"
     assert cells(found)[COLUMN["dry_blows"]] == "0"
-    assert points_text(found.points, found.points_error) == "97±1"
+    assert points_text(found.points, found.points_error) == "96.7±1.3"
     assert "twice what half the step changes" in about_errors([found])
     assert mean_points_error([found, score]) is None
     assert points_text(score.points, score.points_error) == "96.7"
