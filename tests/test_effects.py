@@ -278,6 +278,7 @@ def test_bars_and_numbers_of_the_figure_stay_within_their_panels():
             assert frame.x0 <= drawn.x0, text.get_text()
             assert drawn.x1 <= frame.x1, text.get_text()
         assert [text.get_text() for text in ax.texts[-2:]] == ["undecided"] * 2
+        assert ax.texts[4].get_text() == " ≈+125 "  # its error is not known
         assert ax.texts[5].get_text() == " -21.7±1.6 "
         assert ax.texts[5].get_window_extent().x1 <= ax.patches[5].get_window_extent().x0
 

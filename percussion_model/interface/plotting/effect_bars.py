@@ -11,7 +11,12 @@ from matplotlib.figure import Figure
 
 from percussion_model.analysis.effect_study import EffectsStudy, Trial
 from percussion_model.interface.plotting import style
-from percussion_model.simulation.uncertain import UNDECIDED, change_text, is_undecided
+from percussion_model.simulation.uncertain import (
+    ABOUT,
+    UNDECIDED,
+    change_text,
+    is_undecided,
+)
 
 RATE = "rate_of_penetration"
 COST_COLOUR, MORE_COLOUR, LESS_COLOUR = "#0072B2", "#D55E00", "#009E73"
@@ -151,6 +156,8 @@ def _changes(
         text = " 0 " if abs(share) < NOTHING else text
         if error >= NOTHING:
             text = f" {change_text(0.01 * share, 0.01 * error)} "
+        elif errors[y] is None and abs(share) >= NOTHING:
+            text = f" {ABOUT}{text.strip()} "
         # what has no room beside its bar stands within it, or else on the other side of zero
         length, room = CHARACTER * (len(text) - 1), abs(share) / (ROOM * end)
         within = cut or (room + length > 1.0 and room > length)
