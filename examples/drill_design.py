@@ -92,7 +92,7 @@ def main(out: Path, quick: bool = False) -> dict[str, Any]:
         "stepped, best": design(stepped(*found), stiffness),
     }
     blows = {name: single_blow(scene) for name, scene in designs.items()}
-    motions = {name: settled(scene) for name, scene in designs.items()}
+    motions = {name: settled(scene, error_estimate=True) for name, scene in designs.items()}
     rates = {name: found.rate_of_penetration for name, found in motions.items()}
     shown = {
         name: in_few_characters(1e3 * rates[name], 1e3 * found.rate_of_penetration_error, 1e-3)
@@ -113,7 +113,8 @@ def main(out: Path, quick: bool = False) -> dict[str, Any]:
         style.label(middle, "lower section by length [-]", "its area by that above [-]", title)
         _draw_designs(right, blows, shown, stress)
         style.head(fig, f"Where {ENERGY:g} J of a blow go")
-    return {"blows": blows, "rates": rates, "stress": stress, "best": found}
+    errors = {name: found.rate_of_penetration_error for name, found in motions.items()}
+    return {"blows": blows, "rates": rates, "rate_errors": errors, "stress": stress, "best": found}
 
 
 def _draw_lengths(ax: Axes, ratio: np.ndarray, rock: dict[float, np.ndarray]) -> None:

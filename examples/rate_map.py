@@ -66,9 +66,7 @@ def main(out: Path, quick: bool = False) -> dict[str, Any]:
         ax = fig.subplots()
         x, y = feed / KN, pressure / BAR
         rate = np.where(unknown, np.nan, rows["rate_of_penetration"]) * MM
-        mesh = ax.pcolormesh(
-            x, y, rate.T, shading="gouraud" if quick else "nearest", cmap="viridis"
-        )
+        mesh = ax.pcolormesh(x, y, rate.T, shading="nearest", cmap="viridis")
         fig.colorbar(mesh, ax=ax, label="rate of penetration [mm/s]")
         aperiodic = rows["kind"] != KINDS.index("periodic")
         cells = np.where(aperiodic, 1.0, np.nan).T

@@ -143,6 +143,8 @@ def _rate_second_half(columns: dict[str, np.ndarray]) -> dict[str, Any]:
     rate = float(place[-1] - place[rows[0]]) / float(time[-1] - time[rows[0]])
     if blows is not None:
         begun = rows[1:][np.diff(blows[rows]) > 0.0]
+        if len(begun) < 2:  # no whole blow in it: the rate would be that of a part
+            return {}
         if len(begun) > LEAST_BLOWS:
             rate, error = ratio_of_sums(np.diff(place[begun]), np.diff(time[begun]))
     return {

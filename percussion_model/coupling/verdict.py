@@ -310,8 +310,6 @@ def _praise(numbers: Mapping[str, float]) -> str:
         said.append(f"the string's energies to {_percent(numbers['string_energy_residual'])}")
     if "hammer_energy_residual" in numbers:
         said.append(f"the hammer's ledger to {numbers['hammer_energy_residual']:.1g}")
-    if "shoulder_by_blows" in numbers:
-        said.append(f"the shoulder to {_percent(abs(numbers['shoulder_by_blows']))} of the blows")
     closed = f"energies balance ({', '.join(said)})" if said else "no part keeps an energy balance"
     if "largest_jump" not in numbers:
         return closed

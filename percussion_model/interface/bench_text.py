@@ -27,8 +27,8 @@ COLUMNS = (
 )
 # A smaller error, by the number, does not show in three digits.
 SMALL = 5e-4
-# Points have one decimal, in which a smaller error does not show.
-SMALL_POINTS = 0.05
+# Points have one decimal; with an error that could change it they have more.
+SMALL_POINTS = 0.005
 
 
 def number_text(value: float, error: float | None) -> str:

@@ -32,7 +32,7 @@ SHOWN = (
 # Those that are given, and have all their digits.
 GIVEN = ("time", "step", "steps")
 # Numbers of whose errors nothing is known, and what is meant where there is a rate's.
-UNKNOWN = ("depth", RATE, "shoulder_energy", "feed_work")
+UNKNOWN = ("depth", RATE, "shoulder_energy", "shoulder_by_blows", "feed_work")
 SCATTER = "scatter, also of the rock"
 # Rows of a run without --interval.
 ROWS = 5000

@@ -187,7 +187,8 @@ class Study:
         """The sentence "for 1 % take ..."."""
         good = []
         for name in self.names:
-            points = sorted(self.ladder(name), key=lambda point: point.second)
+            # by size: times of small runs are too uncertain for an order
+            points = sorted(self.ladder(name), key=lambda point: -point.size)
             for k, point in enumerate(points):
                 if all(later.errors.get(self.main, math.inf) <= wanted for later in points[k:]):
                     good.append(point)
