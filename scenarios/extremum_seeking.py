@@ -18,6 +18,10 @@ from scenarios.harness import FIGURES
 
 NAME = "extremum_seeking"
 STEP = 2e-3  # the longest at which the shoulder is as stiff as it is [s]
+ABOUT_STEP = (
+    f"+- is the error of the fit alone. The communication step of {1e3 * STEP:g} ms adds 1 to 2 % "
+    "to a rate (docs/system.md, section 4), much alike in all of them."
+)
 INTERVAL = 0.02  # of the rows that are kept [s]
 DURATION = 40.0  # [s]
 STARTS = (1700.0, 2500.0, 4200.0)  # low, near and high [N]
@@ -169,6 +173,7 @@ def main() -> None:
     top = top_of(hill)
     print(f"best feed {top.feed:.0f} +- {top.feed_error:.0f} N, "
           f"rate {1e3 * top.rate:.3f} +- {1e3 * top.rate_error:.3f} mm/s")  # fmt: skip
+    print(ABOUT_STEP)
     for name, run in runs.items():
         rate = rate_over(run, DURATION - LAST)
         print(f"{name}: {run['controller.seek.centre'][-1]:.0f} N, {1e3 * rate:.3f} mm/s, "

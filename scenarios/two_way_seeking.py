@@ -18,6 +18,7 @@ from percussion_model.interface.terminal import progress
 from scenarios.coupled import archive
 from scenarios.drawing import save_png
 from scenarios.extremum_seeking import (
+    ABOUT_STEP,
     BOUND,
     INTERVAL,
     SETTLING,
@@ -182,6 +183,7 @@ def main() -> None:
     print(f"best feed {top[0]:.0f} +- {errors[0]:.0f} N, pressure {1e-5 * top[1]:.2f} +- "
           f"{1e-5 * errors[1]:.2f} bar, rate {1e3 * top[2]:.3f} +- {1e3 * errors[2]:.3f} mm/s; "
           f"the seeker is to be within {100 * BOUND:.0f} %")  # fmt: skip
+    print(ABOUT_STEP)
     for name, run in runs.items():
         rate = rate_over(run, DURATION - LAST)
         print(f"{name}: {run['controller.seek.centre'][-1]:.0f} N, "

@@ -39,8 +39,8 @@ def fresh(name: str, given: Callable[..., Any], is_new: bool = False) -> Callabl
         made = _make(name, given)
         if not callable(made) or inspect.isclass(made) or _is_factory(made):
             raise CouplingError(
-                f"{name}: {_title(given)} gives {_kind(made)}, which does not take inputs, time, "
-                "step"
+                f"{name}: {_title(given)} gives {_kind(made)}, which cannot be "
+                "called with inputs, time and step"
             )
         _reset(made)
         work: Callable[..., Any] = made

@@ -151,6 +151,8 @@ def _load(controller: str | None) -> Any:
     if not Path(file).is_file():
         raise CouplingError(f"{file}: no such file")
     if not name:
+        if file.endswith(".py"):
+            raise CouplingError(f"{file}: which function or class of it? give {file}:NAME")
         return Path(file)
 
     def anew() -> Callable[..., Any]:
