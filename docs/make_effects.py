@@ -41,9 +41,11 @@ READING = """
   of the standstill that leaps cross at once. That is why events stand beside the time.
 - *Leaps* are no effect but a way to compute: they change the cost and nothing else.
 - A dash is a number that would mean nothing, and the reason is told. *undecided* is a rate that its
-  error hides or that depends on the cells, or a change within the errors of both numbers;
+  error hides or that depends on the cells, or a change within the errors of both numbers, or within
+  three standard errors of their scatter;
   ± is the [numerical error](requested_accuracy.md), by the size of the cells and the scatter of the
-  blows. The errors of a change are taken as independent, which makes its own rather too large.
+  blows. The errors of a change are taken as independent, which makes its own rather too large. A
+  change behind ≈ has no error: that of the cells is not known of one of its numbers.
 """
 
 

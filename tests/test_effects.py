@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from typer.testing import CliRunner
 
 from percussion_model import Scene, simulate
+from percussion_model.analysis.change import Change
 from percussion_model.analysis.effect_study import (
     NOISE,
     EffectsStudy,
@@ -260,11 +261,14 @@ def test_bars_and_numbers_of_the_figure_stay_within_their_panels():
     """Long bars are cut off before the axis ends; numbers stand beside or within theirs."""
     changes = [0.52, 5.33, -0.81, 0.6, 1.25, -0.217, 0.0, None, 0.3, 0.2]
     errors = [0.0006, 0.06, 0.002, 0.0, None, 0.016, 0.0, None, 0.4, None]
-    hidden = [False] * 9 + [True]
+    shown = [
+        Change(change, error if k != 4 else None, error or 0.0, hidden=k == 9)
+        for k, (change, error) in enumerate(zip(changes, errors, strict=True))
+    ]
     fig = Figure(figsize=(12.0, 4.6), layout="constrained")
     axes = fig.subplots(1, 5, sharey=True)
     for ax in axes:
-        effect_bars._changes(ax, changes, errors, hidden)
+        effect_bars._changes(ax, shown)
     axes[0].set_yticks(range(10), [f"a long name of {k}" for k in range(10)])
     fig.draw_without_rendering()
     for ax in axes:
@@ -278,7 +282,7 @@ def test_bars_and_numbers_of_the_figure_stay_within_their_panels():
             assert frame.x0 <= drawn.x0, text.get_text()
             assert drawn.x1 <= frame.x1, text.get_text()
         assert [text.get_text() for text in ax.texts[-2:]] == ["undecided"] * 2
-        assert ax.texts[4].get_text() == " ≈+125 "  # its error is not known
+        assert ax.texts[4].get_text() == " ≈+120 "  # its error is not known
         assert ax.texts[5].get_text() == " -21.7±1.6 "
         assert ax.texts[5].get_window_extent().x1 <= ax.patches[5].get_window_extent().x0
 

@@ -11,7 +11,8 @@ import pytest
 from matplotlib.figure import Figure
 
 from percussion_model import Scene, Settled, compare, settled, simulate
-from percussion_model.analysis.comparison import Comparison, change_error
+from percussion_model.analysis.change import Change, change_error, change_of
+from percussion_model.analysis.comparison import Comparison
 from percussion_model.analysis.effect_study import EffectsStudy, Trial, Variant
 from percussion_model.analysis.study import Study, grid, table
 from percussion_model.analysis.study.response import KINDS, ROW
@@ -93,6 +94,7 @@ def test_what_an_error_hides():
         (-0.0141, 0.0096, "-1.4±1.0"),
         (0.2, 0.014, "+20.0±1.4"),
         (-0.01, 0.09, "undecided"),
+        (-0.2041, 0.1983, "undecided"),  # -20±20
         (0.0123, None, "+1.23"),
         (0.0123, 1e-7, "+1.23"),
         (1e-6, 0.0, "0.00"),
@@ -187,6 +189,7 @@ def test_a_rate_of_the_cells_is_undecided_wherever_it_is_shown(undamped, capsys,
     summary = undamped.summary()
     assert summary["rate_of_penetration_undecided"] is True
     assert rate_text(summary).startswith("undecided, with these cells ")
+    assert "±" in rate_text(summary)  # its scatter is known
     assert "undecided" in repr(undamped)
     show_summary(undamped)
     shown = capsys.readouterr().out
@@ -238,6 +241,41 @@ def test_an_error_of_a_ratio():
     assert change_error(5.0, 1.0, 15.0, 13.0) >= abs(5.0 / 15.0 - 1.0)
     assert change_error(1.0, None, 2.0, None) is None
     assert change_error(None, 1.0, 2.0, 1.0) is None
+
+
+def test_one_known_error_is_enough_to_hide_a_change():
+    base = {"a": 2.0, "a_error": 0.3}
+    here = {"a": 2.1, "a_error": None, "a_standard_error": None}
+    found = change_of(here, base, "a")
+    assert (found.error, found.is_undecided, found.text()) == (None, True, "undecided")
+    found = change_of(here | {"a": 2.8}, base, "a")
+    assert (found.is_rough, found.text()) == (True, "≈+40")  # no digit that is not known
+    assert change_of(here, {"a": 2.0}, "a").text() == "≈+5.0"
+    assert change_of(here | {"a": 2.0001}, {"a": 2.0}, "a").text() == "≈0"
+
+
+def test_scatter_of_a_change_is_a_verdict_beyond_three_standard_errors():
+    base = {"a": 1.0, "a_error": 0.03, "a_standard_error": 0.03}
+    for change, hidden in ((0.04, True), (-0.08, True), (0.16, False)):
+        here = {"a": 1.0 + change, "a_error": 0.03, "a_standard_error": 0.03}
+        assert change_of(here, base, "a").is_undecided == hidden
+    # two numbers of which scatter alone is known
+    here = {"a": 1.3, "a_standard_error": 0.2}
+    assert change_of(here, {"a": 1.0, "a_standard_error": 0.1}, "a").is_undecided
+
+
+def test_runs_on_the_same_grid_differ_by_scatter_alone():
+    base = {"a": 1.0, "a_error": 0.2, "a_standard_error": 1e-3}
+    here = base | {"a": 1.1}
+    assert change_of(here, base, "a").is_undecided
+    found = change_of(here, base, "a", same_grid=True)
+    assert found.error == pytest.approx(math.hypot(1e-3, 1.1e-3))
+    assert not found.is_undecided
+
+
+def test_a_change_that_shows_in_no_digit_is_none():
+    assert Change(1e-9, 1e-7, 1e-7).text() == "0.00"
+    assert Change(1e-3, 1e-2, 1e-2).text() == "undecided"
 
 
 def test_differences_have_the_errors_of_both(aperiodic, periodic, capsys, monkeypatch):
@@ -297,9 +335,10 @@ def test_effects_know_the_error_that_the_grid_makes():
     assert found.warnings() == result.warnings  # and nothing twice
 
 
-def test_a_difference_without_errors_is_no_verdict(aperiodic, capsys):
-    lone = simulate(BOUNCING, 3.0, settle=1.0, error_estimate=False)
-    found = Comparison({"wave": aperiodic, "fem": lone})
+def test_a_difference_without_errors_is_no_verdict(periodic, capsys):
+    other = RIGID.replace(**{"feed.force": 4000.0})
+    lone = simulate(other, 3.0, settle=1.0, error_estimate=False)
+    found = Comparison({"wave": periodic, "fem": lone})
     assert found.difference_errors()["fem"]["blow_period"] is None
     show_comparison(found)
     (line,) = [one for one in capsys.readouterr().out.splitlines() if "Blow period" in one]
@@ -478,8 +517,11 @@ def test_a_coupled_rate_has_its_error():
     # names are words, and what has no error has three digits
     shown = list(_lines(found | {"shoulder_by_blows": -0.000718548, "shoulder_energy": -4.0144}))
     assert not any("_" in text for text in shown)
-    assert any(text.endswith(" -0.000719 of the energy of the blows") for text in shown)
+    assert any("-0.0719 % of blow energy (error not estimated)" in text for text in shown)
     assert any("-4.01 J (error not estimated)" in text for text in shown)
-    short = summary(CoupledRun({name: column[:99] for name, column in columns.items()}, 1e-3, 98))
+    least = summary(CoupledRun({name: column[:99] for name, column in columns.items()}, 1e-3, 98))
+    assert "rate_second_half" not in least  # it has no whole blow
+    short = {name: column[:200] for name, column in columns.items()}
+    short = summary(CoupledRun(short, 1e-3, 199))
     assert short["rate_second_half_error"] is None
     assert any("error not estimated" in text for text in _lines(short))

@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from percussion_model.analysis.change import Change, change_of
 from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.scene.solver_names import SOLVER_NAMES
 from percussion_model.simulation.result import Result
 from percussion_model.simulation.simulate import simulate
-from percussion_model.simulation.uncertain import depends_on_cells, is_undecided, known_error
 from percussion_model.simulation.warnings import unused_note
 
 __all__ = [
     "COMPARED",
     "Comparison",
-    "change_error",
     "compare",
     "read_solvers",
-    "relative_change",
     "solver_names",
 ]
 
@@ -87,18 +84,25 @@ class Comparison:
             for name, one in summaries.items()
         }
 
+    def changes(self) -> dict[str, dict[str, Change]]:
+        """Change of each number against the first solver's, by solver; of a fall its numbers."""
+        summaries = self.compared()
+        base = summaries[self.first]
+        return {
+            name: {key: change_of(summary, base, key) for key in self._keys}
+            for name, summary in summaries.items()
+            if name != self.first
+        }
+
     def differences(self) -> dict[str, dict[str, float | None]]:
         """Relative difference of each number to the first solver's, by solver.
 
         Of a fall those of `Result.fall`. None where a number is not defined, or the first
         solver's is zero.
         """
-        summaries = self.compared()
-        base = summaries[self.first]
         return {
-            name: {key: relative_change(summary[key], base[key]) for key in self._keys}
-            for name, summary in summaries.items()
-            if name != self.first
+            name: {key: change.value for key, change in found.items()}
+            for name, found in self.changes().items()
         }
 
     def difference_errors(self) -> dict[str, dict[str, float | None]]:
@@ -107,12 +111,9 @@ class Comparison:
         By grid and scatter; None where a difference is, or where one of the errors is not
         known.
         """
-        summaries = self.compared()
-        base = summaries[self.first]
         return {
-            name: {key: _difference_error(summary, base, key) for key in self._keys}
-            for name, summary in summaries.items()
-            if name != self.first
+            name: {key: change.error for key, change in found.items()}
+            for name, found in self.changes().items()
         }
 
     @property
@@ -123,22 +124,13 @@ class Comparison:
     def undecided(self) -> dict[str, list[str]]:
         """Numbers whose difference to the first solver is within its error, by solver.
 
-        And those that depend on the cells in one of the two.
+        Or within three standard errors of its scatter. And those that depend on the cells in
+        one of the two.
         """
-        differences, errors = self.differences(), self.difference_errors()
         return {
-            name: [
-                key
-                for key, off in found.items()
-                if is_undecided(_or_nan(off), _or_nan(errors[name][key]))
-                or (off is not None and self.is_of_cells(name, key))
-            ]
-            for name, found in differences.items()
+            name: [key for key, change in found.items() if change.is_undecided]
+            for name, found in self.changes().items()
         }
-
-    def is_of_cells(self, name: str, key: str) -> bool:
-        """Whether a number depends on the cells, that of this solver or that of the first."""
-        return any(depends_on_cells(self.results[one].summary(), key) for one in (name, self.first))
 
     def warnings(self) -> list[str]:
         """Warnings of all results, each after the name of its solver; once where all have it.
@@ -248,36 +240,3 @@ def _after(start: float, progress: Callable[[float], None]) -> Callable[[float],
             progress(reached)
 
     return report
-
-
-def relative_change(value: float | None, base: float | None) -> float | None:
-    """Return value / base - 1, None where that is not defined."""
-    if value is None or base is None or base == 0 or not math.isfinite(value / base):
-        return None
-    return value / base - 1.0
-
-
-def change_error(
-    value: float | None, error: float | None, base: float | None, base_error: float | None
-) -> float | None:
-    """Error of value / base - 1, where those of both are independent.
-
-    No less than that of value - base, relative to the base: a difference within the errors
-    stays within them, however large they are. None where it is not defined, or one of the
-    errors is not known.
-    """
-    if value is None or base is None or relative_change(value, base) is None:
-        return None
-    if error is None or base_error is None:
-        return None
-    return math.hypot(error, max(abs(value / base), 1.0) * base_error) / abs(base)
-
-
-def _difference_error(summary: dict[str, Any], base: dict[str, Any], key: str) -> float | None:
-    """Error of the relative difference of one number of two summaries."""
-    errors = [known_error(one, key) for one in (summary, base)]
-    return change_error(summary[key], errors[0], base[key], errors[1])
-
-
-def _or_nan(value: float | None) -> float:
-    return math.nan if value is None else value

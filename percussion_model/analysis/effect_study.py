@@ -6,10 +6,10 @@ import math
 import re
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
-from percussion_model.analysis.comparison import change_error, relative_change
+from percussion_model.analysis.change import Change, change_of
 from percussion_model.physics.effects import EFFECTS
 from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.simulation.error_estimate import LARGE
@@ -270,27 +270,29 @@ class EffectsStudy:
     trials: list[Trial] = field(repr=False)
     refused: dict[str, str] = field(repr=False)
 
-    def changes(self, trial: Trial) -> dict[str, float | None]:
-        """Relative change of each number of `CHANGED` against the scene itself."""
-        here, base = trial.numbers(), self.base.numbers()
-        found = {name: relative_change(here[name], base[name]) for name in CHANGED}
-        if trial.undecided or self.base.undecided:
-            found["rate_of_penetration"] = None
-        return found
-
-    def change_errors(self, trial: Trial) -> dict[str, float | None]:
-        """Errors of `changes`, by grid and scatter of both runs; None where it is not known.
+    def change(self, trial: Trial, name: str) -> Change:
+        """Change of a number of `CHANGED` against the scene itself.
 
         Leaps go over the same grid: whatever it puts off is in both runs, and scatter is left.
         """
-        kind = "standard_error" if trial.variant.effect == LEAPS else "error"
-        here, base = trial.numbers(), self.base.numbers()
-        return {
-            name: change_error(
-                here[name], here[f"{name}_{kind}"], base[name], base[f"{name}_{kind}"]
-            )
-            for name in CHANGED
-        }
+        found = change_of(trial.numbers(), self.base.numbers(), name, trial.variant.effect == LEAPS)
+        both = trial, self.base
+        if name == CHANGED[0] and any(one.undecided for one in both):
+            return replace(found, hidden=True)
+        return found
+
+    def changes(self, trial: Trial) -> dict[str, float | None]:
+        """Relative change of each number of `CHANGED`; None where there is none that counts."""
+        found = {name: self.change(trial, name) for name in CHANGED}
+        return {name: None if one.hidden else one.value for name, one in found.items()}
+
+    def change_errors(self, trial: Trial) -> dict[str, float | None]:
+        """Errors of `changes`, by grid and scatter of both runs; None where it is not known."""
+        return {name: self.change(trial, name).error for name in CHANGED}
+
+    def undecided(self, trial: Trial) -> list[str]:
+        """Numbers of `CHANGED` whose change is within what is known of its error."""
+        return [name for name in CHANGED if self.change(trial, name).is_undecided]
 
     def warnings(self) -> list[str]:
         """Warnings of the scene, and others of its variants behind their names.
@@ -333,6 +335,7 @@ class EffectsStudy:
                     **trial.numbers(),
                     "changes": self.changes(trial),
                     "change_errors": self.change_errors(trial),
+                    "undecided": self.undecided(trial),
                     "step_dearer": self.is_costlier(trial),
                 }
                 for trial in self.trials

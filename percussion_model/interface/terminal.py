@@ -20,10 +20,10 @@ from percussion_model.interface.progress import Lines, Report, lines
 from percussion_model.interface.tables import print_table
 from percussion_model.simulation.uncertain import (
     ABOUT,
+    ABOUT_CHANGE,
     NOT_THE_MODEL,
     UNDECIDED,
     about_errors,
-    change_text,
     in_digits,
     mean_text,
     of_the_cells,
@@ -290,8 +290,7 @@ def _scale_rows(scene: Scene) -> Iterator[tuple[str, str]]:
 
 def show_comparison(found: Comparison) -> None:
     """Print the numbers of several solvers, each beside its difference to the first."""
-    summaries, differences = found.compared(), found.differences()
-    errors = found.difference_errors()
+    summaries, changes = found.compared(), found.changes()
     title = found.results[found.first].scene.title
     table = Table(
         title=escape(title) or None, box=SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=0
@@ -299,7 +298,7 @@ def show_comparison(found: Comparison) -> None:
     table.add_column("")
     for name in summaries:
         table.add_column(name, justify="right", no_wrap=True)
-        if name in differences:
+        if name in changes:
             table.add_column(f"{name}\noff, %", justify="right", no_wrap=True)
     shown = []
     for label, key, factor, unit in WITHOUT_BLOWS if found.is_fall else (RATE, *SHOWN):
@@ -313,11 +312,8 @@ def show_comparison(found: Comparison) -> None:
                 cells.append(_narrow(rate_text(summary)))
             else:
                 cells.append(_narrow(mean_text(summary, key, factor)))
-            if name in differences:
-                change, error = differences[name].get(key), errors[name].get(key)
-                hidden = change is not None and found.is_of_cells(name, key)
-                doubt = ABOUT if change and error is None else ""
-                cells.append(UNDECIDED if hidden else doubt + change_text(change, error))
+            if name in changes:
+                cells.append(changes[name][key].text() if key in changes[name] else "-")
         table.add_row(f"{label}, {unit}" if unit else label, *cells)
         shown += cells
     table.add_section()
@@ -326,11 +322,11 @@ def show_comparison(found: Comparison) -> None:
         for name, summary in found.summaries().items():
             found_here = value(summary)
             cells.append("-" if found_here is None else in_digits(found_here, TIMED))
-            cells += [""] * (name in differences)
+            cells += [""] * (name in changes)
         table.add_row(label, *cells)
     console = Console()
-    # a solver and its differences stay together
-    print_table(table, console, groups=[1, *[2] * len(differences)])
+    # a solver and its changes stay together
+    print_table(table, console, groups=[1, *[2] * len(changes)])
     for note in _about_comparison(found, " ".join(shown)):
         console.print(wrapped(note), highlight=False)
     show_warnings(console, found.warnings())
@@ -338,6 +334,8 @@ def show_comparison(found: Comparison) -> None:
 
 def _about_comparison(found: Comparison, shown: str) -> Iterator[str]:
     """What the errors are of the numbers that are shown, once for solvers that are alike."""
+    from percussion_model.analysis.change import SIGMAS
+
     told: dict[str, list[str]] = {}
     for name, result in found.results.items():
         if len(result.counted) or result.fall:
@@ -345,9 +343,12 @@ def _about_comparison(found: Comparison, shown: str) -> Iterator[str]:
     for note, names in told.items():
         yield note if len(told) == 1 else f"{', '.join(names)}: {note}"
     if UNDECIDED in shown:
-        yield f"A difference within the errors of both numbers is {UNDECIDED}."
+        yield (
+            f"A difference within the errors of both numbers, or {SIGMAS:g} standard errors of "
+            f"their scatter, is {UNDECIDED}."
+        )
     if ABOUT in shown:
-        yield f"{ABOUT} stands before a difference of which one of the numbers has no error."
+        yield ABOUT_CHANGE
 
 
 def _narrow(text: str) -> str:

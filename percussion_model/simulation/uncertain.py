@@ -19,11 +19,16 @@ SMALL_ERROR = 1e-4
 SMALLEST_UNIT = 8
 # Greater numbers are written with an exponent.
 LARGEST_PLAIN = 1e8
+# Changes below this show in no digit, and their errors neither.
+LEAST_CHANGE = 5e-5
 # Errors whose first digits are less are written with two.
 TWO_DIGITS = 3.55
 UNDECIDED = "undecided"
-# Before a number in a narrow column, or a difference, whose error is not known.
+# Before a number in a narrow column, or a difference, whose error is not, or not all, known.
 ABOUT = "≈"
+ABOUT_CHANGE = (
+    f"{ABOUT} stands before a difference of which one of the numbers has no error by its cells."
+)
 # Numbers that depend on the cells where waves are not damped, and the flag of a summary for it.
 OF_THE_CELLS = ("rate_of_penetration", "rate_of_penetration_fixed_window", "penetration_per_blow")
 BY_CELLS = "rate_of_penetration_depends_on_cells"
@@ -50,7 +55,8 @@ UNDAMPED = (
     "is known: numbers have that of their scatter, or three digits."
 )
 WITHOUT_ESTIMATE = (
-    "The error by the size of the cells was not estimated: numbers have three digits."
+    "The error by the size of the cells was not estimated: numbers have that of their scatter, "
+    "or three digits."
 )
 
 
@@ -96,9 +102,12 @@ def depends_on_cells(summary: Mapping[str, Any], key: str) -> bool:
     return bool(summary.get(BY_CELLS) and key in OF_THE_CELLS and summary.get(key))
 
 
-def of_the_cells(value: float) -> str:
-    """Return a number that depends on the cells."""
-    return f"{UNDECIDED}, with these cells {in_digits(value)}"
+def of_the_cells(value: float, scatter: float | None = None) -> str:
+    """Return a number that depends on the cells, with the standard error of its scatter."""
+    shown = in_digits(value)
+    if scatter is not None and scatter > SMALL_ERROR * abs(value):
+        shown = with_short_error(value, scatter)
+    return f"{UNDECIDED}, with these cells {shown}"
 
 
 def with_short_error(value: float, error: float) -> str:
@@ -131,21 +140,51 @@ def in_few_characters(value: float | None, error: float | None, share: float = S
     return with_short_error(value, error).replace(" ", "")
 
 
-def change_text(change: float | None, error: float | None) -> str:
+def hides_change(change: float, error: float) -> bool:
+    """Whether a relative change is within its error, in the digits that are shown of both.
+
+    Not where the error shows in none: there is no change, or it is known.
+    """
+    if error < LEAST_CHANGE:
+        return False
+    place = _place(error)
+    return is_undecided(change, error) or is_undecided(round(change, -place), round(error, -place))
+
+
+def _place(error: float) -> int:
+    """Decimal place of the last digit of an error: one digit, two of what begins with 1."""
+    place = math.floor(math.log10(error))
+    return place - (error < 2.0 * 10.0**place)
+
+
+def change_text(change: float | None, error: float | None, rough: bool = False) -> str:
     """Return a relative change in per cent, with its error, for a narrow column.
 
     It is undecided where the change is within its error; an error that shows in none of the
     decimals is left out.
+
+    Parameters
+    ----------
+    change, error : float or None
+        Relative.
+    rough : bool
+        Whether the error is only a part of the whole: the change has a sign that says so, at
+        most two digits, and no error.
     """
     if change is None:
         return "-"
-    change, error = 100.0 * change, 100.0 * (error or 0.0)
-    if error >= 0.005:
-        if is_undecided(change, error):
-            return UNDECIDED
-        place = math.floor(math.log10(error))
-        # of an error that begins with 1 one digit would be too coarse
-        place -= error < 2.0 * 10.0**place
+    error = error or 0.0
+    if hides_change(change, error):
+        return UNDECIDED
+    shows = error >= LEAST_CHANGE
+    change, error = 100.0 * change, 100.0 * error
+    if rough:
+        place = math.floor(math.log10(max(abs(change), error))) - 1
+        place = max(place, -1, math.floor(math.log10(error)) if error > 0.0 else place)
+        rounded = round(change, -place)
+        return f"{ABOUT}{rounded:+.{max(-place, 0)}f}" if rounded else f"{ABOUT}0"
+    if shows:
+        place = _place(error)
         digits = max(-place, 0)
         return f"{round(change, -place):+.{digits}f}±{round(error, -place):.{digits}f}"
     decimals = 2 if abs(change) < 10.0 else 1 if abs(change) < 100.0 else 0
@@ -191,7 +230,7 @@ def mean_text(
     """
     value, error, scatter = factor * summary[key], known_error(summary, key), None
     if depends_on_cells(summary, key):
-        return of_the_cells(value)
+        return of_the_cells(value, scaled(factor, known_scatter(summary, key)))
     if error is None:
         scatter = known_scatter(summary, key)
     for known, what in ((error, ""), (scatter, " (scatter alone)")):
@@ -228,7 +267,9 @@ def rate_text(summary: Mapping[str, Any], factor: float = 1e3) -> str:
     if rate is None:
         return "-"
     if depends_on_cells(summary, "rate_of_penetration"):
-        return of_the_cells(factor * rate)
+        return of_the_cells(
+            factor * rate, scaled(factor, known_scatter(summary, "rate_of_penetration"))
+        )
     if error is not None:
         return with_error(factor * rate, factor * error)
     scatter = known_scatter(summary, "rate_of_penetration")

@@ -27,7 +27,7 @@ SHOWN = (
     ("string_energy_residual", "String: energy unexplained", 1.0, "of the energy put in or there"),
     ("shoulder_energy", "Energy lost at the bit's shoulder", 1.0, "J"),
     ("feed_work", "Work of the feed on the bit", 1.0, "J"),
-    ("shoulder_by_blows", "Share lost at the bit's shoulder", 1.0, "of the energy of the blows"),
+    ("shoulder_by_blows", "Share lost at the bit's shoulder", 100.0, "% of blow energy"),
 )
 # Those that are given, and have all their digits.
 GIVEN = ("time", "step", "steps")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -12,8 +12,8 @@ import typer
 from percussion_model.interface.commands import common
 from percussion_model.simulation.uncertain import (
     ABOUT,
+    ABOUT_CHANGE,
     UNDECIDED,
-    change_text,
     in_digits,
     in_few_characters,
     scaled,
@@ -75,9 +75,12 @@ RATE = "rate_of_penetration"
 LEAST_ERROR = 1e-3
 NOTE = (
     "± is the numerical error, by the size of the cells and the scatter of the blows; a rate "
-    "without it is known to 0.1 %. % is the change against the scene as it is, undecided where "
-    "it is within the errors of both. Times are the least of several."
+    "without it is known to 0.1 %. % is the change against the scene as it is, {undecided} where "
+    "it is within the errors of both, or within {sigmas:g} standard errors of their scatter. Times "
+    "are the least of several."
 )
+# Added where it matters.
+OF_LEAPS = "Leaps go over the same cells: the ± of their changes is that of the scatter."
 
 # Columns: heading, and what stands in it.
 _COLUMNS: dict[str, Callable[[EffectsStudy, Trial, dict[str, Any]], str]] = {
@@ -143,8 +146,23 @@ def show_effects(found: EffectsStudy) -> None:
         names = ", ".join(name for name, given in reasons.items() if given == reason)
         show_note(console, names, reason)
     if len(found.base.result.counted):
-        console.print(wrapped(NOTE), highlight=False)
+        for note in _notes(found, rows):
+            console.print(wrapped(note), highlight=False)
     show_warnings(console, found.warnings())
+
+
+def _notes(found: EffectsStudy, rows: list[list[str]]) -> Iterator[str]:
+    """What the errors and signs are that the rows show."""
+    from percussion_model.analysis.change import SIGMAS
+    from percussion_model.analysis.effect_study import CHANGED, LEAPS
+
+    note = NOTE.format(undecided=UNDECIDED, sigmas=SIGMAS)
+    leaps = [trial for trial in found.trials if trial.variant.effect == LEAPS]
+    if any("±" in found.change(trial, name).text() for trial in leaps for name in CHANGED):
+        note += f" {OF_LEAPS}"
+    yield note
+    if any(ABOUT in cell for row in rows for cell in row):
+        yield ABOUT_CHANGE
 
 
 def _rate(row: dict[str, Any]) -> str:
@@ -168,10 +186,4 @@ def _number(value: float | None, factor: float, digits: int) -> str:
 
 
 def _change(found: EffectsStudy, trial: Trial, name: str) -> str:
-    if trial is found.base:
-        return ""
-    hidden = trial.undecided or found.base.undecided
-    if name == RATE and hidden and trial.numbers()[name] is not None:
-        return UNDECIDED
-    change, error = found.changes(trial)[name], found.change_errors(trial)[name]
-    return ABOUT * bool(change and error is None) + change_text(change, error)
+    return "" if trial is found.base else found.change(trial, name).text()

@@ -9,16 +9,11 @@ from functools import partial
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from percussion_model.analysis.effect_study import EffectsStudy, Trial
+from percussion_model.analysis.change import Change
+from percussion_model.analysis.effect_study import EffectsStudy
 from percussion_model.interface.plotting import style
-from percussion_model.simulation.uncertain import (
-    ABOUT,
-    UNDECIDED,
-    change_text,
-    is_undecided,
-)
+from percussion_model.simulation.uncertain import ABOUT, UNDECIDED
 
-RATE = "rate_of_penetration"
 COST_COLOUR, MORE_COLOUR, LESS_COLOUR = "#0072B2", "#D55E00", "#009E73"
 UNDECIDED_COLOUR = "#DDDDDD"
 # Axes are made for changes up to this [%].
@@ -30,7 +25,7 @@ UNCUT = 1.4
 ROOM, WITHIN = 1.75, 0.92
 # Width of a character by that of half a panel.
 CHARACTER = 0.072
-# Changes, and errors of them, below this are none [%].
+# Changes below this are none [%].
 NOTHING = 5e-3
 # A figure is as wide as that of so many panels, for its title.
 LEAST_WIDTH = 3
@@ -42,7 +37,7 @@ Panel = Callable[[Axes], None]
 COSTS = {"step_time": "a time step", "blow_time": "a blow"}
 COST_OF_RUN = {"step_time": "a time step", "wall_time": "the run"}
 CHANGES = {
-    RATE: "Rate of penetration",
+    "rate_of_penetration": "Rate of penetration",
     "blow_period": "Blow period",
     "peak_bit_force": "Peak bit force",
 }
@@ -85,31 +80,18 @@ def _cost_panel(values: list[float | None], title: str, ax: Axes) -> None:
 
 def _change_panels(found: EffectsStudy) -> Iterator[Panel]:
     """Changes of numbers, and which of them are not known."""
-    trials = found.trials
     for key, title in CHANGES.items():
-        values = [found.changes(trial)[key] for trial in trials]
-        hidden = [key == RATE and _is_hidden(found, trial) for trial in trials]
-        errors = [found.change_errors(trial).get(key) for trial in trials]
-        if any(hidden) or any(value is not None for value in values):
-            yield partial(_change_panel, values, errors, hidden, title)
+        changes = [found.change(trial, key) for trial in found.trials]
+        if any(change.value is not None for change in changes):
+            yield partial(_change_panel, changes, title)
 
 
-def _change_panel(
-    values: list[float | None],
-    errors: list[float | None],
-    hidden: list[bool],
-    title: str,
-    ax: Axes,
-) -> None:
-    _changes(ax, values, errors, hidden)
-    style.label(ax, "change [%], hatched: cut off", "", title)
-
-
-def _is_hidden(found: EffectsStudy, trial: Trial) -> bool:
-    """Whether there are two rates, but their difference is not known."""
-    pair = found.base, trial
-    rates = [one.numbers()[RATE] for one in pair]
-    return None not in rates and any(one.undecided for one in pair)
+def _change_panel(changes: list[Change], title: str, ax: Axes) -> None:
+    _changes(ax, changes)
+    notes = ["change [%]", "hatched: cut off"]
+    if any(change.is_rough for change in changes):
+        notes.append(f"{ABOUT}: error not known")
+    style.label(ax, ", ".join(notes[:2]) + "".join(f"\n{note}" for note in notes[2:]), "", title)
 
 
 def _costs(ax: Axes, values: list[float | None]) -> None:
@@ -129,18 +111,19 @@ def _costs(ax: Axes, values: list[float | None]) -> None:
     ax.axvline(1.0, color=style.RULE_COLOUR, linewidth=0.8)
 
 
-def _changes(
-    ax: Axes, values: list[float | None], errors: list[float | None], hidden: list[bool]
-) -> None:
+def _changes(ax: Axes, changes: list[Change]) -> None:
     """Bars from 0 in per cent, with their errors; grey where the change is not known."""
-    shares = [None if value is None else 100.0 * value for value in values]
-    unsure = [0.0 if error is None else 100.0 * error for error in errors]
-    known = [abs(share) for share in shares if share is not None]
+    shares = [None if one.value is None else 100.0 * one.value for one in changes]
+    known = [
+        abs(share)
+        for share, one in zip(shares, changes, strict=True)
+        if share is not None and not one.is_undecided
+    ]
     end = min(max([1.0, *known]), WIDEST)
     ax.set_xlim(-ROOM * end, ROOM * end)
     longest = WITHIN * ROOM * end
-    for y, (share, error, unknown) in enumerate(zip(shares, unsure, hidden, strict=True)):
-        if unknown or (share is not None and error >= NOTHING and is_undecided(share, error)):
+    for y, (share, change) in enumerate(zip(shares, changes, strict=True)):
+        if change.is_undecided:
             ax.barh(y, 2.0 * longest, left=-longest, height=0.62, color=UNDECIDED_COLOUR)
             ax.text(0.0, y, UNDECIDED, va="center", ha="center", fontsize=8.0)
             continue
@@ -152,12 +135,7 @@ def _changes(
         colour = MORE_COLOUR if share >= 0.0 else LESS_COLOUR
         ax.barh(y, shown, height=0.62, color=colour, hatch="///" if cut else None, edgecolor="w")
         align = "left" if share >= 0.0 else "right"
-        text = f" {share:+.2g} " if abs(share) < 100.0 else f" {share:+.0f} "
-        text = " 0 " if abs(share) < NOTHING else text
-        if error >= NOTHING:
-            text = f" {change_text(0.01 * share, 0.01 * error)} "
-        elif errors[y] is None and abs(share) >= NOTHING:
-            text = f" {ABOUT}{text.strip()} "
+        text = " 0 " if abs(share) < NOTHING else f" {change.text()} "
         # what has no room beside its bar stands within it, or else on the other side of zero
         length, room = CHARACTER * (len(text) - 1), abs(share) / (ROOM * end)
         within = cut or (room + length > 1.0 and room > length)

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
-from percussion_model.analysis.comparison import change_error
+from percussion_model.analysis.change import change_error
 from percussion_model.analysis.study.workers import on_this_machine
 from percussion_model.scene.inputs import SimulationError
 from percussion_model.simulation.uncertain import (
