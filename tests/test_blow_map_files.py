@@ -23,6 +23,7 @@ from percussion_model.analysis.blow_maps import (
     outside_map,
     refused_run,
 )
+from percussion_model.analysis.effect_study import study_effects
 from percussion_model.interface.cli import _guarded, app
 from percussion_model.solvers.blow_map import builder
 from percussion_model.solvers.blow_map.builder import build_table, get_table
@@ -280,11 +281,19 @@ def test_a_run_that_its_table_would_refuse_is_refused_before(
     """What to change is said, and no minutes are spent."""
     path = tmp_path / "scene.toml"
     mapped(**change).to_toml(path)
-    code = _guarded(lambda: app(["run", str(path)], standalone_mode=False))
-    told = capsys.readouterr().err
-    assert code != 0
-    assert "the blow map was not made" in told
-    assert words in told
+    out = ["--out", str(tmp_path / "out")]
+    for command in (["run"], ["settled"], ["plot", *out], ["compare", "--solvers=blow-map", *out]):
+        code = _guarded(lambda words=command: app([*words, str(path)], standalone_mode=False))
+        told = capsys.readouterr().err
+        assert code != 0
+        assert "the blow map was not made" in told
+        assert words in told
+        assert list(cache.glob("*.npz")) == []
+
+
+def test_no_blow_maps_are_made_for_a_study_of_effects(cache):
+    with pytest.raises(SceneError, match="would make a blow map for each effect"):
+        study_effects(mapped())
     assert list(cache.glob("*.npz")) == []
 
 

@@ -69,6 +69,23 @@ def ready_map(scene: Scene, workers: int | None = None) -> BlowTable:
         return make_map(scene, progress, workers)
 
 
+def prepare_map(scene: Scene, duration: float | None = None) -> None:
+    """Make the table of a scene that asks for one; refuse first a run that it would not answer."""
+    from percussion_model.analysis.blow_maps import kept_map, refused_run
+    from percussion_model.interface.terminal import progress
+    from percussion_model.scene.inputs import SimulationError
+
+    if scene.solver_name != "blow-map" or kept_map(scene) is not None:
+        return
+    with progress("trying the run before the blow map is made"):
+        refused = refused_run(scene, scene.run.duration if duration is None else duration)
+    if refused:
+        raise SimulationError(
+            f"the blow map was not made, since it would refuse the run: {refused}"
+        )
+    ready_map(scene)
+
+
 def warn_of_outside(scene: Scene) -> None:
     """Warn of what of a scene its table would not answer."""
     from percussion_model.analysis.blow_maps import outside_map

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from percussion_model.interface.commands import common
-from percussion_model.interface.commands.blow_map import ready_map
+from percussion_model.interface.commands.blow_map import prepare_map
 
 
 def compare(
@@ -38,7 +38,7 @@ def compare(
             scene=chosen, solvers=names, duration=duration, settle=settle,
         )  # fmt: skip
     if "blow-map" in names:
-        ready_map(chosen)
+        prepare_map(chosen.computed_by("blow-map"), duration)
     common.tell_of_compiling(*(name for name in names if name != chosen.solver_name))
     end = chosen.run.duration if duration is None else duration
     with progress_bar(end * len(names)) as bar:

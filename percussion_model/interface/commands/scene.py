@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from percussion_model.interface.commands import common
-from percussion_model.interface.commands.blow_map import ready_map, warn_of_outside
+from percussion_model.interface.commands.blow_map import prepare_map, warn_of_outside
 
 if TYPE_CHECKING:
     from percussion_model.interface.progress import Report
@@ -49,9 +49,7 @@ def run(
     made_from |= {"trace": trace, "error_estimate": error_estimate}
     claimed = None if out is None else common.claim("run", out, None, force, **made_from)
     end = chosen.run.duration if duration is None else duration
-    if chosen.solver_name == "blow-map":
-        _try_without_map(chosen, end)
-        ready_map(chosen)
+    prepare_map(chosen, duration)
     with terminal.progress_bar(end) as progress:
         result = simulate(
             chosen,
@@ -103,6 +101,7 @@ def settled(
 
     common.check_json(json_file)
     chosen = common.load_scene(scene, solver, cells, settings)
+    prepare_map(chosen)
     with progress("preparing") as report:
         found = run_until_settled(
             chosen,
@@ -176,6 +175,7 @@ def plot(
         made_from = _made_from(scene, duration, settle)
         # its figures belong to the result of that run, and may stand beside it
         claimed = common.claim("run", out, Path("out") / source.stem, force, **made_from)
+        prepare_map(scene, duration)
         with progress_bar(scene.run.duration if duration is None else duration) as bar:
             result = simulate(scene, duration, settle, progress=bar, stage=bar.stage)
     with progress("drawing") as report:
@@ -196,22 +196,6 @@ def new(
     common.refuse_existing(file, force)
     Scene(title=_NEW_TITLE).to_toml(file, comments=True)
     typer.echo(f"wrote {file}")
-
-
-def _try_without_map(scene: Scene, duration: float) -> None:
-    """Refuse a run that its blow map would not answer, before that is made."""
-    from percussion_model.analysis.blow_maps import kept_map, refused_run
-    from percussion_model.interface.terminal import progress
-    from percussion_model.scene.inputs import SimulationError
-
-    if kept_map(scene) is not None:
-        return
-    with progress("trying the run before the blow map is made"):
-        refused = refused_run(scene, duration)
-    if refused:
-        raise SimulationError(
-            f"the blow map was not made, since it would refuse the run: {refused}"
-        )
 
 
 def _made_from(scene: Scene, duration: float | None, settle: float | None) -> dict[str, Any]:
