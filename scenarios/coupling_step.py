@@ -19,6 +19,8 @@ import numpy as np
 from percussion_model.coupling import Coupling
 from percussion_model.coupling.coupled_run import known_signals, summary
 from percussion_model.interface.terminal import progress
+from percussion_model.simulation.uncertain import change_text, with_error
+from percussion_model.verification.accuracy.orders import Order, fitted_order
 from scenarios.drawing import save_png
 from scenarios.harness import FIGURES, ROOT
 
@@ -84,43 +86,61 @@ def errors(rows: Sequence[OneBlow], exact: OneBlow, name: str) -> np.ndarray:
     return np.array([row.values[name] / exact.values[name] - 1.0 for row in rows])
 
 
-def order_of(rows: Sequence[OneBlow], exact: OneBlow, name: str) -> float:
+def error_of_limit(step: float, change: float, reference: float) -> float:
+    """What a reference of a short step is off itself, by the change of another, of first order."""
+    return abs(change) * reference / (step - reference)
+
+
+def errors_of_limits(rows: Sequence[OneBlow], exact: OneBlow) -> dict[str, float]:
+    """Relative error of each quantity in the reference, by the rows of the shortest step."""
+    least = min(row.step for row in rows)
+    shortest = [row for row in rows if row.step == least]
+    return {
+        name: error_of_limit(least, np.max(np.abs(errors(shortest, exact, name))), exact.step)
+        for name in QUANTITIES
+    }
+
+
+def order_of(rows: Sequence[OneBlow], exact: OneBlow, name: str) -> Order | None:
     """Slope of log error over log step, where the shoulder is as it is given."""
     chosen = [row for row in rows if row.step <= UNCHANGED]
-    steps = np.log([row.step for row in chosen])
-    sizes = np.log(np.abs(errors(chosen, exact, name)))
-    return float(np.polyfit(steps, sizes, 1)[0])
+    return fitted_order([row.step for row in chosen], np.abs(errors(chosen, exact, name)).tolist())
 
 
 def table_of_one(rows: Sequence[OneBlow], exact: OneBlow) -> str:
     """Markdown: relative errors, and the order of each quantity in the last row."""
     words = [f"{text} [{unit}]" for text, unit, _ in QUANTITIES.values()]
     lines = [f"| order | step [ms] | {' | '.join(words)} |", "|---|---|" + "---|" * len(words)]
-    found = [f"{factor * exact.values[name]:.5g}" for name, (_, _, factor) in QUANTITIES.items()]
+    unsure = errors_of_limits(rows, exact)
+    found = [
+        with_error(factor * exact.values[name], factor * abs(exact.values[name]) * unsure[name])
+        for name, (_, _, factor) in QUANTITIES.items()
+    ]
     lines.append(f"| limit | | {' | '.join(found)} |")
     for order in dict.fromkeys(row.order for row in rows):
         chosen = [row for row in rows if row.order == order]
         columns = [errors(chosen, exact, name) for name in QUANTITIES]
         for row, sizes in zip(chosen, np.transpose(columns), strict=True):
-            shown = " | ".join(f"{100.0 * size:+.4f} %" for size in sizes)
+            shown = " | ".join(map(change_text, sizes, unsure.values()))
             lines.append(f"| {order} | {1e3 * row.step:g} | {shown} |")
-        slopes = [f"{order_of(chosen, exact, name):.2f}" for name in QUANTITIES]
-        lines.append(f"| {order} | slope to {1e3 * UNCHANGED:g} | {' | '.join(slopes)} |")
+        slopes = " | ".join(str(order_of(chosen, exact, name) or "-") for name in QUANTITIES)
+        lines.append(f"| {order} | slope to {1e3 * UNCHANGED:g} | {slopes} |")
     return "\n".join(lines)
 
 
 def table_of_eight(rows: Sequence[EightBlows]) -> str:
-    """Markdown: errors of the rate against the shortest step."""
-    exact = min(rows, key=lambda row: row.step).rate
+    """Markdown: changes of the rate against that of the shortest step."""
+    exact = min(rows, key=lambda row: row.step)
     lines = [
-        "| order | step [ms] | rate [mm/s] | error | mean feed [N] | shoulder / blows |",
+        f"| order | step [ms] | rate [mm/s] | change from {1e3 * exact.step:g} ms [%] "
+        "| mean feed [N] | shoulder by blows [%] |",
         "|---|---|---|---|---|---|",
     ]
     for row in rows:
         lines.append(
-            f"| {row.order} | {1e3 * row.step:g} | {1e3 * row.rate:.3f} "
-            f"| {100 * (row.rate / exact - 1.0):+.2f} % | {row.feed:.0f} "
-            f"| {100 * row.shoulder:+.3f} % |"
+            f"| {row.order} | {1e3 * row.step:g} | {1e3 * row.rate:.2f} "
+            f"| {change_text(row.rate / exact.rate - 1.0, None)} | {row.feed:.0f} "
+            f"| {100 * row.shoulder:+.2f} |"
         )
     return "\n".join(lines)
 
@@ -148,7 +168,7 @@ def draw(ones: Sequence[OneBlow], exact: OneBlow, eights: Sequence[EightBlows], 
         axes[2].semilogx(steps, [100.0 * row.shoulder for row in chosen], "o-", ms=4,
                          label=f"shoulder by blows, {order}")  # fmt: skip
         scatter = [100.0 * (row.rate / shortest - 1.0) for row in chosen]
-        axes[2].semilogx(steps, scatter, "x:", ms=5, label=f"error of the rate, {order}")
+        axes[2].semilogx(steps, scatter, "x:", ms=5, label=f"change of the rate, {order}")
     axes[2].set_title("eight blows", fontsize="medium")
     axes[2].set_ylabel("[%]")
     axes[2].axhline(0.0, color="k", linewidth=0.6)
@@ -167,9 +187,12 @@ def main(archive: Path) -> None:
     with progress("one blow with every step"):
         exact = one_blow(archive, "jacobi", REFERENCE)
         ones = [one_blow(archive, order, step) for order in ORDERS for step in STEPS]
+    print(f"One blow: limits by a run at {1e3 * REFERENCE:g} ms, and errors in % against it; ± is")
+    print("what that run may be off itself, by the shortest of the others and first order")
     print(table_of_one(ones, exact), flush=True)
     with progress("eight blows with every step"):
         eights = [eight_blows(archive, order, step) for order in ORDERS for step in STEPS]
+    print("Eight blows")
     print(table_of_eight(eights))
     print(draw(ones, exact, eights, FIGURES / "coupling_step.png"))
 

@@ -16,7 +16,8 @@ from typing import Any
 
 from percussion_model.coupling import CoupledRun, Coupling
 from percussion_model.interface.terminal import progress
-from scenarios.coupling_step import ONE_BLOW
+from percussion_model.simulation.uncertain import change_text
+from scenarios.coupling_step import ONE_BLOW, error_of_limit
 from scenarios.harness import ROOT
 
 SHOULDERS: Mapping[str, Mapping[str, Any]] = {
@@ -40,9 +41,16 @@ class Try:
     """A way through the blow: what it took, and where it led."""
 
     shoulder: str
-    way: str
+    tolerance: float | None
     run: CoupledRun
     cost: float
+
+    @property
+    def way(self) -> str:
+        """The step, or the tolerance of steps that are chosen."""
+        if self.tolerance is None:
+            return f"{1e3 * self.run.step:g} ms"
+        return f"tolerance {self.tolerance:g}"
 
 
 def attempt(system: Path, shoulder: str, step: float, tolerance: float | None = None) -> Try:
@@ -57,27 +65,42 @@ def attempt(system: Path, shoulder: str, step: float, tolerance: float | None = 
     run = coupling.run(ONE_BLOW, step, list(QUANTITIES), max(step, LONGEST), tolerance, note)
     if run.error:
         raise RuntimeError(run.error)
-    way = f"{1e3 * step:g} ms" if tolerance is None else f"tolerance {tolerance:g}"
     share = len(began) / max(len(began) - 1, 1)
-    return Try(shoulder, way, run, share * (began[-1] - began[0]))
+    return Try(shoulder, tolerance, run, share * (began[-1] - began[0]))
 
 
 def table(exact: Mapping[str, CoupledRun], tries: Sequence[Try]) -> str:
-    """Markdown: errors at the end of the blow."""
-    words = " | ".join(QUANTITIES.values())
+    """Markdown: errors at the end of the blow, in per cent."""
+    words = " | ".join(f"{name} [%]" for name in QUANTITIES.values())
     lines = [
         f"| shoulder | steps | done | computed | taken back | time [s] | {words} |",
         "|---|---|---|---|---|---|" + "---|" * len(QUANTITIES),
     ]
     for one in tries:
-        errors = [one.run[q][-1] / exact[one.shoulder][q][-1] - 1.0 for q in QUANTITIES]
-        shown = " | ".join(f"{100.0 * error:+.3f} %" for error in errors)
+        same = [other for other in tries if other.shoulder == one.shoulder]
+        shown = " | ".join(
+            change_text(_change(one, exact, name), _error_of_limit(same, exact, name))
+            for name in QUANTITIES
+        )
         run = one.run
         lines.append(
             f"| {one.shoulder} | {one.way} | {run.steps} | {run.steps + run.tried} "
             f"| {run.rejected} | {one.cost:.2f} | {shown} |"
         )
     return "\n".join(lines)
+
+
+def _change(one: Try, exact: Mapping[str, CoupledRun], name: str) -> float:
+    """Relative change of a quantity against its reference."""
+    return float(one.run[name][-1] / exact[one.shoulder][name][-1] - 1.0)
+
+
+def _error_of_limit(tries: Sequence[Try], exact: Mapping[str, CoupledRun], name: str) -> float:
+    """What the reference is off, by the shortest step that was not chosen."""
+    given = [one for one in tries if one.tolerance is None]
+    shortest = min(given, key=lambda one: one.run.step)
+    reference = exact[shortest.shoulder].step
+    return error_of_limit(shortest.run.step, _change(shortest, exact, name), reference)
 
 
 def measure(

@@ -131,7 +131,13 @@ def test_explain(percussion):
 def test_explain_promises_runs_for_the_error_only_where_there_are_any(percussion):
     wave, promise = SCENARIOS / "reference.toml", "the short runs that tell its error come on top"
     rigid = "no short runs on top, since there are no cells whose error they would tell"
-    for words, said in (([wave], promise), ([RIGID], rigid), ([wave, "--solver", "rigid"], rigid)):
+    undamped = "without loss its error by the cells is not known, and no run looks for it"
+    for words, said in (
+        ([wave], promise),
+        ([RIGID], rigid),
+        ([wave, "--solver", "rigid"], rigid),
+        ([SCENARIOS / "undamped.toml"], undamped),
+    ):
         code, out, _ = percussion("explain", *words)
         assert code == 0
         out = " ".join(out.replace("│", " ").split())

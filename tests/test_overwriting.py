@@ -134,6 +134,15 @@ def test_other_commands_keep_to_the_rule(percussion, command):
     assert percussion(*words, "--out", next(Path("out").iterdir()))[0] == 2
 
 
+def test_a_refusal_names_no_folder(percussion):
+    figures = ("compare", SCENE, "--solvers", "rigid", "--settle", "0", "--duration")
+    assert percussion(*figures, "0.3")[0] == 0
+    code, said = percussion(*figures, "-1")
+    assert code == 2
+    assert "--force" not in said
+    assert "goes to" in percussion(*figures, "0.2")[1]
+
+
 def test_a_calibrated_scene_does_not_replace_a_file(percussion):
     Path("slow.csv").write_text("penetration,force\n" + "\n".join(
         f"{1e-5 * k},{7.5e8 * 1e-5 * k}" for k in range(20)

@@ -132,7 +132,7 @@ def test_an_error_that_is_rounding_is_told_as_such():
     rows = headline_rows({"rate_of_penetration_standard_error": 5.1e-17,
                           "rate_of_penetration_relative_error": 2.0234e-3})  # fmt: skip
     assert [row[1:] for row in rows] == [
-        ("below 1e-9 m/s", "below 1e-6 mm/s"), ("0.002", "0.2 %"),
+        ("below 1e-9 m/s", "below 1e-6 mm/s"), ("0.0020", "0.20 %"),
     ]  # fmt: skip
 
 

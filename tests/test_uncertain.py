@@ -27,6 +27,7 @@ from percussion_model.interface.report import headline_rows, render_report
 from percussion_model.interface.terminal import show_comparison, show_settled, show_summary
 from percussion_model.simulation.uncertain import (
     change_text,
+    in_digits,
     in_few_characters,
     is_undecided,
     rate_text,
@@ -103,6 +104,15 @@ def test_what_an_error_hides():
 )
 def test_a_change_with_its_error(change, error, shown):
     assert change_text(change, error) == shown
+
+
+def test_zeros_that_are_known_are_shown():
+    assert [in_digits(value, 4) for value in (0.852, 22.0, 1020.0, 59500.0)] == [
+        "0.8520", "22.00", "1020", "59500",
+    ]  # fmt: skip
+    assert [in_digits(value, 2) for value in (750.0, 110.0, 0.0, 1.5e9)] == [
+        "750", "110", "0", "1.5e+09",
+    ]  # fmt: skip
 
 
 def test_a_number_of_a_narrow_column():

@@ -34,6 +34,11 @@ def fresh(name: str, given: Callable[..., Any], is_new: bool = False) -> Callabl
         Takes inputs, time and step [s], or makes what does.
     is_new : bool
         Whether it was made for this run already, so that nothing has to be copied.
+
+    Raises
+    ------
+    CouplingError
+        If it makes nothing that can be called, or takes other arguments.
     """
     if inspect.isclass(given) or _is_factory(given):
         made = _make(name, given)
@@ -44,7 +49,9 @@ def fresh(name: str, given: Callable[..., Any], is_new: bool = False) -> Callabl
             )
         _reset(made)
         work: Callable[..., Any] = made
+        _check_arguments(f"{name}: what {_title(given)} gives", work)
         return work
+    _check_arguments(f"{name}: {_title(given)}", given)
     if inspect.isroutine(given) and not inspect.ismethod(given):
         return given
     if _reset(given) or is_new or not _keeps_values(given):
@@ -91,6 +98,19 @@ def _outside(function: types.FunctionType, seen: set[int]) -> Iterator[tuple[str
                 yield from _outside(value, seen)
         elif not isinstance(value, types.ModuleType):
             yield name, value
+
+
+def _check_arguments(what: str, work: Callable[..., Any]) -> None:
+    """Refuse what takes other arguments than a part of a system gets."""
+    try:
+        inspect.signature(work).bind({}, 0.0, 0.0)
+    except TypeError as error:
+        raise CouplingError(
+            f"{what} cannot be called with inputs, time and step ({error}): these three are what "
+            "it gets, each time"
+        ) from None
+    except ValueError:
+        pass  # has no signature, as some callables in C
 
 
 def _is_factory(given: Callable[..., Any]) -> bool:

@@ -37,7 +37,7 @@ def commented_fit(found: Fit, written: Mapping[str, float], scene: str) -> str:
     for one in found.explained:
         kind = "given" if one.noise_is_given else "estimated"
         data = "1 number" if len(one.data) == 1 else f"{len(one.data)} data"
-        lines.append(f"  {one.name}: {data}, noise {one.noise:.3g} {one.unit} ({kind})")
+        lines.append(f"  {one.name}: {data}, noise {one.noise_text()} {one.unit} ({kind})")
     kind = "widened" if found.is_widened else f"{100 * found.confidence:g} %"
     lines += ["", f"Parameters and their {kind} intervals, all together:"]
     for key, symbol in NAMES.items():
@@ -45,7 +45,8 @@ def commented_fit(found: Fit, written: Mapping[str, float], scene: str) -> str:
         if estimate is None:
             lines.append(f"  {key} ({symbol}): not fitted, kept as in {scene}")
             continue
-        at = f"{estimate.value:.4g} in {estimate.low:.4g} to {estimate.high:.4g} {unit}"
+        value, low, high = estimate.texts()
+        at = f"{value} in {low} to {high} {unit}"
         at = f"{at.removesuffix('-').rstrip()}, {estimate.verdict}"
         kept = "" if key in written else f"; kept as in {scene}"
         lines.append(f"  {key} ({symbol}): {at}{kept}")

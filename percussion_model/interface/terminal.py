@@ -201,9 +201,12 @@ def show_explanation(scene: Scene, found: Forecast) -> None:
     """Print what a scene computes, and its cost estimate."""
     from percussion_model.analysis.cost import FACTOR
     from percussion_model.analysis.stationary import MOST_TIME
+    from percussion_model.solvers.wave.resolution import FITS
 
     solver = found.solver
     table = Table(title=escape(scene.title) or None, show_header=False)
+    table.add_column(no_wrap=True)
+    table.add_column()
     table.add_row("Effects on", ", ".join(scene.effects_on) or "none")
     table.add_row("Effects off", ", ".join(scene.effects_off) or "none")
     table.add_row("Without effect here", ", ".join(scene.unused) or "none")
@@ -221,33 +224,44 @@ def show_explanation(scene: Scene, found: Forecast) -> None:
         cells = ", ".join(f"{count} in the {bar}" for bar, count in solver.cells.items())
         table.add_row("Cells", cells)
         table.add_row("Time step", f"{solver.time_step:.6g} s")
-        table.add_row("Wave speed error", f"{100.0 * solver.wave_speed_error:.2g} %")
+        error = 100.0 * solver.wave_speed_error
+        fits = error < 100.0 * FITS
+        table.add_row("Wave speed error", "none" if fits else f"{in_digits(error, TIMED)} %")
     else:
         table.add_row("Steps", "from event to event, in closed form")
     if found.per_blow is not None:
-        counts = ", ".join(f"{value:.3g} {name}" for name, value in found.counts.items())
-        table.add_row("A blow", f"{1e3 * found.per_blow:.2g} ms to compute; {counts}")
+        counts = ", ".join(f"{in_digits(value)} {name}" for name, value in found.counts.items())
+        cost = in_digits(1e3 * found.per_blow, TIMED)
+        table.add_row("A blow", f"{cost} ms to compute; {counts}")
     if found.per_second is not None:
-        table.add_row("A simulated second", f"{found.per_second:.2g} s to compute")
+        table.add_row("A simulated second", f"{in_digits(found.per_second, TIMED)} s to compute")
     if found.wall_time is not None:
         runs = f", {found.runs} runs to compare" if found.runs > 1 else ""
         within = f"within a factor of {FACTOR:g}"
         if scene.solver.accuracy is not None:
             within += " if the motion is periodic"
-        whole = f"about {found.wall_time:.2g} s ({within}) for {found.duration:g} s simulated{runs}"
+        time = in_digits(found.wall_time, TIMED)
+        whole = f"about {time} s ({within}) for {found.duration:g} s simulated{runs}"
         table.add_row("Predicted cost of the run", f"{whole}{_cost_of_errors(scene, solver)}")
     if found.blow_map is not None:
-        blows, cost = found.blow_map
-        words = f"not made yet: {blows:,} blows, about {cost:.2g} s of one processor"
+        blows, seconds = found.blow_map
+        words = (
+            f"not made yet: {blows:,} blows, about {in_digits(seconds, TIMED)} s of one processor"
+        )
         table.add_row("Blow map", words)
         table.add_row(
             "", "the first run makes it, or percussion blow-map; then a run can be predicted"
         )
-    memory = f"; {solver.operator_bytes / 1e6:.2g} MB" if solver and solver.operator_bytes else ""
-    table.add_row("To prepare", f"{found.setup_time:.2g} s{memory}")
+    memory = (
+        f"; {in_digits(solver.operator_bytes / 1e6, TIMED)} MB"
+        if solver and solver.operator_bytes
+        else ""
+    )
+    table.add_row("To prepare", f"{in_digits(found.setup_time, TIMED)} s{memory}")
     if found.settled_time is not None and found.settled_time > MOST_TIME:
         words = (
-            f"up to {found.settled_time:.2g} s, and given up after {MOST_TIME:g} s (--most-time)"
+            f"up to {in_digits(found.settled_time, TIMED)} s, and given up after {MOST_TIME:g} s "
+            "(--most-time)"
         )
         table.add_row("percussion settled", words)
     if found.refused:
@@ -267,6 +281,8 @@ def _cost_of_errors(scene: Scene, solver: Solver | None) -> str:
     if solver is None or scene.solver.accuracy is not None or not scene.run.error_estimate:
         return ""
     coarser = solver.coarser_scenes()
+    if scene.is_undamped:
+        return "; without loss its error by the cells is not known, and no run looks for it"
     if coarser is None:
         return "; its error is not estimated: no coarser runs are known for this solver"
     if not coarser:

@@ -206,13 +206,23 @@ class Scene:
         return found
 
     def computed_by(self, solver: str, **changes: Any) -> Self:
-        """Return the scene for a solver, with other changes; that of rigid bodies makes them so."""
+        """Return the scene for a solver, with other changes; that of rigid bodies makes them so.
+
+        `SceneError` if the solver needs elastic bars and the scene has none.
+        """
         changes["solver.fidelity"] = "blow-map" if solver == "blow-map" else None
         changes["solver.name"] = "auto" if solver == "blow-map" else solver
         if BODIES.get(solver) == "rigid":
             changes["bit.model"] = "rigid"
             if changes.get("piston.model", self.piston.model) == "elastic":
                 changes["piston.model"] = "rigid"
+        elif (
+            BODIES.get(solver) == "elastic" and changes.get("bit.model", self.bit.model) == "rigid"
+        ):
+            raise SceneError(
+                f'bit.model = "rigid": {solver} computes elastic bars alone; set bit.model = '
+                '"elastic", and piston.model too, or compute it by rigid'
+            )
         scene = self.replace(**changes)
         acted = {key for key in self.given if self.matters(key)}
         scene.__dict__["_set_aside"] = (self._set_aside | acted).difference(changes)

@@ -309,10 +309,11 @@ def with_error_estimate(
     Returns
     -------
     Result
-        With `rate_of_penetration_relative_error` and `errors`, of what could be told.
+        With `rate_of_penetration_relative_error` and `errors`, of what could be told: nothing
+        where waves run without loss.
     """
-    if coarser is None or result.cut_short:
-        return result
+    if coarser is None or result.cut_short or result.scene.is_undamped:
+        return result  # what rings on without loss is another on every grid
     if len(result.counted) < LEAST_BLOWS and not any(result.fall.values()):
         return result
     whole = grid_run(result)
@@ -347,11 +348,8 @@ def errors_of_numbers(whole: GridRun, part: GridRun, others: Sequence[GridRun]) 
     Returns
     -------
     dict of float
-        Of grid and scatter, by name, SI units; only what could be told: nothing where
-        waves run without loss, since what rings on is another on every grid.
+        Of grid and scatter, by name, SI units; only what could be told.
     """
-    if whole.result.scene.is_undamped:
-        return {}
     compared = [other.numbers() for other in others]
     of_part, found = part.numbers(), {}
     for name, number in whole.numbers().items():
@@ -400,8 +398,7 @@ def _judged(whole: GridRun, part: GridRun, others: Sequence[GridRun]) -> Result:
     estimate = _of_whole(_estimate(part, others), whole)
     if not math.isfinite(estimate.total):
         return result
-    if not result.scene.is_undamped:  # more cells would not help, as another warning says
-        result.warnings.extend(_large_error(estimate, result.solver))
+    result.warnings.extend(_large_error(estimate, result.solver))
     return replace(result, rate_of_penetration_relative_error=estimate.total)
 
 

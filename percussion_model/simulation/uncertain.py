@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from percussion_model.simulation.means import COUNTS
 from percussion_model.simulation.rate import LEAST_BLOWS
 
 # Digits after the point; smaller errors are not shown.
@@ -89,7 +90,7 @@ def with_error(value: float, error: float, most_digits: int = MOST_DIGITS) -> st
     """Return a number and its error, both to the second digit of the error."""
     hidden = is_undecided(value, error)
     if error < 10.0**-most_digits and not hidden:
-        return f"{value:.{SURE_DIGITS}g}"
+        return in_digits(value, SURE_DIGITS)
     place = 1 - math.floor(math.log10(error))
     place = place if hidden else min(place, most_digits)
     digits = max(place, 0)
@@ -134,7 +135,7 @@ def in_few_characters(value: float | None, error: float | None, share: float = S
     if value is None:
         return "-"
     if error is None or error <= share * abs(value):
-        return f"{value:.4g}"
+        return in_digits(value, SHOWN_DIGITS)
     if is_undecided(value, error):
         return UNDECIDED
     return with_short_error(value, error).replace(" ", "")
@@ -236,14 +237,18 @@ def mean_text(
     for known, what in ((error, ""), (scatter, " (scatter alone)")):
         if known is not None and factor * known > SMALL_ERROR * abs(value):
             return with_error(value, factor * known, most_digits) + what
+    if key in COUNTS and value == round(value):
+        return f"{value:.0f}"
     return in_digits(value, UNSURE_DIGITS if error is None else SHOWN_DIGITS)
 
 
 def in_digits(value: float, digits: int = UNSURE_DIGITS) -> str:
-    """Return a number with so many digits; what is large without an exponent: 1020, 595000."""
+    """Return a number with so many digits, zeros too: 0.850, 22.0; what is large plain: 595000."""
     rounded = float(f"{value:.{digits}g}")
-    large = 10**digits <= abs(rounded) < LARGEST_PLAIN
-    return f"{rounded:.0f}" if large else f"{rounded:.{digits}g}"
+    if rounded == 0.0:
+        return "0"
+    large = 10 ** (digits - 1) <= abs(rounded) < LARGEST_PLAIN
+    return f"{rounded:.0f}" if large else f"{rounded:#.{digits}g}"
 
 
 def rate_field(summary: Mapping[str, Any]) -> str:

@@ -98,8 +98,10 @@ def test_a_function_that_keeps_nothing_is_taken_as_it_is(feed_control, recwarn):
 @pytest.mark.parametrize(
     ("controller", "text"),
     [
-        (lambda: {"gain": 1.0}, "gives dict, which does not take inputs, time, step"),
-        (lambda: PI, "gives the class PI, which does not take"),
+        (lambda: {"gain": 1.0}, "gives dict, which cannot be called with inputs, time and step"),
+        (lambda: PI, "gives the class PI, which cannot be called"),
+        (lambda inputs, time: STILL, "called with inputs, time and step .too many"),
+        (lambda: lambda inputs: STILL, "gives cannot be called with inputs, time and step"),
     ],
 )
 def test_what_makes_no_controller_is_refused(feed_control, controller, text):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -16,6 +17,7 @@ from percussion_model.analysis.fitting.measurements import (
     DropTest,
     Reading,
 )
+from percussion_model.simulation.uncertain import SHOWN_DIGITS, in_digits
 
 DAMPING, ENERGY = "rock.barrier_damping", "rock.barrier_energy"
 NAMES = {STIFFNESS: "K_R", RATIO: "gamma", DAMPING: "C_R", ENERGY: "W_R"}
@@ -24,6 +26,8 @@ Source = Curve | DropTest | Reading
 DETERMINED, RIVALLED = "determined", "rival"
 OPEN_ABOVE, OPEN_BELOW, OPEN = "open above", "open below", "open"
 WIDE = "not determined"
+# Digits of a parameter that is not determined.
+FEW_DIGITS = 2
 # The deviance may be off by the roughness at the best place and at the other: the threshold is
 # higher by so many of it. A roughness from `ROUGH` on is told.
 ROUGH_FACTOR, ROUGH = 2.0, 1.0
@@ -45,6 +49,24 @@ class Estimate(NamedTuple):
         """Whether the interval is closed, and no wider than `fit.MOST_WIDTH`."""
         return self.verdict in (DETERMINED, RIVALLED)
 
+    def texts(self) -> tuple[str, str, str]:
+        """Value and ends of the interval with the digits that are known.
+
+        To the second digit of half the interval; two digits where nothing is determined.
+        """
+        half = 0.5 * (self.high - self.low)
+        numbers = self.value, self.low, self.high
+        if not self.determined or not half > 0.0:
+            return _shown(numbers, [FEW_DIGITS] * 3)
+        place = math.floor(math.log10(half)) - 1
+        digits = [math.floor(math.log10(abs(one) or half)) - place + 1 for one in numbers]
+        return _shown(numbers, [min(max(one, FEW_DIGITS), SHOWN_DIGITS) for one in digits])
+
+
+def _shown(numbers: Sequence[float], digits: Sequence[int]) -> tuple[str, str, str]:
+    value, low, high = map(in_digits, numbers, digits)
+    return value, low, high
+
 
 @dataclass(frozen=True)
 class Explained:
@@ -60,6 +82,11 @@ class Explained:
     def noise_is_given(self) -> bool:
         """Whether the noise came with the data; else it is estimated."""
         return isinstance(self.source, Reading)
+
+    def noise_text(self, factor: float = 1.0) -> str:
+        """The noise in another unit; what was given has all its digits."""
+        noise = factor * self.noise
+        return f"{noise:.6g}" if self.noise_is_given else in_digits(noise)
 
     @property
     def unit(self) -> str:

@@ -23,6 +23,7 @@ from percussion_model.analysis.fitting.found import (
 from percussion_model.analysis.fitting.likelihood import Likelihood, Place
 from percussion_model.analysis.fitting.sampling import Profile
 from percussion_model.analysis.fitting.search import LEAST_STEP, MOST_STEP, STEP_SHARE
+from percussion_model.simulation.uncertain import in_digits
 from percussion_model.solvers.base import make_solver
 
 UNSETTLED = (
@@ -42,8 +43,8 @@ def interval_notes(estimates: Mapping[str, Estimate], like: Likelihood) -> list[
     notes = []
     for name, one in estimates.items():
         unit = like.scene.row_of(name).unit.replace("-", "")
-        low, high = (f"{end:.3g} {unit}".rstrip() for end in (one.low, one.high))
-        factor = f"a factor of {one.high / one.low:.2g}"
+        low, high = (f"{end} {unit}".rstrip() for end in one.texts()[1:])
+        factor = f"a factor of {in_digits(one.high / one.low, 2)}"
         told = {
             OPEN_ABOVE: f"is not determined: the data tell only that it is above {low}",
             OPEN_BELOW: f"is not determined: the data tell only that it is below {high}",
@@ -107,7 +108,9 @@ def rival_notes(rivals: Sequence[Rival]) -> list[str]:
     """Say which other rocks explain the data nearly as well."""
     notes = []
     for one in rivals:
-        values = ", ".join(f"{NAMES[key]} = {value:.4g}" for key, value in one.values.items())
+        values = ", ".join(
+            f"{NAMES[key]} = {in_digits(value)}" for key, value in one.values.items()
+        )
         notes.append(f"another minimum, {_odds(one)}: {values}")
     return notes
 

@@ -60,6 +60,9 @@ KNOWN_ERRORS = (
     "other numbers"
 )
 
+# What is not known of the motions that are counted, of solvers that have a grid.
+OF_ONE_GRID = "are those of one grid; near a threshold another has others (percussion settled)"
+
 
 def _error_of(name: str) -> str:
     """What is known of the error of a column, in words."""
@@ -129,6 +132,8 @@ class Study:
         counts = np.bincount(rows["kind"], minlength=len(KINDS)).tolist()
         motions = [f"{n} {kind}" for n, kind in zip(counts, KINDS, strict=True) if n]
         lines = [("Points", f"{len(self.points)}: {', '.join(motions)}")]
+        if self.scene.solver_name in ("wave", "fem"):
+            lines.append(("These motions", OF_ONE_GRID))
         rate, undecided = rows["rate_of_penetration"].copy(), self.undecided
         rate[undecided] = np.nan
         if np.isfinite(rate).any():
@@ -154,10 +159,10 @@ class Study:
             if np.isfinite(error).any():
                 count = int(np.count_nonzero(error > LARGE_ERROR))
                 words = f"{count} of them above {100 * LARGE_ERROR:g} %" if count else ""
-                largest = f"at most {100 * np.nanmax(error):.3g} % of the rate"
+                largest = f"at most {in_digits(100 * np.nanmax(error))} % of the rate"
                 lines.append((f"Error, {kind}", ", ".join(filter(None, (largest, words)))))
         lines.append(("These errors", KNOWN_ERRORS))
-        lines.append(("Computed in", f"{rows['wall_time'].sum():.3g} s of one core"))
+        lines.append(("Computed in", f"{in_digits(rows['wall_time'].sum(), 2)} s of one core"))
         return lines
 
     def save(self, folder: str | Path) -> list[Path]:

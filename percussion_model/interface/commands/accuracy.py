@@ -67,6 +67,8 @@ def accuracy(
         )
     words = None if methods is None else [word.strip() for word in methods.split(",")]
     ladders = chosen_ladders(words)  # refuses before anything is computed
+    for _, scene in chosen:
+        scene.computed_by("wave")
     common.check_json(json_file)
     if make_references:
         common.tell_of_compiling("wave", "fem")

@@ -11,7 +11,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from percussion_model.interface.tables import print_table
-from percussion_model.simulation.uncertain import with_error
+from percussion_model.simulation.uncertain import in_digits, with_error
 from percussion_model.verification.accuracy.advantage import (
     MET,
     MISSED,
@@ -259,4 +259,4 @@ def _cost_text(cost: Cost) -> str:
 
 def two(value: float) -> str:
     """Two digits without exponent."""
-    return f"{float(f'{value:.2g}'):.0f}" if value >= 10.0 else f"{value:.2g}"
+    return in_digits(value, 2)

@@ -160,8 +160,8 @@ def _show(found: Fit, scene: Scene) -> None:
         table.add_column(heading, no_wrap=True, justify="right" if heading == "value" else "left")
     for key, one in found.estimates.items():
         unit = scene.row_of(key).unit
-        ends = f"{one.low:.4g} to {one.high:.4g}"
-        table.add_row(NAMES[key], unit, f"{one.value:.4g}", ends, one.verdict)
+        value, low, high = one.texts()
+        table.add_row(NAMES[key], unit, value, f"{low} to {high}", one.verdict)
     for key in NAMES:
         if key not in found.estimates:
             unit = scene.row_of(key).unit
@@ -170,7 +170,7 @@ def _show(found: Fit, scene: Scene) -> None:
     print_table(table, console)
     noises = Table("measurement", "data", "noise", "", box=None)
     for source in found.explained:
-        noise = f"{source.noise:.3g} {source.unit}"
+        noise = f"{source.noise_text()} {source.unit}"
         word = "given" if source.noise_is_given else "estimated"
         noises.add_row(source.name, str(len(source.data)), noise, word)
     print_table(noises, console)

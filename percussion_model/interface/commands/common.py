@@ -163,7 +163,8 @@ def claim(
 ) -> Claim:
     """Claim the folder of a result: refuse what holds another one, before anything is computed.
 
-    A folder that is not named by the user is numbered instead, which is said.
+    A folder that is not named by the user is numbered instead, which `list_files` says: what is
+    refused after this went nowhere.
 
     Parameters
     ----------
@@ -181,9 +182,18 @@ def claim(
     assert folder is not None
     origin = {"command": command, **{name: _entries(one) for name, one in made_from.items()}}
     claimed = Claim(folder, origin, force, numbered=out is None)
-    if claimed.moved:
-        print_message(claimed.moved)
+    _moved[:] = [claimed.moved] * bool(claimed.moved)
     return claimed
+
+
+# Why results go to another folder than usual, until files are written there.
+_moved: list[str] = []
+
+
+def tell_of_moving() -> None:
+    """Say once why files that are written now are in another folder than usual."""
+    while _moved:
+        print_message(_moved.pop())
 
 
 def _entries(value: Any) -> Any:
@@ -248,7 +258,11 @@ def if_drawable() -> Iterator[None]:
 
 
 def list_files(paths: Iterable[Path]) -> None:
-    """Name on stderr the files that were written; many of one folder together."""
+    """Name on stderr the files that were written; many of one folder together.
+
+    Why they are in another folder than usual is said before.
+    """
+    tell_of_moving()
     folders: dict[Path, list[str]] = {}
     for path in paths:
         folders.setdefault(path.parent, []).append(path.name)

@@ -180,6 +180,7 @@ def plot(
             result = simulate(scene, duration, settle, progress=bar, stage=bar.stage)
     with progress("drawing") as report:
         files = figures(result, (out or source) if claimed is None else claimed.folder, report)
+    common.tell_of_moving()
     for path in files:
         typer.echo(str(path))
     if claimed is not None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib import rc_context
@@ -13,6 +14,7 @@ from percussion_model.analysis.fitting import Curve, DropTest, Explained, Fit
 from percussion_model.interface.plotting import style
 from percussion_model.interface.plotting.style import KN, MM, MPA, MS
 from percussion_model.simulation.files import staged
+from percussion_model.simulation.uncertain import in_digits
 
 SYMBOLS = {
     "rock.loading_stiffness": ("$K_R$", " [N/m]"),
@@ -57,8 +59,11 @@ def draw_calibration(found: Fit) -> Figure:
     panels = np.atleast_1d(below.subplots(1, len(found.estimates)))
     for ax, key in zip(panels, found.estimates, strict=True):
         _profile(ax, found, key)
-    handles, labels = panels[0].get_legend_handles_labels()
-    below.legend(handles, labels, loc="outside lower center", ncols=len(handles))
+    told: dict[str, Any] = {}
+    for ax in panels:
+        for handle, text in zip(*ax.get_legend_handles_labels(), strict=True):
+            told.setdefault(text, handle)
+    below.legend(told.values(), told.keys(), loc="outside lower center", ncols=len(told))
     return fig
 
 
@@ -77,7 +82,7 @@ def _data(top: Axes, bottom: Axes, one: Explained) -> None:
         top.invert_yaxis()
     bottom.axhspan(-2.0 * one.noise * fine, 2.0 * one.noise * fine, color=FIT, alpha=0.15, lw=0)
     bottom.plot(x, one.residuals * fine, "o", color=DATA, markersize=1.6)
-    words = f"noise {one.noise * fine:.3g} {fine_unit} (band: twice)"
+    words = f"noise {one.noise_text(fine)} {fine_unit} (band: twice)"
     style.label(bottom, place, f"data - fit [{fine_unit}]", words)
 
 
@@ -87,8 +92,8 @@ def _interval(found: Fit) -> str:
     if not found.is_widened:
         return f"{level} interval"
     return (
-        f"interval, widened for roughness to a deviance of {found.threshold:.3g} "
-        f"({level} alone: {found.quantile:.3g})"
+        f"interval, widened for roughness to a deviance of {in_digits(found.threshold)} "
+        f"({level} alone: {in_digits(found.quantile)})"
     )
 
 
@@ -102,7 +107,7 @@ def _profile(ax: Axes, found: Fit, key: str) -> None:
     ax.axhline(found.threshold, color=style.RULE_COLOUR, lw=1.0, ls="--", label=limit)
     ax.axvspan(estimate.low, estimate.high, color=FIT, alpha=0.12, lw=0, label=_interval(found))
     ax.plot([estimate.value], [0.0], "o", color=FIT, markersize=5)
-    rivals = [(one.values[key], one.deviance) for one in found.rivals]
+    rivals = [(one.values[key], one.deviance) for one in found.rivals if one.deviance < top]
     if rivals:
         ax.plot(*zip(*rivals, strict=True), "x", color=RIVAL, markersize=6, label="other minimum")
     if estimate.high > LOGARITHMIC * estimate.low:

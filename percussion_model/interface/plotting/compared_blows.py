@@ -12,6 +12,7 @@ from percussion_model.analysis.comparison import Comparison
 from percussion_model.interface.plotting import style
 from percussion_model.interface.plotting.style import KN, MM, MS
 from percussion_model.interface.plotting.window import CONTACTS_SHARE, Window, last_blow_window
+from percussion_model.simulation.uncertain import in_digits
 
 # The close view ends at this multiple of the last early contact.
 CLOSE = 1.6
@@ -35,7 +36,9 @@ def draw_comparison(comparison: Comparison) -> Figure:
     fig = Figure(figsize=(10.5, 0.6 + 2.67 * rows), layout="constrained")
     axes = fig.subplots(rows, 2)
     words, start = ("The fall", "first contact") if alone else ("One blow", "impact")
-    for column, (end, span) in enumerate(((early, f"First {early * MS:.2g} ms"), (whole, words))):
+    for column, (end, span) in enumerate(
+        ((early, f"First {in_digits(early * MS, 2)} ms"), (whole, words))
+    ):
         for name, window in windows.items():
             shown = (window.time >= 0.0) & (window.time <= end)
             _draw(axes[:, column], name, window, shown)

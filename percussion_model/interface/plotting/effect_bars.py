@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from percussion_model.analysis.change import Change
 from percussion_model.analysis.effect_study import EffectsStudy
 from percussion_model.interface.plotting import style
-from percussion_model.simulation.uncertain import ABOUT, UNDECIDED
+from percussion_model.simulation.uncertain import ABOUT, UNDECIDED, in_digits
 
 COST_COLOUR, MORE_COLOUR, LESS_COLOUR = "#0072B2", "#D55E00", "#009E73"
 UNDECIDED_COLOUR = "#DDDDDD"
@@ -87,11 +87,11 @@ def _change_panels(found: EffectsStudy) -> Iterator[Panel]:
 
 
 def _change_panel(changes: list[Change], title: str, ax: Axes) -> None:
-    _changes(ax, changes)
-    notes = ["change [%]", "hatched: cut off"]
+    any_cut = _changes(ax, changes)
+    words = "change [%]" + ", hatched: cut off" * any_cut
     if any(change.is_rough for change in changes):
-        notes.append(f"{ABOUT}: error not known")
-    style.label(ax, ", ".join(notes[:2]) + "".join(f"\n{note}" for note in notes[2:]), "", title)
+        words += f"\n{ABOUT}: error not known"
+    style.label(ax, words, "", title)
 
 
 def _costs(ax: Axes, values: list[float | None]) -> None:
@@ -107,12 +107,12 @@ def _costs(ax: Axes, values: list[float | None]) -> None:
         ax.barh(y, value - 1.0, left=1.0, height=0.62, color=COST_COLOUR)
         side = 1.08 if value >= 1.0 else 1.0 / 1.08
         align = "left" if value >= 1.0 else "right"
-        ax.text(value * side, y, f"{value:.2g}", va="center", ha=align, fontsize=8.0)
+        ax.text(value * side, y, in_digits(value, 2), va="center", ha=align, fontsize=8.0)
     ax.axvline(1.0, color=style.RULE_COLOUR, linewidth=0.8)
 
 
-def _changes(ax: Axes, changes: list[Change]) -> None:
-    """Bars from 0 in per cent, with their errors; grey where the change is not known."""
+def _changes(ax: Axes, changes: list[Change]) -> bool:
+    """Bars from 0 in per cent, with their errors, grey where they are not known; if any is cut."""
     shares = [None if one.value is None else 100.0 * one.value for one in changes]
     known = [
         abs(share)
@@ -120,6 +120,7 @@ def _changes(ax: Axes, changes: list[Change]) -> None:
         if share is not None and not one.is_undecided
     ]
     end = min(max([1.0, *known]), WIDEST)
+    any_cut = max(known, default=0.0) > UNCUT * end
     ax.set_xlim(-ROOM * end, ROOM * end)
     longest = WITHIN * ROOM * end
     for y, (share, change) in enumerate(zip(shares, changes, strict=True)):
@@ -134,14 +135,10 @@ def _changes(ax: Axes, changes: list[Change]) -> None:
         shown = math.copysign(longest, share) if cut else share
         colour = MORE_COLOUR if share >= 0.0 else LESS_COLOUR
         ax.barh(y, shown, height=0.62, color=colour, hatch="///" if cut else None, edgecolor="w")
-        align = "left" if share >= 0.0 else "right"
         text = " 0 " if abs(share) < NOTHING else f" {change.text()} "
-        # what has no room beside its bar stands within it, or else on the other side of zero
-        length, room = CHARACTER * (len(text) - 1), abs(share) / (ROOM * end)
-        within = cut or (room + length > 1.0 and room > length)
-        if within or room + length > 1.0:
-            align = "right" if share >= 0.0 else "left"
-        box = {"facecolor": "white", "edgecolor": "none", "pad": 0.8} if within else None
-        place = shown if within or room + length <= 1.0 else 0.0
-        ax.text(place, y, text, va="center", ha=align, fontsize=8.0, bbox=box)
+        # what has no room beside its bar stands on the other side of zero
+        has_room = abs(shown) / (ROOM * end) + CHARACTER * (len(text) - 1) <= 1.0
+        align = "left" if (share >= 0.0) == has_room else "right"
+        ax.text(shown if has_room else 0.0, y, text, va="center", ha=align, fontsize=8.0)
     ax.axvline(0.0, color=style.RULE_COLOUR, linewidth=0.8)
+    return any_cut

@@ -10,6 +10,7 @@ from percussion_model.interface.plotting import style
 from percussion_model.interface.plotting.style import KN, MM, MS
 from percussion_model.interface.plotting.window import Window
 from percussion_model.physics.records import Mode
+from percussion_model.simulation.uncertain import in_digits
 
 # Fraction of the whole stretch below which a zoom is worth its panel.
 WORTH_A_ZOOM = 0.8
@@ -25,7 +26,7 @@ def draw_motion(window: Window) -> Figure:
     force = window.samples["bit_force"] / KN
     whole = "One blow" if window.is_blow else "After first contact"
     for column, (end, name) in enumerate(
-        ((window.length, whole), (zoom, f"First {zoom * MS:.2g} ms"))
+        ((window.length, whole), (zoom, f"First {in_digits(zoom * MS, 2)} ms"))
     ):
         ends = (min(0.0, window.time[0]) if column else 0.0, end)
         for ax, values, y, title in (
@@ -59,7 +60,7 @@ def _settled_force(ax: Axes, window: Window) -> None:
     """Say at what force the bit comes to rest: too small to be read off the axis."""
     force = float(window.samples["bit_force"][-1])
     ax.annotate(
-        f"at the end {force / KN:.3g} kN",
+        f"at the end {in_digits(force / KN)} kN",
         (window.length * MS, force / KN),
         (0.97, 0.25),
         textcoords="axes fraction",

@@ -287,7 +287,7 @@ def study(
         If the scene has nothing to refine, or a method is not known.
     """
     names = chosen_ladders(methods)
-    progress("pilot run", 0.0)
+    progress("kernels of the pilot run made or loaded", 0.0)
     # make each solver once: compile, or load what was compiled before
     compilation = {
         name: Simulation(scene.computed_by(name)).setup_time for name in solvers_of(names)
@@ -299,6 +299,8 @@ def study(
     runs: list[tuple[int, Run]] = []
     for k, rung in enumerate(rungs):
         title = ", ".join(filter(None, (LADDERS[rung.ladder].title, rung.label)))
+        if k == 0 or rungs[k - 1].ladder != rung.ladder:
+            title = f"{title}, its kernels made or loaded first"
         progress(title, 0.05 + 0.65 * k / len(rungs))
         point, run = _measured(rung, problem, reference, full)
         points.append(point)
