@@ -94,10 +94,8 @@ def main(out: Path, quick: bool = False) -> dict[str, Any]:
     blows = {name: single_blow(scene) for name, scene in designs.items()}
     motions = {name: settled(scene, error_estimate=True) for name, scene in designs.items()}
     rates = {name: found.rate_of_penetration for name, found in motions.items()}
-    shown = {
-        name: in_few_characters(1e3 * rates[name], 1e3 * found.rate_of_penetration_error, 1e-3)
-        for name, found in motions.items()
-    }
+    errors = {name: found.rate_of_penetration_error for name, found in motions.items()}
+    shown = {k: in_few_characters(1e3 * rates[k], 1e3 * errors[k], 1e-3) for k in rates}
     stress = {name: contact_stress(scene) for name, scene in designs.items()}
     with figure_of(NAME, Path(out), (12.0, 4.6)) as fig:
         left, middle, right = fig.subplots(1, 3, width_ratios=(1.25, 1.2, 0.9))
@@ -113,7 +111,6 @@ def main(out: Path, quick: bool = False) -> dict[str, Any]:
         style.label(middle, "lower section by length [-]", "its area by that above [-]", title)
         _draw_designs(right, blows, shown, stress)
         style.head(fig, f"Where {ENERGY:g} J of a blow go")
-    errors = {name: found.rate_of_penetration_error for name, found in motions.items()}
     return {"blows": blows, "rates": rates, "rate_errors": errors, "stress": stress, "best": found}
 
 

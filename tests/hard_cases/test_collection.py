@@ -188,7 +188,7 @@ def test_a_disagreement_has_the_digits_that_its_errors_leave():
     assert off_text(entry) == "undecided"
     text = page(Collection(rows), None)
     line, *_ = (one for one in text.splitlines() if one.startswith("| gap_0 | fem | 18.0±2.0"))
-    assert "16 (wave) | undecided |" in line
+    assert "16.00 (wave) | undecided |" in line
 
 
 def test_the_error_of_a_rate_is_of_scatter_and_of_the_grid():
