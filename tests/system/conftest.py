@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import os
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from fmu_src.system.archive import SYSTEMS, build_fmus, read_plan, write_system
+from percussion_model.coupling import bench
 
 # Workers of one run of the tests share compiled kernels; NUMBA_CACHE_DIR is theirs too.
 os.environ.setdefault(
@@ -46,3 +48,10 @@ def two_way(fmus, tmp_path_factory):
     """Archive of the system that seeks the best feed and pressure."""
     folder = tmp_path_factory.mktemp("systems")
     return write_system(plan_of("two_way_seeking"), fmus, folder / "TwoWaySeeking.ssp")
+
+
+@pytest.fixture
+def brief(monkeypatch):
+    """Short runs of the bench, for what does not hang on the motion."""
+    trials = tuple(replace(trial, duration=1.2) for trial in bench.TRIALS)
+    monkeypatch.setattr(bench, "TRIALS", trials)

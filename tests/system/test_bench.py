@@ -42,7 +42,7 @@ def test_the_bench_ranks_nothing_below_a_bad_pi_below_a_good_one(feed_control):
     assert points[1] + 1.0 < points[2] <= 100.0
 
 
-def test_the_share_that_is_done_rises_over_all_runs(feed_control):
+def test_the_share_that_is_done_rises_over_all_runs(feed_control, brief):
     shares = []
     watch = RunProgress(lambda text, share: shares.append(share), 0.0)
     bench(feed_control, trials=["rod", "soft"], watch=watch)
@@ -116,7 +116,7 @@ def test_a_bad_controller_fails_visibly(feed_control, tmp_path, monkeypatch, cap
 
 
 def test_an_interrupted_bench_keeps_the_runs_that_are_done(
-    feed_control, tmp_path, monkeypatch, capsys
+    feed_control, brief, tmp_path, monkeypatch, capsys
 ):
     def interrupted(system, controller, values, trials, take, trust, watch, check_step):
         bench(system, controller, values, ["rod"], take, trust, watch, check_step)

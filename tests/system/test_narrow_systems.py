@@ -24,7 +24,7 @@ def called(name, archive):
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_commands_fit(name, feed_control, tmp_path, monkeypatch, capsys):
+def test_commands_fit(name, feed_control, brief, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     printed = Printed(monkeypatch)
     called(name, feed_control)
@@ -36,7 +36,7 @@ def test_commands_fit(name, feed_control, tmp_path, monkeypatch, capsys):
 
 
 def test_a_table_of_a_bench_is_whole_and_its_runs_are_told_elsewhere(
-    feed_control, tmp_path, monkeypatch, capsys
+    feed_control, brief, tmp_path, monkeypatch, capsys
 ):
     """Lines of progress come by the hundred; none of them stands in the table."""
     monkeypatch.chdir(tmp_path)

@@ -30,7 +30,7 @@ def test_commands_are_those_of_the_venv_and_exist():
     assert set(words) == {"couple", "bench-controller"} <= set(known)
 
 
-def test_the_example_runs(feed_control, capsys):
+def test_the_example_runs(feed_control, brief, capsys):
     examples = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
     archive = "dist/FeedControlRigid.ssp"
     said = []

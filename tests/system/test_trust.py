@@ -196,7 +196,7 @@ def test_trust_allows_any_size(entries, tmp_path, monkeypatch):
     Coupling(path, trust=True).free()
 
 
-def test_the_bench_takes_trust_too(feed_control, monkeypatch):
+def test_the_bench_takes_trust_too(feed_control, brief, monkeypatch):
     monkeypatch.setattr(limits, "MOST_BYTES", 1_000_000)
     with pytest.raises(CouplingError, match="unpacks to more than 1000000 bytes"):
         bench(feed_control, trials=["collaring"])
