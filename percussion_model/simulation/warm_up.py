@@ -28,6 +28,7 @@ def compile_kernels(solver: str) -> str:
     simulation = Simulation(Scene().replace(**changes))
     simulation.advance(SHORT)
     simulation.observe()
+    simulation.sample([2.0 * SHORT])
     simulation.energy()
     return solver
 
