@@ -166,6 +166,7 @@ def _settled_error(found: Settled) -> str:
 def show_study(found: Study) -> None:
     """Print the headlines of a study, and how many of its points failed."""
     table = Table(show_header=False)
+    table.add_column(no_wrap=True)
     for name, text in found.headlines():
         table.add_row(name, text)
     console = Console()

@@ -159,7 +159,7 @@ class Study:
             if np.isfinite(error).any():
                 count = int(np.count_nonzero(error > LARGE_ERROR))
                 words = f"{count} of them above {100 * LARGE_ERROR:g} %" if count else ""
-                largest = f"at most {in_digits(100 * np.nanmax(error))} % of the rate"
+                largest = f"at most {in_digits(100 * np.nanmax(error), 2)} % of the rate"
                 lines.append((f"Error, {kind}", ", ".join(filter(None, (largest, words)))))
         lines.append(("These errors", KNOWN_ERRORS))
         lines.append(("Computed in", f"{in_digits(rows['wall_time'].sum(), 2)} s of one core"))
