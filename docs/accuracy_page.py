@@ -16,6 +16,7 @@ from statistics import median
 from typing import Any
 
 from percussion_model.interface.commands.accuracy_tables import two, within_bar
+from percussion_model.simulation.uncertain import in_digits
 from percussion_model.verification.accuracy import Study
 from percussion_model.verification.accuracy.advantage import (
     MET,
@@ -402,7 +403,7 @@ def rungs(study: Study) -> str:
             bounded(point.errors.get(key, math.nan), study.floor(key)) for key in study.quantities
         ]
         spread = f" ± {two(100 * point.spread)} %" if math.isfinite(point.spread) else ""
-        times = [f"{1e3 * point.second:.3g}{spread}", f"{1e3 * point.setup:.3g}"]
+        times = [f"{in_digits(1e3 * point.second)}{spread}", in_digits(1e3 * point.setup)]
         rows.append([title, label, *errors, *times])
     head = [*(SHORT[key] for key in study.quantities), "ms a simulated second", "set-up, ms"]
     return table(["method", "", *head], rows)

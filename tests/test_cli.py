@@ -3,6 +3,7 @@
 import importlib
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -126,6 +127,15 @@ def test_explain(percussion):
         "Bit transit time (T_2)",
     ):
         assert text in out
+
+
+def test_explain_shows_no_rounding_as_an_error_of_the_wave_speed(percussion):
+    lengths = ["--cells", "23"]
+    for words, error in (([], r"none"), (lengths, r"\d\.\d+ %")):
+        code, out, _ = percussion("explain", SCENARIOS / "reference.toml", *words)
+        assert code == 0
+        out = " ".join(out.replace("│", " ").split())
+        assert re.search(rf"Wave speed error {error} ", out)
 
 
 def test_explain_promises_runs_for_the_error_only_where_there_are_any(percussion):

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from percussion_model import Scene, simulate
-from percussion_model.simulation.error_estimate import FEWEST_BLOWS
+from percussion_model.simulation.error_estimate import FEWEST_BLOWS, with_error_estimate
 from percussion_model.simulation.result import Result
 from percussion_model.simulation.uncertain import in_digits, mean_text
 from percussion_model.verification.accuracy.explicit import explicit_rate
@@ -192,3 +192,19 @@ def test_motions_near_a_threshold_have_errors_that_cover(scene, changes, rate):
     whole = Scene.from_toml(Path(__file__).parents[1] / "scenarios" / f"{scene}.toml")
     result = simulate(whole.replace(**changes), 2.0)
     assert abs(result.rate_of_penetration - rate) <= result.rate_of_penetration_error < 0.1 * rate
+
+
+def test_no_run_looks_for_the_error_of_waves_without_loss():
+    """What rings on is another on every grid, so that nothing can be told (as `explain` says)."""
+
+    def run(scene):
+        pytest.fail("a run to compare with was made")
+
+    scene = Scene().replace(**{"effects.loss": False})
+    result = simulate(scene, 0.6, settle=0.1, error_estimate=False)
+    assert len(result.counted) >= FEWEST_BLOWS
+    coarser = [scene.replace(**{"solver.cells": 10})]
+    assert with_error_estimate(result, coarser, run) is result
+    damped = simulate(Scene(), 0.6, settle=0.1, error_estimate=False)
+    with pytest.raises(pytest.fail.Exception, match="was made"):
+        with_error_estimate(damped, [Scene().replace(**{"solver.cells": 10})], run)

@@ -21,8 +21,18 @@ from percussion_model.analysis.fitting import (
     fit_rock,
 )
 from percussion_model.analysis.fitting.curve import best_datum_and_peak
-from percussion_model.analysis.fitting.found import DAMPING, ENERGY
+from percussion_model.analysis.fitting.found import (
+    DAMPING,
+    DETERMINED,
+    ENERGY,
+    OPEN,
+    OPEN_ABOVE,
+    WIDE,
+    Estimate,
+    Rival,
+)
 from percussion_model.analysis.fitting.likelihood import RATIO, STIFFNESS, Likelihood, Series
+from percussion_model.analysis.fitting.notes import interval_notes
 from percussion_model.analysis.fitting.predictions import predicted_reading
 from percussion_model.analysis.fitting.search import descend, roughness
 from percussion_model.interface.calibrated_scene import commented_fit
@@ -70,6 +80,44 @@ def test_an_interval_that_roughness_widens_is_not_called_by_its_confidence():
             widened,
             not widened,
         )
+
+
+def test_estimates_have_the_digits_that_are_known():
+    shown = {
+        Estimate(20123.4, 4217.0, math.inf, OPEN_ABOVE): ("≈20000", "4200", "inf"),
+        Estimate(0.05123, 0.0, 0.3456, OPEN): ("≈0.051", "0", "0.35"),
+        Estimate(20123.4, 4217.0, 61234.0, WIDE): ("≈20000", "4200", "61000"),
+        Estimate(7.5123e8, 7.4123e8, 7.6123e8, DETERMINED): ("7.51e+08", "7.41e+08", "7.61e+08"),
+        Estimate(6.0312, 5.512, 6.612, DETERMINED): ("6.03", "5.51", "6.61"),
+        Estimate(6.0, 6.0, 6.0, DETERMINED): ("6.000", "6.000", "6.000"),
+    }
+    for estimate, texts in shown.items():
+        assert estimate.texts() == texts
+
+
+def test_what_is_not_determined_has_two_digits_wherever_it_is_written():
+    """In notes and in the comments of the calibrated scene."""
+    fit = fit_rock(Scene(), CURVE)
+    unsure = Estimate(12.3456, 3.4567, 98.7654, OPEN_ABOVE)
+    assert "≈12 in 3.5 to 99, open above" in commented_fit(
+        replace(fit, estimates={RATIO: unsure}), {}, "scene.toml"
+    )
+    like = Likelihood(Scene(), [], [RATIO], np.array([[0.0, 5.0]]), lambda: None)
+    (note,) = interval_notes({RATIO: unsure}, like)
+    assert note.endswith("it is above 3.5")
+
+
+def test_the_legend_names_other_minima_only_where_some_are_drawn():
+    pytest.importorskip("matplotlib")
+    fit = fit_rock(Scene(), CURVE)
+    values = {key: 1.01 * one.value for key, one in fit.estimates.items()}
+    for share, is_drawn in ((0.5, True), (5.0, False)):
+        rival = Rival(values, share * fit.threshold)
+        figure = draw_calibration(replace(fit, rivals=[rival]))
+        (legend,) = [legend for part in figure.subfigs for legend in part.legends]
+        labels = [text.get_text() for text in legend.get_texts()]
+        assert ("other minimum" in labels) == is_drawn
+        assert len(labels) == len(set(labels))
 
 
 def test_progress_promises_no_number_of_computations():

@@ -114,6 +114,17 @@ def test_a_rate_has_its_error_where_that_shows(whole):
     assert "nor are those of the other numbers" in told["These errors"]
 
 
+def test_motions_that_are_counted_are_said_to_be_those_of_one_grid(whole):
+    def told(scene):
+        return dict(Study(scene, whole.points, whole.rows, whole.failures).headlines())
+
+    assert "These motions" not in told(SCENE)  # rigid bodies have none
+    for solver in ("wave", "fem"):
+        of_grid = told(Scene().computed_by(solver))
+        assert of_grid["Points"] == told(SCENE)["Points"]
+        assert of_grid["These motions"].startswith("are those of one grid")
+
+
 def test_an_interrupted_study_goes_on_where_it_was(whole, tmp_path):
     """Ctrl-C after two parts; what was finished is not run again."""
     folder = tmp_path / "out"

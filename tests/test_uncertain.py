@@ -17,6 +17,7 @@ from percussion_model.analysis.effect_study import EffectsStudy, Trial, Variant
 from percussion_model.analysis.study import Study, grid, table
 from percussion_model.analysis.study.response import KINDS, ROW
 from percussion_model.coupling.coupled_run import CoupledRun, summary
+from percussion_model.coupling.verdict import _jump
 from percussion_model.interface.commands.couple import _lines
 from percussion_model.interface.commands.effects import table_of
 from percussion_model.interface.plotting.compared_blows import draw_comparison
@@ -25,6 +26,7 @@ from percussion_model.interface.plotting.overview import draw_overview
 from percussion_model.interface.plotting.paper import _points
 from percussion_model.interface.report import headline_rows, render_report
 from percussion_model.interface.terminal import show_comparison, show_settled, show_summary
+from percussion_model.simulation.error_estimate import LARGE, Estimate, _large_error
 from percussion_model.simulation.uncertain import (
     change_text,
     in_digits,
@@ -33,6 +35,7 @@ from percussion_model.simulation.uncertain import (
     rate_text,
     with_error,
 )
+from percussion_model.simulation.validity import numerical_note
 
 RIGID = Scene().computed_by("rigid")
 BOUNCING = RIGID.replace(**{"feed.force": 150.0})
@@ -113,6 +116,15 @@ def test_zeros_that_are_known_are_shown():
     assert [in_digits(value, 2) for value in (750.0, 110.0, 0.0, 1.5e9)] == [
         "750", "110", "0", "1.5e+09",
     ]  # fmt: skip
+
+
+def test_large_shares_have_no_exponent():
+    (said,) = _large_error(Estimate(cells=7.5, fit=0.0, scatter=0.0, floor=0.0), "wave")
+    assert f"{LARGE} 750 %, as coarser runs tell" in said
+    (said,) = numerical_note(1.0, "wave")
+    assert said.startswith("100 % of the energy put in is taken")
+    (found,) = _jump("bit.position", 1.1, 1e-3)
+    assert found.text.startswith("bit.position changes by 110 % of")
 
 
 def test_a_number_of_a_narrow_column():

@@ -18,6 +18,7 @@ from percussion_model.coupling.fresh import REMEDY, kept_values
 from percussion_model.coupling.master import Coupling
 from percussion_model.coupling.port import OnWay
 from percussion_model.coupling.python_part import Given
+from percussion_model.simulation.uncertain import in_digits
 
 STEP = 1e-3  # of the runs; rows are as often, since peaks are those of a step [s]
 # Held values have an error of first order in the step: twice what half of it changes.
@@ -192,7 +193,7 @@ def _faults(numbers: Mapping[str, float], share: float, error: str) -> list[str]
         return [f"ended early, {error}"]
     found = []
     if share > MOST_VIOLATION:
-        found.append(f"{numbers['violations']:.2g} s beyond the limits of feed or torque")
+        found.append(f"{in_digits(numbers['violations'], 2)} s beyond the limits of feed or torque")
     if numbers["feed_error"] > MOST_ERROR:
         found.append(f"the feed is off by {100.0 * numbers['feed_error']:.0f} % on average")
     return found

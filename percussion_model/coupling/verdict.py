@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from percussion_model.coupling.port import Port
+from percussion_model.simulation.uncertain import in_digits
 
 # Greatest change of a force in a step, root mean square by the greatest force: 1 ms has 2 %
 # in the shipped systems, loops that swing up for the step alone have 20 % or more.
@@ -244,7 +245,7 @@ def _softening(columns: Mapping[str, np.ndarray], step: float) -> list[Finding]:
         return []
     text = (
         f"it leaves the shoulder {_percent(share)} of its stiffness ({STIFFNESS} "
-        f"{1e-3 * least:.3g} in place of {1e-3 * given:.3g} kN/m)"
+        f"{in_digits(1e-3 * least)} in place of {in_digits(1e-3 * given)} kN/m)"
     )
     # what a step can bear goes by the inverse square of the step
     shorter = step * (math.sqrt(share) if share > 0.0 else MUCH_SHORTER)
@@ -317,11 +318,11 @@ def _praise(numbers: Mapping[str, float]) -> str:
 
 
 def _percent(share: float) -> str:
-    return f"{100.0 * share:.2g} %"
+    return f"{in_digits(100.0 * share, 2)} %"
 
 
 def _share_of(share: float, what: str) -> str:
-    return f"{_percent(share)} of {what}" if share < 1.0 else f"{share:.3g} times {what}"
+    return f"{_percent(share)} of {what}" if share < 1.0 else f"{in_digits(share)} times {what}"
 
 
 def _ms(time: float) -> str:

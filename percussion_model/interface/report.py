@@ -24,6 +24,7 @@ from percussion_model.simulation.result import REPORT, Result
 from percussion_model.simulation.uncertain import (
     MOST_DIGITS,
     SMALLEST_UNIT,
+    TIMED,
     about_errors,
     in_digits,
     mean_text,
@@ -280,9 +281,9 @@ def _computing_rows(result: Result) -> list[tuple[str, str]]:
     if result.time_step:
         rows.append(("time step", f"{result.time_step * 1e6:.4g} µs"))
     rows += [(name.replace("_", " "), f"{count:,}") for name, count in result.statistics.items()]
-    rows.append(("time to compute", f"{result.wall_time:.3g} s"))
+    rows.append(("time to compute", f"{in_digits(result.wall_time, TIMED)} s"))
     if result.wall_time > 0:
-        rows.append(("times real time", f"{result.real_time_factor:.3g}"))
+        rows.append(("times real time", in_digits(result.real_time_factor, TIMED)))
     return rows
 
 

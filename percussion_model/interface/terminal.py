@@ -22,6 +22,7 @@ from percussion_model.simulation.uncertain import (
     ABOUT,
     ABOUT_CHANGE,
     NOT_THE_MODEL,
+    TIMED,
     UNDECIDED,
     about_errors,
     in_digits,
@@ -44,8 +45,6 @@ if TYPE_CHECKING:
 
 # What ends sooner shows no bar [s].
 _PATIENCE = 2.0
-# Digits of a time that was taken once, and of what is made of it.
-TIMED = 2
 
 RATE = ("Rate of penetration", "rate_of_penetration", 1e3, "mm/s")
 # Other rows of the table: name, key of the summary, factor, unit.
@@ -403,7 +402,7 @@ def show_stability(found: Collection) -> None:
             short_rate(row),
             *(_number(row[key], 1.0, 2) for key in ("residual", "momentum", "events_per_second")),
             str(row["guards"] or ""),
-            f"{row['wall_time']:.2g}",
+            in_digits(row["wall_time"], TIMED),
         )
     console = Console()
     print_table(table, console, keys=2)

@@ -21,6 +21,7 @@ from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.simulation.means import COUNTS, numbers_over, scatter_over
 from percussion_model.simulation.rate import LARGE_ERROR, LEAST_BLOWS, rate_of_blows
 from percussion_model.simulation.result import Result
+from percussion_model.simulation.uncertain import in_digits
 from percussion_model.solvers.wave.resolution import FITS, largest_misfit, misfits, promised_error
 
 # Two aperiodic runs differ if they do by more than so many standard errors.
@@ -412,8 +413,8 @@ def _large_error(estimate: Estimate, solver: str) -> Iterator[str]:
             else "more fem.elements and a greater fem.contact_stiffness bring it closer"
         )
         yield (
-            f"the rate of penetration {LARGE} {100.0 * by_grid:.2g} %, as coarser runs "
-            f"tell; {remedy}"
+            f"the rate of penetration {LARGE} {in_digits(100.0 * by_grid, 2)} %, as coarser "
+            f"runs tell; {remedy}"
         )
 
 

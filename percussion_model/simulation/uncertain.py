@@ -14,6 +14,8 @@ MOST_DIGITS = 5
 # Digits of a number that is known to rounding, of one whose error does not show in them, and
 # of one of whose error nothing is known: coarse grids are off by some per mille.
 SURE_DIGITS, SHOWN_DIGITS, UNSURE_DIGITS = 5, 4, 3
+# Digits of a time that was taken once, and of what is made of it.
+TIMED = 2
 # An error below this share of a number does not show in the four digits of a narrow column.
 SMALL_ERROR = 1e-4
 # The same where numbers are in SI units, in which rates are some 1e-2.

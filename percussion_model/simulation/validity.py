@@ -50,8 +50,9 @@ def numerical_note(share: float, solver: str) -> Iterator[str]:
             "fem": ("the time scheme", "set a smaller fem.courant or more fem.elements"),
             "wave": ("averaging fronts within cells", "set more solver.cells"),
         }.get(solver, ("the discretisation", "refine it"))
+        percent = float(f"{100.0 * share:.2g}")
         yield (
-            f"{100 * share:.2g} % of the energy put in is taken by {cause} (entry numerical "
+            f"{percent:g} % of the energy put in is taken by {cause} (entry numerical "
             f"of its balance), not by anything in the equations: peaks and rates suffer; {remedy}"
         )
 

@@ -11,6 +11,7 @@ from percussion_model.physics.records import EventKind, Mode
 from percussion_model.scene.scales import barrier_shares
 from percussion_model.simulation.rate import LARGE_ERROR, LEAST_BLOWS
 from percussion_model.simulation.result import Result, flight_acceleration
+from percussion_model.simulation.uncertain import in_digits
 from percussion_model.simulation.validity import (
     barrier_note,
     button_note,
@@ -94,8 +95,8 @@ def _about_grid(result: Result) -> Iterator[str]:
     error = result.wave_speed_error
     if error > MOST_WAVE_SPEED_ERROR:
         yield (
-            f"the lengths fit no common cell: wave speeds are off by up to {100 * error:.2g} %; "
-            "more solver.cells bring them closer"
+            f"the lengths fit no common cell: wave speeds are off by up to "
+            f"{in_digits(100 * error, 2)} %; more solver.cells bring them closer"
         )
     if result.scene.loss_on:
         for bar, count in result.cells.items():
@@ -124,7 +125,8 @@ def _about_blows(result: Result) -> Iterator[str]:
     if rate > 0.0 and scatter > LARGE_ERROR * rate:
         yield (
             f"blows do not repeat: the rate of penetration has a standard error of "
-            f"{100.0 * scatter / rate:.2g} %; a longer run.duration (--duration) averages more"
+            f"{in_digits(100.0 * scatter / rate, 2)} %; a longer run.duration (--duration) "
+            "averages more"
         )
 
 
@@ -138,9 +140,9 @@ def _about_flight(result: Result) -> Iterator[str]:
         gone = speed <= 0.0 and pull <= 0.0
         yield (
             f"at the end of the run the bit is in the air, moving {'up' if speed < 0 else 'down'} "
-            f"at {abs(speed):.3g} m/s: it has no depth"
+            f"at {in_digits(abs(speed))} m/s: it has no depth"
             + (
-                f"; it flew off, since weight and feed ({pull:.3g} N) do not bring it back"
+                f"; it flew off, since weight and feed ({in_digits(pull)} N) do not bring it back"
                 if gone
                 else "; a longer run.duration (--duration) lets it come to rest"
             )

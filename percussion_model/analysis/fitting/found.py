@@ -17,7 +17,7 @@ from percussion_model.analysis.fitting.measurements import (
     DropTest,
     Reading,
 )
-from percussion_model.simulation.uncertain import SHOWN_DIGITS, in_digits
+from percussion_model.simulation.uncertain import ABOUT, SHOWN_DIGITS, in_digits
 
 DAMPING, ENERGY = "rock.barrier_damping", "rock.barrier_energy"
 NAMES = {STIFFNESS: "K_R", RATIO: "gamma", DAMPING: "C_R", ENERGY: "W_R"}
@@ -52,12 +52,16 @@ class Estimate(NamedTuple):
     def texts(self) -> tuple[str, str, str]:
         """Value and ends of the interval with the digits that are known.
 
-        To the second digit of half the interval; two digits where nothing is determined.
+        To the second digit of half the interval; two digits, and a value that is about so,
+        where nothing is determined.
         """
         half = 0.5 * (self.high - self.low)
         numbers = self.value, self.low, self.high
-        if not self.determined or not half > 0.0:
-            return _shown(numbers, [FEW_DIGITS] * 3)
+        if not self.determined:
+            value, low, high = _shown(numbers, [FEW_DIGITS] * 3)
+            return f"{ABOUT}{value}", low, high
+        if not half > 0.0:
+            return _shown(numbers, [SHOWN_DIGITS] * 3)
         place = math.floor(math.log10(half)) - 1
         digits = [math.floor(math.log10(abs(one) or half)) - place + 1 for one in numbers]
         return _shown(numbers, [min(max(one, FEW_DIGITS), SHOWN_DIGITS) for one in digits])

@@ -85,8 +85,9 @@ def rough_notes(rough: float) -> list[str]:
     if rough < ROUGH:
         return []
     return [
-        f"the likelihood is rough: many small dips, of about {rough:.2g} in twice its logarithm; "
-        "intervals are widened for that by a rule of thumb, and their confidence is not known"
+        f"the likelihood is rough: many small dips, of about {in_digits(rough, 2)} in twice its "
+        "logarithm; intervals are widened for that by a rule of thumb, and their confidence is "
+        "not known"
     ]
 
 
@@ -96,7 +97,7 @@ def gap_notes(like: Likelihood, profiles: Sequence[Profile]) -> list[str]:
     for name, one in zip(like.names, profiles, strict=True):
         if one.gap is not None:
             unit = like.scene.row_of(name).unit.replace("-", "")
-            low, high = (f"{math.exp(end):.3g} {unit}".rstrip() for end in one.gap)
+            low, high = (f"{in_digits(math.exp(end))} {unit}".rstrip() for end in one.gap)
             notes.append(
                 f"{NAMES[name]} ({name}) lies below {low} or above {high}: "
                 "what lies between explains the data less well"
@@ -117,7 +118,7 @@ def rival_notes(rivals: Sequence[Rival]) -> list[str]:
 
 def _odds(rival: Rival) -> str:
     less = 1.0 / rival.odds
-    return "as likely" if less < 1.5 else f"{less:.2g} times less likely"
+    return "as likely" if less < 1.5 else f"{in_digits(less, 2)} times less likely"
 
 
 def correlation_note(one: Explained) -> list[str]:

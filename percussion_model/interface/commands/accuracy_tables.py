@@ -70,7 +70,7 @@ def show_study(found: Study) -> None:
         if point.note:
             title = LADDERS[point.ladder].title
             console.print(f"{title}, {point.label}: {escape(point.note)}", highlight=False)
-    starts = ", ".join(f"{name} {time:.2g} s" for name, time in found.compilation.items())
+    starts = ", ".join(f"{name} {two(time)} s" for name, time in found.compilation.items())
     console.print(f"First set-up in this process, compilation or its cache included: {starts}.")
     here = found.machine
     load = "" if here["load"] is None else f", load {here['load']:.1f}"

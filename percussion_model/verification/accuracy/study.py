@@ -198,11 +198,11 @@ class Study:
         best = min(good, key=lambda point: point.second)
         error, floor = best.errors[self.main], self.floor(self.main)
         off = (
-            f"off by {100 * error:.2g} %"
+            f"off by {in_digits(100 * error, 2)} %"
             if error > floor
-            else f"off by less than {100 * floor:.2g} %"
+            else f"off by less than {in_digits(100 * floor, 2)} %"
         )
-        spread = f" (± {100 * best.spread:.2g} %)" if math.isfinite(best.spread) else ""
+        spread = f" (± {in_digits(100 * best.spread, 2)} %)" if math.isfinite(best.spread) else ""
         return (
             f"For {100 * wanted:g} % take {LADDERS[best.ladder].title}, {best.label}, of all that "
             f"were tried: {in_digits(1e3 * best.second, 2)} ms{spread} for a simulated second, "
