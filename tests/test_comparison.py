@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
@@ -11,8 +12,10 @@ from typer.testing import CliRunner
 from percussion_model import Scene, SceneError, compare
 from percussion_model.analysis.comparison import COMPARED, Comparison, read_solvers
 from percussion_model.interface.cli import app
+from percussion_model.interface.commands import common
 from percussion_model.simulation.warnings import find_warnings
 
+RIGID = Path(__file__).parents[1] / "scenarios" / "rigid.toml"
 SHORT = {"run.duration": 0.3, "run.settle": 0.05, "fem.elements": 20}
 
 
@@ -116,5 +119,15 @@ def test_bad_lists_of_solvers_are_refused(text, reason):
 
 def test_a_solver_that_cannot_is_named_before_anything_runs():
     scene = Scene().replace(**{"piston.model": "rigid", "bit.model": "rigid"})
-    with pytest.raises(SceneError, match="fem computes elastic bars alone"):
+    with pytest.raises(SceneError, match=r"rigid bodies .*fem computes elastic bars alone"):
         compare(scene, ("rigid", "fem"))
+
+
+def test_a_command_refuses_before_it_tells_of_compiling_or_of_folders(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(common, "tell_of_compiling", lambda *names: pytest.fail("compiles"))
+    done = CliRunner().invoke(app, ["compare", str(RIGID), "--solvers", "rigid,wave"])
+    assert isinstance(done.exception, SceneError)
+    assert 'rigid bodies (bit.model = "rigid"), and wave computes' in str(done.exception)
+    assert done.output == ""
+    assert not list(tmp_path.iterdir())

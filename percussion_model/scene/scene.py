@@ -220,8 +220,9 @@ class Scene:
             BODIES.get(solver) == "elastic" and changes.get("bit.model", self.bit.model) == "rigid"
         ):
             raise SceneError(
-                f'bit.model = "rigid": {solver} computes elastic bars alone; set bit.model = '
-                '"elastic", and piston.model too, or compute it by rigid'
+                f'the scene has rigid bodies (bit.model = "rigid"), and {solver} computes elastic '
+                'bars alone: set bit.model = "elastic", and piston.model too, or take the solver '
+                "rigid"
             )
         scene = self.replace(**changes)
         acted = {key for key in self.given if self.matters(key)}

@@ -6,12 +6,15 @@ import json
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 from percussion_model import Scene, SceneError
 from percussion_model.interface.cli import app
+from percussion_model.interface.commands import common
 from percussion_model.interface.commands.accuracy_tables import (
     show_contests,
     show_study,
@@ -74,6 +77,9 @@ def found():
     patch.undo()
     shares = [share for _, share in said]
     assert shares == sorted(shares)
+    texts = [text for text, _ in said]
+    assert texts.count("compiling or loading explicit elements, 10 elements") == 1
+    assert "explicit elements, 20 elements" in texts
     return result
 
 
@@ -274,8 +280,6 @@ def test_several_scenes_come_in_one_table(found, capsys):
 
 
 def refused(*arguments: str) -> str:
-    from typer.testing import CliRunner
-
     done = CliRunner().invoke(app, ["accuracy", *arguments])
     assert done.exit_code != 0
     return str(done.exception)
@@ -284,6 +288,38 @@ def refused(*arguments: str) -> str:
 def test_rigid_scenes_are_refused():
     with pytest.raises(SceneError, match="rigid bar has closed forms"):
         pose(Scene.from_toml(SCENARIOS / "rigid.toml"))
+
+
+@pytest.mark.parametrize("bar", ["bit", "piston"])
+def test_rigid_scenes_are_refused_before_anything_is_compiled(bar, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(common, "tell_of_compiling", lambda *names: pytest.fail("compiles"))
+    scene = str(SCENARIOS / ("rigid.toml" if bar == "bit" else "reference.toml"))
+    done = CliRunner().invoke(app, ["accuracy", scene, "--set", "piston.model=rigid"])
+    assert isinstance(done.exception, SceneError)
+    assert "the scene has rigid bodies (" in str(done.exception)
+    assert f'{bar}.model = "rigid"' in str(done.exception)
+    assert "solver.name" not in str(done.exception)
+    assert done.output == ""
+    assert not list(tmp_path.iterdir())
+
+
+def test_what_is_compiled_is_told_by_name(monkeypatch):
+    """Held up where the pilot run would begin."""
+
+    def held_up(scene):
+        raise InterruptedError
+
+    said = []
+    monkeypatch.setattr(
+        study_module, "place_of_kernels", lambda name: "a place" if name == "wave" else None
+    )
+    made = SimpleNamespace(setup_time=0.0)
+    monkeypatch.setattr(study_module, "Simulation", lambda scene: made)
+    monkeypatch.setattr(study_module, "pose", held_up)
+    with pytest.raises(InterruptedError):
+        study(Scene(), methods=["wave", "fem"], progress=lambda text, share: said.append(text))
+    assert said == ["compiling the solver wave", "loading the solver fem", "pilot run"]
 
 
 def test_too_few_blows_are_refused():

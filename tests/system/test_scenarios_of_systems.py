@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
+from percussion_model.coupling import CoupledRun
 from scenarios import coupling_step, step_rejection
 
 STEPS = (1e-4, 2e-4, 1e-3)  # [s]
@@ -52,6 +54,41 @@ def test_the_rate_and_the_shoulder_over_eight_blows(feed_control, one_blow, tmp_
     assert coupling_step.table_of_one(*one_blow).count("\n") == 10
     path = coupling_step.draw(*one_blow, eights, tmp_path / "step.png")
     assert path.stat().st_size > 10_000
+
+
+def test_errors_have_the_digits_that_the_limit_has():
+    """A limit that is off by a third of what the shortest step is off, of first order."""
+    names = list(coupling_step.QUANTITIES)
+    exact = coupling_step.OneBlow("jacobi", 1e-5, dict.fromkeys(names, 3.0776))
+    rows = [
+        coupling_step.OneBlow("jacobi", step, dict.fromkeys(names, 3.0776 * (1.0 - error)))
+        for step, error in ((4e-5, 0.054), (1e-4, 0.44619))
+    ]
+    limit, short, long, _ = coupling_step.table_of_one(rows, exact).splitlines()[2:]
+    assert limit.endswith("| 3.078 ± 0.055 |")  # 3.0776 * 0.054 / 3
+    assert short.endswith("| -5.4±1.8 |")
+    assert long.endswith("| -44.6±1.8 |")
+
+
+def test_what_has_no_limit_is_a_change_and_no_error():
+    rows = [coupling_step.EightBlows("jacobi", step, rate, 2931.7, 0.0093217)
+            for step, rate in ((1e-5, 0.0236692), (1e-3, 0.0240171))]  # fmt: skip
+    table = coupling_step.table_of_eight(rows)
+    assert "change from 0.01 ms [%]" in table
+    assert "error" not in table
+    assert table.splitlines()[-1] == "| jacobi | 1 | 24.02 | +1.47 | 2932 | +0.93 |"
+
+
+def test_errors_of_steps_taken_back_have_the_digits_that_the_limit_has():
+    def run(step, value):
+        return CoupledRun({name: np.array([value]) for name in step_rejection.QUANTITIES}, step, 40)
+
+    exact = {"usual": run(1e-5, 1.0)}
+    tries = [step_rejection.Try("usual", None, run(3e-5, 1.00024), 0.1),
+             step_rejection.Try("usual", 0.1, run(1e-3, 1.014678), 0.1)]  # fmt: skip
+    fixed, adaptive = step_rejection.table(exact, tries).splitlines()[2:]
+    assert fixed.endswith("| +0.024±0.012 |")
+    assert adaptive.endswith("| +1.468±0.012 |")
 
 
 def test_what_steps_taken_back_cost_is_measured(feed_control):

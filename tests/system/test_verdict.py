@@ -202,15 +202,22 @@ def test_the_command_says_of_which_numbers_the_error_is_not_known(
         assert line.endswith("(error not estimated)"), line
 
 
-def test_a_system_that_is_refused_claims_no_folder(feed_control, tmp_path, monkeypatch, capsys):
+@pytest.mark.parametrize(
+    "refused",
+    [("--set", "nothing.there=1"), ("--signal", "hammer.nothing"), ("--duration", "0")],
+    ids=lambda words: words[0],
+)
+def test_a_system_that_is_refused_claims_no_folder(
+    feed_control, tmp_path, monkeypatch, capsys, refused
+):
     """Nothing is said of a numbered folder that is not going to be written."""
     monkeypatch.chdir(tmp_path)
     folder = tmp_path / "out" / feed_control.stem
     folder.mkdir(parents=True)
     (folder / "kept.txt").write_text("")
-    words = ["couple", str(feed_control), "--set", "nothing.there=1"]
-    monkeypatch.setattr("sys.argv", ["percussion", *words])
+    monkeypatch.setattr("sys.argv", ["percussion", "couple", str(feed_control), *refused])
     with pytest.raises(SystemExit) as ended:
         main()
     assert ended.value.code == 2
     assert "this one goes to" not in capsys.readouterr().err
+    assert list(folder.parent.iterdir()) == [folder]

@@ -52,9 +52,13 @@ def accuracy(
     from percussion_model.scene.scene import Scene
     from percussion_model.verification.accuracy import study
     from percussion_model.verification.accuracy.ladders import chosen_ladders
+    from percussion_model.verification.accuracy.problems import refuse_rigid
     from percussion_model.verification.accuracy.study import solvers_of
 
-    chosen = [(path.stem, common.load_scene(path, settings=settings)) for path in scenes or ()]
+    chosen = [
+        (path.stem, common.load_scene(path, settings=settings, is_run=False))
+        for path in scenes or ()
+    ]
     if not chosen:
         title = "The reference scene"
         chosen = [("reference", Scene(title=title))]
@@ -68,6 +72,7 @@ def accuracy(
     words = None if methods is None else [word.strip() for word in methods.split(",")]
     ladders = chosen_ladders(words)  # refuses before anything is computed
     for _, scene in chosen:
+        refuse_rigid(scene)
         scene.computed_by("wave")
     common.check_json(json_file)
     if make_references:

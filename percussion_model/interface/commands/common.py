@@ -109,8 +109,12 @@ def load_scene(
     settings: list[str] | None = None,
     accuracy: float | None = None,
     check: bool | None = None,
+    is_run: bool = True,
 ) -> Scene:
-    """Read a scene and apply what the command line changes."""
+    """Read a scene and apply what the command line changes.
+
+    Where the solver that the scene names will run it, tell of its kernels.
+    """
     from percussion_model.scene.scene import Scene
     from percussion_model.scene.text import read_setting
 
@@ -126,7 +130,8 @@ def load_scene(
     if cells is not None:
         key = "fem.elements" if scene.solver_name == "fem" else "solver.cells"
         scene = scene.replace(**{key: cells})
-    tell_of_compiling(scene.solver_name)
+    if is_run:
+        tell_of_compiling(scene.solver_name)
     return scene
 
 

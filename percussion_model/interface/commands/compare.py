@@ -30,7 +30,9 @@ def compare(
     from percussion_model.interface.terminal import progress, progress_bar, show_comparison
 
     names = read_solvers(solvers)
-    chosen = common.load_scene(scene, settings=settings)
+    chosen = common.load_scene(scene, settings=settings, is_run=False)
+    for name in names:
+        chosen.computed_by(name)  # refuses before anything is claimed or compiled
     common.check_json(json_file)
     if figures:
         claimed = common.claim(
@@ -39,7 +41,7 @@ def compare(
         )  # fmt: skip
     if "blow-map" in names:
         prepare_map(chosen.computed_by("blow-map"), duration)
-    common.tell_of_compiling(*(name for name in names if name != chosen.solver_name))
+    common.tell_of_compiling(*names)
     end = chosen.run.duration if duration is None else duration
     with progress_bar(end * len(names)) as bar:
         found = run_all(chosen, names, duration, settle, bar)

@@ -162,6 +162,18 @@ def quantities(kind: str) -> tuple[str, ...]:
     return (*means, *peaks, HISTORY, CONTACT_HISTORY, STRESS_HISTORY)
 
 
+def refuse_rigid(scene: Scene) -> None:
+    """Raise `SceneError` for a scene of rigid bodies."""
+    rigid = [bar for bar in ("piston", "bit") if getattr(scene, bar).model == "rigid"]
+    if rigid:
+        given = ", ".join(f'{bar}.model = "rigid"' for bar in rigid)
+        raise SceneError(
+            f"accuracy: the scene has rigid bodies ({given}), but a rigid bar has closed forms and "
+            f"nothing to refine: set {' and '.join(f'{bar}.model' for bar in rigid)} to "
+            '"elastic"'
+        )
+
+
 def pose(scene: Scene) -> Problem:
     """Find the kind of motion of a scene, and where to start it.
 
@@ -170,11 +182,7 @@ def pose(scene: Scene) -> Problem:
     SceneError
         If there is nothing to refine, or too few blows.
     """
-    if scene.bit.model == "rigid" or scene.piston.model == "rigid":
-        raise SceneError(
-            "accuracy: a rigid bar has closed forms and nothing to refine; "
-            "piston.model and bit.model must be 'elastic' (or the piston 'absent')"
-        )
+    refuse_rigid(scene)
     if scene.piston.model == "absent":
         return Problem(scene, DROP, scene.run.duration, scene.run.duration)
     pilot = Simulation(scene.computed_by("wave"), record_events=False)

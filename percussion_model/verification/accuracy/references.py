@@ -247,7 +247,8 @@ def make_reference(
     for solver, chosen in levels.items():
         answers[solver] = []
         for level in chosen:
-            progress(f"reference: {level.name}")
+            first = "compiling or loading " if level is chosen[0] else ""
+            progress(f"reference: {first}{level.name}")
             answers[solver].append(_answer(problem, level))
     bars = {}
     for key in problem.quantities:
