@@ -178,7 +178,7 @@ def test_points_are_what_they_are_said_to_be():
         ({"feed": 2000.0}, ["the feed is off by 33 % on average"]),
         (
             {"feed": 3000.0, "torque": 300.0, "since": 3.0},
-            ["1 s beyond the limits of feed or torque"],
+            ["1.0 s beyond the limits of feed or torque"],
         ),
         ({"feed": 3000.0, "error": "at 1 s it fell"}, ["ended early, at 1 s it fell"]),
     ],
