@@ -12,6 +12,7 @@ from percussion_model import Result, ResultError, Scene, Simulation, simulate
 from percussion_model.interface.plotting import CAPTIONS
 from percussion_model.physics.records import BLOW
 from percussion_model.simulation.files import check_writable, staged
+from percussion_model.simulation.rate import LEAST_BLOWS
 from percussion_model.simulation.result import FIGURES, REPORT
 from percussion_model.simulation.validity import numerical_note
 
@@ -148,6 +149,20 @@ def test_few_blows_tell_no_rate():
     none = simulate(RIGID, 0.01, settle=0.0)
     assert none.summary()["blow_period"] is None
     assert any("no whole blow" in text for text in none.warnings)
+
+
+def test_a_hammer_that_stalls_has_no_rate():
+    scene = RIGID.replace(**{"effects.drive": "external", "drive.external_force": 5e3})
+    result = simulate(scene, 0.5, settle=0.0)
+    assert result.has_stalled
+    assert len(result.counted) >= LEAST_BLOWS
+    summary = result.summary()
+    for end in ("", "_standard_error", "_error", "_relative_error"):
+        assert summary[f"rate_of_penetration{end}"] is None
+    (said,) = [text for text in result.warnings if "rate of penetration" in text]
+    assert "the hammer has stalled: no blow ended after 0.0" in said
+    held = simulate(scene, 0.02, settle=0.0)  # too soon to tell
+    assert not held.has_stalled
 
 
 def test_an_undamped_scene_warns_and_says_why():

@@ -547,3 +547,5 @@ def test_a_coupled_rate_has_its_error():
     short = summary(CoupledRun(short, 1e-3, 199))
     assert short["rate_second_half_error"] is None
     assert any("error not estimated" in text for text in _lines(short))
+    held = columns | {"hammer.blow_count": np.minimum(blow, 60.0)}  # from 2.7 s on
+    assert "rate_second_half" not in summary(CoupledRun(held, 1e-3, 4000))

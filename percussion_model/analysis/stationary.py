@@ -15,14 +15,14 @@ from percussion_model.physics.records import BLOW
 from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.simulation.error_estimate import SAFETY, with_error_estimate
 from percussion_model.simulation.files import plain
-from percussion_model.simulation.rate import rate_of_blows, ratio_of_sums
+from percussion_model.simulation.rate import STALLED_PERIODS, rate_of_blows, ratio_of_sums
 from percussion_model.simulation.result import Result
 from percussion_model.simulation.simulate import Simulation, SimulationError
 from percussion_model.simulation.uncertain import BY_CELLS, is_undecided, rate_field
 from percussion_model.simulation.warnings import warnings_of_motion
 
-# A run in which no blow ends for so long [s], and so many periods of the last, has stopped.
-STALLED_AFTER, STALLED_PERIODS = 2.0, 4.0
+# A run in which no blow ends for so long [s], and `STALLED_PERIODS` of the last, has stalled.
+STALLED_AFTER = 2.0
 # The standard error is first believed after so many blows, and checked again
 # when there are so many times more.
 FEWEST_SCATTERED, NEXT_CHECK = 100, 1.25

@@ -11,7 +11,7 @@ import numpy as np
 
 from percussion_model.coupling.verdict import LIMITS, STIFFNESS, Verdict, judge_run
 from percussion_model.simulation.files import staged_text
-from percussion_model.simulation.rate import LEAST_BLOWS, ratio_of_sums
+from percussion_model.simulation.rate import LEAST_BLOWS, has_stalled, ratio_of_sums
 from percussion_model.simulation.uncertain import is_undecided
 
 STRING_ENERGIES = ("head", "reaction", "weight", "bit", "shoulder", "wall", "stored")
@@ -134,6 +134,7 @@ def _rate_second_half(columns: dict[str, np.ndarray]) -> dict[str, Any]:
     """Mean rate over the second half [m/s], by the depth of the hole where that is kept.
 
     From the start of a blow to that of another, where there are enough blows to tell an error.
+    None where the hammer has stalled.
     """
     time = columns["time"]
     place = columns.get("hammer.hole_depth", columns["hammer.bit.position"])
@@ -142,8 +143,11 @@ def _rate_second_half(columns: dict[str, np.ndarray]) -> dict[str, Any]:
     error = math.nan
     rate = float(place[-1] - place[rows[0]]) / float(time[-1] - time[rows[0]])
     if blows is not None:
-        begun = rows[1:][np.diff(blows[rows]) > 0.0]
+        ever = 1 + np.flatnonzero(np.diff(blows) > 0.0)
+        begun = ever[ever > rows[0]]
         if len(begun) < 2:  # no whole blow in it: the rate would be that of a part
+            return {}
+        if has_stalled(np.diff(time[ever]), float(time[ever[-1]]), float(time[-1])):
             return {}
         if len(begun) > LEAST_BLOWS:
             rate, error = ratio_of_sums(np.diff(place[begun]), np.diff(time[begun]))

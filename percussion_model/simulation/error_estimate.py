@@ -313,8 +313,8 @@ def with_error_estimate(
         With `rate_of_penetration_relative_error` and `errors`, of what could be told: nothing
         where waves run without loss.
     """
-    if coarser is None or result.cut_short or result.scene.is_undamped:
-        return result  # what rings on without loss is another on every grid
+    if coarser is None or result.cut_short or result.scene.is_undamped or result.has_stalled:
+        return result  # what rings on without loss is another on every grid; no rate, no error
     if len(result.counted) < LEAST_BLOWS and not any(result.fall.values()):
         return result
     whole = grid_run(result)

@@ -18,6 +18,8 @@ FEWEST_DEPENDENT = 20
 # Stretches that tell how scatter grows have this share of all blows. Longer ones are too few,
 # shorter ones do not show what blows take back from each other.
 STRETCH = 0.25
+# A hammer has stalled that begins no blow for so many periods of its longest.
+STALLED_PERIODS = 4.0
 
 
 def rate_of_blows(blows: np.ndarray) -> tuple[float, float]:
@@ -36,6 +38,26 @@ def rate_of_blows(blows: np.ndarray) -> tuple[float, float]:
     if len(blows) < LEAST_BLOWS:
         return math.nan, math.nan
     return ratio_of_sums(blows["hole_advance"], blows["period"])
+
+
+def has_stalled(periods: np.ndarray, ended: float, until: float) -> bool:
+    """Whether blows ended long before a time: what went before is no steady drilling.
+
+    Parameters
+    ----------
+    periods : ndarray
+        Of the whole blows [s].
+    ended : float
+        When the last of them ended [s].
+    until : float
+        Up to which the hammer was followed [s].
+
+    Returns
+    -------
+    bool
+        False where there is no blow.
+    """
+    return len(periods) > 0 and until - ended > STALLED_PERIODS * float(np.max(periods))
 
 
 def ratio_of_sums(values: np.ndarray, weights: np.ndarray) -> tuple[float, float]:

@@ -28,7 +28,7 @@ from percussion_model.simulation.files import (
 )
 from percussion_model.simulation.means import numbers_over, scatter_over
 from percussion_model.simulation.origin import ORIGIN
-from percussion_model.simulation.rate import rate_of_blows, ratio_of_sums
+from percussion_model.simulation.rate import has_stalled, rate_of_blows, ratio_of_sums
 from percussion_model.simulation.uncertain import BY_CELLS, is_undecided, rate_field
 
 if TYPE_CHECKING:
@@ -139,9 +139,17 @@ class Result:
         return self.blows[self.blows["time"] >= self.settle]
 
     @property
+    def has_stalled(self) -> bool:
+        """Whether blows ended long before the run did, so that there is no rate."""
+        return has_stalled(self.blows["period"], end_of(self.blows), self.duration)
+
+    @property
     def rate_of_penetration(self) -> float:
-        """Advance of the hole by time between first and last blow start after settling [m/s]."""
-        return rate_of_blows(self.counted)[0]
+        """Advance of the hole by time between first and last blow start after settling [m/s].
+
+        NaN where fewer than `LEAST_BLOWS` tell none, and where the hammer has stalled.
+        """
+        return math.nan if self.has_stalled else rate_of_blows(self.counted)[0]
 
     @property
     def rate_of_penetration_standard_error(self) -> float:
@@ -149,7 +157,7 @@ class Result:
 
         See `ratio_of_sums`. Zero where the motion is periodic.
         """
-        return rate_of_blows(self.counted)[1]
+        return math.nan if self.has_stalled else rate_of_blows(self.counted)[1]
 
     @property
     def rate_of_penetration_error(self) -> float:
@@ -291,6 +299,11 @@ class Result:
     def load(cls, folder: str | Path) -> Self:
         """Read what `save` has written."""
         return cls(**_read_result(Path(folder)))
+
+
+def end_of(blows: np.ndarray) -> float:
+    """When the last whole blow ended [s]; 0 where there is none."""
+    return float(blows["time"][-1] + blows["period"][-1]) if len(blows) else 0.0
 
 
 def _fall(result: Result) -> dict[str, float]:

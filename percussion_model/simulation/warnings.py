@@ -10,7 +10,7 @@ import numpy as np
 from percussion_model.physics.records import EventKind, Mode
 from percussion_model.scene.scales import barrier_shares
 from percussion_model.simulation.rate import LARGE_ERROR, LEAST_BLOWS
-from percussion_model.simulation.result import Result, flight_acceleration
+from percussion_model.simulation.result import Result, end_of, flight_acceleration
 from percussion_model.simulation.uncertain import in_digits
 from percussion_model.simulation.validity import (
     barrier_note,
@@ -113,6 +113,13 @@ def _about_blows(result: Result) -> Iterator[str]:
         yield "there is no piston, so there are no blows: the rate of penetration is undefined"
     elif len(result.blows) == 0:
         yield "no whole blow in this run: the rate of penetration is undefined"
+    elif result.has_stalled:
+        yield (
+            f"the hammer has stalled: no blow ended after {in_digits(end_of(result.blows))} s of "
+            f"{result.duration:.6g} s, so the rate of penetration is undefined"
+            + "; the other numbers are those of the blows before"
+            * (count > 0)
+        )
     elif count < LEAST_BLOWS:
         yield (
             f"only {count} whole blow{'s' if count != 1 else ''} after settling, fewer than "
