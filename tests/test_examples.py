@@ -109,6 +109,19 @@ def test_blows_without_order_have_none():
     ]
 
 
+def test_rates_of_a_branch_have_their_errors(found):
+    _, numbers = found("bifurcation")
+    ways = [key for key in numbers if key != "errors"]
+    assert {"distance_falling", "distance_rising", "feed_falling", "feed_rising"} <= set(ways)
+    branches = [branch for way in ways for branch in numbers[way]]
+    for branch in branches:
+        assert len(branch["rate_standard_error"]) == len(branch["rate"]) == len(branch["values"])
+        assert min(branch["rate_standard_error"]) >= 0.0
+    # at the least feed no blow is like another
+    assert numbers["feed_rising"][0]["rate_standard_error"][0] > 0.0
+    assert "scatter" in numbers["errors"]
+
+
 def test_the_way_up_and_the_way_down_can_differ(found):
     """Between 300 and 600 N the hammer keeps striking evenly only if it did so before."""
     values = np.array([450.0])
