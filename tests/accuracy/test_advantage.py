@@ -146,12 +146,13 @@ def test_advice_does_not_name_what_the_reference_cannot_tell():
 
 def test_a_longer_run_of_aperiodic_motion_is_the_finer_and_the_dearer_one():
     rungs = [(0.04, 6e-2), (0.05, 5e-3), (0.04, 1e-3)]
-    found = made({"wave": rungs, "rigid": rungs}, kind=APERIODIC, sizes=[2.0, 8.0, 32.0])
+    found = made({"wave": rungs, "rigid": rungs}, bar=5e-3, kind=APERIODIC, sizes=[2.0, 8.0, 32.0])
     # rigid bodies have another error than that of statistics
     assert found.advice(1e-2).startswith("For 1 % take wave, rung 1, ")
     assert "400 ms (± 0 %) for the run" in found.advice(1e-2)
     cost = found.cost("wave", found.main, 5e-3)
     assert cost.value == pytest.approx(0.4)
+    assert cost.decided  # a standard error does not hang on the bar of the reference
 
 
 # ------------------------------------------------------------------------ what is printed

@@ -177,7 +177,6 @@ class Study:
     def cost(self, name: str, key: str, wanted: float) -> Cost:
         """Time at which a ladder meets an error for good [s]; see `seconds`."""
         points = self.ladder(name)
-        floor = self.reference.floor(key)
         return cost_range(
             name,
             [
@@ -185,7 +184,7 @@ class Study:
                 for point in points
             ],
             wanted,
-            0.0 if math.isnan(floor) else floor,
+            self.floor(key),
         )
 
     def best(self, families: Sequence[str], key: str, wanted: float) -> Cost | None:
