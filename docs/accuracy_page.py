@@ -15,14 +15,15 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-from percussion_model.interface.commands.accuracy_tables import two, within_bar
+from percussion_model.interface.commands.accuracy_tables import (
+    bounds_text,
+    ratio_text,
+    two,
+    within_bar,
+)
 from percussion_model.simulation.uncertain import in_digits
 from percussion_model.verification.accuracy import Study
 from percussion_model.verification.accuracy.advantage import (
-    MET,
-    MISSED,
-    PEER_MISSES,
-    UNDECIDED,
     Contest,
     Summary,
     contest,
@@ -120,18 +121,13 @@ def contest_cell(one: Contest) -> str:
     times = f"{milliseconds(one.wave)} / {'–' if one.peer is None else milliseconds(one.peer)}"
     if one.peer is not None and one.peer.ladder != "explicit":
         times += f" {LADDERS[one.peer.ladder].title}"
-    if one.outcome == MET:
-        return f"**{two(one.ratio)}** ({two(one.low)} to {two(one.high)})<br>{times}"
-    if one.outcome == UNDECIDED:
-        return f"undecided<br>{times}"
-    sign = {PEER_MISSES: "above", MISSED: "below"}[one.outcome]
-    return f"**{sign} {two(one.ratio)}**<br>{times}"
+    return f"{ratio_text(one, strong='**')}<br>{times}"
 
 
 def milliseconds(cost: Cost) -> str:
     """Time to compute a simulated second, or why there is none."""
     if math.isfinite(cost.value):
-        return two(1e3 * cost.value)
+        return f"{cost.sign}{two(1e3 * cost.value)}"
     return "?" if math.isfinite(cost.low) else "not met"
 
 
@@ -147,7 +143,7 @@ def contest_table() -> str:
         rows.append([f"[{name}](accuracy/{name}.md)", shown, *cells])
     sums = [summary(column) for column in found.values()]
     for label in ("luckiest", "median", "worst"):
-        rows.append([f"**{label}**", "", *(two(getattr(one, label)) for one in sums)])
+        rows.append([f"**{label}**", "", *(bounds_text(getattr(one, label)) for one in sums)])
     rows.append(["undecided", "", *(f"{one.undecided} of {one.scenes}" for one in sums)])
     head = ["scene", "bar of the reference", *(percent(wanted) for wanted in found)]
     return table(head, rows)
@@ -159,19 +155,20 @@ def force_table() -> str:
     rows = []
     for key in FORCES:
         for one in (summary(column) for column in contests(studies, key).values()):
-            ratios = [two(value) for value in (one.luckiest, one.median, one.worst)]
+            ratios = [bounds_text(value) for value in (one.luckiest, one.median, one.worst)]
             rows.append(
                 [SHORT[key], percent(one.wanted), *ratios, f"{one.undecided} of {one.scenes}"]
             )
     return table(["quantity", "error", "luckiest", "median", "worst", "undecided"], rows)
 
 
-def ratio_text(one: Summary) -> str:
+def summary_text(one: Summary) -> str:
     """Range and median of a summary."""
     decided = one.scenes - one.undecided
-    if not math.isfinite(one.median):
+    if not decided:
         return f"undecided ({one.scenes} scenes)"
-    return f"{two(one.median)} ({two(one.worst)} to {two(one.luckiest)}; {decided} scenes)"
+    ends = f"{bounds_text(one.worst)} to {bounds_text(one.luckiest)}"
+    return f"{bounds_text(one.median)} ({ends}; {decided} scenes)"
 
 
 def fits(study: Study) -> bool:
@@ -185,7 +182,7 @@ def advantage() -> str:
 
     def row(name: str, chosen: Sequence[Study], waves: str = "wave") -> str:
         found = contests(chosen, waves=waves)
-        cells = (ratio_text(summary(found[wanted])) for wanted in STATED)
+        cells = (summary_text(summary(found[wanted])) for wanted in STATED)
         return f"| {name} | {' | '.join(cells)} |"
 
     fitting = [study for study in studies if fits(study)]
@@ -195,8 +192,9 @@ def advantage() -> str:
         (
             "Processor time of the best compiled peer, mostly explicit elements with hard",
             "contact, divided by that of the waves for the same error of the rate: median, range",
-            "and scenes. Below 1 the peer is faster. The advantage is the leaps, as the last row",
-            "shows.",
+            "and scenes. Below 1 the peer is faster. ≥ and ≤ are bounds, where no setting was so",
+            "coarse that it misses the error, or so fine that it meets it. The advantage is the",
+            "leaps, as the last row shows.",
             "",
             f"| | {heads} |",
             f"|---|{'---|' * len(STATED)}",

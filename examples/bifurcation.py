@@ -17,7 +17,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.patches import Patch
 
-from examples.motions import KINDS, Branch, branch_of, kind_of, order_of
+from examples.motions import ABOUT_ERRORS, KINDS, Branch, branch_of, described, kind_of
 from examples.shared import BLUE, ORANGE, PINK, command_line, figure_of
 from percussion_model import Scene, Simulation
 from percussion_model.interface.plotting import style
@@ -79,7 +79,7 @@ def main(out: Path, quick: bool = False) -> dict[str, Any]:
         ("distance", distance, at_constant_power, MM, "distance $D_1$ at constant power [mm]"),
         ("feed", feed, lambda force: {"feed_force": force}, 1.0 / KN, "feed force $F_S$ [kN]"),
     )
-    found = {}
+    found: dict[str, Any] = {"errors": ABOUT_ERRORS}
     with figure_of(NAME, Path(out), (10.5, 6.8)) as fig:
         axes = fig.subplots(3, 2, sharex="col", height_ratios=(0.5, 2.2, 1.4))
         for column, (key, values, inputs, factor, words) in zip(axes.T, ways, strict=True):
@@ -92,17 +92,12 @@ def main(out: Path, quick: bool = False) -> dict[str, Any]:
                 branches["at once"] = [jump(high, k, settle, keep) for k in MOMENTS[quick * 2 :]]
             draw(column, factor, words, branches)
             for name, some in branches.items():
-                found |= {f"{key}_{name}": [_described(branch) for branch in some]}
+                found |= {f"{key}_{name}": [described(branch) for branch in some]}
         handles = [Patch(color=colour, label=kind) for kind, colour in KINDS.items()]
         words = {"at once": f"set at once from {LOW_FEED:g} N"}
         handles += [Patch(color=c, label=words.get(way, way)) for way, c in COLOURS.items()]
         style.head(fig, "Blows of the settled motion, by where the drill comes from", handles)
     return found
-
-
-def _described(branch: Branch) -> dict[str, list[float]]:
-    order = [order_of(velocity) for velocity in branch.impact_velocity]
-    return {"values": branch.values.tolist(), "order": order, "rate": branch.rate.tolist()}
 
 
 def draw(axes: np.ndarray, factor: float, words: str, branches: dict[str, list[Branch]]) -> None:

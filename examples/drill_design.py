@@ -129,19 +129,21 @@ def _draw_lengths(ax: Axes, ratio: np.ndarray, rock: dict[float, np.ndarray]) ->
 def _draw_designs(
     ax: Axes, blows: dict[str, dict[str, float]], rates: dict[str, str], stress: dict[str, float]
 ) -> None:
+    # lying bars: their labels are wide, and have a line each
     base = np.zeros(len(blows))
     for name, colour in SHARES.items():
-        height = np.array([100.0 * blow[name] for blow in blows.values()])
-        ax.bar(range(len(blows)), height, bottom=base, color=colour, label=name, width=0.65)
-        for k, value in enumerate(height):
-            ax.text(k, base[k] + value / 2, f"{value:.0f}", ha="center", va="center", color="white")
-        base += height
+        width = np.array([100.0 * blow[name] for blow in blows.values()])
+        ax.barh(range(len(blows)), width, left=base, color=colour, label=name, height=0.65)
+        for k, value in enumerate(width):
+            ax.text(base[k] + value / 2, k, f"{value:.0f}", ha="center", va="center", color="white")
+        base += width
     words = [f"{name}\n{rates[name]} mm/s\n{1e-6 * stress[name]:.0f} MPa" for name in blows]
-    ax.set_xticks(range(len(blows)), [text.replace(", ", "\n") for text in words])
-    ax.grid(axis="x", visible=False)
-    ax.set_ylim(0.0, 112.0)
-    ax.legend(loc="upper center", ncols=3)
-    style.label(ax, "", "energy of the blow [%]", "Designs, settled rate, stress")
+    ax.set_yticks(range(len(blows)), words)
+    ax.grid(axis="y", visible=False)
+    ax.set_xlim(0.0, 100.0)
+    ax.set_ylim(len(blows) - 0.5, -0.9)
+    ax.legend(loc="upper center", ncols=3, columnspacing=1.0)
+    style.label(ax, "energy of the blow [%]", "", "Designs, settled rate, stress")
 
 
 if __name__ == "__main__":

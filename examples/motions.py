@@ -22,6 +22,10 @@ KINDS = {
     "nearly alike": GREY,
     "no order": BLACK,
 }
+# What the errors of a branch are those of.
+ABOUT_ERRORS = (
+    "standard errors are by the scatter of the blows; those by the cells are not estimated"
+)
 
 
 @dataclass(frozen=True)
@@ -54,3 +58,10 @@ def branch_of(values: np.ndarray, rows: list[np.ndarray]) -> Branch:
     velocity = np.array([blows["impact_velocity"] for blows in rows])
     rate, error = np.array([rate_of_blows(blows) for blows in rows]).T
     return Branch(values[up], velocity[up], rate[up], error[up])
+
+
+def described(branch: Branch) -> dict[str, list[float]]:
+    """Numbers of a branch as plain values, the rate with its standard error."""
+    shown = {"values": branch.values, "rate": branch.rate, "rate_standard_error": branch.error}
+    order = [order_of(velocity) for velocity in branch.impact_velocity]
+    return {"order": order} | {name: numbers.tolist() for name, numbers in shown.items()}

@@ -12,6 +12,13 @@ import numpy as np
 
 from percussion_model.coupling import CoupledRun, Coupling
 from percussion_model.interface.terminal import progress
+from percussion_model.simulation.uncertain import (
+    ABOUT,
+    UNDECIDED,
+    change_text,
+    in_digits,
+    with_error,
+)
 from scenarios.coupled import archive, save_runs, save_table
 from scenarios.drawing import save_png
 from scenarios.harness import FIGURES
@@ -19,8 +26,9 @@ from scenarios.harness import FIGURES
 NAME = "extremum_seeking"
 STEP = 2e-3  # the longest at which the shoulder is as stiff as it is [s]
 ABOUT_STEP = (
-    f"+- is the error of the fit alone. The communication step of {1e3 * STEP:g} ms adds 1 to 2 % "
-    "to a rate (docs/system.md, section 4), much alike in all of them."
+    f"± is the error of the fit alone, and {ABOUT} stands before what has no error of its own. The "
+    f"communication step of {1e3 * STEP:g} ms adds 1 to 2 % to a rate (docs/system.md, section 4), "
+    "much alike in all of them."
 )
 INTERVAL = 0.02  # of the rows that are kept [s]
 DURATION = 40.0  # [s]
@@ -171,14 +179,26 @@ def main() -> None:
         hill = sweep(system)
         runs = {f"from {start:.0f} N": seek(system, start) for start in STARTS}
     top = top_of(hill)
-    print(f"best feed {top.feed:.0f} +- {top.feed_error:.0f} N, "
-          f"rate {1e3 * top.rate:.3f} +- {1e3 * top.rate_error:.3f} mm/s")  # fmt: skip
+    print(f"best feed {with_error(top.feed, top.feed_error)} N, "
+          f"rate {with_error(1e3 * top.rate, 1e3 * top.rate_error)} mm/s")  # fmt: skip
     print(ABOUT_STEP)
     for name, run in runs.items():
         rate = rate_over(run, DURATION - LAST)
-        print(f"{name}: {run['controller.seek.centre'][-1]:.0f} N, {1e3 * rate:.3f} mm/s, "
-              f"{100 * (rate / top.rate - 1.0):+.2f} %")  # fmt: skip
+        print(f"{name}: {about(run['controller.seek.centre'][-1])} N, "
+              f"{reached(rate, top.rate, top.rate_error)}")  # fmt: skip
     write_search(NAME, draw, hill, ("feed_force", "rate_of_penetration"), runs)
+
+
+def about(value: float) -> str:
+    """A number of whose error nothing is known."""
+    return f"{ABOUT}{in_digits(value)}"
+
+
+def reached(rate: float, best: float, error: float) -> str:
+    """Rate of a seeker, and by how much it is off the best one, which has an error [m/s]."""
+    off = change_text(rate / best - 1.0, error / best, rough=True)
+    off = f"{off} off the best rate" if off == UNDECIDED else f"{off} %"
+    return f"{about(1e3 * rate)} mm/s, {off}"
 
 
 def write_search(

@@ -15,6 +15,7 @@ import numpy as np
 
 from percussion_model.coupling import CoupledRun, Coupling
 from percussion_model.interface.terminal import progress
+from percussion_model.simulation.uncertain import with_error
 from scenarios.coupled import archive
 from scenarios.drawing import save_png
 from scenarios.extremum_seeking import (
@@ -24,7 +25,9 @@ from scenarios.extremum_seeking import (
     SETTLING,
     SIGNALS,
     STEP,
+    about,
     rate_over,
+    reached,
     write_search,
 )
 
@@ -180,15 +183,16 @@ def main() -> None:
             f"from {feed:.0f} N {1e-5 * p:.0f} bar": seek(system, (feed, p)) for feed, p in STARTS
         }
     top, errors = top_of(hill)
-    print(f"best feed {top[0]:.0f} +- {errors[0]:.0f} N, pressure {1e-5 * top[1]:.2f} +- "
-          f"{1e-5 * errors[1]:.2f} bar, rate {1e3 * top[2]:.3f} +- {1e3 * errors[2]:.3f} mm/s; "
+    print(f"best feed {with_error(top[0], errors[0])} N, "
+          f"pressure {with_error(1e-5 * top[1], 1e-5 * errors[1])} bar, "
+          f"rate {with_error(1e3 * top[2], 1e3 * errors[2])} mm/s; "
           f"the seeker is to be within {100 * BOUND:.0f} %")  # fmt: skip
     print(ABOUT_STEP)
     for name, run in runs.items():
         rate = rate_over(run, DURATION - LAST)
-        print(f"{name}: {run['controller.seek.centre'][-1]:.0f} N, "
-              f"{1e-5 * run['controller.seek.pressure_centre'][-1]:.2f} bar, "
-              f"{1e3 * rate:.3f} mm/s, {100 * (rate / top[2] - 1.0):+.2f} %")  # fmt: skip
+        print(f"{name}: {about(run['controller.seek.centre'][-1])} N, "
+              f"{about(1e-5 * run['controller.seek.pressure_centre'][-1])} bar, "
+              f"{reached(rate, top[2], errors[2])}")  # fmt: skip
     write_search(NAME, draw, hill, ("feed_force", "supply_pressure", "rate_of_penetration"), runs)
 
 

@@ -6,16 +6,18 @@ import importlib
 import json
 import subprocess
 import sys
+from contextlib import contextmanager
 from pathlib import Path
 from threading import Event
 
 import matplotlib.image
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from examples import bifurcation, drill_design, motions, rate_map
 from examples.all import EXAMPLES
-from examples.shared import tell, write_example
+from examples.shared import figure_of, tell, write_example
 from percussion_model import Scene, Simulation
 from percussion_model.interface import progress
 from percussion_model.simulation.files import to_json
@@ -107,6 +109,19 @@ def test_blows_without_order_have_none():
     ]
 
 
+def test_rates_of_a_branch_have_their_errors(found):
+    _, numbers = found("bifurcation")
+    ways = [key for key in numbers if key != "errors"]
+    assert {"distance_falling", "distance_rising", "feed_falling", "feed_rising"} <= set(ways)
+    branches = [branch for way in ways for branch in numbers[way]]
+    for branch in branches:
+        assert len(branch["rate_standard_error"]) == len(branch["rate"]) == len(branch["values"])
+        assert min(branch["rate_standard_error"]) >= 0.0
+    # at the least feed no blow is like another
+    assert numbers["feed_rising"][0]["rate_standard_error"][0] > 0.0
+    assert "scatter" in numbers["errors"]
+
+
 def test_the_way_up_and_the_way_down_can_differ(found):
     """Between 300 and 600 N the hammer keeps striking evenly only if it did so before."""
     values = np.array([450.0])
@@ -159,6 +174,36 @@ def test_the_first_wave_has_its_known_best():
     ratio = np.linspace(0.5, 30.0, 20_001)
     share = drill_design.first_wave(ratio, 7.5e8)
     assert share.max() == pytest.approx(0.814529 * (1.0 - 1.0 / 5.0), rel=1e-6)
+
+
+def test_no_word_of_the_figure_lies_on_another(tmp_path, monkeypatch):
+    """Labels with rates and their errors are wider than the bars that they belong to."""
+    figures = []
+
+    @contextmanager
+    def kept(*words):
+        with figure_of(*words) as fig:
+            figures.append(fig)
+            yield fig
+
+    monkeypatch.setattr(drill_design, "figure_of", kept)
+    drill_design.main(tmp_path, quick=True)
+    canvas = FigureCanvasAgg(figures[0])
+    canvas.draw()
+    renderer = canvas.get_renderer()
+    right = figures[0].axes[2]
+    assert "±" in "".join(text.get_text() for text in right.get_yticklabels())
+    shown = [
+        text
+        for text in (*right.get_xticklabels(), *right.get_yticklabels(), *right.texts)
+        if text.get_text()
+    ]
+    boxes = [text.get_window_extent(renderer) for text in shown]
+    for k, box in enumerate(boxes):
+        assert box.x0 >= 0.0
+        assert box.x1 <= figures[0].bbox.x1
+        for other in boxes[:k]:
+            assert not box.overlaps(other)
 
 
 def test_an_example_does_not_write_into_the_folder_of_another_result(tmp_path):

@@ -419,6 +419,8 @@ def show_stability(found: Collection) -> None:
     )
     console.print(wrapped(f"{found.about_errors()} {NOT_THE_MODEL}"), highlight=False)
     console.print(wrapped(verdict), highlight=False)
+    for text in found.about_left_out():
+        console.print(wrapped(text), highlight=False)
 
 
 def _counted(count: int, what: str) -> str:

@@ -276,7 +276,7 @@ def test_several_scenes_come_in_one_table(found, capsys):
     show_contests({"one": found, "other": found})
     shown = capsys.readouterr().out
     assert "explicit" in shown
-    assert "at the worst of 2 scenes" in shown
+    assert "at the worst of 2 scenes" in " ".join(shown.split())
 
 
 def refused(*arguments: str) -> str:

@@ -19,6 +19,7 @@ from percussion_model.scene.inputs import SimulationError
 from percussion_model.verification.hard_cases import SOLVERS, hard_cases, measure, run_collection
 from percussion_model.verification.hard_cases.collection import (
     Collection,
+    left_out,
     numerical_error,
     off_text,
     short_rate,
@@ -219,6 +220,26 @@ def test_the_command_writes_json_page_and_figure(tmp_path, capsys):
     assert "bounce_dead" in text
     assert "](images/stability.png)" in text
     assert (tmp_path / "images" / "stability.png").stat().st_size > 10_000
+
+
+def test_cases_that_are_left_out_are_named_with_the_reason(capsys):
+    words = ["stability", "grazing", "hard_penalty", "bounce_dead", "--solvers", "rigid"]
+    words += ["--share", "0.02", "--no-refine", "--workers", "0", "--json", "-"]
+    assert _guarded(lambda: app(words, standalone_mode=False)) == 0
+    left = {entry["case"]: entry for entry in json.loads(capsys.readouterr().out)["left_out"]}
+    assert left["hard_penalty"]["reason"] == "computed by fem alone"
+    assert left["one_cell"]["reason"] == "not asked for"
+    assert len(left) == len(hard_cases()) - 2
+    assert "grazing" not in left
+    entries = left_out(["grazing", "hard_penalty", "bounce_dead"], ["fem", "rigid"])
+    rows = [ROW | {"case": case, "wall_time": 1.0} for case in ("grazing", "bounce_dead")]
+    found = Collection(rows, 1.0, entries)
+    show_stability(found)
+    shown = " ".join(capsys.readouterr().out.split())
+    assert "no solver asked for computes them: hard_penalty (computed by fem alone)" in shown
+    assert "Not computed by every solver: bounce_dead (not by fem)." in shown
+    assert f"Other cases, not asked for: {len(hard_cases()) - 3}." in shown
+    assert Collection([ROW]).about_left_out() == []
 
 
 def test_an_unknown_case_is_refused(capsys):

@@ -7,6 +7,7 @@ import os
 import numpy as np
 import pytest
 
+from scenarios import extremum_seeking as extremum_seeking_script
 from scenarios import two_way_seeking
 from scenarios.coupled import archive
 from scenarios.extremum_seeking import BOUND, LAST, STARTS, draw, rate_over, seek, sweep, top_of
@@ -65,6 +66,53 @@ def test_the_top_of_a_sweep_over_both_is_found():
     top, errors = two_way_seeking.top_of(np.array(rows))
     np.testing.assert_allclose(top, [2830.0, 1.88e6, 0.015], rtol=5e-3)
     assert np.all(errors < 0.01 * top)
+
+
+class Ended(dict):
+    """Signals of a seeker that has ended at 2823.4 N and 19.037 bar, at a rate [m/s]."""
+
+    error = ""
+
+    def __init__(self, rate, duration):
+        time = np.linspace(0.0, duration, 101)
+        super().__init__(
+            {
+                "time": time,
+                "hammer.blow_time": time,
+                "hammer.blow_position": rate * time,
+                "controller.seek.centre": np.full(101, 2823.4),
+                "controller.seek.pressure_centre": np.full(101, 1.9037e6),
+            }
+        )
+
+
+@pytest.mark.parametrize("module", [extremum_seeking_script, two_way_seeking])
+def test_rows_of_a_seeker_say_that_its_errors_are_not_known(module, monkeypatch, capsys):
+    one_way = module is extremum_seeking_script
+    hill = hill_of(2830.0)
+    if not one_way:
+        hill = np.array(
+            [
+                (f, p, 0.016 * np.exp(-3.0 * np.log(f / 2830.0) ** 2 - np.log(p / 1.9e6) ** 2))
+                for f in two_way_seeking.FEEDS
+                for p in two_way_seeking.PRESSURES
+            ]
+        )
+    monkeypatch.setattr(module, "archive", lambda *words: None)
+    monkeypatch.setattr(module, "sweep", lambda *words: hill)
+    monkeypatch.setattr(module, "seek", lambda *words: Ended(0.0155432, module.DURATION))
+    monkeypatch.setattr(module, "write_search", lambda *words: None)
+    module.main()
+    rows = [line for line in capsys.readouterr().out.splitlines() if line.startswith("from ")]
+    assert len(rows) == 3
+    for row in rows:
+        found = row.split(": ")[1]
+        assert found.startswith("≈2820 N, " if one_way else "≈2820 N, ≈19.0 bar, ")
+        assert "≈15.5 mm/s, ≈-2.9 %" in found
+
+
+def test_a_seeker_within_the_error_of_the_best_rate_is_not_said_to_be_worse():
+    assert extremum_seeking_script.reached(0.0162, 0.0164, 0.0005).startswith("≈16.2 mm/s, undecid")
 
 
 @long

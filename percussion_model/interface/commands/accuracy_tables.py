@@ -13,15 +13,14 @@ from rich.table import Table
 from percussion_model.interface.tables import print_table
 from percussion_model.simulation.uncertain import in_digits, with_error
 from percussion_model.verification.accuracy.advantage import (
-    MET,
-    MISSED,
-    PEER_MISSES,
+    UNDECIDED,
+    Bounds,
     Contest,
     contest,
     summary,
 )
 from percussion_model.verification.accuracy.ladders import FITS, LADDERS
-from percussion_model.verification.accuracy.orders import Cost
+from percussion_model.verification.accuracy.orders import AT_LEAST, AT_MOST, Cost
 from percussion_model.verification.accuracy.problems import (
     APERIODIC,
     CONTACT_HISTORY,
@@ -48,7 +47,10 @@ SHORT = {
     STRESS_HISTORY: "stress history",
 }
 
-
+ABOUT_BOUNDS = (
+    "≤ and ≥: a bound, of a method that meets the error with its coarsest setting, or misses it "
+    "with its finest."
+)
 # Families of methods of which the best is shown.
 FAMILIES = {
     "peer": "best of explicit\nand exact",
@@ -193,21 +195,30 @@ def _show_costs(found: Study, console: Console) -> None:
     for heading in (*(LADDERS[name].title.replace(", ", ",\n") for name in ladders),
                     *families.values()):  # fmt: skip
         table.add_column(heading, justify="right", no_wrap=True)
+    bounds = ""
     for wanted in WANTED:
-        cells = [_cost_text(found.cost(name, found.main, wanted)) for name in ladders]
-        for family in families:
-            best = found.best((family,), found.main, wanted)
+        costs = [found.cost(name, found.main, wanted) for name in ladders]
+        bests = [found.best((family,), found.main, wanted) for family in families]
+        if any(cost is not None and cost.is_bound for cost in (*costs, *bests)):
+            bounds = "≤: all settings meet the error, and coarser ones might cost less. "
+        cells = [_cost_text(cost) for cost in costs]
+        for best in bests:
             cells.append(
                 "-" if best is None else f"{_cost_text(best)}\n{LADDERS[best.ladder].title}"
             )
         table.add_row(f"{100 * wanted:g} %", *cells)
-    _print(f"ms to compute a simulated second at an error in {SHORT[found.main]}", table, console)
+    _print(f"ms to compute {found.timed} at an error in the {_compared(found)}", table, console)
     console.print(
         "Read off between the settings above, from where on the error is met for good, with the "
-        "range by the bar of the reference and the spread of the times. What to take is one of "
-        "the settings themselves:",
+        f"range by the bar of the reference and the spread of the times. {bounds}What to "
+        "take is one of the settings themselves:",
         highlight=False,
     )
+
+
+def _compared(found: Study) -> str:
+    """What the errors of a study are those of."""
+    return QUANTITIES[found.main].label
 
 
 def show_contests(studies: dict[str, Study]) -> None:
@@ -224,15 +235,20 @@ def show_contests(studies: dict[str, Study]) -> None:
                 escape(name) if k == 0 else "", f"{100 * one.wanted:g} %", *_contest_cells(one)
             )
         table.add_section()
-    _print("The same error in rate: ms to compute a simulated second", table, console, keys=2)
+    _print("The same error by waves and peers: ms to compute", table, console, keys=2)
+    for what in dict.fromkeys((_compared(one), one.timed) for one in studies.values()):
+        names = [name for name, one in studies.items() if (_compared(one), one.timed) == what]
+        text = f"{', '.join(names)}: error in the {what[0]}, ms to compute {what[1]}."
+        console.print(escape(text), highlight=False)
+    console.print(ABOUT_BOUNDS, highlight=False)
     for column in zip(*found, strict=True):
         told = summary(column)
         text = f"{100 * told.wanted:g} %: no scene is decided."
-        if isfinite(told.median):
+        if told.undecided < told.scenes:
             text = (
-                f"{100 * told.wanted:g} %: ratio {two(told.luckiest)} at the luckiest, "
-                f"{two(told.median)} at the median, {two(told.worst)} at the worst of "
-                f"{told.scenes - told.undecided} scenes; {told.undecided} undecided."
+                f"{100 * told.wanted:g} %: ratio {bounds_text(told.luckiest)} at the luckiest, "
+                f"{bounds_text(told.median)} at the median, {bounds_text(told.worst)} at the "
+                f"worst of {told.scenes - told.undecided} scenes; {told.undecided} undecided."
             )
         console.print(text, highlight=False)
 
@@ -242,18 +258,43 @@ def _contest_cells(one: Contest) -> tuple[str, str, str, str]:
     peer, name = "-", ""
     if one.peer is not None:
         peer, name = _cost_text(one.peer), LADDERS[one.peer.ladder].title
-    ratio = {
-        MET: f"{two(one.ratio)} ({two(one.low)}-{two(one.high)})",
-        PEER_MISSES: f"above {two(one.ratio)}",
-        MISSED: f"below {two(one.ratio)}",
-    }
-    return _cost_text(one.wave), peer, ratio.get(one.outcome, one.outcome), name
+    return _cost_text(one.wave), peer, ratio_text(one), name
+
+
+def ratio_text(one: Contest, strong: str = "") -> str:
+    """Ratio of a contest with its range, or its bound with what that is for sure.
+
+    Parameters
+    ----------
+    strong : str
+        What stands around the ratio.
+    """
+    if one.outcome == UNDECIDED:
+        return one.outcome
+    text = bounds_text(Bounds(one.least, one.most))
+    sure = bounds_text(Bounds(one.low, one.high), "-" if not strong else " to ")
+    shown = f"{strong}{text}{strong}"
+    # the bound of what misses the error has no range
+    return shown if sure == text else f"{shown} ({sure})"
+
+
+def bounds_text(ratio: Bounds, to: str = " to ") -> str:
+    """A ratio, its bound, or its two bounds."""
+    if not ratio.decided:
+        return UNDECIDED
+    if ratio.least == ratio.most:
+        return two(ratio.least)
+    if math.isinf(ratio.most):
+        return f"{AT_LEAST}{two(ratio.least)}"
+    if ratio.least == 0.0:
+        return f"{AT_MOST}{two(ratio.most)}"
+    return f"{two(ratio.least)}{to}{two(ratio.most)}"
 
 
 def _cost_text(cost: Cost) -> str:
     """Milliseconds with their range; what the reference cannot tell is undecided."""
     if isfinite(cost.value) and isfinite(cost.high):
-        return f"{two(1e3 * cost.value)} ({two(1e3 * cost.low)}-{two(1e3 * cost.high)})"
+        return f"{cost.sign}{two(1e3 * cost.value)} ({two(1e3 * cost.low)}-{two(1e3 * cost.high)})"
     return "undecided" if isfinite(cost.low) else "not met"
 
 

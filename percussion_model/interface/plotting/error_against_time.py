@@ -159,9 +159,7 @@ def _log_axes(ax: Axes) -> None:
 
 def _cost(found: Study, point: Point) -> float:
     """Time of a point; of a drop and of aperiodic motion that of the whole run [s]."""
-    if found.kind == APERIODIC:
-        return point.second * point.size
-    return point.second * (found.duration if found.kind == DROP else 1.0)
+    return found.seconds(point) * (found.duration if found.kind == DROP else 1.0)
 
 
 def _points(found: Study, name: str, key: str) -> list[tuple[float, float]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from statistics import median
 from typing import NamedTuple
 
 from percussion_model.verification.accuracy.orders import Cost
@@ -15,13 +16,15 @@ __all__ = [
     "MISSED",
     "PEER_MISSES",
     "UNDECIDED",
+    "Bounds",
     "Contest",
     "Summary",
     "contest",
     "summary",
 ]
 
-# How a contest ends: both meet the error; one of them does not; the reference cannot tell.
+# How a contest ends: both meet the error; one of them does not; the reference cannot tell, or
+# both meet it with their coarsest rungs.
 MET, PEER_MISSES, MISSED, UNDECIDED = "met", "no peer meets it", "waves miss it", "undecided"
 
 
@@ -41,8 +44,8 @@ class Contest:
     outcome : str
         `MET`, `PEER_MISSES`, `MISSED` or `UNDECIDED`.
     ratio, low, high : float
-        Time of the peer by that of the waves, and its range. Where one of the two misses
-        the error a bound, from the dearest rung that it was given.
+        Time of the peer by that of the waves, and its range. Where one of the two misses the
+        error, or meets it with its coarsest rung, a bound, from the dearest rung or from that.
     """
 
     title: str
@@ -53,6 +56,17 @@ class Contest:
     ratio: float
     low: float
     high: float
+
+    @property
+    def least(self) -> float:
+        """What the ratio is at least: 0 where it is bounded from above alone."""
+        bounded_above = self.outcome == MISSED or (self.peer is not None and self.peer.is_bound)
+        return 0.0 if bounded_above else self.ratio
+
+    @property
+    def most(self) -> float:
+        """What the ratio is at most: infinite where it is bounded from below alone."""
+        return math.inf if self.outcome == PEER_MISSES or self.wave.is_bound else self.ratio
 
 
 def contest(found: Study, wanted: float, key: str = "", waves: str = "wave") -> Contest:
@@ -79,8 +93,11 @@ def contest(found: Study, wanted: float, key: str = "", waves: str = "wave") -> 
         return ended(UNDECIDED, math.nan, math.nan, math.nan)
     wave_met = math.isfinite(wave.value)
     if peer is not None and wave_met:
+        if wave.is_bound and peer.is_bound:
+            return ended(UNDECIDED, math.nan, math.nan, math.nan)
         ratio = peer.value / wave.value
-        return ended(MET, ratio, peer.low / wave.high, peer.high / wave.low)
+        low = 0.0 if peer.is_bound else peer.low / wave.high
+        return ended(MET, ratio, low, math.inf if wave.is_bound else peer.high / wave.low)
     if wave_met:
         tried = [found.cost(name, key, wanted) for name in found.peers]
         if not tried or not all(cost.decided for cost in tried):
@@ -93,6 +110,21 @@ def contest(found: Study, wanted: float, key: str = "", waves: str = "wave") -> 
     return ended(UNDECIDED, math.nan, math.nan, math.nan)
 
 
+class Bounds(NamedTuple):
+    """What a ratio is at least and at most; both are the same where it is known."""
+
+    least: float
+    most: float
+
+    @property
+    def decided(self) -> bool:
+        """Whether anything is known of it."""
+        return self.least > 0.0 or self.most < math.inf
+
+
+UNKNOWN = Bounds(math.nan, math.nan)
+
+
 class Summary(NamedTuple):
     """Ratios over scenes: those of the luckiest, the median and the worst.
 
@@ -100,9 +132,9 @@ class Summary(NamedTuple):
     ----------
     wanted : float
     scenes, undecided : int
-        How many there are, and of how many the reference cannot tell.
-    luckiest, median, worst : float
-        Bounds count as what they bound; NaN where nothing is decided.
+        How many there are, and of how many there is no ratio, nor a bound.
+    luckiest, median, worst : Bounds
+        NaN where nothing is decided.
     where : tuple of str
         Titles of the luckiest and the worst scene.
     """
@@ -110,21 +142,28 @@ class Summary(NamedTuple):
     wanted: float
     scenes: int
     undecided: int
-    luckiest: float
-    median: float
-    worst: float
+    luckiest: Bounds
+    median: Bounds
+    worst: Bounds
     where: tuple[str, str]
 
 
 def summary(contests: Sequence[Contest]) -> Summary:
     """Sum up contests of one error."""
-    known = sorted(
-        ((one.ratio, one.title) for one in contests if one.outcome != UNDECIDED), reverse=True
-    )
+    known = [one for one in contests if one.outcome != UNDECIDED]
     wanted, undecided = contests[0].wanted, len(contests) - len(known)
     if not known:
-        return Summary(wanted, len(contests), undecided, math.nan, math.nan, math.nan, ("", ""))
-    ratios = [ratio for ratio, _ in known]
-    middle = 0.5 * (ratios[(len(ratios) - 1) // 2] + ratios[len(ratios) // 2])
-    where = known[0][1], known[-1][1]
-    return Summary(wanted, len(contests), undecided, ratios[0], middle, ratios[-1], where)
+        return Summary(wanted, len(contests), undecided, UNKNOWN, UNKNOWN, UNKNOWN, ("", ""))
+    # what is in a place of the order lies between those that are there if all ratios are as
+    # small, or as great, as their bounds allow
+    least, most = sorted(one.least for one in known), sorted(one.most for one in known)
+    ranked = sorted(known, key=lambda one: one.ratio)
+    return Summary(
+        wanted,
+        len(contests),
+        undecided,
+        Bounds(least[-1], most[-1]),
+        Bounds(median(least), median(most)),
+        Bounds(least[0], most[0]),
+        (ranked[-1].title, ranked[0].title),
+    )

@@ -10,12 +10,14 @@ import numpy as np
 
 from percussion_model.simulation.uncertain import with_short_error
 
-__all__ = ["Cost", "Order", "cost_at", "cost_range", "fitted_order"]
+__all__ = ["AT_LEAST", "AT_MOST", "Cost", "Order", "cost_at", "cost_range", "fitted_order"]
 
 # Fewer points make no order.
 LEAST_POINTS = 3
 # What is left of an error that the bar of the reference may make up whole.
 NOTHING = 1e-3
+# What stands before a bound.
+AT_LEAST, AT_MOST = "≥ ", "≤ "
 # A smaller error of an order is not shown.
 LEAST_SHOWN = 0.01
 
@@ -59,6 +61,9 @@ class Cost:
         not surely met.
     dearest : float
         Time of the dearest rung that was tried [s].
+    is_bound : bool
+        Whether every rung meets the error: a coarser one might cost less, so that value and
+        range are those of an upper bound.
     """
 
     ladder: str
@@ -66,6 +71,12 @@ class Cost:
     low: float
     high: float
     dearest: float
+    is_bound: bool = False
+
+    @property
+    def sign(self) -> str:
+        """What stands before the value: "≤ " where it is a bound."""
+        return AT_MOST if self.is_bound else ""
 
     @property
     def decided(self) -> bool:
@@ -111,7 +122,8 @@ def cost_at(costs: Sequence[float], errors: Sequence[float], wanted: float) -> f
     Returns
     -------
     float
-        NaN where no point meets it, or the dearest does not.
+        NaN where no point meets it, or the dearest does not; where all meet it that of the
+        cheapest, which is an upper bound.
     """
     pairs = sorted(
         (cost, error)
@@ -154,4 +166,5 @@ def cost_range(
         for shift in (0.0, -bar, bar)
     )
     dearest = max(costs, default=math.nan)
-    return Cost(ladder, value, low * (1.0 - spread), high * (1.0 + spread), dearest)
+    is_bound = math.isfinite(value) and not any(error > wanted for _, _, error in rungs)
+    return Cost(ladder, value, low * (1.0 - spread), high * (1.0 + spread), dearest, is_bound)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -28,6 +28,8 @@ MOST_RESIDUAL = 1e-6
 MOST_MOMENTUM = 1e-8
 MOST_TENSION = 1e-9
 
+# Why a case was left out that its solvers could compute.
+NOT_ASKED = "not asked for"
 # Why rates differ where a case says nothing else.
 RIGID_REASON = (
     "rigid bodies: no wave takes its time to the rock, none comes back, none stays in the bit"
@@ -46,10 +48,14 @@ class Collection:
         A row for each case and solver: `Measures` and `Refinement` as plain values.
     share : float
         Share of each case's duration that was run.
+    left_out : list of dict
+        Cases that were not run, or not by all solvers that were asked for: `case`, the
+        `solvers` that did not run it, and the `reason`.
     """
 
     rows: list[dict[str, Any]] = field(repr=False)
     share: float = 1.0
+    left_out: list[dict[str, Any]] = field(default_factory=list, repr=False)
 
     @property
     def is_refined(self) -> bool:
@@ -69,6 +75,29 @@ class Collection:
             "± of a rate is its standard error by the scatter of the blows alone; what finer "
             "cells change was not run (--refine)."
         )
+
+    def about_left_out(self) -> list[str]:
+        """Which cases were left out and why, a sentence each; empty where none was.
+
+        Those that nobody asked for are counted: they are all others.
+        """
+        run = {row["case"] for row in self.rows}
+        others, whole, partly = 0, [], []
+        for entry in self.left_out:
+            if entry["reason"] == NOT_ASKED:
+                others += 1
+            elif entry["case"] in run:
+                partly.append(f"{entry['case']} (not by {', '.join(entry['solvers'])})")
+            else:
+                whole.append(f"{entry['case']} ({entry['reason']})")
+        found = []
+        if whole:
+            found.append(f"Left out, since no solver asked for computes them: {', '.join(whole)}.")
+        if partly:
+            found.append(f"Not computed by every solver: {', '.join(partly)}.")
+        if others:
+            found.append(f"Other cases, {NOT_ASKED}: {others}.")
+        return found
 
     def failures(self) -> list[str]:
         """What does not hold, a line each; empty where all is well."""
@@ -105,6 +134,7 @@ class Collection:
             "cases": len({row["case"] for row in self.rows}),
             "runs": len(self.rows),
             "share": self.share,
+            "left_out": self.left_out,
             "failures": self.failures(),
             "disagreements": self.disagreements(),
             "rows": self.rows,
@@ -251,7 +281,19 @@ def run_collection(
         if progress is not None:
             progress(len(rows), len(jobs))
     rows.sort(key=lambda row: order[row["case"], row["solver"]])
-    return Collection(rows, share)
+    return Collection(rows, share, left_out(chosen, wanted))
+
+
+def left_out(chosen: Sequence[str], wanted: Sequence[str]) -> list[dict[str, Any]]:
+    """Entries of `Collection.left_out` for a choice of cases and solvers."""
+    found = []
+    for name, case in hard_cases().items():
+        missing = [one for one in wanted if name not in chosen or one not in case.solvers]
+        if missing:
+            alone = f"computed by {' and '.join(case.solvers)} alone"
+            reason = alone if name in chosen else NOT_ASKED
+            found.append({"case": name, "solvers": missing, "reason": reason})
+    return found
 
 
 def _row(name: str, solver: str, share: float, refined: bool) -> dict[str, Any]:

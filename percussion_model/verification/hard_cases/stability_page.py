@@ -58,6 +58,7 @@ def page(found: Collection, picture: str | None) -> str:
     """
     parts = [_INTRODUCTION.format(residual=MOST_RESIDUAL, momentum=MOST_MOMENTUM)]
     parts.append(_verdict(found))
+    parts += [f"{text}\n" for text in found.about_left_out()]
     if picture:
         parts.append(f"![Residual, events, momentum and speed of every case]({picture})\n")
     parts.append(_disagreements(found))
