@@ -105,7 +105,9 @@ def couple(
     wanted = [*known_signals(coupling.outputs), *(signals or ())]
     rows_every = max(step, duration / ROWS) if interval is None else interval
     with progress_bar(duration) as bar:
-        run = coupling.run(duration, step, wanted, rows_every, tolerance, bar, on_interrupt="keep")
+        run = coupling.run(
+            duration, step, wanted, rows_every, tolerance, bar, "keep", common.print_message
+        )
     found = summary(run)
     path = run.write_csv(folder / "signals.csv")
     common.write_json(json_file, found)
