@@ -64,7 +64,8 @@ def write_example(
 ) -> None:
     """Run an example; write its figure and what it found where nothing else is replaced."""
     try:
-        claim = Claim(out, {"command": f"examples.{name}", "quick": quick}, force, numbered)
+        origin = {"command": f"python -m examples.{name}", "quick": quick}
+        claim = Claim(out, origin, force, numbered)
     except ResultError as error:
         sys.exit(f"examples.{name}: {error}")
     if claim.moved:

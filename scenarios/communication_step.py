@@ -12,7 +12,6 @@ Three loops over the same eighth of a second, some three blows, with steps from 
 
 from __future__ import annotations
 
-import argparse
 import json
 import math
 import time
@@ -21,9 +20,12 @@ from pathlib import Path
 from typing import Any
 
 from percussion_model.interface.terminal import progress
+from percussion_model.simulation.files import staged_text
 from scenarios.drawing import save_png
-from scenarios.harness import FIGURES, Instance, built
+from scenarios.harness import Instance, fmu
+from scenarios.results import command_line
 
+NAME = "communication_step"
 # Powers of two add up without rounding, so that all loops end at the same time, to the bit.
 STEPS = tuple(2.0**-k for k in (17, 15, 13, 11, 9, 7, 6))  # 8e-6 to 1.6e-2 s
 DURATION = 0.125  # a whole number of each [s]
@@ -162,21 +164,16 @@ def draw(found: dict[str, list[dict[str, Any]]], path: Path) -> Path:
     return save_png(figure, path, 120)
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
+def main(paths: Sequence[Path], folder: Path) -> list[Path]:
     """Print the table, draw the figure, write JSON beside it."""
-    parser = argparse.ArgumentParser(description=str(__doc__).splitlines()[0])
-    parser.add_argument("--fmu", type=Path, help="an FMU; that of dist if left out")
-    parser.add_argument("--out", type=Path, default=FIGURES, help="folder")
-    chosen = parser.parse_args(arguments)
-    fmu = chosen.fmu or built()
     with progress("one run with every step"):
-        found = study(fmu, say=lambda text: print(text, flush=True))
+        found = study(*paths, say=lambda text: print(text, flush=True))
     print(table(found))
-    figure = draw(found, chosen.out / "communication_step.png")
+    figure = draw(found, folder / f"{NAME}.png")
     text = json.dumps(found, indent=1).replace("NaN", "null")
-    figure.with_suffix(".json").write_text(text + "\n", encoding="utf-8")
-    print(figure)
+    staged_text(figure.with_suffix(".json"), text + "\n")
+    return [figure, figure.with_suffix(".json")]
 
 
 if __name__ == "__main__":
-    main()
+    command_line(NAME, __doc__, [fmu("HAMMER.fmu")], main)

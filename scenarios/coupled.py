@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import re
 import sys
 from collections.abc import Callable, Mapping, Sequence
@@ -12,13 +13,14 @@ import numpy as np
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from percussion_model.coupling import CoupledRun, Coupling
+from percussion_model.coupling import CoupledRun, Coupling, CouplingError
 from percussion_model.interface.messages import wrapped
 from percussion_model.interface.tables import print_table
 from percussion_model.interface.terminal import progress, progress_bar
+from percussion_model.simulation.files import staged_text
 from percussion_model.simulation.uncertain import in_digits
 from scenarios.drawing import save_png, stacked
-from scenarios.harness import FIGURES, ROOT
+from scenarios.results import command_line, system, tell
 
 STEP = 2e-3  # the longest at which the shoulder is as stiff as it is [s]
 INTERVAL = 4e-3  # of the rows that are kept [s]
@@ -40,21 +42,21 @@ Panel = tuple[str, float, str]
 Quantity = tuple[str, float, str]
 
 
-def archive(name: str = "FeedControlRigid", words: Sequence[str] = ()) -> Path:
-    """The archive that the words of a command line name, or one of `dist`."""
-    return Path(words[0]) if words else ROOT / "dist" / f"{name}.ssp"
-
-
 def run(
-    system: Path, duration: float, values: Mapping[str, float | bool] | None = None
+    archive: Path, duration: float, values: Mapping[str, float | bool] | None = None
 ) -> CoupledRun:
     """Run the feed-controlled system, its usual signals kept; an early end is an error."""
     with progress_bar(duration) as bar:
-        found = Coupling(system, {**ONE_ROCK, **(values or {})}).run(
-            duration, STEP, SIGNALS, INTERVAL, progress=bar
+        found = Coupling(archive, {**ONE_ROCK, **(values or {})}).run(
+            duration, STEP, SIGNALS, INTERVAL, progress=bar, tell=tell
         )
+    return whole(found)
+
+
+def whole(found: CoupledRun) -> CoupledRun:
+    """A run that did not end early; else its error."""
     if found.error:
-        raise RuntimeError(found.error)
+        raise CouplingError(found.error)
     return found
 
 
@@ -115,8 +117,8 @@ def draw_runs(
     return save_png(figure, path)
 
 
-def save_runs(runs: Mapping[str, CoupledRun], name: str, folder: Path = FIGURES) -> list[Path]:
-    """Write the signals of each run as `NAME_RUN.csv` into the folder of the figures."""
+def save_runs(runs: Mapping[str, CoupledRun], name: str, folder: Path) -> list[Path]:
+    """Write the signals of each run as `NAME_RUN.csv` into a folder."""
     return [
         one.write_csv(folder / f"{name}_{re.sub('[^a-z0-9]+', '_', label.lower())}.csv")
         for label, one in runs.items()
@@ -125,9 +127,10 @@ def save_runs(runs: Mapping[str, CoupledRun], name: str, folder: Path = FIGURES)
 
 def save_table(columns: Mapping[str, np.ndarray], path: Path) -> Path:
     """Write columns as CSV."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    np.savetxt(path, np.column_stack(list(columns.values())), delimiter=",",
+    text = io.StringIO()
+    np.savetxt(text, np.column_stack(list(columns.values())), delimiter=",",
                header=",".join(columns), comments="")  # fmt: skip
+    staged_text(path, text.getvalue())
     return path
 
 
@@ -138,7 +141,7 @@ def write(
     draw: Callable[[dict[str, CoupledRun], Path], Path],
     shown: Mapping[str, Quantity],
 ) -> None:
-    """Run a scenario on the archive of the command line: write figure and data, print numbers.
+    """Run a scenario of the feed-controlled system: write figure and data, print numbers.
 
     Parameters
     ----------
@@ -149,12 +152,15 @@ def write(
     shown : mapping
         What a number is called, by its name: words, factor and unit.
     """
-    runs = simulate(archive(words=sys.argv[1:]))
-    print_numbers({case: numbers(found) for case, found in runs.items()}, shown)
-    with progress("drawing"):
-        paths = [draw(runs, FIGURES / f"{name}.png"), *save_runs(runs, name)]
-    for path in paths:
-        print(path)
+
+    def work(paths: Sequence[Path], folder: Path) -> list[Path]:
+        runs = simulate(*paths)
+        print_numbers({case: numbers(found) for case, found in runs.items()}, shown)
+        with progress("drawing"):
+            return [draw(runs, folder / f"{name}.png"), *save_runs(runs, name, folder)]
+
+    about = sys.modules[simulate.__module__].__doc__
+    command_line(name, about, [system("FeedControlRigid")], work)
 
 
 def print_numbers(found: Mapping[str, Mapping[str, float]], shown: Mapping[str, Quantity]) -> None:

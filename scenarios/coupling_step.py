@@ -9,7 +9,6 @@ the shoulder.
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,9 +20,11 @@ from percussion_model.coupling.coupled_run import known_signals, summary
 from percussion_model.interface.terminal import progress
 from percussion_model.simulation.uncertain import change_text, with_error
 from percussion_model.verification.accuracy.orders import Order, fitted_order
+from scenarios.coupled import whole
 from scenarios.drawing import save_png
-from scenarios.harness import FIGURES, ROOT
+from scenarios.results import command_line, system, tell
 
+NAME = "coupling_step"
 ONE_BLOW, EIGHT_BLOWS = 0.04, 0.4  # [s]
 STEPS = (1e-5, 2e-5, 5e-5, 1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2)  # [s]
 ORDERS = ("jacobi", "gauss-seidel")
@@ -61,21 +62,18 @@ class EightBlows:
     shoulder: float
 
 
-def one_blow(system: Path, order: str, step: float) -> OneBlow:
+def one_blow(archive: Path, order: str, step: float) -> OneBlow:
     """Run the system to just before the second blow."""
-    run = Coupling(system, order=order).run(ONE_BLOW, step, list(QUANTITIES), interval=ONE_BLOW)
-    if run.error:
-        raise RuntimeError(run.error)
+    coupling = Coupling(archive, order=order)
+    run = whole(coupling.run(ONE_BLOW, step, list(QUANTITIES), interval=ONE_BLOW, tell=tell))
     return OneBlow(order, step, {name: float(run[name][-1]) for name in QUANTITIES})
 
 
-def eight_blows(system: Path, order: str, step: float) -> EightBlows:
+def eight_blows(archive: Path, order: str, step: float) -> EightBlows:
     """Run the system for eight blows."""
-    coupling = Coupling(system, order=order)
+    coupling = Coupling(archive, order=order)
     signals = [*known_signals(coupling.outputs), "hammer.blow_position", "hammer.blow_time"]
-    run = coupling.run(EIGHT_BLOWS, step, signals, interval=max(step, 1e-2))
-    if run.error:
-        raise RuntimeError(run.error)
+    run = whole(coupling.run(EIGHT_BLOWS, step, signals, interval=max(step, 1e-2), tell=tell))
     rate = float(run["hammer.blow_position"][-1] / run["hammer.blow_time"][-1])
     feed = float(run["string.bit_impulse"][-1]) / EIGHT_BLOWS
     return EightBlows(order, step, rate, feed, summary(run)["shoulder_by_blows"])
@@ -182,8 +180,9 @@ def draw(ones: Sequence[OneBlow], exact: OneBlow, eights: Sequence[EightBlows], 
     return save_png(figure, path)
 
 
-def main(archive: Path) -> None:
+def main(paths: Sequence[Path], folder: Path) -> list[Path]:
     """Run everything, print the tables, draw the figure."""
+    (archive,) = paths
     with progress("one blow with every step"):
         exact = one_blow(archive, "jacobi", REFERENCE)
         ones = [one_blow(archive, order, step) for order in ORDERS for step in STEPS]
@@ -194,8 +193,8 @@ def main(archive: Path) -> None:
         eights = [eight_blows(archive, order, step) for order in ORDERS for step in STEPS]
     print("Eight blows")
     print(table_of_eight(eights))
-    print(draw(ones, exact, eights, FIGURES / "coupling_step.png"))
+    return [draw(ones, exact, eights, folder / f"{NAME}.png")]
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]) if sys.argv[1:] else ROOT / "dist" / "FeedControlRigid.ssp")
+    command_line(NAME, __doc__, [system("FeedControlRigid")], main)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import cycle
@@ -19,9 +18,9 @@ from percussion_model.simulation.uncertain import (
     in_digits,
     with_error,
 )
-from scenarios.coupled import archive, save_runs, save_table
+from scenarios.coupled import save_runs, save_table, whole
 from scenarios.drawing import save_png
-from scenarios.harness import FIGURES
+from scenarios.results import command_line, system, tell
 
 NAME = "extremum_seeking"
 STEP = 2e-3  # the longest at which the shoulder is as stiff as it is [s]
@@ -69,15 +68,13 @@ def values(feed: float) -> dict[str, float]:
 
 def rate_over(run: CoupledRun, since: float) -> float:
     """Rate of penetration over whole blows after a time [m/s]."""
-    if run.error:
-        raise RuntimeError(run.error)
-    late = run["time"] >= since
+    late = whole(run)["time"] >= since
     places, times = run["hammer.blow_position"][late], run["hammer.blow_time"][late]
     return float((places[-1] - places[0]) / (times[-1] - times[0]))
 
 
 def sweep(
-    system: Path,
+    archive: Path,
     feeds: Sequence[float] = SWEEP,
     held: float = HELD,
     settings: Mapping[str, float | bool] | None = None,
@@ -92,7 +89,7 @@ def sweep(
     rows = []
     for feed in feeds:
         chosen = {**values(feed), "controller.seek.on": False, **(settings or {})}
-        run = Coupling(system, chosen).run(held, STEP, SIGNALS, INTERVAL)
+        run = Coupling(archive, chosen).run(held, STEP, SIGNALS, INTERVAL, tell=tell)
         mean = float(np.mean(run["string.feed_force_mean"][run["time"] >= SETTLING]))
         rows.append((mean, rate_over(run, SETTLING)))
     return np.array(rows)
@@ -128,14 +125,14 @@ def _fitted(hill: np.ndarray) -> tuple[float, float]:
 
 
 def seek(
-    system: Path,
+    archive: Path,
     start: float,
     duration: float = DURATION,
     settings: Mapping[str, float | bool] | None = None,
 ) -> CoupledRun:
     """One run of the seeker from a feed [N]."""
     chosen = {**values(start), **(settings or {})}
-    return Coupling(system, chosen).run(duration, STEP, SIGNALS, INTERVAL)
+    return Coupling(archive, chosen).run(duration, STEP, SIGNALS, INTERVAL, tell=tell)
 
 
 def draw(hill: np.ndarray, runs: Sequence[CoupledRun], path: Path) -> Path:
@@ -172,12 +169,11 @@ def draw(hill: np.ndarray, runs: Sequence[CoupledRun], path: Path) -> Path:
     return save_png(figure, path)
 
 
-def main() -> None:
+def main(paths: Sequence[Path], folder: Path) -> list[Path]:
     """Write figure and data, and print where the top is and where the seeker ends."""
-    system = archive("ExtremumSeekingRigid", sys.argv[1:])
     with progress("sweeping held feeds, then seeking"):
-        hill = sweep(system)
-        runs = {f"from {start:.0f} N": seek(system, start) for start in STARTS}
+        hill = sweep(*paths)
+        runs = {f"from {start:.0f} N": seek(*paths, start) for start in STARTS}
     top = top_of(hill)
     print(f"best feed {with_error(top.feed, top.feed_error)} N, "
           f"rate {with_error(1e3 * top.rate, 1e3 * top.rate_error)} mm/s")  # fmt: skip
@@ -186,7 +182,8 @@ def main() -> None:
         rate = rate_over(run, DURATION - LAST)
         print(f"{name}: {about(run['controller.seek.centre'][-1])} N, "
               f"{reached(rate, top.rate, top.rate_error)}")  # fmt: skip
-    write_search(NAME, draw, hill, ("feed_force", "rate_of_penetration"), runs)
+    columns = ("feed_force", "rate_of_penetration")
+    return write_search(NAME, folder, draw, hill, columns, runs)
 
 
 def about(value: float) -> str:
@@ -203,17 +200,19 @@ def reached(rate: float, best: float, error: float) -> str:
 
 def write_search(
     name: str,
+    folder: Path,
     draw: Callable[[np.ndarray, list[CoupledRun], Path], Path],
     hill: np.ndarray,
     columns: Sequence[str],
     runs: Mapping[str, CoupledRun],
-) -> None:
-    """Write figure, sweep and runs of a search, and say where they are.
+) -> list[Path]:
+    """Write figure, sweep and runs of a search; return their files.
 
     Parameters
     ----------
     name : str
         Of the files.
+    folder : Path
     draw : callable
         Draws hill and runs into a file.
     hill : ndarray, shape (points, columns)
@@ -223,10 +222,12 @@ def write_search(
         Runs by what the names of their files end with.
     """
     table = dict(zip(columns, hill.T, strict=True))
-    print(draw(hill, list(runs.values()), FIGURES / f"{name}.png"))
-    for path in (save_table(table, FIGURES / f"{name}_sweep.csv"), *save_runs(runs, name)):
-        print(path)
+    return [
+        draw(hill, list(runs.values()), folder / f"{name}.png"),
+        save_table(table, folder / f"{name}_sweep.csv"),
+        *save_runs(runs, name, folder),
+    ]
 
 
 if __name__ == "__main__":
-    main()
+    command_line(NAME, __doc__, [system("ExtremumSeekingRigid")], main)

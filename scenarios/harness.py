@@ -2,30 +2,34 @@
 
 from __future__ import annotations
 
-import argparse
 import csv
 import difflib
 import shutil
+import sys
 import tempfile
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from fmpy import extract, read_model_description
+from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import (
     FMU2Slave,
     fmi2CallbackFunctions,
     fmi2CallbackLoggerTYPE,
 )
 
+from percussion_model.coupling.component import COMPILING, WARNING
 from percussion_model.interface.terminal import progress
+from scenarios import results
 from scenarios.drawing import save_png, stacked
+from scenarios.results import Archive, ScenarioError
 
 # A constant, or a function of time.
 Signal = float | bool | Callable[[float], float | bool]
 ROOT = Path(__file__).resolve().parents[1]
-FIGURES = ROOT / "out" / "scenarios"
 
 
 class Instance:
@@ -44,6 +48,8 @@ class Instance:
         [s]
     messages : list of str
         What came through the logger.
+    faults : list of str
+        Those of them that are errors: the first one tells the reason.
     """
 
     def __init__(self, fmu: str | Path, name: str = "instance") -> None:
@@ -53,9 +59,12 @@ class Instance:
             self._own = tempfile.mkdtemp(prefix="fmu-")
             self.folder = Path(extract(str(fmu), self._own))
         self.description = read_model_description(str(self.folder))
+        if self.description.coSimulation is None:
+            raise ScenarioError(f"{fmu}: is no FMU for co-simulation")
         self.variables = {one.name: one for one in self.description.modelVariables}
         self.time = 0.0
         self.messages: list[str] = []
+        self.faults: list[str] = []
         self._logger = fmi2CallbackLoggerTYPE(self._note)
         callbacks = fmi2CallbackFunctions()
         callbacks.logger = self._logger
@@ -72,6 +81,8 @@ class Instance:
         self, environment: Any, name: bytes, status: int, category: bytes, text: bytes
     ) -> None:
         self.messages.append(text.decode("utf-8", "replace"))
+        if status > WARNING:
+            self.faults.append(self.messages[-1])
 
     def start(self, time: float = 0.0, **values: Any) -> Instance:
         """Set values by name (`__` for a dot, as in bit__force), then initialise."""
@@ -79,17 +90,16 @@ class Instance:
         self.time = time
         self.slave.setupExperiment(startTime=time)
         self.slave.enterInitializationMode()
+        for text in self.messages:
+            if COMPILING in text:
+                results.tell(text)
         self.slave.exitInitializationMode()
         return self
 
     def set(self, values: Mapping[str, Any]) -> None:
         """Set parameters or inputs; enumerations by number or by word."""
         for name, value in values.items():
-            if name not in self.variables:
-                near = difflib.get_close_matches(name, self.variables, 1)
-                hint = f"; did you mean {near[0]}?" if near else ""
-                raise ValueError(f"the FMU has no variable {name}{hint}")
-            one = self.variables[name]
+            one = self.find(name)
             if one.type == "Real":
                 self.slave.setReal([one.valueReference], [float(value)])
             elif one.type == "Boolean":
@@ -100,9 +110,17 @@ class Instance:
                     value = items[value]
                 self.slave.setInteger([one.valueReference], [int(value)])
 
+    def find(self, name: str) -> Any:
+        """A variable by name; the error suggests another one."""
+        if name not in self.variables:
+            near = difflib.get_close_matches(name, self.variables, 1)
+            hint = f"; did you mean {near[0]}?" if near else ""
+            raise ScenarioError(f"the FMU has no variable {name}{hint}")
+        return self.variables[name]
+
     def get(self, name: str) -> Any:
         """Present value of a variable."""
-        one = self.variables[name]
+        one = self.find(name)
         read = {"Real": self.slave.getReal, "Boolean": self.slave.getBoolean}
         value = read.get(one.type, self.slave.getInteger)([one.valueReference])[0]
         return bool(value) if one.type == "Boolean" else value
@@ -150,8 +168,10 @@ class Instance:
     def __enter__(self) -> Instance:
         return self
 
-    def __exit__(self, *error: object) -> None:
+    def __exit__(self, kind: object, error: object, trace: object) -> None:
         self.free()
+        if isinstance(error, FMICallException):  # the log has the reason
+            raise ScenarioError(self.faults[0] if self.faults else str(error)) from error
 
 
 def run(
@@ -235,6 +255,9 @@ def plot(
     Path
         The PNG file.
     """
+    missing = {name for _, _, *names in panels for name in names} - found.keys()
+    if missing:
+        raise ScenarioError(f"the FMU has no output {min(missing)}")
     labels = [label for label, *_ in panels]
     figure, axes = stacked(title, labels, (8.0, 1.0 + 1.8 * len(panels)))
     for ax, (_, factor, *names) in zip(axes, panels, strict=True):
@@ -250,22 +273,27 @@ def command_line(
     name: str,
     simulate: Callable[..., dict[str, np.ndarray]],
     draw: Callable[[dict[str, np.ndarray], Path], Path],
-    *fmus: str,
+    *drives: Archive,
 ) -> None:
-    """Run a scenario by `python -m scenarios.NAME`, and say what was written or replaced."""
-    parser = argparse.ArgumentParser(prog=f"python -m scenarios.{name}")
-    parser.add_argument("--out", type=Path, default=FIGURES, metavar="DIR", help="of the figure")
-    path = parser.parse_args().out / f"{name}.png"
-    word = "replaced" if path.exists() else "wrote"
-    paths = list(map(built, fmus or ("PercussiveHammer",)))
-    with progress(f"running {name}"):
-        draw(simulate(*paths), path)
-    print(f"{word} {path}")
+    """Run a scenario of the hammer by `python -m scenarios.NAME`; see `results.command_line`."""
+
+    def work(paths: Sequence[Path], folder: Path) -> list[Path]:
+        with progress(f"running {name}"):
+            return [draw(simulate(*paths), folder / f"{name}.png")]
+
+    about = sys.modules[simulate.__module__].__doc__
+    results.command_line(name, about, (fmu("HAMMER.fmu"), *drives), work)
+
+
+def fmu(metavar: str, name: str = "PercussiveHammer") -> Archive:
+    """An FMU; that of `dist`, built if it is not there, where none is named."""
+    path = results.DIST / f"{name}.fmu"
+    return Archive(metavar, path, "modelDescription.xml", partial(built, name))
 
 
 def built(name: str = "PercussiveHammer") -> Path:
     """An FMU of `dist`, built now if it is not there."""
-    path = ROOT / "dist" / f"{name}.fmu"
+    path = results.DIST / f"{name}.fmu"
     if not path.exists():
         from fmu_src.__main__ import main
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from scenarios.harness import Instance, command_line, plot, run
+from scenarios.harness import Instance, command_line, fmu, plot, run
 
 DURATION, STEP = 0.6, 1e-4  # [s]
 CHAMBERS = ("upper.pressure", "lower.pressure", "piston_force", "air_used")
@@ -53,4 +53,4 @@ def draw(found: dict[str, np.ndarray], path: Path) -> Path:
 
 
 if __name__ == "__main__":
-    command_line("pneumatic_drive", simulate, draw, "PercussiveHammer", "PneumaticDrive")
+    command_line("pneumatic_drive", simulate, draw, fmu("DRIVE.fmu", "PneumaticDrive"))

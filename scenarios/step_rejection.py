@@ -7,7 +7,6 @@ between the parts ask for it. Compared by error and by processor time.
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -16,10 +15,13 @@ from typing import Any
 
 from percussion_model.coupling import CoupledRun, Coupling
 from percussion_model.interface.terminal import progress
+from percussion_model.simulation.files import staged_text
 from percussion_model.simulation.uncertain import change_text
+from scenarios.coupled import whole
 from scenarios.coupling_step import ONE_BLOW, error_of_limit
-from scenarios.harness import ROOT
+from scenarios.results import command_line, system, tell
 
+NAME = "step_rejection"
 SHOULDERS: Mapping[str, Mapping[str, Any]] = {
     "usual": {},
     # the damper too: by critical damping of the bit on the shoulder
@@ -53,18 +55,17 @@ class Try:
         return f"tolerance {self.tolerance:g}"
 
 
-def attempt(system: Path, shoulder: str, step: float, tolerance: float | None = None) -> Try:
+def attempt(archive: Path, shoulder: str, step: float, tolerance: float | None = None) -> Try:
     """Run one blow; the cost is processor time after the start [s]."""
-    coupling = Coupling(system, SHOULDERS[shoulder])
+    coupling = Coupling(archive, SHOULDERS[shoulder])
     began: list[float] = []
 
     def note(at: float) -> None:
         began.append(time.process_time())
 
     # rows of the longest step, so that the first one tells when the start was over
-    run = coupling.run(ONE_BLOW, step, list(QUANTITIES), max(step, LONGEST), tolerance, note)
-    if run.error:
-        raise RuntimeError(run.error)
+    rows = max(step, LONGEST)
+    run = whole(coupling.run(ONE_BLOW, step, list(QUANTITIES), rows, tolerance, note, tell=tell))
     share = len(began) / max(len(began) - 1, 1)
     return Try(shoulder, tolerance, run, share * (began[-1] - began[0]))
 
@@ -104,22 +105,29 @@ def _error_of_limit(tries: Sequence[Try], exact: Mapping[str, CoupledRun], name:
 
 
 def measure(
-    system: Path,
+    archive: Path,
     fixed: Sequence[float] = FIXED,
     tolerances: Sequence[float] = TOLERANCES,
     reference: float = REFERENCE,
 ) -> tuple[dict[str, CoupledRun], list[Try]]:
     """All ways with all shoulders, and the reference of each shoulder."""
-    exact = {name: attempt(system, name, reference).run for name in SHOULDERS}
+    exact = {name: attempt(archive, name, reference).run for name in SHOULDERS}
     tries = []
     for name in SHOULDERS:
-        tries += [attempt(system, name, step) for step in fixed]
-        tries += [attempt(system, name, LONGEST, tolerance) for tolerance in tolerances]
+        tries += [attempt(archive, name, step) for step in fixed]
+        tries += [attempt(archive, name, LONGEST, tolerance) for tolerance in tolerances]
     return exact, tries
 
 
-if __name__ == "__main__":
-    archive = Path(sys.argv[1]) if sys.argv[1:] else ROOT / "dist" / "FeedControlRigid.ssp"
+def main(paths: Sequence[Path], folder: Path) -> list[Path]:
+    """Run the blow in every way, print the table and keep it."""
     with progress("one blow in every way"):
-        found = measure(archive)
-    print(table(*found))
+        found = measure(*paths)
+    text = table(*found)
+    print(text)
+    staged_text(folder / f"{NAME}.md", text + "\n")
+    return [folder / f"{NAME}.md"]
+
+
+if __name__ == "__main__":
+    command_line(NAME, __doc__, [system("FeedControlRigid")], main)

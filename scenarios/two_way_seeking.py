@@ -6,7 +6,6 @@ from the other by its frequency. The top is known from an open-loop sweep over b
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 from itertools import product
 from pathlib import Path
@@ -16,7 +15,6 @@ import numpy as np
 from percussion_model.coupling import CoupledRun, Coupling
 from percussion_model.interface.terminal import progress
 from percussion_model.simulation.uncertain import with_error
-from scenarios.coupled import archive
 from scenarios.drawing import save_png
 from scenarios.extremum_seeking import (
     ABOUT_STEP,
@@ -30,6 +28,7 @@ from scenarios.extremum_seeking import (
     reached,
     write_search,
 )
+from scenarios.results import command_line, system, tell
 
 NAME = "two_way_seeking"
 DURATION = 45.0  # [s]
@@ -54,7 +53,7 @@ def values(feed: float, pressure: float) -> dict[str, float]:
 
 
 def sweep(
-    system: Path, feeds: Sequence[float] = FEEDS, pressures: Sequence[float] = PRESSURES
+    archive: Path, feeds: Sequence[float] = FEEDS, pressures: Sequence[float] = PRESSURES
 ) -> np.ndarray:
     """Rates at constant feeds and pressures.
 
@@ -66,15 +65,15 @@ def sweep(
     rows = []
     for feed, pressure in product(feeds, pressures):
         chosen = {**values(feed, pressure), "controller.seek.on": False}
-        run = Coupling(system, chosen).run(HELD, STEP, SIGNALS, INTERVAL)
+        run = Coupling(archive, chosen).run(HELD, STEP, SIGNALS, INTERVAL, tell=tell)
         rows.append((feed, pressure, rate_over(run, SETTLING)))
     return np.array(rows)
 
 
-def seek(system: Path, start: tuple[float, float], duration: float = DURATION) -> CoupledRun:
+def seek(archive: Path, start: tuple[float, float], duration: float = DURATION) -> CoupledRun:
     """One run of the seeker from a feed [N] and a pressure [Pa]."""
     signals = [*SIGNALS, "controller.seek.pressure_centre", "controller.seek.pressure_gradient"]
-    return Coupling(system, values(*start)).run(duration, STEP, signals, INTERVAL)
+    return Coupling(archive, values(*start)).run(duration, STEP, signals, INTERVAL, tell=tell)
 
 
 def surface(hill: np.ndarray, feeds: np.ndarray, pressures: np.ndarray) -> np.ndarray:
@@ -174,13 +173,13 @@ def draw(hill: np.ndarray, runs: Sequence[CoupledRun], path: Path) -> Path:
     return save_png(figure, path)
 
 
-def main() -> None:
+def main(paths: Sequence[Path], folder: Path) -> list[Path]:
     """Write figure and data, and print where the top is and where the seeker ends."""
-    system = archive("TwoWaySeekingRigid", sys.argv[1:])
+    (archive,) = paths
     with progress("sweeping held feeds and pressures, then seeking"):
-        hill = sweep(system)
+        hill = sweep(archive)
         runs = {
-            f"from {feed:.0f} N {1e-5 * p:.0f} bar": seek(system, (feed, p)) for feed, p in STARTS
+            f"from {feed:.0f} N {1e-5 * p:.0f} bar": seek(archive, (feed, p)) for feed, p in STARTS
         }
     top, errors = top_of(hill)
     print(f"best feed {with_error(top[0], errors[0])} N, "
@@ -193,8 +192,9 @@ def main() -> None:
         print(f"{name}: {about(run['controller.seek.centre'][-1])} N, "
               f"{about(1e-5 * run['controller.seek.pressure_centre'][-1])} bar, "
               f"{reached(rate, top[2], errors[2])}")  # fmt: skip
-    write_search(NAME, draw, hill, ("feed_force", "supply_pressure", "rate_of_penetration"), runs)
+    columns = ("feed_force", "supply_pressure", "rate_of_penetration")
+    return write_search(NAME, folder, draw, hill, columns, runs)
 
 
 if __name__ == "__main__":
-    main()
+    command_line(NAME, __doc__, [system("TwoWaySeekingRigid")], main)

@@ -5,6 +5,11 @@ from __future__ import annotations
 import io
 import json
 import math
+import os
+import signal
+import subprocess
+import sys
+import time
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -24,7 +29,7 @@ from percussion_model.analysis.blow_maps import (
     refused_run,
 )
 from percussion_model.analysis.effect_study import study_effects
-from percussion_model.interface.cli import _guarded, app
+from percussion_model.interface.cli import INTERRUPTED, _guarded, app
 from percussion_model.solvers.blow_map import builder
 from percussion_model.solvers.blow_map.builder import build_table, get_table
 from percussion_model.solvers.blow_map.records import Axis
@@ -91,6 +96,55 @@ def test_an_interrupted_build_goes_on_where_it_was(cache):
     get_table(scene, lambda done, total: seen.append((done, total)))
     total = seen[0][1]
     assert [done for done, _ in seen] == [0, 1, *range(1, total + 1)]
+
+
+def test_an_interrupted_command_says_what_is_kept(cache, tmp_path, monkeypatch, capsys):
+    path = tmp_path / "scene.toml"
+    mapped(**TINY).to_toml(path)
+    make, made = builder.make_slab, []
+
+    def stop(*task):
+        if made:
+            raise KeyboardInterrupt
+        made.append(task)
+        return make(*task)
+
+    monkeypatch.setattr(builder, "make_slab", stop)
+    words = ["blow-map", str(path), "--workers", "1"]
+    assert _guarded(lambda: app(words, standalone_mode=False)) == INTERRUPTED
+    told = " ".join(capsys.readouterr().err.split())
+    assert told.endswith("interrupted; 1 part of the blow map is kept, the same command continues")
+    drafts = map_file(mapped(**TINY)).with_suffix(".part")
+    assert [one.name for one in drafts.iterdir()] == ["0.npy"]
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows sends no SIGINT to a child")
+def test_ctrl_c_does_not_wait_for_what_workers_have_begun(tmp_path):
+    """Each part of this table takes a minute or more."""
+    path = tmp_path / "scene.toml"
+    mapped(solver__cells=200, blow_map__density=3.0).to_toml(path)
+    code = "from percussion_model.interface.cli import main; main()"
+    child = subprocess.Popen(
+        [sys.executable, "-c", code, "blow-map", str(path), "--workers", "2"],
+        stderr=subprocess.PIPE, text=True, start_new_session=True,
+        env={**os.environ, "PERCUSSION_CACHE": str(tmp_path / "cache")},
+        # a shell may have started the tests with the signal ignored
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )  # fmt: skip
+    try:
+        while "parts of the blow map" not in (line := child.stderr.readline()):
+            assert line, "it ended by itself"
+        began = time.monotonic()
+        child.send_signal(signal.SIGINT)
+        _, told = child.communicate(timeout=30)
+    finally:
+        if child.poll() is None:
+            os.killpg(child.pid, signal.SIGKILL)
+    assert child.returncode == INTERRUPTED
+    assert time.monotonic() - began < 5.0, "a second or two on a machine with nothing else to do"
+    assert told.splitlines()[-1] == "percussion: interrupted before there was a result"
+    assert "Traceback" not in told
+    assert [one for one in (tmp_path / "cache").rglob("*") if one.is_file()] == []
 
 
 def test_builders_side_by_side_do_no_harm(cache):

@@ -207,6 +207,20 @@ def test_forcing_removes_nothing_outside_of_the_folder(tmp_path):
     assert sorted(path.name for path in tmp_path.rglob("*")) == ["kept", ORIGIN, "x"]
 
 
+def test_what_another_command_left_is_named_as_it_is_typed(tmp_path):
+    """Of examples earlier versions kept the name alone."""
+    typed = {
+        "run": "percussion run",
+        "python -m scenarios.rod_addition": "python -m scenarios.rod_addition",
+        "examples.rate_map": "python -m examples.rate_map",
+    }
+    for command, words in typed.items():
+        Claim(tmp_path, {"command": command}, force=True).sign()
+        with pytest.raises(ResultError, match=f"holds the result of `{words}`"):
+            Claim(tmp_path, {"command": "couple"})
+    assert Claim(tmp_path, {"command": "python -m examples.rate_map"}).folder == tmp_path
+
+
 @pytest.mark.parametrize("text", ["[]", '{"made_by": 3, "files": []}', '{"made_by": {}}', "{"])
 def test_a_damaged_origin_is_unknown(tmp_path, text):
     (tmp_path / ORIGIN).write_text(text)

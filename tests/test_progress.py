@@ -184,6 +184,33 @@ def test_a_slow_start_is_not_taken_for_the_pace():
     assert lines.line() == "  24 s: runs, 35%"
 
 
+def test_what_has_no_share_is_not_in_the_pace():
+    """A minute of compilation says nothing of the runs, before them or among them."""
+    clock = SimpleNamespace(now=0.0)
+    lines = progress.Lines("runs", lambda: clock.now)
+    for begun in (0.0, 70.0):
+        clock.now = begun
+        lines.show("compiling", None)
+        clock.now = begun + 30.0
+        lines.show("compiling another", None)
+        assert lines.line() == f"{clock.now:4.0f} s: compiling another"
+        for second in range(10):
+            clock.now = begun + 60.0 + second
+            lines.show("runs", (10 * (begun > 0.0) + second) / 40.0)
+        left = 31 if begun == 0.0 else 21
+        assert lines.line().endswith(f", about {left} s left")
+
+
+def test_work_within_work_leaves_what_is_aside_aside(heard):
+    with progress.lines("outer") as report:
+        report("compiling", None)
+        since = progress._running[0].aside
+        with progress.lines("inner") as inner:
+            inner("half", 0.5)
+            assert progress._running[0].aside is None
+        assert progress._running[0].aside == since is not None
+
+
 def test_what_begins_late_is_judged_by_what_is_done_since():
     clock = SimpleNamespace(now=0.0)
     lines = progress.Lines("scenes", lambda: clock.now)
@@ -259,7 +286,7 @@ def test_the_parts_of_the_paper_are_told(heard, tmp_path, monkeypatch):
     pytest.importorskip("matplotlib")
     runs = importlib.import_module("percussion_model.verification.paper.runs")
     law = importlib.import_module("percussion_model.verification.paper.rock_law")
-    monkeypatch.setattr(runs, "run_drops", lambda scene: heard.wait_for(2))
+    monkeypatch.setattr(runs, "run_drops", lambda scene: heard.wait_for(heard.progress() + 2))
     monkeypatch.setattr(law, "run_sinking", lambda scene: {})
 
     def sweep(scene, sweep, folder, processes, report):

@@ -116,13 +116,13 @@ def test_check_without_an_accuracy_is_refused():
 
 
 def invented(rate, scatter=0.0, blows=50, cells=20, misfit=0.0, duration=4.0):
-    """A result whose blows have a given rate and a given scatter of it."""
-    rows = np.zeros(blows, BLOW)
-    rows["period"] = 0.05
-    rows["time"] = 1.0 + 0.05 * np.arange(blows)
+    """A result whose blows, up to its end, have a given rate and a given scatter of it."""
+    rows, period = np.zeros(blows, BLOW), (duration - 1.0) / blows
+    rows["period"] = period
+    rows["time"] = 1.0 + period * np.arange(blows)
     off = np.random.default_rng(blows).standard_normal(blows)
     off -= off.mean()
-    rows["hole_advance"] = 0.05 * (rate + scatter * off / off.std())
+    rows["hole_advance"] = period * (rate + scatter * off / off.std())
     return Result(
         scene=Scene(),
         solver="wave",

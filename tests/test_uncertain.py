@@ -537,7 +537,9 @@ def test_a_coupled_rate_has_its_error():
     assert "±" in line
     assert line.endswith("mm/s (scatter, also of the rock)")
     # names are words, and what has no error has three digits
-    shown = list(_lines(found | {"shoulder_by_blows": -0.000718548, "shoulder_energy": -4.0144}))
+    assert found["without_error"] == ["depth"]
+    more = {"shoulder_by_blows": -0.000718548, "shoulder_energy": -4.0144}
+    shown = list(_lines(found | more | {"without_error": ["depth", *more]}))
     assert not any("_" in text for text in shown)
     assert any("-0.0719 % of blow energy (error not estimated)" in text for text in shown)
     assert any("-4.01 J (error not estimated)" in text for text in shown)
@@ -546,6 +548,7 @@ def test_a_coupled_rate_has_its_error():
     short = {name: column[:200] for name, column in columns.items()}
     short = summary(CoupledRun(short, 1e-3, 199))
     assert short["rate_second_half_error"] is None
+    assert short["without_error"] == ["depth", "rate_second_half"]
     assert any("error not estimated" in text for text in _lines(short))
     held = columns | {"hammer.blow_count": np.minimum(blow, 60.0)}  # from 2.7 s on
     assert "rate_second_half" not in summary(CoupledRun(held, 1e-3, 4000))

@@ -5,12 +5,13 @@ from __future__ import annotations
 import os
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from percussion_model.analysis.study.workers import Task, on_this_machine
 from percussion_model.scene.inputs import SimulationError
 from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.simulation.simulate import Simulation
@@ -19,6 +20,7 @@ from percussion_model.solvers.blow_map.builder import (
     cache_folder,
     get_table,
     kept_table,
+    parts_folder,
     table_file,
 )
 from percussion_model.solvers.blow_map.records import Axis
@@ -31,6 +33,7 @@ __all__ = [
     "MapCost",
     "cache_folder",
     "kept_map",
+    "kept_parts",
     "make_map",
     "map_cost",
     "map_file",
@@ -82,8 +85,8 @@ def make_map(
     progress : callable, optional
         Called with the parts done and their number.
     workers : int, optional
-        Processes; as many as there are processors if left out. Where processes are
-        spawned, more than one wants the guard `if __name__ == "__main__"` in a script.
+        Processes; as many as there are processors if left out. More than one wants the
+        guard `if __name__ == "__main__"` in a script, since they are spawned.
 
     Returns
     -------
@@ -94,12 +97,22 @@ def make_map(
     SceneError
         If no blow map can be made of the scene.
     """
-    return get_table(mapped(scene), progress, workers or os.cpu_count() or 1)
+
+    def compute(work: Callable[..., Any], tasks: list[Task]) -> Iterator[tuple[int, Any]]:
+        processes = max(1, min(workers or os.cpu_count() or 1, len(tasks)))
+        return on_this_machine(work, tasks, processes)
+
+    return get_table(mapped(scene), progress, compute)
 
 
 def kept_map(scene: Scene) -> BlowTable | None:
     """Table of a scene from the cache, None where it has not been made."""
     return kept_table(mapped(scene))
+
+
+def kept_parts(scene: Scene) -> int:
+    """Number of parts that are kept of a table which was interrupted."""
+    return len(list(parts_folder(mapped(scene)).glob("*.npy")))
 
 
 def map_file(scene: Scene) -> Path:

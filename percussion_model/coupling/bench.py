@@ -244,6 +244,7 @@ def bench(
     trust: bool = False,
     watch: Watch | None = None,
     check_step: bool = True,
+    tell: Callable[[str], object] | None = None,
 ) -> list[Score]:
     """Put a controller through the standard runs.
 
@@ -269,6 +270,8 @@ def bench(
     check_step : bool
         Whether each run is done with half the communication step as well, which tells the
         error of its score.
+    tell : callable, optional
+        As for `Coupling.run`.
     """
     names = [trial.name for trial in TRIALS]
     for name in trials:
@@ -295,7 +298,7 @@ def bench(
                 on_way=None if trial.on_way is None else trial.on_way(),
                 trust=trust,
             )
-            run = coupling.run(trial.duration, step, SIGNALS, step, progress=watch)
+            run = coupling.run(trial.duration, step, SIGNALS, step, progress=watch, tell=tell)
             runs.append(judge(trial, run))
             _refuse_changed(controller, kept)
         found.append(with_step_error(*runs) if check_step else runs[0])

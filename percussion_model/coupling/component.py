@@ -31,6 +31,8 @@ _IN_C: dict[str, tuple[Any, str]] = {
 LARGEST = 2.0**31
 # The highest status of a call that did what it should.
 WARNING = 1
+# What FMUs of this project say before they compile; others log what they like.
+COMPILING = "compiling the kernels"
 _STATUS = {2: "discard", 3: "error", 4: "fatal", 5: "pending"}
 
 
@@ -320,6 +322,10 @@ class Component:
         """Enter the initialisation."""
         self._guarded(self._slave.setupExperiment, startTime=time)
         self._guarded(self._slave.enterInitializationMode)
+
+    def compilation(self) -> list[str]:
+        """What the FMU has logged of kernels that it is going to compile."""
+        return [text for _, text in self.messages if COMPILING in text]
 
     def end_initialisation(self) -> None:
         """Leave the initialisation."""

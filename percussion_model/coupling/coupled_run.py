@@ -29,6 +29,9 @@ SIGNALS = (
     "hammer.piston.velocity", "hammer.off_bottom", "hammer.hole_depth", "rock.layer",
     "controller.mode", "controller.feed_wanted", "rig.energy", "supply.energy",
 )  # fmt: skip
+# Numbers of a summary that have an error, which may be known and stands beside them then;
+# residuals are measures of an error themselves.
+ESTIMATES = ("depth", "rate_second_half", "shoulder_energy", "feed_work", "shoulder_by_blows")
 
 
 @dataclass
@@ -116,7 +119,7 @@ def summary(run: CoupledRun) -> dict[str, Any]:
         blows, and whether that hides it [m/s]; greatest residual of the energy
         balance of the string divided by the energy put in and stored at the start; energy that
         the shoulder took and work of the feed [J]; the former divided by the energy of the
-        blows [1]; the verdict.
+        blows [1]; names of those whose error is not known, `without_error`; the verdict.
     """
     columns = run.columns
     found: dict[str, Any] = {
@@ -127,7 +130,9 @@ def summary(run: CoupledRun) -> dict[str, Any]:
         found["depth"] = float(columns["hammer.bit.position"][-1])
         if len(columns["time"]) > 2:
             found |= _rate_second_half(columns)
-    return found | _balances(columns) | {"verdict": run.verdict.to_dict()}
+    found |= _balances(columns)
+    unknown = [key for key in ESTIMATES if key in found and found.get(f"{key}_error") is None]
+    return found | {"without_error": unknown, "verdict": run.verdict.to_dict()}
 
 
 def _rate_second_half(columns: dict[str, np.ndarray]) -> dict[str, Any]:

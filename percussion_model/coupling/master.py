@@ -146,6 +146,7 @@ class Coupling:
         tolerance: float | None = None,
         progress: Callable[[float], None] | None = None,
         on_interrupt: Literal["raise", "keep"] = "raise",
+        tell: Callable[[str], object] | None = None,
     ) -> CoupledRun:
         """Run the system from time zero, and end all its parts.
 
@@ -165,6 +166,8 @@ class Coupling:
         on_interrupt : {"raise", "keep"}
             What Ctrl-C does when the present step is over: raise KeyboardInterrupt, or return
             what there is.
+        tell : callable, optional
+            Called with what an FMU says of kernels that it is going to compile, before it does.
 
         Returns
         -------
@@ -175,7 +178,7 @@ class Coupling:
             count, every = whole_steps(duration, step, interval)
             self._refuse_contradictions(count, tolerance)
             self._connect([*signals, *known_signals(self.outputs, JUDGED)])
-            self._initialise()
+            self._initialise(tell)
             control = None if tolerance is None else StepControl(self.ports, step, tolerance)
             with rare_garbage_collection():
                 run = self._loop(count, step, every, control, progress)
@@ -284,11 +287,14 @@ class Coupling:
         for port in self.ports:
             port.connect(values, places)
 
-    def _initialise(self) -> None:
+    def _initialise(self, tell: Callable[[str], object] | None) -> None:
         for name, part in self.parts.items():
             if isinstance(part, Component):
                 part.set(self._parameters[name])
                 part.begin(0.0)
+                if tell is not None:
+                    for text in part.compilation():
+                        tell(text)
             else:
                 part.begin()
         for _ in range(INITIAL_PASSES):

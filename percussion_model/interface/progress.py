@@ -45,19 +45,28 @@ class Lines:
     def __init__(self, text: str, clock: Callable[[], float] = time.monotonic) -> None:
         self.clock = clock
         self.started = clock()
+        self.aside: float | None = None  # since when what has no share is done
         self.begin(text)
 
     def begin(self, text: str, done: float = 0.0) -> None:
         """Take what begins now, and the share that is done already."""
         self.marks = [(self.clock(), done)]
         self.show(text, None)
+        self.aside = None
 
     def show(self, text: str, share: float | None) -> None:
-        """Take what is done now, and its share; a smaller one than before begins another part."""
+        """Take what is done now, and its share; a smaller one than before begins another part.
+
+        What has no share, as compilation, is done aside: its time is not in the pace of the rest.
+        """
         now = self.clock()
         self.told, self.changed = (text, share), now
         if share is None:
+            self.aside = now if self.aside is None else self.aside
             return
+        if self.aside is not None:
+            self.marks = [(t + now - self.aside, done) for t, done in self.marks]
+            self.aside = None
         # the thread that prints may read them meanwhile: they are replaced, never changed
         if share < self.marks[-1][1]:
             self.marks = [(now, share)]
@@ -117,12 +126,12 @@ def lines(text: str, done: float = 0.0) -> Iterator[Report]:
     """
     if _running:
         (outer,) = _running
-        before = outer.told, outer.marks, outer.changed
+        before = outer.told, outer.marks, outer.changed, outer.aside
         outer.begin(text, done)
         try:
             yield outer.show
         finally:
-            outer.told, outer.marks, outer.changed = before
+            outer.told, outer.marks, outer.changed, outer.aside = before
         return
     own = Lines(text)
     own.begin(text, done)

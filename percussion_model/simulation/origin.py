@@ -17,6 +17,8 @@ from typing import Any
 from percussion_model.simulation.files import ResultError, check_writable, staged_text, to_json
 
 ORIGIN = "made_by.json"
+# What commands begin with that are none of `percussion`: examples and scenarios.
+PYTHON = "python -m "
 # Differences that a message shows.
 SHOWN = 2
 
@@ -29,7 +31,8 @@ class Claim:
     folder : Path
         Wanted.
     origin : mapping
-        Command and what its result follows from, tables in it by their dotted keys.
+        Command, of `percussion` or beginning with `python -m`, and what its result follows
+        from, tables in it by their dotted keys.
     force : bool
         Replace what is there, whatever it is.
     numbered : bool
@@ -112,7 +115,7 @@ def _other_than(folder: Path, origin: Mapping[str, Any]) -> str:
     if found == origin:
         return ""
     if found.get("command") != origin.get("command"):
-        return f"holds the result of `percussion {found.get('command')}`"
+        return f"holds the result of `{_typed(found.get('command'))}`"
     keys = sorted(key for key in found.keys() | origin.keys() if found.get(key) != origin.get(key))
     shown = [
         f"{key.removeprefix('scene.')} {found.get(key, 'not set')}, "
@@ -121,6 +124,11 @@ def _other_than(folder: Path, origin: Mapping[str, Any]) -> str:
     ]
     more = f", and {len(keys) - SHOWN} more" if len(keys) > SHOWN else ""
     return f"holds another result ({'; '.join(shown[:SHOWN])}{more})"
+
+
+def _typed(command: Any) -> str:
+    """A command as it is typed: one of `percussion`, unless it is one of Python."""
+    return str(command) if str(command).startswith(PYTHON) else f"percussion {command}"
 
 
 def _free_beside(folder: Path, origin: Mapping[str, Any]) -> Path:
@@ -140,8 +148,10 @@ def _read(folder: Path) -> tuple[dict[str, Any], list[str]]:
         return {}, []
     if not isinstance(origin, dict) or not isinstance(files, list):
         return {}, []
-    # earlier versions wrote numbers as text
+    # earlier versions wrote numbers as text, and names of examples alone
     origin = {key: _number(value) for key, value in origin.items()}
+    if str(command := origin.get("command")).startswith("examples."):
+        origin["command"] = f"{PYTHON}{command}"
     return origin, [name for name in files if isinstance(name, str)]
 
 

@@ -2,10 +2,19 @@
 
 from __future__ import annotations
 
+import json
+import os
+import subprocess
+import sys
+from functools import partial
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from percussion_model import Scene
+from percussion_model.interface.commands.common import BAD_INPUT, INTERRUPTED
+from percussion_model.simulation.origin import ORIGIN
 from scenarios import (
     collaring_ramp,
     constant_reference,
@@ -15,8 +24,13 @@ from scenarios import (
     pneumatic_drive,
     pressure_loss,
 )
-from scenarios.harness import greatest_difference, ramp, read_signals, run
+from scenarios.harness import Instance, greatest_difference, ramp, read_signals, run
+from scenarios.results import ScenarioError
 
+ROOT = Path(__file__).parents[2]
+# What others share is no scenario.
+SHARED = {"__init__", "coupled", "drawing", "harness", "results"}
+SCRIPTS = sorted({path.stem for path in (ROOT / "scenarios").glob("*.py")} - SHARED)
 SCENE = Scene()
 MASS, GRAVITY = SCENE.piston.mass, SCENE.gravity.acceleration
 START = SCENE.start.piston_velocity
@@ -154,15 +168,96 @@ def test_signals_come_from_functions_and_from_files(make, tmp_path):
     assert max(greatest_difference(*runs).values()) == 0.0
 
 
-def test_a_scenario_takes_no_unknown_words_and_says_what_it_replaces(
-    hammer, tmp_path, monkeypatch, capsys
+@pytest.fixture
+def scenario(monkeypatch, tmp_path, capsys):
+    """The command of a scenario, in a folder of its own: code, and what it said on stderr."""
+    monkeypatch.chdir(tmp_path)
+
+    def call(module, *words):
+        name = module.__name__.removeprefix("scenarios.")
+        monkeypatch.setattr("sys.argv", ["scenario", *map(str, words)])
+        with pytest.raises(SystemExit) as ended:
+            harness.command_line(name, module.simulate, module.draw)
+        return ended.value.code, capsys.readouterr().err
+
+    return call
+
+
+def test_each_scenario_has_a_folder_and_does_not_replace_what_another_hammer_gave(
+    scenario, hammer, rigid, monkeypatch
 ):
-    monkeypatch.setattr(harness, "built", lambda name: hammer)
-    for word in ("wrote", "replaced"):
-        monkeypatch.setattr("sys.argv", ["scenario", "--out", str(tmp_path)])
-        harness.command_line("pressure_loss", pressure_loss.simulate, pressure_loss.draw)
-        assert capsys.readouterr().out == f"{word} {tmp_path / 'pressure_loss.png'}\n"
-    monkeypatch.setattr("sys.argv", ["scenario", "--fast"])
-    with pytest.raises(SystemExit):
-        harness.command_line("pressure_loss", pressure_loss.simulate, pressure_loss.draw)
-    assert "unrecognized arguments: --fast" in capsys.readouterr().err
+    monkeypatch.setattr(pressure_loss, "DURATION", 0.1)
+    for _ in range(2):
+        code, said = scenario(pressure_loss, hammer)
+        assert (code, "holds" in said) == (0, False)
+    folder = Path("out/scenarios/pressure_loss")
+    assert {one.name for one in folder.iterdir()} == {"pressure_loss.png", ORIGIN}
+    assert f"wrote {folder / 'pressure_loss.png'}" in said
+    made_by = json.loads((folder / ORIGIN).read_text())["made_by"]
+    assert made_by["command"] == "python -m scenarios.pressure_loss"
+    before = (folder / "pressure_loss.png").read_bytes()
+    # a folder of the scenario's own is numbered, one that is named is kept
+    code, said = scenario(pressure_loss, rigid)
+    assert (code, "this one goes to out/scenarios/pressure_loss-2" in " ".join(said.split())) == (
+        0, True,
+    )  # fmt: skip
+    code, said = scenario(pressure_loss, rigid, "--out", folder)
+    assert code == BAD_INPUT
+    assert said.startswith(f"scenarios.pressure_loss: {folder} holds another result (")
+    assert said.count("\n") == 1
+    assert (folder / "pressure_loss.png").read_bytes() == before
+    assert scenario(pressure_loss, rigid, "--out", folder, "--force")[0] == 0
+    assert (folder / "pressure_loss.png").read_bytes() != before
+    code, said = scenario(collaring_ramp, hammer, "--out", folder)
+    assert code == BAD_INPUT
+    assert "holds the result of `python -m scenarios.pressure_loss`" in said
+
+
+def test_what_a_scenario_cannot_run_is_one_line(scenario, fmus, tmp_path):
+    (tmp_path / "text.fmu").write_text("text")
+    for words, told in (
+        (["none.fmu"], "none.fmu: no such file"),
+        (["text.fmu"], "text.fmu: is no FMU: there is no modelDescription.xml in it"),
+        ([fmus / "PneumaticDrive.fmu"], "the FMU has no output blow_energy"),
+        (["--fast"], "unrecognized arguments: --fast; see python -m scenarios.pressure_loss"),
+    ):
+        code, said = scenario(pressure_loss, *words)
+        assert code == BAD_INPUT
+        assert said.startswith(f"scenarios.pressure_loss: {told}"), said
+        assert said.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_what_an_fmu_refuses_is_told_by_its_log(rigid):
+    with (
+        pytest.raises(ScenarioError, match=r"rock\.loading_stiffness = -1\.0 N/m: must be"),
+        Instance(rigid) as one,
+    ):
+        one.start(rock__loading_stiffness=-1.0)
+
+
+def test_interrupted_scenarios_say_so(scenario, hammer, monkeypatch):
+    def stop(*paths):
+        raise KeyboardInterrupt
+
+    stop.__module__ = pressure_loss.__name__
+    monkeypatch.setattr(pressure_loss, "simulate", stop)
+    code, said = scenario(pressure_loss, hammer)
+    assert code == INTERRUPTED
+    assert said == "scenarios.pressure_loss: interrupted before there was a result\n"
+
+
+@pytest.mark.parametrize("name", SCRIPTS)
+def test_every_scenario_has_the_same_words(name, tmp_path):
+    """As a person types them, with the clone on the path."""
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "COLUMNS": "200"}
+    call = partial(subprocess.run, cwd=tmp_path, env=environment, capture_output=True, text=True)
+    command = [sys.executable, "-m", f"scenarios.{name}"]
+    helped = call([*command, "--help"])
+    assert helped.returncode == 0
+    for word in (f"python -m scenarios.{name}", "--out DIR", f"out/scenarios/{name}", "--force"):
+        assert word in helped.stdout
+    refused = call([*command, "none.there"])
+    assert refused.returncode == BAD_INPUT
+    assert refused.stderr == f"scenarios.{name}: none.there: no such file\n"
+    assert list(tmp_path.iterdir()) == []

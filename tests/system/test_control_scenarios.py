@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import json
 import math
 
 import numpy as np
 import pytest
 
 from percussion_model.interface import progress
-from scenarios import rod_addition, unstable_controller, void_cut_back
-from scenarios.coupled import print_numbers
+from percussion_model.interface.commands.common import BAD_INPUT
+from scenarios import results, rod_addition, unstable_controller, void_cut_back
+from scenarios.coupled import print_numbers, run, write
 
 BIG = 40_000  # bytes of a figure with five panels
 
@@ -107,3 +109,60 @@ def test_a_scenario_says_on_a_pipe_how_far_it_is(feed_control, monkeypatch, tmp_
     monkeypatch.setattr(progress, "EVERY", 1e-2)
     rod_addition.run(feed_control, 0.5)
     assert "s of 0.5 s simulated" in capsys.readouterr().err
+
+
+def short(archive):
+    return rod_addition.simulate(archive, 2.6)
+
+
+def call(work, monkeypatch, *words):
+    """Run a scenario with the words of a command line; its code."""
+    monkeypatch.setattr("sys.argv", ["scenario", *map(str, words)])
+    with pytest.raises(SystemExit) as ended:
+        work()
+    return ended.value.code
+
+
+def rod():
+    write("rod_addition", short, rod_addition.numbers, rod_addition.draw, rod_addition.SHOWN)
+
+
+def test_a_scenario_of_a_system_keeps_to_its_folder(feed_control, monkeypatch, tmp_path, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert call(rod, monkeypatch, feed_control) == 0
+    folder = tmp_path / "out" / "scenarios" / "rod_addition"
+    assert [one.name for one in folder.parent.iterdir()] == ["rod_addition"]
+    csv = {f"rod_addition_{run}.csv" for run in ("pi_on_the_feed", "constant_force")}
+    assert {one.name for one in folder.iterdir()} == {"rod_addition.png", "made_by.json", *csv}
+    made_by = json.loads((folder / "made_by.json").read_text())["made_by"]
+    assert made_by["command"] == "python -m scenarios.rod_addition"
+    assert "rod_addition.png" in capsys.readouterr().err
+
+
+def unknown():
+    def simulate(archive):
+        return {"one": run(archive, 0.1, {"controller.nothing": 1.0})}
+
+    write("rod_addition", simulate, rod_addition.numbers, rod_addition.draw, rod_addition.SHOWN)
+
+
+def test_a_system_that_a_scenario_cannot_run_is_one_line(
+    feed_control, monkeypatch, tmp_path, capsys
+):
+    """An archive that is not there, one that is none, and one that lacks what is set."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(results, "DIST", tmp_path / "dist")
+    (tmp_path / "text.ssp").write_text("text")
+    for work, words, told in (
+        (rod, [], "FeedControlRigid.ssp: no such file; `python3 build.py system` makes it"),
+        (rod, ["none.ssp"], "none.ssp: no such file"),
+        (rod, ["text.ssp"], "text.ssp: is no SSP archive: there is no SystemStructure.ssd in it"),
+        (rod, [feed_control, "more"], "unrecognized arguments: more; see python -m scenarios.rod"),
+        (unknown, [feed_control], "controller has no variable nothing"),
+    ):
+        assert call(work, monkeypatch, *words) == BAD_INPUT
+        said = capsys.readouterr().err
+        assert said.startswith("scenarios.")
+        assert told in said
+        assert said.count("\n") == 1, said
+    assert [one.name for one in tmp_path.iterdir()] == ["text.ssp"]

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+import os
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -207,3 +210,23 @@ def test_the_command_runs_a_system(feed_control, tmp_path, monkeypatch, capsys):
     table = np.genfromtxt(out / "signals.csv", delimiter=",", names=True)
     assert table["time"][-1] == 0.1
     assert (out / "signals.png").stat().st_size > 20_000
+
+
+@pytest.mark.parametrize("command", ["couple", "bench-controller"])
+def test_a_command_says_before_that_an_fmu_compiles(feed_control, tmp_path, command):
+    words = ["couple", str(feed_control)]
+    if command == "bench-controller":
+        words = [command, "--system", str(feed_control)]
+    caches = {"NUMBA_CACHE_DIR": str(tmp_path / "numba"), "PERCUSSION_FMU_CACHE": str(tmp_path)}
+    child = subprocess.Popen(
+        [sys.executable, "-c", "from percussion_model.interface.cli import main; main()", *words],
+        stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, cwd=tmp_path,
+        env={**os.environ, **caches, "COLUMNS": "1000"},
+    )  # fmt: skip
+    try:
+        said = next(line for line in child.stderr if line.startswith("percussion: "))
+    finally:
+        child.kill()
+        child.communicate()
+    assert said.startswith("percussion: hammer: compiling the kernels of the solver rigid: once, ")
+    assert "half a minute; they are kept in" in said

@@ -9,8 +9,8 @@ import pytest
 
 from scenarios import extremum_seeking as extremum_seeking_script
 from scenarios import two_way_seeking
-from scenarios.coupled import archive
 from scenarios.extremum_seeking import BOUND, LAST, STARTS, draw, rate_over, seek, sweep, top_of
+from scenarios.results import DIST
 
 LONG = os.environ.get("PERCUSSION_LONG") == "1"
 long = pytest.mark.skipif(not LONG, reason="takes minutes; set PERCUSSION_LONG=1")
@@ -143,7 +143,7 @@ def test_the_seeker_finds_feed_and_pressure(two_way, tmp_path):
 @long
 def test_the_seeker_finds_the_best_feed_with_waves():
     """The same with elastic piston and bit, where the archive has been built."""
-    system = archive("ExtremumSeeking")
+    system = DIST / "ExtremumSeeking.ssp"
     if not system.is_file():
         pytest.skip("python3 build.py system makes the archive")
     hill = sweep(system, (2500.0, 2700.0, 2800.0, 2900.0, 3000.0, 3200.0), 4.0)

@@ -193,13 +193,19 @@ def test_the_command_says_of_which_numbers_the_error_is_not_known(
     feed_control, tmp_path, monkeypatch, capsys
 ):
     words = ["couple", str(feed_control), "--duration", "0.2", "--no-figures"]
-    monkeypatch.setattr("sys.argv", ["percussion", *words, "--out", str(tmp_path)])
+    words += ["--json", str(tmp_path / "numbers.json"), "--out", str(tmp_path / "out")]
+    monkeypatch.setattr("sys.argv", ["percussion", *words])
     with pytest.raises(SystemExit):
         main()
     lines = capsys.readouterr().out.splitlines()
-    for name in ("Depth of the bit", "Work of the feed on the bit"):
+    for name in ("Depth of the bit", "Rate in the second half", "Work of the feed on the bit"):
         (line,) = [one for one in lines if one.startswith(name)]
         assert line.endswith("(error not estimated)"), line
+    found = json.loads((tmp_path / "numbers.json").read_text(encoding="utf-8"))
+    assert found["rate_second_half_error"] is None
+    assert found["without_error"] == [
+        "depth", "rate_second_half", "shoulder_energy", "feed_work", "shoulder_by_blows",
+    ]  # fmt: skip
 
 
 @pytest.mark.parametrize(

@@ -110,9 +110,11 @@ def accuracy(
     common.write_json(json_file, found)
 
 
-def _tell(report: Report, place: str, done: int, count: int, text: str, share: float) -> None:
+def _tell(
+    report: Report, place: str, done: int, count: int, text: str, share: float | None
+) -> None:
     """Tell what is done at a scene, and the share of all scenes that is done."""
-    report(f"{place}: {text}", (done + share) / count)
+    report(f"{place}: {text}", None if share is None else (done + share) / count)
 
 
 def _draw(found: Study, folder: Path) -> list[Path]:

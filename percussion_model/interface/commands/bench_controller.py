@@ -67,7 +67,7 @@ def bench_controller(
         with progress_bar(0.0) as bar:
             bench(
                 system, _load(controller), values, trials or (), scores.append, trust, bar,
-                check_step=step_check,
+                check_step=step_check, tell=common.print_message,
             )  # fmt: skip
     except KeyboardInterrupt:
         if not scores:

@@ -44,7 +44,7 @@ def blow_map(
         return
     table = kept_map(chosen)
     if action == "build" and table is None:
-        table = ready_map(chosen, workers)
+        table = _made(chosen, workers)
     else:
         warn_of_outside(chosen)
     numbers = _numbers(chosen, table)
@@ -83,7 +83,21 @@ def prepare_map(scene: Scene, duration: float | None = None) -> None:
         raise SimulationError(
             f"the blow map was not made, since it would refuse the run: {refused}"
         )
-    ready_map(scene)
+    _made(scene)
+
+
+def _made(scene: Scene, workers: int | None = None) -> BlowTable:
+    """Table of a scene as `ready_map` makes it; Ctrl-C ends the command and says what is kept."""
+    from percussion_model.analysis.blow_maps import kept_parts
+
+    try:
+        return ready_map(scene, workers)
+    except KeyboardInterrupt:
+        if not (count := kept_parts(scene)):
+            raise
+        parts = "1 part of the blow map is" if count == 1 else f"{count} parts of the blow map are"
+        words = f"interrupted; {parts} kept, the same command continues"
+        raise typer.Exit(common.print_message(words, common.INTERRUPTED)) from None
 
 
 def warn_of_outside(scene: Scene) -> None:

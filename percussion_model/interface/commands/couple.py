@@ -15,14 +15,13 @@ if TYPE_CHECKING:
     from percussion_model.coupling.verdict import Verdict
 
 SystemFile = Annotated[Path, typer.Argument(metavar="SYSTEM.ssp", help="A system (SSP 1.0).")]
-RATE = "rate_second_half"
 # Numbers of a summary as they are shown: key, name, factor, unit.
 SHOWN = (
     ("time", "Simulated", 1.0, "s"),
     ("step", "Communication step", 1e3, "ms"),
     ("steps", "Steps", 1, ""),
     ("depth", "Depth of the bit", 1e3, "mm"),
-    (RATE, "Rate in the second half", 1e3, "mm/s"),
+    ("rate_second_half", "Rate in the second half", 1e3, "mm/s"),
     ("hammer_energy_residual", "Hammer: energy unexplained", 1.0, "of the energy put in"),
     ("string_energy_residual", "String: energy unexplained", 1.0, "of the energy put in or there"),
     ("shoulder_energy", "Energy lost at the bit's shoulder", 1.0, "J"),
@@ -31,8 +30,7 @@ SHOWN = (
 )
 # Those that are given, and have all their digits.
 GIVEN = ("time", "step", "steps")
-# Numbers of whose errors nothing is known, and what is meant where there is a rate's.
-UNKNOWN = ("depth", RATE, "shoulder_energy", "shoulder_by_blows", "feed_work")
+# What is meant where there is an error of the rate.
 SCATTER = "scatter, also of the rock"
 # Rows of a run without --interval.
 ROWS = 5000
@@ -105,7 +103,9 @@ def couple(
     wanted = [*known_signals(coupling.outputs), *(signals or ())]
     rows_every = max(step, duration / ROWS) if interval is None else interval
     with progress_bar(duration) as bar:
-        run = coupling.run(duration, step, wanted, rows_every, tolerance, bar, on_interrupt="keep")
+        run = coupling.run(
+            duration, step, wanted, rows_every, tolerance, bar, "keep", common.print_message
+        )
     found = summary(run)
     path = run.write_csv(folder / "signals.csv")
     common.write_json(json_file, found)
@@ -135,7 +135,7 @@ def _lines(found: Mapping[str, Any]) -> Iterator[str]:
         if error is not None:
             number = with_error(value, factor * error)
             note = SCATTER
-        elif key in UNKNOWN:
+        elif key in found["without_error"]:
             note = NOT_ESTIMATED
         yield f"{name:33s} {number} {unit}".rstrip() + (f" ({note})" if note else "")
 

@@ -11,7 +11,6 @@ import shutil
 import sys
 import tempfile
 from collections.abc import Callable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +31,14 @@ VARIABLE = "PERCUSSION_CACHE"
 _log = logging.getLogger("percussion_model")
 
 Progress = Callable[[int, int], None]
+# Does work for each of many tasks; gives number and outcome of each as it ends.
+Compute = Callable[[Callable[..., Any], list[tuple[Any, ...]]], Iterator[tuple[int, Any]]]
+
+
+def one_by_one(work: Callable[..., Any], tasks: list[tuple[Any, ...]]) -> Iterator[tuple[int, Any]]:
+    """Do the tasks in this process, one after the other; as in `Compute`."""
+    for number, task in enumerate(tasks):
+        yield number, work(*task)
 
 
 # fmu_src/slave/start.py finds its folder in the same way: it runs before anything that an
@@ -83,7 +90,14 @@ def kept_table(scene: Scene) -> BlowTable | None:
     return table
 
 
-def get_table(scene: Scene, progress: Progress | None = None, workers: int = 1) -> BlowTable:
+def parts_folder(scene: Scene) -> Path:
+    """Folder that keeps the finished slabs of a table which is not finished."""
+    return table_file(scene).with_suffix(".part")
+
+
+def get_table(
+    scene: Scene, progress: Progress | None = None, compute: Compute = one_by_one
+) -> BlowTable:
     """Table of a scene: from the cache, or made and kept there.
 
     Parameters
@@ -91,15 +105,15 @@ def get_table(scene: Scene, progress: Progress | None = None, workers: int = 1) 
     scene : Scene
     progress : callable, optional
         Called with the slabs done and their number.
-    workers : int
-        Processes.
+    compute : callable
+        Makes the slabs, in any order.
     """
     found = kept_table(scene)
     if found is not None:
         return found
     path = table_file(scene)
     _log.info("making the blow map %s", path)
-    table = build_table(scene, path.with_suffix(".part"), progress, workers)
+    table = build_table(scene, parts_folder(scene), progress, compute)
     try:
         write_whole(path, table.to_bytes())
     except OSError as error:
@@ -108,7 +122,7 @@ def get_table(scene: Scene, progress: Progress | None = None, workers: int = 1) 
 
 
 def build_table(
-    scene: Scene, drafts: Path, progress: Progress | None = None, workers: int = 1
+    scene: Scene, drafts: Path, progress: Progress | None = None, compute: Compute = one_by_one
 ) -> BlowTable:
     """Make the table of a scene, slab by slab of equal stiffness.
 
@@ -127,7 +141,9 @@ def build_table(
             values[i] = slab
     if progress is not None:
         progress(len(stiffness) - len(left), len(stiffness))
-    for done, (i, slab) in enumerate(_slabs(scene, stiffness, left, workers), 1):
+    tasks = [(scene, float(stiffness[i])) for i in left]
+    for done, (number, slab) in enumerate(compute(make_slab, tasks), 1):
+        i = left[number]
         values[i] = slab
         _keep_slab(drafts / f"{i}.npy", slab)
         if progress is not None:
@@ -141,27 +157,6 @@ def build_table(
         dict(solver.cells),
         solver.wave_speed_error,
     )
-
-
-def _slabs(
-    scene: Scene, stiffness: np.ndarray, left: list[int], workers: int
-) -> Iterator[tuple[int, np.ndarray]]:
-    """Compute the slabs that are left, in any order."""
-    if workers < 2 or len(left) < 2:
-        for i in left:
-            yield i, make_slab(scene, float(stiffness[i]))
-        return
-    pool = ProcessPoolExecutor(workers)
-    try:
-        jobs: dict[Future[Any], int] = {
-            pool.submit(make_slab, scene, float(stiffness[i])): i for i in left
-        }
-        while jobs:
-            finished, _ = wait(jobs, return_when=FIRST_COMPLETED)
-            for job in finished:
-                yield jobs.pop(job), job.result()
-    finally:
-        pool.shutdown(cancel_futures=True)
 
 
 def make_slab(scene: Scene, stiffness: float) -> np.ndarray:
@@ -209,4 +204,12 @@ def write_whole(path: Path, data: bytes) -> None:
         raise
 
 
-__all__ = ["TableError", "build_table", "cache_folder", "get_table", "kept_table", "table_file"]
+__all__ = [
+    "TableError",
+    "build_table",
+    "cache_folder",
+    "get_table",
+    "kept_table",
+    "parts_folder",
+    "table_file",
+]

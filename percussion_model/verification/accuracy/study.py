@@ -47,9 +47,9 @@ PEERS = ("peer", "fem", "scipy")
 PATIENCE, PATIENCE_FULL = 25.0, 120.0
 # Errors below this multiple of the reference's bar are not resolved.
 RESOLVED = 2.0
-# Share of the work at the first rung: too small to tell the time that is left, since the
-# compilation before it takes a minute, or nothing.
-BEFORE = 0.04
+# Share of the time that the answers take, measured on the reference scene: each is one run,
+# where times are those of up to five.
+ANSWERS = 0.35
 
 
 @dataclass(frozen=True)
@@ -352,7 +352,7 @@ def study(
     scene: Scene,
     full: bool = False,
     methods: Sequence[str] | None = None,
-    progress: Callable[[str, float], None] = lambda text, share: None,
+    progress: Callable[[str, float | None], None] = lambda text, share: None,
 ) -> Study:
     """Measure error against time on one scene.
 
@@ -364,7 +364,8 @@ def study(
     methods : sequence of str, optional
         Names of `LADDERS`, or "scipy" for all general integrators.
     progress : callable
-        Called with what comes next, and the share of the work that is done.
+        Called with what comes next, and the share of the work that is done; None while
+        kernels may have to be compiled, which takes minutes or nothing.
 
     Raises
     ------
@@ -377,27 +378,28 @@ def study(
     # make each solver once: compile, or load what was compiled before
     for name in solvers_of(names):
         word = "loading" if place_of_kernels(name) is None else "compiling"
-        progress(f"{word} the solver {name}", 0.0)
+        progress(f"{word} the solver {name}", None)
         compilation[name] = Simulation(scene.computed_by(name)).setup_time
-    progress("pilot run", 0.0)
+    progress("pilot run", None)
     problem = pose(scene)
-    reference = find_reference(problem, scene, lambda text: progress(text, 0.5 * BEFORE))
+    reference = find_reference(problem, scene, lambda text: progress(text, None))
     rungs = [rung for rung in ladders(problem, full) if rung.ladder in names]
-    points: list[Point] = []
+    points: dict[int, Point] = {}
     runs: list[tuple[int, Run]] = []
-    for k, rung in enumerate(rungs):
-        title = LADDERS[rung.ladder].title
-        is_new = k == 0 or rungs[k - 1].ladder != rung.ladder
-        if is_new and not rung.integrator:  # those of scipy are not compiled
-            title = f"compiling or loading {title}"
-        progress(", ".join(filter(None, (title, rung.label))), BEFORE + 0.66 * k / len(rungs))
-        point, run = _measured(rung, problem, reference, full)
-        points.append(point)
-        if isinstance(run, Run) and not point.note:
+    compiling, others = in_turn(rungs)
+    for done, k in enumerate([*compiling, *others], -len(compiling)):
+        rung, title = rungs[k], LADDERS[rungs[k].ladder].title
+        if done < 0:
+            progress(f"compiling or loading {title}", None)
+        else:
+            progress(f"{title}, {rung.label}".rstrip(", "), ANSWERS * done / len(others))
+        points[k], run = _measured(rung, problem, reference, full)
+        if isinstance(run, Run) and not points[k].note:
             runs.append((k, run))
+    runs.sort(key=lambda one: one[0])
     times = interleaved(
         [run.cost for _, run in runs],
-        lambda done: progress("times, turn by turn", 0.7 + 0.3 * done),
+        lambda done: progress("times, turn by turn", ANSWERS + (1.0 - ANSWERS) * done),
     )
     for (k, run), taken in zip(runs, times, strict=True):
         points[k] = replace(
@@ -413,10 +415,20 @@ def study(
         problem.duration,
         problem.period,
         reference,
-        points,
+        [points[k] for k in range(len(rungs))],
         compilation,
         machine(),
     )
+
+
+def in_turn(rungs: Sequence[Rung]) -> tuple[list[int], list[int]]:
+    """Numbers of the rungs for which kernels may be compiled, to be taken first, and of others.
+
+    Those are the first ones of ladders; scipy's integrators are not compiled.
+    """
+    first = {rung.ladder: k for k, rung in reversed(list(enumerate(rungs)))}
+    compiling = [k for k in sorted(first.values()) if not rungs[k].integrator]
+    return compiling, [k for k in range(len(rungs)) if k not in compiling]
 
 
 def solvers_of(names: Iterable[str]) -> list[str]:
