@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from percussion_model.physics.kernel import kernel, merged
 from percussion_model.physics.readings import fill_ledger, fill_motion
 from percussion_model.physics.records import Piston, Status
@@ -201,7 +203,7 @@ def sample(par_, state, bars, memory, spare, spare_bars, spare_memory, ops, scra
         Times that were read: fewer than all where blows or events were listed.
     """
     for k in range(len(times)):
-        status = run(ADVANCE, par_, state, bars, ops, scratch, times[k], blows, events, reading)
+        status = run(np.int64(ADVANCE), par_, state, bars, ops, scratch, times[k], blows, events, reading)
         if status != Status.DONE:
             return status, k
         listed = state[0].n_blows + state[0].n_events
@@ -211,7 +213,7 @@ def sample(par_, state, bars, memory, spare, spare_bars, spare_memory, ops, scra
             spare_memory[1][i] = memory[1][i]
         spare[0].peak_from = math.inf  # nobody asks for peaks here, and in standstill they are dear
         here = max(times[k], time_of(par_[0], state[0]))
-        run(READ, par_, spare, spare_bars, ops, scratch, here, blows, events, reading)
+        run(np.int64(READ), par_, spare, spare_bars, ops, scratch, here, blows, events, reading)
         for i in range(out.shape[1]):
             out[k, i] = row[i]
         if listed:
