@@ -11,6 +11,7 @@ import pytest
 
 from percussion_model import Scene, Simulation
 from percussion_model.physics.records import BLOW
+from percussion_model.simulation.means import numbers_over, scatter_over
 from percussion_model.simulation.rate import FEWEST_DEPENDENT, rate_of_blows, ratio_of_sums
 
 LONG = os.environ.get("PERCUSSION_LONG") == "1"
@@ -143,6 +144,32 @@ def test_rates_scatter_as_their_standard_errors_say(changes):
     spread = np.std(rates, ddof=1)
     assert spread > 1e-4 * np.mean(rates)  # else the motion would not be aperiodic
     assert 0.6 < math.sqrt(np.mean(errors**2)) / spread < 1.7
+
+
+# Of a number of drilling cycles a single rare blow may be most, which few runs have.
+MEANS = ("blow_period", "impact_velocity", "stroke", "blow_energy", "penetration_per_blow")
+
+
+def test_means_scatter_as_their_standard_errors_say():
+    """5 % of normal numbers lie beyond two errors; by stretches of a quarter alone 11 % did."""
+    beyond = []
+    for changes in [case for case in CASES if FEED in str(case)][:4]:
+        runs = runs_of(tuple(changes.items()))
+        found = [(numbers_over(rows), scatter_over(rows)) for rows in runs]
+        for name in MEANS:
+            values, errors = np.array([(means[name], off[name]) for means, off in found]).T
+            beyond.append(np.mean(np.abs(values - np.mean(values)) > 2.0 * errors))
+            assert math.sqrt(np.mean(errors**2)) < 2.0 * np.std(values, ddof=1), name
+    assert np.mean(beyond) < 0.08
+
+
+def test_a_greatest_value_that_few_blows_come_near_to_is_hardly_known():
+    rows = rows_of(np.full(60, 1e-3))
+    rows["peak_bit_force"] = np.tile([4e5, 5e5, 4e5, 4e5, 4e5, 4e5], 10)  # a cycle of six
+    assert scatter_over(rows)["peak_bit_force"] == 0.0
+    rows["peak_bit_force"] = 4e5
+    rows["peak_bit_force"][[10, 40]] = 9.8e5, 9.7e5  # halves that agree by chance
+    assert scatter_over(rows)["peak_bit_force"] > 5e5
 
 
 @pytest.mark.parametrize("changes", CASES, ids=str)

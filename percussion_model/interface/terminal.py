@@ -21,6 +21,7 @@ from percussion_model.interface.tables import print_table
 from percussion_model.simulation.uncertain import (
     ABOUT,
     ABOUT_CHANGE,
+    ABOUT_NUMBER,
     NOT_THE_MODEL,
     TIMED,
     UNDECIDED,
@@ -81,9 +82,12 @@ def show_summary(result: Result) -> None:
     if len(result.blows):
         table.add_row(RATE[0], _in_two_lines(rate_text(summary)), RATE[3])
     values = summary if len(result.blows) else summary["fall"] | {"errors": summary["errors"]}
+    unknown = False
     for name, key, factor, unit in SHOWN if len(result.blows) else WITHOUT_BLOWS:
         if values.get(key) is not None:
-            table.add_row(name, _in_two_lines(mean_text(values, key, factor)), unit)
+            text = mean_text(values, key, factor)
+            unknown = unknown or ABOUT in text
+            table.add_row(name, _in_two_lines(text), unit)
     energy = summary["energy"]
     for key in ("numerical", "residual"):
         share = energy[f"{key}_relative"]
@@ -104,7 +108,8 @@ def show_summary(result: Result) -> None:
     console = Console()
     print_table(table, console, keys=2)
     if len(result.counted) or result.fall:
-        console.print(wrapped(about_errors(summary)), highlight=False)
+        note = f" {ABOUT_NUMBER}." if unknown else ""
+        console.print(wrapped(about_errors(summary) + note), highlight=False)
     show_warnings(console, result.warnings)
 
 

@@ -22,6 +22,7 @@ from percussion_model.simulation.means import COUNTS, numbers_over, scatter_over
 from percussion_model.simulation.rate import LARGE_ERROR, LEAST_BLOWS, rate_of_blows
 from percussion_model.simulation.result import Result
 from percussion_model.simulation.uncertain import in_digits
+from percussion_model.simulation.warnings import least_loss_time
 from percussion_model.solvers.wave.resolution import FITS, largest_misfit, misfits, promised_error
 
 # Two aperiodic runs differ if they do by more than so many standard errors.
@@ -51,6 +52,8 @@ LARGE = "may be off by"
 # Where blows have two numbers of drilling cycles, and one is this rare, the motion is near the
 # threshold between two: on another grid all blows may be of either kind.
 RARE = 0.25
+# What the vibration that is left of the blow before decides, and grids decide otherwise.
+OF_VIBRATION = ("standstill_bit_force", "rebound_velocity")
 # Runs whose drilling cycles a blow differ by more, or by more than this share of them, are
 # of different motions; where there are dozens, one more or less is a smooth change.
 SAME_MOTION, SAME_SHARE = 0.5, 0.05
@@ -349,11 +352,15 @@ def errors_of_numbers(whole: GridRun, part: GridRun, others: Sequence[GridRun]) 
     Returns
     -------
     dict of float
-        Of grid and scatter, by name, SI units; only what could be told.
+        Of grid and scatter, by name, SI units; only what could be told. Where the bit still
+        vibrates when the next blow comes, grids that agree do so by chance on `OF_VIBRATION`.
     """
+    vibrates = others and whole.result.scene.loss.time < least_loss_time(whole.result)
     compared = [other.numbers() for other in others]
     of_part, found = part.numbers(), {}
     for name, number in whole.numbers().items():
+        if vibrates and name in OF_VIBRATION:
+            continue
         if number.useful and of_part[name].useful:
             known = [numbers[name] for numbers in compared if name in numbers]
             if others and not known:

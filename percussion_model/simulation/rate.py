@@ -6,6 +6,7 @@ The evidence for the estimate is in docs/requested_accuracy.md.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -79,17 +80,21 @@ def ratio_of_sums(values: np.ndarray, weights: np.ndarray) -> tuple[float, float
     return float(ratios[0]), float(errors[0])
 
 
-def ratios_of_sums(values: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def ratios_of_sums(
+    values: np.ndarray, weights: np.ndarray, stretches: Sequence[float] = (STRETCH,)
+) -> tuple[np.ndarray, np.ndarray]:
     """Ratios of the sums of pairs of series of a motion, and their standard errors.
 
     The sum of (value - ratio * weight) over n rows scatters with the variance a n + b: a is
     that of a random walk, b is what later rows take back. Both follow from stretches of one
-    row and of a quarter of all.
+    row and of a share of all.
 
     Parameters
     ----------
     values, weights : ndarray, shape (m, n)
         m series of n successive rows, which may depend on each other.
+    stretches : sequence of float
+        Those shares. Of several the one that tells of the greatest error counts.
 
     Returns
     -------
@@ -111,8 +116,11 @@ def ratios_of_sums(values: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray,
     short, walk = scattered(1)
     if count < FEWEST_DEPENDENT:
         return ratios, np.sqrt(short / walk * count) / totals
-    long, longer_walk = scattered(int(STRETCH * count))
-    a = np.maximum((long - short) / (longer_walk - walk), 0.0)
-    b = short - a * walk
-    a, b = np.where(b < 0.0, long / longer_walk, a), np.maximum(b, 0.0)
-    return ratios, np.sqrt(a * count + b) / totals
+    variance = np.zeros(len(ratios))
+    for length in {max(int(share * count), 2) for share in stretches}:
+        long, longer_walk = scattered(length)
+        a = np.maximum((long - short) / (longer_walk - walk), 0.0)
+        b = short - a * walk
+        a, b = np.where(b < 0.0, long / longer_walk, a), np.maximum(b, 0.0)
+        variance = np.maximum(variance, a * count + b)
+    return ratios, np.sqrt(variance) / totals

@@ -29,9 +29,8 @@ TWO_DIGITS = 3.55
 UNDECIDED = "undecided"
 # Before a number in a narrow column, or a difference, whose error is not, or not all, known.
 ABOUT = "≈"
-ABOUT_CHANGE = (
-    f"{ABOUT} stands before a difference of which one of the numbers has no error by its cells."
-)
+ABOUT_NUMBER = f"{ABOUT} stands before a number whose error is not known"
+ABOUT_CHANGE = f"{ABOUT_NUMBER}, and before a difference of which one of the numbers has none."
 # Numbers that depend on the cells where waves are not damped, and the flag of a summary for it.
 OF_THE_CELLS = ("rate_of_penetration", "rate_of_penetration_fixed_window", "penetration_per_blow")
 BY_CELLS = "rate_of_penetration_depends_on_cells"
@@ -39,8 +38,9 @@ NOT_ESTIMATED = "error not estimated"
 # What stands below tables of means.
 NOT_THE_MODEL = "Whether model and rock are right is not in it."
 PLUS_MINUS = (
-    "± is the estimated numerical error, by the size of the cells and the scatter of the blows; "
-    f"without it a mean is known to its four digits. {NOT_THE_MODEL}"
+    "± is the estimated numerical error of this motion, by the size of the cells and the scatter "
+    f"of the blows; without it a mean is known to its four digits. {NOT_THE_MODEL[:-1]}, nor "
+    "whether another start leads to another motion."
 )
 PLUS_MINUS_OF_FALL = (
     "± is the estimated numerical error, by the size of the cells; without it a number is known "
@@ -222,7 +222,7 @@ def mean_text(
     """A number of a summary with its error.
 
     Four digits where the error does not show in them; where that of the grid was not
-    estimated, the scatter alone, or three digits.
+    estimated, the scatter alone, or three digits, with a ≈ among others that have one.
 
     Parameters
     ----------
@@ -241,7 +241,9 @@ def mean_text(
             return with_error(value, factor * known, most_digits) + what
     if key in COUNTS and value == round(value):
         return f"{value:.0f}"
-    return in_digits(value, UNSURE_DIGITS if error is None else SHOWN_DIGITS)
+    if error is not None:
+        return in_digits(value, SHOWN_DIGITS)
+    return (ABOUT if summary.get("errors") else "") + in_digits(value, UNSURE_DIGITS)
 
 
 def in_digits(value: float, digits: int = UNSURE_DIGITS) -> str:

@@ -202,8 +202,10 @@ def sample(par_, state, bars, memory, spare, spare_bars, spare_memory, ops, scra
     count : int
         Times that were read: fewer than all where blows or events were listed.
     """
+    # as numbers of a type that `run` has been compiled for, not as constants of their own
+    advance, read = np.int64(ADVANCE), np.int64(READ)
     for k in range(len(times)):
-        status = run(np.int64(ADVANCE), par_, state, bars, ops, scratch, times[k], blows, events, reading)
+        status = run(advance, par_, state, bars, ops, scratch, times[k], blows, events, reading)
         if status != Status.DONE:
             return status, k
         listed = state[0].n_blows + state[0].n_events
@@ -213,7 +215,7 @@ def sample(par_, state, bars, memory, spare, spare_bars, spare_memory, ops, scra
             spare_memory[1][i] = memory[1][i]
         spare[0].peak_from = math.inf  # nobody asks for peaks here, and in standstill they are dear
         here = max(times[k], time_of(par_[0], state[0]))
-        run(np.int64(READ), par_, spare, spare_bars, ops, scratch, here, blows, events, reading)
+        run(read, par_, spare, spare_bars, ops, scratch, here, blows, events, reading)
         for i in range(out.shape[1]):
             out[k, i] = row[i]
         if listed:
