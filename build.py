@@ -15,7 +15,9 @@ import subprocess
 import sys
 import tempfile
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 ROOT = Path(__file__).resolve().parent
 VENV = ROOT / ".venv"
@@ -150,26 +152,33 @@ def test(extra: list[str]) -> int:
     code = setup()
     if code != 0:
         return code
-    # pytest comes last, so that its closing line ends the output; it tells itself how far it is.
-    steps: list[tuple[str, list[str | Path]]] = [
+    checks: list[tuple[str, list[str | Path]]] = [
         ("ruff check", [tool("ruff"), "check"]),
         ("ruff format", [tool("ruff"), "format", "--check"]),
         # its cache has hidden an error that a fresh clone showed: 40 s, but of all there is
         ("mypy", [tool("mypy"), "--no-incremental"]),
         ("lint-imports", [tool("lint-imports")]),
-        ("kernels", [tool("python"), "-m", WARM_UP]),
-        ("pytest", [tool("pytest"), "-n", "2", *extra]),
     ]
-    first_failure = 0
     # numba's cache does not see edits in another file's callee, so start afresh.
     with tempfile.TemporaryDirectory(prefix="percussion-numba-") as cache:
-        for name, command in steps:
-            print(f"== {name}", flush=True)
-            code = call(command, silent="" if name == "pytest" else name,
-                        NUMBA_CACHE_DIR=cache, MPLBACKEND="Agg",
-                        PERCUSSION_FMU_CACHE=str(Path(cache) / "percussion_fmu"))  # fmt: skip
-            first_failure = first_failure or code
-    return first_failure
+        variables: dict[str, Any] = {
+            "NUMBA_CACHE_DIR": cache,
+            "PERCUSSION_FMU_CACHE": str(Path(cache) / "percussion_fmu"),
+            "MPLBACKEND": "Agg",
+        }
+        with ThreadPoolExecutor(max_workers=1) as beside:  # the checks leave cores idle
+            print("== kernels", flush=True)
+            compiling: list[str | Path] = [tool("python"), "-m", WARM_UP]
+            kernels = beside.submit(call, compiling, silent="kernels", **variables)
+            codes = []
+            for name, command in checks:
+                print(f"== {name}", flush=True)
+                codes.append(call(command, **variables))
+            codes.append(kernels.result())
+        # pytest comes last, so that its closing line ends the output; it tells how far it is.
+        print("== pytest", flush=True)
+        codes.append(call([tool("pytest"), "-n", "2", *extra], **variables))
+    return next((code for code in codes if code), 0)
 
 
 def bench(extra: list[str]) -> int:
