@@ -7,6 +7,7 @@ from pathlib import Path
 
 from examples import bifurcation, calibration, drill_design, rate_map, sensitivity
 from examples.shared import arguments, write_example
+from percussion_model.interface.commands.common import end_script
 
 EXAMPLES = (bifurcation, rate_map, sensitivity, calibration, drill_design)
 
@@ -20,4 +21,4 @@ def main(out: Path, quick: bool = False, force: bool = False) -> None:
 
 if __name__ == "__main__":
     words = arguments(main, "all", Path("out/examples"))
-    main(words.out, words.quick, words.force)
+    end_script("examples.all", lambda: main(words.out, words.quick, words.force))

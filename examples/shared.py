@@ -7,15 +7,16 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import matplotlib
 from matplotlib.figure import Figure
 
+from percussion_model.interface.commands.common import end_script
 from percussion_model.interface.plotting import style
 from percussion_model.interface.progress import Report
 from percussion_model.interface.terminal import progress
-from percussion_model.simulation.files import ResultError, staged, staged_text, to_json
+from percussion_model.simulation.files import staged, staged_text, to_json
 from percussion_model.simulation.origin import Claim
 
 # What an example found, as JSON.
@@ -63,11 +64,8 @@ def write_example(
     numbered: bool = True,
 ) -> None:
     """Run an example; write its figure and what it found where nothing else is replaced."""
-    try:
-        origin = {"command": f"python -m examples.{name}", "quick": quick}
-        claim = Claim(out, origin, force, numbered)
-    except ResultError as error:
-        sys.exit(f"examples.{name}: {error}")
+    origin = {"command": f"python -m examples.{name}", "quick": quick}
+    claim = Claim(out, origin, force, numbered)
     if claim.moved:
         print(claim.moved, file=sys.stderr)
     numbers = claim.folder / "found.json"
@@ -83,8 +81,12 @@ def write_example(
         print(f"wrote {path}", file=sys.stderr)
 
 
-def command_line(main: Callable[..., dict[str, Any]], name: str) -> None:
+def command_line(main: Callable[..., dict[str, Any]], name: str) -> NoReturn:
     """Run an example with the words of the command line, and write what it found."""
     default = Path("out/examples") / name
     words = arguments(main, name, default)
-    write_example(main, name, words.out, words.quick, words.force, words.out == default)
+    numbered = words.out == default
+    end_script(
+        f"examples.{name}",
+        lambda: write_example(main, name, words.out, words.quick, words.force, numbered),
+    )

@@ -10,11 +10,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NoReturn
 
-from percussion_model.coupling import CouplingError
-from percussion_model.interface.commands.common import BAD_INPUT, INTERRUPTED, claim, digest
+from percussion_model.interface.commands.common import claim, digest, end_script
 from percussion_model.interface.commands.common import list_files as list_files
 from percussion_model.interface.messages import wrapped
-from percussion_model.simulation.files import ResultError
 
 # Each scenario has a folder in it, by its name.
 FOLDER = Path("out") / "scenarios"
@@ -90,7 +88,7 @@ def command_line(
     archives: Sequence[Archive],
     work: Callable[[Sequence[Path], Path], Iterable[Path]],
     arguments: Sequence[str] | None = None,
-) -> None:
+) -> NoReturn:
     """Run a scenario by `python -m scenarios.NAME`, and end the process.
 
     Its results go to a folder of its own, which is claimed as those of `percussion` are: what
@@ -108,15 +106,7 @@ def command_line(
     arguments : sequence of str, optional
         Words of the command line.
     """
-    try:
-        code = _run(name, about or "", archives, work, arguments)
-    except (ScenarioError, CouplingError, ResultError) as error:
-        print(f"scenarios.{name}: {error}", file=sys.stderr)
-        code = BAD_INPUT
-    except KeyboardInterrupt:
-        print(f"scenarios.{name}: interrupted before there was a result", file=sys.stderr)
-        code = INTERRUPTED
-    sys.exit(code)
+    end_script(f"scenarios.{name}", lambda: _run(name, about or "", archives, work, arguments))
 
 
 def _run(
@@ -125,7 +115,7 @@ def _run(
     archives: Sequence[Archive],
     work: Callable[[Sequence[Path], Path], Iterable[Path]],
     arguments: Sequence[str] | None,
-) -> int:
+) -> None:
     command = f"python -m scenarios.{name}"
     parser = _Parser(prog=command, description=about.partition(": `python -m")[0] + ".")
     for k, one in enumerate(archives):
@@ -141,4 +131,3 @@ def _run(
     claimed = claim(command, words.out, FOLDER / name, words.force, archives=made_from)
     files = list(work(paths, claimed.folder))
     list_files([*files, claimed.sign()])
-    return 0

@@ -17,8 +17,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from examples import bifurcation, drill_design, motions, rate_map
 from examples.all import EXAMPLES
-from examples.shared import figure_of, tell, write_example
-from percussion_model import Scene, Simulation
+from examples.shared import command_line, figure_of, tell, write_example
+from percussion_model import Scene, SceneError, Simulation
 from percussion_model.interface import progress
 from percussion_model.simulation.files import to_json
 
@@ -66,6 +66,24 @@ def test_examples_are_short():
     for name in NAMES:
         lines = (ROOT / "examples" / f"{name}.py").read_text(encoding="utf-8").splitlines()
         assert len(lines) <= 150, name
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "words"),
+    [
+        (KeyboardInterrupt(), 130, "interrupted before there was a result"),
+        (SceneError("solver.cells = 0"), 2, "solver.cells = 0"),
+    ],
+)
+def test_an_example_ends_with_a_message(error, code, words, tmp_path, monkeypatch, capsys):
+    def main(out, quick):
+        raise error
+
+    monkeypatch.setattr("sys.argv", ["example", "--out", str(tmp_path / "x")])
+    with pytest.raises(SystemExit) as ended:
+        command_line(main, "example")
+    assert ended.value.code == code
+    assert capsys.readouterr().err.endswith(f"examples.example: {words}\n")
 
 
 def test_command_line_refuses_what_it_does_not_know():

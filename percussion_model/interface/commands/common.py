@@ -7,10 +7,10 @@ import hashlib
 import os
 import sys
 import tomllib
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn
 
 import typer
 
@@ -294,11 +294,34 @@ def refusal(message: str) -> typer.Exit:
     return typer.Exit(print_message(message, BAD_INPUT))
 
 
-def print_message(message: str, code: int = 0) -> int:
+def end_script(name: str, work: Callable[[], object]) -> NoReturn:
+    """Do the work of a script of this project, and end the process.
+
+    What its user can mend and Ctrl-C are a message, as those of `percussion`.
+
+    Parameters
+    ----------
+    name : str
+        Module of the script, as `python -m` takes it.
+    work : callable
+    """
+    code = 0
+    try:
+        work()
+    except KeyboardInterrupt:
+        code = print_message("interrupted before there was a result", INTERRUPTED, name)
+    except ValueError as error:
+        if type(error).__module__.partition(".")[0] not in ("percussion_model", "scenarios"):
+            raise
+        code = print_message(str(error), BAD_INPUT, name)
+    sys.exit(code)
+
+
+def print_message(message: str, code: int = 0, program: str = "percussion") -> int:
     """Print one message on stderr; return the exit code.
 
     What refuses bad input is one line, for scripts; others are broken to fit.
     """
-    text = f"percussion: {message}"
+    text = f"{program}: {message}"
     print(text if code == BAD_INPUT else wrapped(text), file=sys.stderr)
     return code
