@@ -203,7 +203,9 @@ def sample(par_, state, bars, memory, spare, spare_bars, spare_memory, ops, scra
         Times that were read: fewer than all where blows or events were listed.
     """
     for k in range(len(times)):
-        status = run(np.int64(ADVANCE), par_, state, bars, ops, scratch, times[k], blows, events, reading)
+        status = run(
+            np.int64(ADVANCE), par_, state, bars, ops, scratch, times[k], blows, events, reading
+        )
         if status != Status.DONE:
             return status, k
         listed = state[0].n_blows + state[0].n_events
