@@ -106,6 +106,20 @@ def test_an_accuracy_is_asked_for(percussion):
     assert "solver.accuracy" in err
 
 
+@pytest.mark.parametrize("command", ["run", "explain"])
+@pytest.mark.parametrize(
+    ("scene", "reason"), [("undamped", "effects.loss = false"), ("drop_test", "a bit alone")]
+)
+def test_an_accuracy_of_no_rate_is_refused_in_one_line(percussion, command, scene, reason):
+    file = str(SCENARIOS / f"{scene}.toml")
+    for asked in (["--accuracy", "1e-3"], ["--set", "solver.accuracy=1e-3"]):
+        code, out, err = percussion(command, file, *asked)
+        assert (code, out) == (BAD_INPUT, "")
+        assert err.count("\n") == 1
+        assert "solver.accuracy = 0.001" in err
+        assert reason in err
+
+
 # ------------------------------------------------------------------- other commands
 
 

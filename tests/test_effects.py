@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from matplotlib.figure import Figure
@@ -30,6 +31,7 @@ from percussion_model.interface.commands.effects import (
 from percussion_model.interface.plotting import effect_bars
 from percussion_model.simulation.uncertain import with_short_error
 
+DROP = Path(__file__).parents[1] / "scenarios" / "drop_test.toml"
 RIGID = {"piston.model": "rigid", "bit.model": "rigid"}
 SHORT = {"run.duration": 0.6, "run.settle": 0.1}
 
@@ -294,12 +296,44 @@ def test_bars_and_numbers_of_the_figure_stay_within_their_panels():
 def test_dashes_of_a_drop_test_have_their_reason():
     bit = Scene().replace(**{"piston.model": "absent", "effects.drive": "none"})
     found = study_effects(bit.replace(**{"run.duration": 0.02, "run.settle": 0.0}))
-    assert "there is no piston" in found.base.reason
-    assert all(trial.reason for trial in found.trials)
-    # and what has nothing to tell is left out
-    headings, rows, _ = table_of(found)
-    assert headings == ["", "step\nns", "run\nms", "events"]
+    assert not found.base.reason
+    # what has nothing to tell is left out, and what is left has a reason for each dash
+    headings, rows, reasons = table_of(found)
+    assert not any("rate" in heading or "period" in heading for heading in headings)
+    assert len(reasons) > 1
+    assert {name for name, *cells in rows if "-" in cells[3:]} <= set(reasons)
     assert all(len(row) == len(headings) for row in rows)
     axes = effect_bars.draw_effects(found).axes
-    assert len(axes) == 2
+    assert len(axes) == 2 + len([text for text in headings if text.endswith("%")])
     assert all(ax.patches for ax in axes)
+
+
+def test_effects_on_a_drop_test_are_shown_as_changes_of_the_fall():
+    scene = Scene.from_toml(DROP)
+    told = []
+    found = study_effects(scene, progress=lambda text, share: told.append(text))
+    assert told[:2] == ["the scene as it is", "gravity off"]
+    headings, rows, _ = table_of(found)
+    assert headings[4:] == ["depth\nmm", "depth\n%", "rebound\n%", "rest\n%"]
+    by_name = {name: dict(zip(headings[4:], cells, strict=True)) for name, _, _, _, *cells in rows}
+    base = found.base.result
+    without = simulate(scene.replace(**{"effects.barrier": False}))
+    for name, heading in (("depth", "depth\n%"), ("rebound_velocity", "rebound\n%")):
+        change = 100.0 * (without.fall[name] / base.fall[name] - 1.0)
+        shown = by_name["barrier off"][heading]
+        if shown != "undecided":
+            assert float(shown.split("±")[0]) == pytest.approx(change, rel=0.05, abs=0.2)
+    assert by_name["leaps off"]["depth\n%"] == "0.00"
+    # what has no error by its cells is said to have none
+    assert by_name["loss off"]["depth\n%"].startswith("≈")
+    # a bit in the air has no depth, and this is said
+    feed_off = next(trial for trial in found.trials if trial.variant.effect == "feed")
+    assert by_name["feed off"]["depth\nmm"] == "-"
+    assert "no depth" in feed_off.reason
+    assert not found.base.reason
+    entry = found.to_dict()["effects"][0]
+    assert set(entry["changes"]) == {"depth", "rebound_velocity", "rest_time"}
+    titles = [
+        ax.get_title(loc="left") or ax.get_title() for ax in effect_bars.draw_effects(found).axes
+    ]
+    assert {"Depth", "Rebound velocity", "Time of rest"} <= set(titles)

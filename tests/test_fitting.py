@@ -126,6 +126,38 @@ def test_progress_promises_no_number_of_computations():
     assert done == list(range(1, fit.runs + 1))
 
 
+def test_stages_of_a_fit_are_told_with_the_computations_that_they_take():
+    """Those of the search are a bound, of which much is done; those of the walks are exact."""
+    scene = bit()
+    done, told = [0], []
+    sources = {
+        "drop": (None, drops(scene, 0, samples=60, speeds=(5.25,)), [DAMPING]),
+        "both": (CURVE, drops(scene, 0, samples=60, speeds=(5.25,)), [RATIO, ENERGY]),
+        "curve": (CURVE, [], None),
+    }
+    for curve, fallen, names in sources.values():
+        told.clear()
+        done[:] = [0]
+        fit = fit_rock(scene, curve, fallen, (), names, progress=done.append,
+                       stage=lambda name, most: told.append((name, most, done[-1])))  # fmt: skip
+        ends = [at for *_, at in told[1:]] + [fit.runs]
+        taken = {name: (most, end - at) for (name, most, at), end in zip(told, ends, strict=True)}
+        most, surveyed = taken["search of the whole range"]
+        assert 0.6 * most <= surveyed <= most
+        for walk, share in (("walk 1 of 2", 0.4), ("walk 2 of 2", 0.6)):
+            most, walked = taken[walk]
+            assert most == share * 250 * 2 ** len(fit.estimates)
+            assert 0.9 * most <= walked <= most + 1
+        assert taken["check with finer cells"] == (0, 0)
+
+
+def test_an_interval_over_the_whole_range_is_called_that():
+    like = Likelihood(Scene(), [], [DAMPING], np.log([[1e2, 1e7]]), lambda: None)
+    (note,) = interval_notes({DAMPING: Estimate(1.5e4, 1e2, 1e7, OPEN)}, like)
+    assert "reaches over the whole range that was searched" in note
+    assert "nothing" not in note
+
+
 def test_intervals_of_a_curve_cover_as_often_as_they_say():
     """They hold together: the box that they span has the region of all parameters in it."""
     trials, confidence, both, halved = 60, 0.8, 0, 0

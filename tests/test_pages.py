@@ -103,6 +103,50 @@ def test_a_map_shows_the_slice_and_the_quantity_that_are_chosen(found, tmp_path)
     assert title == "Impact velocity [m/s]"
 
 
+# Rows of tables as they are drawn; they lie in the shadows of other elements.
+DRAWN_ROWS = """
+(() => {
+  const found = [];
+  const look = at => {
+    if (at.matches && at.matches(".slick-row"))
+      found.push([...at.querySelectorAll(".slick-cell")].map(cell => cell.textContent.trim()));
+    if (at.shadowRoot) look(at.shadowRoot);
+    for (const inner of at.children) look(inner);
+  };
+  look(document.body);
+  return found;
+})()
+"""
+
+
+@needs_browser
+def test_a_study_shows_three_digits_and_two_of_an_error(tmp_path):
+    """The error of the grid is not known in a study; what was given has all of its digits."""
+    points = grid({"feed.force": [2636.3636, 4321.0], "drive.reversal_distance": [0.002, 0.04]})
+    found = study(SCENE, points, tmp_path / "out", processes=1)
+    rows = found.rows.copy()
+    rows["rate_of_penetration"][:2] = 16.2113e-3, 0.0174321
+    rows["rate_of_penetration_error"][:2] = 1.8069e-11, 0.0004321
+    rows["drilling_cycles_per_blow"][:2] = 3.0, 3.14159
+    path = write_study_report(Study(SCENE, points, rows, found.failures), tmp_path)
+    hover = f"{MODEL}('known digits')"
+    (first, second, *_), names, *shown = opened(
+        path, tmp_path, DRAWN_ROWS, f"{MODEL}('shown').options.map(one => one[1])",
+        f"{hover}.format(16.2113, '', {{}})",
+        f"{MODEL}('shown').value = 'off'; {hover}.format(1.8069e-8, '', {{}})",
+        f"{MODEL}('shown').value = 'cycles'; {hover}.format(3, '', {{}})",
+        f"[...{MODEL}('cells').data.rate_text]",
+    )  # fmt: skip
+    assert first[:2] == ["2636.4", "0.002"]
+    assert first[4:7] == ["16.2", "1.8e-8", "1.1e-9"]
+    assert second[4:7] == ["17.4", "0.43", "0.025"]
+    assert shown[:3] == ["16.2", "1.8e-8", "3"]
+    assert shown[3][0] == "16.2"
+    assert "17.43 ± 0.43" in shown[3]
+    assert "Standard error (scatter) or convergence [mm/s]" in names
+    assert not any(name.startswith("Error") for name in names)
+
+
 @needs_browser
 def test_a_map_hides_what_is_undecided_in_each_slice(found, tmp_path):
     """One point, in the other slice than that shown first."""

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from percussion_model import Scene, SceneError, simulate
+from percussion_model.analysis.fitting.predictions import bit_alone
 from percussion_model.physics.records import BLOW
 from percussion_model.scene.numbers import numbers_of, section_numbers
 from percussion_model.simulation.accuracy_control import GROWTH, run_to_accuracy, time_needed
@@ -33,6 +34,8 @@ from percussion_model.solvers.wave.resolution import (
 )
 
 RIGID = {"piston.model": "rigid", "bit.model": "rigid"}
+UNDAMPED = {"effects.loss": False}
+ALONE = {"piston.model": "absent", "effects.drive": "none"}
 
 
 # --------------------------------------------------------------------------- the rule
@@ -98,11 +101,40 @@ def test_solver_takes_the_cells_of_the_rule_in_library_and_fmu():
         ({"solver.accuracy": 1e-7}, "from 0.0001 to 0.1"),
         ({"solver.accuracy": 0.5}, "from 0.0001 to 0.1"),
         ({"solver.accuracy": True}, "from 0.0001 to 0.1"),
+        (
+            {"solver.accuracy": 1e-3, **UNDAMPED},
+            r"where effects\.loss = false .* set effects\.loss",
+        ),
+        ({"solver.accuracy": 1e-3, "loss.time": 0.0}, r"where loss\.time = 0\.0 s .* above 0 s"),
+        ({"solver.accuracy": 1e-3, **ALONE}, r'piston\.model = "absent"\) does not have'),
+        ({"solver.accuracy": 1e-3, **ALONE, **UNDAMPED}, "give a piston"),
     ],
 )
 def test_contradictions_are_refused(changes, message):
     with pytest.raises(SceneError, match=message):
         Scene().replace(**changes)
+
+
+@pytest.mark.parametrize("changes", [UNDAMPED, ALONE])
+def test_an_accuracy_of_no_rate_is_refused_before_anything_is_computed(changes, monkeypatch):
+    scene = Scene().replace(**changes)
+    monkeypatch.setattr("percussion_model.simulation.simulate.Simulation", None)
+    with pytest.raises(SceneError, match=r"solver\.accuracy = 0\.001"):
+        simulate(scene, accuracy=1e-3)
+    with pytest.raises(SceneError, match=r"solver\.accuracy = 0\.001"):
+        Scene(**{**scene.given_values(), "solver": {"accuracy": 1e-3}})
+
+
+def test_rigid_bodies_need_no_loss():
+    assert Scene().replace(**RIGID, **UNDAMPED, **{"solver.accuracy": 1e-3}).solver.accuracy == 1e-3
+
+
+def test_a_drop_test_of_a_fit_takes_the_cells_of_the_request():
+    asked = Scene().replace(**{"solver.accuracy": 1e-3, "run.check": True})
+    alone = bit_alone(asked)
+    assert (alone.solver.accuracy, alone.run.check) == (None, False)
+    assert alone.solver.cells == 56
+    assert bit_alone(asked.replace(**RIGID)).solver.cells is None
 
 
 def test_check_without_an_accuracy_is_refused():

@@ -54,10 +54,15 @@ LEAPS = "leaps"
 OF_THE_ERROR = (LARGE, "standard error")
 # Numbers of a summary whose change is shown.
 CHANGED = ("rate_of_penetration", "blow_period", "peak_bit_force")
+# The same of a bit that falls without a piston.
+CHANGED_OF_FALL = ("depth", "rebound_velocity", "rest_time")
+# What is said of a bit that has none.
+NO_DEPTH = "it has no depth"
 
 _NO_ROCK = "the bit meets no rock: it flies, and drills nothing"
 _NO_DRIVE = "nothing throws the piston: what moves is left from the start and comes to rest"
 _NO_PISTON = "there is no piston, so no blows that a rate or a period could be taken from"
+_NO_REST = "the bit has not come to rest when the run ends"
 _NO_CRUSHING = "a linear spring gives all back: nothing is crushed"
 _BARRIER = ("rock.barrier_energy", "rock.barrier_damping")
 
@@ -207,8 +212,12 @@ class Trial:
         """Parts of `reason`."""
         if self.variant.no_blows or self.variant.no_penetration:
             return [self.variant.no_blows or self.variant.no_penetration]
-        if self.result.scene.piston.model == "absent":
-            return [_NO_PISTON]
+        if self.falls:
+            fall = self.result.fall
+            if not any(fall.values()):
+                return [_NO_PISTON]
+            has_none = [text for text in self.result.warnings if NO_DEPTH in text]
+            return has_none or [_NO_REST] * ("rest_time" not in fall)
         reasons = [text for text in self.result.warnings if "trusted" in text]
         if len(self.result.counted) < LEAST_BLOWS:
             reasons += [text for text in self.result.warnings if "whole blow" in text][:1]
@@ -217,6 +226,11 @@ class Trial:
                 "the motion is aperiodic, and the run too short to tell its rate of penetration"
             ]
         return reasons
+
+    @property
+    def falls(self) -> bool:
+        """Whether a bit falls without a piston."""
+        return self.result.scene.piston.model == "absent"
 
     @property
     def undecided(self) -> bool:
@@ -231,6 +245,8 @@ class Trial:
         found |= {f"{name}_error": known_error(summary, name) for name in CHANGED}
         found |= {f"{name}_standard_error": known_scatter(summary, name) for name in CHANGED}
         found["rate_of_penetration_undecided"] = self.undecided
+        if self.falls:
+            found |= self._fall(summary)
         if self.variant.no_penetration:
             found |= dict.fromkeys(key for key in found if key.startswith(CHANGED[0]))
         if self.variant.no_blows:
@@ -249,6 +265,15 @@ class Trial:
             "reason": self.reason,
             "warnings": summary["warnings"],
         }
+
+    def _fall(self, summary: dict[str, Any]) -> dict[str, Any]:
+        """Numbers of a fall, which happens once: nothing scatters."""
+        found: dict[str, Any] = {}
+        for name in CHANGED_OF_FALL:
+            found[name] = summary["fall"].get(name)
+            found[f"{name}_error"] = known_error(summary, name)
+            found[f"{name}_standard_error"] = None if found[name] is None else 0.0
+        return found
 
 
 @dataclass(frozen=True)
@@ -270,8 +295,13 @@ class EffectsStudy:
     trials: list[Trial] = field(repr=False)
     refused: dict[str, str] = field(repr=False)
 
+    @property
+    def changed(self) -> tuple[str, ...]:
+        """Numbers whose change is shown: `CHANGED`, or `CHANGED_OF_FALL`."""
+        return CHANGED_OF_FALL if self.base.falls else CHANGED
+
     def change(self, trial: Trial, name: str) -> Change:
-        """Change of a number of `CHANGED` against the scene itself.
+        """Change of a number of `changed` against the scene itself.
 
         Leaps go over the same grid: whatever it puts off is in both runs, and scatter is left.
         """
@@ -282,17 +312,17 @@ class EffectsStudy:
         return found
 
     def changes(self, trial: Trial) -> dict[str, float | None]:
-        """Relative change of each number of `CHANGED`; None where there is none that counts."""
-        found = {name: self.change(trial, name) for name in CHANGED}
+        """Relative change of each number of `changed`; None where there is none that counts."""
+        found = {name: self.change(trial, name) for name in self.changed}
         return {name: None if one.hidden else one.value for name, one in found.items()}
 
     def change_errors(self, trial: Trial) -> dict[str, float | None]:
         """Errors of `changes`, by grid and scatter of both runs; None where it is not known."""
-        return {name: self.change(trial, name).error for name in CHANGED}
+        return {name: self.change(trial, name).error for name in self.changed}
 
     def undecided(self, trial: Trial) -> list[str]:
-        """Numbers of `CHANGED` whose change is within what is known of its error."""
-        return [name for name in CHANGED if self.change(trial, name).is_undecided]
+        """Numbers of `changed` whose change is within what is known of its error."""
+        return [name for name in self.changed if self.change(trial, name).is_undecided]
 
     def warnings(self) -> list[str]:
         """Warnings of the scene, and others of its variants behind their names.
@@ -391,7 +421,7 @@ def study_effects(
     found = []
     for k, (variant, changed) in enumerate(cases):
         if progress is not None:
-            progress(variant.name, k / (len(cases) + 1))
+            progress(variant.name if variant.effect else "the scene as it is", k / (len(cases) + 1))
         found.append(_best_run(changed, duration, settle))
     if progress is not None:
         progress("time steps", len(cases) / (len(cases) + 1))

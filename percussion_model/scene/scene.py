@@ -431,7 +431,7 @@ def _refuse_fidelity(scene: Scene) -> None:
 
 
 def _refuse_requests(scene: Scene) -> None:
-    """Refuse an accuracy that is said in two ways, or that no rule picks a mesh for."""
+    """Refuse an accuracy that is said in two ways, that no rule picks a mesh for, or of no rate."""
     accuracy, cells = scene.solver.accuracy, scene.solver.cells
     if accuracy is None:
         return
@@ -450,4 +450,21 @@ def _refuse_requests(scene: Scene) -> None:
         raise SceneError(
             f"solver.accuracy = {accuracy!r}: a blow map is as accurate as its table "
             '(docs/fidelity.md); set blow_map.density, or solver.fidelity = "wave"'
+        )
+    _refuse_without_rate(scene)
+
+
+def _refuse_without_rate(scene: Scene) -> None:
+    """Refuse an accuracy of the rate of penetration where no finer run tells that rate."""
+    head = f"solver.accuracy = {scene.solver.accuracy!r} is that of the rate of penetration, "
+    if scene.piston.model == "absent":
+        raise SceneError(
+            f'{head}which a bit alone (piston.model = "absent") does not have: leave it out and '
+            "set solver.cells, or give a piston"
+        )
+    if scene.is_undamped:
+        reason = "loss.time = 0.0 s" if scene.effects.loss else "effects.loss = false"
+        raise SceneError(
+            f"{head}which has no limit with finer cells where {reason} (docs/undamped.md): leave "
+            "it out and set solver.cells, or set effects.loss = true with loss.time above 0 s"
         )

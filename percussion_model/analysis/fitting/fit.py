@@ -116,6 +116,7 @@ def fit_rock(
     ranges: Mapping[str, tuple[float, float]] | None = None,
     confidence: float = 0.95,
     progress: Callable[[int], None] | None = None,
+    stage: Callable[[str, int], None] | None = None,
 ) -> Fit:
     """Fit the rock of a scene to all measurements together.
 
@@ -141,6 +142,9 @@ def fit_rock(
         Of the intervals together: they span the region of that confidence of all parameters.
     progress : callable, optional
         Called with the number of computations done. How many there will be is not known.
+    stage : callable, optional
+        Called with what begins, and the most computations that it takes; 0 where that is not
+        known.
 
     Returns
     -------
@@ -165,11 +169,12 @@ def fit_rock(
         raise FitError("nothing to fit: a curve, a drop or a reading is needed")
     names = _chosen(scene, sources, parameters)
     box = _box(scene, names, ranges or {})
-    counter = _Counter(progress)
+    counter = _Counter(progress, stage)
     whole = Likelihood(scene, [_series(one) for one in sources], names, box, counter.tick)
     minima = _minima(whole, sources, counter)
     quantile = _quantile(confidence, len(names))
-    found = _explored(whole, minima, quantile)
+    found = _explored(whole, minima, quantile, counter)
+    counter.begin("check with finer cells")
     return _result(whole, sources, found, confidence, quantile, counter.done)
 
 
@@ -185,10 +190,19 @@ def _quantile(confidence: float, free: int) -> float:
 
 
 class _Counter:
-    """Computations done, passed on."""
+    """Computations done and stages that begin, passed on."""
 
-    def __init__(self, progress: Callable[[int], None] | None) -> None:
-        self.done, self._progress = 0, progress
+    def __init__(
+        self,
+        progress: Callable[[int], None] | None,
+        stage: Callable[[str, int], None] | None,
+    ) -> None:
+        self.done, self._progress, self._stage = 0, progress, stage
+
+    def begin(self, name: str, most: int = 0) -> None:
+        """Tell what begins, and how many computations it takes at most; 0: that is not known."""
+        if self._stage is not None:
+            self._stage(name, most)
 
     def tick(self) -> None:
         """Count one more."""
@@ -260,7 +274,9 @@ def _minima(whole: Likelihood, sources: Sequence[Source], counter: _Counter) -> 
     simple = all(isinstance(one, Curve) for one in sources)
     every = range(len(whole.names))
     sizes = np.array([ZOOM[name] for name in whole.names])
+    counter.begin("search of the whole range", _most_surveyed(whole.names, sources))
     starts = distinct(_survey(thin, sources), ZOOMS[-1] * sizes, STARTS)
+    counter.begin("descent from the best places")
     lower = [descend(thin, one.at, every, rounds=2)[0] for one in starts]
     found = distinct(lower, 0.25 * sizes, STARTS)
     # few samples tell less: what is far above the best in them is so in all
@@ -309,6 +325,23 @@ def _survey(thin: Likelihood, sources: Sequence[Source]) -> list[Place]:
     return places
 
 
+def _most_surveyed(names: Sequence[str], sources: Sequence[Source]) -> int:
+    """Most computations of `_survey`."""
+    rough = [name for name in names if name in VALUES]
+    moved = 1 + len(names) - len(rough)
+    curves = sum(isinstance(one, Curve) for one in sources)
+    if moved > 1 and curves:
+        if len(sources) == curves or not rough:
+            return 2
+        first = 1 + moved * math.prod(VALUES[name] for name in rough) + RELAXED
+    elif ENERGY in names:
+        first = LEVELS if len(names) == 1 else POINTS * LEVELS
+    else:
+        first = POINTS
+    zoom = moved * math.prod(ZOOM_VALUES[name] for name in rough) + ZOOM_RELAXED
+    return 1 + first + (len(ZOOMS) * ZOOMED * zoom if rough else 0)
+
+
 def _zoom(like: Likelihood, at: np.ndarray, sizes: np.ndarray, steps: np.ndarray) -> list[Place]:
     """The best places of a grid of C_R and W_R around a place; K_R and gamma follow."""
     axes = {}
@@ -333,19 +366,23 @@ class Explored(NamedTuple):
     settled: bool
 
 
-def _explored(like: Likelihood, minima: list[Place], quantile: float) -> Explored:
+def _explored(
+    like: Likelihood, minima: list[Place], quantile: float, counter: _Counter
+) -> Explored:
     """Walk from the best of all minima, twice: the second knows how wide the first went."""
     every, rng = range(len(like.names)), np.random.default_rng(0)
     walked = Walk.of(minima)
     wide: np.ndarray | None = None
-    for share in ROUNDS:
+    for turn, share in enumerate(ROUNDS, 1):
         best, spread = descend(like, minima[0].at, every)
         best = polish(like, best, spread)
         threshold = quantile + ROUGH_FACTOR * max(roughness(like, best, spread))
         minima = [best, *(one for one in minima if one.deviance > best.deviance)]
         steps = round(share * steps_wanted(len(every)))
         first = spread if wide is None else wide
+        counter.begin(f"walk {turn} of {len(ROUNDS)}", steps)
         walked = walked.joined(walk(like, best, first, threshold, steps, rng))
+        counter.begin("descent from where it went")
         wide = walked.spread(threshold)
         place = like.at(walked.best)
         settled = place.deviance > best.deviance - BETTER * threshold
@@ -353,6 +390,7 @@ def _explored(like: Likelihood, minima: list[Place], quantile: float) -> Explore
             minima = [place, *minima]
     best, spread = descend(like, minima[0].at, every)
     walked = walked.joined(Walk.of([best]))
+    counter.begin("ends of the intervals")
     beyond = pushed_out(
         like,
         walked,

@@ -48,7 +48,8 @@ def interval_notes(estimates: Mapping[str, Estimate], like: Likelihood) -> list[
         told = {
             OPEN_ABOVE: f"is not determined: the data tell only that it is above {low}",
             OPEN_BELOW: f"is not determined: the data tell only that it is below {high}",
-            OPEN: f"is not determined: the data tell nothing of it between {low} and {high}",
+            OPEN: "is not determined: its interval reaches over the whole range that was searched, "
+            f"{low} to {high}",
             WIDE: f"is not determined: {factor}, {low} to {high}, explains the data",
         }.get(one.verdict)
         if told is None and one.high > ROUGHLY * one.low:

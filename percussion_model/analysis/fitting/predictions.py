@@ -9,9 +9,11 @@ import numpy as np
 
 from percussion_model.analysis.fitting.measurements import DropTest, Reading
 from percussion_model.physics.records import EventKind
+from percussion_model.scene.numbers import numbers_of
 from percussion_model.scene.scene import Scene
 from percussion_model.simulation.gauge import gauge_force, gauge_stress
 from percussion_model.simulation.simulate import Simulation, simulate
+from percussion_model.solvers.wave.resolution import cells_for
 
 # The bit has left the rock for the first time after that many half-periods on its spring.
 HALF_PERIODS = 3.0
@@ -21,7 +23,15 @@ def bit_alone(scene: Scene) -> Scene:
     """Return the scene of a drop test with the bit and the rock of a scene."""
     if scene.piston.model == "absent":
         return scene
-    return scene.replace(**{"piston.model": "absent", "effects.drive": "none"})
+    wanted = scene.solver.accuracy
+    alone = {"piston.model": "absent", "effects.drive": "none"}
+    if wanted is None:
+        return scene.replace(**alone)
+    # a bit alone has no rate that an accuracy could be of: it takes the cells that this asks for
+    scene = scene.replace(**alone, **{"solver.accuracy": None, "run.check": False})
+    if scene.solver_name != "wave":
+        return scene
+    return scene.replace(**{"solver.cells": cells_for(numbers_of(scene), wanted)[0]})
 
 
 def drop_test_signal(

@@ -11,6 +11,7 @@ from percussion_model.interface.commands import common
 
 if TYPE_CHECKING:
     from percussion_model.analysis.fitting import Fit
+    from percussion_model.interface.progress import Report
     from percussion_model.scene.scene import Scene
 
 
@@ -91,11 +92,10 @@ def calibrate(
     numbers = [read_reading(word) for word in measured or ()]
     limits = dict(_read_range(word) for word in ranges or ())
     with progress("preparing") as report:
+        told = _Stages(report)
         found = fit_rock(
-            chosen, slow, drops, numbers, only, limits,
-            # how many there will be is found by the search itself
-            progress=lambda done: report(f"{done} computations done", None),
-        )  # fmt: skip
+            chosen, slow, drops, numbers, only, limits, progress=told.done, stage=told.begin
+        )
     common.write_json(json_file, found.summary())
     written = []
     if json_file != "-":
@@ -117,6 +117,31 @@ def calibrate(
 
             written.append(save_calibration(found, figure))
     common.list_files(written)
+
+
+class _Stages:
+    """Stages of a fit, and their shares where it is known how much they take.
+
+    Parameters
+    ----------
+    report : callable
+        Takes a text and a share.
+    """
+
+    def __init__(self, report: Report) -> None:
+        self._report, self._name, self._most, self._before, self._all = report, "fit", 0, 0, 0
+
+    def begin(self, name: str, most: int) -> None:
+        """Take the stage that begins, and its computations; 0 where they are not known."""
+        self._name, self._most, self._before = name, most, self._all
+        self._report(name, 0.0 if most else None)
+
+    def done(self, count: int) -> None:
+        """Take the number of all computations that are done."""
+        self._all, here = count, count - self._before
+        of = f" of {self._most}" if self._most else ""
+        share = here / self._most if self._most else None
+        self._report(f"{self._name}: {here}{of} computations", share)
 
 
 def _check_file(option: str, path: Path | None, force: bool) -> None:

@@ -71,7 +71,7 @@ LONGEST_NAME = 14
 DEARER = "*"
 
 RATE = "rate_of_penetration"
-# An error below this share of a rate is not shown.
+# An error below this share of a rate or a depth is not shown.
 LEAST_ERROR = 1e-3
 NOTE = (
     "± is the numerical error, by the size of the cells and the scatter of the blows; a rate "
@@ -82,31 +82,47 @@ NOTE = (
 # Added where it matters.
 OF_LEAPS = "Leaps go over the same cells: the ± of their changes is that of the scatter."
 
+NOTE_OF_FALL = (
+    "± is the numerical error, by the size of the cells; a depth without it is known to 0.1 %. % "
+    "is the change against the scene as it is, {undecided} where it is within the errors of both. "
+    "Times are the least of several."
+)
+
 # Columns: heading, and what stands in it.
-_COLUMNS: dict[str, Callable[[EffectsStudy, Trial, dict[str, Any]], str]] = {
+Columns = dict[str, Callable[["EffectsStudy", "Trial", dict[str, Any]], str]]
+_COSTS: Columns = {
     "step\nns": lambda study, trial, row: (
         _number(row["step_time"], 1e9, 3) + DEARER * study.is_costlier(trial)
     ),
     "run\nms": lambda study, trial, row: _number(row["wall_time"], 1e3, 2),
     "blow\nµs": lambda study, trial, row: _number(row["blow_time"], 1e6, 2),
     "events": lambda study, trial, row: f"{row['events']}",
-    "rate\nmm/s": lambda study, trial, row: _rate(row),
+}
+_OF_BLOWS: Columns = {
+    "rate\nmm/s": lambda study, trial, row: _known(row, RATE),
     "rate\n%": lambda study, trial, row: _change(study, trial, RATE),
     "period\n%": lambda study, trial, row: _change(study, trial, "blow_period"),
     "peak\n%": lambda study, trial, row: _change(study, trial, "peak_bit_force"),
+}
+_OF_FALL: Columns = {
+    "depth\nmm": lambda study, trial, row: _known(row, "depth"),
+    "depth\n%": lambda study, trial, row: _change(study, trial, "depth"),
+    "rebound\n%": lambda study, trial, row: _change(study, trial, "rebound_velocity"),
+    "rest\n%": lambda study, trial, row: _change(study, trial, "rest_time"),
 }
 
 
 def table_of(found: EffectsStudy) -> tuple[list[str], list[list[str]], dict[str, str]]:
     """Headings, rows and the reasons of what is not shown, as text."""
+    columns = _COSTS | (_OF_FALL if found.base.falls else _OF_BLOWS)
     rows, reasons = [], {}
     for trial in (found.base, *found.trials):
         numbers = trial.numbers()
         name = trial.variant.name
-        rows.append([name, *(show(found, trial, numbers) for show in _COLUMNS.values())])
+        rows.append([name, *(show(found, trial, numbers) for show in columns.values())])
         if trial.reason:
             reasons[name] = trial.reason
-    headings = ["", *_COLUMNS]
+    headings = ["", *columns]
     # what no row has is left out: the reasons tell why
     told = [any(row[k] not in ("", "-") for row in rows) for k in range(len(headings))]
     rows = [[cell for cell, known in zip(row, told, strict=True) if known] for row in rows]
@@ -145,7 +161,7 @@ def show_effects(found: EffectsStudy) -> None:
     for reason in dict.fromkeys(reasons.values()):
         names = ", ".join(name for name, given in reasons.items() if given == reason)
         show_note(console, names, reason)
-    if len(found.base.result.counted):
+    if len(found.base.result.counted) or found.base.result.fall:
         for note in _notes(found, rows):
             console.print(wrapped(note), highlight=False)
     show_warnings(console, found.warnings())
@@ -154,21 +170,22 @@ def show_effects(found: EffectsStudy) -> None:
 def _notes(found: EffectsStudy, rows: list[list[str]]) -> Iterator[str]:
     """What the errors and signs are that the rows show."""
     from percussion_model.analysis.change import SIGMAS
-    from percussion_model.analysis.effect_study import CHANGED, LEAPS
+    from percussion_model.analysis.effect_study import LEAPS
 
-    note = NOTE.format(undecided=UNDECIDED, sigmas=SIGMAS)
+    form = NOTE_OF_FALL if found.base.falls else NOTE
+    note = form.format(undecided=UNDECIDED, sigmas=SIGMAS)
     leaps = [trial for trial in found.trials if trial.variant.effect == LEAPS]
-    if any("±" in found.change(trial, name).text() for trial in leaps for name in CHANGED):
+    if any("±" in found.change(trial, name).text() for trial in leaps for name in found.changed):
         note += f" {OF_LEAPS}"
     yield note
     if any(ABOUT in cell for row in rows for cell in row):
         yield ABOUT_CHANGE
 
 
-def _rate(row: dict[str, Any]) -> str:
-    """Rate of penetration [mm/s], with its error where it matters."""
-    value, error = row[RATE], row[f"{RATE}_error"]
-    if row["rate_of_penetration_undecided"] and value is not None:
+def _known(row: dict[str, Any], key: str) -> str:
+    """Rate of penetration [mm/s] or depth [mm], with its error where it matters."""
+    value, error = row[key], row[f"{key}_error"]
+    if key == RATE and row["rate_of_penetration_undecided"] and value is not None:
         return UNDECIDED
     if value is not None and error is None:
         return ABOUT + in_digits(1e3 * value)

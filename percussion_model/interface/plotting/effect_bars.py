@@ -40,6 +40,9 @@ CHANGES = {
     "rate_of_penetration": "Rate of penetration",
     "blow_period": "Blow period",
     "peak_bit_force": "Peak bit force",
+    "depth": "Depth",
+    "rebound_velocity": "Rebound velocity",
+    "rest_time": "Time of rest",
 }
 
 
@@ -80,10 +83,10 @@ def _cost_panel(values: list[float | None], title: str, ax: Axes) -> None:
 
 def _change_panels(found: EffectsStudy) -> Iterator[Panel]:
     """Changes of numbers, and which of them are not known."""
-    for key, title in CHANGES.items():
+    for key in found.changed:
         changes = [found.change(trial, key) for trial in found.trials]
         if any(change.value is not None for change in changes):
-            yield partial(_change_panel, changes, title)
+            yield partial(_change_panel, changes, CHANGES[key])
 
 
 def _change_panel(changes: list[Change], title: str, ax: Axes) -> None:

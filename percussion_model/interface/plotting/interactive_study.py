@@ -18,7 +18,6 @@ from bokeh.models import (
     LayoutDOM,
     LinearColorMapper,
     Range1d,
-    ScientificFormatter,
     Select,
     Slider,
     TableColumn,
@@ -30,7 +29,15 @@ from percussion_model.analysis.study import Study
 from percussion_model.analysis.study.response import KINDS
 from percussion_model.interface.plotting import style
 from percussion_model.interface.plotting.interactive import TOOLS, legend, panel
-from percussion_model.simulation.uncertain import UNDECIDED
+from percussion_model.interface.plotting.shown_digits import (
+    COUNT,
+    GIVEN,
+    OF_ERRORS,
+    in_column,
+    in_hover,
+    of_choice,
+)
+from percussion_model.simulation.uncertain import UNDECIDED, UNSURE_DIGITS, of_the_cells
 
 # Larger studies are thinned evenly where they are no grid, and in the table.
 MOST_SHOWN = 20_000
@@ -38,7 +45,7 @@ KIND_COLOURS = dict(
     zip(KINDS, (style.BIT_COLOUR, style.MEAN_COLOUR, "#222222", "#999999"), strict=True)
 )
 # Columns of the table [pixels].
-WIDE, NARROW = 190, 80
+WIDEST, WIDE, NARROW = 300, 190, 80
 # Lines that can be told apart.
 MOST_LINES = 9
 # Steps of an axis are even if they differ by no more than this share.
@@ -46,8 +53,8 @@ EVEN = 1e-6
 # What can be shown: column of the page, name, unit, column of a study, factor from SI.
 QUANTITIES = (
     ("rate", "Rate of penetration", "mm/s", "rate_of_penetration", 1e3),
-    ("off", "Error of the rate", "mm/s", "rate_of_penetration_error", 1e3),
-    ("error", "Relative error of the rate", "–", "", 1.0),
+    ("off", "Standard error (scatter) or convergence", "mm/s", "rate_of_penetration_error", 1e3),
+    ("error", "The same, relative to the rate", "–", "", 1.0),
     ("period", "Blow period", "ms", "blow_period", 1e3),
     ("impact", "Impact velocity", "m/s", "impact_velocity", 1.0),
     ("stroke", "Stroke", "mm", "stroke", 1e3),
@@ -60,13 +67,14 @@ QUANTITIES = (
     ("cycles", "Drilling cycles per blow", "–", "drilling_cycles_per_blow", 1.0),
     ("order", "Blows of a cycle", "–", "order", 1.0),
 )
+# Digits of all: the errors of the grids are not known.
+DIGITS = dict.fromkeys((name for name, *_ in QUANTITIES), UNSURE_DIGITS)
+DIGITS |= {"off": OF_ERRORS, "error": OF_ERRORS, "contacts": COUNT, "cycles": COUNT, "order": COUNT}
 # Those that the error of the rate may hide, as a script asks for them.
 HIDDEN = ("rate", "advance")
 UNDECIDED_COLOUR, HATCH_COLOUR, GREY_POINT = "#EEEEEE", "#666666", "#BBBBBB"
 # What the pointer shows of each point besides.
-RATE_TOOLTIPS = (
-    ("rate", "@rate{0.[00000]} ± @off{0.[00000]} mm/s @verdict"), ("motion", "@motion"),
-)  # fmt: skip
+RATE_TOOLTIPS = ("rate", "@rate_text mm/s"), ("motion", "@motion")
 
 
 def interactive_study(found: Study) -> dict[str, LayoutDOM]:
@@ -96,7 +104,7 @@ def _scatter(found: Study, columns: dict[str, np.ndarray]) -> LayoutDOM:
             "value": columns["rate"][kept].copy(),
             **_bars(columns, kept),
             "motion": kinds,
-            "verdict": _verdicts(undecided),
+            "rate_text": _rates(found, kept),
             "colour": [
                 GREY_POINT if hidden else KIND_COLOURS[kind]
                 for kind, hidden in zip(kinds, undecided.tolist(), strict=True)
@@ -116,8 +124,9 @@ def _scatter(found: Study, columns: dict[str, np.ndarray]) -> LayoutDOM:
                                 line_color="colour", upper_head=None, lower_head=None))  # fmt: skip
         drawn = made.scatter(f"at{k}", "value", source=shared, color="colour", size=5, alpha=0.7,
                              nonselection_alpha=0.06)  # fmt: skip
-        made.add_tools(HoverTool(renderers=[drawn], tooltips=[
-            (key, f"@at{k}{{0.[00000]}}"), ("shown", "@value{0.[00000]}"), *RATE_TOOLTIPS
+        digits = {f"@at{k}": in_hover(GIVEN), "@value": of_choice(chosen, DIGITS)}
+        made.add_tools(HoverTool(renderers=[drawn], formatters=digits, tooltips=[
+            (key, f"@at{k}{{given}}"), ("shown", "@value{known}"), *RATE_TOOLTIPS
         ]))  # fmt: skip
         panels.append(made)
     update = CustomJS(
@@ -137,19 +146,21 @@ def _scatter(found: Study, columns: dict[str, np.ndarray]) -> LayoutDOM:
 def _table(found: Study, columns: dict[str, np.ndarray]) -> LayoutDOM:
     """Points and numbers found; a click on a heading sorts."""
     kept = _thinned(len(found.points))
-    number = ScientificFormatter(precision=4, power_limit_low=-4, power_limit_high=6)
     data: dict[str, Any] = {"kind": [KINDS[kind] for kind in found.rows["kind"][kept].tolist()]}
     shown = []
     for k, key in enumerate(found.points.keys):
         data[f"at{k}"] = found.points.values[kept, k]
         title = _label(key, found.scene.row_of(key).unit)
-        shown.append(TableColumn(field=f"at{k}", title=title, formatter=number, width=WIDE))
+        shown.append(
+            TableColumn(field=f"at{k}", title=title, formatter=in_column(GIVEN), width=WIDE)
+        )
     shown.append(TableColumn(field="kind", title="motion", width=NARROW))
     data["verdict"] = _verdicts(found.undecided[kept])
     shown.append(TableColumn(field="verdict", title="rate is", width=NARROW))
     for name, title in _titles().items():
         data[name] = columns[name][kept]
-        shown.append(TableColumn(field=name, title=title, formatter=number, width=WIDE))
+        width, digits = WIDEST if name == "off" else WIDE, in_column(DIGITS[name])
+        shown.append(TableColumn(field=name, title=title, formatter=digits, width=width))
     return DataTable(source=ColumnDataSource(data), columns=shown, height=360, index_position=None,
                      autosize_mode="none", reorderable=False,
                      sizing_mode="stretch_width")  # fmt: skip
@@ -170,6 +181,20 @@ def _bars(columns: dict[str, np.ndarray], kept: np.ndarray) -> dict[str, np.ndar
     """Ends of the error bars of the rate."""
     rate, off = columns["rate"][kept], np.nan_to_num(columns["off"][kept])
     return {"lower": rate - off, "upper": rate + off}
+
+
+def _rates(found: Study, kept: np.ndarray) -> list[str]:
+    """Rates [mm/s] as text, with what is known of their errors."""
+    rates, of_cells = 1e3 * found.rows["rate_of_penetration"], found.depends_on_cells
+    known = np.isfinite(rates)
+    return [
+        "–"
+        if not known[k]
+        else of_the_cells(float(rates[k]))
+        if of_cells[k] and rates[k]
+        else found.rate_text(k, "")
+        for k in kept.tolist()
+    ]
 
 
 def _verdicts(undecided: np.ndarray) -> list[str]:
@@ -257,7 +282,8 @@ def _map(found: Study, columns: dict[str, np.ndarray]) -> LayoutDOM:
         np.arange(len(y.values))[:, None] * y.stride + np.arange(len(x.values))[None, :] * x.stride
     )
     kinds, undecided = found.rows["kind"], found.undecided
-    cells = _cells(x, y, offset, columns, kinds, undecided, base)
+    texts = _rates(found, np.arange(len(found.points)))
+    cells = _cells(x, y, offset, columns, kinds, undecided, base, texts)
     rows = len(y.values)
     shown = sorted({int(k) for k in np.linspace(0, rows - 1, min(rows, MOST_LINES)).round()})
     lines = ColumnDataSource(
@@ -270,6 +296,8 @@ def _map(found: Study, columns: dict[str, np.ndarray]) -> LayoutDOM:
         }
     )  # fmt: skip
     mapper = LinearColorMapper(Viridis256, nan_color="#DDDDDD", **_limits(cells.data["value"]))
+    chosen, given = _selector(), in_hover(GIVEN)
+    known = of_choice(chosen, DIGITS, name="known digits")
     left = panel("", x.label, y.label, height=400, x_axis_type=x.scale, y_axis_type=y.scale,
                  x_range=_over(x), y_range=_over(y), name="map")  # fmt: skip
     right = panel("", x.label, "", height=400, x_axis_type=x.scale)
@@ -281,9 +309,8 @@ def _map(found: Study, columns: dict[str, np.ndarray]) -> LayoutDOM:
               legend_label=f"{UNDECIDED}: error ≥ rate", visible=True)  # fmt: skip
     left.scatter("x", "y", size="mark", source=cells, marker="x", color="white", line_width=1.5)
     left.add_tools(HoverTool(renderers=[quads], tooltips=[
-        (x.key, "@x{0.[00000]}"), (y.key, "@y{0.[00000]}"), ("shown", "@value{0.[00000]}"),
-        *RATE_TOOLTIPS,
-    ]))  # fmt: skip
+        (x.key, "@x{given}"), (y.key, "@y{given}"), ("shown", "@value{known}"), *RATE_TOOLTIPS,
+    ], formatters={"@x": given, "@y": given, "@value": known}))  # fmt: skip
     legend(left)
     left.legend.visible = bool(undecided.any())
     for made, axis in ((left.xaxis, x), (left.yaxis, y), (right.xaxis, x)):
@@ -293,12 +320,15 @@ def _map(found: Study, columns: dict[str, np.ndarray]) -> LayoutDOM:
     left.grid.visible = False
     drawn = right.multi_line("xs", "ys", source=lines, color="colour", line_width=2)
     right.add_tools(HoverTool(renderers=[drawn], tooltips=[
-        (y.key, "@at{0.[00000]}"), ("shown", "$data_y{0.[0000]}")
-    ]))  # fmt: skip
-    chosen, sliders = _selector(), [_slider(axis) for axis in others]
+        (y.key, "@at{given}"), ("shown", "$data_y{known}")
+    ], formatters={"@at": given, "$data_y": known}))  # fmt: skip
+    sliders = [_slider(axis) for axis in others]
     everything = ColumnDataSource(
-        {**columns, "kind": kinds.astype(np.int32), "hidden": undecided.astype(np.int32)}
-    )
+        {
+            **columns, "rate_text": texts,
+            "kind": kinds.astype(np.int32), "hidden": undecided.astype(np.int32),
+        }
+    )  # fmt: skip
     names = _titles()
     left.title.text = names["rate"]
     low, high = y.values.min(), y.values.max()
@@ -333,7 +363,7 @@ UPDATE_MAP = """
 const from = all.data[choice.value], kind = all.data.kind;
 let base = 0;
 for (let k = 0; k < sliders.length; k++) base += strides[k] * sliders[k].value;
-const {offset, value, mark, grey, rate, off, verdict, motion} = cells.data;
+const {offset, value, mark, grey, rate_text, verdict, motion} = cells.data;
 const may_hide = hideable.includes(choice.value);
 let low = Infinity, high = -Infinity;
 for (let j = 0; j < offset.length; j++) {
@@ -341,8 +371,7 @@ for (let j = 0; j < offset.length; j++) {
   const v = may_hide && hidden ? NaN : from[k];
   value[j] = v;
   grey[j] = may_hide && hidden ? 1 : 0;
-  rate[j] = all.data.rate[k];
-  off[j] = all.data.off[k];
+  rate_text[j] = all.data.rate_text[k];
   verdict[j] = hidden ? words : "";
   motion[j] = names[kind[k]];
   mark[j] = kind[k] == 0 ? 0 : 6;
@@ -367,6 +396,7 @@ def _cells(
     kinds: np.ndarray,
     undecided: np.ndarray,
     base: int,
+    texts: list[str],
 ) -> ColumnDataSource:
     """Cells of a map, row by row from the lowest value of the vertical axis on."""
     across, up = len(x.values), len(y.values)
@@ -379,7 +409,7 @@ def _cells(
             "offset": offset.ravel().astype(np.int32),
             "value": _seen(columns["rate"], undecided)[at],
             "grey": undecided[at].astype(np.float32),
-            "rate": columns["rate"][at], "off": columns["off"][at],
+            "rate_text": [texts[k] for k in at.tolist()],
             "verdict": _verdicts(undecided[at]),
             "motion": [KINDS[kind] for kind in kinds[at].tolist()],
             "mark": np.where(kinds[at] == KINDS.index("periodic"), 0.0, 6.0),
