@@ -120,6 +120,21 @@ def test_the_legend_names_other_minima_only_where_some_are_drawn():
         assert len(labels) == len(set(labels))
 
 
+def test_a_figure_draws_the_ends_of_intervals_that_are_not_open():
+    fit = fit_rock(Scene(), CURVE)
+    one = fit.estimates[RATIO]
+    for verdict, ends in (
+        (DETERMINED, [one.low, one.high]),
+        (OPEN_ABOVE, [one.low]),
+        (OPEN, []),
+    ):
+        estimates = fit.estimates | {RATIO: one._replace(verdict=verdict)}
+        figure = draw_calibration(replace(fit, estimates=estimates))
+        ax = next(ax for ax in figure.axes if "gamma" in ax.get_xlabel())
+        drawn = [line.get_xdata()[0] for line in ax.lines if line.get_label() == "its ends"]
+        assert drawn == ends
+
+
 def test_progress_promises_no_number_of_computations():
     done = []
     fit = fit_rock(Scene(), CURVE, progress=done.append)

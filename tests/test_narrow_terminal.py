@@ -79,6 +79,15 @@ def test_commands_fit(shown, arguments):
     assert text
 
 
+@pytest.mark.parametrize("name", ["undamped", "drop_test"])
+def test_rows_of_a_run_that_have_long_numbers_keep_to_a_line(shown, name):
+    code, text = shown("run", str(ROOT / "scenarios" / f"{name}.toml"))
+    assert code == 0
+    rows = [line.split("│")[1:-1] for line in text.splitlines() if line.startswith("│")]
+    for name, value, _ in rows:  # "undecided" alone has a second line
+        assert name.strip() or "with these cells" in value
+
+
 def test_help_fits(shown):
     assert "blow-map" in shown("--help")[1]
     for command in app.registered_commands:

@@ -198,3 +198,28 @@ def test_a_system_without_usual_signals_shows_what_it_has():
     time = np.linspace(0.0, 1.0, 11)
     (ax,) = draw_signals(CoupledRun({"time": time, "a.b": time}, 1e-3, 10), "A system").axes
     assert [text.get_text() for text in ax.get_legend().texts] == ["signal: a.b"]
+
+
+def test_what_lies_on_another_line_is_seen(results):
+    """The bit is nearly where the hole is: its line is above that, and thinner."""
+    with matplotlib.rc_context(STYLE):
+        overview = dict(draw_figures(results["elastic"]))["overview"]
+    hole, bit = overview.axes[0].lines
+    assert (hole.get_label(), bit.get_label()) == ("hole", "mean bit position")
+    assert hole.get_zorder() <= bit.get_zorder()
+    assert bit.get_linewidth() < 0.5 * hole.get_linewidth()
+    assert bit.get_color() != hole.get_color()
+
+
+def test_letters_of_contacts_lie_on_no_line(results):
+    with matplotlib.rc_context(STYLE):
+        fig = dict(draw_figures(results["elastic"]))["activation"]
+        fig.canvas.draw()
+        ax = next(ax for ax in fig.axes if "near zero" in ax.get_title(loc="left"))
+        assert {text.get_text() for text in ax.texts} == set("ABCD")
+        for text in ax.texts:
+            box = text.get_window_extent()
+            for line in ax.lines[:-1]:  # the last is the axis of zero
+                places = line.get_transform().transform(line.get_xydata())
+                inside = (places > box.min + 1.0) & (places < box.max - 1.0)
+                assert not inside.all(axis=1).any(), text.get_text()

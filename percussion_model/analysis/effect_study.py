@@ -62,6 +62,7 @@ NO_DEPTH = "it has no depth"
 _NO_ROCK = "the bit meets no rock: it flies, and drills nothing"
 _NO_DRIVE = "nothing throws the piston: what moves is left from the start and comes to rest"
 _NO_PISTON = "there is no piston, so no blows that a rate or a period could be taken from"
+_NO_REBOUND = "the bit does not leave the rock"
 _NO_REST = "the bit has not come to rest when the run ends"
 _NO_CRUSHING = "a linear spring gives all back: nothing is crushed"
 _BARRIER = ("rock.barrier_energy", "rock.barrier_damping")
@@ -217,7 +218,8 @@ class Trial:
             if not any(fall.values()):
                 return [_NO_PISTON]
             has_none = [text for text in self.result.warnings if NO_DEPTH in text]
-            return has_none or [_NO_REST] * ("rest_time" not in fall)
+            missing = {"rebound_velocity": _NO_REBOUND, "rest_time": _NO_REST}
+            return has_none or [why for name, why in missing.items() if name not in fall]
         reasons = [text for text in self.result.warnings if "trusted" in text]
         if len(self.result.counted) < LEAST_BLOWS:
             reasons += [text for text in self.result.warnings if "whole blow" in text][:1]

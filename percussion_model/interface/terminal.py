@@ -92,19 +92,17 @@ def show_summary(result: Result) -> None:
     for key in ("numerical", "residual"):
         share = energy[f"{key}_relative"]
         if share is not None:
-            table.add_row(f"Energy ledger: {key}", f"{share:.2g}", "of energy put in")
+            table.add_row(f"Energy ledger: {key}", f"{share:.2g}", "of input")
     table.add_section()
     table.add_row("Simulated", f"{result.duration:.6g}", "s")
     if result.scene.piston.model != "absent":
-        after = f"{len(result.counted)} after settling"
+        after = f"{len(result.counted)} counted"
         table.add_row("Whole blows", f"{len(result.blows)}", after)
     if result.cells:
-        table.add_row(
-            "Cells", " + ".join(map(str, result.cells.values())), " + ".join(result.cells)
-        )
+        table.add_row("Cells", " + ".join(map(str, result.cells.values())), ", ".join(result.cells))
     table.add_row("Prepared in", in_digits(result.setup_time, TIMED), "s")
     table.add_row("Computed in", in_digits(result.wall_time, TIMED), "s")
-    table.add_row("Speed", in_digits(result.real_time_factor, TIMED), "times real time")
+    table.add_row("Speed", in_digits(result.real_time_factor, TIMED), "× real time")
     console = Console()
     print_table(table, console, keys=2)
     if len(result.counted) or result.fall:

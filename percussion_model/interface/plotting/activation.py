@@ -149,7 +149,9 @@ def _near_zero(ax: Axes, window: Window, contacts: list[tuple[float, float]]) ->
     for (letter, _), k in zip(_edges(contacts), samples, strict=False):
         x, y = u[k] * MM, v[k]
         ax.plot([x], [y], "o", color="black", markersize=3.5, zorder=5)
-        ax.annotate(letter, (x, y), (5, 3), textcoords="offset points", fontweight="bold")
+        # the line leaves to the right, upwards: above where it comes, below where it parts
+        off, side = ((5, 3), "bottom") if letter in "ACEG" else ((4, -4), "top")
+        ax.annotate(letter, (x, y), off, textcoords="offset points", va=side, fontweight="bold")
     ax.axvline(0.0, color=style.RULE_COLOUR, linewidth=0.6)
     ax.margins(0.08)
     title = "The same near zero" + (": A, C closing, B, D parting" if len(contacts) == 2 else "")

@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from percussion_model.analysis.fitting import Curve, DropTest, Explained, Fit
+from percussion_model.analysis.fitting.found import OPEN, OPEN_ABOVE, OPEN_BELOW
 from percussion_model.interface.plotting import style
 from percussion_model.interface.plotting.style import KN, MM, MPA, MS
 from percussion_model.simulation.files import staged
@@ -106,6 +107,10 @@ def _profile(ax: Axes, found: Fit, key: str) -> None:
     limit = "limit of the region"
     ax.axhline(found.threshold, color=style.RULE_COLOUR, lw=1.0, ls="--", label=limit)
     ax.axvspan(estimate.low, estimate.high, color=FIT, alpha=0.12, lw=0, label=_interval(found))
+    # where it is not open: the deviance may jump beyond the last point drawn
+    for end, is_open in ((estimate.low, (OPEN, OPEN_BELOW)), (estimate.high, (OPEN, OPEN_ABOVE))):
+        if estimate.verdict not in is_open:
+            ax.axvline(end, color=FIT, lw=0.8, label="its ends")
     ax.plot([estimate.value], [0.0], "o", color=FIT, markersize=5)
     rivals = [(one.values[key], one.deviance) for one in found.rivals if one.deviance < top]
     if rivals:

@@ -16,6 +16,8 @@ from percussion_model.simulation.uncertain import rate_text, shown_error
 
 # Blows beyond this number are drawn as lines without markers.
 MOST_MARKERS = 150
+# Seen on the line of the hole.
+BIT_POSITION_COLOUR = "#111111"
 # An axis never zooms in on less than this share of its values: settled is flat.
 LEAST_SPAN = 0.02
 
@@ -54,11 +56,11 @@ def draw_overview(result: Result) -> Figure:
 
 def _depths(ax: Axes, blows: np.ndarray) -> None:
     """Draw how deep the hole is, and where the bit is, which may leap."""
-    for field, colour, name in (
-        ("bit_position", style.RULE_COLOUR, "mean bit position"),
-        ("hole_depth", style.BIT_COLOUR, "hole"),
-    ):
-        ax.plot(blows["time"], blows[field] * MM, color=colour, label=name, **_marks(len(blows)))
+    ax.plot(blows["time"], blows["hole_depth"] * MM, color=style.BIT_COLOUR, label="hole",
+            **_marks(len(blows)) | {"linewidth": 2.8})  # fmt: skip
+    # thinner and above: where both are the same, both are seen
+    ax.plot(blows["time"], blows["bit_position"] * MM, color=BIT_POSITION_COLOUR, linewidth=0.8,
+            label="mean bit position")  # fmt: skip
     ax.legend(loc="best")
     style.label(ax, "time [s]", "depth gained [mm]", "Depth at each blow")
 
