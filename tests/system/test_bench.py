@@ -119,8 +119,8 @@ def test_a_bad_controller_fails_visibly(feed_control, tmp_path, monkeypatch, cap
 def test_an_interrupted_bench_keeps_the_runs_that_are_done(
     feed_control, brief, tmp_path, monkeypatch, capsys
 ):
-    def interrupted(system, controller, values, trials, take, trust, watch, check_step):
-        bench(system, controller, values, ["rod"], take, trust, watch, check_step)
+    def interrupted(system, controller, values, trials, take, trust, watch, check_step, tell):
+        bench(system, controller, values, ["rod"], take, trust, watch, check_step, tell)
         raise KeyboardInterrupt
 
     monkeypatch.setattr("percussion_model.coupling.bench.bench", interrupted)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -98,11 +99,10 @@ def test_rows_of_a_seeker_say_that_its_errors_are_not_known(module, monkeypatch,
                 for p in two_way_seeking.PRESSURES
             ]
         )
-    monkeypatch.setattr(module, "archive", lambda *words: None)
     monkeypatch.setattr(module, "sweep", lambda *words: hill)
     monkeypatch.setattr(module, "seek", lambda *words: Ended(0.0155432, module.DURATION))
-    monkeypatch.setattr(module, "write_search", lambda *words: None)
-    module.main()
+    monkeypatch.setattr(module, "write_search", lambda *words: [])
+    module.main([Path("x.ssp")], Path("x"))
     rows = [line for line in capsys.readouterr().out.splitlines() if line.startswith("from ")]
     assert len(rows) == 3
     for row in rows:
