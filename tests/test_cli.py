@@ -379,6 +379,47 @@ def test_ctrl_c_is_told_whatever_the_command(percussion, monkeypatch):
         assert err == "percussion: interrupted before there was a result\n"
 
 
+def system_error(behind):
+    """Raise what compiled code makes of an exception that it takes no heed of."""
+    try:
+        raise behind
+    except BaseException as error:
+        raise SystemError("<built-in method f> returned a result with an exception set") from error
+
+
+@pytest.mark.parametrize("far", [False, True])
+def test_ctrl_c_while_kernels_load_is_told_as_one(percussion, monkeypatch, capsys, far):
+    def interrupted(*words, **options):
+        try:
+            system_error(KeyboardInterrupt())
+        except SystemError:
+            if far:  # what lies between does not matter
+                system_error(RuntimeError())
+            raise
+
+    forecast = importlib.import_module("percussion_model.analysis.cost")
+    monkeypatch.setattr(forecast, "forecast", interrupted)
+    told = "interrupted before there was a result\n"
+    assert percussion("explain", RIGID) == (INTERRUPTED, "", f"percussion: {told}")
+    assert _guarded(interrupted) == INTERRUPTED
+    assert capsys.readouterr().err == f"percussion: {told}"
+    with pytest.raises(SystemExit) as end:
+        common.end_script("scripts.one", interrupted)
+    assert end.value.code == INTERRUPTED
+    assert capsys.readouterr().err == f"scripts.one: {told}"
+
+
+def test_other_errors_of_the_system_stay_what_they_are(percussion, monkeypatch):
+    def broken(*words, **options):
+        system_error(RuntimeError())
+
+    forecast = importlib.import_module("percussion_model.analysis.cost")
+    monkeypatch.setattr(forecast, "forecast", broken)
+    for work in (lambda: percussion("explain", RIGID), lambda: common.end_script("one", broken)):
+        with pytest.raises(SystemError):
+            work()
+
+
 # ------------------------------------------------------------------ whole processes
 
 

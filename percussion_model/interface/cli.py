@@ -17,6 +17,7 @@ from percussion_model.interface.commands.calibrate import calibrate
 from percussion_model.interface.commands.common import (
     BAD_INPUT,
     INTERRUPTED,
+    is_interruption,
     own_process,
     print_message,
 )
@@ -68,7 +69,9 @@ def _heard(command: Callable[..., Any]) -> Callable[..., Any]:
         try:
             with nullcontext() if sys.stderr.isatty() else lines("still running"):
                 return command(*words, **options)
-        except KeyboardInterrupt:
+        except (KeyboardInterrupt, SystemError) as error:
+            if not is_interruption(error):
+                raise
             raise typer.Abort from None
 
     return call
@@ -114,6 +117,8 @@ def _guarded(work: Callable[[], Any]) -> int:
     except (KeyboardInterrupt, typer.Abort):
         return print_message("interrupted before there was a result", INTERRUPTED)
     except Exception as error:
+        if is_interruption(error):  # while kernels load with the commands
+            return print_message("interrupted before there was a result", INTERRUPTED)
         if type(error).__module__.startswith("percussion_model."):
             return print_message(str(error), BAD_INPUT)
         # Bad arguments: typer hides the class of its errors.

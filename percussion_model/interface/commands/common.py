@@ -308,13 +308,35 @@ def end_script(name: str, work: Callable[[], object]) -> NoReturn:
     code = 0
     try:
         work()
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, SystemError) as error:
+        if not is_interruption(error):
+            raise
         code = print_message("interrupted before there was a result", INTERRUPTED, name)
     except ValueError as error:
         if type(error).__module__.partition(".")[0] not in ("percussion_model", "scenarios"):
             raise
         code = print_message(str(error), BAD_INPUT, name)
     sys.exit(code)
+
+
+def is_interruption(error: BaseException) -> bool:
+    """Whether an error is Ctrl-C, or comes of it.
+
+    Ctrl-C within compiled code that takes no heed of it, as where numba loads kernels, ends in
+    a `SystemError` with the `KeyboardInterrupt` behind it.
+    """
+    if not isinstance(error, SystemError):
+        return isinstance(error, KeyboardInterrupt)
+    looked_at: set[int] = set()
+    behind: list[BaseException | None] = [error]
+    while behind:
+        one = behind.pop()
+        if isinstance(one, KeyboardInterrupt):
+            return True
+        if one is not None and id(one) not in looked_at:
+            looked_at.add(id(one))
+            behind += [one.__cause__, one.__context__]
+    return False
 
 
 def print_message(message: str, code: int = 0, program: str = "percussion") -> int:
