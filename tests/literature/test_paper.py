@@ -29,6 +29,7 @@ from percussion_model.verification.paper.runs import (
     along,
     drop_scene,
     exponent_and_error,
+    fit_text,
     force_at_constant_power,
     line_errors,
     maxima,
@@ -66,11 +67,17 @@ def waves():
     return result, last_blow_window(result)
 
 
+def unsloped(seed, count):
+    """Noise that tilts neither the points nor half of them: its scatter alone is in an error."""
+    quarter = np.random.default_rng(seed).standard_normal(count // 4)
+    return np.tile(np.concatenate((quarter, quarter[::-1])), 2)
+
+
 def test_fits_find_what_was_put_in():
     x = np.geomspace(1.0, 100.0, 9)
     exponent, factor = power_law(x, 3.0 * x**-0.55)
     assert (exponent, factor) == pytest.approx((-0.55, 3.0))
-    scatter = 0.1 * np.random.default_rng(1).standard_normal(10_000)
+    scatter = 0.1 * unsloped(1, 10_000)
     steps = np.linspace(-1.0, 1.0, 10_000)
     errors = line_errors(steps, 3.0 * steps + scatter)
     # of n points: sigma/sqrt(n), and that by the standard deviation of x, 1/sqrt(3)
@@ -114,11 +121,22 @@ def test_statements_about_sweeps_are_plain_values(sweeps):
     """Of short sweeps: whether the paper agrees takes long ones, `percussion paper`."""
     said = list(about_sweeps(sweeps))
     assert len(said) == 2 + 2 + 3 * 3 + 3 + 3 + 4
+    (line,) = (one for one in said if "linear in the feed" in one.says)
+    assert line.agrees_if.startswith("the line explains more than 95 % of the scatter")
+    (fits,) = (ax for ax in draw_sweeps(sweeps).axes if "(c)" in ax.get_title())
+    c2, c3 = (re.search(rf"{name} = (\S+ ± \S+)", line.found).group(1) for name in ("c2", "c3"))
+    drawn = fits.texts[0].get_text().replace("\\ ", " ").replace("\\pm", "±")
+    assert c2 in drawn
+    assert c3 in drawn
+    above = sweeps["c"].points.values[:, 0] >= 350.0
+    feed, rate, _periodic = (column[above] for column in along(sweeps["c"]))
+    assert f"{1e6 * line_errors(feed, rate)[0]:.2g}" in c2.partition("±")[2]
     for one in said:  # what is compared has its error, or three digits where that is smaller
-        if "c1 =" in one.found or "over the" in one.found:
+        if "c1 =" in one.found or "periodic motions" in one.found:
             assert "whatever the error of the fit" in one.agrees_if
-        if any(word in one.found for word in ("c1 =", "c4 =", "exponent", "upper half")):
-            assert "±" in one.found, one.found
+        if any(word in one.found for word in ("c1 =", "c2 =", "c4 =", "periodic motions")):
+            assert "±" in one.found or "so few points" in one.found, one.found
+            assert "nan" not in one.found
         elif "mm/s" in one.found and "±" not in one.found:
             digits = [text.replace(".", "") for text in re.findall(r"\d+\.\d+", one.found)]
             assert digits, one.found
@@ -167,12 +185,28 @@ def test_exponents_of_section_4_4(key, values, exponent, tmp_path):
 def test_an_exponent_is_as_sure_as_its_scatter_says():
     x = np.geomspace(1.0, 100.0, 400)
     assert exponent_and_error(x, 3.0 * x**-0.55) == pytest.approx((-0.55, 0.0), abs=1e-12)
-    scatter = 0.1 * np.random.default_rng(7).standard_normal(400)
+    scatter = 0.1 * unsloped(7, 400)
     exponent, error = exponent_and_error(x, x**-0.55 * np.exp(scatter))
     expected = 0.1 / np.sqrt(np.sum((np.log(x) - np.mean(np.log(x))) ** 2))
     assert error == pytest.approx(expected, rel=0.15)
     assert abs(exponent + 0.55) < 3.0 * error
     assert np.isnan(exponent_and_error(x[:2], x[:2])).all()
+
+
+@pytest.mark.parametrize("count", [40, 41])
+def test_the_error_of_a_fit_has_what_its_halves_differ_by(count):
+    """Slopes of 1 and 2 on the two sides: 1.5 ± 0.5, however many the points."""
+    x = np.linspace(-1.0, 1.0, count)
+    y = np.where(x < 0.0, x, 2.0 * x)
+    slope, intercept, _explained = straight_line(x, y)
+    errors = line_errors(x[::-1], y[::-1])  # in any order
+    assert slope == pytest.approx(1.5, abs=0.01)
+    assert errors[0] == pytest.approx(0.5, abs=0.01)
+    assert errors[1] > abs(intercept - 0.25) > 0.0
+    exponent, error = exponent_and_error(np.exp(x), np.exp(y))
+    assert (exponent, error) == pytest.approx((slope, errors[0]))
+    assert fit_text(-0.368, 0.0175) == "-0.368 ± 0.018"
+    assert "nan" not in fit_text(np.nan, np.nan)
 
 
 def test_the_scatter_about_the_backbone_is_that_of_the_steepest_contact():

@@ -23,6 +23,7 @@ from percussion_model.verification.paper.runs import (
     Drop,
     along,
     exponent_and_error,
+    fit_text,
     line_errors,
     power_law,
     straight_line,
@@ -136,6 +137,11 @@ def _fit(ax: Axes, x: np.ndarray, y: np.ndarray, words: str, at: tuple[float, fl
     ax.annotate(words, at, xycoords="axes fraction", va="top")
 
 
+def _fitted(value: float, error: float) -> str:
+    """What the statements say of a fit, within a formula."""
+    return fit_text(value, error).replace("±", "\\pm").replace(" ", "\\ ")
+
+
 RATE = "rate of penetration [mm/s]"
 
 
@@ -144,7 +150,7 @@ def _stiffness(ax: Axes, found: Study) -> None:
     x, rate, _ = along(found)
     exponent, factor = power_law(x, rate)
     _, error = exponent_and_error(x, rate)
-    words = f"$\\sim K_R^{{{exponent:.3f} \\pm {error:.3f}}}$ (paper: −0.55)"
+    words = f"$\\sim K_R^{{{_fitted(exponent, error)}}}$ (paper: −0.55)"
     _fit(ax, x * 1e-6, factor * x**exponent, words, (0.35, 0.8))
     ax.set_xscale("log")
     style.label(ax, "loading stiffness $K_R$ [kN/mm]", RATE, "(a) Loading stiffness of the rock")
@@ -178,8 +184,8 @@ def _feed(ax: Axes, found: Study) -> None:
     slope, intercept, _explained = straight_line(x[above], rate[above])
     errors = line_errors(x[above], rate[above])
     words = (
-        f"$({slope * 1e6:.3f} \\pm {errors[0] * 1e6:.3f})\\,F_S$ [kN]\n"
-        f"$+\\,{intercept * MM:.2f} \\pm {errors[1] * MM:.2f}$"
+        f"$({_fitted(slope * 1e6, errors[0] * 1e6)})\\,F_S$ [kN]\n"
+        f"$+\\,{_fitted(intercept * MM, errors[1] * MM)}$"
     )
     _fit(ax, x[above] / KN, slope * x[above] + intercept, words, (0.35, 0.8))
     _paper_limit(ax, PAPER_LEAST_FEED / KN)
@@ -193,7 +199,7 @@ def _distance(ax: Axes, found: Study) -> None:
     above = x >= PAPER_LEAST_DISTANCE
     exponent, factor = power_law(x[above], rate[above])
     _, error = exponent_and_error(x[above], rate[above])
-    words = f"$\\sim D_1^{{{exponent:.3f} \\pm {error:.3f}}}$ (paper: −0.36)"
+    words = f"$\\sim D_1^{{{_fitted(exponent, error)}}}$ (paper: −0.36)"
     _fit(ax, x[above] * MM, factor * x[above] ** exponent, words, (0.5, 0.75))
     _paper_limit(ax, PAPER_LEAST_DISTANCE * MM)
     ax.set_xscale("log")
@@ -232,7 +238,7 @@ def _power_line(
     for shown, face in ((chosen, colour), (~chosen, "white")):
         ax.plot(x[shown], y[shown], "o", color=colour, mfc=face, markersize=4.0)
     ends = np.array([np.min(x[chosen]), np.max(x[chosen])])
-    label = f"{words}$^{{{exponent:.3f} \\pm {error:.3f}}}$ (paper: {law})"
+    label = f"{words}$^{{{_fitted(exponent, error)}}}$ (paper: {law})"
     ax.plot(ends, factor * ends**exponent, color=colour, linewidth=1.0, label=label)
     ax.set(xscale="log", yscale="log")
     for axis in (ax.xaxis, ax.yaxis):

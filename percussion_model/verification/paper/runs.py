@@ -14,6 +14,7 @@ from percussion_model.analysis.study.response import KINDS
 from percussion_model.physics.records import EventKind
 from percussion_model.scene.scene import Scene
 from percussion_model.simulation.simulate import Simulation
+from percussion_model.simulation.uncertain import with_error
 
 # As the paper ran its simulations: rock that pulls in standstill.
 PAPER = {"effects.standstill_tension": "paper"}
@@ -174,15 +175,15 @@ def power_law(x: np.ndarray, y: np.ndarray) -> tuple[float, float]:
 
 
 def exponent_and_error(x: np.ndarray, y: np.ndarray) -> tuple[float, float]:
-    """Exponent of a power law and its standard error, from the scatter about the fit.
+    """Exponent of a power law, and its error as that of the line of logarithms (`line_errors`).
 
     NaN where there are fewer than three points.
     """
     x, y = _known(x, y)
     if len(x) < 3:
         return math.nan, math.nan
-    slopes, covariance = np.polyfit(np.log(x), np.log(y), 1, cov=True)
-    return float(slopes[0]), float(np.sqrt(covariance[0, 0]))
+    x, y = np.log(x), np.log(y)
+    return float(np.polyfit(x, y, 1)[0]), line_errors(x, y)[0]
 
 
 def straight_line(x: np.ndarray, y: np.ndarray) -> tuple[float, float, float]:
@@ -195,12 +196,27 @@ def straight_line(x: np.ndarray, y: np.ndarray) -> tuple[float, float, float]:
 
 
 def line_errors(x: np.ndarray, y: np.ndarray) -> tuple[float, float]:
-    """Standard errors of slope and intercept of a straight line, from the scatter about it."""
+    """Errors of slope and intercept of a straight line.
+
+    Each is the greater of two: the standard error, from the scatter about the line, and half of
+    the difference between lines through the lower and through the upper half of the points. The
+    first is too small where no line holds over the whole range: it falls with the number of
+    points, while the slope drifts. A point in the middle belongs to both halves. NaN where there
+    are fewer than three points.
+    """
     x, y = _known(x, y)
     if len(x) < 3:
         return math.nan, math.nan
-    slope, intercept = np.sqrt(np.diag(np.polyfit(x, y, 1, cov=True)[1]))
+    scatter = np.sqrt(np.diag(np.polyfit(x, y, 1, cov=True)[1]))
+    order, half = np.argsort(x), (len(x) + 1) // 2
+    lower, upper = (np.polyfit(x[k], y[k], 1) for k in (order[:half], order[-half:]))
+    slope, intercept = np.maximum(scatter, 0.5 * np.abs(upper - lower))
     return float(slope), float(intercept)
+
+
+def fit_text(value: float, error: float) -> str:
+    """A fitted number and its error, both to the second digit of the error."""
+    return with_error(value, error) if math.isfinite(error) else "unknown, of so few points"
 
 
 def _known(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

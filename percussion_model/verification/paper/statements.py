@@ -24,6 +24,7 @@ from percussion_model.verification.paper.runs import (
     Drop,
     along,
     exponent_and_error,
+    fit_text,
     line_errors,
     maxima,
     straight_line,
@@ -61,8 +62,9 @@ _PEAK = f"the greatest rate within {NEAR_PEAK:g} of gamma = 40"
 ERRORS = (
     "± is the error where one is known: of rates and means of the stationary blow (4.3) that by "
     "grid and scatter, of rates of the sweeps (4.4) that by convergence and scatter, of what is "
-    "fitted the standard error of the fit. Of all other numbers found here the error is not "
-    "estimated, nor is that of the grid in drop tests and sweeps."
+    "fitted the greater of the standard error of the fit and half of the difference between fits "
+    "of the lower and the upper half of the points. Of all other numbers found here the error is "
+    "not estimated, nor is that of the grid in drop tests and sweeps."
 )
 
 
@@ -352,7 +354,7 @@ def _about_stiffness(found: Study) -> Iterator[Statement]:
     yield Statement(
         "4.4 a",
         "rate ~ K_R^c1 with c1 = -0.55",
-        f"c1 = {exponent:.3f} ± {error:.3f}",
+        f"c1 = {fit_text(exponent, error)}",
         abs(exponent + 0.55) <= SAME_EXPONENT,
         agrees_if=_exponent_near(-0.55),
     )
@@ -429,11 +431,12 @@ def _about_feed(found: Study) -> Iterator[Statement]:
     yield Statement(
         "4.4 c",
         "the rate is linear in the feed above 350 N, c2 F_S + c3",
-        f"c2 = {1e6 * slope:.3f} ± {1e6 * errors[0]:.3f} mm/s per kN, "
-        f"c3 = {1e3 * intercept:.2f} ± {1e3 * errors[1]:.2f} mm/s, "
-        f"explaining {100 * explained:.1f} % of the scatter",
+        f"c2 = {fit_text(1e6 * slope, 1e6 * errors[0])} mm/s per kN, "
+        f"c3 = {fit_text(1e3 * intercept, 1e3 * errors[1])} mm/s; "
+        f"the line explains {100 * explained:.1f} % of the scatter",
         explained > STRAIGHT,
-        agrees_if=f"explaining more than {100 * STRAIGHT:g} %",
+        agrees_if=f"the line explains more than {100 * STRAIGHT:g} % of the scatter of the rates, "
+        "however far lines through its halves are apart",
     )
     first = float(x[periodic].min()) if periodic.any() else float("nan")
     yield Statement(
@@ -461,7 +464,7 @@ def _about_distance(found: Study) -> Iterator[Statement]:
     yield Statement(
         "4.4 d",
         "rate ~ D_1^c4 at constant power with c4 = -0.36",
-        f"c4 = {exponent:.3f} ± {error:.3f} from 3 mm on",
+        f"c4 = {fit_text(exponent, error)} from 3 mm on",
         abs(exponent + 0.36) <= SAME_EXPONENT,
         agrees_if=_exponent_near(-0.36),
     )
@@ -472,13 +475,26 @@ def _about_distance(found: Study) -> Iterator[Statement]:
         f"aperiodic share below 3 mm {_share(~periodic[below])}, above {_share(~periodic[above])}",
         bool((~periodic[below]).all()),
     )
-    slope, error = exponent_and_error(x[below], rate[below])
+    half = int(np.sum(below)) // 2
+    near, far = _mean_rate(found, slice(0, half)), _mean_rate(found, slice(half, 2 * half))
     yield Statement(
         "4.4 d",
         "below, the rate still increases on average as D_1 falls",
-        f"exponent {slope:.2f} ± {error:.2f} below 3 mm",
-        slope < 0,
+        f"mean rate {_with_known_error(*near)} mm/s over the lower half of the points below 3 mm, "
+        f"{_with_known_error(*far)} over the upper",
+        near[0] - far[0] > np.hypot(near[1], far[1]),
+        agrees_if="by more than the errors of the means",
     )
+
+
+def _mean_rate(found: Study, points: slice) -> tuple[float, float]:
+    """Mean rate of some points and its error by theirs [mm/s]; those that failed are left out."""
+    rate, error = (found.rows[f"rate_of_penetration{end}"][points] for end in ("", "_error"))
+    known = np.isfinite(rate) & np.isfinite(error)
+    if not known.any():
+        return float("nan"), float("nan")
+    off = float(np.sqrt(np.sum(error[known] ** 2))) / int(np.sum(known))
+    return 1e3 * float(np.mean(rate[known])), 1e3 * off
 
 
 def _about_scaling(found: Study) -> Iterator[Statement]:
@@ -503,8 +519,8 @@ def _about_scaling(found: Study) -> Iterator[Statement]:
             f"4.4 d, {equation}",
             f"{_WORDS[what]} ~ {_WORDS[by]}^({words}) at constant power"
             + (f"{unrounded} {expected:.2f}" if what == "R" else ""),
-            f"{exponent:.4f} ± {error:.4f} over the {np.sum(chosen)} periodic motions, "
-            f"{upper:.4f} ± {upper_error:.4f} in their upper half",
+            f"{fit_text(exponent, error)} over the {np.sum(chosen)} periodic motions, "
+            f"{fit_text(upper, upper_error)} in their upper half",
             abs(exponent - expected) <= SAME_EXPONENT,
             agrees_if=_exponent_near(expected),
         )
@@ -566,10 +582,10 @@ def _at(found: Study, places: tuple[float, ...]) -> str:
     """Rates between points [mm/s], with the errors of the points beside them where these show."""
     x, rate, _periodic = along(found)
     error = found.rows["rate_of_penetration_error"]
-    texts = []
-    for place in places:
-        value, off = (1e3 * float(np.interp(place, x, y)) for y in (rate, error))
-        # what the grid adds is not known
-        shows = off > LEAST_ERROR * abs(value)
-        texts.append(with_error(value, off) if shows else in_digits(value))
-    return ", ".join(texts)
+    pairs = ((1e3 * float(np.interp(place, x, y)) for y in (rate, error)) for place in places)
+    return ", ".join(_with_known_error(*pair) for pair in pairs)
+
+
+def _with_known_error(value: float, error: float) -> str:
+    """Write a number with its error where that shows; what the grid adds is not known."""
+    return with_error(value, error) if error > LEAST_ERROR * abs(value) else in_digits(value)
