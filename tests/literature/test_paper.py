@@ -241,6 +241,20 @@ def test_sinking_is_told_of_each_bit(sinking):
     assert elastic.why
 
 
+def test_what_depends_on_the_cells_is_about_a_number(sinking):
+    """Without loss: 56 mm, and 85 with twice the cells."""
+    legend = draw_sinking(sinking).axes[0].get_legend()
+    names = [text.get_text() for text in legend.get_texts()]
+    assert sum("no loss" in name for name in names) == 2
+    for name in names:
+        of_cells = bool(re.search(r": ≈ \d\d mm, depends on the cells$", name))
+        assert of_cells == ("no loss" in name), name
+    _rigid, elastic = about_sinking(paper_scene(), sinking)
+    lossless = elastic.found.partition("without structural loss")[2].partition(" s at ")[2]
+    assert re.findall(r"\S+ \d+", lossless) == re.findall(r"≈ \d+", lossless)
+    assert lossless.count("≈") == 4
+
+
 def test_the_datum_jumps_by_eq_19(waves):
     result, window = waves
     jumps = datum_jumps(result.scene, window.restart, window.origin + window.length)

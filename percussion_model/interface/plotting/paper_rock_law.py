@@ -12,11 +12,13 @@ from percussion_model.interface.plotting import style
 from percussion_model.interface.plotting.style import KN, MM, MS
 from percussion_model.interface.plotting.window import ROOM_AFTER, Window
 from percussion_model.physics.records import Mode
+from percussion_model.simulation.uncertain import ABOUT
 from percussion_model.verification.paper.rock_law import (
     BARRIER,
     FINER,
     LOSSLESS,
     LOSSY,
+    OF_THE_CELLS,
     RIGID,
     RIGID_BARRIER,
     Sinking,
@@ -118,8 +120,10 @@ def draw_sinking(found: Mapping[str, Sinking]) -> Figure:
     for name, (colour, dashes) in LINES.items():
         one = found[name]
         depth = one.position * MM
-        words = f"{name}: {depth[-1]:.3g} mm"
-        ax.plot(one.time, depth, color=colour, linestyle=dashes, label=words)
+        words = f"{depth[-1]:.3g} mm"
+        if name in OF_THE_CELLS:
+            words = f"{ABOUT} {depth[-1]:.2g} mm, depends on the cells"
+        ax.plot(one.time, depth, color=colour, linestyle=dashes, label=f"{name}: {words}")
     ax.set_ylim(0.0, None)
     ax.legend(loc="upper left")
     style.label(ax, "time [s]", "mean bit displacement, down [mm]")

@@ -11,6 +11,7 @@ import numpy as np
 from percussion_model.physics.records import EventKind, Mode
 from percussion_model.scene.scene import Scene
 from percussion_model.simulation.simulate import Simulation, Snapshot
+from percussion_model.simulation.uncertain import ABOUT
 from percussion_model.verification.paper.runs import CALIBRATED, drop_scene
 from percussion_model.verification.paper.statements import Statement
 
@@ -133,6 +134,8 @@ RIGID, RIGID_BARRIER = "rigid bit, no barrier", "rigid bit with barrier"
 LOSSLESS, LOSSY = "elastic bit, no barrier, no loss", "elastic bit, no barrier"
 FINER = ", twice the cells"
 BARRIER = "elastic bit with barrier"
+# Without loss waves never decay: how deep such a bit sinks depends on the cells.
+OF_THE_CELLS = (LOSSLESS, LOSSLESS + FINER)
 
 
 def run_sinking(scene: Scene) -> dict[str, Sinking]:
@@ -205,9 +208,10 @@ def about_sinking(scene: Scene, found: dict[str, Sinking]) -> Iterator[Statement
         says,
         f"it stops at {depth[LOSSY]:.2f} mm ({depth[LOSSY + FINER]:.2f} with twice the cells), "
         f"with the barrier at {depth[BARRIER]:.2f}; without structural loss it sinks on, after "
-        f"{SINKING:g} s at {1e3 * found[LOSSLESS].speed:.0f} mm/s in {depth[LOSSLESS]:.0f} mm "
-        f"({1e3 * found[LOSSLESS + FINER].speed:.0f} and {depth[LOSSLESS + FINER]:.0f}: its "
-        "numbers depend on the cells)",
+        f"{SINKING:g} s at {ABOUT} {1e3 * found[LOSSLESS].speed:.0f} mm/s in "
+        f"{ABOUT} {depth[LOSSLESS]:.0f} mm (with twice the cells {ABOUT} "
+        f"{1e3 * found[LOSSLESS + FINER].speed:.0f} and {ABOUT} {depth[LOSSLESS + FINER]:.0f}: "
+        "what a bit without loss does depends on the cells)",
         abs(found[LOSSY].late_advance) > 0.01 * abs(found[LOSSY].position[-1]),
         "at the end of each cycle force and velocity vanish together, so that the least loss "
         "leaves some force; structural loss in the bar thus stops what never stops in a rigid "
