@@ -26,6 +26,8 @@ from percussion_model.verification.paper.rock_law import (
 
 # Jumps of the datum that are small beside the greatest get no number.
 WORTH_A_NUMBER = 0.02
+# Axis by the deepest bit: the legend hides no line.
+ROOM_OF_LEGEND = 1.5
 # The rock bears a load from this share of the peak force on.
 LOADED = 0.1
 LINES = {
@@ -124,7 +126,8 @@ def draw_sinking(found: Mapping[str, Sinking]) -> Figure:
         if name in OF_THE_CELLS:
             words = f"{ABOUT} {depth[-1]:.2g} mm, depends on the cells"
         ax.plot(one.time, depth, color=colour, linestyle=dashes, label=f"{name}: {words}")
-    ax.set_ylim(0.0, None)
+    deepest = max(float(np.max(found[name].position)) for name in LINES)
+    ax.set_ylim(0.0, ROOM_OF_LEGEND * deepest * MM)
     ax.legend(loc="upper left")
     style.label(ax, "time [s]", "mean bit displacement, down [mm]")
     style.head(fig, "Drop test under feed: sinking without an energy barrier (section 2.3)")
