@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from rich.console import Console
 from rich.table import Column, Table
+from rich.text import Text
 
 # More characters than any table has.
 ENDLESS = 10_000
@@ -42,7 +43,15 @@ def print_table(
     wide = Console(width=ENDLESS)
     sizes = [_size(column, wide) for column in table.columns]
     for places in _blocks(table, sizes, console.width, keys, groups):
-        console.print(_fitted(table, sizes, places, console.width))
+        block = _fitted(table, sizes, places, console.width)
+        if console.is_terminal:
+            console.print(block)
+            continue
+        with console.capture() as caught:
+            console.print(block)
+        # lines are padded to the width, which files and pipes have no use for
+        lines = "\n".join(line.rstrip() for line in caught.get().splitlines())
+        console.print(Text(lines), soft_wrap=True)
 
 
 def _size(column: Column, wide: Console) -> Size:

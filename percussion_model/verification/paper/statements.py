@@ -61,8 +61,9 @@ _PEAK = f"the greatest rate within {NEAR_PEAK:g} of gamma = 40"
 # What is known of the errors of the numbers found.
 ERRORS = (
     "± is the error where one is known: of rates and means of the stationary blow (4.3) that by "
-    "grid and scatter, of rates of the sweeps (4.4) that by convergence and scatter, of what is "
-    "fitted the greater of the standard error of the fit and half of the difference between fits "
+    "grid and scatter, of rates of the sweeps (4.4) that by convergence and scatter, which is left "
+    f"out up to {100 * LEAST_ERROR:g} % of a rate: that has three digits; of what is fitted "
+    "the greater of the standard error of the fit and half of the difference between fits "
     "of the lower and the upper half of the points. Of all other numbers found here the error is "
     "not estimated, nor is that of the grid in drop tests and sweeps."
 )
