@@ -36,8 +36,8 @@ SHOWN = (
 )
 # Those that are given, and have all their digits.
 GIVEN = ("time", "step", "steps")
-# What is meant where there is an error of the rate.
-SCATTER = "scatter alone, also of the rock"
+# What the error of the rate is of, where there is one.
+SCATTER = "scatter alone"
 # Of a loss that its error may make.
 HIDDEN = "its error may be as large"
 # Rows of a run without --interval.
@@ -166,8 +166,8 @@ def _lines(found: Mapping[str, Any]) -> Iterator[str]:
     if found.get("rate_second_half_error") is not None:
         *others, last = found["not_in_errors"]
         yield wrapped(
-            f"± is by the scatter of the blows: the error by {', '.join(others)} and {last} is not "
-            "in it."
+            "± is the scatter of the blows, also by the rock: the error by "
+            f"{', '.join(others)} and {last} is not in it."
         )
 
 
