@@ -16,9 +16,7 @@ from percussion_model.analysis.comparison import Comparison
 from percussion_model.analysis.effect_study import EffectsStudy, Trial, Variant
 from percussion_model.analysis.study import Study, grid, table
 from percussion_model.analysis.study.response import KINDS, ROW
-from percussion_model.coupling.coupled_run import CoupledRun, summary
 from percussion_model.coupling.verdict import _jump
-from percussion_model.interface.commands.couple import _lines
 from percussion_model.interface.commands.effects import table_of
 from percussion_model.interface.plotting.compared_blows import draw_comparison
 from percussion_model.interface.plotting.effect_bars import draw_effects
@@ -510,45 +508,3 @@ def test_error_bars_of_figure_9_stay_in_the_panel():
     rate, error = (1e3 * found.rows[f"rate_of_penetration{end}"][1:] for end in ("", "_error"))
     assert low <= np.min(rate - error)
     assert high >= np.max(rate + error)
-
-
-# -------------------------------------------------------------------- coupled runs
-
-
-def test_a_coupled_rate_has_its_error():
-    time = np.linspace(0.0, 4.0, 4001)
-    blow = np.floor(time / 0.045)
-    noise = np.random.default_rng(5).normal(1.0, 0.3, len(blow))
-    advance = np.where(np.diff(blow, prepend=0.0) > 0, 7e-4 * noise, 0.0)
-    columns = {
-        "time": time,
-        "hammer.blow_count": blow,
-        "hammer.hole_depth": np.cumsum(advance),
-        "hammer.bit.position": np.cumsum(advance) + 1e-2 * np.sin(time * 40.0),
-    }
-    found = summary(CoupledRun(columns, 1e-3, 4000))
-    rate, error = found["rate_second_half"], found["rate_second_half_error"]
-    assert 0.0 < error < 0.2 * rate
-    # the mean of a blow by its period, and its standard error by the 44 blows of the half
-    assert abs(rate - 7e-4 / 0.045) < 3.0 * error
-    assert error == pytest.approx(0.3 * 7e-4 / 0.045 / math.sqrt(44.0), rel=0.5)
-    assert found["rate_second_half_undecided"] is False
-    (line,) = [text for text in _lines(found) if text.startswith("Rate in the second half ")]
-    assert "±" in line
-    assert line.endswith("mm/s (scatter, also of the rock)")
-    # names are words, and what has no error has three digits
-    assert found["without_error"] == ["depth"]
-    more = {"shoulder_by_blows": -0.000718548, "shoulder_energy": -4.0144}
-    shown = list(_lines(found | more | {"without_error": ["depth", *more]}))
-    assert not any("_" in text for text in shown)
-    assert any("-0.0719 % of blow energy (error not estimated)" in text for text in shown)
-    assert any("-4.01 J (error not estimated)" in text for text in shown)
-    least = summary(CoupledRun({name: column[:99] for name, column in columns.items()}, 1e-3, 98))
-    assert "rate_second_half" not in least  # it has no whole blow
-    short = {name: column[:200] for name, column in columns.items()}
-    short = summary(CoupledRun(short, 1e-3, 199))
-    assert short["rate_second_half_error"] is None
-    assert short["without_error"] == ["depth", "rate_second_half"]
-    assert any("error not estimated" in text for text in _lines(short))
-    held = columns | {"hammer.blow_count": np.minimum(blow, 60.0)}  # from 2.7 s on
-    assert "rate_second_half" not in summary(CoupledRun(held, 1e-3, 4000))

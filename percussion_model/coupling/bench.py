@@ -26,6 +26,9 @@ FINER, ERROR_FACTOR = 0.5, 2.0
 # At least this share of a number: within a blow, which is shorter than both steps, the damper of
 # the shoulder brakes the bit, and neither sees it (docs/system.md, section 4: 1 to 2 %).
 WITHIN_A_BLOW = 0.02
+# And at least a blow's share of what comes and goes with blows: one halving of the step may
+# happen to change hardly anything.
+BY_BLOWS = ("depth", "energy_per_metre", "time_off_bottom", "dry_blows")
 FEED = 3000.0  # what is wanted [N]
 # Limits of the rig: beyond them a second counts as a violation.
 HIGHEST_FEED, HIGHEST_TORQUE = 4000.0, 250.0  # [N], [N m]
@@ -207,8 +210,14 @@ def with_step_error(score: Score, finer: Score) -> Score:
     score, finer : Score
         Of the same run, with the usual step and with `FINER` of it.
     """
+    of_a_blow = _shares_of_a_blow(score)
     errors = {
-        name: max(ERROR_FACTOR * abs(finer.numbers[name] - value), WITHIN_A_BLOW * abs(value))
+        name: max(
+            ERROR_FACTOR * abs(finer.numbers[name] - value),
+            WITHIN_A_BLOW * abs(value),
+            # what neither step has at all is known
+            of_a_blow.get(name, 0.0) if value or finer.numbers[name] else 0.0,
+        )
         for name, value in score.numbers.items()
     }
     change = abs(finer.points - score.points)
@@ -223,6 +232,13 @@ def with_step_error(score: Score, finer: Score) -> Score:
     # a run that ended early has numbers of another stretch
     known = {} if score.error or finer.error else errors
     return replace(score, points_error=change, errors=known, doubt=doubt)
+
+
+def _shares_of_a_blow(score: Score) -> dict[str, float]:
+    """What one blow more or less makes of the numbers `BY_BLOWS`."""
+    blows = max(1.0, float(score.run["hammer.blow_count"][-1]))
+    whole = {**score.numbers, "time_off_bottom": float(score.run["time"][-1]), "dry_blows": blows}
+    return {name: whole[name] / blows for name in BY_BLOWS}
 
 
 class Watch(Protocol):

@@ -32,6 +32,12 @@ SIGNALS = (
 # Numbers of a summary that have an error, which may be known and stands beside them then;
 # residuals are measures of an error themselves.
 ESTIMATES = ("depth", "rate_second_half", "shoulder_energy", "feed_work", "shoulder_by_blows")
+# What the shoulder takes, by the energy of the blows, is off by up to so much: its damper brakes
+# the bit within a blow. That goes with the step, up to one that sees nothing of a blow [1], [s]
+# (docs/system.md, section 4).
+MISSED_BY_SHOULDER, UNSEEING_STEP = 0.012, 1e-4
+# What the error of the rate is of, and what is in none of the errors.
+SCATTER, STEP, CELLS, BLOW_MAP = "scatter", "communication step", "cells", "blow map"
 
 
 @dataclass
@@ -119,7 +125,9 @@ def summary(run: CoupledRun) -> dict[str, Any]:
         blows, and whether that hides it [m/s]; greatest residual of the energy
         balance of the string divided by the energy put in and stored at the start; energy that
         the shoulder took and work of the feed [J]; the former divided by the energy of the
-        blows [1]; names of those whose error is not known, `without_error`; the verdict.
+        blows [1], and whether step or residual may make up either; names of those whose error
+        is not known, `without_error`; what is in none of the errors, `not_in_errors`; the
+        verdict.
     """
     columns = run.columns
     found: dict[str, Any] = {
@@ -131,8 +139,31 @@ def summary(run: CoupledRun) -> dict[str, Any]:
         if len(columns["time"]) > 2:
             found |= _rate_second_half(columns)
     found |= _balances(columns)
+    found |= _undecided_losses(found, columns, run.step)
     unknown = [key for key in ESTIMATES if key in found and found.get(f"{key}_error") is None]
-    return found | {"without_error": unknown, "verdict": run.verdict.to_dict()}
+    missing = [STEP, CELLS, *([BLOW_MAP] if run.by_map else [])]
+    return found | {
+        "without_error": unknown, "not_in_errors": missing, "verdict": run.verdict.to_dict(),
+    }  # fmt: skip
+
+
+def _undecided_losses(
+    found: dict[str, Any], columns: dict[str, np.ndarray], step: float
+) -> dict[str, bool]:
+    """Whether what the shoulder took is one that step or residual may make, of each number of it.
+
+    A damper gives nothing: what is negative is not known, whatever its size.
+    """
+    if "shoulder_energy" not in found:
+        return {}
+    lost = found["shoulder_energy"]
+    error = found["string_energy_residual"] * _scale(columns)
+    if (share := found.get("shoulder_by_blows")) is not None:
+        missed = MISSED_BY_SHOULDER * min(1.0, step / UNSEEING_STEP)
+        error = max(error, missed * abs(lost / share) if share else math.inf)
+    hidden = lost < 0.0 or is_undecided(lost, error)
+    names = ("shoulder_energy", "shoulder_by_blows")
+    return {f"{name}_undecided": hidden for name in names if name in found}
 
 
 def _rate_second_half(columns: dict[str, np.ndarray]) -> dict[str, Any]:
@@ -159,6 +190,7 @@ def _rate_second_half(columns: dict[str, np.ndarray]) -> dict[str, Any]:
     return {
         "rate_second_half": rate,
         "rate_second_half_error": None if math.isnan(error) else error,
+        "rate_second_half_error_of": None if math.isnan(error) else SCATTER,
         "rate_second_half_undecided": is_undecided(rate, error),
     }
 
@@ -180,12 +212,9 @@ def _energies(columns: dict[str, np.ndarray]) -> dict[str, float]:
     gone = e["bit"] + e["shoulder"] + e["wall"] + e["stored"] - e["stored"][0]
     # what is stored at the start was not put in
     residual = put_in - gone - (put_in - gone)[0]
-    scale = sum(float(np.max(np.abs(e[name]))) for name in ("head", "reaction", "weight"))
-    # and what is there already has its error too: a short run puts hardly anything in
-    scale += float(e["stored"][0])
     blows = columns.get("hammer.blow_energy")
     found = {
-        "string_energy_residual": float(np.max(np.abs(residual))) / (scale or 1.0),
+        "string_energy_residual": float(np.max(np.abs(residual))) / _scale(columns),
         "shoulder_energy": float(e["shoulder"][-1]),
         "feed_work": float(e["bit"][-1]),
     }
@@ -195,3 +224,11 @@ def _energies(columns: dict[str, np.ndarray]) -> dict[str, float]:
         if len(known) and (total := float(count[-1] * np.mean(known))) > 0.0:
             found["shoulder_by_blows"] = found["shoulder_energy"] / total
     return found
+
+
+def _scale(columns: dict[str, np.ndarray]) -> float:
+    """Energy that the residual of the string is divided by: put in, and stored at the start [J]."""
+    put_in = [columns[f"string.energy.{name}"] for name in ("head", "reaction", "weight")]
+    # what is there already has its error too: a short run puts hardly anything in
+    stored = float(columns["string.energy.stored"][0])
+    return sum(float(np.max(np.abs(one))) for one in put_in) + stored or 1.0

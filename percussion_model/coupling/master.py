@@ -192,7 +192,11 @@ class Coupling:
         if tolerance is not None and self.on_way is not None:
             raise CouplingError("on_way cannot be taken back with a step: leave the tolerance out")
         if tolerance is not None and self.every:
-            raise CouplingError(f"every {self.every} and a tolerance do not go together")
+            slow = ", ".join(f"{name}={steps}" for name, steps in self.every.items())
+            raise CouplingError(
+                f"tolerance {tolerance:g} and every {slow} do not go together (--tolerance, "
+                "--every): leave one of them out"
+            )
         refuse_remainder(self.every, self.parts, count)
 
     def _loop(

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import pytest
 
+from percussion_model import Scene
 from percussion_model.interface.commands.accuracy_tables import (
     bounds_text,
     ratio_text,
+    show_bars,
     show_contests,
     show_study,
 )
@@ -22,7 +25,11 @@ from percussion_model.verification.accuracy.advantage import (
     summary,
 )
 from percussion_model.verification.accuracy.problems import APERIODIC, DROP, PERIODIC, quantities
-from percussion_model.verification.accuracy.references import Bar
+from percussion_model.verification.accuracy.references import (
+    Bar,
+    fingerprint,
+    load_references,
+)
 
 
 def made(ladders, bar=0.0, agreed=True, title="", kind=PERIODIC, sizes=None):
@@ -182,3 +189,12 @@ def test_tables_say_what_is_compared(capsys):
     assert "rate" not in text.replace("ratio", "")
     show_contests({"fall": fall, "blows": made({"wave": WAVE})})
     assert "blows: error in the rate of penetration" in " ".join(capsys.readouterr().out.split())
+
+
+@pytest.mark.parametrize("name", ["aperiodic", "reference"])
+def test_a_bar_that_is_a_standard_error_promises_nothing(name, capsys):
+    scene = Scene.from_toml(Path(__file__).parents[2] / "scenarios" / f"{name}.toml")
+    show_bars(load_references()[fingerprint(scene)])
+    said = " ".join(capsys.readouterr().out.split())
+    assert ("true value lies within the bar" in said) == (name == "reference")
+    assert ("The bar is the standard error of the reference" in said) == (name == "aperiodic")

@@ -13,7 +13,7 @@ import pytest
 from typer.testing import CliRunner
 
 from percussion_model import Scene, SceneError
-from percussion_model.interface.cli import app
+from percussion_model.interface.cli import app, main
 from percussion_model.interface.commands import common
 from percussion_model.interface.commands.accuracy_tables import (
     show_contests,
@@ -359,3 +359,18 @@ def test_only_methods_that_were_asked_are_set_up():
     assert solvers_of(("wave", "rigid")) == ["wave", "rigid"]
     assert solvers_of(("fem-time", "explicit")) == ["wave", "fem"]
     assert solvers_of(LADDERS) == ["wave", "fem", "rigid"]
+
+
+def test_methods_of_a_reference_are_refused(monkeypatch, capsys):
+    scene = str(SCENARIOS / "reference.toml")
+    monkeypatch.setattr(
+        "percussion_model.interface.commands.accuracy._make_reference",
+        lambda scene: pytest.fail("it was made"),
+    )
+    words = ["percussion", "accuracy", scene, "--make-references", "--methods", "wave"]
+    monkeypatch.setattr("sys.argv", words)
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "--make-references and --methods do not go together" in line

@@ -35,6 +35,17 @@ def test_scatter_shows_in_the_error_of_the_order():
     assert abs(rough.value - 1.0) < 3.0 * rough.error
 
 
+def test_an_order_of_few_points_has_the_spread_of_its_parts():
+    """Points on a line but for a bend: their mean slope is surer than what lies between them."""
+    sizes = 10.0 ** -np.arange(5.0)
+    order = fitted_order(sizes, 10.0 ** np.array([0.0, -1.0, -2.0, -2.9, -4.0]))
+    assert order is not None
+    assert order.error == pytest.approx(0.5 * (1.1 - 0.9))
+    twice = fitted_order([1.0, 1.0, 0.1, 0.01], [1.0, 1.0, 0.1, 0.01])
+    assert twice is not None
+    assert twice.error == pytest.approx(0.0, abs=1e-9)
+
+
 @pytest.mark.parametrize("errors", [[1e-1, 1e-2], [1e-1, 1e-2, math.nan], [1e-1, 1e-2, 0.0]])
 def test_two_points_are_no_order(errors):
     assert fitted_order([1.0, 0.1, 0.01][: len(errors)], errors) is None

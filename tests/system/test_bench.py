@@ -236,6 +236,45 @@ def test_a_score_has_its_error_by_the_step():
     assert "was not estimated" in about_errors([score])
 
 
+def test_an_error_is_no_less_than_what_a_blow_makes():
+    """One halving happens to change little, the next ones more: 0.423, 0.4315, 0.3975 s."""
+    run, other = made_up(3000.0), made_up(3000.0)
+    for one, end in ((run, 0.423), (other, 0.4315)):
+        time = one.columns["time"] = np.linspace(0.0, 4.0, 8001)
+        for name, column in list(one.columns.items()):
+            if name != "time":
+                one.columns[name] = np.interp(time, np.linspace(0.0, 4.0, len(column)), column)
+        one.columns["string.lifted"] = ((time > 0.0) & (time < end + 1e-6)).astype(float)
+        one.columns["rock.in_void"] = one.columns["string.lifted"]
+        one.columns["hammer.blow_count"] = np.floor(20.0 * time)
+    found = with_step_error(judge(TRIALS[3], run), judge(TRIALS[3], other))
+    times = found.numbers["time_off_bottom"], found.errors["time_off_bottom"]
+    assert times[0] == pytest.approx(0.423, abs=6e-4)
+    assert abs(times[0] - 0.3975) < times[1]
+    assert times[1] == pytest.approx(4.0 / 80.0)
+    assert found.numbers["dry_blows"] == 8.0
+    assert found.errors["dry_blows"] == 1.0
+    short = made_up(3000.0)
+    short.columns["hammer.blow_count"] = np.floor(5.0 * short["time"])  # 20 blows
+    few = with_step_error(*(judge(TRIALS[0], short) for _ in range(2)))
+    for name in ("depth", "energy_per_metre"):
+        assert few.errors[name] == pytest.approx(few.numbers[name] / 20.0)
+    assert (few.errors["time_off_bottom"], few.errors["dry_blows"]) == (0.0, 0.0)
+    assert "one blow's share of depth" in about_errors([few])
+
+
+def test_what_is_no_controller_is_told(feed_control, tmp_path, monkeypatch, capsys):
+    given = tmp_path / "scene.toml"
+    given.write_text("title = 'no archive'\n")
+    words = ["bench-controller", str(given), "--system", str(feed_control)]
+    monkeypatch.setattr("sys.argv", ["percussion", *words, "--out", str(tmp_path / "out")])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.endswith("scene.toml: is neither an FMU nor FILE.py:NAME")
+
+
 def test_a_run_that_fails_with_one_step_alone_is_in_doubt():
     good, bad = judge(TRIALS[0], made_up(3000.0)), judge(TRIALS[0], made_up(2000.0))
     for score, finer, words in ((good, bad, "it fails: the feed is off"), (bad, good, "not fail")):

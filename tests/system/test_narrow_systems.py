@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import builtins
 import time
 from types import SimpleNamespace
 
@@ -79,3 +80,33 @@ def test_they_say_on_a_pipe_that_they_run(name, feed_control, tmp_path, monkeypa
     monkeypatch.setattr(Coupling, "run", run)
     assert called(name, feed_control) == INTERRUPTED
     assert sum(" s: " in line for line in lines) >= 2
+
+
+@pytest.mark.parametrize(
+    ("words", "module"),
+    [
+        (["couple", "{}", "--duration", "0.02"],
+         "percussion_model.interface.plotting.coupled_signals"),
+        (["bench-controller", "--system", "{}", "--trial", "rod", "--no-step-check"],
+         "percussion_model.interface.bench_page"),
+    ],
+)  # fmt: skip
+def test_loading_what_draws_is_told_as_drawing(
+    words, module, feed_control, brief, tmp_path, monkeypatch
+):
+    """It takes seconds, of which a line said "still running"."""
+    monkeypatch.chdir(tmp_path)
+    pipe = SimpleNamespace(write=lambda text: None, flush=lambda: None)
+    monkeypatch.setattr(progress, "sys", SimpleNamespace(stderr=pipe))
+    told, load = [], builtins.__import__
+
+    def loading(name, *others):
+        if name == module:
+            told.append(progress._running[0].told[0])
+        return load(name, *others)
+
+    monkeypatch.setattr(builtins, "__import__", loading)
+    given = [word.format(feed_control) for word in words]
+    assert _guarded(lambda: app([*given, "--out", "out"], standalone_mode=False)) == 0
+    assert told
+    assert all(text.startswith("drawing the figure") for text in told)

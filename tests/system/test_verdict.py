@@ -208,6 +208,31 @@ def test_the_command_says_of_which_numbers_the_error_is_not_known(
     ]  # fmt: skip
 
 
+@pytest.mark.parametrize(("duration", "told"), [("0.1", True), ("0.09", False)])
+def test_a_time_that_is_no_multiple_of_the_step_is_told(
+    feed_control, tmp_path, monkeypatch, capsys, duration, told
+):
+    words = ["couple", str(feed_control), "--duration", duration, "--step", "0.03"]
+    words += ["--no-figures", "--out", str(tmp_path / "out")]
+    monkeypatch.setattr("sys.argv", ["percussion", *words])
+    with pytest.raises(SystemExit):
+        main()
+    said = capsys.readouterr().err
+    line = "--duration 0.1: 0.09 s are simulated, 3 whole steps of 0.03 s"
+    assert (line in said) == told
+    assert ("are simulated" in said) == told
+
+
+def test_options_that_do_not_go_together_are_named(feed_control, tmp_path, monkeypatch, capsys):
+    words = ["couple", str(feed_control), "--tolerance", "0.01", "--every", "rock=10"]
+    monkeypatch.setattr("sys.argv", ["percussion", *words, "--out", str(tmp_path / "out")])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "tolerance 0.01 and every rock=10 do not go together (--tolerance, --every)" in line
+
+
 @pytest.mark.parametrize(
     "refused",
     [("--set", "nothing.there=1"), ("--signal", "hammer.nothing"), ("--duration", "0")],

@@ -69,6 +69,11 @@ def accuracy(
         raise common.refusal(
             f"{', '.join(names)}: results take the names of the scene files, which must differ"
         )
+    if make_references and methods is not None:
+        raise common.refusal(
+            "--make-references and --methods do not go together: a reference is made by the same "
+            "methods always"
+        )
     words = None if methods is None else [word.strip() for word in methods.split(",")]
     ladders = chosen_ladders(words)  # refuses before anything is computed
     for _, scene in chosen:

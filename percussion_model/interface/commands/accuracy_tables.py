@@ -97,8 +97,13 @@ def show_bars(reference: Reference, console: Console | None = None) -> None:
             "" if bar.agreed else "no reference: the limits disagree",
         )
     _print(f"Reference: {reference.title}", table, console)
+    promise = (
+        "The bar is the standard error of the reference: the true value may lie outside of it."
+        if reference.kind == APERIODIC
+        else "The true value lies within the bar of the reference."
+    )
     console.print(
-        "The true value lies within the bar of the reference. Histories, through a blow, have no "
+        f"{promise} Histories, through a blow, have no "
         "one value: theirs is the mean distance by the mean size.",
         highlight=False,
     )

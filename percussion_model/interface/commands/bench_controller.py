@@ -6,6 +6,7 @@ import importlib.util
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
+from zipfile import is_zipfile
 
 import typer
 
@@ -90,13 +91,14 @@ def bench_controller(
                 f"{score.trial}: {score.doubt}, so whether it does is not known with this step"
             )
     try:
-        from percussion_model.interface.bench_page import write_bench_page
+        with progress("drawing the figures"):
+            # to load what draws takes its time too
+            from percussion_model.interface.bench_page import write_bench_page
+
+            page = write_bench_page(scores, claimed.folder, controller or system.stem)
     except ImportError as error:
         common.print_message(common.needs_plot_extra(error))
     else:
-        title = controller or system.stem
-        with progress("drawing the page"):
-            page = write_bench_page(scores, claimed.folder, title)
         common.list_files([page, claimed.sign()])
     if interrupted:
         return common.print_message(
@@ -153,6 +155,8 @@ def _load(controller: str | None) -> Any:
     if not name:
         if file.endswith(".py"):
             raise CouplingError(f"{file}: which function or class of it? give {file}:NAME")
+        if not is_zipfile(file):
+            raise CouplingError(f"{file}: is neither an FMU nor FILE.py:NAME")
         return Path(file)
 
     def anew() -> Callable[..., Any]:

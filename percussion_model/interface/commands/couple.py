@@ -9,7 +9,13 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from percussion_model.interface.commands import common
-from percussion_model.simulation.uncertain import NOT_ESTIMATED, in_digits, with_error
+from percussion_model.interface.messages import wrapped
+from percussion_model.simulation.uncertain import (
+    NOT_ESTIMATED,
+    UNDECIDED,
+    in_digits,
+    with_error,
+)
 
 if TYPE_CHECKING:
     from percussion_model.coupling.verdict import Verdict
@@ -23,15 +29,17 @@ SHOWN = (
     ("depth", "Depth of the bit", 1e3, "mm"),
     ("rate_second_half", "Rate in the second half", 1e3, "mm/s"),
     ("hammer_energy_residual", "Hammer: energy unexplained", 1.0, "of the energy put in"),
-    ("string_energy_residual", "String: energy unexplained", 1.0, "of the energy put in or there"),
+    ("string_energy_residual", "String: energy unexplained", 1.0, "of the energy put in or stored"),
     ("shoulder_energy", "Energy lost at the bit's shoulder", 1.0, "J"),
     ("feed_work", "Work of the feed on the bit", 1.0, "J"),
     ("shoulder_by_blows", "Share lost at the bit's shoulder", 100.0, "% of blow energy"),
 )
 # Those that are given, and have all their digits.
 GIVEN = ("time", "step", "steps")
-# What is meant where there is an error of the rate.
-SCATTER = "scatter, also of the rock"
+# What the error of the rate is of, where there is one.
+SCATTER = "scatter alone"
+# Of a loss that its error may make.
+HIDDEN = "its error may be as large"
 # Rows of a run without --interval.
 ROWS = 5000
 FAILED = 1
@@ -99,6 +107,7 @@ def couple(
     except ResultError:
         coupling.free()
         raise
+    _tell_of_rest(duration, step)
     folder = claimed.folder
     wanted = [*known_signals(coupling.outputs), *(signals or ())]
     rows_every = max(step, duration / ROWS) if interval is None else interval
@@ -115,13 +124,26 @@ def couple(
     common.list_files([path])
     if figures:
         with common.if_drawable():
-            from percussion_model.interface.plotting.coupled_signals import save_signals
-
             with progress("drawing the figure"):
+                # to load what draws takes its time too
+                from percussion_model.interface.plotting.coupled_signals import save_signals
+
                 figure = save_signals(run, folder / "signals.png", system.stem)
             common.list_files([figure])
     common.list_files([claimed.sign()])
     return _tell(run.verdict, common.INTERRUPTED if run.interrupted else FAILED)
+
+
+def _tell_of_rest(duration: float, step: float) -> None:
+    """Say where the time that was asked for is no multiple of the step."""
+    from percussion_model.coupling.master import ROUNDING, whole_steps
+
+    count, _ = whole_steps(duration, step, None)
+    if duration - count * step > ROUNDING * duration:
+        common.print_message(
+            f"--duration {duration:g}: {count * step:.6g} s are simulated, {count} whole "
+            f"{'step' if count == 1 else 'steps'} of {step:g} s"
+        )
 
 
 def _lines(found: Mapping[str, Any]) -> Iterator[str]:
@@ -130,6 +152,9 @@ def _lines(found: Mapping[str, Any]) -> Iterator[str]:
         if key not in found:
             continue
         value, error = factor * found[key], found.get(f"{key}_error")
+        if error is None and found.get(f"{key}_undecided"):
+            yield f"{name:33s} {UNDECIDED} ({HIDDEN})"
+            continue
         number = f"{value:.6g}" if key in GIVEN else in_digits(value)
         note = ""
         if error is not None:
@@ -138,6 +163,12 @@ def _lines(found: Mapping[str, Any]) -> Iterator[str]:
         elif key in found["without_error"]:
             note = NOT_ESTIMATED
         yield f"{name:33s} {number} {unit}".rstrip() + (f" ({note})" if note else "")
+    if found.get("rate_second_half_error") is not None:
+        *others, last = found["not_in_errors"]
+        yield wrapped(
+            "± is the scatter of the blows, also by the rock: the error by "
+            f"{', '.join(others)} and {last} is not in it."
+        )
 
 
 def _tell(verdict: Verdict, code: int) -> int:

@@ -14,6 +14,8 @@ __all__ = ["AT_LEAST", "AT_MOST", "Cost", "Order", "cost_at", "cost_range", "fit
 
 # Fewer points make no order.
 LEAST_POINTS = 3
+# So many may lie on a line by chance, whatever the order between them.
+FEW_POINTS = 5
 # What is left of an error that the bar of the reference may make up whole.
 NOTHING = 1e-3
 # What stands before a bound.
@@ -31,7 +33,8 @@ class Order:
     value : float
         Exponent.
     error : float
-        Its standard error.
+        Its standard error; of few points no less than half the spread of the orders between
+        neighbours.
     scale : float
         Error at size one.
     points : int
@@ -109,7 +112,16 @@ def fitted_order(sizes: Sequence[float], errors: Sequence[float]) -> Order | Non
     rest = y - (slope * x + offset)
     spread = float(np.sum((x - x.mean()) ** 2))
     error = math.sqrt(float(rest @ rest) / (len(x) - 2) / spread)
+    if len(x) <= FEW_POINTS:
+        error = max(error, 0.5 * _spread_of_neighbours(x, y))
     return Order(float(slope), error, math.exp(float(offset)), len(x))
+
+
+def _spread_of_neighbours(x: np.ndarray, y: np.ndarray) -> float:
+    """Range of the slopes between neighbours; of one size the mean counts."""
+    sizes = np.unique(x)
+    means = np.array([y[x == size].mean() for size in sizes])
+    return float(np.ptp(np.diff(means) / np.diff(sizes)))
 
 
 def cost_at(costs: Sequence[float], errors: Sequence[float], wanted: float) -> float:
