@@ -20,6 +20,7 @@ from examples.all import EXAMPLES
 from examples.shared import command_line, figure_of, tell, write_example
 from percussion_model import Scene, SceneError, Simulation
 from percussion_model.interface import progress
+from percussion_model.interface.commands.common import BAD_INPUT
 from percussion_model.simulation.files import to_json
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -228,6 +229,6 @@ def test_an_example_does_not_write_into_the_folder_of_another_result(tmp_path):
     (tmp_path / "kept.json").write_text("{}")
     words = [sys.executable, "-m", "examples.drill_design", "--quick", "--out", str(tmp_path)]
     ended = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False)
-    assert ended.returncode == 1
+    assert ended.returncode == BAD_INPUT
     assert "holds files of unknown origin (kept.json)" in ended.stderr
     assert [path.name for path in tmp_path.iterdir()] == ["kept.json"]

@@ -479,7 +479,11 @@ def test_a_map_does_not_colour_what_it_does_not_know():
     (legend,) = drawn.select({"type": Legend})
     assert legend.visible
     assert "undecided" in legend.items[0].label.value
-    assert any("±" in str(tool.tooltips) for tool in drawn.select({"type": HoverTool}))
+    texts = zip(cells.data["rate_text"], blind[at], strict=True)
+    known = [text for text, grey in texts if not grey]
+    assert known
+    assert all("±" in text for text in known)
+    assert any("@rate_text" in str(tool.tooltips) for tool in drawn.select({"type": HoverTool}))
     sure = interactive_study(made_study(points, np.zeros(6, bool)))["map"]
     assert not any(one.visible for one in sure.select({"type": Legend}))
 
