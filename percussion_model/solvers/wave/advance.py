@@ -213,7 +213,9 @@ def sample(par_, state, bars, memory, spare, spare_bars, spare_memory, ops, scra
             spare_memory[0][i] = memory[0][i]
         for i in range(len(memory[1])):
             spare_memory[1][i] = memory[1][i]
-        spare[0].peak_from = math.inf  # nobody asks for peaks here, and in standstill they are dear
+        # nobody asks here for peaks, dear in standstill, or for what leaps lose: infinite energy
+        # put in makes any loss too small to book
+        spare[0].peak_from = spare[0].e_start = math.inf
         here = max(times[k], time_of(par_[0], state[0]))
         run(read, par_, spare, spare_bars, ops, scratch, here, blows, events, reading)
         for i in range(out.shape[1]):
