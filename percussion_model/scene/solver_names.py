@@ -5,10 +5,11 @@ from __future__ import annotations
 from typing import Literal
 
 # The choices of `solver.name`; the parameter table reads this list whenever it is asked.
-SOLVER_NAMES = ["auto", "wave", "fem", "rigid"]
+SOLVER_NAMES = ["auto", "wave", "modal", "fem", "rigid"]
 # Bodies that a solver computes, where not both kinds.
 BODIES: dict[str, Literal["elastic", "rigid"]] = {
     "wave": "elastic",
+    "modal": "elastic",
     "fem": "elastic",
     "rigid": "rigid",
 }

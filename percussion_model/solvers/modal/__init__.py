@@ -1,0 +1,1 @@
+"""Modal solver: bars by their normal modes, contact and rock step by step."""

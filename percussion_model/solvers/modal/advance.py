@@ -1,0 +1,143 @@
+"""Loop of the modal solver, and reading a state without touching it."""
+
+from __future__ import annotations
+
+import math
+
+from percussion_model.physics.kernel import kernel, merged
+from percussion_model.physics.readings import fill_ledger, fill_motion
+from percussion_model.physics.records import Piston, Status
+from percussion_model.physics.rock import recoverable
+from percussion_model.solvers.modal.bar import (
+    bit_kinetic,
+    bit_vibration,
+    elastic_of,
+    kinetic_of,
+    piston_vibration,
+)
+from percussion_model.solvers.modal.leaps import leap, plan
+from percussion_model.solvers.modal.records import STEP, Task
+from percussion_model.solvers.modal.step import WHOLE, has_piston, step, time_of, unpark
+
+# Events that one step can make besides those of the rock.
+OTHER_EVENTS = 6
+# A time this close below a tick is that tick [ticks].
+TICK_ROUNDING = 1e-3
+
+
+@merged
+def tick_at(par, time):
+    """Last tick up to a time."""
+    return int(math.floor(time / par.tick + TICK_ROUNDING))
+
+
+@kernel
+def advance_to(par, s, bars, ops, end, blows, events):
+    """Advance to a tick, unless a pending leap or step passes it; a `Status`."""
+    s.n_blows = 0
+    s.n_events = 0
+    while True:
+        if s.n_blows >= blows.shape[0]:
+            return Status.BLOWS_FULL
+        if s.events_on == 1 and s.n_events + OTHER_EVENTS > events.shape[0]:
+            return Status.EVENTS_FULL
+        if not math.isfinite(s.p + s.v_b + s.v_p + s.u_r):
+            return Status.NOT_FINITE
+        if s.leap_end < 0 and par.leaps == 1 and s.time >= s.no_plan and s.time < end:
+            plan(par, s, bars, ops)
+        if s.leap_end >= 0:
+            if s.leap_end > end:
+                return Status.DONE
+            leap(par, s, bars, ops)
+        else:
+            if s.time + WHOLE > end:
+                return Status.DONE
+            step(par, s, bars, STEP, blows, events)
+
+
+@kernel
+def commit_to(par, s, bars, ops, end, blows, events):
+    """Carry bit and piston to a tick, within a pending leap or step."""
+    s.n_blows = 0
+    s.n_events = 0
+    if s.leap_end >= 0:
+        cut = min(s.leap_end, end)
+        cut = s.time + (cut - s.time) // WHOLE * WHOLE
+        s.leap_end = cut
+        if cut > s.time:
+            leap(par, s, bars, ops)
+        s.leap_end = -1
+    level = STEP
+    while s.time < end:
+        while s.time + (1 << level) > end:
+            level -= 1
+        step(par, s, bars, level, blows, events)
+    if has_piston(par) and s.parked == 1:
+        unpark(par, s, bars)
+    s.no_plan = s.time
+    s.no_park = s.time
+
+
+@kernel
+def read_at(par, s, bars, time, row):
+    """Read a state, and its motion a fraction of a tick later."""
+    kinetic = bit_kinetic(par, s, bars)
+    row.bit_kinetic_energy = kinetic
+    n = bars.cb.sizes[s.set]
+    elastic = bit_vibration(par, s, bars) - kinetic_of(bars.wb, 0, n)
+    if par.piston == Piston.ELASTIC:
+        n_p = bars.wp.shape[1]
+        own = kinetic_of(bars.wp, 0, n_p)
+        kinetic += own
+        elastic += piston_vibration(s, bars) - own
+    if has_piston(par):
+        kinetic += 0.5 * par.mass_p * s.v_p * s.v_p
+    fill_ledger(s, row, kinetic, elastic, recoverable(s))
+    fill_motion(par, s, row, time, s.u_p + par.start_gap, s.u_b)
+    rest = max(0.0, time - time_of(par, s))
+    row.bit_position += rest * s.v_b
+    row.bit_end_position += rest * s.v_low
+    if has_piston(par):
+        row.piston_position += rest * s.v_p
+    row.bit_end_velocity = s.v_low
+    row.bit_force = s.f_rock
+    row.contact_force = s.f_contact
+    row.bit_impulse += rest * s.f_rock
+    row.contact_impulse += rest * s.f_contact
+
+
+@kernel
+def run(task, par_, state, bars, ops, time, blows, events, reading):
+    """Do one `Task` with a state; the only entry into the modal kernels.
+
+    Parameters
+    ----------
+    task : int
+        ADVANCE: commit up to `time`, unless a pending leap or step passes it.
+        COMMIT: cut it short at the last tick up to `time`.
+        READ: as COMMIT, then evaluate; spoils the state, so give a copy.
+    par_, state : MODAL_PAR, MODAL_STATE array of length 1
+    bars : Bars
+    ops : Standstill
+    time : float
+        [s]
+    blows, events : BLOW, EVENT array
+        Filled from index 0; the state says how far.
+    reading : READING array of length 1
+
+    Returns
+    -------
+    int
+        A `Status`.
+    """
+    par = par_[0]
+    s = state[0]
+    end = tick_at(par, time)
+    if task == Task.ADVANCE:
+        return advance_to(par, s, bars, ops, end, blows, events)
+    if task == Task.READ:
+        s.live = 0
+    commit_to(par, s, bars, ops, end, blows, events)
+    if task == Task.READ:
+        read_at(par, s, bars, time, reading[0])
+    return Status.DONE
