@@ -42,7 +42,7 @@ MOST_SECTIONS = 1000
 # What must hold, key by key, for a parameter to have any influence.
 HAS_PISTON: Needs = {"piston.model": ("elastic", "rigid")}
 HAS_WAVES: Needs = {"bit.model": ("elastic",)}
-SOLVER_WAVE: Needs = {"solver.name": ("auto", "wave"), **HAS_WAVES}
+SOLVER_WAVE: Needs = {"solver.name": ("auto", "wave", "modal"), **HAS_WAVES}
 SOLVER_FEM: Needs = {"solver.name": ("fem",)}
 BLOW_MAP: Needs = {"solver.fidelity": ("blow-map",), **HAS_WAVES}
 ALL_RIGID: Needs = {"piston.model": ("rigid",), "bit.model": ("rigid",)}
@@ -365,7 +365,8 @@ class SolverOptions(Parameters):
     cells: int | None = count(
         None,
         "-",
-        "cells in the piston, or in the bit where no piston is elastic; left out: by the solver",
+        "cells or modes of the piston, or of the bit where no piston is elastic; "
+        "left out: by the solver",
         SOLVER_WAVE,
         ge=1,
         le=100_000,

@@ -282,7 +282,7 @@ class Scene:
 
     @property
     def solver_name(self) -> str:
-        """Solver that computes the scene: "wave", "fem", "rigid" or "blow-map"."""
+        """Solver that computes the scene: "wave", "modal", "fem", "rigid" or "blow-map"."""
         if self.bit.model == "elastic" and self.solver.fidelity != "wave":
             return str(self.solver.fidelity)
         if self.solver.name != "auto":
@@ -439,6 +439,11 @@ def _refuse_requests(scene: Scene) -> None:
         raise SceneError(
             f"solver.accuracy = {accuracy!r} and solver.cells = {cells!r} both choose the "
             "resolution: give one of them"
+        )
+    if scene.solver.name == "modal":
+        raise SceneError(
+            f"solver.accuracy = {accuracy!r} picks the cells of waves, no modes: set "
+            'solver.cells, or solver.name = "wave" or "auto"'
         )
     if scene.solver.name == "fem":
         raise SceneError(

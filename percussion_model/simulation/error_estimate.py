@@ -47,6 +47,12 @@ FLOOR_SHARE = 0.1
 COMPARISON_WORK = 0.12
 # They last for so many blows at least: to settle and to count.
 FEWEST_BLOWS = 10
+# What brings the rate of a solver closer.
+REMEDIES = {
+    "wave": "solver.accuracy (--accuracy) takes as many cells as an error needs",
+    "modal": "more modes (solver.cells, --cells) bring it closer",
+    "fem": "more fem.elements and a greater fem.contact_stiffness bring it closer",
+}
 # Words of the warning of a large error.
 LARGE = "may be off by"
 # Where blows have two numbers of drilling cycles, and one is this rare, the motion is near the
@@ -414,11 +420,7 @@ def _large_error(estimate: Estimate, solver: str) -> Iterator[str]:
     """Warn of a rate that is not known well, and of why."""
     by_grid = max(estimate.cells + estimate.fit, estimate.floor)
     if by_grid > max(LARGE_ERROR, estimate.scatter):
-        remedy = (
-            "solver.accuracy (--accuracy) takes as many cells as an error needs"
-            if solver == "wave"
-            else "more fem.elements and a greater fem.contact_stiffness bring it closer"
-        )
+        remedy = REMEDIES.get(solver, REMEDIES["fem"])
         yield (
             f"the rate of penetration {LARGE} {in_digits(100.0 * by_grid, 2)} %, as coarser "
             f"runs tell; {remedy}"

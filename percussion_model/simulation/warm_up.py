@@ -18,7 +18,7 @@ from percussion_model.solvers.blow_map.table import BlowTable, Nodes, fixed_valu
 # Long enough for a contact, a change of mode and a reading [s].
 SHORT = 1e-4
 COARSE = {"blow_map.density": 0.1}
-SOLVERS = ("wave", "fem", "rigid")
+SOLVERS = ("wave", "modal", "fem", "rigid")
 
 
 def compile_kernels(solver: str) -> str:

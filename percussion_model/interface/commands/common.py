@@ -31,10 +31,10 @@ _own_process = False
 
 SceneFile = Annotated[Path, typer.Argument(metavar="SCENE", help="A scene file (TOML).")]
 SolverName = Annotated[
-    Literal["wave", "fem", "rigid", "blow-map"] | None,
+    Literal["wave", "modal", "fem", "rigid", "blow-map"] | None,
     typer.Option("--solver", help="Solver; rigid makes piston and bit rigid."),
 ]
-Cells = Annotated[int | None, typer.Option("--cells", help="Cells or elements in the piston.")]
+Cells = Annotated[int | None, typer.Option("--cells", help="Cells, modes or elements of the piston.")]
 Settings = Annotated[
     list[str] | None,
     typer.Option(

@@ -19,6 +19,7 @@ CLOSE = 1.6
 # Colour, dashes and width of each solver; dashes tell apart what lies on each other.
 LINES: dict[str, tuple[str, Any, float]] = {
     "wave": ("#0072B2", "-", 1.6),
+    "modal": ("#CC79A7", (0, (3, 1.5, 1.2, 1.5)), 1.5),
     "fem": ("#D55E00", (0, (4, 1.5)), 1.4),
     "rigid": ("#595959", (0, (1.2, 1.2)), 1.4),
     "blow-map": ("#009E73", (0, (6, 1.5, 1.2, 1.5)), 1.4),

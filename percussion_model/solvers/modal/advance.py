@@ -8,19 +8,20 @@ from percussion_model.physics.kernel import kernel, merged
 from percussion_model.physics.readings import fill_ledger, fill_motion
 from percussion_model.physics.records import Piston, Status
 from percussion_model.physics.rock import recoverable
+from percussion_model.solvers.modal.alone import go_alone, may_go_alone
 from percussion_model.solvers.modal.bar import (
     bit_kinetic,
     bit_vibration,
-    elastic_of,
     kinetic_of,
     piston_vibration,
 )
 from percussion_model.solvers.modal.leaps import leap, plan
-from percussion_model.solvers.modal.records import STEP, Task
-from percussion_model.solvers.modal.step import WHOLE, has_piston, step, time_of, unpark
+from percussion_model.solvers.modal.piston import WHOLE, has_piston, time_of, unpark
+from percussion_model.solvers.modal.records import Task
+from percussion_model.solvers.modal.step import step
 
-# Events that one step can make besides those of the rock.
-OTHER_EVENTS = 6
+# Events that one step can make: of the barrier, two of the contact, of the drive, of the rock.
+MOST_EVENTS = 6
 # A time this close below a tick is that tick [ticks].
 TICK_ROUNDING = 1e-3
 
@@ -28,7 +29,17 @@ TICK_ROUNDING = 1e-3
 @merged
 def tick_at(par, time):
     """Last tick up to a time."""
-    return int(math.floor(time / par.tick + TICK_ROUNDING))
+    return math.floor(time / par.tick + TICK_ROUNDING)
+
+
+@merged
+def full(s, blows, events):
+    """Which list has no room for the rows of another step; `Status.DONE`: none."""
+    if s.n_blows >= blows.shape[0]:
+        return Status.BLOWS_FULL
+    if s.events_on == 1 and s.n_events + MOST_EVENTS > events.shape[0]:
+        return Status.EVENTS_FULL
+    return Status.DONE
 
 
 @kernel
@@ -37,10 +48,9 @@ def advance_to(par, s, bars, ops, end, blows, events):
     s.n_blows = 0
     s.n_events = 0
     while True:
-        if s.n_blows >= blows.shape[0]:
-            return Status.BLOWS_FULL
-        if s.events_on == 1 and s.n_events + OTHER_EVENTS > events.shape[0]:
-            return Status.EVENTS_FULL
+        status = full(s, blows, events)
+        if status != Status.DONE:
+            return status
         if not math.isfinite(s.p + s.v_b + s.v_p + s.u_r):
             return Status.NOT_FINITE
         if s.leap_end < 0 and par.leaps == 1 and s.time >= s.no_plan and s.time < end:
@@ -50,9 +60,12 @@ def advance_to(par, s, bars, ops, end, blows, events):
                 return Status.DONE
             leap(par, s, bars, ops)
         else:
-            if s.time + WHOLE > end:
+            level = bars.cb.levels[s.set]
+            if s.time + (1 << level) > end:
                 return Status.DONE
-            step(par, s, bars, STEP, blows, events)
+            if may_go_alone(par, s) and go_alone(par, s, bars, ops.rows, level, end) == 1:
+                continue
+            step(par, s, bars, level, blows, events)
 
 
 @kernel
@@ -67,8 +80,11 @@ def commit_to(par, s, bars, ops, end, blows, events):
         if cut > s.time:
             leap(par, s, bars, ops)
         s.leap_end = -1
-    level = STEP
+    level = bars.cb.levels[s.set]
     while s.time < end:
+        status = full(s, blows, events)
+        if status != Status.DONE:
+            return status
         while s.time + (1 << level) > end:
             level -= 1
         step(par, s, bars, level, blows, events)
@@ -76,6 +92,7 @@ def commit_to(par, s, bars, ops, end, blows, events):
         unpark(par, s, bars)
     s.no_plan = s.time
     s.no_park = s.time
+    return Status.DONE
 
 
 @kernel
@@ -137,7 +154,7 @@ def run(task, par_, state, bars, ops, time, blows, events, reading):
         return advance_to(par, s, bars, ops, end, blows, events)
     if task == Task.READ:
         s.live = 0
-    commit_to(par, s, bars, ops, end, blows, events)
+    status = commit_to(par, s, bars, ops, end, blows, events)
     if task == Task.READ:
         read_at(par, s, bars, time, reading[0])
-    return Status.DONE
+    return status

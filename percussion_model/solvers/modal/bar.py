@@ -5,68 +5,66 @@ from __future__ import annotations
 import math
 
 from percussion_model.physics.kernel import inlined, kernel
-from percussion_model.solvers.modal.records import LEVELS, Move, Reply
+from percussion_model.solvers.modal.lanes import WIDTH, load, spread, store, total
+from percussion_model.solvers.modal.records import LEVELS, Move, Shape
+
+TOP, LOW, SOFT, STIFF = (int(row) for row in Shape)
+QQ, QV, VQ, VV, L_QQ, L_QV, L_VV = (int(row) for row in Move)
 
 # Numbers below this are set to zero: denormal ones are slow.
 TINY = 1e-200
 
 
 @inlined
-def low_offset(w, c, n):
-    """Offset of the low end from the mean, by the modes [m]."""
-    total = 0.0
-    for k in range(n):
-        total += c.low[k] * w[0, k]
-    return total
-
-
-@inlined
-def top_offset(w, c, n):
-    """Offset of the top end from the mean, by the modes [m]."""
-    total = 0.0
-    for k in range(n):
-        total += c.top[k] * w[0, k]
-    return total
+def end_offset(w, c, n, end):
+    """Offset of an end (a row of `Shape`) from the mean, by the modes [m]."""
+    offset = spread(0.0)
+    for k in range(0, n, WIDTH):
+        offset = offset + load(c.shape, end, k) * load(w, 0, k)
+    return total(offset)
 
 
 @inlined
 def low_after(w, c, n, level):
     """Offset of the low end after a free move [m]."""
     m = c.move[level]
-    total = 0.0
-    for k in range(n):
-        total += c.low[k] * (m[Move.Q_BY_Q, k] * w[0, k] + m[Move.Q_BY_V, k] * w[1, k])
-    return total
+    low = spread(0.0)
+    for k in range(0, n, WIDTH):
+        q = load(m, QQ, k) * load(w, 0, k) + load(m, QV, k) * load(w, 1, k)
+        low = low + load(c.shape, LOW, k) * q
+    return total(low)
 
 
 @inlined
 def ends_after(w, c, n, level):
     """Offsets of top and low end [m] and velocity of the low end [m/s] after a free move."""
     m = c.move[level]
-    top = low = speed = 0.0
-    for k in range(n):
-        q = m[Move.Q_BY_Q, k] * w[0, k] + m[Move.Q_BY_V, k] * w[1, k]
-        v = m[Move.V_BY_Q, k] * w[0, k] + m[Move.V_BY_V, k] * w[1, k]
-        top += c.top[k] * q
-        low += c.low[k] * q
-        speed += c.low[k] * v
-    return top, low, speed
+    top = low = speed = spread(0.0)
+    for k in range(0, n, WIDTH):
+        q0, v0, end = load(w, 0, k), load(w, 1, k), load(c.shape, LOW, k)
+        q = load(m, QQ, k) * q0 + load(m, QV, k) * v0
+        v = load(m, VQ, k) * q0 + load(m, VV, k) * v0
+        top = top + load(c.shape, TOP, k) * q
+        low = low + end * q
+        speed = speed + end * v
+    return total(top), total(low), total(speed)
 
 
 @inlined
 def move_bar(w, c, n, level, top, low):
     """Move the modes over 2^level ticks under constant forces at both ends; the loss [J]."""
     m = c.move[level]
-    lost = 0.0
-    for k in range(n):
+    lost = spread(0.0)
+    for k in range(0, n, WIDTH):
         # about where the forces would hold the mode still
-        still = c.soft[k] * (c.top[k] * top + c.low[k] * low)
-        y, v = w[0, k] - still, w[1, k]
-        w[0, k] = still + (m[Move.Q_BY_Q, k] * y + m[Move.Q_BY_V, k] * v)
-        w[1, k] = m[Move.V_BY_Q, k] * y + m[Move.V_BY_V, k] * v
-        lost += (m[Move.LOSS_QQ, k] * y + m[Move.LOSS_QV, k] * v) * y
-        lost += m[Move.LOSS_VV, k] * (v * v)
-    return lost
+        still = load(c.shape, TOP, k) * top + load(c.shape, LOW, k) * low
+        still = load(c.shape, SOFT, k) * still
+        y, v = load(w, 0, k) - still, load(w, 1, k)
+        store(w, 0, k, still + (load(m, QQ, k) * y + load(m, QV, k) * v))
+        store(w, 1, k, load(m, VQ, k) * y + load(m, VV, k) * v)
+        lost = lost + (load(m, L_QQ, k) * y + load(m, L_QV, k) * v) * y
+        lost = lost + load(m, L_VV, k) * (v * v)
+    return total(lost)
 
 
 @kernel
@@ -89,25 +87,21 @@ def carry(w, c, n, ticks):
 @inlined
 def kinetic_of(w, first, n):
     """Kinetic energy of modes [J]."""
-    total = 0.0
-    for k in range(first, n):
-        total += w[1, k] * w[1, k]
-    return 0.5 * total
+    squares = spread(0.0)
+    for k in range(first, n, WIDTH):
+        v = load(w, 1, k)
+        squares = squares + v * v
+    return 0.5 * total(squares)
 
 
 @inlined
 def elastic_of(w, c, first, n):
     """Strain energy of modes [J]."""
-    total = 0.0
-    for k in range(first, n):
-        total += w[0, k] * w[0, k] / c.soft[k]
-    return 0.5 * total
-
-
-@inlined
-def kept_of(c, which, level, column):
-    """What is left of an offset beyond the modes after 2^level ticks without a force."""
-    return c.reply[which, level, column]
+    squares = spread(0.0)
+    for k in range(first, n, WIDTH):
+        q = load(w, 0, k)
+        squares = squares + load(c.shape, STIFF, k) * (q * q)
+    return 0.5 * total(squares)
 
 
 @inlined
@@ -147,6 +141,3 @@ def time_to_cover(distance, velocity, acceleration):
     if bottom <= 0.0:
         return math.inf
     return 2.0 * distance / bottom
-
-
-KEPT_TOP, KEPT_LOW = int(Reply.TOP_KEPT), int(Reply.LOW_KEPT)

@@ -98,6 +98,55 @@ def _find_modes(impedance, transit, mass, out):
         out[2, k] = size * math.cos(phase) / math.sqrt(modal)
 
 
+@kernel
+def _find_forces(impedance, transit, frequency, top, section, share, out):
+    """Fill the force (compression) of each mode at places, shape (places, modes)."""
+    for k in range(len(frequency)):
+        w = frequency[k]
+        size, phase, j = top[k], 0.0, 0
+        for i in range(len(transit)):
+            if i > 0 and impedance[i] != impedance[i - 1]:
+                c = math.cos(phase)
+                s = impedance[i - 1] / impedance[i] * math.sin(phase)
+                phase = math.atan2(s, c)
+                size *= math.sqrt(c * c + s * s)
+            while j < len(section) and section[j] == i:
+                there = phase + w * transit[i] * share[j]
+                out[0, j, k] = size * math.cos(there)
+                out[1, j, k] = impedance[i] * w * size * math.sin(there)
+                j += 1
+            phase += w * transit[i]
+
+
+def shapes_at(
+    sections: np.ndarray, modes: Modes, section: np.ndarray, share: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Offset and force of each mode at places of a bar.
+
+    Parameters
+    ----------
+    section : int array
+        Section of each place, not falling.
+    share : ndarray
+        Of that section's length that lies above it.
+
+    Returns
+    -------
+    offset, force : ndarray, shape (places, modes)
+        Down positive [1/kg^0.5], compression positive [N/(m kg^0.5)].
+    """
+    out = np.zeros((2, len(section), len(modes.frequency)))
+    impedance, transit, _ = _numbers_of(sections)
+    _find_forces(impedance, transit, modes.frequency, modes.top, section, share, out)
+    return out[0], out[1]
+
+
+def _numbers_of(sections: np.ndarray) -> np.ndarray:
+    """Impedance, transit time and mass of each section, in rows."""
+    rows = [(section_impedance(s), section_transit_time(s), section_mass(s)) for s in sections]
+    return np.ascontiguousarray(np.array(rows).T)
+
+
 def free_modes(sections: np.ndarray, count: int) -> Modes:
     """Return the lowest elastic modes of a free bar.
 
@@ -111,11 +160,8 @@ def free_modes(sections: np.ndarray, count: int) -> Modes:
     -------
     Modes
     """
-    rows = np.array(
-        [(section_impedance(s), section_transit_time(s), section_mass(s)) for s in sections]
-    )
     out = np.zeros((3, count))
-    _find_modes(*np.ascontiguousarray(rows.T), out)
+    _find_modes(*_numbers_of(sections), out)
     return Modes(*out)
 
 

@@ -26,6 +26,15 @@ class Move(IntEnum):
     LOSS_VV = 6
 
 
+class Shape(IntEnum):
+    """Rows of what else is known of each mode."""
+
+    TOP = 0  # offset of the top end [1/kg^0.5]
+    LOW = 1
+    SOFT = 2  # 1 / frequency^2 [s2]
+    STIFF = 3
+
+
 class Reply(IntEnum):
     """What an end does by a force of 1 N over 2^level ticks; offsets in m, velocities in m/s."""
 
@@ -45,25 +54,23 @@ class ModalBar(NamedTuple):
 
     Attributes
     ----------
-    top, low : ndarray, shape (n,)
-        Shapes at the ends [1/kg^0.5].
-    soft : ndarray, shape (n,)
-        1 / frequency^2 [s2].
+    shape : ndarray, shape (len(Shape), n)
     move : ndarray, shape (LEVELS, len(Move), n)
-    reply : ndarray, shape (sets, STEP + 1, len(Reply))
+    reply : ndarray, shape (sets, levels, len(Reply))
     sizes : int array, shape (sets,)
         Modes of each set, falling.
     beyond : ndarray, shape (sets, 2)
         Compliance at top and low end beyond the modes of a set [m/N].
+    levels : int array, shape (sets,)
+        A step of the set has 2^level ticks.
     """
 
-    top: np.ndarray
-    low: np.ndarray
-    soft: np.ndarray
+    shape: np.ndarray
     move: np.ndarray
     reply: np.ndarray
     sizes: np.ndarray
     beyond: np.ndarray
+    levels: np.ndarray
 
 
 class Bars(NamedTuple):
@@ -80,15 +87,18 @@ class Standstill(NamedTuple):
 
     Attributes
     ----------
-    powers : ndarray, shape (POWERS, m, m)
-        m = 2 n + 4 numbers: offsets and velocities of n modes, mean offset and velocity,
-        offset beyond the modes, penetration; all about their values at rest.
-    loss, dashpot : ndarray, shape (POWERS, m, m)
+    powers : ndarray, shape (POWERS, m, wide)
+        By columns, filled up with zeros to whole lanes; m = 2 n + 4 numbers: offsets and
+        velocities of n modes, mean offset and velocity, offset beyond the modes, penetration;
+        all about their values at rest.
+    loss, dashpot : ndarray, shape (POWERS, m, wide)
         Forms: what bar and dashpot take [J].
     rest : ndarray, shape (m,)
         Values at rest under a force of 1 N.
-    x, y : ndarray, shape (m,)
+    x, y : ndarray, shape (1, wide)
         Room.
+    rows : ndarray, shape (2, n)
+        Room for the modes of the bit.
     """
 
     powers: np.ndarray
@@ -97,6 +107,7 @@ class Standstill(NamedTuple):
     rest: np.ndarray
     x: np.ndarray
     y: np.ndarray
+    rows: np.ndarray
 
 
 class LeapKind(IntEnum):
@@ -152,6 +163,8 @@ MODAL_STATE = np.dtype(
         ("r_b", "f8"),
         ("spread_p", "f8"),  # bound of the offset of the parked piston's low end [m]
         ("offset", "f8"),  # of ends that touch, found within a tick [m]
+        ("peak_time", "f8"),  # of contact, since the last mean force for a peak [s]
+        ("peak_impulse", "f8"),  # [N s]
         ("v_low", "f8"),  # velocity of the rock end [m/s]
         ("f_contact", "f8"),  # mean forces of the last step [N]
         ("f_rock", "f8"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from percussion_model.physics.kernel import kernel
-from percussion_model.solvers.modal.bar import bit_vibration, elastic_of, kinetic_of
+from percussion_model.solvers.modal.bar import LOW, SOFT, bit_vibration, elastic_of, kinetic_of
 
 # Modes are left out once they have less than this share of the bit's energy of vibration.
 LEAST_SHARE = 1e-8
@@ -26,7 +26,7 @@ def leave_out(par, s, bars):
         before = bit_vibration(par, s, bars)
         offset = 0.0
         for k in range(smaller, n):
-            offset += c.low[k] * w[0, k]
+            offset += c.shape[LOW, k] * w[0, k]
         r = s.r_b + offset
         ends = s.r_t * s.r_t / c.beyond[s.set + 1, 0] + r * r / c.beyond[s.set + 1, 1]
         few = kinetic_of(w, 0, smaller) + elastic_of(w, c, 0, smaller)
@@ -48,7 +48,7 @@ def take_all(s, bars):
     c, w = bars.cb, bars.wb
     force = -s.r_b / c.beyond[s.set, 1]
     for k in range(c.sizes[s.set], c.sizes[0]):
-        w[0, k] = -c.soft[k] * c.low[k] * force
+        w[0, k] = -c.shape[SOFT, k] * c.shape[LOW, k] * force
         w[1, k] = 0.0
     s.r_b *= c.beyond[0, 1] / c.beyond[s.set, 1]
     s.r_t *= math.sqrt(c.beyond[0, 0] / c.beyond[s.set, 0])  # as much energy

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from percussion_model.physics.kernel import kernel
-from percussion_model.solvers.modal.records import STEP, ModalBar, Move, Reply, Standstill
+from percussion_model.solvers.modal.lanes import WIDTH
+from percussion_model.solvers.modal.records import STEP, ModalBar, Move, Reply, Shape, Standstill
 
 # Powers 1, 2, 4, ...: the longest leap is twice the last one.
 POWERS = 16
@@ -39,9 +40,10 @@ def _fill_powers(powers, forms, room):
                     forms[f, p, i, j] = total
 
 
-def no_standstill() -> Standstill:
-    """Stand-in where no leaps are made."""
-    return Standstill(*(np.zeros((1,) * rank) for rank in (3, 3, 3, 1, 1, 1)))
+def no_standstill(modes: int) -> Standstill:
+    """Stand-in where no leaps are made, for a bit of so many modes."""
+    maps, row = np.zeros((1, 1, 1)), np.zeros((1, 1))
+    return Standstill(maps, maps, maps, np.zeros(1), row, row, np.zeros((2, modes)))
 
 
 def standstill_of(bar: ModalBar, mass: float, K: float, C: float, dt: float) -> Standstill:
@@ -52,11 +54,12 @@ def standstill_of(bar: ModalBar, mass: float, K: float, C: float, dt: float) -> 
     last = len(bar.sizes) - 1
     n = int(bar.sizes[last])
     m = 2 * n + 4
+    wide = -(-m // WIDTH) * WIDTH
     unit = np.eye(m)
     q, v, (u, speed, r, p) = unit[:n], unit[n : 2 * n], unit[2 * n :]
     reply = bar.reply[last, STEP]
     move = bar.move[STEP, :, :n]
-    low, soft = bar.low[:n], bar.soft[:n]
+    low, soft = bar.shape[Shape.LOW, :n], bar.shape[Shape.SOFT, :n]
     kept, rest = reply[Reply.LOW_KEPT], reply[Reply.LOW_REST]
     end = u + dt * speed + kept * r
     for k in range(n):
@@ -89,4 +92,8 @@ def standstill_of(bar: ModalBar, mass: float, K: float, C: float, dt: float) -> 
     still[2 * n + 2] = -compliance
     still[2 * n + 3] = 1.0 / K
     still[2 * n] = 1.0 / K + compliance + float(sum((soft * low * low).tolist()))
-    return Standstill(powers, forms[0], forms[1], still, np.zeros(m), np.zeros(m))
+    columns, loss, dashpot = np.zeros((3, POWERS, m, wide))
+    columns[:, :, :m] = powers.transpose(0, 2, 1)
+    loss[:, :, :m], dashpot[:, :, :m] = forms
+    room = np.zeros((1, wide)), np.zeros((1, wide)), np.zeros((2, bar.shape.shape[1]))
+    return Standstill(columns, loss, dashpot, still, *room)

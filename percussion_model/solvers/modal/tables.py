@@ -8,10 +8,12 @@ import numpy as np
 
 from percussion_model.physics.kernel import kernel
 from percussion_model.scene.bars import bar_mass, section_impedance, section_transit_time
+from percussion_model.solvers.modal.lanes import WIDTH
 from percussion_model.solvers.modal.modes import Modes, count_below, end_compliance, free_modes
 from percussion_model.solvers.modal.records import LEVELS, STEP, ModalBar, Move, Reply
 
-# Sizes of the sets of modes: once the others have died away, so few are moved.
+# Sizes of the sets of modes: once the others have died away, so few are moved, in steps twice
+# as long.
 SMALLER = (16, 8)
 # A short section at an end: modes up to so many times the highest one tell how the end yields.
 FURTHER = 40.0
@@ -68,7 +70,7 @@ def _fill_moves(w, eta, tick, nodes, weights, out):
 def end_offset(impedance: float, eta: float, h: float) -> float:
     """Offset of an end of a long Kelvin-Voigt bar by a force of 1 N over `h` [m].
 
-    Its velocity is erf(sqrt(t / eta)) / Z (docs/modal.md, eq. 6).
+    Its velocity is erf(sqrt(t / eta)) / Z (docs/modal.md, eqs 4-5).
     """
     if eta == 0.0:
         return h / impedance
@@ -109,20 +111,20 @@ def modal_bar(sections: np.ndarray, highest: float, eta: float, tick: float) -> 
     sections : ndarray, shape (sections, 4)
         From top to bottom.
     highest : float
-        Angular frequency up to which there are modes [rad/s].
+        Angular frequency up to which there are modes, and some more [rad/s].
     eta : float
         Kelvin-Voigt time [s].
     tick : float
         Unit of time [s].
     """
-    many = free_modes(sections, max(1, count_below(sections, FURTHER * highest)))
-    modes = many.below(highest)
-    if not len(modes.frequency):
-        modes = Modes(*(part[:1] for part in many))
-    n = len(modes.frequency)
+    many = free_modes(sections, max(2 * WIDTH, count_below(sections, FURTHER * highest)))
+    n = len(many.below(highest).frequency)
+    n = max(1, math.ceil(n / WIDTH)) * WIDTH
+    modes = Modes(*(part[:n] for part in many))
     move = np.zeros((LEVELS, len(Move), n))
     _fill_moves(modes.frequency, eta, tick, _NODES, _WEIGHTS, move)
     sizes = np.array([n, *(size for size in SMALLER if size < n)])
+    levels = np.where(sizes == n, STEP - 1, STEP)
     soft = 1.0 / modes.frequency**2
     reply = np.zeros((len(sizes), STEP + 1, len(Reply)))
     beyond = np.zeros((len(sizes), 2))
@@ -154,7 +156,8 @@ def modal_bar(sections: np.ndarray, highest: float, eta: float, tick: float) -> 
             reply[k, level, Reply.CROSS_SPEED] = h / mass + _sum((both * speeds)[:size])
             own = modes.low * modes.low
             reply[k, level, Reply.LOW_SPEED] = h / mass + _sum((own * speeds)[:size])
-    return ModalBar(modes.top, modes.low, soft, move, reply, sizes, beyond)
+    shape = np.stack([modes.top, modes.low, soft, modes.frequency**2])
+    return ModalBar(shape, move, reply, sizes, beyond, levels)
 
 
 def _sum(values: np.ndarray) -> float:

@@ -1,0 +1,160 @@
+"""Eight numbers side by side, which stay in registers through the loops over modes.
+
+The instructions are plain arithmetic in a fixed order: no platform rounds it otherwise than
+another, whatever vectors its processor has.
+"""
+
+from __future__ import annotations
+
+import operator
+
+import numpy as np
+from llvmlite import ir
+from numba import config, types
+from numba.core import cgutils
+from numba.core.datamodel import PrimitiveModel, register_default
+from numba.extending import intrinsic, overload
+
+WIDTH = 8
+_VECTOR = ir.VectorType(ir.DoubleType(), WIDTH)
+
+
+class Lanes(types.Type):  # type: ignore[misc]
+    """Type of eight numbers in kernels."""
+
+    def __init__(self) -> None:
+        super().__init__(name="Eight")
+
+
+@register_default(Lanes)
+class _LanesModel(PrimitiveModel):  # type: ignore[misc]
+    """Kept as one vector."""
+
+    def __init__(self, dmm, fe_type):
+        super().__init__(dmm, fe_type, _VECTOR)
+
+
+_lanes = Lanes()
+
+
+def _pointer(context, builder, array_type, array, indices):
+    """Address of an element of a contiguous array as one of a vector."""
+    made = context.make_array(array_type)(context, builder, array)
+    element = cgutils.get_item_pointer(
+        context, builder, array_type, made, indices, wraparound=False, boundscheck=False
+    )
+    return builder.bitcast(element, _VECTOR.as_pointer())
+
+
+@intrinsic
+def _load(typing, array, row, start):
+    def generate(context, builder, signature, args):
+        pointer = _pointer(context, builder, signature.args[0], args[0], [args[1], args[2]])
+        return builder.load(pointer, align=8)
+
+    return _lanes(array, types.intp, types.intp), generate
+
+
+@intrinsic
+def _store(typing, array, row, start, lanes):
+    def generate(context, builder, signature, args):
+        pointer = _pointer(context, builder, signature.args[0], args[0], [args[1], args[2]])
+        builder.store(args[3], pointer, align=8)
+        return context.get_dummy_value()
+
+    return types.void(array, types.intp, types.intp, _lanes), generate
+
+
+@intrinsic
+def _spread(typing, number):
+    def generate(context, builder, signature, args):
+        undefined = ir.Constant(_VECTOR, ir.Undefined)
+        first = builder.insert_element(undefined, args[0], ir.Constant(ir.IntType(32), 0))
+        zeros = ir.Constant(ir.VectorType(ir.IntType(32), WIDTH), [0] * WIDTH)
+        return builder.shuffle_vector(first, undefined, zeros)
+
+    return _lanes(types.float64), generate
+
+
+@intrinsic
+def _sum(typing, lanes):
+    def generate(context, builder, signature, args):
+        part, width = args[0], WIDTH
+        while width > 1:
+            width //= 2
+            undefined = ir.Constant(part.type, ir.Undefined)
+            first, last = (
+                builder.shuffle_vector(
+                    part,
+                    undefined,
+                    ir.Constant(
+                        ir.VectorType(ir.IntType(32), width), list(range(start, start + width))
+                    ),
+                )
+                for start in (0, width)
+            )
+            part = builder.fadd(first, last)
+        return builder.extract_element(part, ir.Constant(ir.IntType(32), 0))
+
+    return types.float64(_lanes), generate
+
+
+def _binary(instruction):
+    @intrinsic
+    def combine(typing, left, right):
+        def generate(context, builder, signature, args):
+            return getattr(builder, instruction)(*args)
+
+        return _lanes(_lanes, _lanes), generate
+
+    return combine
+
+
+def _overload(function, instruction):
+    combine = _binary(instruction)
+
+    @overload(function)
+    def choose(left, right):
+        if isinstance(left, Lanes) and isinstance(right, Lanes):
+            return lambda left, right: combine(left, right)
+        if isinstance(left, Lanes) and isinstance(right, types.Float):
+            return lambda left, right: combine(left, _spread(right))
+        if isinstance(left, types.Float) and isinstance(right, Lanes):
+            return lambda left, right: combine(_spread(left), right)
+        return None
+
+
+for _function, _instruction in (
+    (operator.add, "fadd"),
+    (operator.sub, "fsub"),
+    (operator.mul, "fmul"),
+):
+    _overload(_function, _instruction)
+
+
+def _load_numbers(array, row, start):
+    return array[row, start : start + WIDTH].copy()
+
+
+def _store_numbers(array, row, start, lanes):
+    array[row, start : start + WIDTH] = lanes
+
+
+def _spread_number(number):
+    return np.full(WIDTH, number)
+
+
+def _sum_numbers(lanes):
+    total = lanes
+    while len(total) > 1:
+        half = len(total) // 2
+        total = total[:half] + total[half:]
+    return float(total[0])
+
+
+# The same for kernels that run as plain Python.
+_PLAIN = bool(config.DISABLE_JIT)
+load = _load_numbers if _PLAIN else _load
+store = _store_numbers if _PLAIN else _store
+spread = _spread_number if _PLAIN else _spread
+total = _sum_numbers if _PLAIN else _sum

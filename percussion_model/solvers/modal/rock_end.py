@@ -1,0 +1,113 @@
+"""Changes of mode of the rock law, and what a standing bit has of energy."""
+
+from __future__ import annotations
+
+from percussion_model.physics.blows import push_checkpoint, push_event
+from percussion_model.physics.body import bit_acceleration
+from percussion_model.physics.kernel import inlined, kernel
+from percussion_model.physics.records import Mode, RockKind
+from percussion_model.physics.rock import (
+    REST_VELOCITY,
+    close_interface,
+    enter_standstill,
+    leave_by_velocity,
+    leave_standstill,
+    overcomes_barrier,
+    recoverable,
+    spring_force,
+)
+from percussion_model.solvers.modal.bar import LOW, SOFT, STIFF, bit_kinetic
+from percussion_model.solvers.modal.piston import WHOLE, time_of
+from percussion_model.solvers.modal.sets import LOOK, leave_out, take_all
+
+# A standstill with less than this share of W_R stays one if nothing comes from outside.
+QUIET_SHARE = 0.9
+
+
+@kernel
+def standing_energy(par, s, bars):
+    """Energy of a standing bit about its rest [J]."""
+    K = s.gamma * s.k_r
+    force = par.mass_b * bit_acceleration(par, s)
+    n, c, w = bars.cb.sizes[s.set], bars.cb, bars.wb
+    total = par.mass_b * s.v_b * s.v_b
+    for k in range(n):
+        off = w[0, k] + c.shape[SOFT, k] * c.shape[LOW, k] * force
+        total += w[1, k] * w[1, k] + off * off * c.shape[STIFF, k]
+    y = s.p - s.p_u - force / K
+    r = s.r_b + c.beyond[s.set, 1] * force
+    return 0.5 * (total + K * y * y + r * r / c.beyond[s.set, 1])
+
+
+@kernel
+def look(par, s, bars):
+    """Look which modes are needed, and whether a standstill may end by itself."""
+    s.look = s.time + LOOK * WHOLE
+    if s.closed == 0:
+        leave_out(par, s, bars)
+    if s.mode == Mode.SS and s.closed == 0 and par.rock == RockKind.BILINEAR:
+        s.alert = 1 if standing_energy(par, s, bars) > QUIET_SHARE * s.w_r else 0
+
+
+@kernel
+def end_standstill(par, s, bars, events):
+    """Leave standstill where the bit's energy passes the barrier."""
+    if overcomes_barrier(par, s, bit_kinetic(par, s, bars)):
+        leave_standstill(par, s, s.v_low)
+        if s.mode != Mode.BC:
+            take_all(s, bars)
+        push_event(s, events, time_of(par, s), s.mode, spring_force(s))
+
+
+@kernel
+def change_mode(par, s, bars, events):
+    """Make the change of mode that the present state asks for."""
+    left, before, energy = s.mode, recoverable(s), bit_kinetic(par, s, bars)
+    if s.mode == Mode.FF:
+        if par.rock == RockKind.WALL:
+            s.e_standstill += before
+            s.p_u = s.p
+        close_interface(par, s, energy)
+    elif par.rock != RockKind.BILINEAR:
+        if par.rock == RockKind.WALL:
+            s.p_u = s.p
+        s.mode = Mode.FF
+    elif s.mode == Mode.DFC and s.w >= s.w_r:
+        s.mode = Mode.FC
+    elif s.mode == Mode.SS:
+        s.mode = Mode.FF
+        s.e_standstill += before - recoverable(s)
+    elif s.mode == Mode.BC and s.p < s.p_u:
+        s.mode = Mode.FF
+    else:
+        leave_by_velocity(par, s, s.v_low, energy)
+    if s.mode == Mode.FF:
+        if par.rock == RockKind.SPRING or left == Mode.BC:
+            s.e_overshoot += before
+    if s.mode == Mode.SS:
+        enter_standstill(s, time_of(par, s))
+        push_checkpoint(s, time_of(par, s))
+    elif s.mode == Mode.DFC or s.mode == Mode.FC:
+        take_all(s, bars)
+    s.alert = 1
+    push_event(s, events, time_of(par, s), s.mode, spring_force(s))
+
+
+@inlined
+def passed(par, s, p, v, work, force):
+    """Whether a state lies beyond the end of the present mode; energy apart."""
+    if par.rock == RockKind.NONE:
+        return False
+    if s.mode == Mode.FF:
+        return p > s.p_u and v > 0.0
+    if par.rock == RockKind.SPRING:
+        return p < 0.0
+    if par.rock == RockKind.WALL:
+        return force < 0.0
+    if s.mode == Mode.DFC and s.w + work >= s.w_r:
+        return True
+    if s.mode == Mode.DFC or s.mode == Mode.FC:
+        return v < -REST_VELOCITY
+    if s.mode == Mode.BC:
+        return p < s.p_u or v > REST_VELOCITY
+    return par.release == 1 and force < 0.0
