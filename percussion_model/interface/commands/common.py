@@ -34,7 +34,9 @@ SolverName = Annotated[
     Literal["wave", "modal", "fem", "rigid", "blow-map"] | None,
     typer.Option("--solver", help="Solver; rigid makes piston and bit rigid."),
 ]
-Cells = Annotated[int | None, typer.Option("--cells", help="Cells, modes or elements of the piston.")]
+Cells = Annotated[
+    int | None, typer.Option("--cells", help="Cells, modes or elements of the piston.")
+]
 Settings = Annotated[
     list[str] | None,
     typer.Option(
