@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from fitting_data import DATUM, DEPTH, TRUTH, bit, drops, noisy_curve
+from fitting_data import DATUM, DEPTH, KEYS, TRUTH, bit, drops, noisy_curve
 from scipy.stats import binom
 
 from percussion_model import Scene
@@ -31,7 +31,14 @@ from percussion_model.analysis.fitting.found import (
     Estimate,
     Rival,
 )
-from percussion_model.analysis.fitting.likelihood import RATIO, STIFFNESS, Likelihood, Series
+from percussion_model.analysis.fitting.likelihood import (
+    RATIO,
+    STIFFNESS,
+    Likelihood,
+    Series,
+    curve_series,
+    drop_series,
+)
 from percussion_model.analysis.fitting.notes import interval_notes
 from percussion_model.analysis.fitting.predictions import predicted_reading
 from percussion_model.analysis.fitting.search import descend, roughness
@@ -342,3 +349,33 @@ def test_senseless_readings_are_refused(reading, words):
 def test_nothing_is_refused():
     with pytest.raises(FitError, match="nothing to fit"):
         fit_rock(bit())
+
+
+def test_a_place_is_given_up_only_where_it_is_above_the_limit():
+    """Without computing the rest: what was given up lies above, what was not is the same."""
+    scene = bit()
+    sources = [noisy_curve(0), *drops(scene, 0, samples=40, end=8e-3)]
+    box = np.log([[1e8, 2e9], [2.0, 20.0], [1e3, 1e6], [1e-3, 1.0]])
+    computed = []
+
+    def series(k, source):
+        made = curve_series(source) if k == 0 else drop_series(source)
+        return replace(made, model=lambda scene: computed.append(k) or made.model(scene))
+
+    every = [series(k, source) for k, source in enumerate(sources)]
+    like, other = (Likelihood(scene, every, KEYS, box, lambda: None) for _ in range(2))
+    best = like.at(np.log([TRUTH[key] for key in KEYS]))
+    # nothing is known of what was never computed
+    assert other.below(best.at, best.deviance + 1.0, 0.0).deviance == best.deviance
+    generator, given_up = np.random.default_rng(1), 0
+    for _ in range(20):
+        at = best.at + 0.3 * generator.standard_normal(4)
+        computed.clear()
+        found = like.below(at, best.deviance + 50.0, 10.0)
+        whole = other.at(at)
+        if found is None:
+            given_up += len(computed) < 2 * len(every)
+            assert whole.deviance > best.deviance + 50.0
+        else:
+            assert found.deviance == whole.deviance
+    assert given_up

@@ -97,14 +97,29 @@ class Likelihood:
         self.low, self.high = ranges.T
         self._tick = tick
         self._known: OrderedDict[bytes, Place] = OrderedDict()
+        self._least = [math.inf] * len(series)  # deviance of each that was seen
 
     def at(self, at: np.ndarray) -> Place:
         """Compute the place of parameters (logarithms), within their ranges."""
+        found = self.below(at, math.inf, 0.0)
+        assert found is not None
+        return found
+
+    def below(self, at: np.ndarray, limit: float, slack: float) -> Place | None:
+        """Compute a place, or return None as soon as its deviance cannot be below a limit.
+
+        Series that are still to be computed are taken to explain their data no better than
+        they did at any place so far, but for a slack in the deviance of each.
+        """
         at = np.clip(at, self.low, self.high)
         key = at.tobytes()
         if key not in self._known:
-            self._known[key] = self._compute(at)
             self._tick()
+            residuals = self._residuals(self.scene_at(at), limit, slack)
+            if residuals is None:
+                return None
+            deviance, noise = self.deviance_of(residuals)
+            self._known[key] = Place(at, deviance, residuals, noise)
             if len(self._known) > KEPT:
                 self._known.popitem(last=False)
         return self._known[key]
@@ -114,24 +129,30 @@ class Likelihood:
         values = np.exp(at).tolist()
         return self.scene.replace(**dict(zip(self.names, values, strict=True)))
 
-    def _compute(self, at: np.ndarray) -> Place:
-        scene = self.scene_at(at)
-        residuals = [one.data - _finite(one, scene) for one in self.series]
-        deviance, noise = self.deviance_of(residuals)
-        return Place(at, deviance, residuals, noise)
+    def _residuals(self, scene: Scene, limit: float, slack: float) -> list[np.ndarray] | None:
+        """Data less model of each series; None where `below` gives up."""
+        residuals, seen = [], []
+        for one in self.series:
+            residuals.append(one.data - _finite(one, scene))
+            seen.append(_deviance(one, residuals[-1])[0])
+            rest = self._least[len(seen) :]
+            if limit < sum(seen) + sum(rest) - slack * len(rest) < math.inf:
+                return None
+        self._least = [min(pair) for pair in zip(self._least, seen, strict=True)]
+        return residuals
 
     def deviance_of(self, residuals: Sequence[np.ndarray]) -> tuple[float, list[float]]:
         """Deviance of residuals, and the noise of each series."""
-        noise, deviance = [], 0.0
-        for one, off in zip(self.series, residuals, strict=True):
-            if one.error is None:
-                sigma = max(math.sqrt(float(off @ off) / len(off)), one.least_noise)
-                deviance += len(off) * 2.0 * math.log(sigma)
-            else:
-                sigma = one.error
-                deviance += float(off @ off) / sigma**2
-            noise.append(sigma)
-        return deviance, noise
+        parts = [_deviance(*pair) for pair in zip(self.series, residuals, strict=True)]
+        return sum(deviance for deviance, _ in parts), [noise for _, noise in parts]
+
+
+def _deviance(one: Series, off: np.ndarray) -> tuple[float, float]:
+    """Deviance of the residuals of a series, and its noise."""
+    if one.error is None:
+        sigma = max(math.sqrt(float(off @ off) / len(off)), one.least_noise)
+        return len(off) * 2.0 * math.log(sigma), sigma
+    return float(off @ off) / one.error**2, one.error
 
 
 def _finite(one: Series, scene: Scene) -> np.ndarray:

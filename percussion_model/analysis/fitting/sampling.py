@@ -28,6 +28,8 @@ WORTH_A_PUSH, PUSH = math.log(2.0), 0.1
 # One round of least squares tells most places; those that end above the limit by less than
 # this share of the threshold get more.
 NEAR, MORE_ROUNDS = 2.0, 3
+# Profiles reach to this multiple of the threshold.
+SHOWN = 2.0
 # Values of a parameter at which its profile is given.
 POINTS = 40
 
@@ -120,7 +122,7 @@ def walk(
     Returns
     -------
     Walk
-        All places that were computed, whether the walk went there or not.
+        All places that may matter, whether the walk went there or not.
 
     References
     ----------
@@ -132,17 +134,23 @@ def walk(
     temperature = threshold / free
     here, factor = start, _root(spread)
     passed, seen, deviance = [start.at], [start.at], [start.deviance]
+    least = start.deviance
     for step in range(1, steps + 1):
         if step >= FIRST_LOOK and step % NEXT_LOOK == 0:
             factor = _root(np.cov(np.array(passed[int(EARLY * step) :]).T))
         length = math.exp(rng.uniform(math.log(SHORTEST), math.log(LONGEST)))
         at = here.at + length * factor @ rng.standard_normal(free)
-        there = like.at(_reflected(at, like.low, like.high))
-        if 0.5 * (there.deviance - here.deviance) < temperature * rng.exponential():
-            here = there
+        limit = here.deviance + 2.0 * temperature * rng.exponential()
+        # above both it is neither where the walk goes nor of use for a profile
+        shown = least + SHOWN * threshold
+        there = like.below(_reflected(at, like.low, like.high), max(limit, shown), threshold)
+        if there is not None:
+            if there.deviance < limit:
+                here = there
+            seen.append(there.at)
+            deviance.append(there.deviance)
+            least = min(least, there.deviance)
         passed.append(here.at)
-        seen.append(there.at)
-        deviance.append(there.deviance)
     return Walk(np.array(seen), np.array(deviance))
 
 
@@ -220,7 +228,7 @@ def profiles_of(like: Likelihood, walked: Walk, threshold: float) -> list[Profil
     for k, values in enumerate(walked.at.T):
         allowed = np.sort(values[inside])
         low, high = allowed[[0, -1]]
-        shown = above < 2.0 * threshold
+        shown = above < SHOWN * threshold
         found.append(
             Profile(
                 low if low > like.low[k] + AT_EDGE else -math.inf,
