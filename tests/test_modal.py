@@ -298,3 +298,10 @@ def test_drives_turn_and_blows_come_when_they_do_with_waves():
     np.testing.assert_allclose(
         ours.blows["peak_bit_force"], waves.blows["peak_bit_force"], rtol=3e-3
     )
+
+
+def test_the_reference_is_periodic():
+    """Events are found so closely that blows repeat to a millionth."""
+    blows = advanced(modal(), 3.0).blows[20:]
+    for name in ("impact_velocity", "hole_advance", "period"):
+        assert np.std(blows[name]) < 3e-6 * np.mean(blows[name]), name

@@ -11,7 +11,7 @@ from percussion_model.physics.state import COMMON_PARAMETERS, COMMON_STATE, COUN
 from percussion_model.solvers.state import Limits
 
 # A step has 2^STEP ticks, to one of which events are found; carries go up to 2^(LEVELS - 1).
-STEP, LEVELS = 6, 24
+STEP, LEVELS = 10, 28
 
 
 class Move(IntEnum):

@@ -189,10 +189,10 @@ def book_contact(par, s, trial):
     """Book what piston and bit do to each other in a step."""
     if s.closed == 1:
         s.i_contact += trial.contact * trial.h
-        # at the first instant a bar with loss resists without bound: a mean over half a step
+        # at the first instant a bar with loss resists without bound: a mean over a step
         s.peak_time += trial.h
         s.peak_impulse += trial.contact * trial.h
-        if s.peak_time >= 0.499 * par.dt:
+        if s.peak_time >= 0.999 * par.dt:
             mean = s.peak_impulse / s.peak_time
             s.b_peak_contact = max(s.b_peak_contact, mean)
             if time_of(par, s) > s.peak_from:
