@@ -110,7 +110,7 @@ def test_command_gives_json_alone(tmp_path):
 
 @pytest.mark.parametrize(
     ("text", "reason"),
-    [("wave,boxes", "'boxes' is no solver: wave, modal, fem"), ("fem,fem", "twice"), ("", "''")],
+    [("wave,boxes", "'boxes' is no solver: wave, fem, rigid"), ("fem,fem", "twice"), ("", "''")],
 )
 def test_bad_lists_of_solvers_are_refused(text, reason):
     with pytest.raises(SceneError, match=reason):

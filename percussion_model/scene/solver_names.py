@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Literal
 
 # The choices of `solver.name`; the parameter table reads this list whenever it is asked.
-SOLVER_NAMES = ["auto", "wave", "modal", "fem", "rigid"]
+# In FMUs they are numbers: new ones come last.
+SOLVER_NAMES = ["auto", "wave", "fem", "rigid", "modal"]
 # Bodies that a solver computes, where not both kinds.
 BODIES: dict[str, Literal["elastic", "rigid"]] = {
     "wave": "elastic",
