@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -95,3 +96,25 @@ def book_piston_load(par, s, push, path, impulse):
     s.e_drive += push * path
     s.e_gravity += par.mass_p * par.gravity * path
     s.i_drive += impulse
+
+
+@inlined
+def time_to_cover(distance, velocity, acceleration):
+    """First time at which v t + a t^2 / 2 reaches a positive distance.
+
+    Returns
+    -------
+    float
+        Time [s]; infinity when it never does, 0 for a distance <= 0.
+    """
+    if distance <= 0.0:
+        return 0.0
+    if distance == math.inf:
+        return math.inf
+    disc = velocity * velocity + 2.0 * acceleration * distance
+    if disc < 0.0:
+        return math.inf
+    bottom = velocity + math.sqrt(disc)
+    if bottom <= 0.0:
+        return math.inf
+    return 2.0 * distance / bottom

@@ -197,9 +197,11 @@ class Estimate:
 
 def grid_run(result: Result) -> GridRun:
     """A result with what its grid is known for; only waves have a misfit and a rule."""
-    if result.solver != "wave":
+    if result.solver not in ("wave", "modal"):
         return GridRun.exact(result)
     numbers, cells = numbers_of(result.scene), next(iter(result.cells.values()))
+    if result.solver == "modal":  # exact lengths; as many modes are surer than cells
+        return GridRun(result, np.zeros(0), promised_error(numbers, cells))
     return GridRun(result, misfits(numbers, cells), promised_error(numbers, cells))
 
 
@@ -393,7 +395,7 @@ def _estimate(part: GridRun, others: Sequence[GridRun]) -> Estimate:
     same = all(_same_motion(part, other) for other in known)
     share = NUMERICAL_SHARE if same else NUMERICAL_SHARE_OF_MOTIONS
     floor = share * abs(part.result.energy["numerical_relative"])
-    return Estimate(off, 0.0, scatter, floor)
+    return Estimate(off, 0.0, scatter, max(floor, FLOOR_SHARE * part.promised))
 
 
 def _of_whole(estimate: Estimate, whole: GridRun) -> Estimate:

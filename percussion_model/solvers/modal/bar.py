@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 from percussion_model.physics.kernel import inlined, kernel
 from percussion_model.solvers.modal.lanes import WIDTH, load, spread, store, total
 from percussion_model.solvers.modal.records import LEVELS, Move, Shape
@@ -125,19 +123,3 @@ def piston_vibration(s, bars):
     n = bars.wp.shape[1]
     energy = kinetic_of(bars.wp, 0, n) + elastic_of(bars.wp, bars.cp, 0, n)
     return energy + 0.5 * s.r_p * s.r_p / bars.cp.beyond[0, 1]
-
-
-@inlined
-def time_to_cover(distance, velocity, acceleration):
-    """First time at which v t + a t^2 / 2 reaches a positive distance; infinite: never [s]."""
-    if distance <= 0.0:
-        return 0.0
-    if distance == math.inf:
-        return math.inf
-    disc = velocity * velocity + 2.0 * acceleration * distance
-    if disc < 0.0:
-        return math.inf
-    bottom = velocity + math.sqrt(disc)
-    if bottom <= 0.0:
-        return math.inf
-    return 2.0 * distance / bottom

@@ -10,6 +10,7 @@ from percussion_model.physics.body import (
     book_bit_load,
     book_piston_load,
     piston_acceleration,
+    time_to_cover,
 )
 from percussion_model.physics.drive import drive_force
 from percussion_model.physics.kernel import inlined, kernel, merged
@@ -26,7 +27,6 @@ from percussion_model.solvers.modal.bar import (
     bit_vibration,
     carry,
     end_offset,
-    time_to_cover,
 )
 from percussion_model.solvers.modal.lanes import WIDTH, load, spread, store, total
 from percussion_model.solvers.modal.piston import WHOLE, has_piston, switches, time_of

@@ -137,7 +137,6 @@ MODAL_PAR = np.dtype(
         ("ss_stiffness", "f8"),  # gamma K_R for which standstill leaps were made [N/m]
         ("ss_damping", "f8"),
         ("leaps", "i8"),  # 0: none
-        ("most_changes", "i8"),
         *COMMON_PARAMETERS,
     ],
     align=True,

@@ -34,7 +34,6 @@ from percussion_model.solvers.modal.records import (
 from percussion_model.solvers.modal.standstill import POWERS, no_standstill, standstill_of
 from percussion_model.solvers.modal.tables import modal_bar
 from percussion_model.solvers.setup import (
-    MOST_CHANGES,
     fill_parameters,
     fill_start,
     kelvin_voigt_time,
@@ -93,7 +92,6 @@ class ModalSolver(Solver):
         p["dt"] = self.time_step = first / self.modes
         p["tick"] = tick = self.time_step / (1 << STEP)
         highest = math.pi / self.time_step
-        p["most_changes"] = MOST_CHANGES
         bit = modal_bar(numbers.bit, highest, eta, tick)
         piston = modal_bar(numbers.piston, highest, eta, tick) if elastic else no_bar()
         self._constant = piston, bit

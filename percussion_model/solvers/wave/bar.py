@@ -6,8 +6,6 @@ v = d + u and F = Z (d - u) (docs/model.md, eqs 5-6). A wave moves one cell a st
 
 from __future__ import annotations
 
-import math
-
 from percussion_model.physics.kernel import inlined, kernel
 from percussion_model.solvers.wave.records import Coef, Row
 
@@ -156,25 +154,3 @@ def deviation_energy(w, c, n, r, velocity, acceleration):
         y = w[r + 1, i] - half + rest
         a += c[Coef.MASS, i] * (x * x + y * y)
     return a
-
-
-@inlined
-def time_to_cover(distance, velocity, acceleration):
-    """First time at which v t + a t^2 / 2 reaches a positive distance.
-
-    Returns
-    -------
-    float
-        Time [s]; infinity when it never does, 0 for a distance <= 0.
-    """
-    if distance <= 0.0:
-        return 0.0
-    if distance == math.inf:
-        return math.inf
-    disc = velocity * velocity + 2.0 * acceleration * distance
-    if disc < 0.0:
-        return math.inf
-    bottom = velocity + math.sqrt(disc)
-    if bottom <= 0.0:
-        return math.inf
-    return 2.0 * distance / bottom

@@ -13,6 +13,7 @@ from percussion_model.physics.body import (
     bit_acceleration,
     book_piston_load,
     piston_acceleration,
+    time_to_cover,
 )
 from percussion_model.physics.drive import drive_force
 from percussion_model.physics.kernel import kernel, merged
@@ -23,7 +24,6 @@ from percussion_model.solvers.wave.bar import (
     elastic_energy,
     kinetic_energy,
     strain_offset,
-    time_to_cover,
 )
 from percussion_model.solvers.wave.leaps.leap import (
     FEWEST_STEPS,

@@ -11,7 +11,12 @@ from __future__ import annotations
 import math
 
 from percussion_model.physics.blows import push_checkpoint
-from percussion_model.physics.body import bit_acceleration, bit_load, book_bit_load
+from percussion_model.physics.body import (
+    bit_acceleration,
+    bit_load,
+    book_bit_load,
+    time_to_cover,
+)
 from percussion_model.physics.kernel import kernel, merged
 from percussion_model.physics.records import Mode, RockKind
 from percussion_model.physics.rock import (
@@ -25,7 +30,6 @@ from percussion_model.solvers.wave.bar import (
     deviation_energy,
     mean_velocity,
     strain_offset,
-    time_to_cover,
 )
 from percussion_model.solvers.wave.leaps.linear import (
     carry,
