@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from fitting_data import DATUM, DEPTH, KEYS, TRUTH, bit, drops, noisy_curve
+from fitting_data import DATUM, DEPTH, KEYS, TRUTH, bit, drawn_truth, drops, noisy_curve
 from scipy.stats import binom
 
 from percussion_model import Scene
@@ -22,9 +22,7 @@ from percussion_model.analysis.fitting import (
 )
 from percussion_model.analysis.fitting.curve import best_datum_and_peak
 from percussion_model.analysis.fitting.found import (
-    DAMPING,
     DETERMINED,
-    ENERGY,
     OPEN,
     OPEN_ABOVE,
     WIDE,
@@ -32,6 +30,8 @@ from percussion_model.analysis.fitting.found import (
     Rival,
 )
 from percussion_model.analysis.fitting.likelihood import (
+    DAMPING,
+    ENERGY,
     RATIO,
     STIFFNESS,
     Likelihood,
@@ -40,7 +40,11 @@ from percussion_model.analysis.fitting.likelihood import (
     drop_series,
 )
 from percussion_model.analysis.fitting.notes import interval_notes
-from percussion_model.analysis.fitting.predictions import predicted_reading
+from percussion_model.analysis.fitting.predictions import (
+    ROCK_INPUTS,
+    DropOnRocks,
+    predicted_reading,
+)
 from percussion_model.analysis.fitting.search import descend, roughness
 from percussion_model.interface.calibrated_scene import commented_fit
 from percussion_model.interface.plotting.calibration import draw_calibration
@@ -241,6 +245,23 @@ def test_the_force_at_a_gauge_is_read_where_it_is():
     at_gauge = drop_test_signal(scene, times, 5.25, "gauge_force", place)
     at_rock = drop_test_signal(scene, times - (length - place) / speed, 5.25, "bit_force")
     assert at_gauge == pytest.approx(at_rock, abs=0.02 * at_rock.max())
+
+
+@pytest.mark.parametrize("solver", ["wave", "modal", "fem", "rigid"])
+@pytest.mark.parametrize("gap", [0.0, 1e-3])
+def test_one_solver_serves_drops_on_other_rock(solver, gap):
+    """As a solver of its own for each rock, whether the bit starts on the rock or above it."""
+    scene = bit(solver, **{"start.rock_gap": gap})
+    drop = drops(scene, 0, samples=60, end=0.012, noise=0.0)[0]
+    both = DropOnRocks(drop, drop.time, ROCK_INPUTS), DropOnRocks(drop, drop.time, (ENERGY,))
+    for seed in (3, 4):
+        rock = scene.replace(**drawn_truth(seed))
+        for energy in (0.05, 0.2):
+            rock = rock.replace(**{ENERGY: energy})
+            alone = drop_test_signal(rock, drop.time, drop.speed)
+            assert np.ptp(alone) > 1e-3
+            for one in both:
+                assert one(rock) == pytest.approx(alone, abs=1e-9)
 
 
 def test_least_squares_weigh_each_series_by_its_own_noise():

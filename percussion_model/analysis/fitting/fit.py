@@ -10,9 +10,7 @@ import numpy as np
 
 from percussion_model.analysis.fitting.curve import first_sight
 from percussion_model.analysis.fitting.found import (
-    DAMPING,
     DETERMINED,
-    ENERGY,
     OPEN,
     OPEN_ABOVE,
     OPEN_BELOW,
@@ -26,6 +24,8 @@ from percussion_model.analysis.fitting.found import (
     Source,
 )
 from percussion_model.analysis.fitting.likelihood import (
+    DAMPING,
+    ENERGY,
     RATIO,
     STIFFNESS,
     Likelihood,

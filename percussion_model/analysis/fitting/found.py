@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from percussion_model.analysis.fitting.likelihood import RATIO, STIFFNESS
+from percussion_model.analysis.fitting.likelihood import DAMPING, ENERGY, RATIO, STIFFNESS
 from percussion_model.analysis.fitting.measurements import (
     QUANTITIES,
     SIGNALS,
@@ -19,7 +19,6 @@ from percussion_model.analysis.fitting.measurements import (
 )
 from percussion_model.simulation.uncertain import ABOUT, SHOWN_DIGITS, in_digits
 
-DAMPING, ENERGY = "rock.barrier_damping", "rock.barrier_energy"
 NAMES = {STIFFNESS: "K_R", RATIO: "gamma", DAMPING: "C_R", ENERGY: "W_R"}
 
 Source = Curve | DropTest | Reading

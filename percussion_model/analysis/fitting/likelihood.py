@@ -16,14 +16,16 @@ from percussion_model.analysis.fitting.curve import (
 )
 from percussion_model.analysis.fitting.measurements import Curve, DropTest, Reading
 from percussion_model.analysis.fitting.predictions import (
+    ROCK_INPUTS,
+    DropOnRocks,
     bit_alone,
-    predicted_drop,
     predicted_reading,
 )
 from percussion_model.scene.inputs import SimulationError
 from percussion_model.scene.scene import Scene
 
 STIFFNESS, RATIO = "rock.loading_stiffness", "rock.unloading_ratio"
+DAMPING, ENERGY = "rock.barrier_damping", "rock.barrier_energy"
 # No noise is taken to be smaller than this share of the data's spread: data of a model
 # without noise would have an infinite likelihood.
 LEAST_NOISE = 1e-8
@@ -181,20 +183,15 @@ def curve_series(curve: Curve) -> Series:
 def drop_series(drop: DropTest, most: int | None = None) -> Series:
     """Series of a drop test, or of at most so many of its samples, evenly taken.
 
-    The few are for a search along W_R, where leaps pay. Else nearly every place has another
-    K_R, gamma or C_R, and to prepare its leaps takes longer than they save.
+    The few are for a search along W_R, which the leaps of a solver do not depend on.
     """
     count = len(drop.time)
-    kept = np.arange(count)
+    kept, along = np.arange(count), ROCK_INPUTS
     if most is not None and count > most:
         kept = np.unique(np.linspace(0, count - 1, most).round().astype(int))
-    times = drop.time[kept]
-    return Series(
-        drop.name,
-        drop.values[kept],
-        None,
-        lambda scene: predicted_drop(bit_alone(scene), drop, times, leaps=most is not None),
-    )
+        along = (ENERGY,)
+    model = DropOnRocks(drop, drop.time[kept], along)
+    return Series(drop.name, drop.values[kept], None, model)
 
 
 def reading_series(reading: Reading) -> Series:

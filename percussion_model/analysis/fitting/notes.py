@@ -8,8 +8,6 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from percussion_model.analysis.fitting.found import (
-    DAMPING,
-    ENERGY,
     NAMES,
     OPEN,
     OPEN_ABOVE,
@@ -20,7 +18,12 @@ from percussion_model.analysis.fitting.found import (
     Explained,
     Rival,
 )
-from percussion_model.analysis.fitting.likelihood import Likelihood, Place
+from percussion_model.analysis.fitting.likelihood import (
+    DAMPING,
+    ENERGY,
+    Likelihood,
+    Place,
+)
 from percussion_model.analysis.fitting.sampling import Profile
 from percussion_model.analysis.fitting.search import LEAST_STEP, MOST_STEP, STEP_SHARE
 from percussion_model.simulation.uncertain import in_digits

@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from typing import Any
 
 import numpy as np
 
 from percussion_model.analysis.fitting.measurements import DropTest, Reading
 from percussion_model.physics.records import EventKind
+from percussion_model.scene.inputs import INPUTS
 from percussion_model.scene.numbers import numbers_of
+from percussion_model.scene.parameters import GROUPS
 from percussion_model.scene.scene import Scene
 from percussion_model.simulation.gauge import gauge_force, gauge_stress
 from percussion_model.simulation.simulate import Simulation, simulate
+from percussion_model.solvers.base import Solver, make_solver
 from percussion_model.solvers.wave.resolution import cells_for
 
+# Parameters of the rock that are inputs too.
+ROCK_INPUTS = tuple(one.key for one in INPUTS.values() if not one.at_once)
 # The bit has left the rock for the first time after that many half-periods on its spring.
 HALF_PERIODS = 3.0
 
@@ -40,7 +46,6 @@ def drop_test_signal(
     speed: float,
     signal: str = "bit_position",
     gauge: float | None = None,
-    leaps: bool = True,
 ) -> np.ndarray:
     """Compute what would be measured in a drop test.
 
@@ -56,15 +61,18 @@ def drop_test_signal(
         One of `SIGNALS`.
     gauge : float, optional
         Distance of the gauge from the top of the bit [m]; default its middle.
-    leaps : bool
-        False: without them, even where the scene has them.
 
     Returns
     -------
     ndarray
         SI units.
     """
-    simulation = _falling(scene, speed, **({} if leaps else {"solver.leaps": False}))
+    return _signal(_falling(scene, speed), times, signal, gauge)
+
+
+def _signal(
+    simulation: Simulation, times: np.ndarray, signal: str, gauge: float | None
+) -> np.ndarray:
     if signal == "gauge_force":
         return gauge_force(simulation, times, gauge)
     if signal == "gauge_stress":
@@ -72,11 +80,48 @@ def drop_test_signal(
     return simulation.sample(times)[signal]
 
 
-def predicted_drop(
-    scene: Scene, drop: DropTest, times: np.ndarray, leaps: bool = True
-) -> np.ndarray:
-    """What a drop would show at given times; see `drop_test_signal`."""
-    return drop_test_signal(scene, times, drop.speed, drop.signal, drop.gauge, leaps)
+class DropOnRocks:
+    """What a drop test shows on one rock after the other.
+
+    One solver, made for the first rock, serves others too: they come as changed inputs, which
+    act from the first drilling cycle on. To make a solver for each, and to prepare its leaps,
+    takes longer than the drop; free flight is leapt whatever the rock.
+
+    Parameters
+    ----------
+    drop : DropTest
+    times : ndarray
+        [s].
+    along : collection of str
+        Keys of the rock that may differ from those of the solver.
+    """
+
+    def __init__(self, drop: DropTest, times: np.ndarray, along: Collection[str]) -> None:
+        self._drop, self._times, self._along = drop, times, along
+        self._scene: Scene | None = None
+        self._start: tuple[Scene, Solver] | None = None
+
+    def __call__(self, scene: Scene) -> np.ndarray:
+        """Compute the signal on the rock of a scene, SI units."""
+        scene = bit_alone(scene)
+        if self._scene is None or self._start is None or not self._serves(self._scene, scene):
+            start = scene.replace(**{"start.bit_velocity": self._drop.speed})
+            self._scene, self._start = scene, (start, make_solver(start))
+        first, solver = self._start
+        simulation = Simulation(first, False, solver)
+        inputs = {name: one.key for name, one in INPUTS.items() if one.key in self._along}
+        simulation.set_inputs(
+            **{name: scene[key] for name, key in inputs.items() if scene[key] != first[key]}
+        )
+        return _signal(simulation, self._times, self._drop.signal, self._drop.gauge)
+
+    def _serves(self, scene: Scene, other: Scene) -> bool:
+        """Whether the solver of one scene serves another."""
+        if any(getattr(scene, name) != getattr(other, name) for name in GROUPS if name != "rock"):
+            return False
+        # for a bit that starts on the rock the first cycle may have begun
+        along = self._along if scene.start.rock_gap > 0.0 else ()
+        return all(scene[key] == other[key] for key in ROCK_INPUTS if key not in along)
 
 
 def predicted_reading(scene: Scene, reading: Reading) -> float:
@@ -115,5 +160,5 @@ def _rebound_velocity(scene: Scene, speed: float) -> float:
     return float(-_falling(scene, speed).sample(times)["bit_velocity"].min())
 
 
-def _falling(scene: Scene, speed: float, record_events: bool = False, **changes: Any) -> Simulation:
-    return Simulation(scene.replace(**{"start.bit_velocity": speed}, **changes), record_events)
+def _falling(scene: Scene, speed: float, record_events: bool = False) -> Simulation:
+    return Simulation(scene.replace(**{"start.bit_velocity": speed}), record_events)
