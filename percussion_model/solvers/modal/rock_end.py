@@ -40,13 +40,20 @@ def standing_energy(par, s, bars):
 
 
 @kernel
+def watch_energy(par, s, bars):
+    """Note whether a standstill may end by the energy that the bit has now."""
+    s.alert = 1
+    if s.mode == Mode.SS and s.closed == 0 and par.rock == RockKind.BILINEAR:
+        s.alert = 1 if standing_energy(par, s, bars) > QUIET_SHARE * s.w_r else 0
+
+
+@kernel
 def look(par, s, bars):
     """Look which modes are needed, and whether a standstill may end by itself."""
     s.look = s.time + LOOK * WHOLE
     if s.closed == 0:
         leave_out(par, s, bars)
-    if s.mode == Mode.SS and s.closed == 0 and par.rock == RockKind.BILINEAR:
-        s.alert = 1 if standing_energy(par, s, bars) > QUIET_SHARE * s.w_r else 0
+    watch_energy(par, s, bars)
 
 
 @kernel
@@ -89,7 +96,7 @@ def change_mode(par, s, bars, events):
         push_checkpoint(s, time_of(par, s))
     elif s.mode == Mode.DFC or s.mode == Mode.FC:
         take_all(s, bars)
-    s.alert = 1
+    watch_energy(par, s, bars)
     push_event(s, events, time_of(par, s), s.mode, spring_force(s))
 
 
