@@ -6,18 +6,18 @@ import math
 
 from percussion_model.physics.kernel import kernel, merged
 from percussion_model.physics.readings import fill_ledger, fill_motion
-from percussion_model.physics.records import Piston, Status
+from percussion_model.physics.records import Mode, Piston, Status
 from percussion_model.physics.rock import recoverable
-from percussion_model.solvers.modal.alone import go_alone, may_go_alone
 from percussion_model.solvers.modal.bar import (
     bit_kinetic,
-    bit_vibration,
+    elastic_of,
     kinetic_of,
     piston_vibration,
+    sag,
 )
 from percussion_model.solvers.modal.leaps import leap, plan
 from percussion_model.solvers.modal.piston import WHOLE, has_piston, time_of, unpark
-from percussion_model.solvers.modal.records import Task
+from percussion_model.solvers.modal.records import STEP, Task
 from percussion_model.solvers.modal.step import step
 
 # Events that one step can make: of the barrier, two of the contact, of the drive, of the rock.
@@ -60,12 +60,9 @@ def advance_to(par, s, bars, ops, end, blows, events):
                 return Status.DONE
             leap(par, s, bars, ops)
         else:
-            level = bars.cb.levels[s.set]
-            if s.time + (1 << level) > end:
+            if s.time + WHOLE > end:
                 return Status.DONE
-            if may_go_alone(par, s) and go_alone(par, s, bars, ops.rows, level, end) == 1:
-                continue
-            step(par, s, bars, level, blows, events)
+            step(par, s, bars, STEP, blows, events)
 
 
 @kernel
@@ -80,7 +77,7 @@ def commit_to(par, s, bars, ops, end, blows, events):
         if cut > s.time:
             leap(par, s, bars, ops)
         s.leap_end = -1
-    level = bars.cb.levels[s.set]
+    level = STEP
     while s.time < end:
         status = full(s, blows, events)
         if status != Status.DONE:
@@ -98,17 +95,16 @@ def commit_to(par, s, bars, ops, end, blows, events):
 @kernel
 def read_at(par, s, bars, time, row):
     """Read a state, and its motion a fraction of a tick later."""
-    kinetic = bit_kinetic(par, s, bars)
-    row.bit_kinetic_energy = kinetic
-    n = bars.cb.sizes[s.set]
-    elastic = bit_vibration(par, s, bars) - kinetic_of(bars.wb, 0, n)
-    if par.piston == Piston.ELASTIC:
-        n_p = bars.wp.shape[1]
-        own = kinetic_of(bars.wp, 0, n_p)
-        kinetic += own
-        elastic += piston_vibration(s, bars) - own
-    if has_piston(par):
+    row.bit_kinetic_energy = bit_kinetic(s, bars, bars.w)
+    n, held = s.active, bars.forms.stiff[s.form]
+    kinetic = kinetic_of(bars.w, n)
+    elastic = elastic_of(bars.w, bars.forms.shape[s.form], n) - 0.5 * held * s.low * s.low
+    if s.closed == 0 and has_piston(par):
         kinetic += 0.5 * par.mass_p * s.v_p * s.v_p
+        if par.piston == Piston.ELASTIC:
+            own = kinetic_of(bars.wp, bars.wp.shape[1])
+            kinetic += own
+            elastic += piston_vibration(bars) - own
     fill_ledger(s, row, kinetic, elastic, recoverable(s))
     fill_motion(par, s, row, time, s.u_p + par.start_gap, s.u_b)
     rest = max(0.0, time - time_of(par, s))
@@ -118,6 +114,9 @@ def read_at(par, s, bars, time, row):
         row.piston_position += rest * s.v_p
     row.bit_end_velocity = s.v_low
     row.bit_force = s.f_rock
+    if s.mode == Mode.SS and s.closed == 0 and held > 0.0:
+        # what modes that are left out would hold of the load
+        row.bit_force += par.mass_b * s.a_b - held * sag(s, bars)
     row.contact_force = s.f_contact
     row.bit_impulse += rest * s.f_rock
     row.contact_impulse += rest * s.f_contact

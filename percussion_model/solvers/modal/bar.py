@@ -1,125 +1,212 @@
-"""A bar by its modes: free motion of its ends, moves, energies and bounds."""
+"""Bars by their modes: moves under constant forces, ends, energies."""
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 from percussion_model.physics.kernel import inlined, kernel
 from percussion_model.solvers.modal.lanes import WIDTH, load, spread, store, total
 from percussion_model.solvers.modal.records import LEVELS, Move, Shape
 
-TOP, LOW, SOFT, STIFF = (int(row) for row in Shape)
-QQ, QV, VQ, VV, L_QQ, L_QV, L_VV = (int(row) for row in Move)
+LOW, TOP, SOFT, STIFF, BIT, PISTON = (int(row) for row in Shape)
+QQ, QV, VQ, VV, YIELD, L_QQ, L_QV, L_VV = (int(row) for row in Move)
+# Rows of the modes that change: offsets, velocities, forces of the body loads.
+Q, V, LOAD = range(3)
 
 # Numbers below this are set to zero: denormal ones are slow.
 TINY = 1e-200
 
 
+class Ends(NamedTuple):
+    """What a move leads to."""
+
+    lost: float  # [J]
+    low: float  # offsets of rock end and top of the bit [m]
+    speed: float  # of the rock end [m/s]
+    top: float
+    bit: float  # integrals over the mass of the bit, of offset and velocity [kg m, kg m/s]
+    bit_speed: float
+    piston: float
+    piston_speed: float
+    pull: float  # what accelerates the piston's mass besides its body load, at the end [N]
+
+
 @inlined
-def end_offset(w, c, n, end):
-    """Offset of an end (a row of `Shape`) from the mean, by the modes [m]."""
-    offset = spread(0.0)
+def row_sum(shape, row, w, which, n):
+    """Sum of a row of shapes times offsets or velocities."""
+    value = spread(0.0)
     for k in range(0, n, WIDTH):
-        offset = offset + load(c.shape, end, k) * load(w, 0, k)
-    return total(offset)
+        value = value + load(shape, row, k) * load(w, which, k)
+    return total(value)
 
 
 @inlined
-def low_after(w, c, n, level):
-    """Offset of the low end after a free move [m]."""
-    m = c.move[level]
+def low_after(w, shape, m, n):
+    """Offset of the low end after a move under the loads alone [m]."""
     low = spread(0.0)
     for k in range(0, n, WIDTH):
-        q = load(m, QQ, k) * load(w, 0, k) + load(m, QV, k) * load(w, 1, k)
-        low = low + load(c.shape, LOW, k) * q
+        q = load(m, QQ, k) * load(w, Q, k) + load(m, QV, k) * load(w, V, k)
+        low = low + load(shape, LOW, k) * (q + load(m, YIELD, k) * load(w, LOAD, k))
     return total(low)
 
 
 @inlined
-def ends_after(w, c, n, level):
-    """Offsets of top and low end [m] and velocity of the low end [m/s] after a free move."""
-    m = c.move[level]
-    top = low = speed = spread(0.0)
+def low_yield(shape, m, n):
+    """How far the low end goes by a force of 1 N there over a move [m/N]."""
+    low = spread(0.0)
     for k in range(0, n, WIDTH):
-        q0, v0, end = load(w, 0, k), load(w, 1, k), load(c.shape, LOW, k)
-        q = load(m, QQ, k) * q0 + load(m, QV, k) * v0
-        v = load(m, VQ, k) * q0 + load(m, VV, k) * v0
-        top = top + load(c.shape, TOP, k) * q
-        low = low + end * q
-        speed = speed + end * v
-    return total(top), total(low), total(speed)
+        end = load(shape, LOW, k)
+        low = low + end * end * load(m, YIELD, k)
+    return total(low)
 
 
 @inlined
-def move_bar(w, c, n, level, top, low):
-    """Move the modes over 2^level ticks under constant forces at both ends; the loss [J]."""
-    m = c.move[level]
+def try_move(w, rows, shape, m, n, force, eta, joined):
+    """Move modes under their loads and a force at the low end, into `rows`."""
+    lost = low = speed = top = bit = bit_speed = spread(0.0)
+    piston = piston_speed = pull = spread(0.0)
+    for k in range(0, n, WIDTH):
+        q0, v0, end = load(w, Q, k), load(w, V, k), load(shape, LOW, k)
+        f = load(w, LOAD, k) - end * force
+        q = load(m, QQ, k) * q0 + load(m, QV, k) * v0 + load(m, YIELD, k) * f
+        v = load(m, VQ, k) * q0 + load(m, VV, k) * v0 + load(m, QV, k) * f
+        store(rows, Q, k, q)
+        store(rows, V, k, v)
+        # about where the forces would hold the mode still
+        y = q0 - load(shape, SOFT, k) * f
+        lost = lost + (load(m, L_QQ, k) * y + load(m, L_QV, k) * v0) * y
+        lost = lost + load(m, L_VV, k) * (v0 * v0)
+        low = low + end * q
+        speed = speed + end * v
+        top = top + load(shape, TOP, k) * q
+        share = load(shape, BIT, k)
+        bit = bit + share * q
+        bit_speed = bit_speed + share * v
+        if joined:
+            share = load(shape, PISTON, k)
+            piston = piston + share * q
+            piston_speed = piston_speed + share * v
+            pull = pull + share * (load(w, LOAD, k) - load(shape, STIFF, k) * (q + v * eta))
+    return Ends(
+        total(lost),
+        total(low),
+        total(speed),
+        total(top),
+        total(bit),
+        total(bit_speed),
+        total(piston),
+        total(piston_speed),
+        total(pull),
+    )
+
+
+@inlined
+def take(w, rows, n):
+    """Make the move that was tried."""
+    for k in range(0, n, WIDTH):
+        store(w, Q, k, load(rows, Q, k))
+        store(w, V, k, load(rows, V, k))
+
+
+@inlined
+def move_free(w, m, n):
+    """Move modes without forces; the loss [J]."""
     lost = spread(0.0)
     for k in range(0, n, WIDTH):
-        # about where the forces would hold the mode still
-        still = load(c.shape, TOP, k) * top + load(c.shape, LOW, k) * low
-        still = load(c.shape, SOFT, k) * still
-        y, v = load(w, 0, k) - still, load(w, 1, k)
-        store(w, 0, k, still + (load(m, QQ, k) * y + load(m, QV, k) * v))
-        store(w, 1, k, load(m, VQ, k) * y + load(m, VV, k) * v)
-        lost = lost + (load(m, L_QQ, k) * y + load(m, L_QV, k) * v) * y
+        q, v = load(w, Q, k), load(w, V, k)
+        store(w, Q, k, load(m, QQ, k) * q + load(m, QV, k) * v)
+        store(w, V, k, load(m, VQ, k) * q + load(m, VV, k) * v)
+        lost = lost + (load(m, L_QQ, k) * q + load(m, L_QV, k) * v) * q
         lost = lost + load(m, L_VV, k) * (v * v)
     return total(lost)
 
 
+@inlined
+def end_after(w, shape, m, n):
+    """Offset of the low end after a free move [m]."""
+    low = spread(0.0)
+    for k in range(0, n, WIDTH):
+        q = load(m, QQ, k) * load(w, Q, k) + load(m, QV, k) * load(w, V, k)
+        low = low + load(shape, LOW, k) * q
+    return total(low)
+
+
 @kernel
-def carry(w, c, n, ticks):
-    """Move free modes over any number of ticks; the loss [J]."""
+def carry(w, move, first, n, ticks):
+    """Move free modes from `first` on over any number of ticks; the loss [J]."""
+    rigid_q, rigid_v = w[Q, 0], w[V, 0]
     lost = 0.0
     rest = ticks
     level = LEVELS - 1
     while rest > 0:
         while rest >> level == 0:
             level -= 1
-        lost += move_bar(w, c, n, level, 0.0, 0.0)
+        lost += move_free(w, move[level], n)
         rest -= 1 << level
-    for k in range(n):
-        if abs(w[0, k]) + abs(w[1, k]) < TINY:
-            w[0, k] = w[1, k] = 0.0
+    if first == 1:
+        w[Q, 0], w[V, 0] = rigid_q, rigid_v
+    for k in range(first, n):
+        if abs(w[Q, k]) + abs(w[V, k]) < TINY:
+            w[Q, k] = w[V, k] = 0.0
     return lost
 
 
 @inlined
-def kinetic_of(w, first, n):
+def kinetic_of(w, n):
     """Kinetic energy of modes [J]."""
     squares = spread(0.0)
-    for k in range(first, n, WIDTH):
-        v = load(w, 1, k)
+    for k in range(0, n, WIDTH):
+        v = load(w, V, k)
         squares = squares + v * v
     return 0.5 * total(squares)
 
 
 @inlined
-def elastic_of(w, c, first, n):
-    """Strain energy of modes [J]."""
+def elastic_of(w, shape, n):
+    """Strain energy of modes, with that of a spring under the low end [J]."""
     squares = spread(0.0)
-    for k in range(first, n, WIDTH):
-        q = load(w, 0, k)
-        squares = squares + load(c.shape, STIFF, k) * (q * q)
+    for k in range(0, n, WIDTH):
+        q = load(w, Q, k)
+        squares = squares + load(shape, STIFF, k) * (q * q)
     return 0.5 * total(squares)
 
 
-@inlined
-def bit_kinetic(par, s, bars):
-    """Kinetic energy of the whole bit [J]."""
-    return 0.5 * par.mass_b * s.v_b * s.v_b + kinetic_of(bars.wb, 0, bars.cb.sizes[s.set])
-
-
-@inlined
-def bit_vibration(par, s, bars):
-    """Energy of the bit's modes, and of what is beyond them [J]."""
-    n = bars.cb.sizes[s.set]
-    beyond = bars.cb.beyond[s.set]
-    energy = kinetic_of(bars.wb, 0, n) + elastic_of(bars.wb, bars.cb, 0, n)
-    return energy + 0.5 * (s.r_t * s.r_t / beyond[0] + s.r_b * s.r_b / beyond[1])
+@kernel
+def bit_kinetic(s, bars, w):
+    """Kinetic energy of the bit, by the velocities in `w` [J]."""
+    if s.form < 3:
+        return kinetic_of(w, s.active)
+    change = bars.forms.change[s.form, s.form - 3]
+    n = bars.forms.sizes[s.form - 3]
+    squares = 0.0
+    for i in range(0, n, WIDTH):
+        v = spread(0.0)
+        for k in range(s.active):
+            v = v + load(change, k, i) * w[V, k]
+        squares += total(v * v)
+    return 0.5 * squares
 
 
 @kernel
-def piston_vibration(s, bars):
-    """Energy of the piston's modes, and of what is beyond them [J]."""
+def sag(s, bars):
+    """Offset of the rock end by which the spring holds the loads, of the modes that move [m]."""
+    shape, low = bars.forms.shape[s.form], spread(0.0)
+    for k in range(0, s.active, WIDTH):
+        still = load(shape, SOFT, k) * load(bars.w, LOAD, k)
+        low = low + load(shape, LOW, k) * still
+    return total(low)
+
+
+@kernel
+def bar_energy(s, bars):
+    """Kinetic and strain energy of what the present form has, without the rock's [J]."""
+    n, stiff = s.active, bars.forms.stiff[s.form]
+    energy = kinetic_of(bars.w, n) + elastic_of(bars.w, bars.forms.shape[s.form], n)
+    return energy - 0.5 * stiff * s.low * s.low
+
+
+@kernel
+def piston_vibration(bars):
+    """Energy of the free piston's modes [J]."""
     n = bars.wp.shape[1]
-    energy = kinetic_of(bars.wp, 0, n) + elastic_of(bars.wp, bars.cp, 0, n)
-    return energy + 0.5 * s.r_p * s.r_p / bars.cp.beyond[0, 1]
+    return kinetic_of(bars.wp, n) + elastic_of(bars.wp, bars.shape_p, n)

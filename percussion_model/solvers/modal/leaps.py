@@ -17,22 +17,27 @@ from percussion_model.physics.kernel import inlined, kernel, merged
 from percussion_model.physics.records import DriveKind, Mode, RockKind
 from percussion_model.physics.rock import barrier_off, recoverable
 from percussion_model.solvers.modal.bar import (
+    BIT,
+    LOAD,
     LOW,
     QQ,
     QV,
+    SOFT,
     STIFF,
     TOP,
     VQ,
     VV,
-    bit_vibration,
+    Q,
+    V,
     carry,
-    end_offset,
+    row_sum,
 )
+from percussion_model.solvers.modal.forms import refresh_loads, refresh_sums, vibration
 from percussion_model.solvers.modal.lanes import WIDTH, load, spread, store, total
 from percussion_model.solvers.modal.piston import WHOLE, has_piston, switches, time_of
 from percussion_model.solvers.modal.records import STEP, LeapKind
 from percussion_model.solvers.modal.rock_end import QUIET_SHARE, standing_energy
-from percussion_model.solvers.modal.standstill import POWERS
+from percussion_model.solvers.modal.standstill import FEW, POWERS
 
 # Most steps of a leap.
 LONGEST = (1 << POWERS) - 1
@@ -90,13 +95,12 @@ def quiet_time(par, s, v_b, a_b, spread_top, spread_mean):
 @kernel
 def plan_flight(par, s, bars):
     """Time of free flight before anything can happen [s]."""
-    spread = math.sqrt(2.0 * bit_vibration(par, s, bars))
+    spread = math.sqrt(2.0 * vibration(s, bars))
     a = bit_acceleration(par, s)
-    beyond = abs(s.r_t) + abs(s.r_b)
-    limit = quiet_time(par, s, s.v_b, a, par.bound_t * spread + beyond, 0.0)
+    limit = quiet_time(par, s, s.v_b, a, par.bound_t * spread + abs(s.offset), 0.0)
     if par.rock != RockKind.NONE:
-        now = end_offset(bars.wb, bars.cb, bars.cb.sizes[s.set], LOW) + s.r_b
-        room = s.p_u - s.p + now - par.bound_b * spread - beyond
+        now = s.low - s.at_b / par.mass_b
+        room = s.p_u - s.p + now - par.bound_b * spread
         limit = min(limit, time_to_cover(room, s.v_b, a))
     return limit
 
@@ -108,32 +112,33 @@ def plan_standstill(par, s, bars, energy):
     size = math.sqrt(2.0 * energy)
     mean = size * (1.0 / math.sqrt(K) + par.bound_b)
     off = s.p_u + par.mass_b * bit_acceleration(par, s) / K - s.p
-    return quiet_time(par, s, 0.0, 0.0, par.bound_t * size, 2.0 * mean + abs(off))
+    spread = par.bound_t * size + abs(s.offset)
+    return quiet_time(par, s, 0.0, 0.0, spread, 2.0 * mean + abs(off))
 
 
 @kernel
-def search_flight(par, s, bars, ops, most):
+def search_flight(par, s, bars, most):
     """Steps of free flight, `most` at most, before the rock, piston or a switch is seen."""
-    c, w, rows = bars.cb, bars.wb, ops.rows
-    n = c.sizes[s.set]
+    w, rows, n = bars.w, bars.rows, s.active
     for k in range(n):
-        rows[0, k], rows[1, k] = w[0, k], w[1, k]
+        rows[Q, k], rows[V, k] = w[Q, k], w[V, k]
+    rows[Q, 0] = rows[V, 0] = 0.0
     h = par.dt * (1 << HOP)
     a = bit_acceleration(par, s)
     piston = has_piston(par)
     a_p = piston_acceleration(par, drive_force(par, s)) if piston else 0.0
-    beyond = abs(s.r_b) + abs(s.r_t)
-    now = end_offset(w, c, n, LOW) + s.r_b
+    shape, m = bars.forms.shape[s.form], bars.forms.move[s.form, STEP + HOP]
+    now = s.low - s.at_b / par.mass_b
     steps = 0
     while steps + (1 << HOP) <= most:
-        top, low = hop(rows, c, n, STEP + HOP)
+        top, low = hop(rows, shape, m, n)
         t = (steps >> HOP) * h + h
         path = t * (s.v_b + 0.5 * a * t)
-        if par.rock != RockKind.NONE and s.p + path + low - now + beyond >= s.p_u:
+        if par.rock != RockKind.NONE and s.p + path + low - now >= s.p_u:
             break
         if piston:
             end = s.u_p + t * (s.v_p + 0.5 * a_p * t)
-            if end + s.spread_p + beyond >= s.u_b + path + top:
+            if end + s.spread_p >= s.u_b + path + top + s.offset:
                 break
             if switches(par, s, end - s.u_b - path):
                 break
@@ -145,11 +150,11 @@ def search_flight(par, s, bars, ops, most):
 def search_standstill(par, s, bars, ops, most):
     """Steps of standstill, `most` at most, before the contact force is lost."""
     force = par.mass_b * bit_acceleration(par, s)
-    load_standstill(s, bars, ops, force)
-    m, steps = 2 * bars.cb.sizes[s.set] + 4, 0
+    load_standstill(s, bars, ops)
+    steps = 0
     while steps + (1 << HOP) <= most:
-        apply(ops, HOP, m)
-        if force + pull(par, s, bars, ops.x[0]) <= 0.0:
+        apply(ops, HOP)
+        if force + pull(s, bars, ops.x) <= 0.0:
             break
         steps += 1 << HOP
     return steps
@@ -167,12 +172,11 @@ def plan(par, s, bars, ops):
             s.leap_kind = LeapKind.FLIGHT
             steps = min(plan_flight(par, s, bars) / par.dt - 1.0, LONGEST)
             if steps < SEARCHED:
-                steps = max(steps, search_flight(par, s, bars, ops, SEARCHED))
-    elif s.mode == Mode.SS and par.rock == RockKind.BILINEAR and s.alert == 0:
-        same = s.gamma * s.k_r == par.ss_stiffness and s.c_r == par.ss_damping
-        energy = standing_energy(par, s, bars)
+                steps = max(steps, search_flight(par, s, bars, SEARCHED))
+    elif s.form == 2 and s.mode == Mode.SS and s.alert == 0 and s.active == FEW:
+        energy = standing_energy(s, bars)
         safe = not barrier_off(par, s) and energy <= QUIET_SHARE * s.w_r
-        if same and safe and s.set + 1 == len(bars.cb.sizes):
+        if safe and s.c_r == par.c_r:
             s.leap_kind = LeapKind.STANDSTILL
             steps = min(plan_standstill(par, s, bars, energy) / par.dt - 1.0, LONGEST)
             if not keeps_contact(par, s, energy):
@@ -183,53 +187,45 @@ def plan(par, s, bars, ops):
 
 
 @inlined
-def hop(rows, c, n, level):
-    """Move copied free modes over 2^level ticks; offsets of top and low end [m]."""
-    m = c.move[level]
+def hop(rows, shape, m, n):
+    """Move copied free modes; offsets of top and low end [m]."""
     top = low = spread(0.0)
     for k in range(0, n, WIDTH):
-        q0, v0 = load(rows, 0, k), load(rows, 1, k)
+        q0, v0 = load(rows, Q, k), load(rows, V, k)
         q = load(m, QQ, k) * q0 + load(m, QV, k) * v0
-        store(rows, 0, k, q)
-        store(rows, 1, k, load(m, VQ, k) * q0 + load(m, VV, k) * v0)
-        top = top + load(c.shape, TOP, k) * q
-        low = low + load(c.shape, LOW, k) * q
+        store(rows, Q, k, q)
+        store(rows, V, k, load(m, VQ, k) * q0 + load(m, VV, k) * v0)
+        top = top + load(shape, TOP, k) * q
+        low = low + load(shape, LOW, k) * q
     return total(top), total(low)
 
 
 @inlined
-def pull(par, s, bars, x):
+def pull(s, bars, x):
     """Force of the rock about that at rest, of a standstill [N]."""
-    n = bars.cb.sizes[s.set]
-    speed = x[2 * n + 1]
-    for k in range(n):
-        speed += bars.cb.shape[LOW, k] * x[n + k]
-    return s.gamma * s.k_r * x[2 * n + 3] + s.c_r * speed
+    low = speed = spread(0.0)
+    shape = bars.forms.shape[2]
+    for k in range(0, FEW, WIDTH):
+        low = low + load(shape, LOW, k) * load(x, 0, k)
+        speed = speed + load(shape, LOW, k) * load(x, 0, FEW + k)
+    return s.gamma * s.k_r * total(low) + s.c_r * total(speed)
 
 
 @inlined
-def load_standstill(s, bars, ops, force):
-    """Take the state about its rest under a force."""
-    n = bars.cb.sizes[s.set]
-    x, rest = ops.x[0], ops.rest
-    for k in range(n):
-        x[k] = bars.wb[0, k] - force * rest[k]
-        x[n + k] = bars.wb[1, k]
-    # places along the hole count from where the rock is unloaded
-    x[2 * n] = -force * rest[2 * n]
-    x[2 * n + 1] = s.v_b
-    x[2 * n + 2] = s.r_b - force * rest[2 * n + 2]
-    x[2 * n + 3] = (s.p - s.p_u) - force * rest[2 * n + 3]
-    total = x[2 * n + 3] - x[2 * n + 2]
-    for k in range(n):
-        total -= bars.cb.shape[LOW, k] * x[k]
-    x[2 * n] = total
+def load_standstill(s, bars, ops):
+    """Take the state about its rest."""
+    shape = bars.forms.shape[2]
+    for k in range(0, FEW, WIDTH):
+        rest = load(shape, SOFT, k) * load(bars.w, LOAD, k)
+        store(ops.x, 0, k, load(bars.w, Q, k) - rest)
+        store(ops.x, 0, FEW + k, load(bars.w, V, k))
 
 
 @inlined
-def multiply(columns, x, y, m):
+def multiply(columns, x, y):
     """Product of a map, column by column, with `x`; into `y`."""
-    for i in range(0, y.shape[1], WIDTH):
+    m = columns.shape[0]
+    for i in range(0, m, WIDTH):
         even = odd = spread(0.0)
         for k in range(0, m, 2):
             even = even + load(columns, k, i) * x[0, k]
@@ -238,9 +234,9 @@ def multiply(columns, x, y, m):
 
 
 @inlined
-def quadratic(form, x, y, m):
+def quadratic(form, x, y):
     """Value of a symmetric form at `x` [J]."""
-    multiply(form, x, y, m)
+    multiply(form, x, y)
     value = spread(0.0)
     for i in range(0, y.shape[1], WIDTH):
         value = value + load(x, 0, i) * load(y, 0, i)
@@ -248,9 +244,9 @@ def quadratic(form, x, y, m):
 
 
 @inlined
-def apply(ops, power, m):
+def apply(ops, power):
     """Apply one power of the map to `ops.x`."""
-    multiply(ops.powers[power], ops.x, ops.y, m)
+    multiply(ops.powers[power], ops.x, ops.y)
     for i in range(0, ops.x.shape[1], WIDTH):
         store(ops.x, 0, i, load(ops.y, 0, i))
 
@@ -258,56 +254,45 @@ def apply(ops, power, m):
 @kernel
 def leap_standstill(par, s, bars, ops, steps):
     """Carry the bit over whole steps of standstill; the path of its mean motion [m]."""
-    n = bars.cb.sizes[s.set]
-    a = bit_acceleration(par, s)
-    force = par.mass_b * a
-    K = s.gamma * s.k_r
-    load_standstill(s, bars, ops, force)
-    m, x, rest = 2 * n + 4, ops.x[0], ops.rest
-    u, before, v = x[2 * n], s.p - s.p_u, s.v_b
+    shape, K = bars.forms.shape[2], s.gamma * s.k_r
+    before, mean, v_b = s.low, s.at_b, s.v_b
+    load_standstill(s, bars, ops)
     lost = damped = 0.0
     for power in range(len(ops.powers)):
         if (steps >> power) & 1:
-            lost += quadratic(ops.loss[power], ops.x, ops.y, m)
-            damped += quadratic(ops.dashpot[power], ops.x, ops.y, m)
-            apply(ops, power, m)
-    for k in range(n):
-        bars.wb[0, k] = x[k] + force * rest[k]
-        bars.wb[1, k] = x[n + k]
-    s.v_b = x[2 * n + 1]
-    s.r_b = x[2 * n + 2] + force * rest[2 * n + 2]
-    after = x[2 * n + 3] + force * rest[2 * n + 3]
-    s.p += after - before
-    s.r_t = 0.0
-    s.v_low = s.v_b
-    for k in range(n):
-        s.v_low += bars.cb.shape[LOW, k] * bars.wb[1, k]
-    s.f_rock = K * after + s.c_r * s.v_low
+            lost += quadratic(ops.loss[power], ops.x, ops.y)
+            damped += quadratic(ops.dashpot[power], ops.x, ops.y)
+            apply(ops, power)
+    for k in range(0, FEW, WIDTH):
+        rest = load(shape, SOFT, k) * load(bars.w, LOAD, k)
+        store(bars.w, Q, k, load(ops.x, 0, k) + rest)
+        store(bars.w, V, k, load(ops.x, 0, FEW + k))
+    refresh_sums(s, bars)
+    s.v_low = row_sum(shape, LOW, bars.w, V, FEW)
+    s.v_b = row_sum(shape, BIT, bars.w, V, FEW) / par.mass_b
+    s.p += s.low - before
+    s.f_rock = K * s.low + s.c_r * s.v_low
     s.e_loss += lost
     s.e_standstill += damped
-    s.rock_work += 0.5 * K * (after - before) * (after + before) + damped
-    s.i_bit += force * (steps * par.dt) - par.mass_b * (s.v_b - v)
-    return x[2 * n] - u
+    s.rock_work += 0.5 * K * (s.low - before) * (s.low + before) + damped
+    s.i_bit += par.mass_b * (s.a_b * (steps * par.dt) - (s.v_b - v_b))
+    return (s.at_b - mean) / par.mass_b
 
 
 @merged
 def leap_flight(par, s, bars, ticks):
     """Carry the bit over free flight; the path of its mean motion [m]."""
-    n = bars.cb.sizes[s.set]
     h = ticks * par.tick
-    a = bit_acceleration(par, s)
-    before = recoverable(s)
-    now = end_offset(bars.wb, bars.cb, n, LOW) + s.r_b
-    s.e_loss += carry(bars.wb, bars.cb, n, ticks)
-    beyond = bars.cb.beyond[s.set]
-    s.e_loss += 0.5 * (s.r_t * s.r_t / beyond[0] + s.r_b * s.r_b / beyond[1])
-    s.r_t = s.r_b = 0.0
+    a, root = bit_acceleration(par, s), math.sqrt(par.mass_b)
+    before, low = recoverable(s), s.low
+    s.e_loss += carry(bars.w, bars.forms.move[0], 1, s.active, ticks)
     path = h * (s.v_b + 0.5 * h * a)
     s.v_b += h * a
-    s.p += path + (end_offset(bars.wb, bars.cb, n, LOW) - now)
-    s.v_low = s.v_b
-    for k in range(n):
-        s.v_low += bars.cb.shape[LOW, k] * bars.wb[1, k]
+    bars.w[Q, 0] += root * path
+    bars.w[V, 0] = root * s.v_b
+    refresh_sums(s, bars)
+    s.p += s.low - low
+    s.v_low = row_sum(bars.forms.shape[0], LOW, bars.w, V, s.active)
     s.f_rock = 0.0
     s.e_standstill += before - recoverable(s)
     return path
@@ -316,22 +301,21 @@ def leap_flight(par, s, bars, ticks):
 @kernel
 def note_peak(par, s, bars, ops, steps):
     """Note the greatest bit force of a standstill leap about to be made."""
-    n = bars.cb.sizes[s.set]
-    force = par.mass_b * bit_acceleration(par, s)
+    force, shape = par.mass_b * bit_acceleration(par, s), bars.forms.shape[2]
     K = s.gamma * s.k_r
-    load_standstill(s, bars, ops, force)
-    m, x = 2 * n + 4, ops.x[0]
+    load_standstill(s, bars, ops)
+    place = row_sum(shape, LOW, ops.x, 0, FEW)
     for k in range(steps):
-        place = x[2 * n + 3]
-        apply(ops, 0, m)
-        change = x[2 * n + 3] - place
+        apply(ops, 0)
+        before, place = place, row_sum(shape, LOW, ops.x, 0, FEW)
         if time_of(par, s) + (k + 1) * par.dt > s.peak_from:
-            mean = force + K * (place + 0.5 * change) + s.c_r * change / par.dt
+            mean = force + 0.5 * K * (before + place) + s.c_r * (place - before) / par.dt
             s.peak_bit_force = max(s.peak_bit_force, mean)
         if k % WHOLE == 0:
-            energy = K * place * place + par.mass_b * x[2 * n + 1] * x[2 * n + 1]
-            for i in range(n):
-                energy += x[i] * x[i] * bars.cb.shape[STIFF, i] + x[n + i] * x[n + i]
+            energy = 0.0
+            for i in range(FEW):
+                energy += ops.x[0, i] * ops.x[0, i] * shape[STIFF, i]
+                energy += ops.x[0, FEW + i] * ops.x[0, FEW + i]
             if K * energy < (STILL_SHARE * force) ** 2:
                 s.peak_bit_force = max(s.peak_bit_force, force)
                 return
@@ -342,6 +326,8 @@ def leap(par, s, bars, ops):
     """Carry bit and mean motion of the piston to s.leap_end in one go."""
     ticks = s.leap_end - s.time
     h = ticks * par.tick
+    if s.a_b != bit_acceleration(par, s):
+        refresh_loads(s, bars, bit_acceleration(par, s), s.a_p)
     if s.mode == Mode.SS:
         push_checkpoint(s, time_of(par, s))
         if time_of(par, s) + h > s.peak_from:

@@ -1,9 +1,10 @@
-"""Normal modes of a stepped bar with free ends, to rounding and for any lengths.
+"""Normal modes of a stepped bar, to rounding and for any lengths.
 
-In each section a mode is u = R cos(phi), with the force -Z w R sin(phi); the phase phi grows
-by w T over a section of transit time T. Where the impedance changes, u and the force stay. Both
-ends are free where the phase at the low end is a multiple of pi, and it rises with w: each
-mode is a root of its own, which bisection finds (docs/modal.md, section 1).
+In each section a mode is u = R cos(phi), with the force Z w R sin(phi); the phase phi grows
+by w T over a section of transit time T. Where the impedance changes, u and the force stay. The
+top end is free or carries a mass, the low end is free or stands on a spring: the phases that
+follow rise with w, and each mode is a root of its own, which bisection finds
+(docs/modal.md, section 1).
 """
 
 from __future__ import annotations
@@ -15,10 +16,6 @@ import numpy as np
 
 from percussion_model.physics.kernel import kernel
 from percussion_model.scene.bars import (
-    AREA,
-    LENGTH,
-    YOUNGS_MODULUS,
-    bar_mass,
     bar_transit_time,
     section_impedance,
     section_mass,
@@ -26,34 +23,52 @@ from percussion_model.scene.bars import (
 )
 
 # Halvings of the interval in which a root lies: more than a number has digits.
-HALVINGS = 60
+HALVINGS = 70
+# Below this argument sin(x) / x is its series.
+SMALL = 1e-4
 
 
 class Modes(NamedTuple):
-    """Elastic modes of a bar, the lowest first; shapes have a modal mass of 1 kg.
+    """Modes of a bar, the lowest first; shapes have a modal mass of 1 kg.
 
     Attributes
     ----------
     frequency : ndarray, shape (n,)
-        Angular, without loss [rad/s].
-    top, low : ndarray, shape (n,)
-        Shape at both ends [1/kg^0.5].
+        Angular, without loss [rad/s]; 0 first where nothing holds the bar.
+    size, phase : ndarray, shape (n, sections)
+        Amplitude [1/kg^0.5] in each section, and phase at its top.
+    impedance, transit, mass : ndarray, shape (sections,)
+        Of the sections [N s/m, s, kg].
+    top_mass : float
+        Mass on the top end [kg].
     """
 
     frequency: np.ndarray
-    top: np.ndarray
-    low: np.ndarray
+    size: np.ndarray
+    phase: np.ndarray
+    impedance: np.ndarray
+    transit: np.ndarray
+    mass: np.ndarray
+    top_mass: float
 
-    def below(self, highest: float) -> Modes:
-        """Modes up to a frequency."""
-        n = int(np.searchsorted(self.frequency, highest, side="right"))
-        return Modes(self.frequency[:n], self.top[:n], self.low[:n])
+    def above(self, section: int) -> np.ndarray:
+        """Shape at the top of a section."""
+        shape: np.ndarray = self.size[:, section] * np.cos(self.phase[:, section])
+        return shape
+
+    @property
+    def low(self) -> np.ndarray:
+        """Shape at the low end."""
+        shape: np.ndarray = self.size[:, -1] * np.cos(
+            self.phase[:, -1] + self.frequency * self.transit[-1]
+        )
+        return shape
 
 
 @kernel
-def _phase(impedance, transit, w):
-    """Phase at the low end of a bar whose top end is free."""
-    phase = 0.0
+def _phase(impedance, transit, top_mass, w):
+    """Phase at the low end."""
+    phase = math.atan2(top_mass * w, impedance[0])
     for i in range(len(transit)):
         if i > 0 and impedance[i] != impedance[i - 1]:
             half = math.pi * math.floor(phase / math.pi + 0.5)
@@ -65,68 +80,153 @@ def _phase(impedance, transit, w):
 
 
 @kernel
-def _find_modes(impedance, transit, mass, out):
-    """Fill rows of frequency, shape at the top and at the low end."""
-    whole = 0.0
+def _find_modes(impedance, transit, mass, top_mass, spring, frequency, size, phases):
+    """Fill frequencies, sizes and phases."""
+    whole = total = 0.0
     for i in range(len(transit)):
         whole += transit[i]
-    # a change of impedance shifts the phase by less than a right angle
-    shift = 0.5 * math.pi * len(transit)
-    for k in range(out.shape[1]):
-        wanted = (k + 1) * math.pi
-        low, high = max(0.0, wanted - shift) / whole, (wanted + shift) / whole
+        total += mass[i]
+    # changes of impedance and a mass on top shift the phase by less than a right angle each
+    shift = 0.5 * math.pi * (len(transit) + 1)
+    for k in range(len(frequency)):
+        if k == 0 and spring == 0.0:
+            frequency[k] = 0.0
+            for i in range(len(transit)):
+                size[k, i] = 1.0 / math.sqrt(total + top_mass)
+                phases[k, i] = 0.0
+            continue
+        low = max(0.0, k * math.pi - shift) / whole
+        high = (k * math.pi + 0.5 * math.pi + shift) / whole
         for _ in range(HALVINGS):
             middle = 0.5 * (low + high)
-            if _phase(impedance, transit, middle) < wanted:
+            wanted = k * math.pi
+            if spring > 0.0:
+                wanted += math.atan2(spring, impedance[-1] * middle)
+            if _phase(impedance, transit, top_mass, middle) < wanted:
                 low = middle
             else:
                 high = middle
         w = 0.5 * (low + high)
-        size, phase, modal = 1.0, 0.0, 0.0
+        phase = math.atan2(top_mass * w, impedance[0])
+        at_top = math.cos(phase)
+        amplitude, modal = 1.0, top_mass * at_top * at_top
         for i in range(len(transit)):
             if i > 0 and impedance[i] != impedance[i - 1]:
                 c = math.cos(phase)
                 s = impedance[i - 1] / impedance[i] * math.sin(phase)
                 phase = math.atan2(s, c)
-                size *= math.sqrt(c * c + s * s)
+                amplitude *= math.sqrt(c * c + s * s)
+            size[k, i], phases[k, i] = amplitude, phase
             then = phase + w * transit[i]
             swing = (math.sin(2.0 * then) - math.sin(2.0 * phase)) / (4.0 * w * transit[i])
-            modal += mass[i] * size * size * (0.5 + swing)
+            modal += mass[i] * amplitude * amplitude * (0.5 + swing)
             phase = then
-        out[0, k] = w
-        out[1, k] = 1.0 / math.sqrt(modal)
-        out[2, k] = size * math.cos(phase) / math.sqrt(modal)
+        frequency[k] = w
+        for i in range(len(transit)):
+            size[k, i] /= math.sqrt(modal)
+
+
+def bar_modes(
+    sections: np.ndarray, count: int, spring: float = 0.0, top_mass: float = 0.0
+) -> Modes:
+    """Return the lowest modes of a bar.
+
+    Parameters
+    ----------
+    sections : ndarray, shape (sections, 4)
+        As `section_numbers` has them.
+    count : int
+        The rigid one of a free bar among them.
+    spring : float
+        Stiffness under the low end [N/m].
+    top_mass : float
+        Mass on the top end [kg].
+    """
+    rows = [(section_impedance(s), section_transit_time(s), section_mass(s)) for s in sections]
+    numbers = np.ascontiguousarray(np.array(rows).T)
+    frequency, (size, phase) = np.zeros(count), np.zeros((2, count, len(rows)))
+    _find_modes(*numbers, float(top_mass), float(spring), frequency, size, phase)
+    return Modes(frequency, size, phase, *numbers, top_mass)
+
+
+def count_below(sections: np.ndarray, highest: float) -> int:
+    """Most elastic modes that may lie below a frequency [rad/s]."""
+    return math.ceil(bar_transit_time(sections) * highest / math.pi + 0.5 * len(sections))
 
 
 @kernel
-def _find_forces(impedance, transit, frequency, top, section, share, out):
-    """Fill the force (compression) of each mode at places, shape (places, modes)."""
-    for k in range(len(frequency)):
-        w = frequency[k]
-        size, phase, j = top[k], 0.0, 0
-        for i in range(len(transit)):
-            if i > 0 and impedance[i] != impedance[i - 1]:
-                c = math.cos(phase)
-                s = impedance[i - 1] / impedance[i] * math.sin(phase)
-                phase = math.atan2(s, c)
-                size *= math.sqrt(c * c + s * s)
-            while j < len(section) and section[j] == i:
-                there = phase + w * transit[i] * share[j]
-                out[0, j, k] = size * math.cos(there)
-                out[1, j, k] = impedance[i] * w * size * math.sin(there)
-                j += 1
-            phase += w * transit[i]
+def _sinc(x):
+    return 1.0 - x * x / 6.0 if abs(x) < SMALL else math.sin(x) / x
+
+
+@kernel
+def _fill_products(mass, transit, w, size, phase, w_2, size_2, phase_2, out):
+    """Fill the products of two sets of shapes, weighted by mass."""
+    for k in range(len(w)):
+        for j in range(len(w_2)):
+            total = 0.0
+            for i in range(len(transit)):
+                less = 0.5 * (w[k] - w_2[j]) * transit[i]
+                more = 0.5 * (w[k] + w_2[j]) * transit[i]
+                both = _sinc(less) * math.cos(phase[k, i] - phase_2[j, i] + less)
+                both += _sinc(more) * math.cos(phase[k, i] + phase_2[j, i] + more)
+                total += 0.5 * mass[i] * size[k, i] * size_2[j, i] * both
+            out[k, j] = total
+
+
+def products(one: Modes, first: int, other: Modes, second: int, count: int) -> np.ndarray:
+    """Products of the shapes of two bars over so many sections that they share.
+
+    Parameters
+    ----------
+    first, second : int
+        The first of these sections, in each bar.
+
+    Returns
+    -------
+    ndarray, shape (modes of one, modes of the other)
+        Weighted by mass.
+    """
+    mine, theirs = slice(first, first + count), slice(second, second + count)
+    out = np.zeros((len(one.frequency), len(other.frequency)))
+    _fill_products(
+        np.ascontiguousarray(one.mass[mine]),
+        np.ascontiguousarray(one.transit[mine]),
+        one.frequency,
+        np.ascontiguousarray(one.size[:, mine]),
+        np.ascontiguousarray(one.phase[:, mine]),
+        other.frequency,
+        np.ascontiguousarray(other.size[:, theirs]),
+        np.ascontiguousarray(other.phase[:, theirs]),
+        out,
+    )
+    if first == second == 0 and one.top_mass and other.top_mass:
+        out += one.top_mass * np.outer(one.above(0), other.above(0))
+    return out
+
+
+def totals(modes: Modes, first: int, count: int) -> np.ndarray:
+    """Integral of each shape over the mass of so many sections [kg^0.5]."""
+    sections = len(modes.mass)
+    rigid = modes._replace(
+        frequency=np.zeros(1),
+        size=np.ones((1, sections)),
+        phase=np.zeros((1, sections)),
+        top_mass=0.0,
+    )
+    found: np.ndarray = products(modes, first, rigid, first, count)[:, 0]
+    return found
 
 
 def shapes_at(
-    sections: np.ndarray, modes: Modes, section: np.ndarray, share: np.ndarray
+    modes: Modes, section: np.ndarray, share: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Offset and force of each mode at places of a bar.
+    """Offset and elastic force of each mode at places of a bar.
 
     Parameters
     ----------
     section : int array
-        Section of each place, not falling.
+        Section of each place.
     share : ndarray
         Of that section's length that lies above it.
 
@@ -135,52 +235,7 @@ def shapes_at(
     offset, force : ndarray, shape (places, modes)
         Down positive [1/kg^0.5], compression positive [N/(m kg^0.5)].
     """
-    out = np.zeros((2, len(section), len(modes.frequency)))
-    impedance, transit, _ = _numbers_of(sections)
-    _find_forces(impedance, transit, modes.frequency, modes.top, section, share, out)
-    return out[0], out[1]
-
-
-def _numbers_of(sections: np.ndarray) -> np.ndarray:
-    """Impedance, transit time and mass of each section, in rows."""
-    rows = [(section_impedance(s), section_transit_time(s), section_mass(s)) for s in sections]
-    return np.ascontiguousarray(np.array(rows).T)
-
-
-def free_modes(sections: np.ndarray, count: int) -> Modes:
-    """Return the lowest elastic modes of a free bar.
-
-    Parameters
-    ----------
-    sections : ndarray, shape (sections, 4)
-        As `section_numbers` has them.
-    count : int
-
-    Returns
-    -------
-    Modes
-    """
-    out = np.zeros((3, count))
-    _find_modes(*_numbers_of(sections), out)
-    return Modes(*out)
-
-
-def count_below(sections: np.ndarray, highest: float) -> int:
-    """Most elastic modes that may lie below a frequency [rad/s]."""
-    return math.ceil(bar_transit_time(sections) * highest / math.pi + 0.5 * len(sections))
-
-
-def end_compliance(sections: np.ndarray) -> float:
-    """Offset of the low end from the mean of a free bar, by a constant force there [m/N].
-
-    The sum of shape^2 / frequency^2 over all modes. The bar's own inertia balances the force,
-    so that a section carries the share of it that the mass above is of all.
-    """
-    whole, above, total = bar_mass(sections), 0.0, 0.0
-    for section in sections:
-        first = above / whole
-        above += section_mass(section)
-        last = above / whole
-        flexible = float(section[LENGTH]) / float(section[YOUNGS_MODULUS] * section[AREA])
-        total += flexible * (first * first + first * last + last * last) / 3.0
-    return total
+    size = modes.size[:, section].T
+    phase = modes.phase[:, section].T + np.outer(modes.transit[section] * share, modes.frequency)
+    impedance = modes.impedance[section][:, None]
+    return size * np.cos(phase), impedance * modes.frequency * size * np.sin(phase)

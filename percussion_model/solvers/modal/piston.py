@@ -13,11 +13,13 @@ from percussion_model.physics.blows import (
 )
 from percussion_model.physics.kernel import inlined, kernel, merged
 from percussion_model.physics.records import DriveKind, Piston
-from percussion_model.solvers.modal.bar import LOW, TOP, carry, end_offset, piston_vibration
-from percussion_model.solvers.modal.records import STEP, Reply
-from percussion_model.solvers.modal.sets import LOOK, take_all
+from percussion_model.solvers.modal.bar import LOW, Q, carry, piston_vibration, row_sum
+from percussion_model.solvers.modal.forms import gap_of, join, part
+from percussion_model.solvers.modal.records import STEP
 
 WHOLE = 1 << STEP
+# Steps between two looks at which modes are needed, and at whether the piston may wait.
+LOOK = 32
 
 
 @inlined
@@ -32,33 +34,24 @@ def has_piston(par):
     return par.piston != Piston.ABSENT
 
 
-@inlined
-def gap_of(s, bars):
-    """Gap between piston and bit by the places of their ends [m]."""
-    top = s.u_b + end_offset(bars.wb, bars.cb, bars.cb.sizes[s.set], TOP) + s.r_t
-    return top - (s.u_p + end_offset(bars.wp, bars.cp, bars.wp.shape[1], LOW) + s.r_p)
-
-
 @kernel
 def unpark(par, s, bars):
     """Bring the vibration of the parked piston to the present."""
-    ticks = s.time - s.piston_time
-    s.e_loss += carry(bars.wp, bars.cp, bars.wp.shape[1], ticks)
-    if s.r_p != 0.0:
-        # what is beyond the modes dies away within a step or two
-        compliance = bars.cp.beyond[0, 1]
-        kept = bars.cp.reply[0, STEP, Reply.LOW_KEPT] ** (ticks // WHOLE)
-        s.e_loss += 0.5 * s.r_p * s.r_p * (1.0 - kept * kept) / compliance
-        s.r_p *= kept
+    if par.piston == Piston.ELASTIC:
+        n = bars.wp.shape[1]
+        s.e_loss += carry(bars.wp, bars.move_p, 0, n, s.time - s.piston_time)
+        s.low_p = row_sum(bars.shape_p, LOW, bars.wp, Q, n)
     s.parked = 0
     s.no_park = s.time + LOOK * WHOLE
-    s.gap = gap_of(s, bars)
+    s.gap = gap_of(par, s)
 
 
 @kernel
 def park(par, s, bars):
     """Leave the vibration of the piston behind while it can touch nothing."""
-    s.spread_p = par.bound_p * math.sqrt(2.0 * piston_vibration(s, bars)) + abs(s.r_p)
+    s.spread_p = 0.0
+    if par.piston == Piston.ELASTIC:
+        s.spread_p = par.bound_p * math.sqrt(2.0 * piston_vibration(bars))
     if s.u_p + s.spread_p < s.u_b - s.spread_p:
         s.parked = 1
         s.piston_time = s.time
@@ -72,8 +65,9 @@ def flip_contact(par, s, bars, approach, blows, events):
     time = time_of(par, s)
     if s.closed == 1:
         s.closed = 0
-        s.offset = s.peak_time = s.peak_impulse = 0.0
+        s.peak_time = s.peak_impulse = 0.0
         s.f_contact = 0.0
+        part(par, s, bars)
         s.no_park = s.time + LOOK * WHOLE
         open_gap(s, events, time, approach)
     else:
@@ -81,10 +75,9 @@ def flip_contact(par, s, bars, approach, blows, events):
             still = standstill_force(s, time, s.i_bit)
             start_blow(par, s, blows, time, s.v_p, s.u_b, still)
         s.closed = 1
+        s.closed_at = s.time
         close_gap(s, events, time, approach)
-        take_all(s, bars)
-        # the ends touch here: a tick's way is left between them as long as they do
-        s.offset = gap_of(s, bars)
+        join(par, s, bars)
     s.alert = 1
     s.look = s.time + LOOK * WHOLE
 

@@ -12,6 +12,8 @@ from percussion_model.solvers.state import Limits
 
 # A step has 2^STEP ticks, to one of which events are found; carries go up to 2^(LEVELS - 1).
 STEP, LEVELS = 10, 28
+# Forms: the bit free, on K_R, on gamma K_R; the same joined to the piston.
+JOINED = 3
 
 
 class Move(IntEnum):
@@ -21,65 +23,69 @@ class Move(IntEnum):
     Q_BY_V = 1
     V_BY_Q = 2
     V_BY_V = 3
-    LOSS_QQ = 4
-    LOSS_QV = 5
-    LOSS_VV = 6
+    YIELD = 4  # offset by a constant force; its velocity is Q_BY_V
+    LOSS_QQ = 5
+    LOSS_QV = 6
+    LOSS_VV = 7
 
 
 class Shape(IntEnum):
     """Rows of what else is known of each mode."""
 
-    TOP = 0  # offset of the top end [1/kg^0.5]
-    LOW = 1
-    SOFT = 2  # 1 / frequency^2 [s2]
+    LOW = 0  # offset of the rock end [1/kg^0.5]
+    TOP = 1  # of the top of the bit
+    SOFT = 2  # 1 / frequency^2 [s2]; 0 of a rigid one
     STIFF = 3
+    BIT = 4  # integral over the mass of the bit [kg^0.5]
+    PISTON = 5
 
 
-class Reply(IntEnum):
-    """What an end does by a force of 1 N over 2^level ticks; offsets in m, velocities in m/s."""
-
-    TOP = 0  # of the top end, by a force there
-    LOW = 1
-    CROSS = 2  # of one end, by a force at the other
-    LOW_SPEED = 3  # of the low end, by a force there
-    CROSS_SPEED = 4
-    TOP_REST = 5  # share of TOP that no mode of the set has
-    LOW_REST = 6
-    TOP_KEPT = 7  # what is left of an offset beyond the modes
-    LOW_KEPT = 8
-
-
-class ModalBar(NamedTuple):
-    """What does not change of a bar.
+class Forms(NamedTuple):
+    """What does not change of the bars.
 
     Attributes
     ----------
-    shape : ndarray, shape (len(Shape), n)
-    move : ndarray, shape (LEVELS, len(Move), n)
-    reply : ndarray, shape (sets, levels, len(Reply))
-    sizes : int array, shape (sets,)
-        Modes of each set, falling.
-    beyond : ndarray, shape (sets, 2)
-        Compliance at top and low end beyond the modes of a set [m/N].
-    levels : int array, shape (sets,)
-        A step of the set has 2^level ticks.
+    sizes : int array, shape (6,)
+        Modes of each form, 0 where there is none.
+    stiff : ndarray, shape (6,)
+        Spring under the rock end [N/m].
+    shape : ndarray, shape (6, len(Shape), n)
+    move : ndarray, shape (6, LEVELS, len(Move), n)
+    change : ndarray, shape (6, 6, n, n)
+        From one form (first) to another; row j is what mode j becomes.
+    join : ndarray, shape (3, modes of the piston, n)
+        What each elastic mode of the piston becomes in a joined form.
     """
 
+    sizes: np.ndarray
+    stiff: np.ndarray
     shape: np.ndarray
     move: np.ndarray
-    reply: np.ndarray
-    sizes: np.ndarray
-    beyond: np.ndarray
-    levels: np.ndarray
+    change: np.ndarray
+    join: np.ndarray
 
 
 class Bars(NamedTuple):
-    """Modes of piston and bit: offsets and velocities, rows that change; and what does not."""
+    """Modes of the present form and of the free piston, what is constant of them, and room.
 
+    Attributes
+    ----------
+    w : ndarray, shape (3, n)
+        Offsets, velocities, and forces of the body loads.
+    wp : ndarray, shape (2, modes of the piston)
+    forms : Forms
+    shape_p, move_p : ndarray
+        Of the piston's elastic modes, as one of `Forms`.
+    rows : ndarray, shape (2, n)
+        Room for a step that is tried.
+    """
+
+    w: np.ndarray
     wp: np.ndarray
-    cp: ModalBar
-    wb: np.ndarray
-    cb: ModalBar
+    forms: Forms
+    shape_p: np.ndarray
+    move_p: np.ndarray
+    rows: np.ndarray
 
 
 class Standstill(NamedTuple):
@@ -87,27 +93,19 @@ class Standstill(NamedTuple):
 
     Attributes
     ----------
-    powers : ndarray, shape (POWERS, m, wide)
-        By columns, filled up with zeros to whole lanes; m = 2 n + 4 numbers: offsets and
-        velocities of n modes, mean offset and velocity, offset beyond the modes, penetration;
-        all about their values at rest.
-    loss, dashpot : ndarray, shape (POWERS, m, wide)
+    powers : ndarray, shape (POWERS, m, m)
+        By columns; m numbers: offsets about rest and velocities of the first modes.
+    loss, dashpot : ndarray, shape (POWERS, m, m)
         Forms: what bar and dashpot take [J].
-    rest : ndarray, shape (m,)
-        Values at rest under a force of 1 N.
-    x, y : ndarray, shape (1, wide)
+    x, y : ndarray, shape (1, m)
         Room.
-    rows : ndarray, shape (2, n)
-        Room for the modes of the bit.
     """
 
     powers: np.ndarray
     loss: np.ndarray
     dashpot: np.ndarray
-    rest: np.ndarray
     x: np.ndarray
     y: np.ndarray
-    rows: np.ndarray
 
 
 class LeapKind(IntEnum):
@@ -129,13 +127,15 @@ MODAL_PAR = np.dtype(
     [
         ("tick", "f8"),  # unit of time [s]
         ("dt", "f8"),  # 2^STEP ticks
+        ("eta", "f8"),  # Kelvin-Voigt time [s]
         ("start_gap", "f8"),  # [m]
         ("bound_p", "f8"),  # |offset of the low end| <= bound_p sqrt(2 E) [m/J^0.5]
         ("bound_t", "f8"),
         ("bound_b", "f8"),
         ("end_speed", "f8"),  # |velocity of the rock end| <= end_speed sqrt(2 E) [1/kg^0.5]
-        ("ss_stiffness", "f8"),  # gamma K_R for which standstill leaps were made [N/m]
-        ("ss_damping", "f8"),
+        ("k_r", "f8"),  # rock for which forms and leaps were made
+        ("gamma", "f8"),
+        ("c_r", "f8"),
         ("leaps", "i8"),  # 0: none
         *COMMON_PARAMETERS,
     ],
@@ -152,16 +152,22 @@ MODAL_STATE = np.dtype(
         ("parked", "i8"),  # 1: the vibration of the piston is that of an earlier time
         ("piston_time", "i8"),
         ("no_park", "i8"),
+        ("closed_at", "i8"),
         ("alert", "i8"),  # 1: standstill may end by the energy of the bit
-        ("set", "i8"),  # of the bit's modes
+        ("form", "i8"),
+        ("active", "i8"),  # modes of it that move
         ("count_leaps", "i8"),
         ("u_p", "f8"),  # mean displacements [m]
         ("u_b", "f8"),
-        ("r_p", "f8"),  # offsets beyond the modes: piston's low end, bit's top and low end [m]
-        ("r_t", "f8"),
-        ("r_b", "f8"),
+        ("low", "f8"),  # offsets in the present form: rock end, top of the bit [m]
+        ("top", "f8"),
+        ("low_p", "f8"),  # of the piston's low end, from its mean
+        ("at_b", "f8"),  # means of bit and piston in the present form [m]
+        ("at_p", "f8"),
+        ("a_b", "f8"),  # accelerations that the body loads stand for [m/s2]
+        ("a_p", "f8"),
         ("spread_p", "f8"),  # bound of the offset of the parked piston's low end [m]
-        ("offset", "f8"),  # of ends that touch, found within a tick [m]
+        ("offset", "f8"),  # between the ends where they parted [m]
         ("peak_time", "f8"),  # of contact, since the last mean force for a peak [s]
         ("peak_impulse", "f8"),  # [N s]
         ("v_low", "f8"),  # velocity of the rock end [m/s]
@@ -183,8 +189,10 @@ MODAL_LIMITS = Limits(
         "parked": FLAG,
         "piston_time": COUNT,
         "no_park": COUNT,
+        "closed_at": COUNT,
         "alert": FLAG,
-        "set": (0, 8),
+        "form": (0, 5),
+        "active": COUNT,
         "count_leaps": COUNT,
     },
 )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from percussion_model.physics.blows import push_checkpoint, push_event
-from percussion_model.physics.body import bit_acceleration
 from percussion_model.physics.kernel import inlined, kernel
 from percussion_model.physics.records import Mode, RockKind
 from percussion_model.physics.rock import (
@@ -16,60 +15,55 @@ from percussion_model.physics.rock import (
     recoverable,
     spring_force,
 )
-from percussion_model.solvers.modal.bar import LOW, SOFT, STIFF, bit_kinetic
-from percussion_model.solvers.modal.piston import WHOLE, time_of
-from percussion_model.solvers.modal.sets import LOOK, leave_out, take_all
+from percussion_model.solvers.modal.bar import LOAD, SOFT, STIFF, Q, V, bit_kinetic
+from percussion_model.solvers.modal.forms import change_spring, leave_out
+from percussion_model.solvers.modal.lanes import WIDTH, load, spread, total
+from percussion_model.solvers.modal.piston import LOOK, WHOLE, time_of
 
 # A standstill with less than this share of W_R stays one if nothing comes from outside.
 QUIET_SHARE = 0.9
 
 
 @kernel
-def standing_energy(par, s, bars):
-    """Energy of a standing bit about its rest [J]."""
-    K = s.gamma * s.k_r
-    force = par.mass_b * bit_acceleration(par, s)
-    n, c, w = bars.cb.sizes[s.set], bars.cb, bars.wb
-    total = par.mass_b * s.v_b * s.v_b
-    for k in range(n):
-        off = w[0, k] + c.shape[SOFT, k] * c.shape[LOW, k] * force
-        total += w[1, k] * w[1, k] + off * off * c.shape[STIFF, k]
-    y = s.p - s.p_u - force / K
-    r = s.r_b + c.beyond[s.set, 1] * force
-    return 0.5 * (total + K * y * y + r * r / c.beyond[s.set, 1])
+def standing_energy(s, bars):
+    """Energy of a standing bit about its rest, with that of the rock's spring [J]."""
+    shape, energy = bars.forms.shape[s.form], spread(0.0)
+    for k in range(0, s.active, WIDTH):
+        off = load(bars.w, Q, k) - load(shape, SOFT, k) * load(bars.w, LOAD, k)
+        v = load(bars.w, V, k)
+        energy = energy + v * v + load(shape, STIFF, k) * (off * off)
+    return 0.5 * total(energy)
 
 
 @kernel
 def watch_energy(par, s, bars):
     """Note whether a standstill may end by the energy that the bit has now."""
     s.alert = 1
-    if s.mode == Mode.SS and s.closed == 0 and par.rock == RockKind.BILINEAR:
-        s.alert = 1 if standing_energy(par, s, bars) > QUIET_SHARE * s.w_r else 0
+    if s.mode == Mode.SS and s.form == 2:
+        s.alert = 1 if standing_energy(s, bars) > QUIET_SHARE * s.w_r else 0
 
 
 @kernel
 def look(par, s, bars):
     """Look which modes are needed, and whether a standstill may end by itself."""
     s.look = s.time + LOOK * WHOLE
-    if s.closed == 0:
-        leave_out(par, s, bars)
+    leave_out(par, s, bars)
     watch_energy(par, s, bars)
 
 
 @kernel
 def end_standstill(par, s, bars, events):
     """Leave standstill where the bit's energy passes the barrier."""
-    if overcomes_barrier(par, s, bit_kinetic(par, s, bars)):
+    if overcomes_barrier(par, s, bit_kinetic(s, bars, bars.w)):
         leave_standstill(par, s, s.v_low)
-        if s.mode != Mode.BC:
-            take_all(s, bars)
+        change_spring(par, s, bars)
         push_event(s, events, time_of(par, s), s.mode, spring_force(s))
 
 
 @kernel
 def change_mode(par, s, bars, events):
     """Make the change of mode that the present state asks for."""
-    left, before, energy = s.mode, recoverable(s), bit_kinetic(par, s, bars)
+    left, before, energy = s.mode, recoverable(s), bit_kinetic(s, bars, bars.w)
     if s.mode == Mode.FF:
         if par.rock == RockKind.WALL:
             s.e_standstill += before
@@ -91,18 +85,27 @@ def change_mode(par, s, bars, events):
     if s.mode == Mode.FF:
         if par.rock == RockKind.SPRING or left == Mode.BC:
             s.e_overshoot += before
+    change_spring(par, s, bars)
     if s.mode == Mode.SS:
         enter_standstill(s, time_of(par, s))
         push_checkpoint(s, time_of(par, s))
-    elif s.mode == Mode.DFC or s.mode == Mode.FC:
-        take_all(s, bars)
     watch_energy(par, s, bars)
     push_event(s, events, time_of(par, s), s.mode, spring_force(s))
 
 
 @inlined
 def passed(par, s, p, v, work, force):
-    """Whether a state lies beyond the end of the present mode; energy apart."""
+    """Whether a state lies beyond the end of the present mode; energy apart.
+
+    Parameters
+    ----------
+    p, v : float
+        Penetration [m] and velocity of the rock end [m/s].
+    work : float
+        Of the rock's dashpot in the step [J].
+    force : float
+        Of the rock on the bit at that time [N].
+    """
     if par.rock == RockKind.NONE:
         return False
     if s.mode == Mode.FF:

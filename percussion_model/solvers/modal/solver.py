@@ -4,36 +4,36 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from percussion_model.physics.kernel import entry_of
 from percussion_model.physics.records import Piston, RockKind
-from percussion_model.scene.bars import bar_mass, bar_transit_time
-from percussion_model.scene.numbers import numbers_of
+from percussion_model.scene.bars import bar_transit_time
+from percussion_model.scene.numbers import Numbers, numbers_of
 from percussion_model.scene.parameters import Bar
 from percussion_model.scene.scene import Scene
 from percussion_model.solvers.base import Solver
 from percussion_model.solvers.modal.advance import TICK_ROUNDING, run
 from percussion_model.solvers.modal.fields import Places
-from percussion_model.solvers.modal.modes import end_compliance
+from percussion_model.solvers.modal.modes import Modes
 from percussion_model.solvers.modal.records import (
-    LEVELS,
+    JOINED,
     MODAL_LIMITS,
     MODAL_PAR,
     MODAL_STATE,
     STEP,
     Bars,
-    ModalBar,
-    Move,
-    Reply,
+    Forms,
     Shape,
+    Standstill,
     Task,
 )
-from percussion_model.solvers.modal.standstill import POWERS, no_standstill, standstill_of
-from percussion_model.solvers.modal.tables import modal_bar
+from percussion_model.solvers.modal.standstill import FEW, POWERS, no_standstill, standstill_of
+from percussion_model.solvers.modal.tables import end_compliance, forms_of, piston_tables
 from percussion_model.solvers.setup import (
+    PISTONS,
     fill_parameters,
     fill_start,
     kelvin_voigt_time,
@@ -48,12 +48,40 @@ COARSER = 0.7
 LONGEST_LEAP = ((1 << POWERS) - 1) << STEP
 
 
-def no_bar() -> ModalBar:
-    """Stand-in for a piston without modes."""
-    reply = np.zeros((1, STEP + 1, len(Reply)))
-    move = np.zeros((LEVELS, len(Move), 0))
-    size, level = np.zeros(1, np.int64), np.full(1, STEP)
-    return ModalBar(np.zeros((len(Shape), 0)), move, reply, size, np.ones((1, 2)), level)
+class Tables(NamedTuple):
+    """What scenes of the same bars and rock share."""
+
+    forms: Forms
+    modes: list[Modes]
+    free_piston: Modes | None
+    shape_p: np.ndarray
+    move_p: np.ndarray
+    standstill: Standstill | None
+
+
+# Tables that were made last; so many are kept.
+_kept: dict[tuple[Any, ...], Tables] = {}
+MOST_KEPT = 4
+
+
+def _tables(
+    numbers: Numbers, mass: float, springs: tuple[float, float], c_r: float, highest: float,
+    tick: float, leaps: bool,
+) -> Tables:  # fmt: skip
+    """Make the tables of a scene, or find them."""
+    elastic = mass > 0.0 and PISTONS[numbers.values.piston_model] == Piston.ELASTIC
+    piston, bit, eta = numbers.piston if elastic else None, numbers.bit, kelvin_voigt_time(numbers)
+    bytes_ = bit.tobytes(), None if piston is None else piston.tobytes()
+    key = (*bytes_, mass, springs, c_r, highest, tick, eta, leaps)
+    if key not in _kept:
+        while len(_kept) >= MOST_KEPT:
+            del _kept[next(iter(_kept))]
+        made = forms_of(bit, piston, mass, springs, highest, eta, tick)
+        still = None
+        if leaps and springs[1] > 0.0:
+            still = standstill_of(made[0], c_r, eta, tick * (1 << STEP))
+        _kept[key] = Tables(*made, *piston_tables(made[2], eta, tick), still)
+    return _kept[key]
 
 
 class ModalSolver(Solver):
@@ -92,11 +120,17 @@ class ModalSolver(Solver):
         p["dt"] = self.time_step = first / self.modes
         p["tick"] = tick = self.time_step / (1 << STEP)
         highest = math.pi / self.time_step
-        bit = modal_bar(numbers.bit, highest, eta, tick)
-        piston = modal_bar(numbers.piston, highest, eta, tick) if elastic else no_bar()
-        self._constant = piston, bit
-        self.cells = {"piston": piston.shape.shape[1]} if elastic else {}
-        self.cells["bit"] = bit.shape.shape[1]
+        rock = rock_numbers(numbers)
+        kind = p["rock"]
+        springs = (
+            rock.k_r if kind in (RockKind.BILINEAR, RockKind.SPRING) else 0.0,
+            rock.gamma * rock.k_r if kind == RockKind.BILINEAR else 0.0,
+        )
+        mass = 0.0 if p["piston"] == Piston.ABSENT else float(p["mass_p"])
+        leaps = bool(numbers.values.solver_leaps and not p["effects"])
+        self._tables = made = _tables(numbers, mass, springs, rock.c_r, highest, tick, leaps)
+        self.cells = {} if made.free_piston is None else {"piston": made.shape_p.shape[1]}
+        self.cells["bit"] = int(made.forms.sizes[0])
         if p["piston"] == Piston.ABSENT:
             p["mass_p"] = 0.0
         else:
@@ -104,43 +138,51 @@ class ModalSolver(Solver):
         p["bound_p"] = math.sqrt(end_compliance(numbers.piston)) if elastic else 0.0
         p["bound_b"] = math.sqrt(end_compliance(numbers.bit))
         p["bound_t"] = math.sqrt(end_compliance(numbers.bit[::-1]))
-        last = int(bit.sizes[-1])
-        p["end_speed"] = math.sqrt(
-            1.0 / bar_mass(numbers.bit) + sum((bit.shape[Shape.LOW, :last] ** 2).tolist())
-        )
-        rock = rock_numbers(numbers)
-        p["ss_stiffness"], p["ss_damping"] = rock.gamma * rock.k_r, rock.c_r
-        self._standstill = no_standstill(bit.shape.shape[1])
-        if numbers.values.solver_leaps and not p["effects"]:
-            p["leaps"] = 1
-            if p["rock"] == RockKind.BILINEAR and p["barrier"] == 1:
-                self._standstill = standstill_of(
-                    bit, float(p["mass_b"]), rock.gamma * rock.k_r, rock.c_r, self.time_step
-                )
-                self.operator_bytes = sum(part.nbytes for part in self._standstill)
+        p["end_speed"] = math.sqrt(sum((made.forms.shape[2, Shape.LOW, :FEW] ** 2).tolist()))
+        p["k_r"], p["gamma"], p["c_r"] = rock.k_r, rock.gamma, rock.c_r
+        p["eta"] = eta
+        p["leaps"] = leaps
+        self._standstill = made.standstill or no_standstill()
+        self.operator_bytes = sum(part.nbytes for part in (*made.forms, *self._standstill))
+        self._rows = np.zeros((2, made.forms.shape.shape[2]))
         self._read_at: dict[str, Places] = {}
         self._entry: Callable[..., int] = entry_of(run)
 
     def _places(self, name: str) -> Places:
         if name not in self._read_at:
             sections = self._numbers.piston if name == "piston" else self._numbers.bit
-            bar = self._constant[name == "bit"]
-            self._read_at[name] = Places(sections, bar, self.time_step)
+            self._read_at[name] = Places(sections, self.time_step)
         return self._read_at[name]
 
     def fields(self, state: State) -> dict[str, np.ndarray]:
         """Elastic force [N] and velocity [m/s] of each cell, top to bottom, by bar."""
-        s, out = state.record[0], {}
+        s, (w, wp), out, made = state.record[0], state.arrays, {}, self._tables
+        form, par = int(s["form"]), self._par[0]
+        joined = form >= JOINED
+        shape = made.forms.shape[form]
+        # about rest, whose force is known in closed form
+        moving = w[:2].copy()
+        moving[0, : s["active"]] -= (shape[Shape.SOFT] * w[2])[: s["active"]]
+        loads = {"piston": float(s["a_p"]), "bit": float(s["a_b"])}
+        whole = float(par["mass_b"]) + (float(par["mass_p"]) if joined else 0.0)
+        if made.forms.stiff[form] == 0.0:
+            pull = float(par["mass_b"]) * loads["bit"]
+            pull += float(par["mass_p"]) * loads["piston"] if joined else 0.0
+            loads = {name: a - pull / whole for name, a in loads.items()}
         for name in self.cells:
-            w, bar = state.arrays[name == "bit"], self._constant[name == "bit"]
-            if name == "bit":
-                which, mean, top, low = int(s["set"]), s["v_b"], s["r_t"], s["r_b"]
-            else:
-                which, mean, top, low = 0, s["v_p"], 0.0, s["r_p"]
-            beyond = bar.beyond[which]
-            out[f"{name}_force"], out[f"{name}_velocity"] = self._places(name).read(
-                w, float(mean), which, int(bar.sizes[which]), top / beyond[0], -low / beyond[1]
-            )
+            first, modes, own, mean, held = 0, made.modes[form], moving, 0.0, 0.0
+            if name == "piston" and not joined:
+                free = made.free_piston
+                assert free is not None
+                own = np.concatenate([np.zeros((2, 1)), wp], axis=1)
+                modes, mean, loads["piston"] = free, float(s["v_p"]), 0.0
+            elif name == "bit" and joined:
+                first = 0 if made.free_piston is None else len(self._numbers.piston)
+                held = float(par["mass_p"]) * loads["piston"]
+            force, velocity = self._places(name).read(modes, first, own)
+            mass = self._places(name).mass
+            force += held + loads[name] * (np.cumsum(mass) - 0.5 * mass)
+            out[f"{name}_force"], out[f"{name}_velocity"] = force, velocity + mean
         return out
 
     def grid_of(self, bar: str) -> Places | None:
@@ -158,17 +200,23 @@ class ModalSolver(Solver):
         return [self.scene.replace(**changes)] if count else None
 
     def _bars(self, state: State) -> Bars:
-        wp, wb = state.arrays
-        return Bars(wp, self._constant[0], wb, self._constant[1])
+        w, wp = state.arrays
+        made = self._tables
+        return Bars(w, wp, made.forms, made.shape_p, made.move_p, self._rows)
 
     def new_state(self) -> State:
         """State at time zero."""
-        state = State(MODAL_STATE, tuple((2, bar.shape.shape[1]) for bar in self._constant))
+        made = self._tables
+        n, n_p = made.forms.shape.shape[2], made.shape_p.shape[1]
+        state = State(MODAL_STATE, ((3, n), (2, n_p)))
         s: Any = state.record[0]
         fill_start(s, self._numbers)
         s["leap_end"] = -1
         s["v_low"] = s["v_b"]
         s["alert"] = 1
+        s["active"] = made.forms.sizes[0]
+        w, root = state.arrays[0], math.sqrt(self._par[0]["mass_b"])
+        w[1, 0] = root * s["v_b"]
         if self._par[0]["piston"] != Piston.ABSENT:
             s["u_p"] = -s["gap"]
             s["u_r"] = s["u_p"]
@@ -193,10 +241,13 @@ class ModalSolver(Solver):
         fault = super().state_fault(state, t)
         if fault:
             return fault
-        s, sets = state.record[0], len(self._constant[1].sizes)
+        s, sizes = state.record[0], self._tables.forms.sizes
         now, end, begin = int(s["time"]), int(s["leap_end"]), int(s["piston_time"])
-        if not s["set"] < sets:
-            return f"set = {int(s['set'])}, of {sets} sets of modes"
+        modes = int(sizes[int(s["form"])])
+        if not 0 < s["active"] <= modes or s["active"] % FEW:
+            return f"active = {int(s['active'])}, of {modes} modes"
+        if (s["form"] >= JOINED) != (s["closed"] == 1):
+            return f"form = {int(s['form'])}, with closed = {int(s['closed'])}"
         if end >= 0 and not now < end <= now + LONGEST_LEAP:
             return f"leap_end = {end}, at {now} with leaps of {LONGEST_LEAP} ticks at most"
         if s["parked"] and not begin <= now:
@@ -241,8 +292,7 @@ class ModalSolver(Solver):
     def readable_until(self, state: State) -> float:
         """Time up to which `read` answers without advancing the state [s]."""
         s = state.record[0]
-        level = int(self._constant[1].levels[int(s["set"])])
-        end = max(int(s["leap_end"]), int(s["time"]) + (1 << level))
+        end = max(int(s["leap_end"]), int(s["time"]) + (1 << STEP))
         return end * float(self._par[0]["tick"])
 
     def grid_point_after(self, state: State, t: float) -> float:

@@ -1,8 +1,7 @@
-"""One step of the modal solver: forces that hold over it, up to the next event.
+"""One step of the modal solver, up to the next event.
 
-A step is as long as its set of modes allows, or as much shorter as it takes for an event to
-lie in its last tick. Contact and rock answer with forces that are constant over a step and
-meet their laws at its end (docs/modal.md, sections 2 and 3).
+Between events the modes of the present form move exactly but for the dashpots at the rock end,
+whose force is constant over a step and meets their law there (docs/modal.md, section 3).
 """
 
 from __future__ import annotations
@@ -28,8 +27,18 @@ from percussion_model.physics.rock import (
     recoverable,
     stiffness,
 )
-from percussion_model.solvers.modal.bar import LOW, end_offset, ends_after, low_after, move_bar
+from percussion_model.solvers.modal.bar import (
+    Ends,
+    end_after,
+    low_after,
+    low_yield,
+    move_free,
+    take,
+    try_move,
+)
+from percussion_model.solvers.modal.forms import gap_of, refresh_loads
 from percussion_model.solvers.modal.piston import (
+    WHOLE,
     flip_contact,
     has_piston,
     park,
@@ -37,136 +46,89 @@ from percussion_model.solvers.modal.piston import (
     time_of,
     unpark,
 )
-from percussion_model.solvers.modal.records import Reply
 from percussion_model.solvers.modal.rock_end import change_mode, end_standstill, look, passed
 
 # Steps after which the running force of a standstill is noted.
 CHECKPOINT = 64
 # Openings and closures of one instant; more would be a loop.
 MOST_FLIPS = 2
-
-
-class Free(NamedTuple):
-    """Where the ends would be after a step without forces between them [m]."""
-
-    piston: float  # low end, or a bound of it
-    top: float
-    path: float  # way of the bit's low end
-    v_low: float  # [m/s]
-    yields: float  # compliance of the contact over the step [m/N]
+# Of a contact, so many steps are told to end by their mean force: fronts ring.
+RINGING = 2
 
 
 class Trial(NamedTuple):
     """A step that may be made."""
 
     h: float  # [s]
-    contact: float  # forces [N]
-    force: float
+    ends: Ends
+    rest: float  # force at the rock end besides the spring of the form [N]
+    force: float  # mean force of the rock [N]
+    last: float  # force of the rock at the end [N]
     path: float  # of the penetration [m]
     work: float  # of the rock's dashpot [J]
-    gap: float  # between piston and bit, where the piston is seen [m]
-    u_p: float
-    v_p: float
-    u_b: float
-    v_b: float
-    v_low: float
+    contact: float  # mean force of piston on bit [N]
+    touch: float  # the same at the end [N]
+    way_b: float  # of the mean motion of bit and piston [m]
+    way_p: float
+    low_p: float  # offset of the free piston's low end [m]
+    gap: float  # [m]
 
 
 @inlined
-def fly_free(par, s, bars, level, a_p, a_b):
-    """Where the ends are after 2^level ticks if nothing holds them."""
-    h = par.tick * (1 << level)
-    wb, cb, n = bars.wb, bars.cb, bars.cb.sizes[s.set]
-    reply = cb.reply[s.set, level]
-    top, low, v_low = ends_after(wb, cb, n, level)
-    path = h * (s.v_b + 0.5 * h * a_b)
-    top += s.u_b + path + reply[Reply.TOP_KEPT] * s.r_t
-    path += low + reply[Reply.LOW_KEPT] * s.r_b - (end_offset(wb, cb, n, LOW) + s.r_b)
-    end, yields = 0.0, reply[Reply.TOP]
-    if has_piston(par):
-        end = s.u_p + h * (s.v_p + 0.5 * h * a_p)
-        if s.parked == 1:
-            end += s.spread_p
-        elif par.piston == Piston.ELASTIC:
-            end += low_after(bars.wp, bars.cp, bars.wp.shape[1], level)
-            end += bars.cp.reply[0, level, Reply.LOW_KEPT] * s.r_p
-            yields += bars.cp.reply[0, level, Reply.LOW]
-        else:
-            yields += 0.5 * h * h / par.mass_p
-    return Free(end, top, path, v_low + s.v_b + h * a_b, yields)
+def rest_force(par, s, bars, m, h):
+    """Force at the rock end besides the spring of the form, over a step of `h` [N]."""
+    shape, n = bars.forms.shape[s.form], s.active
+    held = bars.forms.stiff[s.form]
+    if par.rock == RockKind.WALL:
+        if s.mode == Mode.FF:
+            return 0.0
+        return (low_after(bars.w, shape, m, n) - s.low) / low_yield(shape, m, n)
+    first = slope = 0.0
+    if s.mode != Mode.FF:
+        K = stiffness(s) - held if held == 0.0 else 0.0
+        first = K * (s.p - origin(s))
+        # the loss of a form's modes takes its spring for a part of the bar
+        slope = 0.5 * K + (damping(s) - par.eta * held) / h
+    if first == 0.0 and slope == 0.0:
+        return 0.0
+    free = low_after(bars.w, shape, m, n) - s.low
+    return (first + slope * free) / (1.0 + slope * low_yield(shape, m, n))
 
 
 @inlined
-def solve(par, s, free, reply, h):
-    """Forces of contact and rock, and the way of the rock end, by the laws at the step's end.
-
-    The rock's force is its mean over the step, K (p - P_R) + C v with p in the middle.
-    """
-    near = free.piston - free.top + s.offset
-    cross = reply[Reply.CROSS]
-    contact = 0.0
-    if s.mode == Mode.FF:
-        if s.closed == 1:
-            contact = near / free.yields
-        return contact, 0.0, free.path + cross * contact
-    first, inverse = 0.0, 0.0
-    if par.rock != RockKind.WALL:
-        first = stiffness(s) * (s.p - origin(s))
-        inverse = 1.0 / (0.5 * stiffness(s) + damping(s) / h)
-    whole, due = reply[Reply.LOW] + inverse, free.path + first * inverse
-    if s.closed == 1:
-        det = free.yields * whole - cross * cross
-        contact = (near * whole + cross * due) / det
-        force = (due * free.yields + cross * near) / det
-    else:
-        force = due / whole
-    return contact, force, (force - first) * inverse
-
-
-@inlined
-def try_step(par, s, bars, free, level, a_p, a_b):
+def try_step(par, s, bars, level):
     """Make out a step of 2^level ticks."""
     h = par.tick * (1 << level)
-    reply = bars.cb.reply[s.set, level]
-    contact, force, path = solve(par, s, free, reply, h)
-    v_low = free.v_low + reply[Reply.CROSS_SPEED] * contact - reply[Reply.LOW_SPEED] * force
-    gap = s.offset
-    if s.closed == 0:
-        gap = free.top - free.piston - reply[Reply.CROSS] * force
-    v_p = s.v_p + h * a_p
-    if s.closed == 1:
-        v_p -= h * contact / par.mass_p
-    v_b = s.v_b + h * (a_b + (contact - force) / par.mass_b)
-    u_p, u_b = s.u_p + 0.5 * h * (s.v_p + v_p), s.u_b + 0.5 * h * (s.v_b + v_b)
-    work = damping(s) * path * path / h
-    return Trial(h, contact, force, path, work, gap, u_p, v_p, u_b, v_b, v_low)
-
-
-@merged
-def move_piston(par, s, bars, level, contact):
-    """Move the modes of the piston, and what is beyond them."""
-    if par.piston != Piston.ELASTIC:
-        return
-    cp = bars.cp
-    s.e_loss += move_bar(bars.wp, cp, bars.wp.shape[1], level, 0.0, -contact)
-    kept, beyond = cp.reply[0, level, Reply.LOW_KEPT], cp.beyond[0, 1]
-    off = s.r_p + beyond * contact
-    s.e_loss += 0.5 * (1.0 - kept * kept) * off * off / beyond
-    s.r_p = kept * off - beyond * contact
-
-
-@merged
-def move_bit(s, bars, level, contact, force):
-    """Move the modes of the bit, and what is beyond them."""
-    cb = bars.cb
-    reply, beyond = cb.reply[s.set, level], cb.beyond[s.set]
-    s.e_loss += move_bar(bars.wb, cb, cb.sizes[s.set], level, contact, -force)
-    kept, off = reply[Reply.TOP_KEPT], s.r_t - beyond[0] * contact
-    s.e_loss += 0.5 * (1.0 - kept * kept) * off * off / beyond[0]
-    s.r_t = kept * off + beyond[0] * contact
-    kept, off = reply[Reply.LOW_KEPT], s.r_b + beyond[1] * force
-    s.e_loss += 0.5 * (1.0 - kept * kept) * off * off / beyond[1]
-    s.r_b = kept * off - beyond[1] * force
+    m = bars.forms.move[s.form, level]
+    joined = s.closed == 1
+    rest = rest_force(par, s, bars, m, h)
+    shape = bars.forms.shape[s.form]
+    ends = try_move(bars.w, bars.rows, shape, m, s.active, rest, par.eta, joined)
+    path = ends.low - s.low
+    C, spring = damping(s), stiffness(s) * (s.p - origin(s))
+    force = spring + 0.5 * stiffness(s) * path + C * path / h
+    last = spring + stiffness(s) * path + C * ends.speed
+    if par.rock == RockKind.WALL:
+        force = last = rest
+    way_b = (ends.bit - s.at_b) / par.mass_b
+    way_p = contact = touch = low_p = gap = 0.0
+    if joined:
+        way_p = (ends.piston - s.at_p) / par.mass_p
+        contact = par.mass_p * (s.a_p + (s.v_p - ends.piston_speed / par.mass_p) / h)
+        touch = contact
+        if s.time - s.closed_at >= RINGING * WHOLE:
+            touch = par.mass_p * s.a_p - ends.pull
+    elif has_piston(par):
+        way_p = h * (s.v_p + 0.5 * h * s.a_p)
+        top = s.u_b + way_b + (ends.top - ends.bit / par.mass_b) + s.offset
+        low_p = s.spread_p
+        if s.parked == 0:
+            low_p = 0.0
+            if par.piston == Piston.ELASTIC:
+                low_p = end_after(bars.wp, bars.shape_p, bars.move_p[level], bars.wp.shape[1])
+        gap = top - (s.u_p + way_p + low_p)
+    work = C * path * path / h
+    return Trial(h, ends, rest, force, last, path, work, contact, touch, way_b, way_p, low_p, gap)
 
 
 @merged
@@ -176,7 +138,6 @@ def book_rock(par, s, trial, before):
         s.e_standstill += before - recoverable(s)
         return
     s.rock_work += trial.force * trial.path
-    s.i_bit += trial.force * trial.h
     book_dashpot(s, trial.work)
     crush(par, s, s.p - trial.path)
     s.b_peak_bit = max(s.b_peak_bit, trial.force)
@@ -203,17 +164,28 @@ def book_contact(par, s, trial):
 @kernel
 def make(par, s, bars, level, trial, push, events):
     """Make a step that was tried."""
-    begin, before = time_of(par, s), recoverable(s)
+    begin, before, h = time_of(par, s), recoverable(s), trial.h
+    ends = trial.ends
     s.time += 1 << level
     s.count_steps += 1
+    take(bars.w, bars.rows, s.active)
+    held = bars.forms.stiff[s.form]
+    s.e_loss += ends.lost - par.eta * held * trial.path * trial.path / h
     if has_piston(par):
-        if s.parked == 0:
-            move_piston(par, s, bars, level, trial.contact)
-        book_piston_load(par, s, push, trial.u_p - s.u_p, push * trial.h)
-        s.u_p, s.v_p, s.gap = trial.u_p, trial.v_p, trial.gap
-    move_bit(s, bars, level, trial.contact, trial.force)
-    book_bit_load(par, s, trial.u_b - s.u_b)
-    s.u_b, s.v_b, s.v_low = trial.u_b, trial.v_b, trial.v_low
+        v_p = s.v_p + h * s.a_p - h * trial.contact / par.mass_p
+        if s.closed == 0 and s.parked == 0 and par.piston == Piston.ELASTIC:
+            s.e_loss += move_free(bars.wp, bars.move_p[level], bars.wp.shape[1])
+            s.low_p = trial.low_p
+        book_piston_load(par, s, push, trial.way_p, push * h)
+        s.u_p += trial.way_p
+        s.v_p, s.gap = v_p, trial.gap
+    v_b = ends.bit_speed / par.mass_b
+    if s.mode != Mode.FF:
+        s.i_bit += trial.contact * h + par.mass_b * (h * s.a_b - (v_b - s.v_b))
+    book_bit_load(par, s, trial.way_b)
+    s.u_b += trial.way_b
+    s.v_b, s.v_low = v_b, ends.speed
+    s.low, s.top, s.at_b, s.at_p = ends.low, ends.top, ends.bit, ends.piston
     s.f_contact, s.f_rock = trial.contact, trial.force
     s.p += trial.path
     book_rock(par, s, trial, before)
@@ -222,12 +194,31 @@ def make(par, s, bars, level, trial, push, events):
         u_before = s.u_r
         s.u_r = s.u_p - s.u_b
         s.b_stroke = max(s.b_stroke, -s.u_r)
-        switch_drive(par, s, u_before, begin, trial.h, events)
+        switch_drive(par, s, u_before, begin, h, events)
 
 
 @kernel
 def step(par, s, bars, most, blows, events):
     """Go on by a step, of 2^most ticks at most, or to the next event."""
+    level = go_on(par, s, bars, most, False, blows, events)
+    while level >= 0:
+        level = go_on(par, s, bars, level, True, blows, events)
+
+
+@kernel
+def go_on(par, s, bars, most, near, blows, events):
+    """As `step`, or as far as is known to be before the event.
+
+    Parameters
+    ----------
+    near : bool
+        Whether it is known to come within twice 2^most ticks.
+
+    Returns
+    -------
+    int
+        The event comes within twice 2^level ticks; -1 where it was met, or none is near.
+    """
     if s.time >= s.look:
         look(par, s, bars)
     hold_effects(par, s)
@@ -239,22 +230,23 @@ def step(par, s, bars, most, blows, events):
     push = drive_force(par, s)
     a_p = piston_acceleration(par, push) if piston else 0.0
     a_b = bit_acceleration(par, s)
+    if a_p != s.a_p or a_b != s.a_b:
+        refresh_loads(s, bars, a_b, a_p)
     level, flips = most, 0
     while True:
-        free = fly_free(par, s, bars, level, a_p, a_b)
-        if piston and s.parked == 1 and free.piston > free.top:
+        trial = try_step(par, s, bars, level)
+        if piston and s.parked == 1 and trial.gap < 0.0:
             unpark(par, s, bars)
             continue
-        trial = try_step(par, s, bars, free, level, a_p, a_b)
         flip = False
         if piston and s.parked == 0:
-            flip = trial.contact < 0.0 if s.closed == 1 else trial.gap < 0.0
-        ends = passed(par, s, s.p + trial.path, trial.v_low, trial.work, trial.force)
-        turns = piston and switches(par, s, trial.u_p - trial.u_b)
+            flip = trial.touch < 0.0 if s.closed == 1 else trial.gap < 0.0
+        ends = passed(par, s, s.p + trial.path, trial.ends.speed, trial.work, trial.last)
+        turns = piston and switches(par, s, s.u_r + trial.way_p - trial.way_b)
         if level > 0 and (flip or ends or turns):
             level -= 1
         elif flip and flips < MOST_FLIPS:
-            flip_contact(par, s, bars, trial.v_p - trial.v_b, blows, events)
+            flip_contact(par, s, bars, s.v_p - s.v_b, blows, events)
             level, flips = most, flips + 1
         elif ends and s.mode != Mode.FF and par.rock == RockKind.WALL:
             change_mode(par, s, bars, events)
@@ -265,3 +257,9 @@ def step(par, s, bars, most, blows, events):
         change_mode(par, s, bars, events)
     elif s.mode == Mode.SS and (s.n_check == 0 or s.count_steps % CHECKPOINT == 0):
         push_checkpoint(s, time_of(par, s))
+    if ends or turns or flips > 0 or most == 0 or not (near or level < most):
+        return -1
+    return max(level - 1, 0)
+
+
+__all__ = ["gap_of", "step"]

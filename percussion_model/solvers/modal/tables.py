@@ -1,4 +1,9 @@
-"""What does not change of a modal bar: moves of its modes, and how its ends yield to a force."""
+"""What does not change of the bars: moves of their modes, and changes from one form to another.
+
+A form says which bars move as one and what the rock end stands on: the bit by itself, or joined
+to the piston that it touches; free, or on the rock's spring K_R or gamma K_R
+(docs/modal.md, section 2).
+"""
 
 from __future__ import annotations
 
@@ -7,16 +12,11 @@ import math
 import numpy as np
 
 from percussion_model.physics.kernel import kernel
-from percussion_model.scene.bars import bar_mass, section_impedance, section_transit_time
+from percussion_model.scene.bars import bar_mass
 from percussion_model.solvers.modal.lanes import WIDTH
-from percussion_model.solvers.modal.modes import Modes, count_below, end_compliance, free_modes
-from percussion_model.solvers.modal.records import LEVELS, STEP, ModalBar, Move, Reply
+from percussion_model.solvers.modal.modes import Modes, bar_modes, count_below, products, totals
+from percussion_model.solvers.modal.records import LEVELS, STEP, Forms, Move, Shape
 
-# Sizes of the sets of modes: once the others have died away, so few are moved, in steps twice
-# as long.
-SMALLER = (16, 8)
-# A short section at an end: modes up to so many times the highest one tell how the end yields.
-FURTHER = 40.0
 # Factors of a move below this are zero: what they leave would only slow down arithmetic.
 NOTHING = 1e-40
 # Nodes and weights by which the loss over a tick is integrated.
@@ -52,7 +52,8 @@ def _fill_moves(w, eta, tick, nodes, weights, out):
             qv += share * 2.0 * vq * v
             vv += share * v * v
         for level in range(out.shape[0]):
-            a, b, c, d = _move(w[k], delta, tick * 2.0**level)
+            h = tick * 2.0**level
+            a, b, c, d = _move(w[k], delta, h)
             row = out[level]
             row[Move.LOSS_QQ, k], row[Move.LOSS_QV, k], row[Move.LOSS_VV, k] = qq, qv, vv
             # twice as long: the first half, and what is left after it
@@ -61,55 +62,64 @@ def _fill_moves(w, eta, tick, nodes, weights, out):
                 qv + 2.0 * a * b * qq + (a * d + b * c) * qv + 2.0 * c * d * vv,
                 vv + b * b * qq + b * d * qv + d * d * vv,
             )
-            if abs(a) + abs(b) * w[k] + abs(c) / w[k] + abs(d) < NOTHING:
+            if w[k] == 0.0:
+                row[Move.YIELD, k] = 0.5 * h * h
+            elif abs(a) + abs(b) * w[k] + abs(c) / w[k] + abs(d) < NOTHING:
                 a = b = c = d = 0.0
+            if w[k] > 0.0:
+                row[Move.YIELD, k] = (1.0 - a) / (w[k] * w[k])
             row[Move.Q_BY_Q, k], row[Move.Q_BY_V, k] = a, b
             row[Move.V_BY_Q, k], row[Move.V_BY_V, k] = c, d
 
 
-def end_offset(impedance: float, eta: float, h: float) -> float:
-    """Offset of an end of a long Kelvin-Voigt bar by a force of 1 N over `h` [m].
-
-    Its velocity is erf(sqrt(t / eta)) / Z (docs/modal.md, eqs 4-5).
-    """
-    if eta == 0.0:
-        return h / impedance
-    tau = h / eta
-    root = math.sqrt(tau)
-    inner = (tau - 0.5) * math.erf(root) + root * math.exp(-tau) / math.sqrt(math.pi)
-    return eta / impedance * inner
+def moves_of(frequency: np.ndarray, eta: float, tick: float) -> np.ndarray:
+    """Table of moves over 2^level ticks, shape (LEVELS, len(Move), n)."""
+    out = np.zeros((LEVELS, len(Move), len(frequency)))
+    _fill_moves(frequency, eta, tick, _NODES, _WEIGHTS, out)
+    return out
 
 
-def _yielding(
-    sections: np.ndarray, shapes: np.ndarray, modes: Modes, beyond: float, eta: float, h: float
-) -> float:
-    """Offset of an end by a force of 1 N over `h`, of all modes and the mean motion [m].
+def _lanes(count: int) -> int:
+    """So many modes, in whole lanes."""
+    return max(1, -(-count // WIDTH)) * WIDTH
+
+
+def _shapes(modes: Modes, parts: tuple[int, int]) -> np.ndarray:
+    """Rows of `Shape` of a bar whose first sections, so many, are the piston's."""
+    above, whole = parts
+    row = np.zeros((len(Shape), len(modes.frequency)))
+    w = modes.frequency
+    row[Shape.LOW], row[Shape.TOP] = modes.low, modes.above(above)
+    row[Shape.STIFF] = w * w
+    row[Shape.SOFT, w > 0.0] = 1.0 / w[w > 0.0] ** 2
+    row[Shape.BIT] = totals(modes, above, whole - above)
+    row[Shape.PISTON] = modes.top_mass * modes.above(0)
+    if above:
+        row[Shape.PISTON] = totals(modes, 0, above)
+    return row
+
+
+def forms_of(
+    bit: np.ndarray,
+    piston: np.ndarray | None,
+    piston_mass: float,
+    springs: tuple[float, float],
+    highest: float,
+    eta: float,
+    tick: float,
+) -> tuple[Forms, list[Modes], Modes | None]:
+    """Tables of all forms, their modes, and those of the free piston.
 
     Parameters
     ----------
-    sections : ndarray
-        From this end on.
-    shapes : ndarray
-        Of the end in `modes`, which reach far.
-    beyond : float
-        Compliance beyond those [m/N].
-    """
-    there_and_back = 2.0 * section_transit_time(sections[0])
-    if there_and_back >= h + 4.0 * math.sqrt(eta * h):
-        return end_offset(section_impedance(sections[0]), eta, h)
-    total = 0.5 * h * h / bar_mass(sections)
-    for w, shape in zip(modes.frequency.tolist(), shapes.tolist(), strict=True):
-        total += shape * shape / (w * w) * (1.0 - _move(w, 0.5 * eta * w * w, h)[0])
-    return total + beyond * (1.0 - math.exp(-h / eta) if eta > 0.0 else 1.0)
-
-
-def modal_bar(sections: np.ndarray, highest: float, eta: float, tick: float) -> ModalBar:
-    """Tables of a bar.
-
-    Parameters
-    ----------
-    sections : ndarray, shape (sections, 4)
+    bit : ndarray, shape (sections, 4)
         From top to bottom.
+    piston : ndarray or None
+        Sections of an elastic one.
+    piston_mass : float
+        0 where there is none [kg].
+    springs : (float, float)
+        K_R and gamma K_R [N/m]; a form of 0 is left empty.
     highest : float
         Angular frequency up to which there are modes, and some more [rad/s].
     eta : float
@@ -117,49 +127,77 @@ def modal_bar(sections: np.ndarray, highest: float, eta: float, tick: float) -> 
     tick : float
         Unit of time [s].
     """
-    many = free_modes(sections, max(2 * WIDTH, count_below(sections, FURTHER * highest)))
-    n = len(many.below(highest).frequency)
-    n = max(1, math.ceil(n / WIDTH)) * WIDTH
-    modes = Modes(*(part[:n] for part in many))
-    move = np.zeros((LEVELS, len(Move), n))
-    _fill_moves(modes.frequency, eta, tick, _NODES, _WEIGHTS, move)
-    sizes = np.array([n, *(size for size in SMALLER if size < n)])
-    levels = np.where(sizes == n, STEP - 1, STEP)
-    soft = 1.0 / modes.frequency**2
-    reply = np.zeros((len(sizes), STEP + 1, len(Reply)))
-    beyond = np.zeros((len(sizes), 2))
-    ends = (
-        (Reply.TOP, modes.top, many.top, sections[::-1], Reply.TOP_REST, Reply.TOP_KEPT),
-        (Reply.LOW, modes.low, many.low, sections, Reply.LOW_REST, Reply.LOW_KEPT),
-    )
-    mass = bar_mass(sections)
-    for level in range(STEP + 1):
-        h = tick * 2.0**level
-        row = move[level]
-        yields = soft * (1.0 - row[Move.Q_BY_Q])
-        speeds = row[Move.Q_BY_V]
-        for j, (end, shape, far, seen, rest, kept) in enumerate(ends):
-            # the low end's compliance is that of all that lies above it
-            every = end_compliance(seen)
-            whole = _yielding(
-                seen[::-1], far, many, every - _sum(far * far / many.frequency**2), eta, h
-            )
-            for k, size in enumerate(sizes):
-                by_modes = 0.5 * h * h / mass + _sum((shape * shape * yields)[:size])
-                reply[k, level, end] = whole
-                reply[k, level, rest] = whole - by_modes
-                beyond[k, j] = every - _sum((shape * shape * soft)[:size])
-                reply[k, level, kept] = 1.0 - reply[k, level, rest] / beyond[k, j]
-        for k, size in enumerate(sizes):
-            both = modes.top * modes.low
-            reply[k, level, Reply.CROSS] = 0.5 * h * h / mass + _sum((both * yields)[:size])
-            reply[k, level, Reply.CROSS_SPEED] = h / mass + _sum((both * speeds)[:size])
-            own = modes.low * modes.low
-            reply[k, level, Reply.LOW_SPEED] = h / mass + _sum((own * speeds)[:size])
-    shape = np.stack([modes.top, modes.low, soft, modes.frequency**2])
-    return ModalBar(shape, move, reply, sizes, beyond, levels)
+    n_bit = _lanes(count_below(bit, highest) + 1)
+    above = n_piston = 0
+    free = None
+    if piston is not None:
+        above, n_piston = len(piston), _lanes(count_below(piston, highest))
+        free = bar_modes(piston, n_piston + 1)
+    both = bit if piston is None else np.vstack([piston, bit])
+    n = n_bit + n_piston if piston_mass else n_bit
+    sizes, stiff = np.zeros(6, np.int64), np.array([0.0, *springs] * 2)
+    shape, move = np.zeros((6, len(Shape), n)), np.zeros((6, LEVELS, len(Move), n))
+    change, join = np.zeros((6, 6, n, n)), np.zeros((3, max(n_piston, 1), n))
+    found: list[Modes] = []
+    for form in range(6):
+        joined = form >= 3
+        rigid = piston_mass if joined and piston is None else 0.0
+        count = n if joined else n_bit
+        modes = bar_modes(both if joined else bit, count, stiff[form], rigid)
+        found.append(modes)
+        if (joined and not piston_mass) or (form % 3 and stiff[form] == 0.0):
+            continue
+        sizes[form] = count
+        first = above if joined else 0
+        shape[form, :, :count] = _shapes(modes, (first, len(modes.mass)))
+        move[form, :, :, :count] = moves_of(modes.frequency, eta, tick)
+    for one in range(6):
+        for other in range(6):
+            if one == other or not sizes[one] or not sizes[other]:
+                continue
+            if one % 3 != other % 3 and one // 3 != other // 3:
+                continue
+            a, b = found[one], found[other]
+            if one // 3 == other // 3:
+                part = products(b, 0, a, 0, len(a.mass))
+            elif one < 3:
+                part = products(b, above, a, 0, len(bit))
+            else:
+                part = products(b, 0, a, above, len(bit))
+            change[one, other, : part.shape[1], : part.shape[0]] = part.T
+    if free is not None:
+        for form in range(3):
+            if sizes[3 + form]:
+                part = products(found[3 + form], 0, free, 0, above)[:, 1:]
+                join[form, :n_piston, : len(part)] = part.T
+    return Forms(sizes, stiff, shape, move, change, join), found, free
 
 
-def _sum(values: np.ndarray) -> float:
-    """Sum in the order of the values, whatever the processor."""
-    return sum(values.tolist())
+def piston_tables(free: Modes | None, eta: float, tick: float) -> tuple[np.ndarray, np.ndarray]:
+    """Shapes and moves of the elastic modes of a free piston."""
+    if free is None:
+        return np.zeros((len(Shape), 0)), np.zeros((LEVELS, len(Move), 0))
+    elastic = free._replace(frequency=free.frequency[1:], size=free.size[1:], phase=free.phase[1:])
+    shape = _shapes(elastic, (0, len(free.mass)))
+    return shape, moves_of(elastic.frequency, eta, tick)
+
+
+def end_compliance(sections: np.ndarray) -> float:
+    """Offset of the low end from the mean of a free bar, by a constant force there [m/N].
+
+    The sum of shape^2 / frequency^2 over all modes. The bar's own inertia balances the force,
+    so that a section carries the share of it that the mass above is of all.
+    """
+    from percussion_model.scene.bars import AREA, LENGTH, YOUNGS_MODULUS, section_mass
+
+    whole, above, total = bar_mass(sections), 0.0, 0.0
+    for section in sections:
+        first = above / whole
+        above += section_mass(section)
+        last = above / whole
+        flexible = float(section[LENGTH]) / float(section[YOUNGS_MODULUS] * section[AREA])
+        total += flexible * (first * first + first * last + last * last) / 3.0
+    return total
+
+
+__all__ = ["STEP", "end_compliance", "forms_of", "moves_of", "piston_tables"]

@@ -1,0 +1,274 @@
+"""Changes of form: the same motion in the modes of other bars, or on another spring.
+
+What the modes of the new form have no room for is vibration that the bars' loss would take
+within a microsecond: it is booked as loss.
+"""
+
+from __future__ import annotations
+
+from percussion_model.physics.kernel import inlined, kernel, merged
+from percussion_model.physics.records import Mode, Piston, RockKind
+from percussion_model.physics.rock import damping, origin
+from percussion_model.solvers.modal.bar import (
+    BIT,
+    LOAD,
+    LOW,
+    PISTON,
+    SOFT,
+    STIFF,
+    TOP,
+    Q,
+    V,
+    bar_energy,
+    kinetic_of,
+    piston_vibration,
+    row_sum,
+)
+from percussion_model.solvers.modal.lanes import WIDTH, load, spread, store, total
+from percussion_model.solvers.modal.records import JOINED
+
+# Modes that have less than this share of the energy of vibration together are left out.
+LEAST_SHARE = 1e-8
+# Or where what they could hold of force is below this share of the load.
+LEAST_FORCE = 1e-3
+
+
+@merged
+def form_wanted(par, s):
+    """Form of the present mode; the free one for rock that no form was made for."""
+    form = JOINED if s.closed == 1 else 0
+    if par.rock == RockKind.SPRING and s.mode != Mode.FF and s.k_r == par.k_r:
+        return form + 1
+    if par.rock != RockKind.BILINEAR or s.k_r != par.k_r or s.gamma != par.gamma:
+        return form
+    if s.mode == Mode.DFC or s.mode == Mode.FC:
+        return form + 1
+    if s.mode == Mode.BC or s.mode == Mode.SS:
+        return form + 2
+    return form
+
+
+@inlined
+def refresh_sums(s, bars):
+    """Take the sums over modes that steps begin with."""
+    shape, n = bars.forms.shape[s.form], s.active
+    s.low = row_sum(shape, LOW, bars.w, Q, n)
+    s.top = row_sum(shape, TOP, bars.w, Q, n)
+    s.at_b = row_sum(shape, BIT, bars.w, Q, n)
+    s.at_p = row_sum(shape, PISTON, bars.w, Q, n)
+
+
+@inlined
+def refresh_loads(s, bars, a_b, a_p):
+    """Take the forces of body loads on the modes."""
+    shape = bars.forms.shape[s.form]
+    for k in range(0, bars.forms.sizes[s.form], WIDTH):
+        f = load(shape, BIT, k) * a_b + load(shape, PISTON, k) * a_p
+        store(bars.w, LOAD, k, f)
+    s.a_b, s.a_p = a_b, a_p
+
+
+@inlined
+def shift(s, bars, way):
+    """Move everything by the same way, as far as the modes have it, the rock end by `way` [m]."""
+    shape = bars.forms.shape[s.form]
+    moved = spread(0.0)
+    for k in range(0, s.active, WIDTH):
+        both = load(shape, BIT, k) + load(shape, PISTON, k)
+        moved = moved + load(shape, LOW, k) * both
+    way /= total(moved)
+    for k in range(0, s.active, WIDTH):
+        both = load(shape, BIT, k) + load(shape, PISTON, k)
+        store(bars.w, Q, k, load(bars.w, Q, k) + both * way)
+
+
+@inlined
+def energies_of(bars, shape, k, force):
+    """Twice the energies of modes from `k` on about where the forces would hold them [J]."""
+    v = load(bars.w, V, k)
+    held = load(bars.w, LOAD, k) - load(shape, LOW, k) * force
+    y = load(bars.w, Q, k) - load(shape, SOFT, k) * held
+    return v * v + load(shape, STIFF, k) * (y * y)
+
+
+@kernel
+def trim(par, s, bars):
+    """Leave out the highest modes where they have next to no energy."""
+    shape, held = bars.forms.shape[s.form], bars.forms.stiff[s.form]
+    rest = (damping(s) - par.eta * held) * s.v_low
+    whole = spread(0.0)
+    for k in range(0, s.active, WIDTH):
+        whole = whole + energies_of(bars, shape, k, rest)
+    least = total(whole)
+    if shape[STIFF, 0] == 0.0:
+        least -= bars.w[V, 0] * bars.w[V, 0]
+    force = LEAST_FORCE * s.a_b * par.mass_b
+    enough = LEAST_SHARE * least
+    if held > 0.0:
+        enough = max(enough, force * force / held)
+    above = 0.0
+    while s.active > WIDTH:
+        n = s.active - WIDTH
+        above += total(energies_of(bars, shape, n, rest))
+        if above > enough:
+            break
+        store(bars.w, V, n, spread(0.0))
+        store(bars.w, Q, n, spread(0.0))
+        s.active = n
+
+
+@kernel
+def settle(par, s, bars, low):
+    """Complete a new form: few modes, and the rock end where it was (offset `low`)."""
+    refresh_loads(s, bars, s.a_b, s.a_p)
+    trim(par, s, bars)
+    refresh_sums(s, bars)
+    shift(s, bars, low - s.low)
+    refresh_sums(s, bars)
+    shape, n = bars.forms.shape[s.form], s.active
+    s.v_low = row_sum(shape, LOW, bars.w, V, n)
+    v_b = row_sum(shape, BIT, bars.w, V, n) / par.mass_b
+    push = 0.0
+    if s.form >= JOINED:
+        v_p = row_sum(shape, PISTON, bars.w, V, n) / par.mass_p
+        push = par.mass_p * (s.v_p - v_p)
+        s.v_p = v_p
+    s.i_contact += push
+    s.i_bit += push - par.mass_b * (v_b - s.v_b)
+    s.v_b = v_b
+
+
+@kernel
+def leave_out(par, s, bars):
+    """Leave out modes that have died away."""
+    before, n = bar_energy(s, bars), s.active
+    low, tip = s.low, s.top - s.at_b / par.mass_b
+    trim(par, s, bars)
+    if s.active < n:
+        settle(par, s, bars, low)
+        s.e_loss += before - bar_energy(s, bars)
+        s.offset += tip - (s.top - s.at_b / par.mass_b)
+
+
+@inlined
+def pass_on(change, w, rows, count, n):
+    """Offsets and velocities of `count` modes in `n` others, into `rows`."""
+    for i in range(0, n, WIDTH):
+        q = v = spread(0.0)
+        for k in range(count):
+            row = load(change, k, i)
+            q = q + row * w[Q, k]
+            v = v + row * w[V, k]
+        store(rows, Q, i, q)
+        store(rows, V, i, v)
+
+
+@inlined
+def take_form(s, bars, form, n):
+    """Take what `pass_on` found as the modes of a form."""
+    s.form, s.active = form, n
+    for i in range(0, n, WIDTH):
+        store(bars.w, Q, i, load(bars.rows, Q, i))
+        store(bars.w, V, i, load(bars.rows, V, i))
+
+
+@kernel
+def change_spring(par, s, bars):
+    """Go to the form that the present mode wants, with the penetration that it has."""
+    form, low = form_wanted(par, s), s.p - origin(s)
+    before, tip = bar_energy(s, bars), s.top - s.at_b / par.mass_b
+    if form == s.form:
+        if low != s.low:
+            shift(s, bars, low - s.low)
+            refresh_sums(s, bars)
+        return
+    n = bars.forms.sizes[form]
+    uniform = low - s.low
+    pass_on(bars.forms.change[s.form, form], bars.w, bars.rows, s.active, n)
+    take_form(s, bars, form, n)
+    shift(s, bars, uniform)
+    settle(par, s, bars, low)
+    s.e_loss += before - bar_energy(s, bars)
+    s.offset += tip - (s.top - s.at_b / par.mass_b)
+
+
+@kernel
+def join(par, s, bars):
+    """Join piston and bit, whose ends touch."""
+    form, low = s.form + JOINED, s.low
+    before = bar_energy(s, bars) + 0.5 * par.mass_p * s.v_p * s.v_p
+    n, ends = bars.forms.sizes[form], s.top
+    pass_on(bars.forms.change[s.form, form], bars.w, bars.rows, s.active, n)
+    if par.piston == Piston.ELASTIC:
+        before += piston_vibration(bars)
+        ends -= row_sum(bars.shape_p, LOW, bars.wp, Q, bars.wp.shape[1])
+    rows, shape = bars.rows, bars.forms.shape[form]
+    for i in range(0, n, WIDTH):
+        # the piston as a whole, where its low end meets the bit
+        q = load(rows, Q, i) + load(shape, PISTON, i) * ends
+        v = load(rows, V, i) + load(shape, PISTON, i) * s.v_p
+        for k in range(bars.wp.shape[1]):
+            row = load(bars.forms.join[form - JOINED], k, i)
+            q = q + row * bars.wp[Q, k]
+            v = v + row * bars.wp[V, k]
+        store(rows, Q, i, q)
+        store(rows, V, i, v)
+    take_form(s, bars, form, n)
+    settle(par, s, bars, low)
+    s.e_loss += before - bar_energy(s, bars)
+    # where both are follows from how they are bent: no rounding can add up
+    s.u_r = s.at_p / par.mass_p - s.at_b / par.mass_b
+    s.u_b = s.x_r + s.p - (s.low - s.at_b / par.mass_b)
+    s.u_p = s.u_b + s.u_r
+    s.offset = 0.0
+    s.gap = 0.0
+
+
+@kernel
+def part(par, s, bars):
+    """Part piston and bit where they are."""
+    form, low = s.form - JOINED, s.low
+    before = bar_energy(s, bars)
+    n = bars.forms.sizes[form]
+    for k in range(bars.wp.shape[1]):
+        q = v = spread(0.0)
+        for i in range(0, s.active, WIDTH):
+            row = load(bars.forms.join[form], k, i)
+            q = q + row * load(bars.w, Q, i)
+            v = v + row * load(bars.w, V, i)
+        bars.wp[Q, k], bars.wp[V, k] = total(q), total(v)
+    pass_on(bars.forms.change[s.form, form], bars.w, bars.rows, s.active, n)
+    take_form(s, bars, form, n)
+    v_p = s.v_p
+    settle(par, s, bars, low)
+    s.v_p = v_p
+    after = bar_energy(s, bars) + 0.5 * par.mass_p * v_p * v_p
+    s.low_p = 0.0
+    if par.piston == Piston.ELASTIC:
+        after += piston_vibration(bars)
+        s.low_p = row_sum(bars.shape_p, LOW, bars.wp, Q, bars.wp.shape[1])
+    s.e_loss += before - after
+    s.offset = 0.0
+    s.offset = -gap_of(par, s)
+    s.gap = 0.0
+
+
+@inlined
+def gap_of(par, s):
+    """Gap between piston and bit by the places of their ends [m]."""
+    return s.u_b + (s.top - s.at_b / par.mass_b) - (s.u_p + s.low_p) + s.offset
+
+
+@inlined
+def vibration(s, bars):
+    """Energy of the bit's modes, without that of its mean motion in flight [J]."""
+    shape = bars.forms.shape[s.form]
+    energy = kinetic_of(bars.w, s.active)
+    squares = spread(0.0)
+    for k in range(0, s.active, WIDTH):
+        q = load(bars.w, Q, k)
+        squares = squares + load(shape, STIFF, k) * (q * q)
+    energy += 0.5 * total(squares)
+    if shape[STIFF, 0] == 0.0:
+        energy -= 0.5 * bars.w[V, 0] * bars.w[V, 0]
+    return energy
