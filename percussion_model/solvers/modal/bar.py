@@ -51,16 +51,6 @@ def low_after(w, shape, m, n):
 
 
 @inlined
-def low_yield(shape, m, n):
-    """How far the low end goes by a force of 1 N there over a move [m/N]."""
-    low = spread(0.0)
-    for k in range(0, n, WIDTH):
-        end = load(shape, LOW, k)
-        low = low + end * end * load(m, YIELD, k)
-    return total(low)
-
-
-@inlined
 def try_move(w, rows, shape, m, n, force, eta, joined):
     """Move modes under their loads and a force at the low end, into `rows`."""
     lost = low = speed = top = bit = bit_speed = spread(0.0)

@@ -48,7 +48,7 @@ def form_wanted(par, s):
     return form
 
 
-@inlined
+@kernel
 def refresh_sums(s, bars):
     """Take the sums over modes that steps begin with."""
     shape, n = bars.forms.shape[s.form], s.active
@@ -58,7 +58,7 @@ def refresh_sums(s, bars):
     s.at_p = row_sum(shape, PISTON, bars.w, Q, n)
 
 
-@inlined
+@kernel
 def refresh_loads(s, bars, a_b, a_p):
     """Take the forces of body loads on the modes."""
     shape = bars.forms.shape[s.form]
@@ -68,7 +68,7 @@ def refresh_loads(s, bars, a_b, a_p):
     s.a_b, s.a_p = a_b, a_p
 
 
-@inlined
+@kernel
 def shift(s, bars, way):
     """Move everything by the same way, as far as the modes have it, the rock end by `way` [m]."""
     shape = bars.forms.shape[s.form]
@@ -150,7 +150,7 @@ def leave_out(par, s, bars):
         s.offset += tip - (s.top - s.at_b / par.mass_b)
 
 
-@inlined
+@kernel
 def pass_on(change, w, rows, count, n):
     """Offsets and velocities of `count` modes in `n` others, into `rows`."""
     for i in range(0, n, WIDTH):
@@ -163,7 +163,7 @@ def pass_on(change, w, rows, count, n):
         store(rows, V, i, v)
 
 
-@inlined
+@kernel
 def take_form(s, bars, form, n):
     """Take what `pass_on` found as the modes of a form."""
     s.form, s.active = form, n
@@ -259,7 +259,7 @@ def gap_of(par, s):
     return s.u_b + (s.top - s.at_b / par.mass_b) - (s.u_p + s.low_p) + s.offset
 
 
-@inlined
+@kernel
 def vibration(s, bars):
     """Energy of the bit's modes, without that of its mean motion in flight [J]."""
     shape = bars.forms.shape[s.form]

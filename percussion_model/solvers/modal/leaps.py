@@ -186,7 +186,7 @@ def plan(par, s, bars, ops):
         s.leap_end = s.time + int(steps) * WHOLE
 
 
-@inlined
+@kernel
 def hop(rows, shape, m, n):
     """Move copied free modes; offsets of top and low end [m]."""
     top = low = spread(0.0)
@@ -200,7 +200,7 @@ def hop(rows, shape, m, n):
     return total(top), total(low)
 
 
-@inlined
+@kernel
 def pull(s, bars, x):
     """Force of the rock about that at rest, of a standstill [N]."""
     low = speed = spread(0.0)
@@ -211,7 +211,7 @@ def pull(s, bars, x):
     return s.gamma * s.k_r * total(low) + s.c_r * total(speed)
 
 
-@inlined
+@kernel
 def load_standstill(s, bars, ops):
     """Take the state about its rest."""
     shape = bars.forms.shape[2]
@@ -233,7 +233,7 @@ def multiply(columns, x, y):
         store(y, 0, i, even + odd)
 
 
-@inlined
+@kernel
 def quadratic(form, x, y):
     """Value of a symmetric form at `x` [J]."""
     multiply(form, x, y)
@@ -243,7 +243,7 @@ def quadratic(form, x, y):
     return total(value)
 
 
-@inlined
+@kernel
 def apply(ops, power):
     """Apply one power of the map to `ops.x`."""
     multiply(ops.powers[power], ops.x, ops.y)

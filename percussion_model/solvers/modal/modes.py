@@ -146,7 +146,8 @@ def bar_modes(
     numbers = np.ascontiguousarray(np.array(rows).T)
     frequency, (size, phase) = np.zeros(count), np.zeros((2, count, len(rows)))
     _find_modes(*numbers, float(top_mass), float(spring), frequency, size, phase)
-    return Modes(frequency, size, phase, *numbers, top_mass)
+    impedance, transit, mass = numbers
+    return Modes(frequency, size, phase, impedance, transit, mass, top_mass)
 
 
 def count_below(sections: np.ndarray, highest: float) -> int:

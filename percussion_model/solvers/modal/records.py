@@ -51,6 +51,9 @@ class Forms(NamedTuple):
         Spring under the rock end [N/m].
     shape : ndarray, shape (6, len(Shape), n)
     move : ndarray, shape (6, LEVELS, len(Move), n)
+    yields : ndarray, shape (6, LEVELS, lanes)
+        How far the rock end goes over a move by a force of 1 N there, with the modes of so many
+        lanes [m/N].
     change : ndarray, shape (6, 6, n, n)
         From one form (first) to another; row j is what mode j becomes.
     join : ndarray, shape (3, modes of the piston, n)
@@ -61,6 +64,7 @@ class Forms(NamedTuple):
     stiff: np.ndarray
     shape: np.ndarray
     move: np.ndarray
+    yields: np.ndarray
     change: np.ndarray
     join: np.ndarray
 

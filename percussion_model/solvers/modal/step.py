@@ -31,12 +31,12 @@ from percussion_model.solvers.modal.bar import (
     Ends,
     end_after,
     low_after,
-    low_yield,
     move_free,
     take,
     try_move,
 )
-from percussion_model.solvers.modal.forms import gap_of, refresh_loads
+from percussion_model.solvers.modal.forms import refresh_loads
+from percussion_model.solvers.modal.lanes import WIDTH
 from percussion_model.solvers.modal.piston import (
     WHOLE,
     flip_contact,
@@ -75,14 +75,15 @@ class Trial(NamedTuple):
 
 
 @inlined
-def rest_force(par, s, bars, m, h):
+def rest_force(par, s, bars, level, h):
     """Force at the rock end besides the spring of the form, over a step of `h` [N]."""
     shape, n = bars.forms.shape[s.form], s.active
-    held = bars.forms.stiff[s.form]
+    held, yields = bars.forms.stiff[s.form], bars.forms.yields[s.form, level, n // WIDTH - 1]
+    m = bars.forms.move[s.form, level]
     if par.rock == RockKind.WALL:
         if s.mode == Mode.FF:
             return 0.0
-        return (low_after(bars.w, shape, m, n) - s.low) / low_yield(shape, m, n)
+        return (low_after(bars.w, shape, m, n) - s.low) / yields
     first = slope = 0.0
     if s.mode != Mode.FF:
         K = stiffness(s) - held if held == 0.0 else 0.0
@@ -92,7 +93,7 @@ def rest_force(par, s, bars, m, h):
     if first == 0.0 and slope == 0.0:
         return 0.0
     free = low_after(bars.w, shape, m, n) - s.low
-    return (first + slope * free) / (1.0 + slope * low_yield(shape, m, n))
+    return (first + slope * free) / (1.0 + slope * yields)
 
 
 @inlined
@@ -101,7 +102,7 @@ def try_step(par, s, bars, level):
     h = par.tick * (1 << level)
     m = bars.forms.move[s.form, level]
     joined = s.closed == 1
-    rest = rest_force(par, s, bars, m, h)
+    rest = rest_force(par, s, bars, level, h)
     shape = bars.forms.shape[s.form]
     ends = try_move(bars.w, bars.rows, shape, m, s.active, rest, par.eta, joined)
     path = ends.low - s.low
@@ -260,6 +261,3 @@ def go_on(par, s, bars, most, near, blows, events):
     if ends or turns or flips > 0 or most == 0 or not (near or level < most):
         return -1
     return max(level - 1, 0)
-
-
-__all__ = ["gap_of", "step"]

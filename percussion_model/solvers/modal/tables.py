@@ -12,10 +12,10 @@ import math
 import numpy as np
 
 from percussion_model.physics.kernel import kernel
-from percussion_model.scene.bars import bar_mass
+from percussion_model.scene.bars import AREA, LENGTH, YOUNGS_MODULUS, bar_mass, section_mass
 from percussion_model.solvers.modal.lanes import WIDTH
 from percussion_model.solvers.modal.modes import Modes, bar_modes, count_below, products, totals
-from percussion_model.solvers.modal.records import LEVELS, STEP, Forms, Move, Shape
+from percussion_model.solvers.modal.records import LEVELS, Forms, Move, Shape
 
 # Factors of a move below this are zero: what they leave would only slow down arithmetic.
 NOTHING = 1e-40
@@ -170,7 +170,9 @@ def forms_of(
             if sizes[3 + form]:
                 part = products(found[3 + form], 0, free, 0, above)[:, 1:]
                 join[form, :n_piston, : len(part)] = part.T
-    return Forms(sizes, stiff, shape, move, change, join), found, free
+    ends = shape[:, None, Shape.LOW] ** 2 * move[:, :, Move.YIELD]
+    yields = np.ascontiguousarray(np.cumsum(ends, axis=2)[:, :, WIDTH - 1 :: WIDTH])
+    return Forms(sizes, stiff, shape, move, yields, change, join), found, free
 
 
 def piston_tables(free: Modes | None, eta: float, tick: float) -> tuple[np.ndarray, np.ndarray]:
@@ -188,8 +190,6 @@ def end_compliance(sections: np.ndarray) -> float:
     The sum of shape^2 / frequency^2 over all modes. The bar's own inertia balances the force,
     so that a section carries the share of it that the mass above is of all.
     """
-    from percussion_model.scene.bars import AREA, LENGTH, YOUNGS_MODULUS, section_mass
-
     whole, above, total = bar_mass(sections), 0.0, 0.0
     for section in sections:
         first = above / whole
@@ -198,6 +198,3 @@ def end_compliance(sections: np.ndarray) -> float:
         flexible = float(section[LENGTH]) / float(section[YOUNGS_MODULUS] * section[AREA])
         total += flexible * (first * first + first * last + last * last) / 3.0
     return total
-
-
-__all__ = ["STEP", "end_compliance", "forms_of", "moves_of", "piston_tables"]
