@@ -34,6 +34,11 @@ TOO_LARGE = {
     "elements": (
         LONG_BIT | {"solver": {"name": "fem"}, "fem": {"elements": 100_000}}, "5.72e.08 elements"
     ),
+    "modes": ({"solver": {"name": "modal", "cells": 1000}}, "modes, more than 1000"),
+    "modes of a long bit": (
+        LONG_BIT | SHORT_PISTON | {"solver": {"name": "modal", "cells": 100_000}},
+        "modes, more than 1000",
+    ),
     "blow map": (
         {"solver": {"fidelity": "blow-map"}, "blow_map": WIDE_MAP}, "nodes, more than 1000000"
     ),

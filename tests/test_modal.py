@@ -139,7 +139,7 @@ def moved(w, rows, shape, m, n, force):
 
 def test_what_moves_as_one_stays_as_it_is_when_joined():
     tables = made()
-    one, n = tables.forms.change[0, 3, 0], int(tables.forms.sizes[3])
+    one, n = tables.forms.change[0, 0, 0], int(tables.forms.sizes[3])
     piston = tables.forms.shape[3, Shape.PISTON, :n]
     # bit and piston of the same velocity
     bit = math.sqrt(bar_mass(np.array([[0.20125, 5.5e-3, *STEEL]])))

@@ -52,11 +52,11 @@ class RockNumbers(NamedTuple):
     w_r: float
 
 
-def refuse_many(name: str, count: float) -> None:
-    """Raise `SceneError` for more cells or elements than can be set up."""
-    if not count <= MOST_CELLS:
+def refuse_many(name: str, count: float, most: int = MOST_CELLS) -> None:
+    """Raise `SceneError` for more cells, elements or modes than can be set up."""
+    if not count <= most:
         raise SceneError(
-            f"the bars would have {count:.3g} {name}, more than {MOST_CELLS}: ask for fewer, or "
+            f"the bars would have {count:.3g} {name}, more than {most}: ask for fewer, or "
             "make the bars more alike in length"
         )
 

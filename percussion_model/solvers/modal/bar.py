@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from percussion_model.physics.kernel import inlined, kernel
 from percussion_model.solvers.modal.lanes import WIDTH, load, spread, store, total
-from percussion_model.solvers.modal.records import LEVELS, Move, Shape
+from percussion_model.solvers.modal.records import JOINED, LEVELS, Move, Shape
 
 LOW, TOP, SOFT, STIFF, BIT, PISTON = (int(row) for row in Shape)
 QQ, QV, VQ, VV, YIELD, L_QQ, L_QV, L_VV = (int(row) for row in Move)
@@ -164,10 +164,10 @@ def elastic_of(w, shape, n):
 @kernel
 def bit_kinetic(s, bars, w):
     """Kinetic energy of the bit, by the velocities in `w` [J]."""
-    if s.form < 3:
+    if s.form < JOINED:
         return kinetic_of(w, s.active)
-    change = bars.forms.change[s.form, s.form - 3]
-    n = bars.forms.sizes[s.form - 3]
+    change = bars.forms.change[s.form, s.form % JOINED]
+    n = bars.forms.sizes[s.form - JOINED]
     squares = 0.0
     for i in range(0, n, WIDTH):
         v = spread(0.0)

@@ -184,7 +184,7 @@ def change_spring(par, s, bars):
         return
     n = bars.forms.sizes[form]
     uniform = low - s.low
-    pass_on(bars.forms.change[s.form, form], bars.w, bars.rows, s.active, n)
+    pass_on(bars.forms.change[s.form, form % JOINED], bars.w, bars.rows, s.active, n)
     take_form(s, bars, form, n)
     shift(s, bars, uniform)
     settle(par, s, bars, low)
@@ -198,7 +198,7 @@ def join(par, s, bars):
     form, low = s.form + JOINED, s.low
     before = bar_energy(s, bars) + 0.5 * par.mass_p * s.v_p * s.v_p
     n, ends = bars.forms.sizes[form], s.top
-    pass_on(bars.forms.change[s.form, form], bars.w, bars.rows, s.active, n)
+    pass_on(bars.forms.change[s.form, form % JOINED], bars.w, bars.rows, s.active, n)
     if par.piston == Piston.ELASTIC:
         before += piston_vibration(bars)
         ends -= row_sum(bars.shape_p, LOW, bars.wp, Q, bars.wp.shape[1])
@@ -237,7 +237,7 @@ def part(par, s, bars):
             q = q + row * load(bars.w, Q, i)
             v = v + row * load(bars.w, V, i)
         bars.wp[Q, k], bars.wp[V, k] = total(q), total(v)
-    pass_on(bars.forms.change[s.form, form], bars.w, bars.rows, s.active, n)
+    pass_on(bars.forms.change[s.form, form % JOINED], bars.w, bars.rows, s.active, n)
     take_form(s, bars, form, n)
     v_p = s.v_p
     settle(par, s, bars, low)

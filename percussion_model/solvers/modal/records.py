@@ -54,8 +54,9 @@ class Forms(NamedTuple):
     yields : ndarray, shape (6, LEVELS, lanes)
         How far the rock end goes over a move by a force of 1 N there, with the modes of so many
         lanes [m/N].
-    change : ndarray, shape (6, 6, n, n)
-        From one form (first) to another; row j is what mode j becomes.
+    change : ndarray, shape (6, 3, n, n)
+        From a form to those on another spring, and at its own spring's place to the one that is
+        joined where this is not, or the reverse; row j is what mode j becomes.
     join : ndarray, shape (3, modes of the piston, n)
         What each elastic mode of the piston becomes in a joined form.
     """

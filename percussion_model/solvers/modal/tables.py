@@ -15,10 +15,13 @@ from percussion_model.physics.kernel import kernel
 from percussion_model.scene.bars import AREA, LENGTH, YOUNGS_MODULUS, bar_mass, section_mass
 from percussion_model.solvers.modal.lanes import WIDTH
 from percussion_model.solvers.modal.modes import Modes, bar_modes, count_below, products, totals
-from percussion_model.solvers.modal.records import LEVELS, Forms, Move, Shape
+from percussion_model.solvers.modal.records import JOINED, LEVELS, Forms, Move, Shape
+from percussion_model.solvers.setup import refuse_many
 
 # Factors of a move below this are zero: what they leave would only slow down arithmetic.
 NOTHING = 1e-40
+# More modes than these would take as many seconds, and hundreds of megabytes, to be prepared.
+MOST_MODES = 1000
 # Nodes and weights by which the loss over a tick is integrated.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
 
@@ -129,23 +132,23 @@ def forms_of(
     """
     n_bit = _lanes(count_below(bit, highest) + 1)
     above = n_piston = 0
-    free = None
     if piston is not None:
         above, n_piston = len(piston), _lanes(count_below(piston, highest))
-        free = bar_modes(piston, n_piston + 1)
     both = bit if piston is None else np.vstack([piston, bit])
     n = n_bit + n_piston if piston_mass else n_bit
+    refuse_many("modes", n, MOST_MODES)
+    free = None if piston is None else bar_modes(piston, n_piston + 1)
     sizes, stiff = np.zeros(6, np.int64), np.array([0.0, *springs] * 2)
     shape, move = np.zeros((6, len(Shape), n)), np.zeros((6, LEVELS, len(Move), n))
-    change, join = np.zeros((6, 6, n, n)), np.zeros((3, max(n_piston, 1), n))
+    change, join = np.zeros((6, JOINED, n, n)), np.zeros((JOINED, max(n_piston, 1), n))
     found: list[Modes] = []
     for form in range(6):
-        joined = form >= 3
+        joined = form >= JOINED
         rigid = piston_mass if joined and piston is None else 0.0
         count = n if joined else n_bit
         modes = bar_modes(both if joined else bit, count, stiff[form], rigid)
         found.append(modes)
-        if (joined and not piston_mass) or (form % 3 and stiff[form] == 0.0):
+        if (joined and not piston_mass) or (form % JOINED and stiff[form] == 0.0):
             continue
         sizes[form] = count
         first = above if joined else 0
@@ -155,20 +158,20 @@ def forms_of(
         for other in range(6):
             if one == other or not sizes[one] or not sizes[other]:
                 continue
-            if one % 3 != other % 3 and one // 3 != other // 3:
+            if one % JOINED != other % JOINED and one // JOINED != other // JOINED:
                 continue
             a, b = found[one], found[other]
-            if one // 3 == other // 3:
+            if one // JOINED == other // JOINED:
                 part = products(b, 0, a, 0, len(a.mass))
-            elif one < 3:
+            elif one < JOINED:
                 part = products(b, above, a, 0, len(bit))
             else:
                 part = products(b, 0, a, above, len(bit))
-            change[one, other, : part.shape[1], : part.shape[0]] = part.T
+            change[one, other % JOINED, : part.shape[1], : part.shape[0]] = part.T
     if free is not None:
-        for form in range(3):
-            if sizes[3 + form]:
-                part = products(found[3 + form], 0, free, 0, above)[:, 1:]
+        for form in range(JOINED):
+            if sizes[JOINED + form]:
+                part = products(found[JOINED + form], 0, free, 0, above)[:, 1:]
                 join[form, :n_piston, : len(part)] = part.T
     ends = shape[:, None, Shape.LOW] ** 2 * move[:, :, Move.YIELD]
     yields = np.ascontiguousarray(np.cumsum(ends, axis=2)[:, :, WIDTH - 1 :: WIDTH])
