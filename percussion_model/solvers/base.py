@@ -56,8 +56,6 @@ class Solver(ABC):
         Memory of matrices that were made for it.
     COUNTS : tuple of str
         Counts of what was done that a state carries, without their `count_`.
-    ANY_ROCK : bool
-        Whether it computes rock that comes as an input just as that of its scene.
     LIMITS : Limits or None
         Of a state from outside; None: those of the fields that all states have.
     """
@@ -67,7 +65,6 @@ class Solver(ABC):
     wave_speed_error = 0.0
     operator_bytes = 0
     COUNTS: ClassVar[tuple[str, ...]] = ("events", "blows")
-    ANY_ROCK: ClassVar[bool] = True
     LIMITS: ClassVar[Limits | None] = None
 
     def __init__(self, scene: Scene) -> None:

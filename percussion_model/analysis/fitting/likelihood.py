@@ -16,7 +16,6 @@ from percussion_model.analysis.fitting.curve import (
 )
 from percussion_model.analysis.fitting.measurements import Curve, DropTest, Reading
 from percussion_model.analysis.fitting.predictions import (
-    ROCK_INPUTS,
     DropOnRocks,
     bit_alone,
     predicted_reading,
@@ -181,17 +180,12 @@ def curve_series(curve: Curve) -> Series:
 
 
 def drop_series(drop: DropTest, most: int | None = None) -> Series:
-    """Series of a drop test, or of at most so many of its samples, evenly taken.
-
-    The few are for a search along W_R, which the leaps of a solver do not depend on.
-    """
+    """Series of a drop test, or of at most so many of its samples, evenly taken."""
     count = len(drop.time)
-    kept, along = np.arange(count), ROCK_INPUTS
+    kept = np.arange(count)
     if most is not None and count > most:
         kept = np.unique(np.linspace(0, count - 1, most).round().astype(int))
-        along = (ENERGY,)
-    model = DropOnRocks(drop, drop.time[kept], along)
-    return Series(drop.name, drop.values[kept], None, model)
+    return Series(drop.name, drop.values[kept], None, DropOnRocks(drop, drop.time[kept]))
 
 
 def reading_series(reading: Reading) -> Series:

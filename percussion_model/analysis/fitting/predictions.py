@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from percussion_model.analysis.fitting.measurements import DropTest, Reading
 from percussion_model.physics.records import EventKind
-from percussion_model.scene.inputs import INPUTS
 from percussion_model.scene.numbers import numbers_of
 from percussion_model.scene.parameters import GROUPS
 from percussion_model.scene.scene import Scene
@@ -19,8 +18,6 @@ from percussion_model.simulation.simulate import Simulation, simulate
 from percussion_model.solvers.base import Solver, make_solver
 from percussion_model.solvers.wave.resolution import cells_for
 
-# Parameters of the rock that are inputs too.
-ROCK_INPUTS = tuple(one.key for one in INPUTS.values() if not one.at_once)
 # The bit has left the rock for the first time after that many half-periods on its spring.
 HALF_PERIODS = 3.0
 
@@ -83,21 +80,19 @@ def _signal(
 class DropOnRocks:
     """What a drop test shows on one rock after the other.
 
-    One solver, made for the first rock, serves others too: they come as changed inputs, which
-    act from the first drilling cycle on. To make a solver for each, and to prepare its leaps,
-    takes longer than the drop; free flight is leapt whatever the rock.
+    A solver serves rocks that differ in W_R alone: it comes as a changed input, which acts from
+    the first drilling cycle on. Of another rock the maps of standstill have to be made anew;
+    drops on it share them.
 
     Parameters
     ----------
     drop : DropTest
     times : ndarray
         [s].
-    along : collection of str
-        Keys of the rock that may differ from those of the solver.
     """
 
-    def __init__(self, drop: DropTest, times: np.ndarray, along: Collection[str]) -> None:
-        self._drop, self._times, self._along = drop, times, along
+    def __init__(self, drop: DropTest, times: np.ndarray) -> None:
+        self._drop, self._times = drop, times
         self._scene: Scene | None = None
         self._start: tuple[Scene, Solver] | None = None
 
@@ -105,25 +100,25 @@ class DropOnRocks:
         """Compute the signal on the rock of a scene, SI units."""
         scene = bit_alone(scene)
         if self._scene is None or self._start is None or not self._serves(self._scene, scene):
-            start = scene.replace(**{"start.bit_velocity": self._drop.speed})
+            changes = {"run.duration": float(self._times[-1]), "run.settle": 0.0}
+            start = scene.replace(**changes, **{"start.bit_velocity": self._drop.speed})
             self._scene, self._start = scene, (start, make_solver(start))
         first, solver = self._start
         simulation = Simulation(first, False, solver)
-        inputs = {name: one.key for name, one in INPUTS.items() if one.key in self._along}
-        simulation.set_inputs(
-            **{name: scene[key] for name, key in inputs.items() if scene[key] != first[key]}
-        )
+        if scene.rock != first.rock:
+            simulation.set_inputs(barrier_energy=scene.rock.barrier_energy)
         return _signal(simulation, self._times, self._drop.signal, self._drop.gauge)
 
-    def _serves(self, scene: Scene, other: Scene) -> bool:
+    @staticmethod
+    def _serves(scene: Scene, other: Scene) -> bool:
         """Whether the solver of one scene serves another."""
         if any(getattr(scene, name) != getattr(other, name) for name in GROUPS if name != "rock"):
             return False
-        assert self._start is not None
         # for a bit that starts on the rock the first cycle may have begun
-        free = self._start[1].ANY_ROCK and scene.start.rock_gap > 0.0
-        along = self._along if free else ()
-        return all(scene[key] == other[key] for key in ROCK_INPUTS if key not in along)
+        rock = scene.rock
+        if scene.start.rock_gap > 0.0:
+            rock = replace(rock, barrier_energy=other.rock.barrier_energy)
+        return rock == other.rock
 
 
 def predicted_reading(scene: Scene, reading: Reading) -> float:

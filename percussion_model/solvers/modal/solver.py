@@ -102,7 +102,6 @@ class ModalSolver(Solver):
     name = "modal"
     time_step: float
     COUNTS: ClassVar = ("steps", "leaps", "events", "blows", "locked")
-    ANY_ROCK: ClassVar = False  # there are no modes on its spring
     LIMITS: ClassVar = MODAL_LIMITS
 
     def __init__(self, scene: Scene) -> None:

@@ -92,9 +92,9 @@ class LeapOperators(NamedTuple):
 
     Attributes
     ----------
-    piston : ndarray, shape (LEVELS, size, size)
-        Powers 1, 4, 16, ... of the free piston's step map.
-    bit : ndarray, shape (5, LEVELS, size, size)
+    piston : ndarray, shape (powers, size, size)
+        Powers 1, 2, 3, 4, 8, 12, 16, 32, 48, ... of the free piston's step map.
+    bit : ndarray, shape (5, powers, size, size)
         The same for the bit by `Mode`.
     lookahead : ndarray, shape (5, size, LOOKAHEAD)
         By mode: strain offset of the rock end at the end of the next steps in
@@ -106,12 +106,11 @@ class LeapOperators(NamedTuple):
         FF its strain offset.
     bottom : ndarray, shape (size, LOOKAHEAD)
         Strain offset of the piston's bottom end.
-    piston_loss : ndarray, shape (FORMS, size, size)
-        Structural loss of the free piston over some numbers of steps, those of
-        `carry_and_sum` [J].
-    loss : ndarray, shape (5, FORMS, size, size)
+    piston_loss : ndarray, shape (powers, size, size)
+        Structural loss of the free piston over as many steps as the powers are of [J].
+    loss : ndarray, shape (5, powers, size, size)
         The same of the bit by `Mode`.
-    squares : ndarray, shape (FORMS, size, size)
+    squares : ndarray, shape (powers, size, size)
         In standstill, sum over so many steps of the square of the rock end's
         velocity at the start of each [m2/s2].
     """
@@ -147,7 +146,7 @@ WAVE_PAR = np.dtype(
         ("kappa_f", "f8"),
         ("front", "f8"),  # share of a step before its closure, docs/numerics.md, eq. 14b
         ("ss_stiffness", "f8"),  # gamma K_R for which standstill leaps were made [N/m]
-        ("ss_loading", "f8"),  # K_R for which loading leaps were made
+        ("ss_loading", "f8"),  # K_R for which leaps in contact were made, 0: none were
         ("ss_damping", "f8"),  # C_R for the same
         ("bound_p", "f8"),  # |S_p| <= bound_p sqrt(2 E): piston strain offset [m/J^0.5]
         ("bound_t", "f8"),

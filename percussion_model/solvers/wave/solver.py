@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from percussion_model.physics.kernel import entry_of
-from percussion_model.physics.records import Status
+from percussion_model.physics.records import Piston, Status
 from percussion_model.scene.numbers import Numbers, numbers_of, section_numbers
 from percussion_model.scene.parameters import Bar
 from percussion_model.scene.scene import Scene
@@ -52,6 +52,9 @@ LEAP_WORDS = [
 MANY = 16
 # A state without a leap is no more than a step, and rounding, behind the present [steps].
 MOST_BEHIND = 2
+# A bit alone loads and unloads the rock in a few percent of its steps. To make the maps that
+# leap these takes as long as some ten thousand steps, which a run of fewer than so many spares.
+LONG_RUN = 65_536
 
 
 def wave_parameters(numbers: Numbers, bars: CutBars) -> np.ndarray:
@@ -79,7 +82,8 @@ def wave_parameters(numbers: Numbers, bars: CutBars) -> np.ndarray:
         p["bound_p"] = piston.bound[1]
     rock = rock_numbers(numbers)
     p["ss_stiffness"] = rock.gamma * rock.k_r
-    p["ss_loading"] = rock.k_r
+    many = p["piston"] != Piston.ABSENT or numbers.values.run_duration > LONG_RUN * p["dt"]
+    p["ss_loading"] = rock.k_r if many else 0.0
     p["ss_damping"] = rock.c_r
     return par
 

@@ -18,9 +18,8 @@ from percussion_model.solvers.wave.records import Coef
 
 # Sizes are padded to a multiple of this, which is what a product takes at a time.
 PADDING = WIDTH
-# Below this level each digit of a number of steps has a form of its own, which spares
-# short leaps most of their forms; from it on each level has one, which spares memory.
-SINGLE = 3
+# Powers of a map at each level: those of one, two and three times 4^level steps.
+DIGITS = 3
 
 
 @merged
@@ -85,22 +84,22 @@ def apply(power, x, y, size):
 
 @kernel
 def carry(powers, steps, x, y, size):
-    """x = P^steps x from the powers 1, 4, 16, ... of a map.
-
-    Four to a level, not two: fewer matrices, which stay in the cache.
+    """x = P^steps x, a product for each digit of `steps` to the base four.
 
     Parameters
     ----------
-    powers : float array, shape (levels, size, size)
+    powers : float array, shape (powers, size, size)
+        Powers 1, 2, 3, 4, 8, 12, 16, 32, 48, ... of a map P.
     y : float array
         Scratch.
     """
-    level = 0
+    first = -1
     while steps > 0:
-        for _ in range(steps & 3):
-            apply(powers[level], x, y, size)
+        digit = steps & 3
+        if digit:
+            apply(powers[first + digit], x, y, size)
         steps >>= 2
-        level += 1
+        first += DIGITS
 
 
 @kernel
@@ -109,9 +108,8 @@ def carry_and_sum(powers, loss, squares, lossy, squared, steps, x, y, size):
 
     Parameters
     ----------
-    loss, squares : float array, shape (forms, size, size)
-        Forms summed over 1, 2, 3, 4, 8, 12, 16, 32, 48 steps, then over 64, 256, ...
-        (`SINGLE` and what follows), as upper triangles.
+    loss, squares : float array, shape (powers, size, size)
+        Forms summed over as many steps as the powers are of, as upper triangles.
     lossy, squared : bool
         Which of them are wanted; the other is not looked at.
 
@@ -122,19 +120,17 @@ def carry_and_sum(powers, loss, squares, lossy, squared, steps, x, y, size):
     """
     lost = 0.0
     square = 0.0
-    level = 0
+    first = -1
     while steps > 0:
         digit = steps & 3
-        for k in range(digit):
-            if level >= SINGLE or k == 0:
-                form = level + 2 * SINGLE if level >= SINGLE else 3 * level + digit - 1
-                if lossy:
-                    lost += quadratic(loss[form], x, y, size)
-                if squared:
-                    square += quadratic(squares[form], x, y, size)
-            apply(powers[level], x, y, size)
+        if digit:
+            if lossy:
+                lost += quadratic(loss[first + digit], x, y, size)
+            if squared:
+                square += quadratic(squares[first + digit], x, y, size)
+            apply(powers[first + digit], x, y, size)
         steps >>= 2
-        level += 1
+        first += DIGITS
     return lost, square
 
 

@@ -30,8 +30,10 @@ LOOKAHEAD_LEVELS = 4
 
 @merged
 def has_operators(par, s):
-    """Whether operators exist for the rock law in force."""
-    if s.gamma * s.k_r != par.ss_stiffness or s.k_r != par.ss_loading:
+    """Whether operators exist for the mode and the rock law in force."""
+    if s.gamma * s.k_r != par.ss_stiffness:
+        return False
+    if s.mode != Mode.SS and s.k_r != par.ss_loading:
         return False
     return s.c_r == par.ss_damping or s.mode == Mode.BC or s.mode == Mode.FC
 

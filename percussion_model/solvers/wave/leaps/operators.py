@@ -8,7 +8,7 @@ import numpy as np
 
 from percussion_model.physics.records import DriveKind, Mode, Piston, RockKind
 from percussion_model.solvers.wave.grid import Grid
-from percussion_model.solvers.wave.leaps.linear import PADDING, SINGLE
+from percussion_model.solvers.wave.leaps.linear import DIGITS, PADDING
 from percussion_model.solvers.wave.leaps.lookahead import LOOKAHEAD, LOOKAHEAD_LEVELS
 from percussion_model.solvers.wave.leaps.step_map import (
     Configuration,
@@ -22,10 +22,7 @@ from percussion_model.solvers.wave.records import Coef, LeapOperators, no_operat
 LEVELS = 8
 # Without their operators a scene is stepped through; beyond this size they
 # would cost more memory and set-up time than they save [numbers].
-MOST_NUMBERS = 40_000_000
-
-# Sums of a form, see `carry_and_sum`.
-FORMS = LEVELS + 2 * SINGLE
+MOST_NUMBERS = 60_000_000
 
 # Operators of so many scenes are kept [a few MB each on the default grid], as long as they
 # take no more than so many bytes: those of 250 cells have half a gigabyte.
@@ -59,7 +56,7 @@ def leap_operators(
     """
     n_p = piston.n if piston is not None else 0
     size_p, size = padded(2 * n_p), padded(2 * bit.n + 1)
-    if LEVELS * (size_p * size_p + len(Mode) * size * size) > MOST_NUMBERS:
+    if LEVELS * DIGITS * (size_p * size_p + len(Mode) * size * size) > MOST_NUMBERS:
         return None
     par["size_p"], par["size_r"] = size_p, size
     key = _key(par, cp, cb, piston, bit)
@@ -127,12 +124,12 @@ def _free(
             found["piston"], by_column @ _offset(cp, piston.n, Coef.BOTTOM)
         )
     size = int(alone["size_r"][0])
-    powers = np.zeros((len(Mode), LEVELS, size, size))
+    powers = np.zeros((len(Mode), LEVELS * DIGITS, size, size))
     lookahead, top = np.zeros((2, len(Mode), size, LOOKAHEAD))
     free_bit = Configuration(alone, bit, cb)
     by_column, faces = step_map(free_bit)
     powers[Mode.FF] = _powers(by_column, LEVELS, size)
-    loss = np.zeros((len(Mode), FORMS, size, size) if alone["loss"][0] else (len(Mode), 1, 1, 1))
+    loss = np.zeros(powers.shape if alone["loss"][0] else (len(Mode), 1, 1, 1))
     if alone["loss"][0]:
         loss[Mode.FF] = _sums(step_forms(free_bit, by_column, faces)[0], powers[Mode.FF])
     for rows, row in ((lookahead, Coef.BOTTOM), (top, Coef.TOP)):
@@ -145,11 +142,13 @@ def _loads(par: np.ndarray) -> dict[Mode, tuple[float, float]]:
     p = par[0]
     if p["rock"] != RockKind.BILINEAR:
         return {}
-    return {
+    standstill = {Mode.SS: (p["ss_stiffness"], p["ss_damping"])}
+    if not p["ss_loading"]:
+        return standstill
+    return standstill | {
         Mode.DFC: (p["ss_loading"], p["ss_damping"]),
         Mode.FC: (p["ss_loading"], 0.0),
         Mode.BC: (p["ss_stiffness"], 0.0),
-        Mode.SS: (p["ss_stiffness"], p["ss_damping"]),
     }
 
 
@@ -180,8 +179,11 @@ def _of_loaded_bit(
 ) -> dict[str, np.ndarray]:
     """Operators of the bit, those of `free` among them, in all modes."""
     names = ("bit", "lookahead", "top", "loss")
-    powers, lookahead, top, loss = (free[name].copy() for name in names)
-    size = powers.shape[-1]
+    # nine tenths stay zero in a bit alone, which costs nothing as long as nobody writes there
+    powers, lookahead, top, loss = (np.zeros(free[name].shape) for name in names)
+    for name, of_modes in zip(names, (powers, lookahead, top, loss), strict=True):
+        of_modes[Mode.FF] = free[name][Mode.FF]
+    size = int(alone["size_r"][0])
     sums, squares = np.zeros((len(Mode), size)), no_operators().squares
     rock = alone.copy()
     rock["rock"] = RockKind.BILINEAR
@@ -190,15 +192,18 @@ def _of_loaded_bit(
         configuration = Configuration(rock, bit, cb, float(stiffness), float(damping))
         by_column, faces = step_map(configuration)
         levels = LEVELS if mode == Mode.SS else LOOKAHEAD_LEVELS
-        powers[mode, :levels] = _powers(by_column, levels, size)
+        count = levels * DIGITS
+        powers[mode, :count] = _powers(by_column, levels, size)
         lookahead[mode] = _lookahead(powers[mode], end_row(configuration, by_column))
         top[mode] = _lookahead(powers[mode], by_column @ way)
         sums[mode, : len(by_column)] = _path_to_rest(configuration, by_column)
         lost, of_end = step_forms(configuration, by_column, faces)
-        if alone["loss"][0]:
-            loss[mode, : levels + 2 * SINGLE] = _sums(lost, powers[mode, :levels])
         if mode == Mode.SS:
-            squares = _sums(of_end, powers[mode])
+            lost_sums, squares = _sums(np.stack([lost, of_end]), powers[mode])
+        else:
+            lost_sums = _sums(lost, powers[mode, :count])
+        if alone["loss"][0]:
+            loss[mode, :count] = lost_sums
     found = {"bit": powers, "lookahead": lookahead, "sums": sums, "top": top}
     return found | {"loss": loss, "squares": squares}
 
@@ -208,8 +213,8 @@ def _lookahead(powers: np.ndarray, row: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
-    powers : ndarray, shape (levels, size, size)
-        Powers 1, 4, 16, ... of the step map.
+    powers : ndarray, shape (powers, size, size)
+        As of `_powers`.
     row : ndarray
         Filled up with zeros to `size`.
 
@@ -219,7 +224,7 @@ def _lookahead(powers: np.ndarray, row: np.ndarray) -> np.ndarray:
     """
     shown = np.zeros((powers.shape[-1], 1))
     shown[: len(row), 0] = row
-    for power in powers[: LOOKAHEAD_LEVELS - 1]:  # one to four of each
+    for power in powers[: (LOOKAHEAD_LEVELS - 1) * DIGITS : DIGITS]:  # one to four of each
         later = [shown]
         for _ in range(3):
             later.append(power @ later[-1])
@@ -228,13 +233,15 @@ def _lookahead(powers: np.ndarray, row: np.ndarray) -> np.ndarray:
 
 
 def _powers(by_column: np.ndarray, levels: int, size: int) -> np.ndarray:
-    """Powers 1, 4, 16, ... of a step map, padded."""
-    out = np.zeros((levels, size, size))
-    out[0, : len(by_column), : len(by_column)] = by_column
-    for level in range(1, levels):
-        squared = out[level - 1] @ out[level - 1]
-        out[level] = squared @ squared
-    return out
+    """Powers 1, 2, 3, 4, 8, 12, 16, 32, 48, ... of a step map, padded."""
+    out = np.zeros((levels, DIGITS, size, size))
+    out[0, 0, : len(by_column), : len(by_column)] = by_column
+    for level, (once, twice, thrice) in enumerate(out):
+        if level:
+            np.matmul(out[level - 1, 1], out[level - 1, 1], out=once)
+        np.matmul(once, once, out=twice)
+        np.matmul(once, twice, out=thrice)
+    return out.reshape(-1, size, size)
 
 
 def _path_to_rest(configuration: Configuration, by_column: np.ndarray) -> np.ndarray:
@@ -253,26 +260,25 @@ def _sums(form: np.ndarray, powers: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
-    form : ndarray
-        Not larger than the padded powers.
-    powers : ndarray, shape (levels, size, size)
-        Powers 1, 4, 16, ... of the step map.
+    form : ndarray, shape (..., used, used)
+        One or more, not larger than the padded powers; each need not be symmetric.
+    powers : ndarray, shape (powers, size, size)
+        As of `_powers`.
+
+    Returns
+    -------
+    ndarray, shape (..., powers, size, size)
     """
-    total = np.zeros(powers.shape[1:])
-    total[: len(form), : len(form)] = form
-    totals = []
-    for level, power in enumerate(powers):
-        once = total
-        totals.append(once)
-        if level == len(powers) - 1:
-            break
-        twice = once + power @ once @ power.T
-        squared = power @ power
+    used = form.shape[-1]
+    total = np.zeros((*form.shape[:-2], *powers.shape[1:]))
+    total[..., :used, :used] = 0.5 * (form + form.swapaxes(-1, -2))
+    sums = np.empty((*form.shape[:-2], *powers.shape))
+    for k in range(0, len(powers), DIGITS):
+        power, squared = powers[k], powers[k + 1]
+        twice = total + power @ total @ power.T
+        sums[..., k, :, :], sums[..., k + 1, :, :] = total, twice
+        sums[..., k + 2, :, :] = total + power @ twice @ power.T
         total = twice + squared @ twice @ squared.T
-        if level < SINGLE:
-            totals += [twice, once + power @ twice @ power.T]
     # column by column, the upper triangle says it all
-    both = np.array(totals)
-    both += both.transpose(0, 2, 1).copy()
-    both *= np.tril(np.ones(total.shape), -1) + 0.5 * np.eye(len(total))
-    return both
+    sums *= 2.0 * np.tri(powers.shape[-1], k=-1) + np.eye(powers.shape[-1])
+    return sums
