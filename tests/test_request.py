@@ -8,15 +8,18 @@ import os
 import numpy as np
 import pytest
 
-from percussion_model import Scene, simulate
+from percussion_model import Scene, SceneError, simulate
 from percussion_model.scene.numbers import numbers_of
-from percussion_model.simulation.accuracy_control import planned_cells
+from percussion_model.simulation.accuracy_control import planned_cells, requested_solver
 from percussion_model.simulation.result import Result
+from percussion_model.solvers.modal.resolution import modes_for, most_modes
+from percussion_model.solvers.modal.solver import ModalSolver
 from percussion_model.solvers.wave.grid import elastic_bars, fitting_cells
 from percussion_model.solvers.wave.resolution import misfits
 
 LONG = os.environ.get("PERCUSSION_LONG") == "1"
 RIGID = {"piston.model": "rigid", "bit.model": "rigid"}
+FREE = {"piston.sections.0.length": 0.287, "bit.sections.0.length": 0.411}
 WAVE_SHORT = {"run.duration": 1.4, "run.settle": 0.7}
 
 
@@ -157,8 +160,30 @@ def test_plan_lists_what_will_be_run():
     scene = Scene().replace(**{"solver.accuracy": 1e-3})
     assert planned_cells(scene) == [40, 60]
     assert planned_cells(scene.replace(**{"run.check": True})) == [40, 60, 100]
-    odd = scene.replace(**{"bit.sections.0.length": 0.175 * 1.432})
+    odd = scene.replace(**{"bit.sections.0.length": 0.175 * 1.432, "solver.name": "wave"})
     *coarser, cells = planned_cells(odd)
     sides = [float(np.sum(misfits(numbers_of(odd), count))) for count in coarser]
     assert sides[0] * sides[1] < 0.0
     assert cells > max(coarser)
+    assert planned_cells(odd.replace(**{"solver.name": None})) == [28, 56]
+
+
+@pytest.mark.parametrize(
+    ("changes", "name", "solver"),
+    [({}, "auto", "wave"), (FREE, "auto", "modal"), (FREE, "wave", "wave"), ({}, "modal", "modal")],
+)
+def test_modes_answer_where_no_cell_fits_the_lengths(changes, name, solver):
+    scene = Scene().replace(**changes, **{"solver.name": name, "solver.accuracy": 2e-2})
+    assert requested_solver(scene) == solver
+    result = simulate(scene, 0.6, settle=0.2, record_events=False)
+    assert result.solver == solver
+    assert math.isfinite(result.rate_of_penetration_relative_error)
+
+
+def test_a_modal_solver_takes_the_modes_of_the_rule():
+    scene = Scene().replace(**{"solver.name": "modal", "solver.accuracy": 1e-3})
+    assert ModalSolver(scene).modes == modes_for(numbers_of(scene), 1e-3) == 56
+    most = most_modes(numbers_of(scene))
+    ModalSolver(scene.replace(**{"solver.accuracy": None, "solver.cells": most}))
+    with pytest.raises(SceneError, match="modes, more than 1000"):
+        ModalSolver(scene.replace(**{"solver.accuracy": None, "solver.cells": most + 64}))

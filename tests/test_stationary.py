@@ -240,9 +240,10 @@ def test_chance_repetitions_of_an_aperiodic_motion_are_no_cycle():
     assert found.kind == "aperiodic"
 
 
+# Wandering motions in which that happens nine times each; where, depends on rounding.
 @pytest.mark.parametrize(
     ("feed", "distance"),
-    [(500 + 9500 * 11 / 24, 0.01 + 0.07 * 4 / 19), (500 + 9500 * 23 / 24, 0.01 + 0.07 / 19)],
+    [(500 + 9500 * 11 / 24, 0.01 + 0.07 * 4 / 19), (500 + 9500 * 22 / 24, 0.01)],
 )
 def test_a_few_blows_that_converge_by_chance_are_no_cycle(feed, distance):
     """After tens of blows a few fall evenly to less than the tolerance, and rise again."""

@@ -12,7 +12,7 @@ from percussion_model.analysis.blow_maps import MapCost, kept_map, map_cost
 from percussion_model.analysis.stationary import MOST_BLOWS
 from percussion_model.scene.scales import scales
 from percussion_model.scene.scene import Scene
-from percussion_model.simulation.accuracy_control import planned_cells, with_cells
+from percussion_model.simulation.accuracy_control import has_grid, planned_cells, with_cells
 from percussion_model.simulation.simulate import MOST_ROW_BYTES, Simulation
 from percussion_model.solvers.base import Solver
 
@@ -119,7 +119,7 @@ def forecast(scene: Scene) -> Forecast:
     if scene.solver_name == "blow-map" and kept_map(scene) is None:
         return _without_map(scene)
     scenes = [scene]
-    if scene.solver.accuracy is not None and scene.solver_name == "wave":
+    if scene.solver.accuracy is not None and has_grid(scene):
         scenes = [with_cells(scene, cells) for cells in planned_cells(scene)]
     found = []
     for chosen in scenes:
@@ -219,7 +219,7 @@ def explained(scene: Scene, found: Forecast) -> dict[str, Any]:
         "effects_off": list(scene.effects_off),
         "without_effect": list(scene.unused),
         "scales": {name: scale.value for name, scale in scales(scene).items()},
-        "solver": scene.solver_name,
+        "solver": solver.name if solver else scene.solver_name,
         "cells": (solver.cells or None) if solver else None,
         "time_step": solver.time_step if solver else None,
         "wave_speed_error": solver.wave_speed_error if solver else None,

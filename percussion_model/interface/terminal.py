@@ -218,7 +218,7 @@ def show_explanation(scene: Scene, found: Forecast) -> None:
     table.add_row("Piston, bit", f"{scene.piston.model}, {scene.bit.model}")
     for name, text in _scale_rows(scene):
         table.add_row(name, text)
-    table.add_row("Solver", scene.solver_name)
+    table.add_row("Solver", solver.name if solver else scene.solver_name)
     if scene.solver.accuracy is not None:
         table.add_row("Wanted accuracy of the rate", f"{scene.solver.accuracy:g}")
     if solver is None or scene.solver_name == "blow-map":

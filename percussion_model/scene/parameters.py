@@ -375,8 +375,8 @@ class SolverOptions(Parameters):
     accuracy: float | None = quantity(
         None,
         "-",
-        "wanted relative error of the rate of penetration, in place of cells; "
-        "left out: none is asked for",
+        "wanted relative error of the rate of penetration, in place of cells; modes are taken "
+        "where solver.name = auto and cells do not fit the lengths; left out: none is asked for",
         ge=1e-4,
         le=0.1,
     )

@@ -440,11 +440,6 @@ def _refuse_requests(scene: Scene) -> None:
             f"solver.accuracy = {accuracy!r} and solver.cells = {cells!r} both choose the "
             "resolution: give one of them"
         )
-    if scene.solver.name == "modal":
-        raise SceneError(
-            f"solver.accuracy = {accuracy!r} picks the cells of waves, no modes: set "
-            'solver.cells, or solver.name = "wave" or "auto"'
-        )
     if scene.solver.name == "fem":
         raise SceneError(
             f"solver.accuracy = {accuracy!r} picks the cells of waves, no finite elements: set "

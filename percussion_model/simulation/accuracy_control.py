@@ -20,8 +20,10 @@ from percussion_model.simulation.error_estimate import (
 )
 from percussion_model.simulation.rate import FEWEST_DEPENDENT, LEAST_BLOWS
 from percussion_model.simulation.result import Result
+from percussion_model.solvers.modal.resolution import COARSER, modes_for, most_modes
 from percussion_model.solvers.wave.resolution import (
     FIT_SHARE,
+    FITS,
     cells_for,
     coarser_cells,
     finer_cells,
@@ -42,6 +44,8 @@ MOST_CYCLES, CHATTER_SHARE = 8.0, 0.5
 # More cells in the first bar are not tried: leaps end there, and a run without
 # them takes minutes for a second.
 FINEST = 256
+# Twice the modes: what is left of an error of first order is the distance to the run before.
+FINER_MODES = 2
 # Share of a wanted error that the misfit of a finer run may make, by what is known of it.
 LEFT_TO_FIT = 0.5
 
@@ -56,7 +60,7 @@ class Step:
     Attributes
     ----------
     cells : int
-        In the first elastic bar.
+        Or modes, in the first elastic bar.
     run : GridRun
     estimate : Estimate
     doubt : float
@@ -114,11 +118,11 @@ def run_to_accuracy(scene: Scene, run_once: RunOnce) -> Result:
     """
     wanted = scene.solver.accuracy
     assert wanted is not None
-    if scene.solver_name != "wave":  # rigid bodies move in closed form
+    if not has_grid(scene):  # rigid bodies move in closed form
         return _finished(scene, [GridRun.exact(run_once(scene, True))], None)
     runs: list[GridRun] = []
-    cells, _ = cells_for(numbers_of(scene), wanted)
-    for count in coarser_cells(numbers_of(scene), cells):
+    *coarser, cells = _first_grids(scene)
+    for count in coarser:
         runs.append(_run(scene, count, run_once, extend=False))
         if runs[-1].result.cut_short:
             return _finished(scene, runs, None)
@@ -141,22 +145,54 @@ def run_to_accuracy(scene: Scene, run_once: RunOnce) -> Result:
     return _finished(scene, runs, step)
 
 
+def has_grid(scene: Scene) -> bool:
+    """Whether cells or modes decide how accurate a scene is."""
+    return scene.solver_name in ("wave", "modal")
+
+
+def requested_solver(scene: Scene) -> str:
+    """Solver that answers a request: modes where none was named and cells do not fit lengths."""
+    wanted, name = scene.solver.accuracy, scene.solver_name
+    if wanted is None or name != "wave" or scene.solver.name != "auto":
+        return name
+    _, misfit = cells_for(numbers_of(scene), wanted)
+    return "wave" if misfit <= FITS else "modal"
+
+
 def planned_cells(scene: Scene) -> list[int]:
-    """Cells of the runs that a wanted accuracy takes: to compare with, by rule, to verify."""
+    """Cells, or modes, of the runs of a request: to compare with, by rule, to verify."""
     wanted = scene.solver.accuracy
     assert wanted is not None
-    numbers = numbers_of(scene)
-    cells, _ = cells_for(numbers, wanted)
-    plan = [*coarser_cells(numbers, cells), cells]
+    plan = _first_grids(scene)
     if scene.run.check:
-        finer = finer_cells(numbers, cells, FIT_SHARE * wanted, FINEST)
+        finer = _finer_grid(scene, plan[-1], FIT_SHARE * wanted)
         plan += [] if finer is None else [finer]
     return plan
 
 
 def with_cells(scene: Scene, cells: int) -> Scene:
-    """Return the scene with cells in place of a wanted accuracy."""
-    return scene.replace(**{"solver.accuracy": None, "run.check": False, "solver.cells": cells})
+    """Return the scene with cells, or modes, in place of a wanted accuracy."""
+    changes = {"solver.accuracy": None, "run.check": False, "solver.cells": cells}
+    return scene.replace(**changes, **{"solver.name": requested_solver(scene)})
+
+
+def _first_grids(scene: Scene) -> list[int]:
+    """Cells or modes to begin with: of the runs to compare with, and by the rule."""
+    wanted, numbers = scene.solver.accuracy, numbers_of(scene)
+    assert wanted is not None
+    if requested_solver(scene) == "modal":
+        modes = modes_for(numbers, wanted)
+        return [math.ceil(COARSER * modes), modes]
+    cells, _ = cells_for(numbers, wanted)
+    return [*coarser_cells(numbers, cells), cells]
+
+
+def _finer_grid(scene: Scene, cells: int, fit: float) -> int | None:
+    """Cells, with no more misfit than that if possible, or modes of the next run; None: none."""
+    if requested_solver(scene) == "modal":
+        modes = FINER_MODES * cells
+        return modes if modes <= min(FINEST, most_modes(numbers_of(scene))) else None
+    return finer_cells(numbers_of(scene), cells, fit, FINEST)
 
 
 def _run(scene: Scene, cells: int, run_once: RunOnce, extend: bool = True) -> GridRun:
@@ -181,7 +217,7 @@ def _finer(scene: Scene, step: Step, wanted: float) -> int | None:
     misfit = largest_misfit(step.run.misfit)
     if estimate.fit > 0.0:
         fit = min(LEFT_TO_FIT * wanted / estimate.fit, LEFT_TO_FIT) * misfit
-    return finer_cells(numbers_of(scene), step.cells, fit, FINEST)
+    return _finer_grid(scene, step.cells, fit)
 
 
 def _finished(scene: Scene, runs: list[GridRun], step: Step | None) -> Result:
@@ -230,6 +266,6 @@ def _missed(result: Result, step: Step | None, wanted: float, error: float) -> s
     if step.estimate.fit > wanted:
         return f"{head}, since the lengths fit no common cell"
     return (
-        f"{head} with {next(iter(result.cells.values()))} cells: the rate jumps from grid "
-        "to grid, since the motion passes close by a threshold"
+        f"{head} with {step.cells} {'modes' if result.solver == 'modal' else 'cells'}: the rate "
+        "jumps from grid to grid, since the motion passes close by a threshold"
     )

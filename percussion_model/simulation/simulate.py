@@ -21,6 +21,7 @@ from percussion_model.scene.rows import is_number
 from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.simulation.accuracy_control import (
     LONGEST,
+    has_grid,
     planned_cells,
     run_to_accuracy,
     time_needed,
@@ -344,7 +345,7 @@ def simulate(
     windows = tuple(windows)
     sampling_times(scene.run.duration, None, trace, windows)  # refuses before anything is compiled
     wanted = scene.solver.accuracy
-    several = wanted is not None and scene.solver_name == "wave"
+    several = wanted is not None and has_grid(scene)
     named = _Stages(stage, progress, len(planned_cells(scene)) if several else 1)
     stopped: list[bool] = []
 

@@ -32,7 +32,7 @@ def bit_alone(scene: Scene) -> Scene:
         return scene.replace(**alone)
     # a bit alone has no rate that an accuracy could be of: it takes the cells that this asks for
     scene = scene.replace(**alone, **{"solver.accuracy": None, "run.check": False})
-    if scene.solver_name != "wave":
+    if scene.solver_name not in ("wave", "modal"):
         return scene
     return scene.replace(**{"solver.cells": cells_for(numbers_of(scene), wanted)[0]})
 

@@ -133,7 +133,9 @@ def load_scene(
         key = "fem.elements" if scene.solver_name == "fem" else "solver.cells"
         scene = scene.replace(**{key: cells})
     if is_run:
-        tell_of_compiling(scene.solver_name)
+        from percussion_model.simulation.accuracy_control import requested_solver
+
+        tell_of_compiling(requested_solver(scene))
     return scene
 
 

@@ -30,6 +30,7 @@ from percussion_model.solvers.modal.records import (
     Standstill,
     Task,
 )
+from percussion_model.solvers.modal.resolution import COARSER, asked_modes
 from percussion_model.solvers.modal.standstill import FEW, POWERS, no_standstill, standstill_of
 from percussion_model.solvers.modal.tables import end_compliance, forms_of, piston_tables
 from percussion_model.solvers.setup import (
@@ -41,10 +42,6 @@ from percussion_model.solvers.setup import (
 )
 from percussion_model.solvers.state import State
 
-# Modes in the bar with the shortest transit time, where the scene names none.
-DEFAULT_MODES = 20
-# A coarser run has so many of them.
-COARSER = 0.7
 LONGEST_LEAP = ((1 << POWERS) - 1) << STEP
 
 
@@ -112,11 +109,8 @@ class ModalSolver(Solver):
         fill_parameters(p, numbers, True)
         elastic = p["piston"] == Piston.ELASTIC
         first = bar_transit_time(numbers.piston if elastic else numbers.bit)
-        modes = numbers.values.solver_cells
         eta = kelvin_voigt_time(numbers)
-        if math.isnan(modes):
-            modes = math.ceil(DEFAULT_MODES * first / min(first, bar_transit_time(numbers.bit)))
-        self.modes = int(modes)
+        self.modes = asked_modes(numbers)
         p["dt"] = self.time_step = first / self.modes
         p["tick"] = tick = self.time_step / (1 << STEP)
         highest = math.pi / self.time_step

@@ -16,12 +16,11 @@ from percussion_model.scene.bars import AREA, LENGTH, YOUNGS_MODULUS, bar_mass, 
 from percussion_model.solvers.modal.lanes import WIDTH
 from percussion_model.solvers.modal.modes import Modes, bar_modes, count_below, products, totals
 from percussion_model.solvers.modal.records import JOINED, LEVELS, Forms, Move, Shape
+from percussion_model.solvers.modal.resolution import MOST_MODES
 from percussion_model.solvers.setup import refuse_many
 
 # Factors of a move below this are zero: what they leave would only slow down arithmetic.
 NOTHING = 1e-40
-# More modes than these would take as many seconds, and hundreds of megabytes, to be prepared.
-MOST_MODES = 1000
 # Nodes and weights by which the loss over a tick is integrated.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
 
