@@ -165,7 +165,7 @@ def test_plan_lists_what_will_be_run():
     sides = [float(np.sum(misfits(numbers_of(odd), count))) for count in coarser]
     assert sides[0] * sides[1] < 0.0
     assert cells > max(coarser)
-    assert planned_cells(odd.replace(**{"solver.name": None})) == [28, 56]
+    assert planned_cells(odd.replace(**{"solver.name": None})) == [20, 28, 40, 56]
 
 
 @pytest.mark.parametrize(

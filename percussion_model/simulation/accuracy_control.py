@@ -20,7 +20,12 @@ from percussion_model.simulation.error_estimate import (
 )
 from percussion_model.simulation.rate import FEWEST_DEPENDENT, LEAST_BLOWS
 from percussion_model.simulation.result import Result
-from percussion_model.solvers.modal.resolution import COARSER, modes_for, most_modes
+from percussion_model.solvers.modal.resolution import (
+    REQUESTED,
+    coarser_modes,
+    modes_for,
+    most_modes,
+)
 from percussion_model.solvers.wave.resolution import (
     FIT_SHARE,
     FITS,
@@ -182,7 +187,7 @@ def _first_grids(scene: Scene) -> list[int]:
     assert wanted is not None
     if requested_solver(scene) == "modal":
         modes = modes_for(numbers, wanted)
-        return [math.ceil(COARSER * modes), modes]
+        return [*coarser_modes(modes, REQUESTED), modes]
     cells, _ = cells_for(numbers, wanted)
     return [*coarser_cells(numbers, cells), cells]
 

@@ -50,9 +50,11 @@ FEWEST_BLOWS = 10
 # What brings the rate of a solver closer.
 REMEDIES = {
     "wave": "solver.accuracy (--accuracy) takes as many cells as an error needs",
-    "modal": "more modes (solver.cells, --cells) bring it closer",
+    "modal": "solver.accuracy (--accuracy) takes as many modes as an error needs",
     "fem": "more fem.elements and a greater fem.contact_stiffness bring it closer",
 }
+# A run is compared with those that have at least this share of its modes.
+LEAST_MODES = 0.3
 # Words of the warning of a large error.
 LARGE = "may be off by"
 # Where blows have two numbers of drilling cycles, and one is this rare, the motion is near the
@@ -224,6 +226,8 @@ def estimate_error(run: GridRun, others: Sequence[GridRun]) -> Estimate:
     others = [other for other in others if other.useful]
     if not others:
         return Estimate(math.inf, 0.0, scatter, floor)  # nothing is known
+    if run.result.solver == "modal":
+        return Estimate(_by_modes(run, others), 0.0, scatter, floor)
     fitting = [other for other in others if other.largest <= FITS]
     if misfit <= FITS and fitting:
         other = fitting[-1]
@@ -241,6 +245,21 @@ def estimate_error(run: GridRun, others: Sequence[GridRun]) -> Estimate:
     if misfit > GROSS_MISFIT:
         fit = max(fit, GROSS_EFFECT * misfit)
     return Estimate(cells, fit, scatter, floor)
+
+
+def _by_modes(run: GridRun, others: Sequence[GridRun]) -> float:
+    """Error by the number of modes: the largest distance to runs with not much fewer."""
+    least = LEAST_MODES * _resolution(run.result)
+    near = [other for other in others if _resolution(other.result) >= least] or others[-1:]
+    off = max(_difference(other, run) for other in near)
+    if all(_same_motion(run, other) for other in near):
+        return off
+    return max(SPREAD_MARGIN * off, run.promised)
+
+
+def _resolution(result: Result) -> int:
+    """Cells or modes of the first elastic bar."""
+    return next(iter(result.cells.values()))
 
 
 def _difference(other: GridRun, run: GridRun) -> float:
@@ -387,7 +406,7 @@ def _estimate(part: GridRun, others: Sequence[GridRun]) -> Estimate:
     scatter = part.scatter / abs(part.value)
     if not others:
         return Estimate(0.0, 0.0, scatter, 0.0)
-    if part.result.solver == "wave":
+    if part.result.solver in ("wave", "modal"):
         return estimate_error(part, others)
     known = [other for other in others if other.useful]
     # each of the others is coarser in another way

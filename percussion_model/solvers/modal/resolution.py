@@ -11,9 +11,10 @@ from percussion_model.solvers.wave.resolution import cells_by_rule
 
 # Modes in the bar with the shortest transit time, where the scene names none.
 DEFAULT_MODES = 20
-# Runs to compare with have so many of them: what is left of an error of first order is their
-# distance.
-COARSER = 0.5
+# Runs to compare with have such shares of them: several, since two agree by chance. Requests
+# have one more.
+COARSER = (0.5, 0.7)
+REQUESTED = (0.35, *COARSER)
 # More modes than these would take as many seconds, and hundreds of megabytes, to be prepared.
 MOST_MODES = 1000
 # Modes come in whole lanes, and a few more than asked for.
@@ -47,6 +48,12 @@ def asked_modes(numbers: Numbers) -> int:
     if not math.isnan(values.solver_accuracy):
         return modes_for(numbers, values.solver_accuracy)
     return _in_first(numbers, DEFAULT_MODES)
+
+
+def coarser_modes(modes: int, shares: tuple[float, ...]) -> list[int]:
+    """Modes of the runs that a run is compared with, the fewest first."""
+    counts = {math.ceil(share * modes) for share in shares}
+    return sorted(count for count in counts if count < modes)
 
 
 def _in_first(numbers: Numbers, modes: float) -> int:

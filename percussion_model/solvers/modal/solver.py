@@ -30,7 +30,7 @@ from percussion_model.solvers.modal.records import (
     Standstill,
     Task,
 )
-from percussion_model.solvers.modal.resolution import COARSER, asked_modes
+from percussion_model.solvers.modal.resolution import COARSER, asked_modes, coarser_modes
 from percussion_model.solvers.modal.standstill import FEW, POWERS, no_standstill, standstill_of
 from percussion_model.solvers.modal.tables import end_compliance, forms_of, piston_tables
 from percussion_model.solvers.setup import (
@@ -189,9 +189,11 @@ class ModalSolver(Solver):
 
     def coarser_scenes(self) -> list[Scene] | None:
         """The scene with fewer modes."""
-        count = int(COARSER * (self.modes or 0))
-        changes = {"solver.accuracy": None, "run.check": False, "solver.cells": count}
-        return [self.scene.replace(**changes)] if count else None
+        changes = {"solver.accuracy": None, "run.check": False}
+        counts = coarser_modes(self.modes, COARSER)
+        return [
+            self.scene.replace(**changes, **{"solver.cells": count}) for count in counts
+        ] or None
 
     def _bars(self, state: State) -> Bars:
         w, wp = state.arrays
