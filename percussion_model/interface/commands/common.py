@@ -151,7 +151,8 @@ def tell_of_compiling(*solvers: str) -> None:
     new = {name: place for name, place in places.items() if place is not None}
     if new:
         _told.update(new)
-        long = "half a minute each" if len(new) > 1 else "half a minute"
+        long = "a minute" if "modal" in new else "half a minute"
+        long += " each" if len(new) > 1 else ""
         print_message(
             f"compiling the kernels of the solver {' and '.join(new)}: once, for about {long}; "
             f"they are kept in {', '.join(map(str, new.values()))}"
