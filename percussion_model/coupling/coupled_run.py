@@ -161,6 +161,8 @@ def _undecided_losses(
     if (share := found.get("shoulder_by_blows")) is not None:
         missed = MISSED_BY_SHOULDER * min(1.0, step / UNSEEING_STEP)
         error = max(error, missed * abs(lost / share) if share else math.inf)
+    elif np.any(columns.get("hammer.contact.impulse", 0.0)):
+        error = math.inf  # of a part of a blow
     hidden = lost < 0.0 or is_undecided(lost, error)
     names = ("shoulder_energy", "shoulder_by_blows")
     return {f"{name}_undecided": hidden for name in names if name in found}

@@ -218,7 +218,7 @@ class Coupling:
                 try:
                     go(k * step, step)
                 except CouplingError as failure:
-                    error = f"at {k * step:.6g} s {failure}"
+                    error = f"at {k * step:.6g} s: {failure}"
                     break
                 done = k + 1
                 interrupted = stop()

@@ -18,6 +18,7 @@ from rich.text import Text
 from percussion_model.interface.messages import wrapped
 from percussion_model.interface.progress import Lines, Report, lines
 from percussion_model.interface.tables import print_table
+from percussion_model.scene.solver_names import counted
 from percussion_model.simulation.uncertain import (
     ABOUT,
     ABOUT_CHANGE,
@@ -99,7 +100,8 @@ def show_summary(result: Result) -> None:
         after = f"{len(result.counted)} counted"
         table.add_row("Whole blows", f"{len(result.blows)}", after)
     if result.cells:
-        table.add_row("Cells", " + ".join(map(str, result.cells.values())), ", ".join(result.cells))
+        counts = " + ".join(map(str, result.cells.values()))
+        table.add_row(counted(result.solver).capitalize(), counts, ", ".join(result.cells))
     table.add_row("Prepared in", in_digits(result.setup_time, TIMED), "s")
     table.add_row("Computed in", in_digits(result.wall_time, TIMED), "s")
     table.add_row("Speed", in_digits(result.real_time_factor, TIMED), "× real time")
@@ -225,7 +227,7 @@ def show_explanation(scene: Scene, found: Forecast) -> None:
         table.add_row("Steps", "from blow to blow, out of a table")
     elif solver.time_step is not None:
         cells = ", ".join(f"{count} in the {bar}" for bar, count in solver.cells.items())
-        table.add_row("Cells", cells)
+        table.add_row(counted(solver.name).capitalize(), cells)
         table.add_row("Time step", f"{solver.time_step:.6g} s")
         error = 100.0 * solver.wave_speed_error
         fits = error < 100.0 * FITS

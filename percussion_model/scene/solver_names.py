@@ -31,3 +31,8 @@ def register_name(name: str, bodies: Literal["elastic", "rigid"] | None = None) 
     SOLVER_NAMES.append(name)
     if bodies is not None:
         BODIES[name] = bodies
+
+
+def counted(solver: str) -> str:
+    """What a solver divides elastic bars into: "cells", "modes" or "elements"."""
+    return {"modal": "modes", "fem": "elements"}.get(solver, "cells")

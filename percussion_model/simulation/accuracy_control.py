@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 from percussion_model.scene.numbers import numbers_of
 from percussion_model.scene.scene import Scene
+from percussion_model.scene.solver_names import counted
 from percussion_model.simulation.error_estimate import (
     Estimate,
     GridRun,
@@ -271,6 +272,7 @@ def _missed(result: Result, step: Step | None, wanted: float, error: float) -> s
     if step.estimate.fit > wanted:
         return f"{head}, since the lengths fit no common cell"
     return (
-        f"{head} with {step.cells} {'modes' if result.solver == 'modal' else 'cells'}: the rate "
-        "jumps from grid to grid, since the motion passes close by a threshold"
+        f"{head} with {next(iter(result.cells.values()))} "
+        f"{counted(result.solver)}: the rate jumps from grid to grid, since the motion passes "
+        "close by a threshold"
     )

@@ -19,6 +19,7 @@ from percussion_model.physics.records import BLOW, EVENT, READING, SAMPLE_FIELDS
 from percussion_model.scene.inputs import SimulationError
 from percussion_model.scene.rows import is_number
 from percussion_model.scene.scene import Scene, SceneError
+from percussion_model.scene.solver_names import counted
 from percussion_model.simulation.accuracy_control import (
     LONGEST,
     has_grid,
@@ -404,7 +405,8 @@ class _Stages:
         if purpose or self.planned > 1:
             count = scene.fem.elements if scene.solver_name == "fem" else scene.solver.cells
             of = f"{self.begun} of {max(self.planned, self.begun)}"
-            self.name = f"{purpose}run {of}" + (f" with {count} cells" if count else "")
+            what = counted(scene.solver_name)
+            self.name = f"{purpose}run {of}" + (f" with {count} {what}" if count else "")
         self.longer(scene.run.duration)
 
     def longer(self, end: float) -> None:

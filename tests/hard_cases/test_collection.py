@@ -18,6 +18,7 @@ from percussion_model.interface.terminal import show_stability
 from percussion_model.scene.inputs import SimulationError
 from percussion_model.verification.hard_cases import SOLVERS, hard_cases, measure, run_collection
 from percussion_model.verification.hard_cases.collection import (
+    FROM_CHANGE,
     Collection,
     left_out,
     numerical_error,
@@ -165,9 +166,10 @@ def test_a_rate_is_only_off_where_the_errors_of_both_do_not_reach_so_far(capsys)
     assert "the errors of the two rates reach 2.8 % of the first" in far["reason"]
     assert entry({"depends_on_cells": True}, {})["decided"] is False
     assert short_rate(ROW | {"depends_on_cells": True}) == "undecided"
-    assert entry({}, {"refined_rate_change": 0.02})["decided"] is False
-    assert entry({"refined_rate_change": 0.02}, {})["decided"] is False
-    assert entry({}, {"refined_rate_change": 0.01})["decided"] is True
+    change = 0.02 / FROM_CHANGE
+    assert entry({}, {"refined_rate_change": change})["decided"] is False
+    assert entry({"refined_rate_change": change}, {})["decided"] is False
+    assert entry({}, {"refined_rate_change": 0.5 * change})["decided"] is True
     undecided = other | {"solver": "rigid", "rate_error": 1.5e-4}
     rows = [row | {"wall_time": 0.1} for row in (ROW, other, undecided)]
     show_stability(Collection(rows))
@@ -195,7 +197,7 @@ def test_a_disagreement_has_the_digits_that_its_errors_leave():
 def test_the_error_of_a_rate_is_of_scatter_and_of_the_grid():
     assert numerical_error(ROW | {"rate_error": 1e-4}) == 1e-4
     finer = {"rate_error": 1e-4, "refined_rate_change": 0.05}
-    assert numerical_error(ROW | finer) == pytest.approx(0.05 * ROW["rate"])
+    assert numerical_error(ROW | finer) == pytest.approx(FROM_CHANGE * 0.05 * ROW["rate"])
     assert numerical_error(ROW | {"rate_error": 1e-4, "refined_rate_change": None}) == 1e-4
     assert numerical_error(ROW | {"rate": None}) is None
 

@@ -77,7 +77,7 @@ def test_a_crash_has_no_points_and_a_page(feed_control, tmp_path, monkeypatch, c
         main()
     assert ended.value.code == 1
     said = " ".join(capsys.readouterr().err.split())
-    assert "rod ended early, at 0.051 s controller: RuntimeError: no idea what to do" in said
+    assert "rod ended early, at 0.051 s: controller: RuntimeError: no idea what to do" in said
     page = (out / "index.html").read_text(encoding="utf-8")
     assert "no idea what to do" in page
     assert '<tr class="bad"><td><a href="#rod">rod</a></td><td>a rod is added</td>' in page
@@ -91,7 +91,7 @@ def nonsense(inputs, time, step):
 def test_no_number_ends_the_run_with_what_there_is(feed_control):
     (score,) = bench(feed_control, nonsense, trials=["rod"])
     assert score.points == 0.0
-    assert score.faults == ["ended early, at 0.051 s controller: force_command = nan is no number"]
+    assert score.faults == ["ended early, at 0.051 s: controller: force_command = nan is no number"]
     assert score.numbers["depth"] > 0.0
     assert score.run["time"][-1] == pytest.approx(0.051)
 

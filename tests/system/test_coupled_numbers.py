@@ -62,6 +62,21 @@ def test_a_coupled_rate_has_its_error():
     assert "rate_second_half" not in summary(CoupledRun(held, 1e-3, 4000))
 
 
+@pytest.mark.parametrize("struck", [False, True])
+def test_what_the_shoulder_takes_in_a_part_of_a_blow_is_undecided(struck):
+    time = np.linspace(0.0, 5e-3, 6)
+    columns = {f"string.energy.{name}": 0.0 * time for name in STRING_ENERGIES}
+    columns |= {
+        "time": time,
+        "string.energy.shoulder": 300.0 * time,
+        "string.energy.head": 300.0 * time,
+        "hammer.blow_count": 0.0 * time,
+        "hammer.blow_energy": 0.0 * time,
+        "hammer.contact.impulse": 10.0 * struck * time,
+    }
+    assert summary(CoupledRun(columns, 1e-3, 5))["shoulder_energy_undecided"] is struck
+
+
 @pytest.mark.parametrize(
     ("lost", "step", "residual", "hidden"),
     [

@@ -133,6 +133,7 @@ MODAL_PAR = np.dtype(
         ("tick", "f8"),  # unit of time [s]
         ("dt", "f8"),  # 2^STEP ticks
         ("eta", "f8"),  # Kelvin-Voigt time [s]
+        ("window", "f8"),  # over which a peak of the contact force is a mean [s]
         ("start_gap", "f8"),  # [m]
         ("bound_p", "f8"),  # |offset of the low end| <= bound_p sqrt(2 E) [m/J^0.5]
         ("bound_t", "f8"),

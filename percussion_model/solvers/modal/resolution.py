@@ -47,6 +47,11 @@ def asked_modes(numbers: Numbers) -> int:
         return int(values.solver_cells)
     if not math.isnan(values.solver_accuracy):
         return modes_for(numbers, values.solver_accuracy)
+    return default_modes(numbers)
+
+
+def default_modes(numbers: Numbers) -> int:
+    """Modes in the first elastic bar where a scene asks for none."""
     return _in_first(numbers, DEFAULT_MODES)
 
 

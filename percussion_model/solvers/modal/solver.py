@@ -30,7 +30,12 @@ from percussion_model.solvers.modal.records import (
     Standstill,
     Task,
 )
-from percussion_model.solvers.modal.resolution import COARSER, asked_modes, coarser_modes
+from percussion_model.solvers.modal.resolution import (
+    COARSER,
+    asked_modes,
+    coarser_modes,
+    default_modes,
+)
 from percussion_model.solvers.modal.standstill import FEW, POWERS, no_standstill, standstill_of
 from percussion_model.solvers.modal.tables import end_compliance, forms_of, piston_tables
 from percussion_model.solvers.setup import (
@@ -113,6 +118,7 @@ class ModalSolver(Solver):
         self.modes = asked_modes(numbers)
         p["dt"] = self.time_step = first / self.modes
         p["tick"] = tick = self.time_step / (1 << STEP)
+        p["window"] = first / default_modes(numbers)
         highest = math.pi / self.time_step
         rock = rock_numbers(numbers)
         kind = p["rock"]

@@ -151,11 +151,13 @@ def book_contact(par, s, trial):
     """Book what piston and bit do to each other in a step."""
     if s.closed == 1:
         s.i_contact += trial.contact * trial.h
-        # at the first instant a bar with loss resists without bound: a mean over a step
+        # a bar with loss resists the first instants of a contact without bound: means, and
+        # without the first
         s.peak_time += trial.h
         s.peak_impulse += trial.contact * trial.h
-        if s.peak_time >= 0.999 * par.dt:
-            mean = s.peak_impulse / s.peak_time
+        if s.peak_time >= 0.999 * par.window:
+            first = (s.time - s.closed_at) * par.tick < 1.5 * par.window
+            mean = 0.0 if first else s.peak_impulse / s.peak_time
             s.b_peak_contact = max(s.b_peak_contact, mean)
             if time_of(par, s) > s.peak_from:
                 s.peak_contact_force = max(s.peak_contact_force, mean)

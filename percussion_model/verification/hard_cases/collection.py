@@ -23,6 +23,9 @@ from percussion_model.verification.hard_cases.refinement import SIGMAS, refine
 
 # Solvers disagree where their mean rates are further apart than this.
 DISAGREE = 0.02
+# Error of a rate by what a grid of twice as many cells changes: of first order in the cells that
+# is half of the error.
+FROM_CHANGE = 2.0
 # What must hold of every row.
 MOST_RESIDUAL = 1e-6
 MOST_MOMENTUM = 1e-8
@@ -66,10 +69,10 @@ class Collection:
         """What the ± of a rate is."""
         if self.is_refined:
             return (
-                "± of a rate is its standard error by the scatter of the blows, or what a grid "
-                "of twice as many cells changes, whichever is greater; a rate without it is known "
-                "to its four digits, but without loss in the bars a rate depends on the cells, "
-                "and is undecided."
+                "± of a rate is its standard error by the scatter of the blows, or twice what a "
+                "grid of twice as many cells changes, whichever is greater; a rate without it is "
+                "known to its four digits, but without loss in the bars a rate depends on the "
+                "cells, and is undecided."
             )
         return (
             "± of a rate is its standard error by the scatter of the blows alone; what finer "
@@ -185,8 +188,8 @@ def off_text(entry: dict[str, Any]) -> str:
 
 
 def _by_grid(row: dict[str, Any]) -> float:
-    """Change of a rate on a finer grid [m/s], 0 where there is none to tell."""
-    return abs(row["rate"]) * (row.get("refined_rate_change") or 0.0)
+    """Error of a rate by its change on a finer grid [m/s], 0 where there is none to tell."""
+    return FROM_CHANGE * abs(row["rate"]) * (row.get("refined_rate_change") or 0.0)
 
 
 def _disagreement(
