@@ -167,7 +167,7 @@ def test_an_fmu_that_refuses_says_which_and_why(feed_control):
         return steady(inputs, time, step) | ({"force_command": 1e12} if time > 0.02 else {})
 
     run = Coupling(feed_control, replaced={"controller": wild}).run(SHORT, 1e-3)
-    assert "s rig: force_command = 1000000000000.0 N: must be a number from" in run.error
+    assert "s: rig: force_command = 1000000000000.0 N: must be a number from" in run.error
     assert run.steps >= 20
 
 
