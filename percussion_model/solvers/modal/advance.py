@@ -16,7 +16,9 @@ from percussion_model.solvers.modal.bar import (
     sag,
 )
 from percussion_model.solvers.modal.leaps import leap, plan
-from percussion_model.solvers.modal.piston import WHOLE, has_piston, time_of, unpark
+from percussion_model.solvers.modal.pairs import drop_pairs, law_wanted
+from percussion_model.solvers.modal.phase import go_phase
+from percussion_model.solvers.modal.piston import LOOK, WHOLE, has_piston, time_of, unpark
 from percussion_model.solvers.modal.records import STEP, Task
 from percussion_model.solvers.modal.step import step
 
@@ -43,8 +45,8 @@ def full(s, blows, events):
 
 
 @kernel
-def advance_to(par, s, bars, ops, end, blows, events):
-    """Advance to a tick, unless a pending leap or step passes it; a `Status`."""
+def advance_to(par, s, bars, end, blows, events):
+    """Advance to a tick, unless a pending leap, or what is done in one go, passes it; a `Status`."""
     s.n_blows = 0
     s.n_events = 0
     while True:
@@ -53,21 +55,27 @@ def advance_to(par, s, bars, ops, end, blows, events):
             return status
         if not math.isfinite(s.p + s.v_b + s.v_p + s.u_r):
             return Status.NOT_FINITE
-        if s.leap_end < 0 and par.leaps == 1 and s.time >= s.no_plan and s.time < end:
-            plan(par, s, bars, ops)
-        if s.leap_end >= 0:
-            if s.leap_end > end:
-                return Status.DONE
-            leap(par, s, bars, ops)
-        else:
+        law = law_wanted(par, s, bars.laws)
+        if law < 0:
             if s.time + WHOLE > end:
                 return Status.DONE
             step(par, s, bars, STEP, blows, events)
+            continue
+        if s.leap_end < 0 and par.leaps == 1 and s.time >= s.no_plan and s.time < end:
+            plan(par, s, bars, law)
+        if s.leap_end >= 0:
+            if s.leap_end > end:
+                return Status.DONE
+            leap(par, s, bars)
+        else:
+            if s.time + LOOK * WHOLE > end:
+                return Status.DONE
+            go_phase(par, s, bars, law, s.time + LOOK * WHOLE, blows, events)
 
 
 @kernel
-def commit_to(par, s, bars, ops, end, blows, events):
-    """Carry bit and piston to a tick, within a pending leap or step."""
+def commit_to(par, s, bars, end, blows, events):
+    """Carry bit and piston to a tick, within what is pending."""
     s.n_blows = 0
     s.n_events = 0
     if s.leap_end >= 0:
@@ -75,16 +83,22 @@ def commit_to(par, s, bars, ops, end, blows, events):
         cut = s.time + (cut - s.time) // WHOLE * WHOLE
         s.leap_end = cut
         if cut > s.time:
-            leap(par, s, bars, ops)
+            leap(par, s, bars)
         s.leap_end = -1
     level = STEP
     while s.time < end:
         status = full(s, blows, events)
         if status != Status.DONE:
             return status
+        law = law_wanted(par, s, bars.laws)
+        if law >= 0:
+            go_phase(par, s, bars, law, end, blows, events)
+            continue
         while s.time + (1 << level) > end:
             level -= 1
         step(par, s, bars, level, blows, events)
+    if s.law >= 0:
+        drop_pairs(par, s, bars)
     if has_piston(par) and s.parked == 1:
         unpark(par, s, bars)
     s.no_plan = s.time
@@ -123,7 +137,7 @@ def read_at(par, s, bars, time, row):
 
 
 @kernel
-def run(task, par_, state, bars, ops, time, blows, events, reading):
+def run(task, par_, state, bars, time, blows, events, reading):
     """Do one `Task` with a state; the only entry into the modal kernels.
 
     Parameters
@@ -134,7 +148,6 @@ def run(task, par_, state, bars, ops, time, blows, events, reading):
         READ: as COMMIT, then evaluate; spoils the state, so give a copy.
     par_, state : MODAL_PAR, MODAL_STATE array of length 1
     bars : Bars
-    ops : Standstill
     time : float
         [s]
     blows, events : BLOW, EVENT array
@@ -150,10 +163,10 @@ def run(task, par_, state, bars, ops, time, blows, events, reading):
     s = state[0]
     end = tick_at(par, time)
     if task == Task.ADVANCE:
-        return advance_to(par, s, bars, ops, end, blows, events)
+        return advance_to(par, s, bars, end, blows, events)
     if task == Task.READ:
-        s.live = 0
-    status = commit_to(par, s, bars, ops, end, blows, events)
+        s.live = s.events_on = 0
+    status = commit_to(par, s, bars, end, blows, events)
     if task == Task.READ:
         read_at(par, s, bars, time, reading[0])
     return status

@@ -7,13 +7,16 @@ another, whatever vectors its processor has.
 from __future__ import annotations
 
 import operator
+from typing import ClassVar
 
 import numpy as np
 from llvmlite import ir
 from numba import config, types
 from numba.core import cgutils
 from numba.core.datamodel import PrimitiveModel, register_default
-from numba.extending import intrinsic, overload
+from numba.core.imputils import lower_builtin
+from numba.core.typing.templates import ConcreteTemplate, infer_global, signature
+from numba.extending import intrinsic
 
 WIDTH = 8
 _VECTOR = ir.VectorType(ir.DoubleType(), WIDTH)
@@ -65,13 +68,18 @@ def _store(typing, array, row, start, lanes):
     return types.void(array, types.intp, types.intp, _lanes), generate
 
 
+def _repeat(builder, number):
+    """A vector of one number."""
+    undefined = ir.Constant(_VECTOR, ir.Undefined)
+    first = builder.insert_element(undefined, number, ir.Constant(ir.IntType(32), 0))
+    zeros = ir.Constant(ir.VectorType(ir.IntType(32), WIDTH), [0] * WIDTH)
+    return builder.shuffle_vector(first, undefined, zeros)
+
+
 @intrinsic
 def _spread(typing, number):
     def generate(context, builder, signature, args):
-        undefined = ir.Constant(_VECTOR, ir.Undefined)
-        first = builder.insert_element(undefined, args[0], ir.Constant(ir.IntType(32), 0))
-        zeros = ir.Constant(ir.VectorType(ir.IntType(32), WIDTH), [0] * WIDTH)
-        return builder.shuffle_vector(first, undefined, zeros)
+        return _repeat(builder, args[0])
 
     return _lanes(types.float64), generate
 
@@ -99,29 +107,26 @@ def _sum(typing, lanes):
     return types.float64(_lanes), generate
 
 
-def _binary(instruction):
-    @intrinsic
-    def combine(typing, left, right):
-        def generate(context, builder, signature, args):
-            return getattr(builder, instruction)(*args)
+def _lower(function, instruction):
+    """Make an operator of lanes one instruction: a function of its own would stay a call."""
 
-        return _lanes(_lanes, _lanes), generate
+    @infer_global(function)
+    class Signatures(ConcreteTemplate):  # type: ignore[misc]
+        cases: ClassVar = [
+            signature(_lanes, _lanes, _lanes),
+            signature(_lanes, _lanes, types.float64),
+            signature(_lanes, types.float64, _lanes),
+        ]
 
-    return combine
+    def generate(context, builder, signature, args):
+        both = [
+            one if kind is _lanes else _repeat(builder, one)
+            for one, kind in zip(args, signature.args, strict=True)
+        ]
+        return getattr(builder, instruction)(*both)
 
-
-def _overload(function, instruction):
-    combine = _binary(instruction)
-
-    @overload(function)
-    def choose(left, right):
-        if isinstance(left, Lanes) and isinstance(right, Lanes):
-            return lambda left, right: combine(left, right)
-        if isinstance(left, Lanes) and isinstance(right, types.Float):
-            return lambda left, right: combine(left, _spread(right))
-        if isinstance(left, types.Float) and isinstance(right, Lanes):
-            return lambda left, right: combine(_spread(left), right)
-        return None
+    for case in Signatures.cases:
+        lower_builtin(function, *case.args)(generate)
 
 
 for _function, _instruction in (
@@ -129,7 +134,7 @@ for _function, _instruction in (
     (operator.sub, "fsub"),
     (operator.mul, "fmul"),
 ):
-    _overload(_function, _instruction)
+    _lower(_function, _instruction)
 
 
 def _load_numbers(array, row, start):

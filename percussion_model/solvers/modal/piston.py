@@ -82,6 +82,23 @@ def flip_contact(par, s, bars, approach, blows, events):
     s.look = s.time + LOOK * WHOLE
 
 
+@inlined
+def book_contact(par, s, contact, h, time):
+    """Book what piston and bit did to each other for `h` until a time, by a mean force."""
+    s.i_contact += contact * h
+    # a bar with loss resists the first instants of a contact without bound: means, and
+    # without the first
+    s.peak_time += h
+    s.peak_impulse += contact * h
+    if s.peak_time >= 0.999 * par.window:
+        first = time - s.closed_at * par.tick < 1.5 * par.window
+        mean = 0.0 if first else s.peak_impulse / s.peak_time
+        s.b_peak_contact = max(s.b_peak_contact, mean)
+        if time > s.peak_from:
+            s.peak_contact_force = max(s.peak_contact_force, mean)
+        s.peak_time = s.peak_impulse = 0.0
+
+
 @merged
 def switches(par, s, u_r):
     """Whether the drive turns at a relative displacement."""

@@ -70,15 +70,71 @@ class Forms(NamedTuple):
     join: np.ndarray
 
 
+class Laws(NamedTuple):
+    """Motions of a form under all that its rock end feels: law 2 form, or 2 form + 1 with a dashpot.
+
+    Each damped mode is a pair of numbers Q, V = dQ/dt (docs/modal.md, section 3).
+
+    Attributes
+    ----------
+    sizes : int array, shape (12,)
+        Modes of each law, 0 where there is none.
+    dashpot : float array, shape (12,)
+        Of the rock [N s/m].
+    move : ndarray, shape (12, LEVELS, len(Go), n)
+    ends : ndarray, shape (12, len(End), n)
+    out, into : ndarray, shape (12, 2 n, 2 n)
+        From pairs to offsets and velocities of the form's modes, and back; row by number that is
+        changed, all Q or offsets first. Empty for laws whose pairs are those modes.
+    taken : ndarray, shape (12, 2 n, 2 n)
+        Form: what a dashpot of 1 N s/m takes from now on [J].
+    """
+
+    sizes: np.ndarray
+    dashpot: np.ndarray
+    move: np.ndarray
+    ends: np.ndarray
+    out: np.ndarray
+    into: np.ndarray
+    taken: np.ndarray
+
+
+class Go(IntEnum):
+    """Rows of a table: what a pair does over 2^level ticks."""
+
+    Q_BY_Q = 0
+    Q_BY_V = 1
+    V_BY_Q = 2
+    V_BY_V = 3
+    YIELD = 4  # offset of a rigid mode by a constant force; its velocity is Q_BY_V
+
+
+class End(IntEnum):
+    """Rows by which pairs tell of places; of each the part of Q, then that of V."""
+
+    LOW = 0  # offset of the rock end
+    SPEED = 2  # its velocity
+    TOP = 4  # of the top of the bit
+    BIT = 6  # integral over the mass of the bit
+    BIT_SPEED = 8
+    PISTON = 10
+    PISTON_SPEED = 12
+    PULL = 14  # force that accelerates the piston's mass
+    SHIFT = 16  # pairs of a common offset of 1 m
+    SQUARE = 18  # Q'' + decay Q' + square Q = 0
+    ROWS = 19
+
+
 class Bars(NamedTuple):
     """Modes of the present form and of the free piston, what is constant of them, and room.
 
     Attributes
     ----------
-    w : ndarray, shape (3, n)
-        Offsets, velocities, and forces of the body loads.
+    w : ndarray, shape (6, n)
+        Offsets, velocities, and forces of the body loads; pairs about rest, and their loads.
     wp : ndarray, shape (2, modes of the piston)
     forms : Forms
+    laws : Laws
     shape_p, move_p : ndarray
         Of the piston's elastic modes, as one of `Forms`.
     rows : ndarray, shape (2, n)
@@ -88,36 +144,10 @@ class Bars(NamedTuple):
     w: np.ndarray
     wp: np.ndarray
     forms: Forms
+    laws: Laws
     shape_p: np.ndarray
     move_p: np.ndarray
     rows: np.ndarray
-
-
-class Standstill(NamedTuple):
-    """Powers 1, 2, 4, ... of the map of a step in standstill, and what is lost over them.
-
-    Attributes
-    ----------
-    powers : ndarray, shape (POWERS, m, m)
-        By columns; m numbers: offsets about rest and velocities of the first modes.
-    loss, dashpot : ndarray, shape (POWERS, m, m)
-        Forms: what bar and dashpot take [J].
-    x, y : ndarray, shape (1, m)
-        Room.
-    """
-
-    powers: np.ndarray
-    loss: np.ndarray
-    dashpot: np.ndarray
-    x: np.ndarray
-    y: np.ndarray
-
-
-class LeapKind(IntEnum):
-    """How the bit is carried over a leap."""
-
-    FLIGHT = 0
-    STANDSTILL = 1
 
 
 class Task(IntEnum):
@@ -152,8 +182,10 @@ MODAL_STATE = np.dtype(
     [
         ("time", "i8"),  # [ticks]
         ("leap_end", "i8"),  # when the pending leap ends, or -1
-        ("leap_kind", "i8"),
         ("no_plan", "i8"),  # plan no leap before
+        ("law", "i8"),  # by which the pairs move, or -1: offsets and velocities do
+        ("pairs", "i8"),  # that move
+        ("flips", "i8"),  # of the contact at this instant
         ("look", "i8"),  # when to look again at which modes are needed
         ("parked", "i8"),  # 1: the vibration of the piston is that of an earlier time
         ("piston_time", "i8"),
@@ -176,6 +208,13 @@ MODAL_STATE = np.dtype(
         ("offset", "f8"),  # between the ends where they parted [m]
         ("peak_time", "f8"),  # of contact, since the last mean force for a peak [s]
         ("peak_impulse", "f8"),  # [N s]
+        ("rest_low", "f8"),  # sums at rest under the loads: rock end, top [m]
+        ("rest_top", "f8"),
+        ("rest_b", "f8"),  # bit, piston [kg m]
+        ("rest_p", "f8"),
+        ("rest_pull", "f8"),  # [N]
+        ("vibrates", "f8"),  # energy about rest when the pairs were taken [J]
+        ("takes", "f8"),  # that a dashpot of 1 N s/m would take from then on [J]
         ("v_low", "f8"),  # velocity of the rock end [m/s]
         ("f_contact", "f8"),  # mean forces of the last step [N]
         ("f_rock", "f8"),
@@ -189,8 +228,10 @@ MODAL_LIMITS = Limits(
     {
         "time": COUNT,
         "leap_end": (-1, MOST),
-        "leap_kind": (min(LeapKind), max(LeapKind)),
         "no_plan": COUNT,
+        "law": (-1, 11),
+        "pairs": COUNT,
+        "flips": COUNT,
         "look": COUNT,
         "parked": FLAG,
         "piston_time": COUNT,

@@ -16,8 +16,12 @@ from percussion_model.scene.parameters import Bar
 from percussion_model.scene.scene import Scene
 from percussion_model.solvers.base import Solver
 from percussion_model.solvers.modal.advance import TICK_ROUNDING, run
+from percussion_model.solvers.modal.damped import laws_of
 from percussion_model.solvers.modal.fields import Places
+from percussion_model.solvers.modal.lanes import WIDTH
+from percussion_model.solvers.modal.leaps import LONGEST
 from percussion_model.solvers.modal.modes import Modes
+from percussion_model.solvers.modal.piston import LOOK
 from percussion_model.solvers.modal.records import (
     JOINED,
     MODAL_LIMITS,
@@ -26,8 +30,8 @@ from percussion_model.solvers.modal.records import (
     STEP,
     Bars,
     Forms,
+    Laws,
     Shape,
-    Standstill,
     Task,
 )
 from percussion_model.solvers.modal.resolution import (
@@ -36,7 +40,6 @@ from percussion_model.solvers.modal.resolution import (
     coarser_modes,
     default_modes,
 )
-from percussion_model.solvers.modal.standstill import FEW, POWERS, no_standstill, standstill_of
 from percussion_model.solvers.modal.tables import end_compliance, forms_of, piston_tables
 from percussion_model.solvers.setup import (
     PISTONS,
@@ -47,7 +50,7 @@ from percussion_model.solvers.setup import (
 )
 from percussion_model.solvers.state import State
 
-LONGEST_LEAP = ((1 << POWERS) - 1) << STEP
+LONGEST_LEAP = LONGEST << STEP
 
 
 class Tables(NamedTuple):
@@ -58,7 +61,7 @@ class Tables(NamedTuple):
     free_piston: Modes | None
     shape_p: np.ndarray
     move_p: np.ndarray
-    standstill: Standstill | None
+    laws: Laws
 
 
 # Tables that were made last; so many are kept.
@@ -68,21 +71,19 @@ MOST_KEPT = 4
 
 def _tables(
     numbers: Numbers, mass: float, springs: tuple[float, float], c_r: float, highest: float,
-    tick: float, leaps: bool,
+    tick: float,
 ) -> Tables:  # fmt: skip
     """Make the tables of a scene, or find them."""
     elastic = mass > 0.0 and PISTONS[numbers.values.piston_model] == Piston.ELASTIC
     piston, bit, eta = numbers.piston if elastic else None, numbers.bit, kelvin_voigt_time(numbers)
     bytes_ = bit.tobytes(), None if piston is None else piston.tobytes()
-    key = (*bytes_, mass, springs, c_r, highest, tick, eta, leaps)
+    key = (*bytes_, mass, springs, c_r, highest, tick, eta)
     if key not in _kept:
         while len(_kept) >= MOST_KEPT:
             del _kept[next(iter(_kept))]
         made = forms_of(bit, piston, mass, springs, highest, eta, tick)
-        still = None
-        if leaps and springs[1] > 0.0:
-            still = standstill_of(made[0], c_r, eta, tick * (1 << STEP))
-        _kept[key] = Tables(*made, *piston_tables(made[2], eta, tick), still)
+        laws = laws_of(made[0], c_r, eta, tick)
+        _kept[key] = Tables(*made, *piston_tables(made[2], eta, tick), laws)
     return _kept[key]
 
 
@@ -128,7 +129,7 @@ class ModalSolver(Solver):
         )
         mass = 0.0 if p["piston"] == Piston.ABSENT else float(p["mass_p"])
         leaps = bool(numbers.values.solver_leaps and not p["effects"])
-        self._tables = made = _tables(numbers, mass, springs, rock.c_r, highest, tick, leaps)
+        self._tables = made = _tables(numbers, mass, springs, rock.c_r, highest, tick)
         self.cells = {} if made.free_piston is None else {"piston": made.shape_p.shape[1]}
         self.cells["bit"] = int(made.forms.sizes[0])
         if p["piston"] == Piston.ABSENT:
@@ -138,12 +139,11 @@ class ModalSolver(Solver):
         p["bound_p"] = math.sqrt(end_compliance(numbers.piston)) if elastic else 0.0
         p["bound_b"] = math.sqrt(end_compliance(numbers.bit))
         p["bound_t"] = math.sqrt(end_compliance(numbers.bit[::-1]))
-        p["end_speed"] = math.sqrt(sum((made.forms.shape[2, Shape.LOW, :FEW] ** 2).tolist()))
+        p["end_speed"] = math.sqrt(sum((made.forms.shape[2, Shape.LOW] ** 2).tolist()))
         p["k_r"], p["gamma"], p["c_r"] = rock.k_r, rock.gamma, rock.c_r
         p["eta"] = eta
         p["leaps"] = leaps
-        self._standstill = made.standstill or no_standstill()
-        self.operator_bytes = sum(part.nbytes for part in (*made.forms, *self._standstill))
+        self.operator_bytes = sum(part.nbytes for part in (*made.forms, *made.laws))
         self._rows = np.zeros((2, made.forms.shape.shape[2]))
         self._read_at: dict[str, Places] = {}
         self._entry: Callable[..., int] = entry_of(run)
@@ -204,16 +204,16 @@ class ModalSolver(Solver):
     def _bars(self, state: State) -> Bars:
         w, wp = state.arrays
         made = self._tables
-        return Bars(w, wp, made.forms, made.shape_p, made.move_p, self._rows)
+        return Bars(w, wp, made.forms, made.laws, made.shape_p, made.move_p, self._rows)
 
     def new_state(self) -> State:
         """State at time zero."""
         made = self._tables
         n, n_p = made.forms.shape.shape[2], made.shape_p.shape[1]
-        state = State(MODAL_STATE, ((3, n), (2, n_p)))
+        state = State(MODAL_STATE, ((6, n), (2, n_p)))
         s: Any = state.record[0]
         fill_start(s, self._numbers)
-        s["leap_end"] = -1
+        s["leap_end"] = s["law"] = -1
         s["v_low"] = s["v_b"]
         s["alert"] = 1
         s["active"] = made.forms.sizes[0]
@@ -231,7 +231,7 @@ class ModalSolver(Solver):
         reading: np.ndarray,
     ) -> int:  # fmt: skip
         status = self._entry(
-            int(task), self._par, state.record, self._bars(state), self._standstill, time,
+            int(task), self._par, state.record, self._bars(state), time,
             blows, events, reading,
         )  # fmt: skip
         if self._entry is run:
@@ -246,15 +246,24 @@ class ModalSolver(Solver):
         s, sizes = state.record[0], self._tables.forms.sizes
         now, end, begin = int(s["time"]), int(s["leap_end"]), int(s["piston_time"])
         modes = int(sizes[int(s["form"])])
-        if not 0 < s["active"] <= modes or s["active"] % FEW:
+        if not 0 < s["active"] <= modes or s["active"] % WIDTH:
             return f"active = {int(s['active'])}, of {modes} modes"
         if (s["form"] >= JOINED) != (s["closed"] == 1):
             return f"form = {int(s['form'])}, with closed = {int(s['closed'])}"
+        law, pairs = int(s["law"]), int(s["pairs"])
+        if law >= 0 and law // 2 != s["form"]:
+            return f"law = {law}, in form {int(s['form'])}"
+        if law >= 0 and not 0 < pairs <= self._tables.laws.sizes[law]:
+            return f"pairs = {pairs}, in law {law}"
+        if pairs % WIDTH:
+            return f"pairs = {pairs}, which is no multiple of {WIDTH}"
+        if end >= 0 and law < 0:
+            return f"leap_end = {end}, with law = {law}"
         if end >= 0 and not now < end <= now + LONGEST_LEAP:
             return f"leap_end = {end}, at {now} with leaps of {LONGEST_LEAP} ticks at most"
         if s["parked"] and not begin <= now:
             return f"piston_time = {begin}, after {now}"
-        most = max(now + (1 << STEP), end) * float(self._par[0]["tick"])
+        most = max(now + (LOOK << STEP), end) * float(self._par[0]["tick"])
         return "" if t <= most else f"its time of {self.time(state)!r} s, far before {t!r} s"
 
     def advance(
@@ -294,7 +303,8 @@ class ModalSolver(Solver):
     def readable_until(self, state: State) -> float:
         """Time up to which `read` answers without advancing the state [s]."""
         s = state.record[0]
-        end = max(int(s["leap_end"]), int(s["time"]) + (1 << STEP))
+        go = LOOK if s["law"] >= 0 else 1
+        end = max(int(s["leap_end"]), int(s["time"]) + (go << STEP))
         return end * float(self._par[0]["tick"])
 
     def grid_point_after(self, state: State, t: float) -> float:

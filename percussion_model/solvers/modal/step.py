@@ -39,6 +39,7 @@ from percussion_model.solvers.modal.forms import refresh_loads
 from percussion_model.solvers.modal.lanes import WIDTH
 from percussion_model.solvers.modal.piston import (
     WHOLE,
+    book_contact,
     flip_contact,
     has_piston,
     park,
@@ -146,24 +147,6 @@ def book_rock(par, s, trial, before):
         s.peak_bit_force = max(s.peak_bit_force, trial.force)
 
 
-@merged
-def book_contact(par, s, trial):
-    """Book what piston and bit do to each other in a step."""
-    if s.closed == 1:
-        s.i_contact += trial.contact * trial.h
-        # a bar with loss resists the first instants of a contact without bound: means, and
-        # without the first
-        s.peak_time += trial.h
-        s.peak_impulse += trial.contact * trial.h
-        if s.peak_time >= 0.999 * par.window:
-            first = (s.time - s.closed_at) * par.tick < 1.5 * par.window
-            mean = 0.0 if first else s.peak_impulse / s.peak_time
-            s.b_peak_contact = max(s.b_peak_contact, mean)
-            if time_of(par, s) > s.peak_from:
-                s.peak_contact_force = max(s.peak_contact_force, mean)
-            s.peak_time = s.peak_impulse = 0.0
-
-
 @kernel
 def make(par, s, bars, level, trial, push, events):
     """Make a step that was tried."""
@@ -192,7 +175,8 @@ def make(par, s, bars, level, trial, push, events):
     s.f_contact, s.f_rock = trial.contact, trial.force
     s.p += trial.path
     book_rock(par, s, trial, before)
-    book_contact(par, s, trial)
+    if s.closed == 1:
+        book_contact(par, s, trial.contact, h, time_of(par, s))
     if has_piston(par):
         u_before = s.u_r
         s.u_r = s.u_p - s.u_b

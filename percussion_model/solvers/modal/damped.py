@@ -1,0 +1,309 @@
+"""Modes of a bar with a dashpot under its rock end, from those without one.
+
+The modes of a form obey y'' + eta w^2 y' + w^2 y = -b c (b . y'), with c the dashpot that eq. 4 of
+docs/modal.md does not have. Its solutions are sums of motions exp(lambda t), each close to one of
+a mode alone; lambda is a root of
+
+    lambda^2 + eta w_k^2 lambda + w_k^2 + c lambda b_k^2 / (1 + c lambda S_k) = 0,
+    S_k = sum over j != k of b_j^2 / (lambda^2 + eta w_j^2 lambda + w_j^2),
+
+which Newton's method finds from that mode. The two of a mode make a pair of real numbers Q and
+V = dQ/dt, which moves as an oscillator of its own.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from percussion_model.physics.kernel import kernel
+from percussion_model.solvers.modal.records import JOINED, LEVELS, End, Forms, Go, Laws, Shape
+
+# The dashpot grows to its full size in so many stages, each with Newton steps at most.
+STAGES, MOST_STEPS = 4, 30
+# Factors of a move below this are zero: what they leave would only slow down arithmetic.
+NOTHING = 1e-40
+# Bars with more modes are stepped: tables would take hundreds of megabytes.
+MOST_PAIRS = 400
+# Relative size of the last step, and how far apart two roots are at least.
+CLOSE_ENOUGH, APART = 1e-13, 1e-9
+
+
+class Pairs(NamedTuple):
+    """Damped modes as pairs of numbers.
+
+    Attributes
+    ----------
+    square, decay : ndarray, shape (n,)
+        Q'' + decay Q' + square Q = 0 [1/s2, 1/s].
+    out, into : ndarray, shape (2 n, 2 n)
+        Row j: offsets and velocities of the plain modes by the j-th number (all Q, then all V);
+        and the reverse.
+    taken : ndarray, shape (2 n, 2 n)
+        Form: integral of the end's squared velocity from now on [m2/s].
+    """
+
+    square: np.ndarray
+    decay: np.ndarray
+    out: np.ndarray
+    into: np.ndarray
+    taken: np.ndarray
+
+
+@kernel
+def _start(w, eta, first):
+    """Root of a mode alone: the one of positive frequency, or the slow or fast one."""
+    half = 0.5 * eta * w * w
+    square = half * half - w * w
+    if square < 0.0:
+        return complex(-half, np.sqrt(-square))
+    root = np.sqrt(square)
+    return complex(-w * w / (half + root) if first else -half - root, 0.0)
+
+
+@kernel
+def _newton(w, b, eta, c, k, root):
+    """Root near another; NaN where none is found."""
+    own, share = w[k] * w[k], b[k] * b[k]
+    for _ in range(MOST_STEPS):
+        total = slope = 0.0j
+        for j in range(len(w)):
+            if j != k:
+                square = w[j] * w[j]
+                below = 1.0 / (root * (root + eta * square) + square)
+                total += b[j] * b[j] * below
+                slope -= b[j] * b[j] * below * below * (2.0 * root + eta * square)
+        rest = 1.0 / (1.0 + c * root * total)
+        value = root * (root + eta * own) + own + c * share * root * rest
+        change = 2.0 * root + eta * own
+        change += c * share * rest * (1.0 - root * rest * c * (total + root * slope))
+        step = value / change
+        root -= step
+        if abs(step) < CLOSE_ENOUGH * abs(root):
+            return root
+    return complex(np.nan, np.nan)
+
+
+@kernel
+def _find_roots(w, b, eta, c, roots):
+    """Fill the two roots of each mode; whether all were found, and apart from each other."""
+    n = len(w)
+    for k in range(n):
+        roots[k, 0], roots[k, 1] = _start(w[k], eta, True), _start(w[k], eta, False)
+        for stage in range(1, STAGES + 1):
+            for i in range(2):
+                roots[k, i] = _newton(w, b, eta, c * stage / STAGES, k, roots[k, i])
+        if roots[k, 0].imag != 0.0:
+            if roots[k, 0].imag < 0.0:
+                return False
+            roots[k, 1] = roots[k, 0].conjugate()
+        if not (roots[k, 0].real < 0.0 and roots[k, 1].real < 0.0):
+            return False
+    for k in range(n):
+        for i in range(2):
+            for j in range(n):
+                for m in range(2):
+                    if (j != k or m != i) and abs(roots[j, m] - roots[k, i]) < APART * abs(
+                        roots[k, i]
+                    ):
+                        return False
+    return True
+
+
+@kernel
+def _fill_pairs(w, b, eta, c, roots, shapes, ends, square, decay, out, into, taken):
+    """Fill what belongs to the roots."""
+    n = len(w)
+    for i in range(n):
+        one, two = roots[i, 0], roots[i, 1]
+        square[i], decay[i] = (one * two).real, -(one + two).real
+        scale = 1.0 / (one - two)
+        for which in range(2):
+            root, other = roots[i, which], roots[i, 1 - which]
+            total = 0.0j
+            for j in range(n):
+                if j != i:
+                    total += b[j] * b[j] / (root * (root + eta * w[j] * w[j]) + w[j] * w[j])
+            lead = -c * root * b[i] / (1.0 + c * root * total)
+            end = norm = 0.0j
+            for j in range(n):
+                shape = 1.0 + 0.0j
+                if j != i:
+                    below = root * (root + eta * w[j] * w[j]) + w[j] * w[j]
+                    shape = lead * b[j] / below
+                shapes[j] = shape
+                end += b[j] * shape
+                norm += shape * shape * (2.0 * root + eta * w[j] * w[j])
+            norm += c * end * end
+            ends[i, which] = root * end
+            # a = by_q Q + by_v V, of the part a exp(root t) of Q
+            by_v = scale if which == 0 else -scale
+            by_q = -by_v * other
+            for j in range(n):
+                shape = shapes[j]
+                out[i, j] += (by_q * shape).real
+                out[i, n + j] += (by_q * root * shape).real
+                out[n + i, j] += (by_v * shape).real
+                out[n + i, n + j] += (by_v * root * shape).real
+                # and a of offsets and velocities, since shapes are orthogonal
+                of_q = ((eta * w[j] * w[j] + root) * shape + c * b[j] * end) / norm
+                of_v = shape / norm
+                into[j, i] += of_q.real
+                into[j, n + i] += (root * of_q).real
+                into[n + j, i] += of_v.real
+                into[n + j, n + i] += (root * of_v).real
+    for i in range(n):
+        for j in range(n):
+            for which in range(2):
+                mine = 1.0 / (roots[i, which] - roots[i, 1 - which])
+                for other in range(2):
+                    theirs = 1.0 / (roots[j, other] - roots[j, 1 - other])
+                    both = -ends[i, which] * ends[j, other] * mine * theirs
+                    both /= roots[i, which] + roots[j, other]
+                    left, right = -roots[i, 1 - which], -roots[j, 1 - other]
+                    taken[i, j] += (both * left * right).real
+                    taken[i, n + j] += (both * left).real
+                    taken[n + i, j] += (both * right).real
+                    taken[n + i, n + j] += both.real
+
+
+def damped_pairs(frequency: np.ndarray, ends: np.ndarray, eta: float, c: float) -> Pairs | None:
+    """Return the modes of a bar with a dashpot more; None where they cannot be told apart.
+
+    Parameters
+    ----------
+    frequency : ndarray, shape (n,)
+        Of the plain modes, none rigid [rad/s].
+    ends : ndarray, shape (n,)
+        Their offsets at the rock end [1/kg^0.5].
+    eta : float
+        Kelvin-Voigt time [s].
+    c : float
+        Of the dashpot, negative where eq. 4 has too much [N s/m].
+    """
+    n = len(frequency)
+    roots, at_end, shapes = (np.zeros(size, complex) for size in ((n, 2), (n, 2), n))
+    if not _find_roots(frequency, ends, eta, c, roots):
+        return None
+    square, decay = np.zeros((2, n))
+    out, into, taken = np.zeros((3, 2 * n, 2 * n))
+    _fill_pairs(frequency, ends, eta, c, roots, shapes, at_end, square, decay, out, into, taken)
+    return Pairs(square, decay, out, into, taken)
+
+
+@kernel
+def _times(matrix, row, out):
+    for i in range(matrix.shape[0]):
+        total = 0.0
+        for k in range(len(row)):
+            total += matrix[i, k] * row[k]
+        out[i] = total
+
+
+def _product(matrix: np.ndarray, row: np.ndarray) -> np.ndarray:
+    """Product in an order of its own: BLAS sums otherwise on other processors."""
+    out = np.zeros(len(matrix))
+    _times(np.ascontiguousarray(matrix), np.ascontiguousarray(row), out)
+    return out
+
+
+def _ends_of(shape: np.ndarray, eta: float, pairs: Pairs) -> np.ndarray:
+    """Rows of `End` by those of `Shape`."""
+    n = shape.shape[1]
+    rows = np.zeros((End.ROWS, n))
+    stiff, low = shape[Shape.STIFF], shape[Shape.LOW]
+    bit, piston = shape[Shape.BIT], shape[Shape.PISTON]
+    for end, offsets, velocities in (
+        (End.LOW, low, None),
+        (End.SPEED, None, low),
+        (End.TOP, shape[Shape.TOP], None),
+        (End.BIT, bit, None),
+        (End.BIT_SPEED, None, bit),
+        (End.PISTON, piston, None),
+        (End.PISTON_SPEED, None, piston),
+        (End.PULL, -stiff * piston, -eta * stiff * piston),
+    ):
+        by = np.zeros(2 * n)
+        if offsets is not None:
+            by += _product(pairs.out[:, :n], offsets)
+        if velocities is not None:
+            by += _product(pairs.out[:, n:], velocities)
+        rows[end], rows[end + 1] = by[:n], by[n:]
+    shift = _product(pairs.into[:n].T, bit + piston)
+    rows[End.SHIFT], rows[End.SHIFT + 1] = shift[:n], shift[n:]
+    rows[End.SQUARE] = pairs.square
+    return rows
+
+
+@kernel
+def _fill_goes(square, decay, tick, out):
+    """Fill the table of goes, shape (LEVELS, len(Go), n)."""
+    for k in range(len(square)):
+        delta = 0.5 * decay[k]
+        rest = square[k] - delta * delta
+        root = math.sqrt(abs(rest))
+        for level in range(out.shape[0]):
+            h = tick * 2.0**level
+            if rest > 0.0:
+                fade = math.exp(-delta * h)
+                c, s = fade * math.cos(root * h), fade * math.sin(root * h) / root
+            else:
+                slow, fast = math.exp((root - delta) * h), math.exp(-(root + delta) * h)
+                c = 0.5 * (slow + fast)
+                s = h * slow if root == 0.0 else 0.5 * (slow - fast) / root
+            a, b, v, d = c + delta * s, s, -square[k] * s, c - delta * s
+            if square[k] == 0.0:
+                out[level, Go.YIELD, k] = 0.5 * h * h
+            elif abs(a) + abs(b) * math.sqrt(square[k]) + abs(d) < NOTHING:
+                a = b = v = d = 0.0
+            out[level, Go.Q_BY_Q, k], out[level, Go.Q_BY_V, k] = a, b
+            out[level, Go.V_BY_Q, k], out[level, Go.V_BY_V, k] = v, d
+
+
+def laws_of(forms: Forms, dashpot: float, eta: float, tick: float) -> Laws:
+    """Tables of all laws; those of a form without a spring are its own modes.
+
+    Parameters
+    ----------
+    forms : Forms
+    dashpot : float
+        Of the rock [N s/m].
+    eta, tick : float
+        Kelvin-Voigt time and unit of time [s].
+    """
+    n = forms.shape.shape[2]
+    refuse = n > MOST_PAIRS
+    sizes, dashpots = np.zeros(4 * JOINED, np.int64), np.zeros(4 * JOINED)
+    move = np.zeros((4 * JOINED, LEVELS, len(Go), n))
+    ends = np.zeros((4 * JOINED, End.ROWS, n))
+    out, into, taken = (np.zeros((4 * JOINED, 2 * n, 2 * n)) for _ in range(3))
+    for law in range(4 * JOINED):
+        form = law // 2
+        size, held = int(forms.sizes[form]), float(forms.stiff[form])
+        plain = form % JOINED == 0
+        if not size or refuse or (law % 2 and (plain or dashpot == 0.0)):
+            continue
+        shape = forms.shape[form, :, :size]
+        own = np.sqrt(shape[Shape.STIFF])
+        if plain:
+            unit = np.eye(2 * size)
+            pairs = Pairs(shape[Shape.STIFF], eta * shape[Shape.STIFF], unit, unit, 0.0 * unit)
+        else:
+            c = (dashpot if law % 2 else 0.0) - eta * held
+            found = damped_pairs(own, np.ascontiguousarray(shape[Shape.LOW]), eta, c)
+            if found is None:
+                continue
+            pairs = found
+        sizes[law], dashpots[law] = size, dashpot * (law % 2)
+        _fill_goes(pairs.square, pairs.decay, tick, move[law, :, :, :size])
+        ends[law, :, :size] = _ends_of(shape, eta, pairs)
+        if not plain:
+            for table, part in ((out, pairs.out), (into, pairs.into), (taken, pairs.taken)):
+                for row in (0, 1):
+                    for column in (0, 1):
+                        table[law, row * n : row * n + size, column * n : column * n + size] = part[
+                            row * size : (row + 1) * size, column * size : (column + 1) * size
+                        ]
+    return Laws(sizes, dashpots, move, ends, out, into, taken)

@@ -1,0 +1,377 @@
+"""Pairs of numbers by which the bars move between two events (docs/modal.md, section 3)."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from percussion_model.physics.kernel import inlined, kernel, merged
+from percussion_model.physics.records import Mode
+from percussion_model.physics.rock import book_dashpot, damping
+from percussion_model.solvers.modal.bar import LOAD, SOFT, STIFF, TINY, Q, V, row_sum
+from percussion_model.solvers.modal.forms import LEAST_FORCE, LEAST_SHARE, form_wanted
+from percussion_model.solvers.modal.lanes import WIDTH, load, spread, store, total
+from percussion_model.solvers.modal.records import JOINED, LEVELS, End, Go, Shape
+
+# Rows of the pairs in `Bars.w`: about rest, and the load of a rigid one.
+PQ, PV, PLOAD = 3, 4, 5
+QQ, QV, VQ, VV, YIELD = (int(row) for row in Go)
+LOW, SPEED, TOP, BIT, BIT_SPEED, PISTON, PISTON_SPEED, PULL, SHIFT, SQUARE, _ = (
+    int(row) for row in End
+)
+SHAPE_LOW, SHAPE_TOP, SHAPE_BIT, SHAPE_PISTON = (
+    int(row) for row in (Shape.LOW, Shape.TOP, Shape.BIT, Shape.PISTON)
+)
+
+
+class Sums(NamedTuple):
+    """What pairs tell of the ends, as the fields of the state of these names."""
+
+    low: float
+    speed: float
+    top: float
+    bit: float
+    piston: float
+    piston_speed: float
+    pull: float
+
+
+@merged
+def law_wanted(par, s, laws):
+    """Law by which the present mode moves; -1 where it has to be stepped."""
+    form = form_wanted(par, s)
+    plain = form % JOINED == 0
+    dashpot = damping(s)
+    if par.effects == 1 or form != s.form or plain != (s.mode == Mode.FF):
+        return -1
+    law = 2 * form
+    if dashpot > 0.0:
+        law += 1
+        if laws.dashpot[law] != dashpot:
+            return -1
+    return law if laws.sizes[law] > 0 else -1
+
+
+@inlined
+def part_of(ends, end, k, q, v):
+    """Part of pairs from `k` on in what a row tells."""
+    return load(ends, end, k) * q + load(ends, end + 1, k) * v
+
+
+@inlined
+def sum_of(ends, end, w, n):
+    """What a row tells of the present pairs, about rest."""
+    value = spread(0.0)
+    for k in range(0, n, WIDTH):
+        value = value + part_of(ends, end, k, load(w, PQ, k), load(w, PV, k))
+    return total(value)
+
+
+@inlined
+def open_ahead(s, bars, level):
+    """Move the pairs of a bit alone over 2^level ticks, into `bars.rows`; their sums."""
+    m, ends, w = bars.laws.move[s.law, level], bars.laws.ends[s.law], bars.w
+    low = speed = top = bit = spread(0.0)
+    for k in range(0, s.pairs, WIDTH):
+        q0, v0 = load(w, PQ, k), load(w, PV, k)
+        f = load(w, PLOAD, k)
+        q = load(m, QQ, k) * q0 + load(m, QV, k) * v0 + load(m, YIELD, k) * f
+        v = load(m, VQ, k) * q0 + load(m, VV, k) * v0 + load(m, QV, k) * f
+        store(bars.rows, 0, k, q)
+        store(bars.rows, 1, k, v)
+        low = low + part_of(ends, LOW, k, q, v)
+        speed = speed + part_of(ends, SPEED, k, q, v)
+        top = top + part_of(ends, TOP, k, q, v)
+        bit = bit + part_of(ends, BIT, k, q, v)
+    return Sums(
+        s.rest_low + total(low),
+        total(speed),
+        s.rest_top + total(top),
+        s.rest_b + total(bit),
+        0.0,
+        0.0,
+        0.0,
+    )
+
+
+@inlined
+def joined_ahead(s, bars, level):
+    """The same of piston and bit that touch."""
+    m, ends, w = bars.laws.move[s.law, level], bars.laws.ends[s.law], bars.w
+    low = speed = bit = piston = piston_speed = pull = spread(0.0)
+    for k in range(0, s.pairs, WIDTH):
+        q0, v0 = load(w, PQ, k), load(w, PV, k)
+        f = load(w, PLOAD, k)
+        q = load(m, QQ, k) * q0 + load(m, QV, k) * v0 + load(m, YIELD, k) * f
+        v = load(m, VQ, k) * q0 + load(m, VV, k) * v0 + load(m, QV, k) * f
+        store(bars.rows, 0, k, q)
+        store(bars.rows, 1, k, v)
+        low = low + part_of(ends, LOW, k, q, v)
+        speed = speed + part_of(ends, SPEED, k, q, v)
+        bit = bit + part_of(ends, BIT, k, q, v)
+        piston = piston + part_of(ends, PISTON, k, q, v)
+        piston_speed = piston_speed + part_of(ends, PISTON_SPEED, k, q, v)
+        pull = pull + part_of(ends, PULL, k, q, v)
+    return Sums(
+        s.rest_low + total(low),
+        total(speed),
+        s.top,
+        s.rest_b + total(bit),
+        s.rest_p + total(piston),
+        total(piston_speed),
+        s.rest_pull + total(pull),
+    )
+
+
+@inlined
+def keep_ahead(s, bars):
+    """Make the move that was looked at."""
+    for k in range(0, s.pairs, WIDTH):
+        store(bars.w, PQ, k, load(bars.rows, 0, k))
+        store(bars.w, PV, k, load(bars.rows, 1, k))
+
+
+@kernel
+def carry_pairs(s, bars, ticks):
+    """Move the pairs over any number of ticks."""
+    rest, level, w = ticks, LEVELS - 1, bars.w
+    while rest > 0:
+        while rest >> level == 0:
+            level -= 1
+        m = bars.laws.move[s.law, level]
+        for k in range(0, s.pairs, WIDTH):
+            q, v, f = load(w, PQ, k), load(w, PV, k), load(w, PLOAD, k)
+            ahead = load(m, QQ, k) * q + load(m, QV, k) * v
+            store(w, PQ, k, ahead + load(m, YIELD, k) * f)
+            ahead = load(m, VQ, k) * q + load(m, VV, k) * v
+            store(w, PV, k, ahead + load(m, QV, k) * f)
+        rest -= 1 << level
+    drop_tiny(s, bars)
+
+
+@inlined
+def drop_tiny(s, bars):
+    """Set to zero what would only slow down arithmetic."""
+    for k in range(s.pairs):
+        if abs(bars.w[PQ, k]) + abs(bars.w[PV, k]) < TINY:
+            bars.w[PQ, k] = bars.w[PV, k] = 0.0
+
+
+@kernel
+def present_sums(s, bars):
+    """Sums of a bit alone."""
+    ends, w, n = bars.laws.ends[s.law], bars.w, s.pairs
+    return Sums(
+        s.rest_low + sum_of(ends, LOW, w, n),
+        sum_of(ends, SPEED, w, n),
+        s.rest_top + sum_of(ends, TOP, w, n),
+        s.rest_b + sum_of(ends, BIT, w, n),
+        0.0,
+        0.0,
+        0.0,
+    )
+
+
+@kernel
+def refresh_pair_sums(s, bars):
+    """Take the sums over pairs from which the state goes on."""
+    ends, w, n = bars.laws.ends[s.law], bars.w, s.pairs
+    s.low = s.rest_low + sum_of(ends, LOW, w, n)
+    s.top = s.rest_top + sum_of(ends, TOP, w, n)
+    s.at_b = s.rest_b + sum_of(ends, BIT, w, n)
+    s.at_p = s.rest_p + sum_of(ends, PISTON, w, n)
+
+
+@kernel
+def hold_ends(par, s, bars, low, tip):
+    """Take the sums of other pairs, with the rock end and the top of the bit where they were."""
+    ends, w, n = bars.laws.ends[s.law], bars.w, s.pairs
+    at_b, at_p, rigid = s.at_b, s.at_p, w[PQ, 0]
+    refresh_pair_sums(s, bars)
+    common = spread(0.0)
+    for k in range(0, n, WIDTH):
+        q, v = load(ends, SHIFT, k), load(ends, SHIFT + 1, k)
+        common = common + part_of(ends, LOW, k, q, v)
+    way = (low - s.low) / total(common)
+    for k in range(0, n, WIDTH):
+        store(w, PQ, k, load(w, PQ, k) + load(ends, SHIFT, k) * way)
+        store(w, PV, k, load(w, PV, k) + load(ends, SHIFT + 1, k) * way)
+    refresh_pair_sums(s, bars)
+    s.offset += tip - (s.top - s.at_b / par.mass_b)
+    # no body went this way, so that the loads did no work
+    s.vibrates -= s.a_b * (s.at_b - at_b) + s.a_p * (s.at_p - at_p)
+    s.vibrates += w[PLOAD, 0] * (w[PQ, 0] - rigid)
+
+
+@kernel
+def enough_pairs(par, s, bars):
+    """How many pairs hold next to all of the energy of vibration."""
+    ends, held = bars.laws.ends[s.law], bars.forms.stiff[s.form]
+    whole = spread(0.0)
+    for k in range(0, s.pairs, WIDTH):
+        q, v = load(bars.w, PQ, k), load(bars.w, PV, k)
+        whole = whole + v * v + load(ends, SQUARE, k) * (q * q)
+    least = total(whole)
+    if held == 0.0:
+        least -= bars.w[PV, 0] * bars.w[PV, 0]
+    least *= LEAST_SHARE
+    if held > 0.0:
+        force = LEAST_FORCE * s.a_b * par.mass_b
+        least = max(least, force * force / held)
+    above, n = 0.0, s.pairs
+    while n > WIDTH:
+        q, v = load(bars.w, PQ, n - WIDTH), load(bars.w, PV, n - WIDTH)
+        above += total(v * v + load(ends, SQUARE, n - WIDTH) * (q * q))
+        if above > least:
+            break
+        n -= WIDTH
+    return n
+
+
+@kernel
+def leave_out_pairs(par, s, bars):
+    """Leave out pairs that have died away."""
+    drop_tiny(s, bars)
+    n = enough_pairs(par, s, bars)
+    if n < s.pairs:
+        low, tip = s.low, s.top - s.at_b / par.mass_b
+        s.pairs = n
+        hold_ends(par, s, bars, low, tip)
+
+
+@kernel
+def multiply(table, x, first, active, rows, count):
+    """Product of a table with two rows of `x` from `first` on, into two of `rows`."""
+    n = table.shape[0] // 2
+    for i in range(0, count, WIDTH):
+        q = v = spread(0.0)
+        for k in range(active):
+            q = q + load(table, k, i) * x[first, k] + load(table, n + k, i) * x[first + 1, k]
+            v = v + load(table, k, n + i) * x[first, k]
+            v = v + load(table, n + k, n + i) * x[first + 1, k]
+        store(rows, 0, i, q)
+        store(rows, 1, i, v)
+
+
+@kernel
+def to_be_taken(s, bars):
+    """What a dashpot of 1 N s/m would take from the present pairs on [J]."""
+    table, w, n = bars.laws.taken[s.law], bars.w, bars.w.shape[1]
+    whole = spread(0.0)
+    for i in range(0, s.pairs, WIDTH):
+        q = v = spread(0.0)
+        for k in range(s.pairs):
+            q = q + load(table, k, i) * w[PQ, k] + load(table, n + k, i) * w[PV, k]
+            v = v + load(table, k, n + i) * w[PQ, k] + load(table, n + k, n + i) * w[PV, k]
+        whole = whole + q * load(w, PQ, i) + v * load(w, PV, i)
+    return total(whole)
+
+
+@kernel
+def to_be_taken_ahead(s, bars):
+    """The same of the pairs that were looked at [J]."""
+    table, rows, n = bars.laws.taken[s.law], bars.rows, bars.w.shape[1]
+    whole = spread(0.0)
+    for i in range(0, s.pairs, WIDTH):
+        q = v = spread(0.0)
+        for k in range(s.pairs):
+            q = q + load(table, k, i) * rows[0, k] + load(table, n + k, i) * rows[1, k]
+            v = v + load(table, k, n + i) * rows[0, k] + load(table, n + k, n + i) * rows[1, k]
+        whole = whole + q * load(rows, 0, i) + v * load(rows, 1, i)
+    return total(whole)
+
+
+@kernel
+def spell_out(s, bars):
+    """Offsets about rest and velocities of the form's modes, into `bars.rows`; how many."""
+    n = bars.laws.sizes[s.law]
+    if s.form % JOINED > 0:
+        multiply(bars.laws.out[s.law], bars.w, PQ, s.pairs, bars.rows, n)
+        return n
+    for k in range(0, n, WIDTH):
+        store(bars.rows, 0, k, load(bars.w, PQ, k) if k < s.pairs else spread(0.0))
+        store(bars.rows, 1, k, load(bars.w, PV, k) if k < s.pairs else spread(0.0))
+    return n
+
+
+@kernel
+def energy_about_rest(s, bars, n):
+    """Energy of the modes in `bars.rows`, a rigid one apart [J]."""
+    shape, energy = bars.forms.shape[s.form], spread(0.0)
+    for k in range(0, n, WIDTH):
+        q, v = load(bars.rows, 0, k), load(bars.rows, 1, k)
+        energy = energy + v * v + load(shape, STIFF, k) * (q * q)
+    whole = total(energy)
+    if shape[STIFF, 0] == 0.0:
+        whole -= bars.rows[1, 0] * bars.rows[1, 0]
+    return 0.5 * whole
+
+
+@kernel
+def take_rest(s, bars, n):
+    """Take where the loads would hold the modes still: its sums, and offsets from it."""
+    shape, w = bars.forms.shape[s.form], bars.w
+    low = top = bit = piston = pull = spread(0.0)
+    for k in range(0, n, WIDTH):
+        soft, f = load(shape, SOFT, k), load(w, LOAD, k)
+        rest = soft * f
+        store(bars.rows, 0, k, load(w, Q, k) - rest)
+        store(bars.rows, 1, k, load(w, V, k))
+        low = low + load(shape, SHAPE_LOW, k) * rest
+        top = top + load(shape, SHAPE_TOP, k) * rest
+        bit = bit + load(shape, SHAPE_BIT, k) * rest
+        piston = piston + load(shape, SHAPE_PISTON, k) * rest
+        left = f - load(shape, STIFF, k) * rest
+        store(w, PLOAD, k, left)
+        pull = pull + load(shape, SHAPE_PISTON, k) * left
+    s.rest_low, s.rest_top, s.rest_b = total(low), total(top), total(bit)
+    s.rest_p, s.rest_pull = total(piston), total(pull)
+
+
+@kernel
+def take_pairs(par, s, bars, law):
+    """Go on by the pairs of a law."""
+    n, w = bars.laws.sizes[law], bars.w
+    low, tip = s.low, s.top - s.at_b / par.mass_b
+    take_rest(s, bars, n)
+    s.law, s.pairs = law, n
+    s.vibrates = energy_about_rest(s, bars, n)
+    if s.form % JOINED == 0:
+        for k in range(0, n, WIDTH):
+            store(w, PQ, k, load(bars.rows, 0, k))
+            store(w, PV, k, load(bars.rows, 1, k))
+    else:
+        for k in range(0, n, WIDTH):
+            store(w, Q, k, load(bars.rows, 0, k))
+            store(w, PLOAD, k, spread(0.0))
+        multiply(bars.laws.into[law], w, Q, n, bars.rows, n)
+        for k in range(0, n, WIDTH):
+            store(w, PQ, k, load(bars.rows, 0, k))
+            store(w, PV, k, load(bars.rows, 1, k))
+    s.pairs = enough_pairs(par, s, bars)
+    hold_ends(par, s, bars, low, tip)
+    s.takes = 0.0
+    if law % 2 == 1:
+        s.takes = to_be_taken(s, bars)
+
+
+@kernel
+def drop_pairs(par, s, bars):
+    """Go back to offsets and velocities of the form's modes; book what was lost."""
+    n, shape = spell_out(s, bars), bars.forms.shape[s.form]
+    lost = s.vibrates - energy_about_rest(s, bars, n)
+    if s.law % 2 == 1:
+        work = bars.laws.dashpot[s.law] * (s.takes - to_be_taken(s, bars))
+        lost -= work
+        s.rock_work += work
+        book_dashpot(s, work)
+    s.e_loss += lost
+    for k in range(0, n, WIDTH):
+        rest = load(shape, SOFT, k) * load(bars.w, LOAD, k)
+        store(bars.w, Q, k, load(bars.rows, 0, k) + rest)
+        store(bars.w, V, k, load(bars.rows, 1, k))
+    s.active = n
+    s.law = -1
+    s.low = row_sum(shape, SHAPE_LOW, bars.w, Q, n)
+    s.top = row_sum(shape, SHAPE_TOP, bars.w, Q, n)
+    s.at_b = row_sum(shape, SHAPE_BIT, bars.w, Q, n)
+    s.at_p = row_sum(shape, SHAPE_PISTON, bars.w, Q, n)
