@@ -16,9 +16,9 @@ from percussion_model.solvers.modal.bar import (
     sag,
 )
 from percussion_model.solvers.modal.leaps import leap, plan
-from percussion_model.solvers.modal.pairs import drop_pairs, law_wanted
+from percussion_model.solvers.modal.pairs import FIRST_STRIDE, drop_pairs, law_wanted
 from percussion_model.solvers.modal.phase import go_phase
-from percussion_model.solvers.modal.piston import LOOK, WHOLE, has_piston, time_of, unpark
+from percussion_model.solvers.modal.piston import WHOLE, has_piston, time_of, unpark
 from percussion_model.solvers.modal.records import STEP, Task
 from percussion_model.solvers.modal.step import step
 
@@ -46,7 +46,7 @@ def full(s, blows, events):
 
 @kernel
 def advance_to(par, s, bars, end, blows, events):
-    """Advance to a tick, unless a pending leap, or what is done in one go, passes it; a `Status`."""
+    """Advance to a tick, unless a leap, or what is done in one go, passes it; a `Status`."""
     s.n_blows = 0
     s.n_events = 0
     while True:
@@ -68,9 +68,10 @@ def advance_to(par, s, bars, end, blows, events):
                 return Status.DONE
             leap(par, s, bars)
         else:
-            if s.time + LOOK * WHOLE > end:
+            stride = s.stride if s.law == law else FIRST_STRIDE
+            if s.time + stride * WHOLE > end:
                 return Status.DONE
-            go_phase(par, s, bars, law, s.time + LOOK * WHOLE, blows, events)
+            go_phase(par, s, bars, law, s.time + stride * WHOLE, blows, events)
 
 
 @kernel

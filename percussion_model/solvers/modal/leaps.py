@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 
 from percussion_model.physics.blows import push_checkpoint
-from percussion_model.physics.body import bit_acceleration, piston_acceleration, time_to_cover
-from percussion_model.physics.drive import drive_force
+from percussion_model.physics.body import bit_acceleration, time_to_cover
 from percussion_model.physics.kernel import kernel, merged
-from percussion_model.physics.records import DriveKind, Mode, RockKind
+from percussion_model.physics.records import Mode, RockKind
 from percussion_model.physics.rock import barrier_off, damping, origin, stiffness
 from percussion_model.solvers.modal.bar import Q, V
 from percussion_model.solvers.modal.pairs import (
@@ -16,13 +15,13 @@ from percussion_model.solvers.modal.pairs import (
     PV,
     carry_pairs,
     energy_about_rest,
+    energy_of_pairs,
     keep_ahead,
     open_ahead,
-    present_sums,
     spell_out,
 )
-from percussion_model.solvers.modal.phase import Look, book_way, ready
-from percussion_model.solvers.modal.piston import LOOK, WHOLE, has_piston, time_of
+from percussion_model.solvers.modal.phase import book_way, present_look, ready
+from percussion_model.solvers.modal.piston import LOOK, WHOLE, has_piston, quiet_time, time_of
 from percussion_model.solvers.modal.records import STEP
 
 # Most steps of a leap.
@@ -44,36 +43,6 @@ def keeps_contact(par, s, energy):
     spread = math.sqrt(2.0 * energy * K)
     speed = math.sqrt(2.0 * energy) * par.end_speed
     return spread + s.c_r * speed < rest
-
-
-@merged
-def until_drive(par, s, v, a, spread):
-    """Time before which the drive cannot turn, for a relative mean motion [s]."""
-    if par.drive != DriveKind.PRESSURE:
-        return math.inf
-    if s.alpha > 0:
-        return time_to_cover(-s.u_r - spread, v, a)
-    return time_to_cover(s.reversal + s.u_r - spread, -v, -a)
-
-
-@kernel
-def quiet_time(par, s, v_b, a_b, spread_top, spread_mean):
-    """Time before which the piston can neither meet the bit nor turn the drive [s].
-
-    Parameters
-    ----------
-    v_b, a_b : float
-        Mean motion of the bit [m/s, m/s2].
-    spread_top, spread_mean : float
-        How far its top end and its mean may be from that [m].
-    """
-    if not has_piston(par):
-        return math.inf
-    a = piston_acceleration(par, drive_force(par, s)) - a_b
-    v = s.v_p - v_b
-    room = s.u_b - s.u_p - s.spread_p - spread_top - spread_mean
-    limit = time_to_cover(room, v, a)
-    return min(limit, until_drive(par, s, v, a, spread_mean))
 
 
 @kernel
@@ -113,6 +82,10 @@ def plan(par, s, bars, law):
     if not flies and not (stands and par.rock == RockKind.BILINEAR):
         return
     ready(par, s, bars, law)
+    energy = 0.5 * energy_of_pairs(s, bars)
+    limit = plan_flight(par, s, energy) if flies else plan_standstill(par, s, energy)
+    if limit < FEWEST * par.dt:
+        return
     energy = energy_about_rest(s, bars, spell_out(s, bars))
     limit = plan_flight(par, s, energy) if flies else plan_standstill(par, s, energy)
     steps = min(limit / par.dt - 1.0, LONGEST)
@@ -130,7 +103,7 @@ def note_peak(par, s, bars, ticks):
         w[Q, k], w[V, k] = w[PQ, k], w[PV, k]
     C, K, steps = damping(s), stiffness(s), ticks >> STEP
     for step in range(steps):
-        sums = open_ahead(s, bars, STEP)
+        sums = open_ahead(s, bars, STEP, False)
         keep_ahead(s, bars)
         force = K * (s.p + (sums.low - s.low) - origin(s)) + C * sums.speed
         if time_of(par, s) + (step + 1) * par.dt > s.peak_from:
@@ -152,12 +125,7 @@ def leap(par, s, bars):
         push_checkpoint(s, time_of(par, s))
         note_peak(par, s, bars, ticks)
     carry_pairs(s, bars, ticks)
-    sums = present_sums(s, bars)
-    p = s.p + (sums.low - s.low)
-    force = stiffness(s) * (p - origin(s)) + damping(s) * sums.speed
-    book_way(par, s, bars, ticks, Look(sums, p, force, 0.0, 0.0, 0.0, 0.0))
-    if has_piston(par):
-        s.gap = s.u_b - s.u_p
+    book_way(par, s, bars, ticks, present_look(par, s, bars))
     s.leap_end = -1
     s.no_plan = s.time
     s.count_leaps += 1

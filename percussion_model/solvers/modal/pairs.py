@@ -23,6 +23,12 @@ SHAPE_LOW, SHAPE_TOP, SHAPE_BIT, SHAPE_PISTON = (
 )
 
 
+# Modes that have less than this share of the energy of vibration make no pairs.
+NO_SHARE = 1e-11
+# Steps between two looks at which pairs are needed: the highest die soon.
+FIRST_STRIDE = 4
+
+
 class Sums(NamedTuple):
     """What pairs tell of the ends, as the fields of the state of these names."""
 
@@ -67,8 +73,11 @@ def sum_of(ends, end, w, n):
 
 
 @inlined
-def open_ahead(s, bars, level):
-    """Move the pairs of a bit alone over 2^level ticks, into `bars.rows`; their sums."""
+def open_ahead(s, bars, level, whole):
+    """Move the pairs of a bit alone over 2^level ticks, into `bars.rows`; their sums.
+
+    Without `whole` only those of the rock end.
+    """
     m, ends, w = bars.laws.move[s.law, level], bars.laws.ends[s.law], bars.w
     low = speed = top = bit = spread(0.0)
     for k in range(0, s.pairs, WIDTH):
@@ -80,8 +89,11 @@ def open_ahead(s, bars, level):
         store(bars.rows, 1, k, v)
         low = low + part_of(ends, LOW, k, q, v)
         speed = speed + part_of(ends, SPEED, k, q, v)
-        top = top + part_of(ends, TOP, k, q, v)
-        bit = bit + part_of(ends, BIT, k, q, v)
+    if whole:
+        for k in range(0, s.pairs, WIDTH):
+            q, v = load(bars.rows, 0, k), load(bars.rows, 1, k)
+            top = top + part_of(ends, TOP, k, q, v)
+            bit = bit + part_of(ends, BIT, k, q, v)
     return Sums(
         s.rest_low + total(low),
         total(speed),
@@ -206,13 +218,7 @@ def hold_ends(par, s, bars, low, tip):
 def enough_pairs(par, s, bars):
     """How many pairs hold next to all of the energy of vibration."""
     ends, held = bars.laws.ends[s.law], bars.forms.stiff[s.form]
-    whole = spread(0.0)
-    for k in range(0, s.pairs, WIDTH):
-        q, v = load(bars.w, PQ, k), load(bars.w, PV, k)
-        whole = whole + v * v + load(ends, SQUARE, k) * (q * q)
-    least = total(whole)
-    if held == 0.0:
-        least -= bars.w[PV, 0] * bars.w[PV, 0]
+    least = 2.0 * energy_of_pairs(s, bars)
     least *= LEAST_SHARE
     if held > 0.0:
         force = LEAST_FORCE * s.a_b * par.mass_b
@@ -225,6 +231,19 @@ def enough_pairs(par, s, bars):
             break
         n -= WIDTH
     return n
+
+
+@kernel
+def energy_of_pairs(s, bars):
+    """Energy of vibration as if pairs were orthogonal, which they nearly are [J]."""
+    ends, whole = bars.laws.ends[s.law], spread(0.0)
+    for k in range(0, s.pairs, WIDTH):
+        q, v = load(bars.w, PQ, k), load(bars.w, PV, k)
+        whole = whole + v * v + load(ends, SQUARE, k) * (q * q)
+    energy = 0.5 * total(whole)
+    if bars.forms.stiff[s.form] == 0.0:
+        energy -= 0.5 * bars.w[PV, 0] * bars.w[PV, 0]
+    return energy
 
 
 @kernel
@@ -287,9 +306,14 @@ def spell_out(s, bars):
     if s.form % JOINED > 0:
         multiply(bars.laws.out[s.law], bars.w, PQ, s.pairs, bars.rows, n)
         return n
-    for k in range(0, n, WIDTH):
-        store(bars.rows, 0, k, load(bars.w, PQ, k) if k < s.pairs else spread(0.0))
-        store(bars.rows, 1, k, load(bars.w, PV, k) if k < s.pairs else spread(0.0))
+    for k in range(0, s.pairs, WIDTH):
+        store(bars.rows, 0, k, load(bars.w, PQ, k))
+        store(bars.rows, 1, k, load(bars.w, PV, k))
+    if s.form == 0:
+        return s.pairs
+    for k in range(s.pairs, n, WIDTH):
+        store(bars.rows, 0, k, spread(0.0))
+        store(bars.rows, 1, k, spread(0.0))
     return n
 
 
@@ -328,6 +352,19 @@ def take_rest(s, bars, n):
 
 
 @kernel
+def enough_modes(s, bars, n):
+    """How many of the modes in `bars.rows` have energy that counts."""
+    shape, above = bars.forms.shape[s.form], 0.0
+    while n > WIDTH:
+        q, v = load(bars.rows, 0, n - WIDTH), load(bars.rows, 1, n - WIDTH)
+        above += total(v * v + load(shape, STIFF, n - WIDTH) * (q * q))
+        if above > NO_SHARE * s.vibrates:
+            break
+        n -= WIDTH
+    return n
+
+
+@kernel
 def take_pairs(par, s, bars, law):
     """Go on by the pairs of a law."""
     n, w = bars.laws.sizes[law], bars.w
@@ -335,18 +372,18 @@ def take_pairs(par, s, bars, law):
     take_rest(s, bars, n)
     s.law, s.pairs = law, n
     s.vibrates = energy_about_rest(s, bars, n)
-    if s.form % JOINED == 0:
-        for k in range(0, n, WIDTH):
-            store(w, PQ, k, load(bars.rows, 0, k))
-            store(w, PV, k, load(bars.rows, 1, k))
-    else:
-        for k in range(0, n, WIDTH):
+    if s.form % JOINED > 0:
+        count = enough_modes(s, bars, n)
+        for k in range(0, count, WIDTH):
             store(w, Q, k, load(bars.rows, 0, k))
-            store(w, PLOAD, k, spread(0.0))
-        multiply(bars.laws.into[law], w, Q, n, bars.rows, n)
         for k in range(0, n, WIDTH):
-            store(w, PQ, k, load(bars.rows, 0, k))
-            store(w, PV, k, load(bars.rows, 1, k))
+            store(w, PLOAD, k, spread(0.0))
+        s.pairs = min(count + WIDTH, n)
+        multiply(bars.laws.into[law], w, Q, count, bars.rows, s.pairs)
+    for k in range(0, s.pairs, WIDTH):
+        store(w, PQ, k, load(bars.rows, 0, k))
+        store(w, PV, k, load(bars.rows, 1, k))
+    s.stride = FIRST_STRIDE
     s.pairs = enough_pairs(par, s, bars)
     hold_ends(par, s, bars, low, tip)
     s.takes = 0.0

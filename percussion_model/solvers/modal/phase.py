@@ -1,10 +1,12 @@
 """Between two events: looks ahead by the pairs of the present law, up to the next event.
 
-A look costs a few sums; what the bodies did is booked once for all looks (docs/modal.md, section 4).
+A look costs a few sums; what the bodies did is booked once for all looks
+(docs/modal.md, section 4).
 """
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 from percussion_model.physics.blows import push_checkpoint
@@ -37,6 +39,7 @@ from percussion_model.solvers.modal.pairs import (
     keep_ahead,
     leave_out_pairs,
     open_ahead,
+    present_sums,
     spell_out,
     sum_of,
     take_pairs,
@@ -49,11 +52,12 @@ from percussion_model.solvers.modal.piston import (
     flip_contact,
     has_piston,
     park,
+    quiet_time,
     switches,
     time_of,
     unpark,
 )
-from percussion_model.solvers.modal.records import STEP
+from percussion_model.solvers.modal.records import LOOK, STEP
 from percussion_model.solvers.modal.rock_end import (
     QUIET_SHARE,
     change_mode,
@@ -84,14 +88,17 @@ class Look(NamedTuple):
 
 
 @inlined
-def look_at(par, s, bars, level, ticks, speed_before):
-    """Look 2^level ticks ahead of pairs that are `ticks` after the state."""
+def look_at(par, s, bars, level, ticks, speed_before, far):
+    """Look 2^level ticks ahead of pairs that are `ticks` after the state.
+
+    Where the piston is `far`, at what the rock end does alone.
+    """
     h = par.tick * (1 << level)
     time = par.tick * (ticks + (1 << level))
     if s.closed == 1:
         sums = joined_ahead(s, bars, level)
     else:
-        sums = open_ahead(s, bars, level)
+        sums = open_ahead(s, bars, level, not far)
     p = s.p + (sums.low - s.low)
     force = stiffness(s) * (p - origin(s)) + damping(s) * sums.speed
     way_b = (sums.bit - s.at_b) / par.mass_b
@@ -99,7 +106,7 @@ def look_at(par, s, bars, level, ticks, speed_before):
     if s.closed == 1:
         u_r += (sums.piston - s.at_p) / par.mass_p
         contact = par.mass_p * (s.a_p + (speed_before - sums.piston_speed / par.mass_p) / h)
-    elif has_piston(par):
+    elif not far and has_piston(par):
         way_p = time * (s.v_p + 0.5 * time * s.a_p)
         u_r += way_p
         if s.parked == 1:
@@ -112,10 +119,10 @@ def look_at(par, s, bars, level, ticks, speed_before):
 
 
 @inlined
-def parts_or_meets(par, s, look, ticks):
+def parts_or_meets(par, s, look, ticks, far):
     """Whether the contact of piston and bit opens or closes before a look."""
     if s.closed == 0:
-        return has_piston(par) and look.gap < 0.0
+        return not far and look.gap < 0.0
     if s.time + ticks - s.closed_at < RINGING * WHOLE:
         return look.contact < 0.0
     return par.mass_p * s.a_p < look.sums.pull
@@ -163,8 +170,11 @@ def book_way(par, s, bars, ticks, look):
     if has_piston(par):
         s.u_r = s.u_p - s.u_b
         s.b_stroke = max(s.b_stroke, -s.u_r)
+        if s.parked == 1:
+            s.gap = s.u_b - s.u_p
     s.time += ticks
     s.flips = 0
+    s.stride = min(2 * s.stride, LOOK)
     if s.mode == Mode.SS:
         last = s.check_time[(s.n_check - 1) % CHECKPOINTS]
         if s.n_check == 0 or time_of(par, s) - last >= CHECKPOINT * par.dt:
@@ -219,6 +229,31 @@ def usual_level(s, bars):
     return level
 
 
+@merged
+def is_far(par, s, bars, ticks):
+    """Whether the piston can neither meet the bit nor turn the drive within a time."""
+    if s.closed == 1:
+        return False
+    if has_piston(par) and s.parked == 0:
+        return False
+    size, held = math.sqrt(2.0 * s.vibrates), bars.forms.stiff[s.form]
+    spread = par.bound_t * size + abs(s.offset)
+    if held == 0.0:
+        return quiet_time(par, s, s.v_b, s.a_b, spread, 0.0) > ticks * par.tick
+    mean = size * (1.0 / math.sqrt(held) + par.bound_b)
+    off = 2.0 * mean + abs(s.low - s.rest_low)
+    return quiet_time(par, s, 0.0, 0.0, spread, off) > ticks * par.tick
+
+
+@merged
+def present_look(par, s, bars):
+    """Where a bit alone is now."""
+    sums = present_sums(s, bars)
+    p = s.p + (sums.low - s.low)
+    force = stiffness(s) * (p - origin(s)) + damping(s) * sums.speed
+    return Look(sums, p, force, 0.0, 0.0, 0.0, 0.0)
+
+
 @kernel
 def go_phase(par, s, bars, law, end, blows, events):
     """Go on to tick `end`, or to the next event, or as far as is sensible before."""
@@ -233,6 +268,7 @@ def go_phase(par, s, bars, law, end, blows, events):
             return
         if s.alert == 1:
             most = min(most, WHOLE)
+    far = is_far(par, s, bars, most)
     usual = usual_level(s, bars)
     level, ticks, known = usual, 0, -1
     sums = Sums(s.low, s.v_low, s.top, s.at_b, s.at_p, par.mass_p * s.v_p, 0.0)
@@ -245,19 +281,20 @@ def go_phase(par, s, bars, law, end, blows, events):
     while ticks < most:
         while ticks + (1 << level) > most:
             level -= 1
-        look = look_at(par, s, bars, level, ticks, last.sums.piston_speed / par.mass_p)
+        before = last.sums.piston_speed / par.mass_p
+        look = look_at(par, s, bars, level, ticks, before, far)
         work, share = 0.0, 0.0
         if cutting:
-            speed, before = look.sums.speed, last.sums.speed
-            share = 0.5 * C * (speed * speed + before * before) * (par.tick * (1 << level))
+            speed, earlier = look.sums.speed, last.sums.speed
+            share = 0.5 * C * (speed * speed + earlier * earlier) * (par.tick * (1 << level))
             work = taken
             if s.w + taken + UNSURE * (sampled + share) >= s.w_r:
                 work = C * (s.takes - to_be_taken_ahead(s, bars))
-        flip = parts_or_meets(par, s, look, ticks)
+        flip = parts_or_meets(par, s, look, ticks, far)
         if flip and s.parked == 1:
             break
         ends = passed(par, s, look.p, look.sums.speed, work, look.force)
-        turns = piston and switches(par, s, look.u_r)
+        turns = piston and not far and switches(par, s, look.u_r)
         if level > 0 and (flip or ends or turns):
             known = ticks + (1 << level)
             level -= 1
@@ -267,6 +304,7 @@ def go_phase(par, s, bars, law, end, blows, events):
         flip = False
         keep_ahead(s, bars)
         ticks += 1 << level
+        s.count_steps += 1
         sampled += share
         note(par, s, bars, level, ticks, look)
         u_before, last = last.u_r, look
@@ -277,6 +315,8 @@ def go_phase(par, s, bars, law, end, blows, events):
         else:
             level, known = usual, -1
     tick, flips = par.tick, s.flips
+    if far:
+        last = present_look(par, s, bars)
     if ticks > 0:
         book_way(par, s, bars, ticks, last)
         flips = 0

@@ -11,15 +11,15 @@ from percussion_model.physics.blows import (
     start_blow,
     starts_blow,
 )
+from percussion_model.physics.body import piston_acceleration, time_to_cover
+from percussion_model.physics.drive import drive_force
 from percussion_model.physics.kernel import inlined, kernel, merged
 from percussion_model.physics.records import DriveKind, Piston
 from percussion_model.solvers.modal.bar import LOW, Q, carry, piston_vibration, row_sum
 from percussion_model.solvers.modal.forms import gap_of, join, part
-from percussion_model.solvers.modal.records import STEP
+from percussion_model.solvers.modal.records import LOOK, STEP
 
 WHOLE = 1 << STEP
-# Steps between two looks at which modes are needed, and at whether the piston may wait.
-LOOK = 32
 
 
 @inlined
@@ -105,3 +105,33 @@ def switches(par, s, u_r):
     if par.drive != DriveKind.PRESSURE:
         return False
     return u_r >= 0.0 if s.alpha > 0 else u_r <= -s.reversal
+
+
+@merged
+def until_drive(par, s, v, a, spread):
+    """Time before which the drive cannot turn, for a relative mean motion [s]."""
+    if par.drive != DriveKind.PRESSURE:
+        return math.inf
+    if s.alpha > 0:
+        return time_to_cover(-s.u_r - spread, v, a)
+    return time_to_cover(s.reversal + s.u_r - spread, -v, -a)
+
+
+@kernel
+def quiet_time(par, s, v_b, a_b, spread_top, spread_mean):
+    """Time before which the piston can neither meet the bit nor turn the drive [s].
+
+    Parameters
+    ----------
+    v_b, a_b : float
+        Mean motion of the bit [m/s, m/s2].
+    spread_top, spread_mean : float
+        How far its top end and its mean may be from that [m].
+    """
+    if not has_piston(par):
+        return math.inf
+    a = piston_acceleration(par, drive_force(par, s)) - a_b
+    v = s.v_p - v_b
+    room = s.u_b - s.u_p - s.spread_p - spread_top - spread_mean
+    limit = time_to_cover(room, v, a)
+    return min(limit, until_drive(par, s, v, a, spread_mean))

@@ -12,6 +12,8 @@ from percussion_model.solvers.state import Limits
 
 # A step has 2^STEP ticks, to one of which events are found; carries go up to 2^(LEVELS - 1).
 STEP, LEVELS = 10, 28
+# Most steps between two looks at which modes are needed.
+LOOK = 32
 # Forms: the bit free, on K_R, on gamma K_R; the same joined to the piston.
 JOINED = 3
 
@@ -71,7 +73,7 @@ class Forms(NamedTuple):
 
 
 class Laws(NamedTuple):
-    """Motions of a form under all that its rock end feels: law 2 form, or 2 form + 1 with a dashpot.
+    """Motions of a form with all that its rock end feels: 2 form, or 2 form + 1 with a dashpot.
 
     Each damped mode is a pair of numbers Q, V = dQ/dt (docs/modal.md, section 3).
 
@@ -185,6 +187,7 @@ MODAL_STATE = np.dtype(
         ("no_plan", "i8"),  # plan no leap before
         ("law", "i8"),  # by which the pairs move, or -1: offsets and velocities do
         ("pairs", "i8"),  # that move
+        ("stride", "i8"),  # steps before it is looked again which pairs are needed
         ("flips", "i8"),  # of the contact at this instant
         ("look", "i8"),  # when to look again at which modes are needed
         ("parked", "i8"),  # 1: the vibration of the piston is that of an earlier time
@@ -231,6 +234,7 @@ MODAL_LIMITS = Limits(
         "no_plan": COUNT,
         "law": (-1, 11),
         "pairs": COUNT,
+        "stride": (0, LOOK),
         "flips": COUNT,
         "look": COUNT,
         "parked": FLAG,

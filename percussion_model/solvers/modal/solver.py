@@ -21,9 +21,9 @@ from percussion_model.solvers.modal.fields import Places
 from percussion_model.solvers.modal.lanes import WIDTH
 from percussion_model.solvers.modal.leaps import LONGEST
 from percussion_model.solvers.modal.modes import Modes
-from percussion_model.solvers.modal.piston import LOOK
 from percussion_model.solvers.modal.records import (
     JOINED,
+    LOOK,
     MODAL_LIMITS,
     MODAL_PAR,
     MODAL_STATE,
