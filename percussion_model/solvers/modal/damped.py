@@ -19,7 +19,19 @@ from typing import NamedTuple
 import numpy as np
 
 from percussion_model.physics.kernel import kernel
-from percussion_model.solvers.modal.records import JOINED, LEVELS, End, Forms, Go, Laws, Shape
+from percussion_model.solvers.modal.records import (
+    JOINED,
+    LEVELS,
+    SCAN,
+    STEP,
+    VIEWS,
+    End,
+    Forms,
+    Go,
+    Laws,
+    Shape,
+    View,
+)
 
 # The dashpot grows to its full size in so many stages, each with Newton steps at most.
 STAGES, MOST_STEPS = 4, 30
@@ -238,28 +250,43 @@ def _ends_of(shape: np.ndarray, eta: float, pairs: Pairs) -> np.ndarray:
 
 
 @kernel
-def _fill_goes(square, decay, tick, out):
-    """Fill the table of goes, shape (LEVELS, len(Go), n)."""
+def _go(square, decay, h):
+    """Offset and velocity of a pair after `h`, by those before."""
+    delta = 0.5 * decay
+    rest = square - delta * delta
+    root = math.sqrt(abs(rest))
+    if rest > 0.0:
+        fade = math.exp(-delta * h)
+        c, s = fade * math.cos(root * h), fade * math.sin(root * h) / root
+    else:
+        slow, fast = math.exp((root - delta) * h), math.exp(-(root + delta) * h)
+        c = 0.5 * (slow + fast)
+        s = h * slow if root == 0.0 else 0.5 * (slow - fast) / root
+    a, b, v, d = c + delta * s, s, -square * s, c - delta * s
+    if square > 0.0 and abs(a) + abs(b) * math.sqrt(square) + abs(d) < NOTHING:
+        a = b = v = d = 0.0
+    return a, b, v, d
+
+
+@kernel
+def _fill_goes(square, decay, tick, ends, move, views):
+    """Fill the tables of moves and views of a law."""
     for k in range(len(square)):
-        delta = 0.5 * decay[k]
-        rest = square[k] - delta * delta
-        root = math.sqrt(abs(rest))
-        for level in range(out.shape[0]):
+        for level in range(move.shape[0]):
             h = tick * 2.0**level
-            if rest > 0.0:
-                fade = math.exp(-delta * h)
-                c, s = fade * math.cos(root * h), fade * math.sin(root * h) / root
-            else:
-                slow, fast = math.exp((root - delta) * h), math.exp(-(root + delta) * h)
-                c = 0.5 * (slow + fast)
-                s = h * slow if root == 0.0 else 0.5 * (slow - fast) / root
-            a, b, v, d = c + delta * s, s, -square[k] * s, c - delta * s
+            go = _go(square[k], decay[k], h)
+            for row in range(4):
+                move[level, row, k] = go[row]
             if square[k] == 0.0:
-                out[level, Go.YIELD, k] = 0.5 * h * h
-            elif abs(a) + abs(b) * math.sqrt(square[k]) + abs(d) < NOTHING:
-                a = b = v = d = 0.0
-            out[level, Go.Q_BY_Q, k], out[level, Go.Q_BY_V, k] = a, b
-            out[level, Go.V_BY_Q, k], out[level, Go.V_BY_V, k] = v, d
+                move[level, Go.YIELD, k] = 0.5 * h * h
+        for i in range(views.shape[0]):
+            h = tick * 2.0**i
+            if i >= STEP:
+                h = tick * 2.0 ** (STEP + (i - STEP) // SCAN) * ((i - STEP) % SCAN + 1)
+            qq, qv, vq, vv = _go(square[k], decay[k], h)
+            for row, end in ((View.LOW_Q, End.LOW), (View.SPEED_Q, End.SPEED)):
+                views[i, row, k] = ends[end, k] * qq + ends[end + 1, k] * vq
+                views[i, row + 1, k] = ends[end, k] * qv + ends[end + 1, k] * vv
 
 
 def laws_of(forms: Forms, dashpot: float, eta: float, tick: float) -> Laws:
@@ -278,6 +305,7 @@ def laws_of(forms: Forms, dashpot: float, eta: float, tick: float) -> Laws:
     sizes, dashpots = np.zeros(4 * JOINED, np.int64), np.zeros(4 * JOINED)
     move = np.zeros((4 * JOINED, LEVELS, len(Go), n))
     ends = np.zeros((4 * JOINED, End.ROWS, n))
+    views = np.zeros((4 * JOINED, VIEWS, len(View), n))
     out, into, taken = (np.zeros((4 * JOINED, 2 * n, 2 * n)) for _ in range(3))
     for law in range(4 * JOINED):
         form = law // 2
@@ -297,8 +325,8 @@ def laws_of(forms: Forms, dashpot: float, eta: float, tick: float) -> Laws:
                 continue
             pairs = found
         sizes[law], dashpots[law] = size, dashpot * (law % 2)
-        _fill_goes(pairs.square, pairs.decay, tick, move[law, :, :, :size])
         ends[law, :, :size] = _ends_of(shape, eta, pairs)
+        _fill_goes(pairs.square, pairs.decay, tick, ends[law], move[law], views[law])
         if not plain:
             for table, part in ((out, pairs.out), (into, pairs.into), (taken, pairs.taken)):
                 for row in (0, 1):
@@ -306,4 +334,4 @@ def laws_of(forms: Forms, dashpot: float, eta: float, tick: float) -> Laws:
                         table[law, row * n : row * n + size, column * n : column * n + size] = part[
                             row * size : (row + 1) * size, column * size : (column + 1) * size
                         ]
-    return Laws(sizes, dashpots, move, ends, out, into, taken)
+    return Laws(sizes, dashpots, move, ends, views, out, into, taken)

@@ -103,7 +103,7 @@ def note_peak(par, s, bars, ticks):
         w[Q, k], w[V, k] = w[PQ, k], w[PV, k]
     C, K, steps = damping(s), stiffness(s), ticks >> STEP
     for step in range(steps):
-        sums = open_ahead(s, bars, STEP, False)
+        sums = open_ahead(s, bars, STEP)
         keep_ahead(s, bars)
         force = K * (s.p + (sums.low - s.low) - origin(s)) + C * sums.speed
         if time_of(par, s) + (step + 1) * par.dt > s.peak_from:

@@ -73,11 +73,8 @@ def sum_of(ends, end, w, n):
 
 
 @inlined
-def open_ahead(s, bars, level, whole):
-    """Move the pairs of a bit alone over 2^level ticks, into `bars.rows`; their sums.
-
-    Without `whole` only those of the rock end.
-    """
+def open_ahead(s, bars, level):
+    """Move the pairs of a bit alone over 2^level ticks, into `bars.rows`; their sums."""
     m, ends, w = bars.laws.move[s.law, level], bars.laws.ends[s.law], bars.w
     low = speed = top = bit = spread(0.0)
     for k in range(0, s.pairs, WIDTH):
@@ -89,11 +86,8 @@ def open_ahead(s, bars, level, whole):
         store(bars.rows, 1, k, v)
         low = low + part_of(ends, LOW, k, q, v)
         speed = speed + part_of(ends, SPEED, k, q, v)
-    if whole:
-        for k in range(0, s.pairs, WIDTH):
-            q, v = load(bars.rows, 0, k), load(bars.rows, 1, k)
-            top = top + part_of(ends, TOP, k, q, v)
-            bit = bit + part_of(ends, BIT, k, q, v)
+        top = top + part_of(ends, TOP, k, q, v)
+        bit = bit + part_of(ends, BIT, k, q, v)
     return Sums(
         s.rest_low + total(low),
         total(speed),

@@ -30,9 +30,14 @@ from percussion_model.physics.rock import (
 from percussion_model.physics.state import CHECKPOINTS
 from percussion_model.solvers.modal.bar import end_after, move_free
 from percussion_model.solvers.modal.forms import refresh_loads
+from percussion_model.solvers.modal.lanes import WIDTH, load, spread, total
 from percussion_model.solvers.modal.pairs import (
     BIT_SPEED,
+    PLOAD,
+    PQ,
+    PV,
     Sums,
+    carry_pairs,
     drop_pairs,
     energy_about_rest,
     joined_ahead,
@@ -57,7 +62,14 @@ from percussion_model.solvers.modal.piston import (
     time_of,
     unpark,
 )
-from percussion_model.solvers.modal.records import LOOK, STEP
+from percussion_model.solvers.modal.records import (
+    LONGEST_HOP,
+    LONGEST_STRIDE,
+    SCAN,
+    STEP,
+    End,
+    View,
+)
 from percussion_model.solvers.modal.rock_end import (
     QUIET_SHARE,
     change_mode,
@@ -74,6 +86,9 @@ CHECKPOINT = 64
 # What the dashpot takes is computed once this many times its sum over looks may be enough.
 UNSURE = 2.0
 
+END_LOW = int(End.LOW)
+LOW_Q, LOW_V, SPEED_Q, SPEED_V = (int(row) for row in View)
+
 
 class Look(NamedTuple):
     """Where the bodies are after some time, and what that means."""
@@ -88,17 +103,14 @@ class Look(NamedTuple):
 
 
 @inlined
-def look_at(par, s, bars, level, ticks, speed_before, far):
-    """Look 2^level ticks ahead of pairs that are `ticks` after the state.
-
-    Where the piston is `far`, at what the rock end does alone.
-    """
+def look_at(par, s, bars, level, ticks, speed_before):
+    """Look 2^level ticks ahead of pairs that are `ticks` after the state."""
     h = par.tick * (1 << level)
     time = par.tick * (ticks + (1 << level))
     if s.closed == 1:
         sums = joined_ahead(s, bars, level)
     else:
-        sums = open_ahead(s, bars, level, not far)
+        sums = open_ahead(s, bars, level)
     p = s.p + (sums.low - s.low)
     force = stiffness(s) * (p - origin(s)) + damping(s) * sums.speed
     way_b = (sums.bit - s.at_b) / par.mass_b
@@ -106,7 +118,7 @@ def look_at(par, s, bars, level, ticks, speed_before, far):
     if s.closed == 1:
         u_r += (sums.piston - s.at_p) / par.mass_p
         contact = par.mass_p * (s.a_p + (speed_before - sums.piston_speed / par.mass_p) / h)
-    elif not far and has_piston(par):
+    elif has_piston(par):
         way_p = time * (s.v_p + 0.5 * time * s.a_p)
         u_r += way_p
         if s.parked == 1:
@@ -119,10 +131,10 @@ def look_at(par, s, bars, level, ticks, speed_before, far):
 
 
 @inlined
-def parts_or_meets(par, s, look, ticks, far):
+def parts_or_meets(par, s, look, ticks):
     """Whether the contact of piston and bit opens or closes before a look."""
     if s.closed == 0:
-        return not far and look.gap < 0.0
+        return has_piston(par) and look.gap < 0.0
     if s.time + ticks - s.closed_at < RINGING * WHOLE:
         return look.contact < 0.0
     return par.mass_p * s.a_p < look.sums.pull
@@ -174,7 +186,7 @@ def book_way(par, s, bars, ticks, look):
             s.gap = s.u_b - s.u_p
     s.time += ticks
     s.flips = 0
-    s.stride = min(2 * s.stride, LOOK)
+    s.stride = min(2 * s.stride, LONGEST_STRIDE)
     if s.mode == Mode.SS:
         last = s.check_time[(s.n_check - 1) % CHECKPOINTS]
         if s.n_check == 0 or time_of(par, s) - last >= CHECKPOINT * par.dt:
@@ -223,7 +235,7 @@ def usual_level(s, bars):
     if s.closed == 1:
         return STEP
     level, n = STEP, bars.laws.sizes[s.law]
-    while level < STEP + 2 and 2 * s.pairs <= n:
+    while level < LONGEST_HOP and 2 * s.pairs <= n:
         n //= 2
         level += 1
     return level
@@ -254,11 +266,81 @@ def present_look(par, s, bars):
     return Look(sums, p, force, 0.0, 0.0, 0.0, 0.0)
 
 
+@inlined
+def view_low(s, bars, i, pull, t):
+    """Offset of the rock end at a later time."""
+    view, low = bars.laws.views[s.law, i], spread(0.0)
+    for k in range(0, s.pairs, WIDTH):
+        low = low + load(view, LOW_Q, k) * load(bars.w, PQ, k)
+        low = low + load(view, LOW_V, k) * load(bars.w, PV, k)
+    return s.rest_low + total(low) + 0.5 * pull * t * t
+
+
+@inlined
+def view_speed(s, bars, i, pull, t):
+    """Its velocity."""
+    view, speed = bars.laws.views[s.law, i], spread(0.0)
+    for k in range(0, s.pairs, WIDTH):
+        speed = speed + load(view, SPEED_Q, k) * load(bars.w, PQ, k)
+        speed = speed + load(view, SPEED_V, k) * load(bars.w, PV, k)
+    return total(speed) + pull * t
+
+
+@kernel
+def scan(par, s, bars, most):
+    """Go on by looks at the rock end alone; ticks, and whether the last one ends the mode."""
+    usual, ticks, ends = usual_level(s, bars), 0, False
+    pull = bars.laws.ends[s.law][END_LOW, 0] * bars.w[PLOAD, 0]
+    K, off, C = stiffness(s), origin(s), damping(s)
+    while ticks < most and not ends:
+        level = usual
+        while most - ticks < 1 << level:
+            level -= 1
+        first = level
+        count = 1
+        if level >= STEP:
+            first = STEP + (level - STEP) * SCAN
+            count = min(SCAN, (most - ticks) >> level)
+        kept = 0
+        while kept < count:
+            t = par.tick * ((kept + 1) << level)
+            p = s.p + (view_low(s, bars, first + kept, pull, t) - s.low)
+            speed = view_speed(s, bars, first + kept, pull, t)
+            force = K * (p - off) + C * speed
+            ends = passed(par, s, p, speed, 0.0, force)
+            if ends:
+                break
+            kept += 1
+            if s.mode != Mode.FF:
+                s.b_peak_bit = max(s.b_peak_bit, force)
+                if time_of(par, s) + par.tick * ticks + t > s.peak_from:
+                    s.peak_bit_force = max(s.peak_bit_force, force)
+        s.count_steps += kept
+        if kept > 0:
+            carry_pairs(s, bars, kept << level)
+            ticks += kept << level
+        if not ends:
+            continue
+        # it ends within the next 2^level ticks
+        while level > 0:
+            level -= 1
+            i = level if level < STEP else STEP + (level - STEP) * SCAN
+            t = par.tick * (1 << level)
+            p = s.p + (view_low(s, bars, i, pull, t) - s.low)
+            speed = view_speed(s, bars, i, pull, t)
+            if not passed(par, s, p, speed, 0.0, K * (p - off) + C * speed):
+                carry_pairs(s, bars, 1 << level)
+                ticks += 1 << level
+        carry_pairs(s, bars, 1)
+        ticks += 1
+        s.count_steps += 1
+    return ticks, ends
+
+
 @kernel
 def go_phase(par, s, bars, law, end, blows, events):
     """Go on to tick `end`, or to the next event, or as far as is sensible before."""
-    piston = has_piston(par)
-    if piston and s.parked == 0 and s.closed == 0 and s.time >= s.no_park:
+    if has_piston(par) and s.parked == 0 and s.closed == 0 and s.time >= s.no_park:
         park(par, s, bars)
     ready(par, s, bars, law)
     most = end - s.time
@@ -268,21 +350,35 @@ def go_phase(par, s, bars, law, end, blows, events):
             return
         if s.alert == 1:
             most = min(most, WHOLE)
-    far = is_far(par, s, bars, most)
+    if s.mode != Mode.DFC and is_far(par, s, bars, most):
+        ticks, ends = scan(par, s, bars, most)
+        look = present_look(par, s, bars)
+        if s.mode != Mode.FF:
+            s.b_peak_bit = max(s.b_peak_bit, look.force)
+        book_way(par, s, bars, ticks, look)
+        if ends:
+            drop_pairs(par, s, bars)
+            change_mode(par, s, bars, events)
+    else:
+        go_near(par, s, bars, most, blows, events)
+
+
+@kernel
+def go_near(par, s, bars, most, blows, events):
+    """Go on by looks at both ends of the bit."""
     usual = usual_level(s, bars)
     level, ticks, known = usual, 0, -1
     sums = Sums(s.low, s.v_low, s.top, s.at_b, s.at_p, par.mass_p * s.v_p, 0.0)
     last = Look(sums, s.p, s.f_rock, s.u_r, s.low_p, s.gap, s.f_contact)
     C, taken, sampled, u_before = damping(s), 0.0, 0.0, s.u_r
-    cutting = s.mode == Mode.DFC
+    cutting, piston = s.mode == Mode.DFC, has_piston(par)
     if cutting:
         taken = C * (s.takes - to_be_taken(s, bars))
     flip = ends = turns = False
     while ticks < most:
         while ticks + (1 << level) > most:
             level -= 1
-        before = last.sums.piston_speed / par.mass_p
-        look = look_at(par, s, bars, level, ticks, before, far)
+        look = look_at(par, s, bars, level, ticks, last.sums.piston_speed / par.mass_p)
         work, share = 0.0, 0.0
         if cutting:
             speed, earlier = look.sums.speed, last.sums.speed
@@ -290,11 +386,11 @@ def go_phase(par, s, bars, law, end, blows, events):
             work = taken
             if s.w + taken + UNSURE * (sampled + share) >= s.w_r:
                 work = C * (s.takes - to_be_taken_ahead(s, bars))
-        flip = parts_or_meets(par, s, look, ticks, far)
+        flip = parts_or_meets(par, s, look, ticks)
         if flip and s.parked == 1:
             break
         ends = passed(par, s, look.p, look.sums.speed, work, look.force)
-        turns = piston and not far and switches(par, s, look.u_r)
+        turns = piston and switches(par, s, look.u_r)
         if level > 0 and (flip or ends or turns):
             known = ticks + (1 << level)
             level -= 1
@@ -314,14 +410,12 @@ def go_phase(par, s, bars, law, end, blows, events):
             level = max(level - 1, 0)
         else:
             level, known = usual, -1
-    tick, flips = par.tick, s.flips
-    if far:
-        last = present_look(par, s, bars)
+    flips = s.flips
     if ticks > 0:
         book_way(par, s, bars, ticks, last)
         flips = 0
     if turns and not flip:
-        switch_drive(par, s, u_before, time_of(par, s) - tick, tick, events)
+        switch_drive(par, s, u_before, time_of(par, s) - par.tick, par.tick, events)
     if flip and s.parked == 1:
         unpark(par, s, bars)
     elif flip:

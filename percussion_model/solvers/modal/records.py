@@ -12,8 +12,12 @@ from percussion_model.solvers.state import Limits
 
 # A step has 2^STEP ticks, to one of which events are found; carries go up to 2^(LEVELS - 1).
 STEP, LEVELS = 10, 28
-# Most steps between two looks at which modes are needed.
-LOOK = 32
+# A scan looks so many times at once; between two looks are up to 2^(LONGEST_HOP - STEP) steps.
+SCAN, LONGEST_HOP = 8, STEP + 4
+VIEWS = STEP + (LONGEST_HOP - STEP + 1) * SCAN
+# Most steps between two looks at which modes are needed, or whether the piston may wait; and at
+# which pairs are.
+LOOK, LONGEST_STRIDE = 32, 128
 # Forms: the bit free, on K_R, on gamma K_R; the same joined to the piston.
 JOINED = 3
 
@@ -85,6 +89,9 @@ class Laws(NamedTuple):
         Of the rock [N s/m].
     move : ndarray, shape (12, LEVELS, len(Go), n)
     ends : ndarray, shape (12, len(End), n)
+    views : ndarray, shape (12, VIEWS, len(View), n)
+        What pairs tell now of the rock end at later times: after 2^i ticks for i < STEP, then after
+        1, 2, ... SCAN times 2^STEP, 2^(STEP + 1), ...
     out, into : ndarray, shape (12, 2 n, 2 n)
         From pairs to offsets and velocities of the form's modes, and back; row by number that is
         changed, all Q or offsets first. Empty for laws whose pairs are those modes.
@@ -96,6 +103,7 @@ class Laws(NamedTuple):
     dashpot: np.ndarray
     move: np.ndarray
     ends: np.ndarray
+    views: np.ndarray
     out: np.ndarray
     into: np.ndarray
     taken: np.ndarray
@@ -125,6 +133,15 @@ class End(IntEnum):
     SHIFT = 16  # pairs of a common offset of 1 m
     SQUARE = 18  # Q'' + decay Q' + square Q = 0
     ROWS = 19
+
+
+class View(IntEnum):
+    """Rows by which pairs tell of the rock end later, about rest."""
+
+    LOW_Q = 0
+    LOW_V = 1
+    SPEED_Q = 2
+    SPEED_V = 3
 
 
 class Bars(NamedTuple):
@@ -234,7 +251,7 @@ MODAL_LIMITS = Limits(
         "no_plan": COUNT,
         "law": (-1, 11),
         "pairs": COUNT,
-        "stride": (0, LOOK),
+        "stride": (0, LONGEST_STRIDE),
         "flips": COUNT,
         "look": COUNT,
         "parked": FLAG,

@@ -23,7 +23,7 @@ from percussion_model.solvers.modal.leaps import LONGEST
 from percussion_model.solvers.modal.modes import Modes
 from percussion_model.solvers.modal.records import (
     JOINED,
-    LOOK,
+    LONGEST_STRIDE,
     MODAL_LIMITS,
     MODAL_PAR,
     MODAL_STATE,
@@ -263,7 +263,7 @@ class ModalSolver(Solver):
             return f"leap_end = {end}, at {now} with leaps of {LONGEST_LEAP} ticks at most"
         if s["parked"] and not begin <= now:
             return f"piston_time = {begin}, after {now}"
-        most = max(now + (LOOK << STEP), end) * float(self._par[0]["tick"])
+        most = max(now + (LONGEST_STRIDE << STEP), end) * float(self._par[0]["tick"])
         return "" if t <= most else f"its time of {self.time(state)!r} s, far before {t!r} s"
 
     def advance(
@@ -303,7 +303,7 @@ class ModalSolver(Solver):
     def readable_until(self, state: State) -> float:
         """Time up to which `read` answers without advancing the state [s]."""
         s = state.record[0]
-        go = LOOK if s["law"] >= 0 else 1
+        go = LONGEST_STRIDE if s["law"] >= 0 else 1
         end = max(int(s["leap_end"]), int(s["time"]) + (go << STEP))
         return end * float(self._par[0]["tick"])
 
