@@ -221,29 +221,21 @@ def _product(matrix: np.ndarray, row: np.ndarray) -> np.ndarray:
     return out
 
 
-def _ends_of(shape: np.ndarray, eta: float, pairs: Pairs) -> np.ndarray:
+def _ends_of(shape: np.ndarray, pairs: Pairs) -> np.ndarray:
     """Rows of `End` by those of `Shape`."""
     n = shape.shape[1]
     rows = np.zeros((End.ROWS, n))
-    stiff, low = shape[Shape.STIFF], shape[Shape.LOW]
-    bit, piston = shape[Shape.BIT], shape[Shape.PISTON]
-    for end, offsets, velocities in (
-        (End.LOW, low, None),
-        (End.SPEED, None, low),
-        (End.TOP, shape[Shape.TOP], None),
-        (End.BIT, bit, None),
-        (End.BIT_SPEED, None, bit),
-        (End.PISTON, piston, None),
-        (End.PISTON_SPEED, None, piston),
-        (End.PULL, -stiff * piston, -eta * stiff * piston),
+    offsets, velocities = pairs.out[:, :n], pairs.out[:, n:]
+    for end, part, row in (
+        (End.LOW, offsets, Shape.LOW),
+        (End.SPEED, velocities, Shape.LOW),
+        (End.TOP, offsets, Shape.TOP),
+        (End.BIT, offsets, Shape.BIT),
+        (End.BIT_SPEED, velocities, Shape.BIT),
     ):
-        by = np.zeros(2 * n)
-        if offsets is not None:
-            by += _product(pairs.out[:, :n], offsets)
-        if velocities is not None:
-            by += _product(pairs.out[:, n:], velocities)
+        by = _product(part, shape[row])
         rows[end], rows[end + 1] = by[:n], by[n:]
-    shift = _product(pairs.into[:n].T, bit + piston)
+    shift = _product(pairs.into[:n].T, shape[Shape.BIT])
     rows[End.SHIFT], rows[End.SHIFT + 1] = shift[:n], shift[n:]
     rows[End.SQUARE] = pairs.square
     return rows
@@ -290,7 +282,7 @@ def _fill_goes(square, decay, tick, ends, move, views):
 
 
 def laws_of(forms: Forms, dashpot: float, eta: float, tick: float) -> Laws:
-    """Tables of all laws; those of a form without a spring are its own modes.
+    """Tables of all laws; the pairs of a free bit are its own modes.
 
     Parameters
     ----------
@@ -300,38 +292,31 @@ def laws_of(forms: Forms, dashpot: float, eta: float, tick: float) -> Laws:
     eta, tick : float
         Kelvin-Voigt time and unit of time [s].
     """
-    n = forms.shape.shape[2]
-    refuse = n > MOST_PAIRS
-    sizes, dashpots = np.zeros(4 * JOINED, np.int64), np.zeros(4 * JOINED)
-    move = np.zeros((4 * JOINED, LEVELS, len(Go), n))
-    ends = np.zeros((4 * JOINED, End.ROWS, n))
-    views = np.zeros((4 * JOINED, VIEWS, len(View), n))
-    out, into, taken = (np.zeros((4 * JOINED, 2 * n, 2 * n)) for _ in range(3))
-    for law in range(4 * JOINED):
-        form = law // 2
-        size, held = int(forms.sizes[form]), float(forms.stiff[form])
-        plain = form % JOINED == 0
-        if not size or refuse or (law % 2 and (plain or dashpot == 0.0)):
+    n = int(forms.sizes[0])
+    count = 2 * JOINED
+    sizes, dashpots = np.zeros(count, np.int64), np.zeros(count)
+    move, ends = np.zeros((count, LEVELS, len(Go), n)), np.zeros((count, End.ROWS, n))
+    views = np.zeros((count, VIEWS, len(View), n))
+    out, into, taken = (np.zeros((count, 2 * n, 2 * n)) for _ in range(3))
+    for law in range(count):
+        form, damped = law // 2, law % 2 == 1
+        held = float(forms.stiff[form])
+        if not forms.sizes[form] or n > MOST_PAIRS or (damped and (form == 0 or dashpot == 0.0)):
             continue
-        shape = forms.shape[form, :, :size]
-        own = np.sqrt(shape[Shape.STIFF])
-        if plain:
-            unit = np.eye(2 * size)
-            pairs = Pairs(shape[Shape.STIFF], eta * shape[Shape.STIFF], unit, unit, 0.0 * unit)
+        shape = forms.shape[form, :, :n]
+        stiff = np.ascontiguousarray(shape[Shape.STIFF])
+        if form == 0:
+            unit = np.eye(2 * n)
+            pairs = Pairs(stiff, eta * stiff, unit, unit, 0.0 * unit)
         else:
-            c = (dashpot if law % 2 else 0.0) - eta * held
-            found = damped_pairs(own, np.ascontiguousarray(shape[Shape.LOW]), eta, c)
+            c = (dashpot if damped else 0.0) - eta * held
+            low = np.ascontiguousarray(shape[Shape.LOW])
+            found = damped_pairs(np.sqrt(stiff), low, eta, c)
             if found is None:
                 continue
             pairs = found
-        sizes[law], dashpots[law] = size, dashpot * (law % 2)
-        ends[law, :, :size] = _ends_of(shape, eta, pairs)
+            out[law], into[law], taken[law] = pairs.out, pairs.into, pairs.taken
+        sizes[law], dashpots[law] = n, dashpot if damped else 0.0
+        ends[law] = _ends_of(shape, pairs)
         _fill_goes(pairs.square, pairs.decay, tick, ends[law], move[law], views[law])
-        if not plain:
-            for table, part in ((out, pairs.out), (into, pairs.into), (taken, pairs.taken)):
-                for row in (0, 1):
-                    for column in (0, 1):
-                        table[law, row * n : row * n + size, column * n : column * n + size] = part[
-                            row * size : (row + 1) * size, column * size : (column + 1) * size
-                        ]
     return Laws(sizes, dashpots, move, ends, views, out, into, taken)

@@ -121,7 +121,7 @@ def trim(par, s, bars):
 def settle(par, s, bars, low):
     """Complete a new form: few modes, and the rock end where it was (offset `low`)."""
     refresh_loads(s, bars, s.a_b, s.a_p)
-    if (s.form % JOINED == 0) != (s.mode == Mode.FF) or bars.laws.sizes[2 * s.form] == 0:
+    if s.form >= JOINED or bars.laws.sizes[2 * s.form] == 0 or (s.form == 0) != (s.mode == Mode.FF):
         trim(par, s, bars)
     refresh_sums(s, bars)
     shift(s, bars, low - s.low)

@@ -13,11 +13,11 @@ from percussion_model.solvers.modal.bar import Q, V
 from percussion_model.solvers.modal.pairs import (
     PQ,
     PV,
+    ahead_of,
     carry_pairs,
     energy_about_rest,
     energy_of_pairs,
     keep_ahead,
-    open_ahead,
     spell_out,
 )
 from percussion_model.solvers.modal.phase import book_way, present_look, ready
@@ -103,7 +103,7 @@ def note_peak(par, s, bars, ticks):
         w[Q, k], w[V, k] = w[PQ, k], w[PV, k]
     C, K, steps = damping(s), stiffness(s), ticks >> STEP
     for step in range(steps):
-        sums = open_ahead(s, bars, STEP)
+        sums = ahead_of(s, bars, STEP)
         keep_ahead(s, bars)
         force = K * (s.p + (sums.low - s.low) - origin(s)) + C * sums.speed
         if time_of(par, s) + (step + 1) * par.dt > s.peak_from:

@@ -10,17 +10,13 @@ from percussion_model.physics.rock import book_dashpot, damping
 from percussion_model.solvers.modal.bar import LOAD, SOFT, STIFF, TINY, Q, V, row_sum
 from percussion_model.solvers.modal.forms import LEAST_FORCE, LEAST_SHARE, form_wanted
 from percussion_model.solvers.modal.lanes import WIDTH, load, spread, store, total
-from percussion_model.solvers.modal.records import JOINED, LEVELS, End, Go, Shape
+from percussion_model.solvers.modal.records import LEVELS, End, Go, Shape
 
 # Rows of the pairs in `Bars.w`: about rest, and the load of a rigid one.
 PQ, PV, PLOAD = 3, 4, 5
 QQ, QV, VQ, VV, YIELD = (int(row) for row in Go)
-LOW, SPEED, TOP, BIT, BIT_SPEED, PISTON, PISTON_SPEED, PULL, SHIFT, SQUARE, _ = (
-    int(row) for row in End
-)
-SHAPE_LOW, SHAPE_TOP, SHAPE_BIT, SHAPE_PISTON = (
-    int(row) for row in (Shape.LOW, Shape.TOP, Shape.BIT, Shape.PISTON)
-)
+LOW, SPEED, TOP, BIT, BIT_SPEED, SHIFT, SQUARE, _ = (int(row) for row in End)
+SHAPE_LOW, SHAPE_TOP, SHAPE_BIT = (int(row) for row in (Shape.LOW, Shape.TOP, Shape.BIT))
 
 
 # Modes that have less than this share of the energy of vibration make no pairs.
@@ -36,20 +32,18 @@ class Sums(NamedTuple):
     speed: float
     top: float
     bit: float
-    piston: float
-    piston_speed: float
-    pull: float
 
 
 @merged
 def law_wanted(par, s, laws):
     """Law by which the present mode moves; -1 where it has to be stepped."""
+    if s.closed == 1 or par.effects == 1:
+        return -1
     form = form_wanted(par, s)
-    plain = form % JOINED == 0
-    dashpot = damping(s)
-    if par.effects == 1 or form != s.form or plain != (s.mode == Mode.FF):
+    if form != s.form or (form == 0) != (s.mode == Mode.FF):
         return -1
     law = 2 * form
+    dashpot = damping(s)
     if dashpot > 0.0:
         law += 1
         if laws.dashpot[law] != dashpot:
@@ -73,7 +67,7 @@ def sum_of(ends, end, w, n):
 
 
 @inlined
-def open_ahead(s, bars, level):
+def ahead_of(s, bars, level):
     """Move the pairs of a bit alone over 2^level ticks, into `bars.rows`; their sums."""
     m, ends, w = bars.laws.move[s.law, level], bars.laws.ends[s.law], bars.w
     low = speed = top = bit = spread(0.0)
@@ -93,38 +87,6 @@ def open_ahead(s, bars, level):
         total(speed),
         s.rest_top + total(top),
         s.rest_b + total(bit),
-        0.0,
-        0.0,
-        0.0,
-    )
-
-
-@inlined
-def joined_ahead(s, bars, level):
-    """The same of piston and bit that touch."""
-    m, ends, w = bars.laws.move[s.law, level], bars.laws.ends[s.law], bars.w
-    low = speed = bit = piston = piston_speed = pull = spread(0.0)
-    for k in range(0, s.pairs, WIDTH):
-        q0, v0 = load(w, PQ, k), load(w, PV, k)
-        f = load(w, PLOAD, k)
-        q = load(m, QQ, k) * q0 + load(m, QV, k) * v0 + load(m, YIELD, k) * f
-        v = load(m, VQ, k) * q0 + load(m, VV, k) * v0 + load(m, QV, k) * f
-        store(bars.rows, 0, k, q)
-        store(bars.rows, 1, k, v)
-        low = low + part_of(ends, LOW, k, q, v)
-        speed = speed + part_of(ends, SPEED, k, q, v)
-        bit = bit + part_of(ends, BIT, k, q, v)
-        piston = piston + part_of(ends, PISTON, k, q, v)
-        piston_speed = piston_speed + part_of(ends, PISTON_SPEED, k, q, v)
-        pull = pull + part_of(ends, PULL, k, q, v)
-    return Sums(
-        s.rest_low + total(low),
-        total(speed),
-        s.top,
-        s.rest_b + total(bit),
-        s.rest_p + total(piston),
-        total(piston_speed),
-        s.rest_pull + total(pull),
     )
 
 
@@ -171,9 +133,6 @@ def present_sums(s, bars):
         sum_of(ends, SPEED, w, n),
         s.rest_top + sum_of(ends, TOP, w, n),
         s.rest_b + sum_of(ends, BIT, w, n),
-        0.0,
-        0.0,
-        0.0,
     )
 
 
@@ -184,14 +143,13 @@ def refresh_pair_sums(s, bars):
     s.low = s.rest_low + sum_of(ends, LOW, w, n)
     s.top = s.rest_top + sum_of(ends, TOP, w, n)
     s.at_b = s.rest_b + sum_of(ends, BIT, w, n)
-    s.at_p = s.rest_p + sum_of(ends, PISTON, w, n)
 
 
 @kernel
 def hold_ends(par, s, bars, low, tip):
     """Take the sums of other pairs, with the rock end and the top of the bit where they were."""
     ends, w, n = bars.laws.ends[s.law], bars.w, s.pairs
-    at_b, at_p, rigid = s.at_b, s.at_p, w[PQ, 0]
+    at_b, rigid = s.at_b, w[PQ, 0]
     refresh_pair_sums(s, bars)
     common = spread(0.0)
     for k in range(0, n, WIDTH):
@@ -203,9 +161,8 @@ def hold_ends(par, s, bars, low, tip):
         store(w, PV, k, load(w, PV, k) + load(ends, SHIFT + 1, k) * way)
     refresh_pair_sums(s, bars)
     s.offset += tip - (s.top - s.at_b / par.mass_b)
-    # no body went this way, so that the loads did no work
-    s.vibrates -= s.a_b * (s.at_b - at_b) + s.a_p * (s.at_p - at_p)
-    s.vibrates += w[PLOAD, 0] * (w[PQ, 0] - rigid)
+    # the bit did not go this way, so that its loads did no work
+    s.vibrates -= s.a_b * (s.at_b - at_b) - w[PLOAD, 0] * (w[PQ, 0] - rigid)
 
 
 @kernel
@@ -268,7 +225,7 @@ def multiply(table, x, first, active, rows, count):
 @kernel
 def to_be_taken(s, bars):
     """What a dashpot of 1 N s/m would take from the present pairs on [J]."""
-    table, w, n = bars.laws.taken[s.law], bars.w, bars.w.shape[1]
+    table, w, n = bars.laws.taken[s.law], bars.w, bars.laws.sizes[s.law]
     whole = spread(0.0)
     for i in range(0, s.pairs, WIDTH):
         q = v = spread(0.0)
@@ -282,7 +239,7 @@ def to_be_taken(s, bars):
 @kernel
 def to_be_taken_ahead(s, bars):
     """The same of the pairs that were looked at [J]."""
-    table, rows, n = bars.laws.taken[s.law], bars.rows, bars.w.shape[1]
+    table, rows, n = bars.laws.taken[s.law], bars.rows, bars.laws.sizes[s.law]
     whole = spread(0.0)
     for i in range(0, s.pairs, WIDTH):
         q = v = spread(0.0)
@@ -296,18 +253,13 @@ def to_be_taken_ahead(s, bars):
 @kernel
 def spell_out(s, bars):
     """Offsets about rest and velocities of the form's modes, into `bars.rows`; how many."""
-    n = bars.laws.sizes[s.law]
-    if s.form % JOINED > 0:
-        multiply(bars.laws.out[s.law], bars.w, PQ, s.pairs, bars.rows, n)
-        return n
-    for k in range(0, s.pairs, WIDTH):
-        store(bars.rows, 0, k, load(bars.w, PQ, k))
-        store(bars.rows, 1, k, load(bars.w, PV, k))
     if s.form == 0:
+        for k in range(0, s.pairs, WIDTH):
+            store(bars.rows, 0, k, load(bars.w, PQ, k))
+            store(bars.rows, 1, k, load(bars.w, PV, k))
         return s.pairs
-    for k in range(s.pairs, n, WIDTH):
-        store(bars.rows, 0, k, spread(0.0))
-        store(bars.rows, 1, k, spread(0.0))
+    n = bars.laws.sizes[s.law]
+    multiply(bars.laws.out[s.law], bars.w, PQ, s.pairs, bars.rows, n)
     return n
 
 
@@ -328,21 +280,19 @@ def energy_about_rest(s, bars, n):
 def take_rest(s, bars, n):
     """Take where the loads would hold the modes still: its sums, and offsets from it."""
     shape, w = bars.forms.shape[s.form], bars.w
-    low = top = bit = piston = pull = spread(0.0)
+    low = top = bit = spread(0.0)
     for k in range(0, n, WIDTH):
         soft, f = load(shape, SOFT, k), load(w, LOAD, k)
         rest = soft * f
         store(bars.rows, 0, k, load(w, Q, k) - rest)
         store(bars.rows, 1, k, load(w, V, k))
+        store(w, PLOAD, k, spread(0.0))
         low = low + load(shape, SHAPE_LOW, k) * rest
         top = top + load(shape, SHAPE_TOP, k) * rest
         bit = bit + load(shape, SHAPE_BIT, k) * rest
-        piston = piston + load(shape, SHAPE_PISTON, k) * rest
-        left = f - load(shape, STIFF, k) * rest
-        store(w, PLOAD, k, left)
-        pull = pull + load(shape, SHAPE_PISTON, k) * left
+    if s.form == 0:
+        w[PLOAD, 0] = w[LOAD, 0]
     s.rest_low, s.rest_top, s.rest_b = total(low), total(top), total(bit)
-    s.rest_p, s.rest_pull = total(piston), total(pull)
 
 
 @kernel
@@ -366,12 +316,10 @@ def take_pairs(par, s, bars, law):
     take_rest(s, bars, n)
     s.law, s.pairs = law, n
     s.vibrates = energy_about_rest(s, bars, n)
-    if s.form % JOINED > 0:
+    if s.form > 0:
         count = enough_modes(s, bars, n)
         for k in range(0, count, WIDTH):
             store(w, Q, k, load(bars.rows, 0, k))
-        for k in range(0, n, WIDTH):
-            store(w, PLOAD, k, spread(0.0))
         s.pairs = min(count + WIDTH, n)
         multiply(bars.laws.into[law], w, Q, count, bars.rows, s.pairs)
     for k in range(0, s.pairs, WIDTH):
@@ -405,4 +353,3 @@ def drop_pairs(par, s, bars):
     s.low = row_sum(shape, SHAPE_LOW, bars.w, Q, n)
     s.top = row_sum(shape, SHAPE_TOP, bars.w, Q, n)
     s.at_b = row_sum(shape, SHAPE_BIT, bars.w, Q, n)
-    s.at_p = row_sum(shape, SHAPE_PISTON, bars.w, Q, n)

@@ -37,13 +37,12 @@ from percussion_model.solvers.modal.pairs import (
     PQ,
     PV,
     Sums,
+    ahead_of,
     carry_pairs,
     drop_pairs,
     energy_about_rest,
-    joined_ahead,
     keep_ahead,
     leave_out_pairs,
-    open_ahead,
     present_sums,
     spell_out,
     sum_of,
@@ -53,7 +52,6 @@ from percussion_model.solvers.modal.pairs import (
 )
 from percussion_model.solvers.modal.piston import (
     WHOLE,
-    book_contact,
     flip_contact,
     has_piston,
     park,
@@ -77,10 +75,6 @@ from percussion_model.solvers.modal.rock_end import (
     passed,
 )
 
-# Openings and closures of one instant; more would be a loop.
-MOST_FLIPS = 2
-# Of a contact, so many steps are told to end by their mean force: fronts ring.
-RINGING = 2
 # Steps after which the running force of a standstill is noted.
 CHECKPOINT = 64
 # What the dashpot takes is computed once this many times its sum over looks may be enough.
@@ -91,7 +85,7 @@ LOW_Q, LOW_V, SPEED_Q, SPEED_V = (int(row) for row in View)
 
 
 class Look(NamedTuple):
-    """Where the bodies are after some time, and what that means."""
+    """Where bit and piston are after some time, and what that means."""
 
     sums: Sums
     p: float  # penetration [m]
@@ -99,26 +93,18 @@ class Look(NamedTuple):
     u_r: float  # relative displacement [m]
     low_p: float  # offset of the free piston's low end [m]
     gap: float  # between the ends, or as far as a waiting piston's may be apart [m]
-    contact: float  # mean force of piston on bit since the look before [N]
 
 
 @inlined
-def look_at(par, s, bars, level, ticks, speed_before):
+def look_at(par, s, bars, level, ticks):
     """Look 2^level ticks ahead of pairs that are `ticks` after the state."""
-    h = par.tick * (1 << level)
-    time = par.tick * (ticks + (1 << level))
-    if s.closed == 1:
-        sums = joined_ahead(s, bars, level)
-    else:
-        sums = open_ahead(s, bars, level)
+    sums = ahead_of(s, bars, level)
     p = s.p + (sums.low - s.low)
     force = stiffness(s) * (p - origin(s)) + damping(s) * sums.speed
     way_b = (sums.bit - s.at_b) / par.mass_b
-    u_r, low_p, gap, contact = s.u_r - way_b, 0.0, 0.0, 0.0
-    if s.closed == 1:
-        u_r += (sums.piston - s.at_p) / par.mass_p
-        contact = par.mass_p * (s.a_p + (speed_before - sums.piston_speed / par.mass_p) / h)
-    elif has_piston(par):
+    u_r, low_p, gap = s.u_r - way_b, 0.0, 0.0
+    if has_piston(par):
+        time = par.tick * (ticks + (1 << level))
         way_p = time * (s.v_p + 0.5 * time * s.a_p)
         u_r += way_p
         if s.parked == 1:
@@ -127,65 +113,48 @@ def look_at(par, s, bars, level, ticks, speed_before):
             low_p = end_after(bars.wp, bars.shape_p, bars.move_p[level], bars.wp.shape[1])
         top = s.u_b + way_b + (sums.top - sums.bit / par.mass_b) + s.offset
         gap = top - (s.u_p + way_p + low_p)
-    return Look(sums, p, force, u_r, low_p, gap, contact)
+    return Look(sums, p, force, u_r, low_p, gap)
 
 
-@inlined
-def parts_or_meets(par, s, look, ticks):
-    """Whether the contact of piston and bit opens or closes before a look."""
-    if s.closed == 0:
-        return has_piston(par) and look.gap < 0.0
-    if s.time + ticks - s.closed_at < RINGING * WHOLE:
-        return look.contact < 0.0
-    return par.mass_p * s.a_p < look.sums.pull
+@kernel
+def book_flight(par, s, h, v_b, look):
+    """Book what the piston does alone for `h`, beside a bit that had a velocity."""
+    push = drive_force(par, s)
+    way, a = h * (s.v_p + 0.5 * h * s.a_p), s.a_p - (s.v_b - v_b) / h
+    # the stroke's turning point may lie within
+    turn = -(s.v_p - v_b) / a if a != 0.0 else -1.0
+    if 0.0 < turn < h and s.v_p < v_b:
+        s.b_stroke = max(s.b_stroke, -(s.u_r + 0.5 * (s.v_p - v_b) * turn))
+    book_piston_load(par, s, push, way, push * h)
+    s.u_p += way
+    s.v_p += h * s.a_p
+    s.u_r = s.u_p - s.u_b
+    s.b_stroke = max(s.b_stroke, -s.u_r)
+    s.low_p, s.gap = look.low_p, look.gap
+    if s.parked == 1:
+        s.low_p, s.gap = 0.0, s.u_b - s.u_p
 
 
-@merged
+@kernel
 def book_way(par, s, bars, ticks, look):
-    """Book what the bodies did up to a look that is `ticks` after the state."""
-    h, before, p = ticks * par.tick, recoverable(s), s.p
-    sums, v_b, push, contact = look.sums, s.v_b, drive_force(par, s), 0.0
+    """Book what bit and piston did up to a look that is `ticks` after the state."""
+    h, before, p, v_b, sums = ticks * par.tick, recoverable(s), s.p, s.v_b, look.sums
     s.v_b = sum_of(bars.laws.ends[s.law], BIT_SPEED, bars.w, s.pairs) / par.mass_b
     way_b = (sums.bit - s.at_b) / par.mass_b
-    if has_piston(par):
-        v_p = s.v_p + h * s.a_p
-        if s.closed == 1:
-            way_p = (sums.piston - s.at_p) / par.mass_p
-            v_p = sums.piston_speed / par.mass_p
-        else:
-            way_p = h * (s.v_p + 0.5 * h * s.a_p)
-            a = s.a_p - (s.v_b - v_b) / h
-            turn = -(s.v_p - v_b) / a if a != 0.0 else -1.0
-            if 0.0 < turn < h and s.v_p < v_b:
-                s.b_stroke = max(s.b_stroke, -(s.u_r + 0.5 * (s.v_p - v_b) * turn))
-        if s.closed == 1:
-            contact = par.mass_p * (h * s.a_p - (v_p - s.v_p))
-        book_piston_load(par, s, push, way_p, push * h)
-        s.u_p += way_p
-        s.v_p, s.low_p, s.gap = v_p, look.low_p, look.gap
-        if s.parked == 1:
-            s.low_p = 0.0
-    if s.mode != Mode.FF:
-        s.i_bit += contact + par.mass_b * (h * s.a_b - (s.v_b - v_b))
     book_bit_load(par, s, way_b)
     s.u_b += way_b
-    s.low, s.top, s.at_b, s.at_p = sums.low, sums.top, sums.bit, sums.piston
-    s.v_low, s.f_rock, s.f_contact = sums.speed, look.force, look.contact
-    s.p = look.p
+    s.low, s.top, s.at_b, s.v_low = sums.low, sums.top, sums.bit, sums.speed
+    s.p, s.f_rock, s.f_contact = look.p, look.force, 0.0
     if s.mode == Mode.FF:
         s.f_rock = 0.0
         s.e_standstill += before - recoverable(s)
     else:
-        off = origin(s)
-        s.rock_work += 0.5 * stiffness(s) * (s.p - p) * (s.p + p - 2.0 * off)
+        s.i_bit += par.mass_b * (h * s.a_b - (s.v_b - v_b))
+        s.rock_work += 0.5 * stiffness(s) * (s.p - p) * (s.p + p - 2.0 * origin(s))
         crush(par, s, p)
     if has_piston(par):
-        s.u_r = s.u_p - s.u_b
-        s.b_stroke = max(s.b_stroke, -s.u_r)
-        if s.parked == 1:
-            s.gap = s.u_b - s.u_p
+        book_flight(par, s, h, v_b, look)
     s.time += ticks
-    s.flips = 0
     s.stride = min(2 * s.stride, LONGEST_STRIDE)
     if s.mode == Mode.SS:
         last = s.check_time[(s.n_check - 1) % CHECKPOINTS]
@@ -199,7 +168,7 @@ def take_loads(par, s, bars):
     push = drive_force(par, s)
     a_p = piston_acceleration(par, push) if has_piston(par) else 0.0
     a_b = bit_acceleration(par, s)
-    if s.law >= 0 and (a_b != s.a_b or (s.closed == 1 and a_p != s.a_p)):
+    if s.law >= 0 and a_b != s.a_b:
         drop_pairs(par, s, bars)
     if s.law < 0:
         refresh_loads(s, bars, a_b, a_p)
@@ -232,8 +201,6 @@ def watch_barrier(par, s, bars, law, events):
 @inlined
 def usual_level(s, bars):
     """Length of a look: two for each period of the highest mode that moves."""
-    if s.closed == 1:
-        return STEP
     level, n = STEP, bars.laws.sizes[s.law]
     while level < LONGEST_HOP and 2 * s.pairs <= n:
         n //= 2
@@ -244,8 +211,6 @@ def usual_level(s, bars):
 @merged
 def is_far(par, s, bars, ticks):
     """Whether the piston can neither meet the bit nor turn the drive within a time."""
-    if s.closed == 1:
-        return False
     if has_piston(par) and s.parked == 0:
         return False
     size, held = math.sqrt(2.0 * s.vibrates), bars.forms.stiff[s.form]
@@ -263,7 +228,7 @@ def present_look(par, s, bars):
     sums = present_sums(s, bars)
     p = s.p + (sums.low - s.low)
     force = stiffness(s) * (p - origin(s)) + damping(s) * sums.speed
-    return Look(sums, p, force, 0.0, 0.0, 0.0, 0.0)
+    return Look(sums, p, force, 0.0, 0.0, 0.0)
 
 
 @inlined
@@ -340,7 +305,7 @@ def scan(par, s, bars, most):
 @kernel
 def go_phase(par, s, bars, law, end, blows, events):
     """Go on to tick `end`, or to the next event, or as far as is sensible before."""
-    if has_piston(par) and s.parked == 0 and s.closed == 0 and s.time >= s.no_park:
+    if has_piston(par) and s.parked == 0 and s.time >= s.no_park:
         park(par, s, bars)
     ready(par, s, bars, law)
     most = end - s.time
@@ -368,17 +333,16 @@ def go_near(par, s, bars, most, blows, events):
     """Go on by looks at both ends of the bit."""
     usual = usual_level(s, bars)
     level, ticks, known = usual, 0, -1
-    sums = Sums(s.low, s.v_low, s.top, s.at_b, s.at_p, par.mass_p * s.v_p, 0.0)
-    last = Look(sums, s.p, s.f_rock, s.u_r, s.low_p, s.gap, s.f_contact)
+    last = Look(Sums(s.low, s.v_low, s.top, s.at_b), s.p, s.f_rock, s.u_r, s.low_p, s.gap)
     C, taken, sampled, u_before = damping(s), 0.0, 0.0, s.u_r
     cutting, piston = s.mode == Mode.DFC, has_piston(par)
     if cutting:
         taken = C * (s.takes - to_be_taken(s, bars))
-    flip = ends = turns = False
+    meets = ends = turns = False
     while ticks < most:
         while ticks + (1 << level) > most:
             level -= 1
-        look = look_at(par, s, bars, level, ticks, last.sums.piston_speed / par.mass_p)
+        look = look_at(par, s, bars, level, ticks)
         work, share = 0.0, 0.0
         if cutting:
             speed, earlier = look.sums.speed, last.sums.speed
@@ -386,18 +350,17 @@ def go_near(par, s, bars, most, blows, events):
             work = taken
             if s.w + taken + UNSURE * (sampled + share) >= s.w_r:
                 work = C * (s.takes - to_be_taken_ahead(s, bars))
-        flip = parts_or_meets(par, s, look, ticks)
-        if flip and s.parked == 1:
+        meets = piston and look.gap < 0.0
+        if meets and s.parked == 1:
             break
         ends = passed(par, s, look.p, look.sums.speed, work, look.force)
         turns = piston and switches(par, s, look.u_r)
-        if level > 0 and (flip or ends or turns):
+        if level > 0 and (meets or ends or turns):
             known = ticks + (1 << level)
             level -= 1
             continue
-        if flip and (ticks > 0 or s.flips < MOST_FLIPS):
+        if meets:
             break
-        flip = False
         keep_ahead(s, bars)
         ticks += 1 << level
         s.count_steps += 1
@@ -410,21 +373,19 @@ def go_near(par, s, bars, most, blows, events):
             level = max(level - 1, 0)
         else:
             level, known = usual, -1
-    flips = s.flips
     if ticks > 0:
         book_way(par, s, bars, ticks, last)
-        flips = 0
-    if turns and not flip:
-        switch_drive(par, s, u_before, time_of(par, s) - par.tick, par.tick, events)
-    if flip and s.parked == 1:
+    if meets and s.parked == 1:
         unpark(par, s, bars)
-    elif flip:
+    elif meets:
         drop_pairs(par, s, bars)
         flip_contact(par, s, bars, s.v_p - s.v_b, blows, events)
-        s.flips = flips + 1
-    elif ends:
-        drop_pairs(par, s, bars)
-        change_mode(par, s, bars, events)
+    else:
+        if turns:
+            switch_drive(par, s, u_before, time_of(par, s) - par.tick, par.tick, events)
+        if ends:
+            drop_pairs(par, s, bars)
+            change_mode(par, s, bars, events)
 
 
 @inlined
@@ -435,7 +396,5 @@ def note(par, s, bars, level, ticks, look):
         s.b_peak_bit = max(s.b_peak_bit, look.force)
         if time > s.peak_from:
             s.peak_bit_force = max(s.peak_bit_force, look.force)
-    if s.closed == 1:
-        book_contact(par, s, look.contact, par.tick * (1 << level), time)
-    elif has_piston(par) and s.parked == 0 and par.piston == Piston.ELASTIC:
+    if has_piston(par) and s.parked == 0 and par.piston == Piston.ELASTIC:
         s.e_loss += move_free(bars.wp, bars.move_p[level], bars.wp.shape[1])

@@ -77,25 +77,26 @@ class Forms(NamedTuple):
 
 
 class Laws(NamedTuple):
-    """Motions of a form with all that its rock end feels: 2 form, or 2 form + 1 with a dashpot.
+    """Motions of a bit alone with all that its rock end feels: law 2 form, or 2 form + 1.
 
-    Each damped mode is a pair of numbers Q, V = dQ/dt (docs/modal.md, section 3).
+    The second has the dashpot of the rock besides. Each damped mode is a pair of numbers Q and
+    V = dQ/dt (docs/modal.md, section 4).
 
     Attributes
     ----------
-    sizes : int array, shape (12,)
-        Modes of each law, 0 where there is none.
-    dashpot : float array, shape (12,)
+    sizes : int array, shape (6,)
+        Pairs of each law, 0 where there is none.
+    dashpot : float array, shape (6,)
         Of the rock [N s/m].
-    move : ndarray, shape (12, LEVELS, len(Go), n)
-    ends : ndarray, shape (12, len(End), n)
-    views : ndarray, shape (12, VIEWS, len(View), n)
+    move : ndarray, shape (6, LEVELS, len(Go), n)
+    ends : ndarray, shape (6, len(End), n)
+    views : ndarray, shape (6, VIEWS, len(View), n)
         What pairs tell now of the rock end at later times: after 2^i ticks for i < STEP, then after
         1, 2, ... SCAN times 2^STEP, 2^(STEP + 1), ...
-    out, into : ndarray, shape (12, 2 n, 2 n)
+    out, into : ndarray, shape (6, 2 n, 2 n)
         From pairs to offsets and velocities of the form's modes, and back; row by number that is
-        changed, all Q or offsets first. Empty for laws whose pairs are those modes.
-    taken : ndarray, shape (12, 2 n, 2 n)
+        changed, all Q or offsets first. Empty for the free form, whose pairs are its modes.
+    taken : ndarray, shape (6, 2 n, 2 n)
         Form: what a dashpot of 1 N s/m takes from now on [J].
     """
 
@@ -127,12 +128,9 @@ class End(IntEnum):
     TOP = 4  # of the top of the bit
     BIT = 6  # integral over the mass of the bit
     BIT_SPEED = 8
-    PISTON = 10
-    PISTON_SPEED = 12
-    PULL = 14  # force that accelerates the piston's mass
-    SHIFT = 16  # pairs of a common offset of 1 m
-    SQUARE = 18  # Q'' + decay Q' + square Q = 0
-    ROWS = 19
+    SHIFT = 10  # pairs of a common offset of 1 m
+    SQUARE = 12  # Q'' + decay Q' + square Q = 0
+    ROWS = 13
 
 
 class View(IntEnum):
@@ -205,7 +203,6 @@ MODAL_STATE = np.dtype(
         ("law", "i8"),  # by which the pairs move, or -1: offsets and velocities do
         ("pairs", "i8"),  # that move
         ("stride", "i8"),  # steps before it is looked again which pairs are needed
-        ("flips", "i8"),  # of the contact at this instant
         ("look", "i8"),  # when to look again at which modes are needed
         ("parked", "i8"),  # 1: the vibration of the piston is that of an earlier time
         ("piston_time", "i8"),
@@ -230,9 +227,7 @@ MODAL_STATE = np.dtype(
         ("peak_impulse", "f8"),  # [N s]
         ("rest_low", "f8"),  # sums at rest under the loads: rock end, top [m]
         ("rest_top", "f8"),
-        ("rest_b", "f8"),  # bit, piston [kg m]
-        ("rest_p", "f8"),
-        ("rest_pull", "f8"),  # [N]
+        ("rest_b", "f8"),  # bit [kg m]
         ("vibrates", "f8"),  # energy about rest when the pairs were taken [J]
         ("takes", "f8"),  # that a dashpot of 1 N s/m would take from then on [J]
         ("v_low", "f8"),  # velocity of the rock end [m/s]
@@ -249,10 +244,9 @@ MODAL_LIMITS = Limits(
         "time": COUNT,
         "leap_end": (-1, MOST),
         "no_plan": COUNT,
-        "law": (-1, 11),
+        "law": (-1, 2 * JOINED - 1),
         "pairs": COUNT,
         "stride": (0, LONGEST_STRIDE),
-        "flips": COUNT,
         "look": COUNT,
         "parked": FLAG,
         "piston_time": COUNT,
