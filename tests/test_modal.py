@@ -242,7 +242,9 @@ def test_leaps_change_nothing_but_the_time_that_it_takes(name):
     leaping, stepping = (
         advanced(one, 0.05) for one in (scene, scene.replace(**{"solver.leaps": False}))
     )
-    assert leaping.statistics()["steps"] < 0.3 * stepping.statistics()["steps"]
+    assert leaping.statistics()["leaps"] > 0 == stepping.statistics()["leaps"]
+    # steps are looks, of which a bit alone needs few without leaps too
+    assert leaping.statistics()["steps"] < 0.6 * stepping.statistics()["steps"]
     first, second = (run.events[run.events["time"] < 4e-3] for run in (leaping, stepping))
     assert first["kind"].tolist() == second["kind"].tolist()
     np.testing.assert_allclose(first["time"], second["time"], atol=1e-7)

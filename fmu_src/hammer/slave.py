@@ -31,7 +31,7 @@ from percussion_model.scene.inputs import INPUTS, no_effect_reason
 from percussion_model.scene.numbers import section_numbers
 from percussion_model.scene.rows import refuse_value
 from percussion_model.scene.scene import Scene
-from percussion_model.solvers.base import Solver, place_of_kernels
+from percussion_model.solvers.base import Solver, compiling_takes, place_of_kernels
 from percussion_model.solvers.wave.grid import cell_at
 
 # Solvers hold no state: instances of equal parameters share one.
@@ -121,7 +121,7 @@ class PercussiveHammer(Slave):
         if place is not None:
             self.note(
                 f"compiling the kernels of the solver {solver}: once, for "
-                f"about half a minute; they are kept in {place}"
+                f"about {compiling_takes(solver)}; they are kept in {place}"
             )
 
     def initialise(self) -> Motion:

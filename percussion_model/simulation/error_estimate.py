@@ -201,7 +201,7 @@ def grid_run(result: Result) -> GridRun:
     """A result with what its grid is known for; only waves have a misfit and a rule."""
     if result.solver not in ("wave", "modal"):
         return GridRun.exact(result)
-    numbers, cells = numbers_of(result.scene), next(iter(result.cells.values()))
+    numbers, cells = numbers_of(result.scene), _resolution(result)
     if result.solver == "modal":  # exact lengths; as many modes are surer than cells
         return GridRun(result, np.zeros(0), promised_error(numbers, cells))
     return GridRun(result, misfits(numbers, cells), promised_error(numbers, cells))
@@ -452,7 +452,7 @@ def _comparison_time(result: Result, coarser: Sequence[Scene]) -> float:
     """Until when runs to compare with last [s]; work rises between cells and their square."""
     work = 0.0
     for scene in coarser:
-        share = _cells_asked(scene) / next(iter(result.cells.values()))
+        share = _cells_asked(scene) / _resolution(result)
         work += 0.5 * (share + share * share)
     blows = result.blows[:FEWEST_BLOWS]
     if not len(blows):

@@ -286,7 +286,7 @@ def make_solver(scene: Scene) -> Solver:
 
 
 def place_of_kernels(name: str) -> Path | None:
-    """Folder into which the kernels of a solver will be compiled, which takes half a minute.
+    """Folder into which the kernels of a solver will be compiled (`compiling_takes`).
 
     None where they are kept from an earlier time, or where there are none.
     """
@@ -297,3 +297,8 @@ def place_of_kernels(name: str) -> Path | None:
         return None
     kernels = import_module(f"{entry.module.rpartition('.')[0]}.advance")
     return place_to_compile(getattr(kernels, entry.kernel))
+
+
+def compiling_takes(name: str) -> str:
+    """About how long the kernels of a solver take to be compiled."""
+    return "a minute" if name == "modal" else "half a minute"

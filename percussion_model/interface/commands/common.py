@@ -145,13 +145,13 @@ _told: set[str] = set()
 
 def tell_of_compiling(*solvers: str) -> None:
     """Say on stderr that kernels are going to be compiled, where numba does not keep them yet."""
-    from percussion_model.solvers.base import place_of_kernels
+    from percussion_model.solvers.base import compiling_takes, place_of_kernels
 
     places = {name: place_of_kernels(name) for name in solvers if name not in _told}
     new = {name: place for name, place in places.items() if place is not None}
     if new:
         _told.update(new)
-        long = "a minute" if "modal" in new else "half a minute"
+        long = compiling_takes("modal" if "modal" in new else next(iter(new)))
         long += " each" if len(new) > 1 else ""
         print_message(
             f"compiling the kernels of the solver {' and '.join(new)}: once, for about {long}; "

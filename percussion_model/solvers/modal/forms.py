@@ -20,7 +20,6 @@ from percussion_model.solvers.modal.bar import (
     Q,
     V,
     bar_energy,
-    kinetic_of,
     piston_vibration,
     row_sum,
 )
@@ -258,18 +257,3 @@ def part(par, s, bars):
 def gap_of(par, s):
     """Gap between piston and bit by the places of their ends [m]."""
     return s.u_b + (s.top - s.at_b / par.mass_b) - (s.u_p + s.low_p) + s.offset
-
-
-@kernel
-def vibration(s, bars):
-    """Energy of the bit's modes, without that of its mean motion in flight [J]."""
-    shape = bars.forms.shape[s.form]
-    energy = kinetic_of(bars.w, s.active)
-    squares = spread(0.0)
-    for k in range(0, s.active, WIDTH):
-        q = load(bars.w, Q, k)
-        squares = squares + load(shape, STIFF, k) * (q * q)
-    energy += 0.5 * total(squares)
-    if shape[STIFF, 0] == 0.0:
-        energy -= 0.5 * bars.w[V, 0] * bars.w[V, 0]
-    return energy

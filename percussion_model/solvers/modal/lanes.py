@@ -7,7 +7,6 @@ another, whatever vectors its processor has.
 from __future__ import annotations
 
 import operator
-from typing import ClassVar
 
 import numpy as np
 from llvmlite import ir
@@ -111,8 +110,8 @@ def _lower(function, instruction):
     """Make an operator of lanes one instruction: a function of its own would stay a call."""
 
     @infer_global(function)
-    class Signatures(ConcreteTemplate):  # type: ignore[misc]
-        cases: ClassVar = [
+    class Signatures(ConcreteTemplate):
+        cases = [  # noqa: RUF012
             signature(_lanes, _lanes, _lanes),
             signature(_lanes, _lanes, types.float64),
             signature(_lanes, types.float64, _lanes),

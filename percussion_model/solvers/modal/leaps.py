@@ -21,8 +21,8 @@ from percussion_model.solvers.modal.pairs import (
     spell_out,
 )
 from percussion_model.solvers.modal.phase import book_way, present_look, ready
-from percussion_model.solvers.modal.piston import LOOK, WHOLE, has_piston, quiet_time, time_of
-from percussion_model.solvers.modal.records import STEP
+from percussion_model.solvers.modal.piston import WHOLE, has_piston, quiet_time, time_of
+from percussion_model.solvers.modal.records import LOOK, STEP
 
 # Most steps of a leap.
 LONGEST = (1 << 16) - 1

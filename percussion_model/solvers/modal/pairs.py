@@ -1,11 +1,11 @@
-"""Pairs of numbers by which the bars move between two events (docs/modal.md, section 3)."""
+"""Pairs of numbers by which the bars move between two events (docs/modal.md, section 4)."""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
 from percussion_model.physics.kernel import inlined, kernel, merged
-from percussion_model.physics.records import Mode
+from percussion_model.physics.records import Mode, RockKind
 from percussion_model.physics.rock import book_dashpot, damping
 from percussion_model.solvers.modal.bar import LOAD, SOFT, STIFF, TINY, Q, V, row_sum
 from percussion_model.solvers.modal.forms import LEAST_FORCE, LEAST_SHARE, form_wanted
@@ -223,30 +223,16 @@ def multiply(table, x, first, active, rows, count):
 
 
 @kernel
-def to_be_taken(s, bars):
-    """What a dashpot of 1 N s/m would take from the present pairs on [J]."""
-    table, w, n = bars.laws.taken[s.law], bars.w, bars.laws.sizes[s.law]
-    whole = spread(0.0)
-    for i in range(0, s.pairs, WIDTH):
+def to_be_taken(table, x, first, count):
+    """What a dashpot of 1 N s/m would take of pairs in two rows of `x` from now on [J]."""
+    n, whole = table.shape[0] // 2, spread(0.0)
+    for i in range(0, count, WIDTH):
         q = v = spread(0.0)
-        for k in range(s.pairs):
-            q = q + load(table, k, i) * w[PQ, k] + load(table, n + k, i) * w[PV, k]
-            v = v + load(table, k, n + i) * w[PQ, k] + load(table, n + k, n + i) * w[PV, k]
-        whole = whole + q * load(w, PQ, i) + v * load(w, PV, i)
-    return total(whole)
-
-
-@kernel
-def to_be_taken_ahead(s, bars):
-    """The same of the pairs that were looked at [J]."""
-    table, rows, n = bars.laws.taken[s.law], bars.rows, bars.laws.sizes[s.law]
-    whole = spread(0.0)
-    for i in range(0, s.pairs, WIDTH):
-        q = v = spread(0.0)
-        for k in range(s.pairs):
-            q = q + load(table, k, i) * rows[0, k] + load(table, n + k, i) * rows[1, k]
-            v = v + load(table, k, n + i) * rows[0, k] + load(table, n + k, n + i) * rows[1, k]
-        whole = whole + q * load(rows, 0, i) + v * load(rows, 1, i)
+        for k in range(count):
+            q = q + load(table, k, i) * x[first, k] + load(table, n + k, i) * x[first + 1, k]
+            v = v + load(table, k, n + i) * x[first, k]
+            v = v + load(table, n + k, n + i) * x[first + 1, k]
+        whole = whole + q * load(x, first, i) + v * load(x, first + 1, i)
     return total(whole)
 
 
@@ -330,7 +316,7 @@ def take_pairs(par, s, bars, law):
     hold_ends(par, s, bars, low, tip)
     s.takes = 0.0
     if law % 2 == 1:
-        s.takes = to_be_taken(s, bars)
+        s.takes = to_be_taken(bars.laws.taken[law], w, PQ, s.pairs)
 
 
 @kernel
@@ -339,7 +325,8 @@ def drop_pairs(par, s, bars):
     n, shape = spell_out(s, bars), bars.forms.shape[s.form]
     lost = s.vibrates - energy_about_rest(s, bars, n)
     if s.law % 2 == 1:
-        work = bars.laws.dashpot[s.law] * (s.takes - to_be_taken(s, bars))
+        left = to_be_taken(bars.laws.taken[s.law], bars.w, PQ, s.pairs)
+        work = bars.laws.dashpot[s.law] * (s.takes - left)
         lost -= work
         s.rock_work += work
         book_dashpot(s, work)
@@ -348,7 +335,12 @@ def drop_pairs(par, s, bars):
         rest = load(shape, SOFT, k) * load(bars.w, LOAD, k)
         store(bars.w, Q, k, load(bars.rows, 0, k) + rest)
         store(bars.w, V, k, load(bars.rows, 1, k))
-    s.active = n
+    whole = bars.laws.sizes[s.law]
+    for k in range(n, whole, WIDTH):
+        store(bars.w, Q, k, spread(0.0))
+        store(bars.w, V, k, spread(0.0))
+    # a wall has the same modes, and excites them all
+    s.active = whole if par.rock == RockKind.WALL else n
     s.law = -1
     s.low = row_sum(shape, SHAPE_LOW, bars.w, Q, n)
     s.top = row_sum(shape, SHAPE_TOP, bars.w, Q, n)

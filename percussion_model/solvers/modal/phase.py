@@ -48,7 +48,6 @@ from percussion_model.solvers.modal.pairs import (
     sum_of,
     take_pairs,
     to_be_taken,
-    to_be_taken_ahead,
 )
 from percussion_model.solvers.modal.piston import (
     WHOLE,
@@ -337,7 +336,7 @@ def go_near(par, s, bars, most, blows, events):
     C, taken, sampled, u_before = damping(s), 0.0, 0.0, s.u_r
     cutting, piston = s.mode == Mode.DFC, has_piston(par)
     if cutting:
-        taken = C * (s.takes - to_be_taken(s, bars))
+        taken = C * (s.takes - to_be_taken(bars.laws.taken[s.law], bars.w, PQ, s.pairs))
     meets = ends = turns = False
     while ticks < most:
         while ticks + (1 << level) > most:
@@ -349,7 +348,8 @@ def go_near(par, s, bars, most, blows, events):
             share = 0.5 * C * (speed * speed + earlier * earlier) * (par.tick * (1 << level))
             work = taken
             if s.w + taken + UNSURE * (sampled + share) >= s.w_r:
-                work = C * (s.takes - to_be_taken_ahead(s, bars))
+                left = to_be_taken(bars.laws.taken[s.law], bars.rows, 0, s.pairs)
+                work = C * (s.takes - left)
         meets = piston and look.gap < 0.0
         if meets and s.parked == 1:
             break

@@ -7,7 +7,7 @@ import math
 from percussion_model.scene.bars import bar_transit_time
 from percussion_model.scene.numbers import Numbers
 from percussion_model.solvers.wave.grid import elastic_bars
-from percussion_model.solvers.wave.resolution import cells_by_rule
+from percussion_model.solvers.wave.resolution import cells_by_rule, in_first_bar
 
 # Modes in the bar with the shortest transit time, where the scene names none.
 DEFAULT_MODES = 20
@@ -31,7 +31,7 @@ def modes_for(numbers: Numbers, accuracy: float) -> int:
     accuracy : float
         Wanted relative error of the rate of penetration.
     """
-    return _in_first(numbers, cells_by_rule(accuracy))
+    return in_first_bar(numbers, cells_by_rule(accuracy))
 
 
 def most_modes(numbers: Numbers) -> int:
@@ -52,16 +52,10 @@ def asked_modes(numbers: Numbers) -> int:
 
 def default_modes(numbers: Numbers) -> int:
     """Modes in the first elastic bar where a scene asks for none."""
-    return _in_first(numbers, DEFAULT_MODES)
+    return in_first_bar(numbers, DEFAULT_MODES)
 
 
 def coarser_modes(modes: int, shares: tuple[float, ...]) -> list[int]:
     """Modes of the runs that a run is compared with, the fewest first."""
     counts = {math.ceil(share * modes) for share in shares}
     return sorted(count for count in counts if count < modes)
-
-
-def _in_first(numbers: Numbers, modes: float) -> int:
-    """Modes in the first elastic bar where the one with the shortest transit has so many."""
-    times = [bar_transit_time(bar) for bar in elastic_bars(numbers)]
-    return math.ceil(modes * times[0] / min(times) - 1e-9)

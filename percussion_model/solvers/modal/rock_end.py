@@ -18,7 +18,8 @@ from percussion_model.physics.rock import (
 from percussion_model.solvers.modal.bar import LOAD, SOFT, STIFF, Q, V, bit_kinetic
 from percussion_model.solvers.modal.forms import change_spring, leave_out
 from percussion_model.solvers.modal.lanes import WIDTH, load, spread, total
-from percussion_model.solvers.modal.piston import LOOK, WHOLE, time_of
+from percussion_model.solvers.modal.piston import WHOLE, time_of
+from percussion_model.solvers.modal.records import LOOK
 
 # A standstill with less than this share of W_R stays one if nothing comes from outside.
 QUIET_SHARE = 0.9

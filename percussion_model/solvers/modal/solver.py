@@ -16,9 +16,9 @@ from percussion_model.scene.parameters import Bar
 from percussion_model.scene.scene import Scene
 from percussion_model.solvers.base import Solver
 from percussion_model.solvers.modal.advance import TICK_ROUNDING, run
-from percussion_model.solvers.modal.damped import laws_of
 from percussion_model.solvers.modal.fields import Places
 from percussion_model.solvers.modal.lanes import WIDTH
+from percussion_model.solvers.modal.laws import laws_of
 from percussion_model.solvers.modal.leaps import LONGEST
 from percussion_model.solvers.modal.modes import Modes
 from percussion_model.solvers.modal.records import (

@@ -41,6 +41,12 @@ def asked_cells(numbers: Numbers) -> int:
     return 0
 
 
+def in_first_bar(numbers: Numbers, count: float) -> int:
+    """Cells or modes in the first elastic bar where that of the shortest transit has so many."""
+    times = [bar_transit_time(bar) for bar in elastic_bars(numbers)]
+    return math.ceil(count * times[0] / min(times) - 1e-9)
+
+
 def cells_for(numbers: Numbers, accuracy: float) -> tuple[int, float]:
     """Cells in the first elastic bar for a wanted accuracy.
 
@@ -57,9 +63,7 @@ def cells_for(numbers: Numbers, accuracy: float) -> tuple[int, float]:
     fit : float
         Relative error of the wave speed.
     """
-    bars = elastic_bars(numbers)
-    first, bit = bar_transit_time(bars[0]), bar_transit_time(bars[-1])
-    least = math.ceil(cells_by_rule(accuracy) * first / min(first, bit) - 1e-9)
+    bars, least = elastic_bars(numbers), in_first_bar(numbers, cells_by_rule(accuracy))
     refuse_many("cells", least * sum(map(len, bars)))
     return fitting_cells(bars, least, math.floor(MOST_REFINED * least), FIT_SHARE * accuracy)
 
