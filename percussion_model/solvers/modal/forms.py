@@ -154,13 +154,15 @@ def leave_out(par, s, bars):
 def pass_on(change, w, rows, count, n):
     """Offsets and velocities of `count` modes in `n` others, into `rows`."""
     for i in range(0, n, WIDTH):
-        q = v = spread(0.0)
-        for k in range(count):
-            row = load(change, k, i)
+        q = q_odd = v = v_odd = spread(0.0)
+        for k in range(0, count, 2):
+            row, odd = load(change, k, i), load(change, k + 1, i)
             q = q + row * w[Q, k]
             v = v + row * w[V, k]
-        store(rows, Q, i, q)
-        store(rows, V, i, v)
+            q_odd = q_odd + odd * w[Q, k + 1]
+            v_odd = v_odd + odd * w[V, k + 1]
+        store(rows, Q, i, q + q_odd)
+        store(rows, V, i, v + v_odd)
 
 
 @kernel

@@ -25,7 +25,7 @@ LEVELS = 8
 MOST_NUMBERS = 60_000_000
 
 # Operators of so many scenes are kept [a few MB each on the default grid], as long as they
-# take no more than so many bytes: those of 250 cells have half a gigabyte.
+# take no more than so many bytes: those of 250 cells have 0.8 gigabytes.
 MOST_KEPT, MOST_BYTES = 4, 400_000_000
 _kept: dict[bytes, LeapOperators | None] = {}
 # Those of free bars, which scenes on other rock share, are kept apart.
