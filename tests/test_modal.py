@@ -284,7 +284,17 @@ def test_a_saved_state_goes_on_as_it_was():
 
 @pytest.mark.parametrize(
     ("field", "value"),
-    [("active", 7), ("form", 4), ("leap_end", 2**40), ("piston_time", 2**50), ("mode", 9)],
+    [
+        ("active", 7),
+        ("form", 4),
+        ("leap_end", 2**40),
+        ("piston_time", 2**50),
+        ("mode", 9),
+        ("law", 5),
+        ("law", 12),
+        ("pairs", 7),
+        ("stride", 1000),
+    ],
 )
 def test_a_state_out_of_bounds_is_refused(field, value):
     solver = ModalSolver(modal())

@@ -231,23 +231,23 @@ def present_look(par, s, bars):
 
 
 @inlined
-def view_low(s, bars, i, pull, t):
-    """Offset of the rock end at a later time."""
-    view, low = bars.laws.views[s.law, i], spread(0.0)
-    for k in range(0, s.pairs, WIDTH):
-        low = low + load(view, LOW_Q, k) * load(bars.w, PQ, k)
-        low = low + load(view, LOW_V, k) * load(bars.w, PV, k)
-    return s.rest_low + total(low) + 0.5 * pull * t * t
+def seen_at(s, bars, i, pull, t):
+    """Penetration and velocity of the rock end at a later time, by a row of views.
 
-
-@inlined
-def view_speed(s, bars, i, pull, t):
-    """Its velocity."""
-    view, speed = bars.laws.views[s.law, i], spread(0.0)
+    Parameters
+    ----------
+    pull : float
+        Acceleration of the rock end by the load on a free bit [m/s2].
+    """
+    view, low, speed = bars.laws.views[s.law, i], spread(0.0), spread(0.0)
     for k in range(0, s.pairs, WIDTH):
-        speed = speed + load(view, SPEED_Q, k) * load(bars.w, PQ, k)
-        speed = speed + load(view, SPEED_V, k) * load(bars.w, PV, k)
-    return total(speed) + pull * t
+        q, v = load(bars.w, PQ, k), load(bars.w, PV, k)
+        low = low + load(view, LOW_Q, k) * q
+        low = low + load(view, LOW_V, k) * v
+        speed = speed + load(view, SPEED_Q, k) * q
+        speed = speed + load(view, SPEED_V, k) * v
+    low_then = s.rest_low + total(low) + 0.5 * pull * t * t
+    return s.p + (low_then - s.low), total(speed) + pull * t
 
 
 @kernel
@@ -268,8 +268,7 @@ def scan(par, s, bars, most):
         kept = 0
         while kept < count:
             t = par.tick * ((kept + 1) << level)
-            p = s.p + (view_low(s, bars, first + kept, pull, t) - s.low)
-            speed = view_speed(s, bars, first + kept, pull, t)
+            p, speed = seen_at(s, bars, first + kept, pull, t)
             force = K * (p - off) + C * speed
             ends = passed(par, s, p, speed, 0.0, force)
             if ends:
@@ -290,8 +289,7 @@ def scan(par, s, bars, most):
             level -= 1
             i = level if level < STEP else STEP + (level - STEP) * SCAN
             t = par.tick * (1 << level)
-            p = s.p + (view_low(s, bars, i, pull, t) - s.low)
-            speed = view_speed(s, bars, i, pull, t)
+            p, speed = seen_at(s, bars, i, pull, t)
             if not passed(par, s, p, speed, 0.0, K * (p - off) + C * speed):
                 carry_pairs(s, bars, 1 << level)
                 ticks += 1 << level
