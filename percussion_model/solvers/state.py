@@ -15,11 +15,23 @@ from percussion_model.physics.state import (
     NUMBER,
 )
 
+# Bytes of a line of a processor's cache.
+LINE = 64
+
 
 @lru_cache
 def words_of(dtype: np.dtype) -> dict[str, int]:
     """Place of each field in a record whose fields are words of eight bytes."""
     return {name: int(place[1]) // 8 for name, place in (dtype.fields or {}).items()}
+
+
+def aligned(array: np.ndarray) -> np.ndarray:
+    """A copy that begins where a line of a processor's cache does: vectors load faster."""
+    room = np.zeros(array.nbytes + LINE, np.uint8)
+    start = -room.ctypes.data % LINE
+    copy = room[start : start + array.nbytes].view(array.dtype).reshape(array.shape)
+    copy[...] = array
+    return copy
 
 
 class State:
@@ -56,7 +68,7 @@ class State:
     ) -> None:
         if words is None or workspace is None:
             words = np.zeros(dtype.itemsize // 8, np.int64)
-            workspace = np.zeros(sum(rows * columns for rows, columns in shapes))
+            workspace = aligned(np.zeros(sum(rows * columns for rows, columns in shapes)))
         self.dtype, self.shapes, self.words, self.workspace = dtype, shapes, words, workspace
         self.record = np.ndarray(1, dtype, words)  # a view does it too, but takes ten times as long
         self.numbers = words.view(np.float64)
@@ -69,7 +81,7 @@ class State:
     def copy(self, spare: State | None = None) -> State:
         """An independent copy, in the memory of an old one where that is given."""
         if spare is None:
-            return State(self.dtype, self.shapes, self.words.copy(), self.workspace.copy())
+            return State(self.dtype, self.shapes, self.words.copy(), aligned(self.workspace))
         spare.words[:] = self.words
         spare.workspace[:] = self.workspace
         return spare

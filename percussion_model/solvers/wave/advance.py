@@ -9,6 +9,7 @@ import numpy as np
 from percussion_model.physics.kernel import kernel, merged
 from percussion_model.physics.readings import fill_ledger, fill_motion
 from percussion_model.physics.records import Piston, Status
+from percussion_model.physics.reference import refer
 from percussion_model.solvers.wave.bar import kinetic_energy
 from percussion_model.solvers.wave.leaps.dormant import make_dormant, stays_dormant, wake_piston
 from percussion_model.solvers.wave.leaps.leap import FEWEST_STEPS, leap, longest_leap, plan_leap
@@ -136,7 +137,7 @@ def read_at(par, s, bars, time, blows, events, row):
 
 
 @kernel
-def run(task, par_, state, bars, ops, scratch, time, blows, events, reading):
+def run(task, par_, state, bars_, ops_, scratch_, time, blows, events, reading):
     """Do one `Task` with a state; the only entry into the travelling-wave kernels.
 
     Parameters
@@ -148,9 +149,9 @@ def run(task, par_, state, bars, ops, scratch, time, blows, events, reading):
         READ: as COMMIT, then evaluate at `time`; spoils the state, so give a copy.
         STEP: one step without leaps.
     par_, state : WAVE_PAR, WAVE_STATE array of length 1
-    bars : Bars
-    ops : LeapOperators
-    scratch : Scratch
+    bars_ : Bars
+    ops_ : LeapOperators
+    scratch_ : Scratch
     time : float
         [s]
     blows, events : BLOW, EVENT array
@@ -164,6 +165,7 @@ def run(task, par_, state, bars, ops, scratch, time, blows, events, reading):
     """
     par = par_[0]
     s = state[0]
+    bars, ops, scratch = refer(bars_), refer(ops_), refer(scratch_)
     if task == Task.ADVANCE:
         return advance_to(par, s, bars, ops, scratch, time, blows, events)
     if task == Task.STEP:
