@@ -7,6 +7,7 @@ import math
 from percussion_model.physics.kernel import kernel, merged
 from percussion_model.physics.readings import fill_ledger, fill_motion
 from percussion_model.physics.records import Mode, Piston, Status
+from percussion_model.physics.reference import refer
 from percussion_model.physics.rock import recoverable
 from percussion_model.solvers.modal.bar import (
     bit_kinetic,
@@ -15,9 +16,9 @@ from percussion_model.solvers.modal.bar import (
     piston_vibration,
     sag,
 )
-from percussion_model.solvers.modal.leaps import leap, plan
+from percussion_model.solvers.modal.leaps import LONGEST, leap, plan
+from percussion_model.solvers.modal.near import go_near
 from percussion_model.solvers.modal.pairs import FIRST_STRIDE, drop_pairs, law_wanted
-from percussion_model.solvers.modal.phase import go_phase
 from percussion_model.solvers.modal.piston import WHOLE, has_piston, time_of, unpark
 from percussion_model.solvers.modal.records import STEP, Task
 from percussion_model.solvers.modal.step import step
@@ -61,17 +62,17 @@ def advance_to(par, s, bars, end, blows, events):
                 return Status.DONE
             step(par, s, bars, STEP, blows, events)
             continue
-        if s.leap_end < 0 and par.leaps == 1 and s.time >= s.no_plan and s.time < end:
-            plan(par, s, bars, law)
+        if s.leap_end < 0:
+            most = (s.stride if s.law == law else FIRST_STRIDE) * WHOLE
+            if s.time + most > end:
+                return Status.DONE
+            plan(par, s, bars, law, LONGEST, events)
+            if s.leap_end < 0 and s.law >= 0:
+                go_near(par, s, bars, most, blows, events)
+        if s.leap_end > end:
+            return Status.DONE
         if s.leap_end >= 0:
-            if s.leap_end > end:
-                return Status.DONE
-            leap(par, s, bars)
-        else:
-            stride = s.stride if s.law == law else FIRST_STRIDE
-            if s.time + stride * WHOLE > end:
-                return Status.DONE
-            go_phase(par, s, bars, law, s.time + stride * WHOLE, blows, events)
+            leap(par, s, bars, events)
 
 
 @kernel
@@ -79,13 +80,7 @@ def commit_to(par, s, bars, end, blows, events):
     """Carry bit and piston to a tick, within what is pending."""
     s.n_blows = 0
     s.n_events = 0
-    if s.leap_end >= 0:
-        cut = min(s.leap_end, end)
-        cut = s.time + (cut - s.time) // WHOLE * WHOLE
-        s.leap_end = cut
-        if cut > s.time:
-            leap(par, s, bars)
-        s.leap_end = -1
+    s.leap_end = -1
     level = STEP
     while s.time < end:
         status = full(s, blows, events)
@@ -93,7 +88,11 @@ def commit_to(par, s, bars, end, blows, events):
             return status
         law = law_wanted(par, s, bars.laws)
         if law >= 0:
-            go_phase(par, s, bars, law, end, blows, events)
+            plan(par, s, bars, law, end - s.time, events)
+            if s.leap_end >= 0:
+                leap(par, s, bars, events)
+            elif s.law >= 0:
+                go_near(par, s, bars, end - s.time, blows, events)
             continue
         while s.time + (1 << level) > end:
             level -= 1
@@ -102,7 +101,6 @@ def commit_to(par, s, bars, end, blows, events):
         drop_pairs(par, s, bars)
     if has_piston(par) and s.parked == 1:
         unpark(par, s, bars)
-    s.no_plan = s.time
     s.no_park = s.time
     return Status.DONE
 
@@ -138,7 +136,7 @@ def read_at(par, s, bars, time, row):
 
 
 @kernel
-def run(task, par_, state, bars, time, blows, events, reading):
+def run(task, par_, state, bars_, time, blows, events, reading):
     """Do one `Task` with a state; the only entry into the modal kernels.
 
     Parameters
@@ -148,7 +146,7 @@ def run(task, par_, state, bars, time, blows, events, reading):
         COMMIT: cut it short at the last tick up to `time`.
         READ: as COMMIT, then evaluate; spoils the state, so give a copy.
     par_, state : MODAL_PAR, MODAL_STATE array of length 1
-    bars : Bars
+    bars_ : Bars
     time : float
         [s]
     blows, events : BLOW, EVENT array
@@ -162,6 +160,7 @@ def run(task, par_, state, bars, time, blows, events, reading):
     """
     par = par_[0]
     s = state[0]
+    bars = refer(bars_)
     end = tick_at(par, time)
     if task == Task.ADVANCE:
         return advance_to(par, s, bars, end, blows, events)

@@ -216,7 +216,9 @@ def join(par, s, bars):
         store(rows, Q, i, q)
         store(rows, V, i, v)
     take_form(s, bars, form, n)
+    impulse = s.i_contact
     settle(par, s, bars, low)
+    s.peak_impulse = s.i_contact - impulse
     s.e_loss += before - bar_energy(s, bars)
     # where both are follows from how they are bent: no rounding can add up
     s.u_r = s.at_p / par.mass_p - s.at_b / par.mass_b

@@ -3,27 +3,34 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from percussion_model.physics.kernel import kernel
 from percussion_model.solvers.modal.damped import Pairs, damped_pairs
+from percussion_model.solvers.modal.lanes import WIDTH
 from percussion_model.solvers.modal.records import (
     JOINED,
     LEVELS,
+    LONGEST_HOP,
     SCAN,
     STEP,
-    VIEWS,
     End,
     Forms,
     Go,
     Laws,
+    Rest,
     Shape,
     View,
 )
 
 # Factors of a move below this are zero: what they leave would only slow down arithmetic.
 NOTHING = 1e-40
+# Laws of which one may follow another: FF 0, FC 2, DFC 3, BC 4, SS 5.
+FOLLOWERS = {0: (2, 3, 5), 2: (4,), 3: (2, 4), 4: (0, 2, 3, 5), 5: (0, 2, 3, 4)}
+# Tables from law to law cost cubes of the modes to make: with more pairs go by way of the modes.
+MOST_TO_PASS = 200
 # A bit with more modes is stepped: tables would take hundreds of megabytes.
 MOST_PAIRS = 400
 
@@ -35,6 +42,21 @@ def _times(matrix, row, out):
         for k in range(len(row)):
             total += matrix[i, k] * row[k]
         out[i] = total
+
+
+@kernel
+def _multiply(a, b, out):
+    for i in range(a.shape[0]):
+        for k in range(a.shape[1]):
+            for j in range(b.shape[1]):
+                out[i, j] += a[i, k] * b[k, j]
+
+
+def _matrix(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Product of matrices in an order of its own."""
+    out = np.zeros((a.shape[0], b.shape[1]))
+    _multiply(np.ascontiguousarray(a), np.ascontiguousarray(b), out)
+    return out
 
 
 def _product(matrix: np.ndarray, row: np.ndarray) -> np.ndarray:
@@ -64,6 +86,14 @@ def _ends_of(shape: np.ndarray, pairs: Pairs) -> np.ndarray:
     return rows
 
 
+def _folded(form: np.ndarray) -> np.ndarray:
+    """A symmetric form of numbers Q and V with what lies below its blocks of lanes added above."""
+    n = len(form) // 2
+    lane = np.tile(np.arange(n) // WIDTH, 2)
+    twice = 1.0 + np.sign(lane[None, :] - lane[:, None])
+    return np.asarray(form * twice)
+
+
 @kernel
 def _go(square, decay, h):
     """Offset and velocity of a pair after `h`, by those before."""
@@ -84,8 +114,26 @@ def _go(square, decay, h):
 
 
 @kernel
-def _fill_goes(square, decay, tick, ends, move, views):
-    """Fill the tables of moves and views of a law."""
+def _view(square, decay, ends, h):
+    """What a pair tells of the rock end after `h`: offset by Q and V, velocity by both."""
+    qq, qv, vq, vv = _go(square, decay, h)
+    low, low_v, speed, speed_v = (
+        ends[End.LOW],
+        ends[End.LOW + 1],
+        ends[End.SPEED],
+        ends[End.SPEED + 1],
+    )
+    return (
+        low * qq + low_v * vq,
+        low * qv + low_v * vv,
+        speed * qq + speed_v * vq,
+        speed * qv + speed_v * vv,
+    )
+
+
+@kernel
+def _fill_goes(square, decay, tick, ends, move, views, scans):
+    """Fill the tables of moves and of what is seen ahead of a law."""
     for k in range(len(square)):
         for level in range(move.shape[0]):
             h = tick * 2.0**level
@@ -94,14 +142,58 @@ def _fill_goes(square, decay, tick, ends, move, views):
                 move[level, row, k] = go[row]
             if square[k] == 0.0:
                 move[level, Go.YIELD, k] = 0.5 * h * h
-        for i in range(views.shape[0]):
-            h = tick * 2.0**i
-            if i >= STEP:
-                h = tick * 2.0 ** (STEP + (i - STEP) // SCAN) * ((i - STEP) % SCAN + 1)
-            qq, qv, vq, vv = _go(square[k], decay[k], h)
-            for row, end in ((View.LOW_Q, End.LOW), (View.SPEED_Q, End.SPEED)):
-                views[i, row, k] = ends[end, k] * qq + ends[end + 1, k] * vq
-                views[i, row + 1, k] = ends[end, k] * qv + ends[end + 1, k] * vv
+        for level in range(views.shape[0]):
+            view = _view(square[k], decay[k], ends[:, k], tick * 2.0**level)
+            for row in range(4):
+                views[level, row, k] = view[row]
+        for hop in range(scans.shape[0]):
+            for look in range(SCAN):
+                h = tick * 2.0 ** (STEP + hop) * (look + 1)
+                view = _view(square[k], decay[k], ends[:, k], h)
+                for row in range(4):
+                    scans[hop, 4 * k + row, look] = view[row]
+
+
+def _rest(shape: np.ndarray) -> np.ndarray:
+    """Offsets of the modes where loads hold them that accelerate a free bit by 1 m/s2 [m]."""
+    return np.asarray(shape[Shape.SOFT] * shape[Shape.BIT])
+
+
+class _Over(NamedTuple):
+    """Tables from law to law, as `Laws` has them."""
+
+    way: np.ndarray
+    over: np.ndarray
+    pushed: np.ndarray
+
+
+def _over(forms: Forms, sizes: np.ndarray, out: np.ndarray, into: np.ndarray) -> _Over:
+    """Tables from the pairs of a law to those that may follow."""
+    n = int(forms.sizes[0])
+    way = np.full((2 * JOINED, 2 * JOINED), -1)
+    found: list[np.ndarray] = []
+    pushed: list[np.ndarray] = []
+    for one, followers in FOLLOWERS.items():
+        for other in followers:
+            if not sizes[one] or not sizes[other] or n > MOST_TO_PASS:
+                continue
+            form, then = one // 2, other // 2
+            change = forms.change[form, then, :n, :n] if form != then else np.eye(n)
+            rest = _product(change.T, _rest(forms.shape[form, :, :n]))
+            rest -= _rest(forms.shape[then, :, :n])
+            rows = out[one] if form else np.eye(2 * n)
+            table = np.hstack([_matrix(rows[:, :n], change), _matrix(rows[:, n:], change)])
+            push = np.append(rest, np.zeros(n))
+            if then:
+                table, push = _matrix(table, into[other]), _product(into[other].T, push)
+            way[one, other] = len(found)
+            found.append(table)
+            pushed.append(push.reshape(2, n))
+    return _Over(
+        way,
+        np.array(found) if found else np.zeros((1, 2 * n, 2 * n)),
+        np.array(pushed) if pushed else np.zeros((1, 2, n)),
+    )
 
 
 def laws_of(forms: Forms, dashpot: float, eta: float, tick: float) -> Laws:
@@ -119,7 +211,9 @@ def laws_of(forms: Forms, dashpot: float, eta: float, tick: float) -> Laws:
     count = 2 * JOINED
     sizes, dashpots = np.zeros(count, np.int64), np.zeros(count)
     move, ends = np.zeros((count, LEVELS, len(Go), n)), np.zeros((count, End.ROWS, n))
-    views = np.zeros((count, VIEWS, len(View), n))
+    views = np.zeros((count, LONGEST_HOP + 1, len(View), n))
+    scans = np.zeros((count, LONGEST_HOP - STEP + 1, n * len(View), SCAN))
+    rest = np.zeros((count, len(Rest)))
     out, into, taken = (np.zeros((count, 2 * n, 2 * n)) for _ in range(3))
     for law in range(count):
         form, damped = law // 2, law % 2 == 1
@@ -138,8 +232,10 @@ def laws_of(forms: Forms, dashpot: float, eta: float, tick: float) -> Laws:
             if found is None:
                 continue
             pairs = found
-            out[law], into[law], taken[law] = pairs.out, pairs.into, pairs.taken
+            out[law], into[law], taken[law] = pairs.out, pairs.into, _folded(pairs.taken)
         sizes[law], dashpots[law] = n, dashpot if damped else 0.0
         ends[law] = _ends_of(shape, pairs)
-        _fill_goes(pairs.square, pairs.decay, tick, ends[law], move[law], views[law])
-    return Laws(sizes, dashpots, move, ends, views, out, into, taken)
+        rest[law] = _product(shape[[Shape.LOW, Shape.TOP, Shape.BIT]], _rest(shape))
+        _fill_goes(pairs.square, pairs.decay, tick, ends[law], move[law], views[law], scans[law])
+    over = _over(forms, sizes, out, into)
+    return Laws(sizes, dashpots, rest, move, ends, views, scans, out, into, taken, *over)

@@ -151,8 +151,8 @@ def bar_modes(
 
 
 def count_below(sections: np.ndarray, highest: float) -> int:
-    """Most elastic modes that may lie below a frequency [rad/s]."""
-    return math.ceil(bar_transit_time(sections) * highest / math.pi + 0.5 * len(sections))
+    """Elastic modes below a frequency [rad/s]; with several sections there may be some more."""
+    return round(bar_transit_time(sections) * highest / math.pi)
 
 
 @kernel

@@ -4,16 +4,24 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numpy as np
+
 from percussion_model.physics.kernel import inlined, kernel, merged
 from percussion_model.physics.records import Mode, RockKind
 from percussion_model.physics.rock import book_dashpot, damping
 from percussion_model.solvers.modal.bar import LOAD, SOFT, STIFF, TINY, Q, V, row_sum
-from percussion_model.solvers.modal.forms import LEAST_FORCE, LEAST_SHARE, form_wanted
+from percussion_model.solvers.modal.forms import (
+    LEAST_FORCE,
+    LEAST_SHARE,
+    form_wanted,
+    refresh_loads,
+)
 from percussion_model.solvers.modal.lanes import WIDTH, load, spread, store, total
-from percussion_model.solvers.modal.records import LEVELS, End, Go, Shape
+from percussion_model.solvers.modal.records import End, Go, Shape
 
-# Rows of the pairs in `Bars.w`: about rest, and the load of a rigid one.
-PQ, PV, PLOAD = 3, 4, 5
+# Rows of the pairs in `Bars.w`: about rest, and the load of a rigid one; where a search is, or the
+# pending leap ends. As numbers, not as constants for each of which kernels would be compiled.
+PQ, PV, PLOAD, AT = (np.int64(row) for row in (3, 4, 5, 6))
 QQ, QV, VQ, VV, YIELD = (int(row) for row in Go)
 LOW, SPEED, TOP, BIT, BIT_SPEED, SHIFT, SQUARE, _ = (int(row) for row in End)
 SHAPE_LOW, SHAPE_TOP, SHAPE_BIT = (int(row) for row in (Shape.LOW, Shape.TOP, Shape.BIT))
@@ -35,12 +43,9 @@ class Sums(NamedTuple):
 
 
 @merged
-def law_wanted(par, s, laws):
-    """Law by which the present mode moves; -1 where it has to be stepped."""
-    if s.closed == 1 or par.effects == 1:
-        return -1
-    form = form_wanted(par, s)
-    if form != s.form or (form == 0) != (s.mode == Mode.FF):
+def law_in(par, s, laws, form):
+    """Law by which the present mode moves in a form; -1 where it has to be stepped."""
+    if s.closed == 1 or par.effects == 1 or (form == 0) != (s.mode == Mode.FF):
         return -1
     law = 2 * form
     dashpot = damping(s)
@@ -49,6 +54,13 @@ def law_wanted(par, s, laws):
         if laws.dashpot[law] != dashpot:
             return -1
     return law if laws.sizes[law] > 0 else -1
+
+
+@merged
+def law_wanted(par, s, laws):
+    """Law by which the present mode moves; -1 where it has to be stepped."""
+    form = form_wanted(par, s)
+    return law_in(par, s, laws, form) if form == s.form else -1
 
 
 @inlined
@@ -98,22 +110,34 @@ def keep_ahead(s, bars):
         store(bars.w, PV, k, load(bars.rows, 1, k))
 
 
+@inlined
+def keep(x, first, y, second, n):
+    """Keep pairs in two rows of `x` in two of `y`."""
+    for k in range(0, n, WIDTH):
+        store(y, second, k, load(x, first, k))
+        store(y, second + 1, k, load(x, first + 1, k))
+
+
+@inlined
+def move_pairs(s, bars, x, first, level):
+    """Move pairs in two rows of `x` from `first` on over 2^level ticks."""
+    m, w = bars.laws.move[s.law, level], bars.w
+    for k in range(0, s.pairs, WIDTH):
+        q, v, f = load(x, first, k), load(x, first + 1, k), load(w, PLOAD, k)
+        ahead = load(m, QQ, k) * q + load(m, QV, k) * v
+        store(x, first, k, ahead + load(m, YIELD, k) * f)
+        ahead = load(m, VQ, k) * q + load(m, VV, k) * v
+        store(x, first + 1, k, ahead + load(m, QV, k) * f)
+
+
 @kernel
-def carry_pairs(s, bars, ticks):
-    """Move the pairs over any number of ticks."""
-    rest, level, w = ticks, LEVELS - 1, bars.w
-    while rest > 0:
-        while rest >> level == 0:
-            level -= 1
-        m = bars.laws.move[s.law, level]
-        for k in range(0, s.pairs, WIDTH):
-            q, v, f = load(w, PQ, k), load(w, PV, k), load(w, PLOAD, k)
-            ahead = load(m, QQ, k) * q + load(m, QV, k) * v
-            store(w, PQ, k, ahead + load(m, YIELD, k) * f)
-            ahead = load(m, VQ, k) * q + load(m, VV, k) * v
-            store(w, PV, k, ahead + load(m, QV, k) * f)
-        rest -= 1 << level
-    drop_tiny(s, bars)
+def carry_pairs(s, bars, x, first, ticks):
+    """Move pairs in two rows of `x` from `first` on over any number of ticks."""
+    level = 0
+    while ticks >> level > 0:
+        if (ticks >> level) & 1 == 1:
+            move_pairs(s, bars, x, first, level)
+        level += 1
 
 
 @inlined
@@ -146,61 +170,70 @@ def refresh_pair_sums(s, bars):
 
 
 @kernel
-def hold_ends(par, s, bars, low, tip):
-    """Take the sums of other pairs, with the rock end and the top of the bit where they were."""
+def hold_low(s, bars, low):
+    """Move other pairs as one until the rock end is where it was, and take their sums."""
     ends, w, n = bars.laws.ends[s.law], bars.w, s.pairs
-    at_b, rigid = s.at_b, w[PQ, 0]
-    refresh_pair_sums(s, bars)
-    common = spread(0.0)
+    common = now = spread(0.0)
     for k in range(0, n, WIDTH):
-        q, v = load(ends, SHIFT, k), load(ends, SHIFT + 1, k)
-        common = common + part_of(ends, LOW, k, q, v)
-    way = (low - s.low) / total(common)
+        now = now + part_of(ends, LOW, k, load(w, PQ, k), load(w, PV, k))
+        common = common + part_of(ends, LOW, k, load(ends, SHIFT, k), load(ends, SHIFT + 1, k))
+    way = (low - s.rest_low - total(now)) / total(common)
     for k in range(0, n, WIDTH):
         store(w, PQ, k, load(w, PQ, k) + load(ends, SHIFT, k) * way)
         store(w, PV, k, load(w, PV, k) + load(ends, SHIFT + 1, k) * way)
     refresh_pair_sums(s, bars)
+
+
+@kernel
+def hold_ends(par, s, bars, low, tip):
+    """Take the sums of other pairs, with the rock end and the top of the bit where they were."""
+    at_b, rigid = s.at_b, bars.w[PQ, 0]
+    hold_low(s, bars, low)
     s.offset += tip - (s.top - s.at_b / par.mass_b)
     # the bit did not go this way, so that its loads did no work
-    s.vibrates -= s.a_b * (s.at_b - at_b) - w[PLOAD, 0] * (w[PQ, 0] - rigid)
+    s.vibrates -= s.a_b * (s.at_b - at_b) - bars.w[PLOAD, 0] * (bars.w[PQ, 0] - rigid)
 
 
 @kernel
 def enough_pairs(par, s, bars):
     """How many pairs hold next to all of the energy of vibration."""
     ends, held = bars.laws.ends[s.law], bars.forms.stiff[s.form]
-    least = 2.0 * energy_of_pairs(s, bars)
+    least = 2.0 * energy_of_pairs(s, bars, bars.w, PQ)
     least *= LEAST_SHARE
     if held > 0.0:
         force = LEAST_FORCE * s.a_b * par.mass_b
         least = max(least, force * force / held)
     above, n = 0.0, s.pairs
     while n > WIDTH:
-        q, v = load(bars.w, PQ, n - WIDTH), load(bars.w, PV, n - WIDTH)
-        above += total(v * v + load(ends, SQUARE, n - WIDTH) * (q * q))
+        above += total(size_of(ends, bars.w, PQ, n - WIDTH))
         if above > least:
             break
         n -= WIDTH
     return n
 
 
+@inlined
+def size_of(ends, x, first, k):
+    """Twice the energies of pairs from `k` on, in two rows of `x`, as if they were orthogonal."""
+    q, v = load(x, first, k), load(x, first + 1, k)
+    return v * v + load(ends, SQUARE, k) * (q * q)
+
+
 @kernel
-def energy_of_pairs(s, bars):
-    """Energy of vibration as if pairs were orthogonal, which they nearly are [J]."""
+def energy_of_pairs(s, bars, x, first):
+    """Energy of vibration of pairs in two rows of `x`, as if orthogonal, as nearly they are [J]."""
     ends, whole = bars.laws.ends[s.law], spread(0.0)
     for k in range(0, s.pairs, WIDTH):
-        q, v = load(bars.w, PQ, k), load(bars.w, PV, k)
-        whole = whole + v * v + load(ends, SQUARE, k) * (q * q)
-    energy = 0.5 * total(whole)
+        whole = whole + size_of(ends, x, first, k)
+    energy = total(whole)
     if bars.forms.stiff[s.form] == 0.0:
-        energy -= 0.5 * bars.w[PV, 0] * bars.w[PV, 0]
-    return energy
+        energy -= x[first + 1, 0] * x[first + 1, 0]
+    return 0.5 * energy
 
 
 @kernel
 def leave_out_pairs(par, s, bars):
     """Leave out pairs that have died away."""
-    drop_tiny(s, bars)
     n = enough_pairs(par, s, bars)
     if n < s.pairs:
         low, tip = s.low, s.top - s.at_b / par.mass_b
@@ -244,21 +277,24 @@ def to_be_taken(table, x, first, count):
     """What a dashpot of 1 N s/m would take of pairs in two rows of `x` from now on [J]."""
     whole = spread(0.0)
     for i in range(0, count, WIDTH):
-        q, v = times_table(table, x, first, count, i)
+        q, v = times_table(table, x, first, i + WIDTH, i)
         whole = whole + q * load(x, first, i) + v * load(x, first + 1, i)
     return total(whole)
 
 
 @kernel
-def spell_out(s, bars):
-    """Offsets about rest and velocities of the form's modes, into `bars.rows`; how many."""
+def spell_out(s, bars, x, first):
+    """Offsets about rest and velocities of the form's modes, into `bars.rows`; how many.
+
+    Of the pairs in two rows of `x`, from `first` on.
+    """
     if s.form == 0:
         for k in range(0, s.pairs, WIDTH):
-            store(bars.rows, 0, k, load(bars.w, PQ, k))
-            store(bars.rows, 1, k, load(bars.w, PV, k))
+            store(bars.rows, 0, k, load(x, first, k))
+            store(bars.rows, 1, k, load(x, first + 1, k))
         return s.pairs
     n = bars.laws.sizes[s.law]
-    multiply(bars.laws.out[s.law], bars.w, PQ, s.pairs, bars.rows, n)
+    multiply(bars.laws.out[s.law], x, first, s.pairs, bars.rows, n)
     return n
 
 
@@ -333,17 +369,27 @@ def take_pairs(par, s, bars, law):
 
 
 @kernel
-def drop_pairs(par, s, bars):
-    """Go back to offsets and velocities of the form's modes; book what was lost."""
-    n, shape = spell_out(s, bars), bars.forms.shape[s.form]
-    lost = s.vibrates - energy_about_rest(s, bars, n)
+def book_losses(s, bars):
+    """Spell out the pairs, and book what was lost since they were taken; how many modes."""
+    n = spell_out(s, bars, bars.w, PQ)
+    energy = energy_about_rest(s, bars, n)
+    lost, s.vibrates = s.vibrates - energy, energy
     if s.law % 2 == 1:
         left = to_be_taken(bars.laws.taken[s.law], bars.w, PQ, s.pairs)
         work = bars.laws.dashpot[s.law] * (s.takes - left)
+        s.takes = left
         lost -= work
         s.rock_work += work
         book_dashpot(s, work)
     s.e_loss += lost
+    return n
+
+
+@kernel
+def take_modes(par, s, bars, n):
+    """Go back from pairs to the offsets and velocities of the form's modes in `bars.rows`."""
+    shape = bars.forms.shape[s.form]
+    refresh_loads(s, bars, s.a_b, s.a_p)
     for k in range(0, n, WIDTH):
         rest = load(shape, SOFT, k) * load(bars.w, LOAD, k)
         store(bars.w, Q, k, load(bars.rows, 0, k) + rest)
@@ -358,3 +404,9 @@ def drop_pairs(par, s, bars):
     s.low = row_sum(shape, SHAPE_LOW, bars.w, Q, n)
     s.top = row_sum(shape, SHAPE_TOP, bars.w, Q, n)
     s.at_b = row_sum(shape, SHAPE_BIT, bars.w, Q, n)
+
+
+@kernel
+def drop_pairs(par, s, bars):
+    """Go back to offsets and velocities of the form's modes; book what was lost."""
+    take_modes(par, s, bars, book_losses(s, bars))

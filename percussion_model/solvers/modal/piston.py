@@ -20,6 +20,8 @@ from percussion_model.solvers.modal.forms import gap_of, join, part
 from percussion_model.solvers.modal.records import LOOK, STEP
 
 WHOLE = 1 << STEP
+# Steps after which it is tried again to let the piston wait.
+PATIENCE = 8
 
 
 @inlined
@@ -56,7 +58,7 @@ def park(par, s, bars):
         s.parked = 1
         s.piston_time = s.time
     else:
-        s.no_park = s.time + LOOK * WHOLE
+        s.no_park = s.time + PATIENCE * WHOLE
 
 
 @kernel
@@ -68,7 +70,7 @@ def flip_contact(par, s, bars, approach, blows, events):
         s.peak_time = s.peak_impulse = 0.0
         s.f_contact = 0.0
         part(par, s, bars)
-        s.no_park = s.time + LOOK * WHOLE
+        s.no_park = s.time + PATIENCE * WHOLE
         open_gap(s, events, time, approach)
     else:
         if starts_blow(par, s, time):
@@ -91,8 +93,9 @@ def book_contact(par, s, contact, h, time):
     s.peak_time += h
     s.peak_impulse += contact * h
     if s.peak_time >= 0.999 * par.window:
+        # (a rigid piston pushes hardest at once)
         first = time - s.closed_at * par.tick < 1.5 * par.window
-        mean = 0.0 if first else s.peak_impulse / s.peak_time
+        mean = 0.0 if first and par.piston == Piston.ELASTIC else s.peak_impulse / s.peak_time
         s.b_peak_contact = max(s.b_peak_contact, mean)
         if time > s.peak_from:
             s.peak_contact_force = max(s.peak_contact_force, mean)

@@ -12,9 +12,8 @@ from percussion_model.solvers.state import Limits
 
 # A step has 2^STEP ticks, to one of which events are found; carries go up to 2^(LEVELS - 1).
 STEP, LEVELS = 10, 28
-# A scan looks so many times at once; between two looks are up to 2^(LONGEST_HOP - STEP) steps.
+# A search looks so many times at once; between two looks are up to 2^(LONGEST_HOP - STEP) steps.
 SCAN, LONGEST_HOP = 8, STEP + 4
-VIEWS = STEP + (LONGEST_HOP - STEP + 1) * SCAN
 # Most steps between two looks at which modes are needed, or whether the piston may wait; and at
 # which pairs are.
 LOOK, LONGEST_STRIDE = 32, 128
@@ -88,26 +87,40 @@ class Laws(NamedTuple):
         Pairs of each law, 0 where there is none.
     dashpot : float array, shape (6,)
         Of the rock [N s/m].
+    rest : ndarray, shape (6, len(Rest))
     move : ndarray, shape (6, LEVELS, len(Go), n)
     ends : ndarray, shape (6, len(End), n)
-    views : ndarray, shape (6, VIEWS, len(View), n)
-        What pairs tell now of the rock end at later times: after 2^i ticks for i < STEP, then after
-        1, 2, ... SCAN times 2^STEP, 2^(STEP + 1), ...
+    views : ndarray, shape (6, LONGEST_HOP + 1, len(View), n)
+        What pairs tell now of the rock end 2^level ticks later.
+    scans : ndarray, shape (6, LONGEST_HOP - STEP + 1, n len(View), SCAN)
+        The same for 1, 2, ... SCAN times 2^STEP, 2^(STEP + 1), ... ticks later.
     out, into : ndarray, shape (6, 2 n, 2 n)
         From pairs to offsets and velocities of the form's modes, and back; row by number that is
         changed, all Q or offsets first. Empty for the free form, whose pairs are its modes.
     taken : ndarray, shape (6, 2 n, 2 n)
-        Form: what a dashpot of 1 N s/m takes from now on [J].
+        Form: what a dashpot of 1 N s/m takes from now on [J]; of two numbers in different lanes
+        all is at the one of the lower lanes.
+    way : int array, shape (6, 6)
+        Place in `over` of the table from the pairs of a law to those of another, -1: none.
+    over : ndarray, shape (tables, 2 n, 2 n)
+        As `into`.
+    pushed : ndarray, shape (tables, 2, n)
+        What an acceleration of the bit by its loads of 1 m/s2 adds, since it shifts the rest.
     """
 
     sizes: np.ndarray
     dashpot: np.ndarray
+    rest: np.ndarray
     move: np.ndarray
     ends: np.ndarray
     views: np.ndarray
+    scans: np.ndarray
     out: np.ndarray
     into: np.ndarray
     taken: np.ndarray
+    way: np.ndarray
+    over: np.ndarray
+    pushed: np.ndarray
 
 
 class Go(IntEnum):
@@ -133,6 +146,14 @@ class End(IntEnum):
     ROWS = 13
 
 
+class Rest(IntEnum):
+    """Where loads that would accelerate a free bit by 1 m/s2 hold the modes."""
+
+    LOW = 0  # rock end [m]
+    TOP = 1  # top of the bit
+    BIT = 2  # integral over the mass of the bit [kg m]
+
+
 class View(IntEnum):
     """Rows by which pairs tell of the rock end later, about rest."""
 
@@ -147,15 +168,16 @@ class Bars(NamedTuple):
 
     Attributes
     ----------
-    w : ndarray, shape (6, n)
-        Offsets, velocities, and forces of the body loads; pairs about rest, and their loads.
+    w : ndarray, shape (8, n)
+        Offsets, velocities, and forces of the body loads; pairs about rest, and their loads; pairs
+        where a search is, or the pending leap ends.
     wp : ndarray, shape (2, modes of the piston)
     forms : Forms
     laws : Laws
     shape_p, move_p : ndarray
         Of the piston's elastic modes, as one of `Forms`.
-    rows : ndarray, shape (2, n)
-        Room for a step that is tried.
+    rows : ndarray, shape (6, n)
+        Room: a step that is tried, what a search sees, pairs that are kept.
     """
 
     w: np.ndarray
@@ -199,7 +221,7 @@ MODAL_STATE = np.dtype(
     [
         ("time", "i8"),  # [ticks]
         ("leap_end", "i8"),  # when the pending leap ends, or -1
-        ("no_plan", "i8"),  # plan no leap before
+        ("leap_ends", "i8"),  # 1: the mode of the rock ends then
         ("law", "i8"),  # by which the pairs move, or -1: offsets and velocities do
         ("pairs", "i8"),  # that move
         ("stride", "i8"),  # steps before it is looked again which pairs are needed
@@ -225,6 +247,7 @@ MODAL_STATE = np.dtype(
         ("offset", "f8"),  # between the ends where they parted [m]
         ("peak_time", "f8"),  # of contact, since the last mean force for a peak [s]
         ("peak_impulse", "f8"),  # [N s]
+        ("leap_peak", "f8"),  # greatest force of the rock on the leap [N]
         ("rest_low", "f8"),  # sums at rest under the loads: rock end, top [m]
         ("rest_top", "f8"),
         ("rest_b", "f8"),  # bit [kg m]
@@ -243,7 +266,7 @@ MODAL_LIMITS = Limits(
     {
         "time": COUNT,
         "leap_end": (-1, MOST),
-        "no_plan": COUNT,
+        "leap_ends": FLAG,
         "law": (-1, 2 * JOINED - 1),
         "pairs": COUNT,
         "stride": (0, LONGEST_STRIDE),

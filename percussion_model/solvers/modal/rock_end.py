@@ -62,9 +62,15 @@ def end_standstill(par, s, bars, events):
 
 
 @kernel
-def change_mode(par, s, bars, events):
-    """Make the change of mode that the present state asks for."""
-    left, before, energy = s.mode, recoverable(s), bit_kinetic(s, bars, bars.w)
+def next_mode(par, s, energy):
+    """Take the mode of the rock that follows where the present one ends; whether one does.
+
+    Parameters
+    ----------
+    energy : float
+        Kinetic energy of the bit [J].
+    """
+    left, before = s.mode, recoverable(s)
     if s.mode == Mode.FF:
         if par.rock == RockKind.WALL:
             s.e_standstill += before
@@ -74,7 +80,7 @@ def change_mode(par, s, bars, events):
         if par.rock == RockKind.WALL:
             s.p_u = s.p
         s.mode = Mode.FF
-    elif s.mode == Mode.DFC and s.w >= s.w_r:
+    elif s.mode == Mode.DFC and not (s.w < s.w_r and s.v_low < -REST_VELOCITY):
         s.mode = Mode.FC
     elif s.mode == Mode.SS:
         s.mode = Mode.FF
@@ -86,12 +92,26 @@ def change_mode(par, s, bars, events):
     if s.mode == Mode.FF:
         if par.rock == RockKind.SPRING or left == Mode.BC:
             s.e_overshoot += before
-    change_spring(par, s, bars)
+    return s.mode != left
+
+
+@kernel
+def note_mode(par, s, events):
+    """Note a mode that has just begun."""
+    time = time_of(par, s)
     if s.mode == Mode.SS:
-        enter_standstill(s, time_of(par, s))
-        push_checkpoint(s, time_of(par, s))
-    watch_energy(par, s, bars)
-    push_event(s, events, time_of(par, s), s.mode, spring_force(s))
+        enter_standstill(s, time)
+        push_checkpoint(s, time)
+    push_event(s, events, time, s.mode, spring_force(s))
+
+
+@kernel
+def change_mode(par, s, bars, events):
+    """Make the change of mode that the present state asks for."""
+    if next_mode(par, s, bit_kinetic(s, bars, bars.w)):
+        change_spring(par, s, bars)
+        watch_energy(par, s, bars)
+        note_mode(par, s, events)
 
 
 @inlined

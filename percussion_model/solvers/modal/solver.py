@@ -48,9 +48,7 @@ from percussion_model.solvers.setup import (
     kelvin_voigt_time,
     rock_numbers,
 )
-from percussion_model.solvers.state import State
-
-LONGEST_LEAP = LONGEST << STEP
+from percussion_model.solvers.state import State, aligned
 
 
 class Tables(NamedTuple):
@@ -81,9 +79,11 @@ def _tables(
     if key not in _kept:
         while len(_kept) >= MOST_KEPT:
             del _kept[next(iter(_kept))]
-        made = forms_of(bit, piston, mass, springs, highest, eta, tick)
-        laws = laws_of(made[0], c_r, eta, tick)
-        _kept[key] = Tables(*made, *piston_tables(made[2], eta, tick), laws)
+        forms, modes, free = forms_of(bit, piston, mass, springs, highest, eta, tick)
+        laws = Laws(*map(aligned, laws_of(forms, c_r, eta, tick)))
+        shape_p, move_p = map(aligned, piston_tables(free, eta, tick))
+        forms = Forms(*map(aligned, forms))
+        _kept[key] = Tables(forms, modes, free, shape_p, move_p, laws)
     return _kept[key]
 
 
@@ -144,7 +144,7 @@ class ModalSolver(Solver):
         p["eta"] = eta
         p["leaps"] = leaps
         self.operator_bytes = sum(part.nbytes for part in (*made.forms, *made.laws))
-        self._rows = np.zeros((2, made.forms.shape.shape[2]))
+        self._rows = aligned(np.zeros((6, made.forms.shape.shape[2])))
         self._read_at: dict[str, Places] = {}
         self._entry: Callable[..., int] = entry_of(run)
 
@@ -210,7 +210,7 @@ class ModalSolver(Solver):
         """State at time zero."""
         made = self._tables
         n, n_p = made.forms.shape.shape[2], made.shape_p.shape[1]
-        state = State(MODAL_STATE, ((6, n), (2, n_p)))
+        state = State(MODAL_STATE, ((8, n), (2, n_p)))
         s: Any = state.record[0]
         fill_start(s, self._numbers)
         s["leap_end"] = s["law"] = -1
@@ -259,8 +259,8 @@ class ModalSolver(Solver):
             return f"pairs = {pairs}, which is no multiple of {WIDTH}"
         if end >= 0 and law < 0:
             return f"leap_end = {end}, with law = {law}"
-        if end >= 0 and not now < end <= now + LONGEST_LEAP:
-            return f"leap_end = {end}, at {now} with leaps of {LONGEST_LEAP} ticks at most"
+        if end >= 0 and not now < end <= now + LONGEST:
+            return f"leap_end = {end}, at {now} with leaps of {LONGEST} ticks at most"
         if s["parked"] and not begin <= now:
             return f"piston_time = {begin}, after {now}"
         most = max(now + (LONGEST_STRIDE << STEP), end) * float(self._par[0]["tick"])

@@ -187,9 +187,10 @@ def make(par, s, bars, level, trial, push, events):
 @kernel
 def step(par, s, bars, most, blows, events):
     """Go on by a step, of 2^most ticks at most, or to the next event."""
-    level = go_on(par, s, bars, most, False, blows, events)
+    level, near = most, False
     while level >= 0:
-        level = go_on(par, s, bars, level, True, blows, events)
+        level = go_on(par, s, bars, level, near, blows, events)
+        near = True
 
 
 @kernel

@@ -1,12 +1,10 @@
-"""Between two events: looks ahead by the pairs of the present law, up to the next event.
+"""A bit alone beside a piston that is near: looks at both of its ends, up to the next event.
 
-A look costs a few sums; what the bodies did is booked once for all looks
-(docs/modal.md, section 4).
+What the bodies did is booked once for all looks, and for leaps alike (docs/modal.md, section 4).
 """
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 from percussion_model.physics.blows import push_checkpoint
@@ -29,16 +27,14 @@ from percussion_model.physics.rock import (
 )
 from percussion_model.physics.state import CHECKPOINTS
 from percussion_model.solvers.modal.bar import end_after, move_free
+from percussion_model.solvers.modal.change import end_mode
 from percussion_model.solvers.modal.forms import refresh_loads
-from percussion_model.solvers.modal.lanes import WIDTH, load, spread, total
 from percussion_model.solvers.modal.pairs import (
     BIT_SPEED,
-    PLOAD,
+    FIRST_STRIDE,
     PQ,
-    PV,
     Sums,
     ahead_of,
-    carry_pairs,
     drop_pairs,
     energy_about_rest,
     keep_ahead,
@@ -53,33 +49,25 @@ from percussion_model.solvers.modal.piston import (
     WHOLE,
     flip_contact,
     has_piston,
-    park,
-    quiet_time,
     switches,
     time_of,
     unpark,
 )
 from percussion_model.solvers.modal.records import (
-    LONGEST_HOP,
     LONGEST_STRIDE,
-    SCAN,
     STEP,
-    End,
     View,
 )
 from percussion_model.solvers.modal.rock_end import (
     QUIET_SHARE,
-    change_mode,
     end_standstill,
     passed,
 )
+from percussion_model.solvers.modal.search import UNSURE, moving
 
 # Steps after which the running force of a standstill is noted.
 CHECKPOINT = 64
-# What the dashpot takes is computed once this many times its sum over looks may be enough.
-UNSURE = 2.0
 
-END_LOW = int(End.LOW)
 LOW_Q, LOW_V, SPEED_Q, SPEED_V = (int(row) for row in View)
 
 
@@ -180,14 +168,14 @@ def ready(par, s, bars, law):
     take_loads(par, s, bars)
     if s.law < 0:
         take_pairs(par, s, bars, law)
-    else:
+    elif s.stride > FIRST_STRIDE:
         leave_out_pairs(par, s, bars)
 
 
 @kernel
 def watch_barrier(par, s, bars, law, events):
     """Leave standstill where the bit's energy passes the barrier."""
-    energy = energy_about_rest(s, bars, spell_out(s, bars))
+    energy = energy_about_rest(s, bars, spell_out(s, bars, bars.w, PQ))
     s.alert = 1 if energy > QUIET_SHARE * s.w_r else 0
     if s.alert == 1 and overcomes_barrier(par, s, energy):
         # of which the kinetic part alone counts
@@ -195,30 +183,6 @@ def watch_barrier(par, s, bars, law, events):
         end_standstill(par, s, bars, events)
         if s.mode == Mode.SS:
             take_pairs(par, s, bars, law)
-
-
-@inlined
-def usual_level(s, bars):
-    """Length of a look: two for each period of the highest mode that moves."""
-    level, n = STEP, bars.laws.sizes[s.law]
-    while level < LONGEST_HOP and 2 * s.pairs <= n:
-        n //= 2
-        level += 1
-    return level
-
-
-@merged
-def is_far(par, s, bars, ticks):
-    """Whether the piston can neither meet the bit nor turn the drive within a time."""
-    if has_piston(par) and s.parked == 0:
-        return False
-    size, held = math.sqrt(2.0 * s.vibrates), bars.forms.stiff[s.form]
-    spread = par.bound_t * size + abs(s.offset)
-    if held == 0.0:
-        return quiet_time(par, s, s.v_b, s.a_b, spread, 0.0) > ticks * par.tick
-    mean = size * (1.0 / math.sqrt(held) + par.bound_b)
-    off = 2.0 * mean + abs(s.low - s.rest_low)
-    return quiet_time(par, s, 0.0, 0.0, spread, off) > ticks * par.tick
 
 
 @merged
@@ -230,105 +194,15 @@ def present_look(par, s, bars):
     return Look(sums, p, force, 0.0, 0.0, 0.0)
 
 
-@inlined
-def seen_at(s, bars, i, pull, t):
-    """Penetration and velocity of the rock end at a later time, by a row of views.
-
-    Parameters
-    ----------
-    pull : float
-        Acceleration of the rock end by the load on a free bit [m/s2].
-    """
-    view, low, speed = bars.laws.views[s.law, i], spread(0.0), spread(0.0)
-    for k in range(0, s.pairs, WIDTH):
-        q, v = load(bars.w, PQ, k), load(bars.w, PV, k)
-        low = low + load(view, LOW_Q, k) * q
-        low = low + load(view, LOW_V, k) * v
-        speed = speed + load(view, SPEED_Q, k) * q
-        speed = speed + load(view, SPEED_V, k) * v
-    low_then = s.rest_low + total(low) + 0.5 * pull * t * t
-    return s.p + (low_then - s.low), total(speed) + pull * t
-
-
-@kernel
-def scan(par, s, bars, most):
-    """Go on by looks at the rock end alone; ticks, and whether the last one ends the mode."""
-    usual, ticks, ends = usual_level(s, bars), 0, False
-    pull = bars.laws.ends[s.law][END_LOW, 0] * bars.w[PLOAD, 0]
-    K, off, C = stiffness(s), origin(s), damping(s)
-    while ticks < most and not ends:
-        level = usual
-        while most - ticks < 1 << level:
-            level -= 1
-        first = level
-        count = 1
-        if level >= STEP:
-            first = STEP + (level - STEP) * SCAN
-            count = min(SCAN, (most - ticks) >> level)
-        kept = 0
-        while kept < count:
-            t = par.tick * ((kept + 1) << level)
-            p, speed = seen_at(s, bars, first + kept, pull, t)
-            force = K * (p - off) + C * speed
-            ends = passed(par, s, p, speed, 0.0, force)
-            if ends:
-                break
-            kept += 1
-            if s.mode != Mode.FF:
-                s.b_peak_bit = max(s.b_peak_bit, force)
-                if time_of(par, s) + par.tick * ticks + t > s.peak_from:
-                    s.peak_bit_force = max(s.peak_bit_force, force)
-        s.count_steps += kept
-        if kept > 0:
-            carry_pairs(s, bars, kept << level)
-            ticks += kept << level
-        if not ends:
-            continue
-        # it ends within the next 2^level ticks
-        while level > 0:
-            level -= 1
-            i = level if level < STEP else STEP + (level - STEP) * SCAN
-            t = par.tick * (1 << level)
-            p, speed = seen_at(s, bars, i, pull, t)
-            if not passed(par, s, p, speed, 0.0, K * (p - off) + C * speed):
-                carry_pairs(s, bars, 1 << level)
-                ticks += 1 << level
-        carry_pairs(s, bars, 1)
-        ticks += 1
-        s.count_steps += 1
-    return ticks, ends
-
-
-@kernel
-def go_phase(par, s, bars, law, end, blows, events):
-    """Go on to tick `end`, or to the next event, or as far as is sensible before."""
-    if has_piston(par) and s.parked == 0 and s.time >= s.no_park:
-        park(par, s, bars)
-    ready(par, s, bars, law)
-    most = end - s.time
-    if s.mode == Mode.SS and s.alert == 1 and par.rock == RockKind.BILINEAR:
-        watch_barrier(par, s, bars, law, events)
-        if s.law < 0:
-            return
-        if s.alert == 1:
-            most = min(most, WHOLE)
-    if s.mode != Mode.DFC and is_far(par, s, bars, most):
-        ticks, ends = scan(par, s, bars, most)
-        look = present_look(par, s, bars)
-        if s.mode != Mode.FF:
-            s.b_peak_bit = max(s.b_peak_bit, look.force)
-        book_way(par, s, bars, ticks, look)
-        if ends:
-            drop_pairs(par, s, bars)
-            change_mode(par, s, bars, events)
-    else:
-        go_near(par, s, bars, most, blows, events)
-
-
 @kernel
 def go_near(par, s, bars, most, blows, events):
-    """Go on by looks at both ends of the bit."""
-    usual = usual_level(s, bars)
+    """Go on by looks at both ends of the bit, `most` ticks at most, or to the next event."""
+    if s.mode == Mode.SS and s.alert == 1 and par.rock == RockKind.BILINEAR:
+        most = min(most, WHOLE)
+    usual = moving(s, bars, bars.w, PQ).level
+    if has_piston(par) and s.parked == 0:
+        # which vibrates as well
+        usual = min(usual, STEP + 1)
     level, ticks, known = usual, 0, -1
     last = Look(Sums(s.low, s.v_low, s.top, s.at_b), s.p, s.f_rock, s.u_r, s.low_p, s.gap)
     C, taken, sampled, u_before = damping(s), 0.0, 0.0, s.u_r
@@ -382,8 +256,7 @@ def go_near(par, s, bars, most, blows, events):
         if turns:
             switch_drive(par, s, u_before, time_of(par, s) - par.tick, par.tick, events)
         if ends:
-            drop_pairs(par, s, bars)
-            change_mode(par, s, bars, events)
+            end_mode(par, s, bars, events)
 
 
 @inlined

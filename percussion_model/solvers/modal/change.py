@@ -1,0 +1,102 @@
+"""Changes of mode of a bit alone: from the pairs of one law to those of the next in one product."""
+
+from __future__ import annotations
+
+from percussion_model.physics.kernel import inlined, kernel
+from percussion_model.physics.records import Mode
+from percussion_model.physics.rock import origin
+from percussion_model.solvers.modal.bar import BIT
+from percussion_model.solvers.modal.forms import change_spring, form_wanted
+from percussion_model.solvers.modal.lanes import WIDTH, load, spread, store, total
+from percussion_model.solvers.modal.pairs import (
+    BIT_SPEED,
+    FIRST_STRIDE,
+    PLOAD,
+    PQ,
+    PV,
+    SPEED,
+    book_losses,
+    enough_pairs,
+    hold_low,
+    law_in,
+    leave_out_pairs,
+    multiply,
+    sum_of,
+    take_modes,
+    to_be_taken,
+)
+from percussion_model.solvers.modal.records import Rest
+from percussion_model.solvers.modal.rock_end import QUIET_SHARE, next_mode, note_mode
+
+REST_LOW, REST_TOP, REST_BIT = (int(row) for row in Rest)
+
+
+@inlined
+def besides(s, bars):
+    """Energy of the bar that is not of vibration about rest, without the rock's [J]."""
+    if s.form == 0:
+        return 0.5 * bars.w[PV, 0] * bars.w[PV, 0]
+    return s.a_b * (s.at_b - 0.5 * s.rest_b) - 0.5 * bars.forms.stiff[s.form] * s.low * s.low
+
+
+@kernel
+def pass_over(par, s, bars, law, over):
+    """Go on by the pairs of another law, with the penetration that the mode has.
+
+    What they have no room for is booked with the losses of the law.
+
+    Parameters
+    ----------
+    over : int
+        Place of the table in `Laws.over`.
+    """
+    w, low, v_b = bars.w, s.p - origin(s), s.v_b
+    tip, energy = s.top - s.at_b / par.mass_b, s.vibrates + besides(s, bars)
+    s.pairs, count = bars.laws.sizes[law], s.pairs
+    multiply(bars.laws.over[over], w, PQ, count, bars.rows, s.pairs)
+    pushed = bars.laws.pushed[over]
+    for k in range(0, s.pairs, WIDTH):
+        store(w, PQ, k, load(bars.rows, 0, k) + load(pushed, 0, k) * s.a_b)
+        store(w, PV, k, load(bars.rows, 1, k) + load(pushed, 1, k) * s.a_b)
+        store(w, PLOAD, k, spread(0.0))
+    s.law, s.form, s.active, s.stride = law, law // 2, s.pairs, FIRST_STRIDE
+    if s.form == 0:
+        w[PLOAD, 0] = bars.forms.shape[0, BIT, 0] * s.a_b
+    rest = bars.laws.rest[law]
+    s.rest_low, s.rest_top = rest[REST_LOW] * s.a_b, rest[REST_TOP] * s.a_b
+    s.rest_b = rest[REST_BIT] * s.a_b
+    s.pairs = enough_pairs(par, s, bars)
+    hold_low(s, bars, low)
+    ends = bars.laws.ends[law]
+    s.v_low = sum_of(ends, SPEED, w, s.pairs)
+    s.v_b = sum_of(ends, BIT_SPEED, w, s.pairs) / par.mass_b
+    s.i_bit -= par.mass_b * (s.v_b - v_b)
+    s.offset += tip - (s.top - s.at_b / par.mass_b)
+    s.vibrates = energy - besides(s, bars)
+    s.takes = 0.0
+    if law % 2 == 1:
+        s.takes = to_be_taken(bars.laws.taken[law], w, PQ, s.pairs)
+
+
+@kernel
+def end_mode(par, s, bars, events):
+    """Make the change of mode that the present pairs ask for."""
+    leave_out_pairs(par, s, bars)
+    n, squares = book_losses(s, bars), spread(0.0)
+    for k in range(0, n, WIDTH):
+        v = load(bars.rows, 1, k)
+        squares = squares + v * v
+    if not next_mode(par, s, 0.5 * total(squares)):
+        return
+    form = form_wanted(par, s)
+    law = law_in(par, s, bars.laws, form)
+    over = bars.laws.way[s.law, law] if law >= 0 else -1
+    if over >= 0:
+        pass_over(par, s, bars, law, over)
+    else:
+        take_modes(par, s, bars, n)
+        change_spring(par, s, bars)
+    s.alert = 1
+    if s.mode == Mode.SS and over >= 0 and s.vibrates <= QUIET_SHARE * s.w_r:
+        s.alert = 0
+    note_mode(par, s, events)

@@ -1,0 +1,406 @@
+"""When the mode of a bit alone ends: found by looks at the rock end, with pairs in `Bars.rows`.
+
+The state stays as it is (docs/modal.md, section 4).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from percussion_model.physics.body import bit_acceleration, time_to_cover
+from percussion_model.physics.kernel import inlined, kernel, merged
+from percussion_model.physics.records import Mode, RockKind
+from percussion_model.physics.rock import barrier_off, damping, origin, stiffness
+from percussion_model.solvers.modal.lanes import WIDTH, load, spread, store, total
+from percussion_model.solvers.modal.pairs import (
+    AT,
+    BIT,
+    FIRST_STRIDE,
+    LOW,
+    PLOAD,
+    PQ,
+    SQUARE,
+    carry_pairs,
+    energy_about_rest,
+    energy_of_pairs,
+    keep,
+    move_pairs,
+    size_of,
+    spell_out,
+    to_be_taken,
+)
+from percussion_model.solvers.modal.piston import WHOLE, time_of
+from percussion_model.solvers.modal.records import LONGEST_HOP, SCAN, STEP, View
+from percussion_model.solvers.modal.rock_end import passed
+
+LOW_Q, LOW_V, SPEED_Q, SPEED_V = (int(row) for row in View)
+# Rows of `Bars.rows` with what a search sees.
+SEEN = 2
+# 2^SCAN_LEVEL looks at once.
+SCAN_LEVEL = SCAN.bit_length() - 1
+# Flight shorter than this is looked through.
+FEWEST = 8 * WHOLE
+# Modes that have less than this share of the energy of vibration together are not looked at; at
+# least so many are. With 1e-6 cycles were missed where the bit just touches the rock.
+SLIGHT_SHARE, FEWEST_MODES = 1e-9, 4
+# What the dashpot takes is computed once this many times its sum over looks may be enough.
+UNSURE = 2.0
+# An interval is halved where a straight line told so often to stay on one side.
+SAME_SIDE = 4
+# A standstill is searched for peaks until its vibration is below this share of the load.
+STILL_SHARE = 1e-3
+# Steps between two looks at that.
+LOOK_AGAIN = 32
+# A standstill that is not quiet yet is cut into pieces, at whose ends its mean force is noted.
+LONGEST_GLANCE = 128 * WHOLE
+
+
+class Found(NamedTuple):
+    """What a search found."""
+
+    ticks: int  # so far it came
+    ends: bool  # whether the mode ends then
+    peak: float  # greatest force of the rock on the way [N]
+    late: float  # the same after s.peak_from [N]
+    looks: int
+    leaps: int  # times that nothing could happen for a while
+
+
+class End(NamedTuple):
+    """The rock end at some time."""
+
+    p: float  # penetration [m]
+    speed: float  # [m/s]
+    force: float  # of the rock [N]
+
+
+class Law(NamedTuple):
+    """What does not change while a search goes on."""
+
+    stiffness: float  # of the rock [N/m]
+    damping: float  # [N s/m]
+    origin: float  # [m]
+    pull: float  # acceleration of the rock end by the load on a free bit [m/s2]
+
+
+@inlined
+def present_law(s, bars):
+    """What a search goes by."""
+    pull = bars.laws.ends[s.law][LOW, 0] * bars.w[PLOAD, 0]
+    return Law(stiffness(s), damping(s), origin(s), pull)
+
+
+@inlined
+def end_at(s, law, low, speed, t):
+    """Make out the rock end `t` after where the search is, by what pairs tell of it."""
+    p = s.p + (s.rest_low + low + 0.5 * law.pull * t * t - s.low)
+    speed += law.pull * t
+    return End(p, speed, law.stiffness * (p - law.origin) + law.damping * speed)
+
+
+@inlined
+def end_after(par, s, bars, law, level):
+    """Look at the rock end 2^level ticks after where the search is."""
+    view, low, speed = bars.laws.views[s.law, level], spread(0.0), spread(0.0)
+    for k in range(0, s.pairs, WIDTH):
+        q, v = load(bars.w, AT, k), load(bars.w, AT + 1, k)
+        low = low + load(view, LOW_Q, k) * q
+        low = low + load(view, LOW_V, k) * v
+        speed = speed + load(view, SPEED_Q, k) * q
+        speed = speed + load(view, SPEED_V, k) * v
+    return end_at(s, law, total(low), total(speed), par.tick * (1 << level))
+
+
+@inlined
+def scan(s, bars, hop, modes):
+    """See offset and velocity of the rock end at the next looks, into `bars.rows`.
+
+    Parameters
+    ----------
+    modes : int
+        Pairs that count.
+    """
+    view = bars.laws.scans[s.law, hop]
+    low = low_v = speed = speed_v = spread(0.0)
+    for k in range(modes):
+        q, v = bars.w[AT, k], bars.w[AT + 1, k]
+        low = low + load(view, 4 * k + LOW_Q, 0) * q
+        low_v = low_v + load(view, 4 * k + LOW_V, 0) * v
+        speed = speed + load(view, 4 * k + SPEED_Q, 0) * q
+        speed_v = speed_v + load(view, 4 * k + SPEED_V, 0) * v
+    store(bars.rows, SEEN, 0, low + low_v)
+    store(bars.rows, SEEN + 1, 0, speed + speed_v)
+
+
+class Moving(NamedTuple):
+    """What moves of some pairs."""
+
+    energy: float  # of vibration [J]
+    modes: int  # that hold next to all of it
+    level: int  # of a look: two for each period of the highest of them
+
+
+@kernel
+def moving(s, bars, x, first):
+    """Look which of the pairs in two rows of `x` move."""
+    ends, energy = bars.laws.ends[s.law], energy_of_pairs(s, bars, x, first)
+    least, above, modes = 2.0 * SLIGHT_SHARE * energy, 0.0, s.pairs
+    while modes > FEWEST_MODES:
+        if modes % WIDTH == 0 and modes > WIDTH:
+            both = above + total(size_of(ends, x, first, modes - WIDTH))
+            if both <= least:
+                modes, above = modes - WIDTH, both
+                continue
+        q, v = x[first, modes - 1], x[first + 1, modes - 1]
+        above += v * v + ends[SQUARE, modes - 1] * q * q
+        if above > least:
+            break
+        modes -= 1
+    level, n = STEP, bars.laws.sizes[s.law]
+    while level < LONGEST_HOP and 2 * modes <= n:
+        n //= 2
+        level += 1
+    return Moving(energy, modes, level)
+
+
+@kernel
+def quiet_flight(par, s, bars, energy):
+    """Time of free flight, with an energy of vibration [J], before the rock may be met [s]."""
+    if par.rock == RockKind.NONE:
+        return math.inf
+    ends = bars.laws.ends[s.law]
+    # elastic modes of a free bit leave its mean where it is
+    mean = (s.rest_b + ends[BIT, 0] * bars.w[AT, 0]) / par.mass_b
+    v = ends[BIT, 0] * bars.w[AT + 1, 0] / par.mass_b
+    room = s.p_u - (s.p - s.low) - mean - par.bound_b * math.sqrt(2.0 * energy)
+    return time_to_cover(room, v, bit_acceleration(par, s))
+
+
+@merged
+def most_force(par, s, energy):
+    """Bound of how far the force of a standstill may be from that at rest [N]."""
+    K = s.gamma * s.k_r
+    # |dF| <= K |dy| + C |v|: the end's offset and, by all modes together, its velocity
+    return math.sqrt(2.0 * energy * K) + s.c_r * math.sqrt(2.0 * energy) * par.end_speed
+
+
+@kernel
+def is_quiet(par, s, bars, energy):
+    """Whether a standstill where the search is goes on by itself for ever."""
+    if s.alert == 1 or par.rock != RockKind.BILINEAR or barrier_off(par, s):
+        return False
+    rest = par.mass_b * bit_acceleration(par, s)
+    # pairs are nearly orthogonal, so that this tells when not to try
+    if par.release == 1 and most_force(par, s, 0.5 * energy) >= rest:
+        return False
+    exact = energy_about_rest(s, bars, spell_out(s, bars, bars.w, AT))
+    return par.release == 0 or most_force(par, s, exact) < rest
+
+
+@kernel
+def quiet_peaks(par, s, bars, law, ticks, energy):
+    """Greatest forces of a quiet standstill, where they count; as `Found` has them."""
+    rest, K = par.mass_b * bit_acceleration(par, s), stiffness(s)
+    begin, peak, late = time_of(par, s), 0.0, 0.0
+    watched = begin + ticks * par.tick > s.peak_from
+    if not watched and rest + most_force(par, s, 2.0 * energy) <= s.b_peak_bit:
+        return peak, late
+    for step in range(ticks >> STEP):
+        if step % LOOK_AGAIN == 0:
+            left = 2.0 * energy_of_pairs(s, bars, bars.w, AT)
+            if 2.0 * K * left < (STILL_SHARE * rest) ** 2:
+                break
+        here = end_after(par, s, bars, law, STEP)
+        carry_pairs(s, bars, bars.w, AT, WHOLE)
+        peak = max(peak, here.force)
+        if begin + (step + 1) * par.dt > s.peak_from:
+            late = max(late, here.force)
+    return max(peak, rest), max(late, rest) if watched else 0.0
+
+
+@inlined
+def may_be_enough(s, work):
+    """Whether the barrier may be overcome by so much work of the dashpot since pairs were taken."""
+    return s.mode == Mode.DFC and s.w + work >= s.w_r
+
+
+@kernel
+def taken_so_far(par, s, bars):
+    """What the dashpot has taken of the pairs until where the search is [J]."""
+    left = to_be_taken(bars.laws.taken[s.law], bars.w, AT, s.pairs)
+    return damping(s) * (s.takes - left)
+
+
+@inlined
+def beyond(s, here):
+    """How far the rock end is beyond where the mode ends, where that is likely; in any unit."""
+    if s.mode == Mode.FF:
+        return here.p - s.p_u
+    if s.mode == Mode.SS:
+        return -here.force
+    if s.mode == Mode.BC:
+        return s.p_u - here.p
+    return -here.speed
+
+
+@inlined
+def level_below(ticks):
+    """Greatest level with 2^level ticks at most, of one at least."""
+    level = 0
+    while ticks >= 2 << level:
+        level += 1
+    return level
+
+
+@kernel
+def narrow(par, s, bars, law, most, work, before, then):
+    """Go on to the tick in which the mode ends, if it does so within `most`.
+
+    Parameters
+    ----------
+    work : float
+        What the dashpot has taken so far [J].
+    before, then : End
+        The rock end now, and after `most` ticks.
+
+    Returns
+    -------
+    ticks : int
+    ends : bool
+    work : float
+        At the end.
+    now : End
+    """
+    ticks, rest, low, high, same = 0, most, beyond(s, before), beyond(s, then), 0
+    while rest > 0:
+        guess = 0.5 * rest
+        if low < 0.0 < high and abs(same) < SAME_SIDE:
+            # so far by a straight line
+            guess = rest * low / (low - high)
+        level = level_below(min(max(guess, 1.0), rest - 1.0))
+        go = 1 << level
+        here, after = end_after(par, s, bars, law, level), work
+        if s.mode == Mode.DFC:
+            squares = before.speed * before.speed + here.speed * here.speed
+            if level > 0:
+                half = end_after(par, s, bars, law, level - 1).speed
+                squares = (squares + 4.0 * half * half) / 3.0
+            after += 0.5 * law.damping * squares * (par.tick * go)
+        passes = passed(par, s, here.p, here.speed, after, here.force)
+        if passes and level > 0:
+            rest, high, same = go, beyond(s, here), max(same, 0) + 1
+            continue
+        move_pairs(s, bars, bars.w, AT, level)
+        ticks, rest = ticks + go, rest - go
+        work, before, low, same = after, here, beyond(s, here), min(same, 0) - 1
+        if passes:
+            return ticks, True, work, before
+    return ticks, False, work, before
+
+
+class Seen(NamedTuple):
+    """What looks side by side tell."""
+
+    kept: int  # looks before the mode may end
+    near: bool  # whether it may end by the next
+    sampled: float  # by the looks, what the dashpot took since it was known [J]
+    last: End  # at the last that was kept
+    then: End  # at the next
+    peak: float  # as in `Found`
+    late: float
+
+
+@inlined
+def look_through(par, s, bars, law, begin, level, count, taken, sampled, last):
+    """Go through the looks of a scan.
+
+    Parameters
+    ----------
+    begin : float
+        Time where the search is [s].
+    level, count : int
+        So many looks, 2^level ticks apart.
+    taken, sampled : float
+        What the dashpot had taken when that was known, and what it took by the looks since [J].
+    last : End
+        The rock end where the search is.
+    """
+    h, kept, near, then, peak, late = par.tick * (1 << level), 0, False, last, 0.0, 0.0
+    while kept < count:
+        low, speed = bars.rows[SEEN, kept], bars.rows[SEEN + 1, kept]
+        then, share = end_at(s, law, low, speed, h * (kept + 1)), 0.0
+        if s.mode == Mode.DFC:
+            share = 0.5 * law.damping * h * (last.speed * last.speed + then.speed * then.speed)
+        near = may_be_enough(s, taken + UNSURE * (sampled + share))
+        near = near or passed(par, s, then.p, then.speed, 0.0, then.force)
+        if near:
+            break
+        kept += 1
+        sampled += share
+        last, peak = then, max(peak, then.force)
+        if begin + h * kept > s.peak_from:
+            late = max(late, then.force)
+    return Seen(kept, near, sampled, last, then, peak, late)
+
+
+@merged
+def quiet_ticks(par, s, bars, energy, most):
+    """Ticks in which nothing can happen, up to `most`; 0 where looks are better."""
+    if par.leaps == 0:
+        return 0
+    if s.mode == Mode.FF:
+        ticks = min(quiet_flight(par, s, bars, energy) / par.tick - WHOLE, most)
+        return int(ticks) if ticks >= FEWEST else 0
+    return most if s.mode == Mode.SS and is_quiet(par, s, bars, energy) else 0
+
+
+@kernel
+def search(par, s, bars, most):
+    """Look for the end of the present mode, `most` ticks ahead at most; `Found`."""
+    keep(bars.w, PQ, bars.w, AT, s.pairs)
+    law, stands = present_law(s, bars), s.mode == Mode.SS
+    ticks, looks, leaps, peak, late, ends = 0, 0, 0, 0.0, 0.0, False
+    taken, sampled, last = 0.0, 0.0, End(s.p, s.v_low, s.f_rock)
+    if s.mode == Mode.DFC and s.stride > FIRST_STRIDE:
+        taken = taken_so_far(par, s, bars)
+    while ticks < most and not ends and not (stands and ticks >= LONGEST_GLANCE):
+        now, rest = moving(s, bars, bars.w, AT), most - ticks
+        quiet = quiet_ticks(par, s, bars, now.energy, rest)
+        if quiet > 0 and stands and ticks > 0:
+            break  # its mean force is noted where it begins
+        if quiet > 0:
+            if stands:
+                peak, late = quiet_peaks(par, s, bars, law, most, now.energy)
+                keep(bars.w, PQ, bars.w, AT, s.pairs)
+            carry_pairs(s, bars, bars.w, AT, quiet)
+            ticks += quiet
+            leaps += 1
+            continue
+        level = now.level
+        while level > STEP and rest < 1 << level:
+            level -= 1
+        count = min(SCAN, rest >> level)
+        if count > 0:
+            scan(s, bars, level - STEP, now.modes)
+        begin = time_of(par, s) + par.tick * ticks
+        seen = look_through(par, s, bars, law, begin, level, count, taken, sampled, last)
+        sampled, last = seen.sampled, seen.last
+        peak, late = max(peak, seen.peak), max(late, seen.late)
+        if seen.kept == SCAN:
+            move_pairs(s, bars, bars.w, AT, level + SCAN_LEVEL)
+        else:
+            carry_pairs(s, bars, bars.w, AT, seen.kept << level)
+        ticks += seen.kept << level
+        looks += seen.kept
+        if seen.near and sampled > 0.0:
+            taken, sampled = taken_so_far(par, s, bars), 0.0
+        elif seen.near or count == 0:
+            within = min(1 << level, rest)
+            more, ends, work, last = narrow(par, s, bars, law, within, taken, last, seen.then)
+            ticks += more
+            looks += 1
+            sampled, peak = max(work - taken, 0.0), max(peak, last.force)
+            if time_of(par, s) + par.tick * ticks > s.peak_from:
+                late = max(late, last.force)
+    return Found(ticks, ends, peak, late, looks, leaps)
