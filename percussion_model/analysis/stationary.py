@@ -35,6 +35,8 @@ MOST_TIME, CELL_STEPS, PIECE = 300.0, 1e7, 1.0
 MOST_BLOWS_A_CYCLE = 8
 # Two changes that fall alike take so many blows: looking earlier is in vain.
 FEWEST_BLOWS = 4
+# Many blows are looked at again when there is one more for so many.
+LOOK_AGAIN = 16
 # Blows converge if their changes fall from so many tolerances on, each by this factor at
 # least, and the factors are alike within that one.
 FAR, FALLING, ALIKE = 10.0, 0.9, 3.0
@@ -316,7 +318,8 @@ def settled(
             patience += STALLED_PERIODS * float(last["period"])
         before = len(blows)
         until = max(simulation.time, ended + patience)
-        _advance(simulation, max(1, FEWEST_BLOWS - before), until, began + most_time)
+        more = max(1, FEWEST_BLOWS - before, before // LOOK_AGAIN)
+        _advance(simulation, min(more, most_blows - before), until, began + most_time)
         blows = simulation.blows
         if len(blows) == before:
             return made("stalled", 0, math.nan, math.nan, math.nan)
@@ -414,13 +417,14 @@ def check_request(scene: Scene, tolerance: float, most_blows: int, scatter: floa
 
 def cycles_in(blows: np.ndarray, tolerance: float) -> dict[int, tuple[float, float, float]]:
     """Cycles that the last blows could be, by order; values as from `cycle`."""
-    velocity = blows["impact_velocity"][: -MOST_BLOWS_A_CYCLE - 2 : -1].tolist()
-    last, largest = velocity[0], max(abs(value) for value in velocity)
+    recent = _compared(blows[-MOST_BLOWS_A_CYCLE - 1 :])[::-1]
+    alike = np.abs(recent[1:] - recent[0]) <= tolerance * np.abs(recent).max(axis=0)
+    whole = alike.all(axis=1).tolist()
     found = {
         order: cycle(blows, order, tolerance)
-        for order in range(1, len(velocity))
+        for order, same in enumerate(whole, 1)
         # else `cycle` would refuse, at a greater cost
-        if abs(velocity[order] - last) <= tolerance * largest and not _still_shrinking(blows, order)
+        if same and not _still_shrinking(blows, order)
     }
     return {order: values for order, values in found.items() if values is not None}
 
@@ -483,9 +487,14 @@ def _still_shrinking(blows: np.ndarray, order: int) -> bool:
     return False
 
 
+def _compared(blows: np.ndarray) -> np.ndarray:
+    """Numbers of `COMPARED`, a row for each blow."""
+    return np.asarray(blows.view(np.float64).reshape(len(blows), -1)[:, _COLUMNS])
+
+
 def _changes(blows: np.ndarray, order: int) -> np.ndarray:
     """Relative change of each number of `COMPARED` over a cycle, a row for each blow."""
-    values = blows.view(np.float64).reshape(len(blows), -1)[:, _COLUMNS]
+    values = _compared(blows)
     scale = np.abs(values[-order:]).sum(axis=0) / order
     scale[scale == 0.0] = 1.0
     return (values[order:] - values[:-order]) / scale

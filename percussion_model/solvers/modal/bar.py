@@ -196,6 +196,17 @@ def bar_energy(s, bars):
 
 
 @kernel
+def standing_energy(s, bars):
+    """Energy of a standing bit about its rest, with that of the rock's spring [J]."""
+    shape, energy = bars.forms.shape[s.form], spread(0.0)
+    for k in range(0, s.active, WIDTH):
+        off = load(bars.w, Q, k) - load(shape, SOFT, k) * load(bars.w, LOAD, k)
+        v = load(bars.w, V, k)
+        energy = energy + v * v + load(shape, STIFF, k) * (off * off)
+    return 0.5 * total(energy)
+
+
+@kernel
 def piston_vibration(bars):
     """Energy of the free piston's modes [J]."""
     n = bars.wp.shape[1]

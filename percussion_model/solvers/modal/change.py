@@ -14,7 +14,6 @@ from percussion_model.solvers.modal.pairs import (
     PLOAD,
     PQ,
     PV,
-    SPEED,
     book_losses,
     enough_pairs,
     hold_low,
@@ -68,7 +67,6 @@ def pass_over(par, s, bars, law, over):
     s.pairs = enough_pairs(par, s, bars)
     hold_low(s, bars, low)
     ends = bars.laws.ends[law]
-    s.v_low = sum_of(ends, SPEED, w, s.pairs)
     s.v_b = sum_of(ends, BIT_SPEED, w, s.pairs) / par.mass_b
     s.i_bit -= par.mass_b * (s.v_b - v_b)
     s.offset += tip - (s.top - s.at_b / par.mass_b)

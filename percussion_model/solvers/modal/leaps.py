@@ -12,7 +12,14 @@ from percussion_model.physics.records import Mode, RockKind
 from percussion_model.solvers.modal.change import end_mode
 from percussion_model.solvers.modal.near import book_way, present_look, ready, watch_barrier
 from percussion_model.solvers.modal.pairs import AT, PQ, drop_tiny, keep
-from percussion_model.solvers.modal.piston import WHOLE, has_piston, park, quiet_time, time_of
+from percussion_model.solvers.modal.piston import (
+    WHOLE,
+    at_rest,
+    has_piston,
+    park,
+    quiet_time,
+    time_of,
+)
 from percussion_model.solvers.modal.search import search
 
 # Rows of `Bars.rows` that keep pairs.
@@ -63,6 +70,7 @@ def plan(par, s, bars, law, most, events):
             return
         if s.alert == 1:
             most = min(most, WHOLE)
+    most = at_rest(s, most)
     far = far_ticks(par, s, bars)
     if far < FEWEST:
         return

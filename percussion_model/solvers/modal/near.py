@@ -47,6 +47,7 @@ from percussion_model.solvers.modal.pairs import (
 )
 from percussion_model.solvers.modal.piston import (
     WHOLE,
+    at_rest,
     flip_contact,
     has_piston,
     switches,
@@ -199,6 +200,7 @@ def go_near(par, s, bars, most, blows, events):
     """Go on by looks at both ends of the bit, `most` ticks at most, or to the next event."""
     if s.mode == Mode.SS and s.alert == 1 and par.rock == RockKind.BILINEAR:
         most = min(most, WHOLE)
+    most = at_rest(s, most)
     usual = moving(s, bars, bars.w, PQ).level
     if has_piston(par) and s.parked == 0:
         # which vibrates as well

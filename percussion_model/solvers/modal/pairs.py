@@ -148,25 +148,23 @@ def drop_tiny(s, bars):
             bars.w[PQ, k] = bars.w[PV, k] = 0.0
 
 
-@kernel
+@inlined
 def present_sums(s, bars):
     """Sums of a bit alone."""
-    ends, w, n = bars.laws.ends[s.law], bars.w, s.pairs
+    ends, w = bars.laws.ends[s.law], bars.w
+    low = speed = top = bit = spread(0.0)
+    for k in range(0, s.pairs, WIDTH):
+        q, v = load(w, PQ, k), load(w, PV, k)
+        low = low + part_of(ends, LOW, k, q, v)
+        speed = speed + part_of(ends, SPEED, k, q, v)
+        top = top + part_of(ends, TOP, k, q, v)
+        bit = bit + part_of(ends, BIT, k, q, v)
     return Sums(
-        s.rest_low + sum_of(ends, LOW, w, n),
-        sum_of(ends, SPEED, w, n),
-        s.rest_top + sum_of(ends, TOP, w, n),
-        s.rest_b + sum_of(ends, BIT, w, n),
+        s.rest_low + total(low),
+        total(speed),
+        s.rest_top + total(top),
+        s.rest_b + total(bit),
     )
-
-
-@kernel
-def refresh_pair_sums(s, bars):
-    """Take the sums over pairs from which the state goes on."""
-    ends, w, n = bars.laws.ends[s.law], bars.w, s.pairs
-    s.low = s.rest_low + sum_of(ends, LOW, w, n)
-    s.top = s.rest_top + sum_of(ends, TOP, w, n)
-    s.at_b = s.rest_b + sum_of(ends, BIT, w, n)
 
 
 @kernel
@@ -181,7 +179,8 @@ def hold_low(s, bars, low):
     for k in range(0, n, WIDTH):
         store(w, PQ, k, load(w, PQ, k) + load(ends, SHIFT, k) * way)
         store(w, PV, k, load(w, PV, k) + load(ends, SHIFT + 1, k) * way)
-    refresh_pair_sums(s, bars)
+    sums = present_sums(s, bars)
+    s.low, s.v_low, s.top, s.at_b = sums.low, sums.speed, sums.top, sums.bit
 
 
 @kernel
@@ -219,7 +218,7 @@ def size_of(ends, x, first, k):
     return v * v + load(ends, SQUARE, k) * (q * q)
 
 
-@kernel
+@inlined
 def energy_of_pairs(s, bars, x, first):
     """Energy of vibration of pairs in two rows of `x`, as if orthogonal, as nearly they are [J]."""
     ends, whole = bars.laws.ends[s.law], spread(0.0)

@@ -14,20 +14,36 @@ from percussion_model.physics.blows import (
 from percussion_model.physics.body import piston_acceleration, time_to_cover
 from percussion_model.physics.drive import drive_force
 from percussion_model.physics.kernel import inlined, kernel, merged
-from percussion_model.physics.records import DriveKind, Piston
-from percussion_model.solvers.modal.bar import LOW, Q, carry, piston_vibration, row_sum
+from percussion_model.physics.records import DriveKind, Mode, Piston
+from percussion_model.solvers.modal.bar import (
+    LOW,
+    Q,
+    carry,
+    piston_vibration,
+    row_sum,
+    standing_energy,
+)
 from percussion_model.solvers.modal.forms import gap_of, join, part
 from percussion_model.solvers.modal.records import LOOK, STEP
 
 WHOLE = 1 << STEP
 # Steps after which it is tried again to let the piston wait.
 PATIENCE = 8
+# A bit stands still with less than this share of W_R: it moves slower than modes ring ahead of
+# the front of a blow.
+AT_REST = 1e-6
 
 
 @inlined
 def time_of(par, s):
     """Time of a state [s]."""
     return s.time * par.tick
+
+
+@inlined
+def at_rest(s, most):
+    """So many ticks, `most` at most, as the rock end of a bit is at rest if it is."""
+    return min(most, s.rest_until - s.time) if s.time < s.rest_until else most
 
 
 @inlined
@@ -78,6 +94,8 @@ def flip_contact(par, s, bars, approach, blows, events):
             start_blow(par, s, blows, time, s.v_p, s.u_b, still)
         s.closed = 1
         s.closed_at = s.time
+        if s.mode == Mode.SS and standing_energy(s, bars) < AT_REST * s.w_r:
+            s.rest_until = s.time + par.transit
         close_gap(s, events, time, approach)
         join(par, s, bars)
     s.alert = 1

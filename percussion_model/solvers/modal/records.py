@@ -202,6 +202,7 @@ MODAL_PAR = np.dtype(
         ("tick", "f8"),  # unit of time [s]
         ("dt", "f8"),  # 2^STEP ticks
         ("eta", "f8"),  # Kelvin-Voigt time [s]
+        ("transit", "i8"),  # of a wave through the bit [ticks]
         ("window", "f8"),  # over which a peak of the contact force is a mean [s]
         ("start_gap", "f8"),  # [m]
         ("bound_p", "f8"),  # |offset of the low end| <= bound_p sqrt(2 E) [m/J^0.5]
@@ -230,6 +231,7 @@ MODAL_STATE = np.dtype(
         ("piston_time", "i8"),
         ("no_park", "i8"),
         ("closed_at", "i8"),
+        ("rest_until", "i8"),  # no front of a blow on a bit at rest can be at the rock before
         ("alert", "i8"),  # 1: standstill may end by the energy of the bit
         ("form", "i8"),
         ("active", "i8"),  # modes of it that move
@@ -275,6 +277,7 @@ MODAL_LIMITS = Limits(
         "piston_time": COUNT,
         "no_park": COUNT,
         "closed_at": COUNT,
+        "rest_until": COUNT,
         "alert": FLAG,
         "form": (0, 5),
         "active": COUNT,

@@ -15,25 +15,13 @@ from percussion_model.physics.rock import (
     recoverable,
     spring_force,
 )
-from percussion_model.solvers.modal.bar import LOAD, SOFT, STIFF, Q, V, bit_kinetic
+from percussion_model.solvers.modal.bar import bit_kinetic, standing_energy
 from percussion_model.solvers.modal.forms import change_spring, leave_out
-from percussion_model.solvers.modal.lanes import WIDTH, load, spread, total
 from percussion_model.solvers.modal.piston import WHOLE, time_of
 from percussion_model.solvers.modal.records import LOOK
 
 # A standstill with less than this share of W_R stays one if nothing comes from outside.
 QUIET_SHARE = 0.9
-
-
-@kernel
-def standing_energy(s, bars):
-    """Energy of a standing bit about its rest, with that of the rock's spring [J]."""
-    shape, energy = bars.forms.shape[s.form], spread(0.0)
-    for k in range(0, s.active, WIDTH):
-        off = load(bars.w, Q, k) - load(shape, SOFT, k) * load(bars.w, LOAD, k)
-        v = load(bars.w, V, k)
-        energy = energy + v * v + load(shape, STIFF, k) * (off * off)
-    return 0.5 * total(energy)
 
 
 @kernel
@@ -56,7 +44,8 @@ def look(par, s, bars):
 def end_standstill(par, s, bars, events):
     """Leave standstill where the bit's energy passes the barrier."""
     if overcomes_barrier(par, s, bit_kinetic(s, bars, bars.w)):
-        leave_standstill(par, s, s.v_low)
+        # before a front can be there, modes ring
+        leave_standstill(par, s, s.v_low if s.time >= s.rest_until else 0.0)
         change_spring(par, s, bars)
         push_event(s, events, time_of(par, s), s.mode, spring_force(s))
 
@@ -138,7 +127,7 @@ def passed(par, s, p, v, work, force):
     if s.mode == Mode.DFC and s.w + work >= s.w_r:
         return True
     if s.mode == Mode.DFC or s.mode == Mode.FC:
-        return v < -REST_VELOCITY
+        return v < -REST_VELOCITY and s.time >= s.rest_until
     if s.mode == Mode.BC:
         return p < s.p_u or v > REST_VELOCITY
     return par.release == 1 and force < 0.0

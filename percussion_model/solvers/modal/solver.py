@@ -119,6 +119,7 @@ class ModalSolver(Solver):
         self.modes = asked_modes(numbers)
         p["dt"] = self.time_step = first / self.modes
         p["tick"] = tick = self.time_step / (1 << STEP)
+        p["transit"] = int(bar_transit_time(numbers.bit) / tick)
         p["window"] = first / default_modes(numbers)
         highest = math.pi / self.time_step
         rock = rock_numbers(numbers)
