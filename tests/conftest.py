@@ -35,6 +35,12 @@ def reference() -> Result:
     return simulate(Scene(), 4.0, settle=1.0)
 
 
+@pytest.fixture(scope="session")
+def reference_by_waves() -> Result:
+    """The same by waves."""
+    return simulate(Scene().computed_by("wave"), 4.0, settle=1.0)
+
+
 @pytest.fixture
 def scene_from_text(tmp_path):
     """Read a scene from text."""

@@ -14,23 +14,28 @@ from percussion_model.simulation import simulate as runs
 from percussion_model.solvers.base import make_solver
 
 RIGID = {"piston.model": "rigid", "bit.model": "rigid"}
+WAVES = Scene().computed_by("wave")
 LONG_BIT = {"bit": {"sections": [{"length": 1000.0, "area": 5e-3}]}}
 SHORT_PISTON = {"piston": {"sections": [{"length": 1e-9, "area": 5e-3}]}}
 WIDE_MAP = {"density": 10.0, "force_from": 1e-9, "force_to": 1e13}
 
 TOO_LARGE = {
-    "long bit": (LONG_BIT | {"solver": {"cells": 100_000}}, "5.72e.08 cells, more than 1000000"),
-    "short piston": (LONG_BIT | SHORT_PISTON, "2e.13 cells"),
+    "long bit": (
+        LONG_BIT | {"solver": {"name": "wave", "cells": 100_000}},
+        "5.72e.08 cells, more than 1000000",
+    ),
+    "short piston": (LONG_BIT | SHORT_PISTON | {"solver": {"name": "wave"}}, "2e.13 cells"),
     "accuracy": (
         LONG_BIT | {"piston": {"sections": [{"length": 1e-3, "area": 5e-3}]},
-                    "solver": {"accuracy": 1e-4}},
+                    "solver": {"name": "wave", "accuracy": 1e-4}},
         "cells, more than 1000000",
     ),
     "accuracy of a short bit": (
-        {"piston": LONG_BIT["bit"], "bit": SHORT_PISTON["piston"], "solver": {"accuracy": 1e-4}},
+        {"piston": LONG_BIT["bit"], "bit": SHORT_PISTON["piston"],
+         "solver": {"name": "wave", "accuracy": 1e-4}},
         "cells, more than 1000000",
     ),
-    "sub-steps": ({"solver": {"cells": 100_000}}, "1.14e.03 sub-steps of the loss"),
+    "sub-steps": ({"solver": {"name": "wave", "cells": 100_000}}, "1.14e.03 sub-steps of the loss"),
     "elements": (
         LONG_BIT | {"solver": {"name": "fem"}, "fem": {"elements": 100_000}}, "5.72e.08 elements"
     ),
@@ -52,7 +57,7 @@ def test_what_is_too_large_is_refused_before_it_is_made(name):
         make_solver(Scene(**groups))
 
 
-@pytest.mark.parametrize("solver", ["wave", "fem", "rigid"])
+@pytest.mark.parametrize("solver", ["wave", "modal", "fem", "rigid"])
 def test_a_run_ends_where_its_rows_have_their_ceiling(solver, monkeypatch):
     monkeypatch.setattr(runs, "MOST_ROW_BYTES", 2000)
     simulation = Simulation(Scene().computed_by(solver))
@@ -83,7 +88,7 @@ def test_the_command_has_the_same_ceiling():
     assert default == stationary.MOST_TIME
 
 
-@pytest.mark.parametrize("solver", ["wave", "rigid"])
+@pytest.mark.parametrize("solver", ["wave", "modal", "rigid"])
 def test_looking_at_the_clock_changes_no_bit(solver, monkeypatch):
     scene = Scene().computed_by(solver)
     whole = settled(scene)
@@ -95,7 +100,8 @@ def test_looking_at_the_clock_changes_no_bit(solver, monkeypatch):
 
 
 def test_explain_tells_the_memory_of_the_set_up():
-    solver = make_solver(Scene())
-    assert solver.operator_bytes > 1e5
-    assert make_solver(Scene().replace(**{"solver.leaps": False})).operator_bytes == 0
-    assert explained(Scene(), forecast(Scene()))["operator_bytes"] == solver.operator_bytes
+    for scene in (WAVES, Scene()):
+        solver = make_solver(scene)
+        assert solver.operator_bytes > 1e5
+        assert explained(scene, forecast(scene))["operator_bytes"] == solver.operator_bytes
+    assert make_solver(WAVES.replace(**{"solver.leaps": False})).operator_bytes == 0

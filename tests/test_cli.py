@@ -87,7 +87,7 @@ def test_settings_and_solver_change_the_scene(percussion):
 def test_cells_are_passed_on(percussion):
     code, out, _ = percussion(
         "run", SCENARIOS / "reference.toml", "--duration", "0.01", "--settle", "0", "--cells",
-        "40", "--json", "-",
+        "40", "--solver", "wave", "--json", "-",
     )  # fmt: skip
     assert code == 0
     assert json.loads(out)["cells"] == {"piston": 40, "bit": 46}
@@ -144,9 +144,9 @@ def test_explain(percussion):
 
 
 def test_explain_shows_no_rounding_as_an_error_of_the_wave_speed(percussion):
-    lengths = ["--cells", "23"]
+    waves, lengths = [SCENARIOS / "reference.toml", "--solver", "wave"], ["--cells", "23"]
     for words, error in (([], r"none"), (lengths, r"\d\.\d+ %")):
-        code, out, _ = percussion("explain", SCENARIOS / "reference.toml", *words)
+        code, out, _ = percussion("explain", *waves, *words)
         assert code == 0
         out = " ".join(out.replace("│", " ").split())
         assert re.search(rf"Wave speed error {error} ", out)

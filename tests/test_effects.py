@@ -214,7 +214,7 @@ def test_a_dearer_step_is_marked_where_something_was_turned_off(rigid, capsys):
 
 
 def test_a_step_is_measured_in_free_flight():
-    waves = Scene().replace(**{"solver.cells": 4})
+    waves = Scene().computed_by("wave", **{"solver.cells": 4})
     cost, none = step_costs([waves, Scene().replace(**RIGID)], rounds=1)
     assert none is None
     assert 0.0 < cost < 1.0

@@ -174,7 +174,8 @@ def test_equal_bars_pass_on_what_loss_leaves():
         "bit.sections.0.length": 0.175,
     }  # fmt: skip
     ours = advanced(modal(**changes), 1e-3).sample([1e-3])
-    waves = advanced(Scene().replace(**changes, **{"solver.cells": 160}), 1e-3).sample([1e-3])
+    scene = Scene().computed_by("wave", **changes, **{"solver.cells": 160})
+    waves = advanced(scene, 1e-3).sample([1e-3])
     assert ours["bit_velocity"][0] == pytest.approx(waves["bit_velocity"][0], rel=1e-4)
     momentum = ours["bit_velocity"][0] + ours["piston_velocity"][0]
     assert momentum == pytest.approx(9.0, rel=1e-9)
@@ -343,7 +344,7 @@ def test_stress_agrees_with_that_of_waves():
     """In the middle of the bit, through the first blow."""
     at = np.linspace(2e-5, 2e-4, 60)
     seen = []
-    for scene in (modal(cells=80), Scene().replace(**{"solver.cells": 80})):
+    for scene in (modal(cells=80), Scene().computed_by("wave", **{"solver.cells": 80})):
         run, rows = Simulation(scene), []
         for time in at:
             run.advance(float(time))
@@ -354,9 +355,8 @@ def test_stress_agrees_with_that_of_waves():
 
 
 def test_drives_turn_and_blows_come_when_they_do_with_waves():
-    ours, waves = (
-        advanced(one, 0.3) for one in (modal(cells=40), Scene().replace(**{"solver.cells": 40}))
-    )
+    scene = Scene().computed_by("wave", **{"solver.cells": 40})
+    ours, waves = (advanced(one, 0.3) for one in (modal(cells=40), scene))
     for kind in (EventKind.DRIVE_UP, EventKind.DRIVE_DOWN):
         times = [run.events["time"][run.events["kind"] == kind] for run in (ours, waves)]
         np.testing.assert_allclose(times[0], times[1], rtol=1e-3, atol=1e-7)

@@ -20,6 +20,7 @@ from percussion_model import Scene, simulate
 from percussion_model.interface import progress
 from percussion_model.interface.cli import BAD_INPUT, INTERRUPTED, _guarded, app
 from percussion_model.interface.terminal import RunProgress, progress_bar
+from percussion_model.scene.solver_names import counted
 from percussion_model.simulation.accuracy_control import planned_cells
 from percussion_model.solvers.base import Solver
 
@@ -321,7 +322,7 @@ def test_a_request_names_its_runs():
     assert len(names) >= 2
     for k, name in enumerate(names, 1):
         assert name.startswith(f"run {k} of ")
-        assert name.endswith(" cells")
+        assert name.endswith(f" {counted(scene.solver_name)}")
     assert all(end == 0.4 for _, end, _ in told)
     places = [place for *_, place in told]  # each run moves the bar
     assert places == sorted(set(places))

@@ -215,7 +215,7 @@ NEVER = {40: 1.0, 60: 1.01, 100: 0.99, 140: 1.02, 200: 1.0}
     ],
 )
 def test_doubt_leads_to_finer_runs(rates, check, cells, error):
-    scene = Scene().replace(**{"solver.accuracy": 1e-3, "run.check": check})
+    scene = Scene().computed_by("wave", **{"solver.accuracy": 1e-3, "run.check": check})
     asked = []
 
     def once(chosen, longer):

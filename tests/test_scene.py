@@ -46,8 +46,8 @@ def test_solvers_and_effects_of_the_stored_scenes():
         for name in ("reference", "drop_test", "rigid", "undamped")
     )
     every = ("gravity", "feed", "drive", "loss", "barrier", "rock")
-    assert (reference.solver_name, reference.effects_on) == ("wave", every)
-    assert (drop.solver_name, drop.effects_off) == ("wave", ("drive",))
+    assert (reference.solver_name, reference.effects_on) == ("modal", every)
+    assert (drop.solver_name, drop.effects_off) == ("modal", ("drive",))
     assert (rigid.solver_name, rigid.effects_off) == ("rigid", ("loss",))
     assert (undamped.solver_name, undamped.effects_off) == ("wave", ("loss",))
 
@@ -231,6 +231,29 @@ def test_a_spring_has_no_barrier():
 
 def test_a_rigid_piston_on_an_elastic_bit_is_for_waves():
     assert Scene(piston={"model": "rigid"}).solver_name == "wave"
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"effects.loss": False},
+        {"loss.time": 0.0},
+        {"effects.rock": "wall", "effects.barrier": False},
+        # 5e-4 and 1 of the transit time of the piston, 33.8 us, or of a shorter bit
+        {"loss.time": 1.6e-8},
+        {"loss.time": 3.5e-5},
+        {"loss.time": 2e-5, "bit.sections.0.length": 0.1},
+    ],
+)
+def test_waves_are_taken_where_modes_ring_or_are_too_few(changes):
+    scene = Scene().replace(**changes)
+    assert scene.solver_name == "wave"
+    assert scene.replace(**{"solver.name": "modal"}).solver_name == "modal"
+
+
+@pytest.mark.parametrize("loss", [1.8e-8, 3.3e-5])
+def test_modes_are_taken_between(loss):
+    assert Scene().replace(**{"loss.time": loss}).solver_name == "modal"
 
 
 def test_reading_a_scene_loads_nothing_that_draws_or_exports():

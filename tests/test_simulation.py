@@ -15,7 +15,15 @@ from percussion_model.solvers.wave.grid import cut_bars
 from percussion_model.solvers.wave.totals import begin
 
 RIGID = {"piston.model": "rigid", "bit.model": "rigid"}
-SCENES = {"wave": Scene(), "rigid": Scene().replace(**RIGID)}
+WAVES = Scene().computed_by("wave")
+SCENES = {
+    "wave": WAVES,
+    "modal": Scene().computed_by("modal"),
+    "rigid": Scene().replace(**RIGID),
+}
+# Of the greatest value of each field: modes that are read within a leap are carried there
+# from another time.
+READ_ALIKE = 1e-11
 END = 0.12  # two whole blows and a part of the third [s]
 
 
@@ -74,7 +82,7 @@ def test_a_stop_after_blows_changes_no_bit(solver):
 def test_all_kinds_of_scenes_have_arguments_of_the_same_types(monkeypatch):
     """On that rests that nothing looks at them any more after the first call."""
     monkeypatch.setattr("percussion_model.solvers.wave.solver.entry_of", lambda function: function)
-    one_go(Scene(), end=0.002)
+    one_go(WAVES, end=0.002)
     before = len(run.overloads), len(begin.overloads)
     for changes in (
         {"piston.model": "rigid"},
@@ -83,19 +91,19 @@ def test_all_kinds_of_scenes_have_arguments_of_the_same_types(monkeypatch):
         {"effects.loss": False},
         {"solver.cells": 7},
     ):
-        simulation = one_go(Scene().replace(**changes), end=0.002)
+        simulation = one_go(WAVES.replace(**changes), end=0.002)
         simulation.observe()
         simulation.energy()
     assert (len(run.overloads), len(begin.overloads)) == before
 
 
 def test_scenes_on_the_same_steel_share_their_cells_and_leave_them_alone():
-    scenes = [Scene().replace(**{"rock.loading_stiffness": k}) for k in (7.5e8, 2e9)]
+    scenes = [WAVES.replace(**{"rock.loading_stiffness": k}) for k in (7.5e8, 2e9)]
     bars = cut_bars(numbers_of(scenes[0]), 0)
     assert cut_bars(numbers_of(scenes[1]), 0) is bars
     before = [bar.coefficients.copy() for bar in bars.both]
     alone = one_go(scenes[0])
-    for scene in (scenes[1], Scene().replace(**{"loss.time": 3e-7})):
+    for scene in (scenes[1], WAVES.replace(**{"loss.time": 3e-7})):
         one_go(scene, end=0.06)
     assert cut_bars(numbers_of(scene), 0) is not bars
     assert all(
@@ -119,25 +127,34 @@ def test_reading_does_not_touch(scene):
     assert bits(read) == bits(whole)
 
 
+def read_one_by_one(simulation, times):
+    """Rows of `sample_rows`, each by a call of its own."""
+    rows = []
+    for t in times:
+        simulation.advance(float(t))
+        rows.append(list(simulation.observe().values()))
+    return np.array(rows)
+
+
 def test_a_sample_does_not_depend_on_its_neighbours(scene):
     times = np.sort(np.random.default_rng(2).uniform(0.0, 0.06, 200))
     together = Simulation(scene).sample_rows(times)
-    alone = Simulation(scene)
-    for t, row in zip(times, together, strict=True):
-        alone.advance(float(t))
-        np.testing.assert_array_equal(list(alone.observe().values()), row)
+    alone = read_one_by_one(Simulation(scene), times)
+    if scene.solver_name == "modal":
+        bound = READ_ALIKE * np.nanmax(np.abs(together), axis=0)
+        assert np.all((np.abs(alone - together) <= bound) | (alone == together))
+    else:
+        np.testing.assert_array_equal(alone, together)
 
 
 @pytest.mark.parametrize("leaps", [True, False])
 def test_many_samples_leave_blows_and_settling_as_they_are(leaps):
     """One kernel reads them all; it gives way at blows, and where settling ends."""
-    scene = Scene().replace(**{"solver.leaps": leaps, "run.duration": END, "run.settle": 0.07})
+    scene = WAVES.replace(**{"solver.leaps": leaps, "run.duration": END, "run.settle": 0.07})
     times = np.linspace(0.0, END, 700)
     sampled, alone = Simulation(scene), Simulation(scene)
     together = sampled.sample_rows(times)
-    for t, row in zip(times, together, strict=True):
-        alone.advance(float(t))
-        np.testing.assert_array_equal(list(alone.observe().values()), row)
+    np.testing.assert_array_equal(read_one_by_one(alone, times), together)
     assert bits(sampled) == bits(alone)
     assert len(sampled.blows) == 2
     rates = [one.result().rate_of_penetration_fixed_window for one in (sampled, alone)]

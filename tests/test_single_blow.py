@@ -52,10 +52,10 @@ def test_a_bit_that_sinks_lengthens_the_flight_by_its_way():
 # -------------------------------------------------------------------- single blows
 
 
-def test_a_single_blow_is_that_of_a_run(reference):
-    """A blow of the settled reference run, whose bit rings by some 1e-7 m before and after."""
+def test_a_single_blow_is_that_of_a_run(reference_by_waves):
+    """A blow of the settled reference by waves: its bit rings by 1e-7 m before and after."""
     scene = mapped()
-    blow = reference.blows[-1]
+    blow = reference_by_waves.blows[-1]
     load = scene.feed.force + scene.bit.mass * scene.gravity.acceleration
     v = float(blow["impact_velocity"])
     single = SingleBlow(scene, scene.rock.loading_stiffness)
@@ -76,7 +76,7 @@ def test_a_single_blow_is_that_of_a_run_whose_bit_has_come_to_rest():
     scene = mapped(effects__gravity=False)
     v, way = 8.6, 5.0
     start = {"start.piston_velocity": v, "start.gap": way, "start.rock_gap": 0.0}
-    elastic = scene.replace(**start, **{"effects.drive": "none", "solver.fidelity": "wave"})
+    elastic = scene.computed_by("wave", **start, **{"effects.drive": "none"})
     at = Simulation(elastic).sample([way / v - 1e-5, way / v + 0.1])
     advance = at["bit_position"][1] - at["bit_position"][0]
     single = SingleBlow(scene, scene.rock.loading_stiffness)

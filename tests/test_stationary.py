@@ -19,6 +19,7 @@ from percussion_model.simulation.rate import rate_of_blows
 
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
 TOLERANCE = 1e-4
+WAVES = {"solver.name": "wave"}
 RIGID = {"piston.model": "rigid", "bit.model": "rigid"}
 # Drive force that keeps the power of the reference at another reversal distance.
 REFERENCE_FORCE, REFERENCE_DISTANCE = 3000.0, 0.040
@@ -83,8 +84,9 @@ def test_scatter_is_no_cycle_and_its_error_covers_correlated_blows():
 
 def test_a_settled_rate_has_the_error_of_its_grid():
     """A grid of ten times as many cells lies within it, and not within that of convergence."""
-    coarse, fine = (settled(Scene().replace(**{"solver.cells": n})) for n in (10, 100))
-    judged = settled(Scene().replace(**{"solver.cells": 10}), error_estimate=True)
+    scenes = [Scene().replace(**WAVES, **{"solver.cells": n}) for n in (10, 100)]
+    coarse, fine = map(settled, scenes)
+    judged = settled(scenes[0], error_estimate=True)
     for name in ("rate_of_penetration", "blow_period"):
         off = abs(getattr(coarse, name) - getattr(fine, name))
         assert getattr(coarse, f"{name}_error") < off < getattr(judged, f"{name}_error")
@@ -100,12 +102,12 @@ def test_a_settled_rate_has_the_error_of_its_grid():
 
 
 def chatter(cells):
-    return Scene.from_toml(SCENARIOS / "chatter.toml").replace(**{"solver.cells": cells})
+    return Scene.from_toml(SCENARIOS / "chatter.toml").replace(**WAVES, **{"solver.cells": cells})
 
 
 def test_a_deviation_has_the_error_of_convergence_and_grid(capsys):
-    coarse = settled(Scene(), error_estimate=True)
-    fine = settled(Scene().replace(**{"solver.cells": 100}))
+    coarse = settled(Scene().replace(**WAVES), error_estimate=True)
+    fine = settled(Scene().replace(**WAVES, **{"solver.cells": 100}))
     assert coarse.same_motion is True
     off = abs(coarse.multiplier - fine.multiplier)
     assert off <= coarse.multiplier_error < 0.1 * coarse.multiplier
@@ -154,9 +156,11 @@ def test_an_aperiodic_rate_has_the_error_of_scatter_and_no_other_name(capsys):
     assert "convergence" not in shown
 
 
-def test_reference_agrees_with_a_long_run():
-    long = simulate(Scene(), 4.0, 1.0)
-    short = settled(Scene())
+@pytest.mark.parametrize("solver", ["wave", "modal"])
+def test_reference_agrees_with_a_long_run(solver):
+    scene = Scene().computed_by(solver)
+    long = simulate(scene, 4.0, 1.0)
+    short = settled(scene)
     assert (short.kind, short.order) == ("periodic", 1)
     assert short.rate_of_penetration == pytest.approx(long.rate_of_penetration, rel=5e-4)
     assert short.blow_period == pytest.approx(long.summary()["blow_period"], rel=5e-4)
@@ -226,7 +230,7 @@ def test_command_tells_the_cycle(tmp_path):
 
 def test_chance_repetitions_of_an_aperiodic_motion_are_no_cycle():
     """Blows of this motion agree by chance within the tolerance before it goes on."""
-    changes = {"feed.force": 1721.1, "rock.loading_stiffness": 1.7884e9}
+    changes = WAVES | {"feed.force": 1721.1, "rock.loading_stiffness": 1.7884e9}
     scene = Scene().replace(**changes, **{"drive.reversal_distance": 0.013032})
     found = settled(scene, most_blows=200)
     alike = np.all(
@@ -247,7 +251,7 @@ def test_chance_repetitions_of_an_aperiodic_motion_are_no_cycle():
 )
 def test_a_few_blows_that_converge_by_chance_are_no_cycle(feed, distance):
     """After tens of blows a few fall evenly to less than the tolerance, and rise again."""
-    changes = {"feed.force": feed, "rock.loading_stiffness": 2e9}
+    changes = WAVES | {"feed.force": feed, "rock.loading_stiffness": 2e9}
     scene = Scene().replace(**changes, **{"drive.reversal_distance": distance})
     found = settled(scene, most_blows=120)
     assert any(converge(found.blows[:n]) for n in range(10, 100))
@@ -272,7 +276,7 @@ def test_convergence_after_wandering_is_believed_once_it_has_lasted():
 
 def test_a_rare_blow_that_is_different_is_not_missed():
     """All is within the tolerance for tens of blows, then one gains two per cent more."""
-    changes = {"feed.force": 6437.5, "rock.loading_stiffness": 2e9}
+    changes = WAVES | {"feed.force": 6437.5, "rock.loading_stiffness": 2e9}
     scene = Scene().replace(**changes, **{"drive.reversal_distance": 0.08 / 3.8})
     found = settled(scene)
     long = simulate(scene, 20.0, 2.0)

@@ -21,6 +21,7 @@ from percussion_model.analysis.study.store import PARTS, PLAN
 from percussion_model.interface.cli import app
 from percussion_model.simulation.files import ResultError, to_json
 from percussion_model.solvers import sources
+from percussion_model.solvers.modal import solver as modal
 from percussion_model.solvers.wave.leaps import operators
 
 SCENE = Scene(title="rigid bodies").computed_by("rigid")
@@ -44,14 +45,16 @@ def test_a_point_has_the_numbers_of_settled_and_whole_numbers_stay_whole():
     assert KINDS[rows["kind"][0]] == "periodic"
 
 
-def test_bits_do_not_depend_on_the_threads_of_linear_algebra():
+@pytest.mark.parametrize("solver", ["wave", "modal"])
+def test_bits_do_not_depend_on_the_threads_of_linear_algebra(solver):
     threadpoolctl = pytest.importorskip("threadpoolctl")
-    found = []
+    scene, found = Scene().computed_by(solver), []
     for threads in (1, 2):
         operators._kept.clear()
         operators._kept_free.clear()
+        modal._kept.clear()
         with threadpoolctl.threadpool_limits(threads):
-            rows, _ = run_points(Scene(), ("solver.cells",), np.array([[40.0]]), 1e-4, 400, 1e-3)
+            rows, _ = run_points(scene, ("solver.cells",), np.array([[40.0]]), 1e-4, 400, 1e-3)
         found.append(rows)
     for name in set(found[0].dtype.names) - {"wall_time"}:
         np.testing.assert_array_equal(found[0][name], found[1][name])

@@ -342,7 +342,7 @@ def test_effects_tell_changes_with_errors(aperiodic, periodic, hidden):
 def test_effects_know_the_error_that_the_grid_makes():
     """Lengths that fit no common cell: the rate is known to some per cent, and so is a change."""
     lengths = {"piston.sections.0.length": 0.287, "bit.sections.0.length": 0.411}
-    scene = Scene().replace(**lengths, **{"run.duration": 1.0, "run.settle": 0.4})
+    scene = Scene().computed_by("wave", **lengths, **{"run.duration": 1.0, "run.settle": 0.4})
     result = simulate(scene, record_events=False)
     base = Trial(Variant("", "as it is"), result, 1.0, None)
     without = simulate(scene.replace(**{"effects.gravity": False}), record_events=False)

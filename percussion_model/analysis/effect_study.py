@@ -109,6 +109,12 @@ class Variant:
         return scene.replace(**self.changes)
 
 
+def by_one_solver(scene: Scene) -> Scene:
+    """Return the scene for waves where it names no solver: they compute it without loss too."""
+    chosen = scene.solver.name == "auto" and scene.solver_name == "modal"
+    return scene.computed_by("wave") if chosen else scene
+
+
 def effect_variants(scene: Scene) -> Iterator[Variant]:
     """Go through the scene as it is, then one effect after the other."""
     effects = scene.effects
@@ -119,7 +125,7 @@ def effect_variants(scene: Scene) -> Iterator[Variant]:
     yield from _drive(scene)
     yield from _rock(scene)
     yield from _bars(scene)
-    if scene.solver_name == "wave":
+    if scene.solver_name in ("wave", "modal"):
         is_on = scene.solver.leaps
         # Leaps are no effect but an accelerator: a step without them is the same step.
         yield Variant(LEAPS, "off" if is_on else "on", {"solver.leaps": not is_on})
@@ -169,7 +175,7 @@ def _bars(scene: Scene) -> Iterator[Variant]:
             yield Variant("piston", "elastic", {"piston.model": "elastic"})
         yield Variant("piston and bit", "rigid", {"solver.name": "rigid"}, off=True)
         return
-    changes = {"bit.model": "elastic", "solver.name": "auto"}
+    changes = {"bit.model": "elastic", "solver.name": "wave"}
     if scene.piston.model == "rigid":
         changes["piston.model"] = "elastic"
     yield Variant("piston and bit", "elastic", changes)
@@ -412,6 +418,7 @@ def study_effects(
             "a study of effects would make a blow map for each effect, minutes each: compute the "
             "scene by wave, fem or rigid (--solver)"
         )
+    scene = by_one_solver(scene)
     base, *rest = effect_variants(scene)
     cases = [(base, scene)]
     refused = {}
@@ -448,7 +455,7 @@ def step_costs(scenes: Sequence[Scene], rounds: int = ROUNDS) -> list[float | No
     """Processor time of one time step in free flight, without leaps, of each scene [s].
 
     Short stretches taken in turn, so that a machine that slows down slows all
-    of them. None where a solver goes from event to event and has no step.
+    of them. None where a solver goes from event to event and makes no steps in flight.
     """
     flights = []
     for scene in scenes:
@@ -460,13 +467,14 @@ def step_costs(scenes: Sequence[Scene], rounds: int = ROUNDS) -> list[float | No
             step, least = flight.solver.time_step, best[k]
             if step is not None and least is not None:
                 best[k] = min(least, _cost_of_step(flight, FLIGHT_STEPS * step))
-    return best
+    return [cost if cost is not None and math.isfinite(cost) else None for cost in best]
 
 
 def _cost_of_step(simulation: Simulation, duration: float) -> float:
-    """Advance a simulation; processor time by the steps that it took [s]."""
+    """Advance a simulation; processor time by the steps that it took [s], infinite without one."""
     before = simulation.statistics()["steps"]
     began = time.process_time()
     simulation.advance(simulation.time + duration)
     cost = time.process_time() - began
-    return cost / (simulation.statistics()["steps"] - before)
+    steps = simulation.statistics()["steps"] - before
+    return cost / steps if steps else math.inf

@@ -94,6 +94,7 @@ LEDGER: tuple[tuple[str, tuple[tuple[str, str], ...]], ...] = (
             ("loss", "structural loss in the bars"),
             ("contact", "restitution of rigid contact"),
             ("numerical", "numerical: averaging in cells"),
+            ("overshoot", "overshoot: events found just past their place"),
         ),
     ),
     (

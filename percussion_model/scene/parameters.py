@@ -355,7 +355,12 @@ PAPER_PISTON_ELEMENTS = 50
 class SolverOptions(Parameters):
     """How the scene is computed."""
 
-    name: str = choice("auto", SOLVER_NAMES, "solver; auto: wave for an elastic bit, else rigid")
+    name: str = choice(
+        "auto",
+        SOLVER_NAMES,
+        "solver; auto: modal for an elastic bit, wave where loss is off, slight or strong, the "
+        "piston rigid or the rock a wall; rigid for a rigid bit",
+    )
     fidelity: str = choice(
         "wave",
         ("wave", "rigid", "blow-map"),
@@ -375,8 +380,8 @@ class SolverOptions(Parameters):
     accuracy: float | None = quantity(
         None,
         "-",
-        "wanted relative error of the rate of penetration, in place of cells; modes are taken "
-        "where solver.name = auto and cells do not fit the lengths; left out: none is asked for",
+        "wanted relative error of the rate of penetration, in place of cells; "
+        "left out: none is asked for",
         ge=1e-4,
         le=0.1,
     )

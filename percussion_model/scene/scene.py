@@ -37,6 +37,9 @@ __all__ = ["Scene", "SceneError"]
 
 # Figures, pages and FMUs carry it [characters].
 LONGEST_TITLE = 1000
+# `solver.name = "auto"` takes modes where the loss time is such a share of the shorter transit
+# time. Below fronts stay sharp and ring, above many modes are needed (docs/modal.md, section 9).
+LEAST_LOSS, MOST_LOSS = 5e-4, 1.0
 # Groups that nothing was given of; they cannot change, so all scenes share them.
 _DEFAULTS = {name: group() for name, group in GROUPS.items()}
 
@@ -287,7 +290,19 @@ class Scene:
             return str(self.solver.fidelity)
         if self.solver.name != "auto":
             return str(self.solver.name)
-        return "wave" if self.bit.model == "elastic" else "rigid"
+        if self.bit.model == "rigid":
+            return "rigid"
+        return "modal" if self._modes_fit else "wave"
+
+    @property
+    def _modes_fit(self) -> bool:
+        """Whether modes drill as well as waves, or better, with as many modes as cells."""
+        # a rigid piston and a wall push hardest in the first instant
+        if not self.effects.loss or self.effects.rock == "wall" or self.piston.model == "rigid":
+            return False
+        bars = [bar for bar in (self.piston, self.bit) if bar.model == "elastic"]
+        share = self.loss.time / min(bar.transit_time for bar in bars)
+        return LEAST_LOSS <= share <= MOST_LOSS
 
     @property
     def has_waves(self) -> bool:

@@ -24,12 +24,11 @@ from percussion_model.simulation.result import Result
 from percussion_model.solvers.modal.resolution import (
     REQUESTED,
     coarser_modes,
+    exact_modes,
     modes_for,
-    most_modes,
 )
 from percussion_model.solvers.wave.resolution import (
     FIT_SHARE,
-    FITS,
     cells_for,
     coarser_cells,
     finer_cells,
@@ -156,15 +155,6 @@ def has_grid(scene: Scene) -> bool:
     return scene.solver_name in ("wave", "modal")
 
 
-def requested_solver(scene: Scene) -> str:
-    """Solver that answers a request: modes where none was named and cells do not fit lengths."""
-    wanted, name = scene.solver.accuracy, scene.solver_name
-    if wanted is None or name != "wave" or scene.solver.name != "auto":
-        return name
-    _, misfit = cells_for(numbers_of(scene), wanted)
-    return "wave" if misfit <= FITS else "modal"
-
-
 def planned_cells(scene: Scene) -> list[int]:
     """Cells, or modes, of the runs of a request: to compare with, by rule, to verify."""
     wanted = scene.solver.accuracy
@@ -179,14 +169,14 @@ def planned_cells(scene: Scene) -> list[int]:
 def with_cells(scene: Scene, cells: int) -> Scene:
     """Return the scene with cells, or modes, in place of a wanted accuracy."""
     changes = {"solver.accuracy": None, "run.check": False, "solver.cells": cells}
-    return scene.replace(**changes, **{"solver.name": requested_solver(scene)})
+    return scene.replace(**changes)
 
 
 def _first_grids(scene: Scene) -> list[int]:
     """Cells or modes to begin with: of the runs to compare with, and by the rule."""
     wanted, numbers = scene.solver.accuracy, numbers_of(scene)
     assert wanted is not None
-    if requested_solver(scene) == "modal":
+    if scene.solver_name == "modal":
         modes = modes_for(numbers, wanted)
         return [*coarser_modes(modes, REQUESTED), modes]
     cells, _ = cells_for(numbers, wanted)
@@ -195,9 +185,9 @@ def _first_grids(scene: Scene) -> list[int]:
 
 def _finer_grid(scene: Scene, cells: int, fit: float) -> int | None:
     """Cells, with no more misfit than that if possible, or modes of the next run; None: none."""
-    if requested_solver(scene) == "modal":
+    if scene.solver_name == "modal":
         modes = FINER_MODES * cells
-        return modes if modes <= min(FINEST, most_modes(numbers_of(scene))) else None
+        return modes if modes <= min(FINEST, exact_modes(numbers_of(scene))) else None
     return finer_cells(numbers_of(scene), cells, fit, FINEST)
 
 

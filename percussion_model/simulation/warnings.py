@@ -61,7 +61,7 @@ def _about_scene(result: Result) -> Iterator[str]:
             )
     yield from barrier_note(*barrier_shares(scene))
     least = least_loss_time(result)
-    if scene.loss_on and scene.solver_name == "wave" and scene.loss.time < least:
+    if scene.loss_on and scene.solver_name in ("wave", "modal") and scene.loss.time < least:
         yield (
             f"structural loss is small: at loss.time = {scene.loss.time:.3g} s the bit still "
             "vibrates above the energy barrier when the next blow comes; the rate of penetration "

@@ -52,12 +52,12 @@ class RockNumbers(NamedTuple):
     w_r: float
 
 
-def refuse_many(name: str, count: float, most: int = MOST_CELLS) -> None:
+def refuse_many(name: str, count: float, most: int = MOST_CELLS, instead: str = "") -> None:
     """Raise `SceneError` for more cells, elements or modes than can be set up."""
     if not count <= most:
         raise SceneError(
             f"the bars would have {count:.3g} {name}, more than {most}: ask for fewer, or "
-            "make the bars more alike in length"
+            f"make the bars more alike in length{instead}"
         )
 
 

@@ -87,7 +87,7 @@ def answer(scene: Scene, duration: float, settle: float) -> Answer:
 
 def waves(case: Case, cells: int, duration: float = 4.0, settle: float = 1.0) -> Answer:
     """Answer of the travelling waves."""
-    scene = REFERENCE.replace(**case.changes, **{"solver.cells": cells})
+    scene = REFERENCE.computed_by("wave", **case.changes, **{"solver.cells": cells})
     return answer(scene, duration, settle)
 
 

@@ -30,6 +30,7 @@ def impulse(cells: int, gap: float) -> float:
     """Impulse of the first contact of two free bars that meet at 8 m/s [N s]."""
     scene = Scene().replace(
         **{
+            "solver.name": "wave",
             "solver.cells": cells,
             "start.piston_velocity": 8.0,
             "start.gap": gap,

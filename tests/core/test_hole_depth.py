@@ -8,10 +8,16 @@ import pytest
 from percussion_model import EventKind, Mode, Scene, Simulation, simulate
 
 RIGID = {"solver.name": "rigid", "piston.model": "rigid", "bit.model": "rigid"}
-SOLVERS = {"wave": {}, "fem": {"solver.name": "fem", "fem.elements": 20}, "rigid": RIGID}
+SOLVERS = {
+    "wave": {"solver.name": "wave"},
+    "modal": {"solver.name": "modal"},
+    "fem": {"solver.name": "fem", "fem.elements": 20},
+    "rigid": RIGID,
+}
 # A depth is a sum over drilling cycles of lengths of a millimetre. Elements read between steps
-# by a step of its own, whose end is off by the error of a step [m].
-ROUNDING = {"wave": 1e-15, "fem": 1e-12, "rigid": 1e-15}
+# by a step of its own, whose end is off by the error of a step. Modes ring ahead of the front
+# of a blow, by a nanometre, while the bit is in DFC (docs/modal.md, section 5) [m].
+ROUNDING = {"wave": 1e-15, "modal": 2e-9, "fem": 1e-12, "rigid": 1e-15}
 SHORT_STROKE = {"drive.force": 8143.0, "drive.reversal_distance": 0.002}
 
 
@@ -100,7 +106,7 @@ def test_the_blow_table_has_the_depth_at_its_starts(solver):
     )
 
 
-@pytest.mark.parametrize("solver", ["wave", "rigid"])
+@pytest.mark.parametrize("solver", ["wave", "modal", "rigid"])
 def test_hole_and_bit_advance_alike_where_motion_is_periodic(solver):
     rows = simulate(Scene().replace(**SOLVERS[solver]), error_estimate=False).counted
     hole, bit = (

@@ -119,8 +119,9 @@ def test_substeps_agree_with_one_step():
 
 def resting_bit(**changes):
     """A bit that is set down on the rock, then held by feed and weight alone."""
-    return Scene().replace(
-        **{"piston.model": "absent", "effects.drive": "none", "run.settle": 0.0} | changes
+    return Scene().computed_by(
+        "wave",
+        **{"piston.model": "absent", "effects.drive": "none", "run.settle": 0.0} | changes,
     )
 
 

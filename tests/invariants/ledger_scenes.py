@@ -1,4 +1,4 @@
-"""Random scenes for the ledger: wide ranges of everything that a leap's books depend on."""
+"""Random scenes for the ledger of waves: wide ranges of all that a leap's books depend on."""
 
 from __future__ import annotations
 
@@ -25,6 +25,7 @@ def random_scene(rng):
         rng.choice([0.0, 10.0 ** rng.uniform(-9.0, -3.0), 10.0 ** rng.uniform(-7.5, -6.0)])
     )
     changes = {
+        "solver.name": "wave",
         "bit.sections": random_sections(rng),
         "solver.cells": int(rng.integers(1, 41)),
         "loss.time": loss,

@@ -14,7 +14,18 @@ import numpy as np
 
 # One blow of a coarse reference drill, its leaps off so that every step is made.
 SCENES = {
-    "wave": {"solver.cells": 20, "solver.leaps": False, "run.settle": 0.0},
+    "wave": {
+        "solver.name": "wave",
+        "solver.cells": 20,
+        "solver.leaps": False,
+        "run.settle": 0.0,
+    },
+    "modal": {
+        "solver.name": "modal",
+        "solver.cells": 8,
+        "solver.leaps": False,
+        "run.settle": 0.0,
+    },
     "fem": {"solver.name": "fem", "fem.elements": 10, "run.settle": 0.0},
 }
 DURATION = 0.0025
@@ -25,11 +36,13 @@ def use_attribute_records() -> None:
     """Let the fields of records be attributes, as they are in compiled kernels."""
     from percussion_model.physics import records
     from percussion_model.solvers.fem import records as of_fem
+    from percussion_model.solvers.modal import records as of_modes
     from percussion_model.solvers.wave import records as of_waves
 
     for module, names in (
         (records, ("BLOW", "EVENT", "READING")),
         (of_waves, ("WAVE_PAR", "WAVE_STATE")),
+        (of_modes, ("MODAL_PAR", "MODAL_STATE")),
         (of_fem, ("FEM_PAR", "FEM_STATE")),
     ):
         for name in names:

@@ -1,7 +1,7 @@
-"""An effect that is one file: viscous drag on the bit, in waves, elements and rigid bodies.
+"""An effect that is one file: viscous drag on the bit, in waves, modes, elements and rigid bodies.
 
-Added as CONTRIBUTING.md tells it, to a copy of the package. Waves and elements run as plain
-Python, which spares a minute of compiling, but with PERCUSSION_LONG=1.
+Added as CONTRIBUTING.md tells it, to a copy of the package. Waves, modes and elements run as
+plain Python, which spares a minute of compiling, but with PERCUSSION_LONG=1.
 """
 
 from __future__ import annotations
@@ -62,6 +62,7 @@ print(json.dumps(found))
 """
 COARSE = {
     "wave": {"solver.cells": 4},
+    "modal": {"solver.cells": 8},
     "fem": {"fem.elements": 4, "fem.courant": 1.0},
     "rigid": {},
 }

@@ -1,4 +1,4 @@
-"""Leaps over quiet phases must not change the motion."""
+"""Leaps of the waves over quiet phases must not change the motion."""
 
 from __future__ import annotations
 
@@ -29,7 +29,8 @@ def test_leaps_change_nothing_but_the_time_it_takes(name):
     times = np.linspace(0.0, ENDS[name], 101)[1:]
     runs = []
     for leaps in (True, False):
-        simulation = Simulation(Scene().replace(**SCENES[name], **{"solver.leaps": leaps}))
+        changes = SCENES[name] | {"solver.leaps": leaps}
+        simulation = Simulation(Scene().computed_by("wave", **changes))
         fields = []
         for t in times:
             simulation.advance(float(t))

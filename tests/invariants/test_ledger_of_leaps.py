@@ -12,6 +12,7 @@ from percussion_model.physics.ledger import DISSIPATED, NUMERICAL, STORED, WORKS
 from percussion_model.solvers.wave.solver import WaveSolver
 from tests.invariants.ledger_scenes import random_scene
 
+WAVES = Scene().computed_by("wave")
 ENTRIES = (*WORKS, *DISSIPATED, *NUMERICAL, *STORED)
 # Of a run's energy. Over 300 random scenes residuals stay below 7e-12, `numerical` above
 # -1e-14; over 4 ms, in which rounding hardly grows, leaps on and off differ by 2e-11.
@@ -50,7 +51,7 @@ def both_ways(scene, end):
 @pytest.mark.parametrize("name", SCENES)
 def test_leaps_book_what_their_steps_would(name):
     changes, end = SCENES[name]
-    leaping, stepping, scale, leaps = both_ways(Scene().replace(**changes), end)
+    leaping, stepping, scale, leaps = both_ways(WAVES.replace(**changes), end)
     assert leaps > 1
     for entry in ENTRIES:
         assert abs(leaping[entry] - stepping[entry]) < 1e-9 * scale, entry
@@ -61,7 +62,7 @@ def test_leaps_book_what_their_steps_would(name):
 @pytest.mark.parametrize("part", ["piston_loss", "loss", "squares"])
 def test_the_residual_shows_an_error_in_a_leap(part):
     """A thousandth more in one of the forms that leaps book by."""
-    scene = Scene()
+    scene = WAVES
     solver = WaveSolver(scene)
     forms = getattr(solver._operators, part)
     solver._operators = solver._operators._replace(**{part: 1.001 * forms})
@@ -75,7 +76,7 @@ def test_the_residual_shows_an_error_in_a_leap(part):
 
 def test_the_residual_shows_a_leap_that_moves_otherwise():
     """Powers that lose a millionth of the bit's waves, as its forms do not know."""
-    scene = Scene()
+    scene = WAVES
     solver = WaveSolver(scene)
     solver._operators = solver._operators._replace(bit=(1.0 - 1e-6) * solver._operators.bit)
     simulation = Simulation(scene, solver=solver)
@@ -108,7 +109,7 @@ def test_random_scenes_leap():
 
 def test_feed_works_along_the_way_of_the_bit():
     """Cut steps, of which there are some in every blow, among the others."""
-    scene = Scene().replace(**{"feed.force": 2e4})
+    scene = WAVES.replace(**{"feed.force": 2e4})
     simulation = Simulation(scene)
     simulation.advance(0.1)
     simulation.advance(simulation.solver.grid_point_after(simulation.save().state, 0.1))

@@ -12,9 +12,11 @@ from percussion_model.physics.records import READING, Mode
 
 IMPULSE = SAMPLE_FIELDS.index("bit_impulse")
 
-RIGID = {"piston.model": "rigid", "bit.model": "rigid"}
+ELASTIC = pytest.mark.parametrize("solver", ["wave", "modal"])
 # Blow, rebound and the standstill that rings after it; then only standstill and flight.
 SPAN = 6e-3
+# What may lie between two looks of the modes, relative to the greatest force.
+UNSEEN = {"wave": 1e-9, "rigid": 1e-9, "modal": 1e-3}
 
 
 def peaks(scene, points):
@@ -48,24 +50,25 @@ def dense(scene, points, parts):
     return np.array(found).T
 
 
-@pytest.mark.parametrize("changes", [{}, RIGID], ids=["elastic", "rigid"])
+@pytest.mark.parametrize("solver", ["wave", "modal", "rigid"])
 @pytest.mark.parametrize("step", [2.3e-6, 4.1e-5, 7e-4])
-def test_a_peak_is_the_greatest_force_of_its_interval(changes, step):
+def test_a_peak_is_the_greatest_force_of_its_interval(solver, step):
     # without the barrier, whose dashpot acts for less than a dense sample
-    scene = Scene().replace(**changes, **{"effects.barrier": False})
+    scene = Scene().computed_by(solver, **{"effects.barrier": False})
     points = np.arange(0.0, min(SPAN, 200 * step), step)
     found, _ = peaks(scene, points)
     sampled, change = dense(scene, points, max(10, round(step / 2e-7)))
     scale = sampled.max()
     assert scale > 1e5
-    assert np.all(found[:, 0] >= sampled - 1e-9 * scale)
+    assert np.all(found[:, 0] >= sampled - UNSEEN[solver] * scale)
     # not more than there was: what came before the interval does not count
     assert np.all(found[:, 0] <= sampled + 2.0 * change + 1e-9 * scale)
     assert np.median(change) < 0.02 * scale
 
 
-def test_the_ringing_of_a_quiet_standstill_is_seen_within_its_leaps():
-    scene = Scene()
+@ELASTIC
+def test_the_ringing_of_a_quiet_standstill_is_seen_within_its_leaps(solver):
+    scene = Scene().computed_by(solver)
     run = Simulation(scene)
     run.advance(0.02)
     events = run.events
@@ -76,15 +79,17 @@ def test_the_ringing_of_a_quiet_standstill_is_seen_within_its_leaps():
     sampled, change = dense(scene, points, 300)
     still = 2500.0 + scene.bit.mass * 10.0
     assert sampled.max() > 1.02 * still  # it rings
-    assert np.all(found[:, 0] >= sampled - 1e-6 * still)
+    assert np.all(found[:, 0] >= sampled - max(UNSEEN[solver], 1e-6) * still)
     assert np.all(found[:, 0] <= sampled + 1.01 * change)
     assert change.max() < 0.01 * still
 
 
-def test_watching_changes_no_bit():
-    plain = Simulation(Scene())
+@ELASTIC
+def test_watching_changes_no_bit(solver):
+    scene = Scene().computed_by(solver)
+    plain = Simulation(scene)
     plain.advance(0.1)
-    _, watched = peaks(Scene(), np.arange(0.0, 0.1, 1.7e-3))
+    _, watched = peaks(scene, np.arange(0.0, 0.1, 1.7e-3))
     watched.advance(0.1)
     for name in plain._state.record.dtype.names:
         if not name.startswith("peak_") and name not in ("n_blows", "n_events"):
@@ -93,18 +98,20 @@ def test_watching_changes_no_bit():
     np.testing.assert_array_equal(plain._state.workspace, watched._state.workspace)
 
 
-def test_peaks_of_intervals_make_the_peak_of_the_blow():
-    found, simulation = peaks(Scene(), np.arange(0.0, 0.05, 1e-3))
+@ELASTIC
+def test_peaks_of_intervals_make_the_peak_of_the_blow(solver):
+    found, simulation = peaks(Scene().computed_by(solver), np.arange(0.0, 0.05, 1e-3))
     first = simulation.blows[0]
     assert found[:46, 0].max() == pytest.approx(first["peak_bit_force"], rel=1e-12)
     assert found[:46, 1].max() == pytest.approx(first["peak_contact_force"], rel=1e-12)
 
 
-def test_a_peak_of_the_contact_force_is_not_one_of_the_cells():
+@pytest.mark.parametrize("solver", ["wave", "modal"])
+def test_a_peak_of_the_contact_force_is_not_one_of_the_cells(solver):
     # behind a viscous front that several cells resolve, the waves that come to the ends overshoot
     found = []
     for cells in (20, 160):
-        simulation = Simulation(Scene().replace(**{"solver.cells": cells}))
+        simulation = Simulation(Scene().computed_by(solver, **{"solver.cells": cells}))
         simulation.advance(0.1)
         found.append(float(simulation.blows["peak_contact_force"][0]))
     assert found[1] == pytest.approx(found[0], rel=5e-4)

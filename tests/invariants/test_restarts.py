@@ -10,6 +10,7 @@ from tests.state_bits import run_bits
 
 SOLVERS = {
     "wave": {"solver.name": "wave"},
+    "modal": {"solver.name": "modal"},
     "fem": {"solver.name": "fem"},
     "rigid": {"solver.name": "rigid", "piston.model": "rigid", "bit.model": "rigid"},
 }
@@ -76,7 +77,7 @@ LIMITS = {
 @pytest.mark.parametrize("seed", range(4))
 def test_inputs_at_random_times_leave_the_ledger_closed(seed, solver):
     rng = np.random.default_rng(seed)
-    changes = SOLVERS.get(solver, {"solver.leaps": False})
+    changes = SOLVERS.get(solver, SOLVERS["wave"] | {"solver.leaps": False})
     simulation = Simulation(Scene().replace(**changes))
     end = 0.4
     for t in np.sort(rng.uniform(0.0, end, 60)):

@@ -14,11 +14,13 @@ from percussion_model import Scene, Simulation, SimulationError
 from percussion_model.physics.state import COMMON_UNDEFINED
 
 RIGID = {"piston.model": "rigid", "bit.model": "rigid"}
+WAVES = Scene().computed_by("wave")
 SCENES = {
-    "wave": Scene(),
-    "wave without leaps": Scene().replace(**{"solver.leaps": False}),
-    "wave, rigid piston": Scene().replace(**{"piston.model": "rigid"}),
-    "fem": Scene().replace(**{"solver.name": "fem"}),
+    "wave": WAVES,
+    "wave without leaps": WAVES.replace(**{"solver.leaps": False}),
+    "wave, rigid piston": WAVES.replace(**{"piston.model": "rigid"}),
+    "modal": Scene().computed_by("modal"),
+    "fem": Scene().computed_by("fem"),
     "rigid": Scene().replace(**RIGID),
     "blow-map": mapped(),
 }
@@ -64,11 +66,16 @@ def test_no_whole_number_is_without_limits(runs, name):
         assert field in refused(run, good, **{field: 2**62}), field
         if not field.startswith(COUNTS):
             value = int(good.state.record[0][field])
-            assert value in range(-1, 5) or field in STEPS, field
+            assert value in range(-1, 5) or field in (*STEPS, *OF_MODES), field
 
 
 # Steps of the waves, which have their own test.
 STEPS = ("step", "leap_end", "no_plan", "piston_step", "wake", "no_dormancy")
+# Ticks, sets and counts of modes of the modal solver, of which tests/test_modal.py has a test.
+OF_MODES = (
+    *("time", "look", "piston_time", "no_park", "closed_at", "rest_until"),
+    *("active", "pairs", "stride", "law"),
+)
 
 
 @pytest.mark.parametrize(

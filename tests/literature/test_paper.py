@@ -65,7 +65,7 @@ def sinking():
 @pytest.fixture(scope="module")
 def waves():
     """Return the reference by waves, and its last blow."""
-    result = simulate(paper_scene(), 2.0, 1.0)
+    result = simulate(paper_scene().computed_by("wave"), 2.0, 1.0)
     return result, last_blow_window(result)
 
 

@@ -57,7 +57,7 @@ def test_random_scenes_stay_finite_and_close_their_ledger(case):
 def test_twenty_thousand_random_scenes(tmp_path):
     record = campaign(LONG_COUNT, LONG_SEED, tmp_path / "record.json", "wide")
     assert record["run"] == LONG_COUNT
-    assert set(record["solvers"]) == {"wave", "fem", "rigid"}
+    assert set(record["solvers"]) == {"wave", "modal", "fem", "rigid"}
     assert not record["failures"], record["failures"]
 
 
@@ -78,7 +78,7 @@ def test_cases_cover_solvers_effects_and_parameters():
         except SceneError:
             pytest.fail("scenes that are drawn make sense")
     scenes = [case.scene for case in drawn]
-    assert {scene.solver_name for scene in scenes} == {"wave", "fem", "rigid"}
+    assert {scene.solver_name for scene in scenes} == {"wave", "modal", "fem", "rigid"}
     for key, row in rows_by_key().items():
         if row.kind in ("flag", "choice") and key not in (
             "solver.name",

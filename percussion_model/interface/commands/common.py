@@ -133,9 +133,7 @@ def load_scene(
         key = "fem.elements" if scene.solver_name == "fem" else "solver.cells"
         scene = scene.replace(**{key: cells})
     if is_run:
-        from percussion_model.simulation.accuracy_control import requested_solver
-
-        tell_of_compiling(requested_solver(scene))
+        tell_of_compiling(scene.solver_name)
     return scene
 
 

@@ -39,7 +39,7 @@ def effects(
 
     Prints a table, and draws a figure in out/SCENE-effects.
     """
-    from percussion_model.analysis.effect_study import study_effects
+    from percussion_model.analysis.effect_study import by_one_solver, study_effects
     from percussion_model.interface.terminal import progress
 
     chosen = common.load_scene(scene, solver, cells, settings)
@@ -49,7 +49,7 @@ def effects(
             "effects", out, Path("out") / f"{scene.stem}-effects", force,
             scene=chosen, duration=duration, settle=settle,
         )  # fmt: skip
-    common.tell_of_compiling(*(name for name in ("wave", "rigid") if name != chosen.solver_name))
+    common.tell_of_compiling(by_one_solver(chosen).solver_name, "rigid")
     with progress("effects") as report:
         found = study_effects(chosen, duration, settle, report)
     common.write_json(json_file, found.to_dict())

@@ -120,19 +120,23 @@ def read_at(par, s, bars, time, row):
             elastic += piston_vibration(bars) - own
     fill_ledger(s, row, kinetic, elastic, recoverable(s))
     fill_motion(par, s, row, time, s.u_p + par.start_gap, s.u_b)
+    row.bit_end_velocity = s.v_low
+    row.bit_force = s.f_rock
+    # within a tick forces stay, so that impulses and velocities agree
     rest = max(0.0, time - time_of(par, s))
     row.bit_position += rest * s.v_b
     row.bit_end_position += rest * s.v_low
+    row.bit_velocity += rest * (s.a_b + (s.f_contact - s.f_rock) / par.mass_b)
     if has_piston(par):
         row.piston_position += rest * s.v_p
-    row.bit_end_velocity = s.v_low
-    row.bit_force = s.f_rock
+        row.piston_velocity += rest * (s.a_p - s.f_contact / par.mass_p)
     if s.mode == Mode.SS and s.closed == 0 and held > 0.0:
         # what modes that are left out would hold of the load
         row.bit_force += par.mass_b * s.a_b - held * sag(s, bars)
     row.contact_force = s.f_contact
     row.bit_impulse += rest * s.f_rock
     row.contact_impulse += rest * s.f_contact
+    row.drive_impulse += rest * row.drive_force
 
 
 @kernel

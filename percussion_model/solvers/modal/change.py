@@ -15,6 +15,7 @@ from percussion_model.solvers.modal.pairs import (
     PQ,
     PV,
     book_losses,
+    book_work,
     enough_pairs,
     hold_low,
     law_in,
@@ -76,14 +77,24 @@ def pass_over(par, s, bars, law, over):
         s.takes = to_be_taken(bars.laws.taken[law], w, PQ, s.pairs)
 
 
+@inlined
+def by_energy(s):
+    """Whether the energy of the bit decides which mode follows."""
+    return s.mode == Mode.FF or (s.mode == Mode.BC and s.p >= s.p_u)
+
+
 @kernel
 def end_mode(par, s, bars, events):
     """Make the change of mode that the present pairs ask for."""
     leave_out_pairs(par, s, bars)
-    n, squares = book_losses(s, bars), spread(0.0)
-    for k in range(0, n, WIDTH):
-        v = load(bars.rows, 1, k)
-        squares = squares + v * v
+    n, squares = -1, spread(0.0)
+    if by_energy(s):
+        n = book_losses(s, bars)
+        for k in range(0, n, WIDTH):
+            v = load(bars.rows, 1, k)
+            squares = squares + v * v
+    else:
+        book_work(s, bars)
     if not next_mode(par, s, 0.5 * total(squares)):
         return
     form = form_wanted(par, s)
@@ -92,6 +103,8 @@ def end_mode(par, s, bars, events):
     if over >= 0:
         pass_over(par, s, bars, law, over)
     else:
+        if n < 0:
+            n = book_losses(s, bars)
         take_modes(par, s, bars, n)
         change_spring(par, s, bars)
     s.alert = 1

@@ -62,6 +62,7 @@ from percussion_model.solvers.modal.records import (
 from percussion_model.solvers.modal.rock_end import (
     QUIET_SHARE,
     end_standstill,
+    late_force,
     passed,
 )
 from percussion_model.solvers.modal.search import UNSURE, moving
@@ -239,7 +240,7 @@ def go_near(par, s, bars, most, blows, events):
         ticks += 1 << level
         s.count_steps += 1
         sampled += share
-        note(par, s, bars, level, ticks, look)
+        note(par, s, bars, level, ticks, last.force, look)
         u_before, last = last.u_r, look
         if ends or turns:
             break
@@ -262,12 +263,17 @@ def go_near(par, s, bars, most, blows, events):
 
 
 @inlined
-def note(par, s, bars, level, ticks, look):
-    """Book what every look counts for: peaks, and the loss of a piston in flight."""
-    time = time_of(par, s) + ticks * par.tick
+def note(par, s, bars, level, ticks, before, look):
+    """Book what every look counts for: peaks, and the loss of a piston in flight.
+
+    Parameters
+    ----------
+    before : float
+        Force of the rock at the look before [N].
+    """
     if s.mode != Mode.FF:
+        time, h = time_of(par, s) + ticks * par.tick, par.tick * (1 << level)
         s.b_peak_bit = max(s.b_peak_bit, look.force)
-        if time > s.peak_from:
-            s.peak_bit_force = max(s.peak_bit_force, look.force)
+        s.peak_bit_force = max(s.peak_bit_force, late_force(s, time, h, before, look.force))
     if has_piston(par) and s.parked == 0 and par.piston == Piston.ELASTIC:
         s.e_loss += move_free(bars.wp, bars.move_p[level], bars.wp.shape[1])

@@ -368,19 +368,25 @@ def take_pairs(par, s, bars, law):
 
 
 @kernel
-def book_losses(s, bars):
-    """Spell out the pairs, and book what was lost since they were taken; how many modes."""
-    n = spell_out(s, bars, bars.w, PQ)
-    energy = energy_about_rest(s, bars, n)
-    lost, s.vibrates = s.vibrates - energy, energy
+def book_work(s, bars):
+    """Book what the dashpot took since the pairs were taken; losses of the bars wait."""
     if s.law % 2 == 1:
         left = to_be_taken(bars.laws.taken[s.law], bars.w, PQ, s.pairs)
         work = bars.laws.dashpot[s.law] * (s.takes - left)
         s.takes = left
-        lost -= work
+        s.vibrates -= work
         s.rock_work += work
         book_dashpot(s, work)
-    s.e_loss += lost
+
+
+@kernel
+def book_losses(s, bars):
+    """Spell out the pairs, and book all that was taken or lost; how many modes."""
+    book_work(s, bars)
+    n = spell_out(s, bars, bars.w, PQ)
+    energy = energy_about_rest(s, bars, n)
+    s.e_loss += s.vibrates - energy
+    s.vibrates = energy
     return n
 
 

@@ -32,7 +32,7 @@ from percussion_model.solvers.modal.pairs import (
 )
 from percussion_model.solvers.modal.piston import WHOLE, time_of
 from percussion_model.solvers.modal.records import LONGEST_HOP, SCAN, STEP, View
-from percussion_model.solvers.modal.rock_end import passed
+from percussion_model.solvers.modal.rock_end import late_force, passed
 
 LOW_Q, LOW_V, SPEED_Q, SPEED_V = (int(row) for row in View)
 # Rows of `Bars.rows` with what a search sees.
@@ -204,6 +204,7 @@ def quiet_peaks(par, s, bars, law, ticks, energy):
     rest, K = par.mass_b * bit_acceleration(par, s), stiffness(s)
     begin, peak, late = time_of(par, s), 0.0, 0.0
     watched = begin + ticks * par.tick > s.peak_from
+    before = s.f_rock
     if not watched and rest + most_force(par, s, 2.0 * energy) <= s.b_peak_bit:
         return peak, late
     for step in range(ticks >> STEP):
@@ -214,8 +215,8 @@ def quiet_peaks(par, s, bars, law, ticks, energy):
         here = end_after(par, s, bars, law, STEP)
         carry_pairs(s, bars, bars.w, AT, WHOLE)
         peak = max(peak, here.force)
-        if begin + (step + 1) * par.dt > s.peak_from:
-            late = max(late, here.force)
+        late = max(late, late_force(s, begin + (step + 1) * par.dt, par.dt, before, here.force))
+        before = here.force
     return max(peak, rest), max(late, rest) if watched else 0.0
 
 
@@ -338,9 +339,8 @@ def look_through(par, s, bars, law, begin, level, count, taken, sampled, last):
             break
         kept += 1
         sampled += share
+        late = max(late, late_force(s, begin + h * kept, h, last.force, then.force))
         last, peak = then, max(peak, then.force)
-        if begin + h * kept > s.peak_from:
-            late = max(late, then.force)
     return Seen(kept, near, sampled, last, then, peak, late)
 
 
@@ -396,11 +396,11 @@ def search(par, s, bars, most):
         if seen.near and sampled > 0.0:
             taken, sampled = taken_so_far(par, s, bars), 0.0
         elif seen.near or count == 0:
-            within = min(1 << level, rest)
+            within, first = min(1 << level, rest), last.force
             more, ends, work, last = narrow(par, s, bars, law, within, taken, last, seen.then)
             ticks += more
             looks += 1
             sampled, peak = max(work - taken, 0.0), max(peak, last.force)
-            if time_of(par, s) + par.tick * ticks > s.peak_from:
-                late = max(late, last.force)
+            end = time_of(par, s) + par.tick * ticks
+            late = max(late, late_force(s, end, par.tick * more, first, last.force))
     return Found(ticks, ends, peak, late, looks, leaps)

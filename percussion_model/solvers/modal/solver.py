@@ -119,8 +119,8 @@ class ModalSolver(Solver):
         self.modes = asked_modes(numbers)
         p["dt"] = self.time_step = first / self.modes
         p["tick"] = tick = self.time_step / (1 << STEP)
-        p["transit"] = int(bar_transit_time(numbers.bit) / tick)
-        p["window"] = first / default_modes(numbers)
+        # a period of the highest of few modes; a rigid piston pushes hardest at once
+        p["window"] = (2.0 if elastic else 1.0) * first / default_modes(numbers)
         highest = math.pi / self.time_step
         rock = rock_numbers(numbers)
         kind = p["rock"]
@@ -131,6 +131,7 @@ class ModalSolver(Solver):
         mass = 0.0 if p["piston"] == Piston.ABSENT else float(p["mass_p"])
         leaps = bool(numbers.values.solver_leaps and not p["effects"])
         self._tables = made = _tables(numbers, mass, springs, rock.c_r, highest, tick)
+        p["transit"] = int(bar_transit_time(numbers.bit) / tick)
         self.cells = {} if made.free_piston is None else {"piston": made.shape_p.shape[1]}
         self.cells["bit"] = int(made.forms.sizes[0])
         if p["piston"] == Piston.ABSENT:
@@ -223,8 +224,9 @@ class ModalSolver(Solver):
         if self._par[0]["piston"] != Piston.ABSENT:
             s["u_p"] = -s["gap"]
             s["u_r"] = s["u_p"]
-        s["e_start"] = 0.5 * self._par[0]["mass_b"] * s["v_b"] ** 2
-        s["e_start"] += 0.5 * self._par[0]["mass_p"] * s["v_p"] ** 2
+        # as kernels add it up, to the last bit
+        s["e_start"] = 0.5 * (w[1, 0] * w[1, 0])
+        s["e_start"] += 0.5 * self._par[0]["mass_p"] * s["v_p"] * s["v_p"]
         return state
 
     def _run(

@@ -47,7 +47,13 @@ from percussion_model.solvers.modal.piston import (
     time_of,
     unpark,
 )
-from percussion_model.solvers.modal.rock_end import change_mode, end_standstill, look, passed
+from percussion_model.solvers.modal.rock_end import (
+    change_mode,
+    end_standstill,
+    late_force,
+    look,
+    passed,
+)
 
 # Steps after which the running force of a standstill is noted.
 CHECKPOINT = 64
@@ -134,23 +140,34 @@ def try_step(par, s, bars, level):
 
 
 @merged
-def book_rock(par, s, trial, before):
-    """Book what the rock takes in a step, from an energy that it would give back before [J]."""
+def book_rock(par, s, trial, before, v_low):
+    """Book what the rock takes in a step.
+
+    Parameters
+    ----------
+    before : float
+        Energy that it would have given back before [J].
+    v_low : float
+        Velocity of the rock end then [m/s].
+    """
     if s.mode == Mode.FF:
         s.e_standstill += before - recoverable(s)
         return
     s.rock_work += trial.force * trial.path
     book_dashpot(s, trial.work)
     crush(par, s, s.p - trial.path)
-    s.b_peak_bit = max(s.b_peak_bit, trial.force)
-    if time_of(par, s) > s.peak_from:
-        s.peak_bit_force = max(s.peak_bit_force, trial.force)
+    first = trial.last
+    if par.rock != RockKind.WALL:
+        first = stiffness(s) * (s.p - trial.path - origin(s)) + damping(s) * v_low
+    s.b_peak_bit = max(s.b_peak_bit, trial.last)
+    late = late_force(s, time_of(par, s), trial.h, first, trial.last)
+    s.peak_bit_force = max(s.peak_bit_force, late)
 
 
 @kernel
 def make(par, s, bars, level, trial, push, events):
     """Make a step that was tried."""
-    begin, before, h = time_of(par, s), recoverable(s), trial.h
+    begin, before, h, v_low = time_of(par, s), recoverable(s), trial.h, s.v_low
     ends = trial.ends
     s.time += 1 << level
     s.count_steps += 1
@@ -174,7 +191,7 @@ def make(par, s, bars, level, trial, push, events):
     s.low, s.top, s.at_b, s.at_p = ends.low, ends.top, ends.bit, ends.piston
     s.f_contact, s.f_rock = trial.contact, trial.force
     s.p += trial.path
-    book_rock(par, s, trial, before)
+    book_rock(par, s, trial, before, v_low)
     if s.closed == 1:
         book_contact(par, s, trial.contact, h, time_of(par, s))
     if has_piston(par):

@@ -135,7 +135,7 @@ def forms_of(
         above, n_piston = len(piston), _lanes(count_below(piston, highest))
     both = bit if piston is None else np.vstack([piston, bit])
     n = n_bit + n_piston if piston_mass else n_bit
-    refuse_many("modes", n, MOST_MODES)
+    refuse_many("modes", n, MOST_MODES, ', or take waves (solver.name = "wave")')
     free = None if piston is None else bar_modes(piston, n_piston + 1)
     sizes, stiff = np.zeros(6, np.int64), np.array([0.0, *springs] * 2)
     shape, move = np.zeros((6, len(Shape), n)), np.zeros((6, LEVELS, len(Move), n))
