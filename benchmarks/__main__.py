@@ -7,6 +7,7 @@ repetitions. Take figures for the record on an idle machine.
 from __future__ import annotations
 
 import argparse
+import itertools
 import json
 import os
 import statistics
@@ -57,14 +58,14 @@ def measure(scene: Any, duration: float) -> dict[str, Any]:
 
 
 def reference(repeats: int) -> list[dict[str, Any]]:
-    """Real-time factor of the reference scene, with and without leaps."""
+    """Real-time factor of the reference scene by modes and waves, with and without leaps."""
     from percussion_model import Scene, simulate
 
     rows = []
-    for cells in (20, 40):
-        for leaps in (True, False):
-            scene = Scene.from_toml(REFERENCE).replace(
-                **{"solver.cells": cells, "solver.leaps": leaps}
+    for solver, cells in itertools.product(("modal", "wave"), (20, 40, 80)):
+        for leaps in (True, False) if cells < 80 else (True,):
+            scene = Scene.from_toml(REFERENCE).computed_by(
+                solver, **{"solver.cells": cells, "solver.leaps": leaps}
             )
             duration = LEAPING_DURATION if leaps else STEPPING_DURATION
             count = repeats if leaps else max(2, repeats // 3)
@@ -73,6 +74,7 @@ def reference(repeats: int) -> list[dict[str, Any]]:
             summary = results[0].summary()
             rows.append(
                 {
+                    "solver": solver,
                     "cells": cells,
                     "leaps": leaps,
                     "real_time_factor": statistics.median(factors),
@@ -84,7 +86,6 @@ def reference(repeats: int) -> list[dict[str, Any]]:
                     "blow_period": summary["blow_period"],
                     "numerical_relative": summary["energy"]["numerical_relative"],
                     "steps": results[0].statistics["steps"],
-                    "leap_steps": results[0].statistics["leap_steps"],
                 }
             )
     return rows
@@ -95,7 +96,9 @@ def effects(repeats: int) -> list[dict[str, Any]]:
     from percussion_model import Scene
     from percussion_model.analysis.effect_study import NOISE, effect_variants, step_costs
 
-    base = Scene.from_toml(REFERENCE).replace(**{"solver.cells": 20, "solver.leaps": False})
+    base = Scene.from_toml(REFERENCE).computed_by(
+        "wave", **{"solver.cells": 20, "solver.leaps": False}
+    )
     cases = {}
     for variant in effect_variants(base):
         scene = variant.apply(base)
@@ -181,10 +184,19 @@ def show(found: dict[str, Any]) -> None:
         console.print(f"[yellow]The machine was busy: load {computer['load_before']:.1f}.[/yellow]")
 
     table = Table(title="Reference scene: simulated time by time to compute", title_justify="left")
-    for heading in ("cells", "leaps", "times real time", "range", "rate mm/s", "period ms"):
+    for heading in (
+        "solver",
+        "cells",
+        "leaps",
+        "times real time",
+        "range",
+        "rate mm/s",
+        "period ms",
+    ):
         table.add_column(heading, justify="right")
     for row in found["reference"]:
         table.add_row(
+            row["solver"],
             f"{row['cells']}",
             "on" if row["leaps"] else "off",
             f"{row['real_time_factor']:.1f}",

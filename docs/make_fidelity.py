@@ -46,7 +46,8 @@ POINTS, SEED = 30, 1
 
 def on(rung: str, **changes: Any) -> Scene:
     """The reference scene on a rung of the ladder."""
-    return Scene().replace(**{"solver.fidelity": rung, **changes})
+    by = {"solver.name": "wave"} if rung == "wave" else {}
+    return Scene().replace(**{"solver.fidelity": rung, **by, **changes})
 
 
 def errors() -> str:

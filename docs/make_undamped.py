@@ -42,7 +42,7 @@ def rates() -> Iterator[dict[str, Any]]:
     """Run the reference with every loss time and number of cells."""
     for loss in LOSSES:
         for cells in CELLS:
-            scene = Scene().replace(**{"loss.time": loss, "solver.cells": cells})
+            scene = Scene().computed_by("wave", **{"loss.time": loss, "solver.cells": cells})
             duration = LONG if loss < APERIODIC else SHORT
             if loss < FEW_TELL:
                 duration = SHORTEST

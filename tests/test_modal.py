@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,7 @@ from percussion_model.solvers.modal.modes import bar_modes, products, totals
 from percussion_model.solvers.modal.records import STEP, Shape
 from percussion_model.solvers.modal.solver import ModalSolver
 
+LONG = os.environ.get("PERCUSSION_LONG") == "1"
 ROOT = Path(__file__).parents[1]
 STEEL = 2.1e11, 7850.0
 UNIFORM = np.array([[0.2, 5.5e-3, *STEEL]])
@@ -181,10 +183,10 @@ def test_equal_bars_pass_on_what_loss_leaves():
     assert momentum == pytest.approx(9.0, rel=1e-9)
 
 
-REFERENCE = 16.3494e-3  # m/s, +- 0.0003e-3: limit of waves and of explicit elements
+REFERENCE = 16.3505e-3  # m/s, +- 0.0004e-3: limit of three solvers (docs/modal.md, section 8)
 
 
-@pytest.mark.parametrize(("cells", "off"), [(20, 5e-4), (30, 2e-4), (40, 1e-4)])
+@pytest.mark.parametrize(("cells", "off"), [(20, 1.2e-4), (30, 1e-4), (40, 6e-5), (80, 3e-5)])
 def test_the_reference_keeps_its_rate(cells, off):
     result = simulate(modal(cells=cells), error_estimate=False)
     assert result.rate_of_penetration == pytest.approx(REFERENCE, rel=off)
@@ -306,15 +308,28 @@ def test_a_state_out_of_bounds_is_refused(field, value):
     assert field in solver.state_fault(state, 0.0)
 
 
+def sections(generator, length):
+    """One to three sections, at times of another material."""
+    parts = generator.dirichlet(np.full(int(generator.integers(1, 4)), 4.0))
+    return [
+        {
+            "length": length * float(part),
+            "area": generator.uniform(2e-3, 8e-3),
+            "youngs_modulus": generator.choice([210e9, 210e9, 70e9, 600e9]),
+            "density": generator.choice([7850.0, 7850.0, 2700.0, 14500.0]),
+        }
+        for part in parts
+    ]
+
+
 def test_energy_is_never_made_in_drawn_bars():
     """Geometry, rock and start by seed; what is lost beside the physics is no gain."""
     generator = np.random.default_rng(18)
-    for _ in range(12):
+    for _ in range(2000 if LONG else 25):
         length = generator.uniform(0.15, 0.35)
         scene = modal(cells=int(generator.integers(6, 30)), **{
-            "piston.sections.0.length": length,
-            "bit.sections.0.length": length * generator.uniform(0.7, 2.5),
-            "bit.sections.0.area": generator.uniform(2e-3, 8e-3),
+            "piston.sections": sections(generator, length),
+            "bit.sections": sections(generator, length * generator.uniform(0.7, 2.5)),
             "rock.loading_stiffness": math.exp(generator.uniform(math.log(1e8), math.log(2e9))),
             "rock.unloading_ratio": generator.uniform(2.0, 40.0),
             "feed.force": generator.uniform(500.0, 20e3),

@@ -359,7 +359,7 @@ class SolverOptions(Parameters):
         "auto",
         SOLVER_NAMES,
         "solver; auto: modal for an elastic bit, wave where loss is off, slight or strong, the "
-        "piston rigid or the rock a wall; rigid for a rigid bit",
+        "piston rigid, the rock a wall or one bar far longer; rigid for a rigid bit",
     )
     fidelity: str = choice(
         "wave",

@@ -40,6 +40,9 @@ LONGEST_TITLE = 1000
 # `solver.name = "auto"` takes modes where the loss time is such a share of the shorter transit
 # time. Below fronts stay sharp and ring, above many modes are needed (docs/modal.md, section 9).
 LEAST_LOSS, MOST_LOSS = 5e-4, 1.0
+# And where no bar is longer than so many times the other, by its transit time: it takes as
+# many times the modes, whose tables fill a gigabyte.
+MOST_UNLIKE = 16.0
 # Groups that nothing was given of; they cannot change, so all scenes share them.
 _DEFAULTS = {name: group() for name, group in GROUPS.items()}
 
@@ -300,9 +303,10 @@ class Scene:
         # a rigid piston and a wall push hardest in the first instant
         if not self.effects.loss or self.effects.rock == "wall" or self.piston.model == "rigid":
             return False
-        bars = [bar for bar in (self.piston, self.bit) if bar.model == "elastic"]
-        share = self.loss.time / min(bar.transit_time for bar in bars)
-        return LEAST_LOSS <= share <= MOST_LOSS
+        times = [bar.transit_time for bar in (self.piston, self.bit) if bar.model == "elastic"]
+        if max(times) > MOST_UNLIKE * min(times):
+            return False
+        return LEAST_LOSS <= self.loss.time / min(times) <= MOST_LOSS
 
     @property
     def has_waves(self) -> bool:

@@ -82,6 +82,21 @@ def test_what_must_hold_of_every_run(name, solver):
     assert found.duration > 0.0
 
 
+# Those that modes compute where no solver is named.
+BY_MODES = [name for name, case in hard_cases().items() if case.scene.solver_name == "modal"]
+
+
+@pytest.mark.parametrize("name", BY_MODES)
+def test_what_must_hold_of_every_run_by_modes(name):
+    found = measure(hard_cases()[name], "modal", 1.0 if LONG else SHARES["wave"])
+    assert violations(found.to_dict()) == []
+    assert found.duration > 0.0
+
+
+def test_most_cases_are_computed_by_modes():
+    assert len(BY_MODES) > 70
+
+
 def test_the_ceiling_of_events_is_one_of_a_blow_and_not_of_its_first_burst():
     """The first 10 ms have 400 events, the whole 0.5 s 4500, and at most 20 000 a second."""
     case = hard_cases()["gamma_1000"]
