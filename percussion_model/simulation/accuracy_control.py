@@ -24,8 +24,8 @@ from percussion_model.simulation.result import Result
 from percussion_model.solvers.modal.resolution import (
     REQUESTED,
     coarser_modes,
-    exact_modes,
     modes_for,
+    most_modes,
 )
 from percussion_model.solvers.wave.resolution import (
     FIT_SHARE,
@@ -187,7 +187,7 @@ def _finer_grid(scene: Scene, cells: int, fit: float) -> int | None:
     """Cells, with no more misfit than that if possible, or modes of the next run; None: none."""
     if scene.solver_name == "modal":
         modes = FINER_MODES * cells
-        return modes if modes <= min(FINEST, exact_modes(numbers_of(scene))) else None
+        return modes if modes <= min(FINEST, most_modes(numbers_of(scene))) else None
     return finer_cells(numbers_of(scene), cells, fit, FINEST)
 
 

@@ -24,7 +24,6 @@ from percussion_model.solvers.modal.records import (
     Shape,
     View,
 )
-from percussion_model.solvers.modal.resolution import MOST_PAIRS
 
 # Factors of a move below this are zero: what they leave would only slow down arithmetic.
 NOTHING = 1e-40
@@ -32,6 +31,8 @@ NOTHING = 1e-40
 FOLLOWERS = {0: (2, 3, 5), 2: (4,), 3: (2, 4), 4: (0, 2, 3, 5), 5: (0, 2, 3, 4)}
 # Tables from law to law cost cubes of the modes to make: with more pairs go by way of the modes.
 MOST_TO_PASS = 200
+# A bit with more modes is stepped: tables would take hundreds of megabytes.
+MOST_PAIRS = 400
 
 
 @kernel

@@ -17,8 +17,6 @@ COARSER = (0.5, 0.7)
 REQUESTED = (0.35, *COARSER)
 # More modes than these would take as many seconds, and hundreds of megabytes, to be prepared.
 MOST_MODES = 1000
-# A bit with more modes is stepped: tables would take hundreds of megabytes.
-MOST_PAIRS = 400
 # Modes come in whole lanes, and a few more than asked for.
 SPARE = 32
 
@@ -40,12 +38,6 @@ def most_modes(numbers: Numbers) -> int:
     """Most modes in the first elastic bar for which there are tables."""
     times = [bar_transit_time(bar) for bar in elastic_bars(numbers)]
     return int((MOST_MODES - SPARE) * times[0] / sum(times))
-
-
-def exact_modes(numbers: Numbers) -> int:
-    """Most modes in the first elastic bar with which a bit alone is not stepped."""
-    times = [bar_transit_time(bar) for bar in elastic_bars(numbers)]
-    return min(most_modes(numbers), int((MOST_PAIRS - SPARE) * times[0] / times[-1]))
 
 
 def asked_modes(numbers: Numbers) -> int:
