@@ -65,7 +65,7 @@ def page(found: EffectsStudy, computer: dict[str, object]) -> str:
     cells = " + ".join(str(count) for count in result.cells.values())
     load = computer["load"]
     where = (
-        f"Reference scene, {cells} cells, {result.duration:g} s simulated; "
+        f"Reference scene by waves, {cells} cells, {result.duration:g} s simulated; "
         f"{computer['processor']}, one thread, load {load:.1f} before.\n\n"
     )
     return HEAD + where + table(found) + "\n" + READING

@@ -1,4 +1,4 @@
-"""Percussive drilling with travelling waves: piston, bit and rock, blow by blow."""
+"""Percussive drilling: elastic piston and bit, and rock, blow by blow."""
 
 from __future__ import annotations
 

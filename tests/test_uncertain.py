@@ -391,7 +391,7 @@ def test_what_is_said_of_errors_is_that_of_the_solvers(periodic, aperiodic, caps
     show_comparison(Comparison({"rigid": periodic}))
     shown = capsys.readouterr().out
     assert "Rigid bodies have no cells" in shown
-    assert "by the size of the cells and" not in shown
+    assert "by the resolution and" not in shown
     assert "stands before a difference" not in shown
 
 

@@ -32,7 +32,7 @@ from percussion_model.interface.messages import usage_text
 from percussion_model.interface.progress import lines
 
 app = typer.Typer(
-    help="Percussive drilling with travelling waves: piston, bit and rock, blow by blow.",
+    help="Percussive drilling: elastic piston and bit, and rock, blow by blow.",
     no_args_is_help=True,
     add_completion=False,
     rich_markup_mode=None,  # its help cuts names of options at 80 columns
@@ -55,7 +55,7 @@ def _options(
         typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version."),
     ] = False,
 ) -> None:
-    """Percussive drilling with travelling waves: piston, bit and rock, blow by blow."""
+    """Percussive drilling: elastic piston and bit, and rock, blow by blow."""
 
 
 def _heard(command: Callable[..., Any]) -> Callable[..., Any]:

@@ -159,11 +159,11 @@ def _settled_error(found: Settled) -> str:
     settling = "convergence" if found.error_of.endswith("convergence") else "the scatter of blows"
     grid = found.grid_errors.get(RATE[1])
     if grid is None:
-        parts = f"{settling} alone, since that by the size of the cells was not estimated"
+        parts = f"{settling} alone, since that by the resolution was not estimated"
     elif grid == 0.0:
         parts = f"{settling} alone, since this solver has no grid"
     else:
-        parts = f"the size of the cells and {settling}"
+        parts = f"the resolution and {settling}"
     return f"± is the numerical error, by {parts}. {NOT_THE_MODEL}"
 
 

@@ -74,7 +74,7 @@ RATE = "rate_of_penetration"
 # An error below this share of a rate or a depth is not shown.
 LEAST_ERROR = 1e-3
 NOTE = (
-    "± is the numerical error, by the size of the cells and the scatter of the blows; a rate "
+    "± is the numerical error, by the resolution and the scatter of the blows; a rate "
     "without it is known to 0.1 %. % is the change against the scene as it is, {undecided} where "
     "it is within the errors of both, or within {sigmas:g} standard errors of their scatter. Times "
     "are the least of several."
@@ -83,7 +83,7 @@ NOTE = (
 OF_LEAPS = "Leaps go over the same cells: the ± of their changes is that of the scatter."
 
 NOTE_OF_FALL = (
-    "± is the numerical error, by the size of the cells; a depth without it is known to 0.1 %. % "
+    "± is the numerical error, by the resolution; a depth without it is known to 0.1 %. % "
     "is the change against the scene as it is, {undecided} where it is within the errors of both. "
     "Times are the least of several."
 )
