@@ -208,11 +208,12 @@ def test_lengths_that_fit_no_cells_are_as_good(name):
 
 
 def test_grids_that_agree_by_luck_do_not_make_an_error_small():
-    """Fewer modes have the same rate there, but for a millionth; it is off by 0.03 %."""
+    """Fewer modes have the same rate there, but for millionths, and others are not that close."""
     scene = Scene.from_toml(ROOT / "scenarios" / "top_hammer.toml")
     result = simulate(modal(scene, **{"run.duration": 1.5}))
-    off = abs(result.rate_of_penetration / 82.2353e-3 - 1.0)
-    assert 1e-4 < off < result.rate_of_penetration_relative_error
+    # explicit elements of 100, 200, 300: 82.23356, 82.23436, 82.23438 mm/s
+    off = abs(result.rate_of_penetration / 82.2344e-3 - 1.0)
+    assert off < 1e-4 < result.rate_of_penetration_relative_error
 
 
 SCENES = {
@@ -246,8 +247,8 @@ def test_leaps_change_nothing_but_the_time_that_it_takes(name):
         advanced(one, 0.05) for one in (scene, scene.replace(**{"solver.leaps": False}))
     )
     assert leaping.statistics()["leaps"] > 0 == stepping.statistics()["leaps"]
-    # steps are looks, of which a bit alone needs few without leaps too
-    assert leaping.statistics()["steps"] < 0.6 * stepping.statistics()["steps"]
+    # steps are looks, of which bars that touch, and a bit alone, need few without leaps too
+    assert leaping.statistics()["steps"] < 0.8 * stepping.statistics()["steps"]
     first, second = (run.events[run.events["time"] < 4e-3] for run in (leaping, stepping))
     assert first["kind"].tolist() == second["kind"].tolist()
     np.testing.assert_allclose(first["time"], second["time"], atol=1e-7)

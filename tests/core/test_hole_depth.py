@@ -17,7 +17,7 @@ SOLVERS = {
 # A depth is a sum over drilling cycles of lengths of a millimetre. Elements read between steps
 # by a step of its own, whose end is off by the error of a step. Modes ring ahead of the front
 # of a blow, by a nanometre, while the bit is in DFC (docs/modal.md, section 5) [m].
-ROUNDING = {"wave": 1e-15, "modal": 2e-9, "fem": 1e-12, "rigid": 1e-15}
+ROUNDING = {"wave": 1e-15, "modal": 8e-9, "fem": 1e-12, "rigid": 1e-15}
 SHORT_STROKE = {"drive.force": 8143.0, "drive.reversal_distance": 0.002}
 
 

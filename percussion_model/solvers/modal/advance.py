@@ -58,6 +58,8 @@ def advance_to(par, s, bars, end, blows, events):
             return Status.NOT_FINITE
         law = law_wanted(par, s, bars.laws)
         if law < 0:
+            if s.law >= 0:
+                drop_pairs(par, s, bars)
             if s.time + WHOLE > end:
                 return Status.DONE
             step(par, s, bars, STEP, blows, events)
@@ -66,9 +68,9 @@ def advance_to(par, s, bars, end, blows, events):
             most = (s.stride if s.law == law else FIRST_STRIDE) * WHOLE
             if s.time + most > end:
                 return Status.DONE
-            plan(par, s, bars, law, LONGEST, events)
+            far = plan(par, s, bars, law, LONGEST, events)
             if s.leap_end < 0 and s.law >= 0:
-                go_near(par, s, bars, most, blows, events)
+                go_near(par, s, bars, min(most, far), blows, events)
         if s.leap_end > end:
             return Status.DONE
         if s.leap_end >= 0:
@@ -88,12 +90,14 @@ def commit_to(par, s, bars, end, blows, events):
             return status
         law = law_wanted(par, s, bars.laws)
         if law >= 0:
-            plan(par, s, bars, law, end - s.time, events)
+            far = plan(par, s, bars, law, end - s.time, events)
             if s.leap_end >= 0:
                 leap(par, s, bars, events)
             elif s.law >= 0:
-                go_near(par, s, bars, end - s.time, blows, events)
+                go_near(par, s, bars, far, blows, events)
             continue
+        if s.law >= 0:
+            drop_pairs(par, s, bars)
         while s.time + (1 << level) > end:
             level -= 1
         step(par, s, bars, level, blows, events)

@@ -14,19 +14,22 @@ from percussion_model.solvers.modal.pairs import (
     PLOAD,
     PQ,
     PV,
+    SHIFT,
+    YIELDS,
     book_losses,
     book_work,
-    enough_pairs,
+    drop_pairs,
     hold_low,
     law_in,
     leave_out_pairs,
     multiply,
+    shift_pairs,
     sum_of,
     take_modes,
     to_be_taken,
 )
 from percussion_model.solvers.modal.records import Rest
-from percussion_model.solvers.modal.rock_end import QUIET_SHARE, next_mode, note_mode
+from percussion_model.solvers.modal.rock_end import QUIET_SHARE, change_mode, next_mode, note_mode
 
 REST_LOW, REST_TOP, REST_BIT = (int(row) for row in Rest)
 
@@ -65,13 +68,14 @@ def pass_over(par, s, bars, law, over):
     rest = bars.laws.rest[law]
     s.rest_low, s.rest_top = rest[REST_LOW] * s.a_b, rest[REST_TOP] * s.a_b
     s.rest_b = rest[REST_BIT] * s.a_b
-    s.pairs = enough_pairs(par, s, bars)
-    hold_low(s, bars, low)
+    shift_pairs(s, bars, low - s.low)
+    hold_low(s, bars, low, YIELDS if s.form > 0 else SHIFT)
     ends = bars.laws.ends[law]
     s.v_b = sum_of(ends, BIT_SPEED, w, s.pairs) / par.mass_b
     s.i_bit -= par.mass_b * (s.v_b - v_b)
     s.offset += tip - (s.top - s.at_b / par.mass_b)
     s.vibrates = energy - besides(s, bars)
+    leave_out_pairs(par, s, bars)
     s.takes = 0.0
     if law % 2 == 1:
         s.takes = to_be_taken(bars.laws.taken[law], w, PQ, s.pairs)
@@ -86,6 +90,10 @@ def by_energy(s):
 @kernel
 def end_mode(par, s, bars, events):
     """Make the change of mode that the present pairs ask for."""
+    if s.closed == 1:
+        drop_pairs(par, s, bars)
+        change_mode(par, s, bars, events)
+        return
     leave_out_pairs(par, s, bars)
     n, squares = -1, spread(0.0)
     if by_energy(s):

@@ -27,9 +27,9 @@ from percussion_model.solvers.modal.lanes import WIDTH, load, spread, store, tot
 from percussion_model.solvers.modal.records import JOINED
 
 # Modes that have less than this share of the energy of vibration together are left out.
-LEAST_SHARE = 1e-8
+LEAST_SHARE = 1e-10
 # Or where what they could hold of force is below this share of the load.
-LEAST_FORCE = 1e-3
+LEAST_FORCE = 1e-5
 
 
 @merged
@@ -120,7 +120,11 @@ def trim(par, s, bars):
 def settle(par, s, bars, low):
     """Complete a new form: few modes, and the rock end where it was (offset `low`)."""
     refresh_loads(s, bars, s.a_b, s.a_p)
-    if s.form >= JOINED or bars.laws.sizes[2 * s.form] == 0 or (s.form == 0) != (s.mode == Mode.FF):
+    refresh_sums(s, bars)
+    n = bars.forms.sizes[s.form]
+    if bars.forms.stiff[s.form] > 0.0 and s.active == n:
+        bars.w[Q, n - 1] += (low - s.low) / bars.forms.shape[s.form, LOW, n - 1]
+    if bars.laws.sizes[2 * s.form] == 0 or (s.form % JOINED == 0) != (s.mode == Mode.FF):
         trim(par, s, bars)
     refresh_sums(s, bars)
     shift(s, bars, low - s.low)

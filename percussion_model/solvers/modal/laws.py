@@ -66,22 +66,28 @@ def _product(matrix: np.ndarray, row: np.ndarray) -> np.ndarray:
     return out
 
 
-def _ends_of(shape: np.ndarray, pairs: Pairs) -> np.ndarray:
+def _ends_of(shape: np.ndarray, pairs: Pairs, eta: float) -> np.ndarray:
     """Rows of `End` by those of `Shape`."""
     n = shape.shape[1]
     rows = np.zeros((End.ROWS, n))
     offsets, velocities = pairs.out[:, :n], pairs.out[:, n:]
+    bent = offsets + eta * velocities
     for end, part, row in (
         (End.LOW, offsets, Shape.LOW),
         (End.SPEED, velocities, Shape.LOW),
         (End.TOP, offsets, Shape.TOP),
         (End.BIT, offsets, Shape.BIT),
         (End.BIT_SPEED, velocities, Shape.BIT),
+        (End.PISTON, offsets, Shape.PISTON),
+        (End.PISTON_SPEED, velocities, Shape.PISTON),
+        (End.PULL, -bent * shape[Shape.STIFF], Shape.PISTON),
     ):
         by = _product(part, shape[row])
         rows[end], rows[end + 1] = by[:n], by[n:]
-    shift = _product(pairs.into[:n].T, shape[Shape.BIT])
+    shift = _product(pairs.into[:n].T, shape[Shape.BIT] + shape[Shape.PISTON])
     rows[End.SHIFT], rows[End.SHIFT + 1] = shift[:n], shift[n:]
+    alone = pairs.into[n - 1] / shape[Shape.LOW, n - 1]
+    rows[End.YIELD], rows[End.YIELD + 1] = alone[:n], alone[n:]
     rows[End.SQUARE] = pairs.square
     return rows
 
@@ -114,26 +120,20 @@ def _go(square, decay, h):
 
 
 @kernel
-def _view(square, decay, ends, h):
-    """What a pair tells of the rock end after `h`: offset by Q and V, velocity by both."""
+def _view(square, decay, one, other, h):
+    """What a pair tells after `h`, by Q and V, of what two rows tell now by Q and V."""
     qq, qv, vq, vv = _go(square, decay, h)
-    low, low_v, speed, speed_v = (
-        ends[End.LOW],
-        ends[End.LOW + 1],
-        ends[End.SPEED],
-        ends[End.SPEED + 1],
-    )
     return (
-        low * qq + low_v * vq,
-        low * qv + low_v * vv,
-        speed * qq + speed_v * vq,
-        speed * qv + speed_v * vv,
+        one[0] * qq + one[1] * vq,
+        one[0] * qv + one[1] * vv,
+        other[0] * qq + other[1] * vq,
+        other[0] * qv + other[1] * vv,
     )
 
 
 @kernel
-def _fill_goes(square, decay, tick, ends, move, views, scans):
-    """Fill the tables of moves and of what is seen ahead of a law."""
+def _fill_goes(square, decay, tick, move):
+    """Fill the table of moves of a law."""
     for k in range(len(square)):
         for level in range(move.shape[0]):
             h = tick * 2.0**level
@@ -142,14 +142,28 @@ def _fill_goes(square, decay, tick, ends, move, views, scans):
                 move[level, row, k] = go[row]
             if square[k] == 0.0:
                 move[level, Go.YIELD, k] = 0.5 * h * h
+
+
+@kernel
+def _fill_views(square, decay, tick, ends, views):
+    """Fill the table of what a law's pairs tell of the rock end later."""
+    for k in range(len(square)):
+        low, speed = ends[End.LOW : End.LOW + 2, k], ends[End.SPEED : End.SPEED + 2, k]
         for level in range(views.shape[0]):
-            view = _view(square[k], decay[k], ends[:, k], tick * 2.0**level)
+            view = _view(square[k], decay[k], low, speed, tick * 2.0**level)
             for row in range(4):
                 views[level, row, k] = view[row]
+
+
+@kernel
+def _fill_scans(square, decay, tick, ends, one, other, scans):
+    """Fill a table of what two of a law's rows tell at the next looks."""
+    for k in range(len(square)):
+        first, second = ends[one : one + 2, k], ends[other : other + 2, k]
         for hop in range(scans.shape[0]):
             for look in range(SCAN):
                 h = tick * 2.0 ** (STEP + hop) * (look + 1)
-                view = _view(square[k], decay[k], ends[:, k], h)
+                view = _view(square[k], decay[k], first, second, h)
                 for row in range(4):
                     scans[hop, 4 * k + row, look] = view[row]
 
@@ -157,6 +171,21 @@ def _fill_goes(square, decay, tick, ends, move, views, scans):
 def _rest(shape: np.ndarray) -> np.ndarray:
     """Offsets of the modes where loads hold them that accelerate a free bit by 1 m/s2 [m]."""
     return np.asarray(shape[Shape.SOFT] * shape[Shape.BIT])
+
+
+def _put(room: np.ndarray, table: np.ndarray) -> None:
+    """Put a table into room for as many numbers, or more, in each of its four quarters."""
+    n, most = len(table) // 2, len(room) // 2
+    for row in range(2):
+        for column in range(2):
+            quarter = table[row * n : (row + 1) * n, column * n : (column + 1) * n]
+            room[row * most : row * most + n, column * most : column * most + n] = quarter
+
+
+def _got(room: np.ndarray, n: int) -> np.ndarray:
+    """A table as it was put there."""
+    most = len(room) // 2
+    return np.ascontiguousarray(room.reshape(2, most, 2, most)[:, :n, :, :n].reshape(2 * n, 2 * n))
 
 
 class _Over(NamedTuple):
@@ -181,11 +210,12 @@ def _over(forms: Forms, sizes: np.ndarray, out: np.ndarray, into: np.ndarray) ->
             change = forms.change[form, then, :n, :n] if form != then else np.eye(n)
             rest = _product(change.T, _rest(forms.shape[form, :, :n]))
             rest -= _rest(forms.shape[then, :, :n])
-            rows = out[one] if form else np.eye(2 * n)
+            rows = _got(out[one], n) if form else np.eye(2 * n)
             table = np.hstack([_matrix(rows[:, :n], change), _matrix(rows[:, n:], change)])
             push = np.append(rest, np.zeros(n))
             if then:
-                table, push = _matrix(table, into[other]), _product(into[other].T, push)
+                back = _got(into[other], n)
+                table, push = _matrix(table, back), _product(back.T, push)
             way[one, other] = len(found)
             found.append(table)
             pushed.append(push.reshape(2, n))
@@ -207,35 +237,44 @@ def laws_of(forms: Forms, dashpot: float, eta: float, tick: float) -> Laws:
     eta, tick : float
         Kelvin-Voigt time and unit of time [s].
     """
-    n = int(forms.sizes[0])
-    count = 2 * JOINED
+    alone, most = int(forms.sizes[0]), int(forms.sizes.max())
+    most = most if most <= MOST_PAIRS else alone if alone <= MOST_PAIRS else 0
+    count = 4 * JOINED
     sizes, dashpots = np.zeros(count, np.int64), np.zeros(count)
-    move, ends = np.zeros((count, LEVELS, len(Go), n)), np.zeros((count, End.ROWS, n))
-    views = np.zeros((count, LONGEST_HOP + 1, len(View), n))
-    scans = np.zeros((count, LONGEST_HOP - STEP + 1, n * len(View), SCAN))
-    rest = np.zeros((count, len(Rest)))
-    out, into, taken = (np.zeros((count, 2 * n, 2 * n)) for _ in range(3))
+    move, ends = np.zeros((count, LEVELS, len(Go), most)), np.zeros((count, End.ROWS, most))
+    out, into, taken = (np.zeros((count, 2 * most, 2 * most)) for _ in range(3))
+    views = np.zeros((2 * JOINED, LONGEST_HOP + 1, len(View), alone))
+    scans, sides = np.zeros((2, count, LONGEST_HOP - STEP + 1, most * len(View), SCAN))
+    rest = np.zeros((2 * JOINED, len(Rest)))
     for law in range(count):
         form, damped = law // 2, law % 2 == 1
-        held = float(forms.stiff[form])
-        if not forms.sizes[form] or n > MOST_PAIRS or (damped and (form == 0 or dashpot == 0.0)):
+        n, held = int(forms.sizes[form]), float(forms.stiff[form])
+        if not 0 < n <= most or (damped and (held == 0.0 or dashpot == 0.0)):
             continue
-        shape = forms.shape[form, :, :n]
-        stiff = np.ascontiguousarray(shape[Shape.STIFF])
-        if form == 0:
+        shape = np.ascontiguousarray(forms.shape[form, :, :n])
+        stiff = shape[Shape.STIFF]
+        if held == 0.0:
             unit = np.eye(2 * n)
             pairs = Pairs(stiff, eta * stiff, unit, unit, 0.0 * unit)
         else:
             c = (dashpot if damped else 0.0) - eta * held
-            low = np.ascontiguousarray(shape[Shape.LOW])
-            found = damped_pairs(np.sqrt(stiff), low, eta, c)
+            found = damped_pairs(np.sqrt(stiff), shape[Shape.LOW], eta, c)
             if found is None:
                 continue
             pairs = found
-            out[law], into[law], taken[law] = pairs.out, pairs.into, _folded(pairs.taken)
+            _put(out[law], pairs.out)
+            _put(into[law], pairs.into)
+            _put(taken[law], _folded(pairs.taken))
         sizes[law], dashpots[law] = n, dashpot if damped else 0.0
-        ends[law] = _ends_of(shape, pairs)
-        rest[law] = _product(shape[[Shape.LOW, Shape.TOP, Shape.BIT]], _rest(shape))
-        _fill_goes(pairs.square, pairs.decay, tick, ends[law], move[law], views[law], scans[law])
+        own = _ends_of(shape, pairs, eta)
+        ends[law, :, :n] = own
+        _fill_goes(pairs.square, pairs.decay, tick, move[law])
+        if law < 2 * JOINED:
+            rest[law] = _product(shape[[Shape.LOW, Shape.TOP, Shape.BIT]], _rest(shape))
+            _fill_views(pairs.square, pairs.decay, tick, own, views[law])
+        of_pairs = pairs.square, pairs.decay, tick, own
+        _fill_scans(*of_pairs, int(End.LOW), int(End.SPEED), scans[law])
+        other = End.TOP if law < 2 * JOINED else End.PULL
+        _fill_scans(*of_pairs, int(other), int(End.PISTON_SPEED), sides[law])
     over = _over(forms, sizes, out, into)
-    return Laws(sizes, dashpots, rest, move, ends, views, scans, out, into, taken, *over)
+    return Laws(sizes, dashpots, move, ends, out, into, taken, rest, views, scans, sides, *over)

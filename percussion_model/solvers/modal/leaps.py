@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import math
-
-import numpy as np
+from typing import NamedTuple
 
 from percussion_model.physics.blows import push_checkpoint
 from percussion_model.physics.kernel import kernel, merged
-from percussion_model.physics.records import Mode, RockKind
+from percussion_model.physics.records import DriveKind, Mode, RockKind
 from percussion_model.solvers.modal.change import end_mode
 from percussion_model.solvers.modal.near import book_way, present_look, ready, watch_barrier
 from percussion_model.solvers.modal.pairs import AT, PQ, drop_tiny, keep
 from percussion_model.solvers.modal.piston import (
+    RINGING,
     WHOLE,
     at_rest,
     has_piston,
@@ -20,10 +20,9 @@ from percussion_model.solvers.modal.piston import (
     quiet_time,
     time_of,
 )
-from percussion_model.solvers.modal.search import search
+from percussion_model.solvers.modal.records import KEPT
+from percussion_model.solvers.modal.search import beside_of, search
 
-# Rows of `Bars.rows` that keep pairs.
-KEPT = np.int64(4)
 # Most ticks of a leap.
 LONGEST = 65535 * WHOLE
 # In a longer one modes may die away altogether.
@@ -32,27 +31,57 @@ LONG = 512 * WHOLE
 FEWEST = 4 * WHOLE
 
 
+class Far(NamedTuple):
+    """Ticks in which nothing can come from the piston."""
+
+    meet: int  # before it can meet the bit
+    turn: int  # before the drive can turn
+
+
+@merged
+def far_touching(par, s):
+    """As `far_ticks` of a piston that touches the bit."""
+    age = s.time - s.closed_at
+    if age < RINGING * WHOLE or age * par.tick < RINGING * par.window:
+        return Far(0, 0)
+    if par.drive != DriveKind.PRESSURE:
+        return Far(0, LONGEST)
+    speed = 1.0 / math.sqrt(par.mass_p) + 1.0 / math.sqrt(par.mass_b)
+    speed *= math.sqrt(max(0.0, 2.0 * s.vibrates))
+    room = -s.u_r if s.alpha > 0 else s.reversal + s.u_r
+    return Far(0, int(min(max(room, 0.0) / (speed * par.tick + 1e-300), LONGEST)))
+
+
 @merged
 def far_ticks(par, s, bars):
     """Ticks for which the piston can neither meet the bit nor turn the drive."""
     if not has_piston(par):
-        return LONGEST
+        return Far(LONGEST, LONGEST)
+    if s.closed == 1:
+        return far_touching(par, s)
     if s.parked == 0:
-        return 0
+        return Far(0, 0)
     size, held = math.sqrt(max(0.0, 2.0 * s.vibrates)), bars.forms.stiff[s.form]
     spread = par.bound_t * size + abs(s.offset)
     if held == 0.0:
-        time = quiet_time(par, s, s.v_b, s.a_b, spread, 0.0)
+        meet, turn = quiet_time(par, s, s.v_b, s.a_b, spread, 0.0)
     else:
         mean = size * (1.0 / math.sqrt(held) + par.bound_b)
         off = 2.0 * mean + abs(s.low - s.rest_low)
-        time = quiet_time(par, s, 0.0, 0.0, spread, off)
-    return int(min(time / par.tick - 1.0, LONGEST))
+        meet, turn = quiet_time(par, s, 0.0, 0.0, spread, off)
+    return Far(
+        int(min(meet / par.tick - 1.0, LONGEST)), int(min(turn / par.tick - 1.0, LONGEST))
+    )  # fmt: skip
 
 
 @kernel
 def plan(par, s, bars, law, most, events):
     """Decide where the bit leaps to next: s.leap_end, or -1 where the piston is near.
+
+    Returns
+    -------
+    int
+        Ticks that it may go at most.
 
     Parameters
     ----------
@@ -61,44 +90,56 @@ def plan(par, s, bars, law, most, events):
     most : int
         Ticks that it may go at most.
     """
-    if has_piston(par) and s.parked == 0 and s.time >= s.no_park:
+    if has_piston(par) and s.parked == 0 and s.closed == 0 and s.time >= s.no_park:
         park(par, s, bars)
     ready(par, s, bars, law)
     if s.mode == Mode.SS and s.alert == 1 and par.rock == RockKind.BILINEAR:
-        watch_barrier(par, s, bars, law, events)
+        most = watch_barrier(par, s, bars, most, events)
         if s.law < 0:
-            return
-        if s.alert == 1:
-            most = min(most, WHOLE)
+            return most
     most = at_rest(s, most)
     far = far_ticks(par, s, bars)
-    if far < FEWEST:
-        return
-    found = search(par, s, bars, min(most, far))
+    ahead = min(most, far.turn)
+    if far.meet >= FEWEST:
+        ahead = min(ahead, far.meet)
+    elif ahead < FEWEST or (s.parked == 0 and s.closed == 0):
+        return most
+    found = search(par, s, bars, ahead, beside_of(par, s, bars, far.meet < FEWEST))
+    s.count_steps += found.looks
+    if found.ticks == 0:
+        return min(most, FEWEST)
     s.leap_end = s.time + found.ticks
     s.leap_ends = 1 if found.ends else 0
-    s.leap_peak = found.peak
-    s.count_steps += found.looks
+    s.leap_peak, s.leap_contact = found.peak, found.contact
+    s.leap_time, s.leap_impulse = found.window, found.impulse
     s.count_leaps += found.leaps
+    return most
 
 
 @kernel
-def late_peak(par, s, bars, ticks):
-    """Greatest force of a leap about to be made after s.peak_from, which lies within it [N]."""
+def late_peaks(par, s, bars, ticks):
+    """Note the greatest forces of a leap about to be made after s.peak_from, which lies within."""
     keep(bars.w, AT, bars.rows, KEPT, s.pairs)
-    late = search(par, s, bars, ticks).late
+    far = far_ticks(par, s, bars)
+    found = search(par, s, bars, ticks, beside_of(par, s, bars, far.meet < FEWEST))
     keep(bars.rows, KEPT, bars.w, AT, s.pairs)
-    return late
+    if s.mode != Mode.FF:
+        s.peak_bit_force = max(s.peak_bit_force, found.late)
+    s.peak_contact_force = max(s.peak_contact_force, found.late_contact)
 
 
 @merged
 def note_peaks(par, s, bars, ticks):
     """Note the greatest forces of a leap about to be made."""
+    if s.mode == Mode.FF:
+        s.leap_peak = 0.0
     s.b_peak_bit = max(s.b_peak_bit, s.leap_peak)
+    s.b_peak_contact = max(s.b_peak_contact, s.leap_contact)
     if time_of(par, s) >= s.peak_from:
         s.peak_bit_force = max(s.peak_bit_force, s.leap_peak)
+        s.peak_contact_force = max(s.peak_contact_force, s.leap_contact)
     elif time_of(par, s) + ticks * par.tick > s.peak_from:
-        s.peak_bit_force = max(s.peak_bit_force, late_peak(par, s, bars, ticks))
+        late_peaks(par, s, bars, ticks)
 
 
 @kernel
@@ -106,14 +147,18 @@ def leap(par, s, bars, events):
     """Carry bit and mean motion of the piston to s.leap_end in one go."""
     ticks, ends = s.leap_end - s.time, s.leap_ends == 1
     s.leap_end = -1
-    if s.mode != Mode.FF:
+    if s.mode != Mode.FF or s.closed == 1:
         note_peaks(par, s, bars, ticks)
     if s.mode == Mode.SS:
         push_checkpoint(s, time_of(par, s))
     keep(bars.w, AT, bars.w, PQ, s.pairs)
     if ticks > LONG:
         drop_tiny(s, bars)
+    v_p = s.v_p
     book_way(par, s, bars, ticks, present_look(par, s, bars))
+    if s.closed == 1:
+        s.i_contact += par.mass_p * (ticks * par.tick * s.a_p - (s.v_p - v_p))
+        s.peak_time, s.peak_impulse = s.leap_time, s.leap_impulse
     if s.mode == Mode.SS:
         push_checkpoint(s, time_of(par, s))
     if ends:

@@ -24,6 +24,8 @@ from percussion_model.scene.bars import (
 
 # Halvings of the interval in which a root lies: more than a number has digits.
 HALVINGS = 70
+# What left-out modes yield has to be above this share of what the spring yields to have digits.
+LEAST_YIELD = 1e-9
 # Below this argument sin(x) / x is its series.
 SMALL = 1e-4
 
@@ -35,8 +37,12 @@ class Modes(NamedTuple):
     ----------
     frequency : ndarray, shape (n,)
         Angular, without loss [rad/s]; 0 first where nothing holds the bar.
+    wave : ndarray, shape (n,)
+        The same of the wave in each row of `size` and `phase`.
     size, phase : ndarray, shape (n, sections)
         Amplitude [1/kg^0.5] in each section, and phase at its top.
+    last : ndarray, shape (n,)
+        The last shape is the sum of all waves, so much of each.
     impedance, transit, mass : ndarray, shape (sections,)
         Of the sections [N s/m, s, kg].
     top_mass : float
@@ -44,8 +50,10 @@ class Modes(NamedTuple):
     """
 
     frequency: np.ndarray
+    wave: np.ndarray
     size: np.ndarray
     phase: np.ndarray
+    last: np.ndarray
     impedance: np.ndarray
     transit: np.ndarray
     mass: np.ndarray
@@ -53,16 +61,46 @@ class Modes(NamedTuple):
 
     def above(self, section: int) -> np.ndarray:
         """Shape at the top of a section."""
-        shape: np.ndarray = self.size[:, section] * np.cos(self.phase[:, section])
-        return shape
+        return self.summed(self.size[:, section] * np.cos(self.phase[:, section]))
 
     @property
     def low(self) -> np.ndarray:
         """Shape at the low end."""
-        shape: np.ndarray = self.size[:, -1] * np.cos(
-            self.phase[:, -1] + self.frequency * self.transit[-1]
+        return self.summed(
+            self.size[:, -1] * np.cos(self.phase[:, -1] + self.wave * self.transit[-1])
         )
-        return shape
+
+    def summed(self, rows: np.ndarray) -> np.ndarray:
+        """What belongs to each shape, by what belongs to each wave (first axis)."""
+        out = rows.copy()
+        _sum_last(rows.reshape(len(rows), -1), self.last, out.reshape(len(rows), -1))
+        return out
+
+
+@kernel
+def _sum_last(rows, last, out):
+    """Sum of rows, so much of each, into the last one, in an order of its own."""
+    for j in range(rows.shape[1]):
+        total = 0.0
+        for k in range(len(last)):
+            total += last[k] * rows[k, j]
+        out[-1, j] = total
+
+
+@kernel
+def _inertia(mass, transit, top_mass, wave, size, phase, last, nodes, weights):
+    """Modal mass of the sum of all waves, so much of each."""
+    total = 0.0
+    for i in range(len(transit)):
+        for at in range(-1 if i == 0 else 0, len(nodes)):
+            share = 0.5 * (1.0 + nodes[at]) if at >= 0 else 0.0
+            offset = 0.0
+            for k in range(len(wave)):
+                angle = phase[k, i] + wave[k] * transit[i] * share
+                offset += last[k] * size[k, i] * math.cos(angle)
+            weight = 0.5 * weights[at] * mass[i] if at >= 0 else top_mass
+            total += weight * offset * offset
+    return total
 
 
 @kernel
@@ -146,8 +184,42 @@ def bar_modes(
     numbers = np.ascontiguousarray(np.array(rows).T)
     frequency, (size, phase) = np.zeros(count), np.zeros((2, count, len(rows)))
     _find_modes(*numbers, float(top_mass), float(spring), frequency, size, phase)
+    last = np.zeros(count)
+    last[-1] = 1.0
     impedance, transit, mass = numbers
-    return Modes(frequency, size, phase, impedance, transit, mass, top_mass)
+    return Modes(frequency, frequency, size, phase, last, impedance, transit, mass, top_mass)
+
+
+def with_residual(modes: Modes, spring: float) -> Modes:
+    """Return the modes of a bar on a spring with what those left out yield in place of the last.
+
+    A constant force at the low end moves such a bar as a whole, by 1 / K. Less what the other
+    modes have of that, this is a shape orthogonal to them, in mass and in stiffness: with it
+    the low end yields as that of the whole bar (a residual vector of structural dynamics).
+
+    Parameters
+    ----------
+    modes : Modes
+        As `bar_modes` finds them.
+    spring : float
+        Stiffness under the low end [N/m].
+    """
+    n = len(modes.frequency) - 1
+    kept, low = modes.frequency[:n], modes.low[:n]
+    yields = math.fsum([1.0, *(-spring * (low / kept) ** 2).tolist()]) / spring
+    if not yields > LEAST_YIELD / spring:
+        return modes
+    frequency, wave, size, phase = (part.copy() for part in modes[:4])
+    wave[n], size[n], phase[n] = 0.0, 1.0, 0.0
+    last = np.append(-low / kept**2, 1.0 / spring)
+    # by quadrature: as a difference of squares it would lose its digits
+    nodes, weights = np.polynomial.legendre.leggauss(2 * n + 20)
+    inertia = _inertia(
+        modes.mass, modes.transit, modes.top_mass, wave, size, phase, last, nodes, weights
+    )
+    frequency[n] = math.sqrt(yields / inertia)
+    last /= math.sqrt(inertia)
+    return modes._replace(frequency=frequency, wave=wave, size=size, phase=phase, last=last)
 
 
 def count_below(sections: np.ndarray, highest: float) -> int:
@@ -193,14 +265,15 @@ def products(one: Modes, first: int, other: Modes, second: int, count: int) -> n
     _fill_products(
         np.ascontiguousarray(one.mass[mine]),
         np.ascontiguousarray(one.transit[mine]),
-        one.frequency,
+        one.wave,
         np.ascontiguousarray(one.size[:, mine]),
         np.ascontiguousarray(one.phase[:, mine]),
-        other.frequency,
+        other.wave,
         np.ascontiguousarray(other.size[:, theirs]),
         np.ascontiguousarray(other.phase[:, theirs]),
         out,
     )
+    out = other.summed(np.ascontiguousarray(one.summed(out).T)).T
     if first == second == 0 and one.top_mass and other.top_mass:
         out += one.top_mass * np.outer(one.above(0), other.above(0))
     return out
@@ -211,6 +284,8 @@ def totals(modes: Modes, first: int, count: int) -> np.ndarray:
     sections = len(modes.mass)
     rigid = modes._replace(
         frequency=np.zeros(1),
+        wave=np.zeros(1),
+        last=np.ones(1),
         size=np.ones((1, sections)),
         phase=np.zeros((1, sections)),
         top_mass=0.0,
@@ -237,6 +312,7 @@ def shapes_at(
         Down positive [1/kg^0.5], compression positive [N/(m kg^0.5)].
     """
     size = modes.size[:, section].T
-    phase = modes.phase[:, section].T + np.outer(modes.transit[section] * share, modes.frequency)
+    phase = modes.phase[:, section].T + np.outer(modes.transit[section] * share, modes.wave)
     impedance = modes.impedance[section][:, None]
-    return size * np.cos(phase), impedance * modes.frequency * size * np.sin(phase)
+    offset, force = size * np.cos(phase), impedance * modes.wave * size * np.sin(phase)
+    return modes.summed(offset.T).T, modes.summed(force.T).T

@@ -1,4 +1,4 @@
-"""A bit alone beside a piston that is near: looks at both of its ends, up to the next event.
+"""A bit beside a piston that is near or touches it: looks at both ends, up to the next event.
 
 What the bodies did is booked once for all looks, and for leaps alike (docs/modal.md, section 4).
 """
@@ -16,7 +16,7 @@ from percussion_model.physics.body import (
 )
 from percussion_model.physics.drive import drive_force, switch_drive
 from percussion_model.physics.kernel import inlined, kernel, merged
-from percussion_model.physics.records import Mode, Piston, RockKind
+from percussion_model.physics.records import Mode, Piston
 from percussion_model.physics.rock import (
     crush,
     damping,
@@ -26,10 +26,18 @@ from percussion_model.physics.rock import (
     stiffness,
 )
 from percussion_model.physics.state import CHECKPOINTS
-from percussion_model.solvers.modal.bar import end_after, move_free
+from percussion_model.solvers.modal.bar import end_after, kinetic_of, move_free
+from percussion_model.solvers.modal.between import (
+    End,
+    late_peak,
+    squared_between,
+    top_between,
+    turns_between,
+)
 from percussion_model.solvers.modal.change import end_mode
 from percussion_model.solvers.modal.forms import refresh_loads
 from percussion_model.solvers.modal.pairs import (
+    AT,
     BIT_SPEED,
     FIRST_STRIDE,
     PQ,
@@ -37,17 +45,22 @@ from percussion_model.solvers.modal.pairs import (
     ahead_of,
     drop_pairs,
     energy_about_rest,
+    keep,
     keep_ahead,
     leave_out_pairs,
+    move_pairs,
     present_sums,
     spell_out,
     sum_of,
     take_pairs,
     to_be_taken,
+    touch_of,
 )
 from percussion_model.solvers.modal.piston import (
+    RINGING,
     WHOLE,
     at_rest,
+    book_contact,
     flip_contact,
     has_piston,
     switches,
@@ -55,6 +68,7 @@ from percussion_model.solvers.modal.piston import (
     unpark,
 )
 from percussion_model.solvers.modal.records import (
+    KEPT,
     LONGEST_STRIDE,
     STEP,
     View,
@@ -62,14 +76,22 @@ from percussion_model.solvers.modal.records import (
 from percussion_model.solvers.modal.rock_end import (
     QUIET_SHARE,
     end_standstill,
-    late_force,
     passed,
 )
-from percussion_model.solvers.modal.search import UNSURE, moving
+from percussion_model.solvers.modal.search import (
+    SAME_SIDE,
+    UNSURE,
+    beyond,
+    level_below,
+    moving,
+)
 
 # Steps after which the running force of a standstill is noted.
 CHECKPOINT = 64
 
+# What a look may pass: piston and bit meet or part, the drive turns, the mode of the rock ends, so
+# also by the work of its dashpot; or nothing at the look, but the rock end turned back before.
+MEETS, TURNS, ENDS, WORK, BACK = range(5)
 LOW_Q, LOW_V, SPEED_Q, SPEED_V = (int(row) for row in View)
 
 
@@ -81,18 +103,63 @@ class Look(NamedTuple):
     force: float  # of the rock [N]
     u_r: float  # relative displacement [m]
     low_p: float  # offset of the free piston's low end [m]
-    gap: float  # between the ends, or as far as a waiting piston's may be apart [m]
+    gap: float  # between the ends, or as far as a waiting piston's may be apart [m]; of
+    # a piston that touches: force between them [N]
+    at_p: float  # of a piston that touches: integral of its offset over its mass [kg m]
+    v_p: float  # mean velocity [m/s]
+    contact: float  # mean force on the bit since the look before [N]
+    flips: bool  # whether piston and bit have met, or have parted
 
 
 @inlined
-def look_at(par, s, bars, level, ticks):
-    """Look 2^level ticks ahead of pairs that are `ticks` after the state."""
+def end_of(look):
+    """The rock end at a look."""
+    return End(look.p, look.sums.speed, look.force)
+
+
+@inlined
+def first_look(s):
+    """The present state."""
+    sums = Sums(s.low, s.v_low, s.top, s.at_b)
+    return Look(
+        sums, s.p, s.f_rock, s.u_r, s.low_p, s.gap, s.at_p, s.v_p, s.f_contact, False
+    )  # fmt: skip
+
+
+@inlined
+def touching(par, s, bars, ticks, h, v_p):
+    """What a piston that touches the bit does at a look, `h` after one at which it had `v_p`.
+
+    Returns
+    -------
+    at_p, v_p, contact, touch : float
+        As in `Look`, and the force at that time [N].
+    parts : bool
+        Whether the bit would have to pull it.
+    """
+    found = touch_of(s, bars, bars.rows, 0)
+    then = found.speed / par.mass_p
+    contact = par.mass_p * (s.a_p + (v_p - then) / h)
+    age = s.time + ticks - s.closed_at
+    touch = contact if age < RINGING * WHOLE else par.mass_p * s.a_p - found.pull
+    # not at once
+    parts = touch < 0.0 and (age > 0 or h > par.tick)
+    return found.piston, then, contact, touch, parts
+
+
+@inlined
+def look_at(par, s, bars, level, ticks, before):
+    """Look 2^level ticks ahead of pairs that are `ticks` after the state, and look `before`."""
     sums = ahead_of(s, bars, level)
     p = s.p + (sums.low - s.low)
     force = stiffness(s) * (p - origin(s)) + damping(s) * sums.speed
     way_b = (sums.bit - s.at_b) / par.mass_b
-    u_r, low_p, gap = s.u_r - way_b, 0.0, 0.0
-    if has_piston(par):
+    u_r, low_p, gap, at_p, v_p, contact, flips = s.u_r - way_b, 0.0, 0.0, 0.0, 0.0, 0.0, False
+    if s.closed == 1:
+        h = par.tick * (1 << level)
+        at_p, v_p, contact, gap, flips = touching(par, s, bars, ticks, h, before.v_p)
+        u_r += (at_p - s.at_p) / par.mass_p
+    elif has_piston(par):
         time = par.tick * (ticks + (1 << level))
         way_p = time * (s.v_p + 0.5 * time * s.a_p)
         u_r += way_p
@@ -102,7 +169,21 @@ def look_at(par, s, bars, level, ticks):
             low_p = end_after(bars.wp, bars.shape_p, bars.move_p[level], bars.wp.shape[1])
         top = s.u_b + way_b + (sums.top - sums.bit / par.mass_b) + s.offset
         gap = top - (s.u_p + way_p + low_p)
-    return Look(sums, p, force, u_r, low_p, gap)
+        flips = gap < 0.0
+    return Look(sums, p, force, u_r, low_p, gap, at_p, v_p, contact, flips)
+
+
+@kernel
+def book_touch(par, s, h, look):
+    """Book what a piston that touches the bit does for `h`."""
+    push, way = drive_force(par, s), (look.at_p - s.at_p) / par.mass_p
+    book_piston_load(par, s, push, way, push * h)
+    if s.mode != Mode.FF:
+        s.i_bit += par.mass_p * (h * s.a_p - (look.v_p - s.v_p))
+    s.u_p += way
+    s.v_p, s.at_p, s.f_contact = look.v_p, look.at_p, look.contact
+    s.u_r = s.u_p - s.u_b
+    s.b_stroke = max(s.b_stroke, -s.u_r)
 
 
 @kernel
@@ -141,7 +222,9 @@ def book_way(par, s, bars, ticks, look):
         s.i_bit += par.mass_b * (h * s.a_b - (s.v_b - v_b))
         s.rock_work += 0.5 * stiffness(s) * (s.p - p) * (s.p + p - 2.0 * origin(s))
         crush(par, s, p)
-    if has_piston(par):
+    if s.closed == 1:
+        book_touch(par, s, h, look)
+    elif has_piston(par):
         book_flight(par, s, h, v_b, look)
     s.time += ticks
     s.stride = min(2 * s.stride, LONGEST_STRIDE)
@@ -157,8 +240,9 @@ def take_loads(par, s, bars):
     push = drive_force(par, s)
     a_p = piston_acceleration(par, push) if has_piston(par) else 0.0
     a_b = bit_acceleration(par, s)
-    if s.law >= 0 and a_b != s.a_b:
+    if s.law >= 0 and (a_b != s.a_b or (s.closed == 1 and a_p != s.a_p)):
         drop_pairs(par, s, bars)
+        s.alert = 1
     if s.law < 0:
         refresh_loads(s, bars, a_b, a_p)
     s.a_b, s.a_p = a_b, a_p
@@ -175,64 +259,136 @@ def ready(par, s, bars, law):
 
 
 @kernel
-def watch_barrier(par, s, bars, law, events):
-    """Leave standstill where the bit's energy passes the barrier."""
+def kinetic_at(s, bars, x, first):
+    """Kinetic energy of a bit alone, by pairs in two rows of `x` [J]."""
+    return kinetic_of(bars.rows, spell_out(s, bars, x, first))
+
+
+@kernel
+def watch_barrier(par, s, bars, most, events):
+    """Leave standstill where the kinetic energy of the bit passes the barrier.
+
+    Returns
+    -------
+    int
+        Ticks that the bit may go, `most` at most, before it is to be watched again; within a step
+        up to the tick in which the barrier is passed.
+    """
     energy = energy_about_rest(s, bars, spell_out(s, bars, bars.w, PQ))
     s.alert = 1 if energy > QUIET_SHARE * s.w_r else 0
-    if s.alert == 1 and overcomes_barrier(par, s, energy):
-        # of which the kinetic part alone counts
+    if s.alert == 0:
+        return most
+    most = min(most, WHOLE)
+    if not overcomes_barrier(par, s, energy):
+        return most
+    if overcomes_barrier(par, s, kinetic_of(bars.rows, bars.laws.sizes[s.law])):
         drop_pairs(par, s, bars)
         end_standstill(par, s, bars, events)
-        if s.mode == Mode.SS:
-            take_pairs(par, s, bars, law)
+        return most
+    ticks, level = 0, level_below(most)
+    keep(bars.w, PQ, bars.w, AT, s.pairs)
+    while level >= 0:
+        go = 1 << level
+        if ticks + go <= most:
+            keep(bars.w, AT, bars.rows, KEPT, s.pairs)
+            move_pairs(s, bars, bars.w, AT, level)
+            if overcomes_barrier(par, s, kinetic_at(s, bars, bars.w, AT)):
+                most = ticks + go
+                keep(bars.rows, KEPT, bars.w, AT, s.pairs)
+            else:
+                ticks += go
+                if ticks == most:
+                    break
+        level -= 1
+    return most
 
 
 @merged
 def present_look(par, s, bars):
-    """Where a bit alone is now."""
+    """Where bars are now."""
     sums = present_sums(s, bars)
     p = s.p + (sums.low - s.low)
     force = stiffness(s) * (p - origin(s)) + damping(s) * sums.speed
-    return Look(sums, p, force, 0.0, 0.0, 0.0)
+    at_p = v_p = contact = 0.0
+    if s.closed == 1:
+        found = touch_of(s, bars, bars.w, PQ)
+        at_p, v_p, contact = found.piston, found.speed / par.mass_p, -found.pull
+        contact += par.mass_p * s.a_p
+    return Look(sums, p, force, 0.0, 0.0, 0.0, at_p, v_p, contact, False)
+
+
+@inlined
+def kind_of(s, meets, turns, ends, work):
+    """What a look has passed."""
+    if meets:
+        return MEETS
+    if turns:
+        return TURNS
+    if not ends:
+        return BACK
+    return WORK if s.mode == Mode.DFC and s.w + work >= s.w_r else ENDS
+
+
+@inlined
+def room_at(s, kind, look, work):
+    """How far a look is before what is passed, in any unit; 0 where that is not known."""
+    if kind == MEETS:
+        return look.gap
+    if kind == TURNS:
+        return -look.u_r if s.alpha > 0 else look.u_r + s.reversal
+    if kind == ENDS:
+        return -beyond(s, end_of(look))
+    return s.w_r - s.w - work if kind == WORK else 0.0
+
+
+@inlined
+def share_before(low, high):
+    """Share of an interval before what is passed in it, by a straight line."""
+    return low / (low - high) if low > 0.0 > high else 0.5
 
 
 @kernel
 def go_near(par, s, bars, most, blows, events):
     """Go on by looks at both ends of the bit, `most` ticks at most, or to the next event."""
-    if s.mode == Mode.SS and s.alert == 1 and par.rock == RockKind.BILINEAR:
-        most = min(most, WHOLE)
     most = at_rest(s, most)
     usual = moving(s, bars, bars.w, PQ).level
     if has_piston(par) and s.parked == 0:
         # which vibrates as well
-        usual = min(usual, STEP + 1)
+        usual = min(usual, STEP + 2)
     level, ticks, known = usual, 0, -1
-    last = Look(Sums(s.low, s.v_low, s.top, s.at_b), s.p, s.f_rock, s.u_r, s.low_p, s.gap)
+    last = first_look(s)
     C, taken, sampled, u_before = damping(s), 0.0, 0.0, s.u_r
     cutting, piston = s.mode == Mode.DFC, has_piston(par)
-    if cutting:
+    if cutting and s.stride > FIRST_STRIDE:
         taken = C * (s.takes - to_be_taken(bars.laws.taken[s.law], bars.w, PQ, s.pairs))
     meets = ends = turns = False
+    kind, high, same, goal = ENDS, 0.0, 0, 0.0
     while ticks < most:
         while ticks + (1 << level) > most:
             level -= 1
-        look = look_at(par, s, bars, level, ticks)
+        look = look_at(par, s, bars, level, ticks, last)
         work, share = 0.0, 0.0
         if cutting:
-            speed, earlier = look.sums.speed, last.sums.speed
-            share = 0.5 * C * (speed * speed + earlier * earlier) * (par.tick * (1 << level))
-            work = taken
-            if s.w + taken + UNSURE * (sampled + share) >= s.w_r:
-                left = to_be_taken(bars.laws.taken[s.law], bars.rows, 0, s.pairs)
-                work = C * (s.takes - left)
-        meets = piston and look.gap < 0.0
+            share = C * squared_between(end_of(last), end_of(look), par.tick * (1 << level))
+            if sampled > 0.0 and s.w + taken + UNSURE * (sampled + share) >= s.w_r:
+                left = to_be_taken(bars.laws.taken[s.law], bars.w, PQ, s.pairs)
+                taken, sampled = C * (s.takes - left), 0.0
+            work = taken + sampled + share
+        meets = look.flips
         if meets and s.parked == 1:
             break
         ends = passed(par, s, look.p, look.sums.speed, work, look.force)
         turns = piston and switches(par, s, look.u_r)
-        if level > 0 and (meets or ends or turns):
-            known = ticks + (1 << level)
-            level -= 1
+        back = 0.0
+        if level > 0 and not (meets or ends or turns):
+            back = turns_between(s, end_of(last), end_of(look), par.tick * (1 << level))
+        if level > 0 and (meets or ends or turns or back > 0.0):
+            known, same = ticks + (1 << level), 0
+            kind = kind_of(s, meets, turns, ends, work)
+            high = room_at(s, kind, look, work)
+            share = share_before(room_at(s, kind, last, taken + sampled), high)
+            goal = ticks + (back if back > 0.0 else share) * (1 << level)
+            level = min(level - 1, level_below(max(goal - ticks, 1.0)))
             continue
         if meets:
             break
@@ -240,14 +396,18 @@ def go_near(par, s, bars, most, blows, events):
         ticks += 1 << level
         s.count_steps += 1
         sampled += share
-        note(par, s, bars, level, ticks, last.force, look)
+        note(par, s, bars, level, ticks, last, look)
         u_before, last = last.u_r, look
         if ends or turns:
             break
-        if ticks < known:
-            level = max(level - 1, 0)
-        else:
+        if ticks >= known or (kind == BACK and ticks >= goal):
             level, known = usual, -1
+            continue
+        same += 1
+        if kind != BACK:
+            share = share_before(room_at(s, kind, last, taken + sampled), high)
+            goal = ticks + (share if same < SAME_SIDE else 0.5) * (known - ticks)
+        level = level_below(min(max(goal - ticks, 1.0), max(known - ticks - 1.0, 1.0)))
     if ticks > 0:
         book_way(par, s, bars, ticks, last)
     if meets and s.parked == 1:
@@ -268,12 +428,16 @@ def note(par, s, bars, level, ticks, before, look):
 
     Parameters
     ----------
-    before : float
-        Force of the rock at the look before [N].
+    before : Look
+        The look before.
     """
     if s.mode != Mode.FF:
         time, h = time_of(par, s) + ticks * par.tick, par.tick * (1 << level)
-        s.b_peak_bit = max(s.b_peak_bit, look.force)
-        s.peak_bit_force = max(s.peak_bit_force, late_force(s, time, h, before, look.force))
-    if has_piston(par) and s.parked == 0 and par.piston == Piston.ELASTIC:
+        most = top_between(s, end_of(before), end_of(look), h)
+        s.b_peak_bit = max(s.b_peak_bit, most.peak)
+        s.peak_bit_force = max(s.peak_bit_force, late_peak(s, time, h, most))
+    if s.closed == 1:
+        h = par.tick * (1 << level)
+        book_contact(par, s, look.contact, h, time_of(par, s) + ticks * par.tick)
+    elif has_piston(par) and s.parked == 0 and par.piston == Piston.ELASTIC:
         s.e_loss += move_free(bars.wp, bars.move_p[level], bars.wp.shape[1])

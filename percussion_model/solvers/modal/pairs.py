@@ -8,7 +8,7 @@ import numpy as np
 
 from percussion_model.physics.kernel import inlined, kernel, merged
 from percussion_model.physics.records import Mode, RockKind
-from percussion_model.physics.rock import book_dashpot, damping
+from percussion_model.physics.rock import book_dashpot, damping, recoverable
 from percussion_model.solvers.modal.bar import LOAD, SOFT, STIFF, TINY, Q, V, row_sum
 from percussion_model.solvers.modal.forms import (
     LEAST_FORCE,
@@ -17,18 +17,22 @@ from percussion_model.solvers.modal.forms import (
     refresh_loads,
 )
 from percussion_model.solvers.modal.lanes import WIDTH, load, spread, store, total
-from percussion_model.solvers.modal.records import End, Go, Shape
+from percussion_model.solvers.modal.records import JOINED, End, Go, Shape
 
 # Rows of the pairs in `Bars.w`: about rest, and the load of a rigid one; where a search is, or the
 # pending leap ends. As numbers, not as constants for each of which kernels would be compiled.
 PQ, PV, PLOAD, AT = (np.int64(row) for row in (3, 4, 5, 6))
 QQ, QV, VQ, VV, YIELD = (int(row) for row in Go)
-LOW, SPEED, TOP, BIT, BIT_SPEED, SHIFT, SQUARE, _ = (int(row) for row in End)
-SHAPE_LOW, SHAPE_TOP, SHAPE_BIT = (int(row) for row in (Shape.LOW, Shape.TOP, Shape.BIT))
+LOW, SPEED, TOP, BIT, BIT_SPEED, SHIFT, YIELDS, PISTON, PISTON_SPEED, PULL, SQUARE, _ = (
+    int(row) for row in End
+)
+SHAPE_LOW, SHAPE_TOP, SHAPE_BIT, SHAPE_PISTON = (
+    int(row) for row in (Shape.LOW, Shape.TOP, Shape.BIT, Shape.PISTON)
+)
 
 
 # Modes that have less than this share of the energy of vibration make no pairs.
-NO_SHARE = 1e-9
+NO_SHARE = 1e-12
 # Steps between two looks at which pairs are needed: the highest die soon.
 FIRST_STRIDE = 4
 
@@ -45,8 +49,10 @@ class Sums(NamedTuple):
 @merged
 def law_in(par, s, laws, form):
     """Law by which the present mode moves in a form; -1 where it has to be stepped."""
-    if s.closed == 1 or par.effects == 1 or (form == 0) != (s.mode == Mode.FF):
+    if par.effects == 1 or (form % JOINED == 0) != (s.mode == Mode.FF):
         return -1
+    if s.closed == 1 and s.mode == Mode.SS and s.alert == 1:
+        return -1  # the bit's own energy is known by its modes
     law = 2 * form
     dashpot = damping(s)
     if dashpot > 0.0:
@@ -76,6 +82,26 @@ def sum_of(ends, end, w, n):
     for k in range(0, n, WIDTH):
         value = value + part_of(ends, end, k, load(w, PQ, k), load(w, PV, k))
     return total(value)
+
+
+class Touch(NamedTuple):
+    """What pairs tell of a piston that touches the bit."""
+
+    piston: float  # integrals over its mass, of offset and velocity [kg m, kg m/s]
+    speed: float
+    pull: float  # what the bit accelerates it with [N]
+
+
+@inlined
+def touch_of(s, bars, x, first):
+    """What pairs in two rows of `x` tell of a piston that touches the bit."""
+    ends, piston, speed, pull = bars.laws.ends[s.law], spread(0.0), spread(0.0), spread(0.0)
+    for k in range(0, s.pairs, WIDTH):
+        q, v = load(x, first, k), load(x, first + 1, k)
+        piston = piston + part_of(ends, PISTON, k, q, v)
+        speed = speed + part_of(ends, PISTON_SPEED, k, q, v)
+        pull = pull + part_of(ends, PULL, k, q, v)
+    return Touch(s.rest_p + total(piston), total(speed), s.rest_pull + total(pull))
 
 
 @inlined
@@ -168,29 +194,64 @@ def present_sums(s, bars):
 
 
 @kernel
-def hold_low(s, bars, low):
-    """Move other pairs as one until the rock end is where it was, and take their sums."""
+def hold_low(s, bars, low, row):
+    """Move other pairs as a row says until the rock end is where it was, and take their sums."""
     ends, w, n = bars.laws.ends[s.law], bars.w, s.pairs
     common = now = spread(0.0)
     for k in range(0, n, WIDTH):
         now = now + part_of(ends, LOW, k, load(w, PQ, k), load(w, PV, k))
-        common = common + part_of(ends, LOW, k, load(ends, SHIFT, k), load(ends, SHIFT + 1, k))
+        common = common + part_of(ends, LOW, k, load(ends, row, k), load(ends, row + 1, k))
     way = (low - s.rest_low - total(now)) / total(common)
     for k in range(0, n, WIDTH):
-        store(w, PQ, k, load(w, PQ, k) + load(ends, SHIFT, k) * way)
-        store(w, PV, k, load(w, PV, k) + load(ends, SHIFT + 1, k) * way)
+        store(w, PQ, k, load(w, PQ, k) + load(ends, row, k) * way)
+        store(w, PV, k, load(w, PV, k) + load(ends, row + 1, k) * way)
     sums = present_sums(s, bars)
     s.low, s.v_low, s.top, s.at_b = sums.low, sums.speed, sums.top, sums.bit
 
 
 @kernel
-def hold_ends(par, s, bars, low, tip):
-    """Take the sums of other pairs, with the rock end and the top of the bit where they were."""
-    at_b, rigid = s.at_b, bars.w[PQ, 0]
-    hold_low(s, bars, low)
+def shift_pairs(s, bars, way):
+    """Move all pairs as one."""
+    ends, w = bars.laws.ends[s.law], bars.w
+    for k in range(0, s.pairs, WIDTH):
+        store(w, PQ, k, load(w, PQ, k) + load(ends, SHIFT, k) * way)
+        store(w, PV, k, load(w, PV, k) + load(ends, SHIFT + 1, k) * way)
+
+
+@kernel
+def hold_ends(par, s, bars):
+    """Take the sums of fewer pairs, with the rock end and the top of the bit where they were."""
+    at_b, at_p, rigid = s.at_b, s.at_p, bars.w[PQ, 0]
+    tip = s.top - at_b / par.mass_b
+    hold_low(s, bars, s.low, SHIFT)
     s.offset += tip - (s.top - s.at_b / par.mass_b)
-    # the bit did not go this way, so that its loads did no work
+    # the bars did not go this way, so that their loads did no work
     s.vibrates -= s.a_b * (s.at_b - at_b) - bars.w[PLOAD, 0] * (bars.w[PQ, 0] - rigid)
+    if s.form >= JOINED:
+        s.at_p = touch_of(s, bars, bars.w, PQ).piston
+        s.vibrates -= s.a_p * (s.at_p - at_p)
+
+
+@kernel
+def follow(par, s, bars):
+    """Take the sums of fewer pairs of a free bar.
+
+    Those that were left out vibrated about zero, so that the others tell where it is; were the
+    rock end held instead, all of it would go aside by nanometres.
+    """
+    sums, before = present_sums(s, bars), recoverable(s)
+    s.p += sums.low - s.low
+    s.e_standstill += before - recoverable(s)
+    s.low, s.v_low, s.top, s.at_b = sums.low, sums.speed, sums.top, sums.bit
+
+
+@kernel
+def keep_fewer(par, s, bars):
+    """Take the sums of pairs of which some were left out."""
+    if s.form == 0:
+        follow(par, s, bars)
+    else:
+        hold_ends(par, s, bars)
 
 
 @kernel
@@ -235,9 +296,8 @@ def leave_out_pairs(par, s, bars):
     """Leave out pairs that have died away."""
     n = enough_pairs(par, s, bars)
     if n < s.pairs:
-        low, tip = s.low, s.top - s.at_b / par.mass_b
         s.pairs = n
-        hold_ends(par, s, bars, low, tip)
+        keep_fewer(par, s, bars)
 
 
 @inlined
@@ -287,7 +347,7 @@ def spell_out(s, bars, x, first):
 
     Of the pairs in two rows of `x`, from `first` on.
     """
-    if s.form == 0:
+    if s.form % JOINED == 0:
         for k in range(0, s.pairs, WIDTH):
             store(bars.rows, 0, k, load(x, first, k))
             store(bars.rows, 1, k, load(x, first + 1, k))
@@ -314,7 +374,7 @@ def energy_about_rest(s, bars, n):
 def take_rest(s, bars, n):
     """Take where the loads would hold the modes still: its sums, and offsets from it."""
     shape, w = bars.forms.shape[s.form], bars.w
-    low = top = bit = spread(0.0)
+    low = top = bit = piston = spread(0.0)
     for k in range(0, n, WIDTH):
         soft, f = load(shape, SOFT, k), load(w, LOAD, k)
         rest = soft * f
@@ -324,9 +384,13 @@ def take_rest(s, bars, n):
         low = low + load(shape, SHAPE_LOW, k) * rest
         top = top + load(shape, SHAPE_TOP, k) * rest
         bit = bit + load(shape, SHAPE_BIT, k) * rest
-    if s.form == 0:
+        piston = piston + load(shape, SHAPE_PISTON, k) * rest
+    s.rest_low, s.rest_top, s.rest_b, s.rest_p = total(low), total(top), total(bit), total(piston)
+    s.rest_pull = 0.0
+    if s.form % JOINED == 0:
         w[PLOAD, 0] = w[LOAD, 0]
-    s.rest_low, s.rest_top, s.rest_b = total(low), total(top), total(bit)
+        # every mode but the rigid one is held by what bends it
+        s.rest_pull = shape[SHAPE_PISTON, 0] * w[LOAD, 0]
 
 
 @kernel
@@ -346,11 +410,10 @@ def enough_modes(s, bars, n):
 def take_pairs(par, s, bars, law):
     """Go on by the pairs of a law."""
     n, w = bars.laws.sizes[law], bars.w
-    low, tip = s.low, s.top - s.at_b / par.mass_b
     take_rest(s, bars, n)
     s.law, s.pairs = law, n
     s.vibrates = energy_about_rest(s, bars, n)
-    if s.form > 0:
+    if s.form % JOINED > 0:
         count = enough_modes(s, bars, n)
         for k in range(0, count, WIDTH):
             store(w, Q, k, load(bars.rows, 0, k))
@@ -361,7 +424,7 @@ def take_pairs(par, s, bars, law):
         store(w, PV, k, load(bars.rows, 1, k))
     s.stride = FIRST_STRIDE
     s.pairs = enough_pairs(par, s, bars)
-    hold_ends(par, s, bars, low, tip)
+    keep_fewer(par, s, bars)
     s.takes = 0.0
     if law % 2 == 1:
         s.takes = to_be_taken(bars.laws.taken[law], w, PQ, s.pairs)
@@ -401,14 +464,16 @@ def take_modes(par, s, bars, n):
         store(bars.w, V, k, load(bars.rows, 1, k))
     whole = bars.laws.sizes[s.law]
     for k in range(n, whole, WIDTH):
-        store(bars.w, Q, k, spread(0.0))
+        store(bars.w, Q, k, load(shape, SOFT, k) * load(bars.w, LOAD, k))
         store(bars.w, V, k, spread(0.0))
-    # a wall has the same modes, and excites them all
-    s.active = whole if par.rock == RockKind.WALL else n
-    s.law = -1
+    # loads bend a free bit without a piston by nothing; a wall excites all of its modes
+    if s.form > 0 or par.rock == RockKind.WALL:
+        n = whole
+    s.active, s.law = n, -1
     s.low = row_sum(shape, SHAPE_LOW, bars.w, Q, n)
     s.top = row_sum(shape, SHAPE_TOP, bars.w, Q, n)
     s.at_b = row_sum(shape, SHAPE_BIT, bars.w, Q, n)
+    s.at_p = row_sum(shape, SHAPE_PISTON, bars.w, Q, n)
 
 
 @kernel

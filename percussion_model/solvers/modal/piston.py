@@ -27,11 +27,13 @@ from percussion_model.solvers.modal.forms import gap_of, join, part
 from percussion_model.solvers.modal.records import LOOK, STEP
 
 WHOLE = 1 << STEP
+# Of a contact, so many steps are told to end by their mean force: fronts ring.
+RINGING = 2
 # Steps after which it is tried again to let the piston wait.
 PATIENCE = 8
 # A bit stands still with less than this share of W_R: it moves slower than modes ring ahead of
 # the front of a blow.
-AT_REST = 1e-6
+AT_REST = 1e-5
 
 
 @inlined
@@ -112,7 +114,7 @@ def book_contact(par, s, contact, h, time):
     s.peak_impulse += contact * h
     if s.peak_time >= 0.999 * par.window:
         # (a rigid piston pushes hardest at once)
-        first = time - s.closed_at * par.tick < 1.5 * par.window
+        first = time - s.peak_time - s.closed_at * par.tick < 0.5 * par.window
         mean = 0.0 if first and par.piston == Piston.ELASTIC else s.peak_impulse / s.peak_time
         s.b_peak_contact = max(s.b_peak_contact, mean)
         if time > s.peak_from:
@@ -140,7 +142,7 @@ def until_drive(par, s, v, a, spread):
 
 @kernel
 def quiet_time(par, s, v_b, a_b, spread_top, spread_mean):
-    """Time before which the piston can neither meet the bit nor turn the drive [s].
+    """Times before which the piston can neither meet the bit nor turn the drive [s].
 
     Parameters
     ----------
@@ -150,9 +152,8 @@ def quiet_time(par, s, v_b, a_b, spread_top, spread_mean):
         How far its top end and its mean may be from that [m].
     """
     if not has_piston(par):
-        return math.inf
+        return math.inf, math.inf
     a = piston_acceleration(par, drive_force(par, s)) - a_b
     v = s.v_p - v_b
     room = s.u_b - s.u_p - s.spread_p - spread_top - spread_mean
-    limit = time_to_cover(room, v, a)
-    return min(limit, until_drive(par, s, v, a, spread_mean))
+    return time_to_cover(room, v, a), until_drive(par, s, v, a, spread_mean)

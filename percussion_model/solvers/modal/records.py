@@ -11,12 +11,14 @@ from percussion_model.physics.state import COMMON_PARAMETERS, COMMON_STATE, COUN
 from percussion_model.solvers.state import Limits
 
 # A step has 2^STEP ticks, to one of which events are found; carries go up to 2^(LEVELS - 1).
-STEP, LEVELS = 10, 28
+STEP, LEVELS = 11, 28
 # A search looks so many times at once; between two looks are up to 2^(LONGEST_HOP - STEP) steps.
 SCAN, LONGEST_HOP = 8, STEP + 4
 # Most steps between two looks at which modes are needed, or whether the piston may wait; and at
 # which pairs are.
 LOOK, LONGEST_STRIDE = 32, 128
+# Rows of `Bars.rows` that keep pairs.
+KEPT = np.int64(4)
 # Forms: the bit free, on K_R, on gamma K_R; the same joined to the piston.
 JOINED = 3
 
@@ -76,30 +78,33 @@ class Forms(NamedTuple):
 
 
 class Laws(NamedTuple):
-    """Motions of a bit alone with all that its rock end feels: law 2 form, or 2 form + 1.
+    """Motions of the bars of a form with all that the rock end feels: law 2 form, or 2 form + 1.
 
     The second has the dashpot of the rock besides. Each damped mode is a pair of numbers Q and
     V = dQ/dt (docs/modal.md, section 4).
 
     Attributes
     ----------
-    sizes : int array, shape (6,)
+    sizes : int array, shape (12,)
         Pairs of each law, 0 where there is none.
-    dashpot : float array, shape (6,)
+    dashpot : float array, shape (12,)
         Of the rock [N s/m].
-    rest : ndarray, shape (6, len(Rest))
-    move : ndarray, shape (6, LEVELS, len(Go), n)
-    ends : ndarray, shape (6, len(End), n)
-    views : ndarray, shape (6, LONGEST_HOP + 1, len(View), n)
-        What pairs tell now of the rock end 2^level ticks later.
-    scans : ndarray, shape (6, LONGEST_HOP - STEP + 1, n len(View), SCAN)
-        The same for 1, 2, ... SCAN times 2^STEP, 2^(STEP + 1), ... ticks later.
-    out, into : ndarray, shape (6, 2 n, 2 n)
+    move : ndarray, shape (12, LEVELS, len(Go), n)
+    ends : ndarray, shape (12, len(End), n)
+    out, into : ndarray, shape (12, 2 n, 2 n)
         From pairs to offsets and velocities of the form's modes, and back; row by number that is
-        changed, all Q or offsets first. Empty for the free form, whose pairs are its modes.
-    taken : ndarray, shape (6, 2 n, 2 n)
+        changed, all Q or offsets first. Empty for free forms, whose pairs are their modes.
+    taken : ndarray, shape (12, 2 n, 2 n)
         Form: what a dashpot of 1 N s/m takes from now on [J]; of two numbers in different lanes
         all is at the one of the lower lanes.
+    rest : ndarray, shape (6, len(Rest))
+        Of a bit alone, as all that follows, with its own n.
+    views : ndarray, shape (6, LONGEST_HOP + 1, len(View), n)
+        What pairs tell now of the rock end 2^level ticks later.
+    scans : ndarray, shape (12, LONGEST_HOP - STEP + 1, n len(View), SCAN)
+        The same for 1, 2, ... SCAN times 2^STEP, 2^(STEP + 1), ... ticks later; for all laws.
+    sides : ndarray, shape (12, LONGEST_HOP - STEP + 1, n len(Side), SCAN)
+        What they tell of the bit's other end then.
     way : int array, shape (6, 6)
         Place in `over` of the table from the pairs of a law to those of another, -1: none.
     over : ndarray, shape (tables, 2 n, 2 n)
@@ -110,14 +115,15 @@ class Laws(NamedTuple):
 
     sizes: np.ndarray
     dashpot: np.ndarray
-    rest: np.ndarray
     move: np.ndarray
     ends: np.ndarray
-    views: np.ndarray
-    scans: np.ndarray
     out: np.ndarray
     into: np.ndarray
     taken: np.ndarray
+    rest: np.ndarray
+    views: np.ndarray
+    scans: np.ndarray
+    sides: np.ndarray
     way: np.ndarray
     over: np.ndarray
     pushed: np.ndarray
@@ -142,8 +148,12 @@ class End(IntEnum):
     BIT = 6  # integral over the mass of the bit
     BIT_SPEED = 8
     SHIFT = 10  # pairs of a common offset of 1 m
-    SQUARE = 12  # Q'' + decay Q' + square Q = 0
-    ROWS = 13
+    YIELD = 12  # of an offset of the rock end alone, as the last mode has it
+    PISTON = 14  # integral over the mass of the piston
+    PISTON_SPEED = 16
+    PULL = 18  # what the bit accelerates that mass with [N]
+    SQUARE = 20  # Q'' + decay Q' + square Q = 0
+    ROWS = 21
 
 
 class Rest(IntEnum):
@@ -163,6 +173,15 @@ class View(IntEnum):
     SPEED_V = 3
 
 
+class Side(IntEnum):
+    """Rows by which pairs tell of the other end later, about rest."""
+
+    ONE_Q = 0  # offset of the top of a bit alone, or what the bit accelerates the piston with
+    ONE_V = 1
+    SPEED_Q = 2  # of a piston that touches: integral of its velocity over its mass
+    SPEED_V = 3
+
+
 class Bars(NamedTuple):
     """Modes of the present form and of the free piston, what is constant of them, and room.
 
@@ -176,8 +195,9 @@ class Bars(NamedTuple):
     laws : Laws
     shape_p, move_p : ndarray
         Of the piston's elastic modes, as one of `Forms`.
-    rows : ndarray, shape (6, n)
-        Room: a step that is tried, what a search sees, pairs that are kept.
+    rows : ndarray, shape (8, n)
+        Room: a step that is tried, what a search sees, pairs that are kept, what a search sees of
+        the other end.
     """
 
     w: np.ndarray
@@ -250,9 +270,14 @@ MODAL_STATE = np.dtype(
         ("peak_time", "f8"),  # of contact, since the last mean force for a peak [s]
         ("peak_impulse", "f8"),  # [N s]
         ("leap_peak", "f8"),  # greatest force of the rock on the leap [N]
+        ("leap_contact", "f8"),  # the same of contact, as a mean
+        ("leap_time", "f8"),  # `peak_time` and `peak_impulse` after it
+        ("leap_impulse", "f8"),
         ("rest_low", "f8"),  # sums at rest under the loads: rock end, top [m]
         ("rest_top", "f8"),
-        ("rest_b", "f8"),  # bit [kg m]
+        ("rest_b", "f8"),  # bit and piston [kg m]
+        ("rest_p", "f8"),
+        ("rest_pull", "f8"),  # of bit on piston besides what the pairs tell [N]
         ("vibrates", "f8"),  # energy about rest when the pairs were taken [J]
         ("takes", "f8"),  # that a dashpot of 1 N s/m would take from then on [J]
         ("v_low", "f8"),  # velocity of the rock end [m/s]
@@ -269,7 +294,7 @@ MODAL_LIMITS = Limits(
         "time": COUNT,
         "leap_end": (-1, MOST),
         "leap_ends": FLAG,
-        "law": (-1, 2 * JOINED - 1),
+        "law": (-1, 4 * JOINED - 1),
         "pairs": COUNT,
         "stride": (0, LONGEST_STRIDE),
         "look": COUNT,

@@ -104,15 +104,6 @@ def change_mode(par, s, bars, events):
 
 
 @inlined
-def late_force(s, end, h, first, last):
-    """Greatest force after s.peak_from of one that goes straight for `h` until a time [N]."""
-    after = end - s.peak_from
-    if not after > 0.0:
-        return 0.0
-    return max(last, last + (first - last) * min(after / h, 1.0))
-
-
-@inlined
 def passed(par, s, p, v, work, force):
     """Whether a state lies beyond the end of the present mode; energy apart.
 

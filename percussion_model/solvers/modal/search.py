@@ -12,15 +12,25 @@ from percussion_model.physics.body import bit_acceleration, time_to_cover
 from percussion_model.physics.kernel import inlined, kernel, merged
 from percussion_model.physics.records import Mode, RockKind
 from percussion_model.physics.rock import barrier_off, damping, origin, stiffness
+from percussion_model.solvers.modal.between import (
+    End,
+    late_force,
+    late_peak,
+    squared_between,
+    top_between,
+    turns_between,
+)
 from percussion_model.solvers.modal.lanes import WIDTH, load, spread, store, total
 from percussion_model.solvers.modal.pairs import (
     AT,
     BIT,
     FIRST_STRIDE,
     LOW,
+    PISTON,
     PLOAD,
     PQ,
     SQUARE,
+    TOP,
     carry_pairs,
     energy_about_rest,
     energy_of_pairs,
@@ -31,12 +41,13 @@ from percussion_model.solvers.modal.pairs import (
     to_be_taken,
 )
 from percussion_model.solvers.modal.piston import WHOLE, time_of
-from percussion_model.solvers.modal.records import LONGEST_HOP, SCAN, STEP, View
-from percussion_model.solvers.modal.rock_end import late_force, passed
+from percussion_model.solvers.modal.records import LONGEST_HOP, SCAN, STEP, Side, View
+from percussion_model.solvers.modal.rock_end import passed
 
 LOW_Q, LOW_V, SPEED_Q, SPEED_V = (int(row) for row in View)
-# Rows of `Bars.rows` with what a search sees.
-SEEN = 2
+ONE_Q, ONE_V, PISTON_Q, PISTON_V = (int(row) for row in Side)
+# Rows of `Bars.rows` with what a search sees, of the rock end and of the other.
+SEEN, SIDE = 2, 6
 # 2^SCAN_LEVEL looks at once.
 SCAN_LEVEL = SCAN.bit_length() - 1
 # Flight shorter than this is looked through.
@@ -46,6 +57,8 @@ FEWEST = 8 * WHOLE
 SLIGHT_SHARE, FEWEST_MODES = 1e-9, 4
 # What the dashpot takes is computed once this many times its sum over looks may be enough.
 UNSURE = 2.0
+# Looks within an interval whose work of the dashpot is summed up.
+PIECES = 3
 # An interval is halved where a straight line told so often to stay on one side.
 SAME_SIDE = 4
 # A standstill is searched for peaks until its vibration is below this share of the load.
@@ -63,16 +76,43 @@ class Found(NamedTuple):
     ends: bool  # whether the mode ends then
     peak: float  # greatest force of the rock on the way [N]
     late: float  # the same after s.peak_from [N]
+    contact: float  # greatest force of contact, as a mean, and after s.peak_from [N]
+    late_contact: float
+    window: float  # `peak_time` and `peak_impulse` of contact at the end [s, N s]
+    impulse: float
     looks: int
     leaps: int  # times that nothing could happen for a while
 
 
-class End(NamedTuple):
-    """The rock end at some time."""
+class Beside(NamedTuple):
+    """What does not change of a piston that touches the bit, or waits near it.
 
-    p: float  # penetration [m]
-    speed: float  # [m/s]
-    force: float  # of the rock [N]
+    Attributes
+    ----------
+    near, touches : bool
+        Whether it is near, and whether it touches.
+    room : float
+        Of one that waits: gap to a top of the bit without offset, and bounded vibration [m]. Of
+        one that touches: force on the bit but for what pairs tell [N].
+    pull : float
+        Acceleration of the top by the load on a free bit [m/s2]; of one that touches, of its
+        mass as a whole [N].
+    """
+
+    near: bool
+    touches: bool
+    room: float
+    pull: float
+
+
+@inlined
+def beside_of(par, s, bars, near):
+    """What a search beside a piston goes by."""
+    ends, load_ = bars.laws.ends[s.law], bars.w[PLOAD, 0]
+    if s.closed == 1:
+        return Beside(True, True, par.mass_p * s.a_p - s.rest_pull, ends[PISTON, 0] * load_)
+    room = s.u_b - s.at_b / par.mass_b + s.rest_top + s.offset - (s.u_p + s.spread_p)
+    return Beside(near, False, room, ends[TOP, 0] * load_)
 
 
 class Law(NamedTuple):
@@ -133,6 +173,22 @@ def scan(s, bars, hop, modes):
     store(bars.rows, SEEN + 1, 0, speed + speed_v)
 
 
+@inlined
+def scan_side(s, bars, hop, modes, touches):
+    """See what pairs tell of the other end at the next looks, into `bars.rows`."""
+    view = bars.laws.sides[s.law, hop]
+    one = one_v = speed = speed_v = spread(0.0)
+    for k in range(modes):
+        q, v = bars.w[AT, k], bars.w[AT + 1, k]
+        one = one + load(view, 4 * k + ONE_Q, 0) * q
+        one_v = one_v + load(view, 4 * k + ONE_V, 0) * v
+        if touches:
+            speed = speed + load(view, 4 * k + PISTON_Q, 0) * q
+            speed_v = speed_v + load(view, 4 * k + PISTON_V, 0) * v
+    store(bars.rows, SIDE, 0, one + one_v)
+    store(bars.rows, SIDE + 1, 0, speed + speed_v)
+
+
 class Moving(NamedTuple):
     """What moves of some pairs."""
 
@@ -157,7 +213,7 @@ def moving(s, bars, x, first):
         if above > least:
             break
         modes -= 1
-    level, n = STEP, bars.laws.sizes[s.law]
+    level, n = STEP + 1, bars.laws.sizes[s.law]
     while level < LONGEST_HOP and 2 * modes <= n:
         n //= 2
         level += 1
@@ -254,8 +310,25 @@ def level_below(ticks):
     return level
 
 
+@inlined
+def squared_speed(par, s, bars, law, level, before, after, fresh):
+    """Integral of the squared velocity of the rock end over 2^level ticks [m2/s].
+
+    Pieces are short at first where a bit has just met the rock (`fresh`): its velocity drops
+    within tenths of a microsecond.
+    """
+    total, ticks, begin = 0.0, 0, before
+    if not fresh:
+        return squared_between(before, after, par.tick * (1 << level))
+    for part in range(STEP - PIECES, level):
+        here = end_after(par, s, bars, law, part)
+        total += squared_between(begin, here, par.tick * ((1 << part) - ticks))
+        ticks, begin = 1 << part, here
+    return total + squared_between(begin, after, par.tick * ((1 << level) - ticks))
+
+
 @kernel
-def narrow(par, s, bars, law, most, work, before, then):
+def narrow(par, s, bars, law, most, work, before, then, fresh):
     """Go on to the tick in which the mode ends, if it does so within `most`.
 
     Parameters
@@ -264,6 +337,8 @@ def narrow(par, s, bars, law, most, work, before, then):
         What the dashpot has taken so far [J].
     before, then : End
         The rock end now, and after `most` ticks.
+    fresh : bool
+        Whether the mode has just begun.
 
     Returns
     -------
@@ -274,20 +349,21 @@ def narrow(par, s, bars, law, most, work, before, then):
     now : End
     """
     ticks, rest, low, high, same = 0, most, beyond(s, before), beyond(s, then), 0
+    turn = most * turns_between(s, before, then, par.tick * most)
     while rest > 0:
         guess = 0.5 * rest
-        if low < 0.0 < high and abs(same) < SAME_SIDE:
+        if ticks < turn:
+            guess = turn - ticks
+        elif low < 0.0 < high and abs(same) < SAME_SIDE:
             # so far by a straight line
             guess = rest * low / (low - high)
         level = level_below(min(max(guess, 1.0), rest - 1.0))
         go = 1 << level
         here, after = end_after(par, s, bars, law, level), work
         if s.mode == Mode.DFC:
-            squares = before.speed * before.speed + here.speed * here.speed
-            if level > 0:
-                half = end_after(par, s, bars, law, level - 1).speed
-                squares = (squares + 4.0 * half * half) / 3.0
-            after += 0.5 * law.damping * squares * (par.tick * go)
+            after += law.damping * squared_speed(
+                par, s, bars, law, level, before, here, fresh and ticks == 0
+            )
         passes = passed(par, s, here.p, here.speed, after, here.force)
         if passes and level > 0:
             rest, high, same = go, beyond(s, here), max(same, 0) + 1
@@ -300,48 +376,101 @@ def narrow(par, s, bars, law, most, work, before, then):
     return ticks, False, work, before
 
 
+class Touching(NamedTuple):
+    """Contact of bars that touch, as far as a search has come."""
+
+    speed: float  # mean velocity of the piston [m/s]
+    window: float  # `peak_time` and `peak_impulse` [s, N s]
+    impulse: float
+    contact: float  # as in `Found`
+    late: float
+
+
 class Seen(NamedTuple):
     """What looks side by side tell."""
 
     kept: int  # looks before the mode may end
     near: bool  # whether it may end by the next
+    blocked: bool  # whether piston and bit may meet or part by the next
     sampled: float  # by the looks, what the dashpot took since it was known [J]
     last: End  # at the last that was kept
     then: End  # at the next
     peak: float  # as in `Found`
     late: float
+    touch: Touching
 
 
 @inlined
-def look_through(par, s, bars, law, begin, level, count, taken, sampled, last):
+def touches_on(par, s, touch, speed, h, time):
+    """Go on by the mean force of contact between two looks.
+
+    Parameters
+    ----------
+    speed : float
+        Mean velocity of the piston at the later one [m/s].
+    h, time : float
+        Between the looks, and of the later one [s].
+    """
+    window, contact, late = touch.window + h, touch.contact, touch.late
+    impulse = touch.impulse + par.mass_p * (s.a_p * h - (speed - touch.speed))
+    if window >= 0.999 * par.window:
+        mean = impulse / window
+        contact = max(contact, mean)
+        late = max(late, mean) if time > s.peak_from else late
+        window = impulse = 0.0
+    return Touching(speed, window, impulse, contact, late)
+
+
+@inlined
+def look_through(par, s, bars, law, beside, ticks, level, count, taken, sampled, last, touch):
     """Go through the looks of a scan.
 
     Parameters
     ----------
-    begin : float
-        Time where the search is [s].
+    ticks : int
+        From the state to where the search is.
     level, count : int
         So many looks, 2^level ticks apart.
     taken, sampled : float
         What the dashpot had taken when that was known, and what it took by the looks since [J].
     last : End
         The rock end where the search is.
+    touch : Touching
+        The contact there.
     """
     h, kept, near, then, peak, late = par.tick * (1 << level), 0, False, last, 0.0, 0.0
+    since, blocked, speed_p = par.tick * ticks, False, 0.0
+    begin = time_of(par, s) + since
     while kept < count:
+        if beside.near:
+            t, apart = h * (kept + 1), beside.room
+            if beside.touches:
+                apart -= bars.rows[SIDE, kept]
+                speed_p = (bars.rows[SIDE + 1, kept] + beside.pull * t) / par.mass_p
+            else:
+                apart += bars.rows[SIDE, kept] + 0.5 * beside.pull * t * t
+                apart -= (since + t) * (s.v_p + 0.5 * (since + t) * s.a_p)
+            if apart < 0.0:
+                blocked = True
+                break
         low, speed = bars.rows[SEEN, kept], bars.rows[SEEN + 1, kept]
         then, share = end_at(s, law, low, speed, h * (kept + 1)), 0.0
         if s.mode == Mode.DFC:
             share = 0.5 * law.damping * h * (last.speed * last.speed + then.speed * then.speed)
         near = may_be_enough(s, taken + UNSURE * (sampled + share))
         near = near or passed(par, s, then.p, then.speed, 0.0, then.force)
+        near = near or turns_between(s, last, then, h) > 0.0
         if near:
             break
         kept += 1
         sampled += share
-        late = max(late, late_force(s, begin + h * kept, h, last.force, then.force))
-        last, peak = then, max(peak, then.force)
-    return Seen(kept, near, sampled, last, then, peak, late)
+        if s.mode != Mode.FF:
+            top = top_between(s, last, then, h)
+            peak, late = max(peak, top.peak), max(late, late_peak(s, begin + h * kept, h, top))
+        last = then
+        if beside.touches:
+            touch = touches_on(par, s, touch, speed_p, h, begin + h * kept)
+    return Seen(kept, near, blocked, sampled, last, then, peak, late, touch)
 
 
 @merged
@@ -356,17 +485,22 @@ def quiet_ticks(par, s, bars, energy, most):
 
 
 @kernel
-def search(par, s, bars, most):
-    """Look for the end of the present mode, `most` ticks ahead at most; `Found`."""
+def search(par, s, bars, most, beside):
+    """Look for the end of the present mode, `most` ticks ahead at most; `Found`.
+
+    Beside a piston that is near it ends where the two may meet or part; where one touches, also
+    where the mode may end.
+    """
     keep(bars.w, PQ, bars.w, AT, s.pairs)
     law, stands = present_law(s, bars), s.mode == Mode.SS
     ticks, looks, leaps, peak, late, ends = 0, 0, 0, 0.0, 0.0, False
     taken, sampled, last = 0.0, 0.0, End(s.p, s.v_low, s.f_rock)
+    touch = Touching(s.v_p, s.peak_time, s.peak_impulse, 0.0, 0.0)
     if s.mode == Mode.DFC and s.stride > FIRST_STRIDE:
         taken = taken_so_far(par, s, bars)
     while ticks < most and not ends and not (stands and ticks >= LONGEST_GLANCE):
         now, rest = moving(s, bars, bars.w, AT), most - ticks
-        quiet = quiet_ticks(par, s, bars, now.energy, rest)
+        quiet = 0 if beside.near else quiet_ticks(par, s, bars, now.energy, rest)
         if quiet > 0 and stands and ticks > 0:
             break  # its mean force is noted where it begins
         if quiet > 0:
@@ -377,15 +511,20 @@ def search(par, s, bars, most):
             ticks += quiet
             leaps += 1
             continue
-        level = now.level
+        level = min(now.level, STEP + 2) if beside.near else now.level
         while level > STEP and rest < 1 << level:
             level -= 1
         count = min(SCAN, rest >> level)
+        if beside.near and count == 0:
+            break
         if count > 0:
             scan(s, bars, level - STEP, now.modes)
-        begin = time_of(par, s) + par.tick * ticks
-        seen = look_through(par, s, bars, law, begin, level, count, taken, sampled, last)
-        sampled, last = seen.sampled, seen.last
+        if beside.near:
+            scan_side(s, bars, level - STEP, now.modes, beside.touches)
+        seen = look_through(
+            par, s, bars, law, beside, ticks, level, count, taken, sampled, last, touch
+        )
+        sampled, last, touch = seen.sampled, seen.last, seen.touch
         peak, late = max(peak, seen.peak), max(late, seen.late)
         if seen.kept == SCAN:
             move_pairs(s, bars, bars.w, AT, level + SCAN_LEVEL)
@@ -393,14 +532,25 @@ def search(par, s, bars, most):
             carry_pairs(s, bars, bars.w, AT, seen.kept << level)
         ticks += seen.kept << level
         looks += seen.kept
+        if seen.blocked:
+            break
         if seen.near and sampled > 0.0:
             taken, sampled = taken_so_far(par, s, bars), 0.0
+        elif seen.near and beside.touches:
+            break
         elif seen.near or count == 0:
-            within, first = min(1 << level, rest), last.force
-            more, ends, work, last = narrow(par, s, bars, law, within, taken, last, seen.then)
+            within, first = min(1 << level, rest), last
+            fresh = ticks == 0 and s.stride == FIRST_STRIDE
+            more, ends, work, last = narrow(
+                par, s, bars, law, within, taken, last, seen.then, fresh
+            )
             ticks += more
             looks += 1
-            sampled, peak = max(work - taken, 0.0), max(peak, last.force)
-            end = time_of(par, s) + par.tick * ticks
-            late = max(late, late_force(s, end, par.tick * more, first, last.force))
-    return Found(ticks, ends, peak, late, looks, leaps)
+            sampled = max(work - taken, 0.0)
+            if s.mode != Mode.FF and more > 0:
+                top = top_between(s, first, last, par.tick * more)
+                end = time_of(par, s) + par.tick * ticks
+                peak = max(peak, top.peak)
+                late = max(late, late_peak(s, end, par.tick * more, top))
+    contact = touch.contact, touch.late, touch.window, touch.impulse
+    return Found(ticks, ends, peak, late, *contact, looks, leaps)

@@ -146,7 +146,7 @@ class ModalSolver(Solver):
         p["eta"] = eta
         p["leaps"] = leaps
         self.operator_bytes = sum(part.nbytes for part in (*made.forms, *made.laws))
-        self._rows = aligned(np.zeros((6, made.forms.shape.shape[2])))
+        self._rows = aligned(np.zeros((8, made.forms.shape.shape[2])))
         self._read_at: dict[str, Places] = {}
         self._entry: Callable[..., int] = entry_of(run)
 

@@ -24,20 +24,24 @@ from percussion_model.physics.rock import (
     crush,
     damping,
     origin,
+    overcomes_barrier,
     recoverable,
     stiffness,
 )
 from percussion_model.solvers.modal.bar import (
     Ends,
+    bit_kinetic,
     end_after,
     low_after,
     move_free,
     take,
     try_move,
 )
+from percussion_model.solvers.modal.between import late_force
 from percussion_model.solvers.modal.forms import refresh_loads
 from percussion_model.solvers.modal.lanes import WIDTH
 from percussion_model.solvers.modal.piston import (
+    RINGING,
     WHOLE,
     book_contact,
     flip_contact,
@@ -50,7 +54,6 @@ from percussion_model.solvers.modal.piston import (
 from percussion_model.solvers.modal.rock_end import (
     change_mode,
     end_standstill,
-    late_force,
     look,
     passed,
 )
@@ -59,8 +62,6 @@ from percussion_model.solvers.modal.rock_end import (
 CHECKPOINT = 64
 # Openings and closures of one instant; more would be a loop.
 MOST_FLIPS = 2
-# Of a contact, so many steps are told to end by their mean force: fronts ring.
-RINGING = 2
 
 
 class Trial(NamedTuple):
@@ -239,6 +240,7 @@ def go_on(par, s, bars, most, near, blows, events):
         refresh_loads(s, bars, a_b, a_p)
     level, flips = most, 0
     while True:
+        stands = s.mode == Mode.SS and s.alert == 1 and par.rock == RockKind.BILINEAR
         trial = try_step(par, s, bars, level)
         if piston and s.parked == 1 and trial.gap < 0.0:
             unpark(par, s, bars)
@@ -246,9 +248,11 @@ def go_on(par, s, bars, most, near, blows, events):
         flip = False
         if piston and s.parked == 0:
             flip = trial.touch < 0.0 if s.closed == 1 else trial.gap < 0.0
+        # the barrier is passed within, and left at the next step
+        bursts = stands and overcomes_barrier(par, s, bit_kinetic(s, bars, bars.rows))
         ends = passed(par, s, s.p + trial.path, trial.ends.speed, trial.work, trial.last)
         turns = piston and switches(par, s, s.u_r + trial.way_p - trial.way_b)
-        if level > 0 and (flip or ends or turns):
+        if level > 0 and (flip or ends or turns or bursts):
             level -= 1
         elif flip and flips < MOST_FLIPS:
             flip_contact(par, s, bars, s.v_p - s.v_b, blows, events)

@@ -14,7 +14,14 @@ import numpy as np
 from percussion_model.physics.kernel import kernel
 from percussion_model.scene.bars import AREA, LENGTH, YOUNGS_MODULUS, bar_mass, section_mass
 from percussion_model.solvers.modal.lanes import WIDTH
-from percussion_model.solvers.modal.modes import Modes, bar_modes, count_below, products, totals
+from percussion_model.solvers.modal.modes import (
+    Modes,
+    bar_modes,
+    count_below,
+    products,
+    totals,
+    with_residual,
+)
 from percussion_model.solvers.modal.records import JOINED, LEVELS, Forms, Move, Shape
 from percussion_model.solvers.modal.resolution import MOST_MODES
 from percussion_model.solvers.setup import refuse_many
@@ -146,6 +153,8 @@ def forms_of(
         rigid = piston_mass if joined and piston is None else 0.0
         count = n if joined else n_bit
         modes = bar_modes(both if joined else bit, count, stiff[form], rigid)
+        if stiff[form] > 0.0:
+            modes = with_residual(modes, stiff[form])
         found.append(modes)
         if (joined and not piston_mass) or (form % JOINED and stiff[form] == 0.0):
             continue
@@ -181,7 +190,9 @@ def piston_tables(free: Modes | None, eta: float, tick: float) -> tuple[np.ndarr
     """Shapes and moves of the elastic modes of a free piston."""
     if free is None:
         return np.zeros((len(Shape), 0)), np.zeros((LEVELS, len(Move), 0))
-    elastic = free._replace(frequency=free.frequency[1:], size=free.size[1:], phase=free.phase[1:])
+    elastic = free._replace(
+        **{name: getattr(free, name)[1:] for name in ("frequency", "wave", "size", "phase", "last")}
+    )
     shape = _shapes(elastic, (0, len(free.mass)))
     return shape, moves_of(elastic.frequency, eta, tick)
 
