@@ -14,7 +14,8 @@ from percussion_model.physics.kernel import kernel
 from percussion_model.physics.records import EventKind
 from percussion_model.scene.bars import bar_mass, bar_transit_time
 from percussion_model.solvers.modal.bar import carry, try_move
-from percussion_model.solvers.modal.modes import bar_modes, products, totals
+from percussion_model.solvers.modal.between import falls_below, least_at, parabola
+from percussion_model.solvers.modal.modes import bar_modes, products, totals, with_residual
 from percussion_model.solvers.modal.records import STEP, Shape
 from percussion_model.solvers.modal.solver import ModalSolver
 
@@ -103,6 +104,30 @@ def test_modes_on_a_spring_yield_as_the_spring_does():
     whole = totals(found, 0, len(STEPPED))
     sag = np.sum(found.low * whole / found.frequency**2)
     assert sag == pytest.approx(bar_mass(STEPPED) / 5e8, rel=1e-9)
+
+
+@pytest.mark.parametrize(("spring", "mass"), [(5e7, 0.0), (7.5e8, 7.5), (1e10, 0.0)])
+def test_the_last_shape_yields_what_left_out_modes_would(spring, mass):
+    """A force at the end moves 24 modes as far as the whole bar, and the shape is their like."""
+    plain = bar_modes(STEPPED, 24, spring, mass)
+    found = with_residual(plain, spring)
+    assert np.sum(found.low**2 / found.frequency**2) == pytest.approx(1.0 / spring, rel=1e-12)
+    assert np.sum(plain.low**2 / plain.frequency**2) < (1.0 - 1e-4) / spring
+    np.testing.assert_allclose(products(found, 0, found, 0, len(STEPPED)), np.eye(24), atol=2e-6)
+    np.testing.assert_array_equal(found.frequency[:-1], plain.frequency[:-1])
+    assert found.frequency[-2] < found.frequency[-1] < 2.5 * found.frequency[-2]
+    # as a whole: also under the loads, by the same far end as near end
+    whole = totals(found, 0, len(STEPPED)) + mass * found.above(0)
+    sag = found.above(0) * whole / found.frequency**2
+    assert np.sum(found.above(0) * found.low / found.frequency**2) == pytest.approx(1.0 / spring)
+    assert np.sum(sag) > (bar_mass(STEPPED) + mass) / spring
+
+
+def test_what_falls_below_zero_between_two_looks_is_found():
+    """(x - 0.4)^2 less 0.01, which is above zero at both, and 0.01 more than it."""
+    assert falls_below(0.16 - 0.01, -0.8, 0.36 - 0.01, 1.2, 1.0) == pytest.approx(0.35, abs=0.05)
+    assert falls_below(0.16 + 0.01, -0.8, 0.36 + 0.01, 1.2, 1.0) == 0.0
+    assert least_at(parabola(-0.8, 1.2, 0.2)) == pytest.approx(0.4)
 
 
 def made(cells=20, **changes):
