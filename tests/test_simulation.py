@@ -22,8 +22,8 @@ SCENES = {
     "rigid": Scene().replace(**RIGID),
 }
 # Of the greatest value of each field: modes that are read within a leap are carried there
-# from another time, and others may have been left out, with 1e-10 of the energy.
-READ_ALIKE = 1e-9
+# from another time.
+READ_ALIKE = 1e-11
 END = 0.12  # two whole blows and a part of the third [s]
 
 

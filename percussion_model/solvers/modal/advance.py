@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from percussion_model.physics.kernel import kernel, merged
+from percussion_model.physics.kernel import inlined, kernel, merged
 from percussion_model.physics.readings import fill_ledger, fill_motion
 from percussion_model.physics.records import Mode, Piston, Status
 from percussion_model.physics.reference import refer
@@ -45,6 +45,12 @@ def full(s, blows, events):
     return Status.DONE
 
 
+@inlined
+def portion(s, law):
+    """Ticks that bars go by pairs beside a piston before it is looked again which they need."""
+    return (s.stride if s.law == law else FIRST_STRIDE) * WHOLE
+
+
 @kernel
 def advance_to(par, s, bars, end, blows, events):
     """Advance to a tick, unless a leap, or what is done in one go, passes it; a `Status`."""
@@ -65,7 +71,7 @@ def advance_to(par, s, bars, end, blows, events):
             step(par, s, bars, STEP, blows, events)
             continue
         if s.leap_end < 0:
-            most = (s.stride if s.law == law else FIRST_STRIDE) * WHOLE
+            most = portion(s, law)
             if s.time + most > end:
                 return Status.DONE
             far = plan(par, s, bars, law, LONGEST, events)
@@ -90,11 +96,12 @@ def commit_to(par, s, bars, end, blows, events):
             return status
         law = law_wanted(par, s, bars.laws)
         if law >= 0:
+            most = portion(s, law)
             far = plan(par, s, bars, law, end - s.time, events)
             if s.leap_end >= 0:
                 leap(par, s, bars, events)
             elif s.law >= 0:
-                go_near(par, s, bars, far, blows, events)
+                go_near(par, s, bars, min(most, far), blows, events)
             continue
         if s.law >= 0:
             drop_pairs(par, s, bars)

@@ -19,7 +19,8 @@ import numpy as np
 
 from percussion_model.physics.kernel import kernel
 
-# The dashpot grows to its full size in so many stages, each with Newton steps at most.
+# A dashpot grows to its full size in so many stages, each with Newton steps at most; what eq. 4 has
+# too much is small.
 STAGES, MOST_STEPS = 4, 30
 # Relative size of the last step, and how far apart two roots are at least.
 CLOSE_ENOUGH, APART = 1e-13, 1e-9
@@ -83,12 +84,16 @@ def _newton(w, b, eta, c, k, root):
 @kernel
 def _find_roots(w, b, eta, c, roots):
     """Fill the two roots of each mode; whether all were found, and apart from each other."""
-    n = len(w)
+    n, stages = len(w), STAGES if c > 0.0 else 1
     for k in range(n):
         roots[k, 0], roots[k, 1] = _start(w[k], eta, True), _start(w[k], eta, False)
-        for stage in range(1, STAGES + 1):
+        for stage in range(1, stages + 1):
             for i in range(2):
-                roots[k, i] = _newton(w, b, eta, c * stage / STAGES, k, roots[k, i])
+                roots[k, i] = _newton(w, b, eta, c * stage / stages, k, roots[k, i])
+                # the other of a pair is its conjugate
+                if roots[k, 0].imag != 0.0:
+                    roots[k, 1] = roots[k, 0].conjugate()
+                    break
         if roots[k, 0].imag != 0.0:
             if roots[k, 0].imag < 0.0:
                 return False

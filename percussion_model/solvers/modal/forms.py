@@ -116,14 +116,21 @@ def trim(par, s, bars):
         s.active = n
 
 
+@inlined
+def hold_end(s, bars, low):
+    """Let the last shape take what the others lack of the rock end's offset (`low`) and speed."""
+    n, shape = bars.forms.sizes[s.form], bars.forms.shape[s.form]
+    if bars.forms.stiff[s.form] > 0.0 and s.active == n:
+        bars.w[Q, n - 1] += (low - s.low) / shape[LOW, n - 1]
+        bars.w[V, n - 1] += (s.v_low - row_sum(shape, LOW, bars.w, V, n)) / shape[LOW, n - 1]
+
+
 @kernel
 def settle(par, s, bars, low):
     """Complete a new form: few modes, and the rock end where it was (offset `low`)."""
     refresh_loads(s, bars, s.a_b, s.a_p)
     refresh_sums(s, bars)
-    n = bars.forms.sizes[s.form]
-    if bars.forms.stiff[s.form] > 0.0 and s.active == n:
-        bars.w[Q, n - 1] += (low - s.low) / bars.forms.shape[s.form, LOW, n - 1]
+    hold_end(s, bars, low)
     if bars.laws.sizes[2 * s.form] == 0 or (s.form % JOINED == 0) != (s.mode == Mode.FF):
         trim(par, s, bars)
     refresh_sums(s, bars)

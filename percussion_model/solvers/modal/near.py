@@ -341,10 +341,22 @@ def room_at(s, kind, look, work):
     return s.w_r - s.w - work if kind == WORK else 0.0
 
 
+class Aim(NamedTuple):
+    """What is known to be passed, and when."""
+
+    kind: int
+    known: int  # by so many ticks
+    high: float  # room then, as `room_at` has it
+    goal: float  # ticks by which it may be passed
+
+
 @inlined
-def share_before(low, high):
-    """Share of an interval before what is passed in it, by a straight line."""
-    return low / (low - high) if low > 0.0 > high else 0.5
+def aim_at(s, aim, last, work, ticks, halve):
+    """Foretell by a straight line when that is passed, from a later look before it."""
+    low, share = room_at(s, aim.kind, last, work), 0.5
+    if low > 0.0 > aim.high and not halve:
+        share = low / (low - aim.high)
+    return Aim(aim.kind, aim.known, aim.high, ticks + share * (aim.known - ticks))
 
 
 @kernel
@@ -355,14 +367,14 @@ def go_near(par, s, bars, most, blows, events):
     if has_piston(par) and s.parked == 0:
         # which vibrates as well
         usual = min(usual, STEP + 2)
-    level, ticks, known = usual, 0, -1
+    level, ticks = usual, 0
     last = first_look(s)
     C, taken, sampled, u_before = damping(s), 0.0, 0.0, s.u_r
     cutting, piston = s.mode == Mode.DFC, has_piston(par)
     if cutting and s.stride > FIRST_STRIDE:
         taken = C * (s.takes - to_be_taken(bars.laws.taken[s.law], bars.w, PQ, s.pairs))
     meets = ends = turns = False
-    kind, high, same, goal = ENDS, 0.0, 0, 0.0
+    aim, same = Aim(ENDS, -1, 0.0, 0.0), 0
     while ticks < most:
         while ticks + (1 << level) > most:
             level -= 1
@@ -383,12 +395,11 @@ def go_near(par, s, bars, most, blows, events):
         if level > 0 and not (meets or ends or turns):
             back = turns_between(s, end_of(last), end_of(look), par.tick * (1 << level))
         if level > 0 and (meets or ends or turns or back > 0.0):
-            known, same = ticks + (1 << level), 0
-            kind = kind_of(s, meets, turns, ends, work)
-            high = room_at(s, kind, look, work)
-            share = share_before(room_at(s, kind, last, taken + sampled), high)
-            goal = ticks + (back if back > 0.0 else share) * (1 << level)
-            level = min(level - 1, level_below(max(goal - ticks, 1.0)))
+            kind, known, same = kind_of(s, meets, turns, ends, work), ticks + (1 << level), 0
+            aim = Aim(kind, known, room_at(s, kind, look, work), ticks + back * (1 << level))
+            if kind != BACK:
+                aim = aim_at(s, aim, last, taken + sampled, ticks, False)
+            level = min(level - 1, level_below(max(aim.goal - ticks, 1.0)))
             continue
         if meets:
             break
@@ -400,14 +411,14 @@ def go_near(par, s, bars, most, blows, events):
         u_before, last = last.u_r, look
         if ends or turns:
             break
-        if ticks >= known or (kind == BACK and ticks >= goal):
-            level, known = usual, -1
+        if ticks >= aim.known or (aim.kind == BACK and ticks >= aim.goal):
+            level, aim = usual, Aim(ENDS, -1, 0.0, 0.0)
             continue
         same += 1
-        if kind != BACK:
-            share = share_before(room_at(s, kind, last, taken + sampled), high)
-            goal = ticks + (share if same < SAME_SIDE else 0.5) * (known - ticks)
-        level = level_below(min(max(goal - ticks, 1.0), max(known - ticks - 1.0, 1.0)))
+        if aim.kind != BACK:
+            aim = aim_at(s, aim, last, taken + sampled, ticks, same >= SAME_SIDE)
+        rest = max(aim.known - ticks - 1.0, 1.0)
+        level = level_below(min(max(aim.goal - ticks, 1.0), rest))
     if ticks > 0:
         book_way(par, s, bars, ticks, last)
     if meets and s.parked == 1:

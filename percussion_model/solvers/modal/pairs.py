@@ -8,7 +8,7 @@ import numpy as np
 
 from percussion_model.physics.kernel import inlined, kernel, merged
 from percussion_model.physics.records import Mode, RockKind
-from percussion_model.physics.rock import book_dashpot, damping, recoverable
+from percussion_model.physics.rock import book_dashpot, damping
 from percussion_model.solvers.modal.bar import LOAD, SOFT, STIFF, TINY, Q, V, row_sum
 from percussion_model.solvers.modal.forms import (
     LEAST_FORCE,
@@ -233,28 +233,6 @@ def hold_ends(par, s, bars):
 
 
 @kernel
-def follow(par, s, bars):
-    """Take the sums of fewer pairs of a free bar.
-
-    Those that were left out vibrated about zero, so that the others tell where it is; were the
-    rock end held instead, all of it would go aside by nanometres.
-    """
-    sums, before = present_sums(s, bars), recoverable(s)
-    s.p += sums.low - s.low
-    s.e_standstill += before - recoverable(s)
-    s.low, s.v_low, s.top, s.at_b = sums.low, sums.speed, sums.top, sums.bit
-
-
-@kernel
-def keep_fewer(par, s, bars):
-    """Take the sums of pairs of which some were left out."""
-    if s.form == 0:
-        follow(par, s, bars)
-    else:
-        hold_ends(par, s, bars)
-
-
-@kernel
 def enough_pairs(par, s, bars):
     """How many pairs hold next to all of the energy of vibration."""
     ends, held = bars.laws.ends[s.law], bars.forms.stiff[s.form]
@@ -297,7 +275,7 @@ def leave_out_pairs(par, s, bars):
     n = enough_pairs(par, s, bars)
     if n < s.pairs:
         s.pairs = n
-        keep_fewer(par, s, bars)
+        hold_ends(par, s, bars)
 
 
 @inlined
@@ -424,7 +402,7 @@ def take_pairs(par, s, bars, law):
         store(w, PV, k, load(bars.rows, 1, k))
     s.stride = FIRST_STRIDE
     s.pairs = enough_pairs(par, s, bars)
-    keep_fewer(par, s, bars)
+    hold_ends(par, s, bars)
     s.takes = 0.0
     if law % 2 == 1:
         s.takes = to_be_taken(bars.laws.taken[law], w, PQ, s.pairs)

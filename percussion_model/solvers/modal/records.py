@@ -103,8 +103,10 @@ class Laws(NamedTuple):
         What pairs tell now of the rock end 2^level ticks later.
     scans : ndarray, shape (12, LONGEST_HOP - STEP + 1, n len(View), SCAN)
         The same for 1, 2, ... SCAN times 2^STEP, 2^(STEP + 1), ... ticks later; for all laws.
-    sides : ndarray, shape (12, LONGEST_HOP - STEP + 1, n len(Side), SCAN)
-        What they tell of the bit's other end then.
+    sides : ndarray, shape (12, LONGEST_HOP - STEP + 1, 4 n, SCAN)
+        What they tell of the bit's other end then, by Q and V: of a bit alone the offset of its
+        top; of a piston that touches, what accelerates it, and the integral of its velocity over
+        its mass.
     way : int array, shape (6, 6)
         Place in `over` of the table from the pairs of a law to those of another, -1: none.
     over : ndarray, shape (tables, 2 n, 2 n)
@@ -170,15 +172,6 @@ class View(IntEnum):
     LOW_Q = 0
     LOW_V = 1
     SPEED_Q = 2
-    SPEED_V = 3
-
-
-class Side(IntEnum):
-    """Rows by which pairs tell of the other end later, about rest."""
-
-    ONE_Q = 0  # offset of the top of a bit alone, or what the bit accelerates the piston with
-    ONE_V = 1
-    SPEED_Q = 2  # of a piston that touches: integral of its velocity over its mass
     SPEED_V = 3
 
 

@@ -41,11 +41,10 @@ from percussion_model.solvers.modal.pairs import (
     to_be_taken,
 )
 from percussion_model.solvers.modal.piston import WHOLE, time_of
-from percussion_model.solvers.modal.records import LONGEST_HOP, SCAN, STEP, Side, View
+from percussion_model.solvers.modal.records import LONGEST_HOP, SCAN, STEP, View
 from percussion_model.solvers.modal.rock_end import passed
 
 LOW_Q, LOW_V, SPEED_Q, SPEED_V = (int(row) for row in View)
-ONE_Q, ONE_V, PISTON_Q, PISTON_V = (int(row) for row in Side)
 # Rows of `Bars.rows` with what a search sees, of the rock end and of the other.
 SEEN, SIDE = 2, 6
 # 2^SCAN_LEVEL looks at once.
@@ -153,40 +152,27 @@ def end_after(par, s, bars, law, level):
 
 
 @inlined
-def scan(s, bars, hop, modes):
-    """See offset and velocity of the rock end at the next looks, into `bars.rows`.
+def scan(bars, view, modes, row):
+    """See what two rows tell at the next looks, into two rows of `bars.rows`.
 
     Parameters
     ----------
+    view : ndarray, shape (4 n, SCAN)
+        As `Laws.scans` and `Laws.sides` have it.
     modes : int
         Pairs that count.
+    row : int
+        The first of the two.
     """
-    view = bars.laws.scans[s.law, hop]
-    low = low_v = speed = speed_v = spread(0.0)
+    one = one_v = other = other_v = spread(0.0)
     for k in range(modes):
         q, v = bars.w[AT, k], bars.w[AT + 1, k]
-        low = low + load(view, 4 * k + LOW_Q, 0) * q
-        low_v = low_v + load(view, 4 * k + LOW_V, 0) * v
-        speed = speed + load(view, 4 * k + SPEED_Q, 0) * q
-        speed_v = speed_v + load(view, 4 * k + SPEED_V, 0) * v
-    store(bars.rows, SEEN, 0, low + low_v)
-    store(bars.rows, SEEN + 1, 0, speed + speed_v)
-
-
-@inlined
-def scan_side(s, bars, hop, modes, touches):
-    """See what pairs tell of the other end at the next looks, into `bars.rows`."""
-    view = bars.laws.sides[s.law, hop]
-    one = one_v = speed = speed_v = spread(0.0)
-    for k in range(modes):
-        q, v = bars.w[AT, k], bars.w[AT + 1, k]
-        one = one + load(view, 4 * k + ONE_Q, 0) * q
-        one_v = one_v + load(view, 4 * k + ONE_V, 0) * v
-        if touches:
-            speed = speed + load(view, 4 * k + PISTON_Q, 0) * q
-            speed_v = speed_v + load(view, 4 * k + PISTON_V, 0) * v
-    store(bars.rows, SIDE, 0, one + one_v)
-    store(bars.rows, SIDE + 1, 0, speed + speed_v)
+        one = one + load(view, 4 * k, 0) * q
+        one_v = one_v + load(view, 4 * k + 1, 0) * v
+        other = other + load(view, 4 * k + 2, 0) * q
+        other_v = other_v + load(view, 4 * k + 3, 0) * v
+    store(bars.rows, row, 0, one + one_v)
+    store(bars.rows, row + 1, 0, other + other_v)
 
 
 class Moving(NamedTuple):
@@ -518,9 +504,9 @@ def search(par, s, bars, most, beside):
         if beside.near and count == 0:
             break
         if count > 0:
-            scan(s, bars, level - STEP, now.modes)
+            scan(bars, bars.laws.scans[s.law, level - STEP], now.modes, SEEN)
         if beside.near:
-            scan_side(s, bars, level - STEP, now.modes, beside.touches)
+            scan(bars, bars.laws.sides[s.law, level - STEP], now.modes, SIDE)
         seen = look_through(
             par, s, bars, law, beside, ticks, level, count, taken, sampled, last, touch
         )
