@@ -43,6 +43,8 @@ FAR, FALLING, ALIKE = 10.0, 0.9, 3.0
 # They must have done so for this share of all blows run: a motion that wanders, too, comes
 # by chance upon a few blows that fall evenly, and leaves them again.
 DIRECT = 0.5
+# So many at least: two fall evenly by chance where a motion comes near quickly and then wanders.
+LEAST_FACTORS = 3.0
 # Where changes are below this share of the tolerance, no scatter is left to hide anything.
 STILL = 1e-4
 # A cycle of several blows, or one that only scatters without converging any more, is believed
@@ -473,7 +475,7 @@ def _converges(changes: list[float], tolerance: float) -> bool:
         if factor > FALLING or not alike:
             break
         factors.append(factor)
-    enough = max(2.0, DIRECT * len(changes))
+    enough = max(LEAST_FACTORS, DIRECT * len(changes))
     return len(factors) >= enough and changes[len(factors)] >= FAR * tolerance
 
 
