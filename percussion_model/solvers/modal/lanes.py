@@ -83,24 +83,48 @@ def _spread(typing, number):
     return _lanes(types.float64), generate
 
 
+def _halves(builder, part, width):
+    """The first and the last `width` of twice as many numbers."""
+    undefined = ir.Constant(part.type, ir.Undefined)
+    kind = ir.VectorType(ir.IntType(32), width)
+    return [
+        builder.shuffle_vector(
+            part, undefined, ir.Constant(kind, list(range(start, start + width)))
+        )
+        for start in (0, width)
+    ]
+
+
 @intrinsic
 def _sum(typing, lanes):
     def generate(context, builder, signature, args):
         part, width = args[0], WIDTH
         while width > 1:
             width //= 2
-            undefined = ir.Constant(part.type, ir.Undefined)
-            first, last = (
-                builder.shuffle_vector(
-                    part,
-                    undefined,
-                    ir.Constant(
-                        ir.VectorType(ir.IntType(32), width), list(range(start, start + width))
-                    ),
-                )
-                for start in (0, width)
-            )
+            first, last = _halves(builder, part, width)
             part = builder.fadd(first, last)
+        return builder.extract_element(part, ir.Constant(ir.IntType(32), 0))
+
+    return types.float64(_lanes), generate
+
+
+@intrinsic
+def _lower_of(typing, one, other):
+    def generate(context, builder, signature, args):
+        is_lower = builder.fcmp_ordered("<", *args)
+        return builder.select(is_lower, *args)
+
+    return _lanes(_lanes, _lanes), generate
+
+
+@intrinsic
+def _lowest(typing, lanes):
+    def generate(context, builder, signature, args):
+        part, width = args[0], WIDTH
+        while width > 1:
+            width //= 2
+            first, last = _halves(builder, part, width)
+            part = builder.select(builder.fcmp_ordered("<", first, last), first, last)
         return builder.extract_element(part, ir.Constant(ir.IntType(32), 0))
 
     return types.float64(_lanes), generate
@@ -156,9 +180,15 @@ def _sum_numbers(lanes):
     return float(total[0])
 
 
+def _lowest_number(lanes):
+    return float(lanes.min())
+
+
 # The same for kernels that run as plain Python.
 _PLAIN = bool(config.DISABLE_JIT)
 load = _load_numbers if _PLAIN else _load
 store = _store_numbers if _PLAIN else _store
 spread = _spread_number if _PLAIN else _spread
 total = _sum_numbers if _PLAIN else _sum
+lower_of = np.minimum if _PLAIN else _lower_of
+lowest = _lowest_number if _PLAIN else _lowest

@@ -8,6 +8,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+import numpy as np
+
 from percussion_model.physics.body import bit_acceleration, time_to_cover
 from percussion_model.physics.kernel import inlined, kernel, merged
 from percussion_model.physics.records import Mode, RockKind
@@ -20,7 +22,7 @@ from percussion_model.solvers.modal.between import (
     top_between,
     turns_between,
 )
-from percussion_model.solvers.modal.lanes import WIDTH, load, spread, store, total
+from percussion_model.solvers.modal.lanes import WIDTH, load, lower_of, lowest, spread, store, total
 from percussion_model.solvers.modal.pairs import (
     AT,
     BIT,
@@ -47,6 +49,10 @@ from percussion_model.solvers.modal.rock_end import passed
 LOW_Q, LOW_V, SPEED_Q, SPEED_V = (int(row) for row in View)
 # Rows of `Bars.rows` with what a search sees, of the rock end and of the other.
 SEEN, SIDE = 2, 6
+# And with what it saw from the look before on, where no piston is near.
+BEFORE = SIDE
+# Of looks, in intervals.
+TIMES = np.arange(1.0, SCAN + 1.0).reshape(1, SCAN)
 # 2^SCAN_LEVEL looks at once.
 SCAN_LEVEL = SCAN.bit_length() - 1
 # Flight shorter than this is looked through.
@@ -408,6 +414,43 @@ def touches_on(par, s, touch, speed, h, time):
 
 
 @inlined
+def size(lanes):
+    """Absolute values."""
+    return lower_of(lanes, lanes * -1.0) * -1.0
+
+
+@inlined
+def stands_on(s, bars, law, h, last, most):
+    """Whether a standstill plainly goes on through a whole scan, with no force that counts.
+
+    From one look to the next the velocity is a parabola, which is nowhere greater than 1.5 times
+    its mean and both its ends together.
+
+    Parameters
+    ----------
+    h : float
+        Between looks [s].
+    last : End
+        The rock end where the search is.
+    most : float
+        Force from which on it counts [N].
+    """
+    K, C, rows = law.stiffness, law.damping, bars.rows
+    rows[BEFORE, 0], rows[BEFORE + 1, 0], t = last.p, last.speed, load(TIMES, 0, 0)
+    p = load(rows, SEEN, 0) + (s.p + (s.rest_low - s.low)) + t * t * (0.5 * law.pull * h * h)
+    v = load(rows, SEEN + 1, 0) + t * (law.pull * h)
+    store(rows, BEFORE, 1, p)
+    store(rows, BEFORE + 1, 1, v)
+    p_before, v_before = load(rows, BEFORE, 0), load(rows, BEFORE + 1, 0)
+    way = size(p - p_before) * 1.5 + (size(v) + size(v_before)) * h
+    reach = way * (K + C / h)
+    force, before = p * K + v * C, p_before * K + v_before * C
+    low = lower_of(force, before) - reach
+    high = lower_of(force * -1.0, before * -1.0) - reach
+    return lowest(low) > K * law.origin and -lowest(high) < most + K * law.origin
+
+
+@inlined
 def look_through(par, s, bars, law, beside, ticks, level, count, taken, sampled, last, touch):
     """Go through the looks of a scan.
 
@@ -427,6 +470,14 @@ def look_through(par, s, bars, law, beside, ticks, level, count, taken, sampled,
     h, kept, near, then, peak, late = par.tick * (1 << level), 0, False, last, 0.0, 0.0
     since, blocked, speed_p = par.tick * ticks, False, 0.0
     begin = time_of(par, s) + since
+    if count == SCAN and s.mode == Mode.SS and not beside.near:
+        most = s.b_peak_bit
+        if begin + SCAN * h > s.peak_from:
+            most = min(most, s.peak_bit_force)
+        if stands_on(s, bars, law, h, last, most):
+            low, speed = bars.rows[SEEN, SCAN - 1], bars.rows[SEEN + 1, SCAN - 1]
+            then = end_at(s, law, low, speed, h * SCAN)
+            return Seen(SCAN, False, False, sampled, then, then, 0.0, 0.0, touch)
     while kept < count:
         if beside.near:
             t, apart = h * (kept + 1), beside.room

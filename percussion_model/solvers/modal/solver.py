@@ -27,6 +27,7 @@ from percussion_model.solvers.modal.records import (
     MODAL_LIMITS,
     MODAL_PAR,
     MODAL_STATE,
+    SCAN,
     STEP,
     Bars,
     Forms,
@@ -146,7 +147,7 @@ class ModalSolver(Solver):
         p["eta"] = eta
         p["leaps"] = leaps
         self.operator_bytes = sum(part.nbytes for part in (*made.forms, *made.laws))
-        self._rows = aligned(np.zeros((8, made.forms.shape.shape[2])))
+        self._rows = aligned(np.zeros((8, max(made.forms.shape.shape[2], 2 * SCAN))))
         self._read_at: dict[str, Places] = {}
         self._entry: Callable[..., int] = entry_of(run)
 
