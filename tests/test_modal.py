@@ -125,8 +125,8 @@ def test_the_last_shape_yields_what_left_out_modes_would(spring, mass):
 
 def test_what_falls_below_zero_between_two_looks_is_found():
     """(x - 0.4)^2 less 0.01, which is above zero at both, and 0.01 more than it."""
-    assert falls_below(0.16 - 0.01, -0.8, 0.36 - 0.01, 1.2, 1.0) == pytest.approx(0.35, abs=0.05)
-    assert falls_below(0.16 + 0.01, -0.8, 0.36 + 0.01, 1.2, 1.0) == 0.0
+    assert falls_below(0.16 - 0.01, -0.8, 0.36 - 0.01, 1.2) == pytest.approx(0.35, abs=0.05)
+    assert falls_below(0.16 + 0.01, -0.8, 0.36 + 0.01, 1.2) == 0.0
     assert least_at(parabola(-0.8, 1.2, 0.2)) == pytest.approx(0.4)
 
 

@@ -23,7 +23,7 @@ class End(NamedTuple):
 
 
 class Parabola(NamedTuple):
-    """first + slope x + bend x^2, with x from 0 at a look to 1 at the next."""
+    """first + slope x + bend x^2: a growth in each time between looks, at a share x of that."""
 
     first: float
     slope: float
@@ -38,9 +38,9 @@ def parabola(first, last, mean):
 
 
 @inlined
-def value_at(x, before, rate, h):
-    """What grows at a rate between two looks `h` apart, at a share of that time."""
-    return before + h * x * (rate.first + x * (0.5 * rate.slope + x * rate.bend / 3.0))
+def value_at(x, before, rate):
+    """What grows at a rate between two looks, at a share of the time between them."""
+    return before + x * (rate.first + x * (0.5 * rate.slope + x * rate.bend / 3.0))
 
 
 @inlined
@@ -59,15 +59,15 @@ def least_at(rate):
 
 
 @inlined
-def falls_below(before, slope, then, slope_then, h):
+def falls_below(before, slope, then, slope_then):
     """Where between two looks something falls below zero that is not at either.
 
     Parameters
     ----------
     before, then : float
-        What it is at the looks, which are `h` apart.
+        What it is at the looks.
     slope, slope_then : float
-        How fast it grows there; in between like a parabola.
+        How much it grows there in the time between them; in between like a parabola.
 
     Returns
     -------
@@ -77,9 +77,9 @@ def falls_below(before, slope, then, slope_then, h):
     """
     if not slope < 0.0 < slope_then:
         return 0.0
-    rate = parabola(slope, slope_then, (then - before) / h)
+    rate = parabola(slope, slope_then, then - before)
     at = least_at(rate)
-    least = value_at(at, before, rate, h)
+    least = value_at(at, before, rate)
     if not least < 0.0:
         return 0.0
     # about half way from where it passes zero
@@ -88,10 +88,10 @@ def falls_below(before, slope, then, slope_then, h):
 
 @inlined
 def force_rates(s, one, other, h):
-    """How fast the force of the rock grows at two looks `h` apart [N/s]."""
-    v = parabola(one.speed, other.speed, (other.p - one.p) / h)
-    K, C = stiffness(s), damping(s)
-    return K * one.speed + C * v.slope / h, K * other.speed + C * (v.slope + 2.0 * v.bend) / h
+    """How much the force of the rock grows in `h` at two looks so far apart [N]."""
+    way = parabola(h * one.speed, h * other.speed, other.p - one.p)
+    K, lag = stiffness(s), damping(s) / h
+    return K * way.first + lag * way.slope, K * h * other.speed + lag * (way.slope + 2.0 * way.bend)
 
 
 class Top(NamedTuple):
@@ -99,7 +99,7 @@ class Top(NamedTuple):
 
     first: float  # at the one [N]
     last: float  # at the other
-    rate: Parabola  # how fast it grows in between [N/s]
+    rate: Parabola  # of its growth in between [N]
     at: float  # share of the time between them at which it is greatest
     peak: float  # then [N]
 
@@ -108,11 +108,11 @@ class Top(NamedTuple):
 def top_between(s, one, other, h):
     """Make out the greatest force of the rock between two looks `h` apart."""
     slope, then = force_rates(s, one, other, h)
-    rate = parabola(slope, then, (other.force - one.force) / h)
+    rate = parabola(slope, then, other.force - one.force)
     at, peak = 1.0, other.force
     if slope > 0.0 > then:
         at = least_at(Parabola(-rate.first, -rate.slope, -rate.bend))
-        peak = max(peak, value_at(at, one.force, rate, h))
+        peak = max(peak, value_at(at, one.force, rate))
     return Top(one.force, other.force, rate, at, peak)
 
 
@@ -123,7 +123,7 @@ def late_peak(s, end, h, top):
     if not after > 0.0:
         return 0.0
     begin = 1.0 - min(after / h, 1.0)
-    late = max(top.last, value_at(begin, top.first, top.rate, h))
+    late = max(top.last, value_at(begin, top.first, top.rate))
     return max(late, top.peak) if begin <= top.at else late
 
 
@@ -144,16 +144,16 @@ def turns_between(s, one, other, h):
     if s.time < s.rest_until:
         return 0.0
     if s.mode == Mode.FF:
-        return falls_below(s.p_u - one.p, -one.speed, s.p_u - other.p, -other.speed, h)
+        return falls_below(s.p_u - one.p, -h * one.speed, s.p_u - other.p, -h * other.speed)
     if s.mode == Mode.SS:
         slope, then = force_rates(s, one, other, h)
-        return falls_below(one.force, slope, other.force, then, h)
-    v = parabola(one.speed, other.speed, (other.p - one.p) / h)
-    way = -1.0 if s.mode == Mode.BC else 1.0
-    slope, bend = way * v.slope, way * v.bend
+        return falls_below(one.force, slope, other.force, then)
+    way = parabola(h * one.speed, h * other.speed, other.p - one.p)
+    sign = -1.0 if s.mode == Mode.BC else 1.0
+    slope, bend = sign * way.slope, sign * way.bend
     if not 0.0 < -slope < 2.0 * bend:
         return 0.0
-    if way * v.first - slope * slope / (4.0 * bend) >= -REST_VELOCITY:
+    if sign * way.first - slope * slope / (4.0 * bend) >= -REST_VELOCITY * h:
         return 0.0
     return -0.5 * slope / bend
 
