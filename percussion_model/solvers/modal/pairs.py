@@ -232,15 +232,21 @@ def hold_ends(par, s, bars):
         s.vibrates -= s.a_p * (s.at_p - at_p)
 
 
+@inlined
+def least_size(par, s, bars, form, energy):
+    """Twice the energy from which on pairs count, of some vibration in a form [J]."""
+    least, held = 2.0 * LEAST_SHARE * energy, bars.forms.stiff[form]
+    if held == 0.0:
+        return least
+    force = LEAST_FORCE * s.a_b * par.mass_b
+    return max(least, force * force / held)
+
+
 @kernel
 def enough_pairs(par, s, bars):
     """How many pairs hold next to all of the energy of vibration."""
-    ends, held = bars.laws.ends[s.law], bars.forms.stiff[s.form]
-    least = 2.0 * energy_of_pairs(s, bars, bars.w, PQ)
-    least *= LEAST_SHARE
-    if held > 0.0:
-        force = LEAST_FORCE * s.a_b * par.mass_b
-        least = max(least, force * force / held)
+    ends = bars.laws.ends[s.law]
+    least = least_size(par, s, bars, s.form, energy_of_pairs(s, bars, bars.w, PQ))
     above, n = 0.0, s.pairs
     while n > WIDTH:
         above += total(size_of(ends, bars.w, PQ, n - WIDTH))
@@ -301,9 +307,9 @@ def times_table(table, x, first, count, i):
 
 
 @kernel
-def multiply(table, x, first, active, rows, count):
-    """Product of a table with two rows of `x` from `first` on, into two of `rows`."""
-    for i in range(0, count, WIDTH):
+def multiply(table, x, first, active, rows, start, count):
+    """Product of a table with two rows of `x` from `first` on, into two of `rows` from `start`."""
+    for i in range(start, count, WIDTH):
         q, v = times_table(table, x, first, active, i)
         store(rows, 0, i, q)
         store(rows, 1, i, v)
@@ -331,7 +337,7 @@ def spell_out(s, bars, x, first):
             store(bars.rows, 1, k, load(x, first + 1, k))
         return s.pairs
     n = bars.laws.sizes[s.law]
-    multiply(bars.laws.out[s.law], x, first, s.pairs, bars.rows, n)
+    multiply(bars.laws.out[s.law], x, first, s.pairs, bars.rows, 0, n)
     return n
 
 
@@ -396,7 +402,7 @@ def take_pairs(par, s, bars, law):
         for k in range(0, count, WIDTH):
             store(w, Q, k, load(bars.rows, 0, k))
         s.pairs = min(count + WIDTH, n)
-        multiply(bars.laws.into[law], w, Q, count, bars.rows, s.pairs)
+        multiply(bars.laws.into[law], w, Q, count, bars.rows, 0, s.pairs)
     for k in range(0, s.pairs, WIDTH):
         store(w, PQ, k, load(bars.rows, 0, k))
         store(w, PV, k, load(bars.rows, 1, k))
