@@ -31,6 +31,7 @@ from percussion_model.solvers.modal.pairs import (
     PISTON,
     PLOAD,
     PQ,
+    SPEED,
     SQUARE,
     TOP,
     carry_pairs,
@@ -38,6 +39,7 @@ from percussion_model.solvers.modal.pairs import (
     energy_of_pairs,
     keep,
     move_pairs,
+    part_of,
     size_of,
     spell_out,
     to_be_taken,
@@ -64,6 +66,8 @@ SLIGHT_SHARE, FEWEST_MODES = 1e-9, 4
 UNSURE = 2.0
 # Looks within an interval whose work of the dashpot is summed up.
 PIECES = 3
+# Ticks in which the rock end goes straight.
+STRAIGHT = 128
 # An interval is halved where a straight line told so often to stay on one side.
 SAME_SIDE = 4
 # A standstill is searched for peaks until its vibration is below this share of the load.
@@ -142,6 +146,17 @@ def end_at(s, law, low, speed, t):
     p = s.p + (s.rest_low + low + 0.5 * law.pull * t * t - s.low)
     speed += law.pull * t
     return End(p, speed, law.stiffness * (p - law.origin) + law.damping * speed)
+
+
+@inlined
+def present_end(s, bars, law):
+    """Look at the rock end where the search is."""
+    ends, low, speed = bars.laws.ends[s.law], spread(0.0), spread(0.0)
+    for k in range(0, s.pairs, WIDTH):
+        q, v = load(bars.w, AT, k), load(bars.w, AT + 1, k)
+        low = low + part_of(ends, LOW, k, q, v)
+        speed = speed + part_of(ends, SPEED, k, q, v)
+    return end_at(s, law, total(low), total(speed), 0.0)
 
 
 @inlined
@@ -343,6 +358,17 @@ def narrow(par, s, bars, law, most, work, before, then, fresh):
     ticks, rest, low, high, same = 0, most, beyond(s, before), beyond(s, then), 0
     turn = most * turns_between(s, before, then, par.tick * most)
     while rest > 0:
+        if rest <= STRAIGHT and low < 0.0 < high:
+            # a straight line tells when
+            go = min(1 + int(rest * low / (low - high)), rest)
+            carry_pairs(s, bars, bars.w, AT, go)
+            here = present_end(s, bars, law)
+            if s.mode == Mode.DFC:
+                work += law.damping * squared_between(before, here, par.tick * go)
+            ticks, rest, before, low = ticks + go, rest - go, here, beyond(s, here)
+            if passed(par, s, here.p, here.speed, work, here.force):
+                return ticks, True, work, here
+            continue
         guess = 0.5 * rest
         if ticks < turn:
             guess = turn - ticks
@@ -350,6 +376,8 @@ def narrow(par, s, bars, law, most, work, before, then, fresh):
             # so far by a straight line
             guess = rest * low / (low - high)
         level = level_below(min(max(guess, 1.0), rest - 1.0))
+        if rest > 4 << level:
+            level += 1  # likely beyond: the line is straighter in between
         go = 1 << level
         here, after = end_after(par, s, bars, law, level), work
         if s.mode == Mode.DFC:
