@@ -22,14 +22,12 @@ from percussion_model.solvers.modal.pairs import (
     hold_low,
     keep,
     law_in,
-    least_size,
     leave_out_pairs,
-    multiply,
     shift_pairs,
-    size_of,
     sum_of,
     take_modes,
     to_be_taken,
+    turn_into,
 )
 from percussion_model.solvers.modal.records import Rest
 from percussion_model.solvers.modal.rock_end import QUIET_SHARE, change_mode, next_mode, note_mode
@@ -45,34 +43,6 @@ def besides(s, bars):
     return s.a_b * (s.at_b - 0.5 * s.rest_b) - 0.5 * bars.forms.stiff[s.form] * s.low * s.low
 
 
-@inlined
-def push(s, bars, over, start, count):
-    """Move the pairs of a product in `bars.rows` to where the load holds them."""
-    pushed = bars.laws.pushed[over]
-    for k in range(start, count, WIDTH):
-        store(bars.rows, 0, k, load(bars.rows, 0, k) + load(pushed, 0, k) * s.a_b)
-        store(bars.rows, 1, k, load(bars.rows, 1, k) + load(pushed, 1, k) * s.a_b)
-
-
-@inlined
-def turn_into(par, s, bars, law, over):
-    """Turn pairs into those of another law, in `bars.rows`, as far as they count; how many.
-
-    Of the others first as many as there are and some; the rest where the last of them count.
-    """
-    table, n = bars.laws.over[over], bars.laws.sizes[law]
-    count = min(s.pairs + WIDTH, n)
-    multiply(table, bars.w, PQ, s.pairs, bars.rows, 0, count)
-    push(s, bars, over, 0, count)
-    if count < n:
-        last = total(size_of(bars.laws.ends[law], bars.rows, 0, count - WIDTH))
-        if last > least_size(par, s, bars, law // 2, s.vibrates):
-            multiply(table, bars.w, PQ, s.pairs, bars.rows, count, n)
-            push(s, bars, over, count, n)
-            return n
-    return count
-
-
 @kernel
 def pass_over(par, s, bars, law, over):
     """Go on by the pairs of another law, with the penetration that the mode has.
@@ -86,7 +56,7 @@ def pass_over(par, s, bars, law, over):
     """
     w, low, v_b = bars.w, s.p - origin(s), s.v_b
     tip, energy = s.top - s.at_b / par.mass_b, s.vibrates + besides(s, bars)
-    s.pairs = turn_into(par, s, bars, law, over)
+    s.pairs = turn_into(par, s, bars, law, over, bars.laws.over[over], PQ, s.pairs)
     keep(bars.rows, 0, w, PQ, s.pairs)
     for k in range(0, s.pairs, WIDTH):
         store(w, PLOAD, k, spread(0.0))

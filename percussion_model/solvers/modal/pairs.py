@@ -390,22 +390,65 @@ def enough_modes(s, bars, n):
     return n
 
 
+@inlined
+def push(s, bars, over, start, count):
+    """Move the pairs of a product in `bars.rows` to where the load holds them."""
+    pushed = bars.laws.pushed[over]
+    for k in range(start, count, WIDTH):
+        store(bars.rows, 0, k, load(bars.rows, 0, k) + load(pushed, 0, k) * s.a_b)
+        store(bars.rows, 1, k, load(bars.rows, 1, k) + load(pushed, 1, k) * s.a_b)
+
+
+@inlined
+def turn_into(par, s, bars, law, over, table, first, inputs):
+    """Turn two rows of `Bars.w` into the pairs of a law, in `bars.rows`, as far as they count.
+
+    First somewhat more than there were; the rest where the last of them count.
+
+    Parameters
+    ----------
+    over : int
+        Place in `Laws.pushed` of what the load adds; -1 for nothing.
+    table : ndarray
+        What they are multiplied with.
+    first, inputs : int
+        The first row, and how many numbers of it.
+
+    Returns
+    -------
+    int
+        Pairs that count.
+    """
+    n = bars.laws.sizes[law]
+    count = min(s.pairs + WIDTH, n)
+    multiply(table, bars.w, first, inputs, bars.rows, 0, count)
+    if over >= 0:
+        push(s, bars, over, 0, count)
+    if count < n:
+        last = total(size_of(bars.laws.ends[law], bars.rows, 0, count - WIDTH))
+        if last > least_size(par, s, bars, law // 2, s.vibrates):
+            multiply(table, bars.w, first, inputs, bars.rows, count, n)
+            if over >= 0:
+                push(s, bars, over, count, n)
+            return n
+    return count
+
+
 @kernel
 def take_pairs(par, s, bars, law):
     """Go on by the pairs of a law."""
     n, w = bars.laws.sizes[law], bars.w
     take_rest(s, bars, n)
-    s.law, s.pairs = law, n
+    s.law = law
     s.vibrates = energy_about_rest(s, bars, n)
     if s.form % JOINED > 0:
         count = enough_modes(s, bars, n)
         for k in range(0, count, WIDTH):
             store(w, Q, k, load(bars.rows, 0, k))
-        s.pairs = min(count + WIDTH, n)
-        multiply(bars.laws.into[law], w, Q, count, bars.rows, 0, s.pairs)
-    for k in range(0, s.pairs, WIDTH):
-        store(w, PQ, k, load(bars.rows, 0, k))
-        store(w, PV, k, load(bars.rows, 1, k))
+        s.pairs = turn_into(par, s, bars, law, -1, bars.laws.into[law], Q, count)
+    else:
+        s.pairs = n
+    keep(bars.rows, 0, w, PQ, s.pairs)
     s.stride = FIRST_STRIDE
     s.pairs = enough_pairs(par, s, bars)
     hold_ends(par, s, bars)
