@@ -19,6 +19,7 @@ from percussion_model.solvers.modal.pairs import (
     book_losses,
     book_work,
     drop_pairs,
+    enough_pairs,
     hold_low,
     keep,
     law_in,
@@ -66,6 +67,7 @@ def pass_over(par, s, bars, law, over):
     rest = bars.laws.rest[law]
     s.rest_low, s.rest_top = rest[REST_LOW] * s.a_b, rest[REST_TOP] * s.a_b
     s.rest_b = rest[REST_BIT] * s.a_b
+    s.pairs = enough_pairs(par, s, bars)
     shift_pairs(s, bars, low - s.low)
     hold_low(s, bars, low, YIELDS if s.form > 0 else SHIFT)
     ends = bars.laws.ends[law]
@@ -73,7 +75,6 @@ def pass_over(par, s, bars, law, over):
     s.i_bit -= par.mass_b * (s.v_b - v_b)
     s.offset += tip - (s.top - s.at_b / par.mass_b)
     s.vibrates = energy - besides(s, bars)
-    leave_out_pairs(par, s, bars)
     s.takes = 0.0
     if law % 2 == 1:
         s.takes = to_be_taken(bars.laws.taken[law], w, PQ, s.pairs)

@@ -13,6 +13,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from scipy.special import roots_legendre
 
 from percussion_model.physics.kernel import kernel
 from percussion_model.scene.bars import (
@@ -212,8 +213,9 @@ def with_residual(modes: Modes, spring: float) -> Modes:
     frequency, wave, size, phase = (part.copy() for part in modes[:4])
     wave[n], size[n], phase[n] = 0.0, 1.0, 0.0
     last = np.append(-low / kept**2, 1.0 / spring)
-    # by quadrature: as a difference of squares it would lose its digits
-    nodes, weights = np.polynomial.legendre.leggauss(2 * n + 20)
+    # by quadrature: as a difference of squares it would lose its digits. numpy's nodes come from a
+    # matrix so large that a thread of its linear algebra wakes, and then spins for 0.1 s
+    nodes, weights = roots_legendre(2 * n + 20)
     inertia = _inertia(
         modes.mass, modes.transit, modes.top_mass, wave, size, phase, last, nodes, weights
     )
