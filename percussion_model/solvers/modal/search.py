@@ -67,7 +67,7 @@ UNSURE = 2.0
 # Looks within an interval whose work of the dashpot is summed up.
 PIECES = 3
 # Ticks in which the rock end goes straight.
-STRAIGHT = 128
+STRAIGHT = 256
 # An interval is halved where a straight line told so often to stay on one side.
 SAME_SIDE = 4
 # A standstill is searched for peaks until its vibration is below this share of the load.
@@ -563,8 +563,12 @@ def search(par, s, bars, most, beside):
     touch = Touching(s.v_p, s.peak_time, s.peak_impulse, 0.0, 0.0)
     if s.mode == Mode.DFC and s.stride > FIRST_STRIDE:
         taken = taken_so_far(par, s, bars)
+    now, stale = moving(s, bars, bars.w, AT), False
     while ticks < most and not ends and not (stands and ticks >= LONGEST_GLANCE):
-        now, rest = moving(s, bars, bars.w, AT), most - ticks
+        rest = most - ticks
+        if stale:  # what moved before is a bound of what does
+            now = moving(s, bars, bars.w, AT)
+        stale = not stale
         quiet = 0 if beside.near else quiet_ticks(par, s, bars, now.energy, rest)
         if quiet > 0 and stands and ticks > 0:
             break  # its mean force is noted where it begins
