@@ -143,6 +143,12 @@ def test_explain(percussion):
         assert text in out
 
 
+def test_explain_says_why_a_solver_was_taken(percussion):
+    for words, said in (([], "modal (auto: elastic bars with loss)"), (["--solver", "fem"], "fem")):
+        _, out, _ = percussion("explain", SCENARIOS / "reference.toml", *words)
+        assert re.search(rf"Solver +│ {re.escape(said)} +│", out)
+
+
 def test_explain_shows_no_rounding_as_an_error_of_the_wave_speed(percussion):
     waves, lengths = [SCENARIOS / "reference.toml", "--solver", "wave"], ["--cells", "23"]
     for words, error in (([], r"none"), (lengths, r"\d\.\d+ %")):

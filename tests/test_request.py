@@ -188,6 +188,14 @@ def test_modes_answer_where_no_solver_is_named(changes, name, solver):
     assert math.isfinite(result.rate_of_penetration_relative_error)
 
 
+def test_a_request_says_that_its_error_is_estimated_anyway():
+    scene = Scene(bit={"model": "rigid"}, piston={"model": "rigid"})
+    short = {"duration": 0.4, "settle": 0.1, "record_events": False, "error_estimate": False}
+    notes = simulate(scene, accuracy=0.1, **short).warnings
+    assert [note for note in notes if note.startswith("run.error_estimate = false has no effect")]
+    assert not any("run.error_estimate" in note for note in simulate(scene, **short).warnings)
+
+
 def test_a_modal_solver_takes_the_modes_of_the_rule():
     scene = Scene().replace(**{"solver.name": "modal", "solver.accuracy": 1e-3})
     assert ModalSolver(scene).modes == modes_for(numbers_of(scene), 1e-3) == 56

@@ -234,26 +234,30 @@ def test_a_rigid_piston_on_an_elastic_bit_is_for_waves():
 
 
 @pytest.mark.parametrize(
-    "changes",
+    ("changes", "why"),
     [
-        {"effects.loss": False},
-        {"loss.time": 0.0},
-        {"effects.rock": "wall", "effects.barrier": False},
+        ({"effects.loss": False}, "off"),
+        ({"loss.time": 0.0}, "below 0.0005"),
+        ({"effects.rock": "wall", "effects.barrier": False}, "wall"),
+        ({"bit.sections.0.length": 4.0}, "more than 16 times as long"),
         # 5e-4 and 1 of the transit time of the piston, 33.8 us, or of a shorter bit
-        {"loss.time": 1.6e-8},
-        {"loss.time": 3.5e-5},
-        {"loss.time": 2e-5, "bit.sections.0.length": 0.1},
+        ({"loss.time": 1.6e-8}, "below 0.0005"),
+        ({"loss.time": 3.5e-5}, "above"),
+        ({"loss.time": 2e-5, "bit.sections.0.length": 0.1}, "above"),
     ],
 )
-def test_waves_are_taken_where_modes_ring_or_are_too_few(changes):
+def test_waves_are_taken_where_modes_ring_or_are_too_few(changes, why):
     scene = Scene().replace(**changes)
     assert scene.solver_name == "wave"
-    assert scene.replace(**{"solver.name": "modal"}).solver_name == "modal"
+    assert why in scene.why_solver
+    named = scene.replace(**{"solver.name": "modal"})
+    assert (named.solver_name, named.why_solver) == ("modal", "")
 
 
 @pytest.mark.parametrize("loss", [1.8e-8, 3.3e-5])
 def test_modes_are_taken_between(loss):
-    assert Scene().replace(**{"loss.time": loss}).solver_name == "modal"
+    scene = Scene().replace(**{"loss.time": loss})
+    assert (scene.solver_name, scene.why_solver) == ("modal", "elastic bars with loss")
 
 
 def test_reading_a_scene_loads_nothing_that_draws_or_exports():

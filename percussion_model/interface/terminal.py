@@ -103,7 +103,8 @@ def show_summary(result: Result) -> None:
         counts = " + ".join(map(str, result.cells.values()))
         table.add_row(counted(result.solver).capitalize(), counts, ", ".join(result.cells))
     table.add_row("Prepared in", in_digits(result.setup_time, TIMED), "s")
-    table.add_row("Computed in", in_digits(result.wall_time, TIMED), "s")
+    every = "" if result.scene.solver.accuracy is None else ", all runs"
+    table.add_row("Computed in", in_digits(result.wall_time, TIMED), f"s{every}")
     table.add_row("Speed", in_digits(result.real_time_factor, TIMED), "× real time")
     console = Console()
     print_table(table, console, keys=2)
@@ -220,7 +221,8 @@ def show_explanation(scene: Scene, found: Forecast) -> None:
     table.add_row("Piston, bit", f"{scene.piston.model}, {scene.bit.model}")
     for name, text in _scale_rows(scene):
         table.add_row(name, text)
-    table.add_row("Solver", solver.name if solver else scene.solver_name)
+    why = f" (auto: {scene.why_solver})" if scene.why_solver else ""
+    table.add_row("Solver", f"{solver.name if solver else scene.solver_name}{why}")
     if scene.solver.accuracy is not None:
         table.add_row("Wanted accuracy of the rate", f"{scene.solver.accuracy:g}")
     if solver is None or scene.solver_name == "blow-map":
@@ -231,7 +233,8 @@ def show_explanation(scene: Scene, found: Forecast) -> None:
         table.add_row("Time step", f"{solver.time_step:.6g} s")
         error = 100.0 * solver.wave_speed_error
         fits = error < 100.0 * FITS
-        table.add_row("Wave speed error", "none" if fits else f"{in_digits(error, TIMED)} %")
+        if counted(solver.name) != "modes":
+            table.add_row("Wave speed error", "none" if fits else f"{in_digits(error, TIMED)} %")
     else:
         table.add_row("Steps", "from event to event, in closed form")
     if found.per_blow is not None:

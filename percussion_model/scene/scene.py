@@ -295,18 +295,34 @@ class Scene:
             return str(self.solver.name)
         if self.bit.model == "rigid":
             return "rigid"
-        return "modal" if self._modes_fit else "wave"
+        return "wave" if self._against_modes else "modal"
 
     @property
-    def _modes_fit(self) -> bool:
-        """Whether modes drill as well as waves, or better, with as many modes as cells."""
+    def why_solver(self) -> str:
+        """Why `solver.name = "auto"` took the solver; empty where something else names it."""
+        if self.solver.name != "auto" or self.solver_name not in ("rigid", "modal", "wave"):
+            return ""
+        if self.solver_name == "rigid":
+            return "the bit is rigid" if self.bit.model == "rigid" else ""
+        return self._against_modes or "elastic bars with loss"
+
+    @property
+    def _against_modes(self) -> str:
+        """Why waves drill better than as many modes; empty where they do not."""
         # a rigid piston and a wall push hardest in the first instant
-        if not self.effects.loss or self.effects.rock == "wall" or self.piston.model == "rigid":
-            return False
+        if self.piston.model == "rigid":
+            return "the piston is rigid"
+        if self.effects.rock == "wall":
+            return "the rock is a wall"
+        if not self.effects.loss:
+            return "loss is off"
         times = [bar.transit_time for bar in (self.piston, self.bit) if bar.model == "elastic"]
         if max(times) > MOST_UNLIKE * min(times):
-            return False
-        return LEAST_LOSS <= self.loss.time / min(times) <= MOST_LOSS
+            return f"one bar is more than {MOST_UNLIKE:g} times as long by transit time"
+        share = self.loss.time / min(times)
+        if share < LEAST_LOSS:
+            return f"loss.time is below {LEAST_LOSS:g} of the shorter transit time"
+        return "loss.time is above the shorter transit time" if share > MOST_LOSS else ""
 
     @property
     def has_waves(self) -> bool:

@@ -460,6 +460,10 @@ def _requested(
     scene = scene.replace(**given) if given else scene
     if scene.run.check and scene.solver.accuracy is None:
         raise SceneError("run.check = true verifies solver.accuracy: set that too")
+    if error_estimate is False and scene.solver.accuracy is not None:
+        notes.append(
+            "run.error_estimate = false has no effect: the runs for solver.accuracy tell the error"
+        )
     return scene, notes
 
 
