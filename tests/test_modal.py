@@ -15,7 +15,13 @@ from percussion_model.physics.records import EventKind
 from percussion_model.scene.bars import bar_mass, bar_transit_time
 from percussion_model.solvers.modal.bar import carry, try_move
 from percussion_model.solvers.modal.between import falls_below, least_at, parabola
-from percussion_model.solvers.modal.modes import bar_modes, products, totals, with_residual
+from percussion_model.solvers.modal.modes import (
+    bar_modes,
+    fill_quadrature,
+    products,
+    totals,
+    with_residual,
+)
 from percussion_model.solvers.modal.records import STEP, Shape
 from percussion_model.solvers.modal.solver import ModalSolver
 
@@ -94,6 +100,15 @@ def test_modes_on_a_spring_meet_its_law(spring):
 def test_modes_are_orthogonal_by_mass(sections, spring, mass):
     found = bar_modes(sections, 24, spring, mass)
     np.testing.assert_allclose(products(found, 0, found, 0, len(sections)), np.eye(24), atol=1e-11)
+
+
+@pytest.mark.parametrize("count", [4, 61, 400])
+def test_a_quadrature_is_exact_for_polynomials(count):
+    nodes, weights = np.zeros((2, count))
+    fill_quadrature(nodes, weights)
+    for power in (0, 2, 6, 2 * count - 2):
+        assert weights @ nodes**power == pytest.approx(2.0 / (power + 1.0), rel=1e-12)
+    np.testing.assert_allclose(nodes, -nodes[::-1], rtol=0.0, atol=1e-15)
 
 
 def test_modes_on_a_spring_yield_as_the_spring_does():

@@ -13,7 +13,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import roots_legendre
 
 from percussion_model.physics.kernel import kernel
 from percussion_model.scene.bars import (
@@ -29,6 +28,8 @@ HALVINGS = 70
 LEAST_YIELD = 1e-9
 # Below this argument sin(x) / x is its series.
 SMALL = 1e-4
+# Of the nodes of a quadrature; each doubles their digits.
+NEWTON_STEPS = 5
 
 
 class Modes(NamedTuple):
@@ -86,6 +87,26 @@ def _sum_last(rows, last, out):
         for k in range(len(last)):
             total += last[k] * rows[k, j]
         out[-1, j] = total
+
+
+@kernel
+def fill_quadrature(nodes, weights):
+    """Fill in nodes and weights of Gauss and Legendre from -1 to 1.
+
+    numpy finds them by a matrix so large that a thread of its linear algebra wakes, and then
+    spins for a tenth of a second.
+    """
+    n = len(nodes)
+    for i in range(n):
+        x, slope = math.cos(math.pi * (i + 0.75) / (n + 0.5)), 1.0
+        for _ in range(NEWTON_STEPS):
+            before, value = 1.0, x
+            for k in range(2, n + 1):
+                before, value = value, ((2.0 * k - 1.0) * x * value - (k - 1.0) * before) / k
+            slope = n * (before - x * value) / (1.0 - x * x)
+            x -= value / slope
+        nodes[n - 1 - i] = x
+        weights[n - 1 - i] = 2.0 / ((1.0 - x * x) * slope * slope)
 
 
 @kernel
@@ -213,9 +234,9 @@ def with_residual(modes: Modes, spring: float) -> Modes:
     frequency, wave, size, phase = (part.copy() for part in modes[:4])
     wave[n], size[n], phase[n] = 0.0, 1.0, 0.0
     last = np.append(-low / kept**2, 1.0 / spring)
-    # by quadrature: as a difference of squares it would lose its digits. numpy's nodes come from a
-    # matrix so large that a thread of its linear algebra wakes, and then spins for 0.1 s
-    nodes, weights = roots_legendre(2 * n + 20)
+    # by quadrature: as a difference of squares it would lose its digits
+    nodes, weights = np.zeros((2, 2 * n + 20))
+    fill_quadrature(nodes, weights)
     inertia = _inertia(
         modes.mass, modes.transit, modes.top_mass, wave, size, phase, last, nodes, weights
     )
