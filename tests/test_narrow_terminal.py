@@ -85,7 +85,7 @@ def test_rows_of_a_run_that_have_long_numbers_keep_to_a_line(shown, name):
     assert code == 0
     rows = [line.split("│")[1:-1] for line in text.splitlines() if line.startswith("│")]
     for name, value, _ in rows:  # "undecided" alone has a second line
-        assert name.strip() or "with these cells" in value
+        assert name.strip() or "at this resolution" in value
 
 
 def test_help_fits(shown):

@@ -128,11 +128,11 @@ def test_a_motion_that_changes_with_the_cells_is_said_to(capsys):
     assert found.summary()["multiplier_error"] is None
     show_settled(found)
     shown = " ".join(capsys.readouterr().out.replace("│", " ").split())
-    assert "not the same on a second grid: periodic, 2 blows a cycle" in shown
-    assert "Deviation after a cycle undecided, with these cells" in shown
+    assert "not the same on a second resolution: periodic, 2 blows a cycle" in shown
+    assert "Deviation after a cycle undecided, at this resolution" in shown
     show_settled(settled(chatter(20)))
     shown = " ".join(capsys.readouterr().out.replace("│", " ").split())
-    assert "on no second grid tried" in shown
+    assert "on no second resolution tried" in shown
 
 
 def test_a_settled_motion_has_the_warnings_of_a_run(capsys):

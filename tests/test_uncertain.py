@@ -208,7 +208,7 @@ def test_a_rate_of_the_cells_is_undecided_wherever_it_is_shown(undamped, capsys,
     assert 0.0 < error < 0.5 * undamped.rate_of_penetration
     summary = undamped.summary()
     assert summary["rate_of_penetration_undecided"] is True
-    assert rate_text(summary).startswith("undecided, with these cells ")
+    assert rate_text(summary).startswith("undecided, at this resolution ")
     assert "±" in rate_text(summary)  # its scatter is known
     assert "undecided" in repr(undamped)
     show_summary(undamped)
@@ -222,7 +222,7 @@ def test_a_rate_of_the_cells_is_undecided_wherever_it_is_shown(undamped, capsys,
         assert all(text.startswith("undecided") for text in rows[name])
     page = render_report(undamped, [])
     card = page[page.index('<div class="card">') :]
-    assert card.index("undecided, with these cells") < card.index("</b>")
+    assert card.index("undecided, at this resolution") < card.index("</b>")
     label = draw_overview(undamped).axes[1].get_legend().get_texts()[0].get_text()
     assert "undecided" in label
 
@@ -247,7 +247,7 @@ def test_a_run_without_loss_claims_no_error_by_its_cells(undamped, capsys):
 def test_a_stationary_rate_of_the_cells_is_undecided():
     found = settled(Scene().replace(**{"effects.loss": False}), most_blows=40)
     assert found.summary()["rate_of_penetration_undecided"] is True
-    assert "undecided, with these cells" in repr(found)
+    assert "undecided, at this resolution" in repr(found)
 
 
 # --------------------------------------------------------------------- comparison

@@ -99,6 +99,7 @@ def show_summary(result: Result) -> None:
     if result.scene.piston.model != "absent":
         after = f"{len(result.counted)} counted"
         table.add_row("Whole blows", f"{len(result.blows)}", after)
+    table.add_row("Solver", result.solver, "")
     if result.cells:
         counts = " + ".join(map(str, result.cells.values()))
         table.add_row(counted(result.solver).capitalize(), counts, ", ".join(result.cells))
@@ -140,12 +141,12 @@ def _on_other_grids(found: Settled) -> str:
     """Say whether a motion is that of coarser grids; nothing where there is no grid."""
     if found.same_motion is None:
         has_grid = found.grid_errors.get(RATE[1]) != 0.0
-        return "; on no second grid tried" if has_grid else ""
+        return "; on no second resolution tried" if has_grid else ""
     if found.same_motion:
-        return "; the same on a second grid"
+        return "; the same on a second resolution"
     own = str(found.motion)
     seen = dict.fromkeys(text for text in map(str, found.others) if text != own)
-    return f"; not the same on a second grid: {' or '.join(seen)}"
+    return f"; not the same on a second resolution: {' or '.join(seen)}"
 
 
 def _deviation(found: Settled) -> str:

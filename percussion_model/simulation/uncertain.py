@@ -110,7 +110,7 @@ def of_the_cells(value: float, scatter: float | None = None) -> str:
     shown = in_digits(value)
     if scatter is not None and scatter > SMALL_ERROR * abs(value):
         shown = with_short_error(value, scatter)
-    return f"{UNDECIDED}, with these cells {shown}"
+    return f"{UNDECIDED}, at this resolution {shown}"
 
 
 def with_short_error(value: float, error: float) -> str:
