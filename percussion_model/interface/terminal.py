@@ -104,8 +104,8 @@ def show_summary(result: Result) -> None:
         counts = " + ".join(map(str, result.cells.values()))
         table.add_row(counted(result.solver).capitalize(), counts, ", ".join(result.cells))
     table.add_row("Prepared in", in_digits(result.setup_time, TIMED), "s")
-    every = "" if result.scene.solver.accuracy is None else ", all runs"
-    table.add_row("Computed in", in_digits(result.wall_time, TIMED), f"s{every}")
+    whose = "" if result.scene.solver.accuracy is None else ", all runs"
+    table.add_row("Computed in", in_digits(result.wall_time, TIMED), f"s{whose}")
     table.add_row("Speed", in_digits(result.real_time_factor, TIMED), "× real time")
     console = Console()
     print_table(table, console, keys=2)

@@ -15,15 +15,17 @@ from functools import cached_property
 
 import numpy as np
 
+from percussion_model.scene.bars import bar_transit_time
 from percussion_model.scene.inputs import SimulationError
-from percussion_model.scene.numbers import numbers_of
-from percussion_model.scene.parameters import Bar
+from percussion_model.scene.numbers import Numbers, numbers_of
 from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.simulation.means import COUNTS, numbers_over, scatter_over
 from percussion_model.simulation.rate import LARGE_ERROR, LEAST_BLOWS, rate_of_blows
 from percussion_model.simulation.result import Result
 from percussion_model.simulation.uncertain import in_digits
 from percussion_model.simulation.warnings import least_loss_time
+from percussion_model.solvers.setup import kelvin_voigt_time
+from percussion_model.solvers.wave.grid import elastic_bars
 from percussion_model.solvers.wave.resolution import FITS, largest_misfit, misfits, promised_error
 
 # Two aperiodic runs differ if they do by more than so many standard errors.
@@ -207,20 +209,15 @@ def grid_run(result: Result) -> GridRun:
         return GridRun.exact(result)
     numbers, cells = numbers_of(result.scene), _resolution(result)
     if result.solver == "modal":  # exact lengths; as many modes are surer than cells
-        promised = max(promised_error(numbers, cells), _by_slight_loss(result, cells))
+        promised = max(promised_error(numbers, cells), _by_slight_loss(numbers, cells))
         return GridRun(result, np.zeros(0), promised)
     return GridRun(result, misfits(numbers, cells), promised_error(numbers, cells))
 
 
-def _by_slight_loss(result: Result, modes: int) -> float:
+def _by_slight_loss(numbers: Numbers, modes: int) -> float:
     """Relative error of the rate that is expected of modes that ring for long."""
-    steps = result.scene.loss.time * modes / _first_bar(result.scene).transit_time
+    steps = kelvin_voigt_time(numbers) * modes / bar_transit_time(elastic_bars(numbers)[0])
     return SLIGHT_LOSS / steps if steps > 0.0 else math.inf
-
-
-def _first_bar(scene: Scene) -> Bar:
-    """The elastic bar whose modes or cells are counted."""
-    return scene.piston if scene.piston.model == "elastic" else scene.bit
 
 
 def estimate_error(run: GridRun, others: Sequence[GridRun]) -> Estimate:

@@ -7,6 +7,7 @@ another, whatever vectors its processor has.
 from __future__ import annotations
 
 import operator
+from functools import partial
 
 import numpy as np
 from llvmlite import ir
@@ -83,27 +84,32 @@ def _spread(typing, number):
     return _lanes(types.float64), generate
 
 
-def _halves(builder, part, width):
-    """The first and the last `width` of twice as many numbers."""
-    undefined = ir.Constant(part.type, ir.Undefined)
-    kind = ir.VectorType(ir.IntType(32), width)
-    return [
-        builder.shuffle_vector(
-            part, undefined, ir.Constant(kind, list(range(start, start + width)))
-        )
-        for start in (0, width)
-    ]
+def _fold(builder, lanes, join):
+    """Join both halves of a vector, both halves of that, and so on, to one number."""
+    part, width = lanes, WIDTH
+    while width > 1:
+        width //= 2
+        undefined = ir.Constant(part.type, ir.Undefined)
+        kind = ir.VectorType(ir.IntType(32), width)
+        halves = [
+            builder.shuffle_vector(
+                part, undefined, ir.Constant(kind, list(range(start, start + width)))
+            )
+            for start in (0, width)
+        ]
+        part = join(*halves)
+    return builder.extract_element(part, ir.Constant(ir.IntType(32), 0))
+
+
+def _pick_lower(builder, one, other):
+    """The lower number of each two."""
+    return builder.select(builder.fcmp_ordered("<", one, other), one, other)
 
 
 @intrinsic
 def _sum(typing, lanes):
     def generate(context, builder, signature, args):
-        part, width = args[0], WIDTH
-        while width > 1:
-            width //= 2
-            first, last = _halves(builder, part, width)
-            part = builder.fadd(first, last)
-        return builder.extract_element(part, ir.Constant(ir.IntType(32), 0))
+        return _fold(builder, args[0], builder.fadd)
 
     return types.float64(_lanes), generate
 
@@ -111,8 +117,7 @@ def _sum(typing, lanes):
 @intrinsic
 def _lower_of(typing, one, other):
     def generate(context, builder, signature, args):
-        is_lower = builder.fcmp_ordered("<", *args)
-        return builder.select(is_lower, *args)
+        return _pick_lower(builder, *args)
 
     return _lanes(_lanes, _lanes), generate
 
@@ -120,12 +125,7 @@ def _lower_of(typing, one, other):
 @intrinsic
 def _lowest(typing, lanes):
     def generate(context, builder, signature, args):
-        part, width = args[0], WIDTH
-        while width > 1:
-            width //= 2
-            first, last = _halves(builder, part, width)
-            part = builder.select(builder.fcmp_ordered("<", first, last), first, last)
-        return builder.extract_element(part, ir.Constant(ir.IntType(32), 0))
+        return _fold(builder, args[0], partial(_pick_lower, builder))
 
     return types.float64(_lanes), generate
 

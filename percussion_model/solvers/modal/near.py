@@ -36,6 +36,7 @@ from percussion_model.solvers.modal.between import (
 )
 from percussion_model.solvers.modal.change import end_mode
 from percussion_model.solvers.modal.forms import refresh_loads
+from percussion_model.solvers.modal.narrow import SAME_SIDE, beyond, level_below
 from percussion_model.solvers.modal.pairs import (
     AT,
     BIT_SPEED,
@@ -78,13 +79,7 @@ from percussion_model.solvers.modal.rock_end import (
     end_standstill,
     passed,
 )
-from percussion_model.solvers.modal.search import (
-    SAME_SIDE,
-    UNSURE,
-    beyond,
-    level_below,
-    moving,
-)
+from percussion_model.solvers.modal.search import UNSURE, moving
 
 # Steps after which the running force of a standstill is noted.
 CHECKPOINT = 64

@@ -391,7 +391,7 @@ def enough_modes(s, bars, n):
 
 
 @inlined
-def push(s, bars, over, start, count):
+def push_to_rest(s, bars, over, start, count):
     """Move the pairs of a product in `bars.rows` to where the load holds them."""
     pushed = bars.laws.pushed[over]
     for k in range(start, count, WIDTH):
@@ -423,13 +423,13 @@ def turn_into(par, s, bars, law, over, table, first, inputs):
     count = min(s.pairs + WIDTH, n)
     multiply(table, bars.w, first, inputs, bars.rows, 0, count)
     if over >= 0:
-        push(s, bars, over, 0, count)
+        push_to_rest(s, bars, over, 0, count)
     if count < n:
         last = total(size_of(bars.laws.ends[law], bars.rows, 0, count - WIDTH))
         if last > least_size(par, s, bars, law // 2, s.vibrates):
             multiply(table, bars.w, first, inputs, bars.rows, count, n)
             if over >= 0:
-                push(s, bars, over, count, n)
+                push_to_rest(s, bars, over, count, n)
             return n
     return count
 

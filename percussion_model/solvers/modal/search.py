@@ -13,25 +13,23 @@ import numpy as np
 from percussion_model.physics.body import bit_acceleration, time_to_cover
 from percussion_model.physics.kernel import inlined, kernel, merged
 from percussion_model.physics.records import Mode, RockKind
-from percussion_model.physics.rock import barrier_off, damping, origin, stiffness
+from percussion_model.physics.rock import barrier_off, damping, stiffness
 from percussion_model.solvers.modal.between import (
     End,
     late_force,
     late_peak,
-    squared_between,
     top_between,
     turns_between,
 )
 from percussion_model.solvers.modal.lanes import WIDTH, load, lower_of, lowest, spread, store, total
+from percussion_model.solvers.modal.narrow import end_after, end_at, narrow, present_law
 from percussion_model.solvers.modal.pairs import (
     AT,
     BIT,
     FIRST_STRIDE,
-    LOW,
     PISTON,
     PLOAD,
     PQ,
-    SPEED,
     SQUARE,
     TOP,
     carry_pairs,
@@ -39,16 +37,14 @@ from percussion_model.solvers.modal.pairs import (
     energy_of_pairs,
     keep,
     move_pairs,
-    part_of,
     size_of,
     spell_out,
     to_be_taken,
 )
 from percussion_model.solvers.modal.piston import WHOLE, time_of
-from percussion_model.solvers.modal.records import LONGEST_HOP, SCAN, STEP, View
+from percussion_model.solvers.modal.records import LONGEST_HOP, SCAN, STEP
 from percussion_model.solvers.modal.rock_end import passed
 
-LOW_Q, LOW_V, SPEED_Q, SPEED_V = (int(row) for row in View)
 # Rows of `Bars.rows` with what a search sees, of the rock end and of the other.
 SEEN, SIDE = 2, 6
 # And with what it saw from the look before on, where no piston is near.
@@ -64,12 +60,6 @@ FEWEST = 8 * WHOLE
 SLIGHT_SHARE, FEWEST_MODES = 1e-9, 4
 # What the dashpot takes is computed once this many times its sum over looks may be enough.
 UNSURE = 2.0
-# Looks within an interval whose work of the dashpot is summed up.
-PIECES = 3
-# Ticks in which the rock end goes straight.
-STRAIGHT = 256
-# An interval is halved where a straight line told so often to stay on one side.
-SAME_SIDE = 4
 # A standstill is searched for peaks until its vibration is below this share of the load.
 STILL_SHARE = 1e-3
 # Steps between two looks at that.
@@ -122,54 +112,6 @@ def beside_of(par, s, bars, near):
         return Beside(True, True, par.mass_p * s.a_p - s.rest_pull, ends[PISTON, 0] * load_)
     room = s.u_b - s.at_b / par.mass_b + s.rest_top + s.offset - (s.u_p + s.spread_p)
     return Beside(near, False, room, ends[TOP, 0] * load_)
-
-
-class Law(NamedTuple):
-    """What does not change while a search goes on."""
-
-    stiffness: float  # of the rock [N/m]
-    damping: float  # [N s/m]
-    origin: float  # [m]
-    pull: float  # acceleration of the rock end by the load on a free bit [m/s2]
-
-
-@inlined
-def present_law(s, bars):
-    """What a search goes by."""
-    pull = bars.laws.ends[s.law][LOW, 0] * bars.w[PLOAD, 0]
-    return Law(stiffness(s), damping(s), origin(s), pull)
-
-
-@inlined
-def end_at(s, law, low, speed, t):
-    """Make out the rock end `t` after where the search is, by what pairs tell of it."""
-    p = s.p + (s.rest_low + low + 0.5 * law.pull * t * t - s.low)
-    speed += law.pull * t
-    return End(p, speed, law.stiffness * (p - law.origin) + law.damping * speed)
-
-
-@inlined
-def present_end(s, bars, law):
-    """Look at the rock end where the search is."""
-    ends, low, speed = bars.laws.ends[s.law], spread(0.0), spread(0.0)
-    for k in range(0, s.pairs, WIDTH):
-        q, v = load(bars.w, AT, k), load(bars.w, AT + 1, k)
-        low = low + part_of(ends, LOW, k, q, v)
-        speed = speed + part_of(ends, SPEED, k, q, v)
-    return end_at(s, law, total(low), total(speed), 0.0)
-
-
-@inlined
-def end_after(par, s, bars, law, level):
-    """Look at the rock end 2^level ticks after where the search is."""
-    view, low, speed = bars.laws.views[s.law, level], spread(0.0), spread(0.0)
-    for k in range(0, s.pairs, WIDTH):
-        q, v = load(bars.w, AT, k), load(bars.w, AT + 1, k)
-        low = low + load(view, LOW_Q, k) * q
-        low = low + load(view, LOW_V, k) * v
-        speed = speed + load(view, SPEED_Q, k) * q
-        speed = speed + load(view, SPEED_V, k) * v
-    return end_at(s, law, total(low), total(speed), par.tick * (1 << level))
 
 
 @inlined
@@ -296,106 +238,6 @@ def taken_so_far(par, s, bars):
     return damping(s) * (s.takes - left)
 
 
-@inlined
-def beyond(s, here):
-    """How far the rock end is beyond where the mode ends, where that is likely; in any unit."""
-    if s.mode == Mode.FF:
-        return here.p - s.p_u
-    if s.mode == Mode.SS:
-        return -here.force
-    if s.mode == Mode.BC:
-        return s.p_u - here.p
-    return -here.speed
-
-
-@inlined
-def level_below(ticks):
-    """Greatest level with 2^level ticks at most, of one at least."""
-    level = 0
-    while ticks >= 2 << level:
-        level += 1
-    return level
-
-
-@inlined
-def squared_speed(par, s, bars, law, level, before, after, fresh):
-    """Integral of the squared velocity of the rock end over 2^level ticks [m2/s].
-
-    Pieces are short at first where a bit has just met the rock (`fresh`): its velocity drops
-    within tenths of a microsecond.
-    """
-    total, ticks, begin = 0.0, 0, before
-    if not fresh:
-        return squared_between(before, after, par.tick * (1 << level))
-    for part in range(STEP - PIECES, level):
-        here = end_after(par, s, bars, law, part)
-        total += squared_between(begin, here, par.tick * ((1 << part) - ticks))
-        ticks, begin = 1 << part, here
-    return total + squared_between(begin, after, par.tick * ((1 << level) - ticks))
-
-
-@kernel
-def narrow(par, s, bars, law, most, work, before, then, fresh):
-    """Go on to the tick in which the mode ends, if it does so within `most`.
-
-    Parameters
-    ----------
-    work : float
-        What the dashpot has taken so far [J].
-    before, then : End
-        The rock end now, and after `most` ticks.
-    fresh : bool
-        Whether the mode has just begun.
-
-    Returns
-    -------
-    ticks : int
-    ends : bool
-    work : float
-        At the end.
-    now : End
-    """
-    ticks, rest, low, high, same = 0, most, beyond(s, before), beyond(s, then), 0
-    turn = most * turns_between(s, before, then, par.tick * most)
-    while rest > 0:
-        if rest <= STRAIGHT and low < 0.0 < high:
-            # a straight line tells when
-            go = min(1 + int(rest * low / (low - high)), rest)
-            carry_pairs(s, bars, bars.w, AT, go)
-            here = present_end(s, bars, law)
-            if s.mode == Mode.DFC:
-                work += law.damping * squared_between(before, here, par.tick * go)
-            ticks, rest, before, low = ticks + go, rest - go, here, beyond(s, here)
-            if passed(par, s, here.p, here.speed, work, here.force):
-                return ticks, True, work, here
-            continue
-        guess = 0.5 * rest
-        if ticks < turn:
-            guess = turn - ticks
-        elif low < 0.0 < high and abs(same) < SAME_SIDE:
-            # so far by a straight line
-            guess = rest * low / (low - high)
-        level = level_below(min(max(guess, 1.0), rest - 1.0))
-        if rest > 4 << level:
-            level += 1  # likely beyond: the line is straighter in between
-        go = 1 << level
-        here, after = end_after(par, s, bars, law, level), work
-        if s.mode == Mode.DFC:
-            after += law.damping * squared_speed(
-                par, s, bars, law, level, before, here, fresh and ticks == 0
-            )
-        passes = passed(par, s, here.p, here.speed, after, here.force)
-        if passes and level > 0:
-            rest, high, same = go, beyond(s, here), max(same, 0) + 1
-            continue
-        move_pairs(s, bars, bars.w, AT, level)
-        ticks, rest = ticks + go, rest - go
-        work, before, low, same = after, here, beyond(s, here), min(same, 0) - 1
-        if passes:
-            return ticks, True, work, before
-    return ticks, False, work, before
-
-
 class Touching(NamedTuple):
     """Contact of bars that touch, as far as a search has come."""
 
@@ -442,7 +284,7 @@ def touches_on(par, s, touch, speed, h, time):
 
 
 @inlined
-def size(lanes):
+def magnitude(lanes):
     """Absolute values."""
     return lower_of(lanes, lanes * -1.0) * -1.0
 
@@ -451,8 +293,8 @@ def size(lanes):
 def stands_on(s, bars, law, h, last, most):
     """Whether a standstill plainly goes on through a whole scan, with no force that counts.
 
-    From one look to the next the velocity is a parabola, which is nowhere greater than 1.5 times
-    its mean and both its ends together.
+    From one look to the next the velocity is a parabola: in either half it is no further from
+    the nearer look's than 1.5 times its mean and both its ends together, nor from zero.
 
     Parameters
     ----------
@@ -470,7 +312,7 @@ def stands_on(s, bars, law, h, last, most):
     store(rows, BEFORE, 1, p)
     store(rows, BEFORE + 1, 1, v)
     p_before, v_before = load(rows, BEFORE, 0), load(rows, BEFORE + 1, 0)
-    way = size(p - p_before) * 1.5 + (size(v) + size(v_before)) * h
+    way = magnitude(p - p_before) * 1.5 + (magnitude(v) + magnitude(v_before)) * h
     reach = way * (K + C / h)
     force, before = p * K + v * C, p_before * K + v_before * C
     low = lower_of(force, before) - reach
