@@ -29,8 +29,8 @@ FEWEST_SCATTERED, NEXT_CHECK = 100, 1.25
 # A motion is aperiodic that has not settled after so many blows.
 MOST_BLOWS = 400
 # Processor time after which a run that has not settled is given up [s]. It is looked at after
-# so many steps of a cell, or so much simulated time where there are no cells [s].
-MOST_TIME, CELL_STEPS, PIECE = 300.0, 1e7, 1.0
+# so many steps of a cell.
+MOST_TIME, CELL_STEPS = 300.0, 1e7
 # Longest cycle that is looked for [blows].
 MOST_BLOWS_A_CYCLE = 8
 # Two changes that fall alike take so many blows: looking earlier is in vain.
@@ -389,9 +389,7 @@ def _advance(simulation: Simulation, count: int, until: float, deadline: float) 
     deadline : float
         As `time.thread_time` tells it [s].
     """
-    piece, solver = PIECE, simulation.solver
-    if solver.time_step is not None:
-        piece = solver.time_step * max(1.0, CELL_STEPS / max(1, sum(solver.cells.values())))
+    piece = simulation.solver.time_of_steps(CELL_STEPS)
     wanted = simulation.blow_rows + count
     while simulation.blow_rows < wanted and simulation.time < until:
         if time.thread_time() > deadline:
@@ -420,15 +418,28 @@ def check_request(scene: Scene, tolerance: float, most_blows: int, scatter: floa
 def cycles_in(blows: np.ndarray, tolerance: float) -> dict[int, tuple[float, float, float]]:
     """Cycles that the last blows could be, by order; values as from `cycle`."""
     recent = _compared(blows[-MOST_BLOWS_A_CYCLE - 1 :])[::-1]
-    alike = np.abs(recent[1:] - recent[0]) <= tolerance * np.abs(recent).max(axis=0)
-    whole = alike.all(axis=1).tolist()
+    scale = np.abs(recent).max(axis=0)
+    scale[scale == 0.0] = 1.0
+    change = (np.abs(recent[1:] - recent[0]) / scale).max(axis=1)
     found = {
         order: cycle(blows, order, tolerance)
-        for order, same in enumerate(whole, 1)
+        for order, most in enumerate(change.tolist(), 1)
         # else `cycle` would refuse, at a greater cost
-        if same and not _still_shrinking(blows, order)
+        if most <= tolerance
+        and (order == 1 or most <= STILL * tolerance or _lasts(blows, order))
+        and not _still_shrinking(blows, order)
     }
     return {order: values for order, values in found.items() if values is not None}
+
+
+def _repetitions(order: int) -> int:
+    """How often a cycle must repeat that only scatters."""
+    return max(REPETITIONS, math.ceil(LASTING / order))
+
+
+def _lasts(blows: np.ndarray, order: int) -> bool:
+    """Whether there are blows enough to believe in a cycle that only scatters."""
+    return len(blows) >= _repetitions(order) * order
 
 
 def cycle(blows: np.ndarray, order: int, tolerance: float) -> tuple[float, float, float] | None:
@@ -445,9 +456,9 @@ def cycle(blows: np.ndarray, order: int, tolerance: float) -> tuple[float, float
     to_come = newer * ratio / (1.0 - ratio) if ratio < 1.0 else math.inf
     if order == 1 and to_come <= tolerance and _converges(changes, tolerance):
         return _limit(blows, order)
-    repetitions = max(REPETITIONS, math.ceil(LASTING / order))
-    if len(blows) < repetitions * order:
+    if not _lasts(blows, order):
         return None
+    repetitions = _repetitions(order)
     rows = blows[-repetitions * order :]
     steps = _changes(rows, order)
     largest = np.max(np.abs(steps))

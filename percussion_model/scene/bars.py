@@ -10,6 +10,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
+
 LENGTH, AREA, YOUNGS_MODULUS, DENSITY = range(4)
 
 
@@ -38,30 +40,35 @@ def section_transit_time(section: Any) -> float:
 def bar_mass(sections: Any) -> float:
     """Mass [kg]."""
     total = rest = 0.0
-    for k in range(len(sections)):
-        total, rest = add(total, rest, section_mass(sections[k]))
+    for section in _plain(sections):
+        total, rest = add(total, rest, section_mass(section))
     return total + rest
 
 
 def bar_length(sections: Any) -> float:
     """Length [m]."""
     total = rest = 0.0
-    for k in range(len(sections)):
-        total, rest = add(total, rest, float(sections[k][LENGTH]))
+    for section in _plain(sections):
+        total, rest = add(total, rest, float(section[LENGTH]))
     return total + rest
 
 
 def bar_transit_time(sections: Any) -> float:
     """Time a wave takes from end to end [s]."""
     total = rest = 0.0
-    for k in range(len(sections)):
-        total, rest = add(total, rest, section_transit_time(sections[k]))
+    for section in _plain(sections):
+        total, rest = add(total, rest, section_transit_time(section))
     return total + rest
 
 
 def bar_compliance(sections: Any) -> float:
     """Shortening by a force that is the same along the bar, sum of length / (E A) [m/N]."""
     return sum(float(s[LENGTH]) / (float(s[YOUNGS_MODULUS]) * float(s[AREA])) for s in sections)
+
+
+def _plain(sections: Any) -> Any:
+    """The rows as lists of floats: those of an array are slow to take one by one."""
+    return sections.tolist() if isinstance(sections, np.ndarray) else sections
 
 
 def add(total: float, rest: float, term: float) -> tuple[float, float]:

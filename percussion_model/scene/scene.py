@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Self
 
@@ -306,7 +307,7 @@ class Scene:
             return "the bit is rigid" if self.bit.model == "rigid" else ""
         return self._against_modes or "elastic bars with loss"
 
-    @property
+    @cached_property
     def _against_modes(self) -> str:
         """Why waves drill better than as many modes; empty where they do not."""
         # a rigid piston and a wall push hardest in the first instant

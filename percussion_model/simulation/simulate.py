@@ -40,8 +40,8 @@ __all__ = ["Simulation", "SimulationError", "Snapshot", "simulate"]
 # wall time [s] to react at once, and at most so long in simulated time [s].
 _WANTED_CHUNK_TIME = 0.05
 _LONGEST_CHUNK = 50.0
-# The first is so short that even a very fine grid comes back soon [s].
-_FIRST_CHUNK = 1e-6
+# The first takes so many steps of a cell: even a very fine grid comes back soon.
+_FIRST_STEPS = 1e5
 _GROWTH = 4.0
 
 # Rows of blows and events of a run: two hours of the reference with its events, a day without.
@@ -485,7 +485,7 @@ def run_in_chunks(
     """
     rows = np.empty((len(times), len(SAMPLE_FIELDS)))
     done = 0
-    chunk = _FIRST_CHUNK
+    chunk = first = run.solver.time_of_steps(_FIRST_STEPS)
     while run.time < end and not stop():
         began = time.perf_counter()
         t = min(run.time + chunk, end)
@@ -500,7 +500,7 @@ def run_in_chunks(
         if taken < _WANTED_CHUNK_TIME / _GROWTH:
             chunk = min(chunk * _GROWTH, _LONGEST_CHUNK)
         elif taken > _WANTED_CHUNK_TIME * _GROWTH:
-            chunk = max(chunk / _GROWTH, _FIRST_CHUNK)
+            chunk = max(chunk / _GROWTH, first)
     return rows[:done]
 
 

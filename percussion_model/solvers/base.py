@@ -24,6 +24,8 @@ from percussion_model.solvers.state import Limits, State, common_limits, words_o
 # A state lies ahead of the present after a step that failed half-way, and after a change of
 # inputs; no further than this [s].
 MOST_AHEAD = 1e6
+# A step of a cell, in simulated time, where there are none [s]: events take about as long.
+USUAL_STEP = 1e-7
 
 
 class Cells(Protocol):
@@ -125,6 +127,12 @@ class Solver(ABC):
         """
 
     # what a solver may leave as it is
+
+    def time_of_steps(self, count: float) -> float:
+        """Simulated time that about so many steps of a cell take, at least one of all cells [s]."""
+        if self.time_step is None:
+            return count * USUAL_STEP
+        return self.time_step * max(1.0, count / max(1, sum(self.cells.values())))
 
     def commit(
         self, state: State, t: float, blows: np.ndarray, events: np.ndarray, record_events: bool

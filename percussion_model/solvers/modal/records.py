@@ -221,7 +221,6 @@ MODAL_PAR = np.dtype(
         ("bound_p", "f8"),  # |offset of the low end| <= bound_p sqrt(2 E) [m/J^0.5]
         ("bound_t", "f8"),
         ("bound_b", "f8"),
-        ("end_speed", "f8"),  # |velocity of the rock end| <= end_speed sqrt(2 E) [1/kg^0.5]
         ("k_r", "f8"),  # rock for which forms and leaps were made
         ("gamma", "f8"),
         ("c_r", "f8"),

@@ -27,18 +27,18 @@ from percussion_model.solvers.modal.pairs import (
     AT,
     BIT,
     FIRST_STRIDE,
+    LOW,
     PISTON,
     PLOAD,
     PQ,
+    SPEED,
     SQUARE,
     TOP,
     carry_pairs,
-    energy_about_rest,
     energy_of_pairs,
     keep,
     move_pairs,
     size_of,
-    spell_out,
     to_be_taken,
 )
 from percussion_model.solvers.modal.piston import WHOLE, time_of
@@ -60,6 +60,11 @@ FEWEST = 8 * WHOLE
 SLIGHT_SHARE, FEWEST_MODES = 1e-9, 4
 # What the dashpot takes is computed once this many times its sum over looks may be enough.
 UNSURE = 2.0
+# A standstill is not quiet yet where its energy could move the force by so many times that at
+# rest: by far not all of it ever lies in the rock at once.
+UNLIKELY = 2.0
+# What pairs that were left out could add, as a share of the force at rest.
+LEFT_OUT = 1e-3
 # A standstill is searched for peaks until its vibration is below this share of the load.
 STILL_SHARE = 1e-3
 # Steps between two looks at that.
@@ -182,35 +187,42 @@ def quiet_flight(par, s, bars, energy):
     return time_to_cover(room, v, bit_acceleration(par, s))
 
 
-@merged
-def most_force(par, s, energy):
-    """Bound of how far the force of a standstill may be from that at rest [N]."""
-    K = s.gamma * s.k_r
-    # |dF| <= K |dy| + C |v|: the end's offset and, by all modes together, its velocity
-    return math.sqrt(2.0 * energy * K) + s.c_r * math.sqrt(2.0 * energy) * par.end_speed
+@kernel
+def most_swing(s, bars, law):
+    """Bound of how far the force of a standstill may come from that at rest, now or later [N].
+
+    Each pair is an oscillator of its own, so that its V^2 + square Q^2 never grows.
+    """
+    ends, K, C, most = bars.laws.ends[s.law], law.stiffness, law.damping, 0.0
+    for k in range(s.pairs):
+        q, v, square = bars.w[AT, k], bars.w[AT + 1, k], ends[SQUARE, k]
+        by_q = K * ends[LOW, k] + C * ends[SPEED, k]
+        by_v = K * ends[LOW + 1, k] + C * ends[SPEED + 1, k]
+        most += math.sqrt((by_q * by_q + square * by_v * by_v) * (q * q + v * v / square))
+    return most
 
 
 @kernel
-def is_quiet(par, s, bars, energy):
+def is_quiet(par, s, bars, law, energy):
     """Whether a standstill where the search is goes on by itself for ever."""
     if s.alert == 1 or par.rock != RockKind.BILINEAR or barrier_off(par, s):
         return False
+    if par.release == 0:
+        return True
     rest = par.mass_b * bit_acceleration(par, s)
-    # pairs are nearly orthogonal, so that this tells when not to try
-    if par.release == 1 and most_force(par, s, 0.5 * energy) >= rest:
+    if 2.0 * energy * law.stiffness >= (UNLIKELY * rest) ** 2:
         return False
-    exact = energy_about_rest(s, bars, spell_out(s, bars, bars.w, AT))
-    return par.release == 0 or most_force(par, s, exact) < rest
+    return most_swing(s, bars, law) < (1.0 - LEFT_OUT) * rest
 
 
 @kernel
-def quiet_peaks(par, s, bars, law, ticks, energy):
+def quiet_peaks(par, s, bars, law, ticks):
     """Greatest forces of a quiet standstill, where they count; as `Found` has them."""
     rest, K = par.mass_b * bit_acceleration(par, s), stiffness(s)
     begin, peak, late = time_of(par, s), 0.0, 0.0
     watched = begin + ticks * par.tick > s.peak_from
     before = s.f_rock
-    if not watched and rest + most_force(par, s, 2.0 * energy) <= s.b_peak_bit:
+    if not watched and rest + most_swing(s, bars, law) <= s.b_peak_bit:
         return peak, late
     for step in range(ticks >> STEP):
         if step % LOOK_AGAIN == 0:
@@ -381,14 +393,14 @@ def look_through(par, s, bars, law, beside, ticks, level, count, taken, sampled,
 
 
 @merged
-def quiet_ticks(par, s, bars, energy, most):
+def quiet_ticks(par, s, bars, law, energy, most):
     """Ticks in which nothing can happen, up to `most`; 0 where looks are better."""
     if par.leaps == 0:
         return 0
     if s.mode == Mode.FF:
         ticks = min(quiet_flight(par, s, bars, energy) / par.tick - WHOLE, most)
         return int(ticks) if ticks >= FEWEST else 0
-    return most if s.mode == Mode.SS and is_quiet(par, s, bars, energy) else 0
+    return most if s.mode == Mode.SS and is_quiet(par, s, bars, law, energy) else 0
 
 
 @kernel
@@ -411,12 +423,12 @@ def search(par, s, bars, most, beside):
         if stale:  # what moved before is a bound of what does
             now = moving(s, bars, bars.w, AT)
         stale = not stale
-        quiet = 0 if beside.near else quiet_ticks(par, s, bars, now.energy, rest)
+        quiet = 0 if beside.near else quiet_ticks(par, s, bars, law, now.energy, rest)
         if quiet > 0 and stands and ticks > 0:
             break  # its mean force is noted where it begins
         if quiet > 0:
             if stands:
-                peak, late = quiet_peaks(par, s, bars, law, most, now.energy)
+                peak, late = quiet_peaks(par, s, bars, law, most)
                 keep(bars.w, PQ, bars.w, AT, s.pairs)
             carry_pairs(s, bars, bars.w, AT, quiet)
             ticks += quiet

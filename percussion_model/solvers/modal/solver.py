@@ -142,7 +142,6 @@ class ModalSolver(Solver):
         p["bound_p"] = math.sqrt(end_compliance(numbers.piston)) if elastic else 0.0
         p["bound_b"] = math.sqrt(end_compliance(numbers.bit))
         p["bound_t"] = math.sqrt(end_compliance(numbers.bit[::-1]))
-        p["end_speed"] = math.sqrt(sum((made.forms.shape[2, Shape.LOW] ** 2).tolist()))
         p["k_r"], p["gamma"], p["c_r"] = rock.k_r, rock.gamma, rock.c_r
         p["eta"] = eta
         p["leaps"] = leaps
