@@ -11,6 +11,7 @@ from percussion_model.analysis.cost import explained, forecast
 from percussion_model.analysis.stationary import settled
 from percussion_model.interface.commands.scene import settled as settled_command
 from percussion_model.simulation import simulate as runs
+from percussion_model.solvers import base
 from percussion_model.solvers.base import make_solver
 
 RIGID = {"piston.model": "rigid", "bit.model": "rigid"}
@@ -93,7 +94,7 @@ def test_looking_at_the_clock_changes_no_bit(solver, monkeypatch):
     scene = Scene().computed_by(solver)
     whole = settled(scene)
     monkeypatch.setattr(stationary, "CELL_STEPS", 2e4)
-    monkeypatch.setattr(stationary, "PIECE", 1e-3)
+    monkeypatch.setattr(base, "USUAL_STEP", 5e-8)
     pieces = settled(scene)
     assert whole.blows.tobytes() == pieces.blows.tobytes()
     assert whole.rate_of_penetration == pieces.rate_of_penetration

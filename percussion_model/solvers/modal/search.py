@@ -16,13 +16,17 @@ from percussion_model.physics.records import Mode, RockKind
 from percussion_model.physics.rock import barrier_off, damping, stiffness
 from percussion_model.solvers.modal.between import (
     End,
-    late_force,
     late_peak,
     top_between,
     turns_between,
 )
 from percussion_model.solvers.modal.lanes import WIDTH, load, lower_of, lowest, spread, store, total
-from percussion_model.solvers.modal.narrow import end_after, end_at, narrow, present_law
+from percussion_model.solvers.modal.narrow import (
+    end_at,
+    narrow,
+    present_end,
+    present_law,
+)
 from percussion_model.solvers.modal.pairs import (
     AT,
     BIT,
@@ -71,6 +75,8 @@ STILL_SHARE = 1e-3
 LOOK_AGAIN = 32
 # A standstill that is not quiet yet is cut into pieces, at whose ends its mean force is noted.
 LONGEST_GLANCE = 128 * WHOLE
+# So is one that is quiet, until its force stays within this share of that at rest.
+LONGEST_LEAP, CALM = 16 * LONGEST_GLANCE, 0.5
 
 
 class Found(NamedTuple):
@@ -203,16 +209,19 @@ def most_swing(s, bars, law):
 
 
 @kernel
-def is_quiet(par, s, bars, law, energy):
-    """Whether a standstill where the search is goes on by itself for ever."""
+def quiet_standstill(par, s, bars, law, energy, most):
+    """Ticks in which a standstill goes on by itself, up to `most`; 0 where it is not quiet."""
     if s.alert == 1 or par.rock != RockKind.BILINEAR or barrier_off(par, s):
-        return False
+        return 0
     if par.release == 0:
-        return True
+        return most
     rest = par.mass_b * bit_acceleration(par, s)
     if 2.0 * energy * law.stiffness >= (UNLIKELY * rest) ** 2:
-        return False
-    return most_swing(s, bars, law) < (1.0 - LEFT_OUT) * rest
+        return 0
+    swing = most_swing(s, bars, law)
+    if swing >= (1.0 - LEFT_OUT) * rest:
+        return 0
+    return most if swing < CALM * rest else min(most, LONGEST_LEAP)
 
 
 @kernel
@@ -221,20 +230,23 @@ def quiet_peaks(par, s, bars, law, ticks):
     rest, K = par.mass_b * bit_acceleration(par, s), stiffness(s)
     begin, peak, late = time_of(par, s), 0.0, 0.0
     watched = begin + ticks * par.tick > s.peak_from
-    before = s.f_rock
+    before = present_end(s, bars, law)
     if not watched and rest + most_swing(s, bars, law) <= s.b_peak_bit:
         return peak, late
-    for step in range(ticks >> STEP):
-        if step % LOOK_AGAIN == 0:
+    done = 0
+    while done < ticks:
+        if (done >> STEP) % LOOK_AGAIN == 0:
             left = 2.0 * energy_of_pairs(s, bars, bars.w, AT)
             if 2.0 * K * left < (STILL_SHARE * rest) ** 2:
-                break
-        here = end_after(par, s, bars, law, STEP)
-        carry_pairs(s, bars, bars.w, AT, WHOLE)
-        peak = max(peak, here.force)
-        late = max(late, late_force(s, begin + (step + 1) * par.dt, par.dt, before, here.force))
-        before = here.force
-    return max(peak, rest), max(late, rest) if watched else 0.0
+                return max(peak, rest), max(late, rest) if watched else 0.0
+        go = min(WHOLE, ticks - done)
+        carry_pairs(s, bars, bars.w, AT, go)
+        here, done = present_end(s, bars, law), done + go
+        top = top_between(s, before, here, par.tick * go)
+        peak = max(peak, top.peak)
+        late = max(late, late_peak(s, begin + done * par.tick, par.tick * go, top))
+        before = here
+    return peak, late
 
 
 @inlined
@@ -400,7 +412,7 @@ def quiet_ticks(par, s, bars, law, energy, most):
     if s.mode == Mode.FF:
         ticks = min(quiet_flight(par, s, bars, energy) / par.tick - WHOLE, most)
         return int(ticks) if ticks >= FEWEST else 0
-    return most if s.mode == Mode.SS and is_quiet(par, s, bars, law, energy) else 0
+    return quiet_standstill(par, s, bars, law, energy, most) if s.mode == Mode.SS else 0
 
 
 @kernel
@@ -428,7 +440,7 @@ def search(par, s, bars, most, beside):
             break  # its mean force is noted where it begins
         if quiet > 0:
             if stands:
-                peak, late = quiet_peaks(par, s, bars, law, most)
+                peak, late = quiet_peaks(par, s, bars, law, quiet)
                 keep(bars.w, PQ, bars.w, AT, s.pairs)
             carry_pairs(s, bars, bars.w, AT, quiet)
             ticks += quiet
