@@ -11,7 +11,7 @@ from percussion_model.physics.records import LEDGER_FIELDS, STORED_FIELDS
 
 WORKS = ("drive", "feed", "gravity")
 DISSIPATED = (
-    *("crushing", "barrier", "standstill", "loss", "contact"),
+    *("crushing", "barrier", "standstill", "loss", "contact", "joints", "ends"),
     *(effect.name for effect in EFFECTS),
 )
 NUMERICAL = ("numerical", "overshoot")

@@ -143,6 +143,8 @@ LEDGER_FIELDS = (
     "loss",  # structural loss in the bars
     "contact",  # restitution of rigid contact
     "numerical",  # what the discretisation dissipates
+    "joints",  # what joints and the damper take
+    "ends",  # what leaves by ends without reflection, less what comes in there
     "overshoot",  # what springs lose where an event is found just past its place
     *(effect.name for effect in EFFECTS),  # what their forces take from the bit
 )

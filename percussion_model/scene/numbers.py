@@ -22,7 +22,9 @@ def _is_whole(row: Row) -> bool:
     return row.kind != "number" and (row.required or row.default is not None)
 
 
-_ROWS = [row for row in parameter_table() if row.kind != "sections" and "*" not in row.key]
+_ROWS = [
+    row for row in parameter_table() if row.kind not in ("sections", "rods") and "*" not in row.key
+]
 
 # A field for each row of the parameter table in its order, sections left out; a point of
 # its key is an underline here.
@@ -47,16 +49,48 @@ class Numbers(NamedTuple):
         flags, NaN for what is left out.
     piston, bit : float array, shape (sections, 4)
         Sections as `section_numbers` has them, whatever the model of the bar.
+    rods : tuple of such arrays
+        Bars between them; none without effects.string.
+    joints : float array, shape (rods, 6)
+        Of each rod to the bar below, as `joint_numbers` has them.
     """
 
     values: Any
     piston: np.ndarray
     bit: np.ndarray
+    rods: tuple[np.ndarray, ...] = ()
+    joints: np.ndarray = np.zeros((0, 6))
 
 
 def numbers_of(scene: Scene) -> Numbers:
     """Numbers of a scene and of its bars."""
-    return Numbers(_values(scene), section_numbers(scene.piston), section_numbers(scene.bit))
+    ends = section_numbers(scene.piston), section_numbers(scene.bit)
+    if not scene.effects.string:
+        return Numbers(_values(scene), *ends)
+    rods = tuple(section_numbers(rod) for rod in scene.string.rods)
+    return Numbers(_values(scene), *ends, rods, joint_numbers(scene))
+
+
+# Kinds of joint, in the order of the choices.
+JOINT_KINDS = next(row.choices for row in parameter_table() if row.key == "string.rods.*.joint")
+
+
+def joint_numbers(scene: Scene) -> np.ndarray:
+    """Joints of rods to the bars below.
+
+    Returns
+    -------
+    float array, shape (rods, 6)
+        Kind, by its place in `JOINT_KINDS`, transmission, relaxation [s], gap [m], preload [N]
+        and thread stiffness [N/m]. With effects.joints off all are perfect.
+    """
+    rows = np.zeros((len(scene.string.rods), 6))
+    for row, rod in zip(rows, scene.string.rods, strict=True):
+        kind = JOINT_KINDS.index(rod.joint if scene.effects.joints else "perfect")
+        row[:] = (
+            kind, rod.transmission, rod.relaxation, rod.gap, rod.preload, rod.thread_stiffness
+        )  # fmt: skip
+    return rows
 
 
 def _values(scene: Scene) -> Values:

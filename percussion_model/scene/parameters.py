@@ -27,6 +27,7 @@ from percussion_model.scene.rows import (
     generic_key,
     quantity,
     refuse_value,
+    rod_list,
     section_list,
     shortened,
     show_value,
@@ -36,13 +37,13 @@ from percussion_model.scene.solver_names import SOLVER_NAMES
 # Below this similarity a guess at a misspelt key misleads more than it helps.
 _SIMILAR_ENOUGH = 0.6
 
-# Sections of a bar; each takes a cell at least.
-MOST_SECTIONS = 1000
+# Sections of a bar, each takes a cell at least; and bars between piston and bit.
+MOST_SECTIONS, MOST_RODS = 1000, 100
 
 # What must hold, key by key, for a parameter to have any influence.
 HAS_PISTON: Needs = {"piston.model": ("elastic", "rigid")}
 HAS_WAVES: Needs = {"bit.model": ("elastic",)}
-SOLVER_WAVE: Needs = {"solver.name": ("auto", "wave", "modal"), **HAS_WAVES}
+SOLVER_WAVE: Needs = {"solver.name": ("auto", "wave", "modal", "chain"), **HAS_WAVES}
 SOLVER_FEM: Needs = {"solver.name": ("fem",)}
 BLOW_MAP: Needs = {"solver.fidelity": ("blow-map",), **HAS_WAVES}
 ALL_RIGID: Needs = {"piston.model": ("rigid",), "bit.model": ("rigid",)}
@@ -55,6 +56,10 @@ ROCK_BILINEAR: Needs = {"effects.rock": ("bilinear",)}
 ROCK_SPRINGY: Needs = {"effects.rock": ("bilinear", "spring")}
 ROCK_PRESENT: Needs = {"effects.rock": ("bilinear", "spring", "wall")}
 BARRIER_ON: Needs = {"effects.barrier": (True,), **ROCK_BILINEAR}
+STRING_ON: Needs = {"effects.string": (True,), **HAS_WAVES}
+JOINTS_ON: Needs = {"effects.joints": (True,), **STRING_ON}
+DAMPER_ON: Needs = {"effects.damper": (True,), **STRING_ON}
+NO_PISTON: Needs = {"piston.model": ("absent",), **STRING_ON}
 
 
 class Parameters:
@@ -103,7 +108,17 @@ class Parameters:
                 if row.required:
                     faults.add(_refuse_missing, row, f"{key}.{name}")
             elif row.kind == "sections":
-                kept[name] = _read_sections(row, f"{key}.{name}", values[name], faults)
+                found = _listed(row, f"{key}.{name}", values[name], MOST_SECTIONS, faults)
+                if not found:
+                    faults.add(refuse_value, row, f"{key}.{name}", values[name])
+                kept[name] = tuple(
+                    Section.read(one, f"{key}.{name}.{k}", faults) for k, one in enumerate(found)
+                )
+            elif row.kind == "rods":
+                found = _listed(row, f"{key}.{name}", values[name], MOST_RODS, faults)
+                kept[name] = tuple(
+                    Rod.read(one, f"{key}.{name}.{k}", faults) for k, one in enumerate(found)
+                )
             else:
                 kept[name] = found = row.read(values[name])
                 if found is REFUSED:
@@ -112,26 +127,31 @@ class Parameters:
             if name not in rows:
                 faults.add(unknown_key, f"{key}.{name}")
 
+    @property
+    def telling(self) -> tuple[str, ...]:
+        """Names of the parameters that matter in an entry of a list."""
+        return tuple(self.rows)
+
     def given_values(self) -> dict[str, Any]:
         """Return the values that were given, not left to their defaults."""
         return {name: self.__dict__[name] for name in self.rows if name in self._given}
 
 
-def _read_sections(row: Row, key: str, value: Any, faults: Faults) -> tuple[Section, ...]:
+def _listed(row: Row, key: str, value: Any, most: int, faults: Faults) -> list[Any]:
+    """Return what stands in a list of tables; nothing where it is none, or too long."""
     try:
         found = [] if isinstance(value, (str, bytes, Mapping)) else list(value)
     except TypeError:  # no list of anything
-        found = []
-    if not found:
         faults.add(refuse_value, row, key, value)
-    if len(found) > MOST_SECTIONS:
-        faults.add(_refuse_many, key, len(found))
-        found = []
-    return tuple(Section.read(one, f"{key}.{k}", faults) for k, one in enumerate(found))
+        return []
+    if len(found) > most:
+        faults.add(_refuse_many, row, key, len(found), most)
+        return found[:1]
+    return found
 
 
-def _refuse_many(key: str, count: int) -> str:
-    return f"{key}: {count} sections: must be at most {MOST_SECTIONS}"
+def _refuse_many(row: Row, key: str, count: int, most: int) -> str:
+    return f"{key}: {count} {row.kind}: must be at most {most}"
 
 
 def _refuse_table(key: str, value: Any, wanted: str) -> str:
@@ -203,9 +223,8 @@ REFERENCE_BIT = (Section(length=REFERENCE_BIT_LENGTH, area=REFERENCE_AREA),)
 
 
 class Bar(Parameters):
-    """Sections one below the other; base of piston and bit."""
+    """Sections one below the other; base of all bars."""
 
-    model: str
     sections: tuple[Section, ...]
 
     @property
@@ -243,6 +262,75 @@ class BitBar(Bar):
     sections: tuple[Section, ...] = section_list(REFERENCE_BIT)
 
 
+class Rod(Bar):
+    """A bar between piston and bit, and its joint to the bar below."""
+
+    key = "rod"
+    sections: tuple[Section, ...] = section_list(...)  # type: ignore[arg-type]
+    joint: str = choice(
+        "perfect",
+        ("perfect", "contact", "lossy", "threaded"),
+        "joint to the bar below: none to be felt, a contact that only pushes, one that reflects "
+        "and takes a part, or shoulders that a thread pulls together",
+        JOINTS_ON,
+    )
+    transmission: float = quantity(
+        1.0, "-", "share of a short wave's force that passes a lossy joint", JOINTS_ON, gt=0, le=1
+    )
+    relaxation: float = quantity(
+        1e-3, "s", "time after which a lossy joint carries a lasting force", JOINTS_ON, gt=0, le=10
+    )
+    gap: float = quantity(0.0, "m", "of a contact or a thread at the start", JOINTS_ON, ge=0, le=1)
+    preload: float = quantity(
+        0.0, "N", "with which a thread pulls its shoulders together", JOINTS_ON, ge=0, le=1e9
+    )
+    thread_stiffness: float = quantity(
+        0.0, "N/m", "of a thread whose shoulders have parted", JOINTS_ON, ge=0, le=1e13
+    )
+
+    @property
+    def telling(self) -> tuple[str, ...]:
+        """Names of the parameters that matter to a joint of this kind."""
+        return ("sections", "joint", *_OF_JOINT.get(self.joint, ()))
+
+
+# Parameters that joints of a kind have.
+_OF_JOINT = {
+    "contact": ("gap",),
+    "lossy": ("transmission", "relaxation"),
+    "threaded": ("gap", "preload", "thread_stiffness"),
+}
+
+
+class DrillString(Parameters):
+    """Bars between piston and bit, shank and rods; feed and damper act on the topmost."""
+
+    rods: tuple[Rod, ...] = rod_list(STRING_ON)
+    top: str = choice(
+        "free", ("free", "open"), "top end without a piston: free, or without reflection", NO_PISTON
+    )
+    pulse_force: float = quantity(
+        0.0,
+        "N",
+        "of a rectangular wave that comes down the topmost bar",
+        NO_PISTON,
+        ge=-1e9,
+        le=1e9,
+    )
+    pulse_duration: float = quantity(1e-4, "s", "of that wave", NO_PISTON, gt=0, le=10)
+
+
+class Damper(Parameters):
+    """Recoil damper between the casing of the drill and the topmost bar."""
+
+    stiffness: float = quantity(1e7, "N/m", "of its spring", DAMPER_ON, ge=0, le=1e13)
+    damping: float = quantity(2e4, "N s/m", "of its dashpot", DAMPER_ON, ge=0, le=1e9)
+    preload: float = quantity(0.0, "N", "force at the start", DAMPER_ON, ge=0, le=1e9)
+    casing_mass: float = quantity(
+        150.0, "kg", "of the casing, which feed and recoil act on", DAMPER_ON, gt=0, le=1e6
+    )
+
+
 class Effects(Parameters):
     """Which effects are on; only those are computed."""
 
@@ -266,6 +354,9 @@ class Effects(Parameters):
         "in standstill: let go of the rock when the force vanishes, or pull as in the paper",
         ROCK_BILINEAR,
     )
+    string: bool = flag(False, "bars between piston and bit (string.rods)", HAS_WAVES)
+    joints: bool = flag(True, "joints of the drill string; off: all are perfect", STRING_ON)
+    damper: bool = flag(False, "damper between the casing and the topmost bar", STRING_ON)
 
 
 class Gravity(Parameters):
@@ -488,7 +579,9 @@ class RunOptions(Parameters):
 _BUILT_IN: dict[str, type[Parameters]] = {
     "effects": Effects,
     "piston": PistonBar,
+    "string": DrillString,
     "bit": BitBar,
+    "damper": Damper,
     "gravity": Gravity,
     "feed": Feed,
     "drive": Drive,
@@ -545,6 +638,10 @@ GROUPS = groups_with(EFFECTS)
 globals().update({group.__name__: group for group in GROUPS.values()})
 
 
+# What stands in a list of tables.
+_LISTED: dict[str, type[Parameters]] = {"sections": Section, "rods": Rod}
+
+
 @cache
 def parameter_table() -> tuple[Row, ...]:
     """Return a row for each parameter, in the order of a scene file."""
@@ -556,8 +653,8 @@ def table_of(groups: Mapping[str, type[Parameters]]) -> Iterator[Row]:
     for key, group in groups.items():
         for name, row in group.rows.items():
             yield dataclasses.replace(row, key=f"{key}.{name}")
-            if row.kind == "sections":
-                yield from table_of({f"{key}.{name}.*": Section})
+            if row.kind in _LISTED:
+                yield from table_of({f"{key}.{name}.*": _LISTED[row.kind]})
 
 
 @cache

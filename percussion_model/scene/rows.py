@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, Literal
 
-Kind = Literal["number", "whole number", "flag", "choice", "sections"]
+Kind = Literal["number", "whole number", "flag", "choice", "sections", "rods"]
 
 # Of a key or of a parser's words, no more than this is repeated in a message.
 _LONGEST_WORDS = 200
@@ -36,7 +36,7 @@ class SceneError(ValueError):
 class Row:
     """One parameter.
 
-    Keys of sections have a `*` for the number of the section, counted from 0.
+    Keys of bars and sections have a `*` for their number, counted from 0.
     """
 
     key: str
@@ -61,6 +61,8 @@ class Row:
             return "one of " + ", ".join(toml_value(choice) for choice in self.choices)
         if self.kind == "sections":
             return "a list of at least one section, each with length and area"
+        if self.kind == "rods":
+            return "a list of bars, each with sections and a joint"
         return f"a {self.kind} {self._range()}{unit_suffix(self.unit)}".rstrip()
 
     def _range(self) -> str:
@@ -152,6 +154,11 @@ def section_list(default: tuple[Any, ...], needs: Needs | None = None) -> Any:
     return _declare("sections", default, "sections from top to bottom", needs)
 
 
+def rod_list(needs: Needs | None = None) -> Any:
+    """Declare the bars between piston and bit."""
+    return _declare("rods", (), "bars from top to bottom", needs)
+
+
 def _declare(
     kind: Any,
     default: Any,
@@ -217,7 +224,7 @@ def toml_value(value: object) -> str:
 
 
 def generic_key(key: str) -> str:
-    """Replace the numbers of sections in a dotted key by `*`."""
+    """Replace the numbers of bars and sections in a dotted key by `*`."""
     return ".".join("*" if part.isdecimal() else part for part in key.split("."))
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Self
@@ -85,6 +85,8 @@ class Scene:
     def __init__(self, **values: Any) -> None:
         faults = Faults()
         kept = self.__dict__
+        if "bars" in values:
+            values = chain_as_groups(values)
         kept["title"] = title = values.get("title", "")
         if not isinstance(title, str) or len(title) > LONGEST_TITLE or unprintable(title):
             faults.add(_refuse_title, title)
@@ -188,29 +190,32 @@ class Scene:
             entries = present.given_values() if isinstance(present, Parameters) else dict(present)
             tree[name], (name, *rest) = entries, rest
         if rest:
-            entries, name = self._section_to_change(entries, key), rest[-1]
+            entries, name = self._entry_to_change(entries, key), rest[-1]
         if value is None:
             entries.pop(name, None)
         else:
             entries[name] = value
 
-    def _section_to_change(self, bar: dict[str, Any], key: str) -> dict[str, Any]:
-        """Make the sections of a bar a list of their own, and return one of them."""
-        path, _, _ = key.rpartition(".")
-        group, _, place = path.partition(".sections.")
+    def _entry_to_change(self, group: dict[str, Any], key: str) -> dict[str, Any]:
+        """Make the bars and sections on the way to a key lists of their own; the last of them."""
+        first, *parts = key.split(".")[:-1]
+        path, entries = first, group
         try:
-            bar["sections"] = sections = list(bar.get("sections", self[f"{group}.sections"]))
-            section = sections[int(place)]
-            sections[int(place)] = found = (
-                asdict(section) if isinstance(section, Parameters) else dict(section)
-            )
+            for name, place in zip(parts[::2], parts[1::2], strict=True):
+                here = self[f"{path}.{name}"]
+                entries[name] = rows = list(entries.get(name, here))
+                path = f"{path}.{name}.{place}"
+                row = rows[int(place)]
+                rows[int(place)] = entries = (
+                    row.given_values() if isinstance(row, Parameters) else dict(row)
+                )
         except IndexError:
             raise SceneError(
-                f"{path}: no such section; there are {len(sections)}, counted from 0"
+                f"{path}: no such {name.removesuffix('s')}; there are {len(rows)}, counted from 0"
             ) from None
-        except (TypeError, ValueError):  # what was given before is no list of tables
+        except (KeyError, TypeError, ValueError):  # what was given before is no list of tables
             raise SceneError(unknown_key(key)) from None
-        return found
+        return entries
 
     def computed_by(self, solver: str, **changes: Any) -> Self:
         """Return the scene for a solver, with other changes; that of rigid bodies makes them so.
@@ -258,9 +263,7 @@ class Scene:
         tree: dict[str, Any] = {"title": self.title}
         for group in GROUPS:
             for name, value in self.__dict__[group].given_values().items():
-                if name == "sections":
-                    value = [asdict(section) for section in value]
-                tree.setdefault(group, {})[name] = value
+                tree.setdefault(group, {})[name] = _as_tables(value)
         return tree
 
     @property
@@ -289,9 +292,11 @@ class Scene:
 
     @property
     def solver_name(self) -> str:
-        """Solver that computes the scene: "wave", "modal", "fem", "rigid" or "blow-map"."""
+        """Solver that computes the scene: "wave", "modal", "chain", "fem", "rigid", "blow-map"."""
         if self.bit.model == "elastic" and self.solver.fidelity != "wave":
             return str(self.solver.fidelity)
+        if self.effects.string and self.solver.name in ("auto", "wave"):
+            return "chain"
         if self.solver.name != "auto":
             return str(self.solver.name)
         if self.bit.model == "rigid":
@@ -362,10 +367,19 @@ class Scene:
             "feed": self.effects.feed,
             "drive": self.effects.drive != "none",
             "loss": self.loss_on,
+            **self._string_switches(),
             "barrier": self.barrier_on,
             "rock": self.effects.rock != "none",
             **{effect.name: getattr(self.effects, effect.name) for effect in EFFECTS},
         }
+
+    def _string_switches(self) -> dict[str, bool]:
+        """Effects of a drill string; none without one."""
+        if not self.effects.string:
+            return {}
+        joints = any(rod.joint != "perfect" for rod in self.string.rods)
+        damper = self.effects.damper
+        return {"string": True, "joints": self.effects.joints and joints, "damper": damper}
 
     def _tree(self) -> dict[str, Any]:
         """Return what a scene file holds, as nested plain values."""
@@ -375,11 +389,64 @@ class Scene:
             value = self[row.key]
             if value is None or not (self.matters(row.key) or row.key in given):
                 continue
-            if row.kind == "sections":
-                value = [asdict(section) for section in value]
             group, _, name = row.key.partition(".")
-            tree.setdefault(group, {})[name] = value
+            tree.setdefault(group, {})[name] = _as_tables(value)
         return tree
+
+
+def _as_tables(value: Any) -> Any:
+    """Values of a scene as a file has them: lists of tables for bars and sections."""
+    if not isinstance(value, tuple):
+        return value
+    return [{name: _as_tables(getattr(row, name)) for name in row.telling} for row in value]
+
+
+def chain_as_groups(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Bars that were given as one list, as piston, rods and bit; without a piston as the others.
+
+    Raises
+    ------
+    SceneError
+        If they are no list of two bars at least, or a bar is given twice.
+    """
+    rest = {name: value for name, value in values.items() if name != "bars"}
+    bars = values["bars"]
+    if not isinstance(bars, (list, tuple)) or not all(isinstance(bar, Mapping) for bar in bars):
+        raise SceneError(f"bars = {show_value(bars)}: must be a list of tables, written [[bars]]")
+    first = _group_of(rest, "piston").get("model") != "absent"
+    least = 2 if first else 1
+    if len(bars) < least:
+        raise SceneError(f"bars: {len(bars)} given: must be {least} at least, from drive to rock")
+    chain = [dict(bar) for bar in bars]
+    piston, rods, bit = chain[: int(first)], chain[int(first) : -1], chain[-1]
+    if piston and piston[0].pop("joint", "contact") != "contact":
+        raise SceneError('bars.0.joint: must be "contact": a piston strikes the bar below it')
+    if "joint" in bit:
+        raise SceneError(f"bars.{len(bars) - 1}.joint: there is no bar below the last one")
+    for name, own in [("piston", piston[0])] if piston else []:
+        rest[name] = _joined(rest, name, own)
+    rest["bit"] = _joined(rest, "bit", bit)
+    if rods:
+        rest["string"] = _joined(rest, "string", {"rods": rods})
+        rest["effects"] = {"string": True, **_group_of(rest, "effects")}
+    return rest
+
+
+def _group_of(values: Mapping[str, Any], name: str) -> Mapping[str, Any]:
+    """A group as a table; empty where there is none, or something else."""
+    group = values.get(name, {})
+    if isinstance(group, Parameters):
+        return group.given_values()
+    return group if isinstance(group, Mapping) else {}
+
+
+def _joined(values: Mapping[str, Any], name: str, own: Mapping[str, Any]) -> dict[str, Any]:
+    """A group and what a list of bars says of it."""
+    group = _group_of(values, name)
+    for key in own:
+        if key in group:
+            raise SceneError(f"bars and {name}.{key} are both given: leave out one of them")
+    return {**group, **own}
 
 
 def _plain_rows() -> tuple[Row, ...]:
@@ -418,6 +485,7 @@ def refuse_contradictions(scene: Scene) -> None:
             'set piston.model = "rigid" and bit.model = "rigid", or solver.name = "wave", "fem" '
             'or "auto"'
         )
+    _refuse_string(scene)
     _refuse_fidelity(scene)
     _refuse_requests(scene)
     if effects.barrier and effects.rock != "bilinear" and "effects.barrier" in scene.given:
@@ -429,6 +497,34 @@ def refuse_contradictions(scene: Scene) -> None:
         raise SceneError(
             f"run.settle = {run.settle!r} s: must be below run.duration = {run.duration!r} s"
         )
+
+
+# Solvers that compute bars between piston and bit.
+_OF_STRINGS = ("auto", "wave", "chain")
+
+
+def _refuse_string(scene: Scene) -> None:
+    """Raise `SceneError` for a drill string that nothing computes, or that is none."""
+    if not scene.effects.string:
+        if scene.string.rods:
+            raise SceneError(
+                "string.rods are given, but effects.string = false: set effects.string = true, or "
+                "leave them out"
+            )
+        return
+    if not scene.string.rods:
+        raise SceneError("effects.string = true needs string.rods, or [[bars]] from drive to rock")
+    if scene.bit.model == "rigid":
+        raise SceneError('effects.string = true needs bit.model = "elastic": waves run in rods')
+    if scene.solver.name not in _OF_STRINGS or scene.solver.fidelity != "wave":
+        named = scene.solver.name if scene.solver.fidelity == "wave" else scene.solver.fidelity
+        raise SceneError(
+            f'"{named}" computes piston and bit alone, and effects.string = true: set solver.name '
+            f"to one of {', '.join(_OF_STRINGS)}, and leave solver.fidelity"
+        )
+    for k, rod in enumerate(scene.string.rods):
+        for name in sorted(rod._given.difference(rod.telling)):
+            raise SceneError(f'string.rods.{k}.{name}: a joint that is "{rod.joint}" has none')
 
 
 # What the blow map is a table of, and the ranges that must rise.

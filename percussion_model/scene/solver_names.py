@@ -6,11 +6,12 @@ from typing import Literal
 
 # The choices of `solver.name`; the parameter table reads this list whenever it is asked.
 # In FMUs they are numbers: new ones come last.
-SOLVER_NAMES = ["auto", "wave", "fem", "rigid", "modal"]
+SOLVER_NAMES = ["auto", "wave", "fem", "rigid", "modal", "chain"]
 # Bodies that a solver computes, where not both kinds.
 BODIES: dict[str, Literal["elastic", "rigid"]] = {
     "wave": "elastic",
     "modal": "elastic",
+    "chain": "elastic",
     "fem": "elastic",
     "rigid": "rigid",
 }

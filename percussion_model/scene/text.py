@@ -117,6 +117,8 @@ def commented_scene(title: str, values: Mapping[str, Any], silent: Iterable[str]
         if row.kind == "sections":
             lines += _commented_sections(row, values[row.key], row.key in hidden)
             continue
+        if row.kind == "rods":
+            continue
         if row.key.split(".")[0] != group:
             group = row.key.split(".")[0]
             lines += ["", f"[{group}]"]

@@ -39,7 +39,7 @@ def st_venant_restitution(
 
 def restitution(numbers: Numbers) -> float:
     """Coefficient of restitution of piston and bit, NaN without a piston."""
-    values, piston, bit = numbers
+    values, piston, bit = numbers[:3]
     if PISTONS[values.piston_model] == Piston.ABSENT:
         return math.nan
     if values.bit_model == Bit.RIGID and not math.isnan(values.contact_restitution):

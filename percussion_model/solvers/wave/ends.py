@@ -22,11 +22,16 @@ from percussion_model.physics.body import (
 from percussion_model.physics.drive import drive_force, switch_drive
 from percussion_model.physics.kernel import inlined, kernel, merged
 from percussion_model.physics.records import Piston
-from percussion_model.solvers.wave.bar import face_velocities, send_waves, send_waves_with_loss
+from percussion_model.solvers.wave.bar import (
+    face_velocities,
+    kinetic_energy,
+    send_waves,
+    send_waves_with_loss,
+)
 from percussion_model.solvers.wave.contact import bar_contact, mass_contact
 from percussion_model.solvers.wave.loss import finish_loss, loss_substeps, smooth_cells
 from percussion_model.solvers.wave.records import Row
-from percussion_model.solvers.wave.rock_end import rock_step
+from percussion_model.solvers.wave.rock_end import asks_for_energy, rock_step
 from percussion_model.solvers.wave.totals import bit_position, time_of
 
 # A part of a step shorter than this is not worth a step of its own.
@@ -257,7 +262,10 @@ def meet(par, s, bars, tau, blows, events):
         events,
     )
     z = par.z_b * (1.0 + par.kappa_b)
-    d, q = rock_step(par, s, bars.wb, bars.cb, v_free, z, tau, time, events)
+    energy = 0.0
+    if asks_for_energy(par, s, v_free, z, tau):
+        energy = kinetic_energy(bars.wb, bars.cb, par.n_b, r)
+    d, q = rock_step(par, s, energy, v_free, z, tau, time, events)
     book_end(s, par.z_b, par.kappa_b, bottom, d, q, tau)
     bars.wb[Row.FACE, par.n_b] = d / tau
     push_rock = z * (v_free * tau - d)

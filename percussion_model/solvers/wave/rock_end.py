@@ -13,7 +13,6 @@ from percussion_model.physics.blows import push_event
 from percussion_model.physics.kernel import inlined, kernel, merged
 from percussion_model.physics.records import Mode, RockKind
 from percussion_model.physics.rock import (
-    REST_VELOCITY,
     book_dashpot,
     close_interface,
     crush,
@@ -27,7 +26,6 @@ from percussion_model.physics.rock import (
     spring_force,
     stiffness,
 )
-from percussion_model.solvers.wave.bar import kinetic_energy
 
 
 @merged
@@ -146,15 +144,25 @@ def flight_stretch(par, s, v_free, rest):
 
 
 @inlined
-def rock_step(par, s, w, c, v_free, z, tau, time, events):
+def asks_for_energy(par, s, v_free, z, tau):
+    """Whether a step may come to where the rock law goes by the kinetic energy of the bit."""
+    if s.mode == Mode.SS:
+        return par.rock == RockKind.BILINEAR
+    if s.mode == Mode.FF:
+        return s.p_u - s.p < v_free * tau
+    return s.mode == Mode.BC and z * v_free - spring_force(s) > 0.0
+
+
+@inlined
+def rock_step(par, s, energy, v_free, z, tau, time, events):
     """Advance the rock end of the bit by `tau`.
 
     Parameters
     ----------
     par, s : record
         Parameters and state.
-    w, c : float array
-        The bit, for its kinetic energy.
+    energy : float
+        Kinetic energy of the bit, where `asks_for_energy` [J].
     v_free : float
         Velocity the end would have if it were free [m/s].
     z : float
@@ -168,9 +176,8 @@ def rock_step(par, s, w, c, v_free, z, tau, time, events):
     d, q : float
         Integrals of velocity [m] and of its square [m2/s].
     """
-    r = 2 * s.parity
     if s.mode == Mode.SS and par.rock == RockKind.BILINEAR:
-        if overcomes_barrier(par, s, kinetic_energy(w, c, par.n_b, r)):
+        if overcomes_barrier(par, s, energy):
             force = spring_force(s)
             leave_standstill(par, s, (z * v_free - force) / (z + s.c_r))
             push_event(s, events, time, s.mode, force)
@@ -187,7 +194,7 @@ def rock_step(par, s, w, c, v_free, z, tau, time, events):
             rest -= t
             if closes == 0:
                 return d, q
-            close_interface(par, s, kinetic_energy(w, c, par.n_b, r))
+            close_interface(par, s, energy)
             if s.mode == Mode.SS:
                 enter_standstill(s, here + t)
             push_event(s, events, here + t, s.mode, 0.0)
@@ -202,7 +209,7 @@ def rock_step(par, s, w, c, v_free, z, tau, time, events):
             s.p_u = s.p
             push_event(s, events, here, s.mode, 0.0)
             continue
-        if end_of_mode(par, s, w, c, v_free, z, r) == 1:
+        if end_of_mode(par, s, energy, v_free, z) == 1:
             if s.mode == Mode.SS:
                 enter_standstill(s, here)
             push_event(s, events, here, s.mode, spring_force(s))
@@ -220,10 +227,7 @@ def rock_step(par, s, w, c, v_free, z, tau, time, events):
 
 
 @merged
-def end_of_mode(par, s, w, c, v_free, z, r):
+def end_of_mode(par, s, energy, v_free, z):
     """Whether the sign of the velocity ends the mode at once; sets the next."""
     v = (z * v_free - spring_force(s)) / (z + damping(s))
-    energy = 0.0
-    if s.mode == Mode.BC and v > REST_VELOCITY:
-        energy = kinetic_energy(w, c, par.n_b, r)
     return leave_by_velocity(par, s, v, energy)

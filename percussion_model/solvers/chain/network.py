@@ -1,0 +1,155 @@
+"""A scene's bars as the arrays that the kernels of chains go by."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from percussion_model.physics.records import Piston
+from percussion_model.scene.bars import (
+    bar_mass,
+    bar_transit_time,
+    section_impedance,
+    section_mass,
+    section_transit_time,
+)
+from percussion_model.scene.numbers import Numbers
+from percussion_model.scene.rows import SceneError
+from percussion_model.solvers.chain.records import Body, Chain, Fit, Joint, Place, Steel
+from percussion_model.solvers.chain.taps import weights_of
+from percussion_model.solvers.modal.lanes import WIDTH
+from percussion_model.solvers.setup import MOST_CELLS, PISTONS, kelvin_voigt_time, refuse_many
+
+# Cells in the bar of the shortest transit, where a scene asks for none.
+DEFAULT_CELLS = 20
+
+
+class Network(NamedTuple):
+    """Bars cut into sections for a time step.
+
+    Attributes
+    ----------
+    chain : Chain
+    names : list of str
+        Of the bars: "piston", "rod 1", ..., "bit".
+    time_step : float
+        [s]
+    rings : int
+        Numbers that all rings hold.
+    misfit : float
+        Largest relative error of a section's transit time: one shorter than a step.
+    struck : int
+        The bar that the piston strikes, or the topmost.
+    """
+
+    chain: Chain
+    names: list[str]
+    time_step: float
+    rings: int
+    misfit: float
+    struck: int
+
+
+def elastic_chain(numbers: Numbers) -> tuple[list[np.ndarray], list[str]]:
+    """Sections of each elastic bar from top to bottom, and their names."""
+    bars, names = [*numbers.rods, numbers.bit], [f"rod {k + 1}" for k in range(len(numbers.rods))]
+    names.append("bit")
+    if PISTONS[numbers.values.piston_model] == Piston.ELASTIC:
+        return [numbers.piston, *bars], ["piston", *names]
+    return bars, names
+
+
+def time_step_of(numbers: Numbers) -> float:
+    """Time step of a scene [s]: the transit time of the first elastic bar by its cells."""
+    bars, _ = elastic_chain(numbers)
+    values = numbers.values
+    first = bar_transit_time(bars[0])
+    if not math.isnan(values.solver_cells):
+        return first / float(values.solver_cells)
+    whole = min(map(bar_transit_time, bars)) / DEFAULT_CELLS
+    shortest = min(section_transit_time(section) for bar in bars for section in bar)
+    # what is shorter than a step would be longer than it is
+    return first / math.ceil(first / min(whole, shortest) - 1e-9)
+
+
+def network_of(numbers: Numbers) -> Network:
+    """Cut the bars of a scene."""
+    bars, names = elastic_chain(numbers)
+    dt, eta = time_step_of(numbers), kelvin_voigt_time(numbers)
+    refuse_many("cells", sum(map(bar_transit_time, bars)) / dt, MOST_CELLS)
+    count = sum(map(len, bars))
+    places = np.zeros((count, len(Place)), np.int64)
+    steel = np.zeros((count, len(Steel)))
+    bodies = np.zeros((len(bars), len(Body)))
+    weights: list[np.ndarray] = []
+    ring, misfit, k = 0, 0.0, 0
+    for number, bar in enumerate(bars):
+        bodies[number] = bar_mass(bar), k, k + len(bar) - 1
+        for section in bar:
+            transit = section_transit_time(section) / dt
+            delay, taps, spread = weights_of(transit, eta * transit / dt)
+            mean = delay + float(np.arange(len(taps)) @ taps)
+            misfit = max(misfit, abs(mean / transit - 1.0))
+            padded = len(taps) if len(taps) == 1 else -(-len(taps) // WIDTH) * WIDTH
+            size = 1 << math.ceil(math.log2(delay + padded + 1))
+            places[k] = (
+                number, ring, size, delay - 1, padded, sum(map(len, weights)), max(1, round(mean))
+            )  # fmt: skip
+            # newest last, as they lie in the ring
+            weights.append(np.concatenate([np.zeros(padded - len(taps)), taps[::-1]]))
+            ring += 4 * size
+            loss = 1.0 if spread <= 0.0 else min(1.0, eta * transit / dt / spread)
+            z, mass = section_impedance(section), section_mass(section)
+            steel[k] = z, 0.0, 0.0, loss, mass / places[k, Place.CELLS]
+            if k > bodies[number, Body.FIRST]:
+                above = steel[k - 1, Steel.IMPEDANCE]
+                steel[k, Steel.ALPHA : Steel.BETA + 1] = (
+                    2.0 * above / (above + z), 2.0 * z / (above + z)
+                )  # fmt: skip
+            k += 1
+    struck = int(names[0] == "piston")
+    fits = _fits(numbers, steel, bodies[struck:])
+    chain = Chain(places, steel, np.concatenate(weights)[None], fits, bodies)
+    return Network(chain, names, dt, ring, misfit, struck)
+
+
+def _fits(numbers: Numbers, steel: np.ndarray, bodies: np.ndarray) -> np.ndarray:
+    """Rows of `Fit` of the joints below the rods."""
+    fits = np.zeros((len(numbers.rods), len(Fit)))
+    for fit, joint, above, below in zip(fits, numbers.joints, bodies[:-1], bodies[1:], strict=True):
+        kind, transmission, relaxation, _, preload, thread = joint.tolist()
+        z = steel[[int(above[Body.LAST]), int(below[Body.FIRST])], Steel.IMPEDANCE]
+        gives = float(np.sum(1.0 / z))
+        stiffness, damping = thread, 0.0
+        if kind == Joint.LOSSY and transmission < 1.0:
+            damping = transmission / ((1.0 - transmission) * gives)
+            stiffness = (1.0 + damping * gives) / (gives * relaxation)
+        elif kind == Joint.LOSSY:
+            kind = Joint.PERFECT
+        fit[:] = kind, gives, preload, stiffness, damping, below[Body.FIRST]
+    return fits
+
+
+def refuse_chain(numbers: Numbers) -> None:
+    """Raise `SceneError` for what no chain computes."""
+    if numbers.values.bit_model != 0:
+        raise SceneError('solver.name = "chain" needs bit.model = "elastic"')
+
+
+def parameters_of(network: Network, numbers: Numbers, par: np.ndarray) -> None:
+    """Fill what `CHAIN_PAR` has beside the common parameters."""
+    p: Any = par[0]
+    values = numbers.values
+    p["dt"] = network.time_step
+    p["sections"], p["bars"] = len(network.chain.places), len(network.names)
+    p["joints"], p["struck"] = len(network.chain.fits), network.struck
+    if PISTONS[values.piston_model] == Piston.ABSENT and values.effects_string:
+        p["open_top"] = values.string_top
+        p["pulse"], p["pulse_end"] = values.string_pulse_force, values.string_pulse_duration
+    if values.effects_string and values.effects_damper:
+        p["damper"] = 1
+        for name in ("stiffness", "damping", "preload"):
+            p[f"damper_{name}"] = getattr(values, f"damper_{name}")
+        p["casing_mass"] = values.damper_casing_mass

@@ -1,0 +1,110 @@
+"""Waves in the sections of a chain: arriving, being sent, and the sums over what is under way."""
+
+from __future__ import annotations
+
+from percussion_model.physics.kernel import inlined, kernel
+from percussion_model.solvers.chain.records import Bar, Body, Place, Steel
+from percussion_model.solvers.modal.lanes import WIDTH, load, spread, total
+
+BAR, RING, SIZE, DELAY, TAPS, WEIGHTS, CELLS = (int(row) for row in Place)
+IMPEDANCE, ALPHA, BETA, LOSS, CELL_MASS = (int(row) for row in Steel)
+FIRST, LAST, GIVEN = int(Body.FIRST), int(Body.LAST), int(Bar.GIVEN)
+# Velocity that body forces may give the waves of a bar before it is written into the rings:
+# waves are kept less this, and lose digits where it is large [m/s].
+MOST_GIVEN = 0.1
+
+
+@inlined
+def arrive(places, weights, rings, step, k, way):
+    """What arrives of one wave of a section, and what arriving takes.
+
+    Parameters
+    ----------
+    step : int
+        That begins.
+    way : int
+        0 of the down-going wave, 1 of the up-going.
+
+    Returns
+    -------
+    wave : float
+        [m/s]
+    taken : float
+        Weighted square of what was sent, less the square of `wave` [m2/s2].
+    """
+    size, taps = places[k, SIZE], places[k, TAPS]
+    start = places[k, RING] + 2 * size * way
+    if taps == 1:
+        return rings[0, start + ((step - places[k, DELAY]) & (size - 1))], 0.0
+    first = start + ((step - places[k, DELAY] - taps + 1) & (size - 1))
+    weight = places[k, WEIGHTS]
+    one = square = spread(0.0)
+    for j in range(0, taps, WIDTH):
+        x = load(rings, 0, first + j)
+        share = load(weights, 0, weight + j) * x
+        one = one + share
+        square = square + share * x
+    wave = total(one)
+    return wave, max(total(square) - wave * wave, 0.0)
+
+
+@inlined
+def send(places, rings, step, k, way, wave):
+    """Send a wave into a section at the end of a step."""
+    size = places[k, SIZE]
+    place = places[k, RING] + 2 * size * way + ((step + 1) & (size - 1))
+    rings[0, place] = wave
+    rings[0, place + size] = wave  # so that what is read never wraps
+
+
+@kernel
+def write_given(chain, waves, bar):
+    """Write what body forces gave the waves of a bar into its rings."""
+    given = waves.bars[GIVEN, bar]
+    waves.bars[GIVEN, bar] = 0.0
+    for k in range(int(chain.bodies[bar, FIRST]), int(chain.bodies[bar, LAST]) + 1):
+        start = chain.places[k, RING]
+        for i in range(4 * chain.places[k, SIZE]):
+            waves.rings[0, start + i] += given
+
+
+@inlined
+def wave_in_cell(places, rings, step, k, way, cell):
+    """A wave of a section in a cell, counted from the top, without what body forces gave."""
+    size = places[k, SIZE]
+    age = cell if way == 0 else places[k, CELLS] - 1 - cell
+    return rings[0, places[k, RING] + 2 * size * way + ((step - age) & (size - 1))]
+
+
+@kernel
+def kinetic_of_bar(chain, waves, step, bar):
+    """Kinetic energy of a bar [J]."""
+    energy, given = 0.0, waves.bars[GIVEN, bar]
+    for k in range(int(chain.bodies[bar, FIRST]), int(chain.bodies[bar, LAST]) + 1):
+        one = 0.0
+        for cell in range(chain.places[k, CELLS]):
+            v = wave_in_cell(chain.places, waves.rings, step, k, 0, cell)
+            v += wave_in_cell(chain.places, waves.rings, step, k, 1, cell) + 2.0 * given
+            one += v * v
+        energy += 0.5 * chain.steel[k, CELL_MASS] * one
+    return energy
+
+
+@kernel
+def energy_of_bar(dt, chain, waves, step, bar):
+    """All energy of a bar: of each wave what has not yet arrived of it [J]."""
+    energy, given = 0.0, waves.bars[GIVEN, bar]
+    for k in range(int(chain.bodies[bar, FIRST]), int(chain.bodies[bar, LAST]) + 1):
+        size, taps, weight = chain.places[k, SIZE], chain.places[k, TAPS], chain.places[k, WEIGHTS]
+        one = 0.0
+        for way in range(2):
+            start = chain.places[k, RING] + 2 * size * way
+            left = 1.0
+            for age in range(chain.places[k, DELAY] + taps):
+                late = age - chain.places[k, DELAY]
+                if late > 0:  # the newest weight is the last
+                    left -= chain.weights[0, weight + taps - late]
+                x = waves.rings[0, start + ((step - age) & (size - 1))] + given
+                one += left * x * x
+        energy += chain.steel[k, IMPEDANCE] * dt * one
+    return energy

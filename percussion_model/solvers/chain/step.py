@@ -1,0 +1,349 @@
+"""One step of a chain of bars: what the ends of its sections meet."""
+
+from __future__ import annotations
+
+from percussion_model.physics.blows import (
+    close_gap,
+    open_gap,
+    push_checkpoint,
+    standstill_force,
+    start_blow,
+    starts_blow,
+)
+from percussion_model.physics.body import book_forces, hold_effects, piston_acceleration
+from percussion_model.physics.drive import drive_force
+from percussion_model.physics.kernel import inlined, kernel, merged
+from percussion_model.physics.records import Mode, Piston
+from percussion_model.solvers.chain.joint import Met, shoulders, yielding
+from percussion_model.solvers.chain.records import Bar, Body, Fit, Has, Joint
+from percussion_model.solvers.chain.sections import (
+    ALPHA,
+    BAR,
+    BETA,
+    FIRST,
+    GIVEN,
+    IMPEDANCE,
+    LOSS,
+    MOST_GIVEN,
+    arrive,
+    kinetic_of_bar,
+    send,
+    write_given,
+)
+from percussion_model.solvers.wave.contact import mass_contact
+from percussion_model.solvers.wave.ends import move_piston
+from percussion_model.solvers.wave.rock_end import asks_for_energy, rock_step
+
+PERFECT, _, LOSSY, THREADED = (float(kind) for kind in Joint)
+MASS, VELOCITY, POSITION = int(Body.MASS), int(Bar.VELOCITY), int(Bar.POSITION)
+KIND, YIELD, PRELOAD, STIFFNESS, DAMPING, SECTION = (int(row) for row in Fit)
+CLOSED, GAP, FORCE, LEAST, CAME, PASSED, RETURNED = (int(row) for row in Has)
+# Rows of `Waves.came`: what arrives at the lower and the upper end of a section, what leaves
+# these, and the impulses on the upper and the lower end of a bar and its acceleration.
+DOWN, UP, DOWN_OUT, UP_OUT, FROM_ABOVE, FROM_BELOW, ACCELERATION = range(7)
+CAME_ROWS = 7
+# Spacing of the bit force's checkpoints while standing still [steps].
+CHECKPOINT_STEPS = 64
+
+
+@merged
+def time_of(par, s):
+    """Time of a state [s]."""
+    return s.step * par.dt
+
+
+@inlined
+def stored_in_joint(fits, joints, j):
+    """Energy of a thread or of a lossy joint [J]."""
+    gap = joints[GAP, j]
+    if fits[j, KIND] == LOSSY or fits[j, KIND] == THREADED:
+        return gap * (fits[j, PRELOAD] + 0.5 * fits[j, STIFFNESS] * gap)
+    return 0.0
+
+
+@inlined
+def damper_force(par, shortened, speed):
+    """Force of the damper, which only pushes [N]."""
+    force = par.damper_preload + par.damper_stiffness * shortened + par.damper_damping * speed
+    return max(force, 0.0)
+
+
+@inlined
+def accelerations(par, s, chain, waves, push):
+    """Acceleration that its body forces give each bar; the force of the damper [N]."""
+    for i in range(par.bars):
+        waves.came[ACCELERATION, i] = par.gravity
+    struck, bit, damper = par.struck, par.bars - 1, 0.0
+    if par.damper == 1:
+        speed = s.v_c - waves.bars[VELOCITY, struck]
+        damper = damper_force(par, s.x_c + 0.5 * par.dt * speed, speed)
+        waves.came[ACCELERATION, struck] += damper / chain.bodies[struck, MASS]
+    else:
+        waves.came[ACCELERATION, struck] += s.feed / chain.bodies[struck, MASS]
+    waves.came[ACCELERATION, bit] += s.f_held / chain.bodies[bit, MASS]
+    if par.piston == Piston.ELASTIC:
+        waves.came[ACCELERATION, 0] = piston_acceleration(par, push)
+    return damper
+
+
+@inlined
+def arrivals(par, s, chain, waves):
+    """See what arrives at all ends of sections in the step that begins."""
+    for k in range(par.sections):
+        given = waves.bars[GIVEN, chain.places[k, BAR]]
+        down, lost = arrive(chain.places, chain.weights, waves.rings, s.step, k, 0)
+        up, also = arrive(chain.places, chain.weights, waves.rings, s.step, k, 1)
+        waves.came[DOWN, k], waves.came[UP, k] = down + given, up + given
+        if s.live == 1:
+            taken = chain.steel[k, IMPEDANCE] * par.dt * (lost + also)
+            s.e_loss += chain.steel[k, LOSS] * taken
+            s.e_numerical += (1.0 - chain.steel[k, LOSS]) * taken
+
+
+@inlined
+def kick_of(par, waves, bar):
+    """Mean velocity that body forces give in a step [m/s]."""
+    return 0.5 * par.dt * waves.came[ACCELERATION, bar]
+
+
+@inlined
+def within(par, chain, waves):
+    """Let waves pass from section to section of the bars (docs/model.md, eq. 8)."""
+    came = waves.came
+    for k in range(1, par.sections):
+        bar = chain.places[k, BAR]
+        if chain.places[k - 1, BAR] == bar:
+            v = chain.steel[k, ALPHA] * came[DOWN, k - 1] + chain.steel[k, BETA] * came[UP, k]
+            v += kick_of(par, waves, bar)
+            came[UP_OUT, k - 1] = v - came[DOWN, k - 1]
+            came[DOWN_OUT, k] = v - came[UP, k]
+
+
+@inlined
+def meet_top(par, s, chain, waves, tau, time):
+    """The top end of the topmost bar: free, or without reflection; with a wave from outside."""
+    z, up, kick = chain.steel[0, IMPEDANCE], waves.came[UP, 0], kick_of(par, waves, 0)
+    pulse = 0.0
+    if time < par.pulse_end:
+        pulse = par.pulse * min(1.0, (par.pulse_end - time) / par.dt)
+    if par.open_top == 1:
+        down = pulse / z + kick
+    else:
+        down = up + kick + pulse / z
+    waves.came[DOWN_OUT, 0] = down
+    force = z * (down - kick - up)
+    waves.came[FROM_ABOVE, 0] = force * tau
+    s.e_ends -= force * (down + up) * tau
+
+
+@inlined
+def meet_joint(par, s, fits, waves, j, a, tau):
+    """Let the ends at a joint meet for `tau`."""
+    y, joints = fits[j, YIELD], waves.joints
+    if fits[j, KIND] == PERFECT:
+        force = a / y
+        return Met(1, 0.0, force * tau, force * force * tau, 0.0, 0.0)
+    if fits[j, KIND] == LOSSY:
+        return yielding(joints[GAP, j], a, y, fits[j, STIFFNESS], fits[j, DAMPING], tau)
+    closed = 1 if joints[CLOSED, j] == 1.0 else 0
+    return shoulders(closed, joints[GAP, j], a, y, fits[j, PRELOAD], fits[j, STIFFNESS], tau)
+
+
+@inlined
+def meet_joints(par, s, chain, waves, tau):
+    """All joints below rods."""
+    came, fits, joints = waves.came, chain.fits, waves.joints
+    for j in range(par.joints):
+        k = int(fits[j, SECTION])
+        above, below = chain.places[k - 1, BAR], chain.places[k, BAR]
+        z_a, z_b = chain.steel[k - 1, IMPEDANCE], chain.steel[k, IMPEDANCE]
+        v_a = 2.0 * came[DOWN, k - 1] + kick_of(par, waves, above)
+        v_b = 2.0 * came[UP, k] + kick_of(par, waves, below)
+        stored = stored_in_joint(fits, joints, j)
+        met = meet_joint(par, s, fits, waves, j, v_a - v_b, tau)
+        force = met.impulse / tau
+        joints[CLOSED, j], joints[GAP, j] = met.closed, met.gap
+        joints[FORCE, j] = force
+        came[UP_OUT, k - 1] = v_a - force / z_a - came[DOWN, k - 1]
+        came[DOWN_OUT, k] = v_b + force / z_b - came[UP, k]
+        came[FROM_BELOW, above], came[FROM_ABOVE, below] = met.impulse, met.impulse
+        s.e_stored += stored_in_joint(fits, joints, j) - stored
+        s.e_joints += met.taken
+        s.e_numerical += fits[j, YIELD] * (met.square - met.impulse * force)
+        joints[LEAST, j] = min(joints[LEAST, j], force)
+        joints[CAME, j] += z_a * came[DOWN, k - 1] * came[DOWN, k - 1] * tau
+        joints[PASSED, j] += z_b * came[DOWN_OUT, k] * came[DOWN_OUT, k] * tau
+        joints[RETURNED, j] += z_a * came[UP_OUT, k - 1] * came[UP_OUT, k - 1] * tau
+
+
+@kernel
+def record_contact(par, s, waves, opened, t_close, approach, force, time, tau, blows, events):
+    """Book the opening and the closure of the gap below the piston in this step."""
+    if opened == 1:
+        open_gap(s, events, time, approach)
+    if t_close >= 0.0:
+        closure = time + t_close
+        if starts_blow(par, s, closure):
+            here = waves.bars[POSITION, par.bars - 1] + s.v_b * t_close
+            speed = s.v_p + piston_acceleration(par, drive_force(par, s)) * t_close
+            impulse = s.i_bit + s.gamma * s.k_r * (s.p - s.p_u) * t_close
+            still = standstill_force(s, closure, impulse)
+            start_blow(par, s, blows, closure, speed, here, still)
+        close_gap(s, events, closure, approach)
+    s.b_peak_contact = max(s.b_peak_contact, force)
+    if time + tau > s.peak_from:
+        s.peak_contact_force = max(s.peak_contact_force, force)
+
+
+@inlined
+def meet_piston(par, s, chain, waves, push, tau, time, blows, events):
+    """The piston and the bar that it strikes; the impulse between them [N s]."""
+    came, struck = waves.came, par.struck
+    k = int(chain.bodies[struck, FIRST])
+    z_t = chain.steel[k, IMPEDANCE]
+    v_t = 2.0 * came[UP, k] + kick_of(par, waves, struck)
+    opened, t_close, was = 0, -1.0, s.closed
+    if par.piston == Piston.ELASTIC:
+        z_p, kick = chain.steel[k - 1, IMPEDANCE], kick_of(par, waves, 0)
+        v_p = 2.0 * came[DOWN, k - 1] + kick
+        y = 1.0 / z_p + 1.0 / z_t
+        met = shoulders(was, s.gap, v_p - v_t, y, 0.0, 0.0, tau)
+        impulse, force, square = met.impulse, (v_p - v_t) / y, met.square
+        s.closed, s.gap = met.closed, met.gap
+        if was == 1 and met.free > 0.0:
+            opened = 1
+        if met.closed == 1 and met.free > 0.0:
+            t_close = met.free
+        elif met.closed == 1 and was == 0:
+            t_close = 0.0
+        came[UP_OUT, k - 1] = v_p - impulse / (z_p * tau) - came[DOWN, k - 1]
+        came[DOWN_OUT, 0] = came[UP, 0] + kick
+        s.e_numerical += y * (square - impulse * impulse / tau)
+    else:
+        v_p = s.v_p + 0.5 * par.dt * piston_acceleration(par, push)
+        closed, gap, _, _, d_t, q_t, impulse, t_close, opened = mass_contact(
+            was, s.gap, v_p, v_t, par.mass_p, z_t, tau
+        )
+        s.closed, s.gap, force = closed, gap, z_t * (v_p - v_t)
+        s.e_numerical += z_t * (q_t - d_t * d_t / tau)
+    came[DOWN_OUT, k] = v_t + impulse / (z_t * tau) - came[UP, k]
+    came[FROM_ABOVE, struck] = impulse
+    if was == 1 or s.closed == 1 or opened == 1 or t_close >= 0.0:
+        peak = force if s.closed == 1 else 0.0
+        record_contact(par, s, waves, opened, t_close, v_p - v_t, peak, time, tau, blows, events)
+    return impulse
+
+
+@inlined
+def meet_rock(par, s, chain, waves, tau, time, events):
+    """The bit's lower end on the rock; the impulse on the rock [N s]."""
+    k, bit = par.sections - 1, par.bars - 1
+    z, down = chain.steel[k, IMPEDANCE], waves.came[DOWN, k]
+    v_free, energy = 2.0 * down + kick_of(par, waves, bit), 0.0
+    if asks_for_energy(par, s, v_free, z, tau):
+        energy = kinetic_of_bar(chain, waves, s.step, bit)
+    d, q = rock_step(par, s, energy, v_free, z, tau, time, events)
+    impulse, up = z * (v_free * tau - d), d / tau - down
+    waves.came[UP_OUT, k], waves.came[FROM_BELOW, bit] = up, impulse
+    s.e_numerical += z * (q - d * d / tau)
+    s.rock_work += z * (v_free * d - q)
+    s.i_bit += impulse
+    s.i_came += z * down * down * tau
+    s.i_returned += z * up * up * tau
+    return impulse
+
+
+@inlined
+def move_bars(par, s, chain, waves, damper, tau):
+    """Mean motion of bars and casing, and the work of body forces; path of what the drive holds."""
+    struck, bit, held = par.struck, par.bars - 1, 0.0
+    for i in range(struck, par.bars):
+        mass, v0 = chain.bodies[i, MASS], waves.bars[VELOCITY, i]
+        gained = (waves.came[FROM_ABOVE, i] - waves.came[FROM_BELOW, i]) / mass
+        v1 = v0 + waves.came[ACCELERATION, i] * tau + gained
+        path = 0.5 * tau * (v0 + v1)
+        waves.bars[VELOCITY, i] = v1
+        waves.bars[POSITION, i] += path
+        s.e_gravity += mass * par.gravity * path
+        if i == struck:
+            held = path
+        if i == bit and par.effects == 1:
+            book_forces(s, path)
+    s.v_b = waves.bars[VELOCITY, bit]
+    if par.damper == 0:
+        s.e_feed += s.feed * held
+        return held
+    recoil = drive_force(par, s)
+    v1 = s.v_c + (s.feed - damper - recoil) / par.casing_mass * tau
+    path = 0.5 * tau * (s.v_c + v1)
+    before = s.x_c * (par.damper_preload + 0.5 * par.damper_stiffness * s.x_c)
+    s.x_c += path - held
+    stored = s.x_c * (par.damper_preload + 0.5 * par.damper_stiffness * s.x_c) - before
+    s.e_stored += stored
+    s.e_joints += damper * (path - held) - stored
+    s.e_feed += s.feed * path
+    s.e_drive -= recoil * path
+    s.v_c = v1
+    s.u_c += path
+    return path
+
+
+@inlined
+def meet(par, s, chain, waves, tau, blows, events):
+    """Let all ends meet what they meet for `tau`, up to a whole step.
+
+    Mean motion, gaps, penetration, modes, impulses and the ledger move on; waves do not.
+
+    Returns
+    -------
+    float
+        Velocity that the piston is still to get, where the drive turned [m/s].
+    """
+    time = time_of(par, s)
+    hold_effects(par, s)
+    push = drive_force(par, s)
+    damper = accelerations(par, s, chain, waves, push)
+    arrivals(par, s, chain, waves)
+    within(par, chain, waves)
+    meet_joints(par, s, chain, waves, tau)
+    impulse = 0.0
+    if par.piston == Piston.ABSENT:
+        meet_top(par, s, chain, waves, tau, time)
+    else:
+        impulse = meet_piston(par, s, chain, waves, push, tau, time, blows, events)
+    meet_rock(par, s, chain, waves, tau, time, events)
+    s.i_contact += impulse
+    held = move_bars(par, s, chain, waves, damper, tau)
+    if par.piston != Piston.ABSENT:
+        half, u_before = 0.5 * tau, s.u_r
+        a_p = piston_acceleration(par, push)
+        s.u_r += half * (2.0 * (s.v_p + a_p * half) - impulse / par.mass_p) - held
+        v_p = s.v_p
+        move_piston(par, s, push, impulse, u_before, time, tau, events)
+        if par.piston == Piston.ELASTIC:
+            waves.bars[VELOCITY, 0] = s.v_p
+            # what its waves get is the force at the start over the whole step
+            return s.v_p - v_p + impulse / par.mass_p - a_p * tau
+    return 0.0
+
+
+@kernel
+def step(par, s, chain, waves, tau, blows, events):
+    """Advance the state by one step; a copy that is only read meets what it meets for `tau`."""
+    due = meet(par, s, chain, waves, tau, blows, events)
+    if s.live == 0:
+        return
+    for i in range(par.bars):
+        waves.bars[GIVEN, i] += kick_of(par, waves, i)
+    for k in range(par.sections):
+        given = waves.bars[GIVEN, chain.places[k, BAR]]
+        send(chain.places, waves.rings, s.step, k, 0, waves.came[DOWN_OUT, k] - given)
+        send(chain.places, waves.rings, s.step, k, 1, waves.came[UP_OUT, k] - given)
+    waves.bars[GIVEN, 0] += 0.5 * due
+    s.step += 1
+    s.count_steps += 1
+    for i in range(par.bars):
+        if abs(waves.bars[GIVEN, i]) > MOST_GIVEN:
+            write_given(chain, waves, i)
+    if s.mode == Mode.SS and (s.n_check == 0 or s.step % CHECKPOINT_STEPS == 0):
+        push_checkpoint(s, time_of(par, s))
