@@ -309,6 +309,12 @@ class DrillString(Parameters):
     top: str = choice(
         "free", ("free", "open"), "top end without a piston: free, or without reflection", NO_PISTON
     )
+    bottom: str = choice(
+        "rock",
+        ("rock", "open"),
+        "lower end of the bit: on the rock, or without reflection",
+        STRING_ON,
+    )
     pulse_force: float = quantity(
         0.0,
         "N",

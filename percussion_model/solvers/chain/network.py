@@ -148,6 +148,8 @@ def parameters_of(network: Network, numbers: Numbers, par: np.ndarray) -> None:
     if PISTONS[values.piston_model] == Piston.ABSENT and values.effects_string:
         p["open_top"] = values.string_top
         p["pulse"], p["pulse_end"] = values.string_pulse_force, values.string_pulse_duration
+    if values.effects_string:
+        p["open_bottom"] = values.string_bottom
     if values.effects_string and values.effects_damper:
         p["damper"] = 1
         for name in ("stiffness", "damping", "preload"):

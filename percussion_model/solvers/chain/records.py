@@ -121,6 +121,7 @@ CHAIN_PAR = np.dtype(
         ("struck", "i8"),  # the bar that the piston strikes, or the topmost
         ("most_changes", "i8"),  # of the rock law within a step; more are a loop
         ("open_top", "i8"),  # 1: the top end of a chain without a piston reflects nothing
+        ("open_bottom", "i8"),  # 1: nor does the lower end of the bit
         ("pulse", "f8"),  # force of a wave that comes down from there [N]
         ("pulse_end", "f8"),  # [s]
         ("damper", "i8"),  # 1: there is one
@@ -140,6 +141,7 @@ CHAIN_STATE = np.dtype(
         ("u_c", "f8"),  # its displacement [m]
         ("x_c", "f8"),  # shortening of the damper since the start [m]
         ("e_stored", "f8"),  # in joints and damper [J]
+        ("end_start", "f8"),  # position of the bit's lower end at the start [m]
         ("u_0", "f8"),  # u_r at the start [m]
         ("i_came", "f8"),  # energy that came down to the rock [J]
         ("i_returned", "f8"),  # that it sent back

@@ -8,7 +8,8 @@ from percussion_model.solvers.modal.lanes import WIDTH, load, spread, total
 
 BAR, RING, SIZE, DELAY, TAPS, WEIGHTS, CELLS = (int(row) for row in Place)
 IMPEDANCE, ALPHA, BETA, LOSS, CELL_MASS = (int(row) for row in Steel)
-FIRST, LAST, GIVEN = int(Body.FIRST), int(Body.LAST), int(Bar.GIVEN)
+MASS, FIRST, LAST = (int(row) for row in Body)
+GIVEN = int(Bar.GIVEN)
 # Velocity that body forces may give the waves of a bar before it is written into the rings:
 # waves are kept less this, and lose digits where it is large [m/s].
 MOST_GIVEN = 0.1
@@ -88,6 +89,28 @@ def kinetic_of_bar(chain, waves, step, bar):
             one += v * v
         energy += 0.5 * chain.steel[k, CELL_MASS] * one
     return energy
+
+
+@kernel
+def shortening(dt, chain, waves, step, bar, from_top):
+    """Mean of a bar less one of its ends, by the strain in between [m].
+
+    Parameters
+    ----------
+    from_top : int
+        1 for (top end - mean), 0 for (mean - bottom end); positive where the bar is compressed.
+    """
+    mass, above, moment = chain.bodies[bar, MASS], 0.0, 0.0
+    for k in range(int(chain.bodies[bar, FIRST]), int(chain.bodies[bar, LAST]) + 1):
+        cells, own = chain.places[k, CELLS], chain.steel[k, CELL_MASS]
+        transit = own / chain.steel[k, IMPEDANCE]
+        for cell in range(cells):
+            short = wave_in_cell(chain.places, waves.rings, step, k, 0, cell)
+            short -= wave_in_cell(chain.places, waves.rings, step, k, 1, cell)
+            middle = above + 0.5 * own
+            moment += short * transit * (mass - middle if from_top == 1 else middle)
+            above += own
+    return moment / mass
 
 
 @kernel

@@ -132,6 +132,7 @@ class ChainSolver(Solver):
         if len(numbers.joints):
             joints[Has.GAP] = numbers.joints[:, 3]
             joints[Has.CLOSED] = numbers.joints[:, 3] == 0.0
+        s["end_start"] = s["x_r"] + s["p"]
         if PISTONS[numbers.values.piston_model] != Piston.ABSENT:
             s["u_r"] = s["u_0"] = -s["gap"]
         entry_of(begin)(self._par, state.record, self._chain, self._waves(state))

@@ -15,7 +15,7 @@ from percussion_model.physics.drive import drive_force
 from percussion_model.physics.kernel import inlined, kernel, merged
 from percussion_model.physics.records import Mode, Piston
 from percussion_model.solvers.chain.joint import Met, shoulders, yielding
-from percussion_model.solvers.chain.records import Bar, Body, Fit, Has, Joint
+from percussion_model.solvers.chain.records import Bar, Fit, Has, Joint
 from percussion_model.solvers.chain.sections import (
     ALPHA,
     BAR,
@@ -24,10 +24,12 @@ from percussion_model.solvers.chain.sections import (
     GIVEN,
     IMPEDANCE,
     LOSS,
+    MASS,
     MOST_GIVEN,
     arrive,
     kinetic_of_bar,
     send,
+    shortening,
     write_given,
 )
 from percussion_model.solvers.wave.contact import mass_contact
@@ -35,13 +37,15 @@ from percussion_model.solvers.wave.ends import move_piston
 from percussion_model.solvers.wave.rock_end import asks_for_energy, rock_step
 
 PERFECT, _, LOSSY, THREADED = (float(kind) for kind in Joint)
-MASS, VELOCITY, POSITION = int(Body.MASS), int(Bar.VELOCITY), int(Bar.POSITION)
+VELOCITY, POSITION = int(Bar.VELOCITY), int(Bar.POSITION)
 KIND, YIELD, PRELOAD, STIFFNESS, DAMPING, SECTION = (int(row) for row in Fit)
 CLOSED, GAP, FORCE, LEAST, CAME, PASSED, RETURNED = (int(row) for row in Has)
 # Rows of `Waves.came`: what arrives at the lower and the upper end of a section, what leaves
 # these, and the impulses on the upper and the lower end of a bar and its acceleration.
 DOWN, UP, DOWN_OUT, UP_OUT, FROM_ABOVE, FROM_BELOW, ACCELERATION = range(7)
 CAME_ROWS = 7
+# Mean motion is derived anew from waves and gap so often [steps].
+RESYNC_STEPS = 256
 # Spacing of the bit force's checkpoints while standing still [steps].
 CHECKPOINT_STEPS = 64
 
@@ -254,6 +258,17 @@ def meet_rock(par, s, chain, waves, tau, time, events):
 
 
 @inlined
+def meet_nothing(par, s, chain, waves, tau):
+    """The bit's lower end where it reflects nothing: what comes leaves."""
+    k, bit = par.sections - 1, par.bars - 1
+    z, down, kick = chain.steel[k, IMPEDANCE], waves.came[DOWN, k], kick_of(par, waves, bit)
+    force = z * down
+    waves.came[UP_OUT, k], waves.came[FROM_BELOW, bit] = kick, force * tau
+    s.e_ends += force * (down + kick) * tau
+    s.i_came += z * down * down * tau
+
+
+@inlined
 def move_bars(par, s, chain, waves, damper, tau):
     """Mean motion of bars and casing, and the work of body forces; path of what the drive holds."""
     struck, bit, held = par.struck, par.bars - 1, 0.0
@@ -311,7 +326,10 @@ def meet(par, s, chain, waves, tau, blows, events):
         meet_top(par, s, chain, waves, tau, time)
     else:
         impulse = meet_piston(par, s, chain, waves, push, tau, time, blows, events)
-    meet_rock(par, s, chain, waves, tau, time, events)
+    if par.open_bottom == 1:
+        meet_nothing(par, s, chain, waves, tau)
+    else:
+        meet_rock(par, s, chain, waves, tau, time, events)
     s.i_contact += impulse
     held = move_bars(par, s, chain, waves, damper, tau)
     if par.piston != Piston.ABSENT:
@@ -325,6 +343,25 @@ def meet(par, s, chain, waves, tau, blows, events):
             # what its waves get is the force at the start over the whole step
             return s.v_p - v_p + impulse / par.mass_p - a_p * tau
     return 0.0
+
+
+@kernel
+def resync(par, s, chain, waves):
+    """Derive the mean of the bit from its lower end, and u_r from the gap.
+
+    Momentum that an end gives a bar moves its mean by about v eta/2 less than its ends, while
+    body forces move both alike: blow by blow they would drift apart.
+    """
+    bit = par.bars - 1
+    waves.bars[POSITION, bit] = s.x_r + s.p - s.end_start
+    waves.bars[POSITION, bit] += shortening(par.dt, chain, waves, s.step, bit, 0)
+    if par.piston == Piston.ABSENT:
+        return
+    s.u_r = shortening(par.dt, chain, waves, s.step, par.struck, 1) - s.gap
+    if par.piston == Piston.ELASTIC:
+        s.u_r += shortening(par.dt, chain, waves, s.step, 0, 0)
+    if par.damper == 1:
+        s.u_r -= s.x_c
 
 
 @kernel
@@ -345,5 +382,7 @@ def step(par, s, chain, waves, tau, blows, events):
     for i in range(par.bars):
         if abs(waves.bars[GIVEN, i]) > MOST_GIVEN:
             write_given(chain, waves, i)
+    if s.step % RESYNC_STEPS == 0:
+        resync(par, s, chain, waves)
     if s.mode == Mode.SS and (s.n_check == 0 or s.step % CHECKPOINT_STEPS == 0):
         push_checkpoint(s, time_of(par, s))
