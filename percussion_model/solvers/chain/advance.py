@@ -10,8 +10,13 @@ from percussion_model.physics.records import Piston, Status
 from percussion_model.physics.reference import refer
 from percussion_model.physics.rock import recoverable
 from percussion_model.solvers.chain.records import Task
-from percussion_model.solvers.chain.sections import energy_of_bar, kinetic_of_bar
-from percussion_model.solvers.chain.step import DOWN, POSITION, UP_OUT, step, time_of
+from percussion_model.solvers.chain.sections import (
+    DOWN,
+    UP_OUT,
+    energy_of_bar,
+    kinetic_of_bar,
+)
+from percussion_model.solvers.chain.step import POSITION, step, time_of
 
 # Events that one step can make besides the rock's crossings: contact and drive.
 OTHER_EVENTS = 4

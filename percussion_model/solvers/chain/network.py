@@ -92,7 +92,7 @@ def network_of(numbers: Numbers) -> Network:
             delay, taps, spread = weights_of(transit, eta * transit / dt)
             mean = delay + float(np.arange(len(taps)) @ taps)
             misfit = max(misfit, abs(mean / transit - 1.0))
-            padded = len(taps) if len(taps) == 1 else -(-len(taps) // WIDTH) * WIDTH
+            padded = 1 if len(taps) == 1 else -(-len(taps) // WIDTH) * WIDTH
             size = 1 << math.ceil(math.log2(delay + padded + 1))
             places[k] = (
                 number, ring, size, delay - 1, padded, sum(map(len, weights)), max(1, round(mean))
@@ -128,7 +128,9 @@ def _fits(numbers: Numbers, steel: np.ndarray, bodies: np.ndarray) -> np.ndarray
             stiffness = (1.0 + damping * gives) / (gives * relaxation)
         elif kind == Joint.LOSSY:
             kind = Joint.PERFECT
-        fit[:] = kind, gives, preload, stiffness, damping, below[Body.FIRST]
+        fit[:] = (
+            kind, gives, preload, stiffness, damping, below[Body.FIRST], 1.0 / gives, *(1.0 / z)
+        )  # fmt: skip
     return fits
 
 

@@ -56,6 +56,9 @@ class Fit(IntEnum):
     STIFFNESS = 3  # of the thread, or of the spring of a lossy joint [N/m]
     DAMPING = 4  # of a lossy joint [N s/m]
     SECTION = 5  # the one below it
+    STIFF = 6  # 1 / Y [N s/m]
+    ABOVE = 7  # 1 / Z of the end above [m/(N s)]
+    BELOW = 8
 
 
 class Has(IntEnum):

@@ -10,43 +10,53 @@ BAR, RING, SIZE, DELAY, TAPS, WEIGHTS, CELLS = (int(row) for row in Place)
 IMPEDANCE, ALPHA, BETA, LOSS, CELL_MASS = (int(row) for row in Steel)
 MASS, FIRST, LAST = (int(row) for row in Body)
 GIVEN = int(Bar.GIVEN)
+# Rows of `Waves.came`: what arrives at the lower and the upper end of a section, what leaves
+# these, and the impulses on the upper and the lower end of a bar and its acceleration.
+DOWN, UP, DOWN_OUT, UP_OUT, FROM_ABOVE, FROM_BELOW, ACCELERATION = range(7)
+CAME_ROWS = 7
 # Velocity that body forces may give the waves of a bar before it is written into the rings:
 # waves are kept less this, and lose digits where it is large [m/s].
 MOST_GIVEN = 0.1
 
 
 @inlined
-def arrive(places, weights, rings, step, k, way):
-    """What arrives of one wave of a section, and what arriving takes.
+def arrivals(par, s, chain, waves):
+    """See what arrives at all ends of sections in the step that begins, into rows of `came`.
 
-    Parameters
-    ----------
-    step : int
-        That begins.
-    way : int
-        0 of the down-going wave, 1 of the up-going.
-
-    Returns
-    -------
-    wave : float
-        [m/s]
-    taken : float
-        Weighted square of what was sent, less the square of `wave` [m2/s2].
+    Arriving takes energy: the weighted squares of what was sent, less those of what arrives.
     """
-    size, taps = places[k, SIZE], places[k, TAPS]
-    start = places[k, RING] + 2 * size * way
-    if taps == 1:
-        return rings[0, start + ((step - places[k, DELAY]) & (size - 1))], 0.0
-    first = start + ((step - places[k, DELAY] - taps + 1) & (size - 1))
-    weight = places[k, WEIGHTS]
-    one = square = spread(0.0)
-    for j in range(0, taps, WIDTH):
-        x = load(rings, 0, first + j)
-        share = load(weights, 0, weight + j) * x
-        one = one + share
-        square = square + share * x
-    wave = total(one)
-    return wave, max(total(square) - wave * wave, 0.0)
+    places, steel, weights, step = chain.places, chain.steel, chain.weights, s.step
+    rings, came, bars = waves.rings, waves.came, waves.bars
+    lost = mixed = spread(0.0)
+    loss = other = 0.0
+    for k in range(par.sections):
+        size, taps, weight = places[k, SIZE], places[k, TAPS], places[k, WEIGHTS]
+        first = places[k, RING] + ((step - places[k, DELAY] - taps + 1) & (size - 1))
+        second = first + 2 * size
+        given = bars[GIVEN, places[k, BAR]]
+        if taps == 1:
+            came[DOWN, k], came[UP, k] = rings[0, first] + given, rings[0, second] + given
+            continue
+        share = load(weights, 0, weight)
+        x, y = load(rings, 0, first), load(rings, 0, second)
+        one, two = share * x, share * y
+        squares = one * x + two * y
+        for j in range(WIDTH, taps, WIDTH):
+            share = load(weights, 0, weight + j)
+            x, y = load(rings, 0, first + j), load(rings, 0, second + j)
+            p, q = share * x, share * y
+            one, two = one + p, two + q
+            squares = squares + (p * x + q * y)
+        down, up = total(one), total(two)
+        came[DOWN, k], came[UP, k] = down + given, up + given
+        by, own = par.dt * steel[k, IMPEDANCE], steel[k, LOSS]
+        lost, mixed = lost + squares * (by * own), mixed + squares * (by * (1.0 - own))
+        both = by * (down * down + up * up)
+        loss += own * both
+        other += (1.0 - own) * both
+    if s.live == 1:
+        s.e_loss += total(lost) - loss
+        s.e_numerical += total(mixed) - other
 
 
 @inlined

@@ -28,7 +28,7 @@ from percussion_model.solvers.chain.records import (
     Task,
     Waves,
 )
-from percussion_model.solvers.chain.step import CAME_ROWS
+from percussion_model.solvers.chain.sections import CAME_ROWS
 from percussion_model.solvers.setup import MOST_CHANGES, PISTONS, fill_parameters, fill_start
 from percussion_model.solvers.state import State, words_of
 

@@ -14,19 +14,25 @@ from percussion_model.physics.body import book_forces, hold_effects, piston_acce
 from percussion_model.physics.drive import drive_force
 from percussion_model.physics.kernel import inlined, kernel, merged
 from percussion_model.physics.records import Mode, Piston
-from percussion_model.solvers.chain.joint import Met, shoulders, yielding
+from percussion_model.solvers.chain.joint import shoulders, yielding
 from percussion_model.solvers.chain.records import Bar, Fit, Has, Joint
 from percussion_model.solvers.chain.sections import (
+    ACCELERATION,
     ALPHA,
     BAR,
     BETA,
+    DOWN,
+    DOWN_OUT,
     FIRST,
+    FROM_ABOVE,
+    FROM_BELOW,
     GIVEN,
     IMPEDANCE,
-    LOSS,
     MASS,
     MOST_GIVEN,
-    arrive,
+    UP,
+    UP_OUT,
+    arrivals,
     kinetic_of_bar,
     send,
     shortening,
@@ -38,12 +44,8 @@ from percussion_model.solvers.wave.rock_end import asks_for_energy, rock_step
 
 PERFECT, _, LOSSY, THREADED = (float(kind) for kind in Joint)
 VELOCITY, POSITION = int(Bar.VELOCITY), int(Bar.POSITION)
-KIND, YIELD, PRELOAD, STIFFNESS, DAMPING, SECTION = (int(row) for row in Fit)
+KIND, YIELD, PRELOAD, STIFFNESS, DAMPING, SECTION, STIFF, ABOVE, BELOW = (int(row) for row in Fit)
 CLOSED, GAP, FORCE, LEAST, CAME, PASSED, RETURNED = (int(row) for row in Has)
-# Rows of `Waves.came`: what arrives at the lower and the upper end of a section, what leaves
-# these, and the impulses on the upper and the lower end of a bar and its acceleration.
-DOWN, UP, DOWN_OUT, UP_OUT, FROM_ABOVE, FROM_BELOW, ACCELERATION = range(7)
-CAME_ROWS = 7
 # Mean motion is derived anew from waves and gap so often [steps].
 RESYNC_STEPS = 256
 # Spacing of the bit force's checkpoints while standing still [steps].
@@ -91,20 +93,6 @@ def accelerations(par, s, chain, waves, push):
 
 
 @inlined
-def arrivals(par, s, chain, waves):
-    """See what arrives at all ends of sections in the step that begins."""
-    for k in range(par.sections):
-        given = waves.bars[GIVEN, chain.places[k, BAR]]
-        down, lost = arrive(chain.places, chain.weights, waves.rings, s.step, k, 0)
-        up, also = arrive(chain.places, chain.weights, waves.rings, s.step, k, 1)
-        waves.came[DOWN, k], waves.came[UP, k] = down + given, up + given
-        if s.live == 1:
-            taken = chain.steel[k, IMPEDANCE] * par.dt * (lost + also)
-            s.e_loss += chain.steel[k, LOSS] * taken
-            s.e_numerical += (1.0 - chain.steel[k, LOSS]) * taken
-
-
-@inlined
 def kick_of(par, waves, bar):
     """Mean velocity that body forces give in a step [m/s]."""
     return 0.5 * par.dt * waves.came[ACCELERATION, bar]
@@ -113,12 +101,12 @@ def kick_of(par, waves, bar):
 @inlined
 def within(par, chain, waves):
     """Let waves pass from section to section of the bars (docs/model.md, eq. 8)."""
-    came = waves.came
+    came, places, steel, half = waves.came, chain.places, chain.steel, 0.5 * par.dt
     for k in range(1, par.sections):
-        bar = chain.places[k, BAR]
-        if chain.places[k - 1, BAR] == bar:
-            v = chain.steel[k, ALPHA] * came[DOWN, k - 1] + chain.steel[k, BETA] * came[UP, k]
-            v += kick_of(par, waves, bar)
+        bar = places[k, BAR]
+        if places[k - 1, BAR] == bar:
+            v = steel[k, ALPHA] * came[DOWN, k - 1] + steel[k, BETA] * came[UP, k]
+            v += half * came[ACCELERATION, bar]
             came[UP_OUT, k - 1] = v - came[DOWN, k - 1]
             came[DOWN_OUT, k] = v - came[UP, k]
 
@@ -141,43 +129,54 @@ def meet_top(par, s, chain, waves, tau, time):
 
 
 @inlined
-def meet_joint(par, s, fits, waves, j, a, tau):
-    """Let the ends at a joint meet for `tau`."""
-    y, joints = fits[j, YIELD], waves.joints
-    if fits[j, KIND] == PERFECT:
-        force = a / y
-        return Met(1, 0.0, force * tau, force * force * tau, 0.0, 0.0)
+def give_way(s, fits, joints, j, a, tau):
+    """A joint that parts, closes or yields within `tau`; its impulse [N s]."""
+    y, stored = fits[j, YIELD], stored_in_joint(fits, joints, j)
     if fits[j, KIND] == LOSSY:
-        return yielding(joints[GAP, j], a, y, fits[j, STIFFNESS], fits[j, DAMPING], tau)
-    closed = 1 if joints[CLOSED, j] == 1.0 else 0
-    return shoulders(closed, joints[GAP, j], a, y, fits[j, PRELOAD], fits[j, STIFFNESS], tau)
+        met = yielding(joints[GAP, j], a, y, fits[j, STIFFNESS], fits[j, DAMPING], tau)
+    else:
+        closed = 1 if joints[CLOSED, j] == 1.0 else 0
+        met = shoulders(closed, joints[GAP, j], a, y, fits[j, PRELOAD], fits[j, STIFFNESS], tau)
+    joints[CLOSED, j], joints[GAP, j] = met.closed, met.gap
+    s.e_stored += stored_in_joint(fits, joints, j) - stored
+    s.e_joints += met.taken
+    s.e_numerical += y * (met.square - met.impulse * met.impulse / tau)
+    return met.impulse
+
+
+@inlined
+def holds(fits, joints, j, a):
+    """Whether a joint stays closed and rigid for the whole step."""
+    kind = fits[j, KIND]
+    if kind == PERFECT:
+        return True
+    return kind != LOSSY and joints[CLOSED, j] == 1.0 and a + fits[j, YIELD] * fits[j, PRELOAD] > 0
 
 
 @inlined
 def meet_joints(par, s, chain, waves, tau):
     """All joints below rods."""
     came, fits, joints = waves.came, chain.fits, waves.joints
+    places, steel, half = chain.places, chain.steel, 0.5 * par.dt
     for j in range(par.joints):
         k = int(fits[j, SECTION])
-        above, below = chain.places[k - 1, BAR], chain.places[k, BAR]
-        z_a, z_b = chain.steel[k - 1, IMPEDANCE], chain.steel[k, IMPEDANCE]
-        v_a = 2.0 * came[DOWN, k - 1] + kick_of(par, waves, above)
-        v_b = 2.0 * came[UP, k] + kick_of(par, waves, below)
-        stored = stored_in_joint(fits, joints, j)
-        met = meet_joint(par, s, fits, waves, j, v_a - v_b, tau)
-        force = met.impulse / tau
-        joints[CLOSED, j], joints[GAP, j] = met.closed, met.gap
+        above, below = places[k - 1, BAR], places[k, BAR]
+        down, up = came[DOWN, k - 1], came[UP, k]
+        v_a = 2.0 * down + half * came[ACCELERATION, above]
+        v_b = 2.0 * up + half * came[ACCELERATION, below]
+        if holds(fits, joints, j, v_a - v_b):
+            force = (v_a - v_b) * fits[j, STIFF]
+        else:
+            force = give_way(s, fits, joints, j, v_a - v_b, tau) / tau
+        returned, passed = v_a - force * fits[j, ABOVE] - down, v_b + force * fits[j, BELOW] - up
+        came[UP_OUT, k - 1], came[DOWN_OUT, k] = returned, passed
+        came[FROM_BELOW, above] = came[FROM_ABOVE, below] = force * tau
         joints[FORCE, j] = force
-        came[UP_OUT, k - 1] = v_a - force / z_a - came[DOWN, k - 1]
-        came[DOWN_OUT, k] = v_b + force / z_b - came[UP, k]
-        came[FROM_BELOW, above], came[FROM_ABOVE, below] = met.impulse, met.impulse
-        s.e_stored += stored_in_joint(fits, joints, j) - stored
-        s.e_joints += met.taken
-        s.e_numerical += fits[j, YIELD] * (met.square - met.impulse * force)
         joints[LEAST, j] = min(joints[LEAST, j], force)
-        joints[CAME, j] += z_a * came[DOWN, k - 1] * came[DOWN, k - 1] * tau
-        joints[PASSED, j] += z_b * came[DOWN_OUT, k] * came[DOWN_OUT, k] * tau
-        joints[RETURNED, j] += z_a * came[UP_OUT, k - 1] * came[UP_OUT, k - 1] * tau
+        z_a, z_b = steel[k - 1, IMPEDANCE] * tau, steel[k, IMPEDANCE] * tau
+        joints[CAME, j] += z_a * down * down
+        joints[PASSED, j] += z_b * passed * passed
+        joints[RETURNED, j] += z_a * returned * returned
 
 
 @kernel
@@ -372,10 +371,11 @@ def step(par, s, chain, waves, tau, blows, events):
         return
     for i in range(par.bars):
         waves.bars[GIVEN, i] += kick_of(par, waves, i)
+    places, rings, came, bars, now = chain.places, waves.rings, waves.came, waves.bars, s.step
     for k in range(par.sections):
-        given = waves.bars[GIVEN, chain.places[k, BAR]]
-        send(chain.places, waves.rings, s.step, k, 0, waves.came[DOWN_OUT, k] - given)
-        send(chain.places, waves.rings, s.step, k, 1, waves.came[UP_OUT, k] - given)
+        given = bars[GIVEN, places[k, BAR]]
+        send(places, rings, now, k, 0, came[DOWN_OUT, k] - given)
+        send(places, rings, now, k, 1, came[UP_OUT, k] - given)
     waves.bars[GIVEN, 0] += 0.5 * due
     s.step += 1
     s.count_steps += 1

@@ -1,10 +1,12 @@
 """Weights by which a wave arrives at the far end of a section.
 
-A wave takes the time T = (n + f) dt from end to end, of which f dt is a part of a step, and
-structural loss spreads it as a normal distribution of the variance eta T does (docs/model.md,
-eq. 2, for waves far longer than eta c). So it arrives as a sum of what was sent at some steps
-before, by weights of the mean T/dt and the variance eta T/dt^2. None is negative and their sum is
-one: no wave ever grows, and a lasting force passes as it is.
+A wave takes the time T = (n + f) dt from end to end, and structural loss spreads it as a normal
+distribution of the variance eta T does (docs/model.md, eq. 2, for waves far longer than eta c).
+So it arrives as a sum of what was sent at some steps before, by weights whose sum is one: a
+lasting force passes as it is. The part f dt of a step is Lagrange's cubic between four steps, in
+its middle interval, where it lets no frequency grow (T. Laakso et al., IEEE Signal Processing
+Magazine 13 (1996) 30); the spread is by weights (a, 1 - 2 a, a), some times, which let none grow
+either. So no weights make energy.
 """
 
 from __future__ import annotations
@@ -42,19 +44,33 @@ def weights_of(transit: float, variance: float) -> tuple[int, np.ndarray, float]
     """
     whole = max(1, math.floor(transit + WHOLE))
     part = min(max(transit - whole, 0.0), 1.0)
-    part = part if part > WHOLE else 0.0
-    weights = np.array([1.0 - part, part]) if part else np.ones(1)
-    rest = variance - part * (1.0 - part)
-    if rest <= 0.0:
-        return whole, weights, part * (1.0 - part)
-    rounds = math.ceil(0.5 * rest / MOST_SPREAD)
-    rounds = min(rounds, whole - 1)
+    rounds = math.ceil(0.5 * variance / MOST_SPREAD)
+    if part <= WHOLE:
+        delay, weights, spread = whole, np.ones(1), 0.0
+    elif whole - 1 - min(rounds, 1) >= 1:
+        delay, weights, spread = whole - 1, _cubic(part), 0.0
+    else:  # too short for four steps
+        delay, weights, spread = whole, np.array([1.0 - part, part]), part * (1.0 - part)
+    rounds = min(math.ceil(0.5 * max(variance - spread, 0.0) / MOST_SPREAD), delay - 1)
     if rounds == 0:
-        return whole, weights, part * (1.0 - part)
-    a = min(0.5 * rest / rounds, UTMOST_SPREAD)
+        return delay, weights, spread
+    a = min(0.5 * (variance - spread) / rounds, UTMOST_SPREAD)
     for _ in range(rounds):
         weights = np.convolve(weights, [a, 1.0 - 2.0 * a, a])
-    delay = whole - rounds
-    kept = np.flatnonzero(weights > NOTHING)
+    kept = np.flatnonzero(np.abs(weights) > NOTHING)
     weights = weights[kept[0] : kept[-1] + 1]
-    return delay + int(kept[0]), weights / weights.sum(), part * (1.0 - part) + 2.0 * a * rounds
+    first = delay - rounds + int(kept[0])
+    return first, weights / weights.sum(), spread + 2.0 * a * rounds
+
+
+def _cubic(part: float) -> np.ndarray:
+    """Lagrange's weights of the steps -1, 0, 1 and 2 at a part of the step from 0 to 1."""
+    f = part
+    return np.array(
+        [
+            -f * (f - 1.0) * (f - 2.0) / 6.0,
+            (f + 1.0) * (f - 1.0) * (f - 2.0) / 2.0,
+            -(f + 1.0) * f * (f - 2.0) / 2.0,
+            (f + 1.0) * f * (f - 1.0) / 6.0,
+        ]
+    )
