@@ -102,7 +102,9 @@ def network_of(numbers: Numbers) -> Network:
             ring += 4 * size
             loss = 1.0 if spread <= 0.0 else min(1.0, eta * transit / dt / spread)
             z, mass = section_impedance(section), section_mass(section)
-            steel[k] = z, 0.0, 0.0, loss, mass / places[k, Place.CELLS]
+            steel[k] = (
+                z, 0.0, 0.0, mass / places[k, Place.CELLS], z * dt * loss, z * dt * (1.0 - loss)
+            )  # fmt: skip
             if k > bodies[number, Body.FIRST]:
                 above = steel[k - 1, Steel.IMPEDANCE]
                 steel[k, Steel.ALPHA : Steel.BETA + 1] = (

@@ -34,8 +34,9 @@ class Steel(IntEnum):
     IMPEDANCE = 0  # [N s/m]
     ALPHA = 1  # weights of the waves in the velocity of its upper end (docs/model.md, eq. 8)
     BETA = 2
-    LOSS = 3  # share of what arriving takes that is structural loss
-    CELL_MASS = 4  # [kg]
+    CELL_MASS = 3  # [kg]
+    BY_LOSS = 4  # Z dt of what structural loss takes of a wave that arrives [N s2/m]
+    BY_MIXING = 5  # of what fitting its length to steps takes
 
 
 class Joint(IntEnum):

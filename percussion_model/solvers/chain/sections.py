@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from percussion_model.physics.kernel import inlined, kernel
 from percussion_model.solvers.chain.records import Bar, Body, Place, Steel
-from percussion_model.solvers.modal.lanes import WIDTH, load, spread, total
+from percussion_model.solvers.modal.lanes import WIDTH, load, spread, total, totals
 
 BAR, RING, SIZE, DELAY, TAPS, WEIGHTS, CELLS = (int(row) for row in Place)
-IMPEDANCE, ALPHA, BETA, LOSS, CELL_MASS = (int(row) for row in Steel)
+IMPEDANCE, ALPHA, BETA, CELL_MASS, BY_LOSS, BY_MIXING = (int(row) for row in Steel)
 MASS, FIRST, LAST = (int(row) for row in Body)
 GIVEN = int(Bar.GIVEN)
 # Rows of `Waves.came`: what arrives at the lower and the upper end of a section, what leaves
@@ -20,52 +20,67 @@ MOST_GIVEN = 0.1
 
 
 @inlined
-def arrivals(par, s, chain, waves):
-    """See what arrives at all ends of sections in the step that begins, into rows of `came`.
-
-    Arriving takes energy: the weighted squares of what was sent, less those of what arrives.
-    """
-    places, steel, weights, step = chain.places, chain.steel, chain.weights, s.step
-    rings, came, bars = waves.rings, waves.came, waves.bars
-    lost = mixed = spread(0.0)
-    loss = other = 0.0
-    for k in range(par.sections):
-        size, taps, weight = places[k, SIZE], places[k, TAPS], places[k, WEIGHTS]
-        first = places[k, RING] + ((step - places[k, DELAY] - taps + 1) & (size - 1))
-        second = first + 2 * size
-        given = bars[GIVEN, places[k, BAR]]
-        if taps == 1:
-            came[DOWN, k], came[UP, k] = rings[0, first] + given, rings[0, second] + given
-            continue
-        share = load(weights, 0, weight)
-        x, y = load(rings, 0, first), load(rings, 0, second)
-        one, two = share * x, share * y
-        squares = one * x + two * y
-        for j in range(WIDTH, taps, WIDTH):
-            share = load(weights, 0, weight + j)
-            x, y = load(rings, 0, first + j), load(rings, 0, second + j)
-            p, q = share * x, share * y
-            one, two = one + p, two + q
-            squares = squares + (p * x + q * y)
-        down, up = total(one), total(two)
-        came[DOWN, k], came[UP, k] = down + given, up + given
-        by, own = par.dt * steel[k, IMPEDANCE], steel[k, LOSS]
-        lost, mixed = lost + squares * (by * own), mixed + squares * (by * (1.0 - own))
-        both = by * (down * down + up * up)
-        loss += own * both
-        other += (1.0 - own) * both
-    if s.live == 1:
-        s.e_loss += total(lost) - loss
-        s.e_numerical += total(mixed) - other
-
-
-@inlined
 def send(places, rings, step, k, way, wave):
-    """Send a wave into a section at the end of a step."""
+    """Send a wave, less what body forces gave its bar, into a section at the end of a step."""
     size = places[k, SIZE]
     place = places[k, RING] + 2 * size * way + ((step + 1) & (size - 1))
     rings[0, place] = wave
     rings[0, place + size] = wave  # so that what is read never wraps
+
+
+@inlined
+def pass_on(par, s, chain, waves):
+    """Let waves arrive at the ends of sections, and pass from one to the next within bars.
+
+    v = (2 Z1 d + 2 Z2 u) / (Z1 + Z2) (docs/model.md, eq. 8), in which what body forces give
+    cancels. Waves that come to the ends of bars are left in rows of `came`. Arriving takes energy:
+    the weighted squares of what was sent, less those of what arrives.
+    """
+    places, steel, weights, step = chain.places, chain.steel, chain.weights, s.step
+    rings, came, bars = waves.rings, waves.came, waves.bars
+    lost = mixed = spread(0.0)
+    loss = other = before = 0.0
+    live = s.live == 1
+    for k in range(par.sections):
+        size, taps, weight = places[k, SIZE], places[k, TAPS], places[k, WEIGHTS]
+        first = places[k, RING] + ((step - places[k, DELAY] - taps + 1) & (size - 1))
+        second = first + 2 * size
+        if taps == 1:
+            down, up = rings[0, first], rings[0, second]
+        else:
+            share = load(weights, 0, weight)
+            x, y = load(rings, 0, first), load(rings, 0, second)
+            one, two = share * x, share * y
+            squares = one * x + two * y
+            for j in range(WIDTH, taps, WIDTH):
+                share = load(weights, 0, weight + j)
+                x, y = load(rings, 0, first + j), load(rings, 0, second + j)
+                p, q = share * x, share * y
+                one, two = one + p, two + q
+                squares = squares + (p * x + q * y)
+            down, up = totals(one, two)
+            by, both = steel[k, BY_LOSS], down * down + up * up
+            lost = lost + squares * by
+            loss += by * both
+            by = steel[k, BY_MIXING]
+            if by > 0.0:
+                mixed = mixed + squares * by
+                other += by * both
+        alpha = steel[k, ALPHA]
+        if alpha == 0.0:
+            came[UP, k] = up + bars[GIVEN, places[k, BAR]]
+            if k > 0:
+                came[DOWN, k - 1] = before + bars[GIVEN, places[k - 1, BAR]]
+        elif live:
+            v = alpha * before + steel[k, BETA] * up
+            send(places, rings, step, k - 1, 1, v - before)
+            send(places, rings, step, k, 0, v - up)
+        before = down
+    last = par.sections - 1
+    came[DOWN, last] = before + bars[GIVEN, places[last, BAR]]
+    if live:
+        s.e_loss += total(lost) - loss
+        s.e_numerical += total(mixed) - other
 
 
 @kernel

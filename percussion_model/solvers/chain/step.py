@@ -18,9 +18,7 @@ from percussion_model.solvers.chain.joint import shoulders, yielding
 from percussion_model.solvers.chain.records import Bar, Fit, Has, Joint
 from percussion_model.solvers.chain.sections import (
     ACCELERATION,
-    ALPHA,
     BAR,
-    BETA,
     DOWN,
     DOWN_OUT,
     FIRST,
@@ -28,12 +26,13 @@ from percussion_model.solvers.chain.sections import (
     FROM_BELOW,
     GIVEN,
     IMPEDANCE,
+    LAST,
     MASS,
     MOST_GIVEN,
     UP,
     UP_OUT,
-    arrivals,
     kinetic_of_bar,
+    pass_on,
     send,
     shortening,
     write_given,
@@ -96,19 +95,6 @@ def accelerations(par, s, chain, waves, push):
 def kick_of(par, waves, bar):
     """Mean velocity that body forces give in a step [m/s]."""
     return 0.5 * par.dt * waves.came[ACCELERATION, bar]
-
-
-@inlined
-def within(par, chain, waves):
-    """Let waves pass from section to section of the bars (docs/model.md, eq. 8)."""
-    came, places, steel, half = waves.came, chain.places, chain.steel, 0.5 * par.dt
-    for k in range(1, par.sections):
-        bar = places[k, BAR]
-        if places[k - 1, BAR] == bar:
-            v = steel[k, ALPHA] * came[DOWN, k - 1] + steel[k, BETA] * came[UP, k]
-            v += half * came[ACCELERATION, bar]
-            came[UP_OUT, k - 1] = v - came[DOWN, k - 1]
-            came[DOWN_OUT, k] = v - came[UP, k]
 
 
 @inlined
@@ -317,8 +303,7 @@ def meet(par, s, chain, waves, tau, blows, events):
     hold_effects(par, s)
     push = drive_force(par, s)
     damper = accelerations(par, s, chain, waves, push)
-    arrivals(par, s, chain, waves)
-    within(par, chain, waves)
+    pass_on(par, s, chain, waves)
     meet_joints(par, s, chain, waves, tau)
     impulse = 0.0
     if par.piston == Piston.ABSENT:
@@ -371,11 +356,12 @@ def step(par, s, chain, waves, tau, blows, events):
         return
     for i in range(par.bars):
         waves.bars[GIVEN, i] += kick_of(par, waves, i)
-    places, rings, came, bars, now = chain.places, waves.rings, waves.came, waves.bars, s.step
-    for k in range(par.sections):
-        given = bars[GIVEN, places[k, BAR]]
-        send(places, rings, now, k, 0, came[DOWN_OUT, k] - given)
-        send(places, rings, now, k, 1, came[UP_OUT, k] - given)
+    places, rings, came, now = chain.places, waves.rings, waves.came, s.step
+    for i in range(par.bars):
+        given = waves.bars[GIVEN, i]
+        first, last = int(chain.bodies[i, FIRST]), int(chain.bodies[i, LAST])
+        send(places, rings, now, first, 0, came[DOWN_OUT, first] - given)
+        send(places, rings, now, last, 1, came[UP_OUT, last] - given)
     waves.bars[GIVEN, 0] += 0.5 * due
     s.step += 1
     s.count_steps += 1

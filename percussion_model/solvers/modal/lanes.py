@@ -115,6 +115,43 @@ def _sum(typing, lanes):
 
 
 @intrinsic
+def _sums(typing, one, other):
+    pair = types.UniTuple(types.float64, 2)
+
+    def generate(context, builder, signature, args):
+        undefined, whole = ir.Constant(_VECTOR, ir.Undefined), ir.IntType(32)
+        kind = ir.VectorType(whole, WIDTH)
+        half = WIDTH // 2
+        low, high = (
+            builder.shuffle_vector(
+                *args,
+                ir.Constant(kind, [*range(k, k + half), *range(WIDTH + k, WIDTH + k + half)]),
+            )
+            for k in (0, half)
+        )
+        part, width = builder.fadd(low, high), half
+        while width > 1:
+            width //= 2
+            joined = [
+                ir.Constant(
+                    ir.VectorType(whole, 2 * width),
+                    [
+                        *range(k, k + width),
+                        *range(2 * width + k, 3 * width + k),
+                    ],
+                )
+                for k in (0, width)
+            ]
+            undefined = ir.Constant(part.type, ir.Undefined)
+            low, high = (builder.shuffle_vector(part, undefined, one) for one in joined)
+            part = builder.fadd(low, high)
+        found = [builder.extract_element(part, ir.Constant(whole, place)) for place in range(2)]
+        return context.make_tuple(builder, pair, found)
+
+    return pair(_lanes, _lanes), generate
+
+
+@intrinsic
 def _lower_of(typing, one, other):
     def generate(context, builder, signature, args):
         return _pick_lower(builder, *args)
@@ -180,6 +217,10 @@ def _sum_numbers(lanes):
     return float(total[0])
 
 
+def _sums_of_numbers(one, other):
+    return _sum_numbers(one), _sum_numbers(other)
+
+
 def _lowest_number(lanes):
     return float(lanes.min())
 
@@ -190,5 +231,6 @@ load = _load_numbers if _PLAIN else _load
 store = _store_numbers if _PLAIN else _store
 spread = _spread_number if _PLAIN else _spread
 total = _sum_numbers if _PLAIN else _sum
+totals = _sums_of_numbers if _PLAIN else _sums
 lower_of = np.minimum if _PLAIN else _lower_of
 lowest = _lowest_number if _PLAIN else _lowest
