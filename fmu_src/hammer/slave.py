@@ -159,7 +159,7 @@ class PercussiveHammer(Slave):
     def _find_gauge(self, scene: Scene, solver: Solver) -> Gauge | None:
         """Cell at the place of the gauge, None in a bar without cells."""
         name = self.choice("gauge.bar")
-        bar, place = scene[name], self.values["gauge.position"]
+        bar, place = scene.bars.get(name, scene.piston), self.values["gauge.position"]
         if place == self.by_name["gauge.position"].left_out:
             place = 0.5 * bar.length
         if place > bar.length:

@@ -29,6 +29,8 @@ INTERFACE = Path(__file__).with_name(f"interface-{VERSION}.json")
 # Sections of a bar: this, plus SECTION for each, plus the place of the field in it.
 FIRST_SECTION = {"piston": 10_000, "bit": 20_000}
 SECTION = 10
+# The same of a rod, this times its number more; and its joint, this more.
+FIRST_ROD, JOINT = 100_000, 90_000
 
 # Gauge pressure at which the drive gives the force of the scene [Pa].
 SUPPLY_PRESSURE = 20e5
@@ -160,9 +162,11 @@ def _parameters(scene: Scene) -> Iterator[Variable]:
     replaced = {one.key for one in INPUTS.values()}
     for row in parameter_table():
         group = row.key.partition(".")[0]
-        if row.kind == "sections":
-            yield from _sections(scene, group)
-        if row.kind == "sections" or "*" in row.key or group in ("blow_map", "run"):
+        if row.kind == "sections" and "*" not in row.key:
+            yield from _sections(scene, group, FIRST_SECTION[group])
+        if row.kind == "rods" and scene.effects.string:
+            yield from _rods(scene, row.key)
+        if row.kind in ("sections", "rods") or "*" in row.key or group in ("blow_map", "run"):
             continue
         if row.key not in replaced:
             yield _parameter(row.key, row, scene[row.key])
@@ -174,7 +178,8 @@ def _parameters(scene: Scene) -> Iterator[Variable]:
         area,
         "parameter",
     )
-    bars = tuple((name, k + 1, f"the {name}") for k, name in enumerate(FIRST_SECTION))
+    carriers = gauge_bars(scene)
+    bars = tuple((name, k + 1, f"the {name}") for k, name in enumerate(carriers))
     yield Variable(
         name="gauge.bar",
         reference=reference("gauge.bar", "parameter"),
@@ -183,7 +188,7 @@ def _parameters(scene: Scene) -> Iterator[Variable]:
         description="bar that carries the gauge",
         variability="fixed",
         start=2,
-        row=_choice_row("gauge.bar", tuple(FIRST_SECTION)),
+        row=_choice_row("gauge.bar", carriers),
         enumeration="Bar",
         items=bars,
         lower=1,
@@ -198,20 +203,37 @@ def _parameters(scene: Scene) -> Iterator[Variable]:
     )
 
 
-def _sections(scene: Scene, bar: str) -> Iterator[Variable]:
+def gauge_bars(scene: Scene) -> tuple[str, ...]:
+    """Bars that may carry the gauge; rods come last, for a scene with two bars has none."""
+    return (*FIRST_SECTION, *(name for name in scene.bars if name not in FIRST_SECTION))
+
+
+def _sections(scene: Scene, bar: str, first: int) -> Iterator[Variable]:
     fields = ("length", "area", "youngs_modulus", "density")
     for i in range(len(scene[f"{bar}.sections"])):
         for k, field in enumerate(fields):
             key = f"{bar}.sections.{i}.{field}"
-            name = f"{bar}.sections[{i + 1}].{field}"
-            yield _number(
-                name,
-                FIRST_SECTION[bar] + SECTION * i + k,
-                _row(key),
-                scene[key],
-                "parameter",
-                key=key,
-            )
+            number = first + SECTION * i + k
+            yield _number(_outside(key), number, _row(key), scene[key], "parameter", key=key)
+
+
+def _rods(scene: Scene, rods: str) -> Iterator[Variable]:
+    """Sections of each rod, and the numbers of its joint."""
+    for i, rod in enumerate(scene[rods]):
+        first = FIRST_ROD * (i + 1)
+        yield from _sections(scene, f"{rods}.{i}", first)
+        for name in rod.telling:
+            key = f"{rods}.{i}.{name}"
+            row = _row(key)
+            if row.kind == "number":
+                number = first + JOINT + list(rod.rows).index(name)
+                yield _number(_outside(key), number, row, scene[key], "parameter", key=key)
+
+
+def _outside(key: str) -> str:
+    """Name of a variable in a list: FMI counts from 1."""
+    parts = (f"[{int(one) + 1}]" if one.isdecimal() else f".{one}" for one in key.split("."))
+    return "".join(parts).removeprefix(".")
 
 
 def _parameter(key: str, row: Row, value: Any) -> Variable:

@@ -11,6 +11,7 @@ from typing import Any, Self
 from percussion_model.physics.effects import EFFECTS
 from percussion_model.scene.parameters import (
     GROUPS,
+    Bar,
     BitBar,
     BlowMapOptions,
     Contact,
@@ -302,6 +303,13 @@ class Scene:
         if self.bit.model == "rigid":
             return "rigid"
         return "wave" if self._against_modes else "modal"
+
+    @cached_property
+    def bars(self) -> dict[str, Bar]:
+        """Bars from the drive to the rock by name: "piston", "rod 1", ..., "bit"."""
+        piston = {} if self.piston.model == "absent" else {"piston": self.piston}
+        rods = self.string.rods if self.effects.string else ()
+        return {**piston, **{f"rod {k}": rod for k, rod in enumerate(rods, 1)}, "bit": self.bit}
 
     @property
     def why_solver(self) -> str:

@@ -42,7 +42,7 @@ def test_striker_on_a_bar_of_other_impedance(elwaspatid, ratio):
     """
     cells, long = 20, 200
     area, lengths = 2.5e-3, (0.2, 2.0)
-    transits = 2 * cells if ratio < 1 else 160
+    transits = 2 * cells if ratio <= 1 else 160
     peer, dt, counts = peer_forces(elwaspatid, (ratio * area, area), lengths, cells, transits + 5)
     assert counts == [cells, long]
     bars = [
@@ -61,11 +61,6 @@ def test_striker_on_a_bar_of_other_impedance(elwaspatid, ratio):
     for steps in (1, 7, cells, 2 * cells - 1, transits):
         simulation.advance(steps * simulation.solver.time_step)
         force = simulation.fields()["rod 1_force"]
-        other = peer_of(peer, steps)
-        np.testing.assert_allclose(force[: len(other)], other, atol=1e-10 * z * SPEED)
-        assert np.count_nonzero(other) == steps
-
-
-def peer_of(peer, steps):
-    """What the cells carry after so many steps; its nodes stand between the cells."""
-    return peer[steps]
+        # its nodes stand at the upper ends of the cells
+        np.testing.assert_allclose(force, peer[steps, :long], atol=1e-10 * z * SPEED)
+        assert force[steps - 1] > 0.1 * z * SPEED > force[steps]

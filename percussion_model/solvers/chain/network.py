@@ -22,8 +22,8 @@ from percussion_model.solvers.chain.taps import weights_of
 from percussion_model.solvers.modal.lanes import WIDTH
 from percussion_model.solvers.setup import MOST_CELLS, PISTONS, kelvin_voigt_time, refuse_many
 
-# Cells in the bar of the shortest transit, where a scene asks for none.
-DEFAULT_CELLS = 20
+# Steps in which a wave crosses the piston, and any bar at least, where a scene asks for none.
+DEFAULT_CELLS, FEWEST_CELLS = 20, 4
 
 
 class Network(NamedTuple):
@@ -56,7 +56,7 @@ def elastic_chain(numbers: Numbers) -> tuple[list[np.ndarray], list[str]]:
     """Sections of each elastic bar from top to bottom, and their names."""
     bars, names = [*numbers.rods, numbers.bit], [f"rod {k + 1}" for k in range(len(numbers.rods))]
     names.append("bit")
-    if PISTONS[numbers.values.piston_model] == Piston.ELASTIC:
+    if first_is_piston(numbers):
         return [numbers.piston, *bars], ["piston", *names]
     return bars, names
 
@@ -68,10 +68,16 @@ def time_step_of(numbers: Numbers) -> float:
     first = bar_transit_time(bars[0])
     if not math.isnan(values.solver_cells):
         return first / float(values.solver_cells)
-    whole = min(map(bar_transit_time, bars)) / DEFAULT_CELLS
-    shortest = min(section_transit_time(section) for bar in bars for section in bar)
-    # what is shorter than a step would be longer than it is
-    return first / math.ceil(first / min(whole, shortest) - 1e-9)
+    own = DEFAULT_CELLS if first_is_piston(numbers) else FEWEST_CELLS
+    longest = [first / own, *(bar_transit_time(bar) / FEWEST_CELLS for bar in bars[1:])]
+    # a section shorter than a step would be longer than it is
+    longest += [section_transit_time(section) for bar in bars for section in bar]
+    return first / math.ceil(first / min(longest) - 1e-9)
+
+
+def first_is_piston(numbers: Numbers) -> bool:
+    """Whether the topmost elastic bar is the piston."""
+    return bool(PISTONS[numbers.values.piston_model] == Piston.ELASTIC)
 
 
 def network_of(numbers: Numbers) -> Network:

@@ -20,12 +20,13 @@ MOST_GIVEN = 0.1
 
 
 @inlined
-def send(places, rings, step, k, way, wave):
-    """Send a wave, less what body forces gave its bar, into a section at the end of a step."""
+def send(places, rings, step, k, down, up):
+    """Send both waves, less what body forces gave the bar, into a section at a step's end."""
     size = places[k, SIZE]
-    place = places[k, RING] + 2 * size * way + ((step + 1) & (size - 1))
-    rings[0, place] = wave
-    rings[0, place + size] = wave  # so that what is read never wraps
+    place = places[k, RING] + ((step + 1) & (size - 1))
+    # twice, so that what is read never wraps
+    rings[0, place] = rings[0, place + size] = down
+    rings[0, place + 2 * size] = rings[0, place + 3 * size] = up
 
 
 @inlined
@@ -71,10 +72,9 @@ def pass_on(par, s, chain, waves):
             came[UP, k] = up + bars[GIVEN, places[k, BAR]]
             if k > 0:
                 came[DOWN, k - 1] = before + bars[GIVEN, places[k - 1, BAR]]
-        elif live:
+        else:
             v = alpha * before + steel[k, BETA] * up
-            send(places, rings, step, k - 1, 1, v - before)
-            send(places, rings, step, k, 0, v - up)
+            came[UP_OUT, k - 1], came[DOWN_OUT, k] = v - before, v - up
         before = down
     last = par.sections - 1
     came[DOWN, last] = before + bars[GIVEN, places[last, BAR]]

@@ -204,16 +204,30 @@ class ChainSolver(Solver):
             out[f"{name}_velocity"] = d + u + 2.0 * bars[Bar.GIVEN, i]
         return out
 
+    def force_in(self, state: State, bar: str, cell: int) -> float:
+        """Force in one cell of a bar [N], as `fields` reads it."""
+        if bar not in self._cells:
+            return 0.0
+        cells = self._cells[bar]
+        k, step = self._sections[bar].start, int(state.words[STEP])
+        for count in cells.in_sections:
+            if cell < count:
+                break
+            cell, k = cell - count, k + 1
+        ring, size = self._chain.places[k, [Place.RING, Place.SIZE]].tolist()
+        rings, last = state.arrays[-1][0], cells.in_sections[k - self._sections[bar].start] - 1
+        down = rings[ring + ((step - cell) & (size - 1))]
+        up = rings[ring + 2 * size + ((step - (last - cell)) & (size - 1))]
+        return float(self._chain.steel[k, Steel.IMPEDANCE] * (down - up))
+
     def grid_of(self, bar: str) -> Cells | None:
         """Cells of a bar, None where it has none."""
         return self._cells.get(bar)
 
     def section_cells(self, bar: SceneBar) -> list[int]:
         """Cells in each section of an elastic bar."""
-        scene = self.scene
-        names = {id(scene.piston): "piston", id(scene.bit): "bit"}
-        names |= {id(rod): f"rod {k + 1}" for k, rod in enumerate(scene.string.rods)}
-        return list(self._cells[names[id(bar)]].in_sections)
+        name = next(name for name, one in self.scene.bars.items() if one is bar)
+        return list(self._cells[name].in_sections)
 
     def coarser_scenes(self) -> list[Scene] | None:
         """The scene with steps twice and half as long again."""

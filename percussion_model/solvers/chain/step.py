@@ -359,9 +359,10 @@ def step(par, s, chain, waves, tau, blows, events):
     places, rings, came, now = chain.places, waves.rings, waves.came, s.step
     for i in range(par.bars):
         given = waves.bars[GIVEN, i]
-        first, last = int(chain.bodies[i, FIRST]), int(chain.bodies[i, LAST])
-        send(places, rings, now, first, 0, came[DOWN_OUT, first] - given)
-        send(places, rings, now, last, 1, came[UP_OUT, last] - given)
+        came[DOWN_OUT, int(chain.bodies[i, FIRST])] -= given
+        came[UP_OUT, int(chain.bodies[i, LAST])] -= given
+    for k in range(par.sections):
+        send(places, rings, now, k, came[DOWN_OUT, k], came[UP_OUT, k])
     waves.bars[GIVEN, 0] += 0.5 * due
     s.step += 1
     s.count_steps += 1
