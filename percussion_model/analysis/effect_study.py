@@ -125,6 +125,7 @@ def effect_variants(scene: Scene) -> Iterator[Variant]:
     yield from _drive(scene)
     yield from _rock(scene)
     yield from _bars(scene)
+    yield from _string(scene)
     if scene.solver_name in ("wave", "modal"):
         is_on = scene.solver.leaps
         # Leaps are no effect but an accelerator: a step without them is the same step.
@@ -173,12 +174,25 @@ def _bars(scene: Scene) -> Iterator[Variant]:
             yield Variant("piston", "rigid", {"piston.model": "rigid"}, off=True)
         elif scene.piston.model == "rigid":
             yield Variant("piston", "elastic", {"piston.model": "elastic"})
-        yield Variant("piston and bit", "rigid", {"solver.name": "rigid"}, off=True)
+        if not scene.effects.string:
+            yield Variant("piston and bit", "rigid", {"solver.name": "rigid"}, off=True)
         return
     changes = {"bit.model": "elastic", "solver.name": "wave"}
     if scene.piston.model == "rigid":
         changes["piston.model"] = "elastic"
     yield Variant("piston and bit", "elastic", changes)
+
+
+def _string(scene: Scene) -> Iterator[Variant]:
+    """Effects of a drill string."""
+    if not scene.effects.string:
+        return
+    named = {"damper": True, "joints": any(rod.joint != "perfect" for rod in scene.string.rods)}
+    for name in ("joints", "damper"):
+        is_on = getattr(scene.effects, name)
+        if named[name]:
+            words = "off" if is_on else "on"
+            yield Variant(name, words, {f"effects.{name}": not is_on}, off=is_on)
 
 
 def _not_zero(scene: Scene, keys: tuple[str, ...]) -> dict[str, Any]:

@@ -118,6 +118,7 @@ def commented_scene(title: str, values: Mapping[str, Any], silent: Iterable[str]
             lines += _commented_sections(row, values[row.key], row.key in hidden)
             continue
         if row.kind == "rods":
+            lines += _commented_rods(row, values[row.key])
             continue
         if row.key.split(".")[0] != group:
             group = row.key.split(".")[0]
@@ -135,11 +136,28 @@ def _commented_value(row: Row, value: Any, hidden: bool) -> list[str]:
     return [comment, f"{mark}{row.key.rpartition('.')[2]} = {shown}".rstrip()]
 
 
-def _commented_sections(row: Row, sections: Iterable[Any], hidden: bool) -> list[str]:
+def _commented_rods(row: Row, rods: Iterable[Any]) -> list[str]:
+    lines = []
+    for rod in rods:
+        lines += ["", f"[[{row.key}]]"]
+        for name in rod.telling:
+            entry = rows_by_key()[f"{row.key}.*.{name}"]
+            if entry.kind == "sections":
+                continue
+            unit = f" [{entry.unit}]" if entry.unit else ""
+            lines.append(f"{name} = {toml_value(getattr(rod, name))}  # {entry.description}{unit}")
+        sections = rows_by_key()[f"{row.key}.*.sections"]
+        lines += _commented_sections(sections, rod.sections, False, f"{row.key}.sections")
+    return lines
+
+
+def _commented_sections(
+    row: Row, sections: Iterable[Any], hidden: bool, table: str = ""
+) -> list[str]:
     mark = "# " if hidden else ""
     lines = []
     for section in sections:
-        lines += ["", f"{mark}[[{row.key}]]"]
+        lines += ["", f"{mark}[[{table or row.key}]]"]
         for name, value in asdict(section).items():
             entry = rows_by_key()[f"{row.key}.*.{name}"]
             note = f"{entry.description} [{entry.unit}]"

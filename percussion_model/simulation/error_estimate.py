@@ -57,6 +57,7 @@ FEWEST_BLOWS = 10
 REMEDIES = {
     "wave": "solver.accuracy (--accuracy) takes as many cells as an error needs",
     "modal": "solver.accuracy (--accuracy) takes as many modes as an error needs",
+    "chain": "more solver.cells (--cells) bring it closer",
     "fem": "more fem.elements and a greater fem.contact_stiffness bring it closer",
 }
 # A run is compared with those that have at least this share of its modes.

@@ -15,68 +15,24 @@ import math
 import numpy as np
 import pytest
 
-from percussion_model import Scene, Simulation
-from percussion_model.physics.records import EventKind
-from percussion_model.solvers.chain.records import Bar, Has
+from percussion_model import Scene
 from percussion_model.solvers.chain.taps import weights_of
-
-E, RHO, AREA = 210e9, 7850.0, 2e-3
-C0 = math.sqrt(E / RHO)
-Z = AREA * math.sqrt(E * RHO)
-CELL = 0.01  # [m]
-DT = CELL / C0
-F0 = 1e5  # of incident waves [N]
-BARE = {"drive": "none", "gravity": False, "feed": False, "loss": False, "rock": "none"}
-ROUNDING = 1e-11
-
-
-def bar(cells, area=AREA, **joint):
-    """A bar of one section, and its joint to the bar below."""
-    return {"sections": [{"length": cells * CELL, "area": area}], **joint}
-
-
-def struck(*bars, effects=(), **groups):
-    """A chain that begins with a piston, of cells of 10 mm."""
-    first = next(one for one in bars if one.get("model") != "rigid")
-    cells = round(sum(one["length"] for one in first["sections"]) / CELL)
-    start = {"gap": 0.0, "rock_gap": 0.0, **groups.pop("start", {})}
-    solver = {"cells": cells, **groups.pop("solver", {})}
-    effects = BARE | dict(effects)
-    return Simulation(
-        Scene(
-            bars=list(bars), effects=effects, start=start, solver=solver, run={"settle": 0.0},
-            **groups,
-        )
-    )  # fmt: skip
-
-
-def driven(*bars, steps, force=F0, bottom="open", **groups):
-    """A chain without a piston, into which a wave of so many steps comes."""
-    end = {"top": "open", "pulse_force": force, "pulse_duration": steps * DT, "bottom": bottom}
-    return struck(*bars, piston={"model": "absent"}, string=end, **groups)
-
-
-def after(simulation, steps):
-    """The fields after so many steps from the start."""
-    simulation.advance(steps * simulation.solver.time_step)
-    return simulation.fields()
-
-
-def sent_down(simulation, name, steps):
-    """Mean force that was sent into a bar in each step so far, where none comes up in it."""
-    force = after(simulation, steps)[f"{name}_force"]
-    assert len(force) >= steps
-    return force[:steps][::-1]
-
-
-def of_joint(simulation, row, joint=0):
-    return float(simulation._state.arrays[1][row, joint])
-
-
-def mean_of_exponential(rate, steps, dt=DT):
-    """Mean of exp(-rate t) over each of so many steps."""
-    return np.exp(-rate * dt * np.arange(steps)) * -math.expm1(-rate * dt) / (rate * dt)
-
+from tests.core.chain_scenes import (
+    AREA,
+    C0,
+    CELL,
+    DT,
+    F0,
+    ROUNDING,
+    Z,
+    after,
+    bar,
+    driven,
+    mean_of_exponential,
+    rigid,
+    sent_down,
+    struck,
+)
 
 # ----------------------------------------------------------------------- 1: elastic pistons
 
@@ -100,9 +56,7 @@ def test_striker_of_other_impedance_sends_steps(ratio):
     A striker of lower impedance bounces off after the first transit.
     """
     v, transit, steps = 8.0, 15, 140
-    simulation = struck(
-        bar(transit, ratio * AREA), bar(150), bar(20), start={"piston_velocity": v}
-    )
+    simulation = struck(bar(transit, ratio * AREA), bar(150), bar(20), start={"piston_velocity": v})
     z_p = ratio * Z
     first, factor = z_p * Z / (z_p + Z) * v, max((z_p - Z) / (z_p + Z), 0.0)
     wanted = first * factor ** (np.arange(steps) // (2 * transit))
@@ -111,10 +65,6 @@ def test_striker_of_other_impedance_sends_steps(ratio):
 
 
 # ------------------------------------------------------------------------- 2: rigid pistons
-
-
-def rigid(mass):
-    return {"model": "rigid", "sections": [{"length": mass / (RHO * 0.01), "area": 0.01}]}
 
 
 def test_rigid_piston_sends_an_exponential():
@@ -232,149 +182,7 @@ def test_growing_wave_is_taken_almost_whole(steps):
     assert abs(efficiency - (1 - math.exp(-2 * s))) < 0.2 * (s / steps) ** 2
 
 
-# ---------------------------------------------------------------------------------- 5: joints
-
-
-def at_joint(first, ratio=1.0, force=F0, steps=1000, run=140):
-    """Force that passes the joint below a rod and that comes back, in each step since arrival.
-
-    The rod has 60 cells and the bit more, of another cross-section.
-    """
-    simulation = driven(first, bar(200, ratio * AREA), steps=steps, force=force)
-    passed = sent_down(simulation, "bit", 60 + run)[60:]
-    # up-going waves of the last steps, beside the incident wave
-    count = min(run, 60)
-    back = simulation.fields()["rod 1_force"][-count:] - force
-    return simulation, passed, back
-
-
-def test_equal_bars_pass_everything():
-    """A perfect joint of equal bars is not there."""
-    _, passed, back = at_joint(bar(60))
-    np.testing.assert_allclose(passed, F0, rtol=ROUNDING)
-    np.testing.assert_allclose(back, 0.0, atol=ROUNDING * F0)
-
-
-@pytest.mark.parametrize("kind", ["perfect", "contact", "threaded"])
-@pytest.mark.parametrize("ratio", [0.3, 2.5])
-def test_other_impedance_sends_back_a_part(kind, ratio):
-    """Force passes by 2 Z2/(Z1 + Z2) and comes back by (Z2 - Z1)/(Z1 + Z2)."""
-    simulation, passed, back = at_joint(bar(60, joint=kind), ratio)
-    np.testing.assert_allclose(passed, 2 * ratio / (1 + ratio) * F0, rtol=ROUNDING)
-    np.testing.assert_allclose(back, (ratio - 1) / (1 + ratio) * F0, rtol=ROUNDING)
-    assert abs(simulation.energy()["residual"]) < 1e-10
-
-
-@pytest.mark.parametrize("ratio", [0.3, 2.5])
-def test_sections_of_a_bar_are_as_a_perfect_joint(ratio):
-    """The same where the cross-section changes within a bar."""
-    sections = [{"length": 60 * CELL, "area": AREA}, {"length": 60 * CELL, "area": ratio * AREA}]
-    simulation = driven({"sections": sections}, bar(80, ratio * AREA), steps=1000)
-    force = after(simulation, 100)["rod 1_force"]
-    np.testing.assert_allclose(force[60:100], 2 * ratio / (1 + ratio) * F0, rtol=ROUNDING)
-    np.testing.assert_allclose(force[20:60] - F0, (ratio - 1) / (1 + ratio) * F0, rtol=ROUNDING)
-
-
-@pytest.mark.parametrize("share", [0.2, 0.85])
-@pytest.mark.parametrize("ratio", [1.0, 2.5])
-def test_lossy_joint_passes_a_share_and_relaxes(share, ratio):
-    """A front passes by its share, a lasting wave as by a perfect joint: (1 - (1 - T) exp(-t/tau)).
-
-    Both signs, and what comes back is the rest of the force at the joint.
-    """
-    tau = 30 * DT
-    first = bar(60, joint="lossy", transmission=share, relaxation=tau)
-    wanted = 2 * ratio / (1 + ratio) * (1 - (1 - share) * mean_of_exponential(1 / tau, 140))
-    for sign in (1, -1):
-        simulation, passed, back = at_joint(first, ratio, sign * F0)
-        np.testing.assert_allclose(passed, sign * F0 * wanted, rtol=1e-10)
-        np.testing.assert_allclose(back, sign * F0 * (wanted[-60:] - 1), atol=1e-10 * F0)
-        assert abs(simulation.energy()["residual"]) < 1e-10
-        assert simulation.energy()["joints"] > 0.0
-
-
-def test_lossy_joint_takes_what_a_dashpot_takes():
-    """The dashpot c beside a spring K takes c v^2 = c (Y G exp(-t/tau))^2.
-
-    G is by how much the force at first differs from the last one.
-    """
-    share, tau, run = 0.4, 30 * DT, 100
-    simulation, _, _ = at_joint(
-        bar(60, joint="lossy", transmission=share, relaxation=tau), run=run
-    )
-    y = 2 / Z
-    damping = share / ((1 - share) * y)
-    speed = y * (1 - share) * F0
-    taken = damping * speed**2 * tau / 2 * -math.expm1(-2 * run * DT / tau)
-    assert simulation.energy()["joints"] == pytest.approx(taken, rel=1e-10)
-
-
-def test_contact_passes_compression_and_sends_tension_back():
-    """To tension the joint is a free end, whose gap grows by 2 F0/Z."""
-    simulation, passed, back = at_joint(bar(60, joint="contact"), force=-F0, run=50)
-    np.testing.assert_array_equal(passed, 0.0)
-    np.testing.assert_allclose(back, F0, rtol=ROUNDING)
-    assert of_joint(simulation, Has.CLOSED) == 0.0
-    assert of_joint(simulation, Has.GAP) == pytest.approx(2 * F0 / Z * 50 * DT, rel=1e-10)
-
-
-@pytest.mark.parametrize("kind", ["contact", "threaded"])
-def test_gap_holds_a_wave_up_until_it_is_closed(kind):
-    """The end is free for g Z/(2 F0), within a step at last; what comes later passes."""
-    gap = 2 * F0 / Z * 12.3 * DT
-    simulation, passed, _ = at_joint(bar(60, joint=kind, gap=gap))
-    wanted = F0 * np.concatenate([np.zeros(12), [0.7], np.ones(127)])
-    np.testing.assert_allclose(passed, wanted, atol=1e-9 * F0)
-    assert (of_joint(simulation, Has.CLOSED), of_joint(simulation, Has.GAP)) == (1.0, 0.0)
-
-
-@pytest.mark.parametrize("ratio", [1.0, 0.5])
-def test_preload_lets_tension_pass_up_to_it(ratio):
-    """A joint that its thread pulls together by P passes tension to P, and more of it to P."""
-    whole = 2 * ratio / (1 + ratio) * F0  # what would pass a perfect joint
-    for preload, closed in ((1.01 * whole, 1.0), (0.6 * whole, 0.0)):
-        first = bar(60, joint="threaded", preload=preload)
-        simulation, passed, back = at_joint(first, ratio, -F0)
-        force = -min(whole, preload)
-        np.testing.assert_allclose(passed, force, rtol=ROUNDING)
-        np.testing.assert_allclose(back, force + F0, atol=ROUNDING * F0)
-        assert of_joint(simulation, Has.CLOSED) == closed
-        speed = 2 * F0 / Z - (1 + 1 / ratio) / Z * -force  # with which the shoulders part
-        wanted = 0.0 if closed else speed * 140 * DT
-        assert of_joint(simulation, Has.GAP) == pytest.approx(wanted, rel=1e-9)
-        assert abs(simulation.energy()["residual"]) < 1e-10
-
-
-@pytest.mark.parametrize("ratio", [1.0, 0.5])
-def test_thread_of_parted_shoulders_pulls_like_a_spring(ratio):
-    """Force -(P + k g) tends from -P to that of a perfect joint by exp(-Y k t)."""
-    whole, y = 2 * ratio / (1 + ratio) * F0, (1 + 1 / ratio) / Z
-    preload, k = 0.4 * whole, 1 / (y * 25 * DT)
-    first = bar(60, joint="threaded", preload=preload, thread_stiffness=k)
-    simulation, passed, _ = at_joint(first, ratio, -F0)
-    fade = mean_of_exponential(y * k, 140)
-    np.testing.assert_allclose(passed, -whole + (whole - preload) * fade, rtol=1e-10)
-    gap = (whole - preload) / k * -math.expm1(-y * k * 140 * DT)
-    assert of_joint(simulation, Has.GAP) == pytest.approx(gap, rel=1e-10)
-    assert abs(simulation.energy()["residual"]) < 1e-10
-
-
-def test_thread_closes_its_shoulders_again():
-    """After a wave of tension a thread pulls the shoulders together by Y P, then carries more.
-
-    Without stiffness the gap grows by 2 F0/Z - Y P for T and falls by Y P.
-    """
-    preload, duration = 0.75 * F0, 30
-    first = bar(60, joint="threaded", preload=preload)
-    simulation, passed, _ = at_joint(first, force=-F0, steps=duration, run=120)
-    opened, closing = 2 * F0 / Z - 2 / Z * preload, 2 / Z * preload
-    until = duration + opened * duration / closing  # 40 steps
-    t = np.arange(120)
-    np.testing.assert_allclose(passed, np.where(t < until - 0.5, -preload, 0.0), atol=1e-9 * F0)
-    assert of_joint(simulation, Has.CLOSED) == 1.0
-
-
-# ------------------------------------------------------------------------------- 6: open ends
+# ------------------------------------------------------------------------------- 5: open ends
 
 
 @pytest.mark.parametrize("force", [F0, -F0])
@@ -416,7 +224,7 @@ def test_free_top_doubles_what_comes_up_and_open_top_does_not():
         np.testing.assert_allclose(force[25:35], -0.5 * F0 * twice, atol=ROUNDING * F0)
 
 
-# --------------------------------------------------------------- 7: odd lengths, and loss
+# --------------------------------------------------------------- 6: odd lengths, and loss
 
 
 @pytest.mark.parametrize("part", [0.0, 0.013, 0.37, 0.5, 0.999])
@@ -462,6 +270,19 @@ def test_weights_keep_time_and_make_no_energy(transit, variance):
     assert np.abs(np.exp(-1j * np.outer(w, times)) @ weights).max() < 1 + 1e-13
 
 
+@pytest.mark.xfail(strict=True, reason="spread ends at a step a cell: finer cells have less loss")
+@pytest.mark.parametrize("cells", [200, 400, 800])
+def test_finer_cells_keep_their_loss(cells):
+    """The reference loss time in 0.2 m of steel: the gain at 50 mm, whatever the cells."""
+    eta, transit = Scene().loss.time, 0.2 / C0
+    dt = transit / cells
+    delay, weights, spread = weights_of(float(cells), eta * transit / dt**2)
+    assert spread == pytest.approx(eta * transit / dt**2, rel=1e-9)
+    w = 2 * math.pi * C0 / 0.05
+    gain = abs(np.exp(-1j * w * dt * (delay + np.arange(len(weights)))) @ weights)
+    assert gain == pytest.approx(math.exp(-0.5 * eta * w * w * transit), rel=2e-2)
+
+
 @pytest.mark.parametrize("eta", [2e-7, 1e-6])
 @pytest.mark.parametrize("length", [0.6, 0.6037])
 def test_loss_dampens_a_sine_as_kelvin_voigt_steel_does(eta, length):
@@ -488,169 +309,3 @@ def test_loss_dampens_a_sine_as_kelvin_voigt_steel_does(eta, length):
     ledger = simulation.energy()
     assert ledger["loss"] > 0.0
     assert abs(ledger["residual"]) < 1e-11 * abs(ledger["ends"])
-
-
-# --------------------------------------------------------------- 8: momentum, static load
-
-
-@pytest.mark.parametrize("loss", [False, True])
-def test_momentum_of_all_bars_is_what_outer_forces_gave(loss):
-    """Impulses in joints and of the piston cancel; feed, weight, drive and rock remain."""
-    simulation = struck(
-        bar(18), bar(40, 1.4 * AREA, joint="threaded", preload=2e4),
-        bar(31, joint="contact", gap=1e-4), bar(25, joint="lossy", transmission=0.7),
-        bar(22, 2 * AREA),
-        effects={"feed": True, "gravity": True, "rock": "bilinear", "loss": loss,
-                 "drive": "external"},
-        drive={"external_force": 1500.0}, start={"piston_velocity": 9.0},
-    )  # fmt: skip
-    bodies = simulation.solver._chain.bodies
-    first = bodies[:, 0] @ simulation._state.arrays[0][Bar.VELOCITY]
-    weight = bodies[:, 0].sum() * 10.0
-    for steps in (50, 300, 2000):
-        fields = after(simulation, steps)
-        seen, t = simulation.observe(), simulation.solver.time(simulation._state)
-        moving = bodies[:, 0] @ simulation._state.arrays[0][Bar.VELOCITY]
-        given = (weight + 2500.0 + 1500.0) * t - seen["bit_impulse"]
-        scale = first + seen["bit_impulse"]
-        assert abs(moving - first - given) < 2e-8 * scale  # read 1e-6 steps later
-        if not loss:  # waves in cells are all that there is
-            names = ("piston", "rod 1", "rod 2", "rod 3", "bit")
-            cells = sum(
-                simulation.solver.grid_of(name).mass @ fields[f"{name}_velocity"] for name in names
-            )
-            assert abs(cells - moving) < 1e-10 * scale
-
-
-def at_rest(joint, top="open"):
-    """A string that has come to rest on a spring; its open top took its waves away.
-
-    Returns
-    -------
-    simulation : Simulation
-    seen : dict
-        Samples between 0.1 and 1 s.
-    load, stiffness : float
-        Feed and weight [N], and of the spring [N/m].
-    """
-    more = {
-        "threaded": {"preload": 1e3, "thread_stiffness": 1e8},
-        "lossy": {"transmission": 0.6, "relaxation": 1e-4},
-    }.get(joint, {})
-    K = 1e8
-    simulation = struck(
-        bar(80, joint=joint, **more), bar(60, joint=joint, **more), bar(30.5, 3 * AREA),
-        piston={"model": "absent"}, string={"top": top},
-        effects={"feed": True, "gravity": True, "rock": "spring", "loss": True},
-        rock={"loading_stiffness": K},
-    )  # fmt: skip
-    load = 2500.0 + 10.0 * RHO * AREA * CELL * (80 + 60 + 3 * 30.5)
-    return simulation, simulation.sample([0.1, 0.4, 0.7, 1.0]), load, K
-
-
-@pytest.mark.parametrize("joint", ["perfect", "threaded", "contact", "lossy"])
-def test_static_load_does_not_creep(joint):
-    """A string under feed and weight rests on a spring for a second, as it is.
-
-    The mean velocity of a bar keeps about g eta/2: momentum of waves that loss has spread, which
-    no cell shows. The mean position is derived anew every 256 steps.
-    """
-    simulation, seen, load, K = at_rest(joint)
-    np.testing.assert_allclose(seen["bit_force"], seen["bit_force"][0], rtol=1e-10)
-    np.testing.assert_allclose(seen["penetration"], seen["penetration"][0], rtol=1e-10)
-    np.testing.assert_allclose(K * seen["penetration"], seen["bit_force"], rtol=1e-8)
-    kept = 10.0 * simulation.scene.loss.time
-    np.testing.assert_allclose(seen["bit_velocity"], 0.0, atol=kept)
-    assert np.ptp(seen["bit_position"]) < 256 * DT * kept
-    if joint in ("threaded", "contact"):
-        assert of_joint(simulation, Has.CLOSED) == 1.0
-        assert of_joint(simulation, Has.GAP) == 0.0
-    if joint == "lossy":  # its spring carries the load of the bar above
-        fit = simulation.solver._chain.fits[0]
-        short = (2500.0 + 10.0 * RHO * AREA * CELL * 80) / fit[3]
-        assert of_joint(simulation, Has.GAP) == pytest.approx(short, rel=1e-2)
-
-
-@pytest.mark.xfail(strict=True, reason="an open end takes half a cell of body force too much")
-@pytest.mark.parametrize("joint", ["perfect", "threaded", "contact", "lossy"])
-def test_static_load_is_feed_and_weight(joint):
-    """What rests on the spring is all of the feed and the weight, and no more."""
-    _, seen, load, _ = at_rest(joint)
-    np.testing.assert_allclose(seen["bit_force"], load, rtol=1e-8)
-
-
-@pytest.mark.xfail(strict=True, reason="the spring of a damper that has parted stores energy")
-def test_damper_that_has_parted_stores_nothing():
-    """Casing and string part for good: what they are worth in energy is their motion alone."""
-    simulation = struck(
-        rigid(5.0), bar(40), bar(40), start={"piston_velocity": 8.0}, effects={"damper": True},
-        damper={"stiffness": 1e6, "damping": 0.0, "preload": 1e3, "casing_mass": 100.0},
-    )  # fmt: skip
-    after(simulation, 3000)
-    ledger = simulation.energy()
-    assert abs(ledger["residual_relative"]) < 1e-11
-    assert ledger["joints"] == pytest.approx(0.0, abs=1e-9 * ledger["initial"])
-
-
-@pytest.mark.xfail(strict=True, reason="a wave stays a step at least, and its mass with it")
-def test_sections_shorter_than_a_step_balance():
-    """Feed on bars whose sections are shorter than a step: the ledger closes."""
-    thin = [{"length": length * CELL, "area": AREA} for length in (6.0, 0.4, 7.3, 0.7)]
-    simulation = struck(
-        bar(20), {"sections": thin}, bar(20),
-        start={"piston_velocity": 1.0}, effects={"feed": True, "gravity": True},
-    )  # fmt: skip
-    after(simulation, 400)
-    assert abs(simulation.energy()["residual_relative"]) < 1e-9
-
-
-@pytest.mark.xfail(strict=True, reason="the casing bears the drive of the step's start for all of it")
-def test_recoil_is_the_opposite_of_the_drive():
-    """Piston, string and casing keep their momentum, also in a step in which the drive turns."""
-    simulation = struck(
-        rigid(5.0), bar(40), bar(40), effects={"damper": True, "drive": "pressure"},
-        drive={"reversal_distance": 0.5e-3}, start={"piston_velocity": -1.0, "gap": 1e-4},
-    )  # fmt: skip
-    after(simulation, 600)
-    assert simulation.events["kind"].tolist().count(EventKind.DRIVE_DOWN) > 0
-    bodies, state = simulation.solver._chain.bodies, simulation._state
-    moving = bodies[:, 0] @ state.arrays[0][Bar.VELOCITY]
-    moving += 5.0 * state.record[0]["v_p"] + 150.0 * state.record[0]["v_c"]
-    assert moving == pytest.approx(-5.0, rel=1e-10)
-
-
-# --------------------------------------------------------------------- 9: two ways to say it
-
-
-def test_two_bars_are_piston_and_bit():
-    """[[bars]] of a piston and a bit are the scene with [piston] and [bit], to the last bit."""
-    piston = {"sections": [{"length": 0.175, "area": 5.5e-3}]}
-    bit = {"sections": [{"length": 0.1, "area": 5.5e-3}, {"length": 0.1, "area": 7e-3}]}
-    listed, grouped = Scene(bars=[piston, bit]), Scene(piston=piston, bit=bit)
-    assert listed == grouped
-    assert listed.to_toml() == grouped.to_toml()
-    runs = []
-    for scene in (listed, grouped):
-        # by the solver of chains, which computes these as well
-        simulation = Simulation(scene.replace(**{"solver.name": "chain"}))
-        simulation.advance(0.08)
-        assert len(simulation.blows) > 0
-        runs.append(simulation.blows.tobytes())
-    assert runs[0] == runs[1]
-
-
-def test_rods_in_a_list_are_those_of_the_string():
-    """[[bars]] of a chain are the scene with string.rods, to the last bit."""
-    piston, bit = bar(18), bar(20)
-    rods = [bar(40, joint="lossy", transmission=0.9), bar(30, 2 * AREA)]
-    listed = Scene(bars=[piston, *rods, bit])
-    grouped = Scene(
-        piston=piston, bit=bit, string={"rods": rods}, effects={"string": True}
-    )  # fmt: skip
-    assert listed == grouped
-    runs = []
-    for scene in (listed, grouped):
-        simulation = Simulation(scene)
-        simulation.advance(0.01)
-        runs.append([values.tobytes() for values in simulation.fields().values()])
-    assert runs[0] == runs[1]

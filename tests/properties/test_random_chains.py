@@ -20,7 +20,7 @@ from tests.properties.source import Generator, Source, chance, decades
 from tests.state_bits import run_bits
 
 SEED = 20261125
-COUNT = int(os.environ.get("CCOUNT", 60))
+COUNT = 2000 if os.environ.get("PERCUSSION_LONG") == "1" else 60
 BATCHES = 10
 # Of the energy that was put in: rounding of some thousand steps.
 MOST_RESIDUAL = 1e-9

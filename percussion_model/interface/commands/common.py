@@ -31,7 +31,7 @@ _own_process = False
 
 SceneFile = Annotated[Path, typer.Argument(metavar="SCENE", help="A scene file (TOML).")]
 SolverName = Annotated[
-    Literal["wave", "modal", "fem", "rigid", "blow-map"] | None,
+    Literal["wave", "modal", "chain", "fem", "rigid", "blow-map"] | None,
     typer.Option("--solver", help="Solver; rigid makes piston and bit rigid."),
 ]
 Cells = Annotated[

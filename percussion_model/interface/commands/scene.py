@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -9,6 +10,7 @@ import typer
 
 from percussion_model.interface.commands import common
 from percussion_model.interface.commands.blow_map import prepare_map, warn_of_outside
+from percussion_model.scene.hammers import hammers
 
 if TYPE_CHECKING:
     from percussion_model.interface.progress import Report
@@ -16,6 +18,13 @@ if TYPE_CHECKING:
     from percussion_model.simulation.result import Result
 
 _NEW_TITLE = "A down-the-hole hammer"
+
+
+class Kind(StrEnum):
+    """What a new scene is."""
+
+    HAMMER = "hammer"
+    HOPKINSON = "hopkinson"
 
 
 def run(
@@ -189,13 +198,35 @@ def plot(
 
 def new(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="The scene file to write.")],
+    hammer: Annotated[
+        str | None,
+        typer.Option("--hammer", help="A hammer on the market: " + ", ".join(hammers()) + "."),
+    ] = None,
+    rods: Annotated[
+        int | None, typer.Option("--rods", help="Rods of a top hammer, from 1 on; default 4.")
+    ] = None,
+    kind: Annotated[
+        Kind, typer.Option("--kind", help="hammer, or hopkinson: a striker, a bar and rock.")
+    ] = Kind.HAMMER,
     force: Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")] = False,
 ) -> None:
-    """Write a commented scene to start from: the reference hammer."""
+    """Write a commented scene to start from: the reference hammer, or another."""
+    from percussion_model.scene.hammers import bar_test
+    from percussion_model.scene.hammers import hammer as find
     from percussion_model.scene.scene import Scene
 
     common.refuse_existing(file, force)
-    Scene(title=_NEW_TITLE).to_toml(file, comments=True)
+    if kind == Kind.HOPKINSON:
+        if hammer is not None or rods is not None:
+            raise common.refusal("--kind hopkinson has no --hammer and no --rods")
+        scene = bar_test()
+    elif hammer is not None:
+        scene = find(hammer, rods)
+    elif rods is not None:
+        raise common.refusal("--rods needs --hammer: one of the top hammers")
+    else:
+        scene = Scene(title=_NEW_TITLE)
+    scene.to_toml(file, comments=True)
     typer.echo(f"wrote {file}")
 
 

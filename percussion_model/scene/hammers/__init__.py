@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 from percussion_model.scene.parameters import MOST_RODS
@@ -48,3 +49,21 @@ def hammer(name: str, rods: int | None = None) -> Scene:
     piston, shank, rod, bit = bars
     title = f"{tree['title']}: {count} of them" if count > 1 else f"{tree['title']}: one"
     return Scene(**{**tree, "title": title, "bars": [piston, shank, *[rod] * count, bit]})
+
+
+def bar_test() -> Scene:
+    """A striker, a long bar and rock at its end, as in the tests of Saksala et al. (2014).
+
+    T. Saksala, D. Gomon, M. Hokka, V.-T. Kuokkala, Int. J. Impact Eng. 72 (2014) 56: striker of
+    22 x 200 mm, bar of 32 x 1190 mm, three buttons on Kuru granite, loading stiffness about
+    162 kN/mm (second hand).
+    """
+    return Scene(
+        title="Striker, bar and rock",
+        piston={"sections": [{"length": 0.2, "area": round(math.pi / 4 * 0.022**2, 9)}]},
+        bit={"sections": [{"length": 1.19, "area": round(math.pi / 4 * 0.032**2, 9)}]},
+        effects={"gravity": False, "feed": False, "drive": "none", "barrier": False},
+        rock={"loading_stiffness": 1.62e8},
+        start={"piston_velocity": 10.0, "gap": 0.0, "rock_gap": 0.0},
+        run={"duration": 1e-3, "settle": 0.0, "error_estimate": False},
+    )

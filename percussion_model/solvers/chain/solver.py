@@ -230,10 +230,10 @@ class ChainSolver(Solver):
         return list(self._cells[name].in_sections)
 
     def coarser_scenes(self) -> list[Scene] | None:
-        """The scene with steps twice and half as long again."""
+        """The scene with steps half as long again."""
         first = next(iter(self.cells.values()))
-        counts = sorted({max(1, round(first / 2)), max(1, round(first / 1.5))} - {first})
-        changes = {"solver.accuracy": None, "run.check": False}
-        return [
-            self.scene.replace(**changes, **{"solver.cells": count}) for count in counts
-        ] or None
+        count = max(1, round(first / 1.5))
+        if count == first:
+            return None
+        changes = {"solver.accuracy": None, "run.check": False, "solver.cells": count}
+        return [self.scene.replace(**changes)]
