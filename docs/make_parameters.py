@@ -12,10 +12,12 @@ HEAD = """# Parameters
 
 Every key of a scene file, with its unit, its default and what is allowed. All are SI.
 Any of them can be set on the command line, as in `--set rock.unloading_ratio=10`; sections
-are counted from 0, as in `--set piston.sections.0.length=0.2`.
+and rods are counted from 0, as in `--set piston.sections.0.length=0.2`. All bars may be given
+as one list instead, `[[bars]]`, from the drive to the rock: the first is the piston, the last
+the bit, and those between them are `string.rods`.
 
 This page is written by `python docs/make_parameters.py`; change
-`percussion_model/scene/parameters.py` instead.
+`percussion_model/scene/parameters.py` or `bar_groups.py` instead.
 """
 
 
@@ -27,6 +29,8 @@ def default(row: Row) -> str:
         return "left out"
     if row.kind == "sections":
         return "one, as in the reference scene"
+    if row.kind == "rods":
+        return "none"
     if row.kind == "number":
         return f"{row.default:.10g}"
     return f"`{toml_value(row.default)}`"

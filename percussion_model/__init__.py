@@ -15,9 +15,9 @@ if TYPE_CHECKING:
         EventKind,
         Mode,
     )
+    from percussion_model.scene.bar_groups import BitBar, PistonBar, Section
     from percussion_model.scene.drive_calibration import calibrate_drive, piston_cycle
     from percussion_model.scene.inputs import SimulationError
-    from percussion_model.scene.parameters import BitBar, PistonBar, Section
     from percussion_model.scene.scene import Scene, SceneError
     from percussion_model.simulation.files import ResultError
     from percussion_model.simulation.result import Result

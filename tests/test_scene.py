@@ -11,7 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from percussion_model.scene.parameters import BitBar, PistonBar, RockLaw, Section, parameter_table
+from percussion_model.scene.bar_groups import BitBar, PistonBar, Section
+from percussion_model.scene.parameters import RockLaw, parameter_table
 from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.scene.text import read_setting
 

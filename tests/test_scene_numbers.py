@@ -8,8 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from percussion_model.scene import bars
+from percussion_model.scene.bar_groups import BitBar, Section
 from percussion_model.scene.numbers import SCENE_NUMBERS, scene_numbers, section_numbers
-from percussion_model.scene.parameters import BitBar, Section, find_row, parameter_table
+from percussion_model.scene.parameters import find_row, parameter_table
 from percussion_model.scene.scene import Scene
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import platform
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict
 from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -17,6 +16,7 @@ from markupsafe import Markup
 
 from percussion_model.analysis.study import KNOWN_ERRORS, Study
 from percussion_model.interface.plotting import CAPTIONS, figures
+from percussion_model.scene.group import Parameters
 from percussion_model.scene.parameters import find_row, parameter_table
 from percussion_model.scene.scene import Scene
 from percussion_model.simulation.files import staged
@@ -384,21 +384,25 @@ def _parameter_rows(scene: Scene, changed: dict[str, Any]) -> list[tuple[str, st
     for row in parameter_table():
         if "*" in row.key or not scene.matters(row.key):
             continue
-        if row.kind == "sections":
-            rows += _section_rows(scene, row.key, changed)
+        if row.kind in ("sections", "rods"):
+            rows += _listed_rows(scene[row.key], row.key, changed)
             continue
         value = changed.get(row.key, scene[row.key])
         rows.append((row.key, _written(value), _shown_unit(row.unit), row.description))
     return rows
 
 
-def _section_rows(
-    scene: Scene, sections: str, changed: dict[str, Any]
+def _listed_rows(
+    entries: Iterable[Parameters], path: str, changed: dict[str, Any]
 ) -> list[tuple[str, str, str, str]]:
+    """Rows of the sections of a bar, or of bars with their sections."""
     rows = []
-    for k, section in enumerate(scene[sections]):
-        for name, value in asdict(section).items():
-            key = f"{sections}.{k}.{name}"
+    for k, entry in enumerate(entries):
+        for name in entry.telling:
+            key, value = f"{path}.{k}.{name}", getattr(entry, name)
+            if isinstance(value, tuple):
+                rows += _listed_rows(value, key, changed)
+                continue
             row = find_row(key)
             assert row is not None
             shown = _written(changed.get(key, value))

@@ -12,7 +12,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from percussion_model.scene.parameters import Bar, parameter_table
+from percussion_model.scene.bar_groups import Bar
+from percussion_model.scene.parameters import parameter_table
 from percussion_model.scene.rows import Row
 from percussion_model.scene.scene import Scene
 

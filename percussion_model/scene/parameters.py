@@ -12,13 +12,39 @@ import difflib
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
-from typing import Any, ClassVar, Self
+from typing import Any
 
 from percussion_model.physics.effects import EFFECTS, Effect
-from percussion_model.scene import bars
+from percussion_model.scene.bar_groups import (
+    REFERENCE_BIT_LENGTH,
+    STEEL_DENSITY,
+    STEEL_YOUNGS_MODULUS,
+    BitBar,
+    Damper,
+    DrillString,
+    PistonBar,
+)
+from percussion_model.scene.group import (
+    ALL_RIGID,
+    BARRIER_ON,
+    BLOW_MAP,
+    DRIVE_EXTERNAL,
+    DRIVE_PRESSURE,
+    FEED_ON,
+    GRAVITY_ON,
+    HAS_PISTON,
+    HAS_WAVES,
+    LISTED,
+    LOSS_ON,
+    ROCK_BILINEAR,
+    ROCK_PRESENT,
+    ROCK_SPRINGY,
+    SOLVER_FEM,
+    SOLVER_WAVE,
+    STRING_ON,
+    Parameters,
+)
 from percussion_model.scene.rows import (
-    REFUSED,
-    Faults,
     Needs,
     Row,
     choice,
@@ -26,150 +52,12 @@ from percussion_model.scene.rows import (
     flag,
     generic_key,
     quantity,
-    refuse_value,
-    rod_list,
-    section_list,
     shortened,
-    show_value,
 )
 from percussion_model.scene.solver_names import SOLVER_NAMES
 
 # Below this similarity a guess at a misspelt key misleads more than it helps.
 _SIMILAR_ENOUGH = 0.6
-
-# Sections of a bar, each takes a cell at least; and bars between piston and bit.
-MOST_SECTIONS, MOST_RODS = 1000, 100
-
-# What must hold, key by key, for a parameter to have any influence.
-HAS_PISTON: Needs = {"piston.model": ("elastic", "rigid")}
-HAS_WAVES: Needs = {"bit.model": ("elastic",)}
-SOLVER_WAVE: Needs = {"solver.name": ("auto", "wave", "modal", "chain"), **HAS_WAVES}
-SOLVER_FEM: Needs = {"solver.name": ("fem",)}
-BLOW_MAP: Needs = {"solver.fidelity": ("blow-map",), **HAS_WAVES}
-ALL_RIGID: Needs = {"piston.model": ("rigid",), "bit.model": ("rigid",)}
-GRAVITY_ON: Needs = {"effects.gravity": (True,)}
-FEED_ON: Needs = {"effects.feed": (True,)}
-DRIVE_PRESSURE: Needs = {"effects.drive": ("pressure",)}
-DRIVE_EXTERNAL: Needs = {"effects.drive": ("external",)}
-LOSS_ON: Needs = {"effects.loss": (True,), **HAS_WAVES}
-ROCK_BILINEAR: Needs = {"effects.rock": ("bilinear",)}
-ROCK_SPRINGY: Needs = {"effects.rock": ("bilinear", "spring")}
-ROCK_PRESENT: Needs = {"effects.rock": ("bilinear", "spring", "wall")}
-BARRIER_ON: Needs = {"effects.barrier": (True,), **ROCK_BILINEAR}
-STRING_ON: Needs = {"effects.string": (True,), **HAS_WAVES}
-JOINTS_ON: Needs = {"effects.joints": (True,), **STRING_ON}
-DAMPER_ON: Needs = {"effects.damper": (True,), **STRING_ON}
-NO_PISTON: Needs = {"piston.model": ("absent",), **STRING_ON}
-
-
-class Parameters:
-    """A group of parameters: plain frozen values, checked when they are given.
-
-    Bad values raise `SceneError`.
-    """
-
-    key: ClassVar[str] = ""  # of the group in a scene
-    rows: ClassVar[dict[str, Row]] = {}  # by the name of the field
-    __dataclass_fields__: ClassVar[dict[str, dataclasses.Field[Any]]]
-    _defaults: ClassVar[dict[str, Any]] = {}
-    _given: frozenset[str]
-
-    def __init_subclass__(cls) -> None:
-        dataclasses.dataclass(frozen=True, init=False)(cls)
-        fields = dataclasses.fields(cls)
-        cls.rows = {one.name: one.metadata["row"] for one in fields if one.metadata}
-        cls._defaults = {name: row.default for name, row in cls.rows.items()}
-
-    def __init__(self, **values: Any) -> None:
-        faults = Faults()
-        self._fill(values, self.key, faults)
-        faults.refuse()
-
-    @classmethod
-    def read(cls, value: Any, key: str, faults: Faults) -> Self:
-        """Return a group as it is, or make it of a table of values."""
-        if isinstance(value, cls):
-            return value
-        group = cls.__new__(cls)
-        if isinstance(value, (dict, Mapping)):  # mostly the first, which is quick to see
-            group._fill(value, key, faults)
-        elif generic_key(key).endswith(".*"):
-            faults.add(_refuse_table, key, value, "a table with length and area")
-        else:
-            faults.add(_refuse_table, key, value, f"a table, written [{key}]")
-        return group
-
-    def _fill(self, values: Mapping[str, Any], key: str, faults: Faults) -> None:
-        kept, rows = self.__dict__, self.rows
-        kept.update(self._defaults)
-        kept["_given"] = frozenset(values)
-        for name, row in rows.items():
-            if name not in values:
-                if row.required:
-                    faults.add(_refuse_missing, row, f"{key}.{name}")
-            elif row.kind == "sections":
-                found = _listed(row, f"{key}.{name}", values[name], MOST_SECTIONS, faults)
-                if not found:
-                    faults.add(refuse_value, row, f"{key}.{name}", values[name])
-                kept[name] = tuple(
-                    Section.read(one, f"{key}.{name}.{k}", faults) for k, one in enumerate(found)
-                )
-            elif row.kind == "rods":
-                found = _listed(row, f"{key}.{name}", values[name], MOST_RODS, faults)
-                kept[name] = tuple(
-                    Rod.read(one, f"{key}.{name}.{k}", faults) for k, one in enumerate(found)
-                )
-            else:
-                kept[name] = found = row.read(values[name])
-                if found is REFUSED:
-                    faults.add(refuse_value, row, f"{key}.{name}", values[name])
-        for name in values:
-            if name not in rows:
-                faults.add(unknown_key, f"{key}.{name}")
-
-    @property
-    def telling(self) -> tuple[str, ...]:
-        """Names of the parameters that matter in an entry of a list."""
-        return tuple(self.rows)
-
-    def given_values(self) -> dict[str, Any]:
-        """Return the values that were given, not left to their defaults."""
-        return {name: self.__dict__[name] for name in self.rows if name in self._given}
-
-
-def _listed(row: Row, key: str, value: Any, most: int, faults: Faults) -> list[Any]:
-    """Return what stands in a list of tables; nothing where it is none, or too long."""
-    try:
-        found = [] if isinstance(value, (str, bytes, Mapping)) else list(value)
-    except TypeError:  # no list of anything
-        faults.add(refuse_value, row, key, value)
-        return []
-    if len(found) > most:
-        faults.add(_refuse_many, row, key, len(found), most)
-        return found[:1]
-    return found
-
-
-def _refuse_many(row: Row, key: str, count: int, most: int) -> str:
-    return f"{key}: {count} {row.kind}: must be at most {most}"
-
-
-def _refuse_table(key: str, value: Any, wanted: str) -> str:
-    return f"{key} = {show_value(value)}: must be {wanted}"
-
-
-def _refuse_missing(row: Row, key: str) -> str:
-    return f"{key} is missing: must be {row.allowed}"
-
-
-# ------------------------------------------------------------------------- the groups
-
-# Table II of the paper as repaired in docs/model.md.
-STEEL_YOUNGS_MODULUS = 210e9
-STEEL_DENSITY = 7850.0
-REFERENCE_AREA = 5.5e-3
-REFERENCE_PISTON_LENGTH = 0.175
-REFERENCE_BIT_LENGTH = 0.20125
 
 # The paper damps the highest frequency of its 58-element bit by this ratio.
 _PAPER_DAMPING_RATIO = 0.5
@@ -181,160 +69,6 @@ def _reference_loss_time() -> float:
     wave_speed = math.sqrt(STEEL_YOUNGS_MODULUS / STEEL_DENSITY)
     critical = math.sqrt(12.0) * wave_speed / (REFERENCE_BIT_LENGTH / _PAPER_BIT_ELEMENTS)
     return 2.0 * _PAPER_DAMPING_RATIO / critical
-
-
-class Section(Parameters):
-    """A length of bar with one cross-section and one material."""
-
-    key = "section"
-    length: float = quantity(..., "m", "length", gt=0, le=1000)
-    area: float = quantity(..., "m^2", "cross-section", gt=0, le=10)
-    youngs_modulus: float = quantity(STEEL_YOUNGS_MODULUS, "Pa", "Young's modulus E", gt=0, le=1e13)
-    density: float = quantity(STEEL_DENSITY, "kg/m^3", "density rho", gt=0, le=1e5)
-
-    @property
-    def numbers(self) -> tuple[float, float, float, float]:
-        """Length [m], area [m^2], Young's modulus [Pa] and density [kg/m^3]."""
-        return self.length, self.area, self.youngs_modulus, self.density
-
-    @property
-    def wave_speed(self) -> float:
-        """Speed of longitudinal waves, sqrt(E/rho) [m/s]."""
-        return bars.section_wave_speed(self.numbers)
-
-    @property
-    def impedance(self) -> float:
-        """Force per particle velocity of a wave, A sqrt(E rho) [N s/m]."""
-        return bars.section_impedance(self.numbers)
-
-    @property
-    def mass(self) -> float:
-        """Mass [kg]."""
-        return bars.section_mass(self.numbers)
-
-    @property
-    def transit_time(self) -> float:
-        """Time a wave takes from end to end [s]."""
-        return bars.section_transit_time(self.numbers)
-
-
-REFERENCE_PISTON = (Section(length=REFERENCE_PISTON_LENGTH, area=REFERENCE_AREA),)
-REFERENCE_BIT = (Section(length=REFERENCE_BIT_LENGTH, area=REFERENCE_AREA),)
-
-
-class Bar(Parameters):
-    """Sections one below the other; base of all bars."""
-
-    sections: tuple[Section, ...]
-
-    @property
-    def numbers(self) -> tuple[tuple[float, float, float, float], ...]:
-        """Numbers of each section."""
-        return tuple(section.numbers for section in self.sections)
-
-    @property
-    def mass(self) -> float:
-        """Mass [kg]."""
-        return bars.bar_mass(self.numbers)
-
-    @property
-    def length(self) -> float:
-        """Length [m]."""
-        return bars.bar_length(self.numbers)
-
-    @property
-    def transit_time(self) -> float:
-        """Time a wave takes from end to end [s]."""
-        return bars.bar_transit_time(self.numbers)
-
-
-class PistonBar(Bar):
-    """The piston; the reference one if no sections are given."""
-
-    model: str = choice("elastic", ("elastic", "rigid", "absent"), "how the piston is modelled")
-    sections: tuple[Section, ...] = section_list(REFERENCE_PISTON, HAS_PISTON)
-
-
-class BitBar(Bar):
-    """The bit; the reference one if no sections are given."""
-
-    model: str = choice("elastic", ("elastic", "rigid"), "how the bit is modelled")
-    sections: tuple[Section, ...] = section_list(REFERENCE_BIT)
-
-
-class Rod(Bar):
-    """A bar between piston and bit, and its joint to the bar below."""
-
-    key = "rod"
-    sections: tuple[Section, ...] = section_list(...)  # type: ignore[arg-type]
-    joint: str = choice(
-        "perfect",
-        ("perfect", "contact", "lossy", "threaded"),
-        "joint to the bar below: none to be felt, a contact that only pushes, one that reflects "
-        "and takes a part, or shoulders that a thread pulls together",
-        JOINTS_ON,
-    )
-    transmission: float = quantity(
-        1.0, "-", "share of a short wave's force that passes a lossy joint", JOINTS_ON, gt=0, le=1
-    )
-    relaxation: float = quantity(
-        1e-3, "s", "time after which a lossy joint carries a lasting force", JOINTS_ON, gt=0, le=10
-    )
-    gap: float = quantity(0.0, "m", "of a contact or a thread at the start", JOINTS_ON, ge=0, le=1)
-    preload: float = quantity(
-        0.0, "N", "with which a thread pulls its shoulders together", JOINTS_ON, ge=0, le=1e9
-    )
-    thread_stiffness: float = quantity(
-        0.0, "N/m", "of a thread whose shoulders have parted", JOINTS_ON, ge=0, le=1e13
-    )
-
-    @property
-    def telling(self) -> tuple[str, ...]:
-        """Names of the parameters that matter to a joint of this kind."""
-        return ("sections", "joint", *_OF_JOINT.get(self.joint, ()))
-
-
-# Parameters that joints of a kind have.
-_OF_JOINT = {
-    "contact": ("gap",),
-    "lossy": ("transmission", "relaxation"),
-    "threaded": ("gap", "preload", "thread_stiffness"),
-}
-
-
-class DrillString(Parameters):
-    """Bars between piston and bit, shank and rods; feed and damper act on the topmost."""
-
-    rods: tuple[Rod, ...] = rod_list(STRING_ON)
-    top: str = choice(
-        "free", ("free", "open"), "top end without a piston: free, or without reflection", NO_PISTON
-    )
-    bottom: str = choice(
-        "rock",
-        ("rock", "open"),
-        "lower end of the bit: on the rock, or without reflection",
-        STRING_ON,
-    )
-    pulse_force: float = quantity(
-        0.0,
-        "N",
-        "of a rectangular wave that comes down the topmost bar",
-        NO_PISTON,
-        ge=-1e9,
-        le=1e9,
-    )
-    pulse_duration: float = quantity(1e-4, "s", "of that wave", NO_PISTON, gt=0, le=10)
-
-
-class Damper(Parameters):
-    """Recoil damper between the casing of the drill and the topmost bar."""
-
-    stiffness: float = quantity(1e7, "N/m", "of its spring", DAMPER_ON, ge=0, le=1e13)
-    damping: float = quantity(2e4, "N s/m", "of its dashpot", DAMPER_ON, ge=0, le=1e9)
-    preload: float = quantity(0.0, "N", "force at the start", DAMPER_ON, ge=0, le=1e9)
-    casing_mass: float = quantity(
-        150.0, "kg", "of the casing, which feed and recoil act on", DAMPER_ON, gt=0, le=1e6
-    )
 
 
 class Effects(Parameters):
@@ -644,10 +378,6 @@ GROUPS = groups_with(EFFECTS)
 globals().update({group.__name__: group for group in GROUPS.values()})
 
 
-# What stands in a list of tables.
-_LISTED: dict[str, type[Parameters]] = {"sections": Section, "rods": Rod}
-
-
 @cache
 def parameter_table() -> tuple[Row, ...]:
     """Return a row for each parameter, in the order of a scene file."""
@@ -659,8 +389,8 @@ def table_of(groups: Mapping[str, type[Parameters]]) -> Iterator[Row]:
     for key, group in groups.items():
         for name, row in group.rows.items():
             yield dataclasses.replace(row, key=f"{key}.{name}")
-            if row.kind in _LISTED:
-                yield from table_of({f"{key}.{name}.*": _LISTED[row.kind]})
+            if row.kind in LISTED:
+                yield from table_of({f"{key}.{name}.*": LISTED[row.kind]})
 
 
 @cache
@@ -700,3 +430,6 @@ def unknown_key(key: str) -> str:
         of_group = [one for one in keys if one.startswith(f"{groups[-1]}.") and "*" not in one]
         return f"unknown key {key}: did you mean one of {', '.join(of_group)}?"
     return f"unknown key {key}: a scene has a title and the tables {', '.join(GROUPS)}"
+
+
+Parameters.say_unknown = staticmethod(unknown_key)

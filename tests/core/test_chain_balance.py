@@ -124,7 +124,7 @@ def test_damper_that_has_parted_stores_nothing():
 
 
 @pytest.mark.xfail(strict=True, reason="the step of the damper is explicit")
-@pytest.mark.parametrize(("stiffness", "damping"), [(0.0, 1e8), (1e10, 1e9)])
+@pytest.mark.parametrize(("stiffness", "damping"), [(1e9, 1e8), (1e10, 1e9)])
 def test_strong_damper_makes_no_energy(stiffness, damping):
     """A damper within the bounds of its parameters, however strong, holds or takes."""
     simulation = struck(

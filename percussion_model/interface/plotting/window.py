@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from percussion_model.physics.records import EventKind, Mode
-from percussion_model.scene.parameters import Bar
+from percussion_model.scene.bar_groups import Bar
 from percussion_model.scene.scene import Scene
 from percussion_model.simulation.result import Result
 from percussion_model.simulation.simulate import Simulation, Snapshot

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from percussion_model.scene.parameters import MOST_RODS
+from percussion_model.scene.bar_groups import MOST_RODS
 from percussion_model.scene.rows import SceneError
 from percussion_model.scene.scene import Scene
 from percussion_model.scene.text import read_toml

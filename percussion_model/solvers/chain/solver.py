@@ -10,8 +10,8 @@ import numpy as np
 
 from percussion_model.physics.kernel import entry_of
 from percussion_model.physics.records import Piston
+from percussion_model.scene.bar_groups import Bar as SceneBar
 from percussion_model.scene.numbers import numbers_of
-from percussion_model.scene.parameters import Bar as SceneBar
 from percussion_model.scene.scene import Scene
 from percussion_model.solvers.base import Solver
 from percussion_model.solvers.chain.advance import GRID_ROUNDING, begin, run

@@ -10,9 +10,9 @@ import numpy as np
 
 from percussion_model.physics.kernel import entry_of
 from percussion_model.physics.records import Piston, RockKind
+from percussion_model.scene.bar_groups import Bar
 from percussion_model.scene.bars import bar_transit_time
 from percussion_model.scene.numbers import Numbers, numbers_of
-from percussion_model.scene.parameters import Bar
 from percussion_model.scene.scene import Scene
 from percussion_model.solvers.base import Solver
 from percussion_model.solvers.modal.advance import TICK_ROUNDING, run

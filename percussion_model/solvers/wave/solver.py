@@ -9,8 +9,8 @@ import numpy as np
 
 from percussion_model.physics.kernel import entry_of
 from percussion_model.physics.records import Piston, Status
+from percussion_model.scene.bar_groups import Bar
 from percussion_model.scene.numbers import Numbers, numbers_of, section_numbers
-from percussion_model.scene.parameters import Bar
 from percussion_model.scene.scene import Scene
 from percussion_model.solvers.base import Solver
 from percussion_model.solvers.setup import (

@@ -1,9 +1,9 @@
 """Steps of explicit elements in a chain of bars: what its ends meet, and the ledger.
 
-As in `explicit_step`, positions live at whole steps and
-velocities in the middle between them, and the rock end is followed in closed form. What two
-ends do to each other in a step is one impulse, from the velocity at which they would approach
-each other without it. Shoulders that would pass through each other touch at the step's end.
+As in `explicit_step`, positions live at whole steps and velocities in the middle between them,
+and the rock end is followed in closed form. What two ends do to each other in a step is one
+impulse, from the velocity at which they would approach each other without it. Shoulders that
+would pass through each other touch at the step's end.
 """
 
 from __future__ import annotations
