@@ -6,14 +6,12 @@ import math
 import numpy as np
 import pytest
 
+from percussion_model.scene.bar_groups import BitBar, PistonBar, Section
 from percussion_model.scene.drive_calibration import calibrate_drive, piston_cycle
 from percussion_model.scene.parameters import (
     GROUPS,
-    BitBar,
     Feed,
-    PistonBar,
     RockLaw,
-    Section,
     Start,
     find_row,
     parameter_table,

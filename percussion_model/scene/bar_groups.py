@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from percussion_model.scene import bars
 from percussion_model.scene.group import (
     DAMPER_ON,
@@ -65,7 +67,8 @@ REFERENCE_BIT = (Section(length=REFERENCE_BIT_LENGTH, area=REFERENCE_AREA),)
 class Bar(Parameters):
     """Sections one below the other; base of all bars."""
 
-    sections: tuple[Section, ...]
+    if TYPE_CHECKING:
+        sections: tuple[Section, ...]
 
     @property
     def numbers(self) -> tuple[tuple[float, float, float, float], ...]:
@@ -145,7 +148,6 @@ _OF_JOINT = {
 class DrillString(Parameters):
     """Bars between piston and bit, shank and rods; feed and damper act on the topmost."""
 
-    rods: tuple[Rod, ...] = rod_list(STRING_ON)
     top: str = choice(
         "free", ("free", "open"), "top end without a piston: free, or without reflection", NO_PISTON
     )
@@ -164,6 +166,7 @@ class DrillString(Parameters):
         le=1e9,
     )
     pulse_duration: float = quantity(1e-4, "s", "of that wave", NO_PISTON, gt=0, le=10)
+    rods: tuple[Rod, ...] = rod_list(STRING_ON)
 
 
 class Damper(Parameters):

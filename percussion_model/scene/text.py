@@ -117,7 +117,7 @@ def commented_scene(title: str, values: Mapping[str, Any], silent: Iterable[str]
         if row.kind == "sections":
             lines += _commented_sections(row, values[row.key], row.key in hidden)
             continue
-        if row.kind == "rods":
+        if row.kind == "rods" and values[row.key]:
             lines += _commented_rods(row, values[row.key])
             continue
         if row.key.split(".")[0] != group:
@@ -131,8 +131,8 @@ def _commented_value(row: Row, value: Any, hidden: bool) -> list[str]:
     comment = f"# {row.description}: {row.allowed}"
     if hidden:
         comment += f"; needs {row.effect}"
-    shown = "" if value is None else toml_value(value)
-    mark = "# " if hidden or value is None else ""
+    shown = "" if value in (None, ()) else toml_value(value)
+    mark = "# " if hidden or value in (None, ()) else ""
     return [comment, f"{mark}{row.key.rpartition('.')[2]} = {shown}".rstrip()]
 
 

@@ -101,7 +101,6 @@ def test_static_load_does_not_creep(joint):
         assert of_joint(simulation, Has.GAP) == pytest.approx(short, rel=1e-2)
 
 
-@pytest.mark.xfail(strict=True, reason="an open end takes half a cell of body force too much")
 @pytest.mark.parametrize("joint", ["perfect", "threaded", "contact", "lossy"])
 def test_static_load_is_feed_and_weight(joint):
     """What rests on the spring is all of the feed and the weight, and no more."""
@@ -109,7 +108,6 @@ def test_static_load_is_feed_and_weight(joint):
     np.testing.assert_allclose(seen["bit_force"], load, rtol=1e-8)
 
 
-@pytest.mark.xfail(strict=True, reason="the spring of a damper that has parted stores energy")
 def test_damper_that_has_parted_stores_nothing():
     """Casing and string part for good: what they are worth in energy is their motion alone."""
     simulation = struck(
@@ -123,7 +121,6 @@ def test_damper_that_has_parted_stores_nothing():
     assert ledger["joints"] == pytest.approx(0.0, abs=1e-6 * ledger["initial"])
 
 
-@pytest.mark.xfail(strict=True, reason="the step of the damper is explicit")
 @pytest.mark.parametrize(("stiffness", "damping"), [(1e9, 1e8), (1e10, 1e9)])
 def test_strong_damper_makes_no_energy(stiffness, damping):
     """A damper within the bounds of its parameters, however strong, holds or takes."""
@@ -138,7 +135,6 @@ def test_strong_damper_makes_no_energy(stiffness, damping):
         assert ledger["kinetic"] <= ledger["initial"]
 
 
-@pytest.mark.xfail(strict=True, reason="a wave stays a step at least, and its mass with it")
 def test_sections_shorter_than_a_step_balance():
     """Feed on bars whose sections are shorter than a step: the ledger closes."""
     thin = [{"length": length * CELL, "area": AREA} for length in (6.0, 0.4, 7.3, 0.7)]
@@ -150,7 +146,6 @@ def test_sections_shorter_than_a_step_balance():
     assert abs(simulation.energy()["residual_relative"]) < 1e-9
 
 
-@pytest.mark.xfail(strict=True, reason="the casing bears the drive as if it had not turned")
 def test_recoil_is_the_opposite_of_the_drive():
     """Piston, string and casing keep their momentum, also in a step in which the drive turns."""
     simulation = struck(

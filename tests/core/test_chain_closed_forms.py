@@ -111,7 +111,7 @@ def test_rigid_piston_rod_and_spring_have_the_known_efficiency(r):
         errors.append(np.abs(found - wanted).max() / wanted.max())
         works.append(abs(0.5 * K * found.max() ** 2 / energy - best))
     orders = np.log2(np.array(errors[:-1]) / errors[1:])
-    assert orders == pytest.approx(2.0, abs=0.1)
+    assert orders == pytest.approx(2.0, abs=0.01)
     assert errors[-1] < 1e-4
     assert works[-1] < 1e-4
 
@@ -244,7 +244,6 @@ def test_wave_through_an_odd_length_comes_on_time(part):
     assert lost > -1e-11 * abs(ledger["ends"])
 
 
-@pytest.mark.xfail(strict=True, reason="what Lagrange's weights take is booked as loss")
 def test_loss_that_is_off_takes_nothing():
     """What an odd length takes where loss is off is numerical."""
     simulation = driven(bar(40), bar(23.37), bar(120), steps=3)
@@ -270,7 +269,6 @@ def test_weights_keep_time_and_make_no_energy(transit, variance):
     assert np.abs(np.exp(-1j * np.outer(w, times)) @ weights).max() < 1 + 1e-13
 
 
-@pytest.mark.xfail(strict=True, reason="spread ends at a step a cell: finer cells have less loss")
 @pytest.mark.parametrize("cells", [200, 400, 800])
 def test_finer_cells_keep_their_loss(cells):
     """The reference loss time in 0.2 m of steel: the gain at 50 mm, whatever the cells."""
@@ -303,9 +301,10 @@ def test_loss_dampens_a_sine_as_kelvin_voigt_steel_does(eta, length):
         found = came @ np.exp(-1j * w * DT * np.arange(steps))
         kept = math.exp(-0.5 * eta * w * w * path / C0)
         # weights on steps differ from a normal distribution by the fourth order
-        assert abs(found) == pytest.approx(kept, rel=0.2 * (w * DT) ** 4 * path / CELL + 1e-9)
+        assert abs(found) == pytest.approx(kept, rel=0.016 * (w * DT) ** 4 * path / CELL + 1e-12)
         phase = np.angle(found * np.exp(1j * w * path / C0))
-        assert abs(phase) < 1e-3 * (w * DT) ** 3 * path / CELL + 1e-9
+        # and a part of a step is Lagrange's cubic
+        assert abs(phase) < 3e-3 * (w * DT) ** 5 + 1e-12
     ledger = simulation.energy()
     assert ledger["loss"] > 0.0
     assert abs(ledger["residual"]) < 1e-11 * abs(ledger["ends"])

@@ -113,25 +113,12 @@ def draw_scene(source: Source) -> Scene:
     if effects["rock"] in ("bilinear", "spring"):
         groups["rock"] = {"loading_stiffness": decades(source, 1e6, 1e10)}
     if chance(source, 50):
-        groups["solver"] = {"cells": cells_of(source, bars[model == "rigid" :])}
+        groups["solver"] = {"cells": round(source.between(2.0, 40.0))}
     if effects["feed"]:
         groups["feed"] = {"force": source.between(-2e3, 1e4)}
     return Scene(
         bars=bars, effects=effects, start=start, string=string, run={"settle": 0.0}, **groups
     )
-
-
-def cells_of(source: Source, bars: list[dict[str, Any]]) -> int:
-    """Cells of the first bar with which no section is shorter than a step."""
-    transits = [
-        [
-            one["length"] * math.sqrt(one.get("density", 7850.0) / one.get("youngs_modulus", 210e9))
-            for one in bar["sections"]
-        ]
-        for bar in bars
-    ]
-    shortest = min(map(min, transits))
-    return math.ceil(sum(transits[0]) / shortest * source.between(1.0, 3.0))
 
 
 # ---------------------------------------------------------------------------- what must hold

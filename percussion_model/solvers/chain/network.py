@@ -9,10 +9,9 @@ import numpy as np
 
 from percussion_model.physics.records import Piston
 from percussion_model.scene.bars import (
-    bar_mass,
+    LENGTH,
     bar_transit_time,
     section_impedance,
-    section_mass,
     section_transit_time,
 )
 from percussion_model.scene.numbers import Numbers
@@ -22,6 +21,8 @@ from percussion_model.solvers.chain.taps import weights_of
 from percussion_model.solvers.modal.lanes import WIDTH
 from percussion_model.solvers.setup import MOST_CELLS, PISTONS, kelvin_voigt_time, refuse_many
 
+# Where steps are shorter than the Kelvin-Voigt time, sections must have this share of their loss.
+LEAST_SPREAD = 0.99
 # Steps in which a wave crosses the piston, and any bar at least, where a scene asks for none.
 DEFAULT_CELLS, FEWEST_CELLS = 20, 4
 
@@ -92,10 +93,11 @@ def network_of(numbers: Numbers) -> Network:
     weights: list[np.ndarray] = []
     ring, misfit, k = 0, 0.0, 0
     for number, bar in enumerate(bars):
-        bodies[number] = bar_mass(bar), k, k + len(bar) - 1
+        bodies[number] = 0.0, k, k + len(bar) - 1
         for section in bar:
             transit = section_transit_time(section) / dt
-            delay, taps, spread = weights_of(transit, eta * transit / dt)
+            wanted = eta * transit / dt
+            delay, taps, spread = weights_of(transit, wanted)
             mean = delay + float(np.arange(len(taps)) @ taps)
             misfit = max(misfit, abs(mean / transit - 1.0))
             padded = 1 if len(taps) == 1 else -(-len(taps) // WIDTH) * WIDTH
@@ -106,11 +108,17 @@ def network_of(numbers: Numbers) -> Network:
             # newest last, as they lie in the ring
             weights.append(np.concatenate([np.zeros(padded - len(taps)), taps[::-1]]))
             ring += 4 * size
-            loss = 1.0 if spread <= 0.0 else min(1.0, eta * transit / dt / spread)
-            z, mass = section_impedance(section), section_mass(section)
+            if dt < eta and spread < LEAST_SPREAD * wanted:
+                raise _too_fine(numbers, float(section[LENGTH]), dt, eta)
+            loss = 1.0 if eta else 0.0
+            if spread > wanted:  # the rest is what fitting a short section to steps takes
+                loss = wanted / spread
+            z = section_impedance(section)
+            mass = z * mean * dt  # of what is shorter than a step: as much as its waves have
             steel[k] = (
                 z, 0.0, 0.0, mass / places[k, Place.CELLS], z * dt * loss, z * dt * (1.0 - loss)
             )  # fmt: skip
+            bodies[number, Body.MASS] += mass
             if k > bodies[number, Body.FIRST]:
                 above = steel[k - 1, Steel.IMPEDANCE]
                 steel[k, Steel.ALPHA : Steel.BETA + 1] = (
@@ -121,6 +129,15 @@ def network_of(numbers: Numbers) -> Network:
     fits = _fits(numbers, steel, bodies[struck:])
     chain = Chain(places, steel, np.concatenate(weights)[None], fits, bodies)
     return Network(chain, names, dt, ring, misfit, struck)
+
+
+def _too_fine(numbers: Numbers, length: float, dt: float, eta: float) -> SceneError:
+    """Error for steps so short that a section cannot spread a wave enough."""
+    cells = bar_transit_time(elastic_chain(numbers)[0][0]) / dt
+    return SceneError(
+        f"solver.cells = {cells:.0f}: steps of {dt:.2g} s are shorter than loss.time = "
+        f"{eta:.2g} s, and a section of {length:g} m is too short for its loss: take fewer"
+    )
 
 
 def _fits(numbers: Numbers, steel: np.ndarray, bodies: np.ndarray) -> np.ndarray:
@@ -153,6 +170,9 @@ def parameters_of(network: Network, numbers: Numbers, par: np.ndarray) -> None:
     p: Any = par[0]
     values = numbers.values
     p["dt"] = network.time_step
+    p["mass_b"] = network.chain.bodies[-1, Body.MASS]
+    if PISTONS[values.piston_model] == Piston.ELASTIC:
+        p["mass_p"] = network.chain.bodies[0, Body.MASS]
     p["sections"], p["bars"] = len(network.chain.places), len(network.names)
     p["joints"], p["struck"] = len(network.chain.fits), network.struck
     if PISTONS[values.piston_model] == Piston.ABSENT and values.effects_string:

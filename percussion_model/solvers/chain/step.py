@@ -67,10 +67,24 @@ def stored_in_joint(fits, joints, j):
 
 
 @inlined
-def damper_force(par, shortened, speed):
-    """Force of the damper, which only pushes [N]."""
-    force = par.damper_preload + par.damper_stiffness * shortened + par.damper_damping * speed
-    return max(force, 0.0)
+def damper_force(par, shortened, speed, mass):
+    """Mean force over a step of the damper between casing and bar, which only pushes [N].
+
+    By the trapezoidal rule, which is stable at any stiffness and damping.
+    """
+    k, c, half = par.damper_stiffness, par.damper_damping, 0.5 * par.dt
+    gives = half * (1.0 / par.casing_mass + 1.0 / mass)
+    force = par.damper_preload + k * shortened + (c + half * k) * speed
+    return max(force / (1.0 + gives * (c + half * k)), 0.0)
+
+
+@inlined
+def stored_in_damper(par, shortened):
+    """Energy of its spring, less that at the start; no less than where it has parted [J]."""
+    k, preload = par.damper_stiffness, par.damper_preload
+    if k > 0.0:
+        shortened = max(shortened, -preload / k)
+    return shortened * (preload + 0.5 * k * shortened)
 
 
 @inlined
@@ -81,7 +95,7 @@ def accelerations(par, s, chain, waves, push):
     struck, bit, damper = par.struck, par.bars - 1, 0.0
     if par.damper == 1:
         speed = s.v_c - waves.bars[VELOCITY, struck]
-        damper = damper_force(par, s.x_c + 0.5 * par.dt * speed, speed)
+        damper = damper_force(par, s.x_c, speed, chain.bodies[struck, MASS])
         waves.came[ACCELERATION, struck] += damper / chain.bodies[struck, MASS]
     else:
         waves.came[ACCELERATION, struck] += s.feed / chain.bodies[struck, MASS]
@@ -104,8 +118,8 @@ def meet_top(par, s, chain, waves, tau, time):
     pulse = 0.0
     if time < par.pulse_end:
         pulse = par.pulse * min(1.0, (par.pulse_end - time) / par.dt)
-    if par.open_top == 1:
-        down = pulse / z + kick
+    if par.open_top == 1:  # as a dashpot Z, which no body force acts on
+        down = pulse / z + 0.5 * kick
     else:
         down = up + kick + pulse / z
     waves.came[DOWN_OUT, 0] = down
@@ -247,7 +261,8 @@ def meet_nothing(par, s, chain, waves, tau):
     """The bit's lower end where it reflects nothing: what comes leaves."""
     k, bit = par.sections - 1, par.bars - 1
     z, down, kick = chain.steel[k, IMPEDANCE], waves.came[DOWN, k], kick_of(par, waves, bit)
-    force = z * down
+    kick *= 0.5
+    force = z * (down + kick)
     waves.came[UP_OUT, k], waves.came[FROM_BELOW, bit] = kick, force * tau
     s.e_ends += force * (down + kick) * tau
     s.i_came += z * down * down * tau
@@ -276,9 +291,9 @@ def move_bars(par, s, chain, waves, damper, tau):
     recoil = drive_force(par, s)
     v1 = s.v_c + (s.feed - damper - recoil) / par.casing_mass * tau
     path = 0.5 * tau * (s.v_c + v1)
-    before = s.x_c * (par.damper_preload + 0.5 * par.damper_stiffness * s.x_c)
+    before = stored_in_damper(par, s.x_c)
     s.x_c += path - held
-    stored = s.x_c * (par.damper_preload + 0.5 * par.damper_stiffness * s.x_c) - before
+    stored = stored_in_damper(par, s.x_c) - before
     s.e_stored += stored
     s.e_joints += damper * (path - held) - stored
     s.e_feed += s.feed * path
@@ -320,8 +335,12 @@ def meet(par, s, chain, waves, tau, blows, events):
         half, u_before = 0.5 * tau, s.u_r
         a_p = piston_acceleration(par, push)
         s.u_r += half * (2.0 * (s.v_p + a_p * half) - impulse / par.mass_p) - held
-        v_p = s.v_p
+        v_p, given = s.v_p, s.i_drive
         move_piston(par, s, push, impulse, u_before, time, tau, events)
+        if par.damper == 1:  # recoil of a drive that has turned
+            extra = s.i_drive - given - push * tau
+            s.e_drive -= extra * (s.v_c - 0.5 * extra / par.casing_mass)
+            s.v_c -= extra / par.casing_mass
         if par.piston == Piston.ELASTIC:
             waves.bars[VELOCITY, 0] = s.v_p
             # what its waves get is the force at the start over the whole step

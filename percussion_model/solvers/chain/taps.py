@@ -5,8 +5,8 @@ distribution of the variance eta T does (docs/model.md, eq. 2, for waves far lon
 So it arrives as a sum of what was sent at some steps before, by weights whose sum is one: a
 lasting force passes as it is. The part f dt of a step is Lagrange's cubic between four steps, in
 its middle interval, where it lets no frequency grow (T. Laakso et al., IEEE Signal Processing
-Magazine 13 (1996) 30); the spread is by weights (a, 1 - 2 a, a), some times, which let none grow
-either. So no weights make energy.
+Magazine 13 (1996) 30); the spread is by samples of the normal distribution, or where it is narrow
+by weights (a, 1 - 2 a, a), some times, which let none grow either. So no weights make energy.
 """
 
 from __future__ import annotations
@@ -21,6 +21,11 @@ WHOLE = 1e-9
 MOST_SPREAD = 0.25
 # And where steps are few, up to this.
 UTMOST_SPREAD = 0.5
+# Above this variance samples of a normal distribution have it to rounding [steps^2].
+LEAST_NORMAL = 2.0
+# They end so many standard deviations from the mean, where they are 1e-9 of the greatest; where a
+# section is too short for that no less than so many, which keeps 0.999 of the variance.
+REACH, LEAST_REACH = 6.5, 4.0
 # Weights below this, at either end, are rounding.
 NOTHING = 1e-18
 
@@ -51,10 +56,16 @@ def weights_of(transit: float, variance: float) -> tuple[int, np.ndarray, float]
         delay, weights, spread = whole - 1, _cubic(part), 0.0
     else:  # too short for four steps
         delay, weights, spread = whole, np.array([1.0 - part, part]), part * (1.0 - part)
-    rounds = min(math.ceil(0.5 * max(variance - spread, 0.0) / MOST_SPREAD), delay - 1)
+    rest, room = max(variance - spread, 0.0), delay - 1
+    reach = min(room, math.ceil(REACH * math.sqrt(rest)))
+    if rest >= LEAST_NORMAL and reach >= LEAST_REACH * math.sqrt(rest):
+        normal = np.exp(-0.5 * np.arange(-reach, reach + 1) ** 2 / rest)
+        weights = np.convolve(weights, normal / normal.sum())
+        return delay - reach, weights / weights.sum(), spread + rest
+    rounds = min(math.ceil(0.5 * rest / MOST_SPREAD), room)
     if rounds == 0:
         return delay, weights, spread
-    a = min(0.5 * (variance - spread) / rounds, UTMOST_SPREAD)
+    a = min(0.5 * rest / rounds, UTMOST_SPREAD)
     for _ in range(rounds):
         weights = np.convolve(weights, [a, 1.0 - 2.0 * a, a])
     kept = np.flatnonzero(np.abs(weights) > NOTHING)

@@ -1,0 +1,436 @@
+"""Waves in a drill string: what passes its joints, what reaches the rock, where steel is pulled."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+import numpy as np
+
+from percussion_model.physics.records import EventKind
+from percussion_model.scene.bar_groups import Bar
+from percussion_model.scene.inputs import SimulationError
+from percussion_model.scene.scene import Scene, SceneError
+from percussion_model.simulation.simulate import Simulation
+from percussion_model.solvers.chain.records import Has
+from percussion_model.solvers.chain.solver import ChainSolver
+from percussion_model.solvers.state import State
+
+# Whole blows that means need.
+FEWEST_BLOWS = 3
+# A front is smeared: it is waited for from so many steps before its arrival on.
+FRONT_STEPS = 4
+# Share of the duration that settles where the scene's settling time is longer.
+SETTLING_SHARE = 0.25
+
+
+@dataclass(frozen=True)
+class JointReport:
+    """What a joint does to waves, mean of a blow.
+
+    A wave that crosses a joint several times counts each time, and what the feed presses
+    together counts as waves as well: as much in `came` as in `returned`.
+
+    Attributes
+    ----------
+    came : float
+        Energy of the waves that came down to it [J].
+    passed : float
+        Of those that left it downward [J]; part of it had come up from below.
+    returned : float
+        Of those that left it upward [J]; likewise.
+    efficiency : float
+        Share of the first wave that does not go back, (came - returned) / came from when the
+        front of the impact arrives, for as long as a wave takes to go up and down the longer
+        of the two bars.
+    least_force : float
+        Least force in it, mean of a time step; below zero: the greatest tension [N].
+    """
+
+    came: float
+    passed: float
+    returned: float
+    efficiency: float
+    least_force: float
+
+    @property
+    def net(self) -> float:
+        """Energy that went down through it for good [J]."""
+        return self.came - self.returned
+
+
+@dataclass(frozen=True)
+class RockReport:
+    """What reaches the rock, mean of a blow.
+
+    Attributes
+    ----------
+    incident, reflected : float
+        Energy of the waves that came down to it and that it sent back [J].
+    work : float
+        Done on it [J].
+    penetration : float
+        Advance of the hole [m].
+    first_penetration : float
+        That of the first incident wave [m]: from when the front of the impact arrives until the
+        time in which a wave goes up to the struck end and comes back has passed, or the next
+        front arrives. So nothing that the rock sent up has been turned back by the struck end.
+    """
+
+    incident: float
+    reflected: float
+    work: float
+    penetration: float
+    first_penetration: float
+
+    @property
+    def first_share(self) -> float:
+        """Share of the penetration that the first incident wave makes."""
+        return self.first_penetration / self.penetration if self.penetration > 0.0 else math.nan
+
+
+@dataclass(frozen=True)
+class Extreme:
+    """Greatest or least value in a bar over the watched blow.
+
+    Attributes
+    ----------
+    value : float
+        [Pa], compression positive
+    place : float
+        From the top of the bar, the middle of a cell [m].
+    time : float
+        Since the impact [s].
+    """
+
+    value: float
+    place: float
+    time: float
+
+
+@dataclass(frozen=True)
+class BarStress:
+    """Greatest compression and greatest tension (the least stress) in a bar."""
+
+    compression: Extreme
+    tension: Extreme
+
+
+@dataclass(frozen=True, repr=False)
+class WatchedBlow:
+    """One blow of the settled run, step by step. Times count from its impact.
+
+    Attributes
+    ----------
+    time : float array, shape (n,)
+        [s]
+    start : float
+        Time of the impact in the run [s].
+    edges : dict of float array
+        By bar: edges of its cells, from its own top [m].
+    force : dict of float array, shape (n, cells)
+        By bar, compression positive [N].
+    area : dict of float array
+        By bar: of its cells [m2].
+    kinetic, elastic : dict of float array, shape (n,)
+        Energy of motion and of strain by bar [J].
+    contacts : list of (float, float)
+        From when to when the piston is on the struck bar [s].
+    """
+
+    time: np.ndarray
+    start: float
+    edges: dict[str, np.ndarray]
+    force: dict[str, np.ndarray]
+    area: dict[str, np.ndarray]
+    kinetic: dict[str, np.ndarray]
+    elastic: dict[str, np.ndarray]
+    contacts: list[tuple[float, float]]
+
+    def __repr__(self) -> str:
+        bars = ", ".join(self.force)
+        return f"WatchedBlow({len(self.time)} steps from {self.start:.6g} s on: {bars})"
+
+    def stress(self, bar: str) -> np.ndarray:
+        """Stress by time and cell [Pa], compression positive."""
+        return self.force[bar] / self.area[bar]
+
+    def gauge(self, bar: str, place: float) -> np.ndarray:
+        """Stress over `time` in a bar, at a distance from its top [Pa].
+
+        It is that of the cell in which the gauge sits, in steel of the section there.
+        """
+        if bar not in self.edges:
+            raise SimulationError(f"gauge on {bar!r}: must be one of {', '.join(self.edges)}")
+        edges = self.edges[bar]
+        if not 0.0 <= place <= edges[-1]:
+            raise SimulationError(f"gauge at {place!r} m: the {bar} is {edges[-1]:.6g} m long")
+        cell = int(np.searchsorted(edges[1:-1], place, side="right"))
+        found: np.ndarray = self.force[bar][:, cell] / self.area[bar][cell]
+        return found
+
+
+@dataclass(frozen=True)
+class StringReport:
+    """Waves of a drill string in the settled run.
+
+    Attributes
+    ----------
+    title : str
+        Of the scene.
+    transit_time : float
+        Of a wave from the struck end to the rock [s].
+    blows : int
+        Whole blows after settling, over which the means are taken.
+    period, blow_energy : float
+        Means [s, J].
+    joints : dict of JointReport
+        By the bars above and below, as "rod 1 / rod 2".
+    rock : RockReport
+    bars : dict of BarStress
+        Over the watched blow.
+    gauges : dict of (str, float) to float array
+        Stress over `watched.time`, by bar and distance from its top [Pa].
+    watched : WatchedBlow
+    """
+
+    title: str
+    transit_time: float
+    blows: int
+    period: float
+    blow_energy: float
+    joints: dict[str, JointReport]
+    rock: RockReport
+    bars: dict[str, BarStress]
+    gauges: Mapping[tuple[str, float], np.ndarray] = field(repr=False)
+    watched: WatchedBlow
+
+    @property
+    def efficiency(self) -> float:
+        """Work on the rock by blow energy."""
+        return self.rock.work / self.blow_energy if self.blow_energy > 0.0 else math.nan
+
+
+def string_report(
+    scene: Scene,
+    duration: float | None = None,
+    settle: float | None = None,
+    gauges: Sequence[tuple[str, float]] = (),
+) -> StringReport:
+    """Run a scene with a drill string and tell what its waves do.
+
+    Means are taken over the whole blows after settling. Stress is that of one of these, the
+    first, which is watched step by step.
+
+    Parameters
+    ----------
+    scene : Scene
+        With `effects.string` and a piston.
+    duration, settle : float, optional
+        In place of those of the scene [s].
+    gauges : sequence of (str, float)
+        Bar and distance from its top [m].
+
+    Returns
+    -------
+    StringReport
+
+    Raises
+    ------
+    SceneError
+        If the scene has no drill string or no piston, or is not computed as a chain.
+    SimulationError
+        If there are too few whole blows, or no such place for a gauge.
+    """
+    if not scene.effects.string:
+        raise SceneError("effects.string = false: a string report needs a drill string")
+    if scene.piston.model == "absent":
+        raise SceneError('piston.model = "absent": a string report needs blows')
+    length = scene.run.duration if duration is None else duration
+    wait = scene.run.settle if settle is None else settle
+    if settle is None and duration is not None:
+        wait = min(wait, SETTLING_SHARE * duration)
+    simulation = Simulation(scene)
+    solver = simulation.solver
+    if not isinstance(solver, ChainSolver):
+        raise SceneError(f'solver.name = "{solver.name}": a string report needs "chain"')
+    simulation.advance(min(wait, length))
+    simulation.advance_blows(1, length)  # to the start of the first whole blow
+    before = simulation.blow_rows
+    snapshot = simulation.save()
+    first = _sums(snapshot.state)
+    # a copy of the state, in which only the least force so far begins anew
+    snapshot.state.arrays[1][Has.LEAST] = snapshot.state.arrays[1][Has.FORCE]
+    simulation.restore(snapshot)
+    last, finished = first, -1
+    while finished < simulation.blow_rows:
+        finished = simulation.blow_rows
+        last = _sums(simulation.save().state)
+        simulation.advance_blows(1, length)
+    blows = simulation.blows[before:]
+    if len(blows) < FEWEST_BLOWS:
+        raise SimulationError(
+            f"{len(blows)} whole blows from {wait:g} s to {length:g} s: a string report needs "
+            f"{FEWEST_BLOWS}; set a longer duration"
+        )
+    each = (last - first) / len(blows)
+    names = list(scene.bars)
+    least = simulation.save().state.arrays[1][Has.LEAST].tolist()
+    transits = [bar.transit_time for name, bar in scene.bars.items() if name != "piston"]
+    simulation.restore(snapshot)
+    shares = _first_shares(simulation, blows["time"], transits)
+    joints = {
+        f"{above} / {below}": _joint(each[:, k], shares[k], least[k])
+        for k, (above, below) in enumerate(pairwise(names[1:]))
+    }
+    transit = sum(transits)
+    simulation.restore(snapshot)
+    first_way, whole_way = _penetrations(simulation, blows, transit)
+    simulation.restore(snapshot)
+    watched = _watched(simulation, solver, float(blows["time"][0]), float(blows["period"][0]))
+    return StringReport(
+        title=scene.title,
+        transit_time=transit,
+        blows=len(blows),
+        period=float(np.mean(blows["period"])),
+        blow_energy=float(np.mean(blows["blow_energy"])),
+        joints=joints,
+        rock=RockReport(
+            incident=float(each[-2, 0]),
+            reflected=float(each[-1, 0]),
+            work=float(np.mean(blows["rock_energy"])),
+            penetration=whole_way,
+            first_penetration=first_way,
+        ),
+        bars={name: _bar_stress(watched, name) for name in watched.force},
+        gauges={(bar, place): watched.gauge(bar, place) for bar, place in gauges},
+        watched=watched,
+    )
+
+
+# An event so long before the start of a blow is the one that starts it [s].
+_AT_ONCE = 1e-6
+_ROWS = (Has.CAME, Has.PASSED, Has.RETURNED)
+
+
+def _joint(sums: np.ndarray, share: float, least: float) -> JointReport:
+    came, passed, returned = sums[: len(_ROWS)].tolist()
+    return JointReport(came, passed, returned, share, least)
+
+
+def _sums(state: State) -> np.ndarray:
+    """Energies so far: rows of `_ROWS` by joint, then that came to the rock and went back [J]."""
+    joints, record = state.arrays[1], state.record[0]
+    ends = [np.full(joints.shape[1], record[name]) for name in ("i_came", "i_returned")]
+    return np.vstack([*(joints[row] for row in _ROWS), *ends])
+
+
+def _first_shares(
+    simulation: Simulation, starts: np.ndarray, transits: Sequence[float]
+) -> list[float]:
+    """Share of the first wave that does not go back, by joint, mean of all blows but the last.
+
+    Parameters
+    ----------
+    starts : float array
+        Of the blows [s].
+    transits : sequence of float
+        Of the bars from the struck one down [s].
+    """
+    early = FRONT_STEPS * (simulation.solver.time_step or 0.0)
+    arrivals = np.cumsum(transits)[:-1]
+    stay = 2.0 * np.maximum(transits[1:], transits[:-1])
+    begin = starts[:-1, None] + arrivals - early  # by blow and joint
+    times = np.unique([begin, begin + early + stay])
+    sums = []
+    for time in times:
+        simulation.advance(float(time))
+        sums.append(_sums(simulation.save().state))
+    known = np.array(sums)
+    joints = np.arange(len(arrivals))
+    at = np.searchsorted(times, begin), np.searchsorted(times, begin + early + stay)
+    gained = [known[at[1], row, joints] - known[at[0], row, joints] for row in (0, 2)]
+    came, returned = (change.sum(axis=0) for change in gained)
+    found: list[float] = (1.0 - returned / came).tolist()
+    return found
+
+
+def _penetrations(simulation: Simulation, blows: np.ndarray, transit: float) -> tuple[float, float]:
+    """Advance of the hole by the first incident wave, and by all, mean of a blow [m].
+
+    The last blow is left out: its waves may arrive after the end of the run.
+    """
+    arrivals = blows["time"] + transit
+    ends = np.minimum(arrivals[:-1] + 2.0 * transit, arrivals[1:])
+    times = np.sort(np.concatenate([arrivals, ends]))
+    depth = simulation.sample(times)["hole_depth"]
+    at = np.searchsorted(times, arrivals[:-1]), np.searchsorted(times, ends)
+    first = float(np.mean(depth[at[1]] - depth[at[0]]))
+    return first, float(depth[-1] - depth[0]) / len(ends)
+
+
+def _watched(
+    simulation: Simulation, solver: ChainSolver, start: float, period: float
+) -> WatchedBlow:
+    """Watch a blow step by step, from its start on."""
+    step, bars = solver.time_step, simulation.scene.bars
+    grids = {name: grid for name in bars if (grid := solver.grid_of(name)) is not None}
+    first = math.ceil(simulation.time / step)
+    count = math.floor(period / step)
+    force: dict[str, list[np.ndarray]] = {name: [] for name in grids}
+    kinetic: dict[str, list[float]] = {name: [] for name in grids}
+    elastic: dict[str, list[float]] = {name: [] for name in grids}
+    for k in range(count):
+        simulation.advance((first + k) * step)
+        fields = simulation.fields()
+        for name, grid in grids.items():
+            f, v = fields[f"{name}_force"], fields[f"{name}_velocity"]
+            force[name].append(f)
+            kinetic[name].append(0.5 * float(grid.mass @ (v * v)))
+            strain = f / grid.impedance
+            elastic[name].append(0.5 * float(grid.mass @ (strain * strain)))
+    shapes = {name: _cells(bars[name], grid.in_sections) for name, grid in grids.items()}
+    return WatchedBlow(
+        time=(first + np.arange(count)) * step - start,
+        start=start,
+        edges={name: edges for name, (edges, _) in shapes.items()},
+        force={name: np.array(rows) for name, rows in force.items()},
+        area={name: area for name, (_, area) in shapes.items()},
+        kinetic={name: np.array(rows) for name, rows in kinetic.items()},
+        elastic={name: np.array(rows) for name, rows in elastic.items()},
+        contacts=_contacts(simulation.events, start, start + count * step),
+    )
+
+
+def _cells(bar: Bar, counts: list[int]) -> tuple[np.ndarray, np.ndarray]:
+    """Edges of the cells of a bar from its top [m], and their areas [m2]."""
+    heights = [s.length / n for s, n in zip(bar.sections, counts, strict=True) for _ in range(n)]
+    areas = [s.area for s, n in zip(bar.sections, counts, strict=True) for _ in range(n)]
+    return np.concatenate(([0.0], np.cumsum(heights))), np.array(areas)
+
+
+def _contacts(events: np.ndarray, start: float, end: float) -> list[tuple[float, float]]:
+    """Intervals in which the piston is on the struck bar, counted from `start` [s]."""
+    found: list[tuple[float, float]] = []
+    since = None
+    for event in events[events["time"] >= start - _AT_ONCE]:
+        if event["kind"] == EventKind.CONTACT_CLOSED and since is None:
+            since = float(event["time"]) - start
+        elif event["kind"] == EventKind.CONTACT_OPENED and since is not None:
+            found.append((since, float(event["time"]) - start))
+            since = None
+    return found if since is None else [*found, (since, end - start)]
+
+
+def _bar_stress(watched: WatchedBlow, bar: str) -> BarStress:
+    """Where a bar is pressed and pulled most."""
+    stress, edges = watched.stress(bar), watched.edges[bar]
+    middles = 0.5 * (edges[1:] + edges[:-1])
+
+    def extreme(flat: int) -> Extreme:
+        step, cell = np.unravel_index(flat, stress.shape)
+        return Extreme(float(stress[step, cell]), float(middles[cell]), float(watched.time[step]))
+
+    return BarStress(extreme(int(stress.argmax())), extreme(int(stress.argmin())))
