@@ -20,7 +20,7 @@ from percussion_model.scene.text import write_text
 
 HERE = Path(__file__).resolve().parent
 PAGE = HERE / "top_hammer.md"
-DPI = 90
+DPI = 100
 DURATION, SETTLE = 4.0, 1.0  # [s]
 RODS = (1, 2, 4, 6, 8)
 # The string that the figures show, and its gauges: middle of the first, second and last rod.
@@ -74,9 +74,7 @@ def presets() -> str:
                     f"{100 * found['transfer_efficiency']:.0f}",
                     f"{rate:.1f} ± {error:.1f}" if error > 0.05 else f"{rate:.1f}",
                     f"{1e-3 * found['peak_bit_force']:.0f}",
-                    f"{1.0 / found['real_time_factor']:.0f}"
-                    if found["real_time_factor"] < 1.0
-                    else f"{found['real_time_factor']:.0f}",
+                    f"{found['real_time_factor']:.0f}",
                 ]
             )
     head = ["hammer", "rods", "frequency, Hz", "impact, m/s", "blow, J", "efficiency, %"]
@@ -158,9 +156,7 @@ def fill(text: str, name: str, content: str) -> str:
     """Put content between the marks of a name."""
     marks = f"<!-- {name} -->\n", f"\n<!-- end of {name} -->"
     pattern = f"{re.escape(marks[0])}.*?{re.escape(marks[1])}"
-    filled, count = re.subn(
-        pattern, lambda _: marks[0] + content + marks[1], text, flags=re.DOTALL
-    )
+    filled, count = re.subn(pattern, lambda _: marks[0] + content + marks[1], text, flags=re.DOTALL)
     if count != 1:
         raise ValueError(f"docs/top_hammer.md: marks of {name!r} are there {count} times")
     return filled

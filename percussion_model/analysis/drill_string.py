@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -20,8 +21,6 @@ from percussion_model.solvers.state import State
 
 # Whole blows that means need.
 FEWEST_BLOWS = 3
-# A front is smeared: it is waited for from so many steps before its arrival on.
-FRONT_STEPS = 4
 # Share of the duration that settles where the scene's settling time is longer.
 SETTLING_SHARE = 0.25
 
@@ -42,9 +41,9 @@ class JointReport:
     returned : float
         Of those that left it upward [J]; likewise.
     efficiency : float
-        Share of the first wave that does not go back, (came - returned) / came from when the
-        front of the impact arrives, for as long as a wave takes to go up and down the longer
-        of the two bars.
+        Share of the first wave that does not go back, (came - returned) / came, of one blow
+        at the mean impact velocity on a string at rest, without damper and feed; until a wave
+        has gone up and down the longer of the two bars after the front came to the joint.
     least_force : float
         Least force in it, mean of a time step; below zero: the greatest tension [N].
     """
@@ -63,7 +62,7 @@ class JointReport:
 
 @dataclass(frozen=True)
 class RockReport:
-    """What reaches the rock, mean of a blow.
+    """What reaches the rock, mean of a blow in the settled run.
 
     Attributes
     ----------
@@ -279,8 +278,7 @@ def string_report(
     names = list(scene.bars)
     least = simulation.save().state.arrays[1][Has.LEAST].tolist()
     transits = [bar.transit_time for name, bar in scene.bars.items() if name != "piston"]
-    simulation.restore(snapshot)
-    shares = _first_shares(simulation, blows["time"], transits)
+    shares = _first_shares(scene, float(np.mean(blows["impact_velocity"])), transits)
     joints = {
         f"{above} / {below}": _joint(each[:, k], shares[k], least[k])
         for k, (above, below) in enumerate(pairwise(names[1:]))
@@ -327,34 +325,37 @@ def _sums(state: State) -> np.ndarray:
     return np.vstack([*(joints[row] for row in _ROWS), *ends])
 
 
-def _first_shares(
-    simulation: Simulation, starts: np.ndarray, transits: Sequence[float]
-) -> list[float]:
-    """Share of the first wave that does not go back, by joint, mean of all blows but the last.
+def _first_shares(scene: Scene, speed: float, transits: Sequence[float]) -> list[float]:
+    """Share of the first wave that does not go back, by joint.
 
     Parameters
     ----------
-    starts : float array
-        Of the blows [s].
+    scene : Scene
+    speed : float
+        With which the piston strikes the string at rest [m/s].
     transits : sequence of float
         Of the bars from the struck one down [s].
     """
-    early = FRONT_STEPS * (simulation.solver.time_step or 0.0)
-    arrivals = np.cumsum(transits)[:-1]
+    simulation = Simulation(scene.replace(**_AT_REST, **{"start.piston_velocity": speed}), False)
     stay = 2.0 * np.maximum(transits[1:], transits[:-1])
-    begin = starts[:-1, None] + arrivals - early  # by blow and joint
-    times = np.unique([begin, begin + early + stay])
-    sums = []
-    for time in times:
-        simulation.advance(float(time))
-        sums.append(_sums(simulation.save().state))
-    known = np.array(sums)
-    joints = np.arange(len(arrivals))
-    at = np.searchsorted(times, begin), np.searchsorted(times, begin + early + stay)
-    gained = [known[at[1], row, joints] - known[at[0], row, joints] for row in (0, 2)]
-    came, returned = (change.sum(axis=0) for change in gained)
-    found: list[float] = (1.0 - returned / came).tolist()
-    return found
+    ends = np.cumsum(transits)[:-1] + stay
+    shares = [math.nan] * len(ends)
+    for k in np.argsort(ends).tolist():
+        simulation.advance(float(ends[k]))
+        came, _, returned = _sums(simulation.save().state)[: len(_ROWS), k].tolist()
+        shares[k] = 1.0 - returned / came if came > 0.0 else math.nan
+    return shares
+
+
+# Nothing acts on the string but the piston.
+_AT_REST: dict[str, Any] = {
+    "effects.gravity": False,
+    "effects.feed": False,
+    "effects.drive": "none",
+    "effects.damper": False,
+    "start.gap": 0.0,
+    "start.bit_velocity": 0.0,
+}
 
 
 def _penetrations(simulation: Simulation, blows: np.ndarray, transit: float) -> tuple[float, float]:

@@ -22,7 +22,8 @@ EXCEEDED = 5e-3
 APART = 0.032
 # Two times that are closer than this share of what is shown are written on either side.
 CLOSE = 0.1
-MAP = "RdBu_r"
+# So many shades, an odd number: what is weaker than half of one is white, and files are small.
+MAP, SHADES = "RdBu_r", 25
 PRESSED, PULLED = "#B2182B", "#2166AC"  # as the map has them
 BAR_SHADES = (0.30, 0.85)  # of matplotlib's Blues, for the first and the last rod
 
@@ -86,13 +87,13 @@ def draw_waves(report: StringReport) -> Figure:
     ax, below = fig.subplots(2, 1, sharex=True, height_ratios=(3.4, 1.0))
     shown = np.concatenate([np.abs(force[:count]).ravel() for force in watched.force.values()])
     limit = float(np.quantile(shown, 1.0 - EXCEEDED)) or 1.0
-    offsets = _offsets(watched)
+    shades, offsets = matplotlib.colormaps[MAP].resampled(SHADES), _offsets(watched)
     for name, force in watched.force.items():
         mesh = ax.pcolormesh(
             time_edges,
             offsets[name] + watched.edges[name],
             force[:count].T / KN,
-            cmap=MAP,
+            cmap=shades,
             vmin=-limit / KN,
             vmax=limit / KN,
             rasterized=True,

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from percussion_model.interface.plotting import style
-from percussion_model.verification.hard_cases import SOLVERS, Collection
+from percussion_model.verification.hard_cases import ALL_SOLVERS, Collection
 
 # What lies below this is rounding of one number: it gets the colour of it.
 LEAST = 1e-16
@@ -26,7 +26,7 @@ _ROW_HEIGHT = 0.135
 def draw_stability(found: Collection) -> Figure:
     """Draw a heat map of each measure; what a solver does not compute is left white."""
     cases = list(dict.fromkeys(row["case"] for row in found.rows))
-    solvers = [name for name in SOLVERS if any(row["solver"] == name for row in found.rows)]
+    solvers = [name for name in ALL_SOLVERS if any(row["solver"] == name for row in found.rows)]
     height = 2.2 + _ROW_HEIGHT * len(cases)
     fig = Figure(figsize=(10.5, height), layout="constrained")
     axes = np.atleast_1d(fig.subplots(1, len(PANELS), sharey=True))

@@ -73,6 +73,10 @@ def time_step_of(numbers: Numbers) -> float:
     longest = [first / own, *(bar_transit_time(bar) / FEWEST_CELLS for bar in bars[1:])]
     # a section shorter than a step would be longer than it is
     longest += [section_transit_time(section) for bar in bars for section in bar]
+    # and in steps shorter than the Kelvin-Voigt time short sections would lose their loss
+    least = min(kelvin_voigt_time(numbers), first)
+    if least > min(longest):
+        return first / math.floor(first / least)
     return first / math.ceil(first / min(longest) - 1e-9)
 
 

@@ -17,6 +17,8 @@ from typing import Any
 from percussion_model.scene.scene import Scene
 
 SOLVERS = ("wave", "fem", "rigid")
+# With those that some cases alone are for: drill strings.
+ALL_SOLVERS = (*SOLVERS, "chain")
 
 # What a table leaves out.
 DURATION, SETTLING_SHARE = 0.5, 0.1  # [s], and of it
@@ -102,7 +104,7 @@ class HardCase:
 def hard_cases() -> dict[str, HardCase]:
     """All hard cases by name, in the order of the files and of the tables in them."""
     found: dict[str, HardCase] = {}
-    for group in ("rock", "drive", "bars", "contact", "inputs"):
+    for group in ("rock", "drive", "bars", "contact", "inputs", "chains"):
         text = resources.files(__package__).joinpath(f"{group}.toml").read_text(encoding="utf-8")
         for name, table in tomllib.loads(text).items():
             if name in found:

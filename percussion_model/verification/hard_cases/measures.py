@@ -124,7 +124,7 @@ def measure(
     ----------
     case : HardCase
     solver : str
-        "wave", "fem" or "rigid".
+        "wave", "fem", "rigid" or "chain".
     share : float
         Share of the case's duration.
     again : bool
@@ -280,15 +280,12 @@ def _momentum(scene: Scene, samples: dict[str, np.ndarray]) -> float:
     weight = scene.gravity.acceleration if scene.effects.gravity else 0.0
     t = samples["here"]
     contact = np.nan_to_num(samples["contact_impulse"])
-    mass = scene.bit.mass
-    given = samples["feed_impulse"] + mass * weight * t + contact - samples["bit_impulse"]
-    off = _mismatch(mass * samples["bit_velocity"], given)
-    parts = [
-        samples["feed_impulse"],
-        contact,
-        samples["bit_impulse"],
-        mass * samples["bit_velocity"],
-    ]
+    off, parts = 0.0, [samples["feed_impulse"], contact, samples["bit_impulse"]]
+    if not scene.effects.string:  # else it is of all bars, which samples do not tell
+        mass = scene.bit.mass
+        given = samples["feed_impulse"] + mass * weight * t + contact - samples["bit_impulse"]
+        off = _mismatch(mass * samples["bit_velocity"], given)
+        parts.append(mass * samples["bit_velocity"])
     if scene.piston.model != "absent":
         mass = scene.piston.mass
         given = mass * weight * t + samples["drive_impulse"] - contact
