@@ -154,9 +154,11 @@ def at_the_rock(report: StringReport) -> str:
 
 def fill(text: str, name: str, content: str) -> str:
     """Put content between the marks of a name."""
-    marks = f"<!-- {name} -->\n", f"\n<!-- end of {name} -->"
+    marks = f"<!-- {name} -->", f"<!-- end of {name} -->"
     pattern = f"{re.escape(marks[0])}.*?{re.escape(marks[1])}"
-    filled, count = re.subn(pattern, lambda _: marks[0] + content + marks[1], text, flags=re.DOTALL)
+    filled, count = re.subn(
+        pattern, lambda _: f"{marks[0]}\n{content}\n{marks[1]}", text, flags=re.DOTALL
+    )
     if count != 1:
         raise ValueError(f"docs/top_hammer.md: marks of {name!r} are there {count} times")
     return filled

@@ -150,11 +150,11 @@ def _mark_contacts(ax: Axes, watched: WatchedBlow, end: float) -> None:
 
 
 def _end_forces(ax: Axes, watched: WatchedBlow, count: int) -> None:
-    """Draw the forces in the first and the last cell of the string."""
+    """Draw the forces in the first and the last cell of the string, piston apart."""
     time, names = watched.time[:count] * MS, [name for name in watched.force if name != "piston"]
     first, last = watched.force[names[0]][:count, 0], watched.force[names[-1]][:count, -1]
-    ax.plot(time, first / KN, "--", color=style.PISTON_COLOUR, label="top of the shank")
-    ax.plot(time, last / KN, color=style.BIT_COLOUR, label="lower end of the bit, on the rock")
+    ax.plot(time, first / KN, "--", color=style.PISTON_COLOUR, label="just below the struck end")
+    ax.plot(time, last / KN, color=style.BIT_COLOUR, label="just above the rock")
     ax.axhline(0.0, color=style.RULE_COLOUR, linewidth=0.6)
     low, high = ax.get_ylim()
     ax.set_ylim(low, high + 0.3 * (high - low))

@@ -1,0 +1,137 @@
+"""Force and motion at the end of a bar, from two strain gauges on it.
+
+In a uniform bar F = Z (d - u) and v = d + u, where d moves down and u up, unchanged
+(docs/model.md, eqs 5-6). Two gauges, a transit time T apart, tell both waves as long as nothing
+moved before: d1(t) = F1(t)/Z + u2(t - T), u2(t) = d1(t - T) - F2(t)/Z. So incident and reflected
+waves may overlap at the gauges. (B. Lundberg, A. Henchoz, Experimental Mechanics 17 (1977) 213.)
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from percussion_model.scene.rows import SceneError
+from percussion_model.simulation.gauge import gauge_force
+from percussion_model.simulation.simulate import Simulation
+
+
+class AtEnd(NamedTuple):
+    """What a bar does at its lower end.
+
+    Attributes
+    ----------
+    time : ndarray
+        [s]
+    force : ndarray
+        Compression positive [N].
+    velocity, displacement : ndarray
+        Down positive [m/s, m].
+    incident, reflected : float
+        Energy that came down to the end, and that went back up [J].
+    """
+
+    time: np.ndarray
+    force: np.ndarray
+    velocity: np.ndarray
+    displacement: np.ndarray
+    incident: float
+    reflected: float
+
+
+def at_end(
+    time: np.ndarray, upper: np.ndarray, lower: np.ndarray, impedance: float, apart: float,
+    below: float,
+) -> AtEnd:  # fmt: skip
+    """Make out the lower end of a bar at rest from two force histories.
+
+    Parameters
+    ----------
+    time : ndarray, shape (n,)
+        Evenly rising from the instant before anything moves [s].
+    upper, lower : ndarray, shape (n,)
+        Forces at the gauges, compression positive [N].
+    impedance : float
+        A sqrt(E rho) [N s/m].
+    apart, below : float
+        Transit times from gauge to gauge, and from the lower one to the end [s].
+
+    Returns
+    -------
+    AtEnd
+        As long as it can be told: it ends `below` before the histories do.
+
+    Raises
+    ------
+    SceneError
+        If the gauges are in one place, or nearer to each other than two samples.
+    """
+    step = float(time[1] - time[0])
+    if not apart >= step:
+        raise SceneError(
+            f"gauges a transit time of {apart:.3g} s apart: must be {step:.3g} s at least, the "
+            "time between two samples"
+        )
+    down, up = np.zeros(len(time)), np.zeros(len(time))
+
+    def before(wave: np.ndarray, k: int) -> float:
+        """A wave a transit time before sample k; both are known so far."""
+        place = k - apart / step
+        first = int(np.floor(place))
+        if first < 0:
+            return 0.0
+        share = place - first
+        return float((1.0 - share) * wave[first] + share * wave[min(first + 1, k - 1)])
+
+    for k in range(len(time)):
+        down[k] = upper[k] / impedance + before(up, k)
+        up[k] = before(down, k) - lower[k] / impedance
+    # d at the upper gauge and u at the lower one, at the end at one time
+    seen = time[time <= time[-1] - below]
+    came = np.interp(seen - apart - below, time, down, left=0.0)
+    back = np.interp(seen + below, time, up)
+    velocity = came + back
+    path = np.concatenate([[0.0], np.cumsum(0.5 * step * (velocity[1:] + velocity[:-1]))])
+    energies = (impedance * step * float(np.sum(wave**2)) for wave in (came, back))
+    return AtEnd(seen, impedance * (came - back), velocity, path, *energies)
+
+
+def gauges_on_bit(
+    simulation: Simulation, times: np.ndarray, places: tuple[float, float]
+) -> tuple[np.ndarray, np.ndarray, AtEnd]:
+    """Read two gauges on a uniform bit, and make out its lower end.
+
+    Parameters
+    ----------
+    simulation : Simulation
+        Of a bit that is at rest; is advanced through the times.
+    times : ndarray
+        Evenly rising [s].
+    places : (float, float)
+        From the top of the bit, the upper gauge first [m].
+
+    Returns
+    -------
+    upper, lower : ndarray
+        Forces at the gauges [N].
+    AtEnd
+
+    Raises
+    ------
+    SceneError
+        If the bit has several sections, or the places are none of it.
+    """
+    bit = simulation.scene.bit
+    if len(bit.sections) != 1:
+        raise SceneError(f"bit.sections: {len(bit.sections)}: two gauges need a uniform bar")
+    if not 0.0 < places[0] < places[1] < bit.length:
+        raise SceneError(f"gauges at {places!r} m: must rise, within a bit of {bit.length!r} m")
+    section = bit.sections[0]
+    start = simulation.save()
+    upper = gauge_force(simulation, times, places[0])
+    simulation.restore(start)
+    lower = gauge_force(simulation, times, places[1])
+    speed = section.wave_speed
+    apart, below = (places[1] - places[0]) / speed, (bit.length - places[1]) / speed
+    return upper, lower, at_end(times, upper, lower, section.impedance, apart, below)

@@ -1,0 +1,62 @@
+"""Force and motion at the end of a bar, made out from two gauges."""
+
+import numpy as np
+import pytest
+
+from percussion_model import SceneError, Simulation
+from percussion_model.analysis.two_gauges import at_end, gauges_on_bit
+from percussion_model.scene.hammers import bar_test
+
+STEP = 2e-7
+
+
+def test_waves_that_overlap_are_told_apart():
+    """A wave down and another up, both known: any force at the end comes out right."""
+    time, z, apart, below = np.arange(0.0, 8e-4, STEP), 4.0e4, 7e-5, 5e-5
+
+    def incident(t):
+        return np.where(t > 0.0, np.sin(2e4 * t) ** 2, 0.0)
+
+    def reflected(t):
+        return np.where(t > 0.0, 0.5 * np.sin(1.3e4 * t) ** 2, 0.0)
+
+    arrival = apart + below
+    upper = z * (incident(time) - reflected(time - 2.0 * arrival))
+    lower = z * (incident(time - apart) - reflected(time - arrival - below))
+    found = at_end(time, upper, lower, z, apart, below)
+    d, u = incident(found.time - arrival), reflected(found.time - arrival)
+    assert found.force == pytest.approx(z * (d - u), abs=1e-4 * z)
+    assert found.velocity == pytest.approx(d + u, abs=1e-4)
+    assert found.incident == pytest.approx(z * STEP * np.sum(d**2), rel=1e-3)
+    assert found.reflected == pytest.approx(z * STEP * np.sum(u**2), rel=1e-3)
+
+
+@pytest.mark.parametrize("solver", ["wave", "chain"])
+def test_the_rock_of_a_bar_test_is_found_from_two_gauges(solver):
+    scene = bar_test().replace(
+        **{"solver.name": solver, "solver.cells": 80, "loss.time": 1e-8, "effects.loss": True}
+    )
+    times = np.arange(0.0, 6e-4, STEP)
+    _, _, found = gauges_on_bit(Simulation(scene), times, (0.4, 0.8))
+    true = Simulation(scene).sample(found.time)
+    # its fronts are sharp: a cell early or late they would differ by all of their height
+    off = np.sqrt(np.mean((found.force - true["bit_force"]) ** 2))
+    assert off < 0.15 * np.sqrt(np.mean(true["bit_force"] ** 2))
+    depth = true["bit_end_position"]
+    assert np.max(np.abs(found.displacement - depth)) < 0.01 * depth.max()
+    impulse = np.cumsum(found.force) * STEP
+    assert np.max(np.abs(impulse - true["bit_impulse"])) < 0.01 * true["bit_impulse"].max()
+    assert 0.0 < found.reflected < found.incident
+
+
+def test_places_that_tell_nothing_are_refused():
+    scene = bar_test()
+    times = np.arange(0.0, 1e-4, STEP)
+    for places in ((0.5, 0.5), (0.8, 0.4), (0.0, 0.4), (0.4, 1.2)):
+        with pytest.raises(SceneError, match="gauges at"):
+            gauges_on_bit(Simulation(scene), times, places)
+    two = scene.replace(**{"bit.sections": [{"length": 0.5, "area": 8e-4}] * 2})
+    with pytest.raises(SceneError, match="uniform bar"):
+        gauges_on_bit(Simulation(two), times, (0.2, 0.4))
+    with pytest.raises(SceneError, match="between two samples"):
+        at_end(times, times, times, 1.0, 0.5 * STEP, STEP)
