@@ -165,7 +165,7 @@ class PercussiveHammer(Slave):
         if place > bar.length:
             raise ValueError(
                 f"gauge.position = {place!r} m: lies below the {name}, "
-                f"which is {bar.length!r} m long"
+                f"which is {bar.length:g} m long"
             )
         grid = solver.grid_of(name)
         return None if grid is None else Gauge(name, *cell_at(section_numbers(bar), grid, place))

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from percussion_model.scene.scene import Scene
 
 # Solvers that compute bars between piston and bit.
-_OF_STRINGS = ("auto", "wave", "chain")
+_OF_STRINGS = ("auto", "chain")
 
 
 def refuse_string(scene: Scene) -> None:
@@ -32,11 +32,13 @@ def refuse_string(scene: Scene) -> None:
         named = scene.solver.name if scene.solver.fidelity == "wave" else scene.solver.fidelity
         raise SceneError(
             f'"{named}" computes piston and bit alone, and effects.string = true: set solver.name '
-            f"to one of {', '.join(_OF_STRINGS)}, and leave solver.fidelity"
+            f"to {' or '.join(_OF_STRINGS)}, and leave solver.fidelity"
         )
     for k, rod in enumerate(scene.string.rods):
         for name in sorted(rod._given.difference(rod.telling)):
-            raise SceneError(f'string.rods.{k}.{name}: a joint that is "{rod.joint}" has none')
+            raise SceneError(
+                f'string.rods.{k}.{name}: a joint that is "{rod.joint}" has none: leave it out'
+            )
 
 
 def chain_as_groups(values: Mapping[str, Any]) -> dict[str, Any]:

@@ -297,7 +297,7 @@ class Scene:
         """Solver that computes the scene: "wave", "modal", "chain", "fem", "rigid", "blow-map"."""
         if self.bit.model == "elastic" and self.solver.fidelity != "wave":
             return str(self.solver.fidelity)
-        if self.effects.string and self.solver.name in ("auto", "wave"):
+        if self.effects.string and self.solver.name == "auto":
             return "chain"
         if self.solver.name != "auto":
             return str(self.solver.name)
@@ -315,8 +315,10 @@ class Scene:
     @property
     def why_solver(self) -> str:
         """Why `solver.name = "auto"` took the solver; empty where something else names it."""
-        if self.solver.name != "auto" or self.solver_name not in ("rigid", "modal", "wave"):
+        if self.solver.name != "auto" or self.solver.fidelity != "wave":
             return ""
+        if self.effects.string:
+            return "bars between piston and bit"
         if self.solver_name == "rigid":
             return "the bit is rigid" if self.bit.model == "rigid" else ""
         return self._against_modes or "elastic bars with loss"

@@ -21,6 +21,7 @@ from percussion_model.simulation.error_estimate import (
 )
 from percussion_model.simulation.rate import FEWEST_DEPENDENT, LEAST_BLOWS
 from percussion_model.simulation.result import Result
+from percussion_model.solvers.chain.resolution import coarser_steps, steps_for
 from percussion_model.solvers.modal.resolution import (
     REQUESTED,
     coarser_modes,
@@ -152,7 +153,7 @@ def run_to_accuracy(scene: Scene, run_once: RunOnce) -> Result:
 
 def has_grid(scene: Scene) -> bool:
     """Whether cells or modes decide how accurate a scene is."""
-    return scene.solver_name in ("wave", "modal")
+    return scene.solver_name in ("wave", "modal", "chain")
 
 
 def planned_cells(scene: Scene) -> list[int]:
@@ -179,6 +180,9 @@ def _first_grids(scene: Scene) -> list[int]:
     if scene.solver_name == "modal":
         modes = modes_for(numbers, wanted)
         return [*coarser_modes(modes, REQUESTED), modes]
+    if scene.solver_name == "chain":
+        steps = steps_for(wanted)
+        return [coarser_steps(steps), steps]
     cells, _ = cells_for(numbers, wanted)
     return [*coarser_cells(numbers, cells), cells]
 
@@ -188,6 +192,8 @@ def _finer_grid(scene: Scene, cells: int, fit: float) -> int | None:
     if scene.solver_name == "modal":
         modes = FINER_MODES * cells
         return modes if modes <= min(FINEST, most_modes(numbers_of(scene))) else None
+    if scene.solver_name == "chain":
+        return 2 * cells if 2 * cells <= FINEST else None
     return finer_cells(numbers_of(scene), cells, fit, FINEST)
 
 

@@ -53,11 +53,13 @@ SLIGHT_LOSS = 5e-4
 COMPARISON_WORK = 0.12
 # They last for so many blows at least: to settle and to count.
 FEWEST_BLOWS = 10
+# Steps half as long again change half of an error of first order.
+FIRST_ORDER = 2.0
 # What brings the rate of a solver closer.
 REMEDIES = {
     "wave": "solver.accuracy (--accuracy) takes as many cells as an error needs",
     "modal": "solver.accuracy (--accuracy) takes as many modes as an error needs",
-    "chain": "more solver.cells (--cells) bring it closer",
+    "chain": "solver.accuracy (--accuracy) takes as many steps as an error needs",
     "fem": "more fem.elements and a greater fem.contact_stiffness bring it closer",
 }
 # A run is compared with those that have at least this share of its modes.
@@ -206,6 +208,8 @@ class Estimate:
 
 def grid_run(result: Result) -> GridRun:
     """A result with what its grid is known for; only waves have a misfit and a rule."""
+    if result.solver == "chain":
+        return GridRun(result, np.zeros(0), error_by_steps(_resolution(result)))
     if result.solver not in ("wave", "modal"):
         return GridRun.exact(result)
     numbers, cells = numbers_of(result.scene), _resolution(result)
@@ -242,6 +246,8 @@ def estimate_error(run: GridRun, others: Sequence[GridRun]) -> Estimate:
         return Estimate(math.inf, 0.0, scatter, floor)  # nothing is known
     if run.result.solver == "modal":
         return Estimate(_by_modes(run, others), 0.0, scatter, floor)
+    if run.result.solver == "chain":
+        return Estimate(FIRST_ORDER * _difference(others[-1], run), 0.0, scatter, floor)
     fitting = [other for other in others if other.largest <= FITS]
     if misfit <= FITS and fitting:
         other = fitting[-1]
@@ -425,6 +431,8 @@ def _estimate(part: GridRun, others: Sequence[GridRun]) -> Estimate:
     known = [other for other in others if other.useful]
     # each of the others is coarser in another way
     off = sum(_difference(other, part) for other in known) if known else math.inf
+    if part.result.solver == "chain":
+        off *= FIRST_ORDER
     same = all(_same_motion(part, other) for other in known)
     share = NUMERICAL_SHARE if same else NUMERICAL_SHARE_OF_MOTIONS
     floor = share * abs(part.result.energy["numerical_relative"])

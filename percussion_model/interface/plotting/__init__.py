@@ -8,7 +8,9 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
+from percussion_model.analysis.drill_string import StringReport, string_report
 from percussion_model.interface.plotting.activation import draw_activation
+from percussion_model.interface.plotting.drill_string import draw_string
 from percussion_model.interface.plotting.motion import draw_motion
 from percussion_model.interface.plotting.overview import draw_overview
 from percussion_model.interface.plotting.stress import draw_stress
@@ -44,7 +46,23 @@ CAPTIONS = {
         "Compression is red, tension blue. Waves move at the slope of the stripes; the black line "
         "is thick where the piston touches the bit. Below: the forces at the two ends of the bit."
     ),
+    "string_waves": (
+        "Force in all bars, from the piston down, after one impact. Waves move at the slope of the "
+        "stripes; red is compression, blue tension. Thin lines are the joints."
+    ),
+    "string_energy": (
+        "Energy in piston, string and bit after one impact, and the greatest stress of that blow "
+        "along the string."
+    ),
+    "string_gauges": (
+        "Stress as strain gauges in the middle of three bars show it, after one impact; positive "
+        "in compression."
+    ),
 }
+# Figures of a piston on a bit alone, and of a drill string alone.
+OF_TWO_BARS, OF_STRINGS = ("activation", "stress_waves"), (
+    "string_waves", "string_energy", "string_gauges",
+)  # fmt: skip
 # A run of fewer blows has no overview.
 FEWEST_BLOWS = 2
 
@@ -75,7 +93,8 @@ def _names(result: Result) -> list[str]:
         "activation": result.scene.piston.model == "absent",
         "stress_waves": not result.cells,
     }
-    return [name for name in CAPTIONS if not lacking.get(name)]
+    others = OF_TWO_BARS if result.scene.effects.string else OF_STRINGS
+    return [name for name in CAPTIONS if not lacking.get(name) and name not in others]
 
 
 def draw_figures(result: Result) -> Iterator[tuple[str, Figure]]:
@@ -95,8 +114,20 @@ def draw_figures(result: Result) -> Iterator[tuple[str, Figure]]:
         warnings.warn(f"no detailed figures: {error}", stacklevel=2)
         return
     yield "bit_motion", draw_motion(window)
+    if result.scene.effects.string:
+        if result.scene.piston.model != "absent" and len(result.counted):
+            yield from draw_string(watched_string(result))
+        return
     if result.scene.piston.model != "absent":
         yield "activation", draw_activation(window)
     fields = stress_fields(window)
     if fields:
         yield "stress_waves", draw_stress(window, fields)
+
+
+def watched_string(result: Result) -> StringReport:
+    """One blow of a drill string, with gauges in the middle of three bars."""
+    bars = [name for name in result.scene.bars if name != "piston"]
+    chosen = dict.fromkeys((bars[0], bars[len(bars) // 2], bars[-2]))
+    gauges = [(name, 0.5 * result.scene.bars[name].length) for name in chosen]
+    return string_report(result.scene, gauges=gauges)

@@ -17,14 +17,15 @@ from percussion_model.scene.bars import (
 from percussion_model.scene.numbers import Numbers
 from percussion_model.scene.rows import SceneError
 from percussion_model.solvers.chain.records import Body, Chain, Fit, Joint, Place, Steel
+from percussion_model.solvers.chain.resolution import DEFAULT_STEPS, steps_for
 from percussion_model.solvers.chain.taps import weights_of
 from percussion_model.solvers.modal.lanes import WIDTH
 from percussion_model.solvers.setup import MOST_CELLS, PISTONS, kelvin_voigt_time, refuse_many
 
 # Where steps are shorter than the Kelvin-Voigt time, sections must have this share of their loss.
 LEAST_SPREAD = 0.99
-# Steps in which a wave crosses the piston, and any bar at least, where a scene asks for none.
-DEFAULT_CELLS, FEWEST_CELLS = 20, 4
+# Steps in which a wave crosses any bar at least, where a scene asks for none.
+FEWEST_STEPS = 4
 
 
 class Network(NamedTuple):
@@ -69,8 +70,10 @@ def time_step_of(numbers: Numbers) -> float:
     first = bar_transit_time(bars[0])
     if not math.isnan(values.solver_cells):
         return first / float(values.solver_cells)
-    own = DEFAULT_CELLS if first_is_piston(numbers) else FEWEST_CELLS
-    longest = [first / own, *(bar_transit_time(bar) / FEWEST_CELLS for bar in bars[1:])]
+    if not math.isnan(values.solver_accuracy):
+        return first / steps_for(float(values.solver_accuracy))
+    own = DEFAULT_STEPS if first_is_piston(numbers) else FEWEST_STEPS
+    longest = [first / own, *(bar_transit_time(bar) / FEWEST_STEPS for bar in bars[1:])]
     # a section shorter than a step would be longer than it is
     longest += [section_transit_time(section) for bar in bars for section in bar]
     # and in steps shorter than the Kelvin-Voigt time short sections would lose their loss

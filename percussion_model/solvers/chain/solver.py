@@ -28,6 +28,7 @@ from percussion_model.solvers.chain.records import (
     Task,
     Waves,
 )
+from percussion_model.solvers.chain.resolution import coarser_steps
 from percussion_model.solvers.chain.sections import CAME_ROWS
 from percussion_model.solvers.setup import MOST_CHANGES, PISTONS, fill_parameters, fill_start
 from percussion_model.solvers.state import State, words_of
@@ -232,7 +233,7 @@ class ChainSolver(Solver):
     def coarser_scenes(self) -> list[Scene] | None:
         """The scene with steps half as long again."""
         first = next(iter(self.cells.values()))
-        count = max(1, round(first / 1.5))
+        count = coarser_steps(first)
         if count == first:
             return None
         changes = {"solver.accuracy": None, "run.check": False, "solver.cells": count}
