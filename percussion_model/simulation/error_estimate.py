@@ -24,6 +24,7 @@ from percussion_model.simulation.rate import LARGE_ERROR, LEAST_BLOWS, rate_of_b
 from percussion_model.simulation.result import Result
 from percussion_model.simulation.uncertain import in_digits
 from percussion_model.simulation.warnings import least_loss_time
+from percussion_model.solvers.chain.resolution import error_by_steps
 from percussion_model.solvers.setup import kelvin_voigt_time
 from percussion_model.solvers.wave.grid import elastic_bars
 from percussion_model.solvers.wave.resolution import FITS, largest_misfit, misfits, promised_error
