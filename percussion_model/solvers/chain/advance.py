@@ -24,12 +24,6 @@ OTHER_EVENTS = 4
 GRID_ROUNDING = SHORTEST = 1e-6
 
 
-@merged
-def ends_by(par, step_, time):
-    """Whether a step ends at `time` or before."""
-    return time / par.dt + GRID_ROUNDING >= step_
-
-
 @kernel
 def stored(par, s, chain, waves):
     """Energy of motion, and of strain in bars, joints and damper [J]."""
@@ -110,7 +104,8 @@ def run(task, par_, state, chain_, waves_, time, blows, events, reading):
         return Status.DONE
     s.n_blows = 0
     s.n_events = 0
-    while ends_by(par, s.step + 1, time):
+    last = math.floor(time / par.dt + GRID_ROUNDING)
+    while s.step < last:
         if s.n_blows >= blows.shape[0]:
             return Status.BLOWS_FULL
         if s.events_on == 1 and s.n_events + par.most_changes + OTHER_EVENTS > events.shape[0]:

@@ -100,7 +100,7 @@ def network_of(numbers: Numbers) -> Network:
     weights: list[np.ndarray] = []
     ring, misfit, k = 0, 0.0, 0
     for number, bar in enumerate(bars):
-        bodies[number] = 0.0, k, k + len(bar) - 1
+        bodies[number] = 0.0, k, k + len(bar) - 1, 0.0
         for section in bar:
             transit = section_transit_time(section) / dt
             wanted = eta * transit / dt
@@ -132,6 +132,7 @@ def network_of(numbers: Numbers) -> Network:
                     2.0 * above / (above + z), 2.0 * z / (above + z)
                 )  # fmt: skip
             k += 1
+    bodies[:, Body.INV_MASS] = 1.0 / bodies[:, Body.MASS]
     struck = int(names[0] == "piston")
     fits = _fits(numbers, steel, bodies[struck:])
     chain = Chain(places, steel, np.concatenate(weights)[None], fits, bodies)

@@ -88,6 +88,7 @@ class Body(IntEnum):
     MASS = 0  # [kg]
     FIRST = 1  # section
     LAST = 2
+    INV_MASS = 3  # 1 / mass [1/kg]
 
 
 class Task(IntEnum):

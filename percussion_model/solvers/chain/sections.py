@@ -8,7 +8,7 @@ from percussion_model.solvers.modal.lanes import WIDTH, load, spread, total, tot
 
 BAR, RING, SIZE, DELAY, TAPS, WEIGHTS, CELLS = (int(row) for row in Place)
 IMPEDANCE, ALPHA, BETA, CELL_MASS, BY_LOSS, BY_MIXING = (int(row) for row in Steel)
-MASS, FIRST, LAST = (int(row) for row in Body)
+MASS, FIRST, LAST, INV_MASS = (int(row) for row in Body)
 GIVEN = int(Bar.GIVEN)
 # Rows of `Waves.came`: what arrives at the lower and the upper end of a section, what leaves
 # these, and the impulses on the upper and the lower end of a bar and its acceleration.
@@ -16,7 +16,7 @@ DOWN, UP, DOWN_OUT, UP_OUT, FROM_ABOVE, FROM_BELOW, ACCELERATION = range(7)
 CAME_ROWS = 7
 # Velocity that body forces may give the waves of a bar before it is written into the rings:
 # waves are kept less this, and lose digits where it is large [m/s].
-MOST_GIVEN = 0.1
+MOST_GIVEN = 1.0
 
 
 @inlined

@@ -26,6 +26,7 @@ from percussion_model.solvers.chain.sections import (
     FROM_BELOW,
     GIVEN,
     IMPEDANCE,
+    INV_MASS,
     LAST,
     MASS,
     MOST_GIVEN,
@@ -67,13 +68,13 @@ def stored_in_joint(fits, joints, j):
 
 
 @inlined
-def damper_force(par, shortened, speed, mass):
+def damper_force(par, shortened, speed, inv_mass):
     """Mean force over a step of the damper between casing and bar, which only pushes [N].
 
     By the trapezoidal rule, which is stable at any stiffness and damping.
     """
     k, c, half = par.damper_stiffness, par.damper_damping, 0.5 * par.dt
-    gives = half * (1.0 / par.casing_mass + 1.0 / mass)
+    gives = half * (1.0 / par.casing_mass + inv_mass)
     force = par.damper_preload + k * shortened + (c + half * k) * speed
     return max(force / (1.0 + gives * (c + half * k)), 0.0)
 
@@ -90,18 +91,20 @@ def stored_in_damper(par, shortened):
 @inlined
 def accelerations(par, s, chain, waves, push):
     """Acceleration that its body forces give each bar; the force of the damper [N]."""
+    came, bodies, g = waves.came, chain.bodies, par.gravity
     for i in range(par.bars):
-        waves.came[ACCELERATION, i] = par.gravity
+        came[ACCELERATION, i] = g
     struck, bit, damper = par.struck, par.bars - 1, 0.0
     if par.damper == 1:
         speed = s.v_c - waves.bars[VELOCITY, struck]
-        damper = damper_force(par, s.x_c, speed, chain.bodies[struck, MASS])
-        waves.came[ACCELERATION, struck] += damper / chain.bodies[struck, MASS]
+        damper = damper_force(par, s.x_c, speed, bodies[struck, INV_MASS])
+        came[ACCELERATION, struck] += damper * bodies[struck, INV_MASS]
     else:
-        waves.came[ACCELERATION, struck] += s.feed / chain.bodies[struck, MASS]
-    waves.came[ACCELERATION, bit] += s.f_held / chain.bodies[bit, MASS]
+        came[ACCELERATION, struck] += s.feed * bodies[struck, INV_MASS]
+    if par.effects == 1:
+        came[ACCELERATION, bit] += s.f_held * bodies[bit, INV_MASS]
     if par.piston == Piston.ELASTIC:
-        waves.came[ACCELERATION, 0] = piston_acceleration(par, push)
+        came[ACCELERATION, 0] = piston_acceleration(par, push)
     return damper
 
 
@@ -200,40 +203,45 @@ def record_contact(par, s, waves, opened, t_close, approach, force, time, tau, b
 
 @inlined
 def meet_piston(par, s, chain, waves, push, tau, time, blows, events):
-    """The piston and the bar that it strikes; the impulse between them [N s]."""
+    """The piston and the bar that it strikes; the impulse between them [N s].
+
+    A closure in the first half of a step counts for waves from its start, one in the second from
+    its end: so fronts stay sharp, of which averaging over the step would take a part, and come
+    early as often as late.
+    """
     came, struck = waves.came, par.struck
     k = int(chain.bodies[struck, FIRST])
-    z_t = chain.steel[k, IMPEDANCE]
-    v_t = 2.0 * came[UP, k] + kick_of(par, waves, struck)
-    opened, t_close, was = 0, -1.0, s.closed
-    if par.piston == Piston.ELASTIC:
-        z_p, kick = chain.steel[k - 1, IMPEDANCE], kick_of(par, waves, 0)
-        v_p = 2.0 * came[DOWN, k - 1] + kick
-        y = 1.0 / z_p + 1.0 / z_t
-        met = shoulders(was, s.gap, v_p - v_t, y, 0.0, 0.0, tau)
-        impulse, force, square = met.impulse, (v_p - v_t) / y, met.square
-        s.closed, s.gap = met.closed, met.gap
-        if was == 1 and met.free > 0.0:
-            opened = 1
-        if met.closed == 1 and met.free > 0.0:
-            t_close = met.free
-        elif met.closed == 1 and was == 0:
-            t_close = 0.0
-        came[UP_OUT, k - 1] = v_p - impulse / (z_p * tau) - came[DOWN, k - 1]
-        came[DOWN_OUT, 0] = came[UP, 0] + kick
-        s.e_numerical += y * (square - impulse * impulse / tau)
+    z_t, elastic = chain.steel[k, IMPEDANCE], par.piston == Piston.ELASTIC
+    v_t, yields = 2.0 * came[UP, k] + kick_of(par, waves, struck), 1.0 / z_t
+    if elastic:
+        v_p = 2.0 * came[DOWN, k - 1] + kick_of(par, waves, 0)
+        yields += 1.0 / chain.steel[k - 1, IMPEDANCE]
     else:
         v_p = s.v_p + 0.5 * par.dt * piston_acceleration(par, push)
-        closed, gap, _, _, d_t, q_t, impulse, t_close, opened = mass_contact(
-            was, s.gap, v_p, v_t, par.mass_p, z_t, tau
-        )
-        s.closed, s.gap, force = closed, gap, z_t * (v_p - v_t)
+    approach, was, opened, t_close = v_p - v_t, s.closed, 0, -1.0
+    if was == 1 and approach <= 0.0:
+        s.closed, opened = 0, 1
+    touches = s.closed == 1
+    if s.closed == 0:
+        if approach > 0.0 and s.gap < approach * tau:
+            t_close = s.gap / approach
+            s.closed, touches = 1, t_close < 0.5 * par.dt
+        s.gap = 0.0 if s.closed == 1 else s.gap - approach * tau
+    impulse, force = 0.0, approach / yields
+    if touches and elastic:
+        impulse = force * tau
+    elif touches:
+        _, _, _, _, d_t, q_t, impulse, _, _ = mass_contact(1, 0.0, v_p, v_t, par.mass_p, z_t, tau)
         s.e_numerical += z_t * (q_t - d_t * d_t / tau)
+    if elastic:
+        z_p = chain.steel[k - 1, IMPEDANCE]
+        came[UP_OUT, k - 1] = v_p - impulse / (z_p * tau) - came[DOWN, k - 1]
+        came[DOWN_OUT, 0] = came[UP, 0] + kick_of(par, waves, 0)
     came[DOWN_OUT, k] = v_t + impulse / (z_t * tau) - came[UP, k]
     came[FROM_ABOVE, struck] = impulse
-    if was == 1 or s.closed == 1 or opened == 1 or t_close >= 0.0:
-        peak = force if s.closed == 1 else 0.0
-        record_contact(par, s, waves, opened, t_close, v_p - v_t, peak, time, tau, blows, events)
+    if was == 1 or s.closed == 1:
+        peak = force if touches else 0.0
+        record_contact(par, s, waves, opened, t_close, approach, peak, time, tau, blows, events)
     return impulse
 
 
@@ -271,19 +279,22 @@ def meet_nothing(par, s, chain, waves, tau):
 @inlined
 def move_bars(par, s, chain, waves, damper, tau):
     """Mean motion of bars and casing, and the work of body forces; path of what the drive holds."""
-    struck, bit, held = par.struck, par.bars - 1, 0.0
+    came, bars, bodies, g = waves.came, waves.bars, chain.bodies, par.gravity
+    struck, bit, held, lifted = par.struck, par.bars - 1, 0.0, 0.0
+    path = 0.0
     for i in range(struck, par.bars):
-        mass, v0 = chain.bodies[i, MASS], waves.bars[VELOCITY, i]
-        gained = (waves.came[FROM_ABOVE, i] - waves.came[FROM_BELOW, i]) / mass
-        v1 = v0 + waves.came[ACCELERATION, i] * tau + gained
+        v0 = bars[VELOCITY, i]
+        gained = (came[FROM_ABOVE, i] - came[FROM_BELOW, i]) * bodies[i, INV_MASS]
+        v1 = v0 + came[ACCELERATION, i] * tau + gained
         path = 0.5 * tau * (v0 + v1)
-        waves.bars[VELOCITY, i] = v1
-        waves.bars[POSITION, i] += path
-        s.e_gravity += mass * par.gravity * path
+        bars[VELOCITY, i] = v1
+        bars[POSITION, i] += path
+        lifted += bodies[i, MASS] * path
         if i == struck:
             held = path
-        if i == bit and par.effects == 1:
-            book_forces(s, path)
+    s.e_gravity += g * lifted
+    if par.effects == 1:
+        book_forces(s, path)
     s.v_b = waves.bars[VELOCITY, bit]
     if par.damper == 0:
         s.e_feed += s.feed * held
@@ -373,21 +384,25 @@ def step(par, s, chain, waves, tau, blows, events):
     due = meet(par, s, chain, waves, tau, blows, events)
     if s.live == 0:
         return
+    places, rings, came, bodies, bars = (
+        chain.places, waves.rings, waves.came, chain.bodies, waves.bars
+    )  # fmt: skip
+    now, half, rewrite = s.step, 0.5 * par.dt, False
     for i in range(par.bars):
-        waves.bars[GIVEN, i] += kick_of(par, waves, i)
-    places, rings, came, now = chain.places, waves.rings, waves.came, s.step
-    for i in range(par.bars):
-        given = waves.bars[GIVEN, i]
-        came[DOWN_OUT, int(chain.bodies[i, FIRST])] -= given
-        came[UP_OUT, int(chain.bodies[i, LAST])] -= given
+        given = bars[GIVEN, i] + half * came[ACCELERATION, i]
+        bars[GIVEN, i] = given
+        came[DOWN_OUT, int(bodies[i, FIRST])] -= given
+        came[UP_OUT, int(bodies[i, LAST])] -= given
+        rewrite = rewrite or abs(given) > MOST_GIVEN
     for k in range(par.sections):
         send(places, rings, now, k, came[DOWN_OUT, k], came[UP_OUT, k])
-    waves.bars[GIVEN, 0] += 0.5 * due
-    s.step += 1
+    bars[GIVEN, 0] += 0.5 * due
+    s.step = now + 1
     s.count_steps += 1
-    for i in range(par.bars):
-        if abs(waves.bars[GIVEN, i]) > MOST_GIVEN:
-            write_given(chain, waves, i)
+    if rewrite:
+        for i in range(par.bars):
+            if abs(bars[GIVEN, i]) > MOST_GIVEN:
+                write_given(chain, waves, i)
     if s.step % RESYNC_STEPS == 0:
         resync(par, s, chain, waves)
     if s.mode == Mode.SS and (s.n_check == 0 or s.step % CHECKPOINT_STEPS == 0):

@@ -23,9 +23,9 @@ MOST_SPREAD = 0.25
 UTMOST_SPREAD = 0.5
 # Above this variance samples of a normal distribution have it to rounding [steps^2].
 LEAST_NORMAL = 2.0
-# They end so many standard deviations from the mean, where they are 1e-9 of the greatest; where a
+# They end so many standard deviations from the mean, where they are 4e-5 of the greatest; where a
 # section is too short for that no less than so many, which keeps 0.999 of the variance.
-REACH, LEAST_REACH = 6.5, 4.0
+REACH, LEAST_REACH = 4.5, 4.0
 # Weights below this, at either end, are rounding.
 NOTHING = 1e-18
 
@@ -49,10 +49,9 @@ def weights_of(transit: float, variance: float) -> tuple[int, np.ndarray, float]
     """
     whole = max(1, math.floor(transit + WHOLE))
     part = min(max(transit - whole, 0.0), 1.0)
-    rounds = math.ceil(0.5 * variance / MOST_SPREAD)
     if part <= WHOLE:
         delay, weights, spread = whole, np.ones(1), 0.0
-    elif whole - 1 - min(rounds, 1) >= 1:
+    elif whole >= 2:
         delay, weights, spread = whole - 1, _cubic(part), 0.0
     else:  # too short for four steps
         delay, weights, spread = whole, np.array([1.0 - part, part]), part * (1.0 - part)
