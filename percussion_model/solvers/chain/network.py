@@ -18,7 +18,7 @@ from percussion_model.scene.numbers import Numbers
 from percussion_model.scene.rows import SceneError
 from percussion_model.solvers.chain.records import Body, Chain, Fit, Joint, Place, Steel
 from percussion_model.solvers.chain.resolution import DEFAULT_STEPS, steps_for
-from percussion_model.solvers.chain.taps import weights_of
+from percussion_model.solvers.chain.taps import WHOLE, turning, weights_of
 from percussion_model.solvers.modal.lanes import WIDTH
 from percussion_model.solvers.setup import MOST_CELLS, PISTONS, kelvin_voigt_time, refuse_many
 
@@ -104,17 +104,23 @@ def network_of(numbers: Numbers) -> Network:
         for section in bar:
             transit = section_transit_time(section) / dt
             wanted = eta * transit / dt
-            delay, taps, spread = weights_of(transit, wanted)
-            mean = delay + float(np.arange(len(taps)) @ taps)
+            if 1.0 + WHOLE < transit < 2.0 - WHOLE:
+                a = turning(transit)
+                delay, spread, mean, padded = 1, 0.0, transit, 1
+                row = np.array([a, math.sqrt(1.0 - a * a)])
+            else:
+                delay, taps, spread = weights_of(max(transit, 1.0), wanted)
+                mean = delay + float(np.arange(len(taps)) @ taps)
+                padded = 1 if len(taps) == 1 else -(-len(taps) // WIDTH) * WIDTH
+                # newest last, as they lie in the ring
+                row = np.concatenate([np.zeros(padded - len(taps)), taps[::-1]])
             misfit = max(misfit, abs(mean / transit - 1.0))
-            padded = 1 if len(taps) == 1 else -(-len(taps) // WIDTH) * WIDTH
             size = 1 << math.ceil(math.log2(delay + padded + 1))
-            places[k] = (
-                number, ring, size, delay - 1, padded, sum(map(len, weights)), max(1, round(mean))
-            )  # fmt: skip
-            # newest last, as they lie in the ring
-            weights.append(np.concatenate([np.zeros(padded - len(taps)), taps[::-1]]))
-            ring += 4 * size
+            first = -1 if len(row) == 1 else sum(map(len, weights))
+            cells = max(1, math.floor(mean) if padded == 1 else round(mean))
+            places[k] = number, ring, size, delay - 1, padded, first, cells
+            weights.append(row)
+            ring += 4 * size + 2
             if dt < eta and spread < LEAST_SPREAD * wanted:
                 raise _too_fine(numbers, float(section[LENGTH]), dt, eta)
             loss = 1.0 if eta else 0.0

@@ -20,11 +20,11 @@ class Place(IntEnum):
     """Rows of whole numbers of a section."""
 
     BAR = 0  # the bar that it belongs to
-    RING = 1  # where the ring of its down-going wave begins; that of the up-going follows
+    RING = 1  # where the ring of its down-going wave begins; that of the up-going follows, and q
     SIZE = 2  # of the ring, a power of two; each holds everything twice
     DELAY = 3  # whole steps that a wave waits at least before the one in which it arrives
     TAPS = 4  # how many weights it arrives by
-    WEIGHTS = 5  # where these begin
+    WEIGHTS = 5  # where these begin; of a wave that arrives as it is -1, of q its two weights
     CELLS = 6  # in which it is read
 
 

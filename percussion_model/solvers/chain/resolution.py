@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 # Steps in the piston, where a scene asks for none, and the relative error of a rate by them.
-DEFAULT_STEPS, DEFAULT_ERROR = 20, 1e-2
+DEFAULT_STEPS, DEFAULT_ERROR = 16, 5e-3
 # A run is compared with one whose steps are so many times as long.
 COARSER = 1.5
 

@@ -48,6 +48,12 @@ def pass_on(par, s, chain, waves):
         second = first + 2 * size
         if taps == 1:
             down, up = rings[0, first], rings[0, second]
+            if weight >= 0:  # of one to two steps (taps.turning)
+                a, b, kept = weights[0, weight], weights[0, weight + 1], places[k, RING] + 4 * size
+                x, y, p, q = down, up, rings[0, kept], rings[0, kept + 1]
+                down, up = a * x + b * p, a * y + b * q
+                if live:
+                    rings[0, kept], rings[0, kept + 1] = b * x - a * p, b * y - a * q
         else:
             share = load(weights, 0, weight)
             x, y = load(rings, 0, first), load(rings, 0, second)
@@ -83,15 +89,26 @@ def pass_on(par, s, chain, waves):
         s.e_numerical += total(mixed) - other
 
 
+@inlined
+def kept_of(chain, k):
+    """What a section of one to two steps keeps of a lasting wave of 1 m/s; 0 of others."""
+    weight = chain.places[k, WEIGHTS]
+    if chain.places[k, TAPS] > 1 or weight < 0:
+        return 0.0
+    return chain.weights[0, weight + 1] / (1.0 + chain.weights[0, weight])
+
+
 @kernel
 def write_given(chain, waves, bar):
     """Write what body forces gave the waves of a bar into its rings."""
     given = waves.bars[GIVEN, bar]
     waves.bars[GIVEN, bar] = 0.0
     for k in range(int(chain.bodies[bar, FIRST]), int(chain.bodies[bar, LAST]) + 1):
-        start = chain.places[k, RING]
-        for i in range(4 * chain.places[k, SIZE]):
+        start, count = chain.places[k, RING], 4 * chain.places[k, SIZE]
+        for i in range(count):
             waves.rings[0, start + i] += given
+        waves.rings[0, start + count] += kept_of(chain, k) * given
+        waves.rings[0, start + count + 1] += kept_of(chain, k) * given
 
 
 @inlined
@@ -154,5 +171,7 @@ def energy_of_bar(dt, chain, waves, step, bar):
                     left -= chain.weights[0, weight + taps - late]
                 x = waves.rings[0, start + ((step - age) & (size - 1))] + given
                 one += left * x * x
+            x = waves.rings[0, chain.places[k, RING] + 4 * size + way] + kept_of(chain, k) * given
+            one += x * x
         energy += chain.steel[k, IMPEDANCE] * dt * one
     return energy

@@ -29,7 +29,7 @@ from percussion_model.solvers.chain.records import (
     Waves,
 )
 from percussion_model.solvers.chain.resolution import coarser_steps
-from percussion_model.solvers.chain.sections import CAME_ROWS
+from percussion_model.solvers.chain.sections import CAME_ROWS, kept_of
 from percussion_model.solvers.setup import MOST_CHANGES, PISTONS, fill_parameters, fill_start
 from percussion_model.solvers.state import State, words_of
 
@@ -128,8 +128,9 @@ class ChainSolver(Solver):
             v = s["v_p"] if name == "piston" else numbers.values.start_bit_velocity
             bars[Bar.VELOCITY, i] = v
             for k in range(self._sections[name].start, self._sections[name].stop):
-                first = places[k, Place.RING]
-                rings[0, first : first + 4 * places[k, Place.SIZE]] = 0.5 * v
+                first, count = places[k, Place.RING], 4 * places[k, Place.SIZE]
+                rings[0, first : first + count] = 0.5 * v
+                rings[0, first + count : first + count + 2] = kept_of(self._chain, k) * 0.5 * v
         if len(numbers.joints):
             joints[Has.GAP] = numbers.joints[:, 3]
             joints[Has.CLOSED] = numbers.joints[:, 3] == 0.0

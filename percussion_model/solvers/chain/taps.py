@@ -26,6 +26,8 @@ LEAST_NORMAL = 2.0
 # They end so many standard deviations from the mean, where they are 4e-5 of the greatest; where a
 # section is too short for that no less than so many, which keeps 0.999 of the variance.
 REACH, LEAST_REACH = 4.5, 4.0
+# In so many rounds the variance of what ends comes right to rounding.
+ROUNDS = 8
 # Weights below this, at either end, are rounding.
 NOTHING = 1e-18
 
@@ -36,7 +38,7 @@ def weights_of(transit: float, variance: float) -> tuple[int, np.ndarray, float]
     Parameters
     ----------
     transit, variance : float
-        Wanted mean [steps] and variance [steps^2].
+        Wanted mean, which is one step or at least two [steps], and variance [steps^2].
 
     Returns
     -------
@@ -48,18 +50,15 @@ def weights_of(transit: float, variance: float) -> tuple[int, np.ndarray, float]
         Their variance.
     """
     whole = max(1, math.floor(transit + WHOLE))
-    part = min(max(transit - whole, 0.0), 1.0)
+    part = max(transit - whole, 0.0)
     if part <= WHOLE:
         delay, weights, spread = whole, np.ones(1), 0.0
-    elif whole >= 2:
+    else:
         delay, weights, spread = whole - 1, _cubic(part), 0.0
-    else:  # too short for four steps
-        delay, weights, spread = whole, np.array([1.0 - part, part]), part * (1.0 - part)
     rest, room = max(variance - spread, 0.0), delay - 1
     reach = min(room, math.ceil(REACH * math.sqrt(rest)))
     if rest >= LEAST_NORMAL and reach >= LEAST_REACH * math.sqrt(rest):
-        normal = np.exp(-0.5 * np.arange(-reach, reach + 1) ** 2 / rest)
-        weights = np.convolve(weights, normal / normal.sum())
+        weights = np.convolve(weights, _normal(rest, reach))
         return delay - reach, weights / weights.sum(), spread + rest
     rounds = min(math.ceil(0.5 * rest / MOST_SPREAD), room)
     if rounds == 0:
@@ -71,6 +70,26 @@ def weights_of(transit: float, variance: float) -> tuple[int, np.ndarray, float]
     weights = weights[kept[0] : kept[-1] + 1]
     first = delay - rounds + int(kept[0])
     return first, weights / weights.sum(), spread + 2.0 * a * rounds
+
+
+def _normal(variance: float, reach: int) -> np.ndarray:
+    """Samples of a normal distribution so wide that they have the variance though they end."""
+    places, wide = np.arange(-reach, reach + 1), variance
+    for _ in range(ROUNDS):
+        weights = np.exp(-0.5 * places**2 / wide)
+        weights /= weights.sum()
+        wide *= variance / float(weights @ places**2)
+    return weights
+
+
+def turning(transit: float) -> float:
+    """Weight a of a section of one to two steps, which is too short for others.
+
+    y = a x + sqrt(1 - a^2) q, where q becomes sqrt(1 - a^2) x - a q: it delays by one step and
+    (1 - a)/(1 + a) of another, takes nothing and makes nothing.
+    """
+    part = transit - 1.0
+    return (1.0 - part) / (1.0 + part)
 
 
 def _cubic(part: float) -> np.ndarray:
