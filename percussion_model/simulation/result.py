@@ -44,7 +44,10 @@ _MARKS = ("summary.json", "scene.toml")
 _TRACES = ("trace.csv", "trace.npz")
 # What is made of a result beside it: the page, and figures as PNG and SVG.
 REPORT = "report.html"
-FIGURES = ("overview", "bit_motion", "activation", "stress_waves")
+FIGURES = (
+    "overview", "bit_motion", "activation", "stress_waves",
+    "string_waves", "string_energy", "string_gauges",
+)  # fmt: skip
 _DERIVED = (REPORT, *(f"{name}.{kind}" for name in FIGURES for kind in ("png", "svg")))
 
 
