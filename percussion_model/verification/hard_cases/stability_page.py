@@ -20,6 +20,7 @@ GROUPS = {
     "drive": "Drive, feed and weight",
     "bars": "Bars and their cells",
     "contact": "Starts that graze, rest or bounce",
+    "chains": "Drill strings",
     "inputs": "Inputs that change during the run",
 }
 
