@@ -243,6 +243,9 @@ def string_report(
     SimulationError
         If there are too few whole blows, or no such place for a gauge.
     """
+    for gauge in gauges:
+        if isinstance(gauge, str) or len(gauge) != 2:
+            raise SceneError(f"gauge {gauge!r}: must be a bar and a place [m], as ('rod 2', 1.5)")
     if not scene.effects.string:
         raise SceneError("effects.string = false: a string report needs a drill string")
     if scene.piston.model == "absent":

@@ -81,8 +81,8 @@ LEDGER: tuple[tuple[str, tuple[tuple[str, str], ...]], ...] = (
         (
             ("initial", "energy at the start"),
             ("drive", "work of the drive on the piston"),
-            ("feed", "work of the feed force on the bit"),
-            ("gravity", "work of gravity on piston and bit"),
+            ("feed", "work of the feed force"),
+            ("gravity", "work of gravity"),
         ),
     ),
     (
@@ -93,6 +93,8 @@ LEDGER: tuple[tuple[str, tuple[tuple[str, str], ...]], ...] = (
             ("standstill", "damping at standstill (mode SS)"),
             ("loss", "structural loss in the bars"),
             ("contact", "restitution of rigid contact"),
+            ("joints", "joints of the drill string, and its damper"),
+            ("ends", "ends without reflection, less what comes in there"),
             ("numerical", "numerical: averaging in cells"),
             ("overshoot", "overshoot: events found just past their place"),
         ),

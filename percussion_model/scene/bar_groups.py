@@ -118,17 +118,22 @@ class Rod(Bar):
         JOINTS_ON,
     )
     transmission: float = quantity(
-        1.0, "-", "share of a short wave's force that passes a lossy joint", JOINTS_ON, gt=0, le=1
+        0.95, "-", "share of a short wave's force that passes a lossy joint", JOINTS_ON, gt=0, le=1
     )
     relaxation: float = quantity(
         1e-3, "s", "time after which a lossy joint carries a lasting force", JOINTS_ON, gt=0, le=10
     )
-    gap: float = quantity(0.0, "m", "of a contact or a thread at the start", JOINTS_ON, ge=0, le=1)
+    gap: float = quantity(0.0, "m", "gap of contact or thread at the start", JOINTS_ON, ge=0, le=1)
     preload: float = quantity(
-        0.0, "N", "with which a thread pulls its shoulders together", JOINTS_ON, ge=0, le=1e9
+        0.0,
+        "N",
+        "preload that pulls a thread's shoulders together",
+        JOINTS_ON,
+        ge=0,
+        le=1e9,
     )
     thread_stiffness: float = quantity(
-        0.0, "N/m", "of a thread whose shoulders have parted", JOINTS_ON, ge=0, le=1e13
+        0.0, "N/m", "stiffness of a thread whose shoulders have parted", JOINTS_ON, ge=0, le=1e13
     )
 
     @property
@@ -160,23 +165,23 @@ class DrillString(Parameters):
     pulse_force: float = quantity(
         0.0,
         "N",
-        "of a rectangular wave that comes down the topmost bar",
+        "force of a rectangular wave that comes down the topmost bar",
         NO_PISTON,
         ge=-1e9,
         le=1e9,
     )
-    pulse_duration: float = quantity(1e-4, "s", "of that wave", NO_PISTON, gt=0, le=10)
+    pulse_duration: float = quantity(1e-4, "s", "duration of that wave", NO_PISTON, gt=0, le=10)
     rods: tuple[Rod, ...] = rod_list(STRING_ON)
 
 
 class Damper(Parameters):
     """Recoil damper between the casing of the drill and the topmost bar."""
 
-    stiffness: float = quantity(1e7, "N/m", "of its spring", DAMPER_ON, ge=0, le=1e13)
-    damping: float = quantity(2e4, "N s/m", "of its dashpot", DAMPER_ON, ge=0, le=1e9)
+    stiffness: float = quantity(1e7, "N/m", "stiffness of its spring", DAMPER_ON, ge=0, le=1e13)
+    damping: float = quantity(2e4, "N s/m", "damping of its dashpot", DAMPER_ON, ge=0, le=1e9)
     preload: float = quantity(0.0, "N", "force at the start", DAMPER_ON, ge=0, le=1e9)
     casing_mass: float = quantity(
-        150.0, "kg", "of the casing, which feed and recoil act on", DAMPER_ON, gt=0, le=1e6
+        150.0, "kg", "mass of the casing, which feed and recoil act on", DAMPER_ON, gt=0, le=1e6
     )
 
 

@@ -31,11 +31,13 @@ def refuse_string(scene: Scene) -> None:
     if scene.solver.name not in _OF_STRINGS or scene.solver.fidelity != "wave":
         named = scene.solver.name if scene.solver.fidelity == "wave" else scene.solver.fidelity
         raise SceneError(
-            f'"{named}" computes piston and bit alone, and effects.string = true: set solver.name '
-            f"to {' or '.join(_OF_STRINGS)}, and leave solver.fidelity"
+            f'"{named}" computes piston and bit alone, but the scene has rods (effects.string): '
+            f"set solver.name to {' or '.join(_OF_STRINGS)}, and solver.fidelity to wave"
         )
     for k, rod in enumerate(scene.string.rods):
         for name in sorted(rod._given.difference(rod.telling)):
+            if getattr(rod, name) == rod.rows[name].default:
+                continue  # as a scene that is written in full has it
             raise SceneError(
                 f'string.rods.{k}.{name}: a joint that is "{rod.joint}" has none: leave it out'
             )

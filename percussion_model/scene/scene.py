@@ -445,8 +445,7 @@ def refuse_contradictions(scene: Scene) -> None:
     if bodies == "rigid" and bit == "elastic":
         raise SceneError(
             f'solver.name = "{scene.solver.name}" computes no elastic bars: '
-            'set piston.model = "rigid" and bit.model = "rigid", or solver.name = "wave", "fem" '
-            'or "auto"'
+            'set piston.model = "rigid" and bit.model = "rigid", or another solver.name, as "auto"'
         )
     refuse_string(scene)
     _refuse_fidelity(scene)

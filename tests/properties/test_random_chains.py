@@ -123,7 +123,7 @@ def draw_scene(source: Source) -> Scene:
     try:
         make_solver(scene)
     except SceneError as error:  # cells too fine for the loss: said, and by the default mended
-        if "take fewer" not in str(error):
+        if "fewer solver.cells" not in str(error):
             raise
         scene = scene.replace(**{"solver.cells": None})
     return scene

@@ -51,8 +51,8 @@ CAPTIONS = {
         "stripes; red is compression, blue tension. Thin lines are the joints."
     ),
     "string_energy": (
-        "Energy in piston, string and bit after one impact, and the greatest stress of that blow "
-        "along the string."
+        "Energy in piston, string and bit after one impact, and the greatest forces of that blow "
+        "along the string, as the middle of each cell has them."
     ),
     "string_gauges": (
         "Stress as strain gauges in the middle of three bars show it, after one impact; positive "

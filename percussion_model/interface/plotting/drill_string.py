@@ -153,8 +153,8 @@ def _end_forces(ax: Axes, watched: WatchedBlow, count: int) -> None:
     """Draw the forces in the first and the last cell of the string, piston apart."""
     time, names = watched.time[:count] * MS, [name for name in watched.force if name != "piston"]
     first, last = watched.force[names[0]][:count, 0], watched.force[names[-1]][:count, -1]
-    ax.plot(time, first / KN, "--", color=style.PISTON_COLOUR, label="just below the struck end")
-    ax.plot(time, last / KN, color=style.BIT_COLOUR, label="just above the rock")
+    ax.plot(time, first / KN, "--", color=style.PISTON_COLOUR, label="first cell of the shank")
+    ax.plot(time, last / KN, color=style.BIT_COLOUR, label="last cell of the bit")
     ax.axhline(0.0, color=style.RULE_COLOUR, linewidth=0.6)
     low, high = ax.get_ylim()
     ax.set_ylim(low, high + 0.3 * (high - low))

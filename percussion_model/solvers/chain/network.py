@@ -122,7 +122,7 @@ def network_of(numbers: Numbers) -> Network:
             weights.append(row)
             ring += 4 * size + 2
             if dt < eta and spread < LEAST_SPREAD * wanted:
-                raise _too_fine(numbers, float(section[LENGTH]), dt, eta)
+                raise _too_fine(float(section[LENGTH]), dt, eta)
             loss = 1.0 if eta else 0.0
             if spread > wanted:  # the rest is what fitting a short section to steps takes
                 loss = wanted / spread
@@ -145,12 +145,11 @@ def network_of(numbers: Numbers) -> Network:
     return Network(chain, names, dt, ring, misfit, struck)
 
 
-def _too_fine(numbers: Numbers, length: float, dt: float, eta: float) -> SceneError:
+def _too_fine(length: float, dt: float, eta: float) -> SceneError:
     """Error for steps so short that a section cannot spread a wave enough."""
-    cells = bar_transit_time(elastic_chain(numbers)[0][0]) / dt
     return SceneError(
-        f"solver.cells = {cells:.0f}: steps of {dt:.2g} s are shorter than loss.time = "
-        f"{eta:.2g} s, and a section of {length:g} m is too short for its loss: take fewer"
+        f"loss.time = {eta:.3g} s: too long for a section of {length:g} m in steps of {dt:.2g} s: "
+        "take a shorter loss.time, or fewer solver.cells"
     )
 
 
