@@ -52,6 +52,33 @@ def fill_motion(par, s, reading, time, piston_position, bit_position):
 
 
 @merged
+def fill_forces(s, reading, tau, bit, contact, at_grid_point):
+    """Write mean forces since a grid point, running impulses and peaks.
+
+    Parameters
+    ----------
+    s : record
+        Its impulses count from that grid point.
+    reading : record of READING
+    tau : float
+        Time since then [s].
+    bit, contact : float
+        Impulses until then [N s].
+    at_grid_point : bool
+        Whether it is read there, where no impulse has come on top.
+    """
+    reading.bit_force = s.i_bit / tau
+    reading.contact_force = s.i_contact / tau
+    reading.bit_impulse = bit
+    reading.contact_impulse = contact
+    if not at_grid_point:
+        reading.bit_impulse += s.i_bit
+        reading.contact_impulse += s.i_contact
+    reading.peak_bit_force = s.peak_bit_force
+    reading.peak_contact_force = s.peak_contact_force
+
+
+@merged
 def fill_ledger(s, reading, kinetic, elastic, recoverable):
     """Write the energies of a state and the peaks that its observer asked for.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from percussion_model.physics.kernel import kernel, merged
-from percussion_model.physics.readings import fill_ledger, fill_motion
+from percussion_model.physics.readings import fill_forces, fill_ledger, fill_motion
 from percussion_model.physics.records import Piston, Status
 from percussion_model.physics.reference import refer
 from percussion_model.physics.rock import recoverable
@@ -62,15 +62,7 @@ def read_at(par, s, chain, waves, time, blows, events, row):
         fill_motion(par, s, row, time, s.u_r - s.u_0 + casing, here)
     k = par.sections - 1
     row.bit_end_velocity = waves.came[DOWN, k] + waves.came[UP_OUT, k]
-    row.bit_force = s.i_bit / tau
-    row.contact_force = s.i_contact / tau
-    row.bit_impulse = bit
-    row.contact_impulse = contact
-    if not at_grid_point:
-        row.bit_impulse += s.i_bit
-        row.contact_impulse += s.i_contact
-    row.peak_bit_force = s.peak_bit_force
-    row.peak_contact_force = s.peak_contact_force
+    fill_forces(s, row, tau, bit, contact, at_grid_point)
 
 
 @kernel

@@ -24,8 +24,6 @@ class Met(NamedTuple):
         Between them [m]; of a lossy joint its shortening.
     impulse, square : float
         Integrals of its force, compression positive, and of the square of it [N s, N2 s].
-    free : float
-        How long its shoulders were apart [s].
     taken : float
         What a dashpot took [J].
     """
@@ -34,7 +32,6 @@ class Met(NamedTuple):
     gap: float
     impulse: float
     square: float
-    free: float
     taken: float
 
 
@@ -60,7 +57,7 @@ def shoulders(closed, gap, a, y, preload, stiffness, tau):
     opening = -a - y * preload
     if closed == 1 and opening < 0.0:
         force = a / y
-        return Met(1, 0.0, force * tau, force * force * tau, 0.0, 0.0)
+        return Met(1, 0.0, force * tau, force * force * tau, 0.0)
     rate, free, closed = y * stiffness, tau, 0
     limit = 0.0
     if rate > 0.0:
@@ -83,8 +80,8 @@ def shoulders(closed, gap, a, y, preload, stiffness, tau):
     gap = gap + change
     if closed == 1:
         force, rest = a / y, tau - free
-        return Met(1, 0.0, impulse + force * rest, square + force * force * rest, free, 0.0)
-    return Met(0, max(gap, 0.0), impulse, square, free, 0.0)
+        return Met(1, 0.0, impulse + force * rest, square + force * force * rest, 0.0)
+    return Met(0, max(gap, 0.0), impulse, square, 0.0)
 
 
 @inlined
@@ -108,4 +105,4 @@ def yielding(short, a, y, stiffness, damping, tau):
     impulse = last * tau + swing * e1
     square = last * last * tau + 2.0 * last * swing * e1 + swing * swing * e2
     speeds = y * y * swing * swing * e2  # integral of x'^2, where x' = -Y swing exp(-rate t)
-    return Met(1, short + change, impulse, square, 0.0, damping * speeds)
+    return Met(1, short + change, impulse, square, damping * speeds)

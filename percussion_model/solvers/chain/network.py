@@ -172,12 +172,6 @@ def _fits(numbers: Numbers, steel: np.ndarray, bodies: np.ndarray) -> np.ndarray
     return fits
 
 
-def refuse_chain(numbers: Numbers) -> None:
-    """Raise `SceneError` for what no chain computes."""
-    if numbers.values.bit_model != 0:
-        raise SceneError('solver.name = "chain" needs bit.model = "elastic"')
-
-
 def parameters_of(network: Network, numbers: Numbers, par: np.ndarray) -> None:
     """Fill what `CHAIN_PAR` has beside the common parameters."""
     p: Any = par[0]

@@ -15,7 +15,7 @@ from percussion_model.scene.numbers import numbers_of
 from percussion_model.scene.scene import Scene
 from percussion_model.solvers.base import Solver
 from percussion_model.solvers.chain.advance import GRID_ROUNDING, begin, run
-from percussion_model.solvers.chain.network import network_of, parameters_of, refuse_chain
+from percussion_model.solvers.chain.network import network_of, parameters_of
 from percussion_model.solvers.chain.records import (
     CHAIN_LIMITS,
     CHAIN_PAR,
@@ -84,7 +84,6 @@ class ChainSolver(Solver):
     def __init__(self, scene: Scene) -> None:
         super().__init__(scene)
         self._numbers = numbers = numbers_of(scene)
-        refuse_chain(numbers)
         self._network = network = network_of(numbers)
         self._chain, self._names = network.chain, network.names
         self.time_step, self.wave_speed_error = network.time_step, network.misfit

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from percussion_model.physics.kernel import kernel, merged
-from percussion_model.physics.readings import fill_ledger, fill_motion
+from percussion_model.physics.readings import fill_forces, fill_ledger, fill_motion
 from percussion_model.physics.records import Piston, Status
 from percussion_model.physics.reference import refer
 from percussion_model.solvers.wave.bar import kinetic_energy
@@ -125,15 +125,7 @@ def read_at(par, s, bars, time, blows, events, row):
         here = before + 0.5 * (v_before + s.v_b) * tau
         fill_motion(par, s, row, time, s.u_r - s.u_start + here, here)
     row.bit_end_velocity = bars.wb[Row.FACE, par.n_b]
-    row.bit_force = s.i_bit / tau
-    row.contact_force = s.i_contact / tau
-    row.bit_impulse = bit
-    row.contact_impulse = contact
-    if not at_grid_point:
-        row.bit_impulse += s.i_bit
-        row.contact_impulse += s.i_contact
-    row.peak_bit_force = s.peak_bit_force
-    row.peak_contact_force = s.peak_contact_force
+    fill_forces(s, row, tau, bit, contact, at_grid_point)
 
 
 @kernel
