@@ -141,6 +141,12 @@ def fmu(extra: list[str]) -> int:
                            PYTHONPATH=str(ROOT))  # fmt: skip
 
 
+def native(extra: list[str]) -> int:
+    """Bake a scene into FMUs that need no Python; paths count from where the user is."""
+    return setup() or call([tool("python"), "-m", "fmu_src.native", *extra], folder=Path.cwd(),
+                           PYTHONPATH=str(ROOT))  # fmt: skip
+
+
 def system(extra: list[str]) -> int:
     """Build the systems of FMUs and their archives; paths count from where the user is."""
     return setup() or call([tool("python"), "-m", "fmu_src.system", *extra], folder=Path.cwd(),
@@ -228,6 +234,8 @@ def main(arguments: list[str]) -> int:
     commands.add_parser("test", help="lint, type checks and tests; more goes to pytest")
     commands.add_parser("fmu", help="bake a scene into an FMU: --scene FILE, -o FILE.fmu",
                         add_help=False)  # fmt: skip
+    commands.add_parser("native", help="bake a scene into FMUs that need no Python: --scene FILE, "
+                        "--platforms NAMES", add_help=False)  # fmt: skip
     commands.add_parser("system", help="build drilling systems of FMUs as SSP: -o FOLDER",
                         add_help=False)  # fmt: skip
     commands.add_parser("bench", help="measure speed; more goes to the benchmarks")
@@ -241,7 +249,8 @@ def main(arguments: list[str]) -> int:
             print(f".venv is {'up to date' if code == 0 else 'not ready'} "
                   f"({time.monotonic() - started:.1f} s).")  # fmt: skip
             return code
-        work = {"run": run, "fmu": fmu, "system": system, "test": test, "bench": bench}
+        work = {"run": run, "fmu": fmu, "native": native, "system": system, "test": test,
+                "bench": bench}  # fmt: skip
         return work[choice.command](extra)
     except KeyboardInterrupt:
         print("\nInterrupted.", file=sys.stderr)

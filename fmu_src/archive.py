@@ -60,13 +60,22 @@ def write_fmu(
     entries["documentation/index.html"] = page.encode()
     entries["documentation/licenses/license.txt"] = (ROOT / "LICENSE").read_bytes()
     entries["model.png"] = (HERE / "icon.png").read_bytes()
-    digest = hashlib.sha256()
-    for name, content in sorted(entries.items()):
-        digest.update(name.encode() + b"\0" + hashlib.sha256(content).digest())
-    guid, xml = write_description(about, variables, digest.digest())
-    # the description comes first, so that tools find it at once
-    write_archive(path, {"modelDescription.xml": xml} | dict(sorted(entries.items())))
+    guid, xml = write_description(about, variables, digest(entries))
+    write_described(path, xml, entries)
     return guid
+
+
+def digest(entries: Mapping[str, bytes]) -> bytes:
+    """Hash of names and contents, whatever their order."""
+    found = hashlib.sha256()
+    for name, content in sorted(entries.items()):
+        found.update(name.encode() + b"\0" + hashlib.sha256(content).digest())
+    return found.digest()
+
+
+def write_described(path: Path, xml: bytes, entries: Mapping[str, bytes]) -> None:
+    """Write an FMU; the description comes first, so that tools find it at once."""
+    write_archive(path, {"modelDescription.xml": xml} | dict(sorted(entries.items())))
 
 
 def state_of(path: Path, before: bytes | None) -> str:

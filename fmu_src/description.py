@@ -116,10 +116,10 @@ def _complete(node: Element, variable: Variable) -> None:
     inner.attrib.clear()
     for name, value in attributes.items():
         if value is not None:
-            inner.set(name, value if isinstance(value, str) else _text(value, variable.type))
+            inner.set(name, value if isinstance(value, str) else to_text(value, variable.type))
 
 
-def _text(value: Any, kind: str) -> str:
+def to_text(value: Any, kind: str) -> str:
     """Write a value as XML schema wants it; floats with all their digits."""
     if isinstance(value, bool):
         return str(value).lower()
@@ -130,18 +130,27 @@ def _text(value: Any, kind: str) -> str:
 
 def _type_definitions(variables: Sequence[Variable]) -> Element:
     root = Element("TypeDefinitions")
-    done = set()
-    for variable in variables:
-        if variable.enumeration is None or variable.enumeration in done:
-            continue
-        done.add(variable.enumeration)
-        simple = SubElement(root, "SimpleType", {"name": variable.enumeration})
-        inner = SubElement(simple, "Enumeration")
-        for name, value, text in variable.items:
-            item = SubElement(inner, "Item", {"name": name, "value": str(value)})
-            if text:
-                item.set("description", text)
+    for variable in enumerations(variables):
+        simple = SubElement(root, "SimpleType", {"name": str(variable.enumeration)})
+        write_items(SubElement(simple, "Enumeration"), variable)
     return root
+
+
+def enumerations(variables: Sequence[Variable]) -> list[Variable]:
+    """The first variable of each enumeration."""
+    found: dict[str, Variable] = {}
+    for variable in variables:
+        if variable.enumeration is not None:
+            found.setdefault(variable.enumeration, variable)
+    return list(found.values())
+
+
+def write_items(node: Element, variable: Variable) -> None:
+    """Write the items of a variable's enumeration."""
+    for name, value, text in variable.items:
+        item = SubElement(node, "Item", {"name": name, "value": str(value)})
+        if text:
+            item.set("description", text)
 
 
 def _complete_structure(root: Element, variables: Sequence[Variable]) -> None:
@@ -155,16 +164,23 @@ def _complete_structure(root: Element, variables: Sequence[Variable]) -> None:
         if variable.causality != "output":
             continue
         known = [
-            str(at)
-            for at, one in enumerate(variables, start=1)
-            if variable.at_start is not None
-            and (one.causality == "parameter" or one.name in variable.at_start)
+            str(at) for at, one in enumerate(variables, start=1) if depends_at_start(variable, one)
         ]
         SubElement(unknowns, "Unknown", {"index": str(index), "dependencies": " ".join(known)})
 
 
+def depends_at_start(output: Variable, known: Variable) -> bool:
+    """Whether an output at the start depends on a parameter or an input."""
+    if output.at_start is None:
+        return False
+    return known.causality == "parameter" or known.name in output.at_start
+
+
 def write_description(
-    about: About, variables: Sequence[Variable], contents: bytes
+    about: About,
+    variables: Sequence[Variable],
+    contents: bytes,
+    described: type[Described] = Described,
 ) -> tuple[str, bytes]:
     """Return GUID and text of a model description.
 
@@ -172,9 +188,26 @@ def write_description(
     ----------
     contents : bytes
         Hash of what else is in the FMU, for the GUID.
+    described : type
+        What writes all but the GUID.
     """
-    root = Described(about, variables).to_xml()
+    return sign(described(about, variables).to_xml(), "guid", contents)
+
+
+def sign(root: Element, attribute: str, contents: bytes) -> tuple[str, bytes]:
+    """Give a model description its GUID; return that and the text.
+
+    Parameters
+    ----------
+    attribute : str
+        Where the GUID stands; it is a hash of the rest and of `contents`.
+    """
     guid = str(UUID(bytes=hashlib.sha256(tostring(root) + contents).digest()[:16]))
-    root.set("guid", f"{{{guid}}}")
+    root.set(attribute, f"{{{guid}}}")
+    return guid, to_bytes(root)
+
+
+def to_bytes(root: Element) -> bytes:
+    """Text of an XML file."""
     indent(root, space="  ")
-    return guid, b'<?xml version="1.0" encoding="UTF-8"?>\n' + tostring(root, "utf-8") + b"\n"
+    return b'<?xml version="1.0" encoding="UTF-8"?>\n' + tostring(root, "utf-8") + b"\n"

@@ -19,6 +19,8 @@ from percussion_model.solvers.modal.modes import (
     bar_modes,
     fill_quadrature,
     products,
+    shape_above,
+    shape_low,
     totals,
     with_residual,
 )
@@ -65,16 +67,16 @@ def test_modes_of_a_uniform_bar_are_cosines():
     order = np.arange(13)
     np.testing.assert_allclose(found.frequency, order * np.pi / bar_transit_time(UNIFORM), 1e-13)
     end = math.sqrt(2.0 / bar_mass(UNIFORM))
-    np.testing.assert_allclose(found.above(0)[1:], end, 1e-12)
-    np.testing.assert_allclose(found.low[1:], end * (-1.0) ** order[1:], 1e-11)
+    np.testing.assert_allclose(shape_above(found, 0)[1:], end, 1e-12)
+    np.testing.assert_allclose(shape_low(found)[1:], end * (-1.0) ** order[1:], 1e-11)
 
 
 def test_modes_of_a_stepped_bar_are_those_of_many_masses():
     found = bar_modes(STEPPED, 7)
     frequency, top, low = lumped(STEPPED, 1200)
     np.testing.assert_allclose(found.frequency[1:], frequency[:6], 3e-5)
-    np.testing.assert_allclose(found.above(0)[1:], top[:6], 1e-3)
-    np.testing.assert_allclose(np.abs(found.low)[1:], low[:6], 1e-3)
+    np.testing.assert_allclose(shape_above(found, 0)[1:], top[:6], 1e-3)
+    np.testing.assert_allclose(np.abs(shape_low(found))[1:], low[:6], 1e-3)
 
 
 def test_no_mode_is_left_out():
@@ -114,10 +116,10 @@ def test_a_quadrature_is_exact_for_polynomials(count):
 def test_modes_on_a_spring_yield_as_the_spring_does():
     """A constant force at the end of a bar moves it by F / K, whatever the bar."""
     found = bar_modes(STEPPED, 4000, 5e8)
-    assert np.sum(found.low**2 / found.frequency**2) == pytest.approx(1.0 / 5e8, rel=1e-3)
+    assert np.sum(shape_low(found) ** 2 / found.frequency**2) == pytest.approx(1.0 / 5e8, rel=1e-3)
     # and no further under its weight than its mass asks for
     whole = totals(found, 0, len(STEPPED))
-    sag = np.sum(found.low * whole / found.frequency**2)
+    sag = np.sum(shape_low(found) * whole / found.frequency**2)
     assert sag == pytest.approx(bar_mass(STEPPED) / 5e8, rel=1e-9)
 
 
@@ -126,15 +128,19 @@ def test_the_last_shape_yields_what_left_out_modes_would(spring, mass):
     """A force at the end moves 24 modes as far as the whole bar, and the shape is their like."""
     plain = bar_modes(STEPPED, 24, spring, mass)
     found = with_residual(plain, spring)
-    assert np.sum(found.low**2 / found.frequency**2) == pytest.approx(1.0 / spring, rel=1e-12)
-    assert np.sum(plain.low**2 / plain.frequency**2) < (1.0 - 1e-4) / spring
+    assert np.sum(shape_low(found) ** 2 / found.frequency**2) == pytest.approx(
+        1.0 / spring, rel=1e-12
+    )
+    assert np.sum(shape_low(plain) ** 2 / plain.frequency**2) < (1.0 - 1e-4) / spring
     np.testing.assert_allclose(products(found, 0, found, 0, len(STEPPED)), np.eye(24), atol=2e-6)
     np.testing.assert_array_equal(found.frequency[:-1], plain.frequency[:-1])
     assert found.frequency[-2] < found.frequency[-1] < 2.5 * found.frequency[-2]
     # as a whole: also under the loads, by the same far end as near end
-    whole = totals(found, 0, len(STEPPED)) + mass * found.above(0)
-    sag = found.above(0) * whole / found.frequency**2
-    assert np.sum(found.above(0) * found.low / found.frequency**2) == pytest.approx(1.0 / spring)
+    whole = totals(found, 0, len(STEPPED)) + mass * shape_above(found, 0)
+    sag = shape_above(found, 0) * whole / found.frequency**2
+    assert np.sum(shape_above(found, 0) * shape_low(found) / found.frequency**2) == pytest.approx(
+        1.0 / spring
+    )
     assert np.sum(sag) > (bar_mass(STEPPED) + mass) / spring
 
 

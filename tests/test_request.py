@@ -14,7 +14,7 @@ from percussion_model.simulation.accuracy_control import planned_cells
 from percussion_model.simulation.result import Result
 from percussion_model.solvers.modal.resolution import modes_for, most_modes
 from percussion_model.solvers.modal.solver import ModalSolver
-from percussion_model.solvers.wave.grid import elastic_bars, fitting_cells
+from percussion_model.solvers.wave.grid import fitting_cells
 from percussion_model.solvers.wave.resolution import misfits
 
 LONG = os.environ.get("PERCUSSION_LONG") == "1"
@@ -113,7 +113,7 @@ def truth(scene, levels):
     """
     results = []
     for fewest in levels:
-        cells, fit = fitting_cells(elastic_bars(numbers_of(scene)), fewest, int(1.4 * fewest), 1e-5)
+        cells, fit = fitting_cells(numbers_of(scene), fewest, int(1.4 * fewest), 1e-5)
         waves = scene.computed_by("wave", **{"solver.cells": cells})
         results.append(simulate(waves, record_events=False))
     coarse, fine = (result.rate_of_penetration for result in results)

@@ -21,7 +21,7 @@ from percussion_model.simulation.error_estimate import (
     estimate_error,
 )
 from percussion_model.simulation.result import Result
-from percussion_model.solvers.wave.grid import cut
+from percussion_model.solvers.wave.cutting import cut
 from percussion_model.solvers.wave.resolution import (
     CALIBRATED,
     FIT_SHARE,

@@ -9,7 +9,14 @@ from hypothesis import strategies as st
 
 from percussion_model.scene import bars
 from percussion_model.scene.bar_groups import BitBar, Section
-from percussion_model.scene.numbers import SCENE_NUMBERS, scene_numbers, section_numbers
+from percussion_model.scene.hammers import hammer
+from percussion_model.scene.numbers import (
+    SCENE_NUMBERS,
+    kernel_numbers,
+    numbers_of,
+    scene_numbers,
+    section_numbers,
+)
 from percussion_model.scene.parameters import find_row, parameter_table
 from percussion_model.scene.scene import Scene
 
@@ -87,3 +94,13 @@ def test_the_functions_of_bars_can_be_compiled():
     for name in ("section_wave_speed", "section_impedance", "section_mass"):
         function = getattr(bars, name)
         assert njit(function)(array[1]) == function(array[1])
+
+
+def test_rods_of_any_number_lie_in_one_array():
+    scene = hammer("t38", 3)
+    numbers = numbers_of(scene)
+    assert len(numbers.rods) == len(scene.string.rods) == len(numbers.rod_counts)
+    for found, rod in zip(numbers.rods, scene.string.rods, strict=True):
+        np.testing.assert_array_equal(found, section_numbers(rod))
+    assert numbers_of(Scene()).rods == []
+    assert kernel_numbers(scene).values.tobytes() == scene_numbers(scene).tobytes()

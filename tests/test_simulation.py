@@ -11,7 +11,8 @@ from percussion_model.physics.records import SAMPLE_FIELDS
 from percussion_model.scene.numbers import numbers_of
 from percussion_model.simulation.simulate import sampling_times, stop_on_interrupt
 from percussion_model.solvers.wave.advance import run
-from percussion_model.solvers.wave.grid import cut_bars
+from percussion_model.solvers.wave.grid import choose_time_step
+from percussion_model.solvers.wave.shared import cut_bars
 from percussion_model.solvers.wave.totals import begin
 
 RIGID = {"piston.model": "rigid", "bit.model": "rigid"}
@@ -97,15 +98,20 @@ def test_all_kinds_of_scenes_have_arguments_of_the_same_types(monkeypatch):
     assert (len(run.overloads), len(begin.overloads)) == before
 
 
+def cells_of(scene):
+    numbers = numbers_of(scene)
+    return cut_bars(numbers, choose_time_step(numbers, 0))
+
+
 def test_scenes_on_the_same_steel_share_their_cells_and_leave_them_alone():
     scenes = [WAVES.replace(**{"rock.loading_stiffness": k}) for k in (7.5e8, 2e9)]
-    bars = cut_bars(numbers_of(scenes[0]), 0)
-    assert cut_bars(numbers_of(scenes[1]), 0) is bars
+    bars = cells_of(scenes[0])
+    assert cells_of(scenes[1]) is bars
     before = [bar.coefficients.copy() for bar in bars.both]
     alone = one_go(scenes[0])
     for scene in (scenes[1], WAVES.replace(**{"loss.time": 3e-7})):
         one_go(scene, end=0.06)
-    assert cut_bars(numbers_of(scene), 0) is not bars
+    assert cells_of(scene) is not bars
     assert all(
         np.array_equal(bar.coefficients, c) for bar, c in zip(bars.both, before, strict=True)
     )

@@ -6,12 +6,13 @@ import hashlib
 import os
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
-from numba import njit
+from numba import njit, types
 
 STAMP = "kernels.sha256"
 # Folders with functions that kernels of other files call.
-CALLEES = ("physics", "solvers", "verification/accuracy")
+CALLEES = ("physics", "scene", "solvers", "verification/accuracy")
 
 
 def drop_stale_kernels(folder: Path) -> None:
@@ -79,6 +80,25 @@ def entry_of(function: Callable) -> Callable:
 # counting (which took most of a step's time), and a kernel that allocates does
 # not compile, so that it can always be built ahead of time.
 kernel = njit(cache=True, error_model="numpy", _nrt=False)
+
+
+def preparing(function: Callable) -> Callable:
+    """Compile what is done before a run: it may allocate, and constants are numbers as others.
+
+    Ahead of time, the library brings the memory. Numba would compile a function anew for each
+    constant that it is called with; here that takes longer than it spares.
+    """
+    compiled = njit(cache=True, error_model="numpy")(function)
+    find: Any = getattr(compiled, "get_call_template", None)  # none where nothing is compiled
+
+    def find_plain(arguments: Any, named: Any) -> Any:
+        named = {name: types.unliteral(kind) for name, kind in named.items()}
+        return find([types.unliteral(kind) for kind in arguments], named)
+
+    if find is not None:
+        compiled.get_call_template = find_plain
+    return compiled
+
 
 # For calls of other libraries, which may wait for threads that want to run Python.
 nogil = njit(cache=True, error_model="numpy", _nrt=False, nogil=True)

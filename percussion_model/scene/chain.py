@@ -11,29 +11,9 @@ from percussion_model.scene.rows import SceneError, show_value
 if TYPE_CHECKING:
     from percussion_model.scene.scene import Scene
 
-# Solvers that compute bars between piston and bit.
-_OF_STRINGS = ("auto", "chain")
 
-
-def refuse_string(scene: Scene) -> None:
-    """Raise `SceneError` for a drill string that nothing computes, or that is none."""
-    if not scene.effects.string:
-        if scene.string.rods:
-            raise SceneError(
-                "string.rods are given, but effects.string = false: set effects.string = true, or "
-                "leave them out"
-            )
-        return
-    if not scene.string.rods:
-        raise SceneError("effects.string = true needs string.rods, or [[bars]] from drive to rock")
-    if scene.bit.model == "rigid":
-        raise SceneError('effects.string = true needs bit.model = "elastic": waves run in rods')
-    if scene.solver.name not in _OF_STRINGS or scene.solver.fidelity != "wave":
-        named = scene.solver.name if scene.solver.fidelity == "wave" else scene.solver.fidelity
-        raise SceneError(
-            f'"{named}" computes piston and bit alone, but the scene has rods (effects.string): '
-            f"set solver.name to {' or '.join(_OF_STRINGS)}, and solver.fidelity to wave"
-        )
+def refuse_joints(scene: Scene) -> None:
+    """Raise `SceneError` for numbers of a joint that its kind does not have."""
     for k, rod in enumerate(scene.string.rods):
         for name in sorted(rod._given.difference(rod.telling)):
             if getattr(rod, name) == rod.rows[name].default:

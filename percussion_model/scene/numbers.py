@@ -5,39 +5,14 @@ What follows from the arrays is in `percussion_model.scene.bars`.
 
 from __future__ import annotations
 
-import math
-from collections import namedtuple
-from operator import attrgetter
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from percussion_model.scene.bar_groups import Bar
 from percussion_model.scene.parameters import parameter_table
-from percussion_model.scene.rows import Row
 from percussion_model.scene.scene import Scene
-
-
-def _is_whole(row: Row) -> bool:
-    """Whether a parameter is a whole number in the record; one left out is NaN, no such."""
-    return row.kind != "number" and (row.required or row.default is not None)
-
-
-_ROWS = [
-    row for row in parameter_table() if row.kind not in ("sections", "rods") and "*" not in row.key
-]
-
-# A field for each row of the parameter table in its order, sections left out; a point of
-# its key is an underline here.
-_FIELDS = [(row.key.replace(".", "_"), "i8" if _is_whole(row) else "f8") for row in _ROWS]
-SCENE_NUMBERS = np.dtype(_FIELDS)
-
-# The same fields as a named tuple: Python reads one of them in a tenth of the time.
-Values = namedtuple("Values", [name for name, _ in _FIELDS])  # type: ignore[misc]
-
-_values_of = attrgetter(*(row.key for row in _ROWS))
-_CHOICES = [(k, row.choices) for k, row in enumerate(_ROWS) if row.kind == "choice"]
-_OPTIONAL = [k for k, row in enumerate(_ROWS) if row.default is None and not row.required]
+from percussion_model.scene.values import SCENE_NUMBERS, values_of
 
 
 class Numbers(NamedTuple):
@@ -50,8 +25,11 @@ class Numbers(NamedTuple):
         flags, NaN for what is left out.
     piston, bit : float array, shape (sections, 4)
         Sections as `section_numbers` has them, whatever the model of the bar.
-    rods : tuple of such arrays
-        Bars between them; none without effects.string.
+    rod_sections : float array, shape (sections, 4)
+        The same of all bars between them, from top to bottom: kernels take any number of rods
+        so. None without effects.string.
+    rod_counts : int array, shape (rods,)
+        Sections of each rod.
     joints : float array, shape (rods, 6)
         Of each rod to the bar below, as `joint_numbers` has them.
     """
@@ -59,17 +37,31 @@ class Numbers(NamedTuple):
     values: Any
     piston: np.ndarray
     bit: np.ndarray
-    rods: tuple[np.ndarray, ...] = ()
+    rod_sections: np.ndarray = np.zeros((0, 4))
+    rod_counts: np.ndarray = np.zeros(0, np.int64)
     joints: np.ndarray = np.zeros((0, 6))
+
+    @property
+    def rods(self) -> list[np.ndarray]:
+        """Sections of each rod."""
+        ends = np.cumsum(self.rod_counts).tolist()
+        return [self.rod_sections[a:b] for a, b in zip([0, *ends], ends, strict=False)]
 
 
 def numbers_of(scene: Scene) -> Numbers:
     """Numbers of a scene and of its bars."""
     ends = section_numbers(scene.piston), section_numbers(scene.bit)
     if not scene.effects.string:
-        return Numbers(_values(scene), *ends)
-    rods = tuple(section_numbers(rod) for rod in scene.string.rods)
-    return Numbers(_values(scene), *ends, rods, joint_numbers(scene))
+        return Numbers(values_of(scene), *ends)
+    rods = [section_numbers(rod) for rod in scene.string.rods]
+    counts = np.array([len(rod) for rod in rods], np.int64)
+    return Numbers(values_of(scene), *ends, np.concatenate(rods), counts, joint_numbers(scene))
+
+
+def kernel_numbers(scene: Scene) -> Numbers:
+    """The same as kernels take them: values as a record."""
+    numbers = numbers_of(scene)
+    return numbers._replace(values=np.array([numbers.values], SCENE_NUMBERS)[0])
 
 
 # Kinds of joint, in the order of the choices.
@@ -94,16 +86,6 @@ def joint_numbers(scene: Scene) -> np.ndarray:
     return rows
 
 
-def _values(scene: Scene) -> Values:
-    found = list(_values_of(scene))
-    for k, choices in _CHOICES:
-        found[k] = choices.index(found[k])
-    for k in _OPTIONAL:
-        if found[k] is None:
-            found[k] = math.nan
-    return Values._make(found)
-
-
 def scene_numbers(scene: Scene) -> np.ndarray:
     """Parameters of a scene as one record, by the fields of `Values`.
 
@@ -111,7 +93,7 @@ def scene_numbers(scene: Scene) -> np.ndarray:
     -------
     SCENE_NUMBERS array of length 1
     """
-    return np.array([_values(scene)], SCENE_NUMBERS)
+    return np.array([values_of(scene)], SCENE_NUMBERS)
 
 
 def section_numbers(bar: Bar) -> np.ndarray:

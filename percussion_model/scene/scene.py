@@ -10,7 +10,8 @@ from typing import Any, Self
 
 from percussion_model.physics.effects import EFFECTS
 from percussion_model.scene.bar_groups import Bar, BitBar, Damper, DrillString, PistonBar
-from percussion_model.scene.chain import chain_as_groups, refuse_string
+from percussion_model.scene.chain import chain_as_groups, refuse_joints
+from percussion_model.scene.contradictions import TEXTS, Bodies, Rule, find_contradiction
 from percussion_model.scene.group import Parameters
 from percussion_model.scene.parameters import (
     GROUPS,
@@ -31,19 +32,15 @@ from percussion_model.scene.parameters import (
     unknown_key,
 )
 from percussion_model.scene.rows import Faults, Row, SceneError, show_value, unprintable
+from percussion_model.scene.solver_choice import REASONS, why_waves
 from percussion_model.scene.solver_names import BODIES
 from percussion_model.scene.text import commented_scene, plain_scene, read_toml, write_text
+from percussion_model.scene.values import values_of
 
 __all__ = ["Scene", "SceneError"]
 
 # Figures, pages and FMUs carry it [characters].
 LONGEST_TITLE = 1000
-# `solver.name = "auto"` takes modes where the loss time is such a share of the shorter transit
-# time. Below fronts stay sharp and ring, above many modes are needed (docs/modal.md, section 9).
-LEAST_LOSS, MOST_LOSS = 5e-4, 1.0
-# And where no bar is longer than so many times the other, by its transit time: it takes as
-# many times the modes, whose tables fill a gigabyte.
-MOST_UNLIKE = 16.0
 # Groups that nothing was given of; they cannot change, so all scenes share them.
 _DEFAULTS = {name: group() for name, group in GROUPS.items()}
 
@@ -326,20 +323,16 @@ class Scene:
     @cached_property
     def _against_modes(self) -> str:
         """Why waves drill better than as many modes; empty where they do not."""
-        # a rigid piston and a wall push hardest in the first instant
-        if self.piston.model == "rigid":
-            return "the piston is rigid"
-        if self.effects.rock == "wall":
-            return "the rock is a wall"
-        if not self.effects.loss:
-            return "loss is off"
-        times = [bar.transit_time for bar in (self.piston, self.bit) if bar.model == "elastic"]
-        if max(times) > MOST_UNLIKE * min(times):
-            return f"one bar is more than {MOST_UNLIKE:g} times as long by transit time"
-        share = self.loss.time / min(times)
-        if share < LEAST_LOSS:
-            return f"loss.time is below {LEAST_LOSS:g} of the shorter transit time"
-        return "loss.time is above the shorter transit time" if share > MOST_LOSS else ""
+        bit = self.bit.transit_time
+        found = why_waves(
+            self.piston.model == "rigid",
+            self.effects.rock == "wall",
+            self.effects.loss,
+            self.loss.time,
+            self.piston.transit_time if self.piston.model == "elastic" else bit,
+            bit,
+        )
+        return REASONS[found]
 
     @property
     def has_waves(self) -> bool:
@@ -425,112 +418,17 @@ def _refuse_title(title: Any) -> str:
 
 def refuse_contradictions(scene: Scene) -> None:
     """Raise `SceneError` if parts of a scene contradict each other."""
-    effects, piston, bit, run = scene.effects, scene.piston.model, scene.bit.model, scene.run
-    if piston == "absent" and effects.drive != "none":
-        raise SceneError(
-            f'effects.drive = "{effects.drive}" needs a piston, but piston.model = "absent": '
-            'set effects.drive = "none" or give a piston'
-        )
-    if piston == "elastic" and bit == "rigid":
-        raise SceneError(
-            'piston.model = "elastic" with bit.model = "rigid": no solver computes this; '
-            'set bit.model = "elastic" or piston.model = "rigid"'
-        )
-    bodies = BODIES.get(scene.solver.name)
-    if bodies == "elastic" and bit == "rigid":
-        raise SceneError(
-            f'solver.name = "{scene.solver.name}" needs bit.model = "elastic": '
-            'set that, or solver.name = "rigid" or "auto"'
-        )
-    if bodies == "rigid" and bit == "elastic":
-        raise SceneError(
-            f'solver.name = "{scene.solver.name}" computes no elastic bars: '
-            'set piston.model = "rigid" and bit.model = "rigid", or another solver.name, as "auto"'
-        )
-    refuse_string(scene)
-    _refuse_fidelity(scene)
-    _refuse_requests(scene)
-    if effects.barrier and effects.rock != "bilinear" and "effects.barrier" in scene.given:
-        raise SceneError(
-            f'effects.barrier = true needs effects.rock = "bilinear", not "{effects.rock}": '
-            "set effects.barrier = false"
-        )
-    if run.settle >= run.duration:
-        raise SceneError(
-            f"run.settle = {run.settle!r} s: must be below run.duration = {run.duration!r} s"
-        )
-
-
-# What the blow map is a table of, and the ranges that must rise.
-_MAPPED = {"effects.drive": "pressure", "effects.rock": "bilinear", "bit.model": "elastic"}
-_RANGES = ("velocity", "feed", "force", "stiffness")
-
-
-def _refuse_fidelity(scene: Scene) -> None:
-    """Raise `SceneError` if a scene asks for a fidelity that it cannot have."""
-    fidelity = scene.solver.fidelity
-    if fidelity == "wave":
-        return
-    if scene.solver.name != "auto":
-        raise SceneError(
-            f'solver.fidelity = "{fidelity}" and solver.name = "{scene.solver.name}": a name '
-            'says how elastic waves are computed; leave it "auto"'
-        )
-    if fidelity != "blow-map":
-        return
-    for key, wanted in _MAPPED.items():
-        if scene[key] != wanted:
-            raise SceneError(
-                f'solver.fidelity = "blow-map" needs {key} = "{wanted}", not "{scene[key]}"'
-            )
-    for effect in EFFECTS:
-        if scene[f"effects.{effect.name}"]:
-            raise SceneError(
-                f'solver.fidelity = "blow-map" knows no effects.{effect.name}: set it to false'
-            )
-    for name in _RANGES:
-        low, high = scene[f"blow_map.{name}_from"], scene[f"blow_map.{name}_to"]
-        if not low < high:
-            raise SceneError(
-                f"blow_map.{name}_from = {low!r}: must be below blow_map.{name}_to = {high!r}"
-            )
-
-
-def _refuse_requests(scene: Scene) -> None:
-    """Refuse an accuracy that is said in two ways, that no rule picks a mesh for, or of no rate."""
-    accuracy, cells = scene.solver.accuracy, scene.solver.cells
-    if accuracy is None:
-        return
-    if cells is not None:
-        raise SceneError(
-            f"solver.accuracy = {accuracy!r} and solver.cells = {cells!r} both choose the "
-            "resolution: give one of them"
-        )
-    if scene.solver.name == "fem":
-        raise SceneError(
-            f"solver.accuracy = {accuracy!r} picks the cells of waves, no finite elements: set "
-            "fem.elements, fem.courant and fem.contact_stiffness, or solver.name = "
-            '"wave" or "auto"'
-        )
-    if scene.solver_name == "blow-map":
-        raise SceneError(
-            f"solver.accuracy = {accuracy!r}: a blow map is as accurate as its table "
-            '(docs/fidelity.md); set blow_map.density, or solver.fidelity = "wave"'
-        )
-    _refuse_without_rate(scene)
-
-
-def _refuse_without_rate(scene: Scene) -> None:
-    """Refuse an accuracy of the rate of penetration where no finer run tells that rate."""
-    head = f"solver.accuracy = {scene.solver.accuracy!r} is that of the rate of penetration, "
-    if scene.piston.model == "absent":
-        raise SceneError(
-            f'{head}which a bit alone (piston.model = "absent") does not have: leave it out and '
-            "set solver.cells, or give a piston"
-        )
-    if scene.is_undamped:
-        reason = "loss.time = 0.0 s" if scene.effects.loss else "effects.loss = false"
-        raise SceneError(
-            f"{head}which has no limit with finer cells where {reason} (docs/undamped.md): leave "
-            "it out and set solver.cells, or set effects.loss = true with loss.time above 0 s"
-        )
+    of_solver = BODIES.get(scene.solver.name)
+    bodies = {"elastic": Bodies.ELASTIC, "rigid": Bodies.RIGID}.get(of_solver or "", Bodies.BOTH)
+    found = find_contradiction(
+        values_of(scene),
+        bodies,
+        has_rods=bool(scene.string.rods),
+        has_effects=any(scene[f"effects.{effect.name}"] for effect in EFFECTS),
+        is_barrier_given="barrier" in scene.effects._given,
+    )
+    if found != Rule.NOTHING:
+        # places in the text name values by their keys
+        groups = {name: scene.__dict__[name] for name in GROUPS}
+        raise SceneError(TEXTS[found].format(**groups))
+    refuse_joints(scene)

@@ -86,6 +86,21 @@ def rock_numbers(numbers: Numbers) -> RockNumbers:
     )
 
 
+def elastic_times(numbers: Numbers) -> tuple[float, float]:
+    """Transit times of the first elastic bar, whose cells are counted, and of the shortest [s].
+
+    Parameters
+    ----------
+    numbers : Numbers
+        Of a scene with an elastic bit.
+    """
+    bit = bar_transit_time(numbers.bit)
+    if PISTONS[numbers.values.piston_model] != Piston.ELASTIC:
+        return bit, bit
+    piston = bar_transit_time(numbers.piston)
+    return piston, min(piston, bit)
+
+
 def fill_parameters(p: Any, numbers: Numbers, with_piston: bool) -> None:
     """Fill `COMMON_PARAMETERS`.
 
@@ -110,6 +125,16 @@ def fill_parameters(p: Any, numbers: Numbers, with_piston: bool) -> None:
     p["rock"] = ROCKS[values.effects_rock]
     p["barrier"] = barrier_on(numbers)
     p["release"] = values.effects_standstill_tension == StandstillTension.RELEASE
+    fill_effects(p, values)
+
+
+def any_effect(values: Any) -> bool:
+    """Whether an effect is on that holds a force."""
+    return any(getattr(values, f"effects_{effect.name}") for effect in EFFECTS)
+
+
+def fill_effects(p: Any, values: Any) -> None:
+    """Fill the parameters of effects that hold a force."""
     for effect in EFFECTS:
         if getattr(values, f"effects_{effect.name}"):
             p["effects"] = 1

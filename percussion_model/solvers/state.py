@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
+from percussion_model.physics.kernel import kernel
 from percussion_model.physics.state import (
     COMMON_LIMITS,
     COMMON_STATE,
@@ -17,6 +19,10 @@ from percussion_model.physics.state import (
 
 # Bytes of a line of a processor's cache.
 LINE = 64
+
+# What is said of a number of a state: its field, value and limits.
+BEYOND = "{} = {!r}, which must be from {:g} to {:g}"
+WORKSPACE = f"a number of its workspace, which must be from {-LARGEST:g} to {LARGEST:g}"
 
 
 @lru_cache
@@ -90,8 +96,49 @@ class State:
         return State, (self.dtype, self.shapes, self.words, self.workspace)
 
 
+class LimitRows(NamedTuple):
+    """What each word of a record may hold.
+
+    Attributes
+    ----------
+    low, high : ndarray
+    may_be_nan, whole : bool array
+        Whether it may be undefined, and whether it is a whole number.
+    """
+
+    low: np.ndarray
+    high: np.ndarray
+    may_be_nan: np.ndarray
+    whole: np.ndarray
+
+
+@kernel
+def first_beyond(words, numbers, low, high, may_be_nan, whole):
+    """First word of a record, also given as numbers, that is beyond its limits; or -1."""
+    for k in range(len(low)):
+        value = float(words[k]) if whole[k] else numbers[k]
+        if not (low[k] <= value <= high[k] or (may_be_nan[k] and value != value)):
+            return k
+    return -1
+
+
+@kernel
+def is_bounded(workspace):
+    """Whether all numbers of a workspace are such, and not so large that products overflow."""
+    for value in workspace:
+        if not abs(value) <= LARGEST:
+            return False
+    return True
+
+
 class Limits:
     """What the record and the workspace of a state from outside may hold.
+
+    Attributes
+    ----------
+    names : list of str
+        Of the field to which each word of the record belongs.
+    rows : LimitRows
 
     Parameters
     ----------
@@ -117,37 +164,26 @@ class Limits:
         free = {name for name in dtype.names or () if not own} - {one[0] for one in COMMON_STATE}
         undefined = {*COMMON_UNDEFINED, *undefined, *free}
         size = dtype.itemsize // 8
-        self._names = [""] * size
-        self._low, self._high = np.full(size, -np.inf), np.full(size, np.inf)
-        self._may_be_nan = np.ones(size, bool)
-        whole: list[int] = []
+        self.names = [""] * size
+        low, high = np.full(size, -np.inf), np.full(size, np.inf)
+        may_be_nan, whole = np.ones(size, bool), np.zeros(size, bool)
         for name, begin in words_of(dtype).items():
             end = begin + dtype[name].itemsize // 8
-            self._names[begin:end] = [name] * (end - begin)
+            self.names[begin:end] = [name] * (end - begin)
             if name not in free:
-                self._low[begin:end], self._high[begin:end] = limits.get(name, NUMBER)
-                self._may_be_nan[begin:end] = name in undefined
-            if dtype[name].base.kind == "i":
-                whole += range(begin, end)
-        self._whole = np.array(whole, np.intp)
+                low[begin:end], high[begin:end] = limits.get(name, NUMBER)
+                may_be_nan[begin:end] = name in undefined
+            whole[begin:end] = dtype[name].base.kind == "i"
+        self.rows = LimitRows(low, high, may_be_nan, whole)
 
     def fault(self, state: State) -> str:
         """Which number of a state lies outside its limits; empty where none does."""
-        values = state.numbers.copy()
-        values[self._whole] = state.words[self._whole]
-        good = (values >= self._low) & (values <= self._high)
-        if not good.all():
-            good |= self._may_be_nan & np.isnan(values)
-            k = int(np.argmin(good))
-            if not good[k]:
-                return (
-                    f"{self._names[k]} = {float(values[k])!r}, "
-                    f"which must be from {self._low[k]:g} to {self._high[k]:g}"
-                )
+        k = first_beyond(state.words, state.numbers, *self.rows)
+        if k >= 0:
+            value = state.words[k] if self.rows.whole[k] else state.numbers[k]
+            return BEYOND.format(self.names[k], float(value), self.rows.low[k], self.rows.high[k])
         workspace = state.workspace
-        if len(workspace) and not max(-workspace.min(), workspace.max()) <= LARGEST:
-            return f"a number of its workspace, which must be from {-LARGEST:g} to {LARGEST:g}"
-        return ""
+        return "" if is_bounded(workspace) else WORKSPACE
 
 
 @lru_cache

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from percussion_model import Mode, Scene, Section, Simulation
-from percussion_model.solvers.wave.leaps.step_map import Configuration, step_forms, step_map
+from percussion_model.solvers.wave.leaps.step_map import Configuration, loss_of_step, step_map
 from percussion_model.solvers.wave.records import Coef
 from percussion_model.solvers.wave.solver import WaveSolver
 
@@ -98,7 +98,7 @@ def test_loss_never_gains(bar, cells):
     if cells == 240:
         assert configuration.par[0]["loss"] > 1
     by_column, faces = step_map(configuration)
-    loss = step_forms(configuration, by_column, faces)[0]
+    loss = loss_of_step(configuration, by_column, faces)
     loss = 0.5 * (loss + loss.T)
     mass = np.tile(configuration.c[Coef.MASS, : configuration.grid.n], 2)
     scaled = loss / np.sqrt(np.outer(mass, mass))

@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 
 from percussion_model import Scene
-from percussion_model.solvers.wave.leaps.linear import carry_and_sum
-from percussion_model.solvers.wave.leaps.operators import _alone, _powers, _sums, padded
+from percussion_model.solvers.wave.leaps.linear import DIGITS, carry_and_sum
+from percussion_model.solvers.wave.leaps.operators import alone, fill_powers, fill_sums, padded
 from percussion_model.solvers.wave.leaps.step_map import (
     Configuration,
     _reach,
-    step_forms,
+    loss_of_step,
+    size_of,
+    square_at_end,
     step_map,
 )
 from percussion_model.solvers.wave.solver import WaveSolver
@@ -28,16 +30,16 @@ def forms_of_a_step(load, cells, loss_time):
     )
     solver = WaveSolver(scene)
     stiffness, damping = LOADS[load]
-    par = _alone(solver._par)
+    par = alone(solver._par)
     if stiffness:
         par["rock"] = solver._par["rock"]
     bar = Configuration(par, solver.grid_of("bit"), solver._cb, stiffness, damping)
     by_column, faces = step_map(bar)
-    loss, squares = step_forms(bar, by_column, faces)
+    loss, squares = loss_of_step(bar, by_column, faces), square_at_end(bar, faces)
     path, square = _reach(bar)
     numerical = par[0]["z_b"] * (square - path * path / par[0]["dt"])
     mass = solver.grid_of("bit").mass
-    energy = np.diag([*mass, *mass, 0.5 * stiffness][: bar.size])
+    energy = np.diag([*mass, *mass, 0.5 * stiffness][: size_of(bar)])
     return by_column, loss, (damping * square + numerical) * squares, energy
 
 
@@ -57,7 +59,10 @@ def test_forms_of_a_step_are_the_energy_it_takes(load, cells, loss_time):
 def test_forms_of_a_leap_are_those_of_its_steps(steps):
     by_column, loss, squares, _ = forms_of_a_step("SS", 7, 1e-6)
     size = padded(len(by_column))
-    powers = _powers(by_column, 4, size)
+    powers, lost, squared = np.zeros((3, 4 * DIGITS, size, size))
+    fill_powers(by_column, powers)
+    fill_sums(loss, powers, lost)
+    fill_sums(squares, powers, squared)
     x = np.random.default_rng(steps).normal(size=size)
     x[len(by_column) :] = 0.0
     x[len(by_column) - 1] *= 1e-5  # a length among velocities
@@ -66,9 +71,7 @@ def test_forms_of_a_leap_are_those_of_its_steps(steps):
     for _ in range(steps):
         expected += y @ loss @ y, y @ squares @ y
         y = y @ by_column
-    found = carry_and_sum(
-        powers, _sums(loss, powers), _sums(squares, powers), True, True, steps, x, 0 * x, size
-    )
+    found = carry_and_sum(powers, lost, squared, True, True, steps, x, 0 * x, size)
     assert found == pytest.approx(expected, rel=1e-12)
     np.testing.assert_allclose(x[: len(y)], y, atol=1e-13)
 

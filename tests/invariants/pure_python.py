@@ -35,12 +35,14 @@ FAULT = 0.999
 def use_attribute_records() -> None:
     """Let the fields of records be attributes, as they are in compiled kernels."""
     from percussion_model.physics import records
+    from percussion_model.scene import numbers
     from percussion_model.solvers.fem import records as of_fem
     from percussion_model.solvers.modal import records as of_modes
     from percussion_model.solvers.wave import records as of_waves
 
     for module, names in (
         (records, ("BLOW", "EVENT", "READING")),
+        (numbers, ("SCENE_NUMBERS",)),
         (of_waves, ("WAVE_PAR", "WAVE_STATE")),
         (of_modes, ("MODAL_PAR", "MODAL_STATE")),
         (of_fem, ("FEM_PAR", "FEM_STATE")),

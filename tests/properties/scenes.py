@@ -10,7 +10,7 @@ import numpy as np
 
 from percussion_model import Scene
 from percussion_model.scene.inputs import INPUTS, no_effect_reason
-from percussion_model.scene.numbers import section_numbers
+from percussion_model.scene.numbers import numbers_of, section_numbers
 from percussion_model.scene.parameters import find_row
 from percussion_model.solvers.wave.grid import choose_time_step, section_count
 from tests.properties.source import Source, chance, decades
@@ -205,7 +205,7 @@ def bars_of(scene: Scene) -> list[Any]:
 
 
 def step_of(scene: Scene, wanted: int) -> float:
-    return choose_time_step(bars_of(scene), wanted)
+    return choose_time_step(numbers_of(scene), wanted)
 
 
 def cells_of(scene: Scene, wanted: int) -> int:

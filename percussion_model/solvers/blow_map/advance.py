@@ -31,7 +31,7 @@ ROWS = 3
 def cell_and_share(par, axis, value, count):
     """Cell of an axis that holds a value, and the share of it that lies before."""
     at = (math.log(value) - par.origin[axis]) / par.step[axis]
-    cell = min(max(int(at), 0), count - 2)
+    cell = int(min(max(at, 0.0), count - 2.0))  # as numbers: far outside there is no whole one
     return cell, min(max(at - cell, 0.0), 1.0)
 
 

@@ -3,22 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
 from percussion_model.physics.kernel import entry_of
 from percussion_model.physics.records import READING, Status
-from percussion_model.scene.numbers import Numbers, numbers_of
+from percussion_model.scene.numbers import kernel_numbers
 from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.solvers.base import Solver
 from percussion_model.solvers.blow_map import advance as kernels
 from percussion_model.solvers.blow_map import flight
 from percussion_model.solvers.blow_map.builder import get_table
+from percussion_model.solvers.blow_map.prepare import (
+    MOST_ROCK_GAP,
+    begin,
+    fill_map_parameters,
+    stands_on_rock,
+)
 from percussion_model.solvers.blow_map.records import ENTRIES, MAP_LIMITS, MAP_PAR, MAP_STATE
 from percussion_model.solvers.blow_map.refusals import explain_refusal
-from percussion_model.solvers.blow_map.table import BlowTable, Nodes, fixed_values
-from percussion_model.solvers.setup import fill_parameters, fill_start
+from percussion_model.solvers.blow_map.table import BlowTable, fixed_values
 from percussion_model.solvers.state import State, words_of
 
 _WORD = words_of(MAP_STATE)
@@ -32,44 +37,6 @@ _FIXED = {
     "barrier_damping": "rock.barrier_damping",
     "barrier_energy": "rock.barrier_energy",
 }
-# A bit that hangs further above the rock at the start does not stand on it [m].
-MOST_ROCK_GAP = 1e-3
-
-
-def map_parameters(numbers: Numbers, nodes: Nodes) -> np.ndarray:
-    """Parameter record of a scene and of the nodes of its table.
-
-    Returns
-    -------
-    MAP_PAR array of length 1
-    """
-    par = np.zeros(1, MAP_PAR)
-    p: Any = par[0]
-    fill_parameters(p, numbers, with_piston=True)
-    p["gamma"] = numbers.values.rock_unloading_ratio
-    p["start_gap"] = numbers.values.start_gap
-    p["lowest"], p["highest"] = nodes.lowest, nodes.highest
-    p["origin"], p["step"] = nodes.origin, nodes.step
-    return par
-
-
-def fill_map_start(state: np.ndarray, par: np.ndarray, numbers: Numbers) -> None:
-    """Fill a record at time zero, but for the plan of the first flight.
-
-    Parameters
-    ----------
-    state : MAP_STATE array of length 1
-    par : MAP_PAR array of length 1
-    numbers : Numbers
-    """
-    s: Any = state[0]
-    p: Any = par[0]
-    fill_start(s, numbers)
-    s["p"] = 0.0
-    s["y"] = -numbers.values.start_gap
-    static = s["feed"] + p["mass_b"] * p["gravity"]
-    s["e_start"] = 0.5 * p["mass_p"] * s["v_p"] ** 2
-    s["e_start"] += static**2 / (2.0 * p["gamma"] * s["k_r"])
 
 
 class BlowMapSolver(Solver):
@@ -94,7 +61,8 @@ class BlowMapSolver(Solver):
     def __init__(self, scene: Scene, table: BlowTable) -> None:
         super().__init__(scene)
         table.refuse_other(fixed_values(scene))
-        if not scene.start.rock_gap <= MOST_ROCK_GAP or scene.start.bit_velocity != 0.0:
+        self._numbers = kernel_numbers(scene)
+        if not entry_of(stands_on_rock)(self._numbers):
             raise SceneError(
                 f"start.rock_gap = {scene.start.rock_gap!r} m, start.bit_velocity = "
                 f"{scene.start.bit_velocity!r} m/s: the blow map needs a bit that stands on "
@@ -104,8 +72,8 @@ class BlowMapSolver(Solver):
         self.cells = dict(table.cells)
         self.wave_speed_error = table.wave_speed_error
         self._values = table.values
-        self._numbers = numbers_of(scene)
-        self._par = map_parameters(self._numbers, table.nodes)
+        self._par = np.zeros(1, MAP_PAR)
+        entry_of(fill_map_parameters)(self._par[0], self._numbers, table.head)
         self._found = np.zeros(ENTRIES)
         self._advance: Callable[..., int] = kernels.advance
         self._read: Callable[..., None] = flight.read
@@ -120,14 +88,14 @@ class BlowMapSolver(Solver):
         self._run(state, 0.0, self._no_blows, self._no_events)
         self._read(self._par, state.record, 0.0, np.zeros(1, READING))
         self._move(self._par, state.record, 0.0)
+        self._plan(self._par, state.record)
         self._advance, self._read = entry_of(kernels.advance), entry_of(flight.read)
         self._move, self._plan = entry_of(flight.commit), entry_of(flight.plan_next)
 
     def new_state(self) -> State:
         """State at time zero: the bit stands on the rock, the piston flies."""
         state = State(MAP_STATE)
-        fill_map_start(state.record, self._par, self._numbers)
-        self._plan(self._par, state.record)
+        entry_of(begin)(self._par[0], state.record[0], self._numbers)
         return state
 
     def _run(self, state: State, t: float, blows: np.ndarray, events: np.ndarray) -> int:

@@ -8,6 +8,7 @@ import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 from zipfile import ZipFile
 
@@ -15,6 +16,7 @@ import numpy as np
 
 from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.solvers.blow_map.records import ENTRIES, Axis, Entry
+from percussion_model.solvers.blow_map.words import FIXED, SECTION, head_of
 from percussion_model.solvers.sources import sources_digest
 
 FORMAT = 1
@@ -25,30 +27,12 @@ RATIOS = {Axis.STIFFNESS: 1.03, Axis.VELOCITY: 1.3, Axis.LOAD: 1.33, Axis.DRIVE:
 # Nodes of a table, of some 300 bytes while it is made; the default one has a twentieth.
 MOST_NODES = 1_000_000
 LARGEST_FILE = 200_000_000  # unpacked [bytes]
-# Parameters that a table is made for, besides the sections of the bars.
-FIXED = (
-    "effects.gravity",
-    "effects.feed",
-    "effects.loss",
-    "effects.barrier",
-    "effects.rock",
-    "effects.standstill_tension",
-    "piston.model",
-    "bit.model",
-    "gravity.acceleration",
-    "loss.time",
-    "rock.unloading_ratio",
-    "rock.barrier_damping",
-    "rock.barrier_energy",
-    "solver.cells",
-)
 _RANGES = {
     Axis.STIFFNESS: "stiffness",
     Axis.VELOCITY: "velocity",
     Axis.LOAD: "feed",
     Axis.DRIVE: "force",
 }
-_SECTION = ("length", "area", "youngs_modulus", "density")
 
 
 class TableError(ValueError):
@@ -60,7 +44,7 @@ def fixed_values(scene: Scene) -> dict[str, Any]:
     found = {key: scene[key] for key in FIXED}
     for bar in ("piston", "bit"):
         for k in range(len(scene[f"{bar}.sections"])):
-            for name in _SECTION:
+            for name in SECTION:
                 key = f"{bar}.sections.{k}.{name}"
                 found[key] = scene[key]
     return found
@@ -223,6 +207,15 @@ class BlowTable:
                     f"{key} = {fixed.get(key)!r}: the blow map was made for "
                     f"{self.fixed.get(key)!r} and holds for that alone"
                 )
+
+    @cached_property
+    def head(self) -> np.ndarray:
+        """All but the values as a row of numbers (`words.Word`)."""
+        return head_of(self)
+
+    def to_words(self) -> np.ndarray:
+        """The table as a row of numbers, for kernels."""
+        return np.concatenate([self.head, self.values.ravel()])
 
     def to_bytes(self) -> bytes:
         """The table as a file: compressed, with a checksum."""

@@ -106,11 +106,3 @@ def run(task, par_, state, chain_, waves_, time, blows, events, reading):
             return Status.NOT_FINITE
         step(par, s, chain, waves, par.dt, blows, events)
     return Status.DONE
-
-
-@kernel
-def begin(par_, state, chain, waves):
-    """Complete a new state: its energy at the start."""
-    par, s = par_[0], state[0]
-    kinetic, elastic = stored(par, s, chain, waves)
-    s.e_start = kinetic + elastic + recoverable(s)

@@ -7,9 +7,9 @@ approach each other with a - Y F, Y = 1/Z above + 1/Z below (docs/model.md, eqs 
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
+from percussion_model.physics.elementary import expm1, log
 from percussion_model.physics.kernel import inlined
 
 
@@ -38,7 +38,7 @@ class Met(NamedTuple):
 @inlined
 def _relaxed(rate, t):
     """Integral of exp(-rate t)."""
-    return t if rate * t < 1e-12 else -math.expm1(-rate * t) / rate
+    return t if rate * t < 1e-12 else -expm1(-rate * t) / rate
 
 
 @inlined
@@ -63,7 +63,7 @@ def shoulders(closed, gap, a, y, preload, stiffness, tau):
     if rate > 0.0:
         limit = opening / rate
         if opening < 0.0:
-            free = math.log((gap - limit) / -limit) / rate
+            free = log((gap - limit) / -limit) / rate
     elif opening < 0.0:
         free = -gap / opening
     if free < tau:

@@ -3,29 +3,54 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from percussion_model.physics.kernel import preparing
 from percussion_model.physics.records import Piston
 from percussion_model.scene.bars import (
     LENGTH,
+    add,
     bar_transit_time,
     section_impedance,
     section_transit_time,
 )
-from percussion_model.scene.numbers import Numbers
-from percussion_model.scene.rows import SceneError
+from percussion_model.solvers import plain_code  # noqa: F401  # kernels call functions of scenes
 from percussion_model.solvers.chain.records import Body, Chain, Fit, Joint, Place, Steel
 from percussion_model.solvers.chain.resolution import DEFAULT_STEPS, steps_for
 from percussion_model.solvers.chain.taps import WHOLE, turning, weights_of
 from percussion_model.solvers.modal.lanes import WIDTH
-from percussion_model.solvers.setup import MOST_CELLS, PISTONS, kelvin_voigt_time, refuse_many
+from percussion_model.solvers.setup import PISTONS, kelvin_voigt_time
 
 # Where steps are shorter than the Kelvin-Voigt time, sections must have this share of their loss.
 LEAST_SPREAD = 0.99
 # Steps in which a wave crosses any bar at least, where a scene asks for none.
 FEWEST_STEPS = 4
+PLACES, STEELS, FITS, BODIES = len(Place), len(Steel), len(Fit), len(Body)
+PERFECT = int(Joint.PERFECT)
+
+
+class Plan(NamedTuple):
+    """What the elastic bars of a scene are cut by.
+
+    Attributes
+    ----------
+    sections : float array, shape (sections, 4)
+        Of all these bars from top to bottom, as `section_numbers` has them.
+    counts : int array, shape (bars,)
+        Sections of each bar.
+    time_step, eta : float
+        Time step and Kelvin-Voigt time [s].
+    cells : float
+        About how many there will be.
+    """
+
+    sections: np.ndarray
+    counts: np.ndarray
+    time_step: float
+    eta: float
+    cells: float
 
 
 class Network(NamedTuple):
@@ -34,161 +59,227 @@ class Network(NamedTuple):
     Attributes
     ----------
     chain : Chain
-    names : list of str
-        Of the bars: "piston", "rod 1", ..., "bit".
-    time_step : float
-        [s]
     rings : int
         Numbers that all rings hold.
     misfit : float
         Largest relative error of a section's transit time: one shorter than a step.
     struck : int
         The bar that the piston strikes, or the topmost.
+    too_fine : float
+        0 where all is well; length [m] of a section that cannot spread a wave as the loss would
+        in steps so short. The rest is then not finished.
     """
 
     chain: Chain
-    names: list[str]
-    time_step: float
     rings: int
     misfit: float
     struck: int
+    too_fine: float
 
 
-def elastic_chain(numbers: Numbers) -> tuple[list[np.ndarray], list[str]]:
-    """Sections of each elastic bar from top to bottom, and their names."""
-    bars, names = [*numbers.rods, numbers.bit], [f"rod {k + 1}" for k in range(len(numbers.rods))]
-    names.append("bit")
-    if first_is_piston(numbers):
-        return [numbers.piston, *bars], ["piston", *names]
-    return bars, names
+class Cut(NamedTuple):
+    """How a wave crosses a section.
+
+    Attributes
+    ----------
+    delay : int
+        Steps from a wave that is sent to the newest weight.
+    row : ndarray
+        Weights as they lie in the ring, the newest last; of one to two steps the two of `turning`.
+    taps : int
+        How many weights it arrives by, in whole lanes.
+    mean, spread : float
+        Of its time [steps, steps^2].
+    """
+
+    delay: int
+    row: np.ndarray
+    taps: int
+    mean: float
+    spread: float
 
 
-def time_step_of(numbers: Numbers) -> float:
+@preparing
+def first_is_piston(numbers):
+    """Whether the topmost elastic bar is the piston."""
+    return PISTONS[numbers.values.piston_model] == Piston.ELASTIC
+
+
+@preparing
+def _fill_sections(sections, at, bar):
+    """Copy sections to rows from `at` on; the row after them."""
+    for k in range(len(bar)):
+        for j in range(4):
+            sections[at + k, j] = bar[k, j]
+    return at + len(bar)
+
+
+@preparing
+def _elastic_chain(numbers):
+    """Sections of all elastic bars from top to bottom, and how many each has."""
+    first = int(first_is_piston(numbers))
+    piston = numbers.piston if first else numbers.piston[:0]
+    rods = len(numbers.rod_counts)
+    counts = np.zeros(first + rods + 1, np.int64)
+    counts[0] = len(piston)  # of a rigid one none, and replaced
+    for k in range(rods):
+        counts[first + k] = numbers.rod_counts[k]
+    counts[-1] = len(numbers.bit)
+    sections = np.zeros((counts.sum(), 4))
+    end = _fill_sections(sections, 0, piston)
+    end = _fill_sections(sections, end, numbers.rod_sections)
+    _fill_sections(sections, end, numbers.bit)
+    return sections, counts
+
+
+@preparing
+def _time_step(numbers, sections, counts):
     """Time step of a scene [s]: the transit time of the first elastic bar by its cells."""
-    bars, _ = elastic_chain(numbers)
     values = numbers.values
-    first = bar_transit_time(bars[0])
+    first = bar_transit_time(sections[: counts[0]])
     if not math.isnan(values.solver_cells):
-        return first / float(values.solver_cells)
+        return first / values.solver_cells
     if not math.isnan(values.solver_accuracy):
-        return first / steps_for(float(values.solver_accuracy))
-    own = DEFAULT_STEPS if first_is_piston(numbers) else FEWEST_STEPS
-    longest = [first / own, *(bar_transit_time(bar) / FEWEST_STEPS for bar in bars[1:])]
+        return first / steps_for(values.solver_accuracy)
+    longest = first / (DEFAULT_STEPS if first_is_piston(numbers) else FEWEST_STEPS)
+    end = counts[0]
+    for i in range(1, len(counts)):
+        begin, end = end, end + counts[i]
+        longest = min(longest, bar_transit_time(sections[begin:end]) / FEWEST_STEPS)
     # a section shorter than a step would be longer than it is
-    longest += [section_transit_time(section) for bar in bars for section in bar]
+    for k in range(len(sections)):
+        longest = min(longest, section_transit_time(sections[k]))
     # and in steps shorter than the Kelvin-Voigt time short sections would lose their loss
     least = min(kelvin_voigt_time(numbers), first)
-    if least > min(longest):
+    if least > longest:
         return first / math.floor(first / least)
-    return first / math.ceil(first / min(longest) - 1e-9)
+    return first / math.ceil(first / longest - 1e-9)
 
 
-def first_is_piston(numbers: Numbers) -> bool:
-    """Whether the topmost elastic bar is the piston."""
-    return bool(PISTONS[numbers.values.piston_model] == Piston.ELASTIC)
+@preparing
+def plan_of(numbers):
+    """`Plan` of a scene."""
+    sections, counts = _elastic_chain(numbers)
+    dt = _time_step(numbers, sections, counts)
+    cells = bar_transit_time(sections) / dt
+    return Plan(sections, counts, dt, kelvin_voigt_time(numbers), cells)
 
 
-def network_of(numbers: Numbers) -> Network:
-    """Cut the bars of a scene."""
-    bars, names = elastic_chain(numbers)
-    dt, eta = time_step_of(numbers), kelvin_voigt_time(numbers)
-    refuse_many("cells", sum(map(bar_transit_time, bars)) / dt, MOST_CELLS)
-    count = sum(map(len, bars))
-    places = np.zeros((count, len(Place)), np.int64)
-    steel = np.zeros((count, len(Steel)))
-    bodies = np.zeros((len(bars), len(Body)))
-    weights: list[np.ndarray] = []
-    ring, misfit, k = 0, 0.0, 0
-    for number, bar in enumerate(bars):
-        bodies[number] = 0.0, k, k + len(bar) - 1, 0.0
-        for section in bar:
+@preparing
+def _cut(transit, variance):
+    """`Cut` of a section, by its transit time [steps] and the variance that it wants [steps^2]."""
+    if 1.0 + WHOLE < transit < 2.0 - WHOLE:
+        a = turning(transit)
+        return Cut(1, np.array([a, math.sqrt(1.0 - a * a)]), 1, transit, 0.0)
+    delay, weights, spread = weights_of(max(transit, 1.0), variance)
+    taps, mean, rest = len(weights), float(delay), 0.0
+    for k in range(1, taps):
+        mean, rest = add(mean, rest, k * weights[k])
+    padded = 1 if taps == 1 else (taps + WIDTH - 1) // WIDTH * WIDTH
+    row = np.zeros(padded)
+    for k in range(taps):
+        row[padded - 1 - k] = weights[k]
+    return Cut(delay, row, padded, mean + rest, spread)
+
+
+@preparing
+def _appended(weights, count, row):
+    """The first `count` weights with a row more, in twice the room where there is too little."""
+    if count + len(row) > weights.shape[1]:
+        more = np.zeros((1, 2 * (count + len(row))))
+        for k in range(count):
+            more[0, k] = weights[0, k]
+        weights = more
+    for k in range(len(row)):
+        weights[0, count + k] = row[k]
+    return weights
+
+
+@preparing
+def _fill_place(place, bar, ring, cut, first):
+    """Fill a row of `Place`."""
+    size = 1
+    while size < cut.delay + cut.taps + 1:
+        size *= 2
+    cells = math.floor(cut.mean) if cut.taps == 1 else round(cut.mean)
+    place[Place.BAR], place[Place.RING], place[Place.SIZE] = bar, ring, size
+    place[Place.DELAY], place[Place.TAPS] = cut.delay - 1, cut.taps
+    place[Place.WEIGHTS] = -1 if len(cut.row) == 1 else first
+    place[Place.CELLS] = max(1, cells)
+
+
+@preparing
+def _fill_steel(steel, k, z, mass, cells, by_loss, by_mixing, is_first):
+    """Fill a row of `Steel`."""
+    steel[k, Steel.IMPEDANCE], steel[k, Steel.CELL_MASS] = z, mass / cells
+    steel[k, Steel.BY_LOSS], steel[k, Steel.BY_MIXING] = by_loss, by_mixing
+    if not is_first:
+        above = steel[k - 1, Steel.IMPEDANCE]
+        steel[k, Steel.ALPHA] = 2.0 * above / (above + z)
+        steel[k, Steel.BETA] = 2.0 * z / (above + z)
+
+
+@preparing
+def network_of(numbers, plan):
+    """Cut the bars of a scene; a `Network`."""
+    dt, eta, count, bars = plan.time_step, plan.eta, len(plan.sections), len(plan.counts)
+    places, steel = np.zeros((count, PLACES), np.int64), np.zeros((count, STEELS))
+    bodies, weights = np.zeros((bars, BODIES)), np.zeros((1, 64))
+    ring, used, misfit, k, too_fine = 0, 0, 0.0, 0, 0.0
+    for bar in range(bars):
+        begin = k
+        for _ in range(plan.counts[bar]):
+            section = plan.sections[k]
             transit = section_transit_time(section) / dt
             wanted = eta * transit / dt
-            if 1.0 + WHOLE < transit < 2.0 - WHOLE:
-                a = turning(transit)
-                delay, spread, mean, padded = 1, 0.0, transit, 1
-                row = np.array([a, math.sqrt(1.0 - a * a)])
-            else:
-                delay, taps, spread = weights_of(max(transit, 1.0), wanted)
-                mean = delay + float(np.arange(len(taps)) @ taps)
-                padded = 1 if len(taps) == 1 else -(-len(taps) // WIDTH) * WIDTH
-                # newest last, as they lie in the ring
-                row = np.concatenate([np.zeros(padded - len(taps)), taps[::-1]])
-            misfit = max(misfit, abs(mean / transit - 1.0))
-            size = 1 << math.ceil(math.log2(delay + padded + 1))
-            first = -1 if len(row) == 1 else sum(map(len, weights))
-            cells = max(1, math.floor(mean) if padded == 1 else round(mean))
-            places[k] = number, ring, size, delay - 1, padded, first, cells
-            weights.append(row)
-            ring += 4 * size + 2
-            if dt < eta and spread < LEAST_SPREAD * wanted:
-                raise _too_fine(float(section[LENGTH]), dt, eta)
-            loss = 1.0 if eta else 0.0
-            if spread > wanted:  # the rest is what fitting a short section to steps takes
-                loss = wanted / spread
+            cut = _cut(transit, wanted)
+            if dt < eta and cut.spread < LEAST_SPREAD * wanted and too_fine == 0.0:
+                too_fine = section[LENGTH]
+            misfit = max(misfit, abs(cut.mean / transit - 1.0))
+            _fill_place(places[k], bar, ring, cut, used)
+            weights = _appended(weights, used, cut.row)
+            used += len(cut.row)
+            ring += 4 * places[k, Place.SIZE] + 2
+            loss = 1.0 if eta > 0.0 else 0.0
+            if cut.spread > wanted:  # the rest is what fitting a short section to steps takes
+                loss = wanted / cut.spread
             z = section_impedance(section)
-            mass = z * mean * dt  # of what is shorter than a step: as much as its waves have
-            steel[k] = (
-                z, 0.0, 0.0, mass / places[k, Place.CELLS], z * dt * loss, z * dt * (1.0 - loss)
+            mass = z * cut.mean * dt  # of what is shorter than a step: as much as its waves have
+            _fill_steel(
+                steel, k, z, mass, places[k, Place.CELLS], z * dt * loss, z * dt * (1.0 - loss),
+                k == begin,
             )  # fmt: skip
-            bodies[number, Body.MASS] += mass
-            if k > bodies[number, Body.FIRST]:
-                above = steel[k - 1, Steel.IMPEDANCE]
-                steel[k, Steel.ALPHA : Steel.BETA + 1] = (
-                    2.0 * above / (above + z), 2.0 * z / (above + z)
-                )  # fmt: skip
+            bodies[bar, Body.MASS] += mass
             k += 1
-    bodies[:, Body.INV_MASS] = 1.0 / bodies[:, Body.MASS]
-    struck = int(names[0] == "piston")
+        bodies[bar, Body.FIRST], bodies[bar, Body.LAST] = begin, k - 1
+        bodies[bar, Body.INV_MASS] = 1.0 / bodies[bar, Body.MASS]
+    struck = int(first_is_piston(numbers))
     fits = _fits(numbers, steel, bodies[struck:])
-    chain = Chain(places, steel, np.concatenate(weights)[None], fits, bodies)
-    return Network(chain, names, dt, ring, misfit, struck)
+    own = np.zeros((1, used))
+    for i in range(used):
+        own[0, i] = weights[0, i]
+    chain = Chain(places, steel, own, fits, bodies)
+    return Network(chain, ring, misfit, struck, too_fine)
 
 
-def _too_fine(length: float, dt: float, eta: float) -> SceneError:
-    """Error for steps so short that a section cannot spread a wave enough."""
-    return SceneError(
-        f"loss.time = {eta:.3g} s: too long for a section of {length:g} m in steps of {dt:.2g} s: "
-        "take a shorter loss.time, or fewer solver.cells"
-    )
-
-
-def _fits(numbers: Numbers, steel: np.ndarray, bodies: np.ndarray) -> np.ndarray:
+@preparing
+def _fits(numbers, steel, bodies):
     """Rows of `Fit` of the joints below the rods."""
-    fits = np.zeros((len(numbers.rods), len(Fit)))
-    for fit, joint, above, below in zip(fits, numbers.joints, bodies[:-1], bodies[1:], strict=True):
-        kind, transmission, relaxation, _, preload, thread = joint.tolist()
-        z = steel[[int(above[Body.LAST]), int(below[Body.FIRST])], Steel.IMPEDANCE]
-        gives = float(np.sum(1.0 / z))
-        stiffness, damping = thread, 0.0
+    fits = np.zeros((len(numbers.joints), FITS))
+    for k in range(len(fits)):
+        joint, fit = numbers.joints[k], fits[k]
+        kind, transmission, relaxation = int(joint[0]), joint[1], joint[2]
+        below = int(bodies[k + 1, Body.FIRST])
+        give_above = 1.0 / steel[int(bodies[k, Body.LAST]), Steel.IMPEDANCE]
+        give_below = 1.0 / steel[below, Steel.IMPEDANCE]
+        gives = give_above + give_below
+        stiffness, damping = joint[5], 0.0
         if kind == Joint.LOSSY and transmission < 1.0:
             damping = transmission / ((1.0 - transmission) * gives)
             stiffness = (1.0 + damping * gives) / (gives * relaxation)
         elif kind == Joint.LOSSY:
-            kind = Joint.PERFECT
-        fit[:] = (
-            kind, gives, preload, stiffness, damping, below[Body.FIRST], 1.0 / gives, *(1.0 / z)
-        )  # fmt: skip
+            kind = PERFECT
+        fit[Fit.KIND], fit[Fit.YIELD], fit[Fit.PRELOAD] = kind, gives, joint[4]
+        fit[Fit.STIFFNESS], fit[Fit.DAMPING], fit[Fit.SECTION] = stiffness, damping, below
+        fit[Fit.STIFF], fit[Fit.ABOVE], fit[Fit.BELOW] = 1.0 / gives, give_above, give_below
     return fits
-
-
-def parameters_of(network: Network, numbers: Numbers, par: np.ndarray) -> None:
-    """Fill what `CHAIN_PAR` has beside the common parameters."""
-    p: Any = par[0]
-    values = numbers.values
-    p["dt"] = network.time_step
-    p["mass_b"] = network.chain.bodies[-1, Body.MASS]
-    if PISTONS[values.piston_model] == Piston.ELASTIC:
-        p["mass_p"] = network.chain.bodies[0, Body.MASS]
-    p["sections"], p["bars"] = len(network.chain.places), len(network.names)
-    p["joints"], p["struck"] = len(network.chain.fits), network.struck
-    if PISTONS[values.piston_model] == Piston.ABSENT and values.effects_string:
-        p["open_top"] = values.string_top
-        p["pulse"], p["pulse_end"] = values.string_pulse_force, values.string_pulse_duration
-    if values.effects_string:
-        p["open_bottom"] = values.string_bottom
-    if values.effects_string and values.effects_damper:
-        p["damper"] = 1
-        for name in ("stiffness", "damping", "preload"):
-            p[f"damper_{name}"] = getattr(values, f"damper_{name}")
-        p["casing_mass"] = values.damper_casing_mass

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from percussion_model.physics.kernel import inlined, kernel
+import numpy as np
+
+from percussion_model.physics.kernel import inlined, kernel, preparing
 from percussion_model.solvers.chain.records import Bar, Body, Place, Steel
 from percussion_model.solvers.modal.lanes import WIDTH, load, spread, total, totals
 
@@ -117,6 +119,33 @@ def wave_in_cell(places, rings, step, k, way, cell):
     size = places[k, SIZE]
     age = cell if way == 0 else places[k, CELLS] - 1 - cell
     return rings[0, places[k, RING] + 2 * size * way + ((step - age) & (size - 1))]
+
+
+@kernel
+def force_in(chain, rings, step, bar, cell):
+    """Force in a cell of a bar, compression positive [N]."""
+    k, last = int(chain.bodies[bar, FIRST]), int(chain.bodies[bar, LAST])
+    while k < last and cell >= chain.places[k, CELLS]:
+        cell -= chain.places[k, CELLS]
+        k += 1
+    down = wave_in_cell(chain.places, rings, step, k, 0, cell)
+    up = wave_in_cell(chain.places, rings, step, k, 1, cell)
+    return chain.steel[k, IMPEDANCE] * (down - up)
+
+
+@preparing
+def cell_masses(chain, bar):
+    """Mass of each cell of a bar, top to bottom [kg]."""
+    first, end = int(chain.bodies[bar, FIRST]), int(chain.bodies[bar, LAST]) + 1
+    n = 0
+    for k in range(first, end):
+        n += chain.places[k, CELLS]
+    found, at = np.zeros(n), 0
+    for k in range(first, end):
+        for _ in range(chain.places[k, CELLS]):
+            found[at] = chain.steel[k, CELL_MASS]
+            at += 1
+    return found
 
 
 @kernel

@@ -4,24 +4,25 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
 from percussion_model.physics.kernel import entry_of
-from percussion_model.physics.records import Piston
 from percussion_model.scene.bar_groups import Bar as SceneBar
-from percussion_model.scene.numbers import numbers_of
-from percussion_model.scene.scene import Scene
+from percussion_model.scene.numbers import Numbers, kernel_numbers
+from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.solvers.base import Solver
-from percussion_model.solvers.chain.advance import GRID_ROUNDING, begin, run
-from percussion_model.solvers.chain.network import network_of, parameters_of
+from percussion_model.solvers.chain.advance import GRID_ROUNDING, run
+from percussion_model.solvers.chain.network import Network, Plan, network_of, plan_of
+from percussion_model.solvers.chain.prepare import begin, fill_chain_parameters
 from percussion_model.solvers.chain.records import (
     CHAIN_LIMITS,
     CHAIN_PAR,
     CHAIN_STATE,
     Bar,
     Body,
+    Chain,
     Has,
     Place,
     Steel,
@@ -29,13 +30,27 @@ from percussion_model.solvers.chain.records import (
     Waves,
 )
 from percussion_model.solvers.chain.resolution import coarser_steps
-from percussion_model.solvers.chain.sections import CAME_ROWS, kept_of
-from percussion_model.solvers.setup import MOST_CHANGES, PISTONS, fill_parameters, fill_start
+from percussion_model.solvers.chain.sections import CAME_ROWS, cell_masses, force_in
+from percussion_model.solvers.setup import MOST_CELLS, refuse_many
 from percussion_model.solvers.state import State, words_of
 
 _WORD = words_of(CHAIN_STATE)
 STEP, EVENTS_ON, PEAK_FROM = _WORD["step"], _WORD["events_on"], _WORD["peak_from"]
 N_BLOWS, N_EVENTS = _WORD["n_blows"], _WORD["n_events"]
+
+
+def _network(numbers: Numbers) -> tuple[Plan, Network]:
+    """Cut the bars of a scene, or refuse."""
+    plan = entry_of(plan_of)(numbers)
+    refuse_many("cells", plan.cells, MOST_CELLS)
+    network = entry_of(network_of)(numbers, plan)
+    if network.too_fine > 0.0:
+        raise SceneError(
+            f"loss.time = {plan.eta:.3g} s: too long for a section of {network.too_fine:g} m "
+            f"in steps of {plan.time_step:.2g} s: "
+            "take a shorter loss.time, or fewer solver.cells"
+        )
+    return plan, network
 
 
 class Cells:
@@ -48,10 +63,10 @@ class Cells:
     in_sections : list of int
     """
 
-    def __init__(self, places: np.ndarray, steel: np.ndarray) -> None:
-        self.in_sections = places[:, Place.CELLS].tolist()
-        self.mass = np.repeat(steel[:, Steel.CELL_MASS], self.in_sections)
-        self.impedance = np.repeat(steel[:, Steel.IMPEDANCE], self.in_sections)
+    def __init__(self, chain: Chain, bar: int, sections: slice) -> None:
+        self.in_sections = chain.places[sections, Place.CELLS].tolist()
+        self.mass = entry_of(cell_masses)(chain, bar)
+        self.impedance = np.repeat(chain.steel[sections, Steel.IMPEDANCE], self.in_sections)
 
     @property
     def n(self) -> int:
@@ -83,30 +98,28 @@ class ChainSolver(Solver):
 
     def __init__(self, scene: Scene) -> None:
         super().__init__(scene)
-        self._numbers = numbers = numbers_of(scene)
-        self._network = network = network_of(numbers)
-        self._chain, self._names = network.chain, network.names
-        self.time_step, self.wave_speed_error = network.time_step, network.misfit
+        self._numbers = numbers = kernel_numbers(scene)
+        plan, network = _network(numbers)
+        piston, rods = ["piston"] * network.struck, range(1, len(numbers.rod_counts) + 1)
+        self._chain, self._names = network.chain, [*piston, *(f"rod {k}" for k in rods), "bit"]
+        self.time_step, self.wave_speed_error = plan.time_step, network.misfit
         bodies = network.chain.bodies[:, Body.FIRST : Body.LAST + 1].astype(int)
         self._sections = {
             name: slice(first, last + 1)
-            for name, (first, last) in zip(network.names, bodies.tolist(), strict=True)
+            for name, (first, last) in zip(self._names, bodies.tolist(), strict=True)
         }
         self._cells = {
-            name: Cells(network.chain.places[where], network.chain.steel[where])
-            for name, where in self._sections.items()
+            name: Cells(network.chain, bar, where)
+            for bar, (name, where) in enumerate(self._sections.items())
         }
         self.cells = {name: cells.n for name, cells in self._cells.items()}
         self._par = np.zeros(1, CHAIN_PAR)
-        fill_parameters(self._par[0], numbers, True)
-        parameters_of(network, numbers, self._par)
-        p: Any = self._par[0]
-        p["most_changes"] = MOST_CHANGES
+        entry_of(fill_chain_parameters)(self._par[0], numbers, plan, network)
         self.operator_bytes = sum(part.nbytes for part in network.chain)
         self._shapes = (
-            (len(Bar), len(network.names)),
+            (len(Bar), len(self._names)),
             (len(Has), max(1, len(network.chain.fits))),
-            (CAME_ROWS, max(len(network.chain.places), len(network.names))),
+            (CAME_ROWS, max(len(network.chain.places), len(self._names))),
             (1, network.rings),
         )
         self._entry: Callable[..., int] = entry_of(run)
@@ -118,25 +131,8 @@ class ChainSolver(Solver):
     def new_state(self) -> State:
         """State at time zero."""
         state = State(CHAIN_STATE, self._shapes)
-        s: Any = state.record[0]
-        numbers, network = self._numbers, self._network
-        fill_start(s, numbers)
-        bars, joints, _, rings = state.arrays
-        places = network.chain.places
-        for i, name in enumerate(network.names):
-            v = s["v_p"] if name == "piston" else numbers.values.start_bit_velocity
-            bars[Bar.VELOCITY, i] = v
-            for k in range(self._sections[name].start, self._sections[name].stop):
-                first, count = places[k, Place.RING], 4 * places[k, Place.SIZE]
-                rings[0, first : first + count] = 0.5 * v
-                rings[0, first + count : first + count + 2] = kept_of(self._chain, k) * 0.5 * v
-        if len(numbers.joints):
-            joints[Has.GAP] = numbers.joints[:, 3]
-            joints[Has.CLOSED] = numbers.joints[:, 3] == 0.0
-        s["end_start"] = s["x_r"] + s["p"]
-        if PISTONS[numbers.values.piston_model] != Piston.ABSENT:
-            s["u_r"] = s["u_0"] = -s["gap"]
-        entry_of(begin)(self._par, state.record, self._chain, self._waves(state))
+        waves = self._waves(state)
+        entry_of(begin)(self._par[0], state.record[0], self._chain, waves, self._numbers)
         return state
 
     def _run(
@@ -209,17 +205,8 @@ class ChainSolver(Solver):
         """Force in one cell of a bar [N], as `fields` reads it."""
         if bar not in self._cells:
             return 0.0
-        cells = self._cells[bar]
-        k, step = self._sections[bar].start, int(state.words[STEP])
-        for count in cells.in_sections:
-            if cell < count:
-                break
-            cell, k = cell - count, k + 1
-        ring, size = self._chain.places[k, [Place.RING, Place.SIZE]].tolist()
-        rings, last = state.arrays[-1][0], cells.in_sections[k - self._sections[bar].start] - 1
-        down = rings[ring + ((step - cell) & (size - 1))]
-        up = rings[ring + 2 * size + ((step - (last - cell)) & (size - 1))]
-        return float(self._chain.steel[k, Steel.IMPEDANCE] * (down - up))
+        rings, step = state.arrays[-1], int(state.words[STEP])
+        return float(entry_of(force_in)(self._chain, rings, step, self._names.index(bar), cell))
 
     def grid_of(self, bar: str) -> Cells | None:
         """Cells of a bar, None where it has none."""

@@ -15,6 +15,10 @@ import math
 
 import numpy as np
 
+from percussion_model.physics.kernel import preparing
+from percussion_model.scene.bars import add
+from percussion_model.solvers import plain_code  # noqa: F401  # kernels call functions of scenes
+
 # A part of a step below this is rounding [steps].
 WHOLE = 1e-9
 # Weights (a, 1 - 2 a, a) spread a wave without turning any of its frequencies over up to this a.
@@ -32,7 +36,8 @@ ROUNDS = 8
 NOTHING = 1e-18
 
 
-def weights_of(transit: float, variance: float) -> tuple[int, np.ndarray, float]:
+@preparing
+def weights_of(transit, variance):
     """Weights of a section.
 
     Parameters
@@ -52,37 +57,72 @@ def weights_of(transit: float, variance: float) -> tuple[int, np.ndarray, float]
     whole = max(1, math.floor(transit + WHOLE))
     part = max(transit - whole, 0.0)
     if part <= WHOLE:
-        delay, weights, spread = whole, np.ones(1), 0.0
+        delay, weights = whole, np.ones(1)
     else:
-        delay, weights, spread = whole - 1, _cubic(part), 0.0
-    rest, room = max(variance - spread, 0.0), delay - 1
+        delay, weights = whole - 1, _cubic(part)
+    rest, room = max(variance, 0.0), delay - 1
     reach = min(room, math.ceil(REACH * math.sqrt(rest)))
     if rest >= LEAST_NORMAL and reach >= LEAST_REACH * math.sqrt(rest):
-        weights = np.convolve(weights, _normal(rest, reach))
-        return delay - reach, weights / weights.sum(), spread + rest
+        weights = _scaled(_convolved(weights, _normal(rest, reach)))
+        return delay - reach, weights, rest
     rounds = min(math.ceil(0.5 * rest / MOST_SPREAD), room)
     if rounds == 0:
-        return delay, weights, spread
+        return delay, weights, 0.0
     a = min(0.5 * rest / rounds, UTMOST_SPREAD)
+    once = np.array([a, 1.0 - 2.0 * a, a])
     for _ in range(rounds):
-        weights = np.convolve(weights, [a, 1.0 - 2.0 * a, a])
-    kept = np.flatnonzero(np.abs(weights) > NOTHING)
-    weights = weights[kept[0] : kept[-1] + 1]
-    first = delay - rounds + int(kept[0])
-    return first, weights / weights.sum(), spread + 2.0 * a * rounds
+        weights = _convolved(weights, once)
+    first, end = 0, len(weights)
+    while abs(weights[first]) <= NOTHING:
+        first += 1
+    while abs(weights[end - 1]) <= NOTHING:
+        end -= 1
+    left = np.zeros(end - first)
+    for k in range(end - first):
+        left[k] = weights[first + k]
+    return delay - rounds + first, _scaled(left), 2.0 * a * rounds
 
 
-def _normal(variance: float, reach: int) -> np.ndarray:
-    """Samples of a normal distribution so wide that they have the variance though they end."""
-    places, wide = np.arange(-reach, reach + 1), variance
-    for _ in range(ROUNDS):
-        weights = np.exp(-0.5 * places**2 / wide)
-        weights /= weights.sum()
-        wide *= variance / float(weights @ places**2)
+@preparing
+def _convolved(one, other):
+    """Weights of both, one after the other; BLAS would sum otherwise on other processors."""
+    out = np.zeros(len(one) + len(other) - 1)
+    for k in range(len(one)):
+        for j in range(len(other)):
+            out[k + j] += one[k] * other[j]
+    return out
+
+
+@preparing
+def _scaled(weights):
+    """The same by their sum, in place."""
+    total = rest = 0.0
+    for k in range(len(weights)):
+        total, rest = add(total, rest, weights[k])
+    for k in range(len(weights)):
+        weights[k] /= total + rest
     return weights
 
 
-def turning(transit: float) -> float:
+@preparing
+def _normal(variance, reach):
+    """Samples of a normal distribution so wide that they have the variance though they end."""
+    weights, wide = np.zeros(2 * reach + 1), variance
+    for _ in range(ROUNDS):
+        for k in range(2 * reach + 1):
+            place = float(k - reach)
+            weights[k] = math.exp(-0.5 * (place * place) / wide)
+        _scaled(weights)
+        moment = lost = 0.0
+        for k in range(2 * reach + 1):
+            place = float(k - reach)
+            moment, lost = add(moment, lost, weights[k] * (place * place))
+        wide *= variance / (moment + lost)
+    return weights
+
+
+@preparing
+def turning(transit):
     """Weight a of a section of one to two steps, which is too short for others.
 
     y = a x + sqrt(1 - a^2) q, where q becomes sqrt(1 - a^2) x - a q: it delays by one step and
@@ -92,7 +132,8 @@ def turning(transit: float) -> float:
     return (1.0 - part) / (1.0 + part)
 
 
-def _cubic(part: float) -> np.ndarray:
+@preparing
+def _cubic(part):
     """Lagrange's weights of the steps -1, 0, 1 and 2 at a part of the step from 0 to 1."""
     f = part
     return np.array(

@@ -67,6 +67,13 @@ def elastic_energy(c, a, n):
     return 0.5 * total
 
 
+@kernel
+def force_in(c, a, first, element):
+    """Force in an element of the bar whose nodes begin at `first`, compression positive [N]."""
+    i = first + element
+    return -c[Mesh.STIFFNESS, i] * (a[Node.U, i + 1] - a[Node.U, i])
+
+
 @inlined
 def contact_energy(par, s):
     """Energy in the penalty spring between piston and bit [J]."""

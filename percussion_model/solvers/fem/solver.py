@@ -2,26 +2,25 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any, ClassVar
 
 import numpy as np
 
-from percussion_model.physics.records import Piston, RockKind
+from percussion_model.physics.kernel import entry_of
 from percussion_model.scene.bar_groups import Bar
-from percussion_model.scene.numbers import Numbers, numbers_of, section_numbers
+from percussion_model.scene.numbers import kernel_numbers, section_numbers
 from percussion_model.scene.scene import Scene
 from percussion_model.solvers.base import Solver
 from percussion_model.solvers.fem.advance import run
-from percussion_model.solvers.fem.bars import read_all, stored_energy
+from percussion_model.solvers.fem.bars import force_in
 from percussion_model.solvers.fem.mesh import (
     BarMesh,
-    BarMeshes,
-    assemble,
-    critical_frequency,
     cut_bars,
+    elements_wanted,
+    mesh_of,
     section_count,
 )
+from percussion_model.solvers.fem.prepare import begin, fill_fem_parameters, refresh
 from percussion_model.solvers.fem.records import (
     FEM_LIMITS,
     FEM_PAR,
@@ -36,91 +35,8 @@ from percussion_model.solvers.fem.records import (
     Probe,
     Trial,
 )
-from percussion_model.solvers.setup import (
-    MOST_CHANGES,
-    PISTONS,
-    ROCKS,
-    fill_parameters,
-    fill_start,
-    kelvin_voigt_time,
-)
+from percussion_model.solvers.setup import refuse_many
 from percussion_model.solvers.state import State
-
-# Steps cut short by events within the length of a whole one; more are a storm. The
-# reference has no more than 5.
-MOST_EVENTS = 64
-
-
-def loss_time(numbers: Numbers, bit: BarMesh) -> float:
-    """Kelvin-Voigt time [s]: that of the scene, or 2 zeta_K / omega_cr (eq. 55 of the paper)."""
-    values = numbers.values
-    if not values.effects_loss or math.isnan(values.fem_damping_ratio):
-        return kelvin_voigt_time(numbers)
-    return 2.0 * float(values.fem_damping_ratio) / critical_frequency(bit)
-
-
-def eigenvalue(spectral_radius: float) -> complex:
-    """Complex eigenvalue of the scheme's matrix (docs/numerics.md, section 10)."""
-    p = (2.0 + spectral_radius) / (3.0 * (1.0 + spectral_radius))
-    q = 1.0 / (6.0 * (1.0 + spectral_radius))
-    return complex(0.5 * p, math.sqrt(q - 0.25 * p * p))
-
-
-def defect(spectral_radius: float) -> float:
-    """Defect of the scheme's energy identity (docs/numerics.md, section 10)."""
-    return (1.0 - spectral_radius) / (36.0 * (1.0 + spectral_radius))
-
-
-def fem_parameters(numbers: Numbers, bars: BarMeshes) -> np.ndarray:
-    """Parameter record of a scene on its mesh.
-
-    Returns
-    -------
-    FEM_PAR array of length 1
-    """
-    values = numbers.values
-    par = np.zeros(1, FEM_PAR)
-    p: Any = par[0]
-    fill_parameters(p, numbers, with_piston=PISTONS[values.piston_model] == Piston.ELASTIC)
-    shortest = min([float(bar.transit_time.min()) for bar in bars.both if bar.n])
-    p["dt"] = values.fem_courant * shortest
-    mu = eigenvalue(values.fem_spectral_radius)
-    p["mu_re"], p["mu_im"] = mu.real, mu.imag
-    p["dissipation"] = defect(values.fem_spectral_radius)
-    p["k_c"] = values.fem_contact_stiffness
-    p["eta"] = loss_time(numbers, bars.bit)
-    p["q_tol"], p["t_tol"] = values.fem_event_tolerance, values.fem_time_tolerance
-    p["start_gap"] = values.start_gap
-    p["n_p"] = 0 if bars.piston is None else bars.piston.n + 1
-    p["n_b"] = bars.bit.n + 1
-    if p["rock"] == RockKind.WALL:
-        p["rock"] = RockKind.SPRING  # a wall is met like the piston: by a penalty
-    p["most_changes"], p["most_events"] = MOST_CHANGES, MOST_EVENTS
-    return par
-
-
-def fill_fem_start(state: np.ndarray, w: np.ndarray, n_p: int, numbers: Numbers) -> None:
-    """Fill record and nodes at time zero, but for what `read_all` derives of them.
-
-    Parameters
-    ----------
-    state : FEM_STATE array of length 1
-    w : float array, shape (len(Node), n)
-    n_p : int
-        Nodes of the piston.
-    numbers : Numbers
-    """
-    s: Any = state[0]
-    values = numbers.values
-    fill_start(s, numbers)
-    if ROCKS[values.effects_rock] == RockKind.WALL:
-        s["k_r"] = s["next_k_r"] = values.fem_contact_stiffness
-    s["inputs_changed"] = 1
-    w[Node.U] = -values.start_rock_gap
-    w[Node.U, :n_p] -= values.start_gap
-    w[Node.V, :n_p] = values.start_piston_velocity
-    w[Node.V, n_p:] = values.start_bit_velocity
-
 
 # A state is no more than a step, and rounding, behind the present [steps].
 MOST_BEHIND = 2.0
@@ -153,11 +69,13 @@ class FemSolver(Solver):
 
     def __init__(self, scene: Scene) -> None:
         super().__init__(scene)
-        self._numbers = numbers = numbers_of(scene)
-        bars = cut_bars(numbers)
+        self._numbers = numbers = kernel_numbers(scene)
+        refuse_many("elements", entry_of(elements_wanted)(numbers))
+        bars = entry_of(cut_bars)(numbers)
         self._element, self._piston, self._bit = bars
-        self._mesh = assemble(bars.both)
-        self._par = fem_parameters(numbers, bars)
+        self._mesh = entry_of(mesh_of)(bars)
+        self._par = np.zeros(1, FEM_PAR)
+        entry_of(fill_fem_parameters)(self._par[0], numbers, bars)
         self.time_step, self.loss_time = float(self._par[0]["dt"]), float(self._par[0]["eta"])
         grids = {name: self.grid_of(name) for name in ("piston", "bit")}
         self.cells = {name: grid.n for name, grid in grids.items() if grid is not None}
@@ -171,16 +89,13 @@ class FemSolver(Solver):
     def new_state(self) -> State:
         """State at time zero."""
         state = State(FEM_STATE, ((len(Node), self._mesh.shape[1]),))
-        (w,), n_p = state.arrays, int(self._par[0]["n_p"])
-        fill_fem_start(state.record, w, n_p, self._numbers)
-        self.refresh(state)
+        (w,) = state.arrays
+        entry_of(begin)(self._par[0], state.record[0], w, self._mesh, self._numbers)
         return state
 
     def refresh(self, state: State) -> None:
         """Derive everything from the nodes, as at the start of a run."""
-        s, (w,) = state.record[0], state.arrays
-        read_all(self._par[0], s, w, self._mesh)
-        s["e_start"] = sum(stored_energy(self._par[0], s, w, self._mesh))
+        refresh(self._par[0], state.record[0], state.arrays[0], self._mesh)
 
     def _run(
         self, task: FemTask, state: State, time: float, blows: np.ndarray, events: np.ndarray,
@@ -240,19 +155,26 @@ class FemSolver(Solver):
     def grid_of(self, bar: str) -> BarMesh | None:
         """Elements of "piston" or "bit", None where it has none."""
         mesh = {"piston": self._piston, "bit": self._bit}[bar]
-        return mesh if mesh is not None and mesh.n else None
+        return mesh if mesh.n else None
 
     def fields(self, state: State) -> dict[str, np.ndarray]:
         """Force [N] and velocity [m/s] of each element, top to bottom, by bar."""
         (w,), n_p = state.arrays, int(self._par[0]["n_p"])
         out = {}
         for name, first, bar in (("piston", 0, self._piston), ("bit", n_p, self._bit)):
-            if bar is not None and bar.n:
+            if bar.n:
                 nodes = w[:, first : first + bar.n + 1]
                 stiffness = self._mesh[Mesh.STIFFNESS, first : first + bar.n]
                 out[f"{name}_force"] = -stiffness * np.diff(nodes[Node.U])
                 out[f"{name}_velocity"] = 0.5 * (nodes[Node.V, :-1] + nodes[Node.V, 1:])
         return out
+
+    def force_in(self, state: State, bar: str, cell: int) -> float:
+        """Force in one element of a bar [N], as `fields` reads it."""
+        if self.grid_of(bar) is None:
+            return 0.0
+        first = 0 if bar == "piston" else int(self._par[0]["n_p"])
+        return float(entry_of(force_in)(self._mesh, state.arrays[0], first, cell))
 
     def coarser_scenes(self) -> list[Scene] | None:
         """A coarser mesh with the same loss, and a softer contact: each has an error."""

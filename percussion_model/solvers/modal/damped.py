@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from percussion_model.physics.kernel import kernel
+from percussion_model.physics.kernel import kernel, preparing
 
 # A dashpot grows to its full size in so many stages, each with Newton steps at most; what eq. 4 has
 # too much is small.
@@ -27,7 +27,7 @@ CLOSE_ENOUGH, APART = 1e-13, 1e-9
 
 
 class Pairs(NamedTuple):
-    """Damped modes as pairs of numbers.
+    """Damped modes as pairs of numbers; arrays without any where they cannot be told apart.
 
     Attributes
     ----------
@@ -59,6 +59,12 @@ def _start(w, eta, first):
 
 
 @kernel
+def _square(z):
+    """Square of the size of a complex number."""
+    return z.real * z.real + z.imag * z.imag
+
+
+@kernel
 def _newton(w, b, eta, c, k, root):
     """Root near another; NaN where none is found."""
     own, share = w[k] * w[k], b[k] * b[k]
@@ -76,7 +82,7 @@ def _newton(w, b, eta, c, k, root):
         change += c * share * rest * (1.0 - root * rest * c * (total + root * slope))
         step = value / change
         root -= step
-        if abs(step) < CLOSE_ENOUGH * abs(root):
+        if _square(step) < CLOSE_ENOUGH * CLOSE_ENOUGH * _square(root):
             return root
     return complex(np.nan, np.nan)
 
@@ -104,9 +110,8 @@ def _find_roots(w, b, eta, c, roots):
         for i in range(2):
             for j in range(n):
                 for m in range(2):
-                    if (j != k or m != i) and abs(roots[j, m] - roots[k, i]) < APART * abs(
-                        roots[k, i]
-                    ):
+                    apart = _square(roots[j, m] - roots[k, i])
+                    if (j != k or m != i) and apart < APART * APART * _square(roots[k, i]):
                         return False
     return True
 
@@ -168,8 +173,9 @@ def _fill_pairs(w, b, eta, c, roots, shapes, ends, square, decay, out, into, tak
                     taken[n + i, n + j] += both.real
 
 
-def damped_pairs(frequency: np.ndarray, ends: np.ndarray, eta: float, c: float) -> Pairs | None:
-    """Return the modes of a bar with a dashpot more; None where they cannot be told apart.
+@preparing
+def damped_pairs(frequency, ends, eta, c):
+    """Return the modes of a bar with a dashpot more; none where they cannot be told apart.
 
     Parameters
     ----------
@@ -181,12 +187,18 @@ def damped_pairs(frequency: np.ndarray, ends: np.ndarray, eta: float, c: float) 
         Kelvin-Voigt time [s].
     c : float
         Of the dashpot, negative where eq. 4 has too much [N s/m].
+
+    Returns
+    -------
+    Pairs
     """
     n = len(frequency)
-    roots, at_end, shapes = (np.zeros(size, complex) for size in ((n, 2), (n, 2), n))
+    roots, at_end = np.zeros((n, 2), np.complex128), np.zeros((n, 2), np.complex128)
     if not _find_roots(frequency, ends, eta, c, roots):
-        return None
-    square, decay = np.zeros((2, n))
-    out, into, taken = np.zeros((3, 2 * n, 2 * n))
-    _fill_pairs(frequency, ends, eta, c, roots, shapes, at_end, square, decay, out, into, taken)
+        n = 0
+    shapes = np.zeros(n, np.complex128)
+    square, decay = np.zeros(n), np.zeros(n)
+    out, into, taken = np.zeros((2 * n, 2 * n)), np.zeros((2 * n, 2 * n)), np.zeros((2 * n, 2 * n))
+    if n > 0:
+        _fill_pairs(frequency, ends, eta, c, roots, shapes, at_end, square, decay, out, into, taken)
     return Pairs(square, decay, out, into, taken)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
-from percussion_model.physics.kernel import kernel
+from percussion_model.physics.elementary import cos_and_sin, exp, power_of_two
+from percussion_model.physics.kernel import kernel, preparing
 from percussion_model.solvers.modal.damped import Pairs, damped_pairs
 from percussion_model.solvers.modal.lanes import WIDTH
 from percussion_model.solvers.modal.records import (
@@ -17,7 +17,6 @@ from percussion_model.solvers.modal.records import (
     SCAN,
     STEP,
     End,
-    Forms,
     Go,
     Laws,
     Rest,
@@ -27,12 +26,16 @@ from percussion_model.solvers.modal.records import (
 
 # Factors of a move below this are zero: what they leave would only slow down arithmetic.
 NOTHING = 1e-40
-# Laws of which one may follow another: FF 0, FC 2, DFC 3, BC 4, SS 5.
-FOLLOWERS = {0: (2, 3, 5), 2: (4,), 3: (2, 4), 4: (0, 2, 3, 5), 5: (0, 2, 3, 4)}
+# Laws of which the second may follow the first: FF 0, FC 2, DFC 3, BC 4, SS 5.
+FOLLOWERS = (
+    (0, 2), (0, 3), (0, 5), (2, 4), (3, 2), (3, 4), (4, 0), (4, 2), (4, 3), (4, 5),
+    (5, 0), (5, 2), (5, 3), (5, 4),
+)  # fmt: skip
 # Tables from law to law cost cubes of the modes to make: with more pairs go by way of the modes.
 MOST_TO_PASS = 200
 # A bit with more modes is stepped: tables would take hundreds of megabytes.
 MOST_PAIRS = 400
+GOES, VIEWS, RESTS = len(Go), len(View), len(Rest)
 
 
 @kernel
@@ -52,52 +55,66 @@ def _multiply(a, b, out):
                 out[i, j] += a[i, k] * b[k, j]
 
 
-def _matrix(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+@preparing
+def _matrix(a, b):
     """Product of matrices in an order of its own."""
     out = np.zeros((a.shape[0], b.shape[1]))
-    _multiply(np.ascontiguousarray(a), np.ascontiguousarray(b), out)
+    _multiply(a, b, out)
     return out
 
 
-def _product(matrix: np.ndarray, row: np.ndarray) -> np.ndarray:
+@preparing
+def _product(matrix, row):
     """Product in an order of its own: BLAS sums otherwise on other processors."""
     out = np.zeros(len(matrix))
-    _times(np.ascontiguousarray(matrix), np.ascontiguousarray(row), out)
+    _times(matrix, row, out)
     return out
 
 
-def _ends_of(shape: np.ndarray, pairs: Pairs, eta: float) -> np.ndarray:
+@preparing
+def _fill_end(rows, end, part, row):
+    """Fill a row of `End`, and the one after it, by offsets or velocities of the modes."""
+    n = rows.shape[1]
+    by = _product(part, row)
+    rows[end], rows[end + 1] = by[:n], by[n:]
+
+
+@preparing
+def _ends_of(shape, pairs, eta):
     """Rows of `End` by those of `Shape`."""
     n = shape.shape[1]
     rows = np.zeros((End.ROWS, n))
-    offsets, velocities = pairs.out[:, :n], pairs.out[:, n:]
-    bent = offsets + eta * velocities
-    for end, part, row in (
-        (End.LOW, offsets, Shape.LOW),
-        (End.SPEED, velocities, Shape.LOW),
-        (End.TOP, offsets, Shape.TOP),
-        (End.BIT, offsets, Shape.BIT),
-        (End.BIT_SPEED, velocities, Shape.BIT),
-        (End.PISTON, offsets, Shape.PISTON),
-        (End.PISTON_SPEED, velocities, Shape.PISTON),
-        (End.PULL, -bent * shape[Shape.STIFF], Shape.PISTON),
-    ):
-        by = _product(part, shape[row])
-        rows[end], rows[end + 1] = by[:n], by[n:]
-    shift = _product(pairs.into[:n].T, shape[Shape.BIT] + shape[Shape.PISTON])
-    rows[End.SHIFT], rows[End.SHIFT + 1] = shift[:n], shift[n:]
-    alone = pairs.into[n - 1] / shape[Shape.LOW, n - 1]
+    offsets = np.ascontiguousarray(pairs.out[:, :n])
+    velocities = np.ascontiguousarray(pairs.out[:, n:])
+    low, bit, piston = shape[Shape.LOW], shape[Shape.BIT], shape[Shape.PISTON]
+    _fill_end(rows, End.LOW, offsets, low)
+    _fill_end(rows, End.SPEED, velocities, low)
+    _fill_end(rows, End.TOP, offsets, shape[Shape.TOP])
+    _fill_end(rows, End.BIT, offsets, bit)
+    _fill_end(rows, End.BIT_SPEED, velocities, bit)
+    _fill_end(rows, End.PISTON, offsets, piston)
+    _fill_end(rows, End.PISTON_SPEED, velocities, piston)
+    _fill_end(rows, End.PULL, -(offsets + eta * velocities) * shape[Shape.STIFF], piston)
+    _fill_end(rows, End.SHIFT, np.ascontiguousarray(pairs.into[:n].T), bit + piston)
+    alone = pairs.into[n - 1] / low[n - 1]
     rows[End.YIELD], rows[End.YIELD + 1] = alone[:n], alone[n:]
     rows[End.SQUARE] = pairs.square
     return rows
 
 
-def _folded(form: np.ndarray) -> np.ndarray:
+@preparing
+def _folded(form):
     """A symmetric form of numbers Q and V with what lies below its blocks of lanes added above."""
     n = len(form) // 2
-    lane = np.tile(np.arange(n) // WIDTH, 2)
-    twice = 1.0 + np.sign(lane[None, :] - lane[:, None])
-    return np.asarray(form * twice)
+    out = form.copy()
+    for i in range(2 * n):
+        for j in range(2 * n):
+            mine, other = (i % n) // WIDTH, (j % n) // WIDTH
+            if other > mine:
+                out[i, j] *= 2.0
+            elif other < mine:
+                out[i, j] *= 0.0
+    return out
 
 
 @kernel
@@ -107,10 +124,11 @@ def _go(square, decay, h):
     rest = square - delta * delta
     root = math.sqrt(abs(rest))
     if rest > 0.0:
-        fade = math.exp(-delta * h)
-        c, s = fade * math.cos(root * h), fade * math.sin(root * h) / root
+        fade = exp(-delta * h)
+        c, s = cos_and_sin(root * h)
+        c, s = fade * c, fade * s / root
     else:
-        slow, fast = math.exp((root - delta) * h), math.exp(-(root + delta) * h)
+        slow, fast = exp((root - delta) * h), exp(-(root + delta) * h)
         c = 0.5 * (slow + fast)
         s = h * slow if root == 0.0 else 0.5 * (slow - fast) / root
     a, b, v, d = c + delta * s, s, -square * s, c - delta * s
@@ -136,7 +154,7 @@ def _fill_goes(square, decay, tick, move):
     """Fill the table of moves of a law."""
     for k in range(len(square)):
         for level in range(move.shape[0]):
-            h = tick * 2.0**level
+            h = tick * power_of_two(level)
             go = _go(square[k], decay[k], h)
             for row in range(4):
                 move[level, row, k] = go[row]
@@ -150,7 +168,7 @@ def _fill_views(square, decay, tick, ends, views):
     for k in range(len(square)):
         low, speed = ends[End.LOW : End.LOW + 2, k], ends[End.SPEED : End.SPEED + 2, k]
         for level in range(views.shape[0]):
-            view = _view(square[k], decay[k], low, speed, tick * 2.0**level)
+            view = _view(square[k], decay[k], low, speed, tick * power_of_two(level))
             for row in range(4):
                 views[level, row, k] = view[row]
 
@@ -162,18 +180,20 @@ def _fill_scans(square, decay, tick, ends, one, other, scans):
         first, second = ends[one : one + 2, k], ends[other : other + 2, k]
         for hop in range(scans.shape[0]):
             for look in range(SCAN):
-                h = tick * 2.0 ** (STEP + hop) * (look + 1)
+                h = tick * power_of_two(STEP + hop) * (look + 1)
                 view = _view(square[k], decay[k], first, second, h)
                 for row in range(4):
                     scans[hop, 4 * k + row, look] = view[row]
 
 
-def _rest(shape: np.ndarray) -> np.ndarray:
+@preparing
+def _rest(shape):
     """Offsets of the modes where loads hold them that accelerate a free bit by 1 m/s2 [m]."""
-    return np.asarray(shape[Shape.SOFT] * shape[Shape.BIT])
+    return shape[Shape.SOFT] * shape[Shape.BIT]
 
 
-def _put(room: np.ndarray, table: np.ndarray) -> None:
+@preparing
+def _put(room, table):
     """Put a table into room for as many numbers, or more, in each of its four quarters."""
     n, most = len(table) // 2, len(room) // 2
     for row in range(2):
@@ -182,51 +202,70 @@ def _put(room: np.ndarray, table: np.ndarray) -> None:
             room[row * most : row * most + n, column * most : column * most + n] = quarter
 
 
-def _got(room: np.ndarray, n: int) -> np.ndarray:
+@preparing
+def _got(room, n):
     """A table as it was put there."""
     most = len(room) // 2
-    return np.ascontiguousarray(room.reshape(2, most, 2, most)[:, :n, :, :n].reshape(2 * n, 2 * n))
+    table = np.zeros((2 * n, 2 * n))
+    for row in range(2):
+        for column in range(2):
+            quarter = room[row * most : row * most + n, column * most : column * most + n]
+            table[row * n : (row + 1) * n, column * n : (column + 1) * n] = quarter
+    return table
 
 
-class _Over(NamedTuple):
-    """Tables from law to law, as `Laws` has them."""
+@preparing
+def _pass(forms, one, other, out, into):
+    """Table from the pairs of a law to those of another, and what an acceleration adds."""
+    n = forms.sizes[0]
+    form, then = one // 2, other // 2
+    change = np.eye(n)
+    if form != then:
+        change = np.ascontiguousarray(forms.change[form, then, :n, :n])
+    rest = _product(np.ascontiguousarray(change.T), _rest(forms.shape[form, :, :n]))
+    rest -= _rest(forms.shape[then, :, :n])
+    rows = _got(out[one], n) if form else np.eye(2 * n)
+    table, push = np.zeros((2 * n, 2 * n)), np.zeros(2 * n)
+    table[:, :n] = _matrix(np.ascontiguousarray(rows[:, :n]), change)
+    table[:, n:] = _matrix(np.ascontiguousarray(rows[:, n:]), change)
+    push[:n] = rest
+    if then:
+        back = _got(into[other], n)
+        table, push = _matrix(table, back), _product(np.ascontiguousarray(back.T), push)
+    return table, push
 
-    way: np.ndarray
-    over: np.ndarray
-    pushed: np.ndarray
 
-
-def _over(forms: Forms, sizes: np.ndarray, out: np.ndarray, into: np.ndarray) -> _Over:
-    """Tables from the pairs of a law to those that may follow."""
-    n = int(forms.sizes[0])
+@preparing
+def _over(forms, sizes, out, into):
+    """Tables from the pairs of a law to those that may follow: `way`, `over`, `pushed`."""
+    n = forms.sizes[0]
     way = np.full((2 * JOINED, 2 * JOINED), -1)
-    found: list[np.ndarray] = []
-    pushed: list[np.ndarray] = []
-    for one, followers in FOLLOWERS.items():
-        for other in followers:
-            if not sizes[one] or not sizes[other] or n > MOST_TO_PASS:
-                continue
-            form, then = one // 2, other // 2
-            change = forms.change[form, then, :n, :n] if form != then else np.eye(n)
-            rest = _product(change.T, _rest(forms.shape[form, :, :n]))
-            rest -= _rest(forms.shape[then, :, :n])
-            rows = _got(out[one], n) if form else np.eye(2 * n)
-            table = np.hstack([_matrix(rows[:, :n], change), _matrix(rows[:, n:], change)])
-            push = np.append(rest, np.zeros(n))
-            if then:
-                back = _got(into[other], n)
-                table, push = _matrix(table, back), _product(back.T, push)
-            way[one, other] = len(found)
-            found.append(table)
-            pushed.append(push.reshape(2, n))
-    return _Over(
-        way,
-        np.array(found) if found else np.zeros((1, 2 * n, 2 * n)),
-        np.array(pushed) if pushed else np.zeros((1, 2, n)),
-    )
+    count = 0
+    for one, other in FOLLOWERS:
+        if sizes[one] > 0 and sizes[other] > 0 and n <= MOST_TO_PASS:
+            way[one, other] = count
+            count += 1
+    over, pushed = np.zeros((max(count, 1), 2 * n, 2 * n)), np.zeros((max(count, 1), 2, n))
+    for one, other in FOLLOWERS:
+        if way[one, other] >= 0:
+            table, push = _pass(forms, one, other, out, into)
+            over[way[one, other]] = table
+            pushed[way[one, other], 0], pushed[way[one, other], 1] = push[:n], push[n:]
+    return way, over, pushed
 
 
-def laws_of(forms: Forms, dashpot: float, eta: float, tick: float) -> Laws:
+@preparing
+def _pairs_of(shape, held, dashpot, eta):
+    """Pairs of a law: of a free form its modes, else damped modes, none where there are none."""
+    n, stiff = shape.shape[1], shape[Shape.STIFF]
+    if held == 0.0:
+        unit = np.eye(2 * n)
+        return Pairs(stiff, eta * stiff, unit, unit, np.zeros((2 * n, 2 * n)))
+    return damped_pairs(np.sqrt(stiff), shape[Shape.LOW], eta, dashpot - eta * held)
+
+
+@preparing
+def laws_of(forms, dashpot, eta, tick):
     """Tables of all laws; the pairs of a free bit are its own modes.
 
     Parameters
@@ -236,45 +275,50 @@ def laws_of(forms: Forms, dashpot: float, eta: float, tick: float) -> Laws:
         Of the rock [N s/m].
     eta, tick : float
         Kelvin-Voigt time and unit of time [s].
+
+    Returns
+    -------
+    Laws
     """
-    alone, most = int(forms.sizes[0]), int(forms.sizes.max())
+    alone, most = forms.sizes[0], 0
+    for size in forms.sizes:
+        most = max(most, size)
     most = most if most <= MOST_PAIRS else alone if alone <= MOST_PAIRS else 0
-    count = 4 * JOINED
+    count, hops = 4 * JOINED, LONGEST_HOP - STEP + 1
     sizes, dashpots = np.zeros(count, np.int64), np.zeros(count)
-    move, ends = np.zeros((count, LEVELS, len(Go), most)), np.zeros((count, End.ROWS, most))
-    out, into, taken = (np.zeros((count, 2 * most, 2 * most)) for _ in range(3))
-    views = np.zeros((2 * JOINED, LONGEST_HOP + 1, len(View), alone))
-    scans, sides = np.zeros((2, count, LONGEST_HOP - STEP + 1, most * len(View), SCAN))
-    rest = np.zeros((2 * JOINED, len(Rest)))
+    move, ends = np.zeros((count, LEVELS, GOES, most)), np.zeros((count, End.ROWS, most))
+    out = np.zeros((count, 2 * most, 2 * most))
+    into, taken = np.zeros_like(out), np.zeros_like(out)
+    views = np.zeros((2 * JOINED, LONGEST_HOP + 1, VIEWS, alone))
+    scans = np.zeros((count, hops, most * VIEWS, SCAN))
+    sides, rest = np.zeros_like(scans), np.zeros((2 * JOINED, RESTS))
     for law in range(count):
         form, damped = law // 2, law % 2 == 1
-        n, held = int(forms.sizes[form]), float(forms.stiff[form])
+        n, held = forms.sizes[form], forms.stiff[form]
         if not 0 < n <= most or (damped and (held == 0.0 or dashpot == 0.0)):
             continue
         shape = np.ascontiguousarray(forms.shape[form, :, :n])
-        stiff = shape[Shape.STIFF]
-        if held == 0.0:
-            unit = np.eye(2 * n)
-            pairs = Pairs(stiff, eta * stiff, unit, unit, 0.0 * unit)
-        else:
-            c = (dashpot if damped else 0.0) - eta * held
-            found = damped_pairs(np.sqrt(stiff), shape[Shape.LOW], eta, c)
-            if found is None:
-                continue
-            pairs = found
+        pairs = _pairs_of(shape, held, dashpot if damped else 0.0, eta)
+        if len(pairs.square) == 0:
+            continue
+        if held > 0.0:
             _put(out[law], pairs.out)
             _put(into[law], pairs.into)
             _put(taken[law], _folded(pairs.taken))
         sizes[law], dashpots[law] = n, dashpot if damped else 0.0
         own = _ends_of(shape, pairs, eta)
         ends[law, :, :n] = own
-        _fill_goes(pairs.square, pairs.decay, tick, move[law])
+        square, decay = pairs.square, pairs.decay
+        _fill_goes(square, decay, tick, move[law])
+        other = End.PULL
         if law < 2 * JOINED:
-            rest[law] = _product(shape[[Shape.LOW, Shape.TOP, Shape.BIT]], _rest(shape))
-            _fill_views(pairs.square, pairs.decay, tick, own, views[law])
-        of_pairs = pairs.square, pairs.decay, tick, own
-        _fill_scans(*of_pairs, int(End.LOW), int(End.SPEED), scans[law])
-        other = End.TOP if law < 2 * JOINED else End.PULL
-        _fill_scans(*of_pairs, int(other), int(End.PISTON_SPEED), sides[law])
-    over = _over(forms, sizes, out, into)
-    return Laws(sizes, dashpots, move, ends, out, into, taken, rest, views, scans, sides, *over)
+            other, loads = End.TOP, _rest(shape)
+            for row, place in ((Rest.LOW, Shape.LOW), (Rest.TOP, Shape.TOP), (Rest.BIT, Shape.BIT)):
+                rest[law, row] = _product(shape[place : place + 1], loads)[0]
+            _fill_views(square, decay, tick, own, views[law])
+        _fill_scans(square, decay, tick, own, End.LOW, End.SPEED, scans[law])
+        _fill_scans(square, decay, tick, own, other, End.PISTON_SPEED, sides[law])
+    way, over, pushed = _over(forms, sizes, out, into)
+    return Laws(
+        sizes, dashpots, move, ends, out, into, taken, rest, views, scans, sides, way, over, pushed
+    )

@@ -20,7 +20,7 @@ from percussion_model.solvers.modal.piston import (
     quiet_time,
     time_of,
 )
-from percussion_model.solvers.modal.records import KEPT
+from percussion_model.solvers.modal.records import KEPT, Known
 from percussion_model.solvers.modal.search import beside_of, search
 
 # Most ticks of a leap.
@@ -104,13 +104,17 @@ def plan(par, s, bars, law, most, events):
         ahead = min(ahead, far.meet)
     elif ahead < FEWEST or (s.parked == 0 and s.closed == 0):
         return most
+    # of a copy that is read, all is sought at once
+    s.leap_known = Known.NOT if s.live == 1 else Known.SOUGHT
     found = search(par, s, bars, ahead, beside_of(par, s, bars, far.meet < FEWEST))
+    s.leap_known = Known.YES if found.known else Known.NOT
     s.count_steps += found.looks
     if found.ticks == 0:
         return min(most, FEWEST)
     s.leap_end = s.time + found.ticks
     s.leap_ends = 1 if found.ends else 0
     s.leap_peak, s.leap_contact = found.peak, found.contact
+    s.late_from, s.late_peak, s.late_contact = s.peak_from, found.late, found.late_contact
     s.leap_time, s.leap_impulse = found.window, found.impulse
     s.count_leaps += found.leaps
     return most
@@ -118,14 +122,13 @@ def plan(par, s, bars, law, most, events):
 
 @kernel
 def late_peaks(par, s, bars, ticks):
-    """Note the greatest forces of a leap about to be made after s.peak_from, which lies within."""
+    """Find the greatest forces of a leap about to be made after s.peak_from."""
     keep(bars.w, AT, bars.rows, KEPT, s.pairs)
     far = far_ticks(par, s, bars)
+    s.leap_known = Known.SOUGHT
     found = search(par, s, bars, ticks, beside_of(par, s, bars, far.meet < FEWEST))
     keep(bars.rows, KEPT, bars.w, AT, s.pairs)
-    if s.mode != Mode.FF:
-        s.peak_bit_force = max(s.peak_bit_force, found.late)
-    s.peak_contact_force = max(s.peak_contact_force, found.late_contact)
+    s.late_peak, s.late_contact = found.late, found.late_contact
 
 
 @merged
@@ -135,11 +138,13 @@ def note_peaks(par, s, bars, ticks):
         s.leap_peak = 0.0
     s.b_peak_bit = max(s.b_peak_bit, s.leap_peak)
     s.b_peak_contact = max(s.b_peak_contact, s.leap_contact)
-    if time_of(par, s) >= s.peak_from:
-        s.peak_bit_force = max(s.peak_bit_force, s.leap_peak)
-        s.peak_contact_force = max(s.peak_contact_force, s.leap_contact)
-    elif time_of(par, s) + ticks * par.tick > s.peak_from:
+    if not time_of(par, s) + ticks * par.tick > s.peak_from:
+        return
+    if s.leap_known != Known.YES or s.late_from != s.peak_from:
         late_peaks(par, s, bars, ticks)
+    if s.mode != Mode.FF:
+        s.peak_bit_force = max(s.peak_bit_force, s.late_peak)
+    s.peak_contact_force = max(s.peak_contact_force, s.late_contact)
 
 
 @kernel

@@ -14,13 +14,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from percussion_model.physics.kernel import kernel
+from percussion_model.physics.elementary import atan2, cos, sin
+from percussion_model.physics.kernel import kernel, preparing
 from percussion_model.scene.bars import (
+    add,
     bar_transit_time,
     section_impedance,
     section_mass,
     section_transit_time,
 )
+from percussion_model.solvers import plain_code  # noqa: F401  # kernels call functions of scenes
 
 # Halvings of the interval in which a root lies: more than a number has digits.
 HALVINGS = 70
@@ -61,22 +64,35 @@ class Modes(NamedTuple):
     mass: np.ndarray
     top_mass: float
 
-    def above(self, section: int) -> np.ndarray:
-        """Shape at the top of a section."""
-        return self.summed(self.size[:, section] * np.cos(self.phase[:, section]))
 
-    @property
-    def low(self) -> np.ndarray:
-        """Shape at the low end."""
-        return self.summed(
-            self.size[:, -1] * np.cos(self.phase[:, -1] + self.wave * self.transit[-1])
-        )
+@preparing
+def summed(modes, rows):
+    """What belongs to each shape, by what belongs to each wave (first axis of a matrix)."""
+    out = rows.copy()
+    _sum_last(rows, modes.last, out)
+    return out
 
-    def summed(self, rows: np.ndarray) -> np.ndarray:
-        """What belongs to each shape, by what belongs to each wave (first axis)."""
-        out = rows.copy()
-        _sum_last(rows.reshape(len(rows), -1), self.last, out.reshape(len(rows), -1))
-        return out
+
+@preparing
+def _shape_at(modes, section, share):
+    """Shape at a place of a section, after such a share of its length."""
+    waves = np.zeros((len(modes.wave), 1))
+    for k in range(len(modes.wave)):
+        phase = modes.phase[k, section] + modes.wave[k] * (modes.transit[section] * share)
+        waves[k, 0] = modes.size[k, section] * cos(phase)
+    return summed(modes, waves)[:, 0]
+
+
+@preparing
+def shape_above(modes, section):
+    """Shape at the top of a section."""
+    return _shape_at(modes, section, 0.0)
+
+
+@preparing
+def shape_low(modes):
+    """Shape at the low end."""
+    return _shape_at(modes, len(modes.transit) - 1, 1.0)
 
 
 @kernel
@@ -98,7 +114,7 @@ def fill_quadrature(nodes, weights):
     """
     n = len(nodes)
     for i in range(n):
-        x, slope = math.cos(math.pi * (i + 0.75) / (n + 0.5)), 1.0
+        x, slope = cos(math.pi * (i + 0.75) / (n + 0.5)), 1.0
         for _ in range(NEWTON_STEPS):
             before, value = 1.0, x
             for k in range(2, n + 1):
@@ -119,7 +135,7 @@ def _inertia(mass, transit, top_mass, wave, size, phase, last, nodes, weights):
             offset = 0.0
             for k in range(len(wave)):
                 angle = phase[k, i] + wave[k] * transit[i] * share
-                offset += last[k] * size[k, i] * math.cos(angle)
+                offset += last[k] * size[k, i] * cos(angle)
             weight = 0.5 * weights[at] * mass[i] if at >= 0 else top_mass
             total += weight * offset * offset
     return total
@@ -128,13 +144,13 @@ def _inertia(mass, transit, top_mass, wave, size, phase, last, nodes, weights):
 @kernel
 def _phase(impedance, transit, top_mass, w):
     """Phase at the low end."""
-    phase = math.atan2(top_mass * w, impedance[0])
+    phase = atan2(top_mass * w, impedance[0])
     for i in range(len(transit)):
         if i > 0 and impedance[i] != impedance[i - 1]:
             half = math.pi * math.floor(phase / math.pi + 0.5)
             rest = phase - half
             ratio = impedance[i - 1] / impedance[i]
-            phase = half + math.atan2(ratio * math.sin(rest), math.cos(rest))
+            phase = half + atan2(ratio * sin(rest), cos(rest))
         phase += w * transit[i]
     return phase
 
@@ -161,24 +177,24 @@ def _find_modes(impedance, transit, mass, top_mass, spring, frequency, size, pha
             middle = 0.5 * (low + high)
             wanted = k * math.pi
             if spring > 0.0:
-                wanted += math.atan2(spring, impedance[-1] * middle)
+                wanted += atan2(spring, impedance[-1] * middle)
             if _phase(impedance, transit, top_mass, middle) < wanted:
                 low = middle
             else:
                 high = middle
         w = 0.5 * (low + high)
-        phase = math.atan2(top_mass * w, impedance[0])
-        at_top = math.cos(phase)
+        phase = atan2(top_mass * w, impedance[0])
+        at_top = cos(phase)
         amplitude, modal = 1.0, top_mass * at_top * at_top
         for i in range(len(transit)):
             if i > 0 and impedance[i] != impedance[i - 1]:
-                c = math.cos(phase)
-                s = impedance[i - 1] / impedance[i] * math.sin(phase)
-                phase = math.atan2(s, c)
+                c = cos(phase)
+                s = impedance[i - 1] / impedance[i] * sin(phase)
+                phase = atan2(s, c)
                 amplitude *= math.sqrt(c * c + s * s)
             size[k, i], phases[k, i] = amplitude, phase
             then = phase + w * transit[i]
-            swing = (math.sin(2.0 * then) - math.sin(2.0 * phase)) / (4.0 * w * transit[i])
+            swing = (sin(2.0 * then) - sin(2.0 * phase)) / (4.0 * w * transit[i])
             modal += mass[i] * amplitude * amplitude * (0.5 + swing)
             phase = then
         frequency[k] = w
@@ -186,9 +202,8 @@ def _find_modes(impedance, transit, mass, top_mass, spring, frequency, size, pha
             size[k, i] /= math.sqrt(modal)
 
 
-def bar_modes(
-    sections: np.ndarray, count: int, spring: float = 0.0, top_mass: float = 0.0
-) -> Modes:
+@preparing
+def bar_modes(sections, count, spring=0.0, top_mass=0.0):
     """Return the lowest modes of a bar.
 
     Parameters
@@ -201,18 +216,28 @@ def bar_modes(
         Stiffness under the low end [N/m].
     top_mass : float
         Mass on the top end [kg].
+
+    Returns
+    -------
+    Modes
     """
-    rows = [(section_impedance(s), section_transit_time(s), section_mass(s)) for s in sections]
-    numbers = np.ascontiguousarray(np.array(rows).T)
-    frequency, (size, phase) = np.zeros(count), np.zeros((2, count, len(rows)))
-    _find_modes(*numbers, float(top_mass), float(spring), frequency, size, phase)
-    last = np.zeros(count)
-    last[-1] = 1.0
-    impedance, transit, mass = numbers
-    return Modes(frequency, frequency, size, phase, last, impedance, transit, mass, top_mass)
+    parts = len(sections)
+    impedance, transit, mass = np.zeros(parts), np.zeros(parts), np.zeros(parts)
+    for i in range(parts):
+        impedance[i] = section_impedance(sections[i])
+        transit[i] = section_transit_time(sections[i])
+        mass[i] = section_mass(sections[i])
+    frequency, last = np.zeros(count), np.zeros(count)
+    size, phase = np.zeros((count, parts)), np.zeros((count, parts))
+    _find_modes(impedance, transit, mass, float(top_mass), float(spring), frequency, size, phase)
+    last[count - 1 :] = 1.0
+    return Modes(
+        frequency, frequency.copy(), size, phase, last, impedance, transit, mass, float(top_mass)
+    )
 
 
-def with_residual(modes: Modes, spring: float) -> Modes:
+@preparing
+def with_residual(modes, spring):
     """Return the modes of a bar on a spring with what those left out yield in place of the last.
 
     A constant force at the low end moves such a bar as a whole, by 1 / K. Less what the other
@@ -225,34 +250,50 @@ def with_residual(modes: Modes, spring: float) -> Modes:
         As `bar_modes` finds them.
     spring : float
         Stiffness under the low end [N/m].
+
+    Returns
+    -------
+    Modes
     """
     n = len(modes.frequency) - 1
-    kept, low = modes.frequency[:n], modes.low[:n]
-    yields = math.fsum([1.0, *(-spring * (low / kept) ** 2).tolist()]) / spring
+    low = shape_low(modes)
+    total, rest = 1.0, 0.0
+    for k in range(n):
+        share = low[k] / modes.frequency[k]
+        total, rest = add(total, rest, -spring * (share * share))
+    yields = (total + rest) / spring
     if not yields > LEAST_YIELD / spring:
         return modes
-    frequency, wave, size, phase = (part.copy() for part in modes[:4])
-    wave[n], size[n], phase[n] = 0.0, 1.0, 0.0
-    last = np.append(-low / kept**2, 1.0 / spring)
+    frequency, wave = modes.frequency.copy(), modes.wave.copy()
+    size, phase, last = modes.size.copy(), modes.phase.copy(), np.zeros(n + 1)
+    wave[n] = 0.0
+    size[n], phase[n] = 1.0, 0.0
+    for k in range(n):
+        last[k] = -low[k] / (modes.frequency[k] * modes.frequency[k])
+    last[n] = 1.0 / spring
     # by quadrature: as a difference of squares it would lose its digits
-    nodes, weights = np.zeros((2, 2 * n + 20))
+    nodes, weights = np.zeros(2 * n + 20), np.zeros(2 * n + 20)
     fill_quadrature(nodes, weights)
     inertia = _inertia(
         modes.mass, modes.transit, modes.top_mass, wave, size, phase, last, nodes, weights
     )
     frequency[n] = math.sqrt(yields / inertia)
     last /= math.sqrt(inertia)
-    return modes._replace(frequency=frequency, wave=wave, size=size, phase=phase, last=last)
+    return Modes(
+        frequency, wave, size, phase, last,
+        modes.impedance, modes.transit, modes.mass, modes.top_mass,
+    )  # fmt: skip
 
 
-def count_below(sections: np.ndarray, highest: float) -> int:
+@preparing
+def count_below(sections, highest):
     """Elastic modes below a frequency [rad/s]; with several sections there may be some more."""
     return round(bar_transit_time(sections) * highest / math.pi)
 
 
 @kernel
 def _sinc(x):
-    return 1.0 - x * x / 6.0 if abs(x) < SMALL else math.sin(x) / x
+    return 1.0 - x * x / 6.0 if abs(x) < SMALL else sin(x) / x
 
 
 @kernel
@@ -264,66 +305,67 @@ def _fill_products(mass, transit, w, size, phase, w_2, size_2, phase_2, out):
             for i in range(len(transit)):
                 less = 0.5 * (w[k] - w_2[j]) * transit[i]
                 more = 0.5 * (w[k] + w_2[j]) * transit[i]
-                both = _sinc(less) * math.cos(phase[k, i] - phase_2[j, i] + less)
-                both += _sinc(more) * math.cos(phase[k, i] + phase_2[j, i] + more)
+                both = _sinc(less) * cos(phase[k, i] - phase_2[j, i] + less)
+                both += _sinc(more) * cos(phase[k, i] + phase_2[j, i] + more)
                 total += 0.5 * mass[i] * size[k, i] * size_2[j, i] * both
             out[k, j] = total
 
 
-def products(one: Modes, first: int, other: Modes, second: int, count: int) -> np.ndarray:
+@preparing
+def products(one, first, other, second, count):
     """Products of the shapes of two bars over so many sections that they share.
 
     Parameters
     ----------
+    one, other : Modes
     first, second : int
         The first of these sections, in each bar.
+    count : int
 
     Returns
     -------
     ndarray, shape (modes of one, modes of the other)
         Weighted by mass.
     """
-    mine, theirs = slice(first, first + count), slice(second, second + count)
     out = np.zeros((len(one.frequency), len(other.frequency)))
     _fill_products(
-        np.ascontiguousarray(one.mass[mine]),
-        np.ascontiguousarray(one.transit[mine]),
+        one.mass[first : first + count],
+        one.transit[first : first + count],
         one.wave,
-        np.ascontiguousarray(one.size[:, mine]),
-        np.ascontiguousarray(one.phase[:, mine]),
+        np.ascontiguousarray(one.size[:, first : first + count]),
+        np.ascontiguousarray(one.phase[:, first : first + count]),
         other.wave,
-        np.ascontiguousarray(other.size[:, theirs]),
-        np.ascontiguousarray(other.phase[:, theirs]),
+        np.ascontiguousarray(other.size[:, second : second + count]),
+        np.ascontiguousarray(other.phase[:, second : second + count]),
         out,
     )
-    out = other.summed(np.ascontiguousarray(one.summed(out).T)).T
-    if first == second == 0 and one.top_mass and other.top_mass:
-        out += one.top_mass * np.outer(one.above(0), other.above(0))
-    return out
-
-
-def totals(modes: Modes, first: int, count: int) -> np.ndarray:
-    """Integral of each shape over the mass of so many sections [kg^0.5]."""
-    sections = len(modes.mass)
-    rigid = modes._replace(
-        frequency=np.zeros(1),
-        wave=np.zeros(1),
-        last=np.ones(1),
-        size=np.ones((1, sections)),
-        phase=np.zeros((1, sections)),
-        top_mass=0.0,
-    )
-    found: np.ndarray = products(modes, first, rigid, first, count)[:, 0]
+    by_shape = summed(other, np.ascontiguousarray(summed(one, out).T))
+    found = np.ascontiguousarray(by_shape.T)
+    if first == 0 and second == 0 and one.top_mass > 0.0 and other.top_mass > 0.0:
+        mine, theirs = shape_above(one, 0), shape_above(other, 0)
+        for k in range(len(mine)):
+            found[k] += one.top_mass * (mine[k] * theirs)
     return found
 
 
-def shapes_at(
-    modes: Modes, section: np.ndarray, share: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+@preparing
+def totals(modes, first, count):
+    """Integral of each shape over the mass of so many sections [kg^0.5]."""
+    sections = len(modes.mass)
+    rigid = Modes(
+        np.zeros(1), np.zeros(1), np.ones((1, sections)), np.zeros((1, sections)), np.ones(1),
+        modes.impedance, modes.transit, modes.mass, 0.0,
+    )  # fmt: skip
+    return products(modes, first, rigid, first, count)[:, 0]
+
+
+@preparing
+def shapes_at(modes, section, share):
     """Offset and elastic force of each mode at places of a bar.
 
     Parameters
     ----------
+    modes : Modes
     section : int array
         Section of each place.
     share : ndarray
@@ -331,11 +373,16 @@ def shapes_at(
 
     Returns
     -------
-    offset, force : ndarray, shape (places, modes)
+    offset, force : ndarray, shape (modes, places)
         Down positive [1/kg^0.5], compression positive [N/(m kg^0.5)].
     """
-    size = modes.size[:, section].T
-    phase = modes.phase[:, section].T + np.outer(modes.transit[section] * share, modes.wave)
-    impedance = modes.impedance[section][:, None]
-    offset, force = size * np.cos(phase), impedance * modes.wave * size * np.sin(phase)
-    return modes.summed(offset.T).T, modes.summed(force.T).T
+    n, places = len(modes.wave), len(section)
+    offset, force = np.zeros((n, places)), np.zeros((n, places))
+    for j in range(places):
+        i = section[j]
+        for k in range(n):
+            phase = modes.phase[k, i] + modes.transit[i] * share[j] * modes.wave[k]
+            offset[k, j] = modes.size[k, i] * cos(phase)
+            swing = modes.impedance[i] * modes.wave[k] * modes.size[k, i]
+            force[k, j] = swing * sin(phase)
+    return summed(modes, offset), summed(modes, force)

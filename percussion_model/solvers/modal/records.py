@@ -7,7 +7,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from percussion_model.physics.state import COMMON_PARAMETERS, COMMON_STATE, COUNT, FLAG, MOST
+from percussion_model.physics.state import (
+    COMMON_PARAMETERS,
+    COMMON_STATE,
+    COUNT,
+    FLAG,
+    INFINITE,
+    LARGEST,
+    MOST,
+)
 from percussion_model.solvers.state import Limits
 
 # A step has 2^STEP ticks, to one of which events are found; carries go up to 2^(LEVELS - 1).
@@ -21,6 +29,14 @@ LOOK, LONGEST_STRIDE = 32, 128
 KEPT = np.int64(4)
 # Forms: the bit free, on K_R, on gamma K_R; the same joined to the piston.
 JOINED = 3
+
+
+class Known(IntEnum):
+    """Whether the greatest forces of the pending leap are known."""
+
+    NOT = 0  # they are sought when it is made, if somebody observes it
+    YES = 1
+    SOUGHT = 2
 
 
 class Move(IntEnum):
@@ -235,6 +251,7 @@ MODAL_STATE = np.dtype(
         ("time", "i8"),  # [ticks]
         ("leap_end", "i8"),  # when the pending leap ends, or -1
         ("leap_ends", "i8"),  # 1: the mode of the rock ends then
+        ("leap_known", "i8"),  # Known
         ("law", "i8"),  # by which the pairs move, or -1: offsets and velocities do
         ("pairs", "i8"),  # that move
         ("stride", "i8"),  # steps before it is looked again which pairs are needed
@@ -263,6 +280,9 @@ MODAL_STATE = np.dtype(
         ("peak_impulse", "f8"),  # [N s]
         ("leap_peak", "f8"),  # greatest force of the rock on the leap [N]
         ("leap_contact", "f8"),  # the same of contact, as a mean
+        ("late_from", "f8"),  # `peak_from` when it was planned [s]
+        ("late_peak", "f8"),  # greatest forces of the leap after that [N]
+        ("late_contact", "f8"),
         ("leap_time", "f8"),  # `peak_time` and `peak_impulse` after it
         ("leap_impulse", "f8"),
         ("rest_low", "f8"),  # sums at rest under the loads: rock end, top [m]
@@ -286,6 +306,8 @@ MODAL_LIMITS = Limits(
         "time": COUNT,
         "leap_end": (-1, MOST),
         "leap_ends": FLAG,
+        "leap_known": (0, 2),
+        "late_from": (-LARGEST, INFINITE),
         "law": (-1, 4 * JOINED - 1),
         "pairs": COUNT,
         "stride": (0, LONGEST_STRIDE),

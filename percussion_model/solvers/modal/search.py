@@ -46,7 +46,7 @@ from percussion_model.solvers.modal.pairs import (
     to_be_taken,
 )
 from percussion_model.solvers.modal.piston import WHOLE, time_of
-from percussion_model.solvers.modal.records import LONGEST_HOP, SCAN, STEP
+from percussion_model.solvers.modal.records import LONGEST_HOP, SCAN, STEP, Known
 from percussion_model.solvers.modal.rock_end import passed
 
 # Rows of `Bars.rows` with what a search sees, of the rock end and of the other.
@@ -84,6 +84,7 @@ class Found(NamedTuple):
 
     ticks: int  # so far it came
     ends: bool  # whether the mode ends then
+    known: bool  # whether the peaks are
     peak: float  # greatest force of the rock on the way [N]
     late: float  # the same after s.peak_from [N]
     contact: float  # greatest force of contact, as a mean, and after s.peak_from [N]
@@ -226,27 +227,36 @@ def quiet_standstill(par, s, bars, law, energy, most):
 
 @kernel
 def quiet_peaks(par, s, bars, law, ticks):
-    """Greatest forces of a quiet standstill, where they count; as `Found` has them."""
+    """Greatest forces of a quiet standstill; as `Found` has them, and whether they are known.
+
+    They are not sought where no force can be the greatest of the blow, but for those of an
+    observer, and for these when the leap is made: most of it has passed then unobserved.
+    """
     rest, K = par.mass_b * bit_acceleration(par, s), stiffness(s)
-    begin, peak, late = time_of(par, s), 0.0, 0.0
+    begin, peak, late, done = time_of(par, s), 0.0, 0.0, 0
     watched = begin + ticks * par.tick > s.peak_from
-    before = present_end(s, bars, law)
-    if not watched and rest + most_swing(s, bars, law) <= s.b_peak_bit:
-        return peak, late
-    done = 0
+    if rest + most_swing(s, bars, law) <= s.b_peak_bit:
+        if not watched:
+            return peak, late, True
+        if s.leap_known != Known.SOUGHT:
+            return peak, late, False
+        # whole steps before the observer looks
+        done = max(0, int((s.peak_from - begin) / par.tick) - WHOLE) >> STEP << STEP
+        carry_pairs(s, bars, bars.w, AT, done)
+    before, looks = present_end(s, bars, law), 0
     while done < ticks:
-        if (done >> STEP) % LOOK_AGAIN == 0:
+        if looks % LOOK_AGAIN == 0:
             left = 2.0 * energy_of_pairs(s, bars, bars.w, AT)
             if 2.0 * K * left < (STILL_SHARE * rest) ** 2:
-                return max(peak, rest), max(late, rest) if watched else 0.0
+                return max(peak, rest), max(late, rest) if watched else 0.0, True
         go = min(WHOLE, ticks - done)
         carry_pairs(s, bars, bars.w, AT, go)
-        here, done = present_end(s, bars, law), done + go
+        here, done, looks = present_end(s, bars, law), done + go, looks + 1
         top = top_between(s, before, here, par.tick * go)
         peak = max(peak, top.peak)
         late = max(late, late_peak(s, begin + done * par.tick, par.tick * go, top))
         before = here
-    return peak, late
+    return peak, late, True
 
 
 @inlined
@@ -424,7 +434,7 @@ def search(par, s, bars, most, beside):
     """
     keep(bars.w, PQ, bars.w, AT, s.pairs)
     law, stands = present_law(s, bars), s.mode == Mode.SS
-    ticks, looks, leaps, peak, late, ends = 0, 0, 0, 0.0, 0.0, False
+    ticks, looks, leaps, peak, late, ends, known = 0, 0, 0, 0.0, 0.0, False, True
     taken, sampled, last = 0.0, 0.0, End(s.p, s.v_low, s.f_rock)
     touch = Touching(s.v_p, s.peak_time, s.peak_impulse, 0.0, 0.0)
     if s.mode == Mode.DFC and s.stride > FIRST_STRIDE:
@@ -440,7 +450,7 @@ def search(par, s, bars, most, beside):
             break  # its mean force is noted where it begins
         if quiet > 0:
             if stands:
-                peak, late = quiet_peaks(par, s, bars, law, quiet)
+                peak, late, known = quiet_peaks(par, s, bars, law, quiet)
                 keep(bars.w, PQ, bars.w, AT, s.pairs)
             carry_pairs(s, bars, bars.w, AT, quiet)
             ticks += quiet
@@ -488,4 +498,4 @@ def search(par, s, bars, most, beside):
                 peak = max(peak, top.peak)
                 late = max(late, late_peak(s, end, par.tick * more, top))
     contact = touch.contact, touch.late, touch.window, touch.impulse
-    return Found(ticks, ends, peak, late, *contact, looks, leaps)
+    return Found(ticks, ends, known, peak, late, *contact, looks, leaps)

@@ -11,25 +11,28 @@ import math
 
 import numpy as np
 
-from percussion_model.physics.kernel import kernel
+from percussion_model.physics.elementary import cos_and_sin, exp, power_of_two
+from percussion_model.physics.kernel import kernel, preparing
 from percussion_model.scene.bars import AREA, LENGTH, YOUNGS_MODULUS, bar_mass, section_mass
 from percussion_model.solvers.modal.lanes import WIDTH
 from percussion_model.solvers.modal.modes import (
     Modes,
     bar_modes,
     count_below,
+    fill_quadrature,
     products,
+    shape_above,
+    shape_low,
     totals,
     with_residual,
 )
 from percussion_model.solvers.modal.records import JOINED, LEVELS, Forms, Move, Shape
-from percussion_model.solvers.modal.resolution import MOST_MODES
-from percussion_model.solvers.setup import refuse_many
 
 # Factors of a move below this are zero: what they leave would only slow down arithmetic.
 NOTHING = 1e-40
-# Nodes and weights by which the loss over a tick is integrated.
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
+# Nodes by which the loss over a tick is integrated.
+NODES = 8
+FORMS, SHAPES, MOVES = 2 * JOINED, len(Shape), len(Move)
 
 
 @kernel
@@ -38,11 +41,12 @@ def _move(w, delta, h):
     square = w * w - delta * delta
     if square > 0.0:
         root = math.sqrt(square)
-        decay = math.exp(-delta * h)
-        c, s = decay * math.cos(root * h), decay * math.sin(root * h) / root
+        decay = exp(-delta * h)
+        c, s = cos_and_sin(root * h)
+        c, s = decay * c, decay * s / root
     else:
         root = math.sqrt(-square)
-        slow, fast = math.exp((root - delta) * h), math.exp(-(root + delta) * h)
+        slow, fast = exp((root - delta) * h), exp(-(root + delta) * h)
         c = 0.5 * (slow + fast)
         s = h * slow if root == 0.0 else 0.5 * (slow - fast) / root
     return c + delta * s, s, -w * w * s, c - delta * s
@@ -50,7 +54,7 @@ def _move(w, delta, h):
 
 @kernel
 def _fill_moves(w, eta, tick, nodes, weights, out):
-    """Fill the table of moves, shape (LEVELS, len(Move), n)."""
+    """Fill the table of moves, shape (LEVELS, MOVES, n)."""
     for k in range(len(w)):
         delta = 0.5 * eta * w[k] * w[k]
         qq = qv = vv = 0.0
@@ -61,7 +65,7 @@ def _fill_moves(w, eta, tick, nodes, weights, out):
             qv += share * 2.0 * vq * v
             vv += share * v * v
         for level in range(out.shape[0]):
-            h = tick * 2.0**level
+            h = tick * power_of_two(level)
             a, b, c, d = _move(w[k], delta, h)
             row = out[level]
             row[Move.LOSS_QQ, k], row[Move.LOSS_QV, k], row[Move.LOSS_VV, k] = qq, qv, vv
@@ -81,50 +85,96 @@ def _fill_moves(w, eta, tick, nodes, weights, out):
             row[Move.V_BY_Q, k], row[Move.V_BY_V, k] = c, d
 
 
-def moves_of(frequency: np.ndarray, eta: float, tick: float) -> np.ndarray:
-    """Table of moves over 2^level ticks, shape (LEVELS, len(Move), n)."""
-    out = np.zeros((LEVELS, len(Move), len(frequency)))
-    _fill_moves(frequency, eta, tick, _NODES, _WEIGHTS, out)
+@preparing
+def moves_of(frequency, eta, tick):
+    """Table of moves over 2^level ticks, shape (LEVELS, MOVES, n)."""
+    nodes, weights = np.zeros(NODES), np.zeros(NODES)
+    fill_quadrature(nodes, weights)
+    out = np.zeros((LEVELS, MOVES, len(frequency)))
+    _fill_moves(frequency, eta, tick, nodes, weights, out)
     return out
 
 
-def _lanes(count: int) -> int:
+@preparing
+def _lanes(count):
     """So many modes, in whole lanes."""
     return max(1, -(-count // WIDTH)) * WIDTH
 
 
-def _shapes(modes: Modes, parts: tuple[int, int]) -> np.ndarray:
+@preparing
+def mode_counts(bit, piston, piston_mass, highest):
+    """Modes of the bit by itself, of an elastic piston, and of both where they are joined.
+
+    Parameters
+    ----------
+    bit, piston : ndarray, shape (sections, 4)
+        Without sections the piston is not elastic.
+    piston_mass : float
+        0 where there is none [kg].
+    highest : float
+        Angular frequency up to which there are modes, and some more [rad/s].
+    """
+    n_bit = _lanes(count_below(bit, highest) + 1)
+    n_piston = _lanes(count_below(piston, highest)) if len(piston) else 0
+    return n_bit, n_piston, n_bit + n_piston if piston_mass > 0.0 else n_bit
+
+
+@preparing
+def _shapes(modes, above):
     """Rows of `Shape` of a bar whose first sections, so many, are the piston's."""
-    above, whole = parts
-    row = np.zeros((len(Shape), len(modes.frequency)))
-    w = modes.frequency
-    row[Shape.LOW], row[Shape.TOP] = modes.low, modes.above(above)
-    row[Shape.STIFF] = w * w
-    row[Shape.SOFT, w > 0.0] = 1.0 / w[w > 0.0] ** 2
-    row[Shape.BIT] = totals(modes, above, whole - above)
-    row[Shape.PISTON] = modes.top_mass * modes.above(0)
-    if above:
+    n = len(modes.frequency)
+    row = np.zeros((SHAPES, n))
+    row[Shape.LOW], row[Shape.TOP] = shape_low(modes), shape_above(modes, above)
+    for k in range(n):
+        w = modes.frequency[k]
+        row[Shape.STIFF, k] = w * w
+        if w > 0.0:
+            row[Shape.SOFT, k] = 1.0 / (w * w)
+    row[Shape.BIT] = totals(modes, above, len(modes.mass) - above)
+    row[Shape.PISTON] = modes.top_mass * shape_above(modes, 0)
+    if above > 0:
         row[Shape.PISTON] = totals(modes, 0, above)
     return row
 
 
-def forms_of(
-    bit: np.ndarray,
-    piston: np.ndarray | None,
-    piston_mass: float,
-    springs: tuple[float, float],
-    highest: float,
-    eta: float,
-    tick: float,
-) -> tuple[Forms, list[Modes], Modes | None]:
+@preparing
+def _modes_of_form(form, bit, both, piston_mass, counts, stiff):
+    """Modes of one form, the last of which yields what those left out do."""
+    n_bit, n_piston, n = counts
+    joined = form >= JOINED
+    rigid = piston_mass if joined and n_piston == 0 else 0.0
+    bar, count = (both, n) if joined else (bit, n_bit)
+    modes = bar_modes(bar, count, stiff[form], rigid)
+    return with_residual(modes, stiff[form]) if stiff[form] > 0.0 else modes
+
+
+@preparing
+def _fill_changes(found, above, sections, sizes, change):
+    """Fill what the modes of one form become in another."""
+    for one in range(FORMS):
+        for other in range(FORMS):
+            if one == other or sizes[one] == 0 or sizes[other] == 0:
+                continue
+            if one % JOINED != other % JOINED and one // JOINED != other // JOINED:
+                continue
+            a, b = found[one], found[other]
+            if one // JOINED == other // JOINED:
+                part = products(b, 0, a, 0, len(a.mass))
+            elif one < JOINED:
+                part = products(b, above, a, 0, sections)
+            else:
+                part = products(b, 0, a, above, sections)
+            change[one, other % JOINED, : part.shape[1], : part.shape[0]] = part.T
+
+
+@preparing
+def forms_of(bit, piston, piston_mass, springs, highest, eta, tick):
     """Tables of all forms, their modes, and those of the free piston.
 
     Parameters
     ----------
-    bit : ndarray, shape (sections, 4)
-        From top to bottom.
-    piston : ndarray or None
-        Sections of an elastic one.
+    bit, piston : ndarray, shape (sections, 4)
+        From top to bottom; without sections the piston is not elastic.
     piston_mass : float
         0 where there is none [kg].
     springs : (float, float)
@@ -135,79 +185,92 @@ def forms_of(
         Kelvin-Voigt time [s].
     tick : float
         Unit of time [s].
+
+    Returns
+    -------
+    forms : Forms
+    found : six Modes
+    free : Modes
+        None in it where the piston is not elastic.
     """
-    n_bit = _lanes(count_below(bit, highest) + 1)
-    above = n_piston = 0
-    if piston is not None:
-        above, n_piston = len(piston), _lanes(count_below(piston, highest))
-    both = bit if piston is None else np.vstack([piston, bit])
-    n = n_bit + n_piston if piston_mass else n_bit
-    refuse_many("modes", n, MOST_MODES, ', or take waves (solver.name = "wave")')
-    free = None if piston is None else bar_modes(piston, n_piston + 1)
-    sizes, stiff = np.zeros(6, np.int64), np.array([0.0, *springs] * 2)
-    shape, move = np.zeros((6, len(Shape), n)), np.zeros((6, LEVELS, len(Move), n))
-    change, join = np.zeros((6, JOINED, n, n)), np.zeros((JOINED, max(n_piston, 1), n))
-    found: list[Modes] = []
-    for form in range(6):
+    counts = mode_counts(bit, piston, piston_mass, highest)
+    n_bit, n_piston, n = counts
+    above = len(piston)
+    both = np.concatenate((piston, bit))
+    stiff = np.zeros(FORMS)
+    stiff[1] = stiff[JOINED + 1] = springs[0]
+    stiff[2] = stiff[JOINED + 2] = springs[1]
+    sizes = np.zeros(FORMS, np.int64)
+    shape, move = np.zeros((FORMS, SHAPES, n)), np.zeros((FORMS, LEVELS, MOVES, n))
+    change = np.zeros((FORMS, JOINED, n, n))
+    join = np.zeros((JOINED, max(n_piston, 1), n))
+    found = (
+        _modes_of_form(0, bit, both, piston_mass, counts, stiff),
+        _modes_of_form(1, bit, both, piston_mass, counts, stiff),
+        _modes_of_form(2, bit, both, piston_mass, counts, stiff),
+        _modes_of_form(3, bit, both, piston_mass, counts, stiff),
+        _modes_of_form(4, bit, both, piston_mass, counts, stiff),
+        _modes_of_form(5, bit, both, piston_mass, counts, stiff),
+    )
+    for form in range(FORMS):
         joined = form >= JOINED
-        rigid = piston_mass if joined and piston is None else 0.0
-        count = n if joined else n_bit
-        modes = bar_modes(both if joined else bit, count, stiff[form], rigid)
-        if stiff[form] > 0.0:
-            modes = with_residual(modes, stiff[form])
-        found.append(modes)
-        if (joined and not piston_mass) or (form % JOINED and stiff[form] == 0.0):
+        if (joined and piston_mass == 0.0) or (form % JOINED > 0 and stiff[form] == 0.0):
             continue
-        sizes[form] = count
-        first = above if joined else 0
-        shape[form, :, :count] = _shapes(modes, (first, len(modes.mass)))
+        modes = found[form]
+        count = sizes[form] = n if joined else n_bit
+        shape[form, :, :count] = _shapes(modes, above if joined else 0)
         move[form, :, :, :count] = moves_of(modes.frequency, eta, tick)
-    for one in range(6):
-        for other in range(6):
-            if one == other or not sizes[one] or not sizes[other]:
-                continue
-            if one % JOINED != other % JOINED and one // JOINED != other // JOINED:
-                continue
-            a, b = found[one], found[other]
-            if one // JOINED == other // JOINED:
-                part = products(b, 0, a, 0, len(a.mass))
-            elif one < JOINED:
-                part = products(b, above, a, 0, len(bit))
-            else:
-                part = products(b, 0, a, above, len(bit))
-            change[one, other % JOINED, : part.shape[1], : part.shape[0]] = part.T
-    if free is not None:
-        for form in range(JOINED):
-            if sizes[JOINED + form]:
-                part = products(found[JOINED + form], 0, free, 0, above)[:, 1:]
-                join[form, :n_piston, : len(part)] = part.T
-    ends = shape[:, None, Shape.LOW] ** 2 * move[:, :, Move.YIELD]
-    yields = np.ascontiguousarray(np.cumsum(ends, axis=2)[:, :, WIDTH - 1 :: WIDTH])
+    _fill_changes(found, above, len(bit), sizes, change)
+    free = bar_modes(both[:above], n_piston + 1 if above else 0)
+    for form in range(JOINED):
+        if above and sizes[JOINED + form]:
+            part = products(found[JOINED + form], 0, free, 0, above)
+            join[form, :n_piston, : len(part)] = part[:, 1:].T
+    yields = np.zeros((FORMS, LEVELS, n // WIDTH))
+    for form in range(FORMS):
+        for level in range(LEVELS):
+            total = 0.0
+            for k in range(n):
+                low = shape[form, Shape.LOW, k]
+                total += low * low * move[form, level, Move.YIELD, k]
+                if k % WIDTH == WIDTH - 1:
+                    yields[form, level, k // WIDTH] = total
     return Forms(sizes, stiff, shape, move, yields, change, join), found, free
 
 
-def piston_tables(free: Modes | None, eta: float, tick: float) -> tuple[np.ndarray, np.ndarray]:
+@preparing
+def piston_tables(free, eta, tick):
     """Shapes and moves of the elastic modes of a free piston."""
-    if free is None:
-        return np.zeros((len(Shape), 0)), np.zeros((LEVELS, len(Move), 0))
-    elastic = free._replace(
-        **{name: getattr(free, name)[1:] for name in ("frequency", "wave", "size", "phase", "last")}
-    )
-    shape = _shapes(elastic, (0, len(free.mass)))
-    return shape, moves_of(elastic.frequency, eta, tick)
+    if len(free.frequency) == 0:
+        return np.zeros((SHAPES, 0)), np.zeros((LEVELS, MOVES, 0))
+    # copies, whose types are those of other modes: kernels are compiled for each type
+    elastic = Modes(
+        free.frequency[1:].copy(), free.wave[1:].copy(), free.size[1:].copy(),
+        free.phase[1:].copy(), free.last[1:].copy(),
+        free.impedance, free.transit, free.mass, free.top_mass,
+    )  # fmt: skip
+    return _shapes(elastic, 0), moves_of(elastic.frequency, eta, tick)
 
 
-def end_compliance(sections: np.ndarray) -> float:
-    """Offset of the low end from the mean of a free bar, by a constant force there [m/N].
+@preparing
+def end_compliance(sections, from_below):
+    """Offset of an end from the mean of a free bar, by a constant force there [m/N].
 
     The sum of shape^2 / frequency^2 over all modes. The bar's own inertia balances the force,
-    so that a section carries the share of it that the mass above is of all.
+    so that a section carries the share of it that the mass beyond is of all.
+
+    Parameters
+    ----------
+    sections : ndarray, shape (sections, 4)
+    from_below : bool
+        Whether it is the top, so that sections count from below.
     """
     whole, above, total = bar_mass(sections), 0.0, 0.0
-    for section in sections:
+    for k in range(len(sections)):
+        section = sections[len(sections) - 1 - k] if from_below else sections[k]
         first = above / whole
         above += section_mass(section)
         last = above / whole
-        flexible = float(section[LENGTH]) / float(section[YOUNGS_MODULUS] * section[AREA])
+        flexible = section[LENGTH] / (section[YOUNGS_MODULUS] * section[AREA])
         total += flexible * (first * first + first * last + last * last) / 3.0
     return total

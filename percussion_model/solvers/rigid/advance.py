@@ -5,7 +5,7 @@ from __future__ import annotations
 from percussion_model.physics.blows import starts_blow
 from percussion_model.physics.kernel import kernel
 from percussion_model.physics.readings import fill_ledger, fill_motion
-from percussion_model.physics.records import Piston, Status
+from percussion_model.physics.records import Status
 from percussion_model.physics.rock import recoverable
 from percussion_model.solvers.rigid.events import process_event
 from percussion_model.solvers.rigid.forces import (
@@ -95,18 +95,6 @@ def commit(par_, state, t):
         s.standing_events = 0
     mark_standstill(s)
     s.scheduled = 0
-
-
-@kernel
-def begin(par_, state):
-    """Complete a new state: a piston at rest on the bit, energy."""
-    par = par_[0]
-    s = state[0]
-    if par.piston != Piston.ABSENT and s.gap == 0.0 and s.v_p == s.v_b:
-        s.held = 1
-        if not contact_force(par, s, acceleration(par, s)) > 0.0:
-            s.held = 0
-    s.e_start = kinetic_energy(par, s.v_p, s.v_b)
 
 
 @kernel

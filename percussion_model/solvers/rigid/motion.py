@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 
+from percussion_model.physics.elementary import acos, atan2, atanh, cos_and_sin, exp, expm1
 from percussion_model.physics.kernel import kernel
 
 NEVER = math.inf
@@ -44,14 +45,14 @@ def oscillate(y, v, beta, k, tau):
     w2 = k - beta * beta
     if w2 > 0.0:
         w = math.sqrt(w2)
-        decay = math.exp(-beta * tau)
-        c = math.cos(w * tau)
-        s = math.sin(w * tau) / w
+        decay = exp(-beta * tau)
+        c, s = cos_and_sin(w * tau)
+        s /= w
     else:
         r = math.sqrt(-w2)
-        decay = math.exp(-k / (beta + r) * tau)
-        c = 0.5 * (1.0 + math.exp(-2.0 * r * tau))
-        s = -math.expm1(-2.0 * r * tau) / (2.0 * r) if r > 0.0 else tau
+        decay = exp(-k / (beta + r) * tau)
+        c = 0.5 * (1.0 + exp(-2.0 * r * tau))
+        s = -expm1(-2.0 * r * tau) / (2.0 * r) if r > 0.0 else tau
     return decay * (y * c + (v + beta * y) * s), decay * (v * c - (beta * v + k * y) * s)
 
 
@@ -65,7 +66,7 @@ def zero_time(f, df, beta, k):
     g = df + beta * f
     if w2 > 0.0:
         w = math.sqrt(w2)
-        angle = math.atan2(f * w, -g)
+        angle = atan2(f * w, -g)
         if angle <= 0.0:
             angle += math.pi
         return angle / w
@@ -75,7 +76,7 @@ def zero_time(f, df, beta, k):
     ratio = -f / g
     if r * ratio >= 1.0:
         return NEVER
-    return math.atanh(r * ratio) / r if r > 0.0 else ratio
+    return atanh(r * ratio) / r if r > 0.0 else ratio
 
 
 @kernel
@@ -121,8 +122,8 @@ def fall_time(f, df, beta, k, level):
         radius = math.sqrt(f * f + df * df / k)
         if level < -radius or radius == 0.0:
             return NEVER
-        phase = math.atan2(df / w, f)
-        return max(0.0, (phase + math.acos(min(1.0, level / radius))) / w)
+        phase = atan2(df / w, f)
+        return max(0.0, (phase + acos(min(1.0, level / radius))) / w)
     w2 = k - beta * beta
     a = 0.0
     b = zero_time(df, ddf, beta, k)
@@ -141,11 +142,11 @@ def fall_time(f, df, beta, k, level):
         return _fall_between(f, df, beta, k, level, a, b, b)
     # Amplitude over w/sqrt(k) is the size of the extrema of a decaying cosine.
     g = df + beta * f
-    least = -math.sqrt((f * f * w2 + g * g) / k) * math.exp(-beta * b)
+    least = -math.sqrt((f * f * w2 + g * g) / k) * exp(-beta * b)
     if least > level:
         return NEVER
     # Around its least value the solution is nearly a cosine.
-    t = max(a, b - math.acos(max(level / least, -1.0)) / math.sqrt(k)) if least < 0.0 else b
+    t = max(a, b - acos(max(level / least, -1.0)) / math.sqrt(k)) if least < 0.0 else b
     return _fall_between(f, df, beta, k, level, a, b, t)
 
 
@@ -167,9 +168,8 @@ def oscillate_with_loss(y, v, beta, k, tau):
     w2 = k - beta * beta
     if w2 > NEAR_CRITICAL * k:
         w = math.sqrt(w2)
-        c = math.cos(w * tau)
-        s = math.sin(w * tau)
-        fade = -math.expm1(-beta * tau)
+        c, s = cos_and_sin(w * tau)
+        fade = -expm1(-beta * tau)
         decay = 1.0 - fade
         fade *= 1.0 + decay
         a = (v + beta * y) / w
@@ -189,8 +189,8 @@ def oscillate_with_loss(y, v, beta, k, tau):
         fast = beta + r
         a = (acc + fast * v) / (2.0 * r)
         b = v - a
-        square = -a * a * math.expm1(-2.0 * slow * tau) / (2.0 * slow)
-        square -= a * b * math.expm1(-2.0 * beta * tau) / beta
-        square -= b * b * math.expm1(-2.0 * fast * tau) / (2.0 * fast)
+        square = -a * a * expm1(-2.0 * slow * tau) / (2.0 * slow)
+        square -= a * b * expm1(-2.0 * beta * tau) / beta
+        square -= b * b * expm1(-2.0 * fast * tau) / (2.0 * fast)
         return y1, v1, square
     return y1, v1, (v * v - v1 * v1 + k * (y * y - y1 * y1)) / (4.0 * beta)

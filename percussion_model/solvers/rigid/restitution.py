@@ -39,11 +39,14 @@ def st_venant_restitution(
 
 def restitution(numbers: Numbers) -> float:
     """Coefficient of restitution of piston and bit, NaN without a piston."""
-    values, piston, bit = numbers[:3]
+    values = numbers.values
     if PISTONS[values.piston_model] == Piston.ABSENT:
         return math.nan
     if values.bit_model == Bit.RIGID and not math.isnan(values.contact_restitution):
         return float(values.contact_restitution)
     return st_venant_restitution(
-        bar_mass(piston), bar_transit_time(piston), bar_mass(bit), bar_transit_time(bit)
+        bar_mass(numbers.piston),
+        bar_transit_time(numbers.piston),
+        bar_mass(numbers.bit),
+        bar_transit_time(numbers.bit),
     )

@@ -2,69 +2,24 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any, ClassVar
 
 import numpy as np
 
-from percussion_model.physics.records import Piston, Status
-from percussion_model.scene.numbers import Numbers, numbers_of
+from percussion_model.physics.kernel import entry_of
+from percussion_model.physics.records import Status
+from percussion_model.scene.numbers import kernel_numbers
 from percussion_model.scene.scene import Scene
 from percussion_model.solvers.base import Solver
 from percussion_model.solvers.rigid import advance as kernels
+from percussion_model.solvers.rigid.prepare import begin, fill_rigid_parameters
 from percussion_model.solvers.rigid.records import (
     RIGID_LIMITS,
     RIGID_PAR,
     RIGID_STATE,
     ROWS_AN_EVENT,
 )
-from percussion_model.solvers.rigid.restitution import restitution
-from percussion_model.solvers.setup import (
-    PISTONS,
-    REARM_TRANSITS,
-    fill_parameters,
-    fill_start,
-)
 from percussion_model.solvers.state import State
-
-# More events than this within a transit of the longer bar are a storm: the reference has
-# no more than 13. What rigid bodies do within a transit is not theirs to tell anyway.
-MOST_EVENTS = 200
-SHORTEST_WINDOW = 1e-6  # of a very short bar [s]
-
-
-def rigid_parameters(numbers: Numbers) -> np.ndarray:
-    """Parameter record of a scene whose bars are rigid.
-
-    Returns
-    -------
-    RIGID_PAR array of length 1
-    """
-    par = np.zeros(1, RIGID_PAR)
-    p: Any = par[0]
-    has_piston = PISTONS[numbers.values.piston_model] != Piston.ABSENT
-    fill_parameters(p, numbers, with_piston=has_piston)
-    p["piston"] = Piston.RIGID if has_piston else Piston.ABSENT
-    p["restitution"] = restitution(numbers)
-    p["window"] = max(p["rearm_time"] / REARM_TRANSITS, SHORTEST_WINDOW)
-    p["most_events"] = MOST_EVENTS
-    return par
-
-
-def fill_rigid_start(state: np.ndarray, numbers: Numbers) -> None:
-    """Fill a record at time zero, but for what `begin` derives of it.
-
-    Parameters
-    ----------
-    state : RIGID_STATE array of length 1
-    numbers : Numbers
-    """
-    s: Any = state[0]
-    fill_start(s, numbers)
-    if PISTONS[numbers.values.piston_model] == Piston.ABSENT:
-        s["gap"] = 0.0
-    s["start_gap"] = s["gap"]
-    s["ss_force"] = math.nan
 
 
 class RigidSolver(Solver):
@@ -82,14 +37,14 @@ class RigidSolver(Solver):
 
     def __init__(self, scene: Scene) -> None:
         super().__init__(scene)
-        self._numbers = numbers_of(scene)
-        self._par = rigid_parameters(self._numbers)
+        self._numbers = kernel_numbers(scene)
+        self._par = np.zeros(1, RIGID_PAR)
+        entry_of(fill_rigid_parameters)(self._par[0], self._numbers)
 
     def new_state(self) -> State:
         """State at time zero."""
         state = State(RIGID_STATE)
-        fill_rigid_start(state.record, self._numbers)
-        kernels.begin(self._par, state.record)
+        entry_of(begin)(self._par[0], state.record[0], self._numbers)
         return state
 
     def coarser_scenes(self) -> list[Scene]:

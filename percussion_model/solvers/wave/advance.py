@@ -139,7 +139,6 @@ def run(task, par_, state, bars_, ops_, scratch_, time, blows, events, reading):
         COMMIT: cut a pending leap short at the last grid point up to `time`, and
         wake the piston.
         READ: as COMMIT, then evaluate at `time`; spoils the state, so give a copy.
-        STEP: one step without leaps.
     par_, state : WAVE_PAR, WAVE_STATE array of length 1
     bars_ : Bars
     ops_ : LeapOperators
@@ -160,9 +159,6 @@ def run(task, par_, state, bars_, ops_, scratch_, time, blows, events, reading):
     bars, ops, scratch = refer(bars_), refer(ops_), refer(scratch_)
     if task == Task.ADVANCE:
         return advance_to(par, s, bars, ops, scratch, time, blows, events)
-    if task == Task.STEP:
-        step(par, s, bars, par.dt, blows, events)
-        return Status.DONE
     commit_to(par, s, bars, ops, scratch, time)
     if task == Task.READ:
         s.live = 0

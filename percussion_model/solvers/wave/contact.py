@@ -7,8 +7,7 @@ impedances (docs/model.md, eqs 9-11).
 
 from __future__ import annotations
 
-import math
-
+from percussion_model.physics.elementary import expm1
 from percussion_model.physics.kernel import inlined
 
 
@@ -125,7 +124,7 @@ def mass_contact(closed, gap, v_p, v_t, mass, z_t, tau):
         )
     rest = tau - free
     rate = z_t / mass
-    fade = -math.expm1(-rate * rest)  # 1 - exp(-rate rest)
+    fade = -expm1(-rate * rest)  # 1 - exp(-rate rest)
     moved = approach * fade / rate  # integral of v - v_t
     square = 0.5 * approach * approach * fade * (2.0 - fade) / rate
     end = v_t + approach * (1.0 - fade)

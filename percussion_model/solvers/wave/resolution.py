@@ -9,15 +9,23 @@ import math
 
 import numpy as np
 
+from percussion_model.physics.elementary import exp, log
 from percussion_model.scene.bars import bar_transit_time
 from percussion_model.scene.numbers import Numbers
-from percussion_model.solvers.setup import refuse_many
-from percussion_model.solvers.wave.grid import elastic_bars, fitting_cells, section_misfits
+from percussion_model.solvers.setup import MOST_CELLS, elastic_times, refuse_many
+from percussion_model.solvers.wave.grid import (
+    Refused,
+    Wish,
+    elastic_bars,
+    elastic_piston,
+    fitting_cells,
+    section_misfits,
+)
 
 # Relative error of the rate of penetration, and the cells of the bar with the shortest
 # transit for which it held with a margin of two or more.
 CALIBRATED = ((1e-1, 14), (2e-2, 20), (1e-2, 28), (1e-3, 56), (1e-4, 128))
-_LOGARITHMS = np.log(np.array([(1.0 / error, cells) for error, cells in CALIBRATED])).T
+LOGARITHMS = tuple((-math.log(error), math.log(cells)) for error, cells in CALIBRATED)
 # Errors of the wave speed act some fivefold on the rate, up to fortyfold in some scenes:
 # the share of the wanted error that they may be at first.
 FIT_SHARE = 0.1
@@ -37,14 +45,35 @@ def asked_cells(numbers: Numbers) -> int:
     if not math.isnan(values.solver_cells):
         return int(values.solver_cells)
     if not math.isnan(values.solver_accuracy):
-        return cells_for(numbers, values.solver_accuracy)[0]
+        return cells_that_fit(numbers, values.solver_accuracy)[0]
     return 0
+
+
+def asked_wish(numbers: Numbers) -> Wish:
+    """Size of the grid that an accuracy asks for, refused where none is to be looked for."""
+    values, count = numbers.values, 0.0
+    if math.isnan(values.solver_cells) and not math.isnan(values.solver_accuracy):
+        count = cells_to_fit(numbers, values.solver_accuracy)
+    many = not count <= MOST_CELLS
+    return Wish(Refused.CELLS.value if many else Refused.NOT.value, count, 1.0)
 
 
 def in_first_bar(numbers: Numbers, count: float) -> int:
     """Cells or modes in the first elastic bar where that of the shortest transit has so many."""
-    times = [bar_transit_time(bar) for bar in elastic_bars(numbers)]
-    return math.ceil(count * times[0] / min(times) - 1e-9)
+    first, shortest = elastic_times(numbers)
+    return math.ceil(count * first / shortest - 1e-9)
+
+
+def cells_to_fit(numbers: Numbers, accuracy: float) -> float:
+    """Cells of all sections where each has as many as the first elastic bar is to have."""
+    least = in_first_bar(numbers, cells_by_rule(accuracy))
+    return float(least) * (len(elastic_piston(numbers)) + len(numbers.bit))
+
+
+def cells_that_fit(numbers: Numbers, accuracy: float) -> tuple[int, float]:
+    """As `cells_for`, where `cells_to_fit` are not too many."""
+    least = in_first_bar(numbers, cells_by_rule(accuracy))
+    return fitting_cells(numbers, least, math.floor(MOST_REFINED * least), FIT_SHARE * accuracy)
 
 
 def cells_for(numbers: Numbers, accuracy: float) -> tuple[int, float]:
@@ -63,9 +92,8 @@ def cells_for(numbers: Numbers, accuracy: float) -> tuple[int, float]:
     fit : float
         Relative error of the wave speed.
     """
-    bars, least = elastic_bars(numbers), in_first_bar(numbers, cells_by_rule(accuracy))
-    refuse_many("cells", least * sum(map(len, bars)))
-    return fitting_cells(bars, least, math.floor(MOST_REFINED * least), FIT_SHARE * accuracy)
+    refuse_many("cells", cells_to_fit(numbers, accuracy))
+    return cells_that_fit(numbers, accuracy)
 
 
 def coarser_cells(numbers: Numbers, cells: int) -> list[int]:
@@ -135,14 +163,17 @@ def largest_misfit(misfit: np.ndarray) -> float:
 
 def promised_error(numbers: Numbers, cells: int) -> float:
     """Relative error of the rate that the rule expects of cells in the first elastic bar."""
-    bars = elastic_bars(numbers)
-    first = bar_transit_time(bars[0])
-    fewest = cells * min(first, bar_transit_time(bars[-1])) / first
-    errors, counts = _LOGARITHMS
-    return math.exp(-np.interp(math.log(fewest), counts, errors))
+    first, shortest = elastic_times(numbers)
+    errors, counts = np.array(LOGARITHMS).T
+    return math.exp(-np.interp(math.log(cells * shortest / first), counts, errors))
 
 
 def cells_by_rule(accuracy: float) -> float:
     """Cells of the bar with the shortest transit, a power law between calibrated points."""
-    errors, counts = _LOGARITHMS
-    return math.exp(np.interp(-math.log(accuracy), errors, counts))
+    wanted = -log(accuracy)
+    for k in range(len(LOGARITHMS) - 1):
+        (error, count), (next_error, next_count) = LOGARITHMS[k], LOGARITHMS[k + 1]
+        if wanted <= next_error:
+            slope = (next_count - count) / (next_error - error)
+            return exp(slope * max(0.0, wanted - error) + count)
+    return exp(LOGARITHMS[-1][1])

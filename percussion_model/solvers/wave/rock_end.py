@@ -7,9 +7,8 @@ step, so every crossing is a logarithm (docs/model.md, eqs 14-18, table 1).
 
 from __future__ import annotations
 
-import math
-
 from percussion_model.physics.blows import push_event
+from percussion_model.physics.elementary import expm1, log
 from percussion_model.physics.kernel import inlined, kernel, merged
 from percussion_model.physics.records import Mode, RockKind
 from percussion_model.physics.rock import (
@@ -42,17 +41,17 @@ def time_in_mode(par, s, v_free, v, y, rate, y_end, rest):
     if s.mode == Mode.DFC:
         left = 1.0 - 2.0 * (s.w_r - s.w) * rate / (s.c_r * v * v)
         if left > 0.0:
-            t = -0.5 * math.log(left) / rate
+            t = -0.5 * log(left) / rate
             if t < rest:
                 return max(t, 0.0), Mode.FC
     elif s.mode == Mode.BC or (s.mode == Mode.FC and par.rock == RockKind.SPRING):
         if v < 0.0 and y_end < 0.0:
-            t = -math.log(-y_end / (y - y_end)) / rate if y > 0.0 else 0.0
+            t = -log(-y_end / (y - y_end)) / rate if y > 0.0 else 0.0
             if t < rest:
                 return t, Mode.FF
     elif s.mode == Mode.SS and par.release == 1:
         if v < 0.0 and v_free < 0.0:
-            t = -math.log(v_free / v) / rate if v_free > v else 0.0
+            t = -log(v_free / v) / rate if v_free > v else 0.0
             if t < rest:
                 return t, Mode.FF
     return rest, -1
@@ -75,7 +74,7 @@ def note_peak(s, time, first, change, rate, last):
         Force t after the start is first + change (1 - exp(-rate t)) [N, 1/s].
     """
     if time < s.peak_from:
-        first -= change * math.expm1(-rate * (s.peak_from - time))
+        first -= change * expm1(-rate * (s.peak_from - time))
     s.peak_bit_force = max(s.peak_bit_force, first, last)
 
 
@@ -96,7 +95,7 @@ def contact_stretch(par, s, v_free, z, rest, time):
     v = (z * v_free - K * y) / (z + C)
     rate = K / (z + C)
     t, next_mode = time_in_mode(par, s, v_free, v, y, rate, y + v / rate, rest)
-    fade = -math.expm1(-rate * t)
+    fade = -expm1(-rate * t)
     d = v * fade / rate
     q = 0.5 * v * v * fade * (2.0 - fade) / rate
     p_before = s.p

@@ -3,27 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
 from percussion_model.physics.kernel import entry_of
-from percussion_model.physics.records import Piston, Status
+from percussion_model.physics.records import Status
 from percussion_model.scene.bar_groups import Bar
-from percussion_model.scene.numbers import Numbers, numbers_of, section_numbers
+from percussion_model.scene.numbers import kernel_numbers, numbers_of, section_numbers
 from percussion_model.scene.scene import Scene
 from percussion_model.solvers.base import Solver
-from percussion_model.solvers.setup import (
-    MOST_CHANGES,
-    fill_parameters,
-    fill_start,
-    rock_numbers,
-)
 from percussion_model.solvers.state import State, words_of
 from percussion_model.solvers.wave.advance import GRID_ROUNDING, run, sample
-from percussion_model.solvers.wave.grid import CutBars, Grid, cut_bars, section_count
+from percussion_model.solvers.wave.cutting import Grid
+from percussion_model.solvers.wave.grid import refuse, section_count
 from percussion_model.solvers.wave.leaps.lookahead import LOOKAHEAD
-from percussion_model.solvers.wave.leaps.operators import LEVELS, leap_operators, padded
+from percussion_model.solvers.wave.leaps.operators import LEVELS
+from percussion_model.solvers.wave.prepare import (
+    can_leap,
+    fill_wave_parameters,
+    fill_wave_start,
+    scratch_size,
+    wanted_grid,
+)
 from percussion_model.solvers.wave.records import (
     WAVE_LIMITS,
     WAVE_PAR,
@@ -36,8 +38,9 @@ from percussion_model.solvers.wave.records import (
     Task,
     no_operators,
 )
-from percussion_model.solvers.wave.resolution import asked_cells, coarser_cells
-from percussion_model.solvers.wave.totals import begin, resync
+from percussion_model.solvers.wave.resolution import coarser_cells
+from percussion_model.solvers.wave.shared import cut_bars, leap_operators
+from percussion_model.solvers.wave.totals import resync
 
 _WORD = words_of(WAVE_STATE)
 LEAP_END, STEP, T_BASE = _WORD["leap_end"], _WORD["step"], _WORD["t_base"]
@@ -52,57 +55,6 @@ LEAP_WORDS = [
 MANY = 16
 # A state without a leap is no more than a step, and rounding, behind the present [steps].
 MOST_BEHIND = 2
-# A bit alone loads and unloads the rock in a few percent of its steps. To make the maps that
-# leap these takes as long as some ten thousand steps, which a run of fewer than so many spares.
-LONG_RUN = 65_536
-
-
-def wave_parameters(numbers: Numbers, bars: CutBars) -> np.ndarray:
-    """Parameter record of a scene on its grid, without leaps.
-
-    Returns
-    -------
-    WAVE_PAR array of length 1
-    """
-    par = np.zeros(1, WAVE_PAR)
-    p: Any = par[0]
-    fill_parameters(p, numbers, with_piston=bars.piston is not None)
-    bit, piston = bars.bit, bars.piston
-    p["dt"] = bars.time_step
-    p["most_changes"] = MOST_CHANGES
-    p["loss"], p["front"] = bars.substeps, bars.front
-    p["n_b"] = bit.grid.n
-    p["z_t"], p["z_b"] = bit.grid.impedance[[0, -1]]
-    p["kappa_t"], p["kappa_b"] = bit.kappa
-    p["bound_t"], p["bound_b"] = bit.bound
-    if piston is not None:
-        p["n_p"] = piston.grid.n
-        p["z_f"], p["z_p"] = piston.grid.impedance[[0, -1]]
-        p["kappa_f"], p["kappa_p"] = piston.kappa
-        p["bound_p"] = piston.bound[1]
-    rock = rock_numbers(numbers)
-    p["ss_stiffness"] = rock.gamma * rock.k_r
-    many = p["piston"] != Piston.ABSENT or numbers.values.run_duration > LONG_RUN * p["dt"]
-    p["ss_loading"] = rock.k_r if many else 0.0
-    p["ss_damping"] = rock.c_r
-    return par
-
-
-def fill_wave_start(state: np.ndarray, wp: np.ndarray, wb: np.ndarray, numbers: Numbers) -> None:
-    """Fill record and waves at time zero, but for what `begin` derives of them.
-
-    Parameters
-    ----------
-    state : WAVE_STATE array of length 1
-    wp, wb : float array, shape (len(Row), n + 1)
-        Waves of piston and bit.
-    numbers : Numbers
-    """
-    s: Any = state[0]
-    fill_start(s, numbers)
-    s["leap_end"] = -1
-    wb[Row.DOWN : Row.UP + 1, :-1] = 0.5 * numbers.values.start_bit_velocity
-    wp[Row.DOWN : Row.UP + 1, :-1] = 0.5 * numbers.values.start_piston_velocity
 
 
 class WaveSolver(Solver):
@@ -130,31 +82,26 @@ class WaveSolver(Solver):
 
     def __init__(self, scene: Scene) -> None:
         super().__init__(scene)
-        self._numbers = numbers = numbers_of(scene)
-        bars = cut_bars(numbers, asked_cells(numbers))
-        self.time_step = bars.time_step
-        self._grids: dict[str, Grid | None] = {
-            "piston": None if bars.piston is None else bars.piston.grid,
-            "bit": bars.bit.grid,
-        }
+        self._numbers = kernel_numbers(scene)
+        self.time_step, wish = entry_of(wanted_grid)(self._numbers)
+        refuse(wish)
+        bars = cut_bars(numbers_of(scene), self.time_step)
+        piston, bit = bars.piston, bars.bit
+        self._grids = {"piston": piston.grid if piston.grid.n else None, "bit": bit.grid}
         self.cells = {name: grid.n for name, grid in self._grids.items() if grid is not None}
         self.wave_speed_error = max(bar.grid.fit for bar in bars.both)
-        self._cb = bars.bit.coefficients
-        self._cp = np.zeros((len(Coef), 1)) if bars.piston is None else bars.piston.coefficients
-        self._par = wave_parameters(numbers, bars)
+        self._cb, self._cp = bit.coefficients, piston.coefficients
+        self._par = np.zeros(1, WAVE_PAR)
+        entry_of(fill_wave_parameters)(self._par[0], self._numbers, bars)
         self._operators = no_operators()
-        # forces that change from step to step leave no step a constant map
-        if numbers.values.solver_leaps and not self._par[0]["effects"]:
-            found = leap_operators(
-                self._par, self._grids["piston"], self._cp, bars.bit.grid, self._cb
-            )
+        if entry_of(can_leap)(self._par[0], self._numbers, bars):
+            found = leap_operators(self._par, bars)
             if found is not None:
                 self._par["leaps"] = LEVELS
                 self._operators = found
                 self.operator_bytes = sum(part.nbytes for part in found)
         self._longest_leap = 4 ** int(self._par[0]["leaps"]) - 1
-        size = max(padded(2 * max(self.cells.values()) + 1), LOOKAHEAD)
-        self._scratch = Scratch(*np.zeros((3, size)))
+        self._scratch = Scratch(*np.zeros((3, scratch_size(self._par[0]))))
         self._entry: Callable[..., int] = entry_of(run)
         self._sample_entry: Callable[..., tuple[int, int]] = entry_of(sample)
 
@@ -166,9 +113,7 @@ class WaveSolver(Solver):
         """State at time zero."""
         shapes = tuple((len(Row), self.cells.get(name, 0) + 1) for name in self._grids)
         state = State(WAVE_STATE, shapes)
-        wp, wb = state.arrays
-        fill_wave_start(state.record, wp, wb, self._numbers)
-        entry_of(begin)(self._par, state.record, self._bars(state))
+        entry_of(fill_wave_start)(self._par, state.record, self._bars(state), self._numbers)
         return state
 
     def derive(self, state: State) -> None:
@@ -311,7 +256,7 @@ class WaveSolver(Solver):
 
     def coarser_scenes(self) -> list[Scene] | None:
         """One scene where lengths fit, else two that are off to either side."""
-        counts = coarser_cells(self._numbers, next(iter(self.cells.values())))
+        counts = coarser_cells(numbers_of(self.scene), next(iter(self.cells.values())))
         changes = {"solver.accuracy": None, "run.check": False}
         return [
             self.scene.replace(**changes, **{"solver.cells": count}) for count in counts

@@ -15,7 +15,7 @@ from typing import Any
 from percussion_model.scene.numbers import numbers_of
 from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.solvers.base import Solver
-from percussion_model.solvers.wave.grid import elastic_bars, fitting_cells
+from percussion_model.solvers.wave.grid import fitting_cells
 from percussion_model.verification.accuracy.cvode import CvodeSolver
 from percussion_model.verification.accuracy.exact_flow import ExactFlowSolver
 from percussion_model.verification.accuracy.explicit import ExplicitSolver
@@ -273,7 +273,7 @@ def _affordable(scene: Scene, counts: tuple[int, ...], most: float) -> list[int]
 
 def misfit_of(scene: Scene, cells: int) -> float:
     """Relative error of the wave speed with so many cells in the first elastic bar."""
-    return fitting_cells(elastic_bars(numbers_of(scene)), cells, cells, 0.0)[1]
+    return fitting_cells(numbers_of(scene), cells, cells, 0.0)[1]
 
 
 def best_fitting(scene: Scene, about: float) -> int:

@@ -8,10 +8,9 @@ mode ends or the gap closes (docs/numerics.md, section 5).
 
 from __future__ import annotations
 
-import math
-
 from percussion_model.physics.body import bit_acceleration
 from percussion_model.physics.drive import drive_force
+from percussion_model.physics.elementary import expm1
 from percussion_model.physics.kernel import kernel, merged
 from percussion_model.physics.records import Mode, Piston
 from percussion_model.physics.rock import REST_VELOCITY, damping, origin, stiffness
@@ -86,7 +85,7 @@ def step_constants(par, s):
     C = damping(s)
     z = par.z_b * (1.0 + par.kappa_b)
     rate = K / (z + C)
-    fade = -math.expm1(-rate * par.dt)
+    fade = -expm1(-rate * par.dt)
     return K, C, z, fade, fade / rate, 0.5 * fade * (2.0 - fade) / rate
 
 

@@ -7,34 +7,39 @@ forms follow from the same formulas as the ledger of a step
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from percussion_model.physics.kernel import entry_of
-from percussion_model.physics.records import BLOW, EVENT, READING, Mode
-from percussion_model.solvers.wave.advance import run
-from percussion_model.solvers.wave.grid import Grid
-from percussion_model.solvers.wave.records import (
-    WAVE_STATE,
-    Bars,
-    Coef,
-    Row,
-    Scratch,
-    Task,
-    no_operators,
-)
+from percussion_model.physics.elementary import expm1
+from percussion_model.physics.kernel import kernel, preparing
+from percussion_model.physics.records import BLOW, EVENT, Mode
+from percussion_model.physics.reference import refer
+from percussion_model.solvers.wave.cutting import Grid
+from percussion_model.solvers.wave.leaps.products import of_pairs
+from percussion_model.solvers.wave.records import WAVE_STATE, Bars, Coef, Row
+from percussion_model.solvers.wave.step import step
 
 # Unit in which the map counts the penetration while it is made [m].
 SCALE = 1e-6
 # A barrier that nothing passes, to hold a configuration in standstill [J].
 NO_WAY_OUT = 1e300
-STEP = int(Task.STEP)
+ROWS, COEFS = len(Row), len(Coef)
 
 
-@dataclass(frozen=True)
-class Configuration:
-    """A bar whose step map is wanted: free, or on a spring and dashpot."""
+class Configuration(NamedTuple):
+    """A bar whose step map is wanted: free, or on a spring and dashpot.
+
+    Attributes
+    ----------
+    par : WAVE_PAR array of length 1
+        Of the bar as a bit.
+    grid : Grid
+    c : ndarray
+        Rows of `Coef`.
+    stiffness, damping : float
+        Under the lower end; 0 where it is free [N/m], [N s/m].
+    """
 
     par: np.ndarray
     grid: Grid
@@ -42,14 +47,53 @@ class Configuration:
     stiffness: float = 0.0
     damping: float = 0.0
 
-    @property
-    def size(self) -> int:
-        """Numbers in its state."""
-        return 2 * self.grid.n + (1 if self.stiffness else 0)
+
+@kernel
+def size_of(bar):
+    """Numbers in the state of a `Configuration`."""
+    size = 2 * len(bar.grid.mass)
+    return size + 1 if bar.stiffness > 0.0 else size
 
 
-def step_map(configuration: Configuration) -> tuple[np.ndarray, np.ndarray]:
+@kernel
+def _begin(bar, s):
+    """Complete a state of zeros in which only the waves are still to be set."""
+    s.mode = Mode.SS if bar.stiffness > 0.0 else Mode.FF
+    s.leap_end = -1
+    s.live = 1
+    s.gamma = s.next_gamma = 1.0
+    s.k_r = s.next_k_r = bar.stiffness
+    s.c_r = bar.damping
+    s.next_c_r = 1.0  # a barrier stands, so that standstill lasts
+    s.w_r = s.next_w_r = NO_WAY_OUT
+
+
+@kernel
+def _disturb(s, w, n, k):
+    """Set the k-th unit deviation."""
+    w[:] = 0.0
+    if k < n:
+        w[Row.DOWN, k] = 1.0
+    elif k < 2 * n:
+        w[Row.UP, k - n] = 1.0
+    else:
+        s.p = SCALE
+
+
+@kernel
+def _make_step(par_, state, bars_, blows, events):
+    """Make one step without leaps."""
+    par, bars = par_[0], refer(bars_)
+    step(par, state[0], bars, par.dt, blows, events)
+
+
+@preparing
+def step_map(bar):
     """What one step makes of each unit deviation.
+
+    Parameters
+    ----------
+    bar : Configuration
 
     Returns
     -------
@@ -59,128 +103,173 @@ def step_map(configuration: Configuration) -> tuple[np.ndarray, np.ndarray]:
     faces : ndarray, shape (size, n + 1)
         Row k holds the interface velocities that the step had [m/s].
     """
-    n, size = configuration.grid.n, configuration.size
-    start = np.zeros(1, WAVE_STATE)
-    start["mode"] = Mode.SS if configuration.stiffness else Mode.FF
-    start["leap_end"] = -1
-    start["live"] = 1
-    start["gamma"] = start["next_gamma"] = 1.0
-    start["k_r"] = start["next_k_r"] = configuration.stiffness
-    start["c_r"] = configuration.damping
-    start["next_c_r"] = 1.0  # a barrier stands, so that standstill lasts
-    start["w_r"] = start["next_w_r"] = NO_WAY_OUT
-    none = np.zeros(1)
-    scratch, operators, advance = Scratch(none, none, none), no_operators(), entry_of(run)
-    unused = np.zeros(1, BLOW), np.zeros(1, EVENT), np.zeros(1, READING)
+    n, size = len(bar.grid.mass), size_of(bar)
+    blows, events = np.zeros(1, BLOW), np.zeros(1, EVENT)
     by_column, faces = np.zeros((size, size)), np.zeros((size, n + 1))
-    state, w = start.copy(), np.zeros((len(Row), n + 1))
-    bars = Bars(np.zeros((len(Row), 1)), np.zeros((len(Coef), 1)), w, configuration.c)
-    # As bytes, since NumPy copies records field by field.
-    to, origin = state.view(np.uint8), start.view(np.uint8)
+    w = np.zeros((ROWS, n + 1))
+    bars = Bars(np.zeros((ROWS, 1)), np.zeros((COEFS, 1)), w, bar.c)
     for k in range(size):
-        to[:] = origin
-        w[:] = 0.0
-        if k < n:
-            w[Row.DOWN, k] = 1.0
-        elif k < 2 * n:
-            w[Row.UP, k - n] = 1.0
-        else:
-            state["p"] = SCALE
-        advance(STEP, configuration.par, state, bars, operators, scratch, 0.0, *unused)
-        by_column[k, :n], by_column[k, n : 2 * n] = w[Row.DOWN_OTHER, :n], w[Row.UP_OTHER, :n]
-        faces[k] = w[Row.FACE]
+        state = np.zeros(1, WAVE_STATE)
+        _begin(bar, state[0])
+        _disturb(state[0], w, n, k)
+        _make_step(bar.par, state, bars, blows, events)
+        unit = 1.0 if k < 2 * n else SCALE
+        for i in range(n):
+            by_column[k, i] = w[Row.DOWN_OTHER, i] / unit
+            by_column[k, n + i] = w[Row.UP_OTHER, i] / unit
+        for i in range(n + 1):
+            faces[k, i] = w[Row.FACE, i] / unit
         if size > 2 * n:
-            by_column[k, -1] = state[0]["p"]
-    if size > 2 * n:
-        by_column[-1] /= SCALE
-        faces[-1] /= SCALE
+            by_column[k, size - 1] = state[0].p / unit
     return by_column, faces
 
 
-def end_row(configuration: Configuration, by_column: np.ndarray) -> np.ndarray:
-    """Velocity of the loaded end at the start of the step, as a row."""
-    row: np.ndarray = by_column[:, -1].copy()
-    row[-1] -= 1.0
-    return row / _reach(configuration)[0]
-
-
-def _reach(configuration: Configuration) -> tuple[float, float]:
+@kernel
+def _reach(bar):
     """Integrals over a step of the loaded end's velocity and of its square.
 
     For unit velocity at the start, which then fades with the rate K/(z + C).
     """
-    par = configuration.par[0]
-    if not configuration.stiffness:
-        return float(par["dt"]), float(par["dt"])
-    z = par["z_b"] * (1.0 + par["kappa_b"])
-    rate = configuration.stiffness / (z + configuration.damping)
-    fade = -np.expm1(-rate * par["dt"])
-    return float(fade / rate), float(0.5 * fade * (2.0 - fade) / rate)
+    par = bar.par[0]
+    if bar.stiffness == 0.0:
+        return par.dt, par.dt
+    z = par.z_b * (1.0 + par.kappa_b)
+    rate = bar.stiffness / (z + bar.damping)
+    fade = -expm1(-rate * par.dt)
+    return fade / rate, 0.5 * fade * (2.0 - fade) / rate
 
 
-def step_forms(
-    configuration: Configuration, by_column: np.ndarray, faces: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Quadratic forms of one step, by the formulas of its ledger.
+@kernel
+def fill_end_row(bar, by_column, out):
+    """Fill the velocity of the loaded end at the start of the step into the first column."""
+    last, path = len(by_column) - 1, _reach(bar)[0]
+    for k in range(last + 1):
+        moved = by_column[k, last] - (1.0 if k == last else 0.0)
+        out[k, 0] = moved / path
+
+
+@kernel
+def _fill_before(c, n, before):
+    """Fill the inner interface velocities of each unit deviation before any loss [m/s]."""
+    for i in range(1, n):
+        before[i - 1, i - 1] = c[Coef.ALPHA, i]
+        before[n + i, i - 1] = c[Coef.BETA, i]
+
+
+@kernel
+def _settle(c, n, faces, before, settled):
+    """Fill the inner interface velocities as one sub-step of the loss leaves them."""
+    for k in range(len(faces)):
+        for i in range(1, n):
+            below = c[Coef.VISCOUS, i] * (faces[k, i + 1] - faces[k, i])
+            above = c[Coef.VISCOUS, i - 1] * (faces[k, i] - faces[k, i - 1])
+            settled[k, i] = before[k, i - 1] + c[Coef.INV_Z, i] * (below - above)
+
+
+@kernel
+def _fill_pairs_of_faces(c, n, dt, before, settled, one, other):
+    """Fill what the interfaces lost, and the velocities that it was lost at."""
+    for k in range(len(settled)):
+        for i in range(1, n):
+            other[k, i - 1] = settled[k, i]
+            one[k, i - 1] = -dt * (settled[k, i] - before[k, i - 1]) / c[Coef.INV_Z, i]
+
+
+@kernel
+def _fill_pairs_of_cells(n, mass, by_column, settled, one, other):
+    """Fill pairs whose products are the kinetic energy that the loss between cells takes.
+
+    What the interfaces sent, less what had come in from the other side, are the cells before.
+    """
+    for k in range(len(settled)):
+        for i in range(n):
+            before = settled[k, i] + settled[k, i + 1]
+            if k == i or k == n + i:
+                before -= 1.0
+            after = by_column[k, i] + by_column[k, n + i]
+            one[k, i], other[k, i] = 0.5 * mass[i] * before, before
+            one[k, n + i], other[k, n + i] = -0.5 * mass[i] * after, after
+
+
+@preparing
+def _lost_inside(bar, by_column, faces):
+    """Form of what a step loses between interfaces and between cells [J]."""
+    par, c, n, size = bar.par[0], bar.c, len(bar.grid.mass), len(faces)
+    before, settled = np.zeros((size, n - 1)), faces.copy()
+    _fill_before(c, n, before)
+    if par.loss == 1:  # the step kept them as they were before the loss
+        _settle(c, n, faces, before, settled)
+    # all pairs side by side: one product sums them
+    one, other = np.zeros((size, 3 * n - 1)), np.zeros((size, 3 * n - 1))
+    _fill_pairs_of_cells(n, bar.grid.mass, by_column, settled, one, other)
+    _fill_pairs_of_faces(c, n, par.dt, before, settled, one[:, 2 * n :], other[:, 2 * n :])
+    return of_pairs(one, other)
+
+
+@kernel
+def _add_ends(bar, faces, loss):
+    """Add what the end cells lose: what they work against, times their viscous numbers."""
+    par, n, last = bar.par[0], len(bar.grid.mass), len(faces) - 1
+    dt = par.dt
+    path, square = _reach(bar)
+    z, viscous = par.z_b * (1.0 + par.kappa_b), par.z_b * par.kappa_b * square
+    for i in range(last + 1):
+        top, mean = faces[i, 0], faces[i, n]
+        end = mean * (dt / path)
+        against = (1.0 + par.kappa_t) * top - (2.0 if i == n else 0.0)
+        at_top = par.z_t * dt * (par.kappa_t * top - against)
+        free = mean
+        if bar.stiffness > 0.0:
+            free = (1.0 + bar.damping / z) * end
+            free += bar.stiffness / z if i == last else 0.0
+        against = (1.0 + par.kappa_b) * free - (2.0 if i == n - 1 else 0.0)
+        at_bottom = par.z_b * dt * against
+        for j in range(last + 1):
+            other = faces[j, n]
+            loss[i, j] += at_top * faces[j, 0]
+            loss[i, j] += viscous * (end * (other * (dt / path))) - at_bottom * other
+
+
+@preparing
+def loss_of_step(bar, by_column, faces):
+    """Quadratic form of a step's structural loss, by the formulas of its ledger.
 
     Parameters
     ----------
+    bar : Configuration
     by_column, faces : ndarray
         From `step_map`.
 
     Returns
     -------
-    loss : ndarray, shape (size, size)
-        Structural loss [J]. It need not be symmetric.
-    squares : ndarray, shape (size, size)
-        Square of the lower end's velocity at the start of the step [m2/s2].
+    ndarray, shape (size, size)
+        [J]. It need not be symmetric.
     """
-    par, c, n = configuration.par[0], configuration.c, configuration.grid.n
-    dt, unit = float(par["dt"]), np.eye(configuration.size)
-    down, up = unit[:, :n], unit[:, n : 2 * n]
-    path, square = _reach(configuration)
-    mean = faces[:, n]
-    end = mean * (dt / path)
-    squares = np.outer(end, end)
-    if not par["loss"] or n < 2:
-        return np.zeros_like(squares), squares
-    before = c[Coef.ALPHA, 1:n] * down[:, :-1] + c[Coef.BETA, 1:n] * up[:, 1:]
-    settled = faces.copy()
-    if par["loss"] == 1:  # the step kept them as they were before the loss
-        force = np.diff(c[Coef.VISCOUS, :n] * np.diff(faces, axis=1), axis=1)
-        settled[:, 1:n] = before + c[Coef.INV_Z, 1:n] * force
-    inner = settled[:, 1:n]
-    loss = _taken_by_smoothing(configuration, by_column, settled)
-    loss -= dt * ((inner - before) / c[Coef.INV_Z, 1:n]) @ inner.T
-    # what the end cells work against, times their viscous number
-    top = faces[:, 0]
-    against = (1.0 + par["kappa_t"]) * top - 2.0 * up[:, 0]
-    loss += par["z_t"] * dt * np.outer(par["kappa_t"] * top - against, top)
-    free = mean
-    if configuration.stiffness:
-        z = par["z_b"] * (1.0 + par["kappa_b"])
-        free = (1.0 + configuration.damping / z) * end
-        free = free + configuration.stiffness / z * unit[:, -1]
-    against = (1.0 + par["kappa_b"]) * free - 2.0 * down[:, n - 1]
-    loss += par["z_b"] * (par["kappa_b"] * square * squares - dt * np.outer(against, mean))
-    return loss, squares
+    if bar.par[0].loss == 0 or len(bar.grid.mass) < 2:
+        return np.zeros((len(faces), len(faces)))
+    loss = _lost_inside(bar, by_column, faces)
+    _add_ends(bar, faces, loss)
+    return loss
 
 
-def _taken_by_smoothing(
-    configuration: Configuration, by_column: np.ndarray, faces: np.ndarray
-) -> np.ndarray:
-    """Form of the kinetic energy that the loss between cells takes in a step [J].
+@preparing
+def square_at_end(bar, faces):
+    """Quadratic form of the square of the lower end's velocity at the start of the step.
 
     Parameters
     ----------
-    faces : ndarray, shape (size, n + 1)
-        Final interface velocities of the step.
+    bar : Configuration
+    faces : ndarray
+        From `step_map`.
+
+    Returns
+    -------
+    ndarray, shape (size, size)
+        [m2/s2]
     """
-    n = configuration.grid.n
-    after = by_column[:, :n] + by_column[:, n : 2 * n]
-    unit = np.eye(configuration.size)
-    # what the interfaces sent, less what had come in from the other side
-    before = faces[:, :-1] + faces[:, 1:] - unit[:, :n] - unit[:, n : 2 * n]
-    mass = 0.5 * configuration.grid.mass
-    form: np.ndarray = (before * mass) @ before.T - (after * mass) @ after.T
-    return form
+    size, n, growth = len(faces), len(bar.grid.mass), bar.par[0].dt / _reach(bar)[0]
+    squares = np.zeros((size, size))
+    for i in range(size):
+        for j in range(size):
+            squares[i, j] = (faces[i, n] * growth) * (faces[j, n] * growth)
+    return squares

@@ -1,0 +1,99 @@
+"""Writes the FMUs that need no Python: the same inputs give the same bytes."""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Literal
+
+from fmu_src.archive import HERE, ROOT, digest, write_described
+from fmu_src.description import About
+from fmu_src.hammer.variables import hammer_variables
+from fmu_src.native.description import write_native_description
+from fmu_src.native.description3 import write_description3
+from fmu_src.native.page import write_native_page
+from fmu_src.native.terminals import FOLDER, write_terminals
+from fmu_src.native.variables3 import fmi3_variables
+from percussion_model.scene.scene import Scene
+
+Version = Literal["2.0", "3.0"]
+SUFFIXES = {"linux": ".so", "windows": ".dll", "darwin": ".dylib"}
+# FMI 2.0 has names of its own for x86, and takes those of FMI 3.0 for all others (2.0.5).
+FMI2_PLATFORMS = {
+    "x86_64-linux": "linux64",
+    "x86_64-windows": "win64",
+    "x86_64-darwin": "darwin64",
+}
+MODEL = "resources/model.bin"
+
+
+def write_native_fmu(
+    path: Path,
+    version: Version,
+    about: About,
+    scene: Scene,
+    libraries: Mapping[str, bytes],
+    model: Callable[[str], bytes],
+) -> str:
+    """Write an FMU and return its GUID or instantiation token, without the braces.
+
+    Parameters
+    ----------
+    version : str
+        Of FMI.
+    libraries : dict of str
+        Libraries by platform, whose names are those of FMI 3.0 for both versions.
+    model : callable
+        Gives the tables of the scene for a GUID as hosts pass it, with its braces; it is asked
+        for an empty one as well, whose tables are part of what the GUID is a hash of.
+    """
+    variables = hammer_variables(scene)
+    page = write_native_page(about, variables, scene, libraries)
+    entries = {
+        "documentation/index.html": page.encode(),
+        "documentation/licenses/license.txt": (ROOT / "LICENSE").read_bytes(),
+        MODEL: model(""),
+        **_pictures(version),
+    }
+    for platform, library in libraries.items():
+        entries[library_path(version, platform, about.model)] = library
+    contents = digest(entries)
+    if version == "2.0":
+        guid, xml = write_native_description(about, variables, contents)
+    else:
+        guid, xml = write_description3(about, variables, fmi3_variables(scene), contents)
+    entries[MODEL] = model(f"{{{guid}}}")
+    write_described(path, xml, entries)
+    return guid
+
+
+def library_path(version: Version, platform: str, model: str) -> str:
+    """Where a library lies in the archive.
+
+    Parameters
+    ----------
+    platform : str
+        Processor and system as FMI 3.0 has them, such as `x86_64-linux`.
+    """
+    processor, _, system = platform.partition("-")
+    if processor not in ("x86_64", "aarch64") or system not in SUFFIXES:
+        raise ValueError(f"no platform of FMI 3.0 that is known here: {platform}")
+    folder = FMI2_PLATFORMS.get(platform, platform) if version == "2.0" else platform
+    return f"binaries/{folder}/{model}{SUFFIXES[system]}"
+
+
+def _pictures(version: Version) -> dict[str, bytes]:
+    """Icon, and terminals where FMI has them."""
+    icon = (HERE / "icon.png").read_bytes()
+    if version == "2.0":
+        return {"model.png": icon}
+    return {f"{FOLDER}/icon.png": icon, f"{FOLDER}/terminalsAndIcons.xml": write_terminals()}
+
+
+def add_files(path: Path, files: Mapping[str, bytes]) -> None:
+    """Put files into an FMU, in the place of those of the same names."""
+    with zipfile.ZipFile(path) as archive:
+        entries = {name: archive.read(name) for name in archive.namelist()}
+    xml = entries.pop("modelDescription.xml")
+    write_described(path, xml, {**entries, **files})

@@ -1,0 +1,291 @@
+"""What the shell calls: checks, makes, steps, reads and restores motions of the hammer.
+
+Arguments are addresses and numbers; results are 0 or the number of a fault (`Fault`). No
+function keeps anything outside the memory that it is given.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from fmu_src.native import kinds, modal
+from fmu_src.native.image import AT, Own, fill_values, numbers_at, own_numbers, row_of
+from fmu_src.native.layout import (
+    MOTION_BYTES,
+    GaugeBar,
+    Left,
+    blow_records,
+    head_records,
+    motion_of,
+    motion_records,
+)
+from fmu_src.native.memory import floats_at, words_at
+from fmu_src.native.messages import FIRST_RULE, Fault, Note, keys_in
+from fmu_src.native.motion import (
+    COUNT,
+    NEW_INPUTS,
+    begin_step,
+    set_inputs,
+    step,
+)
+from fmu_src.native.notes import add_note, look, set_fault
+from fmu_src.native.outputs import OUTPUT_COUNT, fill_outputs
+from fmu_src.native.solvers import kind_of
+from percussion_model.physics.kernel import preparing
+from percussion_model.physics.records import BLOW, DriveKind, Piston, Status
+from percussion_model.physics.state import LARGEST, MOST
+from percussion_model.scene.bars import bar_length, bar_mass
+from percussion_model.scene.contradictions import TEXTS, Bodies, Rule, find_contradiction
+from percussion_model.scene.inputs import INPUTS
+from percussion_model.scene.solver_names import BODIES
+from percussion_model.scene.values import SCENE_NUMBERS
+from percussion_model.solvers import plain_code  # noqa: F401  # kernels call functions of scenes
+from percussion_model.solvers.base import MOST_AHEAD
+from percussion_model.solvers.setup import DRIVES, PISTONS, ROCKS, any_effect, barrier_on
+from percussion_model.solvers.state import is_bounded
+
+# Word of each input in the record of `SCENE_NUMBERS`, and in that of a solver's state.
+INPUT_WORDS = tuple(AT[one.key.replace(".", "_")] for one in INPUTS.values())
+FIELDS = tuple(one.field for one in INPUTS.values())
+STIFFNESS = list(INPUTS).index("loading_stiffness")
+BARRIER = tuple(name.startswith("barrier") for name in INPUTS)
+
+
+def _needs() -> tuple[tuple[int, int, int], ...]:
+    """Of each input what must hold: its number, word of a choice, bits of what it may be."""
+    found = []
+    for k, one in enumerate(INPUTS.values()):
+        for key, allowed in row_of(one.key).needs.items():
+            choices = row_of(key).choices or (False, True)
+            bits = sum(1 << choices.index(value) for value in allowed)
+            found.append((k, AT[key.replace(".", "_")], bits))
+    return tuple(found)
+
+
+NEEDS = _needs()
+BLOW_COUNTS = tuple(k for k, name in enumerate(BLOW.names or ()) if BLOW[name].kind == "i")
+BLOW_NUMBERS = tuple(k for k in range(len(BLOW.names or ())) if k not in BLOW_COUNTS)
+MOST_BLOWS = 2**31 - 1  # an output is a whole number of FMI
+# The host's times come from sums and products of its own; a share of the time.
+CLOCK_ROUNDING = 1e-12
+MODAL_INPUTS = tuple(modal.WORDS[field] for field in FIELDS)
+MODAL_PEAKS = tuple(
+    modal.WORDS[name] for name in ("peak_from", "peak_bit_force", "peak_contact_force")
+)
+
+
+@preparing
+def _wanted(values):
+    """Inputs as a solver takes them."""
+    words, wanted = values.view(np.float64), np.zeros(COUNT)
+    for k in range(COUNT):
+        wanted[k] = words[INPUT_WORDS[k]]
+    return wanted
+
+
+@preparing
+def _fill_acts(head, numbers, values):
+    """Enter which inputs have an effect."""
+    words = values.view(np.int64)
+    head.acts[:] = 1
+    for k, word, bits in NEEDS:
+        if bits & (1 << words[word]) == 0:
+            head.acts[k] = 0
+    if not barrier_on(numbers):
+        for k in range(COUNT):
+            if BARRIER[k]:
+                head.acts[k] = 0
+
+
+@preparing
+def _fill_barrier(head, numbers):
+    """Enter shares of the barrier: of a drilling cycle's time and of a blow's energy (eq. 30)."""
+    values = numbers.values
+    energy = values.drive_force * values.drive_reversal_distance
+    is_pressure = DRIVES[values.effects_drive] == DriveKind.PRESSURE
+    if not (is_pressure and energy > 0.0 and barrier_on(numbers)):
+        return
+    share = values.rock_barrier_energy / energy
+    took = share * bar_mass(numbers.piston) / values.rock_barrier_damping
+    cycle = math.sqrt(bar_mass(numbers.bit) / values.rock_loading_stiffness)
+    head.time_share, head.energy_share = took / cycle, share
+
+
+Pair = tuple[tuple[int, int], tuple[int, int]]
+NO_VALUE = (-1, 0)
+
+
+def _facts() -> tuple[Pair, ...]:
+    """Of each rule the two values in its text: words, -1 for none, and 1 for choices."""
+    found: list[Pair] = [(NO_VALUE, NO_VALUE)] * (1 + len(TEXTS))
+    for rule, text in TEXTS.items():
+        one, two = NO_VALUE, NO_VALUE
+        for key in reversed(keys_in(text)):
+            one, two = (AT[key.replace(".", "_")], int(bool(row_of(key).choices))), one
+        found[rule] = (one, two)
+    return tuple(found)
+
+
+FACTS = _facts()
+BODIES_OF_SOLVERS = tuple(
+    {"elastic": int(Bodies.ELASTIC), "rigid": int(Bodies.RIGID)}.get(BODIES.get(name) or "", 0)
+    for name in row_of("solver.name").choices
+)
+
+
+@preparing
+def _fact(values, word, is_choice):
+    """A value as a fact: of a choice its place, counted from 1."""
+    if word < 0:
+        return 0.0
+    if is_choice == 1:
+        return values.view(np.int64)[word] + 1.0
+    return values.view(np.float64)[word]
+
+
+@preparing
+def _refuse_contradiction(values, has_rods, is_barrier_given, notes):
+    """Refuse parameters that contradict each other."""
+    v = values[0]
+    bodies = BODIES_OF_SOLVERS[v.solver_name]
+    has_effects = any_effect(v)
+    found = find_contradiction(v, bodies, has_rods, has_effects, is_barrier_given)
+    rule = found.value
+    if rule == Rule.NOTHING.value:
+        return 0
+    (one, one_is), (two, two_is) = FACTS[rule]
+    first, second = _fact(values, one, one_is), _fact(values, two, two_is)
+    return set_fault(notes, FIRST_RULE + rule - 1, first, second, 0.0)
+
+
+@preparing
+def check(image, notes):
+    """Refuse parameters that go together with none other, or with none of this library."""
+    values = np.zeros(1, SCENE_NUMBERS)
+    fill_values(image, values)
+    numbers = numbers_at(image, values)
+    given = own_numbers(image)[Own.BARRIER_GIVEN] != 0.0
+    fault = _refuse_contradiction(values, len(numbers.rod_counts) > 0, given, notes)
+    if fault > 0:
+        return fault
+    if kind_of(numbers) == 0:
+        return set_fault(notes, Fault.SOLVER.value, 0.0, 0.0, 0.0)
+    count, most = modal.modes_of(numbers)
+    if count > most:
+        return set_fault(notes, Fault.MODES.value, count, most, 0.0)
+    own = own_numbers(image)
+    on_piston = int(own[Own.GAUGE_BAR]) == GaugeBar.PISTON
+    length = bar_length(numbers.piston if on_piston else numbers.bit)
+    if own[Own.GAUGE_PLACE] > length:
+        return set_fault(notes, Fault.GAUGE.value, own[Own.GAUGE_PLACE], length, own[Own.GAUGE_BAR])
+    return 0
+
+
+@preparing
+def create(image, table, table_size, motion, notes):
+    """Make the memory of a motion at time zero; its address goes to the address `motion`."""
+    fault = check(image, notes)
+    if fault != 0:
+        return fault
+    values = np.zeros(1, SCENE_NUMBERS)
+    fill_values(image, values)
+    numbers = numbers_at(image, values)
+    own = own_numbers(image)
+    bar, place = int(own[Own.GAUGE_BAR]), own[Own.GAUGE_PLACE]
+    if place < 0.0:
+        place = 0.5 * bar_length(numbers.piston if bar == GaugeBar.PISTON else numbers.bit)
+    if bar == GaugeBar.PISTON and PISTONS[numbers.values.piston_model] != Piston.ELASTIC:
+        bar = GaugeBar.NONE.value
+    base = kinds.create(kind_of(numbers), numbers, bar, place)
+    if base == 0:
+        return set_fault(notes, Fault.MEMORY.value, 0.0, 0.0, 0.0)
+    head = head_records(base, 1)[0]
+    for k in range(COUNT):
+        head.inputs_at[k] = MODAL_INPUTS[k]
+    head.peak_from_at, head.peak_bit_at, head.peak_contact_at = MODAL_PEAKS
+    head.locked_at, head.storms_at = modal.LOCKED, -1
+    head.rock = ROCKS[numbers.values.effects_rock]
+    _fill_acts(head, numbers, values)
+    _fill_barrier(head, numbers)
+    motion_of(base).acting[:] = _wanted(values)
+    words_at(motion, 1)[0] = base
+    return 0
+
+
+@preparing
+def _end(base, status, notes):
+    """Fault of a solver that could not go on; 0 for none."""
+    if status == Status.DONE or status == Status.BLOWS_FULL:
+        return 0
+    head = head_records(base, 1)[0]
+    number = Fault.STOPPED.value
+    if status == Status.NOT_FINITE:
+        number = Fault.NOT_FINITE.value
+    return set_fault(notes, number, kinds.state_time(base, base + head.state_at), 0.0, 0.0)
+
+
+@preparing
+def take_step(motion, image, flags, t, size, reached, notes):
+    """Advance a motion to a time; what is new of it is noted."""
+    words_at(notes, 2)[:] = 0
+    begin_step(motion, flags)
+    if flags & NEW_INPUTS:
+        values = np.zeros(1, SCENE_NUMBERS)
+        fill_values(image, values)
+        status, in_vain = set_inputs(motion, _wanted(values))
+        for k in range(COUNT):
+            if in_vain & (1 << k):
+                add_note(notes, Note.IN_VAIN + k, 0.0, 0.0, t)
+        fault = _end(motion, status, notes)
+        if fault != 0:
+            return fault
+    status, there = step(motion, t, size, flags)
+    floats_at(reached, 1)[0] = there
+    fault = _end(motion, status, notes)
+    if fault == 0:
+        look(motion, motion_of(motion).acting[STIFFNESS], notes)
+    return fault
+
+
+@preparing
+def read_outputs(motion, flags, outputs):
+    """Fill the outputs."""
+    fill_outputs(motion, flags, floats_at(outputs, OUTPUT_COUNT))
+    return 0
+
+
+@preparing
+def find_fault(motion, state, t, notes):
+    """Refuse a state from outside that kernels cannot go on from.
+
+    Parameters
+    ----------
+    motion : int
+        Address of a motion of the same scene.
+    state : int
+        Address of what is to move.
+    t : float
+        Time that it is said to have [s].
+    """
+    m, blow = motion_records(state, 1)[0], blow_records(state + MOTION_BYTES, 1)
+    good = 0 <= m.is_read <= 1 and m.left == Left.NOWHERE and 0 <= m.blow_count <= MOST_BLOWS
+    good = good and 0.0 <= m.time <= LARGEST and 0.0 <= m.step_size <= LARGEST
+    good = good and is_bounded(m.before) and is_bounded(m.acting)
+    numbers, counts = blow.view(np.float64), blow.view(np.int64)
+    for word in BLOW_NUMBERS:
+        good = good and (abs(numbers[word]) <= LARGEST or numbers[word] != numbers[word])
+    for word in BLOW_COUNTS:
+        good = good and 0 <= counts[word] <= MOST
+    # the clock of the motion follows that of the host, within the rounding of a step
+    if not good or not abs(t - m.time) <= m.step_size + CLOCK_ROUNDING * abs(t):
+        return set_fault(notes, Fault.MOTION.value, 0.0, 0.0, 0.0)
+    if not kinds.state_time(motion, state) <= m.time + MOST_AHEAD:
+        return set_fault(notes, Fault.MOTION.value, 0.0, 0.0, 0.0)
+    facts = np.zeros(4)
+    number = kinds.find_fault(motion, state, m.time, facts)
+    if number > 0:
+        set_fault(notes, number, facts[0], facts[1], facts[2])
+        floats_at(notes + 16, 4)[3] = facts[3]
+    return number

@@ -1,0 +1,137 @@
+"""What the memory of a motion holds: a head, what moves, and what does not.
+
+The shell knows the first four words. What moves stands in one part, which is all of a saved
+state; copies of it are read, since to read a state means to carry it on.
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+import numpy as np
+
+from fmu_src.native.memory import records_at, viewing
+from percussion_model.physics.records import BLOW, EVENT, READING
+from percussion_model.scene.inputs import INPUTS
+
+# Rows of blows that one call of a solver can fill.
+BLOW_ROOM = 64
+# What a solver is asked for.
+ADVANCE, COMMIT = 0, 1
+# Most arrays of a solver.
+ENTRIES = 40
+
+
+class Kind(IntEnum):
+    """Solvers that a motion may have."""
+
+    MODAL = 1
+
+
+class GaugeBar(IntEnum):
+    """Bars that carry the gauge: numbers of the FMU's enumeration."""
+
+    NONE = 0  # none that has waves
+    PISTON = 1
+    BIT = 2
+
+
+class Left(IntEnum):
+    """Where the state stands from which the impulses at the start of the last step follow."""
+
+    NOWHERE = 0  # they are known
+    HERE = 1  # in the present state, which has not changed since
+    COPY = 2
+
+
+HEAD = np.dtype(
+    [
+        ("bytes", "i8"),  # of all
+        ("state_at", "i8"),  # where what moves begins [bytes]
+        ("state_bytes", "i8"),
+        ("kind", "i8"),  # Kind
+        # below, the shell looks no more
+        ("par_at", "i8"),
+        ("record_at", "i8"),  # of the solver's state, from the begin of what moves
+        ("left_at", "i8"),  # copies of what moves: at the start of the last step,
+        ("here_at", "i8"),  # at the present time,
+        ("trial_at", "i8"),  # and for what is read beside them
+        ("blows_at", "i8"),
+        ("entries_at", "i8"),
+        ("acts", "i8", (len(INPUTS),)),  # 1: an input has an effect
+        ("inputs_at", "i8", (len(INPUTS),)),  # words of the record that hold the inputs
+        ("peak_from_at", "i8"),  # and when peaks began, the peaks, counts of guards
+        ("peak_bit_at", "i8"),
+        ("peak_contact_at", "i8"),
+        ("locked_at", "i8"),  # -1: there is none
+        ("storms_at", "i8"),
+        ("rock", "i8"),  # RockKind
+        ("gauge_bar", "i8"),  # GaugeBar
+        ("gauge_above", "f8"),  # mass of the bar above the gauge [kg]
+        ("gauge_area", "f8"),  # [m2]
+        ("time_share", "f8"),  # of the barrier, T_5/T_4
+        ("energy_share", "f8"),  # W_R/(F_0 D_1)
+        # of what was read last
+        ("has_peaks", "i8"),
+        ("has_stress", "i8"),
+        ("stress", "f8"),
+        # of the warnings
+        ("told", "i8"),  # bits of those that were told
+        ("scene_seen", "i8"),
+        ("blows_seen", "i8"),
+        ("check_at", "f8"),  # time of the next check [s]
+        ("pushed_at", "f8"),  # when the rock was last seen to be pushed [s]
+        ("impulse_seen", "f8"),  # of the bit force, then [N s]
+    ],
+    align=True,
+)
+
+# What moves, besides the solver's state; it begins with what the shell sets to 0.
+MOTION = np.dtype(
+    [
+        ("is_read", "i8"),  # 1: what was read belongs to the state
+        ("time", "f8"),  # [s]
+        ("step_size", "f8"),
+        ("blow_count", "i8"),
+        ("left", "i8"),  # Left
+        ("left_time", "f8"),
+        ("before", "f8", (3,)),  # impulses at the start of the last step [N s]
+        ("acting", "f8", (len(INPUTS),)),  # inputs as the solver has them
+    ],
+    align=True,
+)
+
+head_records = records_at(HEAD)
+motion_records = records_at(MOTION)
+blow_records = records_at(BLOW)
+event_records = records_at(EVENT)
+reading_records = records_at(READING)
+
+MOTION_BYTES, BLOW_BYTES, READING_BYTES = MOTION.itemsize, BLOW.itemsize, READING.itemsize
+HEAD_BYTES, EVENT_BYTES = HEAD.itemsize, EVENT.itemsize
+
+
+@viewing
+def motion_of(base):
+    """The MOTION record."""
+    return motion_records(base + head_records(base, 1)[0].state_at, 1)[0]
+
+
+@viewing
+def last_blow(base):
+    """The last whole blow: it moves too, behind the MOTION record."""
+    return blow_records(base + head_records(base, 1)[0].state_at + MOTION_BYTES, 1)
+
+
+@viewing
+def reading_of(base):
+    """What was read of the present state."""
+    at = head_records(base, 1)[0].blows_at + BLOW_ROOM * BLOW_BYTES + EVENT_BYTES
+    return reading_records(base + at, 1)
+
+
+@viewing
+def other_reading(base):
+    """What is read beside it."""
+    at = head_records(base, 1)[0].blows_at + BLOW_ROOM * BLOW_BYTES + EVENT_BYTES
+    return reading_records(base + at + READING_BYTES, 1)

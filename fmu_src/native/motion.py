@@ -1,0 +1,234 @@
+"""Motion of the hammer as communication steps see it, in plain memory."""
+
+from __future__ import annotations
+
+from fmu_src.native import kinds
+from fmu_src.native.layout import (
+    ADVANCE,
+    BLOW_ROOM,
+    COMMIT,
+    Left,
+    blow_records,
+    head_records,
+    last_blow,
+    motion_of,
+    other_reading,
+    reading_of,
+)
+from fmu_src.native.memory import floats_at, words_at
+from percussion_model.physics.kernel import preparing
+from percussion_model.physics.records import Status
+from percussion_model.scene.inputs import INPUTS
+
+# Inputs of the solver, in the order of INPUTS.
+COUNT = len(INPUTS)
+# A rate holds for this many periods after the last blow, then falls towards 0.
+PERIODS_HELD = 2.0
+# Flags of a step, as the shell has them (fmu_src/native/shell.h).
+NEW_INPUTS, STOP_AT_BLOW, SAME_STEP = 1, 2, 4
+NO_LIMIT = 1 << 30  # of blows
+
+
+@preparing
+def numbers_of_record(base):
+    """Words of the solver's record, as numbers."""
+    head = head_records(base, 1)[0]
+    return floats_at(base + head.state_at + head.record_at, head.state_bytes // 8)
+
+
+@preparing
+def count_of(base, word):
+    """A count that the solver's record has at a word; 0 for none."""
+    head = head_records(base, 1)[0]
+    if word < 0:
+        return 0
+    return words_at(base + head.state_at + head.record_at, head.state_bytes // 8)[word]
+
+
+@preparing
+def _copy(base, to):
+    """Copy what moves to another place of the memory."""
+    head = head_records(base, 1)[0]
+    count = head.state_bytes // 8
+    words_at(base + to, count)[:] = words_at(base + head.state_at, count)
+
+
+@preparing
+def _take_impulses(motion, row):
+    """Keep the impulses of a reading as those at the start of the last step."""
+    motion.before[0] = row.bit_impulse
+    motion.before[1] = row.contact_impulse
+    motion.before[2] = row.drive_impulse
+    motion.left = Left.NOWHERE
+
+
+@preparing
+def _leave(base):
+    """Keep a copy of the state if it is needed as it is, since it is about to change."""
+    motion = motion_of(base)
+    if motion.left == Left.HERE:
+        _copy(base, head_records(base, 1)[0].left_at)
+        motion.left = Left.COPY
+
+
+@preparing
+def settle_before(base):
+    """Find the impulses at the start of the last step, if they are not known yet."""
+    motion, head = motion_of(base), head_records(base, 1)[0]
+    if motion.left == Left.NOWHERE:
+        return
+    at = head.left_at
+    if motion.left == Left.HERE:
+        at = head.trial_at
+        _copy(base, at)
+    row = other_reading(base)
+    t = max(motion.left_time, kinds.state_time(base, base + at))
+    kinds.read(base, base + at, t, row, False)
+    _take_impulses(motion, row[0])
+
+
+@preparing
+def begin_step(base, flags):
+    """Remember what a step begins with, and count peaks from now on."""
+    motion, head = motion_of(base), head_records(base, 1)[0]
+    if flags & SAME_STEP:
+        return
+    if motion.is_read == 1:
+        _take_impulses(motion, reading_of(base)[0])
+    else:
+        motion.left, motion.left_time = Left.HERE, motion.time
+    numbers = numbers_of_record(base)
+    numbers[head.peak_from_at] = motion.time
+    numbers[head.peak_bit_at] = numbers[head.peak_contact_at] = 0.0
+
+
+@preparing
+def _run(base, task, t, most):
+    """Let the solver do a task, until so many blows more have ended; a `Status`."""
+    motion, head, blow = motion_of(base), head_records(base, 1)[0], last_blow(base)
+    status = Status.BLOWS_FULL.value
+    while most > 0:
+        status, found = kinds.go(base, task, t, min(most, BLOW_ROOM))
+        if found > 0:
+            blow[0] = blow_records(base + head.blows_at, BLOW_ROOM)[found - 1]
+            motion.blow_count += found
+            most -= found
+        full = status == Status.BLOWS_FULL or status == Status.EVENTS_FULL
+        if not (full and found > 0):
+            break
+    return status
+
+
+@preparing
+def advance(base, t, most):
+    """Advance until so many blows more have ended, or else to a time; a `Status`."""
+    if kinds.is_quiet(base, t):
+        return Status.DONE.value
+    _leave(base)
+    return _run(base, ADVANCE, t, most)
+
+
+@preparing
+def set_inputs(base, wanted):
+    """Commit the state at its next grid point and give it inputs that are new and act.
+
+    Parameters
+    ----------
+    wanted : float array, shape (COUNT,)
+        Inputs as the solver takes them.
+
+    Returns
+    -------
+    status : int
+        A `Status`.
+    in_vain : int
+        Bits of the inputs that are new and have no effect.
+    """
+    motion, head = motion_of(base), head_records(base, 1)[0]
+    in_vain, acts = 0, False
+    for k in range(COUNT):
+        if wanted[k] != motion.acting[k]:
+            if head.acts[k] == 1:
+                acts = True
+            else:
+                in_vain |= 1 << k
+                motion.acting[k] = wanted[k]
+    if not acts:
+        return Status.DONE.value, in_vain
+    _leave(base)
+    t = kinds.grid_point_after(base, motion.time)
+    status = advance(base, t, NO_LIMIT)
+    if status == Status.DONE:
+        status = _run(base, COMMIT, t, NO_LIMIT)
+    if status == Status.DONE:
+        numbers = numbers_of_record(base)
+        for k in range(COUNT):
+            if wanted[k] != motion.acting[k]:
+                numbers[head.inputs_at[k]] = motion.acting[k] = wanted[k]
+    return status, in_vain
+
+
+@preparing
+def step(base, t, size, flags):
+    """Advance to a time, after inputs were set.
+
+    Parameters
+    ----------
+    t, size : float
+        End and size of the communication step [s].
+    flags : int
+
+    Returns
+    -------
+    status : int
+        A `Status`; BLOWS_FULL: it stopped at the end of a blow.
+    reached : float
+        [s]
+    """
+    motion, head = motion_of(base), head_records(base, 1)[0]
+    t = max(t, motion.time)
+    stops = flags & STOP_AT_BLOW != 0
+    status, reached = advance(base, t, 1 if stops else NO_LIMIT), t
+    if stops and status == Status.BLOWS_FULL:
+        reached = min(t, max(motion.time, kinds.state_time(base, base + head.state_at)))
+    motion.step_size = size - (t - reached)
+    motion.time = reached
+    motion.is_read = 0
+    return status, reached
+
+
+@preparing
+def read(base, peaks):
+    """What it is like now, greatest forces only if asked for: a READING array of length 1."""
+    motion, head, row = motion_of(base), head_records(base, 1)[0], reading_of(base)
+    if motion.is_read == 1 and (head.has_peaks == 1 or not peaks):
+        return row
+    at = base + head.here_at
+    _copy(base, head.here_at)
+    # after a change of inputs a state may lie a step ahead
+    kinds.read(base, at, max(motion.time, kinds.state_time(base, at)), row, peaks)
+    head.has_peaks = 1 if peaks else 0
+    if motion.is_read == 0:
+        motion.is_read, head.has_stress = 1, 0
+    return row
+
+
+@preparing
+def read_stress(base):
+    """Stress at the gauge [Pa]."""
+    head = head_records(base, 1)[0]
+    read(base, False)
+    if head.has_stress == 0:
+        head.stress, head.has_stress = kinds.stress(base, base + head.here_at), 1
+    return head.stress
+
+
+@preparing
+def rate_decay(base):
+    """Share of the last blow's rate that holds now; falls when blows fail to come."""
+    motion, blow = motion_of(base), last_blow(base)[0]
+    if motion.blow_count == 0 or not blow.period > 0.0:
+        return 0.0
+    since = motion.time - (blow.time + blow.period)
+    late = since / blow.period - (PERIODS_HELD - 1.0)
+    return min(1.0, 1.0 / late) if late > 0.0 else 1.0

@@ -1,0 +1,123 @@
+"""Notes about a motion for the log: each once, and as soon as it is seen."""
+
+from __future__ import annotations
+
+from fmu_src.native.layout import head_records, last_blow, motion_of
+from fmu_src.native.memory import floats_at, words_at
+from fmu_src.native.messages import Note
+from fmu_src.native.motion import count_of, read
+from fmu_src.native.outputs import numerical, residual
+from percussion_model.physics.kernel import preparing
+from percussion_model.physics.records import Mode, RockKind
+from percussion_model.simulation.validity import (
+    BUTTON_LENGTH,
+    LEAST_NUMERICAL,
+    LONGEST_FLIGHT,
+    MOST_BARRIER,
+    MOST_NUMERICAL,
+    MOST_RATE,
+    MOST_RESIDUAL,
+)
+
+# Time between two checks of a motion [s]; one costs as much as reading an output.
+INTERVAL = 0.1
+# Rows of notes, as the shell has them (fmu_src/native/shell.h); the first is for a fault.
+ROW, ROWS = 8, 32
+TIME = 6  # place of the fact that tells when
+
+
+@preparing
+def add_note(notes, number, first, second, time):
+    """Write a row: the number of a template and its facts."""
+    count = words_at(notes, 1)
+    k = max(count[0], 1)
+    if k < ROWS:
+        words_at(notes + 8 * (1 + ROW * k), 1)[0] = number
+        facts = floats_at(notes + 8 * (2 + ROW * k), ROW - 1)
+        facts[0], facts[1], facts[TIME] = first, second, time
+        count[0] = k + 1
+
+
+@preparing
+def set_fault(notes, number, first, second, third):
+    """Write why a kernel refuses; its number."""
+    words_at(notes, 2)[1] = number
+    facts = floats_at(notes + 16, ROW - 1)
+    facts[0], facts[1], facts[2] = first, second, third
+    return number
+
+
+@preparing
+def _tell(base, notes, number, first, second):
+    """Add a note that was not told before."""
+    head = head_records(base, 1)[0]
+    if head.told & (1 << number) == 0:
+        head.told |= 1 << number
+        add_note(notes, number, first, second, motion_of(base).time)
+
+
+@preparing
+def _of_blow(base, stiffness, notes):
+    """What the last whole blow tells."""
+    head, blow = head_records(base, 1)[0], last_blow(base)[0]
+    head.blows_seen = motion_of(base).blow_count
+    if head.rock == RockKind.BILINEAR or head.rock == RockKind.SPRING:
+        depth = blow.peak_bit_force / stiffness
+        if depth > BUTTON_LENGTH:
+            _tell(base, notes, Note.BUTTON, 1e3 * depth, 0.0)
+    if head.rock != RockKind.NONE and blow.period > 0.0:
+        rate = blow.hole_advance / blow.period
+        if rate > MOST_RATE:
+            _tell(base, notes, Note.RATE, rate, 0.0)
+
+
+@preparing
+def _of_state(base, notes):
+    """What ledger, counts and forces tell."""
+    head, motion = head_records(base, 1)[0], motion_of(base)
+    if head.scene_seen == 0:
+        head.scene_seen = 1
+        if max(head.time_share, head.energy_share) > MOST_BARRIER:
+            _tell(base, notes, Note.BARRIER, head.time_share, head.energy_share)
+    reading = read(base, False)
+    row, share = reading[0], residual(reading)
+    if not abs(share) <= MOST_RESIDUAL:
+        _tell(base, notes, Note.LEDGER, share, 0.0)
+    taken = numerical(reading)
+    if not taken >= LEAST_NUMERICAL:
+        _tell(base, notes, Note.GIVES_ENERGY, taken, 0.0)
+    elif taken > MOST_NUMERICAL:
+        _tell(base, notes, Note.TAKES_ENERGY, 100.0 * taken, 0.0)
+    locked, storms = count_of(base, head.locked_at), count_of(base, head.storms_at)
+    if locked > 0:
+        _tell(base, notes, Note.LOCKED, locked, 1.0 if locked == 1 else 2.0)
+    if storms > 0:
+        _tell(base, notes, Note.STORM, storms, 1.0 if storms == 1 else 2.0)
+    if head.rock == RockKind.NONE:
+        return
+    if int(row.drilling_mode) != Mode.FF or row.bit_impulse != head.impulse_seen:
+        head.pushed_at, head.impulse_seen = motion.time, row.bit_impulse
+    if motion.time - head.pushed_at > LONGEST_FLIGHT:
+        _tell(base, notes, Note.FLIGHT, motion.time - head.pushed_at, 0.0)
+
+
+@preparing
+def look(base, stiffness, notes):
+    """Add notes that are new.
+
+    Parameters
+    ----------
+    stiffness : float
+        K_R of the rock now [N/m].
+    notes : int
+        Address of the notes.
+    """
+    head, motion = head_records(base, 1)[0], motion_of(base)
+    if motion.time < head.check_at - INTERVAL:  # an older state has been restored
+        head.check_at = head.pushed_at = motion.time
+    due = motion.time >= head.check_at
+    if motion.blow_count != head.blows_seen:
+        _of_blow(base, stiffness, notes)
+    if due:
+        head.check_at = motion.time + INTERVAL
+        _of_state(base, notes)

@@ -1,0 +1,147 @@
+"""Outputs of the hammer from its motion, in the order of the FMU's outputs."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fmu_src.hammer.outputs import OUTPUTS
+from fmu_src.native.layout import last_blow, motion_of
+from fmu_src.native.motion import (
+    rate_decay,
+    read,
+    read_stress,
+    settle_before,
+)
+from percussion_model.physics.kernel import preparing
+from percussion_model.physics.ledger import DISSIPATED, NUMERICAL, STORED, WORKS
+from percussion_model.physics.records import BLOW, READING, Mode
+from percussion_model.solvers.state import words_of
+
+# Flags of a reading, as the shell has them (fmu_src/native/shell.h).
+WITH_PEAKS, WITH_STRESS, TO_SAVE = 1, 2, 4
+# An impulse below this in a communication step is no contact [N s].
+NO_CONTACT = 1e-9
+
+_WORD, _BLOW_WORD = words_of(READING), words_of(BLOW)
+# Words of a reading by the entry of the ledger that they are.
+_START = _WORD["e_start"]
+_WORKS = tuple(_WORD[f"e_{name}"] for name in WORKS)
+_DISSIPATED = tuple(_WORD[f"e_{name}"] for name in DISSIPATED)
+_NUMERICAL = tuple(_WORD[f"e_{name}"] for name in NUMERICAL)
+_STORED = tuple(_WORD[name] for name in STORED)
+
+AT = {name: k for k, name in enumerate(OUTPUTS)}
+OUTPUT_COUNT = len(AT)
+# Outputs that are a field of what is read, or of the last blow.
+READ = (
+    ("hole_depth", "hole_depth"),
+    ("bit.position", "bit_position"),
+    ("bit.velocity", "bit_velocity"),
+    ("bit.force", "bit_force"),
+    ("bit.force_peak", "peak_bit_force"),
+    ("bit.impulse", "bit_impulse"),
+    ("contact.force", "contact_force"),
+    ("contact.force_peak", "peak_contact_force"),
+    ("contact.impulse", "contact_impulse"),
+    ("piston.position", "piston_position"),
+    ("piston.velocity", "piston_velocity"),
+    ("drilling_mode", "drilling_mode"),
+)
+OF_BLOW = (
+    ("piston.stroke", "stroke"),
+    ("impact_velocity", "impact_velocity"),
+    ("blow_energy", "blow_energy"),
+    ("penetration_per_blow", "hole_advance"),
+    ("blow_time", "time"),
+    ("blow_position", "bit_position"),
+)
+_READ = tuple((AT[name], _WORD[field]) for name, field in READ)
+_OF_BLOW = tuple((AT[name], _BLOW_WORD[field]) for name, field in OF_BLOW)
+RATE, FREQUENCY, EFFICIENCY = (
+    AT[name] for name in ("rate_of_penetration", "blow_frequency", "transfer_efficiency")
+)
+BIT_MEAN, CONTACT_MEAN = AT["bit.force_mean"], AT["contact.force_mean"]
+CASING, CASING_IMPULSE = AT["casing_force"], AT["casing.impulse"]
+STRESS, RESIDUAL = AT["gauge_stress"], AT["energy_residual"]
+BLOWS, OFF_BOTTOM = AT["blow_count"], AT["off_bottom"]
+
+
+@preparing
+def defined(value):
+    """A number, 0 where it is not defined."""
+    return value if value == value else 0.0
+
+
+@preparing
+def sum_of(seen, words):
+    """Sum of some numbers of a reading."""
+    total = 0.0
+    for word in words:
+        total += defined(seen[word])
+    return total
+
+
+@preparing
+def energy_put_in(seen):
+    """Energy put in so far, to which what is unexplained is compared [J]."""
+    moved = 0.0
+    for word in _WORKS:
+        moved += abs(defined(seen[word]))
+    return abs(defined(seen[_START])) + moved
+
+
+@preparing
+def residual(reading):
+    """Share of the energy put in that the ledger leaves unexplained."""
+    seen = reading.view(np.float64)
+    rest = defined(seen[_START]) + sum_of(seen, _WORKS) - sum_of(seen, _STORED)
+    rest = rest - sum_of(seen, _DISSIPATED) - sum_of(seen, _NUMERICAL)
+    scale = energy_put_in(seen)
+    return rest / scale if scale > 0.0 else 0.0
+
+
+@preparing
+def numerical(reading):
+    """Share of the energy put in that the discretisation took."""
+    seen = reading.view(np.float64)
+    scale = energy_put_in(seen)
+    return defined(seen[_NUMERICAL[0]]) / scale if scale > 0.0 else 0.0
+
+
+@preparing
+def mean_force(motion, impulse, before):
+    """Mean force over the last step, by the impulses at its end and start [N]."""
+    return (impulse - before) / motion.step_size if motion.step_size != 0.0 else 0.0
+
+
+@preparing
+def fill_outputs(base, flags, out):
+    """Fill the outputs; peaks and stress only where they are asked for."""
+    if flags & TO_SAVE:
+        # what was read is no part of a saved state: another may come to stand here
+        settle_before(base)
+        motion_of(base).is_read = 0
+        return
+    peaks = flags & WITH_PEAKS != 0
+    motion, reading, blow = motion_of(base), read(base, peaks), last_blow(base)[0]
+    row = reading[0]
+    settle_before(base)
+    seen, hit = reading.view(np.float64), last_blow(base).view(np.float64)
+    for at, word in _READ:
+        out[at] = defined(seen[word])
+    for at, word in _OF_BLOW:
+        out[at] = defined(hit[word])
+    share = rate_decay(base)
+    out[RATE] = share * defined(blow.hole_advance) / blow.period if share > 0.0 else 0.0
+    out[FREQUENCY] = share / blow.period if share > 0.0 else 0.0
+    energy = blow.blow_energy
+    out[EFFICIENCY] = defined(blow.rock_energy) / energy if energy > 0.0 else 0.0
+    out[BIT_MEAN] = mean_force(motion, row.bit_impulse, motion.before[0])
+    out[CONTACT_MEAN] = mean_force(motion, row.contact_impulse, motion.before[1])
+    out[CASING], out[CASING_IMPULSE] = -defined(row.drive_force), -defined(row.drive_impulse)
+    if flags & WITH_STRESS:
+        out[STRESS] = read_stress(base)
+    out[RESIDUAL] = residual(reading)
+    out[BLOWS] = motion.blow_count
+    free = int(row.drilling_mode) == Mode.FF
+    out[OFF_BOTTOM] = free and abs(row.bit_impulse - motion.before[0]) < NO_CONTACT

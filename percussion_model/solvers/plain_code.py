@@ -1,0 +1,134 @@
+"""Plain functions of scenes and their numbers that kernels call as well: each is written once.
+
+Scenes are read without numba, which takes a second to load; here numba learns to compile
+what it needs of them. Kernels that call such a function import it from its own module, and
+this module beside it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from numba.extending import overload, register_jitable
+
+from percussion_model.physics.effects import EFFECTS
+from percussion_model.physics.kernel import composed
+from percussion_model.scene import bars, contradictions, solver_choice
+from percussion_model.solvers import setup
+from percussion_model.solvers.chain import resolution as chain_resolution
+from percussion_model.solvers.modal import resolution as modal_resolution
+from percussion_model.solvers.rigid import restitution as rigid_restitution
+from percussion_model.solvers.wave import grid as wave_grid
+from percussion_model.solvers.wave import records as wave_records
+from percussion_model.solvers.wave import resolution as wave_resolution
+
+for _function in (
+    bars.section_wave_speed,
+    bars.section_impedance,
+    bars.section_mass,
+    bars.section_transit_time,
+    bars.add,
+    bars.bar_mass,
+    bars.bar_length,
+    bars.bar_transit_time,
+    solver_choice.why_waves,
+    contradictions.find_contradiction,
+    contradictions._in_string,
+    contradictions._in_fidelity,
+    contradictions._in_accuracy,
+    setup.barrier_on,
+    setup.kelvin_voigt_time,
+    setup.rock_numbers,
+    setup.fill_parameters,
+    setup.fill_start,
+    setup.elastic_times,
+    wave_grid.section_count,
+    wave_grid.section_misfit,
+    wave_grid.misfit,
+    wave_grid.elastic_piston,
+    wave_grid.fitting_cells,
+    wave_grid.choose_time_step,
+    wave_grid.wish_for,
+    wave_grid.substeps,
+    wave_records.no_operators,
+    wave_resolution.in_first_bar,
+    wave_resolution.cells_by_rule,
+    wave_resolution.cells_to_fit,
+    wave_resolution.cells_that_fit,
+    wave_resolution.asked_cells,
+    wave_resolution.asked_wish,
+    modal_resolution.asked_modes,
+    modal_resolution.default_modes,
+    modal_resolution.modes_for,
+    rigid_restitution.st_venant_restitution,
+    rigid_restitution.restitution,
+    chain_resolution.steps_for,
+):
+    register_jitable(_function)
+
+
+@overload(bars._plain)
+def _rows(sections):
+    return lambda sections: sections
+
+
+@composed
+def _nothing(p: Any, values: Any) -> None:
+    pass
+
+
+def _and_number(before: Callable, field: str) -> Callable:
+    @composed
+    def fill(p: Any, values: Any) -> None:
+        before(p, values)
+        p[field] = values[field]
+
+    return fill
+
+
+def _and_effect(before: Callable, name: str, numbers: Callable) -> Callable:
+    switch = f"effects_{name}"
+
+    @composed
+    def fill(p: Any, values: Any) -> None:
+        before(p, values)
+        if values[switch]:
+            p["effects"] = 1
+            numbers(p, values)
+
+    return fill
+
+
+@overload(setup.fill_effects)
+def _effects(p, values):
+    fill = _nothing
+    for effect in EFFECTS:
+        numbers = _nothing
+        for name in effect.parameters:
+            numbers = _and_number(numbers, f"{effect.name}_{name}")
+        fill = _and_effect(fill, effect.name, numbers)
+    return lambda p, values: fill(p, values)
+
+
+def _or_effect(before: Callable, name: str) -> Callable:
+    switch = f"effects_{name}"
+
+    @composed
+    def either(values: Any) -> bool:
+        return before(values) or values[switch] != 0
+
+    return either
+
+
+@composed
+def _none(values: Any) -> bool:
+    return False
+
+
+@overload(setup.any_effect)
+def _any(values):
+    either = _none
+    for effect in EFFECTS:
+        either = _or_effect(either, effect.name)
+    return lambda values: either(values)
