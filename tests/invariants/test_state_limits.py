@@ -95,7 +95,7 @@ def test_numbers_are_finite(runs, name):
     run, good = runs[name]
     dtype = good.state.dtype
     may_be_infinite = {"gap", "t_open", "peak_from", "next_time", "next_tau", "t_next", "rest"}
-    may_be_infinite |= {"refused_value"}
+    may_be_infinite |= {"refused_value", "late_from"}
     undefined = {*COMMON_UNDEFINED, "ss_force", "refused_value"}
     if name == "rigid":
         undefined |= {"peak_contact_force"}
