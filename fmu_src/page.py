@@ -20,6 +20,8 @@ SI units; positions and velocities point down, forces on rock and contact are po
 compression. The solver takes its own steps: communication steps of any size, equal or not, give
 the same blows. Inputs are held over a communication step and must be finite and within their
 bounds. Outputs belong to the step just finished; none depends on an input at once.</p>
+"""
+NEEDS_PYTHON = """\
 <p>Needs a Python 3.11 or newer with numpy and numba in the process of the host. The kernels are
 compiled when they are used for the first time (about a minute) and kept in the user's cache
 folder; the environment variable <code>PERCUSSION_FMU_CACHE</code> names another one.</p>
@@ -37,20 +39,27 @@ grid and scatter, for constant inputs.</p>
 """
 
 
-def write_page(about: About, variables: Sequence[Variable], scene: Scene | None = None) -> str:
+def write_page(
+    about: About,
+    variables: Sequence[Variable],
+    scene: Scene | None = None,
+    needs: str = NEEDS_PYTHON,
+) -> str:
     """Return the page as HTML.
 
     Parameters
     ----------
     scene : Scene, optional
         The scene that is baked in, for its text.
+    needs : str
+        What the FMU needs of its host, HTML; said where there is a scene.
     """
     parts = [
         f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
         f"<title>{escape(about.model)}</title><style>{STYLE}</style></head><body>",
         f"<h1>{escape(about.model)}</h1><p>{escape(about.description)}. "
         f"Version {escape(about.version)}, licence {escape(about.license)}.</p>",
-        INTRODUCTION if scene is not None else "",
+        INTRODUCTION + needs if scene is not None else "",
     ]
     for causality in ("input", "output", "parameter"):
         rows = [variable for variable in variables if variable.causality == causality]

@@ -32,7 +32,7 @@ from percussion_model.scene.numbers import section_numbers
 from percussion_model.scene.rows import refuse_value
 from percussion_model.scene.scene import Scene
 from percussion_model.solvers.base import Solver, compiling_takes, place_of_kernels
-from percussion_model.solvers.wave.grid import cell_at
+from percussion_model.solvers.cells import find_cell
 
 # Solvers hold no state: instances of equal parameters share one.
 _SOLVERS: WeakValueDictionary[bytes, Solver] = WeakValueDictionary()
@@ -168,7 +168,9 @@ class PercussiveHammer(Slave):
                 f"which is {bar.length:g} m long"
             )
         grid = solver.grid_of(name)
-        return None if grid is None else Gauge(name, *cell_at(section_numbers(bar), grid, place))
+        if grid is None:
+            return None
+        return Gauge(name, *find_cell(section_numbers(bar), grid.mass, float(place)))
 
     def step(self, time: float, step_size: float) -> None:
         """Pass on changed inputs, then advance."""

@@ -11,7 +11,7 @@ from fmu_src.hammer.outputs import OUTPUTS
 from fmu_src.run import run_fmu
 from percussion_model.scene.numbers import section_numbers
 from percussion_model.scene.scene import Scene, SceneError
-from percussion_model.solvers.wave.grid import cell_at
+from percussion_model.solvers.cells import find_cell
 
 # Two steps of a power of two, whose sums have no rounding [s].
 STEP = 2.0**-10
@@ -23,7 +23,7 @@ def package_outputs(scene: Scene, steps: int = STEPS, step: float = STEP) -> np.
     motion = Motion(scene, None)
     grid = motion.solver.grid_of("bit")
     if grid is not None:
-        place = cell_at(section_numbers(scene.bit), grid, 0.5 * scene.bit.length)
+        place = find_cell(section_numbers(scene.bit), grid.mass, 0.5 * scene.bit.length)
         motion.gauge = Gauge("bit", *place)
     reads = [one.read for one in OUTPUTS.values()]
     rows = []

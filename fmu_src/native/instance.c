@@ -40,25 +40,27 @@ static void begin(Instance *one, Text *text) {
     }
 }
 
-Status refuse(Instance *one, const char *format, ...) {
+static void log_list(Instance *one, Status status, Category category, const char *format,
+                     va_list rest) {
     Text text;
-    va_list rest;
     begin(one, &text);
-    va_start(rest, format);
     text_print_list(&text, format, rest);
+    send(one, status, category, &text);
+}
+
+Status refuse(Instance *one, const char *format, ...) {
+    va_list rest;
+    va_start(rest, format);
+    log_list(one, REFUSED, ERRORS, format, rest);
     va_end(rest);
-    send(one, REFUSED, ERRORS, &text);
     return REFUSED;
 }
 
 void warn(Instance *one, const char *format, ...) {
-    Text text;
     va_list rest;
-    begin(one, &text);
     va_start(rest, format);
-    text_print_list(&text, format, rest);
+    log_list(one, WARNED, WARNINGS, format, rest);
     va_end(rest);
-    send(one, WARNED, WARNINGS, &text);
 }
 
 Status out_of_memory(Instance *one) {

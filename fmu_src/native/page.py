@@ -6,12 +6,10 @@ from collections.abc import Iterable, Sequence
 from html import escape
 
 from fmu_src.description import About
-from fmu_src.page import INTRODUCTION, write_page
+from fmu_src.page import write_page
 from fmu_src.variables import Variable
 from percussion_model.scene.scene import Scene
 
-# In the place of what the page says of Python; the paragraph before it is true of both.
-NEEDS_PYTHON = INTRODUCTION[INTRODUCTION.index("<p>Needs a Python") :]
 NEEDS_NOTHING = """<p>Needs nothing but the C library of the system. There are libraries for
 {platforms}; the numbers of the scene lie in <code>resources/model.bin</code>.</p>
 """
@@ -28,4 +26,4 @@ def write_native_page(
         Those that the FMU has a library for.
     """
     text = NEEDS_NOTHING.format(platforms=escape(", ".join(sorted(platforms))))
-    return write_page(about, variables, scene).replace(NEEDS_PYTHON, text)
+    return write_page(about, variables, scene, text)

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from fmu_src.description import depends_at_start
 from fmu_src.hammer.inputs import DRIVE_INPUTS
 from fmu_src.hammer.variables import TABLE_INPUTS, hammer_variables
 from fmu_src.native import messages
@@ -255,6 +256,21 @@ class _Writer:
             *closed_bounds(row),
         )  # fmt: skip
 
+    def _known_at_start(self, one: Variable3, found: Sequence[Variable3]) -> list[int]:
+        """Indices of the variables of FMI 3.0 on which one depends at the start."""
+        if one.causality != "output":
+            return []
+        output = self._first(one)
+        return [
+            k
+            for k, other in enumerate(found)
+            if other.members and depends_at_start(output, self._first(other))
+        ]
+
+    def _first(self, one: Variable3) -> Variable:
+        """What is said of the first member is true of all."""
+        return self.variables[self.index[one.members[0]]]
+
     def _entries(self) -> tuple[list[bytes], list[int], list[int]]:
         """Variables of FMI 3.0, indices of their members, and what outputs depend on."""
         found = fmi3_variables(self.scene)
@@ -263,7 +279,7 @@ class _Writer:
         known: list[int] = []
         for one in found:
             mine = [self.index[name] for name in one.members]
-            needed = known_at_start(one, found, self.variables[mine[0]] if mine else None)
+            needed = self._known_at_start(one, found)
             records.append(
                 ENTRY.pack(
                     one.reference, self._place(one.name), TYPES3[one.type],
@@ -273,19 +289,6 @@ class _Writer:
             members += mine
             known += needed
         return records, members, known
-
-
-def known_at_start(
-    one: Variable3, variables: Sequence[Variable3], member: Variable | None
-) -> list[int]:
-    """Indices of the variables on which a variable of FMI 3.0 depends at the start."""
-    if one.causality != "output" or member is None or member.at_start is None:
-        return []
-    return [
-        k
-        for k, other in enumerate(variables)
-        if other.causality == "parameter" or other.name in member.at_start
-    ]
 
 
 def _key(one: Variable) -> str:

@@ -563,12 +563,6 @@ def atan2(y, x):
     return -angle if bits_of(y) < 0 else angle
 
 
-@kernel
-def atan(x):
-    """Inverse tangent."""
-    return atan2(x, 1.0)
-
-
 @inlined
 def _other_leg(x):
     """Root of 1 - x**2, in two."""
@@ -589,15 +583,3 @@ def acos(x):
         return 2.0 * HALF_PI if x == -1.0 else math.nan
     root, low = _other_leg(x)
     return _half_turn(root, low, abs(x), 0.0, x < 0.0)
-
-
-@kernel
-def asin(x):
-    """Inverse sine."""
-    if abs(x) < SMALL:
-        return x
-    if not abs(x) < 1.0:
-        return math.copysign(HALF_PI, x) if abs(x) == 1.0 else math.nan
-    root, low = _other_leg(x)
-    angle = _half_turn(abs(x), 0.0, root, low, False)
-    return -angle if x < 0.0 else angle

@@ -6,6 +6,8 @@ import math
 from enum import IntEnum
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from percussion_model.physics.effects import EFFECTS
 from percussion_model.physics.records import DriveKind, Mode, Piston, RockKind
 from percussion_model.scene.bars import bar_mass, bar_transit_time
@@ -84,6 +86,13 @@ def rock_numbers(numbers: Numbers) -> RockNumbers:
         values.rock_barrier_damping if barrier else 0.0,
         values.rock_barrier_energy if barrier else 0.0,
     )
+
+
+def elastic_piston(numbers: Numbers) -> np.ndarray:
+    """Sections of an elastic piston, none of another."""
+    if PISTONS[numbers.values.piston_model] == Piston.ELASTIC:
+        return numbers.piston
+    return numbers.piston[:0]
 
 
 def elastic_times(numbers: Numbers) -> tuple[float, float]:

@@ -23,6 +23,7 @@ from percussion_model.solvers.modal.tables import (
 )
 from percussion_model.solvers.setup import (
     PISTONS,
+    elastic_piston,
     fill_parameters,
     fill_start,
     kelvin_voigt_time,
@@ -79,22 +80,10 @@ class Tables(NamedTuple):
 
 
 @preparing
-def is_elastic(numbers):
-    """Whether the piston is an elastic bar."""
-    return PISTONS[numbers.values.piston_model] == Piston.ELASTIC
-
-
-@preparing
-def elastic_piston(numbers):
-    """Sections of an elastic piston, none of another."""
-    return numbers.piston if is_elastic(numbers) else numbers.piston[:0]
-
-
-@preparing
 def fill_modal_parameters(p, numbers):
     """Fill a MODAL_PAR record; a `Request` for its tables."""
     fill_parameters(p, numbers, True)
-    elastic = is_elastic(numbers)
+    elastic = PISTONS[numbers.values.piston_model] == Piston.ELASTIC
     first = bar_transit_time(numbers.piston if elastic else numbers.bit)
     eta, rock = kelvin_voigt_time(numbers), rock_numbers(numbers)
     dt = first / asked_modes(numbers)

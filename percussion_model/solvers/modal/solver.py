@@ -21,7 +21,6 @@ from percussion_model.solvers.modal.prepare import (
     Request,
     Tables,
     begin,
-    elastic_piston,
     fill_modal_parameters,
     modes_wanted,
 )
@@ -45,7 +44,7 @@ from percussion_model.solvers.modal.resolution import (
     coarser_modes,
 )
 from percussion_model.solvers.modal.tables import forms_of, piston_tables
-from percussion_model.solvers.setup import refuse_many
+from percussion_model.solvers.setup import elastic_piston, refuse_many
 from percussion_model.solvers.state import State, aligned
 
 # Tables that were made last; so many are kept.

@@ -10,19 +10,16 @@ import numpy as np
 
 from percussion_model.physics.records import Piston
 from percussion_model.scene.bars import (
-    AREA,
-    LENGTH,
     bar_transit_time,
-    section_mass,
     section_transit_time,
 )
 from percussion_model.scene.numbers import Numbers
 from percussion_model.scene.rows import SceneError
-from percussion_model.solvers.base import Cells
 from percussion_model.solvers.setup import (
     MOST_CELLS,
     PISTONS,
     Bit,
+    elastic_piston,
     elastic_times,
     kelvin_voigt_time,
     refuse_many,
@@ -90,31 +87,6 @@ def misfit(sections: np.ndarray, time_step: float) -> float:
     return worst
 
 
-def cell_at(sections: np.ndarray, grid: Cells, place: float) -> tuple[int, float]:
-    """Cell at a place along a bar.
-
-    Parameters
-    ----------
-    place : float
-        From the top of the bar [m].
-
-    Returns
-    -------
-    cell : int
-    area : float
-        Cross-section there [m2].
-    """
-    above = 0.0
-    for section in sections:
-        if place <= section[LENGTH]:
-            break
-        above += section_mass(section)
-        place -= section[LENGTH]
-    mass = above + section_mass(section) * min(place / section[LENGTH], 1.0)
-    cell = int(np.searchsorted(np.cumsum(grid.mass), mass, side="right"))
-    return min(cell, grid.n - 1), float(section[AREA])
-
-
 def elastic_bars(numbers: Numbers) -> list[np.ndarray]:
     """Sections of the bars that get cells, the one first whose cells are counted."""
     if numbers.values.bit_model != Bit.ELASTIC:
@@ -122,13 +94,6 @@ def elastic_bars(numbers: Numbers) -> list[np.ndarray]:
     if PISTONS[numbers.values.piston_model] == Piston.ELASTIC:
         return [numbers.piston, numbers.bit]
     return [numbers.bit]
-
-
-def elastic_piston(numbers: Numbers) -> np.ndarray:
-    """Sections of an elastic piston, none of another."""
-    if PISTONS[numbers.values.piston_model] == Piston.ELASTIC:
-        return numbers.piston
-    return numbers.piston[:0]
 
 
 def choose_time_step(numbers: Numbers, cells: int) -> float:

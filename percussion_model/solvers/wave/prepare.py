@@ -7,6 +7,7 @@ from percussion_model.physics.records import Piston
 from percussion_model.solvers import plain_code  # noqa: F401  # kernels call functions of scenes
 from percussion_model.solvers.setup import (
     MOST_CHANGES,
+    elastic_piston,
     fill_parameters,
     fill_start,
     kelvin_voigt_time,
@@ -16,7 +17,6 @@ from percussion_model.solvers.wave.cutting import cut_both
 from percussion_model.solvers.wave.grid import (
     Refused,
     choose_time_step,
-    elastic_piston,
     wish_for,
 )
 from percussion_model.solvers.wave.leaps.lookahead import LOOKAHEAD

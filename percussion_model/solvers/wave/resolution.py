@@ -12,12 +12,11 @@ import numpy as np
 from percussion_model.physics.elementary import exp, log
 from percussion_model.scene.bars import bar_transit_time
 from percussion_model.scene.numbers import Numbers
-from percussion_model.solvers.setup import MOST_CELLS, elastic_times, refuse_many
+from percussion_model.solvers.setup import MOST_CELLS, elastic_piston, elastic_times, refuse_many
 from percussion_model.solvers.wave.grid import (
     Refused,
     Wish,
     elastic_bars,
-    elastic_piston,
     fitting_cells,
     section_misfits,
 )

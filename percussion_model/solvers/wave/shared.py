@@ -9,9 +9,8 @@ import numpy as np
 
 from percussion_model.physics.records import Mode
 from percussion_model.scene.numbers import Numbers
-from percussion_model.solvers.setup import kelvin_voigt_time
+from percussion_model.solvers.setup import elastic_piston, kelvin_voigt_time
 from percussion_model.solvers.wave.cutting import CutBars, cut_both
-from percussion_model.solvers.wave.grid import elastic_piston
 from percussion_model.solvers.wave.leaps.operators import (
     LOADED,
     alone,
