@@ -118,7 +118,8 @@ CASES = [
         for changes in ELASTIC_SCENES
     ),
 ]
-SETTLE, SHORT, RUNS = 1.0, 4.0, 32
+# So many runs that chance hides no share of them: with 32 one of 0.87 fell below 0.8 by a last bit.
+SETTLE, SHORT, RUNS = 1.0, 4.0, 128
 LONG_RUN = 300.0  # [s]
 
 
