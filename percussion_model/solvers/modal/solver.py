@@ -52,9 +52,8 @@ _kept: dict[tuple[Any, ...], Tables] = {}
 MOST_KEPT = 4
 
 
-def _tables(numbers: Numbers, request: Request) -> Tables:
-    """Make the tables of a scene, or find them."""
-    piston = elastic_piston(numbers)
+def _tables(numbers: Numbers, piston: np.ndarray, request: Request) -> Tables:
+    """Make the tables of a scene, whose elastic piston has such sections, or find them."""
     key = (numbers.bit.tobytes(), piston.tobytes(), *request)
     if key not in _kept:
         while len(_kept) >= MOST_KEPT:
@@ -63,7 +62,7 @@ def _tables(numbers: Numbers, request: Request) -> Tables:
         refuse_many("modes", count, MOST_MODES, ', or take waves (solver.name = "wave")')
         # in parts, as `tables_of` together: compiled with all that it calls that takes long
         forms, modes, free = forms_of(
-            numbers.bit, elastic_piston(numbers), request.piston_mass, request.springs,
+            numbers.bit, piston, request.piston_mass, request.springs,
             request.highest, request.eta, request.tick,
         )  # fmt: skip
         parts = piston_tables(free, request.eta, request.tick)
@@ -104,7 +103,7 @@ class ModalSolver(Solver):
         request = fill_modal_parameters(p, self._numbers)
         self.time_step = float(p["dt"])
         self.modes = asked_modes(numbers)
-        self._tables = made = _tables(self._numbers, request)
+        self._tables = made = _tables(self._numbers, elastic_piston(numbers), request)
         elastic = len(made.free.frequency) > 0
         self.cells = {"piston": made.shape_p.shape[1]} if elastic else {}
         self.cells["bit"] = int(made.forms.sizes[0])
