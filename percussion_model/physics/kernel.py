@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from numba import njit, types
+from numba.extending import register_jitable
 
 STAMP = "kernels.sha256"
 # Folders with functions that kernels of other files call.
@@ -80,6 +81,16 @@ def entry_of(function: Callable) -> Callable:
 # counting (which took most of a step's time), and a kernel that allocates does
 # not compile, so that it can always be built ahead of time.
 kernel = njit(cache=True, error_model="numpy", _nrt=False)
+
+
+def plain(function: Callable) -> Callable:
+    """Let kernels call what stays plain Python: it calls kernels for all that takes long.
+
+    For what is put together before a run. Compiled for Python, it would take longer to be
+    compiled and loaded than it takes to run.
+    """
+    register_jitable(function)
+    return function
 
 
 def preparing(function: Callable) -> Callable:

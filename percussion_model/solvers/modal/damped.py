@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from percussion_model.physics.kernel import kernel, preparing
+from percussion_model.physics.kernel import kernel, plain
 
 # A dashpot grows to its full size in so many stages, each with Newton steps at most; what eq. 4 has
 # too much is small.
@@ -173,7 +173,7 @@ def _fill_pairs(w, b, eta, c, roots, shapes, ends, square, decay, out, into, tak
                     taken[n + i, n + j] += both.real
 
 
-@preparing
+@plain
 def damped_pairs(frequency, ends, eta, c):
     """Return the modes of a bar with a dashpot more; none where they cannot be told apart.
 

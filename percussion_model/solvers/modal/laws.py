@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from percussion_model.physics.elementary import cos_and_sin, exp, power_of_two
-from percussion_model.physics.kernel import kernel, preparing
+from percussion_model.physics.kernel import kernel, plain
 from percussion_model.solvers.modal.damped import Pairs, damped_pairs
 from percussion_model.solvers.modal.lanes import WIDTH
 from percussion_model.solvers.modal.records import (
@@ -55,7 +55,7 @@ def _multiply(a, b, out):
                 out[i, j] += a[i, k] * b[k, j]
 
 
-@preparing
+@plain
 def _matrix(a, b):
     """Product of matrices in an order of its own."""
     out = np.zeros((a.shape[0], b.shape[1]))
@@ -63,7 +63,7 @@ def _matrix(a, b):
     return out
 
 
-@preparing
+@plain
 def _product(matrix, row):
     """Product in an order of its own: BLAS sums otherwise on other processors."""
     out = np.zeros(len(matrix))
@@ -71,7 +71,7 @@ def _product(matrix, row):
     return out
 
 
-@preparing
+@plain
 def _fill_end(rows, end, part, row):
     """Fill a row of `End`, and the one after it, by offsets or velocities of the modes."""
     n = rows.shape[1]
@@ -79,7 +79,7 @@ def _fill_end(rows, end, part, row):
     rows[end], rows[end + 1] = by[:n], by[n:]
 
 
-@preparing
+@plain
 def _ends_of(shape, pairs, eta):
     """Rows of `End` by those of `Shape`."""
     n = shape.shape[1]
@@ -102,18 +102,23 @@ def _ends_of(shape, pairs, eta):
     return rows
 
 
-@preparing
-def _folded(form):
-    """A symmetric form of numbers Q and V with what lies below its blocks of lanes added above."""
+@kernel
+def _fold(form):
     n = len(form) // 2
-    out = form.copy()
     for i in range(2 * n):
         for j in range(2 * n):
             mine, other = (i % n) // WIDTH, (j % n) // WIDTH
             if other > mine:
-                out[i, j] *= 2.0
+                form[i, j] *= 2.0
             elif other < mine:
-                out[i, j] *= 0.0
+                form[i, j] *= 0.0
+
+
+@plain
+def _folded(form):
+    """A symmetric form of numbers Q and V with what lies below its blocks of lanes added above."""
+    out = form.copy()
+    _fold(out)
     return out
 
 
@@ -186,13 +191,13 @@ def _fill_scans(square, decay, tick, ends, one, other, scans):
                     scans[hop, 4 * k + row, look] = view[row]
 
 
-@preparing
+@plain
 def _rest(shape):
     """Offsets of the modes where loads hold them that accelerate a free bit by 1 m/s2 [m]."""
     return shape[Shape.SOFT] * shape[Shape.BIT]
 
 
-@preparing
+@plain
 def _put(room, table):
     """Put a table into room for as many numbers, or more, in each of its four quarters."""
     n, most = len(table) // 2, len(room) // 2
@@ -202,7 +207,7 @@ def _put(room, table):
             room[row * most : row * most + n, column * most : column * most + n] = quarter
 
 
-@preparing
+@plain
 def _got(room, n):
     """A table as it was put there."""
     most = len(room) // 2
@@ -214,7 +219,7 @@ def _got(room, n):
     return table
 
 
-@preparing
+@plain
 def _pass(forms, one, other, out, into):
     """Table from the pairs of a law to those of another, and what an acceleration adds."""
     n = forms.sizes[0]
@@ -235,7 +240,7 @@ def _pass(forms, one, other, out, into):
     return table, push
 
 
-@preparing
+@plain
 def _over(forms, sizes, out, into):
     """Tables from the pairs of a law to those that may follow: `way`, `over`, `pushed`."""
     n = forms.sizes[0]
@@ -254,7 +259,7 @@ def _over(forms, sizes, out, into):
     return way, over, pushed
 
 
-@preparing
+@plain
 def _pairs_of(shape, held, dashpot, eta):
     """Pairs of a law: of a free form its modes, else damped modes, none where there are none."""
     n, stiff = shape.shape[1], shape[Shape.STIFF]
@@ -264,7 +269,7 @@ def _pairs_of(shape, held, dashpot, eta):
     return damped_pairs(np.sqrt(stiff), shape[Shape.LOW], eta, dashpot - eta * held)
 
 
-@preparing
+@plain
 def laws_of(forms, dashpot, eta, tick):
     """Tables of all laws; the pairs of a free bit are its own modes.
 
@@ -310,14 +315,14 @@ def laws_of(forms, dashpot, eta, tick):
         ends[law, :, :n] = own
         square, decay = pairs.square, pairs.decay
         _fill_goes(square, decay, tick, move[law])
-        other = End.PULL
+        other = End.PULL.value
         if law < 2 * JOINED:
-            other, loads = End.TOP, _rest(shape)
+            other, loads = End.TOP.value, _rest(shape)
             for row, place in ((Rest.LOW, Shape.LOW), (Rest.TOP, Shape.TOP), (Rest.BIT, Shape.BIT)):
                 rest[law, row] = _product(shape[place : place + 1], loads)[0]
             _fill_views(square, decay, tick, own, views[law])
-        _fill_scans(square, decay, tick, own, End.LOW, End.SPEED, scans[law])
-        _fill_scans(square, decay, tick, own, other, End.PISTON_SPEED, sides[law])
+        _fill_scans(square, decay, tick, own, End.LOW.value, End.SPEED.value, scans[law])
+        _fill_scans(square, decay, tick, own, other, End.PISTON_SPEED.value, sides[law])
     way, over, pushed = _over(forms, sizes, out, into)
     return Laws(
         sizes, dashpots, move, ends, out, into, taken, rest, views, scans, sides, way, over, pushed

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from percussion_model.physics.elementary import atan2, cos, sin
-from percussion_model.physics.kernel import kernel, preparing
+from percussion_model.physics.kernel import kernel, plain, preparing
 from percussion_model.scene.bars import (
     add,
     bar_transit_time,
@@ -65,7 +65,7 @@ class Modes(NamedTuple):
     top_mass: float
 
 
-@preparing
+@plain
 def summed(modes, rows):
     """What belongs to each shape, by what belongs to each wave (first axis of a matrix)."""
     out = rows.copy()
@@ -73,23 +73,29 @@ def summed(modes, rows):
     return out
 
 
-@preparing
-def _shape_at(modes, section, share):
-    """Shape at a place of a section, after such a share of its length."""
-    waves = np.zeros((len(modes.wave), 1))
+@kernel
+def _fill_shape(modes, section, share, waves):
+    """Fill the one column of a matrix with the waves at a place, after a share of a section."""
     for k in range(len(modes.wave)):
         phase = modes.phase[k, section] + modes.wave[k] * (modes.transit[section] * share)
         waves[k, 0] = modes.size[k, section] * cos(phase)
-    return summed(modes, waves)[:, 0]
 
 
-@preparing
+@plain
+def _shape_at(modes, section, share):
+    """Shape at a place of a section, after such a share of its length."""
+    waves = np.zeros((len(modes.wave), 1))
+    _fill_shape(modes, section, share, waves)
+    return summed(modes, waves)[:, 0].copy()
+
+
+@plain
 def shape_above(modes, section):
     """Shape at the top of a section."""
     return _shape_at(modes, section, 0.0)
 
 
-@preparing
+@plain
 def shape_low(modes):
     """Shape at the low end."""
     return _shape_at(modes, len(modes.transit) - 1, 1.0)
@@ -202,7 +208,7 @@ def _find_modes(impedance, transit, mass, top_mass, spring, frequency, size, pha
             size[k, i] /= math.sqrt(modal)
 
 
-@preparing
+@plain
 def bar_modes(sections, count, spring=0.0, top_mass=0.0):
     """Return the lowest modes of a bar.
 
@@ -236,7 +242,17 @@ def bar_modes(sections, count, spring=0.0, top_mass=0.0):
     )
 
 
-@preparing
+@kernel
+def _yields_left(low, frequency, spring):
+    """What modes but the last one leave of the offset by a force of 1 N at the low end [m/N]."""
+    total, rest = 1.0, 0.0
+    for k in range(len(low) - 1):
+        share = low[k] / frequency[k]
+        total, rest = add(total, rest, -spring * (share * share))
+    return (total + rest) / spring
+
+
+@plain
 def with_residual(modes, spring):
     """Return the modes of a bar on a spring with what those left out yield in place of the last.
 
@@ -257,19 +273,14 @@ def with_residual(modes, spring):
     """
     n = len(modes.frequency) - 1
     low = shape_low(modes)
-    total, rest = 1.0, 0.0
-    for k in range(n):
-        share = low[k] / modes.frequency[k]
-        total, rest = add(total, rest, -spring * (share * share))
-    yields = (total + rest) / spring
+    yields = _yields_left(low, modes.frequency, float(spring))
     if not yields > LEAST_YIELD / spring:
         return modes
     frequency, wave = modes.frequency.copy(), modes.wave.copy()
     size, phase, last = modes.size.copy(), modes.phase.copy(), np.zeros(n + 1)
     wave[n] = 0.0
     size[n], phase[n] = 1.0, 0.0
-    for k in range(n):
-        last[k] = -low[k] / (modes.frequency[k] * modes.frequency[k])
+    last[:n] = -low[:n] / (modes.frequency[:n] * modes.frequency[:n])
     last[n] = 1.0 / spring
     # by quadrature: as a difference of squares it would lose its digits
     nodes, weights = np.zeros(2 * n + 20), np.zeros(2 * n + 20)
@@ -285,7 +296,7 @@ def with_residual(modes, spring):
     )  # fmt: skip
 
 
-@preparing
+@plain
 def count_below(sections, highest):
     """Elastic modes below a frequency [rad/s]; with several sections there may be some more."""
     return round(bar_transit_time(sections) * highest / math.pi)
@@ -311,7 +322,7 @@ def _fill_products(mass, transit, w, size, phase, w_2, size_2, phase_2, out):
             out[k, j] = total
 
 
-@preparing
+@plain
 def products(one, first, other, second, count):
     """Products of the shapes of two bars over so many sections that they share.
 
@@ -348,7 +359,7 @@ def products(one, first, other, second, count):
     return found
 
 
-@preparing
+@plain
 def totals(modes, first, count):
     """Integral of each shape over the mass of so many sections [kg^0.5]."""
     sections = len(modes.mass)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from percussion_model.physics.kernel import preparing
+from percussion_model.physics.kernel import plain
 from percussion_model.physics.records import Piston, RockKind
 from percussion_model.scene.bars import bar_transit_time
 from percussion_model.solvers import plain_code  # noqa: F401  # kernels call functions of scenes
@@ -79,7 +79,7 @@ class Tables(NamedTuple):
     laws: Laws
 
 
-@preparing
+@plain
 def fill_modal_parameters(p, numbers):
     """Fill a MODAL_PAR record; a `Request` for its tables."""
     fill_parameters(p, numbers, True)
@@ -88,34 +88,34 @@ def fill_modal_parameters(p, numbers):
     eta, rock = kelvin_voigt_time(numbers), rock_numbers(numbers)
     dt = first / asked_modes(numbers)
     tick = dt / (1 << STEP)
-    p.eta, p.dt, p.tick = eta, dt, tick
+    p["eta"], p["dt"], p["tick"] = eta, dt, tick
     # a period of the highest of few modes; a rigid piston pushes hardest at once
-    p.window = (2.0 if elastic else 1.0) * first / default_modes(numbers)
-    p.transit = int(bar_transit_time(numbers.bit) / tick)
-    if p.piston == Piston.ABSENT:
-        p.mass_p = 0.0
+    p["window"] = (2.0 if elastic else 1.0) * first / default_modes(numbers)
+    p["transit"] = int(bar_transit_time(numbers.bit) / tick)
+    if p["piston"] == Piston.ABSENT:
+        p["mass_p"] = 0.0
     else:
-        p.start_gap = numbers.values.start_gap
-    p.bound_p = math.sqrt(end_compliance(numbers.piston, False)) if elastic else 0.0
-    p.bound_b = math.sqrt(end_compliance(numbers.bit, False))
-    p.bound_t = math.sqrt(end_compliance(numbers.bit, True))
-    p.k_r, p.gamma, p.c_r = rock.k_r, rock.gamma, rock.c_r
+        p["start_gap"] = numbers.values.start_gap
+    p["bound_p"] = math.sqrt(end_compliance(numbers.piston, False)) if elastic else 0.0
+    p["bound_b"] = math.sqrt(end_compliance(numbers.bit, False))
+    p["bound_t"] = math.sqrt(end_compliance(numbers.bit, True))
+    p["k_r"], p["gamma"], p["c_r"] = rock.k_r, rock.gamma, rock.c_r
     # forces that change from step to step leave no law that pairs could go by
-    p.leaps = numbers.values.solver_leaps and p.effects == 0
-    bilinear = p.rock == RockKind.BILINEAR
-    loading = rock.k_r if bilinear or p.rock == RockKind.SPRING else 0.0
+    p["leaps"] = numbers.values.solver_leaps and p["effects"] == 0
+    bilinear = p["rock"] == RockKind.BILINEAR
+    loading = rock.k_r if bilinear or p["rock"] == RockKind.SPRING else 0.0
     springs = (loading, rock.gamma * rock.k_r if bilinear else 0.0)
-    return Request(p.mass_p, springs, rock.c_r, math.pi / dt, eta, tick)
+    return Request(p["mass_p"], springs, rock.c_r, math.pi / dt, eta, tick)
 
 
-@preparing
+@plain
 def modes_wanted(numbers, request):
     """Modes of the bit, of an elastic piston, and of both where they are joined."""
     piston = elastic_piston(numbers)
     return mode_counts(numbers.bit, piston, request.piston_mass, request.highest)
 
 
-@preparing
+@plain
 def forms_for(numbers, request):
     """Forms of a scene, as `forms_of` has them."""
     return forms_of(
@@ -124,7 +124,7 @@ def forms_for(numbers, request):
     )  # fmt: skip
 
 
-@preparing
+@plain
 def tables_of(numbers, request):
     """`Tables` of a scene."""
     eta, tick = request.eta, request.tick
@@ -134,7 +134,7 @@ def tables_of(numbers, request):
     return Tables(forms, modes, free, shape_p, move_p, laws)
 
 
-@preparing
+@plain
 def begin(p, s, w, active, numbers):
     """Fill state and modes at time zero.
 
@@ -147,12 +147,12 @@ def begin(p, s, w, active, numbers):
     numbers : Numbers
     """
     fill_start(s, numbers)
-    s.leap_end = s.law = -1
-    s.v_low = s.v_b
-    s.alert = 1
-    s.active = active
-    w[1, 0] = math.sqrt(p.mass_b) * s.v_b
-    if p.piston != Piston.ABSENT:
-        s.u_p = s.u_r = -s.gap
-    s.e_start = 0.5 * (w[1, 0] * w[1, 0])
-    s.e_start += 0.5 * p.mass_p * s.v_p * s.v_p
+    s["leap_end"] = s["law"] = -1
+    s["v_low"] = s["v_b"]
+    s["alert"] = 1
+    s["active"] = active
+    w[1, 0] = math.sqrt(p["mass_b"]) * s["v_b"]
+    if p["piston"] != Piston.ABSENT:
+        s["u_p"] = s["u_r"] = -s["gap"]
+    s["e_start"] = 0.5 * (w[1, 0] * w[1, 0])
+    s["e_start"] += 0.5 * p["mass_p"] * s["v_p"] * s["v_p"]

@@ -10,7 +10,7 @@ import numpy as np
 
 from percussion_model.physics.kernel import entry_of
 from percussion_model.scene.bar_groups import Bar
-from percussion_model.scene.numbers import Numbers, numbers_of, scene_numbers
+from percussion_model.scene.numbers import Numbers, numbers_of
 from percussion_model.scene.scene import Scene
 from percussion_model.solvers.base import Solver
 from percussion_model.solvers.modal.advance import TICK_ROUNDING, run
@@ -96,8 +96,7 @@ class ModalSolver(Solver):
     def __init__(self, scene: Scene) -> None:
         super().__init__(scene)
         numbers = numbers_of(scene)
-        # kernels take the parameters as a record
-        self._numbers = Numbers(scene_numbers(scene)[0], numbers.piston, numbers.bit)
+        self._numbers = numbers
         self._par = np.zeros(1, MODAL_PAR)
         p: Any = self._par[0]
         request = fill_modal_parameters(p, self._numbers)

@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from percussion_model.physics.elementary import cos_and_sin, exp, power_of_two
-from percussion_model.physics.kernel import kernel, preparing
+from percussion_model.physics.kernel import kernel, plain
 from percussion_model.scene.bars import AREA, LENGTH, YOUNGS_MODULUS, bar_mass, section_mass
 from percussion_model.solvers.modal.lanes import WIDTH
 from percussion_model.solvers.modal.modes import (
@@ -85,7 +85,7 @@ def _fill_moves(w, eta, tick, nodes, weights, out):
             row[Move.V_BY_Q, k], row[Move.V_BY_V, k] = c, d
 
 
-@preparing
+@plain
 def moves_of(frequency, eta, tick):
     """Table of moves over 2^level ticks, shape (LEVELS, MOVES, n)."""
     nodes, weights = np.zeros(NODES), np.zeros(NODES)
@@ -95,13 +95,13 @@ def moves_of(frequency, eta, tick):
     return out
 
 
-@preparing
+@plain
 def _lanes(count):
     """So many modes, in whole lanes."""
     return max(1, -(-count // WIDTH)) * WIDTH
 
 
-@preparing
+@plain
 def mode_counts(bit, piston, piston_mass, highest):
     """Modes of the bit by itself, of an elastic piston, and of both where they are joined.
 
@@ -119,7 +119,7 @@ def mode_counts(bit, piston, piston_mass, highest):
     return n_bit, n_piston, n_bit + n_piston if piston_mass > 0.0 else n_bit
 
 
-@preparing
+@plain
 def _shapes(modes, above):
     """Rows of `Shape` of a bar whose first sections, so many, are the piston's."""
     n = len(modes.frequency)
@@ -137,7 +137,7 @@ def _shapes(modes, above):
     return row
 
 
-@preparing
+@plain
 def _modes_of_form(form, bit, both, piston_mass, counts, stiff):
     """Modes of one form, the last of which yields what those left out do."""
     n_bit, n_piston, n = counts
@@ -148,7 +148,7 @@ def _modes_of_form(form, bit, both, piston_mass, counts, stiff):
     return with_residual(modes, stiff[form]) if stiff[form] > 0.0 else modes
 
 
-@preparing
+@plain
 def _fill_changes(found, above, sections, sizes, change):
     """Fill what the modes of one form become in another."""
     for one in range(FORMS):
@@ -167,7 +167,20 @@ def _fill_changes(found, above, sections, sizes, change):
             change[one, other % JOINED, : part.shape[1], : part.shape[0]] = part.T
 
 
-@preparing
+@kernel
+def _fill_yields(shape, move, yields):
+    """Fill how far the rock end goes with the modes of so many lanes."""
+    for form in range(yields.shape[0]):
+        for level in range(yields.shape[1]):
+            total = 0.0
+            for k in range(shape.shape[2]):
+                low = shape[form, Shape.LOW, k]
+                total += low * low * move[form, level, Move.YIELD, k]
+                if k % WIDTH == WIDTH - 1:
+                    yields[form, level, k // WIDTH] = total
+
+
+@plain
 def forms_of(bit, piston, piston_mass, springs, highest, eta, tick):
     """Tables of all forms, their modes, and those of the free piston.
 
@@ -227,18 +240,11 @@ def forms_of(bit, piston, piston_mass, springs, highest, eta, tick):
             part = products(found[JOINED + form], 0, free, 0, above)
             join[form, :n_piston, : len(part)] = part[:, 1:].T
     yields = np.zeros((FORMS, LEVELS, n // WIDTH))
-    for form in range(FORMS):
-        for level in range(LEVELS):
-            total = 0.0
-            for k in range(n):
-                low = shape[form, Shape.LOW, k]
-                total += low * low * move[form, level, Move.YIELD, k]
-                if k % WIDTH == WIDTH - 1:
-                    yields[form, level, k // WIDTH] = total
+    _fill_yields(shape, move, yields)
     return Forms(sizes, stiff, shape, move, yields, change, join), found, free
 
 
-@preparing
+@plain
 def piston_tables(free, eta, tick):
     """Shapes and moves of the elastic modes of a free piston."""
     if len(free.frequency) == 0:
@@ -252,7 +258,7 @@ def piston_tables(free, eta, tick):
     return _shapes(elastic, 0), moves_of(elastic.frequency, eta, tick)
 
 
-@preparing
+@plain
 def end_compliance(sections, from_below):
     """Offset of an end from the mean of a free bar, by a constant force there [m/N].
 
