@@ -18,7 +18,7 @@ from percussion_model import Scene, SceneError, settled
 from percussion_model.analysis.study import Study, grid, study, table, workers
 from percussion_model.analysis.study.response import COMPUTING, KINDS, run_points
 from percussion_model.analysis.study.store import PARTS, PLAN
-from percussion_model.interface.cli import app
+from percussion_model.interface.cli import INTERRUPTED, _guarded, app
 from percussion_model.simulation.files import ResultError, to_json
 from percussion_model.solvers import sources
 from percussion_model.solvers.modal import solver as modal
@@ -255,7 +255,7 @@ def test_ctrl_c_ends_a_study_at_once_and_says_what_is_kept(tmp_path):
         "from percussion_model.interface.cli import main; main()",
         "study",
     ]
-    words += [str(scene), "--over", "feed.force=1:9000:20000", "--processes", "2"]
+    words += [str(scene), "--over", "feed.force=1:9000:90000", "--processes", "2"]
     for number, wait in enumerate((2.0, 6.0)):
         out = ["--out", str(tmp_path / f"out{number}")]
         child = subprocess.Popen(
@@ -276,6 +276,27 @@ def test_ctrl_c_ends_a_study_at_once_and_says_what_is_kept(tmp_path):
         assert "Traceback" not in errors
         if (tmp_path / f"out{number}" / PARTS).is_dir():
             assert "the same command continues" in " ".join(errors.split())
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, SystemError])
+def test_ctrl_c_while_the_report_is_written_says_what_is_kept(error, tmp_path, monkeypatch, capsys):
+    """It may come out of compiled code as a `SystemError`."""
+
+    def interrupted(found, folder):
+        try:
+            raise KeyboardInterrupt
+        except KeyboardInterrupt as cause:
+            raise error from cause
+
+    monkeypatch.setattr("percussion_model.interface.commands.study._report", interrupted)
+    scene, out = tmp_path / "scene.toml", tmp_path / "out"
+    SCENE.to_toml(scene)
+    words = ["study", str(scene), "--over", "feed.force=1500,4000", "--processes", "1"]
+    words += ["--out", str(out)]
+    assert _guarded(lambda: app(words, standalone_mode=False)) == INTERRUPTED
+    told = " ".join(capsys.readouterr().err.split())
+    assert told.endswith(f"finished points are kept in {out}, the same command continues")
+    assert (out / "points.parquet").is_file()
 
 
 def test_a_cluster_finds_the_same_and_survives_a_worker(whole, tmp_path):

@@ -65,7 +65,7 @@ def bench_controller(
     interrupted = False
 
     try:
-        with progress_bar(0.0) as bar:
+        with common.interruptible(), progress_bar(0.0) as bar:
             bench(
                 system, _load(controller), values, trials or (), scores.append, trust, bar,
                 check_step=step_check, tell=common.print_message,

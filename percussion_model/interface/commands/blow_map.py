@@ -91,7 +91,8 @@ def _made(scene: Scene, workers: int | None = None) -> BlowTable:
     from percussion_model.analysis.blow_maps import kept_parts
 
     try:
-        return ready_map(scene, workers)
+        with common.interruptible():
+            return ready_map(scene, workers)
     except KeyboardInterrupt:
         if not (count := kept_parts(scene)):
             raise

@@ -342,6 +342,17 @@ def is_interruption(error: BaseException) -> bool:
     return False
 
 
+@contextmanager
+def interruptible() -> Iterator[None]:
+    """Have all that comes of Ctrl-C be a `KeyboardInterrupt`."""
+    try:
+        yield
+    except SystemError as error:
+        if not is_interruption(error):
+            raise
+        raise KeyboardInterrupt from error
+
+
 def print_message(message: str, code: int = 0, program: str = "percussion") -> int:
     """Print one message on stderr; return the exit code.
 

@@ -83,24 +83,25 @@ def study(
     common.check_outputs(out, None)
     chosen = common.load_scene(scene, solver, cells, settings)
     try:
-        with count_bar("points") as report_count:
-            found = run_study(
-                chosen,
-                points,
-                out,
-                tolerance,
-                scatter=scatter,
-                processes=processes,
-                cluster=cluster,
-                progress=report_count,
-            )
+        with common.interruptible():
+            with count_bar("points") as report_count:
+                found = run_study(
+                    chosen,
+                    points,
+                    out,
+                    tolerance,
+                    scatter=scatter,
+                    processes=processes,
+                    cluster=cluster,
+                    progress=report_count,
+                )
+            files = found.save(out)
+            if report:
+                with progress("report"):
+                    files += _report(found, out)
     except KeyboardInterrupt:
         words = f"interrupted; finished points are kept in {out}, the same command continues"
         raise typer.Exit(common.print_message(words, common.INTERRUPTED)) from None
-    files = found.save(out)
-    if report:
-        with progress("report"):
-            files += _report(found, out)
     show_study(found)
     common.list_files(files)
     if any(found.failures):

@@ -30,6 +30,8 @@ from percussion_model.solvers.setup import (
     rock_numbers,
 )
 
+MOST_TICKS = 2.0**62  # that a number of a record holds
+
 
 class Request(NamedTuple):
     """What the tables of a scene follow from, besides its bars.
@@ -91,7 +93,8 @@ def fill_modal_parameters(p, numbers):
     p["eta"], p["dt"], p["tick"] = eta, dt, tick
     # a period of the highest of few modes; a rigid piston pushes hardest at once
     p["window"] = (2.0 if elastic else 1.0) * first / default_modes(numbers)
-    p["transit"] = int(bar_transit_time(numbers.bit) / tick)
+    # lengths far apart are refused for their modes
+    p["transit"] = int(min(bar_transit_time(numbers.bit) / tick, MOST_TICKS))
     if p["piston"] == Piston.ABSENT:
         p["mass_p"] = 0.0
     else:
