@@ -7,14 +7,25 @@ function keeps anything outside the memory that it is given.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
-from fmu_src.native import kinds, modal
-from fmu_src.native.image import AT, Own, fill_values, numbers_at, own_numbers, row_of
+from fmu_src.native import blow_map, kinds
+from fmu_src.native.image import (
+    AT,
+    Own,
+    fill_values,
+    gauge_sections,
+    has_rods,
+    numbers_at,
+    own_numbers,
+    row_of,
+)
 from fmu_src.native.layout import (
     MOTION_BYTES,
     GaugeBar,
+    Kind,
     Left,
     blow_records,
     head_records,
@@ -43,8 +54,14 @@ from percussion_model.scene.solver_names import BODIES
 from percussion_model.scene.values import SCENE_NUMBERS
 from percussion_model.solvers import plain_code  # noqa: F401  # kernels call functions of scenes
 from percussion_model.solvers.base import MOST_AHEAD
+from percussion_model.solvers.blow_map.records import MAP_STATE
+from percussion_model.solvers.chain.records import CHAIN_STATE
+from percussion_model.solvers.fem.records import FEM_STATE
+from percussion_model.solvers.modal.records import MODAL_STATE
+from percussion_model.solvers.rigid.records import RIGID_STATE
 from percussion_model.solvers.setup import DRIVES, PISTONS, ROCKS, any_effect, barrier_on
-from percussion_model.solvers.state import is_bounded
+from percussion_model.solvers.state import is_bounded, words_of
+from percussion_model.solvers.wave.records import WAVE_STATE
 
 # Word of each input in the record of `SCENE_NUMBERS`, and in that of a solver's state.
 INPUT_WORDS = tuple(AT[one.key.replace(".", "_")] for one in INPUTS.values())
@@ -70,10 +87,23 @@ BLOW_NUMBERS = tuple(k for k in range(len(BLOW.names or ())) if k not in BLOW_CO
 MOST_BLOWS = 2**31 - 1  # an output is a whole number of FMI
 # The host's times come from sums and products of its own; a share of the time.
 CLOCK_ROUNDING = 1e-12
-MODAL_INPUTS = tuple(modal.WORDS[field] for field in FIELDS)
-MODAL_PEAKS = tuple(
-    modal.WORDS[name] for name in ("peak_from", "peak_bit_force", "peak_contact_force")
-)
+# Records of the solvers by `Kind`, of which the first is none.
+RECORDS = {
+    Kind.MODAL: MODAL_STATE, Kind.WAVE: WAVE_STATE, Kind.CHAIN: CHAIN_STATE, Kind.FEM: FEM_STATE,
+    Kind.RIGID: RIGID_STATE, Kind.MAP: MAP_STATE,
+}  # fmt: skip
+
+
+def _words(fields: Sequence[str]) -> tuple[tuple[int, ...], ...]:
+    """Words of fields in the record of each solver, -1 where it has none."""
+    found = [words_of(RECORDS[kind]) for kind in Kind]
+    none = (-1,) * len(fields)
+    return (none, *(tuple(words.get(field, -1) for field in fields) for words in found))
+
+
+INPUTS_AT = _words(FIELDS)
+PEAKS_AT = _words(("peak_from", "peak_bit_force", "peak_contact_force"))
+GUARDS_AT = _words(("count_locked", "count_storms"))
 
 
 @preparing
@@ -156,8 +186,9 @@ def _refuse_contradiction(values, has_rods, is_barrier_given, notes):
     if rule == Rule.NOTHING.value:
         return 0
     (one, one_is), (two, two_is) = FACTS[rule]
-    first, second = _fact(values, one, one_is), _fact(values, two, two_is)
-    return set_fault(notes, FIRST_RULE + rule - 1, first, second, 0.0)
+    facts = np.zeros(4)
+    facts[0], facts[1] = _fact(values, one, one_is), _fact(values, two, two_is)
+    return set_fault(notes, FIRST_RULE + rule - 1, facts)
 
 
 @preparing
@@ -167,19 +198,20 @@ def check(image, notes):
     fill_values(image, values)
     numbers = numbers_at(image, values)
     given = own_numbers(image)[Own.BARRIER_GIVEN] != 0.0
-    fault = _refuse_contradiction(values, len(numbers.rod_counts) > 0, given, notes)
+    fault = _refuse_contradiction(values, has_rods(image), given, notes)
     if fault > 0:
         return fault
     if kind_of(numbers) == 0:
-        return set_fault(notes, Fault.SOLVER.value, 0.0, 0.0, 0.0)
-    count, most = modal.modes_of(numbers)
-    if count > most:
-        return set_fault(notes, Fault.MODES.value, count, most, 0.0)
+        return set_fault(notes, Fault.SOLVER.value, np.zeros(4))
+    facts = np.zeros(4)
+    fault = kinds.refuse(kind_of(numbers), numbers, facts)
+    if fault > 0:
+        return set_fault(notes, fault, facts)
     own = own_numbers(image)
-    on_piston = int(own[Own.GAUGE_BAR]) == GaugeBar.PISTON
-    length = bar_length(numbers.piston if on_piston else numbers.bit)
+    length = bar_length(gauge_sections(numbers, int(own[Own.GAUGE_BAR])))
     if own[Own.GAUGE_PLACE] > length:
-        return set_fault(notes, Fault.GAUGE.value, own[Own.GAUGE_PLACE], length, own[Own.GAUGE_BAR])
+        facts[0], facts[1], facts[2] = own[Own.GAUGE_PLACE], length, own[Own.GAUGE_BAR]
+        return set_fault(notes, Fault.GAUGE.value, facts)
     return 0
 
 
@@ -195,17 +227,26 @@ def create(image, table, table_size, motion, notes):
     own = own_numbers(image)
     bar, place = int(own[Own.GAUGE_BAR]), own[Own.GAUGE_PLACE]
     if place < 0.0:
-        place = 0.5 * bar_length(numbers.piston if bar == GaugeBar.PISTON else numbers.bit)
+        place = 0.5 * bar_length(gauge_sections(numbers, bar))
     if bar == GaugeBar.PISTON and PISTONS[numbers.values.piston_model] != Piston.ELASTIC:
         bar = GaugeBar.NONE.value
-    base = kinds.create(kind_of(numbers), numbers, bar, place)
+    if bar - GaugeBar.ROD >= len(numbers.rod_counts):
+        bar = GaugeBar.NONE.value
+    kind, facts = kind_of(numbers), np.zeros(4)
+    if kind == Kind.MAP:
+        fault = blow_map.refuse_map(numbers, table, table_size, facts)
+        if fault > 0:
+            return set_fault(notes, fault, facts)
+    if kind == Kind.MAP or kind == Kind.RIGID:
+        bar = GaugeBar.NONE.value
+    base = kinds.create(kind, numbers, table, bar, place)
     if base == 0:
-        return set_fault(notes, Fault.MEMORY.value, 0.0, 0.0, 0.0)
+        return set_fault(notes, Fault.MEMORY.value, facts)
     head = head_records(base, 1)[0]
     for k in range(COUNT):
-        head.inputs_at[k] = MODAL_INPUTS[k]
-    head.peak_from_at, head.peak_bit_at, head.peak_contact_at = MODAL_PEAKS
-    head.locked_at, head.storms_at = modal.LOCKED, -1
+        head.inputs_at[k] = INPUTS_AT[kind][k]
+    head.peak_from_at, head.peak_bit_at, head.peak_contact_at = PEAKS_AT[kind]
+    head.locked_at, head.storms_at = GUARDS_AT[kind]
     head.rock = ROCKS[numbers.values.effects_rock]
     _fill_acts(head, numbers, values)
     _fill_barrier(head, numbers)
@@ -219,11 +260,15 @@ def _end(base, status, notes):
     """Fault of a solver that could not go on; 0 for none."""
     if status == Status.DONE or status == Status.BLOWS_FULL:
         return 0
-    head = head_records(base, 1)[0]
+    head, facts = head_records(base, 1)[0], np.zeros(4)
     number = Fault.STOPPED.value
+    if status == Status.REFUSED and head.kind == Kind.MAP:
+        number = blow_map.explain(base, facts)
+        return set_fault(notes, number, facts)
     if status == Status.NOT_FINITE:
         number = Fault.NOT_FINITE.value
-    return set_fault(notes, number, kinds.state_time(base, base + head.state_at), 0.0, 0.0)
+    facts[0] = kinds.state_time(base, base + head.state_at)
+    return set_fault(notes, number, facts)
 
 
 @preparing
@@ -234,7 +279,11 @@ def take_step(motion, image, flags, t, size, reached, notes):
     if flags & NEW_INPUTS:
         values = np.zeros(1, SCENE_NUMBERS)
         fill_values(image, values)
-        status, in_vain = set_inputs(motion, _wanted(values))
+        wanted, facts = _wanted(values), np.zeros(4)
+        fault = kinds.refuse_inputs(motion, wanted, facts)
+        if fault > 0:
+            return set_fault(notes, fault, facts)
+        status, in_vain = set_inputs(motion, wanted)
         for k in range(COUNT):
             if in_vain & (1 << k):
                 add_note(notes, Note.IN_VAIN + k, 0.0, 0.0, t)
@@ -269,6 +318,7 @@ def find_fault(motion, state, t, notes):
     t : float
         Time that it is said to have [s].
     """
+    facts = np.zeros(4)
     m, blow = motion_records(state, 1)[0], blow_records(state + MOTION_BYTES, 1)
     good = 0 <= m.is_read <= 1 and m.left == Left.NOWHERE and 0 <= m.blow_count <= MOST_BLOWS
     good = good and 0.0 <= m.time <= LARGEST and 0.0 <= m.step_size <= LARGEST
@@ -280,12 +330,10 @@ def find_fault(motion, state, t, notes):
         good = good and 0 <= counts[word] <= MOST
     # the clock of the motion follows that of the host, within the rounding of a step
     if not good or not abs(t - m.time) <= m.step_size + CLOCK_ROUNDING * abs(t):
-        return set_fault(notes, Fault.MOTION.value, 0.0, 0.0, 0.0)
+        return set_fault(notes, Fault.MOTION.value, facts)
     if not kinds.state_time(motion, state) <= m.time + MOST_AHEAD:
-        return set_fault(notes, Fault.MOTION.value, 0.0, 0.0, 0.0)
-    facts = np.zeros(4)
+        return set_fault(notes, Fault.MOTION.value, facts)
     number = kinds.find_fault(motion, state, m.time, facts)
     if number > 0:
-        set_fault(notes, number, facts[0], facts[1], facts[2])
-        floats_at(notes + 16, 4)[3] = facts[3]
+        set_fault(notes, number, facts)
     return number

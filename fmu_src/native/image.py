@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from enum import IntEnum
 
+from fmu_src.native.layout import GaugeBar
 from fmu_src.native.memory import (
     floats_at,
     matrix_at,
@@ -17,7 +18,8 @@ from fmu_src.native.memory import (
     viewing,
     words_at,
 )
-from percussion_model.scene.numbers import Numbers
+from percussion_model.physics.kernel import preparing
+from percussion_model.scene.numbers import JOINT_KINDS, Numbers
 from percussion_model.scene.parameters import find_row
 from percussion_model.scene.rows import Row
 from percussion_model.scene.values import SCENE_NUMBERS
@@ -26,6 +28,7 @@ from percussion_model.solvers.state import words_of
 COUNTS = 3  # words before the sections of each rod
 VALUES = SCENE_NUMBERS.itemsize // 8
 SECTION, JOINT = 4, 6
+PERFECT = float(JOINT_KINDS.index("perfect"))
 AT = words_of(SCENE_NUMBERS)
 _values_at = records_at(SCENE_NUMBERS)
 
@@ -88,17 +91,38 @@ def fill_values(image, values):
 def numbers_at(image, values):
     """Numbers of an image, with values that were filled in."""
     counts = words_at(image, first_value(image))
+    rods = counts[2] if values[0].effects_string else 0
     piston_at = image + 8 * (len(counts) + VALUES)
     bit_at = piston_at + 8 * SECTION * counts[0]
     rods_at = bit_at + 8 * SECTION * counts[1]
-    rod_counts = counts[COUNTS:].copy()
-    sections = rod_counts.sum()
-    joints_at = rods_at + 8 * SECTION * sections
+    rod_counts = counts[COUNTS : COUNTS + rods].copy()
+    joints_at = rods_at + 8 * SECTION * counts[COUNTS:].sum()
+    joints = matrix_at(joints_at, rods, JOINT).copy()
+    if not values[0].effects_joints:
+        joints[:, 0] = PERFECT
     return Numbers(
         values[0],
         matrix_at(piston_at, counts[0], SECTION),
         matrix_at(bit_at, counts[1], SECTION),
-        matrix_at(rods_at, sections, SECTION),
+        matrix_at(rods_at, rod_counts.sum(), SECTION),
         rod_counts,
-        matrix_at(joints_at, counts[2], JOINT),
+        joints,
     )
+
+
+@viewing
+def has_rods(image):
+    """Whether the scene has rods, with or without effects.string."""
+    return words_at(image, COUNTS)[2] > 0
+
+
+@preparing
+def gauge_sections(numbers, bar):
+    """Sections of the bar that carries the gauge, by `GaugeBar`; the piston's where it is none."""
+    if bar == GaugeBar.BIT:
+        return numbers.bit
+    if bar >= GaugeBar.ROD and bar - GaugeBar.ROD < len(numbers.rod_counts):
+        which = bar - GaugeBar.ROD
+        first = numbers.rod_counts[:which].sum()
+        return numbers.rod_sections[first : first + numbers.rod_counts[which]]
+    return numbers.piston

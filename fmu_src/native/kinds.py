@@ -2,15 +2,38 @@
 
 from __future__ import annotations
 
-import math
-
-from fmu_src.native import modal
-from fmu_src.native.layout import Kind, head_records
+from fmu_src.native import blow_map, chain, fem, modal, rigid, wave
+from fmu_src.native.layout import GaugeBar, Kind, head_records, motion_of
 from percussion_model.physics.kernel import preparing
 
 
 @preparing
-def create(kind, numbers, bar, place):
+def refuse(kind, numbers, facts):
+    """Number of why a solver cannot set up a scene, 0 for none.
+
+    Parameters
+    ----------
+    kind : int
+        `Kind`.
+    numbers : Numbers
+    facts : float array, shape (4,)
+        Filled where there is one.
+    """
+    if kind == Kind.MODAL:
+        return modal.refuse(numbers, facts)
+    if kind == Kind.WAVE:
+        return wave.refuse(numbers, facts)
+    if kind == Kind.CHAIN:
+        return chain.refuse(numbers, facts)
+    if kind == Kind.FEM:
+        return fem.refuse(numbers, facts)
+    if kind == Kind.MAP:
+        return blow_map.refuse(numbers, facts)
+    return 0
+
+
+@preparing
+def create(kind, numbers, table, bar, place):
     """Make the memory of a motion at time zero; its address, 0 where there is no memory left.
 
     Parameters
@@ -18,6 +41,8 @@ def create(kind, numbers, bar, place):
     kind : int
         `Kind`.
     numbers : Numbers
+    table : int
+        Address of a blow map.
     bar : int
         `GaugeBar`.
     place : float
@@ -25,59 +50,144 @@ def create(kind, numbers, bar, place):
     """
     if kind == Kind.MODAL:
         return modal.create(numbers, bar, place)
-    return 0
+    if kind == Kind.WAVE:
+        return wave.create(numbers, bar, place)
+    if kind == Kind.CHAIN:
+        return chain.create(numbers, bar, place)
+    if kind == Kind.FEM:
+        return fem.create(numbers, bar, place)
+    if kind == Kind.RIGID:
+        return rigid.create(numbers)
+    return blow_map.create(numbers, table)
 
 
 @preparing
 def state_time(base, moving):
     """Time up to which the state in a copy of what moves is committed [s]."""
-    if head_records(base, 1)[0].kind == Kind.MODAL:
+    kind = head_records(base, 1)[0].kind
+    if kind == Kind.MODAL:
         return modal.state_time(base, moving)
-    return math.nan
+    if kind == Kind.WAVE:
+        return wave.state_time(base, moving)
+    if kind == Kind.CHAIN:
+        return chain.state_time(base, moving)
+    if kind == Kind.FEM:
+        return fem.state_time(moving)
+    if kind == Kind.RIGID:
+        return rigid.state_time(moving)
+    return blow_map.state_time(moving)
 
 
 @preparing
 def grid_point_after(base, t):
     """First time at or after `t` at which inputs can change [s]."""
-    if head_records(base, 1)[0].kind == Kind.MODAL:
+    head = head_records(base, 1)[0]
+    if head.kind == Kind.MODAL:
         return modal.grid_point_after(base, t)
-    return math.nan
+    if head.kind == Kind.WAVE:
+        return wave.grid_point_after(base, t)
+    if head.kind == Kind.CHAIN:
+        return chain.grid_point_after(base, t)
+    if head.kind == Kind.MAP:
+        return t
+    return max(t, state_time(base, base + head.state_at))
 
 
 @preparing
 def is_quiet(base, t):
     """Whether nothing has to be done to come to a time."""
-    if head_records(base, 1)[0].kind == Kind.MODAL:
+    kind = head_records(base, 1)[0].kind
+    if kind == Kind.MODAL:
         return modal.is_quiet(base, t)
+    if kind == Kind.WAVE:
+        return wave.is_quiet(base, t)
+    if kind == Kind.RIGID:
+        return rigid.is_quiet(base, t)
+    if kind == Kind.MAP:
+        return blow_map.is_quiet(base, t)
     return False
 
 
 @preparing
 def go(base, task, t, room):
     """Do a task with the state, with room for so many blows; status and blows."""
-    if head_records(base, 1)[0].kind == Kind.MODAL:
+    kind = head_records(base, 1)[0].kind
+    if kind == Kind.MODAL:
         return modal.go(base, task, t, room)
-    return 0, 0
+    if kind == Kind.WAVE:
+        return wave.go(base, task, t, room)
+    if kind == Kind.CHAIN:
+        return chain.go(base, t, room)
+    if kind == Kind.FEM:
+        return fem.go(base, task, t, room)
+    if kind == Kind.RIGID:
+        return rigid.go(base, task, t, room)
+    return blow_map.go(base, task, t, room)
+
+
+@preparing
+def refuse_inputs(base, wanted, facts):
+    """Number of why inputs cannot have new values, 0 for none."""
+    if head_records(base, 1)[0].kind == Kind.MAP:
+        return blow_map.refuse_inputs(motion_of(base).acting, wanted, facts)
+    return 0
+
+
+@preparing
+def take_inputs(base, changed):
+    """Let the solver follow inputs that have changed, by their bits."""
+    kind = head_records(base, 1)[0].kind
+    if kind == Kind.FEM:
+        fem.take_inputs(base)
+    elif kind == Kind.MAP:
+        blow_map.take_inputs(base, changed)
 
 
 @preparing
 def read(base, moving, t, reading, peaks):
     """Carry a copy of what moves to a time and read it."""
-    if head_records(base, 1)[0].kind == Kind.MODAL:
+    kind = head_records(base, 1)[0].kind
+    if kind == Kind.MODAL:
         modal.read(base, moving, t, reading, peaks)
+    elif kind == Kind.WAVE:
+        wave.read(base, moving, t, reading, peaks)
+    elif kind == Kind.CHAIN:
+        chain.read(base, moving, t, reading, peaks)
+    elif kind == Kind.FEM:
+        fem.read(base, moving, t, reading)
+    elif kind == Kind.RIGID:
+        rigid.read(base, moving, t, reading)
+    else:
+        blow_map.read(base, moving, t, reading)
 
 
 @preparing
 def stress(base, moving):
     """Stress at the gauge in a copy of what moves [Pa]."""
-    if head_records(base, 1)[0].kind == Kind.MODAL:
+    head = head_records(base, 1)[0]
+    if head.gauge_bar == GaugeBar.NONE:
+        return 0.0
+    if head.kind == Kind.MODAL:
         return modal.stress(base, moving)
-    return 0.0
+    if head.kind == Kind.WAVE:
+        return wave.stress(base, moving)
+    if head.kind == Kind.CHAIN:
+        return chain.stress(base, moving)
+    return fem.stress(base, moving)
 
 
 @preparing
 def find_fault(base, moving, t, facts):
-    """Number of what is wrong with what moves, from outside, 0 for nothing; fills three facts."""
-    if head_records(base, 1)[0].kind == Kind.MODAL:
+    """Number of what is wrong with what moves, from outside, 0 for nothing; fills four facts."""
+    kind = head_records(base, 1)[0].kind
+    if kind == Kind.MODAL:
         return modal.find_fault(base, moving, t, facts)
-    return 0
+    if kind == Kind.WAVE:
+        return wave.find_fault(base, moving, t, facts)
+    if kind == Kind.CHAIN:
+        return chain.find_fault(base, moving, facts)
+    if kind == Kind.FEM:
+        return fem.find_fault(base, moving, t, facts)
+    if kind == Kind.RIGID:
+        return rigid.find_fault(moving, t, facts)
+    return blow_map.find_fault(moving, t, facts)

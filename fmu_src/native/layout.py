@@ -9,8 +9,18 @@ from __future__ import annotations
 from enum import IntEnum
 
 import numpy as np
+from numba import carray
 
-from fmu_src.native.memory import records_at, viewing
+from fmu_src.native.memory import (
+    ENTRY_WORDS,
+    LINE,
+    allocate,
+    lines,
+    records_at,
+    viewing,
+    word_pointer,
+)
+from percussion_model.physics.kernel import preparing
 from percussion_model.physics.records import BLOW, EVENT, READING
 from percussion_model.scene.inputs import INPUTS
 
@@ -26,6 +36,18 @@ class Kind(IntEnum):
     """Solvers that a motion may have."""
 
     MODAL = 1
+    WAVE = 2
+    CHAIN = 3
+    FEM = 4
+    RIGID = 5
+    MAP = 6
+
+
+# By the names of solvers.
+KINDS = {
+    "modal": Kind.MODAL, "wave": Kind.WAVE, "chain": Kind.CHAIN, "fem": Kind.FEM,
+    "rigid": Kind.RIGID, "blow-map": Kind.MAP,
+}  # fmt: skip
 
 
 class GaugeBar(IntEnum):
@@ -34,6 +56,7 @@ class GaugeBar(IntEnum):
     NONE = 0  # none that has waves
     PISTON = 1
     BIT = 2
+    ROD = 3  # and the following: one for each rod
 
 
 class Left(IntEnum):
@@ -57,7 +80,7 @@ HEAD = np.dtype(
         ("here_at", "i8"),  # at the present time,
         ("trial_at", "i8"),  # and for what is read beside them
         ("blows_at", "i8"),
-        ("entries_at", "i8"),
+        ("table_address", "i8"),  # of a blow map, which is not copied
         ("acts", "i8", (len(INPUTS),)),  # 1: an input has an effect
         ("inputs_at", "i8", (len(INPUTS),)),  # words of the record that hold the inputs
         ("peak_from_at", "i8"),  # and when peaks began, the peaks, counts of guards
@@ -67,7 +90,9 @@ HEAD = np.dtype(
         ("storms_at", "i8"),
         ("rock", "i8"),  # RockKind
         ("gauge_bar", "i8"),  # GaugeBar
+        ("gauge_cell", "i8"),
         ("gauge_above", "f8"),  # mass of the bar above the gauge [kg]
+        ("gauge_impedance", "f8"),  # of its cell [N s/m]
         ("gauge_area", "f8"),  # [m2]
         ("time_share", "f8"),  # of the barrier, T_5/T_4
         ("energy_share", "f8"),  # W_R/(F_0 D_1)
@@ -109,6 +134,14 @@ reading_records = records_at(READING)
 
 MOTION_BYTES, BLOW_BYTES, READING_BYTES = MOTION.itemsize, BLOW.itemsize, READING.itemsize
 HEAD_BYTES, EVENT_BYTES = HEAD.itemsize, EVENT.itemsize
+# Place of the solver's record in what moves; its arrays follow at whole lines.
+RECORD = MOTION_BYTES + BLOW_BYTES
+ENTRIES_AT = (HEAD_BYTES + LINE - 1) // LINE * LINE
+
+
+def work_at(dtype: np.dtype) -> int:
+    """Place of a solver's first array in what moves, behind a record of a type."""
+    return (RECORD + dtype.itemsize + LINE - 1) // LINE * LINE
 
 
 @viewing
@@ -124,6 +157,24 @@ def last_blow(base):
 
 
 @viewing
+def directory(base):
+    """Where the arrays of a solver lie: rows as in `fmu_src.native.memory`."""
+    return carray(word_pointer(base + ENTRIES_AT), (ENTRIES, ENTRY_WORDS))
+
+
+@viewing
+def blow_rows(base, room):
+    """Room for so many blows."""
+    return blow_records(base + head_records(base, 1)[0].blows_at, room)
+
+
+@viewing
+def event_rows(base):
+    """Room for an event, which is never filled."""
+    return event_records(base + head_records(base, 1)[0].blows_at + BLOW_ROOM * BLOW_BYTES, 1)
+
+
+@viewing
 def reading_of(base):
     """What was read of the present state."""
     at = head_records(base, 1)[0].blows_at + BLOW_ROOM * BLOW_BYTES + EVENT_BYTES
@@ -135,3 +186,51 @@ def other_reading(base):
     """What is read beside it."""
     at = head_records(base, 1)[0].blows_at + BLOW_ROOM * BLOW_BYTES + EVENT_BYTES
     return reading_records(base + at + READING_BYTES, 1)
+
+
+@preparing
+def make_memory(kind, par_bytes, moving_bytes, tables_bytes):
+    """Memory of zeros for a motion, with its head.
+
+    Parameters
+    ----------
+    kind : int
+        `Kind`.
+    par_bytes : int
+        Of the solver's parameters.
+    moving_bytes : int
+        Of all that moves.
+    tables_bytes : int
+        Of the solver's tables.
+
+    Returns
+    -------
+    base : int
+        Address; 0 where there is no memory left.
+    tables_at : int
+        Offset of the tables.
+    """
+    par_at = ENTRIES_AT + lines(8 * ENTRIES * ENTRY_WORDS)
+    state_at = par_at + lines(par_bytes)
+    moving_bytes = lines(moving_bytes)
+    left_at = state_at + moving_bytes
+    blows_at = left_at + 3 * moving_bytes
+    tables_at = blows_at + lines(BLOW_ROOM * BLOW_BYTES + EVENT_BYTES + 2 * READING_BYTES)
+    total = tables_at + tables_bytes
+    base = allocate(total)
+    if base == 0:
+        return base, tables_at
+    head = head_records(base, 1)[0]
+    head.bytes, head.state_at, head.state_bytes, head.kind = total, state_at, moving_bytes, kind
+    head.par_at, head.blows_at, head.record_at = par_at, blows_at, RECORD
+    head.left_at, head.here_at = left_at, left_at + moving_bytes
+    head.trial_at = left_at + 2 * moving_bytes
+    return base, tables_at
+
+
+@preparing
+def set_gauge(base, bar, cell, above, impedance, area):
+    """Enter where stress is read, and what is there."""
+    head = head_records(base, 1)[0]
+    head.gauge_bar, head.gauge_cell, head.gauge_above = bar, cell, above
+    head.gauge_impedance, head.gauge_area = impedance, area

@@ -10,8 +10,10 @@ from typing import Any
 
 import numpy as np
 from llvmlite import ir
-from numba import carray, from_dtype, njit, types
+from numba import carray, from_dtype, literal_unroll, njit, types
 from numba.extending import intrinsic
+
+from percussion_model.physics.kernel import preparing
 
 # As `preparing`, but part of the caller: views of memory are cheap only there.
 viewing = njit(cache=True, error_model="numpy", forceinline=True)
@@ -153,3 +155,27 @@ def put(base, entries, k, offset, array):
         entries[k, j] = size
         j += 1
     return offset + lines(8 * array.size)
+
+
+@preparing
+def table_bytes(arrays):
+    """Bytes that arrays of a tuple take, each in whole lines."""
+    total = 0
+    for array in literal_unroll(arrays):
+        total += lines(8 * array.size)
+    return total
+
+
+@preparing
+def put_tables(base, entries, offset, arrays):
+    """Copy arrays of a tuple to an offset, and enter them in a directory from its first row on."""
+    at, k = offset, 0
+    for array in literal_unroll(arrays):
+        at = put(base, entries, k, at, array)
+        k += 1  # noqa: SIM113  # numba unrolls no enumeration
+
+
+@preparing
+def enter(entries, k, offset, rows, columns):
+    """Enter an array of two dimensions that lies at an offset of what moves."""
+    entries[k, 0], entries[k, 1], entries[k, 2] = offset, rows, columns

@@ -6,33 +6,69 @@ Python package.
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from enum import IntEnum
 
 from fmu_src.hammer.inputs import NAMES_OUTSIDE
+from fmu_src.native.layout import KINDS
 from percussion_model.scene.contradictions import TEXTS
 from percussion_model.scene.inputs import INPUTS
 from percussion_model.scene.parameters import find_row
+from percussion_model.scene.scene import SceneError
 from percussion_model.simulation import validity
+from percussion_model.solvers.blow_map.prepare import NO_STAND
+from percussion_model.solvers.blow_map.records import MAP_LIMITS, Refusal
+from percussion_model.solvers.blow_map.refusals import FALLEN, MOVING, RANGE, TURNED
+from percussion_model.solvers.blow_map.words import FIXED, FIXED_INPUTS
+from percussion_model.solvers.chain.network import TOO_FINE
+from percussion_model.solvers.chain.records import CHAIN_LIMITS
+from percussion_model.solvers.fem.records import FEM_LIMITS
 from percussion_model.solvers.modal.faults import FAULTS as MODAL_FAULTS
 from percussion_model.solvers.modal.records import MODAL_LIMITS
+from percussion_model.solvers.rigid.records import RIGID_LIMITS
+from percussion_model.solvers.setup import refuse_many
 from percussion_model.solvers.state import WORKSPACE
+from percussion_model.solvers.wave.grid import WORK
+from percussion_model.solvers.wave.records import WAVE_LIMITS
 
 
 class Fault(IntEnum):
     """Why a kernel refuses; 0 stands for none."""
 
     MEMORY = 1
-    MODES = 2  # how many, at most
-    SOLVER = 3
-    GAUGE = 4  # place, length of the bar
-    NOT_FINITE = 5  # time
-    STOPPED = 6  # time
-    MOTION = 7  # what a communication step keeps
-    WORKSPACE = 8
-    MODAL_FIELD = 9  # word, value, its limits
-    MODAL_STATE = 10  # and the following: as `solvers.modal.faults.FAULTS`
+    SOLVER = 2
+    GAUGE = 3  # place, length of the bar, which
+    MODES = 4  # how many, at most
+    CELLS = 5
+    ELEMENTS = 6
+    WORK = 7  # cells, sub-steps
+    TOO_FINE = 8  # loss time, length of a section, time step
+    NO_STAND = 9  # gap to the rock, velocity
+    NO_MAP = 10
+    BAD_MAP = 11
+    MAP_SECTIONS = 12  # which bar, counted from 0
+    MAP_FIXED = 13  # place in `FIXED`
+    MAP_SECTION = 14
+    MAP_INPUT = 15  # value, that of the map, input counted from 1
+    NOT_FINITE = 16  # time
+    STOPPED = 17  # time
+    MAP_NEVER_RESTS = 18  # time of flight [ms], feed force
+    MAP_REFUSAL = 19  # and the following: as `Refusal` from 1 on
+    MOTION = 26  # what a communication step keeps
+    WORKSPACE = 27
+    BEHIND = 28  # time of the state, present
+    NEXT_EVENT = 29  # time of the next event, present
+    WAVE_LEAP = 30  # end, step, most steps
+    WAVE_WAKE = 31  # when, step, since when
+    MODAL_FIELD = 32  # word, value, its limits
+    WAVE_FIELD = 33
+    CHAIN_FIELD = 34
+    FEM_FIELD = 35
+    RIGID_FIELD = 36
+    MAP_FIELD = 37
+    MODAL_STATE = 38  # and the following: as `solvers.modal.faults.FAULTS`
 
 
 class Note(IntEnum):
@@ -40,14 +76,15 @@ class Note(IntEnum):
 
     BARRIER = 1
     LEDGER = 2
-    GIVES_ENERGY = 3
-    TAKES_ENERGY = 4
-    LOCKED = 5
-    STORM = 6
-    FLIGHT = 7
-    BUTTON = 8
-    RATE = 9
-    IN_VAIN = 10  # and the following: one for each input
+    MAP_LEDGER = 3
+    GIVES_ENERGY = 4
+    TAKES_ENERGY = 5  # and the following: one for each `Kind`
+    LOCKED = 11
+    STORM = 12
+    FLIGHT = 13
+    BUTTON = 14
+    RATE = 15
+    IN_VAIN = 16  # and the following: one for each input
 
 
 class Fact(float):
@@ -74,29 +111,114 @@ class Fact(float):
         return Fact(self.place, float(self) / other)
 
 
-def faults() -> tuple[str, ...]:
-    """Templates of the faults, by `Fault`."""
+def _too_many(name: str, instead: str = "") -> str:
+    """Template of `refuse_many`."""
+    text = refused(lambda: refuse_many(name, math.inf, 10**9, instead))
+    return text.replace("inf", "{0:.3g}", 1).replace(str(10**9), "{1:d}", 1)
+
+
+def refused(work: Callable[[], object]) -> str:
+    """Message of an error that work ends with."""
+    try:
+        work()
+    except SceneError as error:
+        return str(error)
+    raise ValueError("nothing was refused")
+
+
+def _map_texts() -> dict[int, str]:
+    """Templates of a map that does not answer."""
+    ranges = {
+        Refusal.STIFFNESS: ("rock.loading_stiffness", "N/m", "stiffness"),
+        Refusal.VELOCITY: ("the impact velocity", "m/s", "velocity"),
+        Refusal.FEED: ("feed.force", "N", "feed"),
+        Refusal.DRIVE: ("drive.force", "N", "force"),
+    }
     texts = {
+        reason: RANGE.format(
+            name=name, value="{0:.6g}", unit=unit, low="{1:.6g}", high="{2:.6g}",
+            key=f"blow_map.{key}_{{3:|from|to|}}",
+        )
+        for reason, (name, unit, key) in ranges.items()
+    }  # fmt: skip
+    texts[Refusal.MOVING] = MOVING.format(
+        flight="{0:.3g}", feed="{1:.6g}", until="after {2:.3g} ms"
+    )
+    texts[Refusal.TURNED] = TURNED.format(reversal="{0:.6g}")
+    texts[Refusal.FALLEN] = FALLEN.format(force="{0:.6g}")
+    return {int(reason): texts[reason] for reason in Refusal if reason != Refusal.NONE}
+
+
+def faults(bars: Sequence[str] = ("piston", "bit")) -> tuple[str, ...]:
+    """Templates of the faults, by `Fault`.
+
+    Parameters
+    ----------
+    bars : sequence of str
+        That may carry the gauge.
+    """
+    fixed, inputs = "|".join(FIXED), "|".join(FIXED_INPUTS.get(name, name) for name in INPUTS)
+    texts: dict[int, str] = {
         Fault.MEMORY: "memory is exhausted",
-        Fault.MODES: (
-            "the bars would have {0:.3g} modes, more than {1:g}: ask for fewer, or make the bars "
-            'more alike in length, or take waves (solver.name = "wave")'
-        ),
         Fault.SOLVER: (
             "this library does not compute the solver that the parameters ask for: take the FMU "
             "that runs Python"
         ),
         Fault.GAUGE: (
-            "gauge.position = {0:r} m: lies below the {2:|piston|bit|}, which is {1:g} m long"
+            f"gauge.position = {{0:r}} m: lies below the {{2:|{'|'.join(bars)}|}}, "
+            "which is {1:g} m long"
+        ),
+        Fault.MODES: _too_many("modes", ', or take waves (solver.name = "wave")'),
+        Fault.CELLS: _too_many("cells"),
+        Fault.ELEMENTS: _too_many("elements"),
+        Fault.WORK: WORK.format(cells="{0:.3g}", parts="{1:.3g}"),
+        Fault.TOO_FINE: TOO_FINE.format(eta="{0:.3g}", length="{1:g}", step="{2:.2g}"),
+        Fault.NO_STAND: NO_STAND.format(gap="{0:r}", velocity="{1:r}"),
+        Fault.NO_MAP: (
+            "solver.fidelity = 'blow-map': this FMU has no blow map; build one of a scene with "
+            "solver.fidelity = 'blow-map'"
+        ),
+        Fault.BAD_MAP: "the blow map of this FMU is damaged, or of another format",
+        Fault.MAP_SECTIONS: (
+            "the blow map was made for another number of sections of the {0:|piston|bit|} and "
+            "holds for that alone"
+        ),
+        Fault.MAP_FIXED: (
+            f"the blow map was made for another {{0:|{fixed}|}} and holds for that alone"
+        ),
+        Fault.MAP_SECTION: "the blow map was made for other sections and holds for those alone",
+        Fault.MAP_INPUT: (
+            f"{{2:|{inputs}|}} = {{0:r}}: the blow map was made for {{1:r}} "
+            "and holds for that alone"
         ),
         Fault.NOT_FINITE: "at t = {0:r} s the state is no longer finite: check the scene",
         Fault.STOPPED: "at t = {0:r} s the solver could not continue",
+        Fault.MAP_NEVER_RESTS: MOVING.format(
+            flight="{0:.3g}", feed="{1:.6g}", until="in no time of the table"
+        ),
         Fault.MOTION: "the saved motion has a number that is not finite, or a count below 0",
         Fault.WORKSPACE: f"the saved state has {WORKSPACE}",
+        Fault.BEHIND: "the saved state has its time of {0:r} s, far before {1:r} s",
+        Fault.NEXT_EVENT: (
+            "the saved state has its next event at {0:r} s, at a present of {1:r} s"
+        ),
+        Fault.WAVE_LEAP: (
+            "the saved state has leap_end = {0:d}, at step {1:d} with leaps of {2:d} steps at most"
+        ),
+        Fault.WAVE_WAKE: (
+            "the saved state has wake = {0:d}, at step {1:d} of a piston that waits from {2:d} on"
+        ),
         Fault.MODAL_FIELD: _of_field(MODAL_LIMITS.names),
+        Fault.WAVE_FIELD: _of_field(WAVE_LIMITS.names),
+        Fault.CHAIN_FIELD: _of_field(CHAIN_LIMITS.names),
+        Fault.FEM_FIELD: _of_field(FEM_LIMITS.names),
+        Fault.RIGID_FIELD: _of_field(RIGID_LIMITS.names),
+        Fault.MAP_FIELD: _of_field(MAP_LIMITS.names),
     }
-    states = [_of_state(text) for text in MODAL_FAULTS[1:]]
-    return ("", *texts.values(), *states, *map(_of_rule, TEXTS.values()))
+    texts |= {Fault.MAP_REFUSAL + k - 1: text for k, text in _map_texts().items()}
+    more = [*(_of_state(text) for text in MODAL_FAULTS[1:]), *map(_of_rule, TEXTS.values())]
+    texts |= {Fault.MODAL_STATE + k: text for k, text in enumerate(more)}
+    return ("", *(texts[k] for k in range(1, 1 + len(texts))))
 
 
 # Number of the fault for the first of the rules, and places of a scene's values in their texts.
@@ -149,18 +271,20 @@ def _counted(name: str, two: str, template: str) -> str:
 def notes() -> tuple[str, ...]:
     """Templates of the notes, by `Note`."""
     one = Fact(0, 1.0)
-    texts = {
+    texts: dict[int, str] = {
         Note.BARRIER: _only(validity.barrier_note(one, Fact(1, 1.0))),
         Note.LEDGER: _only(validity.ledger_note(one, "modal")),
+        Note.MAP_LEDGER: _only(validity.ledger_note(one, "blow-map")),
         Note.GIVES_ENERGY: _only(validity.numerical_note(Fact(0, -1.0), "modal")),
-        Note.TAKES_ENERGY: _only(validity.numerical_note(0.5, "modal")).replace(
-            "50 %", "{0:.2g} %", 1
-        ),
         Note.LOCKED: _counted("locked", "2 time steps", "{0:d} time step{1:||s|}"),
         Note.STORM: _counted("storms", "2 storms", "{0:d} storm{1:||s|}"),
         Note.FLIGHT: _only(validity.flight_note(one)),
         Note.BUTTON: _only(validity.button_note(one, 1.0)),
         Note.RATE: _only(validity.rate_note(one)),
     }
+    for name, kind in KINDS.items():
+        text = _only(validity.numerical_note(0.5, name))
+        texts[Note.TAKES_ENERGY + kind - 1] = text.replace("50 %", "{0:.2g} %", 1)
+    ordered = [texts[k] for k in range(1, 1 + len(texts))]
     vain = [f"a new {NAMES_OUTSIDE[name]} has no effect in this scene" for name in INPUTS]
-    return ("", *(f"at t = {{6:.6g}} s: {text}" for text in texts.values()), *vain)
+    return ("", *(f"at t = {{6:.6g}} s: {text}" for text in ordered), *vain)

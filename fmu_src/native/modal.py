@@ -5,41 +5,37 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import carray, literal_unroll
 
+from fmu_src.native.checks import arrays_are_bounded, record_fault
 from fmu_src.native.layout import (
     ADVANCE,
-    BLOW_BYTES,
     BLOW_ROOM,
-    ENTRIES,
-    EVENT_BYTES,
-    HEAD_BYTES,
-    MOTION_BYTES,
-    READING_BYTES,
+    RECORD,
     GaugeBar,
     Kind,
-    blow_records,
-    event_records,
+    blow_rows,
+    directory,
+    event_rows,
     head_records,
-    reading_records,
+    make_memory,
+    reading_of,
+    set_gauge,
+    work_at,
 )
 from fmu_src.native.memory import (
-    ENTRY_WORDS,
-    allocate,
+    enter,
     floats_1,
     floats_2,
     floats_3,
     floats_4,
-    floats_at,
     lines,
     matrix_at,
-    put,
+    put_tables,
     records_at,
+    table_bytes,
     viewing,
-    word_pointer,
     words_1,
     words_2,
-    words_at,
 )
 from fmu_src.native.messages import Fault
 from percussion_model.physics.kernel import preparing
@@ -66,15 +62,12 @@ from percussion_model.solvers.modal.records import (
     Task,
 )
 from percussion_model.solvers.modal.resolution import MOST_MODES
-from percussion_model.solvers.state import first_beyond, is_bounded, words_of
 
 _parameters_at = records_at(MODAL_PAR)
 _states_at = records_at(MODAL_STATE)
 LOW, HIGH, MAY_BE_NAN, WHOLE = MODAL_LIMITS.rows
-RECORD = MOTION_BYTES + BLOW_BYTES  # place of the state's record in what moves
-WORDS = words_of(MODAL_STATE)
-LOCKED = WORDS["count_locked"]
-PAR_BYTES, STATE_BYTES = MODAL_PAR.itemsize, MODAL_STATE.itemsize
+PAR_BYTES = MODAL_PAR.itemsize
+WORK = work_at(MODAL_STATE)  # place of the first array in what moves
 FREE = 2 * JOINED  # column of a gauge for a free piston
 # Rows of modes and of the piston's in what moves, and of the room of a step.
 ROWS, PISTON_ROWS, ROOM = 8, 2, 8
@@ -83,12 +76,6 @@ ROWS, PISTON_ROWS, ROOM = 8, 2, 8
     LAW_SIZES, DASHPOT, LAW_MOVE, ENDS, OUT, INTO, TAKEN, REST, VIEWS, SCANS, SIDES, WAY, OVER,
     PUSHED, SHAPE_P, MOVE_P, ROOM_AT, GAUGE_AT, W_AT, WP_AT,
 ) = range(27)  # fmt: skip
-
-
-@viewing
-def _entries(base):
-    at = base + head_records(base, 1)[0].entries_at
-    return carray(word_pointer(at), (ENTRIES, ENTRY_WORDS))
 
 
 @viewing
@@ -106,7 +93,7 @@ def state_in(moving):
 @viewing
 def bars_in(base, moving):
     """`Bars` of what moves, or of a copy of it, at an address."""
-    d = _entries(base)
+    d = directory(base)
     forms = Forms(
         words_1(base, d, SIZES), floats_1(base, d, STIFF), floats_3(base, d, SHAPE),
         floats_4(base, d, MOVE), floats_3(base, d, YIELDS), floats_4(base, d, CHANGE),
@@ -135,24 +122,6 @@ def _arrays(made, room, gauge):
         laws.views, laws.scans, laws.sides, laws.way, laws.over, laws.pushed,
         made.shape_p, made.move_p, room, gauge,
     )  # fmt: skip
-
-
-@preparing
-def _copy_tables(base, begin_at, arrays):
-    """Copy tables into a memory, and enter them in its directory."""
-    d, at, k = _entries(base), begin_at, 0
-    for array in literal_unroll(arrays):
-        at = put(base, d, k, at, array)
-        k += 1  # noqa: SIM113  # numba unrolls no enumeration
-
-
-@preparing
-def _table_bytes(arrays):
-    """Bytes of what `_copy_tables` copies."""
-    total = 0
-    for array in literal_unroll(arrays):
-        total += lines(8 * array.size)
-    return total
 
 
 @preparing
@@ -204,10 +173,8 @@ def gauge_rows(numbers, made, dt, bar, place):
 def stress(base, moving):
     """Stress at the gauge in a copy of what moves [Pa]."""
     head = head_records(base, 1)[0]
-    if head.gauge_bar == GaugeBar.NONE:
-        return 0.0
     par, s, bars = parameters(base)[0], state_in(moving)[0], bars_in(base, moving)
-    rows = floats_2(base, _entries(base), GAUGE_AT)
+    rows = floats_2(base, directory(base), GAUGE_AT)
     form, on_piston = s.form, head.gauge_bar == GaugeBar.PISTON
     a_p, a_b = loads_of(par, s, bars.forms.stiff[form])
     own = np.zeros((2, rows.shape[0]))
@@ -225,11 +192,12 @@ def stress(base, moving):
 
 
 @preparing
-def modes_of(numbers):
-    """How many modes there would be, and how many at most: more are refused."""
+def refuse(numbers, facts):
+    """Number of why a scene cannot be set up, 0 for none: too many modes."""
     par = np.zeros(1, MODAL_PAR)
     request = fill_modal_parameters(par[0], numbers)
-    return modes_wanted(numbers, request)[2], MOST_MODES
+    facts[0], facts[1] = modes_wanted(numbers, request)[2], MOST_MODES
+    return Fault.MODES.value if facts[0] > facts[1] else 0
 
 
 @preparing
@@ -257,37 +225,20 @@ def create(numbers, bar, place):
     if bar != GaugeBar.NONE:
         gauge, above, area = gauge_rows(numbers, made, par[0].dt, bar, place)
     arrays = _arrays(made, np.zeros((ROOM, max(n, 2 * SCAN))), gauge)
-    # what moves: MOTION, the last blow, the record, rows of modes
-    w_at = lines(RECORD + STATE_BYTES)
-    wp_at = w_at + lines(8 * ROWS * n)
-    moving_bytes = wp_at + lines(8 * PISTON_ROWS * n_p)
-    entries_at = lines(HEAD_BYTES)
-    par_at = entries_at + lines(8 * ENTRIES * ENTRY_WORDS)
-    state_at = par_at + lines(PAR_BYTES)
-    left_at = state_at + moving_bytes
-    blows_at = left_at + 3 * moving_bytes
-    tables_at = blows_at + lines(BLOW_ROOM * BLOW_BYTES + EVENT_BYTES + 2 * READING_BYTES)
-    total = tables_at + _table_bytes(arrays)
-    base = allocate(total)
+    wp_at = WORK + lines(8 * ROWS * n)
+    moving = wp_at + lines(8 * PISTON_ROWS * n_p)
+    base, tables_at = make_memory(Kind.MODAL.value, PAR_BYTES, moving, table_bytes(arrays))
     if base == 0:
         return base
-    head = head_records(base, 1)[0]
-    head.bytes, head.state_at, head.state_bytes, head.kind = (
-        total, state_at, moving_bytes, Kind.MODAL.value
-    )  # fmt: skip
-    head.entries_at, head.par_at, head.blows_at, head.record_at = (
-        entries_at, par_at, blows_at, RECORD
-    )  # fmt: skip
-    head.left_at, head.here_at = left_at, left_at + moving_bytes
-    head.trial_at = left_at + 2 * moving_bytes
-    _copy_tables(base, tables_at, arrays)
-    d = _entries(base)
-    d[W_AT, 0], d[W_AT, 1], d[W_AT, 2] = w_at, ROWS, n
-    d[WP_AT, 0], d[WP_AT, 1], d[WP_AT, 2] = wp_at, PISTON_ROWS, n_p
+    d = directory(base)
+    put_tables(base, d, tables_at, arrays)
+    enter(d, W_AT, WORK, ROWS, n)
+    enter(d, WP_AT, wp_at, PISTON_ROWS, n_p)
     parameters(base)[0] = par[0]
-    head.gauge_bar, head.gauge_above, head.gauge_area = bar, above, area
-    w = matrix_at(base + state_at + w_at, ROWS, n)
-    begin(par[0], state_in(base + state_at)[0], w, made.forms.sizes[0], numbers)
+    set_gauge(base, bar, 0, above, 0.0, area)
+    at = base + head_records(base, 1)[0].state_at
+    w = matrix_at(at + WORK, ROWS, n)
+    begin(par[0], state_in(at)[0], w, made.forms.sizes[0], numbers)
     return base
 
 
@@ -315,27 +266,21 @@ def is_quiet(base, t):
 @preparing
 def go(base, task, t, room):
     """Advance the state or commit it, with room for so many blows; status and blows."""
-    head = head_records(base, 1)[0]
-    moving = base + head.state_at
-    state, blows = state_in(moving), blow_records(base + head.blows_at, room)
-    events = event_records(base + head.blows_at + BLOW_ROOM * BLOW_BYTES, 1)
-    reading = reading_records(base + head.blows_at + BLOW_ROOM * BLOW_BYTES + EVENT_BYTES, 1)
+    moving = base + head_records(base, 1)[0].state_at
+    state, blows, events = state_in(moving), blow_rows(base, room), event_rows(base)
     state[0].events_on = 0
     bars = bars_in(base, moving)
     wanted = Task.ADVANCE.value if task == ADVANCE else Task.COMMIT.value
-    status = run(wanted, parameters(base), state, bars, t, blows, events, reading)
+    status = run(wanted, parameters(base), state, bars, t, blows, events, reading_of(base))
     return status, state[0].n_blows
 
 
 @preparing
 def read(base, moving, t, reading, peaks):
     """Carry a copy of what moves to a time and read it."""
-    head = head_records(base, 1)[0]
-    state = state_in(moving)
+    state, blows, events = state_in(moving), blow_rows(base, BLOW_ROOM), event_rows(base)
     if not peaks:
         state[0].peak_from = math.inf
-    blows = blow_records(base + head.blows_at, BLOW_ROOM)
-    events = event_records(base + head.blows_at + BLOW_ROOM * BLOW_BYTES, 1)
     bars = bars_in(base, moving)
     run(Task.READ.value, parameters(base), state, bars, t, blows, events, reading)
 
@@ -343,19 +288,14 @@ def read(base, moving, t, reading, peaks):
 @preparing
 def find_fault(base, moving, t, facts):
     """Number of the fault of what moves, from outside; its facts are filled in."""
-    state, d = state_in(moving), _entries(base)
-    words = words_at(moving + RECORD, STATE_BYTES // 8)
-    k = first_beyond(words, words.view(np.float64), LOW, HIGH, MAY_BE_NAN, WHOLE)
-    if k >= 0:
-        value = float(words[k]) if WHOLE[k] else words.view(np.float64)[k]
-        facts[0], facts[1] = k + 1.0, value
-        facts[2], facts[3] = LOW[k], HIGH[k]
-        return Fault.MODAL_FIELD.value
-    rows = floats_at(moving + d[W_AT, 0], d[W_AT, 1] * d[W_AT, 2])
-    others = floats_at(moving + d[WP_AT, 0], d[WP_AT, 1] * d[WP_AT, 2])
-    if not (is_bounded(rows) and is_bounded(others)):
+    number = Fault.MODAL_FIELD.value
+    fault = record_fault(moving, LOW, HIGH, MAY_BE_NAN, WHOLE, number, facts)
+    if fault > 0:
+        return fault
+    if not arrays_are_bounded(base, moving, W_AT, 2):
         return Fault.WORKSPACE.value
+    d = directory(base)
     sizes, law_sizes = words_1(base, d, SIZES), words_1(base, d, LAW_SIZES)
-    tick = parameters(base)[0].tick
-    number, facts[0], facts[1] = state_fault(state[0], sizes, law_sizes, tick, t)
+    tick, s = parameters(base)[0].tick, state_in(moving)[0]
+    number, facts[0], facts[1] = state_fault(s, sizes, law_sizes, tick, t)
     return Fault.MODAL_STATE.value + number - 1 if number > 0 else 0

@@ -161,10 +161,12 @@ def set_inputs(base, wanted):
     if status == Status.DONE:
         status = _run(base, COMMIT, t, NO_LIMIT)
     if status == Status.DONE:
-        numbers = numbers_of_record(base)
+        numbers, changed = numbers_of_record(base), 0
         for k in range(COUNT):
             if wanted[k] != motion.acting[k]:
                 numbers[head.inputs_at[k]] = motion.acting[k] = wanted[k]
+                changed |= 1 << k
+        kinds.take_inputs(base, changed)
     return status, in_vain
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fmu_src.native.layout import head_records, last_blow, motion_of
+from fmu_src.native.layout import Kind, head_records, last_blow, motion_of
 from fmu_src.native.memory import floats_at, words_at
 from fmu_src.native.messages import Note
 from fmu_src.native.motion import count_of, read
@@ -14,6 +14,7 @@ from percussion_model.simulation.validity import (
     LEAST_NUMERICAL,
     LONGEST_FLIGHT,
     MOST_BARRIER,
+    MOST_MAP_RESIDUAL,
     MOST_NUMERICAL,
     MOST_RATE,
     MOST_RESIDUAL,
@@ -39,11 +40,12 @@ def add_note(notes, number, first, second, time):
 
 
 @preparing
-def set_fault(notes, number, first, second, third):
-    """Write why a kernel refuses; its number."""
+def set_fault(notes, number, facts):
+    """Write why a kernel refuses, with its facts; its number."""
     words_at(notes, 2)[1] = number
-    facts = floats_at(notes + 16, ROW - 1)
-    facts[0], facts[1], facts[2] = first, second, third
+    written = floats_at(notes + 16, ROW - 1)
+    for k in range(len(facts)):
+        written[k] = facts[k]
     return number
 
 
@@ -81,13 +83,14 @@ def _of_state(base, notes):
             _tell(base, notes, Note.BARRIER, head.time_share, head.energy_share)
     reading = read(base, False)
     row, share = reading[0], residual(reading)
-    if not abs(share) <= MOST_RESIDUAL:
-        _tell(base, notes, Note.LEDGER, share, 0.0)
+    is_map = head.kind == Kind.MAP
+    if not abs(share) <= (MOST_MAP_RESIDUAL if is_map else MOST_RESIDUAL):
+        _tell(base, notes, Note.MAP_LEDGER if is_map else Note.LEDGER, share, 0.0)
     taken = numerical(reading)
-    if not taken >= LEAST_NUMERICAL:
+    if not taken >= (-MOST_MAP_RESIDUAL if is_map else LEAST_NUMERICAL):
         _tell(base, notes, Note.GIVES_ENERGY, taken, 0.0)
     elif taken > MOST_NUMERICAL:
-        _tell(base, notes, Note.TAKES_ENERGY, 100.0 * taken, 0.0)
+        _tell(base, notes, Note.TAKES_ENERGY + head.kind - 1, 100.0 * taken, 0.0)
     locked, storms = count_of(base, head.locked_at), count_of(base, head.storms_at)
     if locked > 0:
         _tell(base, notes, Note.LOCKED, locked, 1.0 if locked == 1 else 2.0)

@@ -10,12 +10,17 @@ from __future__ import annotations
 import ctypes
 import re
 import sys
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
+from unittest.mock import patch
 
 import llvmlite.binding as llvm
 from numba import njit, types
+from numba.core.caching import FunctionCache
+from numba.core.codegen import CPUCodeLibrary
+from numba.core.cpu import CPUContext
 
 from fmu_src.native import entries
 from fmu_src.native.library import PLATFORMS
@@ -87,27 +92,60 @@ declare i32 @"{called}"(ptr, ptr, {", ".join(map(_ir_type, arguments))})
 """
 
 
+@contextmanager
+def _each_by_itself() -> Iterator[None]:
+    """Let numba translate functions, and leave it at that.
+
+    It would link each with all that it calls, optimise the whole and make machine code of it,
+    again for each caller: here this is done once, for all entries together.
+    """
+
+    def mark(library: Any) -> None:
+        library._finalized = True
+
+    def call_nothing(*_: Any) -> Callable[..., Any]:
+        return [].append  # some built-in function, another each time: numba tells them apart by it
+
+    def keep_nothing(*_: Any) -> None:
+        pass
+
+    with (
+        patch.object(CPUCodeLibrary, "finalize", mark),
+        patch.object(CPUContext, "get_executable", call_nothing),
+        patch.object(FunctionCache, "load_overload", keep_nothing),
+        patch.object(FunctionCache, "save_overload", keep_nothing),
+    ):
+        yield
+
+
+def _add_callees_first(library: Any, found: dict[int, Any]) -> None:
+    """Add those that a library calls to those found, and then itself."""
+    if id(library) in found:
+        return
+    for one in library._linking_libraries:
+        _add_callees_first(one, found)
+    found[id(library)] = library
+
+
 def compile_entries() -> str:
     """Compile all entries; LLVM's text of one module with all that they call."""
     # numba wants to know where it is, though nothing calls it here
     llvm.add_symbol("native_allocate", ctypes.cast(ctypes.CDLL(None).malloc, ctypes.c_void_p).value)
-    whole: Any = None
-    for name, (function, arguments) in ENTRIES.items():
-        # not out of numba's cache, which keeps machine code of what it compiled alone
-        fresh = njit(error_model="numpy")(function.py_func)
-        fresh.compile(arguments)
-        compiled = fresh.overloads[arguments]
-        module = llvm.parse_assembly(compiled.library.get_llvm_str())
-        wrapper = llvm.parse_assembly(_wrapper(name, compiled.fndesc.llvm_func_name, arguments))
-        wrapper.link_in(module)
-        if whole is None:
-            whole = wrapper
-        else:
-            whole.link_in(wrapper)
-    text = _without_words(str(whole))
-    if baked := re.search(r"inttoptr \(i64 [0-9]{6,}", text):
-        raise ValueError(f"an address of this process is in the code: {baked.group()}")
-    return text
+    wrappers, libraries = [], dict[int, Any]()
+    with _each_by_itself():
+        for name, (function, arguments) in ENTRIES.items():
+            fresh = njit(error_model="numpy")(function.py_func)
+            fresh.compile(arguments)
+            compiled = fresh.overloads[arguments]
+            wrappers.append(_wrapper(name, compiled.fndesc.llvm_func_name, arguments))
+            _add_callees_first(compiled.library, libraries)
+        whole = llvm.parse_assembly("")
+        for text in wrappers:
+            whole.link_in(llvm.parse_assembly(text))
+        # what nothing calls yet is left out: so what calls comes before what is called
+        for library in reversed(libraries.values()):
+            whole.link_in(library._get_module_for_linking(), preserve=True)
+    return _without_words(str(whole))
 
 
 # Functions that put the words of an error together, for Python: an error is a status here.
@@ -170,6 +208,8 @@ def make_object(text: str, target: Target, names: Iterable[str] = tuple(ENTRIES)
     builder.getModulePassManager().run(module, builder)
     if missing := undefined(module) - ALLOWED:
         raise ValueError(f"left undefined for {target.triple}: {', '.join(sorted(missing))}")
+    if baked := re.search(r"inttoptr \(i64 [0-9]{6,}", str(module)):
+        raise ValueError(f"an address of this process is in the code: {baked.group()}")
     code: bytes = machine.emit_object(module)
     return code
 

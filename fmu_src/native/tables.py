@@ -16,7 +16,7 @@ import numpy as np
 
 from fmu_src.description import depends_at_start
 from fmu_src.hammer.inputs import DRIVE_INPUTS
-from fmu_src.hammer.variables import TABLE_INPUTS, hammer_variables
+from fmu_src.hammer.variables import TABLE_INPUTS, gauge_bars, hammer_variables
 from fmu_src.native import messages
 from fmu_src.native.variables3 import Variable3, fmi3_variables
 from fmu_src.variables import Variable, closed_bounds
@@ -28,6 +28,7 @@ from percussion_model.scene.numbers import (
 from percussion_model.scene.rows import unit_suffix
 from percussion_model.scene.scene import Scene
 from percussion_model.scene.values import SCENE_NUMBERS
+from percussion_model.solvers.blow_map.builder import get_table
 
 FILE = "model.bin"
 MAGIC, VERSION = b"PHTABLE\0", 1
@@ -138,12 +139,15 @@ def model_tables(
     guid : str
         Of the model description, FMI 2.0 or 3.0; saved states belong to it too.
     blow_map : float array, optional
-        Numbers of the blow map, as `kernel_create` takes them.
+        Numbers of the blow map, as `kernel_create` takes them; if left out those of the map that
+        the scene asks for, if it does.
     faults, notes : sequence of str, optional
         Templates of messages, the first unused; those of `fmu_src.native.messages` if left out.
     """
+    if blow_map is None and scene.solver_name == "blow-map":
+        blow_map = get_table(scene).to_words()
     if faults is None or notes is None:
-        faults, notes = messages.faults(), messages.notes()
+        faults, notes = messages.faults(gauge_bars(scene)), messages.notes()
     return _Writer(scene).write(guid, blow_map, faults, notes)
 
 

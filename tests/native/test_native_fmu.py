@@ -13,14 +13,22 @@ from fmpy import extract, read_model_description, simulate_fmu
 from fmpy.fmi2 import FMU2Slave
 from fmpy.validation import validate_fmu
 
-from fmu_src.hammer.motion import Motion
+from fmu_src.hammer.motion import Gauge, Motion
 from fmu_src.hammer.outputs import OUTPUTS
+from fmu_src.hammer.variables import gauge_bars
 from fmu_src.native.compare import fmu_outputs, package_outputs
 from percussion_model import Scene
+from percussion_model.scene.numbers import section_numbers
+from percussion_model.solvers.cells import find_cell
+from tests.blow_map_scenes import mapped
 
 VERSIONS = ("2.0", "3.0")
 STEP = 2.0**-10
-# Scenes that the modal solver computes, one a kind of motion.
+RODS = [
+    {"sections": [{"length": 0.4, "area": 3e-3}], "joint": "lossy", "transmission": 0.9},
+    {"sections": [{"length": 0.3, "area": 4e-3}], "joint": "threaded", "preload": 2e4},
+]
+# One scene for each kind of motion, and for each solver.
 SCENES = {
     "reference": {},
     "finer": {"solver.cells": 56},
@@ -35,7 +43,28 @@ SCENES = {
         ],
         "bit.sections": [{"length": 0.15, "area": 4e-3}, {"length": 0.2, "area": 6e-3}],
     },
-}
+    "waves": {"solver.name": "wave", "solver.cells": 23},
+    "waves without leaps": {"solver.name": "wave", "solver.cells": 12, "solver.leaps": False},
+    "waves and a rigid piston": {"piston.model": "rigid"},
+    "wall": {"effects.rock": "wall", "effects.barrier": False},
+    "no loss": {"effects.loss": False},
+    "waves in a bit alone": {
+        "solver.name": "wave", "piston.model": "absent", "effects.drive": "none",
+        "start.bit_velocity": 5.0,
+    },
+    "elements": {"solver.name": "fem", "fem.elements": 12},
+    "elements and a rigid piston": {
+        "solver.name": "fem", "fem.elements": 12, "piston.model": "rigid",
+    },
+    "rigid bodies": {"piston.model": "rigid", "bit.model": "rigid"},
+    "as rigid bodies": {"solver.fidelity": "rigid"},
+    "chain": {"solver.name": "chain"},
+    "string": {"string.rods": RODS, "effects.string": True, "effects.joints": True},
+    "string without joints": {
+        "string.rods": RODS, "effects.string": True, "effects.joints": False, "effects.loss": False,
+    },
+    "damper": {"effects.damper": True, "string.rods": RODS[:1], "effects.string": True},
+}  # fmt: skip
 
 
 def same(there, here):
@@ -52,6 +81,63 @@ def test_outputs_are_those_of_the_package_to_the_last_bit(write, name, version):
     assert len(there) == 256
     if "bit alone" not in name:
         assert there[-1, list(OUTPUTS).index("blow_count")] >= 3
+
+
+def test_a_blow_map_comes_along(write, tmp_path, monkeypatch, capfd):
+    """And says, as the package does, why it does not answer, or why it is none for a scene."""
+    monkeypatch.setenv("PERCUSSION_CACHE", str(tmp_path / "cache"))
+    scene = mapped(blow_map__density=0.1)
+    path = write(scene, "2.0")
+    there, here = fmu_outputs(path), package_outputs(scene)
+    assert same(there, here) == []
+    assert there[-1, list(OUTPUTS).index("blow_count")] >= 3
+    assert "feed.force = 9000 N: the blow map covers 2000 to 3500 N" in told(
+        path, capfd, feed_force=9000.0
+    )
+    assert "made for other sections" in told(path, capfd, **{"bit.sections[1].length": 0.4})
+    plain = write(Scene(), "2.0")
+    assert "this FMU has no blow map" in told(plain, capfd, **{"solver.fidelity": 3})
+
+
+def told(path, capfd, **start_values):
+    """What an FMU logs of a run that fails."""
+    capfd.readouterr()
+    with pytest.raises(Exception, match="failed"):
+        simulate_fmu(path, stop_time=256 * STEP, step_size=STEP, start_values=start_values)
+    return capfd.readouterr().out
+
+
+@pytest.mark.parametrize("solver", ["wave", "fem", "chain"])
+def test_a_host_may_choose_the_solver(write, solver):
+    scene = Scene().replace(**{"solver.name": solver, "fem.elements": 12})
+    choices = list(scene.row_of("solver.name").choices)
+    found = simulate_fmu(
+        write(Scene(), "2.0"), stop_time=256 * STEP, step_size=STEP, output_interval=STEP,
+        output=list(OUTPUTS),
+        start_values={"solver.name": 1 + choices.index(solver), "fem.elements": 12},
+    )  # fmt: skip
+    there = np.array([[float(row[name]) for name in OUTPUTS] for row in found[1:]])
+    assert same(there, package_outputs(scene)) == []
+
+
+@pytest.mark.parametrize("bar", ["piston", "bit", "rod 1", "rod 2"])
+def test_the_gauge_reads_any_bar(write, bar):
+    scene = Scene().replace(**SCENES["string"])
+    motion = Motion(scene, None)
+    sections = section_numbers(scene.bars[bar])
+    place = 0.3 * scene.bars[bar].length
+    motion.gauge = Gauge(bar, *find_cell(sections, motion.solver.grid_of(bar).mass, place))
+    here = []
+    for k in range(1, 65):
+        motion.advance_to(k * STEP, STEP, {})
+        here.append(motion.stress())
+    found = simulate_fmu(
+        write(scene, "2.0"), stop_time=64 * STEP, step_size=STEP, output_interval=STEP,
+        output=["gauge_stress"],
+        start_values={"gauge.bar": 1 + gauge_bars(scene).index(bar), "gauge.position": place},
+    )  # fmt: skip
+    assert np.ptp(here) > 1e6
+    np.testing.assert_array_equal(found["gauge_stress"][1:], here)
 
 
 @pytest.mark.parametrize("version", VERSIONS)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 from percussion_model.physics.blows import close_gap, open_gap, start_blow
 from percussion_model.physics.body import (
     bit_load,
@@ -12,6 +10,7 @@ from percussion_model.physics.body import (
     piston_acceleration,
 )
 from percussion_model.physics.drive import drive_force, turn_drive
+from percussion_model.physics.elementary import log
 from percussion_model.physics.kernel import kernel
 from percussion_model.physics.records import Status
 from percussion_model.solvers.blow_map.flight import PIECES, bit_at, move, plan
@@ -30,7 +29,7 @@ ROWS = 3
 @kernel
 def cell_and_share(par, axis, value, count):
     """Cell of an axis that holds a value, and the share of it that lies before."""
-    at = (math.log(value) - par.origin[axis]) / par.step[axis]
+    at = (log(value) - par.origin[axis]) / par.step[axis]
     cell = int(min(max(at, 0.0), count - 2.0))  # as numbers: far outside there is no whole one
     return cell, min(max(at - cell, 0.0), 1.0)
 

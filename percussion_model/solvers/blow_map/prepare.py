@@ -13,6 +13,10 @@ from percussion_model.solvers.setup import fill_parameters, fill_start
 
 # A bit that hangs further above the rock at the start does not stand on it [m].
 MOST_ROCK_GAP = 1e-3
+NO_STAND = (
+    "start.rock_gap = {gap} m, start.bit_velocity = {velocity} m/s: the blow map needs a bit "
+    f"that stands on the rock, within {MOST_ROCK_GAP:g} m and at 0 m/s"
+)
 AXES = len(Axis)
 # More sections or nodes of an axis than these are no numbers of them.
 MOST_SECTIONS, MOST_COUNT = 10_000, 1_000_000

@@ -24,6 +24,22 @@ _RANGES = {
     Refusal.DRIVE: "force",
 }
 
+# Texts of these refusals, without their numbers.
+RANGE = "{name} = {value} {unit}: the blow map covers {low} to {high} {unit}; {key} widens it"
+MOVING = (
+    "the piston strikes {flight} ms after the last blow, but at feed.force = {feed} N the bit "
+    "stands still {until}: the blow map holds for a bit at rest alone; take "
+    "solver.fidelity = 'wave'"
+)
+TURNED = (
+    "drive.reversal_distance = {reversal} m: the drive turns before the last contact of the blow "
+    "has opened, which the blow map does not know; take solver.fidelity = 'wave'"
+)
+FALLEN = (
+    "drive.force = {force} N: the piston falls back on the bit before drive.reversal_distance, "
+    "which the blow map does not know and no range of it changes; take solver.fidelity = 'wave'"
+)
+
 
 def notes_outside(scene: Scene) -> list[str]:
     """Say which parameters of a scene lie outside the ranges of its blow map."""
@@ -41,9 +57,8 @@ def _range_note(reason: Refusal, value: float, nodes: Nodes) -> str:
     axis, name, unit = _NAMES[reason]
     low, high = nodes.lowest[axis], nodes.highest[axis]
     key = f"blow_map.{_RANGES[reason]}_{'from' if value < low else 'to'}"
-    return (
-        f"{name} = {value:.6g} {unit}: the blow map covers {low:.6g} to {high:.6g} {unit}; "
-        f"{key} widens it"
+    return RANGE.format(
+        name=name, value=f"{value:.6g}", unit=unit, low=f"{low:.6g}", high=f"{high:.6g}", key=key
     )
 
 
@@ -62,19 +77,9 @@ def explain_refusal(table: BlowTable, s: Any) -> str:
     if reason == Refusal.MOVING:
         rest = float(s["rest"])
         until = f"after {1e3 * rest:.3g} ms" if np.isfinite(rest) else "in no time of the table"
-        return (
-            f"the piston strikes {1e3 * value:.3g} ms after the last blow, but at "
-            f"feed.force = {float(s['feed']):.6g} N the bit stands still {until}: "
-            "the blow map holds for a bit at rest alone; take solver.fidelity = 'wave'"
+        return MOVING.format(
+            flight=f"{1e3 * value:.3g}", feed=f"{float(s['feed']):.6g}", until=until
         )
     if reason == Refusal.TURNED:
-        return (
-            f"drive.reversal_distance = {value:.6g} m: the drive turns before the last "
-            "contact of the blow has opened, which the blow map does not know; "
-            "take solver.fidelity = 'wave'"
-        )
-    return (
-        f"drive.force = {value:.6g} N: the piston falls back on the bit before "
-        "drive.reversal_distance, which the blow map does not know and no range of it changes; "
-        "take solver.fidelity = 'wave'"
-    )
+        return TURNED.format(reversal=f"{value:.6g}")
+    return FALLEN.format(force=f"{value:.6g}")

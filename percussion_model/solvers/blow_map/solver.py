@@ -16,7 +16,7 @@ from percussion_model.solvers.blow_map import advance as kernels
 from percussion_model.solvers.blow_map import flight
 from percussion_model.solvers.blow_map.builder import get_table
 from percussion_model.solvers.blow_map.prepare import (
-    MOST_ROCK_GAP,
+    NO_STAND,
     begin,
     fill_map_parameters,
     stands_on_rock,
@@ -24,19 +24,12 @@ from percussion_model.solvers.blow_map.prepare import (
 from percussion_model.solvers.blow_map.records import ENTRIES, MAP_LIMITS, MAP_PAR, MAP_STATE
 from percussion_model.solvers.blow_map.refusals import explain_refusal
 from percussion_model.solvers.blow_map.table import BlowTable, fixed_values
+from percussion_model.solvers.blow_map.words import FIXED_INPUTS, FLIGHT_INPUTS
 from percussion_model.solvers.state import State, words_of
 
 _WORD = words_of(MAP_STATE)
 T, T_NEXT, EVENTS_ON = _WORD["t"], _WORD["t_next"], _WORD["events_on"]
 N_BLOWS, N_EVENTS = _WORD["n_blows"], _WORD["n_events"]
-
-# Inputs that the flight follows; others count at the next blow.
-_FLIGHT = frozenset({"drive_force", "reversal_distance"})
-_FIXED = {
-    "unloading_ratio": "rock.unloading_ratio",
-    "barrier_damping": "rock.barrier_damping",
-    "barrier_energy": "rock.barrier_energy",
-}
 
 
 class BlowMapSolver(Solver):
@@ -63,10 +56,9 @@ class BlowMapSolver(Solver):
         table.refuse_other(fixed_values(scene))
         self._numbers = kernel_numbers(scene)
         if not entry_of(stands_on_rock)(self._numbers):
+            start = scene.start
             raise SceneError(
-                f"start.rock_gap = {scene.start.rock_gap!r} m, start.bit_velocity = "
-                f"{scene.start.bit_velocity!r} m/s: the blow map needs a bit that stands on "
-                f"the rock, within {MOST_ROCK_GAP:g} m and at 0 m/s"
+                NO_STAND.format(gap=repr(start.rock_gap), velocity=repr(start.bit_velocity))
             )
         self.table = table
         self.cells = dict(table.cells)
@@ -151,13 +143,13 @@ class BlowMapSolver(Solver):
         the rock law are fixed in the table: `SceneError` if one of them differs.
         """
         for name, value in inputs.items():
-            if name in _FIXED and value != self.table.fixed[_FIXED[name]]:
+            if name in FIXED_INPUTS and value != self.table.fixed[FIXED_INPUTS[name]]:
                 raise SceneError(
-                    f"{_FIXED[name]} = {value!r}: the blow map was made for "
-                    f"{self.table.fixed[_FIXED[name]]!r} and holds for that alone"
+                    f"{FIXED_INPUTS[name]} = {value!r}: the blow map was made for "
+                    f"{self.table.fixed[FIXED_INPUTS[name]]!r} and holds for that alone"
                 )
         super().set_inputs(state, **inputs)
-        if not _FLIGHT.isdisjoint(inputs):
+        if not FLIGHT_INPUTS.isdisjoint(inputs):
             self._plan(self._par, state.record)
 
     def grid_point_after(self, state: State, t: float) -> float:

@@ -34,6 +34,13 @@ FIXED = (
 )
 _ROWS = {row.key: row for row in parameter_table() if row.key in FIXED}
 SECTION = ("length", "area", "youngs_modulus", "density")
+# Inputs that the flight follows; others count at the next blow, and these not at all.
+FLIGHT_INPUTS = frozenset({"drive_force", "reversal_distance"})
+FIXED_INPUTS = {
+    "unloading_ratio": "rock.unloading_ratio",
+    "barrier_damping": "rock.barrier_damping",
+    "barrier_energy": "rock.barrier_energy",
+}
 # Of these rows of numbers.
 FORMAT = 1
 

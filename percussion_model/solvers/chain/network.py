@@ -27,6 +27,10 @@ from percussion_model.solvers.setup import PISTONS, kelvin_voigt_time
 LEAST_SPREAD = 0.99
 # Steps in which a wave crosses any bar at least, where a scene asks for none.
 FEWEST_STEPS = 4
+TOO_FINE = (
+    "loss.time = {eta} s: too long for a section of {length} m in steps of {step} s: take a "
+    "shorter loss.time, or fewer solver.cells"
+)
 PLACES, STEELS, FITS, BODIES = len(Place), len(Steel), len(Fit), len(Body)
 PERFECT = int(Joint.PERFECT)
 

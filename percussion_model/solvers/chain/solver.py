@@ -14,7 +14,7 @@ from percussion_model.scene.numbers import Numbers, kernel_numbers
 from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.solvers.base import Solver
 from percussion_model.solvers.chain.advance import GRID_ROUNDING, run
-from percussion_model.solvers.chain.network import Network, Plan, network_of, plan_of
+from percussion_model.solvers.chain.network import TOO_FINE, Network, Plan, network_of, plan_of
 from percussion_model.solvers.chain.prepare import begin, fill_chain_parameters
 from percussion_model.solvers.chain.records import (
     CHAIN_LIMITS,
@@ -45,11 +45,11 @@ def _network(numbers: Numbers) -> tuple[Plan, Network]:
     refuse_many("cells", plan.cells, MOST_CELLS)
     network = entry_of(network_of)(numbers, plan)
     if network.too_fine > 0.0:
-        raise SceneError(
-            f"loss.time = {plan.eta:.3g} s: too long for a section of {network.too_fine:g} m "
-            f"in steps of {plan.time_step:.2g} s: "
-            "take a shorter loss.time, or fewer solver.cells"
-        )
+        numbers_in_text = {
+            "eta": f"{plan.eta:.3g}", "length": f"{network.too_fine:g}",
+            "step": f"{plan.time_step:.2g}",
+        }  # fmt: skip
+        raise SceneError(TOO_FINE.format(**numbers_in_text))
     return plan, network
 
 

@@ -15,6 +15,7 @@ import math
 
 import numpy as np
 
+from percussion_model.physics.elementary import exp
 from percussion_model.physics.kernel import preparing
 from percussion_model.scene.bars import add
 from percussion_model.solvers import plain_code  # noqa: F401  # kernels call functions of scenes
@@ -111,7 +112,7 @@ def _normal(variance, reach):
     for _ in range(ROUNDS):
         for k in range(2 * reach + 1):
             place = float(k - reach)
-            weights[k] = math.exp(-0.5 * (place * place) / wide)
+            weights[k] = exp(-0.5 * (place * place) / wide)
         _scaled(weights)
         moment = lost = 0.0
         for k in range(2 * reach + 1):

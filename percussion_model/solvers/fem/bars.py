@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from percussion_model.physics.kernel import fused, inlined, kernel
+from percussion_model.physics.kernel import inlined, kernel
 from percussion_model.physics.records import Mode
 from percussion_model.physics.rock import recoverable
 from percussion_model.solvers.fem.records import Mesh, Node
 
 
-@fused
+@inlined
 def moment(c, a, row, first, count):
     """Sum of mass times value over `count` nodes."""
     sum0 = 0.0
@@ -34,7 +34,7 @@ def relative_motion(par, c, a, row):
     return moment(c, a, row, 0, par.n_p) / par.mass_p - bit
 
 
-@fused
+@inlined
 def kinetic_energy(c, a, first, count):
     """Kinetic energy of `count` nodes that a bar has, eq. 52 of the paper [J]."""
     p = 0.0
@@ -57,7 +57,7 @@ def kinetic_energy(c, a, first, count):
     return 0.5 * (p + r) + (q + s)
 
 
-@fused
+@inlined
 def elastic_energy(c, a, n):
     """Strain energy of all elements [J]."""
     total = 0.0

@@ -10,14 +10,14 @@ from __future__ import annotations
 
 from percussion_model.physics.body import bit_acceleration, piston_acceleration
 from percussion_model.physics.drive import drive_force
-from percussion_model.physics.kernel import fused, inlined, kernel, merged
+from percussion_model.physics.kernel import inlined, kernel, merged
 from percussion_model.physics.rock import damping, origin, stiffness
 from percussion_model.solvers.fem.bars import read_ahead
 from percussion_model.solvers.fem.records import Mesh, Node, Trial
 from percussion_model.solvers.fem.solve import factors, substitute
 
 
-@fused
+@inlined
 def load(par, s, w, c, x, h):
     """Right-hand side of the stage equation into rows RE, IM (docs/model.md, eqs 1-2)."""
     n_p = par.n_p

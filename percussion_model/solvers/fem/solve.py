@@ -6,7 +6,7 @@ towards the contact, where two unknowns are left (docs/numerics.md, section 10).
 
 from __future__ import annotations
 
-from percussion_model.physics.kernel import fused, inlined, kernel, merged
+from percussion_model.physics.kernel import inlined, kernel, merged
 from percussion_model.physics.rock import damping, stiffness
 from percussion_model.solvers.fem.records import Factor, Key, Mesh, Trial
 
@@ -95,7 +95,7 @@ def factors(par, s, c, f, h):
     return slot
 
 
-@fused
+@inlined
 def meet_at_contact(par, s, f, at, x, h):
     """Solve for the two nodes at the contact, whose spring couples them while it is closed."""
     lower = par.n_p
@@ -141,7 +141,7 @@ def meet_at_contact(par, s, f, at, x, h):
     x[Trial.IM, lower] = (low_im * det_re - low_re * det_im) / size
 
 
-@fused
+@inlined
 def forward(f, at, x, i, re, im):
     """Eliminate row `i`, with what the row before it came to."""
     next_re = x[Trial.RE, i] - f[at + Factor.LOW_RE, i] * re + f[at + Factor.LOW_IM, i] * im
@@ -151,7 +151,7 @@ def forward(f, at, x, i, re, im):
     return next_re, next_im
 
 
-@fused
+@inlined
 def backward(f, at, x, i, solved, re, im):
     """Solve for row `i`, with the solution of the row `solved` next to it."""
     pivot_re = (

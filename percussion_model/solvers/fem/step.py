@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from percussion_model.physics.body import book_bit_load, book_piston_load
 from percussion_model.physics.drive import drive_force
-from percussion_model.physics.kernel import fused, inlined, kernel, merged
+from percussion_model.physics.kernel import inlined, kernel, merged
 from percussion_model.physics.records import Mode
 from percussion_model.physics.rock import (
     book_dashpot,
@@ -39,7 +39,7 @@ def dashpot_work(par, s, x, w, h):
     return C * h * (mean * mean + TWELFTH * bend * bend)
 
 
-@fused
+@inlined
 def book_bars(par, w, c, x, h):
     """Structural loss and dissipation of the scheme in each element."""
     n = par.n_p + par.n_b

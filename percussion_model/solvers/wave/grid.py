@@ -33,6 +33,10 @@ WANTED_FIT = 2e-3
 MOST_REFINED = 2.0
 # Cells times sub-steps: a step takes some ten milliseconds then, the set-up a second.
 MOST_WORK = 5e6
+WORK = (
+    "{cells} cells, each with {parts} sub-steps of the loss: the product must be at most "
+    f"{MOST_WORK:.3g}: lower solver.cells or loss.time"
+)
 # Explicit loss stays free of overshoot up to this viscous number a sub-step.
 MOST_VISCOUS = 0.5
 
@@ -162,10 +166,7 @@ def refuse(wish: Wish) -> None:
     if wish.refused == Refused.CELLS:
         refuse_many("cells", wish.cells)
     if wish.refused == Refused.WORK:
-        raise SceneError(
-            f"{wish.cells:.3g} cells, each with {wish.parts:.3g} sub-steps of the loss: the "
-            f"product must be at most {MOST_WORK:.3g}: lower solver.cells or loss.time"
-        )
+        raise SceneError(WORK.format(cells=f"{wish.cells:.3g}", parts=f"{wish.parts:.3g}"))
 
 
 def substeps(loss_time: float, time_step: float) -> int:

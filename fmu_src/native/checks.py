@@ -1,0 +1,51 @@
+"""What moves, where it comes from outside: whether its numbers are within their limits."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fmu_src.native.layout import RECORD, directory
+from fmu_src.native.memory import floats_at, words_at
+from percussion_model.physics.kernel import preparing
+from percussion_model.solvers.state import first_beyond, is_bounded
+
+
+@preparing
+def record_fault(moving, low, high, may_be_nan, whole, number, facts):
+    """Look at each word of a solver's record.
+
+    Parameters
+    ----------
+    moving : int
+        Address of what moves.
+    low, high, may_be_nan, whole : ndarray
+        As in `LimitRows`.
+    number : int
+        Of the fault.
+    facts : float array, shape (4,)
+        Filled where there is one: word and value, and its limits.
+
+    Returns
+    -------
+    int
+        0 where all are good.
+    """
+    words = words_at(moving + RECORD, len(low))
+    numbers = words.view(np.float64)
+    k = first_beyond(words, numbers, low, high, may_be_nan, whole)
+    if k < 0:
+        return 0
+    facts[0] = k + 1.0
+    facts[1] = float(words[k]) if whole[k] else numbers[k]
+    facts[2], facts[3] = low[k], high[k]
+    return number
+
+
+@preparing
+def arrays_are_bounded(base, moving, first, count):
+    """Whether all numbers of arrays of what moves are such; their rows of the directory."""
+    d = directory(base)
+    for k in range(first, first + count):
+        if not is_bounded(floats_at(moving + d[k, 0], d[k, 1] * d[k, 2])):
+            return False
+    return True
