@@ -98,8 +98,7 @@ def setup() -> int:
         print("The installation failed, see above. Is the network up? Then run this again.",
               file=sys.stderr)  # fmt: skip
         return code
-    print("Compiling the kernels, for Python and for the FMU (once, a minute or two) ...",
-          flush=True)  # fmt: skip
+    print("Compiling the kernels, and the library of FMUs (once, some minutes) ...", flush=True)
     code = call([tool("python"), "-m", WARM_UP], silent="compiling")
     if code != 0:
         return code

@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import os
 import zipfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from fmu_src.description import About, write_description
@@ -22,6 +22,8 @@ ROOT = HERE.parent
 # The oldest date that a zip archive can hold.
 DATE = (1980, 1, 1, 0, 0, 0)
 PERMISSIONS = 0o644 << 16
+# All that the native library needs to know of a scene.
+MODEL = "resources/model.bin"
 
 
 def write_fmu(
@@ -32,6 +34,7 @@ def write_fmu(
     slave: type,
     resources: dict[str, str | bytes],
     page: str,
+    model: Callable[[str], bytes] | None = None,
 ) -> str:
     """Write an FMU and return its GUID.
 
@@ -43,6 +46,9 @@ def write_fmu(
         Further files for the folder `resources`.
     page : str
         Documentation, HTML.
+    model : callable, optional
+        Gives `resources/model.bin` for a GUID with its braces; it is asked for an empty one as
+        well, whose tables are part of what the GUID is a hash of.
     """
     module, text = script(bundle, slave)
     entries: dict[str, bytes] = {
@@ -60,7 +66,11 @@ def write_fmu(
     entries["documentation/index.html"] = page.encode()
     entries["documentation/licenses/license.txt"] = (ROOT / "LICENSE").read_bytes()
     entries["model.png"] = (HERE / "icon.png").read_bytes()
+    if model is not None:
+        entries[MODEL] = model("")
     guid, xml = write_description(about, variables, digest(entries))
+    if model is not None:
+        entries[MODEL] = model(f"{{{guid}}}")
     write_described(path, xml, entries)
     return guid
 

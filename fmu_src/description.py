@@ -17,7 +17,7 @@ from fmu_src.units import write_units
 from fmu_src.variables import Variable
 
 OPTIONS = {
-    "needsExecutionTool": "true",  # a Python with numpy and numba
+    "needsExecutionTool": "true",  # a Python
     "canHandleVariableCommunicationStepSize": "true",
     "canGetAndSetFMUstate": "true",
     "canSerializeFMUstate": "true",

@@ -22,8 +22,9 @@ the same blows. Inputs are held over a communication step and must be finite and
 bounds. Outputs belong to the step just finished; none depends on an input at once.</p>
 """
 NEEDS_PYTHON = """\
-<p>Needs a Python 3.11 or newer with numpy and numba in the process of the host. The kernels are
-compiled when they are used for the first time (about a minute) and kept in the user's cache
+<p>Needs a Python 3.11 or newer in the process of the host. <code>resources/native</code> has
+libraries that compute; on a platform without one Python needs numpy and numba too, and compiles
+when kernels are used for the first time (about a minute). They are kept in the user's cache
 folder; the environment variable <code>PERCUSSION_FMU_CACHE</code> names another one.</p>
 """
 ERRORS = """

@@ -7,6 +7,11 @@ from pathlib import Path
 
 from percussion_model.solvers.blow_map.table import BlowTable
 
+NO_MAP = (
+    'solver.fidelity = "blow-map": this FMU brings no blow map; build it by build.py fmu '
+    '--blow-map, or of a scene with solver.fidelity = "blow-map"'
+)
+
 
 def read_blow_map(folder: str) -> BlowTable:
     """Table of blows that the FMU in a folder brings along; instances share one.
@@ -18,9 +23,7 @@ def read_blow_map(folder: str) -> BlowTable:
     """
     path = Path(folder) / "blow_map.npz"
     if not path.is_file():
-        raise ValueError(
-            'solver.fidelity = "blow-map": this FMU brings no blow map; build it with --blow-map'
-        )
+        raise ValueError(NO_MAP)
     stamp = path.stat()
     return _read(path, stamp.st_mtime_ns, stamp.st_size)
 

@@ -2,28 +2,43 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import re
 import zipfile
 import zlib
+from collections.abc import Mapping
 from importlib.metadata import version
 from pathlib import Path
+
+import numpy as np
 
 from fmu_src.archive import write_fmu
 from fmu_src.description import About
 from fmu_src.hammer.slave import PercussiveHammer
 from fmu_src.hammer.variables import VERSION, hammer_variables
+from fmu_src.native.library import library_here
+from fmu_src.native.tables import model_tables
 from fmu_src.page import write_page
+from fmu_src.slave.native import library_name
 from fmu_src.staging import stage
 from fmu_src.variables import FILE, Variable, to_json, write_variables
 from percussion_model.scene.scene import Scene, SceneError
+from percussion_model.solvers.base import added_solvers
 from percussion_model.solvers.blow_map.table import BlowTable, fixed_values
 
 STEP_SIZE = 1e-3  # of the default experiment [s]
 
 
-def build_hammer(scene: Scene, path: Path, blow_map: BlowTable | None = None) -> str:
+def build_hammer(
+    scene: Scene,
+    path: Path,
+    blow_map: BlowTable | None = None,
+    libraries: Mapping[str, bytes] | None = None,
+) -> str:
     """Write the FMU of a scene; return its GUID.
+
+    It runs by a native library where it brings one for the machine, else by numba.
 
     Parameters
     ----------
@@ -31,6 +46,8 @@ def build_hammer(scene: Scene, path: Path, blow_map: BlowTable | None = None) ->
         What `solver.fidelity = "blow-map"` needs; the FMU runs without it otherwise.
     path : Path
         Ends with `.fmu`; the rest of its name is the model identifier.
+    libraries : dict of str, optional
+        Native libraries by platform; that of this machine if left out.
 
     Raises
     ------
@@ -47,8 +64,14 @@ def build_hammer(scene: Scene, path: Path, blow_map: BlowTable | None = None) ->
     if blow_map is not None:
         blow_map.refuse_other(fixed_values(scene))
         resources["blow_map.npz"] = blow_map.to_bytes()
+    model = None
+    if not added_solvers():  # the library has the solvers of the package alone
+        for name, library in (library_here() if libraries is None else libraries).items():
+            resources[library_name(name)] = library
+        words = np.zeros(0) if blow_map is None else blow_map.to_words()
+        model = functools.partial(model_tables, scene, blow_map=words)
     page = write_page(about, variables, scene)
-    return write_fmu(path, about, variables, bundle, PercussiveHammer, resources, page)
+    return write_fmu(path, about, variables, bundle, PercussiveHammer, resources, page, model)
 
 
 def refuse_other(path: Path, scene: Scene, with_map: bool, force: bool = False) -> None:

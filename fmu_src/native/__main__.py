@@ -12,10 +12,11 @@ from fmu_src.archive import content, fault, state_of
 from fmu_src.hammer.build import about_hammer, hammer_name
 from fmu_src.native.archive import Version, write_native_fmu
 from fmu_src.native.compare import refuse_difference
-from fmu_src.native.library import libraries, platform_names, this_platform
+from fmu_src.native.library import libraries, platform_names
 from fmu_src.native.reference_results import add_reference_results
 from fmu_src.native.tables import model_tables
 from fmu_src.run import run_fmu
+from fmu_src.slave.native import this_platform
 from percussion_model.interface.terminal import progress
 from percussion_model.scene.scene import Scene, SceneError
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Literal
 
-from fmu_src.archive import HERE, ROOT, digest, write_described
+from fmu_src.archive import HERE, MODEL, ROOT, digest, write_described
 from fmu_src.description import About
 from fmu_src.hammer.variables import hammer_variables
 from fmu_src.native.description import write_native_description
@@ -15,17 +15,16 @@ from fmu_src.native.description3 import write_description3
 from fmu_src.native.page import write_native_page
 from fmu_src.native.terminals import FOLDER, write_terminals
 from fmu_src.native.variables3 import fmi3_variables
+from fmu_src.slave.native import SUFFIXES
 from percussion_model.scene.scene import Scene
 
 Version = Literal["2.0", "3.0"]
-SUFFIXES = {"linux": ".so", "windows": ".dll", "darwin": ".dylib"}
 # FMI 2.0 has names of its own for x86, and takes those of FMI 3.0 for all others (2.0.5).
 FMI2_PLATFORMS = {
     "x86_64-linux": "linux64",
     "x86_64-windows": "win64",
     "x86_64-darwin": "darwin64",
 }
-MODEL = "resources/model.bin"
 
 
 def write_native_fmu(

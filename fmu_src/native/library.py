@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import importlib.util
 import os
-import platform as machine
 import shutil
 import subprocess
 import sys
@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from fmu_src.archive import ROOT
+from fmu_src.slave.native import this_platform
 from percussion_model.scene.scene import SceneError
 
 HERE = Path(__file__).resolve().parent
@@ -58,12 +59,8 @@ PLATFORMS = {
 }
 
 
-def this_platform() -> str:
-    """Name of the platform that this is."""
-    processor = {"amd64": "x86_64", "arm64": "aarch64"}.get(
-        machine.machine().lower(), machine.machine().lower()
-    )
-    return f"{processor}-{machine.system().lower()}"
+class NoCompilerError(SceneError):
+    """Nothing here can compile the library."""
 
 
 def platform_names(words: Sequence[str]) -> list[str]:
@@ -100,15 +97,17 @@ def compiler_for(name: str) -> list[str]:
 
     Raises
     ------
-    SceneError
+    NoCompilerError
         If there is none.
     """
+    if name not in PLATFORMS:
+        raise NoCompilerError(f"no compiler for {name}: known are {', '.join(PLATFORMS)}")
     if name == this_platform():
         found = next((shutil.which(one) for one in ("cc", "gcc", "clang") if shutil.which(one)), "")
         if found:
             return [found]
     if importlib.util.find_spec("ziglang") is None:
-        raise SceneError(
+        raise NoCompilerError(
             f"no compiler for {name}: install a C compiler (cc, gcc or clang) for this machine, "
             "or the package ziglang for any platform"
         )
@@ -125,10 +124,10 @@ def libraries(names: Sequence[str], kept: Path = KEPT) -> dict[str, bytes]:
     kept : Path
         Folder; libraries of other sources are taken out of it.
     """
-    compilers = {name: compiler_for(name) for name in names}
     folder = kept / stamp()
     files = {name: folder / f"{name}{PLATFORMS[name].suffix}" for name in names}
     missing = [name for name in names if not files[name].is_file()]
+    compilers = {name: compiler_for(name) for name in missing}
     if missing:
         for old in kept.glob("*/"):
             if old != folder:
@@ -139,6 +138,16 @@ def libraries(names: Sequence[str], kept: Path = KEPT) -> dict[str, bytes]:
             for name in missing:
                 link(name, compilers[name], Path(work), files[name])
     return {name: file.read_bytes() for name, file in files.items()}
+
+
+@functools.cache
+def library_here() -> dict[str, bytes]:
+    """Library for this machine by its platform; none, and a line that says so, without compiler."""
+    try:
+        return libraries([this_platform()])
+    except NoCompilerError as error:
+        print(f"FMUs are built without a library and run by numba: {error}", file=sys.stderr)
+        return {}
 
 
 def make_objects(work: Path, names: Sequence[str]) -> None:

@@ -11,6 +11,7 @@ import re
 from collections.abc import Callable, Iterator, Sequence
 from enum import IntEnum
 
+from fmu_src.hammer.blow_map import NO_MAP
 from fmu_src.hammer.inputs import NAMES_OUTSIDE
 from fmu_src.native.layout import KINDS
 from percussion_model.scene.contradictions import TEXTS
@@ -174,10 +175,7 @@ def faults(bars: Sequence[str] = ("piston", "bit")) -> tuple[str, ...]:
         Fault.WORK: WORK.format(cells="{0:.3g}", parts="{1:.3g}"),
         Fault.TOO_FINE: TOO_FINE.format(eta="{0:.3g}", length="{1:g}", step="{2:.2g}"),
         Fault.NO_STAND: NO_STAND.format(gap="{0:r}", velocity="{1:r}"),
-        Fault.NO_MAP: (
-            "solver.fidelity = 'blow-map': this FMU has no blow map; build one of a scene with "
-            "solver.fidelity = 'blow-map'"
-        ),
+        Fault.NO_MAP: NO_MAP,
         Fault.BAD_MAP: "the blow map of this FMU is damaged, or of another format",
         Fault.MAP_SECTIONS: (
             "the blow map was made for another number of sections of the {0:|piston|bit|} and "

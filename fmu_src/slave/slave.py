@@ -7,17 +7,12 @@ when they are needed, which is in the next step.
 
 from __future__ import annotations
 
-import ctypes
-import functools
 import sys
 from collections.abc import Callable, Iterable
 from math import inf
-from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
-from pythonfmu import Fmi2Slave
-from pythonfmu.enums import Fmi2Status
-
+from fmu_src.slave.host import Hosted, guarded
 from fmu_src.slave.states import (
     PLACE,
     STEPPING,
@@ -48,41 +43,7 @@ REAL, INTEGER, BOOLEAN, STRING = ("Real",), ("Integer", "Enumeration"), ("Boolea
 Read = Callable[[Any], list[Any]]
 
 
-class FmuError(ValueError):
-    """An error that the host must see; the text has its percent signs doubled."""
-
-
-def guarded(method: Callable) -> Callable:
-    """Let an error end the call as a fatal one in the host, without a crash."""
-
-    @functools.wraps(method)
-    def call(self: Any, *arguments: Any) -> Any:
-        try:
-            return method(self, *arguments)
-        except Exception as error:
-            raise self.fatal(error) from None
-
-    return call
-
-
-@functools.cache
-def finalise_in_time(folder: str) -> None:
-    """Let the export library end before its own static variables do (Linux).
-
-    Left alone, it finalises the same pointer twice at the end of the process.
-    """
-    if not sys.platform.startswith("linux"):
-        return
-    libraries = sorted((Path(folder).parent / "binaries" / "linux64").glob("*.so"))
-    if not libraries:
-        return
-    library = ctypes.CDLL(str(libraries[0]))
-    # by getattr, since a class would mangle a name of two underscores
-    at_exit = getattr(ctypes.CDLL(None), "__cxa_atexit")
-    at_exit(ctypes.cast(library.finalizePythonInterpreter, ctypes.c_void_p), None, None)
-
-
-class Slave(Fmi2Slave):
+class Slave(Hosted):
     """Base of the slaves.
 
     A slave gives `reset`, `initialise`, `step`, a `reader` of outputs, its `identity`, and its
@@ -102,17 +63,9 @@ class Slave(Fmi2Slave):
         Inputs whose new values may be out of bounds.
     """
 
-    start_notes: ClassVar[list[str]] = []  # of the loader
-
     def __init__(self, **arguments: Any) -> None:
         super().__init__(**arguments)
-        while self.start_notes:
-            self.warn(self.start_notes.pop(0))
         folder = arguments["resources"]
-        # The export library adds the folder for each instance; once loaded it is not needed.
-        while folder in sys.path:
-            sys.path.remove(folder)
-        finalise_in_time(folder)
         self.phase = Phase.INSTANTIATED
         self.is_set_up = False
         self.start_time = 0.0
@@ -448,7 +401,9 @@ class Slave(Fmi2Slave):
         return pack(self._owner(phase), place + values + motion)
 
     @guarded
-    def _set_fmu_state(self, state: bytes) -> None:
+    def _set_fmu_state(self, state: Any) -> None:
+        if not isinstance(state, bytes):
+            raise StateError("the saved state belongs to another FMU")
         owner, body = unpack(state)
         place = unpack_place(body)
         if owner != self._owner(place.phase):
@@ -471,42 +426,10 @@ class Slave(Fmi2Slave):
         self.renew_inputs()
 
     @staticmethod
-    def _fmu_state_to_bytes(state: bytes) -> bytes:
-        return state
+    def _fmu_state_to_bytes(state: Any) -> bytes:
+        return state if isinstance(state, bytes) else b""  # of another FMU: none here
 
     @staticmethod
     def _fmu_state_from_bytes(state: bytes) -> bytes:
         # looked at when it is set: an error here would bring the export library down
         return state
-
-    # messages
-
-    def log(
-        self,
-        msg: str,
-        status: Fmi2Status = Fmi2Status.ok,
-        category: str | None = None,
-        debug: bool | None = None,
-    ) -> None:
-        """Log a message; hosts take it for a printf format, so percent signs are doubled."""
-        super().log(msg.replace("%", "%%"), status, category)
-
-    def note(self, message: str) -> None:
-        """Log what is no warning."""
-        self.log(f"{self.instance_name}: {message}", Fmi2Status.ok, "logEvents")
-
-    def warn(self, message: str) -> None:
-        """Log a warning."""
-        self.log(f"{self.instance_name}: {message}", Fmi2Status.warning, "logStatusWarning")
-
-    def fatal(self, error: Exception) -> FmuError:
-        """Log an error and return what is to be raised.
-
-        After an exception the export library gives the instance, its class and its
-        message queue back twice: one reference more to each keeps the heap whole.
-        """
-        for held in (self, type(self), self.log_queue):
-            ctypes.pythonapi.Py_IncRef(ctypes.py_object(held))
-        text = str(error) if isinstance(error, ValueError) else f"{type(error).__name__}: {error}"
-        self.log(f"{self.instance_name}: {text}", Fmi2Status.error, "logStatusError")
-        return FmuError(text.replace("%", "%%"))

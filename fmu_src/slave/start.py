@@ -1,5 +1,7 @@
 """Loader of the sources that an FMU brings along, from a place where compiled kernels last.
 
+An FMU with a library that fits the machine needs no kernels, and runs from where it lies. For
+all others:
 Numba keeps compiled kernels beside the sources, but hosts unpack an FMU into a new
 folder each time. So the sources are copied once into the user's cache folder, under
 a name that holds a hash of their contents, and imported from there. The environment
@@ -19,16 +21,22 @@ import stat
 import sys
 import tempfile
 from pathlib import Path
+from typing import Any
 
 PACKAGE = "__BUNDLE__"
 VARIABLE = "PERCUSSION_FMU_CACHE"
+# In the resources of FMUs with a library, and the module of the package that runs it.
+MODEL, NATIVE = "model.bin", "fmu_src.slave.native"
 
 
-# Why another folder than the first was taken; the first instance logs it.
+# Why the library, or the first folder, was not taken; the first instance logs it.
 notes: list[str] = []
+told: set[str] = set()
+# Files of the package, for kernels; empty while it was loaded from where an FMU lies.
+kept: list[Path] = []
 
 
-def slave_class(module_globals: dict, module: str, name: str) -> type:
+def slave_class(module_globals: dict, module: str, name: str) -> Any:
     """Return a class of the bundled sources.
 
     Parameters
@@ -40,16 +48,54 @@ def slave_class(module_globals: dict, module: str, name: str) -> type:
         Module within the bundle, and class in it.
     """
     ctypes.pythonapi.Py_IncRef(ctypes.py_object(module_globals))
-    if PACKAGE not in sys.modules:
-        load(Path(module_globals["__file__"]).parent / PACKAGE)
-    found = getattr(importlib.import_module(f"{PACKAGE}.{module}"), name)
+    # where the library has just put it; the script itself may be that of an equal FMU before
+    resources = Path(sys.path[0])
+    found = native_class(resources) if (resources / MODEL).is_file() else None
+    if found is None:
+        if not kept:
+            forget()
+            kept.append(kept_copy(resources / PACKAGE))
+            load(kept[0])
+        found = class_of(module, name)
     found.start_notes = notes
+    # The library takes the class out of the script's module, which an equal FMU may have loaded;
+    # what the script itself assigns now is lost.
+    module_globals[name] = found
     return found
 
 
-def load(source: Path) -> None:
-    """Import the package from where its kernels are kept."""
-    folder = kept_copy(source)
+def native_class(resources: Path) -> Any:
+    """Class that runs the library of an FMU; None, and a note, if that does not fit."""
+    if PACKAGE not in sys.modules:
+        load(resources / PACKAGE)
+    native = importlib.import_module(f"{PACKAGE}.{NATIVE}")
+    reason = native.reason_against(str(resources))
+    if not reason:
+        return class_of(NATIVE, "NativeSlave")
+    note = f"runs by numba, and starts more slowly: {reason}"
+    if note not in told:
+        told.add(note)
+        notes.append(note)
+    return None
+
+
+def class_of(module: str, name: str) -> Any:
+    """Class of the package; where a module is missing, the reason for needing it is told too."""
+    try:
+        return getattr(importlib.import_module(f"{PACKAGE}.{module}"), name)
+    except ImportError as error:
+        raise ImportError("; ".join([*notes, str(error)])) from error
+
+
+def forget() -> None:
+    """Drop the package, if it was loaded from where an FMU lies."""
+    for name in [*sys.modules]:
+        if name == PACKAGE or name.startswith(f"{PACKAGE}."):
+            del sys.modules[name]
+
+
+def load(folder: Path) -> None:
+    """Import the package from a folder."""
     spec = importlib.util.spec_from_file_location(
         PACKAGE, folder / "__init__.py", submodule_search_locations=[str(folder)]
     )

@@ -33,16 +33,12 @@ def compile_kernels(solver: str) -> str:
     return solver
 
 
-def empty_table(scene: Scene) -> BlowTable:
-    """A table of blows that do nothing: enough to compile what reads one."""
-    nodes = Nodes.of(scene)
-    return BlowTable(nodes, np.zeros((*nodes.counts, ENTRIES)), fixed_values(scene), {}, 0.0)
-
-
 def compile_blow_map() -> str:
-    """Make the solver of the blow map, which compiles its kernels, without a real table."""
+    """Make the solver of the blow map, which compiles its kernels, on a table of no blows."""
     scene = Scene().computed_by("blow-map", **COARSE)
-    return BlowMapSolver(scene, empty_table(scene)).name
+    nodes = Nodes.of(scene)
+    table = BlowTable(nodes, np.zeros((*nodes.counts, ENTRIES)), fixed_values(scene), {}, 0.0)
+    return BlowMapSolver(scene, table).name
 
 
 def main() -> None:

@@ -24,11 +24,15 @@ RIGID = {"piston.model": "rigid", "bit.model": "rigid"}
 
 
 @pytest.fixture(scope="session")
-def fmus(tmp_path_factory):
-    """Folder with the reference's FMU, that of rigid bodies, and the pneumatic one."""
+def fmus(built_library, tmp_path_factory):
+    """Folder with the reference's FMU, that of rigid bodies, both also without a library, and
+    the pneumatic one.
+    """
     folder = tmp_path_factory.mktemp("fmus")
     build_hammer(Scene(), folder / "PercussiveHammer.fmu")
     build_hammer(Scene().replace(**RIGID), folder / "RigidHammer.fmu")
+    build_hammer(Scene(), folder / "NumbaHammer.fmu", libraries={})
+    build_hammer(Scene().replace(**RIGID), folder / "NumbaRigidHammer.fmu", libraries={})
     build_part(pneumatic_drive.TABLE, folder / "PneumaticDrive.fmu")
     return folder
 
@@ -41,7 +45,7 @@ def hammer(fmus):
 
 @pytest.fixture(scope="session")
 def rigid(fmus):
-    """FMU of the rigid scene, which compiles sooner."""
+    """FMU of the rigid scene."""
     return fmus / "RigidHammer.fmu"
 
 
@@ -60,6 +64,7 @@ def make(unpacked):
     made = []
 
     def one(name="RigidHammer", start=True, **values):
+        """`NumbaHammer` and `NumbaRigidHammer` have no library, and run by numba."""
         instance = Instance(unpacked[name], name=f"{name}{len(made)}")
         made.append(instance)
         if start:

@@ -57,6 +57,8 @@ KINDS: dict[str, dict[str, Any]] = {
     "RigidHammer": {},
     "FemHammer": {},
     "MapHammer": {},
+    "NumbaHammer": {},
+    "NumbaRigidHammer": {},
     **{name: {} for name in PARTS},
     "DrillString/lumped": {"model": 2, "rod.automatic": True},
     "PneumaticDrive": {},
@@ -81,8 +83,9 @@ def build(names: Sequence[str], folder: Path) -> dict[str, str]:
                     "PercussiveHammer": {},
                     "RigidHammer": {"piston.model": "rigid", "bit.model": "rigid"},
                     "FemHammer": {"solver.name": "fem"},
-                }[base]
-                build_hammer(Scene().replace(**changes), path)
+                }[base.replace("NumbaHammer", "PercussiveHammer").removeprefix("Numba")]
+                numba: Any = {"libraries": {}} if base.startswith("Numba") else {}
+                build_hammer(Scene().replace(**changes), path, **numba)
             extract(str(path), str(folder / base))
         found[name] = str(folder / base)
     return found

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 from fmpy import simulate_fmu
@@ -54,10 +56,16 @@ def test_four_seconds_of_the_reference_are_identical(hammer, reference):
     assert abs(found["energy_residual"][-1]) < 1e-12
 
 
-@pytest.mark.parametrize("name", ["PercussiveHammer", "RigidHammer"])
-@pytest.mark.parametrize("step", [1e-4, 1e-3, 7.3e-3, 0.05, "random"])
+@pytest.mark.parametrize(
+    ("name", "step"),
+    [
+        *itertools.product(["PercussiveHammer", "RigidHammer"], [1e-4, 1e-3, 7.3e-3, 0.05]),
+        *((name, "random") for name in ("PercussiveHammer", "NumbaHammer", "RigidHammer")),
+        ("NumbaRigidHammer", "random"),
+    ],
+)
 def test_communication_steps_change_no_bit(make, library, name, step):
-    simulation = library[name]
+    simulation = library[name.replace("NumbaHammer", "PercussiveHammer").removeprefix("Numba")]
     rng = np.random.default_rng(3)
     if step == "random":
         steps = np.exp(rng.uniform(np.log(SHORTEST), np.log(LONGEST), 200))

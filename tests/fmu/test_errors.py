@@ -11,6 +11,18 @@ from fmpy.fmi1 import FMICallException
 NAN, INFINITE = math.nan, math.inf
 
 
+@pytest.fixture(params=["RigidHammer", "NumbaRigidHammer"])
+def make(make, request):
+    """Make instances that run by a library, and by numba."""
+
+    def one(**arguments):
+        instance = make(request.param, **arguments)
+        del instance.messages[:]  # the first one says why it runs by numba
+        return instance
+
+    return one
+
+
 def fails(instance, action, *words):
     """Do what must fail; the log has all the words in one message."""
     before = len(instance.messages)
@@ -134,7 +146,7 @@ def test_what_is_fixed_or_computed_cannot_be_set(make):
 
 
 def test_percent_signs_reach_the_log_as_they_are(make):
-    instance = make("RigidHammer", start=False)
+    instance = make(start=False)
     other = type(instance)(instance.folder, name="100%s%n of it")
     other.set({"loss.time": -1.0})
     with pytest.raises(FMICallException):

@@ -22,7 +22,7 @@ def scene():
 
 
 @pytest.fixture(scope="module")
-def ladder(scene, tmp_path_factory):
+def ladder(scene, built_library, tmp_path_factory):
     """Folder of the unpacked FMU."""
     from fmpy import extract
 

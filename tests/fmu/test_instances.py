@@ -37,20 +37,25 @@ def test_interleaved_instances_equal_those_alone(make, name, count, steps):
 
 
 def test_different_fmus_live_in_one_process(make):
-    several = [make(name) for name in ("RigidHammer", "PercussiveHammer", "PneumaticDrive")] * 2
+    names = ("RigidHammer", "PercussiveHammer", "PneumaticDrive", "NumbaRigidHammer")
+    several = [make(name) for name in names]
+    several += [make(name) for name in names]
     for _ in range(20):
         for instance in several:
             instance.step(1e-3)
-    assert several[0].values(several[0].outputs) == several[3].values(several[3].outputs)
+    outputs = several[0].outputs
+    for k in (3, 4, 7):
+        assert several[k].values(outputs) == several[0].values(outputs)
     assert several[1].get("contact.force_peak") >= 0.0
     peak = max(several[0].get("bit.impulse"), several[1].get("bit.impulse"))
     assert several[0].get("bit.impulse") != several[1].get("bit.impulse")
     assert peak > 0
-    assert several[2].get("piston_force") == several[5].get("piston_force")
+    assert several[2].get("piston_force") == several[6].get("piston_force")
 
 
 def test_no_module_is_left_under_a_common_name(make):
     make("RigidHammer")
+    make("NumbaRigidHammer")
     make("PneumaticDrive")
     prefixes = ("percussive_hammer_", "pneumatic_drive_")
     bundled = [name for name in sys.modules if name.startswith(prefixes)]
@@ -125,9 +130,10 @@ print(json.dumps(seen))
 
 
 @pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="reads the memory from /proc")
-def test_a_thousand_instances_come_and_go_within_five_megabytes(unpacked):
+@pytest.mark.parametrize("name", ["RigidHammer", "NumbaRigidHammer"])
+def test_a_thousand_instances_come_and_go_within_five_megabytes(unpacked, name):
     done = subprocess.run(
-        [sys.executable, "-c", MEMORY, unpacked["RigidHammer"], str(CYCLES)],
+        [sys.executable, "-c", MEMORY, unpacked[name], str(CYCLES)],
         cwd=ROOT, capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr

@@ -11,25 +11,33 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 
-# A host with nothing but fmpy, numpy and numba and what these bring along.
+# A host with nothing but fmpy and, unless they are hidden, numpy and numba.
 HOST = """
 import importlib.abc, sys
 
+from fmpy import extract, read_model_description
+from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
+
+callbacks = fmi2CallbackFunctions()
+callbacks.logger = logger = fmi2CallbackLoggerTYPE(
+    lambda environment, name, status, category, text: print(text.decode()) if status > 1 else None)
+absent = sys.argv[2].split(",")
 class Refuse(importlib.abc.MetaPathFinder):
     def find_spec(self, name, path=None, target=None):
-        if name.split(".")[0] in sys.argv[2].split(","):
+        if name.split(".")[0] in absent:
             raise ModuleNotFoundError(f"{name} is not installed here")
 
-sys.meta_path.insert(0, Refuse())
-from fmpy import extract, read_model_description
-from fmpy.fmi2 import FMU2Slave
 folder = extract(sys.argv[1])
 model = read_model_description(folder)
+for name in [*sys.modules]:  # what fmpy has needed itself
+    if name.split(".")[0] in absent:
+        del sys.modules[name]
+sys.meta_path.insert(0, Refuse())
 slaves = []
 for k in range(3):
     slave = FMU2Slave(guid=model.guid, unzipDirectory=folder, instanceName=f"i{k}",
                       modelIdentifier=model.coSimulation.modelIdentifier)
-    slave.instantiate()
+    slave.instantiate(callbacks=callbacks, loggingOn=True)
     slave.setupExperiment(startTime=0.0)
     slave.enterInitializationMode()
     slave.exitInitializationMode()
@@ -46,20 +54,41 @@ sys.stderr.write(repr(values.pop()))
 ABSENT = "percussion_model,fmu_src,pythonfmu,scipy,pandas,matplotlib,typer,rich,tomli_w"
 
 
-def host(fmu, cwd, output="blow_position", **environment):
+def host(fmu, cwd, output="blow_position", absent=ABSENT, **environment):
     return subprocess.run(
-        [sys.executable, "-c", HOST, str(fmu), ABSENT, output],
+        [sys.executable, "-c", HOST, str(fmu), absent, output],
         cwd=cwd, capture_output=True, text=True, check=False,
         env={**os.environ, "PYTHONPATH": "", **environment},
     )  # fmt: skip
 
 
 @pytest.mark.parametrize("name", ["PercussiveHammer", "RigidHammer"])
-def test_numpy_and_numba_are_enough_and_nothing_is_printed(fmus, tmp_path, make, name):
-    done = host(fmus / f"{name}.fmu", tmp_path)
+def test_with_a_library_neither_numpy_nor_numba_nor_a_cache_is_needed(fmus, tmp_path, make, name):
+    cache = tmp_path / "cache"
+    done = host(
+        fmus / f"{name}.fmu", tmp_path, absent=f"{ABSENT},numpy,numba,llvmlite",
+        PERCUSSION_FMU_CACHE=str(cache),
+    )  # fmt: skip
+    assert (done.returncode, done.stdout) == (0, ""), done.stderr
+    assert not cache.exists()
+    instance = make(name)
+    for _ in range(20):
+        instance.step(0.01)
+    assert float(done.stderr) == instance.get("blow_position")
+
+
+def test_without_a_library_and_without_numba_the_reason_is_told(fmus, tmp_path):
+    done = host(fmus / "NumbaRigidHammer.fmu", tmp_path, absent=f"{ABSENT},numba")
+    assert done.returncode != 0
+    assert "no library for" in done.stdout
+    assert "numba is not installed here" in done.stdout
+
+
+def test_numpy_and_numba_are_enough_and_nothing_is_printed(fmus, tmp_path, make):
+    done = host(fmus / "NumbaRigidHammer.fmu", tmp_path)
     assert done.returncode == 0, done.stderr  # no crash at the end either
     assert done.stdout == ""
-    instance = make(name)
+    instance = make("RigidHammer")
     for _ in range(20):
         instance.step(0.01)
     assert float(done.stderr) == instance.get("blow_position")
@@ -106,18 +135,21 @@ for _ in range(2):
 
 
 @pytest.mark.slow
-def test_the_log_says_once_that_kernels_are_compiled(rigid, tmp_path):
+def test_the_log_says_once_that_kernels_are_compiled(fmus, tmp_path):
     """Before they are, in a process with an empty cache; not again where they are kept."""
     told = []
     for _ in range(2):
         done = subprocess.run(
-            [sys.executable, "-c", LOGGED, str(rigid)],
+            [sys.executable, "-c", LOGGED, str(fmus / "NumbaRigidHammer.fmu")],
             cwd=tmp_path, capture_output=True, text=True, check=True,
             env={**os.environ, "PYTHONPATH": str(ROOT), "NUMBA_CACHE_DIR": "",
                  "PERCUSSION_FMU_CACHE": str(tmp_path / "kept")},
         )  # fmt: skip
         told.append(done.stdout.splitlines())
     first, again = told
-    assert first[0].startswith("0 RigidHammer: compiling the kernels of the solver rigid: once")
+    because = first.pop(0)
+    assert because.startswith("1 NumbaRigidHammer: runs by numba")
+    assert because == again.pop(0)
+    assert first[0].startswith("0 NumbaRigidHammer: compiling the kernels of the solver rigid")
     assert str(tmp_path / "kept") in first[0]
     assert first[1:] == again == ["done", "done"]

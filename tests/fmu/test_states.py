@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 from fmpy.fmi1 import FMICallException
 
-from fmu_src.slave.states import HEADER, MAGIC, VERSION
+from fmu_src.slave.states import HEADER, MAGIC
 
 ROOT = Path(__file__).parents[2]
 STEP = 1.9e-3
-NAMES = ["PercussiveHammer", "RigidHammer"]
+NAMES = ["PercussiveHammer", "RigidHammer", "NumbaRigidHammer"]
+RIGID = NAMES[1:]
 
 
 def go_on(instance, count, feed=None):
@@ -60,8 +61,10 @@ def test_a_state_that_never_was_bytes_repeats_too(make, name):
     instance.slave.freeFMUstate(state)
 
 
-def test_a_state_of_another_fmu_of_the_process_is_refused(make):
-    instance, other = make("RigidHammer"), make("PneumaticDrive")
+@pytest.mark.parametrize(("name", "of"), [(RIGID[0], RIGID[1]), (RIGID[1], RIGID[0]),
+                                          (RIGID[0], "PneumaticDrive")])  # fmt: skip
+def test_a_state_of_another_fmu_of_the_process_is_refused(make, name, of):
+    instance, other = make(name), make(of)
     state = other.slave.getFMUstate()
     with pytest.raises(FMICallException):
         instance.slave.setFMUstate(state)
@@ -153,25 +156,30 @@ def refused(instance, saved, message):
     assert any(message in text for text in instance.messages), instance.messages
 
 
-def test_a_state_of_other_parameters_is_refused(make):
-    saved = make("RigidHammer").save()
-    refused(make("RigidHammer", bit__model="rigid", loss__time=1e-7), saved, "other parameters")
+@pytest.mark.parametrize("name", RIGID)
+def test_a_state_of_other_parameters_is_refused(make, name):
+    saved = make(name).save()
+    refused(make(name, bit__model="rigid", loss__time=1e-7), saved, "other parameters")
 
 
-def test_a_state_of_another_version_is_refused(make):
-    saved = bytearray(make("RigidHammer").save())
-    assert HEADER.unpack_from(saved)[:2] == (MAGIC, VERSION)
+@pytest.mark.parametrize("name", RIGID)
+def test_a_state_of_another_version_is_refused(make, name):
+    saved = bytearray(make(name).save())
+    magic, version, *_ = HEADER.unpack_from(saved)
+    assert magic == MAGIC
     saved[8] += 1
-    refused(make("RigidHammer"), bytes(saved), f"version {VERSION + 1}")
+    refused(make(name), bytes(saved), f"version {version + 1}")
 
 
+@pytest.mark.parametrize("name", RIGID)
 @pytest.mark.parametrize("wrong", [b"", b"nonsense" * 20], ids=["empty", "nonsense"])
-def test_what_is_no_state_is_refused(make, wrong):
-    refused(make("RigidHammer"), wrong or b"\0", "saved state")
+def test_what_is_no_state_is_refused(make, wrong, name):
+    refused(make(name), wrong or b"\0", "saved state")
 
 
-def test_a_state_that_is_cut_short_is_refused(make):
-    refused(make("RigidHammer"), make("RigidHammer").save()[:-8], "bytes where")
+@pytest.mark.parametrize("name", RIGID)
+def test_a_state_that_is_cut_short_is_refused(make, name):
+    refused(make(name), make(name).save()[:-8], "bytes where")
 
 
 def test_the_pneumatic_drive_saves_its_state_too(make):

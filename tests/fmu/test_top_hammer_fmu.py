@@ -35,7 +35,7 @@ STEP = 1.9e-3
 
 
 @pytest.fixture(scope="module")
-def archive(tmp_path_factory):
+def archive(built_library, tmp_path_factory):
     """FMU of the T38 drifter with two rods."""
     path = tmp_path_factory.mktemp("top") / "TopHammer.fmu"
     build_hammer(SCENE, path)

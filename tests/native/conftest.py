@@ -2,42 +2,22 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 
 import pytest
 
 from fmu_src.hammer.build import about_hammer
 from fmu_src.native.archive import write_native_fmu
-from fmu_src.native.library import libraries, this_platform
 from fmu_src.native.tables import model_tables
 from percussion_model import Scene
-from percussion_model.scene.scene import SceneError
-
-# Compiling takes minutes; another worker waits for it so long [s].
-LONGEST_WAIT = 900.0
 
 
 @pytest.fixture(scope="session")
-def library(tmp_path_factory):
-    """Library for this machine: {platform: bytes}. One worker compiles it, others wait."""
-    lock = tmp_path_factory.getbasetemp().parent / "native.lock"
-    deadline = time.monotonic() + LONGEST_WAIT
-    while True:
-        try:
-            lock.open("x").close()
-            break
-        except FileExistsError:
-            assert time.monotonic() < deadline, f"{lock}: its worker has not ended"
-            time.sleep(0.2)
-    try:
-        return libraries([this_platform()])
-    except SceneError as error:
-        if "no compiler" in str(error):
-            pytest.skip(str(error))
-        raise
-    finally:
-        lock.unlink()
+def library(built_library):
+    """Library for this machine: {platform: bytes}."""
+    if not built_library:
+        pytest.skip("no C compiler, and no ziglang")
+    return built_library
 
 
 @pytest.fixture(scope="session")

@@ -14,11 +14,12 @@ from fmpy import read_csv, read_model_description
 from fmpy.validation import validate_fmu
 from lxml import etree
 
+from fmu_src.archive import MODEL
 from fmu_src.description import write_description
 from fmu_src.hammer.build import about_hammer
 from fmu_src.hammer.variables import hammer_variables
 from fmu_src.native import reference_results
-from fmu_src.native.archive import MODEL, add_files, library_path, write_native_fmu
+from fmu_src.native.archive import add_files, library_path, write_native_fmu
 from fmu_src.native.description import write_native_description
 from fmu_src.native.reference_results import add_reference_results, experiments
 from fmu_src.native.terminals import TERMINALS

@@ -96,7 +96,7 @@ def test_a_blow_map_comes_along(write, tmp_path, monkeypatch, capfd):
     )
     assert "made for other sections" in told(path, capfd, **{"bit.sections[1].length": 0.4})
     plain = write(Scene(), "2.0")
-    assert "this FMU has no blow map" in told(plain, capfd, **{"solver.fidelity": 3})
+    assert "this FMU brings no blow map" in told(plain, capfd, **{"solver.fidelity": 3})
 
 
 def told(path, capfd, **start_values):

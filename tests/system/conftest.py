@@ -24,7 +24,7 @@ def plan_of(name, **changes):
 
 
 @pytest.fixture(scope="session")
-def fmus(tmp_path_factory):
+def fmus(built_library, tmp_path_factory):
     """FMUs by component."""
     return build_fmus(plan_of("feed_control"), tmp_path_factory.mktemp("parts"))
 
