@@ -21,6 +21,11 @@ LONGEST_WAIT = 900.0
 settings.register_profile("shared", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("shared")
 
+# Workers of one run of the tests share compiled kernels; NUMBA_CACHE_DIR is theirs too.
+os.environ.setdefault(
+    "PERCUSSION_FMU_CACHE",
+    str(Path(os.environ.get("NUMBA_CACHE_DIR") or tempfile.gettempdir()) / "percussion_fmu"),
+)
 # Tables of blows are shared like compiled kernels, and never the user's own.
 os.environ.setdefault(
     "PERCUSSION_CACHE",

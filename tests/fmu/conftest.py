@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
-from pathlib import Path
-
 import pytest
 
 from fmu_src.hammer.build import build_hammer
@@ -13,12 +9,6 @@ from fmu_src.parts import pneumatic_drive
 from fmu_src.parts.build import build_part
 from percussion_model import Scene
 from scenarios.harness import Instance
-
-# Workers of one run of the tests share compiled kernels; NUMBA_CACHE_DIR is theirs too.
-os.environ.setdefault(
-    "PERCUSSION_FMU_CACHE",
-    str(Path(os.environ.get("NUMBA_CACHE_DIR") or tempfile.gettempdir()) / "percussion_fmu"),
-)
 
 RIGID = {"piston.model": "rigid", "bit.model": "rigid"}
 

@@ -2,21 +2,12 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
 from fmu_src.system.archive import SYSTEMS, build_fmus, read_plan, write_system
 from percussion_model.coupling import bench
-
-# Workers of one run of the tests share compiled kernels; NUMBA_CACHE_DIR is theirs too.
-os.environ.setdefault(
-    "PERCUSSION_FMU_CACHE",
-    str(Path(os.environ.get("NUMBA_CACHE_DIR") or tempfile.gettempdir()) / "percussion_fmu"),
-)
 
 
 def plan_of(name, **changes):
@@ -34,6 +25,14 @@ def feed_control(fmus, tmp_path_factory):
     """Archive of the feed-controlled system."""
     folder = tmp_path_factory.mktemp("systems")
     return write_system(plan_of("feed_control"), fmus, folder / "FeedControl.ssp")
+
+
+@pytest.fixture
+def without_library(tmp_path, monkeypatch):
+    """The same with a hammer that runs by numba."""
+    monkeypatch.setattr("fmu_src.hammer.build.library_here", dict)
+    plan = plan_of("feed_control")
+    return write_system(plan, build_fmus(plan, tmp_path / "parts"), tmp_path / "FeedControl.ssp")
 
 
 @pytest.fixture(scope="session")

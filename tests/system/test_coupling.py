@@ -213,10 +213,10 @@ def test_the_command_runs_a_system(feed_control, tmp_path, monkeypatch, capsys):
 
 
 @pytest.mark.parametrize("command", ["couple", "bench-controller"])
-def test_a_command_says_before_that_an_fmu_compiles(feed_control, tmp_path, command):
-    words = ["couple", str(feed_control)]
+def test_a_command_says_before_that_an_fmu_compiles(without_library, tmp_path, command):
+    words = ["couple", str(without_library)]
     if command == "bench-controller":
-        words = [command, "--system", str(feed_control)]
+        words = [command, "--system", str(without_library)]
     caches = {"NUMBA_CACHE_DIR": str(tmp_path / "numba"), "PERCUSSION_FMU_CACHE": str(tmp_path)}
     child = subprocess.Popen(
         [sys.executable, "-c", "from percussion_model.interface.cli import main; main()", *words],
