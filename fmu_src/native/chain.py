@@ -159,6 +159,13 @@ def grid_point_after(base, t):
 
 
 @preparing
+def is_quiet(base, t):
+    """Whether nothing has to be done to come to a time: a step passes it."""
+    s = state_in(base + head_records(base, 1)[0].state_at)[0]
+    return math.floor(t / parameters(base)[0].dt + GRID_ROUNDING) <= s.step
+
+
+@preparing
 def go(base, t, room):
     """Advance the state, with room for so many blows; status and blows."""
     moving = base + head_records(base, 1)[0].state_at

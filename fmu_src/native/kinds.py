@@ -101,6 +101,8 @@ def is_quiet(base, t):
         return modal.is_quiet(base, t)
     if kind == Kind.WAVE:
         return wave.is_quiet(base, t)
+    if kind == Kind.CHAIN:
+        return chain.is_quiet(base, t)
     if kind == Kind.RIGID:
         return rigid.is_quiet(base, t)
     if kind == Kind.MAP:

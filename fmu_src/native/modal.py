@@ -40,10 +40,11 @@ from fmu_src.native.memory import (
 from fmu_src.native.messages import Fault
 from percussion_model.physics.kernel import preparing
 from percussion_model.solvers.cells import find_cell
-from percussion_model.solvers.modal.advance import TICK_ROUNDING, run
+from percussion_model.solvers.modal.advance import TICK_ROUNDING, portion, run
 from percussion_model.solvers.modal.faults import find_fault as state_fault
 from percussion_model.solvers.modal.fields import loads_of, places_of, take_rest, total
 from percussion_model.solvers.modal.modes import shapes_at
+from percussion_model.solvers.modal.pairs import law_wanted
 from percussion_model.solvers.modal.prepare import (
     begin,
     fill_modal_parameters,
@@ -56,6 +57,7 @@ from percussion_model.solvers.modal.records import (
     MODAL_PAR,
     MODAL_STATE,
     SCAN,
+    STEP,
     Bars,
     Forms,
     Laws,
@@ -257,10 +259,13 @@ def grid_point_after(base, t):
 
 @preparing
 def is_quiet(base, t):
-    """Whether nothing has to be done to come to a time: a leap that is pending passes it."""
-    head = head_records(base, 1)[0]
-    s = state_in(base + head.state_at)[0]
-    return s.leap_end > math.floor(t / parameters(base)[0].tick + TICK_ROUNDING)
+    """Whether nothing has to be done to come to a time: a leap, or a step, passes it."""
+    moving, par = base + head_records(base, 1)[0].state_at, parameters(base)[0]
+    s, end = state_in(moving)[0], math.floor(t / par.tick + TICK_ROUNDING)
+    if s.leap_end >= 0:
+        return s.leap_end > end
+    law = law_wanted(par, s, bars_in(base, moving).laws)
+    return s.time + (portion(s, law) if law >= 0 else 1 << STEP) > end
 
 
 @preparing

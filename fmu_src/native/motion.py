@@ -50,7 +50,9 @@ def _copy(base, to):
     """Copy what moves to another place of the memory."""
     head = head_records(base, 1)[0]
     count = head.state_bytes // 8
-    words_at(base + to, count)[:] = words_at(base + head.state_at, count)
+    there, here = words_at(base + to, count), words_at(base + head.state_at, count)
+    for k in range(count):  # an assignment of all would look first whether they overlap
+        there[k] = here[k]
 
 
 @preparing

@@ -180,10 +180,10 @@ def grid_point_after(base, t):
 
 @preparing
 def is_quiet(base, t):
-    """Whether nothing has to be done to come to a time: a leap that is pending passes it."""
+    """Whether nothing has to be done to come to a time: a leap, or a step, passes it."""
     s = state_in(base + head_records(base, 1)[0].state_at)[0]
     steps = (t - s.t_base) / parameters(base)[0].dt + GRID_ROUNDING
-    return s.leap_end >= 0 and steps < s.leap_end
+    return steps < (s.leap_end if s.leap_end >= 0 else s.step + 1)
 
 
 @preparing

@@ -71,8 +71,9 @@ UNLIKELY = 2.0
 LEFT_OUT = 1e-3
 # A standstill is searched for peaks until its vibration is below this share of the load.
 STILL_SHARE = 1e-3
-# Steps between two looks at that.
-LOOK_AGAIN = 32
+# Looks for peaks until it is asked again what still moves, and by how many levels they are finer
+# than looks for the end of a mode.
+LOOK_AGAIN, FINER = 16, 1
 # A standstill that is not quiet yet is cut into pieces, at whose ends its mean force is noted.
 LONGEST_GLANCE = 128 * WHOLE
 # So is one that is quiet, until its force stays within this share of that at rest.
@@ -243,13 +244,17 @@ def quiet_peaks(par, s, bars, law, ticks):
         # whole steps before the observer looks
         done = max(0, int((s.peak_from - begin) / par.tick) - WHOLE) >> STEP << STEP
         carry_pairs(s, bars, bars.w, AT, done)
-    before, looks = present_end(s, bars, law), 0
+    before, looks, hop = present_end(s, bars, law), 0, WHOLE
     while done < ticks:
         if looks % LOOK_AGAIN == 0:
-            left = 2.0 * energy_of_pairs(s, bars, bars.w, AT)
-            if 2.0 * K * left < (STILL_SHARE * rest) ** 2:
+            now = moving(s, bars, bars.w, AT)
+            hop = 1 << max(now.level - FINER, STEP)
+            if 4.0 * K * now.energy < (STILL_SHARE * rest) ** 2:
                 return max(peak, rest), max(late, rest) if watched else 0.0, True
-        go = min(WHOLE, ticks - done)
+            most = rest + most_swing(s, bars, law)
+            if most <= max(peak, s.b_peak_bit) and (most <= late or not watched):
+                return peak, late, True  # whatever follows is smaller
+        go = min(hop, ticks - done)
         carry_pairs(s, bars, bars.w, AT, go)
         here, done, looks = present_end(s, bars, law), done + go, looks + 1
         top = top_between(s, before, here, par.tick * go)
