@@ -118,13 +118,13 @@ static void any_call3(fmi3Instance one) {
     }
 }
 
-void test_any_calls(unsigned seed) {
+void test_any_calls(unsigned seed, int count) {
     fmi2Component pair[2] = {make2(), make2()};
     fmi3Instance third = make3(seed % 2);
     fmi2FMUstate states[2][STATES] = {{NULL}};
     double now = 0.0;
     random_state = seed;
-    for (int k = 0; k < 3000; k++) {
+    for (int k = 0; k < count; k++) {
         unsigned which = draw(2);
         now = any_call2(pair[which], states[which], now);
         any_call3(third);
