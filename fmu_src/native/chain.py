@@ -25,6 +25,7 @@ from fmu_src.native.layout import (
 from fmu_src.native.memory import (
     enter,
     floats_2,
+    hold,
     lines,
     put_tables,
     records_at,
@@ -136,6 +137,7 @@ def create(numbers, bar, place):
     enter(d, CAME, came_at, CAME_ROWS, came)
     enter(d, RINGS, rings_at, 1, network.rings)
     parameters(base)[0] = par[0]
+    hold(par)
     if bar != GaugeBar.NONE:
         which = _which(bar, network.struck, bars)
         cell, area = find_cell(gauge_sections(numbers, bar), cell_masses(chain, which), place)

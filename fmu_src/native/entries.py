@@ -32,7 +32,7 @@ from fmu_src.native.layout import (
     motion_of,
     motion_records,
 )
-from fmu_src.native.memory import floats_at, words_at
+from fmu_src.native.memory import floats_at, hold, words_at
 from fmu_src.native.messages import FIRST_RULE, Fault, Note, keys_in
 from fmu_src.native.motion import (
     COUNT,
@@ -196,6 +196,13 @@ def check(image, notes):
     """Refuse parameters that go together with none other, or with none of this library."""
     values = np.zeros(1, SCENE_NUMBERS)
     fill_values(image, values)
+    fault = _check_values(image, values, notes)
+    hold(values)
+    return fault
+
+
+@preparing
+def _check_values(image, values, notes):
     numbers = numbers_at(image, values)
     given = own_numbers(image)[Own.BARRIER_GIVEN] != 0.0
     fault = _refuse_contradiction(values, has_rods(image), given, notes)
@@ -252,6 +259,7 @@ def create(image, table, table_size, motion, notes):
     _fill_barrier(head, numbers)
     motion_of(base).acting[:] = _wanted(values)
     words_at(motion, 1)[0] = base
+    hold(values)
     return 0
 
 

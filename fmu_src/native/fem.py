@@ -23,6 +23,7 @@ from fmu_src.native.layout import (
 from fmu_src.native.memory import (
     enter,
     floats_2,
+    hold,
     lines,
     put_tables,
     records_at,
@@ -112,6 +113,7 @@ def create(numbers, bar, place):
     put_tables(base, d, tables_at, arrays)
     enter(d, NODES, WORK, ROWS, n)
     parameters(base)[0] = par[0]
+    hold(par)
     if bar != GaugeBar.NONE:
         masses, sections = bars.bit.mass, numbers.bit
         if bar == GaugeBar.PISTON:

@@ -9,6 +9,9 @@
 /* Communication points may differ from the present time by rounding: this share of a step,
  * and some units in the last place of the time. */
 static const double SHARE_OF_STEP = 1e-3, LAST_PLACES = 8.0 * DBL_EPSILON;
+/* The longest step [s], as the longest run of the package: an error at once, instead of a call
+ * that does not come back. */
+static const double LONGEST_STEP = 1e6;
 
 static const char *const PHASE_WORDS[PHASES] = {
     "instantiated", "initialising", "stepping", "terminated", "failed", "in event mode",
@@ -366,8 +369,9 @@ Status check_step(Instance *one, const char *call, double from, double size) {
     if (from != place->now && check_time(one, from, slack) != DONE) {
         return REFUSED;
     }
-    if (!(to < INFINITY)) {
-        return refuse(one, "communicationStepSize = %r: the step has no end", size);
+    if (!(to - place->now <= LONGEST_STEP)) { /* the slack may be long at a great time */
+        return refuse(one, "communicationStepSize = %r: must be at most %r s", size,
+                      LONGEST_STEP);
     }
     if (place->has_stop && to > place->stop + slack) {
         return refuse(one, "the step ends at %r s, beyond stopTime = %r s", to, place->stop);

@@ -1,6 +1,12 @@
 /* The kernels, compiled elsewhere, for the processor on which the library runs. */
 #include "shell.h"
 
+/* Hidden: two libraries in a process must not take each other's. COFF hides all that is not
+ * exported. */
+#if !defined(_WIN32)
+#pragma GCC visibility push(hidden)
+#endif
+
 #define DECLARE(suffix)                                                                        \
     int64_t kernel_check##suffix(const int64_t *image, int64_t *notes);                        \
     int64_t kernel_create##suffix(const int64_t *image, const double *map, int64_t map_size,   \

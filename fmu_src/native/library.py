@@ -172,14 +172,18 @@ def link(name: str, compiler: Sequence[str], work: Path, out: Path) -> None:
         flags.append("-DHAVE_AVX2_KERNELS")
     if "windows" not in name:
         flags.append("-fPIC")
-    draft = out.with_name(f".{os.getpid()}.{out.name}")
+    if "darwin" in name:
+        flags.append(f"-Wl,-install_name,@rpath/{out.name}")
     sources = sorted(HERE.glob("*.c"))
-    command = [*compiler, *flags, *map(str, sources), *map(str, objects), "-lm", "-o", str(draft)]
-    done = subprocess.run(command, text=True, capture_output=True)
-    if done.returncode != 0:
-        raise SceneError(
-            f"the library for {name} could not be built:\n{done.stderr.strip()[-2000:]}"
+    # the name stands in some libraries, and some linkers put more beside them
+    with tempfile.TemporaryDirectory(dir=out.parent) as folder:
+        draft = Path(folder) / out.name
+        given = [*map(str, sources), *map(str, objects)]
+        done = subprocess.run(
+            [*compiler, *flags, *given, "-lm", "-o", str(draft)], text=True, capture_output=True
         )
-    draft.replace(out)
-    for left in out.parent.glob(f".{os.getpid()}.*"):  # what linkers put beside a library
-        left.unlink()
+        if done.returncode != 0:
+            raise SceneError(
+                f"the library for {name} could not be built:\n{done.stderr.strip()[-2000:]}"
+            )
+        draft.replace(out)

@@ -21,6 +21,13 @@ viewing = njit(cache=True, error_model="numpy", forceinline=True)
 # For what returns records within tuples, which no compiled function can.
 merging = njit(cache=True, error_model="numpy", inline="always")
 
+
+@preparing
+def hold(array):
+    """Keep an array until here: numba frees it after its last use, and a record of it is none."""
+    return len(array)
+
+
 ENTRY_WORDS = 5
 # Of a line of a processor's cache: parts of a memory begin at whole lines [bytes].
 LINE = 64

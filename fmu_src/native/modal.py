@@ -28,6 +28,7 @@ from fmu_src.native.memory import (
     floats_2,
     floats_3,
     floats_4,
+    hold,
     lines,
     matrix_at,
     put_tables,
@@ -198,6 +199,7 @@ def refuse(numbers, facts):
     """Number of why a scene cannot be set up, 0 for none: too many modes."""
     par = np.zeros(1, MODAL_PAR)
     request = fill_modal_parameters(par[0], numbers)
+    hold(par)
     facts[0], facts[1] = modes_wanted(numbers, request)[2], MOST_MODES
     return Fault.MODES.value if facts[0] > facts[1] else 0
 
@@ -241,6 +243,7 @@ def create(numbers, bar, place):
     at = base + head_records(base, 1)[0].state_at
     w = matrix_at(at + WORK, ROWS, n)
     begin(par[0], state_in(at)[0], w, made.forms.sizes[0], numbers)
+    hold(par)
     return base
 
 

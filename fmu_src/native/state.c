@@ -120,6 +120,10 @@ static State *readable(Instance *one, void *block) {
 }
 
 Status free_state(Instance *one, void **block) {
+    void *itself = block; /* fmusim gives the state, not the place of it */
+    if (is_mine(one, itself)) {
+        block = &itself;
+    }
     if (block == NULL || *block == NULL) {
         return DONE;
     }

@@ -27,6 +27,7 @@ from fmu_src.native.memory import (
     floats_2,
     floats_3,
     floats_4,
+    hold,
     lines,
     put_tables,
     records_at,
@@ -148,6 +149,7 @@ def create(numbers, bar, place):
     enter(d, WP, WORK, ROWS, n_p)
     enter(d, WB, wb_at, ROWS, n_b)
     parameters(base)[0] = par[0]
+    hold(par)
     if bar != GaugeBar.NONE:
         cut, sections = bars.bit, numbers.bit
         if bar == GaugeBar.PISTON:

@@ -68,8 +68,14 @@ int main(int count, char **words) {
             measure();
         } else if (strcmp(words[k], "any") == 0) {
             for (unsigned seed = 1; seed <= 40; seed++) {
-                test_any_calls(seed);
+                test_any_calls(seed, 3000);
             }
+        } else if (strcmp(words[k], "many") == 0) {
+            test_many();
+        } else if (strcmp(words[k], "sequences") == 0) {
+            test_sequences();
+        } else if (strcmp(words[k], "states") == 0) {
+            test_bad_states();
         } else if (strcmp(words[k], "memory") == 0) {
             int (*left)(int);
             *(void **)&left = symbol(library, "left_of_memory");

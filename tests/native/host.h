@@ -88,10 +88,14 @@ void test_fmi3(void);
 void test_threads(void);
 void measure(void);
 /* Calls in any order with any arguments; memory that ends anywhere. */
-void test_any_calls(unsigned seed);
+void test_any_calls(unsigned seed, int count);
 void test_no_memory(int (*left_of_memory)(int count));
 /* Tables in which a word was changed, with a right hash. */
 void test_damaged_tables(const char *file);
+/* With the real kernels: many instances and sequences, states with a right hash that are bad. */
+void test_many(void);
+void test_sequences(void);
+void test_bad_states(void);
 /* Resources elsewhere: given as they are to FMI 2.0 and 3.0, they are found, or not. */
 bool is_found2(const char *location);
 bool is_found3(const char *location);

@@ -2,6 +2,7 @@
 #include "host.h"
 #include "shell.h" /* the hash, which the library does not give away */
 
+#include <float.h>
 #include <math.h>
 #include <pthread.h>
 #include <stdarg.h>
@@ -207,6 +208,10 @@ static void test_sequence(void) {
     double bad[] = {0.0, -1e-3, NAN, INFINITY};
     for (int k = 0; k < 4; k++) {
         REFUSED(two.DoStep(c, 0.0, bad[k], 1), "communicationStepSize = ");
+    }
+    for (int k = 0; k < 3; k++) { /* it would not come back */
+        REFUSED(two.DoStep(c, 0.0, (double[]){1e300, DBL_MAX, 1.001e6}[k], 1),
+                ": must be at most 1000000.0 s");
     }
     REFUSED(two.DoStep(c, NAN, 1e-3, 1), "nan s lies after the present time of 0.0 s");
     works(c);
@@ -416,6 +421,11 @@ static void test_states(void) {
     OK(two.FreeFMUstate(c, &state));
     OK(two.FreeFMUstate(c, NULL));
     REFUSED(two.FreeFMUstate(c, &same), "the saved state was freed");
+    OK(two.GetFMUstate(c, &state));
+    OK(two.FreeFMUstate(c, (fmi2FMUstate *)state)); /* as fmusim does */
+    REFUSED(two.FreeFMUstate(c, (fmi2FMUstate *)state), "the saved state was freed");
+    REFUSED(two.SetFMUstate(c, state), "the saved state was freed");
+    state = NULL;
     REFUSED(two.SetFMUstate(c, same), "the saved state was freed");
     REFUSED(two.SetFMUstate(c, NULL), "the saved state is NULL");
     REFUSED(two.GetFMUstate(c, NULL), "NULL");

@@ -154,6 +154,7 @@ static void test_sequence(void) {
     OK(step(one, 0.0, 1e-3, &now));
     OK(step(one, 1e-3, 1e-3, &now));
     REFUSED(step(one, 2e-3, 1e-3, &now), "beyond stopTime = 0.002 s");
+    REFUSED(step(one, 2e-3, 1e300, &now), ": must be at most 1000000.0 s");
     CHECK(now.time == 2e-3 && !now.early);
     REFUSED(three.DoStep(one, 2e-3, 1e-3, true, NULL, NULL, NULL, NULL), "an argument is NULL");
     REFUSED(three.EnterConfigurationMode(one), "no structural parameters");

@@ -1,9 +1,22 @@
 /* A host in C: loads an FMU of FMI 2.0, steps it, writes an output after each step, and whether
  * any Python lies in its process. Arguments: library, GUID, resources, reference, steps. */
-#include <dlfcn.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+
+#ifdef _WIN32
+#include <windows.h>
+static void *open_library(const char *path) { return (void *)LoadLibraryA(path); }
+static void *symbol(void *library, const char *name) {
+    return (void *)GetProcAddress((HMODULE)library, name);
+}
+static const char *why(void) { return "LoadLibrary"; }
+#else
+#include <dlfcn.h>
+static void *open_library(const char *path) { return dlopen(path, RTLD_NOW | RTLD_LOCAL); }
+static void *symbol(void *library, const char *name) { return dlsym(library, name); }
+static const char *why(void) { return dlerror(); }
+#endif
 
 typedef void *Component;
 typedef struct {
@@ -37,9 +50,9 @@ int main(int count, char **words) {
     if (count != 6) {
         return 2;
     }
-    void *library = dlopen(words[1], RTLD_NOW | RTLD_LOCAL);
+    void *library = open_library(words[1]);
     if (library == NULL) {
-        fprintf(stderr, "%s\n", dlerror());
+        fprintf(stderr, "%s\n", why());
         return 3;
     }
     Component (*instantiate)(const char *, int, const char *, const char *, const Callbacks *, int,
@@ -49,14 +62,14 @@ int main(int count, char **words) {
     int (*step)(Component, double, double, int);
     int (*get)(Component, const unsigned *, size_t, double *);
     void (*release)(Component);
-    *(void **)&instantiate = dlsym(library, "fmi2Instantiate");
-    *(void **)&setup = dlsym(library, "fmi2SetupExperiment");
-    *(void **)&enter = dlsym(library, "fmi2EnterInitializationMode");
-    *(void **)&leave = dlsym(library, "fmi2ExitInitializationMode");
-    *(void **)&step = dlsym(library, "fmi2DoStep");
-    *(void **)&get = dlsym(library, "fmi2GetReal");
-    *(void **)&end = dlsym(library, "fmi2Terminate");
-    *(void **)&release = dlsym(library, "fmi2FreeInstance");
+    *(void **)&instantiate = symbol(library, "fmi2Instantiate");
+    *(void **)&setup = symbol(library, "fmi2SetupExperiment");
+    *(void **)&enter = symbol(library, "fmi2EnterInitializationMode");
+    *(void **)&leave = symbol(library, "fmi2ExitInitializationMode");
+    *(void **)&step = symbol(library, "fmi2DoStep");
+    *(void **)&get = symbol(library, "fmi2GetReal");
+    *(void **)&end = symbol(library, "fmi2Terminate");
+    *(void **)&release = symbol(library, "fmi2FreeInstance");
     Callbacks callbacks = {log_message, calloc, free, NULL, NULL};
     Component one = instantiate("hammer", 1, words[2], words[3], &callbacks, 0, 1);
     if (one == NULL || setup(one, 0, 0.0, 0.0, 0, 0.0) || enter(one) || leave(one)) {

@@ -84,9 +84,9 @@ def build_library(folder: Path, flags: Sequence[str] = ()) -> Path:
 
 def build_host(folder: Path, flags: Sequence[str] = ()) -> Path:
     """The host in C."""
-    sources = [HERE / f"{name}.c" for name in ("host", "host2", "host3", "host_any")] + [
-        SHELL / "hash.c"
-    ]
+    sources = [
+        HERE / f"{name}.c" for name in ("host", "host2", "host3", "host_any", "host_real")
+    ] + [SHELL / "hash.c"]
     return compile_c(
         folder / "host", sources, (f"-DSECTIONS={len(SECTIONS)}", "-pthread", "-ldl", *flags)
     )

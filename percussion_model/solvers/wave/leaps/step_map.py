@@ -120,7 +120,7 @@ def step_map(bar):
         for i in range(n + 1):
             faces[k, i] = w[Row.FACE, i] / unit
         if size > 2 * n:
-            by_column[k, size - 1] = state[0].p / unit
+            by_column[k, size - 1] = state["p"][0] / unit  # a record does not keep its array
     return by_column, faces
 
 
