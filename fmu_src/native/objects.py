@@ -156,8 +156,15 @@ _WORDS = re.compile(
 )
 
 
+# What errors are made of in Python, with places in files of this machine.
+_PLACES = re.compile(
+    r"^(@\.const\.picklebuf\.\S+ = internal constant \{[^{}]*\}) \{.*$", re.MULTILINE
+)
+
+
 def _without_words(text: str) -> str:
     """The module without what writes errors for Python."""
+    text = _PLACES.sub(r"\1 zeroinitializer", text)
     return _WORDS.sub(
         lambda found: f"{found[1]}\n  ret {found[2]} {'1' if found[2] == 'i32' else 'null'}\n}}",
         text,
@@ -196,13 +203,15 @@ def make_object(text: str, target: Target, names: Iterable[str] = tuple(ENTRIES)
     module = llvm.parse_assembly(text)
     module.triple, module.data_layout = target.triple, str(machine.target_data)
     kept = set(names)
-    for one in (*module.functions, *module.global_variables):
-        if one.is_declaration:
-            continue
-        if one.name in kept:
-            one.name += target.suffix
-        else:
-            one.linkage = "internal"
+    for one in module.functions:
+        if not one.is_declaration:
+            if one.name in kept:
+                one.name += target.suffix
+            else:
+                one.linkage = "internal"
+    for one in module.global_variables:
+        if not one.is_declaration:
+            one.linkage = "private"  # names of some follow from where files of this machine lie
     options = llvm.create_pipeline_tuning_options(3)
     builder = llvm.create_pass_builder(machine, options)
     builder.getModulePassManager().run(module, builder)

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import subprocess
 import sys
 from pathlib import Path
 
+import numba
 import numpy as np
 import pytest
 from fmpy import extract, read_model_description, simulate_fmu
 from fmpy.fmi2 import FMU2Slave
 from fmpy.validation import validate_fmu
 
+from fmu_src.archive import ROOT
 from fmu_src.hammer.motion import Gauge, Motion
 from fmu_src.hammer.outputs import OUTPUTS
 from fmu_src.hammer.variables import gauge_bars
@@ -225,6 +228,13 @@ def test_inputs_that_change_give_the_bits_of_the_package(write, name):
         here.append([float(read(motion)) for read in reads])
     names = same(there, np.array(here))
     assert names in ([], ["gauge_stress"])  # the motion here carries no gauge
+
+
+def test_the_library_names_no_place_of_the_machine_that_made_it(library):
+    """So that it has the same bytes wherever it is built."""
+    for made in library.values():
+        for place in (ROOT, Path(numba.__file__).parent):
+            assert os.fsencode(place) not in made
 
 
 @pytest.mark.parametrize("version", VERSIONS)
