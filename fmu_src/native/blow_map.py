@@ -10,13 +10,13 @@ from numba import carray
 from fmu_src.native.checks import record_fault
 from fmu_src.native.layout import (
     ADVANCE,
-    RECORD,
     Kind,
     blow_rows,
     directory,
     event_rows,
     head_records,
     make_memory,
+    views_of,
     work_at,
 )
 from fmu_src.native.memory import (
@@ -24,7 +24,6 @@ from fmu_src.native.memory import (
     floats_1,
     floats_at,
     put_tables,
-    records_at,
     table_bytes,
     viewing,
 )
@@ -55,8 +54,7 @@ from percussion_model.solvers.blow_map.records import (
 )
 from percussion_model.solvers.blow_map.words import FIXED_INPUTS, FLIGHT_INPUTS, WordFault
 
-_parameters_at = records_at(MAP_PAR)
-_states_at = records_at(MAP_STATE)
+parameters, state_in = views_of(MAP_PAR, MAP_STATE)
 LOW, HIGH, MAY_BE_NAN, WHOLE = MAP_LIMITS.rows
 PAR_BYTES, MOVING = MAP_PAR.itemsize, work_at(MAP_STATE)
 FOUND = 0  # row of the directory: room for what is looked up
@@ -68,18 +66,6 @@ AXIS_OF = tuple(
      Refusal.FEED: int(Axis.LOAD), Refusal.DRIVE: int(Axis.DRIVE)}.get(one, -1)
     for one in Refusal
 )  # fmt: skip
-
-
-@viewing
-def parameters(base):
-    """Parameters, as an array of one record."""
-    return _parameters_at(base + head_records(base, 1)[0].par_at, 1)
-
-
-@viewing
-def state_in(moving):
-    """State in what moves, or in a copy of it, at an address."""
-    return _states_at(moving + RECORD, 1)
 
 
 @viewing

@@ -10,7 +10,6 @@ from fmu_src.native.checks import arrays_are_bounded, record_fault
 from fmu_src.native.image import gauge_sections
 from fmu_src.native.layout import (
     BLOW_ROOM,
-    RECORD,
     GaugeBar,
     Kind,
     blow_rows,
@@ -20,6 +19,7 @@ from fmu_src.native.layout import (
     make_memory,
     reading_of,
     set_gauge,
+    views_of,
     work_at,
 )
 from fmu_src.native.memory import (
@@ -28,7 +28,6 @@ from fmu_src.native.memory import (
     hold,
     lines,
     put_tables,
-    records_at,
     table_bytes,
     viewing,
     words_2,
@@ -52,25 +51,12 @@ from percussion_model.solvers.chain.records import (
 from percussion_model.solvers.chain.sections import CAME_ROWS, cell_masses, force_in
 from percussion_model.solvers.setup import MOST_CELLS
 
-_parameters_at = records_at(CHAIN_PAR)
-_states_at = records_at(CHAIN_STATE)
+parameters, state_in = views_of(CHAIN_PAR, CHAIN_STATE)
 LOW, HIGH, MAY_BE_NAN, WHOLE = CHAIN_LIMITS.rows
 PAR_BYTES = CHAIN_PAR.itemsize
 WORK = work_at(CHAIN_STATE)  # place of the first array in what moves
 BAR_ROWS, JOINT_ROWS = len(Bar), len(Has)
 PLACES, STEEL, WEIGHTS, FITS, BODIES, BARS, JOINTS, CAME, RINGS = range(9)
-
-
-@viewing
-def parameters(base):
-    """Parameters, as an array of one record."""
-    return _parameters_at(base + head_records(base, 1)[0].par_at, 1)
-
-
-@viewing
-def state_in(moving):
-    """State in what moves, or in a copy of it, at an address."""
-    return _states_at(moving + RECORD, 1)
 
 
 @viewing

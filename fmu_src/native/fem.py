@@ -8,7 +8,6 @@ from fmu_src.native.checks import arrays_are_bounded, record_fault
 from fmu_src.native.layout import (
     ADVANCE,
     BLOW_ROOM,
-    RECORD,
     GaugeBar,
     Kind,
     blow_rows,
@@ -18,6 +17,7 @@ from fmu_src.native.layout import (
     make_memory,
     reading_of,
     set_gauge,
+    views_of,
     work_at,
 )
 from fmu_src.native.memory import (
@@ -26,7 +26,6 @@ from fmu_src.native.memory import (
     hold,
     lines,
     put_tables,
-    records_at,
     table_bytes,
     viewing,
 )
@@ -52,8 +51,7 @@ from percussion_model.solvers.fem.records import (
 )
 from percussion_model.solvers.setup import MOST_CELLS
 
-_parameters_at = records_at(FEM_PAR)
-_states_at = records_at(FEM_STATE)
+parameters, state_in = views_of(FEM_PAR, FEM_STATE)
 LOW, HIGH, MAY_BE_NAN, WHOLE = FEM_LIMITS.rows
 PAR_BYTES = FEM_PAR.itemsize
 WORK = work_at(FEM_STATE)  # place of the nodes in what moves
@@ -62,18 +60,6 @@ PROBES, COLUMNS = len(Probe), len(Column)
 # A state is no more than a step, and rounding, behind the present [steps].
 MOST_BEHIND = 2.0
 MESH, FACTORS, TRIAL, PROBE, NODES = range(5)
-
-
-@viewing
-def parameters(base):
-    """Parameters, as an array of one record."""
-    return _parameters_at(base + head_records(base, 1)[0].par_at, 1)
-
-
-@viewing
-def state_in(moving):
-    """State in what moves, or in a copy of it, at an address."""
-    return _states_at(moving + RECORD, 1)
 
 
 @viewing

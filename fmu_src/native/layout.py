@@ -7,6 +7,7 @@ state; copies of it are read, since to read a state means to carry it on.
 from __future__ import annotations
 
 from enum import IntEnum
+from typing import Any
 
 import numpy as np
 from numba import carray
@@ -154,6 +155,24 @@ def motion_of(base):
 def last_blow(base):
     """The last whole blow: it moves too, behind the MOTION record."""
     return blow_records(base + head_records(base, 1)[0].state_at + MOTION_BYTES, 1)
+
+
+def views_of(par: np.dtype, state: np.dtype) -> tuple[Any, Any]:
+    """Views of a solver's parameters and of its state, as arrays of one record.
+
+    The first takes the address of a motion, the second that of what moves or of a copy of it.
+    """
+    parameters_at, states_at = records_at(par), records_at(state)
+
+    @viewing
+    def parameters(base):
+        return parameters_at(base + head_records(base, 1)[0].par_at, 1)
+
+    @viewing
+    def state_in(moving):
+        return states_at(moving + RECORD, 1)
+
+    return parameters, state_in
 
 
 @viewing

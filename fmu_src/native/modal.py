@@ -10,7 +10,6 @@ from fmu_src.native.checks import arrays_are_bounded, record_fault
 from fmu_src.native.layout import (
     ADVANCE,
     BLOW_ROOM,
-    RECORD,
     GaugeBar,
     Kind,
     blow_rows,
@@ -20,6 +19,7 @@ from fmu_src.native.layout import (
     make_memory,
     reading_of,
     set_gauge,
+    views_of,
     work_at,
 )
 from fmu_src.native.memory import (
@@ -32,7 +32,6 @@ from fmu_src.native.memory import (
     lines,
     matrix_at,
     put_tables,
-    records_at,
     table_bytes,
     viewing,
     words_1,
@@ -66,8 +65,7 @@ from percussion_model.solvers.modal.records import (
 )
 from percussion_model.solvers.modal.resolution import MOST_MODES
 
-_parameters_at = records_at(MODAL_PAR)
-_states_at = records_at(MODAL_STATE)
+parameters, state_in = views_of(MODAL_PAR, MODAL_STATE)
 LOW, HIGH, MAY_BE_NAN, WHOLE = MODAL_LIMITS.rows
 PAR_BYTES = MODAL_PAR.itemsize
 WORK = work_at(MODAL_STATE)  # place of the first array in what moves
@@ -79,18 +77,6 @@ ROWS, PISTON_ROWS, ROOM = 8, 2, 8
     LAW_SIZES, DASHPOT, LAW_MOVE, ENDS, OUT, INTO, TAKEN, REST, VIEWS, SCANS, SIDES, WAY, OVER,
     PUSHED, SHAPE_P, MOVE_P, ROOM_AT, GAUGE_AT, W_AT, WP_AT,
 ) = range(27)  # fmt: skip
-
-
-@viewing
-def parameters(base):
-    """Parameters, as an array of one record."""
-    return _parameters_at(base + head_records(base, 1)[0].par_at, 1)
-
-
-@viewing
-def state_in(moving):
-    """State in what moves, or in a copy of it, at an address."""
-    return _states_at(moving + RECORD, 1)
 
 
 @viewing

@@ -6,15 +6,14 @@ from fmu_src.native.checks import record_fault
 from fmu_src.native.layout import (
     ADVANCE,
     BLOW_ROOM,
-    RECORD,
     Kind,
     blow_rows,
     event_rows,
     head_records,
     make_memory,
+    views_of,
     work_at,
 )
-from fmu_src.native.memory import records_at, viewing
 from fmu_src.native.messages import Fault
 from percussion_model.physics.kernel import preparing
 from percussion_model.physics.records import Status
@@ -22,22 +21,9 @@ from percussion_model.solvers.rigid import advance as kernels
 from percussion_model.solvers.rigid.prepare import begin, fill_rigid_parameters
 from percussion_model.solvers.rigid.records import RIGID_LIMITS, RIGID_PAR, RIGID_STATE
 
-_parameters_at = records_at(RIGID_PAR)
-_states_at = records_at(RIGID_STATE)
+parameters, state_in = views_of(RIGID_PAR, RIGID_STATE)
 LOW, HIGH, MAY_BE_NAN, WHOLE = RIGID_LIMITS.rows
 PAR_BYTES, MOVING = RIGID_PAR.itemsize, work_at(RIGID_STATE)
-
-
-@viewing
-def parameters(base):
-    """Parameters, as an array of one record."""
-    return _parameters_at(base + head_records(base, 1)[0].par_at, 1)
-
-
-@viewing
-def state_in(moving):
-    """State in what moves, or in a copy of it, at an address."""
-    return _states_at(moving + RECORD, 1)
 
 
 @preparing

@@ -10,7 +10,6 @@ from fmu_src.native.checks import arrays_are_bounded, record_fault
 from fmu_src.native.layout import (
     ADVANCE,
     BLOW_ROOM,
-    RECORD,
     GaugeBar,
     Kind,
     blow_rows,
@@ -20,6 +19,7 @@ from fmu_src.native.layout import (
     make_memory,
     reading_of,
     set_gauge,
+    views_of,
     work_at,
 )
 from fmu_src.native.memory import (
@@ -30,7 +30,6 @@ from fmu_src.native.memory import (
     hold,
     lines,
     put_tables,
-    records_at,
     table_bytes,
     viewing,
 )
@@ -61,8 +60,7 @@ from percussion_model.solvers.wave.records import (
     Task,
 )
 
-_parameters_at = records_at(WAVE_PAR)
-_states_at = records_at(WAVE_STATE)
+parameters, state_in = views_of(WAVE_PAR, WAVE_STATE)
 LOW, HIGH, MAY_BE_NAN, WHOLE = WAVE_LIMITS.rows
 PAR_BYTES = WAVE_PAR.itemsize
 WORK = work_at(WAVE_STATE)  # place of the first array in what moves
@@ -73,18 +71,6 @@ MOST_BEHIND = 2
     OF_PISTON, OF_BIT, PISTON, BIT, AHEAD, SUMS, TOP, BOTTOM, PISTON_LOSS, LOSS, SQUARES,
     SCRATCH, WP, WB,
 ) = range(14)  # fmt: skip
-
-
-@viewing
-def parameters(base):
-    """Parameters, as an array of one record."""
-    return _parameters_at(base + head_records(base, 1)[0].par_at, 1)
-
-
-@viewing
-def state_in(moving):
-    """State in what moves, or in a copy of it, at an address."""
-    return _states_at(moving + RECORD, 1)
 
 
 @viewing
