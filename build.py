@@ -152,6 +152,20 @@ def system(extra: list[str]) -> int:
                            PYTHONPATH=str(ROOT))  # fmt: skip
 
 
+def docs(extra: list[str]) -> int:
+    """Build the documentation site; what is wrong in a page or a link fails."""
+    code = setup()
+    if code != 0:
+        return code
+    page = ROOT / "out" / "docs" / "index.html"
+    print("Building the documentation (half a minute) ...", flush=True)
+    code = call([tool("sphinx-build"), "-q", "-W", "--keep-going", "-b", "html", *extra, "docs",
+                 page.parent], silent="building")  # fmt: skip
+    if code == 0:
+        print(f"Open {page.relative_to(ROOT)} in a browser.")
+    return code
+
+
 def test(extra: list[str]) -> int:
     """Run lint, type checks and tests, all of them; return the first failure."""
     code = setup()
@@ -237,6 +251,7 @@ def main(arguments: list[str]) -> int:
                         "--platforms NAMES", add_help=False)  # fmt: skip
     commands.add_parser("system", help="build drilling systems of FMUs as SSP: -o FOLDER",
                         add_help=False)  # fmt: skip
+    commands.add_parser("docs", help="build the documentation site; more goes to sphinx-build")
     commands.add_parser("bench", help="measure speed; more goes to the benchmarks")
     choice, extra = parser.parse_known_args(arguments)
     started = time.monotonic()
@@ -248,8 +263,8 @@ def main(arguments: list[str]) -> int:
             print(f".venv is {'up to date' if code == 0 else 'not ready'} "
                   f"({time.monotonic() - started:.1f} s).")  # fmt: skip
             return code
-        work = {"run": run, "fmu": fmu, "native": native, "system": system, "test": test,
-                "bench": bench}  # fmt: skip
+        work = {"run": run, "fmu": fmu, "native": native, "system": system, "docs": docs,
+                "test": test, "bench": bench}  # fmt: skip
         return work[choice.command](extra)
     except KeyboardInterrupt:
         print("\nInterrupted.", file=sys.stderr)

@@ -6,6 +6,7 @@ Plain data only. The kernels fill these records; Python reads them.
 from __future__ import annotations
 
 from enum import IntEnum
+from typing import NamedTuple
 
 import numpy as np
 
@@ -72,82 +73,109 @@ class RockKind(IntEnum):
     WALL = 3
 
 
-# One blow: from the first closure of the piston/bit gap after the downward
-# switch of the drive to the next such closure. SI units.
-BLOW = np.dtype(
-    [
-        ("time", "f8"),  # start [s]
-        ("period", "f8"),  # to the start of the next blow [s]
-        ("impact_velocity", "f8"),  # mean piston velocity at the start [m/s]
-        ("rebound_velocity", "f8"),  # mean piston velocity after the last contact [m/s]
-        ("stroke", "f8"),  # greatest upward relative mean displacement [m]
-        ("blow_energy", "f8"),  # kinetic energy of the mean piston motion at the start [J]
-        ("rock_energy", "f8"),  # work done on the rock during the blow [J]
-        ("penetration", "f8"),  # advance of the mean bit position over the blow [m]
-        ("bit_position", "f8"),  # mean bit displacement since the start of the run [m]
-        ("hole_advance", "f8"),  # of the depth of the hole over the blow [m]
-        ("hole_depth", "f8"),  # at the start [m]
-        ("peak_contact_force", "f8"),  # [N]
-        ("peak_bit_force", "f8"),  # [N]
-        ("standstill_force", "f8"),  # mean bit force in the last tenth of standstill before [N]
-        ("contact_impulse", "f8"),  # [N s]
-        ("bit_impulse", "f8"),  # [N s]
-        ("drive_impulse", "f8"),  # [N s]
-        ("contacts", "i8"),  # closures of the gap
-        ("drilling_cycles", "i8"),  # cycles that crushed more than W_R/100
-    ],
-    align=True,
-)
+class Column(NamedTuple):
+    """A column of what a run finds, as files and documents name it.
 
-EVENT = np.dtype(
-    [
-        ("time", "f8"),  # [s]
-        ("value", "f8"),  # closing speed [m/s]; bit force [N] for modes; u_r [m] for the drive
-        ("bit_position", "f8"),  # mean bit displacement since the start of the run [m]
-        ("kind", "i8"),  # EventKind
-    ],
-    align=True,
+    Attributes
+    ----------
+    name : str
+    unit : str
+        SI; empty where there is none.
+    meaning : str
+        For the list of columns.
+    kind : str
+        Type of its numbers.
+    """
+
+    name: str
+    unit: str
+    meaning: str
+    kind: str = "f8"
+
+
+# One blow: from the first closure of the piston/bit gap after the downward
+# switch of the drive to the next such closure.
+BLOW_COLUMNS = (
+    Column("time", "s", "start of the blow"),
+    Column("period", "s", "time to the start of the next blow"),
+    Column("impact_velocity", "m/s", "mean velocity of the piston at the start"),
+    Column("rebound_velocity", "m/s", "mean velocity of the piston when the last contact opens"),
+    Column("stroke", "m", "greatest upward displacement of the piston relative to the bit"),
+    Column("blow_energy", "J", "kinetic energy of the piston's mean motion at the start"),
+    Column("rock_energy", "J", "work done on the rock during the blow"),
+    Column("penetration", "m", "advance of the bit's mean position over the blow"),
+    Column("bit_position", "m", "mean displacement of the bit at the start, since the run began"),
+    Column("hole_advance", "m", "growth of the hole depth over the blow"),
+    Column("hole_depth", "m", "hole depth at the start of the blow"),
+    Column("peak_contact_force", "N", "greatest elastic force of the piston on the bit"),
+    Column("peak_bit_force", "N", "greatest force of the bit on the rock"),
+    Column(
+        "standstill_force",
+        "N",
+        "mean bit force in the last tenth of the standstill before it",
+    ),
+    Column("contact_impulse", "N s", "impulse of the contact force over the blow"),
+    Column("bit_impulse", "N s", "impulse of the bit force over the blow"),
+    Column("drive_impulse", "N s", "impulse of the drive on the piston over the blow"),
+    Column("contacts", "", "how often the gap of piston and bit closed", "i8"),
+    Column("drilling_cycles", "", "cycles of the rock law that crushed more than W_R/100", "i8"),
 )
+BLOW = np.dtype([(column.name, column.kind) for column in BLOW_COLUMNS], align=True)
+
+EVENT_COLUMNS = (
+    Column("time", "s", "when it happened"),
+    Column(
+        "value",
+        "m/s, N, m",
+        "closing speed of a contact [m/s], bit force at a change of mode [N], "
+        "relative displacement at a turn of the drive [m]",
+    ),
+    Column("bit_position", "m", "mean displacement of the bit since the run began"),
+    Column("kind", "", "what happened: a mode of the rock law, contact or drive", "i8"),
+)
+EVENT = np.dtype([(column.name, column.kind) for column in EVENT_COLUMNS], align=True)
 
 # What is seen of a state at a time, in the order of the columns of a sample.
-SAMPLE_FIELDS = (
-    "time",  # [s]
-    "piston_position",  # mean displacement since the start of the run [m], down positive
-    "piston_velocity",  # mean [m/s]
-    "bit_position",  # mean displacement since the start of the run [m]
-    "bit_velocity",  # mean [m/s]
-    "bit_end_position",  # displacement of the bit's rock end since the start of the run [m]
-    "bit_end_velocity",  # [m/s]
-    "gap",  # between piston and bit [m]
-    "relative_displacement",  # u_r of the pressure law [m]
-    "penetration",  # p, of the present drilling cycle [m]
-    "hole_depth",  # surface of the rock once the bit is unloaded, since the start of the run [m]
-    "bit_force",  # force on the rock, compression positive [N]
-    "contact_force",  # piston on bit, compression positive [N]
-    "drive_force",  # on the piston, down positive [N]
-    "drilling_mode",  # Mode
-    "bit_kinetic_energy",  # of the whole elastic bit [J]
-    "bit_impulse",  # running integral of the bit force [N s]
-    "contact_impulse",  # [N s]
-    "drive_impulse",  # [N s]
+SAMPLE_COLUMNS = (
+    Column("time", "s", "time of the sample"),
+    Column("piston_position", "m", "mean displacement of the piston since the run began"),
+    Column("piston_velocity", "m/s", "mean velocity of the piston"),
+    Column("bit_position", "m", "mean displacement of the bit since the run began"),
+    Column("bit_velocity", "m/s", "mean velocity of the bit"),
+    Column("bit_end_position", "m", "displacement of the bit's end at the rock"),
+    Column("bit_end_velocity", "m/s", "velocity of the bit's end at the rock"),
+    Column("gap", "m", "distance between the faces of piston and bit"),
+    Column("relative_displacement", "m", "u_r of the pressure law"),
+    Column("penetration", "m", "p of the rock law, in the present drilling cycle"),
+    Column("hole_depth", "m", "surface of the rock if the bit were unloaded now"),
+    Column("bit_force", "N", "force of the bit on the rock"),
+    Column("contact_force", "N", "force of the piston on the bit"),
+    Column("drive_force", "N", "force of the drive on the piston, positive down"),
+    Column("drilling_mode", "", "mode of the rock law, by its number"),
+    Column("bit_kinetic_energy", "J", "kinetic energy of the whole bit"),
+    Column("bit_impulse", "N s", "integral of the bit force since the run began"),
+    Column("contact_impulse", "N s", "integral of the contact force since the run began"),
+    Column("drive_impulse", "N s", "integral of the drive force since the run began"),
 )
+SAMPLE_FIELDS = tuple(column.name for column in SAMPLE_COLUMNS)
 
-# Running entries of the energy ledger [J], all since the start of the run.
-LEDGER_FIELDS = (
-    "drive",  # work of the drive on the piston
-    "feed",  # work of the feed force on the bit
-    "gravity",  # work of gravity on piston and bit
-    "crushing",  # into the rock, not recoverable
-    "barrier",  # dashpot in DFC
-    "standstill",  # dashpot in SS
-    "loss",  # structural loss in the bars
-    "contact",  # restitution of rigid contact
-    "numerical",  # what the discretisation dissipates
-    "joints",  # what joints and the damper take
-    "ends",  # what leaves by ends without reflection, less what comes in there
-    "overshoot",  # what springs lose where an event is found just past its place
-    *(effect.name for effect in EFFECTS),  # what their forces take from the bit
+# Running entries of the energy ledger, all since the start of the run.
+LEDGER_COLUMNS = (
+    Column("drive", "J", "work of the drive on the piston"),
+    Column("feed", "J", "work of the feed force on the bit"),
+    Column("gravity", "J", "work of gravity on piston and bit"),
+    Column("crushing", "J", "given to the rock and not recoverable"),
+    Column("barrier", "J", "taken by the dashpot of mode DFC"),
+    Column("standstill", "J", "taken by the dashpot of mode SS"),
+    Column("loss", "J", "structural loss in the bars"),
+    Column("contact", "J", "lost in impacts of rigid bodies"),
+    Column("numerical", "J", "dissipated by the discretisation"),
+    Column("joints", "J", "taken by joints and the damper"),
+    Column("ends", "J", "leaves by ends without reflection, less what comes in there"),
+    Column("overshoot", "J", "lost by springs where an event is found just past its place"),
+    *(Column(one.name, "J", "taken from the bit by this effect's force") for one in EFFECTS),
 )
+LEDGER_FIELDS = tuple(column.name for column in LEDGER_COLUMNS)
 
 # Stored energies [J]: at the start, and now.
 STORED_FIELDS = ("start", "kinetic", "elastic", "recoverable")

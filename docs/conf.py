@@ -1,0 +1,65 @@
+"""Settings of the documentation site: `python3 build.py docs`."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from sphinx.application import Sphinx
+
+sys.path.insert(0, str(Path(__file__).parent / "site"))
+
+project = "percussion_model"
+author = "percussion_model developers"
+copyright = author
+
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "mathml",
+]
+source_suffix = {".md": "markdown"}
+root_doc = "index"
+exclude_patterns = ["site"]
+# Names of fields and words for types in docstrings are no references.
+suppress_warnings = ["ref.python"]
+
+myst_enable_extensions = ["dollarmath"]
+myst_heading_anchors = 4
+myst_dmath_double_inline = False
+
+autodoc_typehints = "none"
+autodoc_member_order = "bysource"
+napoleon_google_docstring = False
+napoleon_use_rtype = False
+napoleon_use_ivar = True
+
+html_theme = "furo"
+html_title = "Percussion model"
+html_math_renderer = "mathml"
+html_static_path = ["site"]
+html_css_files = ["site.css"]
+html_copy_source = False
+html_show_sphinx = False
+pygments_style = "default"
+
+# Files beside docs/ that pages link to, and the pages of the site that show them.
+BESIDE = {
+    "README.md": "index.md",
+    "CONTRIBUTING.md": "developers/contributing.md",
+    "CHANGELOG.md": "developers/changelog.md",
+    "benchmarks/RECORD.md": "developers/record.md",
+}
+
+
+def link_pages(app: Sphinx, name: str, source: list[str]) -> None:
+    """Let links to files beside docs/ lead to their pages."""
+    up = "../" * name.count("/")
+    for file, page in BESIDE.items():
+        source[0] = source[0].replace(f"]({up}../{file}", f"]({up}{page}")
+
+
+def setup(app: Sphinx) -> None:
+    """Connect what Sphinx calls."""
+    app.connect("source-read", link_pages)

@@ -1,0 +1,97 @@
+"""Write the pages of docs/reference that come from the code: `python -m docs.make_reference`."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+
+from percussion_model.analysis.study.response import FOUND, KINDS
+from percussion_model.physics.records import (
+    BLOW_COLUMNS,
+    EVENT_COLUMNS,
+    SAMPLE_COLUMNS,
+    Column,
+    EventKind,
+    Mode,
+)
+from percussion_model.simulation.columns import ENERGY_COLUMNS, SUMMARY_COLUMNS
+
+FOLDER = Path(__file__).with_name("reference")
+MADE = "This page is written by `python -m docs.make_reference`."
+
+OUTPUTS = f"""# Output columns
+
+Every column and number that a run writes, with its unit and its meaning. Positions point down.
+Forces on rock and contact are positive in compression. [The model](../model.md) has the
+definitions with equations. {MADE}
+"""
+STUDY_ONLY = (
+    Column("kind", "", f"what the motion is: {', '.join(KINDS)}"),
+    Column("order", "", "blows after which the motion repeats"),
+    Column("blows", "", "blows that were run"),
+    Column("wall_time", "s", "computing time of the point"),
+)
+OF_THE_CYCLE = {
+    "multiplier": "what is left of a deviation after one cycle; below 1 the cycle is stable",
+}
+
+
+def study_columns() -> tuple[Column, ...]:
+    """Columns of a study; most are called as in a summary and mean the same."""
+    known = {column.name: column.meaning for column in SUMMARY_COLUMNS} | OF_THE_CYCLE
+    units = {name: "" if unit == "-" else unit for name, unit in FOUND.items()}
+    return tuple(Column(name, units[name], known[name]) for name in FOUND) + STUDY_ONLY
+
+
+def table(columns: Iterable[Column]) -> str:
+    """Columns as a table in Markdown."""
+    rows = [f"| `{one.name}` | {one.unit} | {one.meaning} |" for one in columns]
+    return "\n".join(["| name | unit | meaning |", "|---|---|---|", *rows])
+
+
+def numbers(kinds: Iterable[Mode | EventKind]) -> str:
+    """Numbers of an enumeration as a list of words."""
+    return ", ".join(f"{kind.value} {kind.name}" for kind in kinds)
+
+
+def outputs() -> str:
+    """Text of the page of outputs."""
+    parts = {
+        "Summary": "`summary.json`, `--json`, `Result.summary()`. Means are over the counted "
+        "blows.\n\n" + table(SUMMARY_COLUMNS),
+        "Blows": "`blows.csv`, `Result.blows`: a row for each whole blow.\n\n"
+        + table(BLOW_COLUMNS),
+        "Events": "`events.csv`, `Result.events`. In the file the kind is a word, in Python a "
+        f"number: {numbers(EventKind)}.\n\n" + table(EVENT_COLUMNS),
+        "Samples": "`trace.csv` or `trace.npz` (`--trace`), `Result.trace`, "
+        f"`Simulation.observe()`. Modes of the rock law: {numbers(Mode)}.\n\n"
+        + table(SAMPLE_COLUMNS),
+        "Energy ledger": "`energy` in a summary. [The model, section 8](../model.md) tells how "
+        "the entries add up.\n\n" + table(ENERGY_COLUMNS),
+        "Points of a study": "`points.parquet` and `points.nc` of `percussion study`, beside the "
+        "parameters that vary.\n\n" + table(study_columns()),
+    }
+    return OUTPUTS + "".join(f"\n## {head}\n\n{text}\n" for head, text in parts.items())
+
+
+def command_line() -> str:
+    """Text of the page of commands, which typer makes."""
+    made = subprocess.run(
+        [
+            *(sys.executable, "-m", "typer", "percussion_model.interface.cli"),
+            *("utils", "docs", "--name", "percussion"),
+        ],
+        capture_output=True, text=True, check=True,
+    ).stdout  # fmt: skip
+    text = made.replace("# `percussion`\n", f"# Command line\n\n{MADE}\n", 1)
+    return text.replace("```console", "```text").rstrip() + "\n"
+
+
+PAGES = {"outputs.md": outputs, "command_line.md": command_line}
+
+
+if __name__ == "__main__":
+    for name, write in PAGES.items():
+        (FOLDER / name).write_text(write(), encoding="utf-8")
