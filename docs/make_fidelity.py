@@ -1,4 +1,4 @@
-"""Measure the rungs of the fidelity ladder for docs/fidelity.md: `python -m docs.make_fidelity`.
+"""Measure the fidelities for docs/fidelity.md: `python -m docs.make_fidelity`.
 
 Makes the usual blow map of the reference scene first, unless it is kept already.
 """
@@ -39,20 +39,20 @@ COMPARED = {
 }
 RUNGS = ("rigid", "blow-map")
 DURATION = 4.0
-# Long enough to time a run of each rung [s].
+# Long enough to time a run of each [s].
 TIMED = {"wave": 4.0, "rigid": 40.0, "blow-map": 400.0}
 POINTS, SEED = 30, 1
 
 
 def on(rung: str, **changes: Any) -> Scene:
-    """The reference scene on a rung of the ladder."""
+    """The reference scene at a fidelity."""
     by = {"solver.name": "wave"} if rung == "wave" else {}
     return Scene().replace(**{"solver.fidelity": rung, **by, **changes})
 
 
 def errors() -> str:
-    """Error of each rung against the waves, Markdown."""
-    lines = ["| scene | rung | " + " | ".join(f"{n}, %" for n in COMPARED.values()) + " |"]
+    """Error of each fidelity against the waves, Markdown."""
+    lines = ["| scene | fidelity | " + " | ".join(f"{n}, %" for n in COMPARED.values()) + " |"]
     lines.append("|---" * (2 + len(COMPARED)) + "|")
     for name, changes in SCENES.items():
         wave = simulate(on("wave", **changes), DURATION).summary()
@@ -64,8 +64,8 @@ def errors() -> str:
 
 
 def costs() -> str:
-    """Processor time of each rung, Markdown."""
-    lines = ["| rung | × real time | µs a blow |", "|---|---|---|"]
+    """Processor time of each fidelity, Markdown."""
+    lines = ["| fidelity | × real time | µs a blow |", "|---|---|---|"]
     for rung, duration in TIMED.items():
         best, blows = math.inf, 1
         for _ in range(5):

@@ -35,7 +35,7 @@ from percussion_model.verification.hard_cases.collection import (
 from percussion_model.verification.hard_cases.refinement import refine
 from percussion_model.verification.hard_cases.stability_page import page
 
-PAGE = Path(__file__).parents[2] / "docs" / "stability.md"
+PAGE = Path(__file__).parents[2] / "docs" / "data" / "hard_cases.md"
 LONG = os.environ.get("PERCUSSION_LONG") == "1"
 # Share of each case's duration: enough for a blow or two, and for the first storm.
 SHARES = {"wave": 0.15, "fem": 0.08, "rigid": 0.12, "chain": 0.2}
@@ -239,7 +239,7 @@ def test_the_command_writes_json_page_and_figure(tmp_path, capsys):
     assert values["cases"] == values["runs"] == 2
     assert values["failures"] == []
     assert {row["case"] for row in values["rows"]} == {"grazing", "bounce_dead"}
-    text = (tmp_path / "stability.md").read_text(encoding="utf-8")
+    text = (tmp_path / "hard_cases.md").read_text(encoding="utf-8")
     assert "bounce_dead" in text
     assert "](images/stability.png)" in text
     assert (tmp_path / "images" / "stability.png").stat().st_size > 10_000
@@ -313,7 +313,7 @@ def test_the_page_tells_of_every_case_and_knows_every_reason():
     text = PAGE.read_text(encoding="utf-8")
     for name, case in hard_cases().items():
         for solver in case.solvers:
-            assert f"| {name} | {solver} |" in text, "run: percussion stability --out docs"
-        assert case.hard in text, "run: percussion stability --out docs"
+            assert f"| {name} | {solver} |" in text, "run: python -m docs.make_stability"
+        assert case.hard in text, "run: python -m docs.make_stability"
     assert "all of this holds for all of them" in text
     assert "not known" not in text

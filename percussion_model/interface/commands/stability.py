@@ -75,5 +75,5 @@ def _write(found: Collection, folder: Path) -> None:
                 lambda: [("stability", draw_stability(found))], folder / "images", kinds=("png",)
             )
         picture = "images/stability.png"
-    staged_text(folder / "stability.md", page(found, picture))
-    common.list_files([folder / "stability.md"])
+    staged_text(folder / "hard_cases.md", page(found, picture))
+    common.list_files([folder / "hard_cases.md"])

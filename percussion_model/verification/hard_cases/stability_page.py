@@ -1,4 +1,4 @@
-"""Page of the hard cases (docs/stability.md): runs, verdict, disagreements of solvers."""
+"""Page of all hard cases (docs/data/hard_cases.md): runs, verdict, disagreements of solvers."""
 
 from __future__ import annotations
 
@@ -24,31 +24,28 @@ GROUPS = {
     "inputs": "Inputs that change during the run",
 }
 
-_INTRODUCTION = """# Stability
+_INTRODUCTION = """# Hard cases: all runs
 
-What the solvers make of the nastiest scenes that this model has. This page is written by
-`percussion stability --out out/stability`; the cases are stored in
-`percussion_model/verification/hard_cases/*.toml`, each with what makes it hard and what must hold.
-How guards act and what they warn of is told in [numerics.md](numerics.md), section 12.
+The data behind {guide}: every hard case by every solver that computes it. `percussion stability` writes
+this page. Read it to look up a case, a rate or a disagreement.
 
-**What must hold of every run**: it ends, with finite numbers; the energy residual is below
-{residual:g} of the ledger's denominator; momentum equals impulses within {momentum:g}; nothing
-pulls between piston and bit, nor on the rock with `release`; piston and bit do not interpenetrate
-(waves, rigid bodies), or by no more than the penalty holds when it takes all energy put in
-(finite elements); there are no more events a second than the case's ceiling, on the mean over
-50 ms at least, since events come in bursts; and the same run in other calls gives the same bits.
+**What must hold of every run**: it ends, with finite numbers. The energy residual is below {residual:g} of
+the ledger's denominator, and momentum equals impulses within {momentum:g}. Nothing pulls between
+piston and bit, nor on the rock with `release`. Piston and bit interpenetrate no deeper than a penalty
+allows that holds all energy put in, and not at all without a penalty. There are no more events a second
+than the ceiling of the case, in the mean over 50 ms. The same run in other calls gives the same bits.
 """
 
-_COLUMNS = """**Columns.** *rate*: rate of penetration. {about_errors}
-*residual* and *numerical*: entries of the energy ledger divided by its denominator;
-*momentum*: its greatest difference to the impulses, divided by the greatest impulse; *events*: per
-simulated second; *guards*: how often one acted; *refined*: change of the rate on a grid of twice as
-many cells or elements, of aperiodic cases in standard errors; *speed*: simulated time divided by
-time to compute, readings included.
+_COLUMNS = """*rate*: rate of penetration. {about_errors}
+
+*residual*, *numerical*: entries of the energy ledger, divided by its denominator. *momentum*: its greatest
+difference to the impulses, divided by the greatest impulse. *events*: per simulated second. *guards*: how
+often one acted. *refined*: change of the rate with twice as many cells or elements, of aperiodic cases in
+standard errors. *speed*: simulated time divided by time to compute, readings included.
 """
 
 
-def page(found: Collection, picture: str | None) -> str:
+def page(found: Collection, picture: str | None, guide: str = "docs/stability.md") -> str:
     """Text of the page.
 
     Parameters
@@ -56,9 +53,13 @@ def page(found: Collection, picture: str | None) -> str:
     found : Collection
     picture : str, optional
         Path of the figure from the page.
+    guide : str
+        What the page that explains this one is called, in Markdown.
     """
-    parts = [_INTRODUCTION.format(residual=MOST_RESIDUAL, momentum=MOST_MOMENTUM)]
-    parts.append(_verdict(found))
+    introduction = _INTRODUCTION.format(
+        guide=guide, residual=MOST_RESIDUAL, momentum=MOST_MOMENTUM
+    )
+    parts = [introduction, verdict(found)]
     parts += [f"{text}\n" for text in found.about_left_out()]
     if picture:
         parts.append(f"![Residual, events, momentum and speed of every case]({picture})\n")
@@ -70,7 +71,8 @@ def page(found: Collection, picture: str | None) -> str:
     return "\n".join(parts)
 
 
-def _verdict(found: Collection) -> str:
+def verdict(found: Collection) -> str:
+    """Whether all holds for all runs, and the extremes of residual, events and guards."""
     failures = found.failures()
     guarded = [row for row in found.rows if row["guards"]]
     worst = max(found.rows, key=lambda row: abs(row["residual"] or 0.0))
@@ -96,8 +98,9 @@ def _disagreements(found: Collection) -> str:
         "## Where solvers disagree",
         "",
         f"Every case whose mean rate differs by more than {100 * DISAGREE:g} % from that of the "
-        "first solver, with the reason; ± is by the errors of both rates. It is undecided where "
-        "these, three standard errors of the scatter and what finer grids change, reach so far.",
+        "first solver, with the reason. ± follows from the errors of both rates. A difference is "
+        "undecided where it lies within three standard errors of the scatter and what finer grids "
+        "change.",
         "",
         "| case | solver | rate, mm/s | first solver, mm/s | off | reason |",
         "|---|---|---|---|---|---|",
@@ -117,9 +120,9 @@ def _unresolved(found: Collection) -> str:
         "## What a finer grid changes",
         "",
         f"Rates that change by more than {100 * RATE_WITHIN:g} % and by more than {SIGMAS:g} "
-        "standard errors on a grid of twice as many cells, or (aperiodic cases) whose "
-        f"distribution of periods changes with a chance below {LEAST_CHANCE:g}: not resolved at "
-        "the default. All others are.",
+        "standard errors with twice as many cells or elements. In aperiodic cases also those whose "
+        f"distribution of periods changes: by chance it would with less than {LEAST_CHANCE:g}. The "
+        "default does not resolve these; it resolves all others.",
         "",
         "| case | solver | rate changes by | standard errors | chance of the periods |",
         "|---|---|---|---|---|",

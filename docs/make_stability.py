@@ -1,0 +1,50 @@
+"""Write docs/data/hard_cases.md, and its verdict in docs/stability.md: `python -m docs.make_stability [FILE]`.
+
+Runs all hard cases by every solver, which takes half an hour of one core, or takes them from the JSON file
+of an earlier `percussion stability --json FILE`.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+from percussion_model.interface.plotting.stability_map import draw_stability
+from percussion_model.interface.plotting.style import save_figures
+from percussion_model.interface.terminal import count_bar
+from percussion_model.verification.hard_cases import Collection, run_collection
+from percussion_model.verification.hard_cases.stability_page import page, verdict
+
+HERE = Path(__file__).resolve().parent
+GUIDE, DATA = HERE / "stability.md", HERE / "data" / "hard_cases.md"
+BEGIN, END = "<!-- tables: begin -->", "<!-- tables: end -->"
+
+
+def collection(file: str | None) -> Collection:
+    """All hard cases, run now or taken from a file."""
+    if file is None:
+        with count_bar("runs of hard cases") as progress:
+            return run_collection(progress=progress)
+    found = json.loads(Path(file).read_text(encoding="utf-8"))
+    return Collection(found["rows"], found["share"], found["left_out"])
+
+
+def guide(found: Collection) -> str:
+    """Text of the guide with the verdict renewed."""
+    before, _, rest = GUIDE.read_text(encoding="utf-8").partition(BEGIN)
+    _, _, after = rest.partition(END)
+    return f"{before}{BEGIN}\n\n{verdict(found)}\n{END}{after}"
+
+
+def main(file: str | None = None) -> None:
+    """Write both pages and draw the figure."""
+    found = collection(file)
+    save_figures(lambda: [("stability", draw_stability(found))], HERE / "images", kinds=("png",))
+    text = page(found, "../images/stability.png", "the [guide to hard cases](../stability.md)")
+    DATA.write_text(text, encoding="utf-8")
+    GUIDE.write_text(guide(found), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:2])
