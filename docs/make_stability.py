@@ -1,7 +1,7 @@
-"""Write docs/data/hard_cases.md, and its verdict in docs/stability.md: `python -m docs.make_stability [FILE]`.
+"""Write docs/data/hard_cases.md and what docs/stability.md takes from it.
 
-Runs all hard cases by every solver, which takes half an hour of one core, or takes them from the JSON file
-of an earlier `percussion stability --json FILE`.
+`python -m docs.make_stability` runs all hard cases by every solver, which takes half an hour of one
+core; with a file name it takes them from an earlier `percussion stability --json FILE`.
 """
 
 from __future__ import annotations

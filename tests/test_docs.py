@@ -20,7 +20,7 @@ PAGES = (
     *("docs/model.md", "docs/numerics.md", "docs/parameters.md", "docs/fmu.md"),
     *("docs/fidelity.md", "docs/stability.md", "docs/system.md", "docs/studies.md"),
     *("docs/paper.md", "docs/gallery.md", "docs/top_hammer.md"),
-    "docs/stability_record.md",
+    *("docs/stability_record.md", "docs/data/hard_cases.md", "docs/how_to/calibrate_a_rock.md"),
     *("docs/accuracy.md", "docs/requested_accuracy.md", "docs/effects.md", "docs/undamped.md"),
     *("docs/glossary.md", "README.md", "CONTRIBUTING.md"),
 )

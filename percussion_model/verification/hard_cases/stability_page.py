@@ -26,22 +26,25 @@ GROUPS = {
 
 _INTRODUCTION = """# Hard cases: all runs
 
-The data behind {guide}: every hard case by every solver that computes it. `percussion stability` writes
-this page. Read it to look up a case, a rate or a disagreement.
+Read this page to look up a case, a rate or a disagreement. It has every hard case by every solver
+that computes it, as `percussion stability` writes them, and is explained in
+{guide}.
 
-**What must hold of every run**: it ends, with finite numbers. The energy residual is below {residual:g} of
-the ledger's denominator, and momentum equals impulses within {momentum:g}. Nothing pulls between
-piston and bit, nor on the rock with `release`. Piston and bit interpenetrate no deeper than a penalty
-allows that holds all energy put in, and not at all without a penalty. There are no more events a second
-than the ceiling of the case, in the mean over 50 ms. The same run in other calls gives the same bits.
+**What must hold of every run**: it ends, with finite numbers. The energy residual is below
+{residual:g} of the ledger's denominator, and momentum equals impulses within {momentum:g}.
+Nothing pulls between piston and bit, nor on the rock with `release`. Piston and bit interpenetrate
+no deeper than a penalty allows that holds all energy put in, and not at all without a penalty.
+There are no more events a second than the ceiling of the case, in the mean over 50 ms or more. The
+same run in other calls gives the same bits.
 """
 
 _COLUMNS = """*rate*: rate of penetration. {about_errors}
 
-*residual*, *numerical*: entries of the energy ledger, divided by its denominator. *momentum*: its greatest
-difference to the impulses, divided by the greatest impulse. *events*: per simulated second. *guards*: how
-often one acted. *refined*: change of the rate with twice as many cells or elements, of aperiodic cases in
-standard errors. *speed*: simulated time divided by time to compute, readings included.
+*residual*, *numerical*: entries of the energy ledger, divided by its denominator. *momentum*: its
+greatest difference to the impulses, divided by the greatest impulse. *events*: per simulated
+second. *guards*: how often one acted. *refined*: change of the rate with twice as many cells or
+elements, of aperiodic cases in standard errors. *speed*: simulated time divided by time to compute,
+readings included.
 """
 
 
@@ -56,9 +59,7 @@ def page(found: Collection, picture: str | None, guide: str = "docs/stability.md
     guide : str
         What the page that explains this one is called, in Markdown.
     """
-    introduction = _INTRODUCTION.format(
-        guide=guide, residual=MOST_RESIDUAL, momentum=MOST_MOMENTUM
-    )
+    introduction = _INTRODUCTION.format(guide=guide, residual=MOST_RESIDUAL, momentum=MOST_MOMENTUM)
     parts = [introduction, verdict(found)]
     parts += [f"{text}\n" for text in found.about_left_out()]
     if picture:
