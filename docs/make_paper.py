@@ -1,0 +1,62 @@
+"""Write docs/data/paper_statements.md and the figures of docs/paper.md.
+
+`python -m docs.make_paper FOLDER` takes them from the folder of `percussion paper --out FOLDER`.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+import sys
+from itertools import groupby
+from pathlib import Path
+from typing import Any
+
+HERE = Path(__file__).resolve().parent
+PAGE = HERE / "data" / "paper_statements.md"
+FIGURES = ("figures4and7", "sinking", "figure6", "figures7and8", "figure9", "scaling")
+
+HEAD = """# Statements of the paper
+
+Read this page to look up what the program finds for a statement of Depouhon, Denoël and Detournay
+(2014). `percussion paper` writes these numbers, and [the paper again](../paper.md) discusses them.
+
+{agree} of {all} statements agree. {errors}
+"""
+
+
+def page(found: dict[str, Any]) -> str:
+    """Text of the page: a table for each place in the paper."""
+    statements = found["statements"]
+    agree = sum(one["agrees"] for one in statements)
+    parts = [HEAD.format(agree=agree, all=len(statements), errors=found["errors"])]
+    for place, ones in groupby(statements, key=lambda one: one["place"]):
+        parts += [
+            f"## Section {place}\n",
+            "| the paper | found | agrees | it must be |",
+            "|---|---|---|---|",
+        ]
+        parts += [row(one) for one in ones]
+        parts.append("")
+    return "\n".join(parts)
+
+
+def row(one: dict[str, Any]) -> str:
+    """A row of a table, with the reason where a statement differs."""
+    agrees = "yes" if one["agrees"] else f"**no**: {one['why']}"
+    cells = (one["says"], one["found"], agrees, one["agrees_if"])
+    return f"| {' | '.join(text.replace('|', '/') for text in cells)} |"
+
+
+def main(folder: Path) -> None:
+    """Write the page and copy the figures."""
+    found = json.loads((folder / "statements.json").read_text(encoding="utf-8"))
+    PAGE.write_text(page(found), encoding="utf-8")
+    for name in FIGURES:
+        shutil.copyfile(folder / f"{name}.png", HERE / "images" / f"paper_{name}.png")
+
+
+if __name__ == "__main__":
+    if len(sys.argv) != 2:
+        raise SystemExit("name the folder of `percussion paper`: python -m docs.make_paper FOLDER")
+    main(Path(sys.argv[1]))
