@@ -44,7 +44,7 @@ _COLUMNS = """*rate*: rate of penetration. {about_errors}
 greatest difference to the impulses, divided by the greatest impulse. *events*: per simulated
 second. *guards*: how often one acted. *refined*: change of the rate with twice as many cells or
 elements, of aperiodic cases in standard errors. *speed*: simulated time divided by time to compute,
-readings included.
+readings included, beside whatever else the machine did.
 """
 
 
