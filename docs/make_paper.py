@@ -26,25 +26,26 @@ Read this page to look up what the program finds for a statement of Depouhon, De
 
 
 def page(found: dict[str, Any]) -> str:
-    """Text of the page: a table for each place in the paper."""
+    """Text of the page: a table for each section of the paper."""
     statements = found["statements"]
     agree = sum(one["agrees"] for one in statements)
     parts = [HEAD.format(agree=agree, all=len(statements), errors=found["errors"])]
-    for place, ones in groupby(statements, key=lambda one: one["place"]):
-        parts += [
-            f"## Section {place}\n",
-            "| the paper | found | agrees | it must be |",
-            "|---|---|---|---|",
-        ]
-        parts += [row(one) for one in ones]
-        parts.append("")
+    for section, ones in groupby(statements, key=section_of):
+        parts += [f"## {section}\n", "| place | the paper | found | agrees | it must be |"]
+        parts += ["|---|---|---|---|---|", *(row(one) for one in ones), ""]
     return "\n".join(parts)
+
+
+def section_of(one: dict[str, Any]) -> str:
+    """The section of the paper, or the table, that a statement is from."""
+    number, _, _ = one["place"].partition(",")[0].partition(" ")
+    return f"Section {number}" if number[0].isdigit() else one["place"]
 
 
 def row(one: dict[str, Any]) -> str:
     """A row of a table, with the reason where a statement differs."""
     agrees = "yes" if one["agrees"] else f"**no**: {one['why']}"
-    cells = (one["says"], one["found"], agrees, one["agrees_if"])
+    cells = (one["place"], one["says"], one["found"], agrees, one["agrees_if"])
     return f"| {' | '.join(text.replace('|', '/') for text in cells)} |"
 
 
