@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import importlib.util
 import re
 import tomllib
@@ -20,7 +21,8 @@ PAGES = (
     *("docs/model.md", "docs/numerics.md", "docs/parameters.md", "docs/fmu.md"),
     *("docs/fidelity.md", "docs/stability.md", "docs/system.md", "docs/studies.md"),
     *("docs/paper.md", "docs/gallery.md", "docs/top_hammer.md"),
-    *("docs/stability_record.md", "docs/data/hard_cases.md", "docs/how_to/calibrate_a_rock.md"),
+    *("docs/stability_record.md", "docs/data/hard_cases.md"),
+    *("docs/data/paper_statements.md", "docs/how_to/calibrate_a_rock.md"),
     *("docs/accuracy.md", "docs/requested_accuracy.md", "docs/effects.md", "docs/undamped.md"),
     *("docs/glossary.md", "README.md", "CONTRIBUTING.md"),
 )
@@ -86,6 +88,14 @@ def test_links_lead_somewhere(page):
     path = ROOT / page
     for target in re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", path.read_text(encoding="utf-8")):
         assert (path.parent / target).exists(), f"{page} links to {target}"
+
+
+@pytest.mark.parametrize("name", ["effects", "fidelity", "stability"])
+def test_what_scripts_write_into_a_page_has_its_marks(name):
+    module = importlib.import_module(f"docs.make_{name}")
+    text = (ROOT / "docs" / f"{name}.md").read_text(encoding="utf-8")
+    assert text.count(module.BEGIN) == text.count(module.END) == 1
+    assert text.index(module.BEGIN) < text.index(module.END)
 
 
 def test_pictures_are_small():

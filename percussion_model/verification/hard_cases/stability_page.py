@@ -63,7 +63,7 @@ def page(found: Collection, picture: str | None, guide: str = "docs/stability.md
     parts = [introduction, verdict(found)]
     parts += [f"{text}\n" for text in found.about_left_out()]
     if picture:
-        parts.append(f"![Residual, events, momentum and speed of every case]({picture})\n")
+        parts.append(f"![Residual, momentum, dissipation and events of every case]({picture})\n")
     parts.append(_disagreements(found))
     if found.is_refined:
         parts.append(_unresolved(found))
