@@ -461,7 +461,7 @@ BLOCKS: dict[str, Callable[[], str]] = {
     "orders": reference_orders,
     "machine": machine,
 }
-FILLED = (DOCS / "accuracy.md", DOCS.parent / "README.md")
+FILLED = (DOCS / "accuracy.md", DOCS / "data" / "costs.md", DOCS.parent / "README.md")
 
 
 def filled(path: Path) -> str:
