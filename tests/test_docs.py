@@ -22,6 +22,8 @@ PAGES = (
     *("docs/paper.md", "docs/gallery.md", "docs/top_hammer.md"),
     "docs/stability_record.md",
     *("docs/accuracy.md", "docs/requested_accuracy.md", "docs/effects.md", "docs/undamped.md"),
+    "docs/modal.md",
+    *sorted(f"docs/data/{path.name}" for path in (ROOT / "docs" / "data").glob("*.md")),
     *("docs/glossary.md", "README.md", "CONTRIBUTING.md"),
 )
 

@@ -1,6 +1,6 @@
 """Waves against finite elements over a range of parameters, both refined.
 
-python tests/agreement/study.py            # writes the tables of docs/numerics.md to stdout
+python tests/agreement/study.py            # writes the rows of docs/data/agreement.md to stdout
 python tests/agreement/study.py K_R gamma  # some of them
 """
 
