@@ -229,7 +229,7 @@ def general() -> str:
 
 
 def misfit() -> str:
-    """Error of the rate by that of the wave speed, scene by scene."""
+    """Error of the rate divided by that of the wave speed, scene by scene."""
     rows, factors = [], []
     for name, study in load_studies().items():
         points = [
@@ -248,7 +248,12 @@ def misfit() -> str:
                 f"{two(median(each))}, {two(max(each))}",
             ]
         )
-    head = ["scene", "misfit", "greatest error of the rate", "error by misfit: median, greatest"]
+    head = [
+        "scene",
+        "misfit",
+        "greatest error of the rate",
+        "error divided by misfit: median, greatest",
+    ]
     text = table(head, rows)
     return (
         f"{text}\n\nOver all of these the rate is off by {two(median(factors))} times the misfit "
@@ -461,7 +466,7 @@ BLOCKS: dict[str, Callable[[], str]] = {
     "orders": reference_orders,
     "machine": machine,
 }
-FILLED = (DOCS / "accuracy.md", DOCS.parent / "README.md")
+FILLED = (DOCS / "accuracy.md", DOCS / "data" / "costs.md", DOCS.parent / "README.md")
 
 
 def filled(path: Path) -> str:

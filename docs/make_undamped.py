@@ -1,6 +1,6 @@
 """Study the rate of penetration against structural loss: `python -m docs.make_undamped`.
 
-Writes docs/images/undamped.png and the table of docs/undamped.md. Takes some minutes.
+Writes docs/images/undamped.png and the table of docs/data/undamped.md. Takes some minutes.
 """
 
 from __future__ import annotations
@@ -137,7 +137,7 @@ def main() -> None:
         print({name: row[name] for name in ("loss", "cells", "rate", "error")}, file=sys.stderr)
     with matplotlib.rc_context(style.STYLE):
         draw(rows).savefig(HERE / "images" / "undamped.png", metadata={"Software": None}, dpi=110)
-    page = HERE / "undamped.md"
+    page = HERE / "data" / "undamped.md"
     text = page.read_text(encoding="utf-8")
     marks = "<!-- table -->\n", "\n<!-- end of table -->"
     pattern = f"{re.escape(marks[0])}.*{re.escape(marks[1])}"

@@ -24,6 +24,8 @@ PAGES = (
     *("docs/stability_record.md", "docs/data/hard_cases.md"),
     *("docs/data/paper_statements.md", "docs/how_to/calibrate_a_rock.md"),
     *("docs/accuracy.md", "docs/requested_accuracy.md", "docs/effects.md", "docs/undamped.md"),
+    "docs/modal.md",
+    *sorted(f"docs/data/{path.name}" for path in (ROOT / "docs" / "data").glob("*.md")),
     *("docs/glossary.md", "README.md", "CONTRIBUTING.md"),
 )
 

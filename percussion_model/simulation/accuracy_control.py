@@ -1,6 +1,6 @@
 """Accuracy control: finer runs until they agree, longer ones where motion is aperiodic.
 
-The evidence for the constants is in docs/requested_accuracy.md.
+The evidence for the constants is in docs/data/stated_errors.md.
 """
 
 from __future__ import annotations

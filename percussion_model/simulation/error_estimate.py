@@ -3,7 +3,7 @@
 Two things are wrong with a grid: its cells have a size, and lengths that fit no common
 cell let the wave speed take the error, the misfit. Runs that share a misfit agree on the
 same wrong rate, so agreement counts only between grids that do not
-(docs/requested_accuracy.md).
+(docs/accuracy.md, section 9).
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Rate of penetration of some blows and its standard error.
 
-The evidence for the estimate is in docs/requested_accuracy.md.
+The evidence for the estimate is in docs/data/stated_errors.md.
 """
 
 from __future__ import annotations

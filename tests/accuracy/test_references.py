@@ -104,7 +104,7 @@ def test_references_survive_their_file(tmp_path):
 
 
 def test_the_waves_find_the_reference_scene():
-    """40 cells, from a start near the periodic motion; docs/numerics.md says 0.01 %."""
+    """40 cells, from a start near the periodic motion; docs/data/waves.md says 0.01 %."""
     scene = Scene.from_toml(SCENARIOS / "reference.toml")
     problem, found = pose(scene), reference("reference")
     assert problem.kind == PERIODIC

@@ -1,7 +1,7 @@
 """Finite elements against travelling waves and rigid bodies, which share no motion with them.
 
 The whole range of parameters, with both refined, runs with PERCUSSION_LONG=1; its table
-stands in docs/numerics.md. Here some of it, over fewer blows.
+stands in docs/data/agreement.md. Here some of it, over fewer blows.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Cells that meet a wanted accuracy, by a rule that was calibrated (docs/requested_accuracy.md).
+"""Cells that meet a wanted accuracy, by a rule that was calibrated (docs/data/stated_errors.md).
 
 The rule only knows the scene. What it cannot know, such as chatter, shows in the run.
 """
