@@ -14,7 +14,7 @@ Place = tuple[float, float]
 INK = "#222222"
 NOTE = "#595959"
 SMALL = 8.0
-# Two texts may overlap by so much of the smaller one's height or width [pixel]: boxes have a margin.
+# Boxes of texts have a margin: they may overlap by so much [pixel].
 TOUCHING = 1.0
 
 
@@ -37,9 +37,7 @@ def arrow(
     return patch
 
 
-def dimension(
-    ax: Axes, x: float, top: float, bottom: float, text: str, at: float = 0.5
-) -> None:
+def dimension(ax: Axes, x: float, top: float, bottom: float, text: str, at: float = 0.5) -> None:
     """Draw an upright dimension with its symbol left of it, at a share of its length."""
     arrow(ax, (x, top), (x, bottom), NOTE, "<|-|>", linewidth=0.9, mutation_scale=8.0)
     ax.text(x - 0.15, top + at * (bottom - top), text, ha="right", va="center", color=NOTE)
@@ -68,8 +66,13 @@ def lines_of_text(
 def misplaced_texts(fig: Figure) -> list[str]:
     """Texts of a drawn figure that leave it, or lie on each other; none in a good one."""
     fig.draw_without_rendering()
+    unseen = _unseen_ticks(fig)
     texts = [one for one in fig.findobj(Text) if one.get_visible() and one.get_text().strip()]
-    boxes = [(one.get_text(), one.get_window_extent()) for one in texts if _is_shown(one)]
+    boxes = [
+        (one.get_text(), one.get_window_extent())
+        for one in texts
+        if _is_shown(one) and one not in unseen
+    ]
     frame, found = fig.bbox, []
     for k, (text, one) in enumerate(boxes):
         if one.x0 < frame.x0 or one.y0 < frame.y0 or one.x1 > frame.x1 or one.y1 > frame.y1:
@@ -79,6 +82,19 @@ def misplaced_texts(fig: Figure) -> list[str]:
             high = min(one.y1, two.y1) - max(one.y0, two.y0)
             if wide > TOUCHING and high > TOUCHING:
                 found.append(f"{text!r} lies on {other!r}")
+    return found
+
+
+def _unseen_ticks(fig: Figure) -> set[Text]:
+    """Labels of ticks beyond the ends of their axis, which exist but are not drawn."""
+    found = set()
+    for ax in fig.axes:
+        for axis in (ax.xaxis, ax.yaxis):
+            low, high = sorted(axis.get_view_interval())
+            room = 1e-9 * (high - low)
+            for tick in [*axis.get_major_ticks(), *axis.get_minor_ticks()]:
+                if not low - room <= tick.get_loc() <= high + room:
+                    found |= {tick.label1, tick.label2}
     return found
 
 

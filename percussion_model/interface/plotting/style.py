@@ -161,6 +161,7 @@ def save_figures(
     kinds: Sequence[str] = ("png", "svg"),
     names: Sequence[str] = (),
     report: Report | None = None,
+    dpi: float | None = None,
 ) -> list[Path]:
     """Draw figures in this style and write all of them into a folder, or none.
 
@@ -176,6 +177,8 @@ def save_figures(
         Of the figures that are to come, for `report`.
     report : callable, optional
         Is told which figure is drawn.
+    dpi : float, optional
+        Pixels by inch, where not those of the style.
 
     Returns
     -------
@@ -191,7 +194,7 @@ def save_figures(
     files: list[str] = []
     with staged(folder) as draft, rc_context(STYLE):
         for name, fig in _each_told(draw(), names, report):
-            files += save(fig, draft, name, kinds)
+            files += save(fig, draft, name, kinds, dpi)
     return [folder / name for name in files]
 
 
@@ -210,13 +213,19 @@ def _each_told(
         yield one
 
 
-def save(fig: Figure, folder: Path, name: str, kinds: Sequence[str] = ("png", "svg")) -> list[str]:
+def save(
+    fig: Figure,
+    folder: Path,
+    name: str,
+    kinds: Sequence[str] = ("png", "svg"),
+    dpi: float | None = None,
+) -> list[str]:
     """Write a figure as PNG and SVG and return the names of the files."""
     fig.draw_without_rendering()
     fig.set_layout_engine("none")  # laid out once, not again for each file
     names = [f"{name}.{kind}" for kind in kinds]
     for file, kind in zip(names, kinds, strict=True):
-        fig.savefig(folder / file, metadata=_METADATA[kind])
+        fig.savefig(folder / file, dpi=dpi, metadata=_METADATA[kind])
     return names
 
 
