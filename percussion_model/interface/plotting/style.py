@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib import rc_context
+from matplotlib import cycler, rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -36,6 +36,8 @@ MODE_NAMES = {
 }
 # The short modes are drawn on top.
 _DRAWING_ORDER = (Mode.FF, Mode.SS, Mode.BC, Mode.FC, Mode.DFC)
+# The same for lines that are told apart by colour alone, the strongest first.
+LINE_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#222222")
 PISTON_COLOUR = "#CC79A7"
 BIT_COLOUR = "#0072B2"
 CONTACT_COLOUR = "#CC79A7"
@@ -65,6 +67,7 @@ STYLE: Any = {
     "axes.grid": True,
     "axes.axisbelow": True,
     "axes.xmargin": 0.02,
+    "axes.prop_cycle": cycler(color=LINE_COLOURS),
     "grid.color": "#E6E6E6",
     "grid.linewidth": 0.6,
     "lines.linewidth": 1.3,
