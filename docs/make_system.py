@@ -20,8 +20,7 @@ def tables() -> str:
     variables = {name: {v.name: v for v in part_variables(part)} for name, part in PARTS.items()}
     lines = ["### Signals\n", "| from | to | unit | meaning |", "|---|---|---|---|"]
     for sink, source in plan.connections.items():
-        ends = (find_variable(plan.components, variables, end) for end in (source, sink))
-        one = next(filter(None, ends), None)
+        one = _find(plan.components, variables, source) or _find(plan.components, variables, sink)
         unit = (one.unit or "") if one else ""
         lines.append(f"| `{source}` | `{sink}` | {unit} | {one.description if one else ''} |")
     for name in PARTS:
@@ -32,10 +31,9 @@ def tables() -> str:
     return "\n".join(lines) + "\n"
 
 
-def find_variable(
+def _find(
     components: dict[str, str], variables: dict[str, dict[str, Variable]], signal: str
 ) -> Variable | None:
-    """Variable of a signal, by the components' parts; None for the hammer's, which is no part."""
     component, _, name = signal.partition(".")
     return variables.get(components[component], {}).get(name)
 

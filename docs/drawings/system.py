@@ -11,11 +11,11 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from docs.drawings.shapes import INK, NOTE, SMALL, Place, arrow, blank, box, lines_of_text
-from docs.make_system import SYSTEM, find_variable
 from fmu_src.parts.build import PARTS, part_variables
-from fmu_src.system.archive import HAMMER, SystemPlan, read_plan
+from fmu_src.system.archive import HAMMER, SYSTEMS, SystemPlan, read_plan
 from percussion_model.interface.plotting import style
 
+SYSTEM = SYSTEMS / "feed_control.toml"
 WIDTH, HEIGHT = 19.2, 10.4
 ACTION, COMMAND, MEASURED, ROCK = "#222222", "#D55E00", "#0072B2", "#8A6D3B"
 HAMMER_WORDS = "Piston, bit and rock force, blow by blow, with the scene in it"
@@ -96,13 +96,16 @@ def signals(plan: SystemPlan) -> dict[tuple[str, str], list[str]]:
     variables = {name: {v.name: v for v in part_variables(part)} for name, part in PARTS.items()}
     found: dict[tuple[str, str], list[str]] = {}
     for sink, source in plan.connections.items():
-        ends = (find_variable(plan.components, variables, end) for end in (source, sink))
-        one = next(filter(None, ends), None)
         component, _, name = source.partition(".")
+        receiver, _, received = sink.partition(".")
+        # the hammer is no part: what it gives or takes is known by the other end
+        ends = ((component, name), (receiver, received))
+        known = (variables.get(plan.components[one], {}).get(signal) for one, signal in ends)
+        one = next(filter(None, known), None)
         unit = f" [{one.unit}]" if one and one.unit else ""
         if one and one.type == "Boolean":
             unit = " [on/off]"
-        found.setdefault((component, sink.partition(".")[0]), []).append(name + unit)
+        found.setdefault((component, receiver), []).append(name + unit)
     return found
 
 

@@ -73,5 +73,5 @@ def draw_signals(run: CoupledRun, title: str) -> Figure:
             low, high = ax.get_ylim()
             ax.set_ylim(low, high + ROOM_OF_LEGEND * (high - low))
     axes[-1, 0].set_xlabel("time [s]")
-    head(figure, title)
+    head(figure, f"{title}: signals of a coupled run")
     return figure
