@@ -48,7 +48,7 @@ SPEED = 0.055  # of the string at the start [m/s]
 Run = dict[str, np.ndarray]
 # Label with unit, factor and column of each panel; columns of `simulate`.
 PANELS = (
-    ("loading stiffness K_R of the rock [kN/mm]", 1e-6, "rock.loading_stiffness"),
+    ("loading stiffness $K_R$ of the rock [kN/mm]", 1e-6, "rock.loading_stiffness"),
     ("depth of the bit [mm]", 1e3, "depth"),
     ("feed force [kN]", 1e-3, "feed_force"),
     ("supply pressure [bar]", 1e-5, "supply_pressure"),

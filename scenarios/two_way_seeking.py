@@ -169,7 +169,7 @@ def draw(hill: np.ndarray, runs: Sequence[CoupledRun], path: Path) -> Path:
         label(ax, "", text, name)
     over_time[1].set_xlabel("time [s]")
     label(above, "feed force [kN]", "supply pressure that is asked for [bar]",
-          "Ways over the hill, and the rate at their ends")  # fmt: skip
+          "Ways over the hill; rate at the end by the best one")  # fmt: skip
     head(figure, "Extremum seeking on feed and pressure at once")
     handles, labels = above.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=5)
