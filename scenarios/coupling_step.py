@@ -179,7 +179,7 @@ def draw(ones: Sequence[OneBlow], exact: OneBlow, eights: Sequence[EightBlows], 
     figure.legend(*axes[2].get_legend_handles_labels(), loc="outside lower right", ncols=1)
     for ax in axes:
         ax.axvline(1e3 * UNCHANGED, color=RULE_COLOUR, linewidth=1.0, linestyle=":")
-    axes[2].annotate("default", (1e3 * UNCHANGED, 0.97), (4, 0), xycoords=(
+    axes[2].annotate("default", (1e3 * UNCHANGED, 0.5), (4, 0), xycoords=(
         "data", "axes fraction"), textcoords="offset points", va="top")  # fmt: skip
     head(figure, "Error of a coupled run against its communication step")
     return save_png(figure, path)

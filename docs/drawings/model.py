@@ -185,7 +185,7 @@ def _say(ax: Axes, x: np.ndarray, force: np.ndarray, mode: np.ndarray) -> None:
     """Write beside the pieces of the path what they are."""
     peak = int(np.argmax(np.where(mode == Mode.FC, force, 0.0)))
     dfc = mode == Mode.DFC
-    ax.annotate("barrier: the dashpot takes $W_R$", (x[dfc][0], force[dfc][0]), (26, -8),
+    ax.annotate("barrier: the dashpot takes $W_R$", (x[dfc][0], force[dfc][0]), (12, 18),
                 textcoords="offset points", color=INK)  # fmt: skip
     ax.annotate("slope $K_R$", (0.62 * x[peak], 0.62 * force[peak]), (8, -6),
                 textcoords="offset points", va="top")  # fmt: skip

@@ -17,6 +17,7 @@ from percussion_model.interface.plotting import style
 from percussion_model.interface.plotting.style import KN, MM, MODE_COLOURS, US
 from percussion_model.interface.plotting.window import closed_contacts
 from percussion_model.physics.records import EventKind, Mode
+from percussion_model.solvers.modal.records import STEP
 from percussion_model.verification.accuracy.ladders import FITS, misfit_of
 
 # A piston with a step, so that waves meet one [m], [m^2].
@@ -41,7 +42,7 @@ EXACT = (
 APPROXIMATE = (
     "Approximate",
     "modes: finitely many, so fronts are rounded and ring",
-    "modes: events to a 2048th of a step",
+    f"modes: events to 1/{1 << STEP} of a step",
     "waves: lengths in whole cells; where they share none, the",
     "wave speed is off by the misfit, shown above",
     "waves: what arrives at an end is constant over a step",
@@ -143,7 +144,8 @@ def _diagram(fig: Figure, ax: Axes, scene: Scene, found: Impact) -> None:
         )  # fmt: skip
     struck = len(scene.piston.sections)
     for k, border in enumerate(borders[1:-1], start=1):
-        ax.axhline(border * MM, color=NOTE, linewidth=0.8, linestyle=":" if k != struck else "-")
+        dashes = "-" if k == struck else ":"
+        ax.plot([0.0, SHOWN * US], [border * MM] * 2, dashes, color=NOTE, linewidth=0.8)
         if k != struck:
             ax.text(SHOWN * US - 6, border * MM - 5, "step of the piston", ha="right", va="bottom",
                     fontsize=SMALL, color=NOTE)  # fmt: skip
@@ -178,6 +180,7 @@ def _contacts(ax: Axes, found: Impact, depth: float) -> None:
             ax.annotate(
                 words.pop(EventKind(kind)), (time * US, depth * MM), (-14 if late else 14, 20),
                 textcoords="offset points", ha="right" if late else "left", fontsize=SMALL,
+                bbox={"facecolor": "white", "linewidth": 0.0, "alpha": 0.8, "pad": 1.0},
                 arrowprops={"arrowstyle": "-|>", "color": INK, "linewidth": 0.9},
             )  # fmt: skip
 
