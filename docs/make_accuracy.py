@@ -7,12 +7,13 @@ docs/accuracy/*.json, README.md included. All of it takes some ten minutes of on
 from __future__ import annotations
 
 import json
+import math
 import sys
 from typing import Any
 
 import matplotlib
 
-from docs.accuracy_page import COMPARED, DATA, DOCS, OTHERS, load_studies, pages
+from docs.accuracy_page import COMPARED, DATA, DOCS, OTHERS, load, load_studies, pages
 from percussion_model.interface.plotting import style
 from percussion_model.interface.plotting.error_against_time import (
     draw_accuracy,
@@ -58,11 +59,21 @@ def measure_closed_forms() -> None:
 
 def measure_steps() -> None:
     """Error and time of the FMU against communication step."""
-    from scenarios.communication_step import draw, study
+    from scenarios.communication_step import study
     from scenarios.harness import built
 
     found = study(built(), say=say)
     keep("communication_step", found)
+
+
+def draw_steps() -> None:
+    """Draw error and time of the FMU against communication step, from the data."""
+    from scenarios.communication_step import draw
+
+    found = load("communication_step")
+    for rows in found.values():
+        for row in rows:
+            row |= {name: math.nan for name, value in row.items() if value is None}
     draw(found, IMAGES / "communication_step.png")
 
 
@@ -116,6 +127,7 @@ def write_pages() -> None:
         for name, figure in figures.items():
             dpi = DPI if name == "accuracy_misfit" else DPI_OF_MANY
             style.save_png(figure, IMAGES / f"{name}.png", dpi)
+    draw_steps()
 
 
 EXTRA = {

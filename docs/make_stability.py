@@ -10,7 +10,7 @@ import json
 import sys
 from pathlib import Path
 
-from percussion_model.interface.plotting.stability_map import draw_stability
+from percussion_model.interface.plotting.stability_dots import draw_stability
 from percussion_model.interface.plotting.style import save_figures
 from percussion_model.interface.terminal import count_bar
 from percussion_model.verification.hard_cases import Collection, run_collection

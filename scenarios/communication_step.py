@@ -21,7 +21,7 @@ from typing import Any
 
 from percussion_model.interface.terminal import progress
 from percussion_model.simulation.files import staged_text
-from scenarios.drawing import save_png
+from scenarios.drawing import in_style, save_png
 from scenarios.harness import Instance, fmu
 from scenarios.results import command_line
 
@@ -36,6 +36,11 @@ RAMP = 1500.0, 4000.0  # feed at the start and the end [N]
 STRING = {"stiffness": 2e5, "lowering": 0.0165, "load": 2500.0}
 READ = ("bit.position", "bit.impulse", "piston.velocity", "blow_count")
 CASES = ("constant", "ramp", "coupled")
+WORDS = {
+    "constant": "constant inputs",
+    "ramp": "ramp: feed rises with time",
+    "coupled": "coupled: feed through a spring, by the bit's position",
+}
 # The coupling is lost once the bit is further off than this [m].
 LOST = 0.1
 
@@ -127,40 +132,41 @@ def table(found: dict[str, list[dict[str, Any]]]) -> str:
     return "\n".join(lines)
 
 
+@in_style
 def draw(found: dict[str, list[dict[str, Any]]], path: Path) -> Path:
     """Draw error and time against step."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(10.0, 4.4))
+    from percussion_model.interface.plotting.style import RULE_COLOUR, head, label
+
+    figure = Figure(figsize=(10.0, 4.8), layout="constrained")
     left, right = figure.subplots(1, 2)
     marks = {"constant": ("#595959", "x"), "ramp": ("#0072B2", "o"), "coupled": ("#D55E00", "s")}
     for case, rows in found.items():
         colour, marker = marks[case]
         good = [row for row in rows if row["error"] > 0 and not row["same_bits"]]
-        label = f"{case}: same bits at every step" if not good else case
+        name = WORDS[case] + (", the same bits at every step" if not good else "")
         left.plot(
             [row["step"] for row in good], [row["error"] for row in good],
-            color=colour, marker=marker, label=label,
+            color=colour, marker=marker, label=name,
         )  # fmt: skip
         known = [row for row in rows if not math.isnan(row["error"])]
         right.plot(
             [row["step"] for row in known], [row["cost"] for row in known],
-            color=colour, marker=marker, label=case,
+            color=colour, marker=marker,
         )  # fmt: skip
     steps = [min(STEPS), max(STEPS)]
     ramp = [row for row in found.get("ramp", ()) if row["error"] > 0]
     if ramp:
         scale = ramp[-1]["error"] / ramp[-1]["step"]
-        left.plot(steps, [scale * s for s in steps], "--", color="#BBBBBB", label="first order")
-    left.set_ylabel("error of the bit's advance, relative")
-    right.set_ylabel("time to compute a simulated second [s]")
+        left.plot(steps, [scale * s for s in steps], "--", color=RULE_COLOUR, label="first order")
     for ax in (left, right):
-        ax.set(xscale="log", yscale="log", xlabel="communication step [s]")
-        ax.grid(alpha=0.3)
-        ax.legend(fontsize="small")
-    left.set_title("Held inputs: error against step", loc="left", fontsize=10)
-    right.set_title("What short steps cost", loc="left", fontsize=10)
-    figure.tight_layout()
+        ax.set(xscale="log", yscale="log")
+    step = "communication step [s]"
+    label(left, step, "relative error of the bit's advance [–]", "An input that is held lags")
+    label(right, step, "computing time of a simulated second [s]", "Short steps cost time")
+    head(figure, "What a communication step of the FMU makes of the result, and what it costs")
+    figure.legend(loc="outside lower center", ncols=2)
     return save_png(figure, path, 120)
 
 

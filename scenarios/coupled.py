@@ -19,7 +19,7 @@ from percussion_model.interface.tables import print_table
 from percussion_model.interface.terminal import progress, progress_bar
 from percussion_model.simulation.files import staged_text
 from percussion_model.simulation.uncertain import in_digits
-from scenarios.drawing import save_png, stacked
+from scenarios.drawing import in_style, save_png, stacked
 from scenarios.results import command_line, system, tell
 
 STEP = 2e-3  # the longest at which the shoulder is as stiff as it is [s]
@@ -68,6 +68,7 @@ def held_since(time: np.ndarray, held: np.ndarray) -> float:
     return float(time[broken[-1] + 1]) if broken[-1] + 1 < len(time) else float("nan")
 
 
+@in_style
 def draw_runs(
     path: Path,
     title: str,
@@ -96,24 +97,24 @@ def draw_runs(
     """
     from matplotlib.patches import Patch
 
+    from percussion_model.interface.plotting.style import SHADE_COLOUR
+
     labels = [label for label, _, _ in panels]
     figure, axes = stacked(title, labels, (8.5, 1.6 + 1.5 * len(panels)))
     for ax, (_, factor, signal) in zip(axes, panels, strict=True):
         for name, one in runs.items():
             ax.plot(one["time"], factor * one[signal], linewidth=1.2, label=name)
         for begin, end, _ in spans:
-            ax.axvspan(begin, end, color="#dddddd", linewidth=0, zorder=0)
+            ax.axvspan(begin, end, color=SHADE_COLOUR, linewidth=0, zorder=0)
         for level, text in (marks or {}).get(signal, ()):
             ax.axhline(level, color="k", linewidth=0.8, linestyle="--")
-            ax.annotate(text, (1.01, level), xycoords=("axes fraction", "data"), fontsize="small",
-                        va="center")  # fmt: skip
+            ax.annotate(text, (1.01, level), xycoords=("axes fraction", "data"), va="center")
         ax.margins(x=0.01, y=0.12)
     handles, names = axes[0].get_legend_handles_labels()
     for _, _, text in spans[:1]:
-        handles.append(Patch(color="#dddddd"))
+        handles.append(Patch(color=SHADE_COLOUR))
         names.append(text)
-    figure.tight_layout(rect=(0.0, 0.045, 1.0, 1.0))
-    figure.legend(handles, names, loc="lower center", ncols=4, fontsize="small", frameon=False)
+    figure.legend(handles, names, loc="outside lower center", ncols=4)
     return save_png(figure, path)
 
 

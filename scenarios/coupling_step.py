@@ -21,13 +21,14 @@ from percussion_model.interface.terminal import progress
 from percussion_model.simulation.uncertain import change_text, with_error
 from percussion_model.verification.accuracy.orders import Order, fitted_order
 from scenarios.coupled import whole
-from scenarios.drawing import save_png
+from scenarios.drawing import in_style, save_png
 from scenarios.results import command_line, system, tell
 
 NAME = "coupling_step"
 ONE_BLOW, EIGHT_BLOWS = 0.04, 0.4  # [s]
 STEPS = (1e-5, 2e-5, 5e-5, 1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2)  # [s]
 ORDERS = ("jacobi", "gauss-seidel")
+NAMES = {"jacobi": "Jacobi", "gauss-seidel": "Gauss–Seidel"}
 REFERENCE = 2.5e-6  # of one blow [s]
 # Up to here shoulder and damper are as they are given (docs/system.md, section 4) [s].
 UNCHANGED = 1e-3
@@ -143,11 +144,14 @@ def table_of_eight(rows: Sequence[EightBlows]) -> str:
     return "\n".join(lines)
 
 
+@in_style
 def draw(ones: Sequence[OneBlow], exact: OneBlow, eights: Sequence[EightBlows], path: Path) -> Path:
     """Draw errors of one blow over the step, and what the shoulder takes in eight."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(12.0, 4.2))
+    from percussion_model.interface.plotting.style import RULE_COLOUR, head, label
+
+    figure = Figure(figsize=(12.0, 5.0), layout="constrained")
     axes = figure.subplots(1, 3)
     for ax, order in zip(axes, ORDERS, strict=False):
         rows = [row for row in ones if row.order == order]
@@ -156,27 +160,28 @@ def draw(ones: Sequence[OneBlow], exact: OneBlow, eights: Sequence[EightBlows], 
             ax.loglog(steps, 100.0 * np.abs(errors(rows, exact, name)), "o-", ms=4, label=text)
         guide = np.array([1e-2, 1.0])
         ax.loglog(guide, 0.2 * guide, "k--", linewidth=0.8, label="first order")
-        ax.set_title(f"one blow, {order}", fontsize="medium")
-        ax.set_ylabel("error [%]")
-    axes[0].legend(fontsize="x-small")
+        label(ax, "communication step [ms]", "error [%]", f"One blow, {NAMES[order]}")
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower left", ncols=3)
     shortest = min(eights, key=lambda row: row.step).rate
-    for order in ORDERS:
+    for order, dashes in zip(ORDERS, ("-", "--"), strict=True):
         chosen = [row for row in eights if row.order == order]
         steps = [1e3 * row.step for row in chosen]
-        axes[2].semilogx(steps, [100.0 * row.shoulder for row in chosen], "o-", ms=4,
-                         label=f"shoulder by blows, {order}")  # fmt: skip
-        scatter = [100.0 * (row.rate / shortest - 1.0) for row in chosen]
-        axes[2].semilogx(steps, scatter, "x:", ms=5, label=f"change of the rate, {order}")
-    axes[2].set_title("eight blows", fontsize="medium")
-    axes[2].set_ylabel("[%]")
+        change = [100.0 * (row.rate / shortest - 1.0) for row in chosen]
+        shoulder = [100.0 * row.shoulder for row in chosen]
+        for values, colour, mark, words in (
+            (change, "#0072B2", "o", "change of the rate"),
+            (shoulder, "#D55E00", "s", "energy of the shoulder by that of the blows"),
+        ):
+            axes[2].semilogx(steps, values, color=colour, linestyle=dashes, marker=mark, ms=4,
+                             label=f"{words}, {NAMES[order]}")  # fmt: skip
+    label(axes[2], "communication step [ms]", "share [%]", "Eight blows")
     axes[2].axhline(0.0, color="k", linewidth=0.6)
-    axes[2].set_ylim(top=2.6)  # room for the legend
-    axes[2].legend(fontsize="x-small", loc="upper left")
+    figure.legend(*axes[2].get_legend_handles_labels(), loc="outside lower right", ncols=1)
     for ax in axes:
-        ax.set_xlabel("communication step [ms]")
-        ax.axvline(1e3 * UNCHANGED, color="0.6", linewidth=0.8)
-        ax.grid(alpha=0.3, which="both")
-    figure.tight_layout()
+        ax.axvline(1e3 * UNCHANGED, color=RULE_COLOUR, linewidth=1.0, linestyle=":")
+    axes[2].annotate("default", (1e3 * UNCHANGED, 0.5), (4, 0), xycoords=(
+        "data", "axes fraction"), textcoords="offset points", va="top")  # fmt: skip
+    head(figure, "Error of a coupled run against its communication step")
     return save_png(figure, path)
 
 

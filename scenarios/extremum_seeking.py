@@ -19,7 +19,7 @@ from percussion_model.simulation.uncertain import (
     with_error,
 )
 from scenarios.coupled import save_runs, save_table, whole
-from scenarios.drawing import save_png
+from scenarios.drawing import in_style, save_png
 from scenarios.results import command_line, system, tell
 
 NAME = "extremum_seeking"
@@ -135,12 +135,15 @@ def seek(
     return Coupling(archive, chosen).run(duration, STEP, SIGNALS, INTERVAL, tell=tell)
 
 
+@in_style
 def draw(hill: np.ndarray, runs: Sequence[CoupledRun], path: Path) -> Path:
     """Draw the hill and the ways up."""
     from matplotlib.figure import Figure
 
+    from percussion_model.interface.plotting.style import head, label
+
     top = top_of(hill)
-    figure = Figure(figsize=(11.0, 4.6))
+    figure = Figure(figsize=(11.0, 4.8), layout="constrained")
     axes = figure.subplots(1, 2)
     axes[0].plot(1e-3 * hill[:, 0], 1e3 * hill[:, 1], "o-", color="0.4", markersize=4,
                  label="feed held (open loop)")  # fmt: skip
@@ -149,23 +152,18 @@ def draw(hill: np.ndarray, runs: Sequence[CoupledRun], path: Path) -> Path:
     for run, marker in zip(runs, cycle("s^o"), strict=False):
         centre = run["controller.seek.centre"]
         rate = rate_over(run, run["time"][-1] - LAST)
-        label = f"from {1e-3 * centre[0]:.1f} kN: {100 * (rate / top.rate - 1.0):+.1f} %"
+        words = f"from {1e-3 * centre[0]:.1f} kN: {100 * (rate / top.rate - 1.0):+.1f} %"
         (line,) = axes[1].plot(run["time"], 1e-3 * centre, label=f"from {1e-3 * centre[0]:.1f} kN")
-        axes[0].plot(1e-3 * centre[-1], 1e3 * rate, marker, color=line.get_color(), label=label,
+        axes[0].plot(1e-3 * centre[-1], 1e3 * rate, marker, color=line.get_color(), label=words,
                      fillstyle="none", markersize=9)  # fmt: skip
     axes[1].axhline(1e-3 * top.feed, color="k", linewidth=0.9, linestyle="--",
                     label=f"best feed of the sweep, {1e-3 * top.feed:.2f} kN")  # fmt: skip
-    axes[0].set_title("Where the seeker ends, its swing included", loc="left", fontsize="medium")
-    axes[1].set_title("The way of the seeker", loc="left", fontsize="medium")
-    axes[0].set_xlabel("feed force [kN]")
-    axes[0].set_ylabel("rate of penetration [mm/s]")
-    axes[1].set_xlabel("time [s]")
-    axes[1].set_ylabel("feed about which the seeker swings [kN]")
+    label(axes[0], "feed force [kN]", "rate of penetration [mm/s]",
+          "Where the seeker ends, its swing included")  # fmt: skip
+    label(axes[1], "time [s]", "feed about which the seeker swings [kN]", "The way of the seeker")
     for ax in axes:
-        ax.grid(alpha=0.3)
-        ax.legend(fontsize="small")
-    figure.suptitle("Extremum seeking on the feed force", fontweight="bold")
-    figure.tight_layout()
+        ax.legend()
+    head(figure, "Extremum seeking on the feed force")
     return save_png(figure, path)
 
 

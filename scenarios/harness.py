@@ -24,7 +24,7 @@ from fmpy.fmi2 import (
 from percussion_model.coupling.component import COMPILING, WARNING
 from percussion_model.interface.terminal import progress
 from scenarios import results
-from scenarios.drawing import save_png, stacked
+from scenarios.drawing import in_style, save_png, stacked
 from scenarios.results import Archive, ScenarioError
 
 # A constant, or a function of time.
@@ -245,6 +245,7 @@ def greatest_difference(
     }
 
 
+@in_style
 def plot(
     path: Path, title: str, found: Mapping[str, np.ndarray], panels: Sequence[tuple[str, ...]]
 ) -> Path:
@@ -264,8 +265,7 @@ def plot(
         for name in names:
             ax.plot(found["time"], float(factor) * found[name], linewidth=1.2, label=name)
         if len(names) > 1:
-            ax.legend(fontsize="small", loc="upper right")
-    figure.tight_layout()
+            ax.legend(loc="upper right")
     return save_png(figure, path)
 
 

@@ -37,11 +37,11 @@ def draw(found: dict[str, np.ndarray], path: Path) -> Path:
         "Soft, hard and soft rock by depth",
         found,
         [
-            ("loading stiffness K_R of the rock [kN/mm]", 1e-6, "rock.loading_stiffness"),
+            ("loading stiffness $K_R$ of the rock [kN/mm]", 1e-6, "rock.loading_stiffness"),
             ("depth of the bit [mm]", 1e3, "bit.position"),
             ("rate of penetration, last blow [mm/s]", 1e3, "rate_of_penetration"),
             ("peak force on the rock in each step [kN]", 1e-3, "bit.force_peak"),
-            ("share of the blow energy that reaches the rock [-]", 1, "transfer_efficiency"),
+            ("share of the blow energy that reaches the rock [–]", 1, "transfer_efficiency"),
         ],
     )
 

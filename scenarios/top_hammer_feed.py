@@ -21,7 +21,7 @@ from percussion_model.interface.terminal import progress
 from percussion_model.scene.hammers import hammer
 from percussion_model.simulation.uncertain import in_digits
 from scenarios.coupled import Quantity, save_table
-from scenarios.drawing import save_png, stacked
+from scenarios.drawing import in_style, save_png, stacked
 from scenarios.harness import Instance
 from scenarios.results import DIST, Archive, command_line
 
@@ -48,7 +48,7 @@ SPEED = 0.055  # of the string at the start [m/s]
 Run = dict[str, np.ndarray]
 # Label with unit, factor and column of each panel; columns of `simulate`.
 PANELS = (
-    ("loading stiffness K_R of the rock [kN/mm]", 1e-6, "rock.loading_stiffness"),
+    ("loading stiffness $K_R$ of the rock [kN/mm]", 1e-6, "rock.loading_stiffness"),
     ("depth of the bit [mm]", 1e3, "depth"),
     ("feed force [kN]", 1e-3, "feed_force"),
     ("supply pressure [bar]", 1e-5, "supply_pressure"),
@@ -167,6 +167,7 @@ def numbers(found: Run) -> dict[str, float]:
     }
 
 
+@in_style
 def draw(runs: Mapping[str, Run], path: Path) -> Path:
     """Draw the runs over time."""
     labels = [label for label, _, _ in PANELS]
@@ -182,12 +183,10 @@ def draw(runs: Mapping[str, Run], path: Path) -> Path:
                     label=label)  # fmt: skip
         for level, text in marks.get(column, ()):
             ax.axhline(level, color="k", linewidth=0.8, linestyle="--")
-            ax.annotate(text, (1.01, level), xycoords=("axes fraction", "data"), fontsize="small",
-                        va="center")  # fmt: skip
+            ax.annotate(text, (1.01, level), xycoords=("axes fraction", "data"), va="center")
         ax.margins(x=0.01, y=0.12)
     handles, names = axes[0].get_legend_handles_labels()
-    figure.tight_layout(rect=(0.0, 0.035, 1.0, 1.0))
-    figure.legend(handles, names, loc="lower center", ncols=2, fontsize="small", frameon=False)
+    figure.legend(handles, names, loc="outside lower center", ncols=2)
     return save_png(figure, path)
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from percussion_model.coupling import CoupledRun, Coupling
 from percussion_model.interface.terminal import progress
 from percussion_model.simulation.uncertain import with_error
-from scenarios.drawing import save_png
+from scenarios.drawing import in_style, save_png
 from scenarios.extremum_seeking import (
     ABOUT_STEP,
     BOUND,
@@ -122,13 +122,16 @@ def _top(hill: np.ndarray) -> tuple[float, float, float]:
     return float(feeds[i]), float(pressures[j]), float(rates[i, j])
 
 
+@in_style
 def draw(hill: np.ndarray, runs: Sequence[CoupledRun], path: Path) -> Path:
     """Draw the hill from above with the ways up, and both centres over time."""
     from matplotlib.figure import Figure
 
+    from percussion_model.interface.plotting.style import head, label
+
     top, _ = top_of(hill)
     feeds, pressures = _axes(hill)
-    figure = Figure(figsize=(11.0, 5.0))
+    figure = Figure(figsize=(11.0, 5.2), layout="constrained")
     grid = figure.add_gridspec(2, 2, width_ratios=(1.25, 1.0))
     above = figure.add_subplot(grid[:, 0])
     filled = above.contourf(
@@ -136,40 +139,40 @@ def draw(hill: np.ndarray, runs: Sequence[CoupledRun], path: Path) -> Path:
         1e-5 * pressures,
         1e3 * surface(hill, feeds, pressures).T,
         12,
-        cmap="YlGn",
-        alpha=0.8,
+        cmap="Greys",
+        alpha=0.6,
     )
     figure.colorbar(filled, ax=above, label="rate of penetration, held (open loop) [mm/s]")
+    above.grid(False)
     above.plot(1e-3 * hill[:, 0], 1e-5 * hill[:, 1], "k.", markersize=3, label="sweep")
     over_time = [figure.add_subplot(grid[k, 1]) for k in range(2)]
     for run in runs:
         centres = run["controller.seek.centre"], run["controller.seek.pressure_centre"]
         rate = rate_over(run, run["time"][-1] - LAST)
-        label = (f"from {1e-3 * centres[0][0]:.1f} kN, {1e-5 * centres[1][0]:.0f} bar: "
+        words = (f"from {1e-3 * centres[0][0]:.1f} kN, {1e-5 * centres[1][0]:.0f} bar: "
                  f"{100 * (rate / top[2] - 1.0):+.1f} %")  # fmt: skip
-        (line,) = above.plot(1e-3 * centres[0], 1e-5 * centres[1], label=label, linewidth=1.4)
+        (line,) = above.plot(1e-3 * centres[0], 1e-5 * centres[1], label=words, linewidth=1.4)
         above.plot(1e-3 * centres[0][-1], 1e-5 * centres[1][-1], "D", color=line.get_color())
         for ax, factor, centre in zip(over_time, (1e-3, 1e-5), centres, strict=True):
             ax.plot(run["time"], factor * centre, color=line.get_color())
-    above.plot(1e-3 * top[0], 1e-5 * top[1], "r*", markersize=13, label="top of the sweep")
-    for ax, level, text in (
-        (over_time[0], 1e-3 * top[0], "feed [kN]"),
-        (over_time[1], 1e-5 * top[1], "pressure [bar]"),
+    above.plot(1e-3 * top[0], 1e-5 * top[1], "k*", markersize=13, label="top of the sweep")
+    for ax, level, text, name in (
+        (
+            over_time[0],
+            1e-3 * top[0],
+            "feed [kN]",
+            "Centres of the swings; dashed: best of the sweep",
+        ),
+        (over_time[1], 1e-5 * top[1], "pressure [bar]", ""),
     ):
         ax.axhline(level, color="k", linewidth=0.9, linestyle="--")
-        ax.set_ylabel(text)
-        ax.grid(alpha=0.3)
-    over_time[0].set_title("Centres of the swings; dashed: top of the sweep", loc="left",
-                           fontsize="medium")  # fmt: skip
+        label(ax, "", text, name)
     over_time[1].set_xlabel("time [s]")
-    above.set_title("Ways over the hill; rate at the end by the best one", loc="left",
-                    fontsize="medium")  # fmt: skip
-    above.set_xlabel("feed force [kN]")
-    above.set_ylabel("supply pressure that is asked for [bar]")
-    figure.suptitle("Extremum seeking on feed and pressure at once", fontweight="bold")
-    figure.tight_layout(rect=(0.0, 0.06, 1.0, 1.0))
+    label(above, "feed force [kN]", "supply pressure that is asked for [bar]",
+          "Ways over the hill; rate at the end by the best one")  # fmt: skip
+    head(figure, "Extremum seeking on feed and pressure at once")
     handles, labels = above.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="lower center", ncols=5, fontsize="small", frameon=False)
+    figure.legend(handles, labels, loc="outside lower center", ncols=5)
     return save_png(figure, path)
 
 

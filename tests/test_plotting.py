@@ -25,6 +25,7 @@ from percussion_model.scene.scene import Scene
 from percussion_model.simulation.files import ResultError
 from percussion_model.simulation.result import Result
 from percussion_model.simulation.simulate import simulate
+from percussion_model.verification.hard_cases import Collection
 
 ELASTIC = Scene(run={"duration": 0.2, "settle": 0.0})
 RIGID = ELASTIC.replace(**{"piston.model": "rigid", "bit.model": "rigid"})
@@ -223,3 +224,37 @@ def test_letters_of_contacts_lie_on_no_line(results):
                 places = line.get_transform().transform(line.get_xydata())
                 inside = (places > box.min + 1.0) & (places < box.max - 1.0)
                 assert not inside.all(axis=1).any(), text.get_text()
+
+
+def test_every_hard_case_is_a_dot_and_the_greatest_is_named():
+    from percussion_model.interface.plotting.stability_dots import PANELS, draw_stability
+
+    rows = [
+        {"case": f"case_{k}", "solver": solver, "residual": residual, "momentum": 1e-12,
+         "numerical": None, "events_per_second": 100.0 * (k + 1), "ceiling": 2e4}
+        for solver in ("wave", "rigid") for k, residual in enumerate((1e-9, -1e-8, 0.0))
+    ]  # fmt: skip
+    with matplotlib.rc_context(STYLE):
+        axes = draw_stability(Collection(rows, 1.0, [])).axes
+    assert len(axes) == len(PANELS)
+    dots = [line for line in axes[0].lines if line.get_marker() == "o"]
+    for line in dots:  # sorted, by size, what is zero at the foot
+        np.testing.assert_allclose(line.get_ydata(), [PANELS[0].foot, 1e-9, 1e-8])
+    names = [text.get_text() for text in axes[0].get_xticklabels()]
+    assert len(dots) == len(names) == 2
+    assert all("3 cases" in name and name.endswith("case_1") for name in names)
+    assert all("0 cases" in text.get_text() for text in axes[2].get_xticklabels())
+    assert not [line for line in axes[2].lines if line.get_marker() == "o"]
+
+
+def test_errors_are_drawn_in_per_cent():
+    from percussion_model.interface.plotting.error_against_time import _log_axes
+
+    ax = Figure().subplots()
+    ax.plot([1e-3, 1.0], [1e-4, 1e-2])
+    _log_axes(ax)
+    ax.figure.draw_without_rendering()
+    shown = {text.get_text(): value for value, text in
+             zip(ax.get_yticks(), ax.get_yticklabels(), strict=True)}  # fmt: skip
+    assert shown["1"] == pytest.approx(1e-2)
+    assert shown["0.01"] == pytest.approx(1e-4)

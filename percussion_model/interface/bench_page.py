@@ -8,6 +8,7 @@ from html import escape
 from pathlib import Path
 
 import numpy as np
+from matplotlib import rc_context
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -30,7 +31,7 @@ from percussion_model.interface.bench_text import (
     mean_text,
     points_text,
 )
-from percussion_model.interface.plotting.style import save_png
+from percussion_model.interface.plotting import style
 from percussion_model.simulation.files import staged
 
 STYLE = (
@@ -112,10 +113,11 @@ def _table(scores: Sequence[Score]) -> str:
     return "".join([*rows, "</table>"])
 
 
+@rc_context(style.STYLE)
 def _figure(score: Score, path: Path) -> Path:
     """Feed and what is wanted, force of the rig, depth and torque, over time."""
     run = score.run
-    figure = Figure(figsize=(10.0, 5.2))
+    figure = Figure(figsize=(10.0, 5.4), layout="constrained")
     axes = figure.subplots(2, 2, sharex=True)
     (feed, depth), (rig, torque) = axes
     _panel(feed, score, "feed force on the bit [kN]", 1e-3, "string.feed_force_mean")
@@ -136,9 +138,8 @@ def _figure(score: Score, path: Path) -> Path:
         labels.append("ended early")
     for ax in axes[1]:
         ax.set_xlabel("time [s]")
-    figure.legend(handles, labels, loc="lower center", ncols=4, frameon=False, fontsize="small")
-    figure.tight_layout(rect=(0.0, 0.05, 1.0, 1.0))
-    return save_png(figure, path, dpi=90)
+    figure.legend(handles, labels, loc="outside lower center", ncols=4)
+    return style.save_png(figure, path, dpi=90)
 
 
 def _panel(ax: Axes, score: Score, label: str, factor: float, name: str) -> None:
@@ -148,6 +149,5 @@ def _panel(ax: Axes, score: Score, label: str, factor: float, name: str) -> None
         run["time"], 0, 1, where=run["rock.in_void"] > 0.0, color=VOID_COLOUR, linewidth=0,
         transform=ax.get_xaxis_transform(), zorder=0,
     )  # fmt: skip
-    ax.set_title(label, loc="left", fontsize="medium")
-    ax.grid(alpha=0.3)
+    ax.set_title(label[:1].upper() + label[1:])
     ax.margins(x=0.01, y=0.1)

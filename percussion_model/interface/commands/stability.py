@@ -67,7 +67,7 @@ def _write(found: Collection, folder: Path) -> None:
 
     picture = None
     with common.if_drawable():
-        from percussion_model.interface.plotting.stability_map import draw_stability
+        from percussion_model.interface.plotting.stability_dots import draw_stability
         from percussion_model.interface.plotting.style import save_figures
 
         with progress("drawing the figure"):

@@ -5,10 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import NamedTuple
 
+from matplotlib import rc_context
 from matplotlib.figure import Figure
 
 from percussion_model.coupling.coupled_run import CoupledRun
-from percussion_model.interface.plotting.style import save_png
+from percussion_model.interface.plotting.style import STYLE, head, save_png
 
 
 class Panel(NamedTuple):
@@ -21,6 +22,8 @@ class Panel(NamedTuple):
 
 
 MODE = "controller.mode"
+# Room for a legend above the lines, as a share of their range.
+ROOM_OF_LEGEND = 0.35
 # A panel is drawn where the run has one of its signals.
 PANELS = (
     Panel("Stiffness of the rock under the bit (loading stiffness $K_R$)", "kN/mm", 1e-6,
@@ -43,7 +46,8 @@ MODES = ("drills", "in a void", "retracts")
 
 def save_signals(run: CoupledRun, path: Path, title: str) -> Path:
     """Draw what a drilling system has of the usual signals; return the PNG file."""
-    return save_png(draw_signals(run, title), path, dpi=110)
+    with rc_context(STYLE):
+        return save_png(draw_signals(run, title), path, dpi=110)
 
 
 def draw_signals(run: CoupledRun, title: str) -> Figure:
@@ -52,7 +56,7 @@ def draw_signals(run: CoupledRun, title: str) -> Figure:
     panels = [panel for panel in PANELS if kept & set(panel.signals)]
     if not panels:
         panels = [Panel("", "", 1.0, dict.fromkeys(list(run.columns)[1:5], "signal"))]
-    figure = Figure(figsize=(8.0, 1.0 + 1.7 * len(panels)))
+    figure = Figure(figsize=(8.0, 1.0 + 1.7 * len(panels)), layout="constrained")
     axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)
     for ax, panel in zip(axes[:, 0], panels, strict=True):
         names = [name for name in panel.signals if name in kept]
@@ -60,14 +64,14 @@ def draw_signals(run: CoupledRun, title: str) -> Figure:
             label = f"{panel.signals[name]}: {name}"
             ax.plot(run["time"], panel.factor * run[name], linewidth=1.1, label=label)
         unit = f" [{panel.unit}]" if panel.unit else ""
-        ax.set_title(panel.title + unit, loc="left", fontsize="medium")
+        ax.set_title(panel.title + unit, loc="left")
         if names == [MODE]:
             ax.set_yticks(range(len(MODES)), MODES)
             ax.set_ylim(-0.4, len(MODES) - 0.6)
-        ax.grid(alpha=0.3)
         if any(panel.signals.values()):
-            ax.legend(fontsize="small", loc="best")
+            ax.legend(loc="upper right", ncols=2)
+            low, high = ax.get_ylim()
+            ax.set_ylim(low, high + ROOM_OF_LEGEND * (high - low))
     axes[-1, 0].set_xlabel("time [s]")
-    figure.suptitle(title)
-    figure.tight_layout()
+    head(figure, f"{title}: signals of a coupled run")
     return figure

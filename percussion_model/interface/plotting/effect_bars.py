@@ -8,6 +8,9 @@ from functools import partial
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.ticker import FuncFormatter, NullLocator
 
 from percussion_model.analysis.change import Change
 from percussion_model.analysis.effect_study import EffectsStudy
@@ -15,7 +18,8 @@ from percussion_model.interface.plotting import style
 from percussion_model.simulation.uncertain import ABOUT, UNDECIDED, in_digits
 
 COST_COLOUR, MORE_COLOUR, LESS_COLOUR = "#0072B2", "#D55E00", "#009E73"
-UNDECIDED_COLOUR = "#DDDDDD"
+UNDECIDED_COLOUR = "#EEEEEE"
+UNDECIDED_EDGE = "#BBBBBB"
 # Axes are made for changes up to this [%].
 WIDEST = 60.0
 # Bars beyond this multiple of it have no room for their number, and are cut off.
@@ -51,7 +55,7 @@ def draw_effects(found: EffectsStudy) -> Figure:
     trials = found.trials
     names = [trial.variant.name for trial in trials]
     panels = [*_cost_panels(found), *_change_panels(found)]
-    height, width = 1.6 + 0.32 * len(trials), 2.0 + 2.0 * max(len(panels), LEAST_WIDTH)
+    height, width = 2.2 + 0.32 * len(trials), 2.0 + 2.0 * max(len(panels), LEAST_WIDTH)
     fig = Figure(figsize=(width, height), layout="constrained")
     axes = fig.subplots(1, len(panels), sharey=True, squeeze=False)[0]
     for ax, draw in zip(axes, panels, strict=True):
@@ -61,9 +65,41 @@ def draw_effects(found: EffectsStudy) -> Figure:
     for ax in axes:
         ax.grid(visible=False, axis="y")
         ax.tick_params(axis="y", length=0)
+        # a rule between the rows leads from their names to the last panel
+        ends = ax.get_xlim()
+        ax.hlines([k + 0.5 for k in range(len(trials) - 1)], *ends, color="#E6E6E6", linewidth=0.7,
+                  zorder=0)  # fmt: skip
+        ax.set_xlim(ends)
     title = found.scene.title
-    style.head(fig, "One effect turned at a time" + (f" — {title}" if title else ""))
+    head = "What each effect costs and changes, one turned at a time"
+    style.head(fig, head + (f" — {title}" if title else ""), _handles(found))
     return fig
+
+
+def _handles(found: EffectsStudy) -> list[Patch | Line2D]:
+    """Legend of what occurs: colours, cut bars, and signs of what is not known."""
+    changes = [found.change(trial, key) for trial in found.trials for key in found.changed]
+    known = [one for one in changes if one.value is not None and not one.is_undecided]
+    handles: list[Patch | Line2D] = [
+        Patch(facecolor=COST_COLOUR, label="computing time by that of the scene as it is"),
+        Patch(facecolor=MORE_COLOUR, label="more than in the scene as it is"),
+        Patch(facecolor=LESS_COLOUR, label="less than in it"),
+    ]
+    if any(one.is_undecided for one in changes):
+        handles.append(Patch(facecolor=UNDECIDED_COLOUR, edgecolor=UNDECIDED_EDGE,
+                             label="undecided: the errors may explain it"))  # fmt: skip
+    if any(100.0 * abs(one.value or 0.0) > UNCUT * WIDEST for one in known):
+        handles.append(
+            Patch(facecolor=MORE_COLOUR, edgecolor="w", hatch="///", label="bar cut off")
+        )
+    words = {"–": "means nothing there"}
+    if any(one.is_rough for one in changes):
+        words[ABOUT] = "error not known"
+    handles += [
+        Line2D([], [], linestyle="", marker=f"${sign}$", color="black", label=text)
+        for sign, text in words.items()
+    ]
+    return handles
 
 
 def _cost_panels(found: EffectsStudy) -> Iterator[Panel]:
@@ -78,7 +114,7 @@ def _cost_panels(found: EffectsStudy) -> Iterator[Panel]:
 
 def _cost_panel(values: list[float | None], title: str, ax: Axes) -> None:
     _costs(ax, values)
-    style.label(ax, "by the scene's own", "", f"Cost of {title}")
+    style.label(ax, "times that of the scene", "", f"Cost of {title}")
 
 
 def _change_panels(found: EffectsStudy) -> Iterator[Panel]:
@@ -90,11 +126,8 @@ def _change_panels(found: EffectsStudy) -> Iterator[Panel]:
 
 
 def _change_panel(changes: list[Change], title: str, ax: Axes) -> None:
-    any_cut = _changes(ax, changes)
-    words = "change [%]" + ", hatched: cut off" * any_cut
-    if any(change.is_rough for change in changes):
-        words += f"\n{ABOUT}: error not known"
-    style.label(ax, words, "", title)
+    _changes(ax, changes)
+    style.label(ax, "change [%]", "", title)
 
 
 def _costs(ax: Axes, values: list[float | None]) -> None:
@@ -103,6 +136,8 @@ def _costs(ax: Axes, values: list[float | None]) -> None:
     least, most = min([0.5, *known]), max([2.0, *known])
     ax.set_xscale("log")
     ax.set_xlim(least / 20.0, most * 9.0)
+    ax.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    ax.xaxis.set_minor_locator(NullLocator())
     for y, value in enumerate(values):
         if value is None:
             ax.text(1.0, y, " –", va="center")
@@ -114,8 +149,8 @@ def _costs(ax: Axes, values: list[float | None]) -> None:
     ax.axvline(1.0, color=style.RULE_COLOUR, linewidth=0.8)
 
 
-def _changes(ax: Axes, changes: list[Change]) -> bool:
-    """Bars from 0 in per cent, with their errors, grey where they are not known; if any is cut."""
+def _changes(ax: Axes, changes: list[Change]) -> None:
+    """Bars from 0 in per cent, with their errors, grey where they are not known."""
     shares = [None if one.value is None else 100.0 * one.value for one in changes]
     known = [
         abs(share)
@@ -123,12 +158,12 @@ def _changes(ax: Axes, changes: list[Change]) -> bool:
         if share is not None and not one.is_undecided
     ]
     end = min(max([1.0, *known]), WIDEST)
-    any_cut = max(known, default=0.0) > UNCUT * end
     ax.set_xlim(-ROOM * end, ROOM * end)
     longest = WITHIN * ROOM * end
     for y, (share, change) in enumerate(zip(shares, changes, strict=True)):
         if change.is_undecided:
-            ax.barh(y, 2.0 * longest, left=-longest, height=0.62, color=UNDECIDED_COLOUR)
+            ax.barh(y, 2.0 * longest, left=-longest, height=0.62, facecolor=UNDECIDED_COLOUR,
+                    edgecolor=UNDECIDED_EDGE, linewidth=0.6)  # fmt: skip
             ax.text(0.0, y, UNDECIDED, va="center", ha="center", fontsize=8.0)
             continue
         if share is None:
@@ -144,4 +179,3 @@ def _changes(ax: Axes, changes: list[Change]) -> bool:
         align = "left" if (share >= 0.0) == has_room else "right"
         ax.text(shown if has_room else 0.0, y, text, va="center", ha=align, fontsize=8.0)
     ax.axvline(0.0, color=style.RULE_COLOUR, linewidth=0.8)
-    return any_cut

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import LogLocator, NullLocator
+from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
 from percussion_model.interface.plotting import style
 from percussion_model.verification.accuracy.ladders import LADDERS
@@ -41,6 +41,11 @@ LINES: dict[str, tuple[str, Any, str]] = {
 }
 # Errors below this are drawn at it: they are zero within the bar of the reference.
 LEAST = 1e-7
+# Width of the lines of this program's own solver, and of its peers.
+OWN_WIDTH, WIDTH = 2.0, 1.0
+OWN = "wave"
+# Time at which a run takes as long as what it simulates [s].
+REAL_TIME = 1.0
 IN_A_ROW = 4
 
 
@@ -97,14 +102,18 @@ def draw_misfits(studies: Sequence[Study]) -> Figure:
             linestyle="", label=found.title,
         )  # fmt: skip
         drawn += 1
-    for factor, dashes in ((1.0, "-"), (10.0, (0, (4, 1.5)))):
+    for factor, dashes, words in (
+        (1.0, "-", "as large as the misfit"),
+        (10.0, (0, (4, 1.5)), "10 times the misfit"),
+    ):
         ax.plot(
             scale, [factor * value for value in scale], color=style.RULE_COLOUR,
-            linestyle=dashes, linewidth=0.9, zorder=1, label=f"{factor:g} times the misfit",
+            linestyle=dashes, linewidth=0.9, zorder=1, label=words,
         )  # fmt: skip
     _log_axes(ax)
-    style.label(ax, "error of the wave speed, relative", "error of the rate, relative")
-    style.head(fig, "Lengths that do not fit the cells, at about 40 cells in the piston")
+    ax.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{100.0 * value:g}"))
+    style.label(ax, "misfit: error of the wave speed [%]", "error of the rate of penetration [%]")
+    style.head(fig, "Waves in lengths that do not fit the cells, about 40 in the piston")
     fig.legend(loc="outside lower center", ncols=2)
     return fig
 
@@ -117,7 +126,8 @@ def _head(fig: Figure, title: str, found: Study) -> None:
 
 def _title(found: Study) -> str:
     what = "Standard error" if found.kind == APERIODIC else "Error"
-    return f"{what} against time to compute" + (f" — {found.title}" if found.title else "")
+    where = f" — {found.title}" if found.title else ""
+    return f"{what} against computing time{where}"
 
 
 def _drawn(found: Study) -> list[str]:
@@ -141,12 +151,20 @@ def _panel(ax: Axes, found: Study, key: str) -> None:
         ax.text(0.5, 0.5, "no reference: see the table", ha="center", transform=ax.transAxes)
     _log_axes(ax)
     quantity = QUANTITIES[key]
-    unit = {DROP: "the whole drop [s]", APERIODIC: "the run [s]"}.get(
-        found.kind, "a simulated second [s]"
-    )
-    kind = "mean over the blow, relative" if key in HISTORIES else "relative"
+    unit = {DROP: "the whole drop", APERIODIC: "the run"}.get(found.kind, "one simulated second")
+    kind = "mean difference, by the mean force" if key == HISTORY else "error"
+    if key in HISTORIES and key != HISTORY:
+        kind = "mean difference, by the mean"
+    if found.kind == APERIODIC:
+        kind = "standard error"
     title = quantity.label[0].upper() + quantity.label[1:]
-    style.label(ax, f"processor time of {unit}", f"error, {kind}", title)
+    if key == found.main:
+        ax.text(0.99, 0.985, "lower left is better", transform=ax.transAxes, ha="right", va="top",
+                color=style.RULE_COLOUR)  # fmt: skip
+    style.label(ax, f"computing time of {unit} [s]", f"{kind} [%]", title)
+    low, high = ax.get_xlim()
+    if found.kind not in (DROP, APERIODIC) and low < REAL_TIME < high:
+        ax.axvline(REAL_TIME, color=style.RULE_COLOUR, linestyle=":", linewidth=1.0, zorder=1)
 
 
 def _log_axes(ax: Axes) -> None:
@@ -155,6 +173,8 @@ def _log_axes(ax: Axes) -> None:
     for axis in (ax.xaxis, ax.yaxis):
         axis.set_major_locator(LogLocator(10.0, numticks=12))
         axis.set_minor_locator(NullLocator())  # hundreds of ticks take most of the drawing
+    ax.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{100.0 * value:g}"))
 
 
 def _cost(found: Study, point: Point) -> float:
@@ -178,7 +198,8 @@ def _ladder(ax: Axes, found: Study, name: str, key: str) -> None:
     """Line through all points; hollow markers where they are not in the order."""
     colour, dashes, marker = LINES[name]
     x, y = np.array(_points(found, name, key)).T
-    ax.plot(x, y, color=colour, linestyle=dashes, linewidth=1.0, zorder=2)
+    width = OWN_WIDTH if name == OWN else WIDTH
+    ax.plot(x, y, color=colour, linestyle=dashes, linewidth=width, zorder=2)
     fitted = {point.label for point in found.fitted(name, key)}
     full = [point for point in found.ladder(name) if point.label in fitted]
     rest = [point for point in found.ladder(name) if point.label not in fitted]
@@ -197,15 +218,21 @@ def _handles(found: Study) -> list[Any]:
     handles = []
     for name in _drawn(found):
         colour, dashes, marker = LINES[name]
-        text = LADDERS[name].title
+        text = LADDERS[name].title.replace("K_C", "$K_C$")
         handles.append(
-            Line2D([], [], color=colour, linestyle=dashes, marker=marker, markersize=5, label=text)
-        )
+            Line2D([], [], color=colour, linestyle=dashes, marker=marker, markersize=5, label=text,
+                   linewidth=OWN_WIDTH if name == OWN else WIDTH)
+        )  # fmt: skip
     if found.kind != APERIODIC:
         hollow = Line2D(
             [], [], color=style.RULE_COLOUR, linestyle="", marker="o", markersize=5,
-            markerfacecolor="white", label="lengths do not fit, or near the bar",
+            markerfacecolor="white", label="hollow: lengths do not fit the cells, or grey is near",
         )  # fmt: skip
-        bar = Line2D([], [], color=style.SHADE_COLOUR, linewidth=6, label="bar of the reference")
+        bar = Line2D(
+            [], [], color=style.SHADE_COLOUR, linewidth=6, label="the reference is known no better"
+        )
         handles += [hollow, bar]
+    if found.kind not in (DROP, APERIODIC):
+        real = Line2D([], [], color=style.RULE_COLOUR, linestyle=":", label="real time")
+        handles.append(real)
     return handles

@@ -38,6 +38,8 @@ DROP_SHOWN = 45e-3
 ROOM = 1.25
 # The same above the end of the highest error bar.
 ROOM_OF_BAR = 1.05
+# Room for a legend below the lowest point of a logarithmic axis, as a factor on it.
+ROOM_BELOW = 0.5
 PERIODIC_COLOUR, APERIODIC_COLOUR = "#0072B2", "#D55E00"
 RIGID_COLOUR = "#009E73"
 
@@ -221,6 +223,10 @@ def draw_scaling(found: Study) -> Figure:
     _power_line(rates, period, rate, chosen, PERIODIC_COLOUR, "rate ~ $T$", "−1/2")
     _power_line(rates, velocity, rate, chosen, APERIODIC_COLOUR, "rate ~ $v$", "−1")
     style.label(rates, both, RATE, "Rate of penetration (eq. 59)")
+    for ax, corner in ((scales, "lower right"), (rates, "lower left")):
+        low, high = ax.get_ylim()
+        ax.set_ylim(ROOM_BELOW * low, high)
+        ax.legend(loc=corner)
     handles = [
         Line2D([], [], linestyle="", marker="o", color="black", label="periodic, in the fit"),
         Line2D([], [], linestyle="", marker="o", color="black", mfc="white", label="other"),
@@ -245,7 +251,6 @@ def _power_line(
         axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         axis.set_major_formatter(ScalarFormatter())
         axis.set_minor_formatter(NullFormatter())
-    ax.legend()
 
 
 def _paper_limit(ax: Axes, x: float) -> None:

@@ -14,6 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.rcsetup import cycler
 
 from percussion_model.interface.progress import Report
 from percussion_model.physics.records import Mode
@@ -36,6 +37,8 @@ MODE_NAMES = {
 }
 # The short modes are drawn on top.
 _DRAWING_ORDER = (Mode.FF, Mode.SS, Mode.BC, Mode.FC, Mode.DFC)
+# The same for lines that are told apart by colour alone, the strongest first.
+LINE_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#222222")
 PISTON_COLOUR = "#CC79A7"
 BIT_COLOUR = "#0072B2"
 CONTACT_COLOUR = "#CC79A7"
@@ -65,6 +68,7 @@ STYLE: Any = {
     "axes.grid": True,
     "axes.axisbelow": True,
     "axes.xmargin": 0.02,
+    "axes.prop_cycle": cycler(color=LINE_COLOURS),
     "grid.color": "#E6E6E6",
     "grid.linewidth": 0.6,
     "lines.linewidth": 1.3,
@@ -161,6 +165,7 @@ def save_figures(
     kinds: Sequence[str] = ("png", "svg"),
     names: Sequence[str] = (),
     report: Report | None = None,
+    dpi: float | None = None,
 ) -> list[Path]:
     """Draw figures in this style and write all of them into a folder, or none.
 
@@ -176,6 +181,8 @@ def save_figures(
         Of the figures that are to come, for `report`.
     report : callable, optional
         Is told which figure is drawn.
+    dpi : float, optional
+        Pixels by inch, where not those of the style.
 
     Returns
     -------
@@ -191,7 +198,7 @@ def save_figures(
     files: list[str] = []
     with staged(folder) as draft, rc_context(STYLE):
         for name, fig in _each_told(draw(), names, report):
-            files += save(fig, draft, name, kinds)
+            files += save(fig, draft, name, kinds, dpi)
     return [folder / name for name in files]
 
 
@@ -210,13 +217,19 @@ def _each_told(
         yield one
 
 
-def save(fig: Figure, folder: Path, name: str, kinds: Sequence[str] = ("png", "svg")) -> list[str]:
+def save(
+    fig: Figure,
+    folder: Path,
+    name: str,
+    kinds: Sequence[str] = ("png", "svg"),
+    dpi: float | None = None,
+) -> list[str]:
     """Write a figure as PNG and SVG and return the names of the files."""
     fig.draw_without_rendering()
     fig.set_layout_engine("none")  # laid out once, not again for each file
     names = [f"{name}.{kind}" for kind in kinds]
     for file, kind in zip(names, kinds, strict=True):
-        fig.savefig(folder / file, metadata=_METADATA[kind])
+        fig.savefig(folder / file, dpi=dpi, metadata=_METADATA[kind])
     return names
 
 

@@ -1,0 +1,119 @@
+"""The drawings of the documents: every text is inside and readable, and they are current."""
+
+from __future__ import annotations
+
+import html
+import re
+import tomllib
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+import pytest
+
+from docs.drawings import fronts, house, system, waves
+from docs.drawings.shapes import misplaced_texts
+from docs.make_drawings import DPI, DRAWINGS, IMAGES, REFERENCE
+from fmu_src.parts.build import PARTS
+from fmu_src.system.archive import HAMMER, read_plan
+from percussion_model import Scene
+from percussion_model.interface.plotting.style import STYLE, save_figures
+
+ROOT = Path(__file__).resolve().parent.parent
+# Drawn without a run, from what the code says of itself: these are held to it word by word.
+OF_THE_CODE = ("drawing_house", "drawing_system")
+
+
+@pytest.mark.parametrize("name", DRAWINGS)
+def test_texts_are_inside_and_apart(name, tmp_path):
+    with matplotlib.rc_context(STYLE):
+        fig = DRAWINGS[name]()
+        assert misplaced_texts(fig) == []
+    for path in save_figures(lambda: [(name, fig)], tmp_path, dpi=DPI):
+        assert 20_000 < path.stat().st_size < 300_000
+
+
+def test_misplaced_texts_are_found():
+    fig = matplotlib.figure.Figure()
+    fig.text(0.5, 0.5, "one")
+    fig.text(0.5, 0.5, "upon another")
+    fig.text(0.99, 0.1, "beyond the edge")
+    assert misplaced_texts(fig) == [
+        "'one' lies on 'upon another'", "'beyond the edge' leaves the figure",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("name", OF_THE_CODE)
+def test_drawings_of_the_code_are_current(name):
+    """Matplotlib notes every text of a figure in its SVG."""
+    svg = (IMAGES / f"{name}.svg").read_text(encoding="utf-8")
+    written = {html.unescape(text) for text in re.findall(r"<!-- (.*?) -->", svg)}
+    with matplotlib.rc_context(STYLE):
+        drawn = {text.get_text() for text in DRAWINGS[name]().axes[0].texts}
+    assert drawn <= written, f"run: python -m docs.make_drawings {name}"
+
+
+def test_every_drawing_is_there():
+    for name in DRAWINGS:
+        assert (IMAGES / f"{name}.png").is_file()
+        assert (IMAGES / f"{name}.svg").is_file()
+
+
+def test_layers_are_those_of_the_contract():
+    text = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+    contracts = tomllib.loads(text)["tool"]["importlinter"]["contracts"]
+    rows = next(one["layers"] for one in contracts if one["type"] == "layers")
+    assert [" | ".join(row) for row in house.layers()] == rows
+    for row in house.layers():
+        for folder in row:
+            assert folder in house.COLOURS
+            assert house.line_on(f"percussion_model/{folder}")
+
+
+def test_every_component_and_signal_has_its_place():
+    plan = read_plan(system.SYSTEM)
+    assert set(system.BLOCKS) == set(plan.components)
+    assert set(plan.components.values()) == {HAMMER, *PARTS}
+    signals = system.signals(plan)
+    assert set(system.ROUTES) == set(signals)
+    assert sum(map(len, signals.values())) == len(plan.connections)
+    assert all(re.search(r" \[.+\]$", name) for names in signals.values() for name in names)
+
+
+def test_arrows_begin_and_end_at_their_blocks():
+    def touches(block, place):
+        edges = (
+            np.isclose(place[0], [block.x, block.x + block.width]),
+            np.isclose(place[1], [block.y, block.y + block.height]),
+        )
+        across = block.x <= place[0] <= block.x + block.width
+        along = block.y <= place[1] <= block.y + block.height
+        return (edges[0].any() and along) or (edges[1].any() and across)
+
+    for (source, sink), route in system.ROUTES.items():
+        assert touches(system.BLOCKS[source], route.points[0]), source
+        assert touches(system.BLOCKS[sink], route.points[-1]), sink
+
+
+def test_fronts_take_the_share_of_the_impedances():
+    """At the step of the piston the force divides, and both bars' times add up."""
+    scene = waves.stepped(Scene.from_toml(REFERENCE))
+    upper, lower = scene.piston.sections
+    found, borders = fronts.fronts(scene, [(0.0, 1.0)], 200e-6)
+    assert borders == pytest.approx([0.0, 0.105, 0.175, 0.37625])
+    upwards = [f for f in found if f.start[1] == borders[1] and f.end[1] == 0.0]
+    passed = min(upwards, key=lambda f: f.start)
+    share = 2.0 * upper.area / (upper.area + lower.area)
+    assert passed.force == pytest.approx(share)
+    assert passed.end[0] == pytest.approx(scene.piston.transit_time)
+    back = next(f for f in found if f.start == passed.end)
+    assert back.force == pytest.approx(-share)  # a free end
+
+
+def test_fronts_of_an_open_gap_turn_back():
+    scene = Scene.from_toml(REFERENCE)
+    found, borders = fronts.fronts(scene, [(0.0, 1e-6)], 100e-6)
+    from_above = [f for f in found if f.end[1] == borders[1] and f.start[1] < borders[1]]
+    (first,) = [f for f in from_above if f.end[0] < 80e-6]
+    assert any(f.start == first.end and f.end[1] == 0.0 and f.force == -first.force for f in found)
+    assert not any(f.start == first.end and f.end[1] > borders[1] for f in found)
