@@ -1,4 +1,4 @@
-"""Write the tables of docs/fmu.md from a model description: `python -m docs.make_fmu_interface`.
+"""Write docs/data/fmu_interface.md from a model description: `python -m docs.make_fmu_interface`.
 
 The FMU of the reference scene is built for it, and read as any tool would.
 """
@@ -14,8 +14,13 @@ from fmpy import read_model_description
 from fmu_src.hammer.build import build_hammer
 from percussion_model.scene.scene import Scene
 
-PAGE = Path(__file__).with_name("fmu.md")
-BEGIN, END = "<!-- tables: begin -->", "<!-- tables: end -->"
+PAGE = Path(__file__).parent / "data" / "fmu_interface.md"
+HEAD = """# Variables of the hammer's FMU
+
+This page lists every input, output and parameter of the [FMU of the hammer](../fmu.md), with unit, start value, bounds
+and value reference. The start values are those of the reference scene. Units are SI; *shown in* is the display unit
+that a tool may choose. `.venv/bin/python -m docs.make_fmu_interface` writes this page from a model description.
+"""
 HEADS = {"input": "Inputs", "output": "Outputs", "parameter": "Parameters"}
 
 
@@ -27,7 +32,7 @@ def tables() -> str:
         variables = read_model_description(str(path)).modelVariables
     parts = []
     for causality, head in HEADS.items():
-        parts.append(f"### {head}\n")
+        parts.append(f"## {head}\n")
         parts.append("| name | unit | shown in | start | range | meaning | reference |")
         parts.append("|---|---|---|---|---|---|---|")
         for one in variables:
@@ -52,11 +57,10 @@ def _cells(one: Any) -> tuple[str, ...]:
 
 
 def page() -> str:
-    """Text of the page with its tables renewed."""
-    before, _, rest = PAGE.read_text(encoding="utf-8").partition(BEGIN)
-    _, _, after = rest.partition(END)
-    return f"{before}{BEGIN}\n\n{tables()}\n{END}{after}"
+    """Text of the page."""
+    return f"{HEAD}\n{tables().rstrip()}\n"
 
 
 if __name__ == "__main__":
+    PAGE.parent.mkdir(exist_ok=True)
     PAGE.write_text(page(), encoding="utf-8")

@@ -1,4 +1,7 @@
-"""Write the tables of docs/system.md from the parts' tables: `python -m docs.make_system`."""
+"""Write the tables of signals and variables of the drilling system: `python -m docs.make_system`.
+
+The signals stand in docs/system.md, the variables of the parts in docs/data/system_variables.md.
+"""
 
 from __future__ import annotations
 
@@ -10,24 +13,38 @@ from fmu_src.system.archive import SYSTEMS, read_plan
 from fmu_src.variables import Variable
 
 PAGE = Path(__file__).with_name("system.md")
+VARIABLES = Path(__file__).parent / "data" / "system_variables.md"
 BEGIN, END = "<!-- tables: begin -->", "<!-- tables: end -->"
 SYSTEM = SYSTEMS / "feed_control.toml"
+HEAD = """# Variables of the drilling system
+
+This page lists every input, output and parameter of the parts of a [drilling system](../system.md): the hammer has
+[its own](fmu_interface.md). Values are in SI units; down is positive. Of the six layers of rock the first is listed,
+and the others have the same variables; their `top` is -1 unless set, which switches them off.
+`.venv/bin/python -m docs.make_system` writes this page from the tables of the parts.
+"""
 
 
-def tables() -> str:
-    """Signals of the feed-controlled system, then the variables of each part."""
+def signals() -> str:
+    """Table of the signals of the feed-controlled system, Markdown."""
     plan = read_plan(SYSTEM)
     variables = {name: {v.name: v for v in part_variables(part)} for name, part in PARTS.items()}
-    lines = ["### Signals\n", "| from | to | unit | meaning |", "|---|---|---|---|"]
+    lines = ["| from | to | unit | meaning |", "|---|---|---|---|"]
     for sink, source in plan.connections.items():
         one = _find(plan.components, variables, source) or _find(plan.components, variables, sink)
         unit = (one.unit or "") if one else ""
         lines.append(f"| `{source}` | `{sink}` | {unit} | {one.description if one else ''} |")
-    for name in PARTS:
-        lines.append(f"\n### {name}\n")
+    return "\n".join(lines) + "\n"
+
+
+def variables_page() -> str:
+    """Text of the page of the variables of all parts."""
+    lines = [HEAD.rstrip()]
+    for name, part in PARTS.items():
+        lines.append(f"\n## {name}\n")
         lines.append("| name | kind | unit | start | range | meaning |")
         lines.append("|---|---|---|---|---|---|")
-        lines += [_line(one) for one in variables[name].values() if not _repeated(one.name)]
+        lines += [_line(one) for one in part_variables(part) if not _repeated(one.name)]
     return "\n".join(lines) + "\n"
 
 
@@ -59,11 +76,13 @@ def _line(one: Variable) -> str:
 
 
 def page() -> str:
-    """Text of the page with its tables renewed."""
+    """Text of docs/system.md with its table renewed."""
     before, _, rest = PAGE.read_text(encoding="utf-8").partition(BEGIN)
     _, _, after = rest.partition(END)
-    return f"{before}{BEGIN}\n\n{tables()}\n{END}{after}"
+    return f"{before}{BEGIN}\n\n{signals()}\n{END}{after}"
 
 
 if __name__ == "__main__":
+    VARIABLES.parent.mkdir(exist_ok=True)
+    VARIABLES.write_text(variables_page(), encoding="utf-8")
     PAGE.write_text(page(), encoding="utf-8")

@@ -1,4 +1,6 @@
-"""Make figures and tables of docs/top_hammer.md: `python -m docs.top_hammer_page`.
+"""Make figures and tables of top hammers: `python -m docs.top_hammer_page`.
+
+They stand in docs/top_hammer.md; the long ones in docs/data/top_hammer.md.
 
 Runs every hammer with some numbers of rods, and reports on one string; takes a minute.
 """
@@ -20,6 +22,7 @@ from percussion_model.scene.text import write_text
 
 HERE = Path(__file__).resolve().parent
 PAGE = HERE / "top_hammer.md"
+DATA = HERE / "data" / "top_hammer.md"
 DPI = 100
 DURATION, SETTLE = 4.0, 1.0  # [s]
 RODS = (1, 2, 4, 6, 8)
@@ -160,7 +163,7 @@ def fill(text: str, name: str, content: str) -> str:
         pattern, lambda _: f"{marks[0]}\n{content}\n{marks[1]}", text, flags=re.DOTALL
     )
     if count != 1:
-        raise ValueError(f"docs/top_hammer.md: marks of {name!r} are there {count} times")
+        raise ValueError(f"marks of {name!r} are there {count} times")
     return filled
 
 
@@ -171,17 +174,20 @@ def main() -> None:
         for name, fig in draw_string(report):
             path = HERE / "images" / f"top_hammer_{name.removeprefix('string_')}.png"
             fig.savefig(path, metadata={"Software": None}, dpi=DPI)
-    text = PAGE.read_text(encoding="utf-8")
-    for name, content in (
-        ("presets", presets()),
-        ("rock", at_the_rock(report)),
-        ("joints", joints(report)),
-        ("stresses", stresses(report)),
-        ("shares", shares()),
-        ("changes", changes()),
-    ):
-        text = fill(text, name, content)
-    write_text(PAGE, text)
+    blocks = {
+        PAGE: {
+            "rock": at_the_rock(report),
+            "joints": joints(report),
+            "shares": shares(),
+            "changes": changes(),
+        },
+        DATA: {"presets": presets(), "stresses": stresses(report)},
+    }
+    for path, contents in blocks.items():
+        text = path.read_text(encoding="utf-8")
+        for name, content in contents.items():
+            text = fill(text, name, content)
+        write_text(path, text)
 
 
 if __name__ == "__main__":

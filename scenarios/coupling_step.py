@@ -185,17 +185,23 @@ def draw(ones: Sequence[OneBlow], exact: OneBlow, eights: Sequence[EightBlows], 
     return save_png(figure, path)
 
 
-def main(paths: Sequence[Path], folder: Path) -> list[Path]:
-    """Run everything, print the tables, draw the figure."""
-    (archive,) = paths
+def measure(archive: Path) -> tuple[OneBlow, list[OneBlow], list[EightBlows]]:
+    """Run one blow as the reference, and one and eight blows with every order and step."""
     with progress("one blow with every step"):
         exact = one_blow(archive, "jacobi", REFERENCE)
         ones = [one_blow(archive, order, step) for order in ORDERS for step in STEPS]
+    with progress("eight blows with every step"):
+        eights = [eight_blows(archive, order, step) for order in ORDERS for step in STEPS]
+    return exact, ones, eights
+
+
+def main(paths: Sequence[Path], folder: Path) -> list[Path]:
+    """Run everything, print the tables, draw the figure."""
+    (archive,) = paths
+    exact, ones, eights = measure(archive)
     print(f"One blow: limits by a run at {1e3 * REFERENCE:g} ms, and errors in % against it; ± is")
     print("what that run may be off itself, by the shortest of the others and first order")
     print(table_of_one(ones, exact), flush=True)
-    with progress("eight blows with every step"):
-        eights = [eight_blows(archive, order, step) for order in ORDERS for step in STEPS]
     print("Eight blows")
     print(table_of_eight(eights))
     return [draw(ones, exact, eights, folder / f"{NAME}.png")]
