@@ -9,44 +9,49 @@ from __future__ import annotations
 from pathlib import Path
 
 from percussion_model.coupling import Coupling
-from percussion_model.coupling.coupled_run import CoupledRun, summary
+from percussion_model.coupling.coupled_run import CoupledRun, known_signals, summary
 from percussion_model.interface.terminal import progress
 from percussion_model.scene.text import write_text
-from percussion_model.simulation.uncertain import in_digits
+from percussion_model.simulation.uncertain import in_digits, with_error
 from scenarios import coupling_step, step_rejection
 from scenarios.results import system, tell
 
 FOLDER = Path(__file__).parent / "data"
-# Steps of which the verdict is shown, and the time of each run [s].
+# Steps of which the verdict is shown, the time of each run, and the least between rows [s].
 JUDGED = (1e-5, 1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 2.5e-3, 5e-3, 1e-2, 2e-2, 5e-2, 0.1, 0.2, 0.5)
 DURATION = 1.0
+INTERVAL = 2e-4
 STEPS_HEAD = """# Error against the communication step
 
-This page has the numbers behind [section 4 and 5 of the drilling system](../system.md#4-the-shoulder-and-the-step):
-how far results of a coupled run are off at steps from 0.01 to 500 ms. The system is FeedControl with the rigid hammer
-in its first rock. `.venv/bin/python -m docs.make_coupling` writes this page.
+This page has the numbers behind [section 4 and 5 of the drilling
+system](../system.md#4-the-shoulder-and-the-step): how far results of a coupled run are off at
+steps from 0.01 to 500 ms. The system is FeedControl with the rigid hammer in its first rock.
+`.venv/bin/python -m docs.make_coupling` writes this page.
 """
 ONE = """## One blow
 
-From the first impact to just before the second one. Nothing here depends on where the bit happens to be, so
-every quantity has a limit. Errors are in per cent against a run at {reference:g} ms. ± is the error of that run itself,
-estimated from the shortest of the other steps and first order.
+From the first impact to just before the second one. Nothing here depends on where the bit happens
+to be, so every quantity has a limit. Errors are in per cent against a run at {reference:g} ms. ±
+is the error of that run itself, estimated from the shortest of the other steps and first order.
 """
 EIGHT = """## Eight blows
 
-The rate over whole blows, and its change against that of the shortest step. Each row is what its step gives.
+The rate over whole blows, and its change against that of the shortest step. Each row is what its
+step gives.
 """
 VERDICTS = """## Verdicts
 
-The [verdict](../system.md#5-balances-and-the-verdict) on runs of {duration:g} s. *Largest change* is that of a force
-in a step. The rate is that of the second half, where it has enough blows to scatter.
+The [verdict](../system.md#5-balances-and-the-verdict) on runs of {duration:g} s. *Largest change*
+is that of a force in a step. The rate is that of the second half, where it has enough blows to
+scatter; ± is that scatter alone.
 """
 REJECTION_HEAD = """# Steps that are taken back
 
-This page has the numbers behind [section 4 of the drilling system](../system.md#steps-that-are-taken-back): whether
-it pays to repeat steps whose error is too large. It compares fixed steps with tolerances over one blow, with the usual
-shoulder and with one of 10 kN/mm and 2 kN s/m. Errors are in per cent at the end of the blow. *Time* is
-processor time on the machine that wrote this page, with `.venv/bin/python -m docs.make_coupling`.
+This page has the numbers behind [section 4 of the drilling
+system](../system.md#steps-that-are-taken-back): whether it pays to repeat steps whose error is
+too large. It compares fixed steps with tolerances over one blow, with the usual shoulder and with
+one of 10 kN/mm and 2 kN s/m. Errors are in per cent at the end of the blow. *Time* is processor
+time on the machine that wrote this page, with `.venv/bin/python -m docs.make_coupling`.
 """
 
 
@@ -74,29 +79,31 @@ def verdicts(archive: Path) -> str:
     ]
     with progress("verdicts with every step"):
         for step in JUDGED:
-            lines.append(_verdict(Coupling(archive).run(DURATION, step, tell=tell)))
+            coupling = Coupling(archive)
+            signals, interval = known_signals(coupling.outputs), max(step, INTERVAL)
+            lines.append(_verdict(coupling.run(DURATION, step, signals, interval, tell=tell)))
     return "\n".join(lines)
 
 
 def _verdict(run: CoupledRun) -> str:
     found, verdict = summary(run), run.verdict
     stiffness = run["string.shoulder_stiffness"]
-    rate = found.get("rate_second_half") if found.get("rate_second_half_error") else None
+    rate, error = (found.get(f"rate_second_half{end}") for end in ("", "_error"))
     proposed = "" if verdict.step is None else f": {1e3 * verdict.step:g} ms"
     cells = [
         f"{1e3 * run.step:g}",
         _percent(float(stiffness.min() / stiffness[0])),
         _percent(found["string_energy_residual"]),
-        f"{100 * found['shoulder_by_blows']:+.1f} %" if "shoulder_by_blows" in found else "",
+        f"{100 * found['shoulder_by_blows']:+.1f} %",
         _percent(verdict.numbers["largest_jump"]),
-        "" if rate is None else f"{1e3 * rate:.2f}",
+        with_error(1e3 * rate, 1e3 * error) if rate is not None and error is not None else "",
         verdict.word + proposed,
     ]
     return "| " + " | ".join(cells) + " |"
 
 
 def _percent(share: float) -> str:
-    return f"{in_digits(100.0 * share, 2)} %"
+    return f"{in_digits(share, 2)} times" if share >= 1.05 else f"{in_digits(100.0 * share, 2)} %"
 
 
 def rejection_page(archive: Path) -> str:

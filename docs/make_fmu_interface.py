@@ -17,9 +17,10 @@ from percussion_model.scene.scene import Scene
 PAGE = Path(__file__).parent / "data" / "fmu_interface.md"
 HEAD = """# Variables of the hammer's FMU
 
-This page lists every input, output and parameter of the [FMU of the hammer](../fmu.md), with unit, start value, bounds
-and value reference. The start values are those of the reference scene. Units are SI; *shown in* is the display unit
-that a tool may choose. `.venv/bin/python -m docs.make_fmu_interface` writes this page from a model description.
+This page lists every input, output and parameter of the [FMU of the hammer](../fmu.md), with
+unit, start value, bounds and value reference. The start values are those of the reference scene.
+Units are SI; *shown in* is the display unit that a tool may choose. `.venv/bin/python -m
+docs.make_fmu_interface` writes this page from a model description.
 """
 HEADS = {"input": "Inputs", "output": "Outputs", "parameter": "Parameters"}
 

@@ -35,7 +35,7 @@ CHANGES: tuple[tuple[str, dict[str, object]], ...] = (
     ("damper without dashpot", {"damper.damping": 0.0}),
     ("no damper, feed on the shank", {"effects.damper": False}),
     ("joints perfect", {"effects.joints": False}),
-    ("a tenth of the structural loss", {"loss.time": 2e-8}),
+    ("a tenth of the structural loss", {"loss.time": 5e-9}),
     ("softer rock, 0.3 GN/m", {"rock.loading_stiffness": 3e8}),
 )
 
