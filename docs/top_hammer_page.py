@@ -23,6 +23,8 @@ from percussion_model.scene.text import write_text
 HERE = Path(__file__).resolve().parent
 PAGE = HERE / "top_hammer.md"
 DATA = HERE / "data" / "top_hammer.md"
+# What is written into which page, by the names of its marks.
+BLOCKS = {PAGE: ("rock", "joints", "shares", "changes"), DATA: ("presets", "stresses")}
 DPI = 100
 DURATION, SETTLE = 4.0, 1.0  # [s]
 RODS = (1, 2, 4, 6, 8)
@@ -174,19 +176,18 @@ def main() -> None:
         for name, fig in draw_string(report):
             path = HERE / "images" / f"top_hammer_{name.removeprefix('string_')}.png"
             fig.savefig(path, metadata={"Software": None}, dpi=DPI)
-    blocks = {
-        PAGE: {
-            "rock": at_the_rock(report),
-            "joints": joints(report),
-            "shares": shares(),
-            "changes": changes(),
-        },
-        DATA: {"presets": presets(), "stresses": stresses(report)},
+    contents = {
+        "rock": at_the_rock(report),
+        "joints": joints(report),
+        "shares": shares(),
+        "changes": changes(),
+        "presets": presets(),
+        "stresses": stresses(report),
     }
-    for path, contents in blocks.items():
+    for path, names in BLOCKS.items():
         text = path.read_text(encoding="utf-8")
-        for name, content in contents.items():
-            text = fill(text, name, content)
+        for name in names:
+            text = fill(text, name, contents[name])
         write_text(path, text)
 
 

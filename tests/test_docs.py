@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from docs import top_hammer_page
 from percussion_model import Scene
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -83,6 +84,13 @@ def test_citations_exist(name):
         assert f"\\tag{{{number}}}" in text, f"{where} cites equation {number}"
     for number, where in cited(rf"docs/{name}\.md", "section").items():
         assert f"\n## {number} " in text, f"{where} cites section {number}"
+
+
+def test_the_tables_of_top_hammers_have_their_places():
+    for path, names in top_hammer_page.BLOCKS.items():
+        text = path.read_text(encoding="utf-8")
+        for name in names:
+            assert "a table" in top_hammer_page.fill(text, name, "a table")
 
 
 @pytest.mark.parametrize("page", PAGES)

@@ -1,4 +1,4 @@
-"""docs/fmu.md tells what the FMU has, and its example runs."""
+"""The pages on the FMU tell what it has, and their examples run."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ from fmu_src.page import write_page
 from percussion_model import Scene
 
 ROOT = Path(__file__).parents[2]
-PAGE = ROOT / "docs" / "fmu.md"
+TABLES = ROOT / "docs" / "data" / "fmu_interface.md"
+HOW_TO = ROOT / "docs" / "how_to" / "use_the_fmu.md"
 
 
 def test_the_tables_are_those_of_the_model_description():
@@ -20,16 +21,17 @@ def test_the_tables_are_those_of_the_model_description():
     spec = importlib.util.spec_from_file_location("make_fmu_interface", path)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
-    assert module.page() == PAGE.read_text(encoding="utf-8"), "run: " + module.__doc__
+    assert module.page() == TABLES.read_text(encoding="utf-8"), "run: " + module.__doc__
 
 
 def test_the_examples_run(hammer, capsys):
-    examples = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+    examples = re.findall(r"```python\n(.*?)```", HOW_TO.read_text(encoding="utf-8"), re.DOTALL)
     assert len(examples) == 2
     for example in examples:
         assert '"dist/PercussiveHammer.fmu"' in example
         exec(
-            compile(example.replace("dist/PercussiveHammer.fmu", str(hammer)), "fmu.md", "exec"), {}
+            compile(example.replace("dist/PercussiveHammer.fmu", str(hammer)), HOW_TO.name, "exec"),
+            {},
         )
     rates = [float(line.split()[0]) for line in capsys.readouterr().out.splitlines()]
     assert len(rates) == 2
