@@ -19,10 +19,10 @@ SYSTEM = SYSTEMS / "feed_control.toml"
 HEAD = """# Variables of the drilling system
 
 This page lists every input, output and parameter of the parts of a [drilling
-system](../system.md): the hammer has [its own](fmu_interface.md). Values are in SI units; down is
-positive. Of the six layers of rock the first is listed, and the others have the same variables;
-their `top` is -1 unless set, which switches them off. `.venv/bin/python -m docs.make_system`
-writes this page from the tables of the parts.
+system](../system.md). The hammer has [a page of its own](fmu_interface.md). Values are in SI units;
+down is positive. Of the six layers of rock only the first is listed: the others have the same
+variables, and are off until their `top` is set. `.venv/bin/python -m docs.make_system` writes this
+page from the tables of the parts.
 """
 
 

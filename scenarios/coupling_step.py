@@ -132,7 +132,7 @@ def table_of_eight(rows: Sequence[EightBlows]) -> str:
     exact = min(rows, key=lambda row: row.step)
     lines = [
         f"| order | step [ms] | rate [mm/s] | change from {1e3 * exact.step:g} ms [%] "
-        "| mean feed [N] | shoulder by blows [%] |",
+        "| mean feed [N] | shoulder divided by blows [%] |",
         "|---|---|---|---|---|---|",
     ]
     for row in rows:

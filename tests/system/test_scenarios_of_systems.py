@@ -46,7 +46,7 @@ def test_the_rate_and_the_shoulder_over_eight_blows(feed_control, one_blow, tmp_
         for step in (5e-4, 1e-3)
     ]
     rates = [row.rate for row in eights]
-    # the scatter between steps, docs/system.md
+    # the scatter between steps, docs/data/coupling_step.md
     assert max(rates) / min(rates) < 1.015
     assert all(row.feed == pytest.approx(3000.0, rel=0.05) for row in eights)
     assert all(abs(row.shoulder) < 0.005 for row in eights)

@@ -13,8 +13,8 @@ from percussion_model.coupling.coupled_run import STRING_ENERGIES, CoupledRun
 from percussion_model.coupling.verdict import judge_run
 from percussion_model.interface.cli import main
 
-# A shoulder whose own time is a fortieth of the usual one; docs/system.md, section 4, has its
-# errors: 27 % of the feed at 1 ms.
+# A shoulder whose own time is a fortieth of the usual one; docs/data/step_rejection.md has
+# its errors: 27 % of the feed at 1 ms.
 STIFF = {"string.shoulder.stiffness": 1e7, "string.shoulder.damping": 2000.0}
 
 
@@ -22,7 +22,7 @@ def run_at(system, step, duration, parameters=None):
     return Coupling(system, parameters or {}).run(duration, step)
 
 
-# Rows of docs/system.md: up to 2 ms the rate is right to 1.5 % and the shoulder is as given.
+# Rows of docs/data/coupling_step.md: up to 2 ms the rate is right to 1.5 %, the shoulder as given.
 @pytest.mark.parametrize(
     ("step", "duration", "word"),
     [
