@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
+import venv
 import zipfile
 from functools import partial
 from pathlib import Path
@@ -17,13 +19,15 @@ import fmu_src.native.library as native
 from fmu_src.archive import MODEL
 from fmu_src.hammer.build import build_hammer
 from fmu_src.hammer.outputs import OUTPUTS
-from fmu_src.native.compare import fmu_outputs, package_outputs
+from fmu_src.native.compare import STEP, STEPS, fmu_outputs, package_outputs
 from fmu_src.slave.native import library_name, this_platform
 from percussion_model import Scene
 from scenarios.harness import Instance
 from tests.blow_map_scenes import mapped
 
 ROOT = Path(__file__).parents[2]
+# Real outputs that a host of plain Python reads.
+OUTPUTS_READ = ("hole_depth", "bit.force_mean", "bit.force_peak", "impact_velocity")
 LIBRARY = f"resources/{library_name(this_platform())}"
 RIGID = Scene().replace(**{"piston.model": "rigid", "bit.model": "rigid"})
 SCENES = {
@@ -196,3 +200,25 @@ def test_the_first_instance_of_a_process_is_there_at_once(write):
         cwd=ROOT, capture_output=True, text=True, check=True,
     )  # fmt: skip
     assert float(done.stdout) < SOON
+
+
+BARE = Path(__file__).with_name("bare_host.py")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the host takes the library for Linux")
+def test_a_python_with_nothing_installed_runs_it(write, tmp_path):
+    """Neither numpy nor numba can be imported there; the bits are those of the package."""
+    venv.create(tmp_path / "bare", with_pip=False)
+    done = subprocess.run(
+        [tmp_path / "bare" / "bin" / "python", "-B", BARE, write(Scene()), tmp_path / "unpacked",
+         str(STEPS), str(STEP), *OUTPUTS_READ],
+        env={}, cwd=tmp_path, capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    told = json.loads(done.stdout)
+    assert told["prefix"] == str(tmp_path / "bare")
+    assert told["found"] == []
+    assert (told["refused"], told["messages"]) == (0, [])
+    wanted = package_outputs(Scene())[:, [list(OUTPUTS).index(name) for name in OUTPUTS_READ]]
+    np.testing.assert_array_equal(
+        [[float.fromhex(value) for value in row] for row in told["rows"]], wanted
+    )
