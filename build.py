@@ -75,7 +75,7 @@ def wanted_stamp(pyproject: bytes, version: tuple[int, ...]) -> str:
 
 
 def setup() -> int:
-    """Make .venv and install the package with all extras, unless that is done."""
+    """Make .venv and install the package with what development needs, unless that is done."""
     lacking = missing_requirement(
         sys.version_info[:3],
         {name: importlib.util.find_spec(name) is not None for name in ("venv", "ensurepip")},
@@ -93,7 +93,7 @@ def setup() -> int:
     print("Installing percussion_model and what it needs (a minute or two) ...", flush=True)
     silent = ",".join(filter(None, (os.environ.get("PYTHONWARNINGS"), EDITABLE_IS_MEANT)))
     code = call([tool("python"), "-m", "pip", "--disable-pip-version-check", "install", "-q",
-                 "-e", ".[all]"], silent="installing", PYTHONWARNINGS=silent)  # fmt: skip
+                 "-e", ".[dev]"], silent="installing", PYTHONWARNINGS=silent)  # fmt: skip
     if code != 0:
         print("The installation failed, see above. Is the network up? Then run this again.",
               file=sys.stderr)  # fmt: skip
@@ -136,20 +136,17 @@ def run(extra: list[str]) -> int:
 
 def fmu(extra: list[str]) -> int:
     """Bake a scene into an FMU; paths count from where the user is."""
-    return setup() or call([tool("python"), "-m", "fmu_src", *extra], folder=Path.cwd(),
-                           PYTHONPATH=str(ROOT))  # fmt: skip
+    return setup() or call([tool("percussion"), "fmu", *extra], folder=Path.cwd())
 
 
 def native(extra: list[str]) -> int:
     """Bake a scene into FMUs that need no Python; paths count from where the user is."""
-    return setup() or call([tool("python"), "-m", "fmu_src.native", *extra], folder=Path.cwd(),
-                           PYTHONPATH=str(ROOT))  # fmt: skip
+    return setup() or call([tool("percussion"), "native", *extra], folder=Path.cwd())
 
 
 def system(extra: list[str]) -> int:
     """Build the systems of FMUs and their archives; paths count from where the user is."""
-    return setup() or call([tool("python"), "-m", "fmu_src.system", *extra], folder=Path.cwd(),
-                           PYTHONPATH=str(ROOT))  # fmt: skip
+    return setup() or call([tool("percussion"), "system", *extra], folder=Path.cwd())
 
 
 def docs(extra: list[str]) -> int:

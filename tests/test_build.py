@@ -86,7 +86,7 @@ def test_setup_installs_once(build, monkeypatch):
     assert build.setup() == 0
     assert [words[-1] for words in calls] == [
         str(build.VENV),
-        ".[all]",
+        ".[dev]",
         "fmu_src.warm_up",
     ]
     assert build.setup() == 0
@@ -165,7 +165,7 @@ def test_fmu_passes_its_arguments_on(build, monkeypatch):
     monkeypatch.setattr(build, "call", lambda command, **variables: commands.append(command) or 0)
     words = ["--scene", "scenarios/rigid.toml", "-o", "dist/Rigid.fmu"]
     assert build.main(["fmu", *words]) == 0
-    assert commands[0][1:] == ["-m", "fmu_src", *words]
+    assert commands[0] == [build.tool("percussion"), "fmu", *words]
 
 
 def test_run_passes_extra_arguments_on(build, monkeypatch):

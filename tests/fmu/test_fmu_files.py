@@ -6,29 +6,31 @@ from pathlib import Path
 
 import pytest
 
-import fmu_src.__main__ as command
 import fmu_src.compare as comparison
+from fmu_src.commands import options
 from fmu_src.hammer.build import hammer_name
 from fmu_src.system.archive import SYSTEMS, build_fmus, read_plan
+from percussion_model.scene.presets import scene_presets
 from percussion_model.scene.scene import Scene, SceneError
+from tests.commands import percussion
 
-RIGID = command.ROOT / "scenarios" / "rigid.toml"
+RIGID = scene_presets()["rigid"]
 
 
 @pytest.fixture
 def dist(tmp_path, monkeypatch):
     """The folder of FMUs, for all that build into it."""
-    monkeypatch.setattr(command, "DIST", tmp_path)
+    monkeypatch.setattr(options, "DIST", tmp_path)
     monkeypatch.setattr(comparison, "DEFAULT", tmp_path / "PercussiveHammer.fmu")
     return tmp_path
 
 
 def build(*words):
-    return command.main(["--no-reference", *map(str, words)])
+    return percussion("fmu", "--no-reference", *words)
 
 
 def test_all_commands_make_the_same_bytes(dist, monkeypatch, capsys):
-    """`build.py fmu`, `build.py system` and `build.py run`."""
+    """`percussion fmu`, `percussion system` and `build.py run`."""
     assert build() == 0
     first = (dist / "PercussiveHammer.fmu").read_bytes()
     assert capsys.readouterr().out.strip().endswith("}: written")
@@ -52,7 +54,7 @@ def test_another_scene_has_a_file_of_its_own(dist, capsys):
     assert sorted(path.name for path in dist.iterdir()) == [
         "PercussiveHammer.fmu", "RigidHammer.fmu",
     ]  # fmt: skip
-    plan = read_plan(SYSTEMS / "feed_control.toml", hammer="scenarios/rigid.toml")
+    plan = read_plan(SYSTEMS / "feed_control.toml", hammer="rigid")
     before = (dist / "RigidHammer.fmu").read_bytes()
     build_fmus(plan, dist)
     assert (dist / "RigidHammer.fmu").read_bytes() == before
@@ -62,7 +64,7 @@ def test_the_fmu_of_another_scene_is_not_replaced(dist, tmp_path, capsys):
     path = tmp_path / "PercussiveHammer.fmu"
     assert build("--scene", RIGID, "-o", path) == 0
     before = path.read_bytes()
-    assert build() == 1
+    assert build() == 2
     said = capsys.readouterr().err
     assert "PercussiveHammer.fmu: holds another FMU than that of this scene" in said
     assert "--force" in said
@@ -77,7 +79,7 @@ def test_the_fmu_of_another_scene_is_not_replaced(dist, tmp_path, capsys):
 
 def test_a_file_that_is_no_fmu_is_not_replaced(dist, tmp_path):
     (tmp_path / "PercussiveHammer.fmu").write_text("mine")
-    assert build() == 1
+    assert build() == 2
     assert (tmp_path / "PercussiveHammer.fmu").read_text() == "mine"
 
 

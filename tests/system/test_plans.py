@@ -2,8 +2,8 @@
 
 import pytest
 
-from fmu_src.system.__main__ import main
 from fmu_src.system.archive import SYSTEMS, read_plan
+from tests.commands import percussion
 
 PLAIN = (SYSTEMS / "feed_control.toml").read_text()
 NAME = 'name = "FeedControl"'
@@ -30,7 +30,7 @@ def test_a_nasty_plan_is_one_line(name, tmp_path, capsys):
     (tmp_path / "plain.toml").write_text(PLAIN)
     path = tmp_path / "system.toml"
     path.write_text(text)
-    assert main([str(path), "-o", str(tmp_path / "out")]) == 1
+    assert percussion("system", path, "-o", tmp_path / "out") == 2
     lines = capsys.readouterr().err.strip().splitlines()
     assert len(lines) == 1
     assert said in lines[0]
