@@ -242,9 +242,9 @@ def main(arguments: list[str]) -> int:
     commands.add_parser("setup", help="make .venv and install everything")
     commands.add_parser("run", help="run the reference scene; more goes to `percussion run`")
     commands.add_parser("test", help="lint, type checks and tests; more goes to pytest")
-    commands.add_parser("fmu", help="bake a scene into an FMU: --scene FILE, -o FILE.fmu",
+    commands.add_parser("fmu", help="bake a scene into an FMU: SCENE, -o FILE.fmu",
                         add_help=False)  # fmt: skip
-    commands.add_parser("native", help="bake a scene into FMUs that need no Python: --scene FILE, "
+    commands.add_parser("native", help="bake a scene into FMUs that need no Python: SCENE, "
                         "--platforms NAMES", add_help=False)  # fmt: skip
     commands.add_parser("system", help="build drilling systems of FMUs as SSP: -o FOLDER",
                         add_help=False)  # fmt: skip

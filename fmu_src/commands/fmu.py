@@ -65,13 +65,15 @@ def write_hammer(
 ) -> Path:
     """Write the FMU of a scene and say so; the parameters are those of `fmu`."""
     from fmu_src.archive import content, state_of
-    from fmu_src.hammer.build import build_hammer, hammer_name, refuse_other
+    from fmu_src.hammer.build import about_hammer, build_hammer, hammer_name, refuse_other
     from percussion_model.interface.terminal import progress
 
     file, chosen = options.baked_scene(scene, scene_option)
     names = None if platforms is None else _export_platforms(platforms)
     path = output or options.DIST / hammer_name(file, "Ladder" if blow_map else "")
     refuse_other(path, chosen, blow_map or chosen.solver_name == "blow-map", force)
+    about_hammer(chosen, path)  # refuses a name before anything is compiled
+    common.check_outputs(path.parent, None)
     libraries = _libraries(names)
     table = options.table_for(chosen, blow_map)
     before = content(path)

@@ -50,6 +50,7 @@ def native(
         with_map = blow_map or chosen.solver_name == "blow-map"
         for path in files.values():
             refuse_other(path, chosen, with_map, force)
+        common.check_outputs(output, None)
         with progress(COMPILING):
             made = libraries(names)
         table = options.table_for(chosen, blow_map)

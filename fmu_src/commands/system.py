@@ -39,6 +39,7 @@ def system(
         problems = 0
         checked = set()
         chosen = [find_plan(path) for path in systems or ()] or plans()
+        common.check_outputs(output, None)
         with progress(COMPILING):
             library_here()
         for plan in chosen:

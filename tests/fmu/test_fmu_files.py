@@ -106,3 +106,48 @@ def test_a_table_makes_another_fmu(tmp_path):
     refuse_other(path, Scene(), with_map=False)
     with pytest.raises(SceneError, match="holds another FMU"):
         refuse_other(path, Scene(), with_map=True)
+
+
+def test_a_folder_is_no_fmu(tmp_path, capsys):
+    path = tmp_path / "Empty.fmu"
+    path.mkdir()
+    for words in ([], ["--force"]):
+        assert percussion("fmu", "rigid", "-o", path, *words) == 2
+        said = capsys.readouterr().err
+        assert said.startswith(f"percussion: {path}: is a folder")
+        assert said.count("\n") == 1
+
+
+def test_platforms_bring_their_libraries(tmp_path, built_library, capsys):
+    from zipfile import ZipFile
+
+    assert percussion("fmu", "rigid", "--platforms", "aarch64-linux") == 2
+    said = capsys.readouterr().err
+    assert "--platforms aarch64-linux: an FMU that runs Python is for linux64, win64" in said
+    assert percussion("fmu", "rigid", "--platforms", "linux65") == 2
+    assert "--platforms linux65: must be one or more of" in capsys.readouterr().err
+    if "x86_64-linux" not in built_library:
+        pytest.skip("no compiler for linux64")
+    path = tmp_path / "Hammer.fmu"
+    assert percussion("fmu", "rigid", "-o", path, "--no-reference", "--platforms", "linux64") == 0
+    found = ZipFile(path).read("resources/native/x86_64-linux/hammer.so")
+    assert found == built_library["x86_64-linux"]
+
+
+def test_bad_names_are_refused_before_anything_is_compiled(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("fmu_src.native.library.library_here", lambda: pytest.fail("compiles"))
+    (tmp_path / "file").touch()
+    for name, told in (
+        ("two-words.fmu", "an FMU is named by letters"),
+        ("Hammer.zip", "ends with .fmu"),
+        ("file/Hammer.fmu", "is a file, not a folder"),
+    ):
+        assert percussion("fmu", "rigid", "-o", tmp_path / name) == 2
+        said = capsys.readouterr().err
+        assert told in said
+        assert said.count("\n") == 1
+
+
+def test_a_scene_is_given_once(capsys):
+    assert percussion("fmu", "rigid", "--scene", RIGID) == 2
+    assert "a scene is given already" in capsys.readouterr().err
