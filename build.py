@@ -26,8 +26,6 @@ OLDEST_PYTHON = (3, 11)
 INTERRUPTED = 130  # what shells report for Ctrl-C
 EVERY = 3.0  # between lines that say that a silent program still runs [s]
 
-# setuptools explains at length what an editable installation is; this text alone is kept still.
-EDITABLE_IS_MEANT = "ignore:Editable installation"
 WARM_UP = "fmu_src.warm_up"
 REFERENCE_RUN = [
     "run", "scenarios/reference.toml", "--duration", "4", "--settle", "1", "--out", "out/reference",
@@ -91,9 +89,8 @@ def setup() -> int:
     if made != 0:
         return made
     print("Installing percussion_model and what it needs (a minute or two) ...", flush=True)
-    silent = ",".join(filter(None, (os.environ.get("PYTHONWARNINGS"), EDITABLE_IS_MEANT)))
     code = call([tool("python"), "-m", "pip", "--disable-pip-version-check", "install", "-q",
-                 "-e", ".[dev]"], silent="installing", PYTHONWARNINGS=silent)  # fmt: skip
+                 "-e", ".[dev]"], silent="installing")  # fmt: skip
     if code != 0:
         print("The installation failed, see above. Is the network up? Then run this again.",
               file=sys.stderr)  # fmt: skip

@@ -11,6 +11,7 @@ from fmu_src.commands.scenario import SETTINGS, scenario
 from fmu_src.commands.system import system
 from percussion_model.interface import cli
 
+app = cli.app
 for _command in (fmu, native, system):
     cli.add(_command)
 cli.add(scenario, settings=SETTINGS)

@@ -17,7 +17,7 @@ def system(
     systems: Annotated[
         list[Path] | None,
         typer.Argument(
-            metavar="[SYSTEM]...",
+            metavar="SYSTEM",
             help="Files (TOML), or presets, as FeedControlRigid; left out: all of these.",
         ),
     ] = None,
