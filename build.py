@@ -26,8 +26,6 @@ OLDEST_PYTHON = (3, 11)
 INTERRUPTED = 130  # what shells report for Ctrl-C
 EVERY = 3.0  # between lines that say that a silent program still runs [s]
 
-# setuptools explains at length what an editable installation is; this text alone is kept still.
-EDITABLE_IS_MEANT = "ignore:Editable installation"
 WARM_UP = "fmu_src.warm_up"
 REFERENCE_RUN = [
     "run", "scenarios/reference.toml", "--duration", "4", "--settle", "1", "--out", "out/reference",
@@ -75,7 +73,7 @@ def wanted_stamp(pyproject: bytes, version: tuple[int, ...]) -> str:
 
 
 def setup() -> int:
-    """Make .venv and install the package with all extras, unless that is done."""
+    """Make .venv and install the package with what development needs, unless that is done."""
     lacking = missing_requirement(
         sys.version_info[:3],
         {name: importlib.util.find_spec(name) is not None for name in ("venv", "ensurepip")},
@@ -91,9 +89,8 @@ def setup() -> int:
     if made != 0:
         return made
     print("Installing percussion_model and what it needs (a minute or two) ...", flush=True)
-    silent = ",".join(filter(None, (os.environ.get("PYTHONWARNINGS"), EDITABLE_IS_MEANT)))
     code = call([tool("python"), "-m", "pip", "--disable-pip-version-check", "install", "-q",
-                 "-e", ".[all]"], silent="installing", PYTHONWARNINGS=silent)  # fmt: skip
+                 "-e", ".[dev]"], silent="installing")  # fmt: skip
     if code != 0:
         print("The installation failed, see above. Is the network up? Then run this again.",
               file=sys.stderr)  # fmt: skip
@@ -136,20 +133,17 @@ def run(extra: list[str]) -> int:
 
 def fmu(extra: list[str]) -> int:
     """Bake a scene into an FMU; paths count from where the user is."""
-    return setup() or call([tool("python"), "-m", "fmu_src", *extra], folder=Path.cwd(),
-                           PYTHONPATH=str(ROOT))  # fmt: skip
+    return setup() or call([tool("percussion"), "fmu", *extra], folder=Path.cwd())
 
 
 def native(extra: list[str]) -> int:
     """Bake a scene into FMUs that need no Python; paths count from where the user is."""
-    return setup() or call([tool("python"), "-m", "fmu_src.native", *extra], folder=Path.cwd(),
-                           PYTHONPATH=str(ROOT))  # fmt: skip
+    return setup() or call([tool("percussion"), "native", *extra], folder=Path.cwd())
 
 
 def system(extra: list[str]) -> int:
     """Build the systems of FMUs and their archives; paths count from where the user is."""
-    return setup() or call([tool("python"), "-m", "fmu_src.system", *extra], folder=Path.cwd(),
-                           PYTHONPATH=str(ROOT))  # fmt: skip
+    return setup() or call([tool("percussion"), "system", *extra], folder=Path.cwd())
 
 
 def docs(extra: list[str]) -> int:
@@ -245,9 +239,9 @@ def main(arguments: list[str]) -> int:
     commands.add_parser("setup", help="make .venv and install everything")
     commands.add_parser("run", help="run the reference scene; more goes to `percussion run`")
     commands.add_parser("test", help="lint, type checks and tests; more goes to pytest")
-    commands.add_parser("fmu", help="bake a scene into an FMU: --scene FILE, -o FILE.fmu",
+    commands.add_parser("fmu", help="bake a scene into an FMU: SCENE, -o FILE.fmu",
                         add_help=False)  # fmt: skip
-    commands.add_parser("native", help="bake a scene into FMUs that need no Python: --scene FILE, "
+    commands.add_parser("native", help="bake a scene into FMUs that need no Python: SCENE, "
                         "--platforms NAMES", add_help=False)  # fmt: skip
     commands.add_parser("system", help="build drilling systems of FMUs as SSP: -o FOLDER",
                         add_help=False)  # fmt: skip

@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Any
 
 from percussion_model.coupling import CoupledRun, Coupling
-from scenarios.harness import ROOT
 
+ROOT = Path(__file__).resolve().parents[1]
 STEP = 1e-3  # [s]
 ROWS_EVERY = 1.0  # [s]
 DURATION, CLOCKED = 20.0, 5.0  # simulated [s]

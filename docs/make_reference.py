@@ -80,7 +80,7 @@ def command_line() -> str:
     """Text of the page of commands, which typer makes."""
     made = subprocess.run(
         [
-            *(sys.executable, "-m", "typer", "percussion_model.interface.cli"),
+            *(sys.executable, "-m", "typer", "fmu_src.command_line"),
             *("utils", "docs", "--name", "percussion"),
         ],
         capture_output=True, text=True, check=True,

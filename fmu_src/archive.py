@@ -6,15 +6,18 @@ package along under its plain name; so its parts are put together here.
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import os
 import zipfile
 from collections.abc import Callable, Mapping, Sequence
+from importlib.metadata import distribution
 from pathlib import Path
 
 from fmu_src.description import About, write_description
 from fmu_src.staging import LIBRARY, Bundle, script
 from fmu_src.variables import Variable
+from percussion_model.scene.presets import is_clone
 from percussion_model.simulation.files import reason
 
 HERE = Path(__file__).resolve().parent
@@ -22,8 +25,12 @@ ROOT = HERE.parent
 # The oldest date that a zip archive can hold.
 DATE = (1980, 1, 1, 0, 0, 0)
 PERMISSIONS = 0o644 << 16
+# The export library: what a host loads of an FMU that runs Python.
+BINARIES = LIBRARY / "resources" / "binaries"
 # All that the native library needs to know of a scene.
 MODEL = "resources/model.bin"
+# The scene that an FMU of the hammer was made of.
+SCENE = "resources/scene.json"
 
 
 def write_fmu(
@@ -57,14 +64,13 @@ def write_fmu(
             **bundle.files, **resources, f"{module}.py": text, "slavemodule.txt": module,
         }.items()
     }  # fmt: skip
-    binaries = LIBRARY / "resources" / "binaries"
-    for source in sorted(binaries.rglob("*")):
+    for source in sorted(BINARIES.rglob("*")):
         if source.suffix not in (".so", ".dll", ".dylib"):
             continue
-        platform = source.parent.relative_to(binaries).as_posix()
+        platform = source.parent.relative_to(BINARIES).as_posix()
         entries[f"binaries/{platform}/{about.model}{source.suffix}"] = source.read_bytes()
     entries["documentation/index.html"] = page.encode()
-    entries["documentation/licenses/license.txt"] = (ROOT / "LICENSE").read_bytes()
+    entries["documentation/licenses/license.txt"] = licence()
     entries["model.png"] = (HERE / "icon.png").read_bytes()
     if model is not None:
         entries[MODEL] = model("")
@@ -73,6 +79,21 @@ def write_fmu(
         entries[MODEL] = model(f"{{{guid}}}")
     write_described(path, xml, entries)
     return guid
+
+
+def export_platforms() -> list[str]:
+    """Platforms of the export library, as FMI 2.0 calls them: there an FMU of Python can start."""
+    return sorted(one.name for one in BINARIES.iterdir() if one.is_dir())
+
+
+def licence() -> bytes:
+    """Text of the licence, which FMUs bring along: that of the clone, or of what is installed."""
+    if is_clone():
+        return (ROOT / "LICENSE").read_bytes()
+    text = distribution("percussion_model").read_text("licenses/LICENSE")
+    if text is None:
+        raise FileNotFoundError(errno.ENOENT, "", "LICENSE of percussion_model")
+    return text.encode()
 
 
 def digest(entries: Mapping[str, bytes]) -> bytes:

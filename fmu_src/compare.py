@@ -13,15 +13,16 @@ from typing import Any
 
 import numpy as np
 
-from fmu_src.__main__ import DEFAULT
-from fmu_src.archive import ROOT, content, state_of
+from fmu_src.archive import content, state_of
 from fmu_src.hammer.build import build_hammer, refuse_other
 from fmu_src.run import run_fmu
 from percussion_model.interface.terminal import progress
+from percussion_model.scene.presets import scene_presets
 from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.simulation.simulate import simulate
 from percussion_model.simulation.uncertain import rate_text
 
+DEFAULT = Path("dist") / "PercussiveHammer.fmu"
 STEP_SIZE = 0.01  # of the communication [s]
 
 # Label, factor and unit for print, output of the FMU, column of the blow table.
@@ -100,7 +101,7 @@ def _rate(table: Any, time_name: str, advance: str, settle: float) -> float:
 
 def main() -> int:
     """Compare on the reference scene."""
-    scene = Scene.from_toml(ROOT / "scenarios" / "reference.toml")
+    scene = Scene.from_toml(scene_presets()["reference"])
     try:
         refuse_other(DEFAULT, scene, with_map=False)
     except SceneError as error:

@@ -21,9 +21,10 @@ from typing import Any
 
 from percussion_model.interface.terminal import progress
 from percussion_model.simulation.files import staged_text
-from scenarios.drawing import in_style, save_png
-from scenarios.harness import Instance, fmu
-from scenarios.results import command_line
+
+from .drawing import in_style, save_png
+from .harness import Instance, fmu
+from .results import command_line
 
 NAME = "communication_step"
 # Powers of two add up without rounding, so that all loops end at the same time, to the bit.

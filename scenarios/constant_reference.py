@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from scenarios.harness import Instance, command_line, plot, run
+from .harness import Instance, command_line, plot, run
 
 DURATION, STEP = 1.0, 1e-3  # [s]
 

@@ -19,8 +19,9 @@ from percussion_model.interface.tables import print_table
 from percussion_model.interface.terminal import progress, progress_bar
 from percussion_model.simulation.files import staged_text
 from percussion_model.simulation.uncertain import in_digits
-from scenarios.drawing import in_style, save_png, stacked
-from scenarios.results import command_line, system, tell
+
+from .drawing import in_style, save_png, stacked
+from .results import command_line, system, tell
 
 STEP = 2e-3  # the longest at which the shoulder is as stiff as it is [s]
 INTERVAL = 4e-3  # of the rows that are kept [s]

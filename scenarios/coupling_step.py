@@ -20,9 +20,10 @@ from percussion_model.coupling.coupled_run import known_signals, summary
 from percussion_model.interface.terminal import progress
 from percussion_model.simulation.uncertain import change_text, with_error
 from percussion_model.verification.accuracy.orders import Order, fitted_order
-from scenarios.coupled import whole
-from scenarios.drawing import in_style, save_png
-from scenarios.results import command_line, system, tell
+
+from .coupled import whole
+from .drawing import in_style, save_png
+from .results import command_line, system, tell
 
 NAME = "coupling_step"
 ONE_BLOW, EIGHT_BLOWS = 0.04, 0.4  # [s]

@@ -18,9 +18,10 @@ from percussion_model.simulation.uncertain import (
     in_digits,
     with_error,
 )
-from scenarios.coupled import save_runs, save_table, whole
-from scenarios.drawing import in_style, save_png
-from scenarios.results import command_line, system, tell
+
+from .coupled import save_runs, save_table, whole
+from .drawing import in_style, save_png
+from .results import command_line, system, tell
 
 NAME = "extremum_seeking"
 STEP = 2e-3  # the longest at which the shoulder is as stiff as it is [s]

@@ -23,13 +23,13 @@ from fmpy.fmi2 import (
 
 from percussion_model.coupling.component import COMPILING, WARNING
 from percussion_model.interface.terminal import progress
-from scenarios import results
-from scenarios.drawing import in_style, save_png, stacked
-from scenarios.results import Archive, ScenarioError
+
+from . import results
+from .drawing import in_style, save_png, stacked
+from .results import Archive, ScenarioError
 
 # A constant, or a function of time.
 Signal = float | bool | Callable[[float], float | bool]
-ROOT = Path(__file__).resolve().parents[1]
 
 
 class Instance:
@@ -295,9 +295,9 @@ def built(name: str = "PercussiveHammer") -> Path:
     """An FMU of `dist`, built now if it is not there."""
     path = results.DIST / f"{name}.fmu"
     if not path.exists():
-        from fmu_src.__main__ import main
+        from fmu_src.commands.fmu import write_drive, write_hammer
 
-        main(["--no-reference"] if name == "PercussiveHammer" else ["--pneumatics"])
+        (write_hammer if name == "PercussiveHammer" else write_drive)(output=path)
     return path
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from scenarios.harness import Instance, command_line, plot, run
+from .harness import Instance, command_line, plot, run
 
 DURATION, STEP = 3.0, 1e-2  # [s]
 SOFT, HARD = 3e8, 1.2e9  # K_R [N/m]

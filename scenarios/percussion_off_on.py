@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from scenarios.harness import Instance, command_line, plot, run
+from .harness import Instance, command_line, plot, run
 
 DURATION, STEP = 2.4, 5e-3  # [s]
 # Switched off near the top of a stroke: in the ideal pressure law nothing but weight

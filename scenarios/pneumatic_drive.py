@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from scenarios.harness import Instance, command_line, fmu, plot, run
+from .harness import Instance, command_line, fmu, plot, run
 
 DURATION, STEP = 0.6, 1e-4  # [s]
 CHAMBERS = ("upper.pressure", "lower.pressure", "piston_force", "air_used")

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from scenarios.harness import Instance, command_line, plot, ramp, run
+from .harness import Instance, command_line, plot, ramp, run
 
 DURATION, STEP = 2.4, 5e-3  # [s]
 FULL, LEFT = 20e5, 8e5  # [Pa]

@@ -16,7 +16,7 @@ from percussion_model.interface.messages import wrapped
 
 # Each scenario has a folder in it, by its name.
 FOLDER = Path("out") / "scenarios"
-DIST = Path(__file__).resolve().parents[1] / "dist"
+DIST = Path("dist")
 
 
 class ScenarioError(ValueError):
@@ -50,7 +50,7 @@ class Archive:
         if named is None and not path.exists() and self.make is not None:
             self.make()
         if not path.is_file():
-            how = "" if named else "; `python3 build.py system` makes it"
+            how = "" if named else f"; `percussion system {path.stem}` makes it"
             raise ScenarioError(f"{path}: no such file{how}")
         if not self._is_valid(path):
             kind = "FMU" if path.suffix != ".ssp" else "SSP archive"
@@ -106,7 +106,7 @@ def command_line(
     arguments : sequence of str, optional
         Words of the command line.
     """
-    end_script(f"scenarios.{name}", lambda: _run(name, about or "", archives, work, arguments))
+    end_script(f"{__package__}.{name}", lambda: _run(name, about or "", archives, work, arguments))
 
 
 def _run(
@@ -116,7 +116,7 @@ def _run(
     work: Callable[[Sequence[Path], Path], Iterable[Path]],
     arguments: Sequence[str] | None,
 ) -> None:
-    command = f"python -m scenarios.{name}"
+    command = f"python -m {__package__}.{name}"
     parser = _Parser(prog=command, description=about.partition(": `python -m")[0] + ".")
     for k, one in enumerate(archives):
         words = f"left out: dist/{one.default.name}" + (", made if need be" if one.make else "")

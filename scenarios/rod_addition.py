@@ -11,7 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from percussion_model.coupling import CoupledRun
-from scenarios.coupled import FEED, draw_runs, held_since, run, write
+
+from .coupled import FEED, draw_runs, held_since, run, write
 
 NAME = "rod_addition"
 DURATION = 4.0  # [s]

@@ -17,9 +17,10 @@ from percussion_model.coupling import CoupledRun, Coupling
 from percussion_model.interface.terminal import progress
 from percussion_model.simulation.files import staged_text
 from percussion_model.simulation.uncertain import change_text
-from scenarios.coupled import whole
-from scenarios.coupling_step import ONE_BLOW, error_of_limit
-from scenarios.results import command_line, system, tell
+
+from .coupled import whole
+from .coupling_step import ONE_BLOW, error_of_limit
+from .results import command_line, system, tell
 
 NAME = "step_rejection"
 SHOULDERS: Mapping[str, Mapping[str, Any]] = {

@@ -20,10 +20,11 @@ from percussion_model.interface.tables import print_table
 from percussion_model.interface.terminal import progress
 from percussion_model.scene.hammers import hammer
 from percussion_model.simulation.uncertain import in_digits
-from scenarios.coupled import Quantity, save_table
-from scenarios.drawing import in_style, save_png, stacked
-from scenarios.harness import Instance
-from scenarios.results import DIST, Archive, command_line
+
+from .coupled import Quantity, save_table
+from .drawing import in_style, save_png, stacked
+from .harness import Instance
+from .results import DIST, Archive, command_line
 
 NAME = "top_hammer_feed"
 FMU = DIST / "TopHammer.fmu"

@@ -15,8 +15,9 @@ import numpy as np
 from percussion_model.coupling import CoupledRun, Coupling
 from percussion_model.interface.terminal import progress
 from percussion_model.simulation.uncertain import with_error
-from scenarios.drawing import in_style, save_png
-from scenarios.extremum_seeking import (
+
+from .drawing import in_style, save_png
+from .extremum_seeking import (
     ABOUT_STEP,
     BOUND,
     INTERVAL,
@@ -28,7 +29,7 @@ from scenarios.extremum_seeking import (
     reached,
     write_search,
 )
-from scenarios.results import command_line, system, tell
+from .results import command_line, system, tell
 
 NAME = "two_way_seeking"
 DURATION = 45.0  # [s]

@@ -14,7 +14,8 @@ import numpy as np
 
 from percussion_model.coupling import CoupledRun
 from percussion_model.coupling.bench import HIGHEST_FEED, TRIALS, judge
-from scenarios.coupled import FEED, draw_runs, run, write
+
+from .coupled import FEED, draw_runs, run, write
 
 NAME = "unstable_controller"
 DURATION = 5.0  # [s]

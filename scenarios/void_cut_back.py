@@ -13,7 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from percussion_model.coupling import CoupledRun
-from scenarios.coupled import FEED, draw_runs, held_since, run, write
+
+from .coupled import FEED, draw_runs, held_since, run, write
 
 NAME = "void_cut_back"
 DURATION = 5.0  # [s]

@@ -86,35 +86,11 @@ def test_setup_installs_once(build, monkeypatch):
     assert build.setup() == 0
     assert [words[-1] for words in calls] == [
         str(build.VENV),
-        ".[all]",
+        ".[dev]",
         "fmu_src.warm_up",
     ]
     assert build.setup() == 0
     assert len(calls) == 3
-
-
-def test_only_the_note_on_editable_installations_is_silenced(build, monkeypatch):
-    given = []
-    monkeypatch.setattr(build, "make_venv", lambda renew: 0)
-    monkeypatch.setattr(build, "call", lambda command, **variables: given.append(variables) or 3)
-    monkeypatch.setenv("PYTHONWARNINGS", "error:mine")
-    build.setup()
-    filters = given[0]["PYTHONWARNINGS"]
-    assert filters.startswith("error:mine,")
-    say = (
-        "import warnings; warnings.warn('Editable installation.\\n!!'); "
-        "warnings.warn('Something else'); warnings.warn('See Editable installation')"
-    )
-    shown = subprocess.run(
-        [sys.executable, "-c", say],
-        env={**os.environ, "PYTHONWARNINGS": filters},
-        capture_output=True,
-        text=True,
-        check=True,
-    ).stderr
-    assert "UserWarning: Something else" in shown
-    assert "UserWarning: See Editable" in shown
-    assert "UserWarning: Editable" not in shown
 
 
 def test_a_failed_installation_is_tried_again(build, monkeypatch):
@@ -165,7 +141,7 @@ def test_fmu_passes_its_arguments_on(build, monkeypatch):
     monkeypatch.setattr(build, "call", lambda command, **variables: commands.append(command) or 0)
     words = ["--scene", "scenarios/rigid.toml", "-o", "dist/Rigid.fmu"]
     assert build.main(["fmu", *words]) == 0
-    assert commands[0][1:] == ["-m", "fmu_src", *words]
+    assert commands[0] == [build.tool("percussion"), "fmu", *words]
 
 
 def test_run_passes_extra_arguments_on(build, monkeypatch):

@@ -8,8 +8,8 @@ from pathlib import Path
 from percussion_model.solvers.blow_map.table import BlowTable
 
 NO_MAP = (
-    'solver.fidelity = "blow-map": this FMU brings no blow map; build it by build.py fmu '
-    '--blow-map, or of a scene with solver.fidelity = "blow-map"'
+    'solver.fidelity = "blow-map": this FMU brings no blow map; build it with --blow-map, or of a '
+    'scene with solver.fidelity = "blow-map"'
 )
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fmu_src.archive import write_fmu
+from fmu_src.archive import SCENE, write_fmu
 from fmu_src.description import About
 from fmu_src.hammer.slave import PercussiveHammer
 from fmu_src.hammer.variables import VERSION, hammer_variables
@@ -28,6 +28,7 @@ from percussion_model.solvers.base import added_solvers
 from percussion_model.solvers.blow_map.table import BlowTable, fixed_values
 
 STEP_SIZE = 1e-3  # of the default experiment [s]
+BLOW_MAP = "resources/blow_map.npz"  # of an FMU that runs Python
 
 
 def build_hammer(
@@ -84,19 +85,22 @@ def refuse_other(path: Path, scene: Scene, with_map: bool, force: bool = False) 
     force : bool
         Let it be replaced.
     """
+    if path.is_dir():
+        raise SceneError(f"{path}: is a folder; -o names the FMU, as {path / 'Hammer.fmu'}")
     if force or not path.exists():
         return
     try:
         with zipfile.ZipFile(path) as archive:
-            found = json.loads(archive.read("resources/scene.json"))["given"]
-            same = (found, "resources/blow_map.npz" in archive.namelist()) == (
-                json.loads(to_json(scene.given_values())), with_map
-            )  # fmt: skip
+            found = json.loads(archive.read(SCENE))
+            has_map = BLOW_MAP in archive.namelist() or found.get("blow_map") is True
+            given = json.loads(to_json(scene.given_values()))
+            same = (found["given"], has_map) == (given, with_map)
     except (
         OSError,
         ValueError,
         LookupError,
         TypeError,
+        AttributeError,
         RuntimeError,
         zipfile.BadZipFile,
         zlib.error,

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Literal
 
-from fmu_src.archive import HERE, MODEL, ROOT, digest, write_described
+from fmu_src.archive import HERE, MODEL, SCENE, digest, licence, write_described
 from fmu_src.description import About
 from fmu_src.hammer.variables import hammer_variables
 from fmu_src.native.description import write_native_description
@@ -16,6 +16,7 @@ from fmu_src.native.page import write_native_page
 from fmu_src.native.terminals import FOLDER, write_terminals
 from fmu_src.native.variables3 import fmi3_variables
 from fmu_src.slave.native import SUFFIXES
+from fmu_src.variables import to_json
 from percussion_model.scene.scene import Scene
 
 Version = Literal["2.0", "3.0"]
@@ -34,6 +35,7 @@ def write_native_fmu(
     scene: Scene,
     libraries: Mapping[str, bytes],
     model: Callable[[str], bytes],
+    with_map: bool = False,
 ) -> str:
     """Write an FMU and return its GUID or instantiation token, without the braces.
 
@@ -46,13 +48,17 @@ def write_native_fmu(
     model : callable
         Gives the tables of the scene for a GUID as hosts pass it, with its braces; it is asked
         for an empty one as well, whose tables are part of what the GUID is a hash of.
+    with_map : bool
+        Whether they have a blow map.
     """
     variables = hammer_variables(scene)
     page = write_native_page(about, variables, scene, libraries)
     entries = {
         "documentation/index.html": page.encode(),
-        "documentation/licenses/license.txt": (ROOT / "LICENSE").read_bytes(),
+        "documentation/licenses/license.txt": licence(),
         MODEL: model(""),
+        # what nothing that runs reads: whose FMU this is
+        SCENE: to_json({"given": scene.given_values(), "blow_map": with_map}).encode(),
         **_pictures(version),
     }
     for platform, library in libraries.items():

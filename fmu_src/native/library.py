@@ -1,4 +1,8 @@
-"""The library of the native FMU for each platform: compiled once for all scenes, and kept."""
+"""The library of the native FMU for each platform: compiled once for all scenes, and kept.
+
+It is kept in `dist/native` of a clone, else in the folder `native` of the user's cache
+(`PERCUSSION_CACHE`).
+"""
 
 from __future__ import annotations
 
@@ -10,17 +14,21 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
 from typing import NamedTuple
 
 from fmu_src.archive import ROOT
 from fmu_src.slave.native import this_platform
+from percussion_model.scene.presets import is_clone
 from percussion_model.scene.scene import SceneError
+from percussion_model.solvers.blow_map.builder import cache_folder
 
 HERE = Path(__file__).resolve().parent
-KEPT = ROOT / "dist" / "native"
+# So many libraries are kept, the newest: installations of other versions share a user's cache.
+MOST_KEPT = 4
 # What the library follows from, besides the versions of what compiles.
 SOURCES = (
     *("fmu_src/native", "fmu_src/hammer"),
@@ -28,6 +36,8 @@ SOURCES = (
 )
 COMPILERS = ("numba", "llvmlite", "numpy")
 FLAGS = ("-std=c11", "-O2", "-D_POSIX_C_SOURCE=200809L", "-fvisibility=hidden", "-shared")
+# What a command says meanwhile.
+COMPILING = "compiling the library of FMUs, which takes a few minutes the first time"
 # Names of platforms that FMI 2.0 has.
 ALIASES = {"linux64": "x86_64-linux", "win64": "x86_64-windows", "darwin64": "x86_64-darwin"}
 
@@ -63,20 +73,20 @@ class NoCompilerError(SceneError):
     """Nothing here can compile the library."""
 
 
-def platform_names(words: Sequence[str]) -> list[str]:
-    """Names of platforms as hosts of either version of FMI call them.
+def platform_names(words: Sequence[str]) -> dict[str, str]:
+    """Names of platforms as hosts of FMI 3.0 call them, with the words that stand for them.
 
     Raises
     ------
     SceneError
         If one is not known.
     """
-    names = [ALIASES.get(word, word) for word in words]
-    for name, word in zip(names, words, strict=True):
+    names = {ALIASES.get(word, word): word for word in map(str.strip, words)}
+    for name, word in names.items():
         if name not in PLATFORMS:
             known = ", ".join([*PLATFORMS, *ALIASES])
             raise SceneError(f"--platforms {word}: must be one or more of {known}")
-    return list(dict.fromkeys(names))
+    return names
 
 
 def stamp() -> str:
@@ -92,8 +102,15 @@ def stamp() -> str:
     return digest.hexdigest()[:16]
 
 
-def compiler_for(name: str) -> list[str]:
+def compiler_for(name: str, word: str = "") -> list[str]:
     """Command of a compiler for a platform.
+
+    Parameters
+    ----------
+    name : str
+        Of `PLATFORMS`.
+    word : str
+        What the user calls it.
 
     Raises
     ------
@@ -102,42 +119,95 @@ def compiler_for(name: str) -> list[str]:
     """
     if name not in PLATFORMS:
         raise NoCompilerError(f"no compiler for {name}: known are {', '.join(PLATFORMS)}")
+    own = ""
     if name == this_platform():
+        own = "a C compiler (cc, gcc or clang), or "
         found = next((shutil.which(one) for one in ("cc", "gcc", "clang") if shutil.which(one)), "")
         if found:
             return [found]
     if importlib.util.find_spec("ziglang") is None:
         raise NoCompilerError(
-            f"no compiler for {name}: install a C compiler (cc, gcc or clang) for this machine, "
-            "or the package ziglang for any platform"
+            f"no compiler for {word or name}: install {own}ziglang: "
+            'pip install "percussion_model[native]"'
         )
     return [sys.executable, "-m", "ziglang", "cc", "-target", PLATFORMS[name].zig]
 
 
-def libraries(names: Sequence[str], kept: Path = KEPT) -> dict[str, bytes]:
+def kept_folder() -> Path:
+    """Folder that libraries are kept in."""
+    return ROOT / "dist" / "native" if is_clone() else cache_folder() / "native"
+
+
+def libraries(
+    names: Sequence[str] | Mapping[str, str], kept: Path | None = None
+) -> dict[str, bytes]:
     """Libraries by platform: those that are kept, the others compiled now.
+
+    Of several processes one compiles, and the others wait for it.
 
     Parameters
     ----------
-    names : sequence of str
-        Of `PLATFORMS`.
-    kept : Path
-        Folder; libraries of other sources are taken out of it.
+    names : sequence of str, or mapping
+        Of `PLATFORMS`, perhaps with the words of the user.
+    kept : Path, optional
+        Folder; `kept_folder` if left out.
     """
-    folder = kept / stamp()
-    files = {name: folder / f"{name}{PLATFORMS[name].suffix}" for name in names}
-    missing = [name for name in names if not files[name].is_file()]
-    compilers = {name: compiler_for(name) for name in missing}
-    if missing:
-        for old in kept.glob("*/"):
-            if old != folder:
-                shutil.rmtree(old, ignore_errors=True)
+    words = names if isinstance(names, Mapping) else {name: name for name in names}
+    folder = (kept or kept_folder()) / stamp()
+    files = {
+        name: folder / f"{name}{PLATFORMS[name].suffix}" for name in words if name in PLATFORMS
+    }
+    compilers = {
+        name: compiler_for(name, words[name])
+        for name in words
+        if name not in files or not files[name].is_file()
+    }
+    if compilers:
         folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory() as work:
-            make_objects(Path(work), missing)
-            for name in missing:
-                link(name, compilers[name], Path(work), files[name])
-    return {name: file.read_bytes() for name, file in files.items()}
+        with only_one(folder.with_suffix(".lock")):
+            _compile({name: file for name, file in files.items() if not file.is_file()}, compilers)
+            _remove_old(folder.parent)
+    return {name: files[name].read_bytes() for name in words}
+
+
+@contextmanager
+def only_one(file: Path) -> Iterator[None]:
+    """Work that one process does at a time; another one says that it waits.
+
+    Parameters
+    ----------
+    file : Path
+        The lock, which ends with the process that holds it.
+    """
+    from filelock import FileLock, Timeout
+
+    lock = FileLock(file)
+    try:
+        lock.acquire(timeout=0)
+    except Timeout:
+        print("another process compiles the library of FMUs: waiting for it", file=sys.stderr)
+        lock.acquire()
+    try:
+        yield
+    finally:
+        lock.release()
+
+
+def _compile(files: Mapping[str, Path], compilers: Mapping[str, Sequence[str]]) -> None:
+    """Compile libraries by platform."""
+    if not files:
+        return
+    with tempfile.TemporaryDirectory() as work:
+        make_objects(Path(work), list(files))
+        for name, file in files.items():
+            link(name, compilers[name], Path(work), file)
+
+
+def _remove_old(kept: Path) -> None:
+    """Remove all folders of libraries but the newest."""
+    folders = sorted(kept.glob("*/"), key=lambda one: one.stat().st_mtime, reverse=True)
+    for old in folders[MOST_KEPT:]:
+        shutil.rmtree(old, ignore_errors=True)
 
 
 @functools.cache
@@ -153,10 +223,12 @@ def library_here() -> dict[str, bytes]:
 def make_objects(work: Path, names: Sequence[str]) -> None:
     """Compile the kernels for platforms, by a process in which numba knows no processor."""
     plain = {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": "", "NUMBA_DISABLE_JIT": "0"}
-    kept = {"NUMBA_CACHE_DIR": str(work / "kernels"), "PYTHONPATH": str(ROOT)}
+    kept = {"NUMBA_CACHE_DIR": str(work / "kernels")}
+    if is_clone():  # what is installed is found as this process has found it
+        kept["PYTHONPATH"] = str(ROOT)
     command = [sys.executable, "-m", "fmu_src.native.objects", str(work), *names]
     done = subprocess.run(
-        command, env=os.environ | plain | kept, cwd=ROOT, text=True, capture_output=True
+        command, env=os.environ | plain | kept, cwd=work, text=True, capture_output=True
     )
     if done.returncode != 0:
         raise SceneError(f"the kernels could not be compiled:\n{done.stderr.strip()[-2000:]}")

@@ -10,16 +10,17 @@ from xml.etree.ElementTree import Element, SubElement, indent, register_namespac
 
 from fmpy import read_model_description
 
-from fmu_src.archive import ROOT, write_archive
+from fmu_src.archive import write_archive
 from fmu_src.hammer.build import build_hammer, hammer_name, refuse_other
 from fmu_src.parts.build import PARTS, build_part
 from fmu_src.units import UNITS
 from percussion_model.interface.commands.blow_map import ready_map
-from percussion_model.scene.rows import show_value, unprintable
+from percussion_model.scene.presets import scenario_folder, scene_file, system_file
+from percussion_model.scene.rows import shortened, show_value, unprintable
 from percussion_model.scene.scene import Scene
 from percussion_model.scene.text import read_toml
 
-SYSTEMS = ROOT / "scenarios" / "systems"
+SYSTEMS = scenario_folder() / "systems"
 HAMMER = "PercussiveHammer"
 # Masters find the parameters of all components under one name.
 PARAMETER_SET = "initialValues"
@@ -80,7 +81,8 @@ def read_plan(path: Path, **changes: Any) -> SystemPlan:
     Parameters
     ----------
     changes : dict
-        Entries that replace those of the file, as `name` or `hammer`.
+        Entries that replace those of the file, as `name` or `hammer`: the file of a scene, from
+        the folder of the system's file or from the present one, or a preset.
     """
     try:
         found = _merged(path) | changes
@@ -90,7 +92,7 @@ def read_plan(path: Path, **changes: Any) -> SystemPlan:
     return SystemPlan(
         name=found["name"],
         description=found["description"],
-        hammer=ROOT / found["hammer"],
+        hammer=_beside(path, found["hammer"]) or scene_file(Path(found["hammer"])),
         fidelity=found.get("fidelity", "wave"),
         duration=float(found["duration"]),
         step=float(found["step"]),
@@ -134,7 +136,7 @@ def _merged(path: Path, left: int = MOST_BASES) -> dict[str, Any]:
             f"{path}: base = {show_value(base)}: must name a file that has a base of its own at "
             f"most {MOST_BASES} times"
         )
-    below = _merged(path.parent / base, left - 1)
+    below = _merged(_beside(path, base) or system_file(Path(base)), left - 1)
     for key, value in found.items():
         if key == "parameters" and isinstance(value, dict):
             both = {**below.get(key, {})}
@@ -146,6 +148,12 @@ def _merged(path: Path, left: int = MOST_BASES) -> dict[str, Any]:
         else:
             below[key] = value
     return below
+
+
+def _beside(path: Path, name: str) -> Path | None:
+    """File that a system's file names, where it is in its folder."""
+    file = path.parent / name
+    return file if file.is_file() else None
 
 
 def build_fmus(plan: SystemPlan, folder: Path, force: bool = False) -> dict[str, Path]:
@@ -321,12 +329,25 @@ def _values(values: dict[str, Any], variables: dict[str, Any]) -> bytes:
     return _text(root)
 
 
+def find_plan(named: Path) -> SystemPlan:
+    """Return the system that a user names: a file, or else one that ships, by its name."""
+    if named.suffix or named.name != str(named) or named.exists():
+        return read_plan(named)
+    found = {plan.name: plan for plan in plans()}
+    if named.name not in found:
+        raise SystemPlanError(
+            f"{shortened(str(named))}: there is no such file of a system, and no preset of that "
+            f"name: they are {', '.join(found)}"
+        )
+    return found[named.name]
+
+
 def plans() -> list[SystemPlan]:
     """All systems of `scenarios/systems`, each with the three hammers of docs/fidelity.md."""
     found = []
     for path in sorted(SYSTEMS.glob("*.toml")):
         plan = read_plan(path)
         found.append(plan)
-        found.append(read_plan(path, name=f"{plan.name}Rigid", hammer="scenarios/rigid.toml"))
+        found.append(read_plan(path, name=f"{plan.name}Rigid", hammer="rigid"))
         found.append(read_plan(path, name=f"{plan.name}Map", fidelity="blow-map"))
     return found

@@ -57,9 +57,7 @@ def unpack(path: Path, folder: str, allowance: Allowance) -> Archive:
         What the archive may take; one that is trusted may name FMUs outside of it.
     """
     if not path.is_file():
-        raise CouplingError(
-            f"{path}: no such file; `python3 build.py system` makes the archives of dist"
-        )
+        raise CouplingError(f"{path}: no such file; `percussion system` makes archives in dist")
     try:
         unpack_zip(path, Path(folder), allowance)
         _check_files(path.name, Path(folder), allowance)

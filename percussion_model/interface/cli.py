@@ -1,4 +1,7 @@
-"""The command `percussion`; its subcommands are in `percussion_model.interface.commands`."""
+"""The command `percussion`; its subcommands are in `percussion_model.interface.commands`.
+
+Those that make FMUs are added by `fmu_src.command_line`, which stands above this package.
+"""
 
 from __future__ import annotations
 
@@ -77,10 +80,27 @@ def _heard(command: Callable[..., Any]) -> Callable[..., Any]:
     return call
 
 
-def _add(command: Callable[..., Any], name: str | None = None) -> None:
-    """Add a command; its first line stands whole in the list of all."""
+# Packages whose own errors are messages.
+_packages: set[str] = set()
+
+
+def add(
+    command: Callable[..., Any], name: str | None = None, settings: dict[str, Any] | None = None
+) -> None:
+    """Add a command; its first line stands whole in the list of all.
+
+    Parameters
+    ----------
+    command : callable
+        As typer takes it. Errors that its package defines are messages.
+    name : str, optional
+        That of the function if left out.
+    settings : dict, optional
+        Of the context, as click takes them.
+    """
+    _packages.add(command.__module__.partition(".")[0])
     first = (command.__doc__ or "").partition("\n")[0]
-    app.command(name, short_help=first)(_heard(command))
+    app.command(name, short_help=first, context_settings=settings)(_heard(command))
 
 
 for _command in (
@@ -99,8 +119,8 @@ for _command in (
     bench_controller,
     new,
 ):
-    _add(_command)
-_add(blow_map, "blow-map")
+    add(_command)
+add(blow_map, "blow-map")
 
 
 def main() -> None:
@@ -119,7 +139,7 @@ def _guarded(work: Callable[[], Any]) -> int:
     except Exception as error:
         if is_interruption(error):  # while kernels load with the commands
             return print_message("interrupted before there was a result", INTERRUPTED)
-        if type(error).__module__.startswith("percussion_model."):
+        if type(error).__module__.partition(".")[0] in _packages:
             return print_message(str(error), BAD_INPUT)
         # Bad arguments: typer hides the class of its errors.
         told = getattr(error, "format_message", None)

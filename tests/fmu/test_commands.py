@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from fmpy import read_model_description
 
-from fmu_src.__main__ import main
 from fmu_src.compare import describe, run_both
 from percussion_model import Scene, Simulation
+from tests.commands import percussion
 
 RIGID = {"piston.model": "rigid", "bit.model": "rigid"}
 
@@ -19,7 +19,7 @@ def test_any_scene_is_baked_in_and_its_signals_lie_beside(tmp_path, capsys):
     scene = Scene().replace(**RIGID, **{"feed.force": 4321.0, "title": "more feed"})
     scene.to_toml(tmp_path / "scene.toml")
     path = tmp_path / "dist" / "MoreFeed.fmu"
-    assert main(["--scene", str(tmp_path / "scene.toml"), "-o", str(path)]) == 0
+    assert percussion("fmu", tmp_path / "scene.toml", "-o", path) == 0
     assert str(path) in capsys.readouterr().out
     model = read_model_description(str(path))
     starts = {one.name: one.start for one in model.modelVariables}
@@ -43,9 +43,10 @@ def test_any_scene_is_baked_in_and_its_signals_lie_beside(tmp_path, capsys):
 def test_a_bad_scene_ends_in_one_line(tmp_path, capsys):
     scene = tmp_path / "scene.toml"
     scene.write_text("[feed]\nforce = 'much'\n")
-    assert main(["--scene", str(scene), "-o", str(tmp_path / "A.fmu")]) == 1
+    assert percussion("fmu", "--scene", scene, "-o", tmp_path / "A.fmu") == 2
     said = capsys.readouterr().err
-    assert said.startswith("error: ")
+    assert said.startswith("percussion: ")
+    assert said.count("\n") == 1
     assert "feed.force" in said
     assert not (tmp_path / "A.fmu").exists()
 

@@ -14,7 +14,7 @@ from fmpy import read_csv, read_model_description
 from fmpy.validation import validate_fmu
 from lxml import etree
 
-from fmu_src.archive import MODEL
+from fmu_src.archive import MODEL, SCENE
 from fmu_src.description import write_description
 from fmu_src.hammer.build import about_hammer
 from fmu_src.hammer.variables import hammer_variables
@@ -237,7 +237,7 @@ def test_archive_holds_what_belongs_to_it(fmu, version):
     icon = "model.png" if version == "2.0" else "terminalsAndIcons/icon.png"
     assert {icon, "documentation/index.html", "documentation/licenses/license.txt"} <= set(names)
     assert sum(name.startswith("binaries/") for name in names) == len(LIBRARIES)
-    assert not any(name.endswith((".py", ".json")) for name in names)
+    assert [name for name in names if name.endswith((".py", ".json"))] == [SCENE]
     assert model == f"tables {read_model_description(str(fmu)).guid}"
 
 

@@ -11,7 +11,7 @@ from percussion_model.coupling import bench
 
 
 def plan_of(name, **changes):
-    return read_plan(SYSTEMS / f"{name}.toml", hammer="scenarios/rigid.toml", **changes)
+    return read_plan(SYSTEMS / f"{name}.toml", hammer="rigid", **changes)
 
 
 @pytest.fixture(scope="session")

@@ -154,7 +154,11 @@ def test_a_system_that_a_scenario_cannot_run_is_one_line(
     monkeypatch.setattr(results, "DIST", tmp_path / "dist")
     (tmp_path / "text.ssp").write_text("text")
     for work, words, told in (
-        (rod, [], "FeedControlRigid.ssp: no such file; `python3 build.py system` makes it"),
+        (
+            rod,
+            [],
+            "FeedControlRigid.ssp: no such file; `percussion system FeedControlRigid` makes it",
+        ),
         (rod, ["none.ssp"], "none.ssp: no such file"),
         (rod, ["text.ssp"], "text.ssp: is no SSP archive: there is no SystemStructure.ssd in it"),
         (rod, [feed_control, "more"], "unrecognized arguments: more; see python -m scenarios.rod"),

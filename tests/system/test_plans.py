@@ -1,9 +1,12 @@
 """Files of systems that come from strangers: one error, and no file outside of the folder."""
 
+from pathlib import Path
+
 import pytest
 
-from fmu_src.system.__main__ import main
-from fmu_src.system.archive import SYSTEMS, read_plan
+from fmu_src.system.archive import SYSTEMS, find_plan, plans, read_plan
+from percussion_model.scene.presets import scene_presets
+from tests.commands import percussion
 
 PLAIN = (SYSTEMS / "feed_control.toml").read_text()
 NAME = 'name = "FeedControl"'
@@ -30,7 +33,7 @@ def test_a_nasty_plan_is_one_line(name, tmp_path, capsys):
     (tmp_path / "plain.toml").write_text(PLAIN)
     path = tmp_path / "system.toml"
     path.write_text(text)
-    assert main([str(path), "-o", str(tmp_path / "out")]) == 1
+    assert percussion("system", path, "-o", tmp_path / "out") == 2
     lines = capsys.readouterr().err.strip().splitlines()
     assert len(lines) == 1
     assert said in lines[0]
@@ -40,3 +43,27 @@ def test_a_nasty_plan_is_one_line(name, tmp_path, capsys):
 def test_plans_that_ship_are_read():
     for path in SYSTEMS.glob("*.toml"):
         assert read_plan(path).components
+
+
+def test_a_plan_names_files_beside_it_or_presets(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    folder = tmp_path / "mine"
+    folder.mkdir()
+    (folder / "own.toml").write_text("[feed]\nforce = 2000.0\n")
+    path = folder / "system.toml"
+    path.write_text('base = "feed_control"\nname = "Mine"\nhammer = "own.toml"')
+    plan = read_plan(path)
+    assert (plan.name, plan.hammer) == ("Mine", folder / "own.toml")
+    assert plan.components == read_plan(SYSTEMS / "feed_control.toml").components
+    path.write_text('base = "feed_control"\nhammer = "rigid"')
+    assert read_plan(path).hammer == scene_presets()["rigid"]
+
+
+def test_systems_that_ship_go_by_name(capsys):
+    plan = find_plan(Path("FeedControlRigid"))
+    assert (plan.name, plan.hammer) == ("FeedControlRigid", scene_presets()["rigid"])
+    assert percussion("system", "Nosuch") == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    for one in plans():
+        assert one.name in said

@@ -29,7 +29,9 @@ FEW_FILES = 3
 
 _own_process = False
 
-SceneFile = Annotated[Path, typer.Argument(metavar="SCENE", help="A scene file (TOML).")]
+SceneFile = Annotated[
+    Path, typer.Argument(metavar="SCENE", help="A scene file (TOML), or a preset, as reference.")
+]
 SolverName = Annotated[
     Literal["wave", "modal", "chain", "fem", "rigid", "blow-map"] | None,
     typer.Option("--solver", help="Solver; rigid makes piston and bit rigid."),
@@ -113,15 +115,16 @@ def load_scene(
     check: bool | None = None,
     is_run: bool = True,
 ) -> Scene:
-    """Read a scene and apply what the command line changes.
+    """Read a scene, a file or a preset, and apply what the command line changes.
 
     Where the solver that the scene names will run it, tell of its kernels.
     """
+    from percussion_model.scene.presets import scene_file
     from percussion_model.scene.scene import Scene
     from percussion_model.scene.text import read_setting
 
     load_numba()
-    scene = Scene.from_toml(path)
+    scene = Scene.from_toml(scene_file(path))
     changes: dict[str, Any] = dict(read_setting(text) for text in settings or ())
     if solver is not None:
         scene = scene.computed_by(solver, **changes)
@@ -292,6 +295,15 @@ def needs_extra(error: ImportError, extra: str) -> str:
     return f"{error.name or error} is missing: pip install 'percussion_model[{extra}]'"
 
 
+@contextmanager
+def needing(extra: str) -> Iterator[None]:
+    """Refuse to go on where a package is missing that an extra installs."""
+    try:
+        yield
+    except ImportError as error:
+        raise refusal(needs_extra(error, extra)) from None
+
+
 def refusal(message: str) -> typer.Exit:
     """Print one message on stderr; return what ends the command as bad input."""
     return typer.Exit(print_message(message, BAD_INPUT))
@@ -316,7 +328,8 @@ def end_script(name: str, work: Callable[[], object]) -> NoReturn:
             raise
         code = print_message("interrupted before there was a result", INTERRUPTED, name)
     except ValueError as error:
-        if type(error).__module__.partition(".")[0] not in ("percussion_model", "scenarios"):
+        package = type(error).__module__.partition(".")[0]
+        if package not in ("percussion_model", name.partition(".")[0]):
             raise
         code = print_message(str(error), BAD_INPUT, name)
     sys.exit(code)

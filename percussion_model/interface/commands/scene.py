@@ -159,6 +159,7 @@ def plot(
 ) -> None:
     """Draw the figures of a result, or run a scene and draw them."""
     from percussion_model.interface.terminal import progress, progress_bar
+    from percussion_model.scene.presets import scene_file
     from percussion_model.scene.scene import Scene
     from percussion_model.simulation.result import Result
     from percussion_model.simulation.simulate import simulate
@@ -167,7 +168,8 @@ def plot(
         from percussion_model.interface.plotting import figures
     except ImportError as error:
         raise common.refusal(common.needs_plot_extra(error)) from None
-    if not source.exists():
+    file = source if source.is_dir() else scene_file(source)
+    if not file.exists():
         raise common.refusal(f"{source}: there is no such folder or scene file")
     claimed = None
     if source.is_dir():
@@ -179,7 +181,7 @@ def plot(
             numbers = common.digest(source / "summary.json")
             claimed = common.claim("plot", out, None, force, result=numbers)
     else:
-        scene = Scene.from_toml(source)
+        scene = Scene.from_toml(file)
         common.tell_of_compiling(scene.solver_name)
         made_from = _made_from(scene, duration, settle)
         # its figures belong to the result of that run, and may stand beside it

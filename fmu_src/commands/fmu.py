@@ -1,0 +1,131 @@
+"""Command `fmu`: a scene as an FMU of FMI 2.0 that runs by Python in its host."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from fmu_src.commands import options
+from percussion_model.interface.commands import common
+
+DRIVE = "PneumaticDrive.fmu"
+
+
+def fmu(
+    scene: options.Baked = None,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "-o",
+            "--output",
+            metavar="FILE.fmu",
+            help="The FMU to write; left out: by the scene's name, in dist.",
+        ),
+    ] = None,
+    platforms: Annotated[
+        str | None,
+        typer.Option(
+            "--platforms",
+            metavar="NAMES",
+            help="Bring native libraries for linux64,win64 along; left out: for this one.",
+        ),
+    ] = None,
+    blow_map: options.BlowMap = False,
+    pneumatics: Annotated[
+        bool, typer.Option("--pneumatics", help="Write the simple pneumatic drive instead.")
+    ] = False,
+    no_reference: Annotated[
+        bool, typer.Option("--no-reference", help="Do not run it for _in.csv and _ref.csv.")
+    ] = False,
+    force: options.Force = False,
+    scene_option: options.BakedToo = None,
+) -> None:
+    """Bake a scene into an FMU for co-simulation, FMI 2.0, which runs Python.
+
+    Its reference signals go beside it.
+    """
+    with common.needing("fmu"), options.refusing_faults():
+        if pneumatics:
+            write_drive(output)
+            return
+        path = write_hammer(scene, output, platforms, blow_map, force, scene_option)
+        if not no_reference:
+            _write_reference(path)
+
+
+def write_hammer(
+    scene: Path | None = None,
+    output: Path | None = None,
+    platforms: str | None = None,
+    blow_map: bool = False,
+    force: bool = False,
+    scene_option: Path | None = None,
+) -> Path:
+    """Write the FMU of a scene and say so; the parameters are those of `fmu`."""
+    from fmu_src.archive import content, state_of
+    from fmu_src.hammer.build import about_hammer, build_hammer, hammer_name, refuse_other
+    from percussion_model.interface.terminal import progress
+
+    file, chosen = options.baked_scene(scene, scene_option)
+    names = None if platforms is None else _export_platforms(platforms)
+    path = output or options.DIST / hammer_name(file, "Ladder" if blow_map else "")
+    refuse_other(path, chosen, blow_map or chosen.solver_name == "blow-map", force)
+    about_hammer(chosen, path)  # refuses a name before anything is compiled
+    common.check_outputs(path.parent, None)
+    libraries = _libraries(names)
+    table = options.table_for(chosen, blow_map)
+    before = content(path)
+    with progress("building the FMU"):
+        guid = build_hammer(chosen, path, table, libraries)
+    typer.echo(f"{path} {{{guid}}}: {state_of(path, before)}")
+    return path
+
+
+def write_drive(output: Path | None = None) -> Path:
+    """Write the FMU of the pneumatic drive and say so."""
+    from fmu_src.archive import content, state_of
+    from fmu_src.parts import pneumatic_drive
+    from fmu_src.parts.build import build_part
+
+    path = output or options.DIST / DRIVE
+    before = content(path)
+    guid = build_part(pneumatic_drive.TABLE, path)
+    typer.echo(f"{path} {{{guid}}}: {state_of(path, before)}")
+    return path
+
+
+def _export_platforms(words: str) -> dict[str, str]:
+    """Platforms by their names, refused where the FMU could not start for lack of its frame."""
+    from fmu_src.archive import export_platforms
+    from fmu_src.native.library import ALIASES, platform_names
+
+    names = platform_names(words.split(","))
+    known = {ALIASES[word]: word for word in export_platforms() if word in ALIASES}
+    for name, word in names.items():
+        if name not in known:
+            raise common.refusal(
+                f"--platforms {word}: an FMU that runs Python is for {', '.join(known.values())}; "
+                "`percussion native` makes those for others"
+            )
+    return names
+
+
+def _libraries(names: dict[str, str] | None) -> dict[str, bytes]:
+    """Libraries for platforms; for this one, if there is a compiler, where none are named."""
+    from fmu_src.native.library import COMPILING, libraries, library_here
+    from percussion_model.interface.terminal import progress
+
+    with progress(COMPILING):
+        return library_here() if names is None else libraries(names)
+
+
+def _write_reference(path: Path) -> None:
+    from fmu_src.reference import write_reference
+    from percussion_model.interface.terminal import progress
+
+    with progress("running the FMU; the first run compiles"):
+        files = write_reference(path)
+    for written in files:
+        typer.echo(str(written))

@@ -1,0 +1,62 @@
+"""Shared parts of the commands that make FMUs: options, and what is refused."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from percussion_model.interface.commands import common
+
+if TYPE_CHECKING:
+    from percussion_model.scene.scene import Scene
+    from percussion_model.solvers.blow_map.table import BlowTable
+
+DIST = Path("dist")
+REFERENCE = Path("reference")
+
+Baked = Annotated[
+    Path | None,
+    typer.Argument(metavar="SCENE", help="A scene file, or a preset; left out: reference."),
+]
+# How `build.py fmu` and `build.py native` have named it from the first.
+BakedToo = Annotated[Path | None, typer.Option("--scene", hidden=True)]
+BlowMap = Annotated[
+    bool, typer.Option("--blow-map", help="Bring the table that solver.fidelity needs along.")
+]
+Force = Annotated[bool, typer.Option("--force", help="Replace the FMU of another scene.")]
+
+
+def baked_scene(named: Path | None, option: Path | None) -> tuple[Path, Scene]:
+    """File of the scene to bake, and the scene."""
+    from percussion_model.scene.presets import scene_file
+    from percussion_model.scene.scene import Scene
+
+    if named is not None and option is not None:
+        raise common.refusal(f"--scene {option}: a scene is given already, {named}")
+    common.load_numba()
+    file = scene_file(named or option or REFERENCE)
+    return file, Scene.from_toml(file)
+
+
+def table_for(scene: Scene, wanted: bool) -> BlowTable | None:
+    """Blow map that the FMU of a scene brings along, if it does."""
+    if not wanted and scene.solver_name != "blow-map":
+        return None
+    from percussion_model.interface.commands.blow_map import ready_map
+
+    return ready_map(scene)
+
+
+@contextmanager
+def refusing_faults() -> Iterator[None]:
+    """Make one line of what the operating system refuses: a file, and why."""
+    from fmu_src.archive import fault
+
+    try:
+        yield
+    except OSError as error:
+        raise common.refusal(fault(error)) from None

@@ -1,0 +1,54 @@
+"""The native FMUs of a scene, with their reference results."""
+
+from __future__ import annotations
+
+import functools
+from pathlib import Path
+
+from fmu_src.hammer.build import about_hammer, hammer_name
+from fmu_src.native.archive import Version, write_native_fmu
+from fmu_src.native.compare import refuse_difference
+from fmu_src.native.reference_results import add_reference_results
+from fmu_src.native.tables import model_tables
+from fmu_src.run import run_fmu
+from fmu_src.slave.native import this_platform
+from percussion_model.scene.scene import Scene
+from percussion_model.solvers.blow_map.table import BlowTable
+
+# Files by version of FMI: what follows the name of the scene's FMU.
+SUFFIXES: dict[Version, str] = {"2.0": "-native", "3.0": "-fmi3"}
+
+
+def native_files(scene: Path, folder: Path, blow_map: bool = False) -> dict[Version, Path]:
+    """Native FMUs of a scene's file by version of FMI; those with a map have another name."""
+    stem = hammer_name(scene, "Ladder" if blow_map else "").removesuffix(".fmu")
+    return {version: folder / f"{stem}{suffix}.fmu" for version, suffix in SUFFIXES.items()}
+
+
+def build_native(
+    scene: Scene,
+    path: Path,
+    version: Version,
+    libraries: dict[str, bytes],
+    blow_map: BlowTable | None = None,
+) -> str:
+    """Write the native FMU of a scene, with reference results; return its GUID.
+
+    Parameters
+    ----------
+    libraries : dict of bytes
+        By platform.
+    blow_map : BlowTable, optional
+        What `solver.fidelity = "blow-map"` needs.
+    """
+    # the name of the file is no identifier, that of the model is
+    about = about_hammer(scene, path.with_name(f"{path.stem.partition('-')[0]}.fmu"))
+    words = None if blow_map is None else blow_map.to_words()
+    tables = functools.partial(model_tables, scene, blow_map=words)
+    guid = write_native_fmu(
+        path, version, about, scene, libraries, tables, with_map=blow_map is not None
+    )
+    if this_platform() in libraries:
+        refuse_difference(scene, path)
+        add_reference_results(path, scene, functools.partial(run_fmu, path))
+    return guid

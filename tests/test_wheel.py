@@ -1,0 +1,119 @@
+"""What is installed without the clone: the wheel's files, and tasks from an empty folder.
+
+With PERCUSSION_LONG=1 the wheel is installed as users do, with all that it needs.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import sysconfig
+import zipfile
+from email import message_from_bytes
+
+import pytest
+
+from fmu_src.hammer.build import build_hammer
+from fmu_src.native.library import PLATFORMS, stamp
+from percussion_model import Scene, simulate
+from percussion_model.scene.presets import scene_presets
+from tests.installed import build_wheel, expected_files, plain_environment, try_python
+
+# Beside the packages: what a wheel says of itself.
+ABOUT = {"METADATA", "WHEEL", "RECORD", "entry_points.txt", "licenses/LICENSE"}
+SHORT = {"duration": 0.5, "settle": 0.1}
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory):
+    pytest.importorskip("hatchling")
+    return build_wheel(tmp_path_factory.mktemp("wheel"))
+
+
+@pytest.fixture(scope="module")
+def installed(wheel, built_library, tmp_path_factory):
+    """The wheel in an environment of its own; the library of FMUs is kept there already."""
+    folder = tmp_path_factory.mktemp("installed")
+    outer = {sysconfig.get_path(name) for name in ("purelib", "platlib")}
+    made = plain_environment(folder, wheel, sorted(outer))
+    kept = folder / "percussion_cache" / "native" / stamp()
+    kept.mkdir(parents=True)
+    for name, content in built_library.items():
+        (kept / f"{name}{PLATFORMS[name].suffix}").write_bytes(content)
+    made.variables["PATH"] = str(made.program("percussion").parent)  # without a compiler
+    return made
+
+
+def test_the_wheel_has_every_file_and_no_other(wheel):
+    found = set(zipfile.ZipFile(wheel).namelist())
+    about = {name.partition(".dist-info/")[2] for name in found if ".dist-info/" in name}
+    assert about == ABOUT
+    assert {name for name in found if ".dist-info/" not in name} == expected_files()
+    kinds = {name.rpartition(".")[2] for name in found}
+    assert {"py", "c", "h", "toml", "json", "j2", "png", "typed"} <= kinds
+
+
+def test_users_get_no_tools_of_development(wheel):
+    archive = zipfile.ZipFile(wheel)
+    (name,) = (one for one in archive.namelist() if one.endswith("/METADATA"))
+    needed = message_from_bytes(archive.read(name)).get_all("Requires-Dist")
+    plain = {text.partition(">")[0] for text in needed if "extra ==" not in text}
+    assert plain == {"numpy", "scipy", "numba", "typer", "rich", "tomli-w"}
+    of_all = [text for text in needed if "extra == 'all'" in text]
+    assert of_all
+    for tool in ("ruff", "mypy", "pytest", "hypothesis", "import-linter", "ecospy", "hatchling"):
+        assert any(text.startswith(tool) for text in needed)
+        assert not any(text.startswith(tool) for text in of_all)
+
+
+def test_scenes_are_found_by_name(installed):
+    out = installed.percussion("run", "rigid", "--duration", "0.5", "--settle", "0.1",
+                               "--json", "-")  # fmt: skip
+    here = simulate(Scene.from_toml(scene_presets()["rigid"]), **SHORT).summary()
+    assert json.loads(out)["rate_of_penetration"] == here["rate_of_penetration"]
+    installed.percussion("new", "mine.toml", "--hammer", "dth5")
+    assert (installed.empty / "mine.toml").is_file()
+    refused = installed.call("run", "nosuch")
+    assert refused.returncode == 2
+    said = [line for line in refused.stderr.splitlines() if not line.endswith("still running")]
+    assert len(said) == 1
+    assert "reference" in said[0]
+    assert "layered_rock" in installed.percussion("scenario")
+
+
+def test_the_fmu_is_that_of_the_clone_to_the_byte(installed, built_library, tmp_path):
+    """It is run by fmpy for its reference signals."""
+    installed.percussion("fmu", "rigid", "-o", "Hammer.fmu")
+    build_hammer(Scene.from_toml(scene_presets()["rigid"]), tmp_path / "Hammer.fmu")
+    made = installed.empty / "Hammer.fmu"
+    assert made.read_bytes() == (tmp_path / "Hammer.fmu").read_bytes()
+    assert (installed.empty / "Hammer_ref.csv").read_text().count("\n") > 500
+    names = zipfile.ZipFile(made).namelist()
+    assert any(name.startswith("resources/native/") for name in names) == bool(built_library)
+
+
+def test_fmus_without_python_are_made(installed, built_library):
+    if not built_library:
+        pytest.skip("no C compiler, and no ziglang")
+    said = installed.percussion("native", "rigid", "-o", "native").splitlines()
+    assert len(said) == 2
+    assert all(line.endswith("}: written") for line in said)
+
+
+def test_a_system_is_built_valid_and_runs(installed):
+    said = installed.percussion("system", "FeedControlRigid", "-o", "systems").splitlines()
+    assert [line.endswith(", valid") for line in said] == [True] * 6 + [False]
+    done = installed.call("couple", "systems/FeedControlRigid.ssp", "--duration", "0.4",
+                          "--no-figures", "--json", "-")  # fmt: skip
+    found = json.loads(done.stdout)
+    assert found["time"] == pytest.approx(0.4)
+    assert found["depth"] > 1e-3
+    assert (installed.empty / "out" / "FeedControlRigid" / "signals.csv").is_file()
+
+
+@pytest.mark.skipif(
+    not os.environ.get("PERCUSSION_LONG"), reason="takes minutes: PERCUSSION_LONG=1 runs it"
+)
+def test_all_tasks_from_a_fresh_installation(wheel):
+    try_python(sys.executable, wheel)
