@@ -125,7 +125,9 @@ def show_settled(found: Settled) -> None:
     if summary[RATE[1]] is not None:
         table.add_row(RATE[0], f"{rate_text(summary)} {RATE[3]}")
     if summary["blow_period"] is not None:
-        table.add_row("Blow period", f"{mean_text(summary, 'blow_period', 1e3)} ms")
+        for name, key, factor, unit in SHOWN:
+            if summary.get(key) is not None:
+                table.add_row(name, f"{mean_text(summary, key, factor)} {unit}")
     if summary["multiplier"] is not None:
         table.add_row("Deviation after a cycle", _deviation(found))
     table.add_row("Blows run", f"{len(found.blows)} in {found.duration:.4g} s of simulated time")
