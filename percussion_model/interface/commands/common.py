@@ -105,7 +105,7 @@ def load_numba() -> None:
 
 
 def load_scene(
-    path: Path,
+    path: Path | None,
     solver: str | None = None,
     cells: int | None = None,
     settings: list[str] | None = None,
@@ -113,7 +113,7 @@ def load_scene(
     check: bool | None = None,
     is_run: bool = True,
 ) -> Scene:
-    """Read a scene and apply what the command line changes.
+    """Read a scene, or take the reference, and apply what the command line changes.
 
     Where the solver that the scene names will run it, tell of its kernels.
     """
@@ -121,7 +121,7 @@ def load_scene(
     from percussion_model.scene.text import read_setting
 
     load_numba()
-    scene = Scene.from_toml(path)
+    scene = Scene() if path is None else Scene.from_toml(path)
     changes: dict[str, Any] = dict(read_setting(text) for text in settings or ())
     if solver is not None:
         scene = scene.computed_by(solver, **changes)

@@ -1,0 +1,278 @@
+"""Page of the explorer: one session of a browser, from a slider to what is drawn."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any
+
+from bokeh.document import Document
+from bokeh.layouts import column
+from bokeh.models import (
+    Button,
+    CustomJS,
+    Div,
+    Select,
+    TextAreaInput,
+    Toggle,
+)
+
+from percussion_model.interface.explore.figures import CAPTIONS, Figures
+from percussion_model.interface.explore.inputs import WIDGETS, Entry, Switch, keys_of, switch_keys
+from percussion_model.interface.explore.response import (
+    Overtaken,
+    Response,
+    motion,
+    notes,
+    numbers,
+    respond,
+)
+from percussion_model.interface.explore.worker import Worker
+from percussion_model.interface.plotting import style
+from percussion_model.scene.scene import Scene, SceneError
+
+OWN = "the scene given"
+# Differences of two scenes that are named; more are counted.
+MOST_NAMED = 4
+COPY = """
+const done = () => { note.text = '<span role="status">copied</span>';
+  setTimeout(() => { note.text = ''; }, 3000); };
+const refused = () => {
+  note.text = '<span role="alert">not copied: mark the text below and copy it by hand</span>'; };
+if (navigator.clipboard) navigator.clipboard.writeText(area.value).then(done, refused);
+else refused();
+"""
+NUMBERS = """
+:host { font: 15px/1.4 system-ui, "Segoe UI", Roboto, "DejaVu Sans", sans-serif; }
+table { width: 100%; border-collapse: collapse; }
+th, td { padding: .2rem .5rem .2rem 0; border-bottom: 1px solid #dcdfe3; text-align: left;
+  vertical-align: top; font-weight: 400; }
+td.now { font-weight: 600; font-variant-numeric: tabular-nums; }
+td.pinned, th.pinned { color: #6b6b6b; font-variant-numeric: tabular-nums; }
+p { margin: .35rem 0; color: #5f6368; font-size: 14px; }
+p.refusal, p.warning { padding: .4rem .6rem; color: #1a1a1a; background: #fff4e0;
+  border-left: 4px solid #e69f00; }
+.line { white-space: nowrap; }
+"""
+
+
+class Explorer:
+    """One page in one browser; pages know nothing of each other.
+
+    Parameters
+    ----------
+    document : Document
+        Of the session.
+    scenes : mapping of str to callable
+        Scenes to start from, by name; the first is shown.
+    worker : Worker
+        Computes for all pages.
+    """
+
+    def __init__(
+        self, document: Document, scenes: Mapping[str, Callable[[], Scene]], worker: Worker
+    ) -> None:
+        self.document, self.scenes, self.worker = document, scenes, worker
+        self.figures = Figures()
+        self.asked = self.shown = 0
+        self.response: Response | None = None
+        self.pinned: Response | None = None
+        self.over = False
+        self._make_widgets()
+        self._take(scenes[next(iter(scenes))]())
+        for made in self._roots():
+            document.add_root(made)
+        document.on_session_destroyed(self._end)
+
+    def _make_widgets(self) -> None:
+        more: dict[str, Any] = {"stylesheets": [WIDGETS]}
+        names = list(self.scenes)
+        self.preset = Select(
+            title="start from", value=names[0], options=names, name="preset",
+            sizing_mode="stretch_width", visible=len(names) > 1, **more,
+        )  # fmt: skip
+        self.preset.on_change("value", self._choose)
+        self.reset = Button(label="Reset", name="reset", **more)
+        self.reset.on_click(self._reset)
+        self.pin = Toggle(label="Compare with pinned: pin this", name="pin", **more)
+        self.pin.on_change("active", self._pin)
+        self.copied = Div(text="", name="copied", stylesheets=[NUMBERS])
+        self.toml = TextAreaInput(
+            title="the scene as a file for `percussion run`", name="toml", rows=14,
+            max_length=None, sizing_mode="stretch_width", **more,
+        )  # fmt: skip
+        self.copy = Button(label="Copy as TOML", name="copy", **more)
+        self.copy.js_on_click(CustomJS(args={"area": self.toml, "note": self.copied}, code=COPY))
+        self.note = Div(text="", name="note", visible=False, stylesheets=[NUMBERS],
+                        sizing_mode="stretch_width")  # fmt: skip
+        self.numbers = Div(text="<p>computing …</p>", name="numbers", stylesheets=[NUMBERS],
+                           sizing_mode="stretch_width", tags=[0, 0, 0.0])  # fmt: skip
+        told = CustomJS(code="window.explorer?.(cb_obj.tags)")
+        self.numbers.js_on_change("tags", told)
+        self.inputs = column(name="inputs", sizing_mode="stretch_width", spacing=6)
+        self.switches = column(name="switches", sizing_mode="stretch_width", spacing=6)
+
+    def _roots(self) -> list[Any]:
+        figures = self.figures
+        for name, made in (("stress", figures.stress), ("forces", figures.forces),
+                           ("law", figures.law)):  # fmt: skip
+            made.name = name
+        return [self.preset, self.reset, self.pin, self.copy, self.copied, self.note, self.inputs,
+                self.switches, self.numbers, self.toml, figures.stress, figures.forces,
+                figures.law]  # fmt: skip
+
+    # ------------------------------------------------------------------ what is asked for
+
+    def _take(self, scene: Scene) -> None:
+        """Start from a scene: inputs of its own."""
+        self.first = self.scene = scene
+        self.entries = [Entry(key, scene, self._change) for key in keys_of(scene)]
+        self.inputs.children = [made for entry in self.entries for made in entry.layout]
+        changed = [Switch(key, scene, self._change, self._tell) for key in switch_keys()]
+        self.effects = changed
+        self.switches.children = [switch.widget for switch in changed]
+        self._ask()
+
+    def _choose(self, _: str, __: Any, name: str) -> None:
+        if name in self.scenes:
+            self._tell("")
+            self._take(self.scenes[name]())
+
+    def _reset(self) -> None:
+        self._tell("")
+        self._take(self.first)
+
+    def _change(self, key: str, value: Any) -> str:
+        """Change one value of the scene; what is wrong with it, else nothing."""
+        first = self.first
+        # what was not given in the first scene, and is as it was there, is not given again
+        is_back = key.count(".") == 1 and key not in first.given and value == first[key]
+        wanted = None if is_back else value
+        try:
+            scene = self.scene.replace(**{key: wanted})
+        except SceneError as error:
+            return str(error)
+        if scene == self.scene:
+            return ""
+        self.scene = scene
+        for entry in self.entries:
+            entry.show_use(scene)
+        for switch in self.effects:
+            switch.show_use(scene)
+        self._tell("")
+        self._ask()
+        return ""
+
+    def _ask(self) -> None:
+        """Wish for the response of the scene as it is now."""
+        self.asked += 1
+        self.toml.value = self.scene.to_toml()
+        self._mark()
+        self.worker.ask(self, partial(self._compute, self.scene, self.asked))
+
+    def _tell(self, text: str) -> None:
+        told = f'<p class="refusal" role="alert">{html.escape(text)}</p>' if text else ""
+        if told != self.note.text:
+            self.note.update(text=told, visible=bool(text))
+
+    # ------------------------------------------------------------------ what is shown
+
+    def _compute(self, scene: Scene, number: int, is_overtaken: Callable[[], bool]) -> None:
+        """Find a response, in the thread of the worker."""
+        try:
+            response = respond(scene, lambda: self.over or is_overtaken())
+        except Overtaken:
+            return
+        if not self.over:
+            self.document.add_next_tick_callback(partial(self._show, response, number))
+
+    def _show(self, response: Response, number: int) -> None:
+        if self.over or number <= self.shown:
+            return
+        self.response, self.shown = response, number
+        self.document.hold("collect")
+        try:
+            self.figures.draw(response)
+            self._write()
+            self._mark()
+        finally:
+            self.document.unhold()
+
+    def _mark(self) -> None:
+        """Tell the page what was asked for, what is shown, and how long that took [ms]."""
+        taken = 0.0 if self.response is None else 1e3 * self.response.taken
+        self.numbers.tags = [self.asked, self.shown, taken]
+
+    def _pin(self, _: str, __: Any, active: bool) -> None:
+        self.pinned = self.response if active else None
+        self.pin.label = "Remove pinned" if active else "Compare with pinned: pin this"
+        self.figures.pin(self.pinned)
+        self._write()
+
+    def _write(self) -> None:
+        if self.response is not None:
+            self.numbers.text = table(self.response, self.pinned)
+
+    def _end(self, _: Any) -> None:
+        self.over = True
+        self.worker.drop(self)
+
+
+def table(now: Response, pinned: Response | None) -> str:
+    """Numbers of a response as HTML, beside those of a pinned one."""
+    if now.refusal:
+        return f'<p class="refusal" role="status">{html.escape(now.refusal)}</p>'
+    shown, other = _rows(now), {} if pinned is None else _rows(pinned)
+    lines = []
+    for name in dict.fromkeys([*shown, *other]):
+        cells = f'<th scope="row">{name}</th><td class="now">{_lines(shown.get(name, "–"))}</td>'
+        if pinned is not None:
+            cells += f'<td class="pinned">{_lines(other.get(name, "–"))}</td>'
+        lines.append(f"<tr>{cells}</tr>")
+    head = ""
+    if pinned is not None:
+        head = (
+            '<tr><th></th><th scope="col">now</th><th scope="col" class="pinned">pinned</th></tr>'
+        )
+        lines.append(f'<tr><td colspan="3"><p>{html.escape(_apart(now, pinned))}</p></td></tr>')
+    told = "".join(f"<p>{html.escape(text)}</p>" for text in _notes(now))
+    return f"<table>{head}{''.join(lines)}</table>{told}"
+
+
+def _rows(response: Response) -> dict[str, str]:
+    if response.found is None:
+        return {"Motion": response.refusal}
+    return {**numbers(response.found), "Motion": motion(response.found)}
+
+
+def _notes(response: Response) -> list[str]:
+    return [] if response.found is None else notes(response.found)
+
+
+def _lines(text: str) -> str:
+    """Parts of a text, each on a line of its own."""
+    return "<br>".join(html.escape(part) for part in text.split("; "))
+
+
+def _apart(now: Response, pinned: Response) -> str:
+    """Say in which values two scenes differ."""
+    if now.scene.title != pinned.scene.title:
+        return f"pinned: {pinned.scene.title or 'another scene'}"
+    keys = dict.fromkeys([*keys_of(now.scene), *switch_keys()])
+    others = [f"{key} = {pinned.scene[key]}" for key in keys if pinned.scene[key] != now.scene[key]]
+    more = f" and {len(others) - MOST_NAMED} more" if len(others) > MOST_NAMED else ""
+    return f"pinned: {', '.join(others[:MOST_NAMED])}{more}" if others else "pinned: the same scene"
+
+
+def legend() -> list[tuple[str, str, str]]:
+    """Colours of the curves: kind of line, colour, name."""
+    lines = [("solid", colour, style.MODE_NAMES[mode]) for mode, colour in
+             style.MODE_COLOURS.items()]  # fmt: skip
+    return [*lines, ("dotted", style.PISTON_COLOUR, "piston on bit"),
+            ("solid", style.RULE_COLOUR, "pinned")]  # fmt: skip
+
+
+def page_variables(title: str) -> dict[str, Any]:
+    """What the template of the page takes."""
+    return {"heading": title, "captions": CAPTIONS, "legend": legend()}
