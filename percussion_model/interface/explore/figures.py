@@ -22,10 +22,10 @@ EMPTY = np.zeros(0, np.float32)
 ROOM = 0.05
 CAPTIONS = {
     "stress": (
-        "Stress along piston and bit after the impact, top to bottom. Red is compression, blue "
+        "Stress along piston and bit, top to bottom, from the impact on. Red is compression, blue "
         "tension. The line between the bars is thick while the piston touches the bit."
     ),
-    "forces": "Forces from the impact on, positive in compression.",
+    "forces": "Force of the bit on the rock and of the piston on the bit, positive in compression.",
     "law": (
         "Path of one blow in the law of the rock: force against the penetration of the bit's end "
         "since the impact."
@@ -44,11 +44,11 @@ class Figures:
         self.contact, self.force, self.path = _line(), _by_mode(), _by_mode()
         self.pinned = {name: _line() for name in ("contact", "force", "path")}
         self.forces = panel(
-            "Force on the rock, and of the piston on the bit", "time since the impact [ms]",
+            "Forces over time", "time [ms]",
             "force [kN]", tools=TOOLS, x_range=Range1d(0.0, 1.0),
         )  # fmt: skip
         self.law = panel(
-            "Force against penetration", "penetration since the impact [mm]", "bit force [kN]",
+            "Force against penetration", "penetration [mm]", "bit force [kN]",
             tools=TOOLS, x_range=Range1d(0.0, 1.0),
         )  # fmt: skip
         _draw(self.forces, self.pinned["contact"], style.RULE_COLOUR, line_dash="dotted")
@@ -64,7 +64,7 @@ class Figures:
 
     def _stress(self) -> Any:
         made = panel(
-            "Axial stress in piston and bit", "time since the impact [µs]",
+            "Stress in piston and bit", "time [µs]",
             "depth below the top [mm]", tools=TOOLS, height=340,
             x_range=Range1d(0.0, 1.0), y_range=Range1d(1.0, 0.0),
         )  # fmt: skip

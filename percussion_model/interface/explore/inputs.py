@@ -7,6 +7,7 @@ import math
 from collections.abc import Callable, Iterator
 from typing import Any
 
+from bokeh.layouts import column
 from bokeh.layouts import row as side_by_side
 from bokeh.models import Checkbox, Div, LayoutDOM, Select, Slider, TextInput
 
@@ -32,6 +33,8 @@ MOST_SECTIONS = 6
 _OF_STRINGS = ("string", "joints", "damper")
 # A slider has so many steps, about; its values have so many digits.
 STEPS, DIGITS = 200, 10
+# Outside of these numbers are written with an exponent.
+LEAST_PLAIN, LARGEST_PLAIN = 1e-4, 1e6
 # No number is written with more characters.
 LONGEST = 60
 
@@ -39,7 +42,8 @@ WIDGETS = """
 :host { font: 15px/1.35 system-ui, "Segoe UI", Roboto, "DejaVu Sans", sans-serif; }
 .bk-input:focus, .noUi-handle:focus, .bk-btn:focus, input:focus, textarea:focus, select:focus {
   outline: 3px solid #0072B2 !important; outline-offset: 1px; }
-.bk-slider-title { white-space: normal; }
+.bk-input-group label, label { white-space: normal; }
+.key { color: #5f6368; font: 12.5px ui-monospace, "DejaVu Sans Mono", monospace; }
 .noUi-handle { border-radius: 4px; }
 :host(.refused) .bk-input { border-color: #D55E00; background: #FFF4E0; }
 """
@@ -66,8 +70,11 @@ def range_of(row: Row, value: float) -> tuple[float, float, float]:
 
 
 def short(value: float) -> str:
-    """A number as a scene file has it, without the rounding of a slider."""
-    return f"{float(f'{value:.{DIGITS}g}')!r}"
+    """A number as one writes it in a scene, without the rounding of a slider: 0.04, 2500, 7.5e8."""
+    if value == 0.0 or LEAST_PLAIN <= abs(value) < LARGEST_PLAIN:
+        return f"{value:.{DIGITS}g}"
+    mantissa, _, exponent = f"{value:.{DIGITS - 1}e}".partition("e")
+    return f"{mantissa.rstrip('0').rstrip('.')}e{int(exponent)}"
 
 
 class Entry:
@@ -79,7 +86,7 @@ class Entry:
         value = float(scene[key])
         start, end, step = range_of(self.row, value)
         self.slider = Slider(
-            start=start, end=end, step=step, value=value, title=label_of(self.row, key),
+            start=start, end=end, step=step, value=value,
             show_value=False, tooltips=False, name=key, stylesheets=[WIDGETS],
             sizing_mode="stretch_width", bar_color="#0072B2",
         )  # fmt: skip
@@ -87,6 +94,12 @@ class Entry:
             value=short(value), width=112, name=f"{key} field", stylesheets=[WIDGETS],
             max_length=LONGEST,
         )  # fmt: skip
+        named = f'<span class="name">{html.escape(label_of(self.row, key))}</span>'
+        self.label = Div(
+            text=f'{named} <span class="key">{key}</span>',
+            sizing_mode="stretch_width",
+            stylesheets=[WIDGETS],
+        )
         self.note = Div(text="", visible=False, sizing_mode="stretch_width", stylesheets=[WIDGETS])
         self._quiet = False
         self.slider.on_change("value", self._slid)
@@ -94,10 +107,10 @@ class Entry:
         self.show_use(scene)
 
     @property
-    def layout(self) -> list[LayoutDOM]:
-        """The row of both, and the note below."""
-        pair = side_by_side(self.slider, self.field, sizing_mode="stretch_width", spacing=12)
-        return [pair, self.note]
+    def layout(self) -> LayoutDOM:
+        """The label, the row of both, and the note below."""
+        pair = side_by_side(self.slider, self.field, sizing_mode="stretch_width", spacing=14)
+        return column(self.label, pair, self.note, sizing_mode="stretch_width", spacing=0)
 
     def show_use(self, scene: Scene) -> None:
         """Grey out what has no effect in a scene, and say what it needs."""

@@ -45,15 +45,16 @@ else refused();
 """
 NUMBERS = """
 :host { font: 15px/1.4 system-ui, "Segoe UI", Roboto, "DejaVu Sans", sans-serif; }
-table { width: 100%; border-collapse: collapse; }
-th, td { padding: .2rem .5rem .2rem 0; border-bottom: 1px solid #dcdfe3; text-align: left;
-  vertical-align: top; font-weight: 400; }
-td.now { font-weight: 600; font-variant-numeric: tabular-nums; }
-td.pinned, th.pinned { color: #6b6b6b; font-variant-numeric: tabular-nums; }
+.bk-clearfix { display: block !important; width: 100%; }
+dl { display: grid; gap: .5rem .8rem; margin: 0;
+  grid-template-columns: repeat(auto-fit, minmax(9.4rem, 1fr)); }
+dl div { padding-left: .5rem; border-left: 3px solid #0072B2; }
+dt { color: #5f6368; font-size: 13px; }
+dd { margin: 0; font-weight: 600; font-variant-numeric: tabular-nums; }
+dd.pinned { color: #6b6b6b; font-weight: 400; }
 p { margin: .35rem 0; color: #5f6368; font-size: 14px; }
 p.refusal, p.warning { padding: .4rem .6rem; color: #1a1a1a; background: #fff4e0;
   border-left: 4px solid #e69f00; }
-.line { white-space: nowrap; }
 """
 
 
@@ -95,7 +96,7 @@ class Explorer:
         self.preset.on_change("value", self._choose)
         self.reset = Button(label="Reset", name="reset", **more)
         self.reset.on_click(self._reset)
-        self.pin = Toggle(label="Compare with pinned: pin this", name="pin", **more)
+        self.pin = Toggle(label="Pin to compare", name="pin", **more)
         self.pin.on_change("active", self._pin)
         self.copied = Div(text="", name="copied", stylesheets=[NUMBERS])
         self.toml = TextAreaInput(
@@ -108,6 +109,8 @@ class Explorer:
                         sizing_mode="stretch_width")  # fmt: skip
         self.numbers = Div(text="<p>computing …</p>", name="numbers", stylesheets=[NUMBERS],
                            sizing_mode="stretch_width", tags=[0, 0, 0.0])  # fmt: skip
+        self.remarks = Div(text="", name="remarks", stylesheets=[NUMBERS],
+                           sizing_mode="stretch_width")  # fmt: skip
         told = CustomJS(code="window.explorer?.(cb_obj.tags)")
         self.numbers.js_on_change("tags", told)
         self.inputs = column(name="inputs", sizing_mode="stretch_width", spacing=6)
@@ -118,9 +121,11 @@ class Explorer:
         for name, made in (("stress", figures.stress), ("forces", figures.forces),
                            ("law", figures.law)):  # fmt: skip
             made.name = name
-        return [self.preset, self.reset, self.pin, self.copy, self.copied, self.note, self.inputs,
-                self.switches, self.numbers, self.toml, figures.stress, figures.forces,
-                figures.law]  # fmt: skip
+        return [
+            *(self.preset, self.reset, self.pin, self.copy, self.copied, self.note),
+            *(self.inputs, self.switches, self.numbers, self.remarks, self.toml),
+            *(figures.stress, figures.forces, figures.law),
+        ]
 
     # ------------------------------------------------------------------ what is asked for
 
@@ -128,7 +133,7 @@ class Explorer:
         """Start from a scene: inputs of its own."""
         self.first = self.scene = scene
         self.entries = [Entry(key, scene, self._change) for key in keys_of(scene)]
-        self.inputs.children = [made for entry in self.entries for made in entry.layout]
+        self.inputs.children = [entry.layout for entry in self.entries]
         changed = [Switch(key, scene, self._change, self._tell) for key in switch_keys()]
         self.effects = changed
         self.switches.children = [switch.widget for switch in changed]
@@ -206,48 +211,46 @@ class Explorer:
 
     def _pin(self, _: str, __: Any, active: bool) -> None:
         self.pinned = self.response if active else None
-        self.pin.label = "Remove pinned" if active else "Compare with pinned: pin this"
+        self.pin.label = "Remove pinned" if active else "Pin to compare"
         self.figures.pin(self.pinned)
         self._write()
 
     def _write(self) -> None:
         if self.response is not None:
-            self.numbers.text = table(self.response, self.pinned)
+            self.numbers.text = cards(self.response, self.pinned)
+            self.remarks.text = remarks(self.response, self.pinned)
 
     def _end(self, _: Any) -> None:
         self.over = True
         self.worker.drop(self)
 
 
-def table(now: Response, pinned: Response | None) -> str:
-    """Numbers of a response as HTML, beside those of a pinned one."""
+def cards(now: Response, pinned: Response | None) -> str:
+    """Numbers of a response as HTML, above those of a pinned one."""
     if now.refusal:
         return f'<p class="refusal" role="status">{html.escape(now.refusal)}</p>'
     shown, other = _rows(now), {} if pinned is None else _rows(pinned)
-    lines = []
+    made = []
     for name in dict.fromkeys([*shown, *other]):
-        cells = f'<th scope="row">{name}</th><td class="now">{_lines(shown.get(name, "–"))}</td>'
+        parts = f'<dt>{name}</dt><dd class="now">{_lines(shown.get(name, "–"))}</dd>'
         if pinned is not None:
-            cells += f'<td class="pinned">{_lines(other.get(name, "–"))}</td>'
-        lines.append(f"<tr>{cells}</tr>")
-    head = ""
+            parts += f'<dd class="pinned">{_lines(other.get(name, "–"))}</dd>'
+        made.append(f"<div>{parts}</div>")
+    return f"<dl>{''.join(made)}</dl>"
+
+
+def remarks(now: Response, pinned: Response | None) -> str:
+    """What one must know of the numbers, as HTML: what is pinned, what ± is of, warnings."""
+    told = [] if now.found is None else notes(now.found)
     if pinned is not None:
-        head = (
-            '<tr><th></th><th scope="col">now</th><th scope="col" class="pinned">pinned</th></tr>'
-        )
-        lines.append(f'<tr><td colspan="3"><p>{html.escape(_apart(now, pinned))}</p></td></tr>')
-    told = "".join(f"<p>{html.escape(text)}</p>" for text in _notes(now))
-    return f"<table>{head}{''.join(lines)}</table>{told}"
+        told.insert(0, f"In grey, pinned: {_apart(now, pinned)}.")
+    return "".join(f"<p>{html.escape(text)}</p>" for text in told)
 
 
 def _rows(response: Response) -> dict[str, str]:
     if response.found is None:
         return {"Motion": response.refusal}
     return {**numbers(response.found), "Motion": motion(response.found)}
-
-
-def _notes(response: Response) -> list[str]:
-    return [] if response.found is None else notes(response.found)
 
 
 def _lines(text: str) -> str:
@@ -258,11 +261,11 @@ def _lines(text: str) -> str:
 def _apart(now: Response, pinned: Response) -> str:
     """Say in which values two scenes differ."""
     if now.scene.title != pinned.scene.title:
-        return f"pinned: {pinned.scene.title or 'another scene'}"
+        return pinned.scene.title or "another scene"
     keys = dict.fromkeys([*keys_of(now.scene), *switch_keys()])
     others = [f"{key} = {pinned.scene[key]}" for key in keys if pinned.scene[key] != now.scene[key]]
     more = f" and {len(others) - MOST_NAMED} more" if len(others) > MOST_NAMED else ""
-    return f"pinned: {', '.join(others[:MOST_NAMED])}{more}" if others else "pinned: the same scene"
+    return f"{', '.join(others[:MOST_NAMED])}{more}" if others else "the same scene"
 
 
 def legend() -> list[tuple[str, str, str]]:
