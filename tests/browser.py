@@ -216,9 +216,11 @@ class Tab:
         raise TimeoutError(f"never true: {expression}")
 
     async def press(self, key: str, text: str = "") -> None:
-        """Press and release a key, by its name; `text` is what it writes."""
+        """Press and release a key, by its name, as ShiftTab; `text` is what it writes."""
+        shift = 8 if key.startswith("Shift") else 0
+        key = key.removeprefix("Shift")
         code = KEYS.get(key, 0)
-        more = {"key": key, "code": key, "windowsVirtualKeyCode": code}
+        more = {"key": key, "code": key, "windowsVirtualKeyCode": code, "modifiers": shift}
         down = {"type": "keyDown", "text": text} if text else {"type": "rawKeyDown"}
         await self.call("Input.dispatchKeyEvent", **down, **more)
         await self.call("Input.dispatchKeyEvent", type="keyUp", **more)

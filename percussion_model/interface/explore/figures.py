@@ -10,7 +10,7 @@ from bokeh.palettes import interp_palette
 
 from percussion_model.interface.explore.response import Response
 from percussion_model.interface.plotting import style
-from percussion_model.interface.plotting.interactive import panel, source
+from percussion_model.interface.plotting.interactive import panel
 from percussion_model.interface.plotting.interactive_run import STRESS_COLOURS, image_rows
 from percussion_model.interface.plotting.style import KN, MM, MPA, MS, US
 from percussion_model.interface.plotting.window import Window
@@ -92,7 +92,7 @@ class Figures:
             lines = {mode: (xs, ys) for mode, xs, ys in style.by_mode(x, y, modes)}
             for mode, columns in sources.items():
                 xs, ys = lines.get(mode, (EMPTY, EMPTY))
-                columns.data = dict(source(x=xs, y=ys).data)
+                columns.data = _columns(xs, ys)
         if window is None:
             return
         _move(self.forces.x_range, min(0.0, float(window.time[0])) * MS, window.active_until * MS)
@@ -139,8 +139,13 @@ class Figures:
         return [self.stress.x_range.start, self.stress.x_range.end]
 
 
+def _columns(x: np.ndarray, y: np.ndarray) -> dict[str, np.ndarray]:
+    """Columns of a line, with single precision, which no eye can tell."""
+    return {"x": np.asarray(x, np.float32), "y": np.asarray(y, np.float32)}
+
+
 def _line() -> ColumnDataSource:
-    return source(x=EMPTY, y=EMPTY)
+    return ColumnDataSource(_columns(EMPTY, EMPTY))
 
 
 def _pairs() -> ColumnDataSource:
@@ -200,4 +205,4 @@ def _curves(window: Window | None) -> dict[str, Any]:
         pushed = np.nan_to_num(window.samples["contact_force"][: len(time)]) / KN
         depth = np.where(modes == Mode.FF, np.nan, depth)
     lines = {"contact": (time, pushed), "force": (time, force), "path": (depth, resistance)}
-    return {name: dict(source(x=x, y=y).data) for name, (x, y) in lines.items()}
+    return {name: _columns(x, y) for name, (x, y) in lines.items()}

@@ -100,7 +100,13 @@ class Entry:
             sizing_mode="stretch_width",
             stylesheets=[WIDGETS],
         )
-        self.note = Div(text="", visible=False, sizing_mode="stretch_width", stylesheets=[WIDGETS])
+        self.note = Div(
+            name=f"{key} note",
+            text="",
+            visible=False,
+            sizing_mode="stretch_width",
+            stylesheets=[WIDGETS],
+        )
         self._quiet = False
         self.slider.on_change("value", self._slid)
         self.field.on_change("value", self._typed)

@@ -46,11 +46,12 @@ else refused();
 NUMBERS = """
 :host { font: 15px/1.4 system-ui, "Segoe UI", Roboto, "DejaVu Sans", sans-serif; }
 .bk-clearfix { display: block !important; width: 100%; }
-dl { display: grid; gap: .5rem .8rem; margin: 0;
-  grid-template-columns: repeat(auto-fit, minmax(9.4rem, 1fr)); }
+dl { display: grid; gap: .5rem .6rem; margin: 0;
+  grid-template-columns: repeat(auto-fit, minmax(9.8rem, 1fr)); }
 dl div { padding-left: .5rem; border-left: 3px solid #0072B2; }
 dt { color: #5f6368; font-size: 13px; }
-dd { margin: 0; font-weight: 600; font-variant-numeric: tabular-nums; }
+dd { margin: 0; font-size: 14.5px; font-weight: 600; font-variant-numeric: tabular-nums;
+  white-space: nowrap; }
 dd.pinned { color: #6b6b6b; font-weight: 400; }
 p { margin: .35rem 0; color: #5f6368; font-size: 14px; }
 p.refusal, p.warning { padding: .4rem .6rem; color: #1a1a1a; background: #fff4e0;
@@ -236,7 +237,19 @@ def cards(now: Response, pinned: Response | None) -> str:
         if pinned is not None:
             parts += f'<dd class="pinned">{_lines(other.get(name, "–"))}</dd>'
         made.append(f"<div>{parts}</div>")
-    return f"<dl>{''.join(made)}</dl>"
+    return f"<dl>{''.join(made)}</dl>{_motions(now, pinned)}"
+
+
+def _motions(now: Response, pinned: Response | None) -> str:
+    """Say how the blows follow each other, now and in what is pinned."""
+    told = [f"<p>Motion: <b>{html.escape(_motion(now))}</b></p>"]
+    if pinned is not None and _motion(pinned) != _motion(now):
+        told.append(f"<p>Motion, pinned: {html.escape(_motion(pinned))}</p>")
+    return "".join(told)
+
+
+def _motion(response: Response) -> str:
+    return response.refusal if response.found is None else motion(response.found)
 
 
 def remarks(now: Response, pinned: Response | None) -> str:
@@ -248,9 +261,7 @@ def remarks(now: Response, pinned: Response | None) -> str:
 
 
 def _rows(response: Response) -> dict[str, str]:
-    if response.found is None:
-        return {"Motion": response.refusal}
-    return {**numbers(response.found), "Motion": motion(response.found)}
+    return {} if response.found is None else numbers(response.found)
 
 
 def _lines(text: str) -> str:

@@ -112,9 +112,9 @@ def respond(
         refuse_scene(scene)
         found = settled(scene, progress=look, most_time=most_time, error_estimate=True)
         look()
-        # what follows the last blow is not needed, and is not reached
-        until = math.inf if len(found.blows) else found.duration
-        window = blow_window(scene, found.blows, until, EVERY)
+        # the run stopped where its last blow ended: a whole one more is sure to end it again
+        after = float(found.blows[-1]["period"]) if len(found.blows) else 0.0
+        window = blow_window(scene, found.blows, found.duration + after, EVERY)
         look()
         fields = stress_fields(window, EVERY)
     except (SceneError, SimulationError, NotRepeatable) as error:
