@@ -74,7 +74,7 @@ def main() -> None:
     )  # fmt: skip
     try:
         url = server.stdout.readline().split()[0]
-        with tempfile.TemporaryDirectory() as folder:
+        with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
             times = asyncio.run(measure(url, Path(folder), moves))
     finally:
         server.terminate()
