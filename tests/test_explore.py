@@ -31,10 +31,10 @@ pytest.importorskip("bokeh", reason="the explorer needs bokeh")
 from percussion_model.interface.explore.inputs import KEYS, keys_of, range_of, short
 from percussion_model.interface.explore.response import (
     Overtaken,
-    notes,
     numbers,
     refuse_scene,
     respond,
+    verdict,
 )
 from percussion_model.interface.explore.worker import Worker
 
@@ -88,10 +88,10 @@ def test_an_undecided_rate_is_said_and_not_shown():
     found = respond(Scene()).found
     by_cells = replace(found, depends_on_cells=True)
     assert numbers(by_cells)[RATE] == "undecided"
-    assert any("depends on the resolution" in text for text in notes(by_cells))
+    assert any("depends on the resolution" in text for text in verdict(by_cells))
     unsure = replace(found, grid_errors=found.grid_errors | {"rate_of_penetration": 1.0})
     assert numbers(unsure)[RATE] == "undecided"
-    assert any("no smaller than the rate" in text for text in notes(unsure))
+    assert any("no smaller than the rate" in text for text in verdict(unsure))
 
 
 def test_a_hammer_that_stalls_has_no_rate():

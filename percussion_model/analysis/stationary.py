@@ -61,6 +61,8 @@ STEADY = 0.9
 LEAST_LIMIT = 32
 # Numbers whose errors by the grid are estimated: rate, period, and other means over blows.
 _RATE, _PERIOD = "rate_of_penetration", "blow_period"
+# Smaller efficiencies are rounding.
+ROUNDING = 1e-12
 MEANS = ("blow_frequency", "impact_velocity", "transfer_efficiency")
 _JUDGED = (_RATE, _PERIOD, *MEANS)
 # Grids are compared over so many blows at least; where the motion is periodic, over the last
@@ -222,6 +224,8 @@ class Settled:
         if self.kind == "stalled":
             return dict.fromkeys(MEANS, math.nan)
         found = numbers_over(self.counted)
+        # sums of energies that cancel leave their rounding
+        found["transfer_efficiency"] *= abs(found["transfer_efficiency"]) > ROUNDING
         return {name: found[name] for name in MEANS}
 
     @property

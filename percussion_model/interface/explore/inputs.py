@@ -5,6 +5,7 @@ from __future__ import annotations
 import html
 import math
 from collections.abc import Callable, Iterator
+from functools import cached_property
 from typing import Any
 
 from bokeh.layouts import column
@@ -112,11 +113,20 @@ class Entry:
         self.field.on_change("value", self._typed)
         self.show_use(scene)
 
-    @property
+    @cached_property
     def layout(self) -> LayoutDOM:
         """The label, the row of both, and the note below."""
         pair = side_by_side(self.slider, self.field, sizing_mode="stretch_width", spacing=14)
         return column(self.label, pair, self.note, sizing_mode="stretch_width", spacing=0)
+
+    def start(self, scene: Scene) -> None:
+        """Take the value of a scene to start from."""
+        value = float(scene[self.key])
+        start, end, step = range_of(self.row, value)
+        self._set(self.slider, value, start=start, end=end, step=step)
+        self._set(self.field, short(value))
+        self._tell("")
+        self.show_use(scene)
 
     def show_use(self, scene: Scene) -> None:
         """Grey out what has no effect in a scene, and say what it needs."""
@@ -192,6 +202,12 @@ class Switch:
         self.widget.on_change(self.property, self._chosen)
         self.show_use(scene)
 
+    def start(self, scene: Scene) -> None:
+        """Take the value of a scene to start from."""
+        self.kept = scene[self.key]
+        self._go_back()
+        self.show_use(scene)
+
     def show_use(self, scene: Scene) -> None:
         """Grey out what has no effect in a scene."""
         needed = scene.matters(self.key)
@@ -203,9 +219,12 @@ class Switch:
             return
         refused = self.change(self.key, value)
         self.tell(refused)
-        if not refused:
+        if refused:
+            self._go_back()
+        else:
             self.kept = value
-            return
+
+    def _go_back(self) -> None:
         self._quiet = True
         try:
             self.widget.update(**{self.property: self.kept})

@@ -27,6 +27,7 @@ from percussion_model.interface.explore.response import (
     notes,
     numbers,
     respond,
+    verdict,
 )
 from percussion_model.interface.explore.worker import Worker
 from percussion_model.interface.plotting import style
@@ -46,11 +47,10 @@ else refused();
 NUMBERS = """
 :host { font: 15px/1.4 system-ui, "Segoe UI", Roboto, "DejaVu Sans", sans-serif; }
 .bk-clearfix { display: block !important; width: 100%; }
-dl { display: grid; gap: .5rem .6rem; margin: 0;
-  grid-template-columns: repeat(auto-fit, minmax(9.8rem, 1fr)); }
-dl div { padding-left: .5rem; border-left: 3px solid #0072B2; }
-dt { color: #5f6368; font-size: 13px; }
-dd { margin: 0; font-size: 14.5px; font-weight: 600; font-variant-numeric: tabular-nums;
+dl { display: flex; flex-wrap: wrap; gap: .5rem .9rem; margin: 0; }
+dl div { padding-left: .45rem; min-width: 8.4rem; border-left: 3px solid #0072B2; }
+dt { color: #5f6368; font-size: 12.5px; }
+dd { margin: 0; font-size: 13.5px; font-weight: 600; font-variant-numeric: tabular-nums;
   white-space: nowrap; }
 dd.pinned { color: #6b6b6b; font-weight: 400; }
 p { margin: .35rem 0; color: #5f6368; font-size: 14px; }
@@ -80,7 +80,11 @@ class Explorer:
         self.asked = self.shown = 0
         self.response: Response | None = None
         self.pinned: Response | None = None
+        self.pinned_from = ""
         self.over = False
+        self.made: dict[str, Entry] = {}
+        self.entries: list[Entry] = []
+        self.effects: list[Switch] = []
         self._make_widgets()
         self._take(scenes[next(iter(scenes))]())
         for made in self._roots():
@@ -101,7 +105,7 @@ class Explorer:
         self.pin.on_change("active", self._pin)
         self.copied = Div(text="", name="copied", stylesheets=[NUMBERS])
         self.toml = TextAreaInput(
-            title="the scene as a file for `percussion run`", name="toml", rows=14,
+            title="the scene as a file for percussion run", name="toml", rows=14,
             max_length=None, sizing_mode="stretch_width", **more,
         )  # fmt: skip
         self.copy = Button(label="Copy as TOML", name="copy", **more)
@@ -131,13 +135,25 @@ class Explorer:
     # ------------------------------------------------------------------ what is asked for
 
     def _take(self, scene: Scene) -> None:
-        """Start from a scene: inputs of its own."""
+        """Start from a scene: inputs of its own, which are made once."""
         self.first = self.scene = scene
-        self.entries = [Entry(key, scene, self._change) for key in keys_of(scene)]
-        self.inputs.children = [entry.layout for entry in self.entries]
-        changed = [Switch(key, scene, self._change, self._tell) for key in switch_keys()]
-        self.effects = changed
-        self.switches.children = [switch.widget for switch in changed]
+        shown = []
+        for key in keys_of(scene):
+            if key not in self.made:
+                self.made[key] = Entry(key, scene, self._change)
+            shown.append(self.made[key])
+        for entry in shown:
+            entry.start(scene)
+        layouts = [entry.layout for entry in shown]
+        if layouts != self.inputs.children:
+            self.inputs.children = layouts
+        if not self.effects:
+            keys = switch_keys()
+            self.effects = [Switch(key, scene, self._change, self._tell) for key in keys]
+            self.switches.children = [switch.widget for switch in self.effects]
+        for switch in self.effects:
+            switch.start(scene)
+        self.entries = shown
         self._ask()
 
     def _choose(self, _: str, __: Any, name: str) -> None:
@@ -212,6 +228,7 @@ class Explorer:
 
     def _pin(self, _: str, __: Any, active: bool) -> None:
         self.pinned = self.response if active else None
+        self.pinned_from = self.preset.value
         self.pin.label = "Remove pinned" if active else "Pin to compare"
         self.figures.pin(self.pinned)
         self._write()
@@ -219,7 +236,8 @@ class Explorer:
     def _write(self) -> None:
         if self.response is not None:
             self.numbers.text = cards(self.response, self.pinned)
-            self.remarks.text = remarks(self.response, self.pinned)
+            name = "" if self.pinned_from == self.preset.value else self.pinned_from
+            self.remarks.text = remarks(self.response, self.pinned, name)
 
     def _end(self, _: Any) -> None:
         self.over = True
@@ -252,11 +270,18 @@ def _motion(response: Response) -> str:
     return response.refusal if response.found is None else motion(response.found)
 
 
-def remarks(now: Response, pinned: Response | None) -> str:
-    """What one must know of the numbers, as HTML: what is pinned, what ± is of, warnings."""
+def remarks(now: Response, pinned: Response | None, name: str) -> str:
+    """What one must know of the numbers, as HTML: what is pinned, what ± is of, warnings.
+
+    Parameters
+    ----------
+    now, pinned : Response
+    name : str
+        What the pinned one started from, if that is another scene.
+    """
     told = [] if now.found is None else notes(now.found)
     if pinned is not None:
-        told.insert(0, f"In grey, pinned: {_apart(now, pinned)}.")
+        told.insert(0, f"In grey, pinned: {name or _apart(now, pinned)}.")
     return "".join(f"<p>{html.escape(text)}</p>" for text in told)
 
 
@@ -271,8 +296,6 @@ def _lines(text: str) -> str:
 
 def _apart(now: Response, pinned: Response) -> str:
     """Say in which values two scenes differ."""
-    if now.scene.title != pinned.scene.title:
-        return pinned.scene.title or "another scene"
     keys = dict.fromkeys([*keys_of(now.scene), *switch_keys()])
     others = [f"{key} = {pinned.scene[key]}" for key in keys if pinned.scene[key] != now.scene[key]]
     more = f" and {len(others) - MOST_NAMED} more" if len(others) > MOST_NAMED else ""

@@ -153,8 +153,8 @@ def motion(found: Settled) -> str:
     return f"{found.motion}{on_other_grids(found)}"
 
 
-def notes(found: Settled) -> list[str]:
-    """Say what one must know of the numbers: no rate, undecided, what ± is of, warnings."""
+def verdict(found: Settled) -> list[str]:
+    """Say in words where there is no rate, where it is undecided, and where blows differ."""
     told = []
     if found.kind == "stalled":
         told.append("The blows have ceased: there is no rate and no period.")
@@ -162,10 +162,14 @@ def notes(found: Settled) -> list[str]:
         told.append(f"The blows do not repeat: numbers are means over {len(found.counted)} blows.")
     if found.rate_of_penetration_undecided:
         told.append(
-            "Without structural loss the rate depends on the resolution and on nothing else."
+            "Without structural loss the rate depends on the resolution: it is undecided."
             if found.depends_on_cells
-            else "The error of the rate is no smaller than the rate."
+            else "The error of the rate is no smaller than the rate: it is undecided."
         )
-    elif found.error_of:
-        told.append(settled_error(found))
-    return [*told, *(f"Warning: {text}" for text in found.warnings)]
+    return told
+
+
+def notes(found: Settled) -> list[str]:
+    """Say what ± is of, and the warnings."""
+    of_what = [settled_error(found)] if found.error_of else []
+    return [*of_what, *(f"Warning: {text}" for text in found.warnings)]
