@@ -98,7 +98,7 @@ def test_a_hammer_that_stalls_has_no_rate():
     response = respond(Scene(effects={"drive": "none"}))
     assert response.found.kind == "stalled"
     assert RATE not in numbers(response.found)
-    assert any("have ceased" in text for text in notes(response.found))
+    assert any("have ceased" in text for text in verdict(response.found))
     assert response.window is not None
 
 
@@ -428,7 +428,7 @@ def test_a_pinned_response_stays_and_reset_goes_back(served, tmp_path):
             # without a drive blows cease, which is said in words
             await set_input(page, "effects.drive", "none")
             assert set((await shown_numbers(page)).values()) == {"–"}
-            assert "stalled" in await page.ask(f"{MODEL}('numbers').text")
+            assert "The blows have ceased" in await page.ask(f"{MODEL}('numbers').text")
             asked = await page.ask(f"{MODEL}('numbers').tags[0]")
             await page.ask(f"{MODEL}('reset').trigger_event(new (Bokeh.require('core/bokeh_events')"
                            f".ButtonClick)()); 0")  # fmt: skip

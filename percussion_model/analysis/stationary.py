@@ -61,7 +61,7 @@ STEADY = 0.9
 LEAST_LIMIT = 32
 # Numbers whose errors by the grid are estimated: rate, period, and other means over blows.
 _RATE, _PERIOD = "rate_of_penetration", "blow_period"
-# Smaller efficiencies are rounding.
+# Smaller ones, and smaller errors of them, are rounding.
 ROUNDING = 1e-12
 MEANS = ("blow_frequency", "impact_velocity", "transfer_efficiency")
 _JUDGED = (_RATE, _PERIOD, *MEANS)
@@ -224,9 +224,8 @@ class Settled:
         if self.kind == "stalled":
             return dict.fromkeys(MEANS, math.nan)
         found = numbers_over(self.counted)
-        # sums of energies that cancel leave their rounding
-        found["transfer_efficiency"] *= abs(found["transfer_efficiency"]) > ROUNDING
-        return {name: found[name] for name in MEANS}
+        # of energies that cancel their rounding is left
+        return {name: 0.0 if abs(found[name]) < ROUNDING else found[name] for name in MEANS}
 
     @property
     def mean_errors(self) -> dict[str, float]:
@@ -240,7 +239,8 @@ class Settled:
             settling = {name: abs(last[name] - before[name]) for name in MEANS}
         else:
             settling = scatter_over(counted)
-        return {name: self._with_grid(name, settling.get(name, math.nan)) for name in MEANS}
+        found = {name: self._with_grid(name, settling.get(name, math.nan)) for name in MEANS}
+        return {name: 0.0 if error < ROUNDING else error for name, error in found.items()}
 
     def summary(self) -> dict[str, Any]:
         """Return the numbers as plain values for JSON; None is what is not defined."""

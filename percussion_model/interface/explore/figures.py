@@ -45,11 +45,11 @@ class Figures:
         self.pinned = {name: _line() for name in ("contact", "force", "path")}
         self.forces = panel(
             "Forces over time", "time [ms]",
-            "force [kN]", tools=TOOLS, x_range=Range1d(0.0, 1.0),
+            "force [kN]", tools=TOOLS, x_range=Range1d(0.0, 1.0), y_range=Range1d(0.0, 1.0),
         )  # fmt: skip
         self.law = panel(
             "Force against penetration", "penetration [mm]", "bit force [kN]",
-            tools=TOOLS, x_range=Range1d(0.0, 1.0),
+            tools=TOOLS, x_range=Range1d(0.0, 1.0), y_range=Range1d(0.0, 1.0),
         )  # fmt: skip
         _draw(self.forces, self.pinned["contact"], style.RULE_COLOUR, line_dash="dotted")
         _draw(self.forces, self.pinned["force"], style.RULE_COLOUR)
@@ -93,6 +93,7 @@ class Figures:
             for mode, columns in sources.items():
                 xs, ys = lines.get(mode, (EMPTY, EMPTY))
                 columns.data = _columns(xs, ys)
+        self._fit()
         if window is None:
             return
         _move(self.forces.x_range, min(0.0, float(window.time[0])) * MS, window.active_until * MS)
@@ -103,6 +104,20 @@ class Figures:
         curves = _curves(None if response is None else response.window)
         for name, columns in self.pinned.items():
             columns.data = curves[name]
+        self._fit()
+
+    def _fit(self) -> None:
+        """Let the axes of forces span what is drawn, now and pinned."""
+        for made, drawn in (
+            (self.forces, (self.contact, *self.force.values(), self.pinned["contact"],
+                           self.pinned["force"])),
+            (self.law, (*self.path.values(), self.pinned["path"])),
+        ):  # fmt: skip
+            values = np.concatenate([columns.data["y"] for columns in drawn])
+            values = values[np.isfinite(values)]
+            low, high = (float(values.min()), float(values.max())) if len(values) else (0.0, 1.0)
+            room = ROOM * (high - low) or 1.0
+            _move(made.y_range, low - room, high + room)
 
     def _draw_stress(self, response: Response) -> None:
         fields, window = response.fields, response.window

@@ -255,7 +255,9 @@ def cards(now: Response, pinned: Response | None) -> str:
         if pinned is not None:
             parts += f'<dd class="pinned">{_lines(other.get(name, "–"))}</dd>'
         made.append(f"<div>{parts}</div>")
-    return f"<dl>{''.join(made)}</dl>{_motions(now, pinned)}"
+    told = [] if now.found is None else verdict(now.found)
+    words = "".join(f'<p class="warning" role="status">{html.escape(text)}</p>' for text in told)
+    return f"<dl>{''.join(made)}</dl>{_motions(now, pinned)}{words}"
 
 
 def _motions(now: Response, pinned: Response | None) -> str:
