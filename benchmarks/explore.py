@@ -3,13 +3,15 @@
 `python -m benchmarks.explore` moves the slider of the feed force on the reference hammer, and tells
 the medians of three parts: computing (the server's own clock), drawing (from the arrival of
 the numbers to the end of the next frame), and what is left: the way there and back, with what
-bokeh makes of it. Take figures for the record on an idle machine, with compiled kernels.
+bokeh makes of it. The processor time of the server stands beside it: on a busy machine it
+changes less. Take figures for the record on an idle machine, with compiled kernels.
 """
 
 from __future__ import annotations
 
 import argparse
 import asyncio
+import math
 import os
 import statistics
 import subprocess
@@ -49,15 +51,37 @@ new Promise(done => {
 """
 
 
-async def measure(url: str, folder: Path, count: int) -> list[list[float]]:
-    """Times of so many moves, each after the one before is drawn [ms]."""
+def processor_time(pid: int) -> float:
+    """Processor time of a process that still runs [s]; NaN where the system does not tell."""
+    file = Path(f"/proc/{pid}/stat")
+    if not file.exists():
+        return math.nan
+    fields = file.read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+async def measure(url: str, folder: Path, count: int, pid: int) -> tuple[list[Any], float]:
+    """Times of so many moves, each after the one before is drawn, and of the processor [ms].
+
+    Parameters
+    ----------
+    url : str
+    folder : Path
+        For the browser.
+    count : int
+    pid : int
+        Of the server.
+    """
     with browser(folder) as port:
         async with tab(port) as page:
             await page.open(url)
             await page.until(READY)
             await page.wait(1000)
-            times = [await page.ask(MOVE % (2000.0 + 100.0 * k)) for k in range(count + 3)]
-            return times[3:]
+            for k in range(3):
+                await page.ask(MOVE % (1500.0 + 100.0 * k))
+            used = processor_time(pid)
+            times = [await page.ask(MOVE % (2000.0 + 100.0 * k)) for k in range(count)]
+            return times, 1e3 * (processor_time(pid) - used) / count
 
 
 def main() -> None:
@@ -75,7 +99,8 @@ def main() -> None:
     try:
         url = server.stdout.readline().split()[0]
         with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
-            times = asyncio.run(measure(url, Path(folder), moves))
+            work = measure(url, Path(folder), moves, server.pid)
+            times, used = asyncio.run(work)
     finally:
         server.terminate()
         server.wait()
@@ -86,6 +111,7 @@ def main() -> None:
         ("compute", compute), ("transfer", transfer), ("draw", draw), ("slider to frame", total),
     ):  # fmt: skip
         print(f"{name:16} {statistics.median(values):6.1f} ({max(values):.1f})")
+    print(f"processor time of the server {used:.1f} ms a move")
 
 
 if __name__ == "__main__":
