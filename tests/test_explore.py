@@ -28,6 +28,8 @@ from tests.browser import browser, find_browser, tab
 
 pytest.importorskip("bokeh", reason="the explorer needs bokeh")
 
+from bokeh.document import Document
+
 from percussion_model.interface.explore.inputs import KEYS, keys_of, range_of, short
 from percussion_model.interface.explore.response import (
     Overtaken,
@@ -36,6 +38,7 @@ from percussion_model.interface.explore.response import (
     respond,
     verdict,
 )
+from percussion_model.interface.explore.server import MOST_PAGES, Explored
 from percussion_model.interface.explore.worker import Worker
 
 LONG = os.environ.get("PERCUSSION_LONG") == "1"
@@ -256,6 +259,21 @@ def test_only_pages_of_its_own_are_answered(served):
     assert status(port, "/ws", Origin="http://stranger.example", **SOCKET) == 403
     assert status(port, "/ws", Host="rebound.example", Origin="http://rebound.example",
                   **SOCKET) == 403  # fmt: skip
+
+
+def test_more_pages_than_the_limit_are_refused():
+    async def open_one_more():
+        served = Explored({"reference": Scene}, 0)
+        served.pages = MOST_PAGES
+        document = Document()
+        served._open(document)
+        served.worker.stop()
+        served.http.stop()
+        return document
+
+    document = asyncio.run(open_one_more())
+    assert document.roots == []
+    assert "pages are open, which is the limit" in document.template_variables["refusal"]
 
 
 def test_ctrl_c_ends_it_as_other_commands():

@@ -108,7 +108,7 @@ class Entry:
             sizing_mode="stretch_width",
             stylesheets=[WIDGETS],
         )
-        self._quiet = False
+        self._quiet = self.refused = False
         self.slider.on_change("value", self._slid)
         self.field.on_change("value", self._typed)
         self.show_use(scene)
@@ -134,7 +134,8 @@ class Entry:
         for widget in (self.slider, self.field):
             if widget.disabled == needed:
                 widget.disabled = not needed
-        self._say("" if needed else f"without effect: needs {self.row.effect}", "calm")
+        if not self.refused:  # what is refused is still in the field
+            self._say("" if needed else f"without effect: needs {self.row.effect}", "calm")
 
     def _slid(self, _: str, __: Any, value: float) -> None:
         if self._quiet:
@@ -168,6 +169,7 @@ class Entry:
             self._quiet = False
 
     def _tell(self, refused: str) -> None:
+        self.refused = bool(refused)
         self.field.css_classes = ["refused"] if refused else []
         self._say(refused, "refusal")
 

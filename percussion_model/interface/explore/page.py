@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import logging
 from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
@@ -33,7 +34,8 @@ from percussion_model.interface.explore.worker import Worker
 from percussion_model.interface.plotting import style
 from percussion_model.scene.scene import Scene, SceneError
 
-OWN = "the scene given"
+log = logging.getLogger(__name__)
+
 # Differences of two scenes that are named; more are counted.
 MOST_NAMED = 4
 COPY = """
@@ -206,6 +208,9 @@ class Explorer:
             response = respond(scene, lambda: self.over or is_overtaken())
         except Overtaken:
             return
+        except Exception:  # a fault of the program: the page must not wait for ever
+            log.exception("a response could not be computed")
+            response = Response(scene, refusal="Not computed: the terminal says why.")
         if not self.over:
             self.document.add_next_tick_callback(partial(self._show, response, number))
 

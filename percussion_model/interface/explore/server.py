@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import threading
 import webbrowser
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -110,10 +111,10 @@ class Explored:
             check_unused_sessions_milliseconds=FORGOTTEN_AFTER,
         )
         application.hosts = hosts
-        http = HTTPServer(application, max_body_size=LARGEST_MESSAGE)
-        http.add_sockets(sockets)
+        self.http = HTTPServer(application, max_body_size=LARGEST_MESSAGE)
+        self.http.add_sockets(sockets)
         self.loop = IOLoop.current()
-        self.server = BaseServer(self.loop, application, http)
+        self.server = BaseServer(self.loop, application, self.http)
 
     @property
     def url(self) -> str:
@@ -142,8 +143,8 @@ class Explored:
     def run(self, browser: bool) -> None:
         """Serve until Ctrl-C, which is a `KeyboardInterrupt`."""
         self.server.start()
-        if browser:
-            self.loop.add_callback(webbrowser.open, self.url)
+        if browser:  # some do not return before they are closed
+            threading.Thread(target=webbrowser.open, args=(self.url,), daemon=True).start()
         try:
             self.loop.start()
         finally:
