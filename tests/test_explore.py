@@ -429,6 +429,26 @@ def test_keys_move_a_slider_and_bad_values_change_nothing(served, tmp_path):
     assert told == str(found.exception)
 
 
+CLICK = """(text => {
+  const look = root => { for (const one of root.querySelectorAll('*')) {
+      if (one.matches('button') && one.textContent === text) return one;
+      if (one.shadowRoot) { const found = look(one.shadowRoot); if (found) return found; } } };
+  look(document).click(); return true;
+})(%s)"""
+
+
+async def copied(page):
+    """Copy the scene by its button: the clipboard has what the text area shows."""
+    await page.call("Browser.grantPermissions",
+                    permissions=["clipboardReadWrite", "clipboardSanitizedWrite"])  # fmt: skip
+    await page.call("Page.bringToFront")
+    await page.ask(CLICK % json.dumps("Copy as TOML"))
+    await page.until(f"{MODEL}('copied').text.includes('copied')")
+    assert await page.ask("navigator.clipboard.readText()") == (
+        await page.ask(f"{MODEL}('toml').value")
+    )
+
+
 @needs_browser
 def test_a_pinned_response_stays_and_reset_goes_back(served, tmp_path):
     async def work(port):
@@ -443,13 +463,13 @@ def test_a_pinned_response_stays_and_reset_goes_back(served, tmp_path):
             assert [one.replace("<br>", "; ") for one in pinned] == list(before.values())
             assert await shown_numbers(page) == expected(Scene(feed={"force": 9000.0}))
             assert "feed.force = 2500" in await page.ask(f"{MODEL}('remarks').text")
+            await copied(page)
             # without a drive blows cease, which is said in words
             await set_input(page, "effects.drive", "none")
             assert set((await shown_numbers(page)).values()) == {"–"}
             assert "The blows have ceased" in await page.ask(f"{MODEL}('numbers').text")
             asked = await page.ask(f"{MODEL}('numbers').tags[0]")
-            await page.ask(f"{MODEL}('reset').trigger_event(new (Bokeh.require('core/bokeh_events')"
-                           f".ButtonClick)()); 0")  # fmt: skip
+            await page.ask(CLICK % json.dumps("Reset"))
             await page.until(f"{MODEL}('numbers').tags[0] > {asked}")
             await settled_page(page)
             assert await shown_numbers(page) == before
