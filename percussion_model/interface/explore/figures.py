@@ -74,7 +74,7 @@ class Figures:
         made.multi_line("x", "y", source=self.closed, color="black", line_width=3)
         told = [("", "$x{0.0} µs, $y{0.0} mm: @image{0.0} MPa")]
         made.add_tools(HoverTool(renderers=[drawn], tooltips=told))
-        bar = ColorBar(color_mapper=self.mapper, title="axial stress [MPa], compression positive",
+        bar = ColorBar(color_mapper=self.mapper, title="stress [MPa], compression positive",
                        height=10, title_text_font_style="normal")  # fmt: skip
         made.add_layout(bar, "below")
         return made

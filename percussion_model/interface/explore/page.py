@@ -49,7 +49,7 @@ else refused();
 NUMBERS = """
 :host { font: 15px/1.4 system-ui, "Segoe UI", Roboto, "DejaVu Sans", sans-serif; }
 .bk-clearfix { display: block !important; width: 100%; }
-dl { display: flex; flex-wrap: wrap; gap: .5rem .9rem; margin: 0; }
+dl { display: flex; flex-wrap: wrap; gap: .5rem .5rem; margin: 0; }
 dl div { padding-left: .45rem; min-width: 8.4rem; border-left: 3px solid #0072B2; }
 dt { color: #5f6368; font-size: 12.5px; }
 dd { margin: 0; font-size: 13.5px; font-weight: 600; font-variant-numeric: tabular-nums;
