@@ -73,7 +73,8 @@ def read_variables(folder: str) -> tuple[Variable, ...]:
 def read_row(entry: Mapping[str, Any]) -> Row:
     """A row of the parameter table from its plain values; JSON has no tuples."""
     needs = {key: tuple(values) for key, values in entry["needs"].items()}
-    return Row(**{**entry, "choices": tuple(entry["choices"]), "needs": needs})
+    usual = tuple(entry["usual"]) if entry.get("usual") else None
+    return Row(**{**entry, "choices": tuple(entry["choices"]), "needs": needs, "usual": usual})
 
 
 def number_row(key: str, unit: str, lower: float, upper: float, description: str) -> Row:

@@ -11,7 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 from percussion_model import Scene, SceneError, settled, simulate
-from percussion_model.analysis.stationary import COMPARED, cycle, cycles_in
+from percussion_model.analysis.stationary import COMPARED, MEANS, cycle, cycles_in
 from percussion_model.interface.cli import app
 from percussion_model.interface.terminal import show_settled
 from percussion_model.physics.records import BLOW
@@ -87,9 +87,10 @@ def test_a_settled_rate_has_the_error_of_its_grid():
     scenes = [Scene().replace(**WAVES, **{"solver.cells": n}) for n in (10, 100)]
     coarse, fine = map(settled, scenes)
     judged = settled(scenes[0], error_estimate=True)
-    for name in ("rate_of_penetration", "blow_period"):
-        off = abs(getattr(coarse, name) - getattr(fine, name))
-        assert getattr(coarse, f"{name}_error") < off < getattr(judged, f"{name}_error")
+    coarse_numbers, fine_numbers, numbers = (one.summary() for one in (coarse, fine, judged))
+    for name in ("rate_of_penetration", "blow_period", *MEANS):
+        off = abs(coarse_numbers[name] - fine_numbers[name])
+        assert coarse_numbers[f"{name}_error"] < off < numbers[f"{name}_error"]
     assert judged.rate_of_penetration == coarse.rate_of_penetration
     assert len(judged.blows) == len(coarse.blows)
     assert judged.summary()["rate_of_penetration_error_of"] == "grid and convergence"
@@ -98,7 +99,7 @@ def test_a_settled_rate_has_the_error_of_its_grid():
     assert coarse.summary()["grid_errors"] == {}
     assert "error_of='convergence'" in repr(coarse)
     rigid = settled(Scene().replace(**RIGID), error_estimate=True)
-    assert rigid.grid_errors == {"rate_of_penetration": 0.0, "blow_period": 0.0}
+    assert rigid.grid_errors == dict.fromkeys(("rate_of_penetration", "blow_period", *MEANS), 0.0)
 
 
 def chatter(cells):

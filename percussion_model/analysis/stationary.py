@@ -15,6 +15,7 @@ from percussion_model.physics.records import BLOW
 from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.simulation.error_estimate import SAFETY, with_error_estimate
 from percussion_model.simulation.files import plain
+from percussion_model.simulation.means import numbers_over, scatter_over
 from percussion_model.simulation.rate import STALLED_PERIODS, rate_of_blows, ratio_of_sums
 from percussion_model.simulation.result import Result
 from percussion_model.simulation.simulate import Simulation, SimulationError
@@ -58,8 +59,12 @@ _COLUMNS = [(BLOW.names or ()).index(name) for name in COMPARED]
 STEADY = 0.9
 # With fewer blows allowed nothing is known of an aperiodic motion.
 LEAST_LIMIT = 32
-# Numbers whose errors by the grid are estimated.
+# Numbers whose errors by the grid are estimated: rate, period, and other means over blows.
 _RATE, _PERIOD = "rate_of_penetration", "blow_period"
+# Smaller ones, and smaller errors of them, are rounding.
+ROUNDING = 1e-12
+MEANS = ("blow_frequency", "impact_velocity", "transfer_efficiency")
+_JUDGED = (_RATE, _PERIOD, *MEANS)
 # Grids are compared over so many blows at least; where the motion is periodic, over the last
 # of them, so that settling does not count as scatter.
 FEWEST_JUDGED, JUDGED_SHARE = 12, 0.5
@@ -106,9 +111,9 @@ class Settled:
     depends_on_cells : bool
         Whether the rate is one of the cells and of nothing else.
     grid_errors : dict of float
-        The other part of the errors of `rate_of_penetration` [m/s] and `blow_period` [s], as
-        `simulate` estimates it by coarser grids, with what scatter does to these runs; 0
-        without a grid. Of what was not estimated there is none.
+        The other part of the errors of `rate_of_penetration` [m/s], `blow_period` [s] and
+        `MEANS`, as `simulate` estimates it by coarser grids, with what scatter does to these
+        runs; 0 without a grid. Of what was not estimated there is none.
     others : tuple of Motion
         The motions on coarser grids, where errors were estimated.
     warnings : list of str
@@ -213,6 +218,30 @@ class Settled:
             settling = ratio_of_sums(counted, np.ones(len(counted)))[1]
         return self._with_grid(_PERIOD, settling)
 
+    @property
+    def means(self) -> dict[str, float]:
+        """`MEANS` over the blows that count, SI units; NaN where blows have died out."""
+        if self.kind == "stalled":
+            return dict.fromkeys(MEANS, math.nan)
+        found = numbers_over(self.counted)
+        # of energies that cancel their rounding is left
+        return {name: 0.0 if abs(found[name]) < ROUNDING else found[name] for name in MEANS}
+
+    @property
+    def mean_errors(self) -> dict[str, float]:
+        """How far `means` may be off, by the same as the rate, SI units; else NaN."""
+        counted = self.counted
+        if len(counted) == 0 or self.kind == "stalled":
+            return dict.fromkeys(MEANS, math.nan)
+        if self.order:
+            last = numbers_over(counted)
+            before = numbers_over(self.blows[-2 * self.order : -self.order])
+            settling = {name: abs(last[name] - before[name]) for name in MEANS}
+        else:
+            settling = scatter_over(counted)
+        found = {name: self._with_grid(name, settling.get(name, math.nan)) for name in MEANS}
+        return {name: 0.0 if error < ROUNDING else error for name, error in found.items()}
+
     def summary(self) -> dict[str, Any]:
         """Return the numbers as plain values for JSON; None is what is not defined."""
         numbers = {
@@ -227,6 +256,8 @@ class Settled:
             BY_CELLS: self.depends_on_cells,
             "blow_period": self.blow_period,
             "blow_period_error": self.blow_period_error,
+            **self.means,
+            **{f"{name}_error": error for name, error in self.mean_errors.items()},
             "multiplier": self.multiplier,
             "multiplier_error": self.multiplier_error,
             "same_motion_on_other_grids": self.same_motion,
@@ -352,13 +383,13 @@ def _other_motions(
 
 
 def _grid_errors(simulation: Simulation, settling: float) -> dict[str, float]:
-    """Estimated errors of rate and period by the grid, SI units; of what could be told.
+    """Estimated errors of `_JUDGED` by the grid, SI units; of what could be told.
 
     A run of few blows is made longer; `settling` is the share of it that does not count.
     """
     coarser = simulation.solver.coarser_scenes()
     if coarser == []:
-        return {_RATE: 0.0, _PERIOD: 0.0}
+        return dict.fromkeys(_JUDGED, 0.0)
     while simulation.blow_rows < FEWEST_JUDGED:
         before = simulation.blow_rows
         simulation.advance_blows(1, simulation.time + STALLED_AFTER)
@@ -369,7 +400,7 @@ def _grid_errors(simulation: Simulation, settling: float) -> dict[str, float]:
     result = replace(simulation.result(settle), scene=whole)
     judged = with_error_estimate(result, coarser, _run, whole_time=True)
     errors = {_RATE: judged.rate_of_penetration_error, **judged.errors}
-    return {name: errors[name] for name in (_RATE, _PERIOD) if errors.get(name, math.nan) >= 0.0}
+    return {name: errors[name] for name in _JUDGED if errors.get(name, math.nan) >= 0.0}
 
 
 def _run(scene: Scene) -> Result:

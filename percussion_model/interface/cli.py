@@ -27,6 +27,7 @@ from percussion_model.interface.commands.common import (
 from percussion_model.interface.commands.compare import compare
 from percussion_model.interface.commands.couple import couple
 from percussion_model.interface.commands.effects import effects
+from percussion_model.interface.commands.explore import explore
 from percussion_model.interface.commands.paper import paper
 from percussion_model.interface.commands.scene import explain, new, plot, run, settled
 from percussion_model.interface.commands.stability import stability
@@ -61,16 +62,17 @@ def _options(
     """Percussive drilling: elastic piston and bit, and rock, blow by blow."""
 
 
-def _heard(command: Callable[..., Any]) -> Callable[..., Any]:
+def _heard(command: Callable[..., Any], waits: bool = False) -> Callable[..., Any]:
     """Tell on a pipe that a command still runs, and let `_guarded` know of Ctrl-C.
 
-    After Ctrl-C typer would end without a word.
+    After Ctrl-C typer would end without a word. A command that `waits` for others, as a server
+    does, is not said to run.
     """
 
     @functools.wraps(command)
     def call(*words: Any, **options: Any) -> Any:
         try:
-            with nullcontext() if sys.stderr.isatty() else lines("still running"):
+            with nullcontext() if waits or sys.stderr.isatty() else lines("still running"):
                 return command(*words, **options)
         except (KeyboardInterrupt, SystemError) as error:
             if not is_interruption(error):
@@ -85,7 +87,10 @@ _packages: set[str] = set()
 
 
 def add(
-    command: Callable[..., Any], name: str | None = None, settings: dict[str, Any] | None = None
+    command: Callable[..., Any],
+    name: str | None = None,
+    settings: dict[str, Any] | None = None,
+    waits: bool = False,
 ) -> None:
     """Add a command; its first line stands whole in the list of all.
 
@@ -97,10 +102,12 @@ def add(
         That of the function if left out.
     settings : dict, optional
         Of the context, as click takes them.
+    waits : bool
+        Whether it waits for others, as a server does.
     """
     _packages.add(command.__module__.partition(".")[0])
     first = (command.__doc__ or "").partition("\n")[0]
-    app.command(name, short_help=first, context_settings=settings)(_heard(command))
+    app.command(name, short_help=first, context_settings=settings)(_heard(command, waits))
 
 
 for _command in (
@@ -121,6 +128,7 @@ for _command in (
 ):
     add(_command)
 add(blow_map, "blow-map")
+add(explore, waits=True)
 
 
 def main() -> None:

@@ -121,11 +121,13 @@ def show_settled(found: Settled) -> None:
     table = Table(show_header=False)
     table.add_column(no_wrap=True)
     table.add_column()
-    table.add_row("Motion", f"{found.motion}{_on_other_grids(found)}")
+    table.add_row("Motion", f"{found.motion}{on_other_grids(found)}")
     if summary[RATE[1]] is not None:
         table.add_row(RATE[0], f"{rate_text(summary)} {RATE[3]}")
     if summary["blow_period"] is not None:
-        table.add_row("Blow period", f"{mean_text(summary, 'blow_period', 1e3)} ms")
+        for name, key, factor, unit in SHOWN:
+            if summary.get(key) is not None:
+                table.add_row(name, f"{mean_text(summary, key, factor)} {unit}")
     if summary["multiplier"] is not None:
         table.add_row("Deviation after a cycle", _deviation(found))
     table.add_row("Blows run", f"{len(found.blows)} in {found.duration:.4g} s of simulated time")
@@ -133,11 +135,11 @@ def show_settled(found: Settled) -> None:
     console = Console()
     print_table(table, console)
     if found.error_of:
-        console.print(wrapped(_settled_error(found)), highlight=False)
+        console.print(wrapped(settled_error(found)), highlight=False)
     show_warnings(console, found.warnings)
 
 
-def _on_other_grids(found: Settled) -> str:
+def on_other_grids(found: Settled) -> str:
     """Say whether a motion is that of coarser grids; nothing where there is no grid."""
     if found.same_motion is None:
         has_grid = found.grid_errors.get(RATE[1]) != 0.0
@@ -156,7 +158,7 @@ def _deviation(found: Settled) -> str:
     return f"{text} of what it was"
 
 
-def _settled_error(found: Settled) -> str:
+def settled_error(found: Settled) -> str:
     """Say what the ± of a stationary response is of, and what is not in it."""
     settling = "convergence" if found.error_of.endswith("convergence") else "the scatter of blows"
     grid = found.grid_errors.get(RATE[1])

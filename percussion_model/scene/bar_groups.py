@@ -29,7 +29,7 @@ class Section(Parameters):
     """A length of bar with one cross-section and one material."""
 
     key = "section"
-    length: float = quantity(..., "m", "length", gt=0, le=1000)
+    length: float = quantity(..., "m", "length", usual=(0.02, 0.5), gt=0, le=1000)
     area: float = quantity(..., "m^2", "cross-section", gt=0, le=10)
     youngs_modulus: float = quantity(STEEL_YOUNGS_MODULUS, "Pa", "Young's modulus E", gt=0, le=1e13)
     density: float = quantity(STEEL_DENSITY, "kg/m^3", "density rho", gt=0, le=1e5)

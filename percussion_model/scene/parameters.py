@@ -111,7 +111,13 @@ class Feed(Parameters):
     """Force from the surface on the bit."""
 
     force: float = quantity(
-        2500.0, "N", "feed force F_S on the bit, down positive", FEED_ON, ge=-1e9, le=1e9
+        2500.0,
+        "N",
+        "feed force F_S on the bit, down positive",
+        FEED_ON,
+        usual=(0.0, 20e3),
+        ge=-1e9,
+        le=1e9,
     )
 
 
@@ -119,13 +125,31 @@ class Drive(Parameters):
     """Force on the piston."""
 
     force: float = quantity(
-        3000.0, "N", "drive force F_0 of the pressure law", DRIVE_PRESSURE, ge=0, le=1e9
+        3000.0,
+        "N",
+        "drive force F_0 of the pressure law",
+        DRIVE_PRESSURE,
+        usual=(500.0, 20e3),
+        ge=0,
+        le=1e9,
     )
     reversal_distance: float = quantity(
-        0.040, "m", "D_1: piston this far up turns the drive downward", DRIVE_PRESSURE, gt=0, le=100
+        0.040,
+        "m",
+        "D_1: piston this far up turns the drive downward",
+        DRIVE_PRESSURE,
+        usual=(0.005, 0.1),
+        gt=0,
+        le=100,
     )
     external_force: float = quantity(
-        0.0, "N", "force on the piston, down positive", DRIVE_EXTERNAL, ge=-1e9, le=1e9
+        0.0,
+        "N",
+        "force on the piston, down positive",
+        DRIVE_EXTERNAL,
+        usual=(-20e3, 20e3),
+        ge=-1e9,
+        le=1e9,
     )
 
 
@@ -141,15 +165,23 @@ class RockLaw(Parameters):
     """The rock under the bit (docs/model.md, table 1)."""
 
     loading_stiffness: float = quantity(
-        7.5e8, "N/m", "loading stiffness K_R", ROCK_SPRINGY, ge=1, le=1e13
+        7.5e8, "N/m", "loading stiffness K_R", ROCK_SPRINGY, usual=(1e8, 3e9), ge=1, le=1e13
     )
     unloading_ratio: float = quantity(
-        5.0, "-", "gamma: unloading by loading stiffness", ROCK_BILINEAR, gt=1, le=1e4
+        5.0,
+        "-",
+        "gamma: unloading by loading stiffness",
+        ROCK_BILINEAR,
+        usual=(1.1, 20.0),
+        gt=1,
+        le=1e4,
     )
     barrier_damping: float = quantity(
         1e4, "N s/m", "damping C_R of the energy barrier", BARRIER_ON, ge=0, le=1e9
     )
-    barrier_energy: float = quantity(0.05, "J", "energy barrier W_R", BARRIER_ON, ge=0, le=1e6)
+    barrier_energy: float = quantity(
+        0.05, "J", "energy barrier W_R", BARRIER_ON, usual=(0.0, 0.5), ge=0, le=1e6
+    )
 
 
 class Contact(Parameters):

@@ -36,7 +36,8 @@ class SceneError(ValueError):
 class Row:
     """One parameter.
 
-    Keys of bars and sections have a `*` for their number, counted from 0.
+    Keys of bars and sections have a `*` for their number, counted from 0. `usual` is where
+    hammers and rocks lie, from and to: what is worth trying by hand; None where that was not said.
     """
 
     key: str
@@ -51,6 +52,7 @@ class Row:
     choices: Sequence[Any]
     description: str
     needs: Mapping[str, tuple[Any, ...]]
+    usual: tuple[float, float] | None = None
 
     @property
     def allowed(self) -> str:
@@ -121,13 +123,18 @@ Needs = dict[str, tuple[object, ...]]
 
 
 def quantity(
-    default: Any, unit: str, description: str, needs: Needs | None = None, **bounds: float
+    default: Any,
+    unit: str,
+    description: str,
+    needs: Needs | None = None,
+    usual: tuple[float, float] | None = None,
+    **bounds: float,
 ) -> Any:
     """Declare a number with its unit, bounds (gt, ge, lt, le) and what it needs.
 
     The default ... makes it required; None lets it be left out.
     """
-    return _declare("number", default, description, needs, unit, bounds=bounds)
+    return _declare("number", default, description, needs, unit, bounds=bounds, usual=usual)
 
 
 def count(
@@ -167,6 +174,7 @@ def _declare(
     unit: str = "",
     choices: Sequence[Any] = (),
     bounds: Mapping[str, float] = MappingProxyType({}),
+    usual: tuple[float, float] | None = None,
 ) -> Any:
     low, high = bounds.get("gt", bounds.get("ge")), bounds.get("lt", bounds.get("le"))
     row = Row(
@@ -182,6 +190,7 @@ def _declare(
         choices=choices,
         description=description,
         needs=needs or {},
+        usual=usual,
     )
     return dataclasses.field(default=row.default, metadata={"row": row})
 

@@ -107,7 +107,7 @@ def load_numba() -> None:
 
 
 def load_scene(
-    path: Path,
+    path: Path | None,
     solver: str | None = None,
     cells: int | None = None,
     settings: list[str] | None = None,
@@ -115,7 +115,7 @@ def load_scene(
     check: bool | None = None,
     is_run: bool = True,
 ) -> Scene:
-    """Read a scene, a file or a preset, and apply what the command line changes.
+    """Read a scene (a file, a preset, else the reference), and apply what the command line changes.
 
     Where the solver that the scene names will run it, tell of its kernels.
     """
@@ -124,7 +124,7 @@ def load_scene(
     from percussion_model.scene.text import read_setting
 
     load_numba()
-    scene = Scene.from_toml(scene_file(path))
+    scene = Scene() if path is None else Scene.from_toml(scene_file(path))
     changes: dict[str, Any] = dict(read_setting(text) for text in settings or ())
     if solver is not None:
         scene = scene.computed_by(solver, **changes)

@@ -219,15 +219,20 @@ def _stress(window: Window, fields: dict[str, StressField]) -> LayoutDOM:
 
 def _image(to: Any, field: StressField, top: float, mapper: LinearColorMapper) -> float:
     """Draw the stress in one bar below `top` [mm]; return where it ends."""
-    edges, heights = field.depth_edges, np.diff(field.depth_edges)
-    rows = np.arange(len(heights))
-    if np.ptp(heights) > 1e-6 * heights.mean():
-        centres = (np.arange(MOST_ROWS) + 0.5) / MOST_ROWS * edges[-1]
-        rows = np.clip(np.searchsorted(edges, centres) - 1, 0, len(heights) - 1)
-    values = (field.stress[rows] / MPA).astype(np.float32)
+    edges = field.depth_edges
+    values = (field.stress[image_rows(field)] / MPA).astype(np.float32)
     first, last = field.time_edges[0] * US, field.time_edges[-1] * US
     drawn = to.image([values], x=[first], y=[top], dw=[last - first], dh=[edges[-1] * MM],
                      color_mapper=mapper)  # fmt: skip
     shown = [("time", "$x{0.0} µs"), ("depth", "$y{0.0} mm"), ("stress", "@image{0.0} MPa")]
     to.add_tools(HoverTool(renderers=[drawn], tooltips=shown))
     return float(top + edges[-1] * MM)
+
+
+def image_rows(field: StressField) -> np.ndarray:
+    """Cell of each row of pixels: rows are alike in height, cells need not be."""
+    edges, heights = field.depth_edges, np.diff(field.depth_edges)
+    if np.ptp(heights) <= 1e-6 * heights.mean():
+        return np.arange(len(heights))
+    centres = (np.arange(MOST_ROWS) + 0.5) / MOST_ROWS * edges[-1]
+    return np.clip(np.searchsorted(edges, centres) - 1, 0, len(heights) - 1)

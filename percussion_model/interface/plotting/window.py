@@ -113,11 +113,22 @@ class StressField:
 
 
 def last_blow_window(result: Result) -> Window:
-    """Run a result's scene again and sample its last blow at full rate.
+    """Run a result's scene again and sample its last blow at full rate; see `blow_window`."""
+    return blow_window(result.scene, result.blows, result.duration)
+
+
+def blow_window(scene: Scene, blows: np.ndarray, duration: float, every: int = 1) -> Window:
+    """Run a scene again and sample the last of its blows.
 
     Parameters
     ----------
-    result : Result
+    scene : Scene
+    blows : ndarray of BLOW
+        That it has made from its start on.
+    duration : float
+        Simulated time of that run [s].
+    every : int
+        Steps of the solver from sample to sample; 1 is the full rate.
 
     Returns
     -------
@@ -130,18 +141,20 @@ def last_blow_window(result: Result) -> Window:
     NotRepeatable
         If the scene alone does not repeat the run.
     """
-    simulation = Simulation(result.scene)
-    blows = result.blows
+    simulation = Simulation(scene)
     if len(blows) == 0:
-        simulation.advance(result.duration)
+        simulation.advance(duration)
         events = simulation.events
-        start, length, name = _first_contact(events, result.duration)
-        simulation = Simulation(result.scene)
-        return _sampled(simulation, events, name, start, length, is_blow=False)
+        start, length, name = _first_contact(events, duration)
+        simulation = Simulation(scene)
+        return _sampled(simulation, events, name, start, length, every, is_blow=False)
     expected, period = float(blows["time"][-1]), float(blows["period"][-1])
     simulation.advance(max(0.0, expected - RESTART * period))
     before = simulation.save()
-    simulation.advance(min(expected + (1.0 + RESTART) * period, result.duration))
+    simulation.advance(min(expected + (1.0 + RESTART) * period, duration))
+    if simulation.blow_rows < len(blows) and simulation.time < duration:
+        # a piston that comes to rest ends its blows late
+        simulation.advance_blows(len(blows) - simulation.blow_rows, duration)
     again = simulation.blows[: len(blows)]
     if len(again) < len(blows) or np.any(
         np.abs(again["time"] - blows["time"]) > SAME_BLOW * blows["period"]
@@ -154,7 +167,7 @@ def last_blow_window(result: Result) -> Window:
     simulation.restore(before)
     start, length = float(again["time"][-1]), float(again["period"][-1])
     name = f"blow {len(blows)}, from {start:.3f} s on"
-    return _sampled(simulation, events, name, start, length, is_blow=True)
+    return _sampled(simulation, events, name, start, length, every, is_blow=True)
 
 
 def _first_contact(events: np.ndarray, duration: float) -> tuple[float, float, str]:
@@ -183,11 +196,13 @@ def _sampled(
     name: str,
     start: float,
     length: float,
+    every: int,
     is_blow: bool,
 ) -> Window:
     """Sample a stretch of the run, from just before `start`."""
     step = simulation.solver.time_step or RIGID_SAMPLING
-    step *= max(1, math.ceil(length / step / MOST_SAMPLES))
+    busy = BUSY_STEPS * step
+    step *= max(every, math.ceil(length / step / MOST_SAMPLES))
     simulation.advance(max(simulation.time, start - LEAD * length))
     restart = simulation.save()
     times = np.append(np.arange(simulation.time, start, step), start + np.arange(0.0, length, step))
@@ -196,19 +211,19 @@ def _sampled(
         name=name,
         origin=start,
         length=length,
-        samples=simulation.sample(times[_worth_sampling(times, start, step, events)]),
+        samples=simulation.sample(times[_worth_sampling(times, start, busy, events)]),
         contacts=closed_contacts(events, start, start + length),
         is_blow=is_blow,
         restart=restart,
     )
 
 
-def _worth_sampling(times: np.ndarray, start: float, step: float, events: np.ndarray) -> np.ndarray:
-    """Choose every time near the start and near events, every few elsewhere."""
-    busy = np.append(events["time"], start)
-    busy.sort()
-    after = np.searchsorted(busy, times - BUSY_STEPS * step)
-    before = np.searchsorted(busy, times + BUSY_STEPS * step)
+def _worth_sampling(times: np.ndarray, start: float, busy: float, events: np.ndarray) -> np.ndarray:
+    """Choose every time near the start and less than `busy` [s] from events, few elsewhere."""
+    marks = np.append(events["time"], start)
+    marks.sort()
+    after = np.searchsorted(marks, times - busy)
+    before = np.searchsorted(marks, times + busy)
     chosen: np.ndarray = before > after
     chosen[::QUIET_STRIDE] = True
     chosen[-1] = True
@@ -240,8 +255,14 @@ _CONTACT_KINDS = (EventKind.CONTACT_CLOSED, EventKind.CONTACT_OPENED)
 _SAME_TIME = 1e-9
 
 
-def stress_fields(window: Window) -> dict[str, StressField]:
-    """Stress in the elastic bars at every step of the window's first waves.
+def stress_fields(window: Window, every: int = 1) -> dict[str, StressField]:
+    """Stress in the elastic bars during the window's first waves.
+
+    Parameters
+    ----------
+    window : Window
+    every : int
+        Steps of the solver from column to column.
 
     Returns
     -------
@@ -259,6 +280,7 @@ def stress_fields(window: Window) -> dict[str, StressField]:
     }
     if not bars or not step:
         return {}
+    step *= every
     shown = TRANSITS_SHOWN * max(bar.transit_time for bar in bars.values())
     first = math.ceil(max(window.origin / step - 1.0, window.restart.time / step))
     count = math.ceil(min(shown, window.length) / step)

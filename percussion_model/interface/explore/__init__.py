@@ -1,0 +1,1 @@
+"""The explorer: an interactive page on which the response follows sliders."""

@@ -1,0 +1,223 @@
+"""Figures of the explorer: made once, and filled with one response after the other."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from bokeh.models import ColorBar, ColumnDataSource, HoverTool, LinearColorMapper, Range1d
+from bokeh.palettes import interp_palette
+
+from percussion_model.interface.explore.response import Response
+from percussion_model.interface.plotting import style
+from percussion_model.interface.plotting.interactive import panel
+from percussion_model.interface.plotting.interactive_run import STRESS_COLOURS, image_rows
+from percussion_model.interface.plotting.style import KN, MM, MPA, MS, US
+from percussion_model.interface.plotting.window import Window
+from percussion_model.physics.records import Mode
+
+# A figure is moved by its page alone; on a telephone a finger on it moves the page.
+TOOLS = "save"
+EMPTY = np.zeros(0, np.float32)
+ROOM = 0.05
+CAPTIONS = {
+    "stress": (
+        "Stress along piston and bit, top to bottom, from the impact on. Red is compression, blue "
+        "tension. The line between the bars is thick while the piston touches the bit."
+    ),
+    "forces": "Force of the bit on the rock and of the piston on the bit, positive in compression.",
+    "law": (
+        "Path of one blow in the law of the rock: force against the penetration of the bit's end "
+        "since the impact."
+    ),
+}
+
+
+class Figures:
+    """The three figures, and the columns of numbers behind them."""
+
+    def __init__(self) -> None:
+        self.mapper = LinearColorMapper(interp_palette(STRESS_COLOURS, 255), low=-1.0, high=1.0)
+        self.images = ColumnDataSource({name: [] for name in ("image", "x", "y", "dw", "dh")})
+        self.border, self.closed = _pairs(), _pairs()
+        self.stress = self._stress()
+        self.contact, self.force, self.path = _line(), _by_mode(), _by_mode()
+        self.pinned = {name: _line() for name in ("contact", "force", "path")}
+        self.forces = panel(
+            "Forces over time", "time [ms]",
+            "force [kN]", tools=TOOLS, x_range=Range1d(0.0, 1.0), y_range=Range1d(0.0, 1.0),
+        )  # fmt: skip
+        self.law = panel(
+            "Force against penetration", "penetration [mm]", "bit force [kN]",
+            tools=TOOLS, x_range=Range1d(0.0, 1.0), y_range=Range1d(0.0, 1.0),
+        )  # fmt: skip
+        _draw(self.forces, self.pinned["contact"], style.RULE_COLOUR, line_dash="dotted")
+        _draw(self.forces, self.pinned["force"], style.RULE_COLOUR)
+        _draw(self.law, self.pinned["path"], style.RULE_COLOUR)
+        _draw(self.forces, self.contact, style.PISTON_COLOUR, line_dash="dotted")
+        for mode, colour in style.MODE_COLOURS.items():
+            _draw(self.forces, self.force[mode], colour)
+            _draw(self.law, self.path[mode], colour)
+        for made, x in ((self.forces, "ms"), (self.law, "mm")):
+            shown = [("", f"$x{{0.000}} {x}, $y{{0.0}} kN")]
+            made.add_tools(HoverTool(tooltips=shown, mode="mouse"))
+
+    def _stress(self) -> Any:
+        made = panel(
+            "Stress in piston and bit", "time [µs]",
+            "depth below the top [mm]", tools=TOOLS, height=340,
+            x_range=Range1d(0.0, 1.0), y_range=Range1d(1.0, 0.0),
+        )  # fmt: skip
+        drawn = made.image("image", "x", "y", "dw", "dh", source=self.images,
+                           color_mapper=self.mapper)  # fmt: skip
+        made.multi_line("x", "y", source=self.border, color="black", line_dash="dashed")
+        made.multi_line("x", "y", source=self.closed, color="black", line_width=3)
+        told = [("", "$x{0.0} µs, $y{0.0} mm: @image{0.0} MPa")]
+        made.add_tools(HoverTool(renderers=[drawn], tooltips=told))
+        bar = ColorBar(color_mapper=self.mapper, title="stress [MPa], compression positive",
+                       height=10, title_text_font_style="normal")  # fmt: skip
+        made.add_layout(bar, "below")
+        return made
+
+    def draw(self, response: Response) -> None:
+        """Show a response; nothing where there is none."""
+        window = response.window
+        curves = _curves(window)
+        self.contact.data = curves["contact"]
+        self._draw_stress(response)
+        for sources, (x, y, modes) in (
+            (self.force, _force(window)),
+            (self.path, _path(window)),
+        ):
+            lines = {mode: (xs, ys) for mode, xs, ys in style.by_mode(x, y, modes)}
+            for mode, columns in sources.items():
+                xs, ys = lines.get(mode, (EMPTY, EMPTY))
+                columns.data = _columns(xs, ys)
+        self._fit()
+        if window is None:
+            return
+        _move(self.forces.x_range, min(0.0, float(window.time[0])) * MS, window.active_until * MS)
+        _move(self.law.x_range, *_touching(window))
+
+    def pin(self, response: Response | None) -> None:
+        """Keep the curves of a response in grey, or of none."""
+        curves = _curves(None if response is None else response.window)
+        for name, columns in self.pinned.items():
+            columns.data = curves[name]
+        self._fit()
+
+    def _fit(self) -> None:
+        """Let the axes of forces span what is drawn, now and pinned."""
+        for made, drawn in (
+            (self.forces, (self.contact, *self.force.values(), self.pinned["contact"],
+                           self.pinned["force"])),
+            (self.law, (*self.path.values(), self.pinned["path"])),
+        ):  # fmt: skip
+            values = np.concatenate([columns.data["y"] for columns in drawn])
+            values = values[np.isfinite(values)]
+            low, high = (float(values.min()), float(values.max())) if len(values) else (0.0, 1.0)
+            room = ROOM * (high - low) or 1.0
+            _move(made.y_range, low - room, high + room)
+
+    def _draw_stress(self, response: Response) -> None:
+        fields, window = response.fields, response.window
+        images: dict[str, list[Any]] = {name: [] for name in ("image", "x", "y", "dw", "dh")}
+        top, borders, closed = 0.0, [], []
+        for one in fields.values():
+            first, last = float(one.time_edges[0]) * US, float(one.time_edges[-1]) * US
+            depth = float(one.depth_edges[-1]) * MM
+            values = (one.stress[image_rows(one)] / MPA).astype(np.float32)
+            row = values, first, top, last - first, depth
+            for name, value in zip(images, row, strict=True):
+                images[name].append(value)
+            top += depth
+            borders.append(top)
+        self.images.data = images
+        if fields and window is not None:
+            limit = max(float(np.abs(one.stress).max(initial=0.0)) for one in fields.values())
+            self.mapper.update(low=-limit / MPA or -1.0, high=limit / MPA or 1.0)
+            end = float(next(iter(fields.values())).time_edges[-1]) * US
+            _move(self.stress.x_range, 0.0, end)
+            _move(self.stress.y_range, top, 0.0)
+            closed = [(a * US, min(b * US, end)) for a, b in window.contacts if a * US < end]
+        inner = borders[:-1]
+        self.border.data = {
+            "x": [self.stress_width() for _ in inner], "y": [[at, at] for at in inner]
+        }  # fmt: skip
+        self.closed.data = {
+            "x": [list(pair) for pair in closed for _ in inner],
+            "y": [[at, at] for _ in closed for at in inner],
+        }
+
+    def stress_width(self) -> list[float]:
+        """Start and end of the time axis of the stress [µs]."""
+        return [self.stress.x_range.start, self.stress.x_range.end]
+
+
+def _columns(x: np.ndarray, y: np.ndarray) -> dict[str, np.ndarray]:
+    """Columns of a line, with single precision, which no eye can tell."""
+    return {"x": np.asarray(x, np.float32), "y": np.asarray(y, np.float32)}
+
+
+def _line() -> ColumnDataSource:
+    return ColumnDataSource(_columns(EMPTY, EMPTY))
+
+
+def _pairs() -> ColumnDataSource:
+    return ColumnDataSource({"x": [], "y": []})
+
+
+def _by_mode() -> dict[Mode, ColumnDataSource]:
+    return {mode: _line() for mode in style.MODE_COLOURS}
+
+
+def _draw(to: Any, columns: ColumnDataSource, colour: str, **more: Any) -> None:
+    to.line("x", "y", source=columns, color=colour, line_width=2, **more)
+
+
+def _move(to: Range1d, start: float, end: float) -> None:
+    """Show a stretch of an axis, also after a double click."""
+    to.update(start=start, end=end, reset_start=start, reset_end=end)
+
+
+Line = tuple[np.ndarray, np.ndarray, np.ndarray]
+_NOTHING: Line = EMPTY, EMPTY, EMPTY
+
+
+def _force(window: Window | None) -> Line:
+    """Time [ms], force on the rock [kN] and mode, as far as the bit is active."""
+    if window is None:
+        return _NOTHING
+    shown = window.time <= (1.0 + ROOM) * window.active_until
+    force, modes = window.samples["bit_force"], window.samples["drilling_mode"]
+    return window.time[shown] * MS, force[shown] / KN, modes[shown]
+
+
+def _path(window: Window | None) -> Line:
+    """Penetration [mm], force on the rock [kN] and mode from the impact on."""
+    if window is None:
+        return _NOTHING
+    inside = window.time >= 0.0
+    depth, force = window.since_start("bit_end_position"), window.samples["bit_force"]
+    return depth[inside] * MM, force[inside] / KN, window.samples["drilling_mode"][inside]
+
+
+def _touching(window: Window) -> tuple[float, float]:
+    """Stretch of penetration in which the bit is on the rock, with some room [mm]."""
+    depth, _, modes = _path(window)
+    touching = depth[modes != Mode.FF] if (modes != Mode.FF).any() else depth
+    room = ROOM * float(np.ptp(touching)) or 1.0
+    return float(touching.min()) - room, float(touching.max()) + room
+
+
+def _curves(window: Window | None) -> dict[str, Any]:
+    """Columns of the curves that can be pinned."""
+    time, force, _ = _force(window)
+    depth, resistance, modes = _path(window)
+    if window is None:
+        pushed = EMPTY
+    else:
+        pushed = np.nan_to_num(window.samples["contact_force"][: len(time)]) / KN
+        depth = np.where(modes == Mode.FF, np.nan, depth)
+    lines = {"contact": (time, pushed), "force": (time, force), "path": (depth, resistance)}
+    return {name: _columns(x, y) for name, (x, y) in lines.items()}
