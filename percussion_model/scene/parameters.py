@@ -47,6 +47,7 @@ from percussion_model.scene.group import (
 from percussion_model.scene.rows import (
     Needs,
     Row,
+    SceneError,
     choice,
     count,
     flag,
@@ -55,6 +56,7 @@ from percussion_model.scene.rows import (
     shortened,
 )
 from percussion_model.scene.solver_names import SOLVER_NAMES
+from percussion_model.scene.units import UnitError, in_si, refuse
 
 # Below this similarity a guess at a misspelt key misleads more than it helps.
 _SIMILAR_ENOUGH = 0.6
@@ -402,6 +404,36 @@ def rows_by_key() -> Mapping[str, Row]:
 def find_row(key: str) -> Row | None:
     """Find the row of a dotted key, `piston.sections.0.length` included."""
     return rows_by_key().get(generic_key(key))
+
+
+def read_number(key: str, text: str) -> float:
+    """Read a number of a parameter: of SI, or with its unit. Bounds are not looked at.
+
+    Parameters
+    ----------
+    key : str
+        Dotted.
+    text : str
+        As "5000" or "5 kN".
+
+    Raises
+    ------
+    SceneError
+        If there is no such key, or the text is no such number.
+    """
+    row = find_row(key)
+    if row is None:
+        raise SceneError(unknown_key(key))
+    try:
+        return float(text)
+    except ValueError:
+        pass
+    try:
+        if row.kind == "number":
+            return in_si(text, row.unit)
+    except UnitError:
+        pass
+    raise SceneError(refuse(row, key, text))
 
 
 def unknown_key(key: str) -> str:

@@ -29,6 +29,23 @@ FEW_FILES = 3
 
 _own_process = False
 
+
+
+def number_of(key: str) -> Callable[[str], float]:
+    """Return what reads an option whose value is that of a parameter, with its unit or in SI."""
+
+    def read(text: str) -> float:
+        from percussion_model.scene.parameters import read_number
+        from percussion_model.scene.rows import SceneError
+
+        try:
+            return read_number(key, text)
+        except SceneError as error:
+            raise typer.BadParameter(str(error)) from None
+
+    return read
+
+
 SceneFile = Annotated[Path, typer.Argument(metavar="SCENE", help="A scene file (TOML).")]
 SolverName = Annotated[
     Literal["wave", "modal", "chain", "fem", "rigid", "blow-map"] | None,
@@ -42,12 +59,17 @@ Settings = Annotated[
     typer.Option(
         "--set",
         metavar="KEY=VALUE",
-        help="Set any parameter, as in rock.unloading_ratio=10; may be repeated.",
+        help="Set any parameter, as in rock.unloading_ratio=10 or feed.force=5kN; may be repeated.",
     ),
 ]
 Accuracy = Annotated[
     float | None,
-    typer.Option("--accuracy", help="Wanted relative error of the rate, in place of cells."),
+    typer.Option(
+        "--accuracy",
+        metavar="ERROR",
+        parser=number_of("solver.accuracy"),
+        help="Wanted relative error of the rate, in place of cells.",
+    ),
 ]
 Check = Annotated[
     bool | None, typer.Option("--check/--no-check", help="Verify --accuracy by a finer run.")
@@ -59,8 +81,24 @@ ErrorEstimate = Annotated[
         help="Estimate the error of the rate by short runs on coarser cells.",
     ),
 ]
-Duration = Annotated[float | None, typer.Option("--duration", help="Simulated time, in s.")]
-Settle = Annotated[float | None, typer.Option("--settle", help="Time before blows count, in s.")]
+Duration = Annotated[
+    float | None,
+    typer.Option(
+        "--duration",
+        metavar="TIME",
+        parser=number_of("run.duration"),
+        help="Simulated time, in s or with its unit.",
+    ),
+]
+Settle = Annotated[
+    float | None,
+    typer.Option(
+        "--settle",
+        metavar="TIME",
+        parser=number_of("run.settle"),
+        help="Time before blows count, in s or with its unit.",
+    ),
+]
 JsonFile = Annotated[
     str | None,
     typer.Option("--json", metavar="FILE|-", help="Write the summary as JSON; - for stdout."),
