@@ -73,6 +73,16 @@ def _reference_loss_time() -> float:
     return 2.0 * _PAPER_DAMPING_RATIO / critical
 
 
+# What is usual, from the sources that docs/top_hammer.md, section 4, lists.
+GRAVITY = (9.78, 10.0)  # on the surface of the earth, and that of the paper
+FEED = (2500.0, 18100.0)  # the paper, 3 1/4 inch; hammers of 3 to 6 inch by a trade page
+DRIVE = (3000.0, 13100.0)  # the paper; tuned to the blow energies of hammers on the market
+REVERSAL = (0.0148, 0.04)  # the same; the greatest is the paper's
+# Three buttons on Kuru granite, Saksala et al. (2014); the paper's by the diameter, 6 inch.
+STIFFNESS = (1.62e8, 1.5e9)
+HOLE = (0.048, 0.165)  # bits of those hammers
+
+
 class Effects(Parameters):
     """Which effects are on; only those are computed."""
 
@@ -105,7 +115,7 @@ class Gravity(Parameters):
     """Weight."""
 
     acceleration: float = quantity(
-        10.0, "m/s^2", "acceleration, down positive", GRAVITY_ON, ge=-1000, le=1000
+        10.0, "m/s^2", "acceleration, down positive", GRAVITY_ON, GRAVITY, ge=-1000, le=1000
     )
 
 
@@ -113,7 +123,13 @@ class Feed(Parameters):
     """Force from the surface on the bit."""
 
     force: float = quantity(
-        2500.0, "N", "feed force F_S on the bit, down positive", FEED_ON, ge=-1e9, le=1e9
+        2500.0,
+        "N",
+        "feed force F_S on the bit, down positive",
+        FEED_ON,
+        typical=FEED,
+        ge=-1e9,
+        le=1e9,
     )
 
 
@@ -121,10 +137,16 @@ class Drive(Parameters):
     """Force on the piston."""
 
     force: float = quantity(
-        3000.0, "N", "drive force F_0 of the pressure law", DRIVE_PRESSURE, ge=0, le=1e9
+        3000.0, "N", "drive force F_0 of the pressure law", DRIVE_PRESSURE, DRIVE, ge=0, le=1e9
     )
     reversal_distance: float = quantity(
-        0.040, "m", "D_1: piston this far up turns the drive downward", DRIVE_PRESSURE, gt=0, le=100
+        0.040,
+        "m",
+        "D_1: piston this far up turns the drive downward",
+        DRIVE_PRESSURE,
+        typical=REVERSAL,
+        gt=0,
+        le=100,
     )
     external_force: float = quantity(
         0.0, "N", "force on the piston, down positive", DRIVE_EXTERNAL, ge=-1e9, le=1e9
@@ -143,7 +165,7 @@ class RockLaw(Parameters):
     """The rock under the bit (docs/model.md, table 1)."""
 
     loading_stiffness: float = quantity(
-        7.5e8, "N/m", "loading stiffness K_R", ROCK_SPRINGY, ge=1, le=1e13
+        7.5e8, "N/m", "loading stiffness K_R", ROCK_SPRINGY, STIFFNESS, ge=1, le=1e13
     )
     unloading_ratio: float = quantity(
         5.0, "-", "gamma: unloading by loading stiffness", ROCK_BILINEAR, gt=1, le=1e4
@@ -181,6 +203,18 @@ class Start(Parameters):
     )
 
 
+# Of the scene itself, beside its title: no solver takes it and no FMU has it.
+HOLE_DIAMETER: Row = dataclasses.replace(
+    quantity(
+        None,
+        "m",
+        "diameter of the hole, which tells the specific energy; left out: that is not known",
+        typical=HOLE,
+        gt=0,
+        le=10,
+    ).metadata["row"],
+    key="hole_diameter",
+)
 # Elements that the paper gives the piston.
 PAPER_PISTON_ELEMENTS = 50
 
@@ -397,8 +431,8 @@ def table_of(groups: Mapping[str, type[Parameters]]) -> Iterator[Row]:
 
 @cache
 def rows_by_key() -> Mapping[str, Row]:
-    """Return the rows of `parameter_table` by their dotted keys."""
-    return {row.key: row for row in parameter_table()}
+    """Return the rows of `parameter_table` by their dotted keys, and `HOLE_DIAMETER`."""
+    return {row.key: row for row in (HOLE_DIAMETER, *parameter_table())}
 
 
 def find_row(key: str) -> Row | None:
@@ -451,7 +485,7 @@ def unknown_key(key: str) -> str:
     underlined = {one.replace(".", "_"): one for one in keys}
     if key in underlined:  # as keyword arguments of Python are written
         return f"unknown key {key}: did you mean {underlined[key]}?"
-    known = list(keys) if parent else ["title", *GROUPS]
+    known = list(keys) if parent else ["title", HOLE_DIAMETER.key, *GROUPS]
     near = difflib.get_close_matches(generic_key(key), known, 1, _SIMILAR_ENOUGH)
     if near:
         return f"unknown key {key}: did you mean {near[0].replace('.*', '.0')}?"

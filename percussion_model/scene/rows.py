@@ -51,6 +51,7 @@ class Row:
     choices: Sequence[Any]
     description: str
     needs: Mapping[str, tuple[Any, ...]]
+    typical: tuple[float, float] | None = None  # what the literature has
 
     @property
     def allowed(self) -> str:
@@ -121,13 +122,19 @@ Needs = dict[str, tuple[object, ...]]
 
 
 def quantity(
-    default: Any, unit: str, description: str, needs: Needs | None = None, **bounds: float
+    default: Any,
+    unit: str,
+    description: str,
+    needs: Needs | None = None,
+    typical: tuple[float, float] | None = None,
+    **bounds: float,
 ) -> Any:
     """Declare a number with its unit, bounds (gt, ge, lt, le) and what it needs.
 
-    The default ... makes it required; None lets it be left out.
+    The default ... makes it required; None lets it be left out. `typical` is the range that
+    sources have, where there are any.
     """
-    return _declare("number", default, description, needs, unit, bounds=bounds)
+    return _declare("number", default, description, needs, unit, bounds=bounds, typical=typical)
 
 
 def count(
@@ -167,6 +174,7 @@ def _declare(
     unit: str = "",
     choices: Sequence[Any] = (),
     bounds: Mapping[str, float] = MappingProxyType({}),
+    typical: tuple[float, float] | None = None,
 ) -> Any:
     low, high = bounds.get("gt", bounds.get("ge")), bounds.get("lt", bounds.get("le"))
     row = Row(
@@ -182,6 +190,7 @@ def _declare(
         choices=choices,
         description=description,
         needs=needs or {},
+        typical=typical,
     )
     return dataclasses.field(default=row.default, metadata={"row": row})
 

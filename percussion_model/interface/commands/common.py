@@ -170,9 +170,31 @@ def load_scene(
     if cells is not None:
         key = "fem.elements" if scene.solver_name == "fem" else "solver.cells"
         scene = scene.replace(**{key: cells})
+    hint_at_unusual(scene)
     if is_run:
         tell_of_compiling(scene.solver_name)
     return scene
+
+
+# Parameters of which this process has hinted.
+_hinted: set[str] = set()
+
+
+def hint(key: str, text: str) -> None:
+    """Print a hint on stderr, once for each parameter of all sections and scenes."""
+    from percussion_model.scene.rows import generic_key
+
+    if text and generic_key(key) not in _hinted:
+        _hinted.add(generic_key(key))
+        print_message(f"hint: {text}")
+
+
+def hint_at_unusual(scene: Scene) -> None:
+    """Hint at values of a scene that are far from what is usual, as by a slip of the unit."""
+    from percussion_model.scene.typical import unusual_values
+
+    for key, text in unusual_values(scene):
+        hint(key, text)
 
 
 # Solvers of whose compilation this process has told: many scenes may be read before it begins.

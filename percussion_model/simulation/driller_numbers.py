@@ -1,0 +1,77 @@
+"""Numbers of a run in the units of drillers, each defined here once."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+from percussion_model.simulation.uncertain import known_error, mean_text, rate_text, scaled
+
+
+class DrillerNumber(NamedTuple):
+    """One number.
+
+    Attributes
+    ----------
+    name : str
+    definition : str
+    factor : float
+        From SI, which a summary is in, to `unit`.
+    unit : str
+    """
+
+    name: str
+    definition: str
+    factor: float
+    unit: str
+
+
+# By the key of a summary.
+DRILLER_NUMBERS = {
+    "rate_of_penetration": DrillerNumber(
+        "Rate of penetration", "advance of the hole by time, over whole blows", 3600.0, "m/h"
+    ),
+    "blow_frequency": DrillerNumber(
+        "Blow frequency", "blows by time", 60.0, "blows/min"
+    ),
+    "percussive_power": DrillerNumber(
+        "Percussive power", "blow energy times blow frequency", 1e-3, "kW"
+    ),
+    "specific_energy": DrillerNumber(
+        "Specific energy", "blow energy by volume of the hole drilled", 1e-6, "MJ/m^3"
+    ),
+}  # fmt: skip
+
+
+def driller_numbers(summary: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """Return the numbers of a summary in the units of drillers, of those that are known.
+
+    Parameters
+    ----------
+    summary : mapping
+        Of a `Result` or a `Settled`, SI units.
+
+    Returns
+    -------
+    dict of dict
+        By key of the summary: `value`, `error` by grid and scatter, None where that is not
+        known, `unit` and `definition`.
+    """
+    return {
+        key: {
+            "value": one.factor * summary[key],
+            "error": scaled(one.factor, known_error(summary, key)),
+            "unit": one.unit,
+            "definition": one.definition,
+        }
+        for key, one in DRILLER_NUMBERS.items()
+        if summary.get(key) is not None
+    }
+
+
+def driller_text(summary: Mapping[str, Any], key: str) -> str:
+    """A number of a summary in the unit of drillers, with its error, as text without the unit."""
+    factor = DRILLER_NUMBERS[key].factor
+    if key == "rate_of_penetration":
+        return rate_text(summary, factor)
+    return mean_text(summary, key, factor)
