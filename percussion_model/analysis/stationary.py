@@ -14,7 +14,9 @@ import numpy as np
 from percussion_model.physics.records import BLOW
 from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.simulation.error_estimate import SAFETY, with_error_estimate
+from percussion_model.simulation.driller_numbers import driller_numbers
 from percussion_model.simulation.files import plain
+from percussion_model.simulation.means import by_volume, numbers_over, scatter_over
 from percussion_model.simulation.rate import STALLED_PERIODS, rate_of_blows, ratio_of_sums
 from percussion_model.simulation.result import Result
 from percussion_model.simulation.simulate import Simulation, SimulationError
@@ -60,6 +62,8 @@ STEADY = 0.9
 LEAST_LIMIT = 32
 # Numbers whose errors by the grid are estimated.
 _RATE, _PERIOD = "rate_of_penetration", "blow_period"
+_POWER, _ENERGY = "percussive_power", "energy_per_advance"
+JUDGED = (_RATE, _PERIOD, _POWER, _ENERGY)
 # Grids are compared over so many blows at least; where the motion is periodic, over the last
 # of them, so that settling does not count as scatter.
 FEWEST_JUDGED, JUDGED_SHARE = 12, 0.5
@@ -106,13 +110,16 @@ class Settled:
     depends_on_cells : bool
         Whether the rate is one of the cells and of nothing else.
     grid_errors : dict of float
-        The other part of the errors of `rate_of_penetration` [m/s] and `blow_period` [s], as
-        `simulate` estimates it by coarser grids, with what scatter does to these runs; 0
-        without a grid. Of what was not estimated there is none.
+        The other part of the errors of `rate_of_penetration` [m/s], `blow_period` [s],
+        `percussive_power` [W] and `energy_per_advance` [J/m], as `simulate` estimates it by
+        coarser grids, with what scatter does to these runs; 0 without a grid. Of what was not
+        estimated there is none.
     others : tuple of Motion
         The motions on coarser grids, where errors were estimated.
     warnings : list of str
         As of a run, but for those of its length, where errors were estimated.
+    hole_diameter : float or None
+        Of the scene [m].
     """
 
     kind: str
@@ -128,6 +135,7 @@ class Settled:
     grid_errors: dict[str, float] = field(default_factory=dict)
     others: tuple[Motion, ...] = ()
     warnings: list[str] = field(default_factory=list, repr=False)
+    hole_diameter: float | None = None
 
     def __repr__(self) -> str:
         rate = rate_field(self.summary())
@@ -213,8 +221,28 @@ class Settled:
             settling = ratio_of_sums(counted, np.ones(len(counted)))[1]
         return self._with_grid(_PERIOD, settling)
 
+    def _power_and_energy(self) -> tuple[dict[str, float], dict[str, float]]:
+        """Percussive power [W] and energy by advance [J/m] with their errors, as the period's."""
+        counted = self.counted
+        if len(counted) == 0 or self.kind == "stalled":
+            return {}, {}
+        found = numbers_over(counted)
+        if self.order:
+            before = numbers_over(self.blows[-2 * self.order : -self.order])
+            off = {name: abs(found[name] - before[name]) for name in JUDGED[2:]}
+        else:
+            off = scatter_over(counted)
+        errors = {name: self._with_grid(name, off.get(name, math.nan)) for name in JUDGED[2:]}
+        return {name: found[name] for name in JUDGED[2:]}, errors
+
     def summary(self) -> dict[str, Any]:
-        """Return the numbers as plain values for JSON; None is what is not defined."""
+        """Return the numbers as plain values for JSON; None is what is not defined.
+
+        `driller_numbers` has some of them in the units of drillers, as that of a `Result`.
+        """
+        period, off = self.blow_period, self.blow_period_error
+        found, errors = self._power_and_energy()
+        volume = by_volume(found, self.hole_diameter), by_volume(errors, self.hole_diameter)
         numbers = {
             "kind": self.kind,
             "order": self.order or None,
@@ -225,8 +253,13 @@ class Settled:
             "grid_errors": self.grid_errors,
             "rate_of_penetration_undecided": self.rate_of_penetration_undecided,
             BY_CELLS: self.depends_on_cells,
-            "blow_period": self.blow_period,
-            "blow_period_error": self.blow_period_error,
+            "blow_period": period,
+            "blow_period_error": off,
+            "blow_frequency": 1.0 / period,
+            "blow_frequency_error": off / period**2,
+            **found,
+            **volume[0],
+            **{f"{name}_error": error for name, error in (errors | volume[1]).items()},
             "multiplier": self.multiplier,
             "multiplier_error": self.multiplier_error,
             "same_motion_on_other_grids": self.same_motion,
@@ -237,7 +270,7 @@ class Settled:
             "warnings": self.warnings,
         }
         values: dict[str, Any] = plain(numbers)
-        return values
+        return values | {"driller_numbers": driller_numbers(values)}
 
 
 def settled(
@@ -299,7 +332,9 @@ def settled(
     def made(kind: str, order: int, rate: float, error: float, multiplier: float) -> Settled:
         cycle, times = blows[len(blows) - order :], (simulation.time, simulation.wall_time)
         values = kind, order, rate, error, multiplier, cycle, blows, *times
-        found = Settled(*values, depends_on_cells=scene.is_undamped)
+        found = Settled(
+            *values, depends_on_cells=scene.is_undamped, hole_diameter=scene.hole_diameter
+        )
         if not error_estimate:
             return found
         # before other runs make this one longer; a study of thousands would pay for them
@@ -352,13 +387,13 @@ def _other_motions(
 
 
 def _grid_errors(simulation: Simulation, settling: float) -> dict[str, float]:
-    """Estimated errors of rate and period by the grid, SI units; of what could be told.
+    """Estimated errors of `JUDGED` by the grid, SI units; of what could be told.
 
     A run of few blows is made longer; `settling` is the share of it that does not count.
     """
     coarser = simulation.solver.coarser_scenes()
     if coarser == []:
-        return {_RATE: 0.0, _PERIOD: 0.0}
+        return dict.fromkeys(JUDGED, 0.0)
     while simulation.blow_rows < FEWEST_JUDGED:
         before = simulation.blow_rows
         simulation.advance_blows(1, simulation.time + STALLED_AFTER)
@@ -369,7 +404,7 @@ def _grid_errors(simulation: Simulation, settling: float) -> dict[str, float]:
     result = replace(simulation.result(settle), scene=whole)
     judged = with_error_estimate(result, coarser, _run, whole_time=True)
     errors = {_RATE: judged.rate_of_penetration_error, **judged.errors}
-    return {name: errors[name] for name in (_RATE, _PERIOD) if errors.get(name, math.nan) >= 0.0}
+    return {name: errors[name] for name in JUDGED if errors.get(name, math.nan) >= 0.0}
 
 
 def _run(scene: Scene) -> Result:

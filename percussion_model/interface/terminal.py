@@ -145,8 +145,12 @@ def show_settled(found: Settled) -> None:
     table.add_row("Motion", f"{found.motion}{_on_other_grids(found)}")
     if summary[RATE[1]] is not None:
         table.add_row(RATE[0], f"{rate_text(summary)} {RATE[3]}")
+        table.add_row("", _with_driller_unit(summary, RATE[1]))
     if summary["blow_period"] is not None:
         table.add_row("Blow period", f"{mean_text(summary, 'blow_period', 1e3)} ms")
+    for key, one in DRILLER_NUMBERS.items():
+        if key != RATE[1] and summary.get(key) is not None:
+            table.add_row(one.name, _with_driller_unit(summary, key))
     if summary["multiplier"] is not None:
         table.add_row("Deviation after a cycle", _deviation(found))
     table.add_row("Blows run", f"{len(found.blows)} in {found.duration:.4g} s of simulated time")
@@ -156,6 +160,10 @@ def show_settled(found: Settled) -> None:
     if found.error_of:
         console.print(wrapped(_settled_error(found)), highlight=False)
     show_warnings(console, found.warnings)
+
+
+def _with_driller_unit(summary: Mapping[str, Any], key: str) -> str:
+    return f"{driller_text(summary, key)} {DRILLER_NUMBERS[key].unit}"
 
 
 def _on_other_grids(found: Settled) -> str:
