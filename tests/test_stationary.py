@@ -11,7 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 from percussion_model import Scene, SceneError, settled, simulate
-from percussion_model.analysis.stationary import COMPARED, cycle, cycles_in
+from percussion_model.analysis.stationary import COMPARED, JUDGED, cycle, cycles_in
 from percussion_model.interface.cli import app
 from percussion_model.interface.terminal import show_settled
 from percussion_model.physics.records import BLOW

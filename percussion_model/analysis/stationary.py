@@ -13,8 +13,8 @@ import numpy as np
 
 from percussion_model.physics.records import BLOW
 from percussion_model.scene.scene import Scene, SceneError
-from percussion_model.simulation.error_estimate import SAFETY, with_error_estimate
 from percussion_model.simulation.driller_numbers import driller_numbers
+from percussion_model.simulation.error_estimate import SAFETY, with_error_estimate
 from percussion_model.simulation.files import plain
 from percussion_model.simulation.means import by_volume, numbers_over, scatter_over
 from percussion_model.simulation.rate import STALLED_PERIODS, rate_of_blows, ratio_of_sums
@@ -232,7 +232,11 @@ class Settled:
             off = {name: abs(found[name] - before[name]) for name in JUDGED[2:]}
         else:
             off = scatter_over(counted)
-        errors = {name: self._with_grid(name, off.get(name, math.nan)) for name in JUDGED[2:]}
+        errors = {
+            name: self._with_grid(name, off.get(name, math.nan))
+            for name in JUDGED[2:]
+            if name in self.grid_errors or not self.grid_errors
+        }
         return {name: found[name] for name in JUDGED[2:]}, errors
 
     def summary(self) -> dict[str, Any]:

@@ -72,8 +72,8 @@ class Row:
         if self.lower_open or self.upper_open:
             start = "above" if self.lower_open else "from"
             end = "below" if self.upper_open else "up to"
-            return f"{start} {_short(self.lower)} and {end} {_short(self.upper)}"
-        return f"from {_short(self.lower)} to {_short(self.upper)}"
+            return f"{start} {short_number(self.lower)} and {end} {short_number(self.upper)}"
+        return f"from {short_number(self.lower)} to {short_number(self.upper)}"
 
     @property
     def effect(self) -> str:
@@ -207,7 +207,7 @@ def is_number(value: Any) -> bool:
         return False
 
 
-def _short(number: float) -> str:
+def short_number(number: float) -> str:
     """Write a bound without needless digits, as in 1e9."""
     return f"{number:g}".replace("e+0", "e").replace("e+", "e").replace("e-0", "e-")
 

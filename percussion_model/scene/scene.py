@@ -89,7 +89,11 @@ class Scene:
     blow_map: BlowMapOptions
     run: RunOptions
     # fields of the dataclass: those above, and groups that effects have added
-    __annotations__ = {"title": "str", "hole_diameter": "float | None"} | dict.fromkeys(GROUPS, Parameters) | __annotations__
+    __annotations__ = (
+        {"title": "str", "hole_diameter": "float | None"}
+        | dict.fromkeys(GROUPS, Parameters)
+        | __annotations__
+    )
 
     def __init__(self, **values: Any) -> None:
         faults = Faults()

@@ -16,6 +16,7 @@ from percussion_model.physics.effects import EFFECTS
 from percussion_model.physics.records import BLOW, EVENT, EventKind, Mode
 from percussion_model.scene.rows import shortened
 from percussion_model.scene.scene import Scene
+from percussion_model.simulation.driller_numbers import driller_numbers
 from percussion_model.simulation.files import (
     LARGEST_TABLE,
     LARGEST_TEXT,
@@ -26,7 +27,6 @@ from percussion_model.simulation.files import (
     staged,
     to_json,
 )
-from percussion_model.simulation.driller_numbers import driller_numbers
 from percussion_model.simulation.means import by_volume, numbers_over, scatter_over
 from percussion_model.simulation.origin import ORIGIN
 from percussion_model.simulation.rate import has_stalled, rate_of_blows, ratio_of_sums

@@ -162,7 +162,8 @@ def read_axis(text: str) -> tuple[str, np.ndarray]:
         if ":" not in right:
             return key, np.array(_numbers(key, right.split(","), text))
         first, last, count = right.split(":")
-        return key, _spread(text, *_numbers(key, [first, last], text), count)
+        ends = _numbers(key, [first, last], text)
+        return key, _spread(text, ends[0], ends[1], count)
     except SceneError:
         raise
     except ValueError:

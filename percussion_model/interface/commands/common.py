@@ -30,7 +30,6 @@ FEW_FILES = 3
 _own_process = False
 
 
-
 def number_of(key: str) -> Callable[[str], float]:
     """Return what reads an option whose value is that of a parameter, with its unit or in SI."""
 

@@ -27,8 +27,8 @@ def study(
         typer.Option(
             "--over",
             metavar="KEY=FIRST:LAST:COUNT",
-            help="Values of a parameter, in SI or with units; COUNTlog for even steps of its logarithm, or KEY=A,B,C. "
-            "May be repeated: the study runs all combinations.",
+            help="Values of a parameter, in SI or with units; COUNTlog for even steps of its "
+            "logarithm, or KEY=A,B,C. May be repeated: the study runs all combinations.",
         ),
     ],
     out: Annotated[
