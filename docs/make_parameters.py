@@ -21,8 +21,8 @@ as one list instead, `[[bars]]`, from the drive to the rock: the first is the pi
 the bit, and those between them are `string.rods`.
 
 *Typical* is the range of the sources in [top_hammer.md](top_hammer.md#4-sources-of-the-numbers), of
-the paper and of steel. It is no bound: commands hint, once for each key, at a value that is ten times
-beyond, since that is mostly a slip of the unit.
+the paper and of steel. It is no bound: commands hint, once for each key, at a value that is ten
+times beyond, since that is mostly a slip of the unit.
 
 This page is written by `python docs/make_parameters.py`; change
 `percussion_model/scene/parameters.py` or `bar_groups.py` instead.

@@ -56,6 +56,7 @@ def _shown_unit(unit: str) -> str:
 # SI unit, the unit that people use and SI units in one of those.
 HEADLINES: tuple[tuple[str, str, str, str, float], ...] = (
     ("rate_of_penetration", "Rate of penetration", "m/s", "mm/s", 1e-3),
+    _of_drillers("rate_of_penetration", "m/s", "… in an hour"),
     ("rate_of_penetration_standard_error", "… its standard error", "m/s", "mm/s", 1e-3),
     ("rate_of_penetration_relative_error", "… its estimated relative error", "–", "%", 1e-2),
     (
@@ -65,7 +66,6 @@ HEADLINES: tuple[tuple[str, str, str, str, float], ...] = (
         "mm/s",
         1e-3,
     ),
-    _of_drillers("rate_of_penetration", "m/s", "… in the hour"),
     ("blow_period", "Blow period", "s", "ms", 1e-3),
     _of_drillers("blow_frequency", "Hz"),
     ("impact_velocity", "Impact velocity (mean of the piston)", "m/s", "m/s", 1.0),
@@ -94,7 +94,6 @@ ROUNDING = 1e-9
 CARDS = (
     ("blow_frequency", 1.0, "Hz", "blow frequency"),
     ("blow_energy", 1.0, "J", "blow energy"),
-    ("percussive_power", 1e-3, "kW", "percussive power"),
     ("transfer_efficiency", 100.0, "%", "of it given to the rock"),
     ("penetration_per_blow", 1e3, "mm", "penetration per blow"),
 )
@@ -301,10 +300,18 @@ def _error(value: float, factor: float, unit: str) -> str:
 def mean_cards(summary: dict[str, Any]) -> list[tuple[str, str]]:
     """Number with its unit, and name, of the cards beside that of the rate."""
     return [
-        (f"{_text(summary, key, factor, MOST_DIGITS)} {unit}", name)
+        (f"{_text(summary, key, factor, MOST_DIGITS)} {unit}", f"{name}{_power(summary, key)}")
         for key, factor, unit, name in CARDS
-        if summary.get(key) is not None
+        if summary[key] is not None
     ]
+
+
+def _power(summary: dict[str, Any], key: str) -> str:
+    """The percussive power, behind the name of the blow energy."""
+    if key != "blow_energy" or summary.get("percussive_power") is None:
+        return ""
+    unit = DRILLER_NUMBERS["percussive_power"].unit
+    return f" (power {driller_text(summary, 'percussive_power')} {unit})"
 
 
 def _text(summary: dict[str, Any], key: str, factor: float, most_digits: int) -> str:
