@@ -254,8 +254,8 @@ def test_settings_and_times_of_the_command_line_take_units(capsys):
     ("words", "told"),
     [
         (("--set", "feed.force=5 kg"), 'feed.force = "5 kg": a force is wanted'),
-        (("--duration", "5 kN"), 'run.duration = "5 kN": a time is wanted'),
-        (("--settle", "soon"), 'run.settle = "soon": must be a number from 0 to 1e6 s'),
+        (("--duration", "5 kN"), '--duration = "5 kN": a time is wanted'),
+        (("--settle", "soon"), '--settle = "soon": must be a number from 0 to 1e6 s'),
     ],
 )
 def test_bad_units_on_the_command_line_end_in_one_line(words, told, capsys):

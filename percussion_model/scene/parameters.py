@@ -440,7 +440,7 @@ def find_row(key: str) -> Row | None:
     return rows_by_key().get(generic_key(key))
 
 
-def read_number(key: str, text: str) -> float:
+def read_number(key: str, text: str, name: str = "") -> float:
     """Read a number of a parameter: of SI, or with its unit. Bounds are not looked at.
 
     Parameters
@@ -449,6 +449,8 @@ def read_number(key: str, text: str) -> float:
         Dotted.
     text : str
         As "5000" or "5 kN".
+    name : str
+        What an error calls it; default the key.
 
     Raises
     ------
@@ -467,7 +469,7 @@ def read_number(key: str, text: str) -> float:
             return in_si(text, row.unit)
     except UnitError:
         pass
-    raise SceneError(refuse(row, key, text))
+    raise SceneError(refuse(row, name or key, text))
 
 
 def unknown_key(key: str) -> str:

@@ -30,7 +30,14 @@ FEW_FILES = 3
 _own_process = False
 
 
-def number_of(key: str) -> Callable[[str], float]:
+class BadValue(typer.BadParameter):
+    """A bad value of an option, whose message names the option and is told as it is.
+
+    What a parser of typer raises must be no `ValueError`: of these it drops the message.
+    """
+
+
+def number_of(key: str, option: str) -> Callable[[str], float]:
     """Return what reads an option whose value is that of a parameter, with its unit or in SI."""
 
     def read(text: str) -> float:
@@ -38,9 +45,9 @@ def number_of(key: str) -> Callable[[str], float]:
         from percussion_model.scene.rows import SceneError
 
         try:
-            return read_number(key, text)
+            return read_number(key, text, option)
         except SceneError as error:
-            raise typer.BadParameter(str(error)) from None
+            raise BadValue(str(error)) from None
 
     return read
 
@@ -66,7 +73,7 @@ Accuracy = Annotated[
     typer.Option(
         "--accuracy",
         metavar="ERROR",
-        parser=number_of("solver.accuracy"),
+        parser=number_of("solver.accuracy", "--accuracy"),
         help="Wanted relative error of the rate, in place of cells.",
     ),
 ]
@@ -85,7 +92,7 @@ Duration = Annotated[
     typer.Option(
         "--duration",
         metavar="TIME",
-        parser=number_of("run.duration"),
+        parser=number_of("run.duration", "--duration"),
         help="Simulated time, in s or with its unit.",
     ),
 ]
@@ -94,7 +101,7 @@ Settle = Annotated[
     typer.Option(
         "--settle",
         metavar="TIME",
-        parser=number_of("run.settle"),
+        parser=number_of("run.settle", "--settle"),
         help="Time before blows count, in s or with its unit.",
     ),
 ]
