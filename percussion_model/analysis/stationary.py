@@ -262,7 +262,7 @@ class Settled:
             "blow_frequency": 1.0 / period,
             "blow_frequency_error": off / period**2,
             **found,
-            **volume[0],
+            "specific_energy": volume[0].get("specific_energy"),
             **{f"{name}_error": error for name, error in (errors | volume[1]).items()},
             "multiplier": self.multiplier,
             "multiplier_error": self.multiplier_error,

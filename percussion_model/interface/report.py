@@ -43,8 +43,7 @@ from percussion_model.simulation.uncertain import (
 def _of_drillers(key: str, unit: str, name: str = "") -> tuple[str, str, str, str, float]:
     """A number at the head of the report in the unit of drillers, and in SI."""
     one = DRILLER_NUMBERS[key]
-    about = f" ({one.definition})" if key in ("percussive_power", "specific_energy") else ""
-    return key, name or f"{one.name}{about}", unit, _shown_unit(one.unit), 1.0 / one.factor
+    return key, name or one.name, unit, _shown_unit(one.unit), 1.0 / one.factor
 
 
 def _shown_unit(unit: str) -> str:
@@ -72,10 +71,10 @@ HEADLINES: tuple[tuple[str, str, str, str, float], ...] = (
     ("rebound_velocity", "Rebound velocity (mean of the piston)", "m/s", "m/s", 1.0),
     ("stroke", "Stroke", "m", "mm", 1e-3),
     ("blow_energy", "Blow energy", "J", "J", 1.0),
-    _of_drillers("percussive_power", "W"),
+    _of_drillers("percussive_power", "W", "Percussive power (blow energy times frequency)"),
     ("rock_energy", "Energy into the rock, per blow", "J", "J", 1.0),
     ("transfer_efficiency", "Energy transfer efficiency", "–", "%", 1e-2),
-    _of_drillers("specific_energy", "J/m³"),
+    _of_drillers("specific_energy", "J/m³", "Specific energy (blow energy by volume drilled)"),
     ("penetration_per_blow", "Penetration per blow", "m", "mm", 1e-3),
     ("contacts_per_blow", "Piston/bit contacts per blow", "–", "", 1.0),
     ("drilling_cycles_per_blow", "Drilling cycles per blow", "–", "", 1.0),

@@ -29,9 +29,8 @@ _NUMBER = r"[+-]?(?:[0-9]{1,25}(?:\.[0-9]{0,25})?|\.[0-9]{1,25})(?:[eE][+-]?[0-9
 # A name of a unit, and a power of it; most of them a force by length and time.
 _FACTOR = r"(?:[A-Za-zµμ]{1,24}|%)(?:[²³]|\^?[1-9]|\^?-[1-9])?"
 _SIGN = r"(?:[ ]?[*·/][ ]?|[ ])"
-_QUANTITY = re.compile(
-    rf"[ ]*(?P<number>{_NUMBER})[ ]*(?P<unit>{_FACTOR}(?:{_SIGN}{_FACTOR}){{0,5}})[ ]*"
-)
+_UNIT = re.compile(rf"{_FACTOR}(?:{_SIGN}{_FACTOR}){{0,5}}")
+_QUANTITY = re.compile(rf"[ ]*(?P<number>{_NUMBER})[ ]*(?P<unit>{_UNIT.pattern})[ ]*")
 _FACTORS = re.compile(r"(?P<sign>^|[ *·/]+)(?P<name>[A-Za-zµμ]+|%)(?P<power>[²³]|\^?-?[1-9])?")
 # Angles, temperatures and bits are in no parameter.
 _DIMENSIONS = {"[length]", "[mass]", "[time]"}
@@ -160,11 +159,13 @@ def factor(unit: str, si: str) -> Fraction:
     Raises
     ------
     UnitError
-        If there is none: for an unknown unit, another dimension, and units whose zero is
-        another one or that are logarithms.
+        If there is none: for what is written otherwise, an unknown unit, another dimension,
+        and units whose zero is another one or that are logarithms.
     """
     from fractions import Fraction
 
+    if not all(len(one) <= LONGEST and _UNIT.fullmatch(one) for one in (unit, si) if one != "-"):
+        raise UnitError
     if si == "-":
         if unit == "%":
             return Fraction(1, 100)

@@ -5,42 +5,34 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
+from percussion_model.simulation.columns import SUMMARY_COLUMNS
 from percussion_model.simulation.uncertain import known_error, mean_text, rate_text, scaled
 
 
 class DrillerNumber(NamedTuple):
-    """One number.
+    """One number of a summary.
 
     Attributes
     ----------
     name : str
-    definition : str
     factor : float
         From SI, which a summary is in, to `unit`.
     unit : str
     """
 
     name: str
-    definition: str
     factor: float
     unit: str
 
 
-# By the key of a summary.
+# By the key of a summary; what each is stands in `SUMMARY_COLUMNS`.
 DRILLER_NUMBERS = {
-    "rate_of_penetration": DrillerNumber(
-        "Rate of penetration", "advance of the hole by time, over whole blows", 3600.0, "m/h"
-    ),
-    "blow_frequency": DrillerNumber(
-        "Blow frequency", "blows by time", 60.0, "blows/min"
-    ),
-    "percussive_power": DrillerNumber(
-        "Percussive power", "blow energy times blow frequency", 1e-3, "kW"
-    ),
-    "specific_energy": DrillerNumber(
-        "Specific energy", "blow energy by volume of the hole drilled", 1e-6, "MJ/m^3"
-    ),
-}  # fmt: skip
+    "rate_of_penetration": DrillerNumber("Rate of penetration", 3600.0, "m/h"),
+    "blow_frequency": DrillerNumber("Blow frequency", 60.0, "blows/min"),
+    "percussive_power": DrillerNumber("Percussive power", 1e-3, "kW"),
+    "specific_energy": DrillerNumber("Specific energy", 1e-6, "MJ/m^3"),
+}
+_DEFINITIONS = {column.name: column.meaning for column in SUMMARY_COLUMNS}
 
 
 def driller_numbers(summary: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
@@ -62,7 +54,7 @@ def driller_numbers(summary: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
             "value": one.factor * summary[key],
             "error": scaled(one.factor, known_error(summary, key)),
             "unit": one.unit,
-            "definition": one.definition,
+            "definition": _DEFINITIONS[key],
         }
         for key, one in DRILLER_NUMBERS.items()
         if summary.get(key) is not None

@@ -252,7 +252,7 @@ class Result:
             "rate_of_penetration_fixed_window": self.rate_of_penetration_fixed_window,
             "rate_of_penetration_fixed_window_error": self.rate_of_penetration_fixed_window_error,
             **over_blows,
-            **by_volume(over_blows, hole),
+            "specific_energy": by_volume(over_blows, hole).get("specific_energy"),
             "standard_errors": standard_errors | by_volume(standard_errors, hole),
             "errors": self.errors | by_volume(self.errors, hole),
             "energy": self.energy,
