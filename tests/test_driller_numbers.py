@@ -103,7 +103,7 @@ def test_the_table_shows_them_beside_si(result, capsys):
     for key, one in DRILLER_NUMBERS.items():
         name, value = by_unit[one.unit]
         assert value == pytest.approx(one.factor * summary[key], rel=1e-3)
-        assert name in ("", one.name)
+        assert name == (one.behind or one.name)
     at = {unit: k for k, (_, _, unit) in enumerate(rows)}
     assert at["m/h"] == at["mm/s"] + 1
     assert at["blows/min"] == at["Hz"] + 1
@@ -125,7 +125,7 @@ def test_the_report_shows_them_with_their_errors(result):
     energy = next(texts for name, texts in shown.items() if name.startswith("Specific energy"))
     assert re.fullmatch(r"\d+\.\d\d ± 0\.30 MJ/m³", energy[1])
     assert re.fullmatch(r"\d+\.\d ± 1\.2 blows/min", shown["Blow frequency"][1])
-    assert shown["… in an hour"][1].endswith("m/h")
+    assert shown["Rate in an hour"][1].endswith("m/h")
     assert any("kW" in name for _, name in mean_cards(summary))
 
 

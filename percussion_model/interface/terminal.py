@@ -132,7 +132,7 @@ def _add_driller_row(table: Table, summary: Mapping[str, Any], key: str) -> None
     if summary.get(other) is None:
         return
     one = DRILLER_NUMBERS[other]
-    name = "" if other == key else one.name
+    name = one.behind if other == key else one.name
     table.add_row(name, _in_two_lines(driller_text(summary, other)), one.unit)
 
 
@@ -145,7 +145,8 @@ def show_settled(found: Settled) -> None:
     table.add_row("Motion", f"{found.motion}{_on_other_grids(found)}")
     if summary[RATE[1]] is not None:
         table.add_row(RATE[0], f"{rate_text(summary)} {RATE[3]}")
-        table.add_row("", _with_driller_unit(summary, RATE[1]))
+        one = DRILLER_NUMBERS[RATE[1]]
+        table.add_row(one.behind, _with_driller_unit(summary, RATE[1]))
     if summary["blow_period"] is not None:
         table.add_row("Blow period", f"{mean_text(summary, 'blow_period', 1e3)} ms")
     for key, one in DRILLER_NUMBERS.items():

@@ -18,19 +18,22 @@ class DrillerNumber(NamedTuple):
     factor : float
         From SI, which a summary is in, to `unit`.
     unit : str
+    behind : str
+        Its name in a table behind the same number in SI.
     """
 
     name: str
     factor: float
     unit: str
+    behind: str
 
 
 # By the key of a summary; what each is stands in `SUMMARY_COLUMNS`.
 DRILLER_NUMBERS = {
-    "rate_of_penetration": DrillerNumber("Rate of penetration", 3600.0, "m/h"),
-    "blow_frequency": DrillerNumber("Blow frequency", 60.0, "blows/min"),
-    "percussive_power": DrillerNumber("Percussive power", 1e-3, "kW"),
-    "specific_energy": DrillerNumber("Specific energy", 1e-6, "MJ/m^3"),
+    "rate_of_penetration": DrillerNumber("Rate of penetration", 3600.0, "m/h", "Rate in an hour"),
+    "blow_frequency": DrillerNumber("Blow frequency", 60.0, "blows/min", "Blows in a minute"),
+    "percussive_power": DrillerNumber("Percussive power", 1e-3, "kW", ""),
+    "specific_energy": DrillerNumber("Specific energy", 1e-6, "MJ/m^3", ""),
 }
 _DEFINITIONS = {column.name: column.meaning for column in SUMMARY_COLUMNS}
 
