@@ -216,6 +216,7 @@ def test_a_rate_of_the_cells_is_undecided_wherever_it_is_shown(undamped, capsys,
     shown = capsys.readouterr().out
     assert [line.split("│")[1].strip() for line in shown.splitlines() if "undecided" in line] == [
         "Rate of penetration",
+        "Rate in an hour",
         "Penetration per blow",
     ]
     rows = {name: texts for name, *texts in headline_rows(summary)}
