@@ -179,3 +179,15 @@ def test_greatest_stresses_have_their_place():
     assert dataclasses.astuple(found["piston"].tension) == (-4.0, 2.0, 1.0)
     assert dataclasses.astuple(found["bit"].tension) == (-5.0, 2.0, 0.0)
     assert found["piston"] == bar_stress(upper.T, edges, np.array([0.0, 1.0]))
+
+
+def test_an_fmu_does_not_depend_on_the_hole():
+    pytest.importorskip("pythonfmu")
+    from fmu_src.hammer.build import _scene
+    from fmu_src.hammer.variables import hammer_variables
+
+    scene = Scene(hole_diameter=HOLE)
+    variables = hammer_variables(scene)
+    assert variables == hammer_variables(Scene())
+    assert not [one.name for one in variables if "hole_diameter" in one.name]
+    assert _scene(scene, variables, "")["given"] == Scene().given_values()

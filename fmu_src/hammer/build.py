@@ -90,7 +90,7 @@ def refuse_other(path: Path, scene: Scene, with_map: bool, force: bool = False) 
         with zipfile.ZipFile(path) as archive:
             found = json.loads(archive.read("resources/scene.json"))["given"]
             same = (found, "resources/blow_map.npz" in archive.namelist()) == (
-                json.loads(to_json(scene.given_values())), with_map
+                json.loads(to_json(_given(scene))), with_map
             )  # fmt: skip
     except (
         OSError,
@@ -107,6 +107,11 @@ def refuse_other(path: Path, scene: Scene, with_map: bool, force: bool = False) 
             f"{path}: holds another FMU than that of this scene; --force replaces it, another -o "
             "keeps it"
         )
+
+
+def _given(scene: Scene) -> dict[str, object]:
+    """What was given of a scene, as an FMU has it: of the hole's diameter nothing depends there."""
+    return scene.replace(hole_diameter=None).given_values()
 
 
 def hammer_name(scene: Path, suffix: str = "") -> str:
@@ -136,6 +141,6 @@ def about_hammer(scene: Scene, path: Path) -> About:
 def _scene(scene: Scene, variables: list[Variable], bundle: str) -> dict[str, object]:
     """What an instance needs of the scene, besides its variables."""
     return {
-        "given": scene.given_values(),
+        "given": _given(scene),
         "identity": [bundle, [variable.name for variable in variables]],
     }
