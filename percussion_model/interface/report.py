@@ -55,7 +55,6 @@ def _shown_unit(unit: str) -> str:
 # SI unit, the unit that people use and SI units in one of those.
 HEADLINES: tuple[tuple[str, str, str, str, float], ...] = (
     ("rate_of_penetration", "Rate of penetration", "m/s", "mm/s", 1e-3),
-    _of_drillers("rate_of_penetration", "m/s", DRILLER_NUMBERS["rate_of_penetration"].behind),
     ("rate_of_penetration_standard_error", "… its standard error", "m/s", "mm/s", 1e-3),
     ("rate_of_penetration_relative_error", "… its estimated relative error", "–", "%", 1e-2),
     (
@@ -65,6 +64,7 @@ HEADLINES: tuple[tuple[str, str, str, str, float], ...] = (
         "mm/s",
         1e-3,
     ),
+    _of_drillers("rate_of_penetration", "m/s", DRILLER_NUMBERS["rate_of_penetration"].behind),
     ("blow_period", "Blow period", "s", "ms", 1e-3),
     _of_drillers("blow_frequency", "Hz"),
     ("impact_velocity", "Impact velocity (mean of the piston)", "m/s", "m/s", 1.0),
