@@ -23,7 +23,7 @@ STEEL_DENSITY = 7850.0
 REFERENCE_AREA = 5.5e-3
 REFERENCE_PISTON_LENGTH = 0.175
 REFERENCE_BIT_LENGTH = 0.20125
-# What is usual of a section in the hammers of docs/top_hammer.md, section 4, and of steel.
+# What is usual of a section in the hammers of docs/data/hammer_sources.md, and of steel.
 USUAL_LENGTH, USUAL_AREA = (0.035, 3.66), (6.5e-4, 0.017)
 USUAL_MODULUS, USUAL_DENSITY = (200e9, 215e9), (7700.0, 8000.0)
 # From the HC 25 to the HLX5T, the same page.

@@ -73,7 +73,7 @@ def _reference_loss_time() -> float:
     return 2.0 * _PAPER_DAMPING_RATIO / critical
 
 
-# What is usual, from the sources that docs/top_hammer.md, section 4, lists.
+# What is usual, from the sources that docs/data/hammer_sources.md lists.
 GRAVITY = (9.78, 10.0)  # on the surface of the earth, and that of the paper
 FEED = (2500.0, 18100.0)  # the paper, 3 1/4 inch; hammers of 3 to 6 inch by a trade page
 DRIVE = (3000.0, 13100.0)  # the paper; tuned to the blow energies of hammers on the market
