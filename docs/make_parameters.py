@@ -2,22 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from itertools import groupby
 from pathlib import Path
 
-from percussion_model.scene.parameters import parameter_table
-from percussion_model.scene.rows import Row, toml_value
+from percussion_model.scene.parameters import HOLE_DIAMETER, parameter_table
+from percussion_model.scene.rows import Row, short_number, toml_value
 
 HEAD = """# Parameters
 
-Every key of a scene file, with its unit, its default and what is allowed. All are SI.
-Any of them can be set on the command line, as in `--set rock.unloading_ratio=10`; sections
+Every key of a scene file, with its unit, its default and what is allowed. A plain number is in
+SI. A number may also have its unit, as text: `force = "5 kN"`, `"1124 lbf"`, `"0.75 GN/m"`; scenes
+that are written out are in SI.
+Any of them can be set on the command line, as in `--set rock.unloading_ratio=10` or
+`--set feed.force=5kN`; sections
 and rods are counted from 0, as in `--set piston.sections.0.length=0.2`. All bars may be given
 as one list instead, `[[bars]]`, from the drive to the rock: the first is the piston, the last
 the bit, and those between them are `string.rods`.
 
+*Typical* is the range of the [sources of hammers](data/hammer_sources.md), of the paper and of
+steel. It is no bound. Commands hint, once for each key, at a value ten times beyond, since that is
+mostly a slip of the unit.
+
 This page is written by `python docs/make_parameters.py`; change
 `percussion_model/scene/parameters.py` or `bar_groups.py` instead.
+
+One key stands before all tables, beside `title`. No solver takes it, and FMUs do not have it.
 """
 
 
@@ -43,18 +53,34 @@ def allowed(row: Row) -> str:
     return row.allowed.removesuffix(f" {row.unit}") if row.unit else row.allowed
 
 
+def typical(row: Row) -> str:
+    """The range that sources have; nothing where they have none."""
+    if row.typical is None:
+        return ""
+    low, high = map(short_number, row.typical)
+    return f"{low} to {high}"
+
+
+def table(rows: Iterable[Row]) -> list[str]:
+    """Lines of a table of parameters."""
+    lines = [
+        "| key | meaning | unit | default | allowed | typical | matters if |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for row in rows:
+        key = row.key.replace("*", "N")
+        needs = f"`{row.effect}`" if row.effect else ""
+        shown = default(row), allowed(row), typical(row), needs
+        lines.append("| " + " | ".join((f"`{key}`", row.description, row.unit, *shown)) + " |")
+    return lines
+
+
 def page() -> str:
     """Text of the page."""
-    parts = [HEAD]
+    parts = [HEAD, *table([HOLE_DIAMETER])]
     for group, rows in groupby(parameter_table(), key=lambda row: row.key.split(".")[0]):
         parts.append(f"\n## {group}\n")
-        parts.append("| key | meaning | unit | default | allowed | matters if |")
-        parts.append("|---|---|---|---|---|---|")
-        for row in rows:
-            key = row.key.replace("*", "N")
-            needs = f"`{row.effect}`" if row.effect else ""
-            cells = (f"`{key}`", row.description, row.unit, default(row), allowed(row), needs)
-            parts.append("| " + " | ".join(cells) + " |")
+        parts += table(rows)
     return "\n".join(parts) + "\n"
 
 

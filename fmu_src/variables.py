@@ -73,8 +73,9 @@ def read_variables(folder: str) -> tuple[Variable, ...]:
 def read_row(entry: Mapping[str, Any]) -> Row:
     """A row of the parameter table from its plain values; JSON has no tuples."""
     needs = {key: tuple(values) for key, values in entry["needs"].items()}
-    usual = tuple(entry["usual"]) if entry.get("usual") else None
-    return Row(**{**entry, "choices": tuple(entry["choices"]), "needs": needs, "usual": usual})
+    typical = None if entry["typical"] is None else tuple(entry["typical"])
+    lists = {"choices": tuple(entry["choices"]), "typical": typical}
+    return Row(**{**entry, **lists, "needs": needs})
 
 
 def number_row(key: str, unit: str, lower: float, upper: float, description: str) -> Row:

@@ -296,7 +296,10 @@ def test_bad_scenes_are_one_message_on_stderr(percussion, tmp_path, text, messag
         (["run", RIGID, "--solver", "fem"], "fem"),
         (["run", RIGID, "--cells", "many"], "--cells 'many': must be a whole number; see"),
         (["run", RIGID, "--cells", "1.5"], "--cells '1.5': must be a whole number; see"),
-        (["run", RIGID, "--duration", "ten"], "--duration 'ten': must be a number; see"),
+        (
+            ["run", RIGID, "--duration", "ten"],
+            '--duration = "ten": must be a number above 0 and up to 1e6 s, or text as "2 ms"',
+        ),
         (["run", RIGID, "--solver", "my"], "--solver 'my': must be one of 'wave', 'modal',"),
         (["stability", "--share", "7"], "--share '7': must be at most 1; see"),
         (["paper", "--out", "a", "--processes", "0"], "--processes '0': must be at least 1; see"),

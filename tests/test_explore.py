@@ -30,7 +30,7 @@ pytest.importorskip("bokeh", reason="the explorer needs bokeh")
 
 from bokeh.document import Document
 
-from percussion_model.interface.explore.inputs import KEYS, keys_of, range_of, short
+from percussion_model.interface.explore.inputs import SLIDERS, keys_of, range_of, short
 from percussion_model.interface.explore.response import (
     Overtaken,
     numbers,
@@ -132,13 +132,13 @@ def test_scenes_that_cannot_follow_a_slider_are_refused(values, named):
 def test_sliders_lie_in_the_bounds_of_the_table_and_reach_every_default():
     for key in keys_of(Scene()):
         row = find_row(key)
-        start, end, step = range_of(row, float(Scene()[key]))
+        start, end, step = range_of(key, float(Scene()[key]))
         assert row.allows(start)
         assert row.allows(end)
         assert start <= Scene()[key] <= end
         assert 50 <= (end - start) / step <= 250
     row = find_row("feed.force")
-    assert range_of(row, 1e6)[1] == 1e6
+    assert range_of(key, 1e6)[1] == 1e6
 
 
 @pytest.mark.parametrize("value", [0.0, 0.04, 2500.0, 7.5e8, 1.9370000001e-7, -20e3, 1 / 3])
@@ -485,7 +485,7 @@ def test_every_choice_and_both_ends_of_each_slider_are_answered(served, tmp_path
     async def work(port):
         async with tab(port) as page:
             await opened(page, served.url)
-            for key in KEYS:
+            for key in SLIDERS:
                 for end in ("start", "end"):
                     value = await page.ask(f"{MODEL}('{key}').{end}")
                     await set_input(page, key, value)

@@ -105,7 +105,8 @@ def test_ledger_of_the_report_balances(case):
 
 def test_headlines_are_in_both_units():
     rows = headline_rows({key: None for key, *_ in HEADLINES} | {"rate_of_penetration": 0.0163934})
-    assert rows == [("Rate of penetration", "0.0164 m/s", "16.4 mm/s")]
+    hourly = ("Rate in an hour", "0.0164 m/s", "59.0 m/h")
+    assert rows == [("Rate of penetration", "0.0164 m/s", "16.4 mm/s"), hourly]
     rows = headline_rows({"peak_bit_force": 594760.6, "rebound_velocity": -3.38})
     assert rows == [
         ("Rebound velocity (mean of the piston)", "−3.38 m/s", ""),

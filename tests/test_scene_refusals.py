@@ -24,7 +24,7 @@ BAD = {
         "[[bit.sections]]\nlenth = 1.0\nlength = 1.0\narea = 1e-3",
         ("bit.sections.0.lenth", "did you mean bit.sections.0.length?"),
     ),
-    "text for a number": ('[feed]\nforce = "10 kN"', ('feed.force = "10 kN"', "a number", " N")),
+    "text for a number": ('[feed]\nforce = "ten kN"', ('feed.force = "ten kN"', "a number", " N")),
     "flag for a number": ("[feed]\nforce = true", ("feed.force = true", "a number")),
     "number for a flag": ("[effects]\nfeed = 1", ("effects.feed = 1", "true or false")),
     "number for a table": ("rock = 5", ("rock = 5", "[rock]")),

@@ -11,7 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 from percussion_model import Scene, SceneError, settled, simulate
-from percussion_model.analysis.stationary import COMPARED, MEANS, cycle, cycles_in
+from percussion_model.analysis.stationary import COMPARED, JUDGED, MEANS, cycle, cycles_in
 from percussion_model.interface.cli import app
 from percussion_model.interface.terminal import show_settled
 from percussion_model.physics.records import BLOW
@@ -99,7 +99,7 @@ def test_a_settled_rate_has_the_error_of_its_grid():
     assert coarse.summary()["grid_errors"] == {}
     assert "error_of='convergence'" in repr(coarse)
     rigid = settled(Scene().replace(**RIGID), error_estimate=True)
-    assert rigid.grid_errors == dict.fromkeys(("rate_of_penetration", "blow_period", *MEANS), 0.0)
+    assert rigid.grid_errors == dict.fromkeys(JUDGED, 0.0)
 
 
 def chatter(cells):

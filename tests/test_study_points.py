@@ -46,7 +46,7 @@ def test_samples_fill_every_slice_and_repeat_with_their_seed():
     [
         (lambda: grid({}), "at least one parameter"),
         (lambda: grid({"feed.force": []}), "feed.force: values of a study must be finite"),
-        (lambda: grid({"feed.force": ["much"]}), "feed.force: values of a study must be numbers"),
+        (lambda: grid({"feed.force": ["much"]}), 'feed.force = "much": must be a number from'),
         (lambda: grid({"feed.force": [2.0, 1.0, 2.0]}), "feed.force: 2.0 is given twice"),
         (lambda: grid(dict([read_axis("feed.force=3:3:2")])), "feed.force: 3.0 is given twice"),
         (lambda: table({"feed.force": [1.0], "loss.time": [0, 1]}), "of one length"),

@@ -24,8 +24,8 @@ def blocks(page):
 
 def do(page, folder):
     """Write each file that a page shows into a folder, and run each command there."""
-    programs = {**os.environ, "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}",
-                "MPLBACKEND": "Agg", "PYTHONPATH": str(ROOT)}  # fmt: skip
+    tools = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    programs = {**os.environ, "PATH": tools, "MPLBACKEND": "Agg", "PYTHONPATH": str(ROOT)}
     for language, text in blocks(page):
         if language == "python":
             name = re.match(r"# (\w+\.py)\n", text)[1]

@@ -181,7 +181,8 @@ def test_tables_of_runs(aperiodic, hidden, capsys, monkeypatch):
     assert "undecided" in capsys.readouterr().out
     show_settled(settled(BOUNCING, most_blows=60))
     shown = capsys.readouterr().out
-    assert sum("±" in line for line in shown.splitlines()) == 3  # rate, period, what ± is
+    # rate and period, both in the units of drillers too, power, and what ± is
+    assert sum("±" in line for line in shown.splitlines()) == 6
     assert "by the scatter of blows alone" in " ".join(shown.split())
 
 
@@ -215,6 +216,7 @@ def test_a_rate_of_the_cells_is_undecided_wherever_it_is_shown(undamped, capsys,
     shown = capsys.readouterr().out
     assert [line.split("│")[1].strip() for line in shown.splitlines() if "undecided" in line] == [
         "Rate of penetration",
+        "Rate in an hour",
         "Penetration per blow",
     ]
     rows = {name: texts for name, *texts in headline_rows(summary)}

@@ -113,6 +113,11 @@ def refuse_other(path: Path, scene: Scene, with_map: bool, force: bool = False) 
         )
 
 
+def _given(scene: Scene) -> dict[str, object]:
+    """What was given of a scene, as an FMU has it: of the hole's diameter nothing depends there."""
+    return scene.replace(hole_diameter=None).given_values()
+
+
 def hammer_name(scene: Path, suffix: str = "") -> str:
     """Name of the file for the FMU of a scene's file: that of the reference, or of its own."""
     stem = re.sub(r"\W", "", scene.stem.title().replace("_", "")) + suffix
@@ -140,6 +145,6 @@ def about_hammer(scene: Scene, path: Path) -> About:
 def _scene(scene: Scene, variables: list[Variable], bundle: str) -> dict[str, object]:
     """What an instance needs of the scene, besides its variables."""
     return {
-        "given": scene.given_values(),
+        "given": _given(scene),
         "identity": [bundle, [variable.name for variable in variables]],
     }

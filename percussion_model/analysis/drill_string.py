@@ -305,7 +305,10 @@ def string_report(
             penetration=whole_way,
             first_penetration=first_way,
         ),
-        bars={name: _bar_stress(watched, name) for name in watched.force},
+        bars={
+            name: bar_stress(watched.stress(name), watched.edges[name], watched.time)
+            for name in watched.force
+        },
         gauges={(bar, place): watched.gauge(bar, place) for bar, place in gauges},
         watched=watched,
     )
@@ -428,13 +431,22 @@ def _contacts(events: np.ndarray, start: float, end: float) -> list[tuple[float,
     return found if since is None else [*found, (since, end - start)]
 
 
-def _bar_stress(watched: WatchedBlow, bar: str) -> BarStress:
-    """Where a bar is pressed and pulled most."""
-    stress, edges = watched.stress(bar), watched.edges[bar]
+def bar_stress(stress: np.ndarray, edges: np.ndarray, time: np.ndarray) -> BarStress:
+    """Where and when a bar is pressed and pulled most.
+
+    Parameters
+    ----------
+    stress : float array, shape (n, cells)
+        Compression positive [Pa].
+    edges : float array, shape (cells + 1,)
+        Of the cells, from the top of the bar [m].
+    time : float array, shape (n,)
+        [s]
+    """
     middles = 0.5 * (edges[1:] + edges[:-1])
 
     def extreme(flat: int) -> Extreme:
         step, cell = np.unravel_index(flat, stress.shape)
-        return Extreme(float(stress[step, cell]), float(middles[cell]), float(watched.time[step]))
+        return Extreme(float(stress[step, cell]), float(middles[cell]), float(time[step]))
 
     return BarStress(extreme(int(stress.argmax())), extreme(int(stress.argmin())))

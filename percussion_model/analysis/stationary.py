@@ -13,9 +13,10 @@ import numpy as np
 
 from percussion_model.physics.records import BLOW
 from percussion_model.scene.scene import Scene, SceneError
+from percussion_model.simulation.driller_numbers import driller_numbers
 from percussion_model.simulation.error_estimate import SAFETY, with_error_estimate
 from percussion_model.simulation.files import plain
-from percussion_model.simulation.means import numbers_over, scatter_over
+from percussion_model.simulation.means import by_volume, numbers_over, scatter_over
 from percussion_model.simulation.rate import STALLED_PERIODS, rate_of_blows, ratio_of_sums
 from percussion_model.simulation.result import Result
 from percussion_model.simulation.simulate import Simulation, SimulationError
@@ -63,8 +64,11 @@ LEAST_LIMIT = 32
 _RATE, _PERIOD = "rate_of_penetration", "blow_period"
 # Smaller ones, and smaller errors of them, are rounding.
 ROUNDING = 1e-12
-MEANS = ("blow_frequency", "impact_velocity", "transfer_efficiency")
-_JUDGED = (_RATE, _PERIOD, *MEANS)
+MEANS = (
+    *("blow_frequency", "impact_velocity", "transfer_efficiency"),
+    *("percussive_power", "energy_per_advance"),
+)
+JUDGED = (_RATE, _PERIOD, *MEANS)
 # Grids are compared over so many blows at least; where the motion is periodic, over the last
 # of them, so that settling does not count as scatter.
 FEWEST_JUDGED, JUDGED_SHARE = 12, 0.5
@@ -118,6 +122,8 @@ class Settled:
         The motions on coarser grids, where errors were estimated.
     warnings : list of str
         As of a run, but for those of its length, where errors were estimated.
+    hole_diameter : float or None
+        Of the scene [m].
     """
 
     kind: str
@@ -133,6 +139,7 @@ class Settled:
     grid_errors: dict[str, float] = field(default_factory=dict)
     others: tuple[Motion, ...] = ()
     warnings: list[str] = field(default_factory=list, repr=False)
+    hole_diameter: float | None = None
 
     def __repr__(self) -> str:
         rate = rate_field(self.summary())
@@ -243,7 +250,11 @@ class Settled:
         return {name: 0.0 if error < ROUNDING else error for name, error in found.items()}
 
     def summary(self) -> dict[str, Any]:
-        """Return the numbers as plain values for JSON; None is what is not defined."""
+        """Return the numbers as plain values for JSON; None is what is not defined.
+
+        `driller_numbers` has some of them in the units of drillers, as that of a `Result`.
+        """
+        means, errors, diameter = self.means, self.mean_errors, self.hole_diameter
         numbers = {
             "kind": self.kind,
             "order": self.order or None,
@@ -256,8 +267,10 @@ class Settled:
             BY_CELLS: self.depends_on_cells,
             "blow_period": self.blow_period,
             "blow_period_error": self.blow_period_error,
-            **self.means,
-            **{f"{name}_error": error for name, error in self.mean_errors.items()},
+            **means,
+            "specific_energy": by_volume(means, diameter).get("specific_energy", math.nan),
+            **{f"{name}_error": error for name, error in errors.items()},
+            "specific_energy_error": by_volume(errors, diameter).get("specific_energy", math.nan),
             "multiplier": self.multiplier,
             "multiplier_error": self.multiplier_error,
             "same_motion_on_other_grids": self.same_motion,
@@ -268,7 +281,7 @@ class Settled:
             "warnings": self.warnings,
         }
         values: dict[str, Any] = plain(numbers)
-        return values
+        return values | {"driller_numbers": driller_numbers(values)}
 
 
 def settled(
@@ -330,7 +343,9 @@ def settled(
     def made(kind: str, order: int, rate: float, error: float, multiplier: float) -> Settled:
         cycle, times = blows[len(blows) - order :], (simulation.time, simulation.wall_time)
         values = kind, order, rate, error, multiplier, cycle, blows, *times
-        found = Settled(*values, depends_on_cells=scene.is_undamped)
+        found = Settled(
+            *values, depends_on_cells=scene.is_undamped, hole_diameter=scene.hole_diameter
+        )
         if not error_estimate:
             return found
         # before other runs make this one longer; a study of thousands would pay for them
@@ -383,13 +398,13 @@ def _other_motions(
 
 
 def _grid_errors(simulation: Simulation, settling: float) -> dict[str, float]:
-    """Estimated errors of `_JUDGED` by the grid, SI units; of what could be told.
+    """Estimated errors of `JUDGED` by the grid, SI units; of what could be told.
 
     A run of few blows is made longer; `settling` is the share of it that does not count.
     """
     coarser = simulation.solver.coarser_scenes()
     if coarser == []:
-        return dict.fromkeys(_JUDGED, 0.0)
+        return dict.fromkeys(JUDGED, 0.0)
     while simulation.blow_rows < FEWEST_JUDGED:
         before = simulation.blow_rows
         simulation.advance_blows(1, simulation.time + STALLED_AFTER)
@@ -400,7 +415,7 @@ def _grid_errors(simulation: Simulation, settling: float) -> dict[str, float]:
     result = replace(simulation.result(settle), scene=whole)
     judged = with_error_estimate(result, coarser, _run, whole_time=True)
     errors = {_RATE: judged.rate_of_penetration_error, **judged.errors}
-    return {name: errors[name] for name in _JUDGED if errors.get(name, math.nan) >= 0.0}
+    return {name: errors[name] for name in JUDGED if errors.get(name, math.nan) >= 0.0}
 
 
 def _run(scene: Scene) -> Result:

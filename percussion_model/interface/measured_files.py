@@ -16,15 +16,16 @@ from percussion_model.analysis.fitting import (
     FitError,
     Reading,
 )
+from percussion_model.scene.units import factor
 from percussion_model.simulation.files import reason
 
-# SI unit, and units that may stand for it with their factors to it.
-UNITS: dict[str, dict[str, float]] = {
-    "m": {"m": 1.0, "mm": 1e-3, "um": 1e-6, "cm": 1e-2, "in": 0.0254},
-    "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6},
-    "N": {"N": 1.0, "kN": 1e3, "MN": 1e6, "lbf": 4.4482216152605},
-    "Pa": {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9, "psi": 6894.757293168},
-    "m/s": {"m/s": 1.0, "mm/s": 1e-3, "km/h": 1.0 / 3.6},
+# SI unit, and units that may stand for it.
+UNITS = {
+    "m": ("m", "mm", "um", "cm", "in"),
+    "s": ("s", "ms", "us"),
+    "N": ("N", "kN", "MN", "lbf"),
+    "Pa": ("Pa", "kPa", "MPa", "GPa", "psi"),
+    "m/s": ("m/s", "mm/s", "km/h"),
 }
 CURVE_COLUMNS = {"penetration": "m", "force": "N"}
 DROP_COLUMNS = {"time": "s"} | {name: unit for name, (unit, _) in SIGNALS.items()}
@@ -43,11 +44,10 @@ def factor_of(unit: str | None, si: str, where: str) -> float:
     FitError
         If it is no unit of that quantity.
     """
-    known = UNITS[si]
     plain = (unit or si).strip().replace("µ", "u").replace("μ", "u")
-    if plain not in known:
-        raise FitError(f"{where}: unit {unit!r} must be one of {', '.join(known)}")
-    return known[plain]
+    if plain not in UNITS[si]:
+        raise FitError(f"{where}: unit {unit!r} must be one of {', '.join(UNITS[si])}")
+    return 1.0 if plain == si else float(factor(plain, si))
 
 
 def read_curve(path: Path) -> Curve:

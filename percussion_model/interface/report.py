@@ -14,11 +14,19 @@ import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
+from percussion_model.analysis.drill_string import Extreme
 from percussion_model.analysis.study import KNOWN_ERRORS, Study
-from percussion_model.interface.plotting import CAPTIONS, figures
+from percussion_model.interface.plotting import CAPTIONS, figures, watched_string
+from percussion_model.interface.plotting.window import (
+    StressField,
+    Window,
+    last_blow,
+    peak_stresses,
+)
 from percussion_model.scene.group import Parameters
-from percussion_model.scene.parameters import find_row, parameter_table
+from percussion_model.scene.parameters import HOLE_DIAMETER, find_row, parameter_table
 from percussion_model.scene.scene import Scene
+from percussion_model.simulation.driller_numbers import DRILLER_NUMBERS, driller_text
 from percussion_model.simulation.files import staged
 from percussion_model.simulation.result import REPORT, Result
 from percussion_model.simulation.uncertain import (
@@ -30,6 +38,18 @@ from percussion_model.simulation.uncertain import (
     mean_text,
     rate_text,
 )
+
+
+def _of_drillers(key: str, unit: str, name: str = "") -> tuple[str, str, str, str, float]:
+    """A number at the head of the report in the unit of drillers, and in SI."""
+    one = DRILLER_NUMBERS[key]
+    return key, name or one.name, unit, _shown_unit(one.unit), 1.0 / one.factor
+
+
+def _shown_unit(unit: str) -> str:
+    """A unit as a page shows it."""
+    return {"-": "–"}.get(unit, unit).replace("^2", "²").replace("^3", "³")
+
 
 # Numbers at the head of the report: key of the summary, what it is called, its
 # SI unit, the unit that people use and SI units in one of those.
@@ -44,14 +64,17 @@ HEADLINES: tuple[tuple[str, str, str, str, float], ...] = (
         "mm/s",
         1e-3,
     ),
+    _of_drillers("rate_of_penetration", "m/s", DRILLER_NUMBERS["rate_of_penetration"].behind),
     ("blow_period", "Blow period", "s", "ms", 1e-3),
-    ("blow_frequency", "Blow frequency", "Hz", "blows/min", 1.0 / 60.0),
+    _of_drillers("blow_frequency", "Hz"),
     ("impact_velocity", "Impact velocity (mean of the piston)", "m/s", "m/s", 1.0),
     ("rebound_velocity", "Rebound velocity (mean of the piston)", "m/s", "m/s", 1.0),
     ("stroke", "Stroke", "m", "mm", 1e-3),
     ("blow_energy", "Blow energy", "J", "J", 1.0),
+    _of_drillers("percussive_power", "W", "Percussive power (blow energy times frequency)"),
     ("rock_energy", "Energy into the rock, per blow", "J", "J", 1.0),
     ("transfer_efficiency", "Energy transfer efficiency", "–", "%", 1e-2),
+    _of_drillers("specific_energy", "J/m³", "Specific energy (blow energy by volume drilled)"),
     ("penetration_per_blow", "Penetration per blow", "m", "mm", 1e-3),
     ("contacts_per_blow", "Piston/bit contacts per blow", "–", "", 1.0),
     ("drilling_cycles_per_blow", "Drilling cycles per blow", "–", "", 1.0),
@@ -190,12 +213,12 @@ def render_report(result: Result, drawings: Sequence[Path]) -> str:
         SVG files, for figures that cannot be zoomed.
     """
     blocks = {path.stem: _inline_svg(path, CAPTIONS[path.stem]) for path in drawings}
-    remark, scripts = why_not_interactive(), ""
+    remark, scripts, blow = why_not_interactive(), "", last_blow(result)
     if not remark:
         from percussion_model.interface.plotting.interactive import embedded
         from percussion_model.interface.plotting.interactive_run import interactive_figures
 
-        made = interactive_figures(result)
+        made = interactive_figures(result, blow)
         places, scripts = embedded(list(made.values()))
         blocks |= {name: Markup(place) for name, place in zip(made, places, strict=True)}
     summary = result.summary()
@@ -208,10 +231,11 @@ def render_report(result: Result, drawings: Sequence[Path]) -> str:
         ran,
         summary=summary,
         rate=rate_text(summary),
-        hourly_rate=rate_text(summary, 3600.0),
+        hourly_rate=driller_text(summary, "rate_of_penetration"),
         means=mean_cards(summary),
         headlines=headline_rows(summary),
         about_errors=about_errors(summary),
+        stress=stress_note(result, blow),
         figures=[FigureBlock(blocks[name], text) for name, text in CAPTIONS.items()
                  if name in blocks],
         zoomable=not remark,
@@ -238,6 +262,32 @@ def headline_rows(summary: dict[str, Any]) -> list[tuple[str, str, str]]:
     return rows
 
 
+def stress_note(result: Result, blow: tuple[Window, dict[str, StressField]] | None) -> str:
+    """Where steel is pressed and pulled most in a blow; empty where the solver has no stress."""
+    if result.scene.effects.string:
+        if result.scene.piston.model == "absent" or not len(result.counted):
+            return ""
+        found, when = watched_string(result).bars, "the first counted blow"
+    elif blow is None:
+        return ""
+    else:
+        found, when = peak_stresses(blow[1]), blow[0].name
+    if not found:
+        return ""
+    pressed = max(found, key=lambda bar: found[bar].compression.value)
+    pulled = min(found, key=lambda bar: found[bar].tension.value)
+    text = f"Steel is pressed most by {_stress_at(pressed, found[pressed].compression)}"
+    if found[pulled].tension.value < 0.0:
+        text += f", and pulled most by {_stress_at(pulled, found[pulled].tension)}"
+    return f"{text} ({when}). These are means of a cell, whose errors were not estimated."
+
+
+def _stress_at(bar: str, extreme: Extreme) -> str:
+    """A stress and its place."""
+    value, place = in_digits(abs(extreme.value) / 1e6), in_digits(extreme.place * 1e3)
+    return f"{value} MPa, in the {bar}, {place} mm below its top"
+
+
 def _error(value: float, factor: float, unit: str) -> str:
     """Write an error with two digits; of rounding only that it is no more."""
     small = value < ROUNDING
@@ -249,10 +299,18 @@ def _error(value: float, factor: float, unit: str) -> str:
 def mean_cards(summary: dict[str, Any]) -> list[tuple[str, str]]:
     """Number with its unit, and name, of the cards beside that of the rate."""
     return [
-        (f"{_text(summary, key, factor, MOST_DIGITS)} {unit}", name)
+        (f"{_text(summary, key, factor, MOST_DIGITS)} {unit}", f"{name}{_power(summary, key)}")
         for key, factor, unit, name in CARDS
         if summary[key] is not None
     ]
+
+
+def _power(summary: dict[str, Any], key: str) -> str:
+    """The percussive power, behind the name of the blow energy."""
+    if key != "blow_energy" or summary.get("percussive_power") is None:
+        return ""
+    unit = DRILLER_NUMBERS["percussive_power"].unit
+    return f" (power {driller_text(summary, 'percussive_power')} {unit})"
 
 
 def _text(summary: dict[str, Any], key: str, factor: float, most_digits: int) -> str:
@@ -383,7 +441,9 @@ def _render(template: str, scene: Scene, changed: dict[str, Any], **values: Any)
 def _parameter_rows(scene: Scene, changed: dict[str, Any]) -> list[tuple[str, str, str, str]]:
     """Key, value, unit and description of each parameter that has an influence."""
     rows = []
-    for row in parameter_table():
+    for row in (HOLE_DIAMETER, *parameter_table()):
+        if row is HOLE_DIAMETER and scene.hole_diameter is None:
+            continue
         if "*" in row.key or not scene.matters(row.key):
             continue
         if row.kind in ("sections", "rods"):
@@ -419,11 +479,6 @@ def _written(value: Any) -> str:
     if isinstance(value, bool):
         return "on" if value else "off"
     return f"{value:.6g}" if isinstance(value, float) else str(value)
-
-
-def _shown_unit(unit: str) -> str:
-    """A unit as a page shows it."""
-    return {"-": "–"}.get(unit, unit).replace("^2", "²").replace("^3", "³")
 
 
 def _versions() -> list[tuple[str, str]]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +19,7 @@ from percussion_model.interface.messages import wrapped
 from percussion_model.interface.progress import Lines, Report, lines
 from percussion_model.interface.tables import print_table
 from percussion_model.scene.solver_names import counted
+from percussion_model.simulation.driller_numbers import DRILLER_NUMBERS, driller_text
 from percussion_model.simulation.uncertain import (
     ABOUT,
     ABOUT_CHANGE,
@@ -63,6 +64,14 @@ SHOWN = (
     ("Peak contact force", "peak_contact_force", 1e-3, "kN"),
     ("Standstill bit force", "standstill_bit_force", 1e-3, "kN"),
 )
+# Behind them those in the units of drillers, by the key of the summary: the same number once
+# more, or another one.
+BEHIND = {
+    "rate_of_penetration": "rate_of_penetration",
+    "blow_frequency": "blow_frequency",
+    "blow_energy": "percussive_power",
+    "transfer_efficiency": "specific_energy",
+}
 # Instead of them where there are no blows: name, key of `Result.fall`, factor, unit.
 WITHOUT_BLOWS = (
     ("Depth of the bit's end in the rock", "depth", 1e3, "mm"),
@@ -82,6 +91,7 @@ def show_summary(result: Result) -> None:
     table.add_column(justify="left")
     if len(result.blows):
         table.add_row(RATE[0], _in_two_lines(rate_text(summary)), RATE[3])
+        _add_driller_row(table, summary, RATE[1])
     values = summary if len(result.blows) else summary["fall"] | {"errors": summary["errors"]}
     unknown = False
     for name, key, factor, unit in SHOWN if len(result.blows) else WITHOUT_BLOWS:
@@ -89,6 +99,7 @@ def show_summary(result: Result) -> None:
             text = mean_text(values, key, factor)
             unknown = unknown or ABOUT in text
             table.add_row(name, _in_two_lines(text), unit)
+            _add_driller_row(table, summary, key)
     energy = summary["energy"]
     for key in ("numerical", "residual"):
         share = energy[f"{key}_relative"]
@@ -115,6 +126,16 @@ def show_summary(result: Result) -> None:
     show_warnings(console, result.warnings)
 
 
+def _add_driller_row(table: Table, summary: Mapping[str, Any], key: str) -> None:
+    """Add the number in the units of drillers that stands behind one in SI, if it is known."""
+    other = BEHIND.get(key, "")
+    if summary.get(other) is None:
+        return
+    one = DRILLER_NUMBERS[other]
+    name = one.behind if other == key else one.name
+    table.add_row(name, _in_two_lines(driller_text(summary, other)), one.unit)
+
+
 def show_settled(found: Settled) -> None:
     """Print the stationary response of a scene."""
     summary = found.summary()
@@ -124,10 +145,15 @@ def show_settled(found: Settled) -> None:
     table.add_row("Motion", f"{found.motion}{on_other_grids(found)}")
     if summary[RATE[1]] is not None:
         table.add_row(RATE[0], f"{rate_text(summary)} {RATE[3]}")
+        one = DRILLER_NUMBERS[RATE[1]]
+        table.add_row(one.behind, _with_driller_unit(summary, RATE[1]))
     if summary["blow_period"] is not None:
         for name, key, factor, unit in SHOWN:
             if summary.get(key) is not None:
                 table.add_row(name, f"{mean_text(summary, key, factor)} {unit}")
+    for key, one in DRILLER_NUMBERS.items():
+        if key != RATE[1] and summary.get(key) is not None:
+            table.add_row(one.behind or one.name, _with_driller_unit(summary, key))
     if summary["multiplier"] is not None:
         table.add_row("Deviation after a cycle", _deviation(found))
     table.add_row("Blows run", f"{len(found.blows)} in {found.duration:.4g} s of simulated time")
@@ -137,6 +163,10 @@ def show_settled(found: Settled) -> None:
     if found.error_of:
         console.print(wrapped(settled_error(found)), highlight=False)
     show_warnings(console, found.warnings)
+
+
+def _with_driller_unit(summary: Mapping[str, Any], key: str) -> str:
+    return f"{driller_text(summary, key)} {DRILLER_NUMBERS[key].unit}"
 
 
 def on_other_grids(found: Settled) -> str:

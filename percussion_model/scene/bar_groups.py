@@ -23,16 +23,25 @@ STEEL_DENSITY = 7850.0
 REFERENCE_AREA = 5.5e-3
 REFERENCE_PISTON_LENGTH = 0.175
 REFERENCE_BIT_LENGTH = 0.20125
+# What is usual of a section in the hammers of docs/data/hammer_sources.md, and of steel.
+USUAL_LENGTH, USUAL_AREA = (0.035, 3.66), (6.5e-4, 0.017)
+USUAL_MODULUS, USUAL_DENSITY = (200e9, 215e9), (7700.0, 8000.0)
+# From the HC 25 to the HLX5T, the same page.
+USUAL_CASING = (72.0, 218.0)
 
 
 class Section(Parameters):
     """A length of bar with one cross-section and one material."""
 
     key = "section"
-    length: float = quantity(..., "m", "length", usual=(0.02, 0.5), gt=0, le=1000)
-    area: float = quantity(..., "m^2", "cross-section", gt=0, le=10)
-    youngs_modulus: float = quantity(STEEL_YOUNGS_MODULUS, "Pa", "Young's modulus E", gt=0, le=1e13)
-    density: float = quantity(STEEL_DENSITY, "kg/m^3", "density rho", gt=0, le=1e5)
+    length: float = quantity(..., "m", "length", typical=USUAL_LENGTH, gt=0, le=1000)
+    area: float = quantity(..., "m^2", "cross-section", typical=USUAL_AREA, gt=0, le=10)
+    youngs_modulus: float = quantity(
+        STEEL_YOUNGS_MODULUS, "Pa", "Young's modulus E", typical=USUAL_MODULUS, gt=0, le=1e13
+    )
+    density: float = quantity(
+        STEEL_DENSITY, "kg/m^3", "density rho", typical=USUAL_DENSITY, gt=0, le=1e5
+    )
 
     @property
     def numbers(self) -> tuple[float, float, float, float]:
@@ -181,7 +190,13 @@ class Damper(Parameters):
     damping: float = quantity(2e4, "N s/m", "damping of its dashpot", DAMPER_ON, ge=0, le=1e9)
     preload: float = quantity(0.0, "N", "force at the start", DAMPER_ON, ge=0, le=1e9)
     casing_mass: float = quantity(
-        150.0, "kg", "mass of the casing, which feed and recoil act on", DAMPER_ON, gt=0, le=1e6
+        150.0,
+        "kg",
+        "mass of the casing, which feed and recoil act on",
+        DAMPER_ON,
+        typical=USUAL_CASING,
+        gt=0,
+        le=1e6,
     )
 
 

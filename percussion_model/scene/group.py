@@ -12,9 +12,9 @@ from percussion_model.scene.rows import (
     Needs,
     Row,
     generic_key,
-    refuse_value,
     show_value,
 )
+from percussion_model.scene.units import read_value, refuse
 
 # What must hold, key by key, for a parameter to have any influence.
 HAS_PISTON: Needs = {"piston.model": ("elastic", "rigid")}
@@ -88,9 +88,9 @@ class Parameters:
             elif row.kind in LISTED:
                 kept[name] = _entries(row, f"{key}.{name}", values[name], faults)
             else:
-                kept[name] = found = row.read(values[name])
+                kept[name] = found = read_value(row, values[name])
                 if found is REFUSED:
-                    faults.add(refuse_value, row, f"{key}.{name}", values[name])
+                    faults.add(refuse, row, f"{key}.{name}", values[name])
         for name in values:
             if name not in rows:
                 faults.add(Parameters.say_unknown, f"{key}.{name}")
@@ -117,7 +117,7 @@ def _entries(row: Row, key: str, value: Any, faults: Faults) -> tuple[Parameters
     except TypeError:  # no list of anything
         found = []
     if not found and (row.default != () or value not in ([], ())):
-        faults.add(refuse_value, row, key, value)
+        faults.add(refuse, row, key, value)
     if len(found) > MOST_LISTED[row.kind]:
         faults.add(_refuse_many, row, key, len(found), MOST_LISTED[row.kind])
         found = []

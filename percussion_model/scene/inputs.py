@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from percussion_model.scene.rows import REFUSED, refuse_value
+from percussion_model.scene.rows import REFUSED
 from percussion_model.scene.scene import Scene
+from percussion_model.scene.units import read_value, refuse
 
 
 class SimulationError(ValueError):
@@ -67,7 +68,7 @@ def check_input(scene: Scene, name: str, value: Any) -> float:
     if reason:
         raise SimulationError(f"{name} has no effect in this scene: {reason}")
     row = scene.row_of(INPUTS[name].key)
-    number = row.read(value)
+    number = read_value(row, value)
     if number is REFUSED:
-        raise SimulationError(refuse_value(row, name, value))
+        raise SimulationError(refuse(row, name, value))
     return float(number)

@@ -47,6 +47,7 @@ from percussion_model.scene.group import (
 from percussion_model.scene.rows import (
     Needs,
     Row,
+    SceneError,
     choice,
     count,
     flag,
@@ -55,6 +56,7 @@ from percussion_model.scene.rows import (
     shortened,
 )
 from percussion_model.scene.solver_names import SOLVER_NAMES
+from percussion_model.scene.units import UnitError, in_si, refuse
 
 # Below this similarity a guess at a misspelt key misleads more than it helps.
 _SIMILAR_ENOUGH = 0.6
@@ -69,6 +71,16 @@ def _reference_loss_time() -> float:
     wave_speed = math.sqrt(STEEL_YOUNGS_MODULUS / STEEL_DENSITY)
     critical = math.sqrt(12.0) * wave_speed / (REFERENCE_BIT_LENGTH / _PAPER_BIT_ELEMENTS)
     return 2.0 * _PAPER_DAMPING_RATIO / critical
+
+
+# What is usual, from the sources that docs/data/hammer_sources.md lists.
+GRAVITY = (9.78, 10.0)  # on the surface of the earth, and that of the paper
+FEED = (2500.0, 18100.0)  # the paper, 3 1/4 inch; hammers of 3 to 6 inch by a trade page
+DRIVE = (3000.0, 13100.0)  # the paper; tuned to the blow energies of hammers on the market
+REVERSAL = (0.0148, 0.04)  # the same; the greatest is the paper's
+# Three buttons on Kuru granite, Saksala et al. (2014); the paper's by the diameter, 6 inch.
+STIFFNESS = (1.62e8, 1.5e9)
+HOLE = (0.048, 0.165)  # bits of those hammers
 
 
 class Effects(Parameters):
@@ -103,7 +115,7 @@ class Gravity(Parameters):
     """Weight."""
 
     acceleration: float = quantity(
-        10.0, "m/s^2", "acceleration, down positive", GRAVITY_ON, ge=-1000, le=1000
+        10.0, "m/s^2", "acceleration, down positive", GRAVITY_ON, GRAVITY, ge=-1000, le=1000
     )
 
 
@@ -115,7 +127,7 @@ class Feed(Parameters):
         "N",
         "feed force F_S on the bit, down positive",
         FEED_ON,
-        usual=(0.0, 20e3),
+        typical=FEED,
         ge=-1e9,
         le=1e9,
     )
@@ -125,20 +137,14 @@ class Drive(Parameters):
     """Force on the piston."""
 
     force: float = quantity(
-        3000.0,
-        "N",
-        "drive force F_0 of the pressure law",
-        DRIVE_PRESSURE,
-        usual=(500.0, 20e3),
-        ge=0,
-        le=1e9,
+        3000.0, "N", "drive force F_0 of the pressure law", DRIVE_PRESSURE, DRIVE, ge=0, le=1e9
     )
     reversal_distance: float = quantity(
         0.040,
         "m",
         "D_1: piston this far up turns the drive downward",
         DRIVE_PRESSURE,
-        usual=(0.005, 0.1),
+        typical=REVERSAL,
         gt=0,
         le=100,
     )
@@ -147,7 +153,6 @@ class Drive(Parameters):
         "N",
         "force on the piston, down positive",
         DRIVE_EXTERNAL,
-        usual=(-20e3, 20e3),
         ge=-1e9,
         le=1e9,
     )
@@ -165,23 +170,20 @@ class RockLaw(Parameters):
     """The rock under the bit (docs/model.md, table 1)."""
 
     loading_stiffness: float = quantity(
-        7.5e8, "N/m", "loading stiffness K_R", ROCK_SPRINGY, usual=(1e8, 3e9), ge=1, le=1e13
+        7.5e8, "N/m", "loading stiffness K_R", ROCK_SPRINGY, STIFFNESS, ge=1, le=1e13
     )
     unloading_ratio: float = quantity(
         5.0,
         "-",
         "gamma: unloading by loading stiffness",
         ROCK_BILINEAR,
-        usual=(1.1, 20.0),
         gt=1,
         le=1e4,
     )
     barrier_damping: float = quantity(
         1e4, "N s/m", "damping C_R of the energy barrier", BARRIER_ON, ge=0, le=1e9
     )
-    barrier_energy: float = quantity(
-        0.05, "J", "energy barrier W_R", BARRIER_ON, usual=(0.0, 0.5), ge=0, le=1e6
-    )
+    barrier_energy: float = quantity(0.05, "J", "energy barrier W_R", BARRIER_ON, ge=0, le=1e6)
 
 
 class Contact(Parameters):
@@ -211,6 +213,18 @@ class Start(Parameters):
     )
 
 
+# Of the scene itself, beside its title: no solver takes it and no FMU has it.
+HOLE_DIAMETER: Row = dataclasses.replace(
+    quantity(
+        None,
+        "m",
+        "diameter of the hole, which tells the specific energy; left out: that is not known",
+        typical=HOLE,
+        gt=0,
+        le=10,
+    ).metadata["row"],
+    key="hole_diameter",
+)
 # Elements that the paper gives the piston.
 PAPER_PISTON_ELEMENTS = 50
 
@@ -427,13 +441,45 @@ def table_of(groups: Mapping[str, type[Parameters]]) -> Iterator[Row]:
 
 @cache
 def rows_by_key() -> Mapping[str, Row]:
-    """Return the rows of `parameter_table` by their dotted keys."""
-    return {row.key: row for row in parameter_table()}
+    """Return the rows of `parameter_table` by their dotted keys, and `HOLE_DIAMETER`."""
+    return {row.key: row for row in (HOLE_DIAMETER, *parameter_table())}
 
 
 def find_row(key: str) -> Row | None:
     """Find the row of a dotted key, `piston.sections.0.length` included."""
     return rows_by_key().get(generic_key(key))
+
+
+def read_number(key: str, text: str, name: str = "") -> float:
+    """Read a number of a parameter: of SI, or with its unit. Bounds are not looked at.
+
+    Parameters
+    ----------
+    key : str
+        Dotted.
+    text : str
+        As "5000" or "5 kN".
+    name : str
+        What an error calls it; default the key.
+
+    Raises
+    ------
+    SceneError
+        If there is no such key, or the text is no such number.
+    """
+    row = find_row(key)
+    if row is None:
+        raise SceneError(unknown_key(key))
+    try:
+        return float(text)
+    except ValueError:
+        pass
+    try:
+        if row.kind == "number":
+            return in_si(text, row.unit)
+    except UnitError:
+        pass
+    raise SceneError(refuse(row, name or key, text))
 
 
 def unknown_key(key: str) -> str:
@@ -451,7 +497,7 @@ def unknown_key(key: str) -> str:
     underlined = {one.replace(".", "_"): one for one in keys}
     if key in underlined:  # as keyword arguments of Python are written
         return f"unknown key {key}: did you mean {underlined[key]}?"
-    known = list(keys) if parent else ["title", *GROUPS]
+    known = list(keys) if parent else ["title", HOLE_DIAMETER.key, *GROUPS]
     near = difflib.get_close_matches(generic_key(key), known, 1, _SIMILAR_ENOUGH)
     if near:
         return f"unknown key {key}: did you mean {near[0].replace('.*', '.0')}?"

@@ -36,8 +36,8 @@ class SceneError(ValueError):
 class Row:
     """One parameter.
 
-    Keys of bars and sections have a `*` for their number, counted from 0. `usual` is where
-    hammers and rocks lie, from and to: what is worth trying by hand; None where that was not said.
+    Keys of bars and sections have a `*` for their number, counted from 0. `typical` is where
+    hammers and rocks of the literature lie, from and to; None where no source says so.
     """
 
     key: str
@@ -52,7 +52,7 @@ class Row:
     choices: Sequence[Any]
     description: str
     needs: Mapping[str, tuple[Any, ...]]
-    usual: tuple[float, float] | None = None
+    typical: tuple[float, float] | None = None
 
     @property
     def allowed(self) -> str:
@@ -73,8 +73,8 @@ class Row:
         if self.lower_open or self.upper_open:
             start = "above" if self.lower_open else "from"
             end = "below" if self.upper_open else "up to"
-            return f"{start} {_short(self.lower)} and {end} {_short(self.upper)}"
-        return f"from {_short(self.lower)} to {_short(self.upper)}"
+            return f"{start} {short_number(self.lower)} and {end} {short_number(self.upper)}"
+        return f"from {short_number(self.lower)} to {short_number(self.upper)}"
 
     @property
     def effect(self) -> str:
@@ -127,14 +127,15 @@ def quantity(
     unit: str,
     description: str,
     needs: Needs | None = None,
-    usual: tuple[float, float] | None = None,
+    typical: tuple[float, float] | None = None,
     **bounds: float,
 ) -> Any:
     """Declare a number with its unit, bounds (gt, ge, lt, le) and what it needs.
 
-    The default ... makes it required; None lets it be left out.
+    The default ... makes it required; None lets it be left out. `typical` is the range that
+    sources have, where there are any.
     """
-    return _declare("number", default, description, needs, unit, bounds=bounds, usual=usual)
+    return _declare("number", default, description, needs, unit, bounds=bounds, typical=typical)
 
 
 def count(
@@ -174,7 +175,7 @@ def _declare(
     unit: str = "",
     choices: Sequence[Any] = (),
     bounds: Mapping[str, float] = MappingProxyType({}),
-    usual: tuple[float, float] | None = None,
+    typical: tuple[float, float] | None = None,
 ) -> Any:
     low, high = bounds.get("gt", bounds.get("ge")), bounds.get("lt", bounds.get("le"))
     row = Row(
@@ -190,7 +191,7 @@ def _declare(
         choices=choices,
         description=description,
         needs=needs or {},
-        usual=usual,
+        typical=typical,
     )
     return dataclasses.field(default=row.default, metadata={"row": row})
 
@@ -207,7 +208,7 @@ def is_number(value: Any) -> bool:
         return False
 
 
-def _short(number: float) -> str:
+def short_number(number: float) -> str:
     """Write a bound without needless digits, as in 1e9."""
     return f"{number:g}".replace("e+0", "e").replace("e+", "e").replace("e-0", "e-")
 

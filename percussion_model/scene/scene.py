@@ -15,6 +15,7 @@ from percussion_model.scene.contradictions import TEXTS, Bodies, Rule, find_cont
 from percussion_model.scene.group import Parameters
 from percussion_model.scene.parameters import (
     GROUPS,
+    HOLE_DIAMETER,
     BlowMapOptions,
     Contact,
     Drive,
@@ -31,10 +32,18 @@ from percussion_model.scene.parameters import (
     parameter_table,
     unknown_key,
 )
-from percussion_model.scene.rows import Faults, Row, SceneError, show_value, unprintable
+from percussion_model.scene.rows import (
+    REFUSED,
+    Faults,
+    Row,
+    SceneError,
+    show_value,
+    unprintable,
+)
 from percussion_model.scene.solver_choice import REASONS, why_waves
 from percussion_model.scene.solver_names import BODIES
 from percussion_model.scene.text import commented_scene, plain_scene, read_toml, write_text
+from percussion_model.scene.units import read_value, refuse
 from percussion_model.scene.values import values_of
 
 __all__ = ["Scene", "SceneError"]
@@ -55,13 +64,14 @@ class Scene:
     Parameters
     ----------
     **values
-        A title, and groups as tables of values or as objects.
+        A title, the diameter of the hole, and groups as tables of values or as objects.
     """
 
     # Given keys that a change of solver has left without effect: nobody has to be warned of them.
     _set_aside = frozenset[str]()
 
     title: str
+    hole_diameter: float | None
     effects: Effects
     piston: PistonBar
     string: DrillString
@@ -79,7 +89,11 @@ class Scene:
     blow_map: BlowMapOptions
     run: RunOptions
     # fields of the dataclass: those above, and groups that effects have added
-    __annotations__ = {"title": "str"} | dict.fromkeys(GROUPS, Parameters) | __annotations__
+    __annotations__ = (
+        {"title": "str", "hole_diameter": "float | None"}
+        | dict.fromkeys(GROUPS, Parameters)
+        | __annotations__
+    )
 
     def __init__(self, **values: Any) -> None:
         faults = Faults()
@@ -89,6 +103,9 @@ class Scene:
         kept["title"] = title = values.get("title", "")
         if not isinstance(title, str) or len(title) > LONGEST_TITLE or unprintable(title):
             faults.add(_refuse_title, title)
+        kept["hole_diameter"] = hole = read_value(HOLE_DIAMETER, values.get("hole_diameter"))
+        if hole is REFUSED:
+            faults.add(refuse, HOLE_DIAMETER, "hole_diameter", values["hole_diameter"])
         for name, group in GROUPS.items():
             if name in values:
                 kept[name] = group.read(values[name], name, faults)
@@ -148,7 +165,7 @@ class Scene:
             values = {row.key: self[row.key] for row in _plain_rows()}
             given = self.given
             silent = [key for key in values if not (self.matters(key) or key in given)]
-            text = commented_scene(self.title, values, silent)
+            text = commented_scene(self._head(), values, silent)
         else:
             text = plain_scene(self._tree())
         if path is not None:
@@ -165,7 +182,7 @@ class Scene:
             sections are counted from 0, as in `piston.sections.0.length`. None
             goes back to the default. A whole group may be given as well.
         """
-        tree: dict[str, Any] = {"title": self.title}
+        tree = self._head()
         tree |= {name: self.__dict__[name] for name in GROUPS if self.__dict__[name]._given}
         for key, value in changes.items():
             if key not in ("title", *GROUPS) and find_row(key) is None:
@@ -253,13 +270,17 @@ class Scene:
     @property
     def given(self) -> frozenset[str]:
         """Dotted keys that were given, not left to their defaults."""
-        return frozenset(
-            f"{group}.{name}" for group in GROUPS for name in self.__dict__[group]._given
-        )
+        keys = (f"{group}.{name}" for group in GROUPS for name in self.__dict__[group]._given)
+        return frozenset([*keys, *self._head()]) - {"title"}
+
+    def _head(self) -> dict[str, Any]:
+        """What stands before the groups: the title, and the diameter of the hole if it is known."""
+        hole = {} if self.hole_diameter is None else {"hole_diameter": self.hole_diameter}
+        return {"title": self.title, **hole}
 
     def given_values(self) -> dict[str, Any]:
         """Return what was given as nested plain values: `Scene(**values)` is an equal scene."""
-        tree: dict[str, Any] = {"title": self.title}
+        tree = self._head()
         for group in GROUPS:
             for name, value in self.__dict__[group].given_values().items():
                 tree.setdefault(group, {})[name] = _as_tables(value)
@@ -387,7 +408,7 @@ class Scene:
 
     def _tree(self) -> dict[str, Any]:
         """Return what a scene file holds, as nested plain values."""
-        tree: dict[str, Any] = {"title": self.title} if self.title else {}
+        tree = {name: value for name, value in self._head().items() if value != ""}
         given = self.given
         for row in _plain_rows():
             value = self[row.key]

@@ -11,7 +11,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from percussion_model.scene.parameters import parameter_table, rows_by_key
+from percussion_model.scene.parameters import HOLE_DIAMETER, parameter_table, rows_by_key
 from percussion_model.scene.rows import Row, SceneError, shortened, toml_value
 
 # A scene of a thousand sections has a tenth of it [bytes].
@@ -96,20 +96,23 @@ def plain_scene(tree: Mapping[str, Any]) -> str:
     return tomli_w.dumps(tree)
 
 
-def commented_scene(title: str, values: Mapping[str, Any], silent: Iterable[str]) -> str:
+def commented_scene(
+    head: Mapping[str, Any], values: Mapping[str, Any], silent: Iterable[str]
+) -> str:
     """Write a complete scene, each parameter with its meaning, unit and bounds.
 
     Parameters
     ----------
-    title : str
-        Title of the scene.
+    head : mapping
+        Title of the scene, and the diameter of the hole where it is known.
     values : mapping
         Value of each dotted key, None where the solver picks one.
     silent : iterable of str
         Keys without influence on this scene: written, but commented out.
     """
     hidden = set(silent)
-    lines = [*_HEADER, f"title = {toml_value(title)}"]
+    lines = [*_HEADER, f"title = {toml_value(head['title'])}"]
+    lines += _commented_value(HOLE_DIAMETER, head.get(HOLE_DIAMETER.key), False)
     group = ""
     for row in parameter_table():
         if "*" in row.key:

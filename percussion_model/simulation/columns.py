@@ -43,8 +43,15 @@ SUMMARY_COLUMNS = (
     Column("transfer_efficiency", "", "energy into the rock divided by the blow energy, of sums"),
     Column("mean_bit_force", "N", "impulse of the bit force divided by time"),
     Column("mean_contact_force", "N", "impulse of the contact force divided by time"),
+    Column("percussive_power", "W", "blow energy times blow frequency, of sums"),
+    Column("energy_per_advance", "J/m", "blow energy divided by the advance of the hole, of sums"),
     Column("peak_bit_force", "N", "greatest bit force of the counted blows"),
     Column("peak_contact_force", "N", "greatest elastic contact force of the counted blows"),
+    Column(
+        "specific_energy",
+        "J/m^3",
+        "blow energy divided by the volume drilled, a hole of `hole_diameter`; none without it",
+    ),
     Column("standard_errors", "as above", "errors of these numbers from the scatter of the blows"),
     Column("errors", "as above", "estimated numerical errors of these numbers, scatter included"),
     Column("energy", "J", "the energy ledger since the start of the run, by its entries"),
@@ -66,6 +73,12 @@ SUMMARY_COLUMNS = (
     Column("settle", "s", "time from which blows count"),
     Column("statistics", "", "counts of what the solver did"),
     Column("warnings", "", "what a user should know of this run"),
+    Column(
+        "driller_numbers",
+        "its own",
+        "rate, frequency, power and specific energy in m/h, blows/min, kW and MJ/m^3, each with "
+        "value, error, unit and definition",
+    ),
 )
 
 # Entries of the ledger, and what is added up of them (docs/model.md, section 8).

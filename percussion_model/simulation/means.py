@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -28,6 +29,8 @@ _RATIOS = {
     "transfer_efficiency": ("rock_energy", "blow_energy"),
     "mean_bit_force": ("bit_impulse", "period"),
     "mean_contact_force": ("contact_impulse", "period"),
+    "percussive_power": ("blow_energy", "period"),
+    "energy_per_advance": ("blow_energy", "hole_advance"),
 }
 # The greatest of all blows.
 _GREATEST = ("peak_bit_force", "peak_contact_force")
@@ -61,6 +64,26 @@ def numbers_over(blows: np.ndarray) -> dict[str, float]:
     found["blow_frequency"] = 1.0 / found["blow_period"]
     found |= {name: _ratio(blows, *columns) for name, columns in _RATIOS.items()}
     return found | {name: _greatest(blows[name]) for name in _GREATEST}
+
+
+def by_volume(numbers: Mapping[str, float], diameter: float | None) -> dict[str, float]:
+    """Specific energy of a hole: `energy_per_advance` by its area, or the error of both.
+
+    Parameters
+    ----------
+    numbers : mapping
+        Numbers over blows, or their errors, by name.
+    diameter : float or None
+        Of the hole [m]; None where it is not known.
+
+    Returns
+    -------
+    dict of float
+        `specific_energy` [J/m^3]; empty where it is not known.
+    """
+    if diameter is None or "energy_per_advance" not in numbers:
+        return {}
+    return {"specific_energy": numbers["energy_per_advance"] / (0.25 * math.pi * diameter**2)}
 
 
 def scatter_over(blows: np.ndarray) -> dict[str, float]:

@@ -16,6 +16,7 @@ from percussion_model.physics.effects import EFFECTS
 from percussion_model.physics.records import BLOW, EVENT, EventKind, Mode
 from percussion_model.scene.rows import shortened
 from percussion_model.scene.scene import Scene
+from percussion_model.simulation.driller_numbers import driller_numbers
 from percussion_model.simulation.files import (
     LARGEST_TABLE,
     LARGEST_TEXT,
@@ -26,7 +27,7 @@ from percussion_model.simulation.files import (
     staged,
     to_json,
 )
-from percussion_model.simulation.means import numbers_over, scatter_over
+from percussion_model.simulation.means import by_volume, numbers_over, scatter_over
 from percussion_model.simulation.origin import ORIGIN
 from percussion_model.simulation.rate import has_stalled, rate_of_blows, ratio_of_sums
 from percussion_model.simulation.uncertain import BY_CELLS, is_undecided, rate_field
@@ -236,8 +237,11 @@ class Result:
         """Return the numbers of the run as plain values for JSON, SI units.
 
         Numbers of blows are means over the whole blows after settling, peak
-        forces the greatest of them; None is what is not defined.
+        forces the greatest of them; None is what is not defined. `driller_numbers` has some
+        of them once more, each with its unit, its error and its definition.
         """
+        over_blows, hole = numbers_over(self.counted), self.scene.hole_diameter
+        standard_errors = self.standard_errors
         numbers = {
             "rate_of_penetration": self.rate_of_penetration,
             "rate_of_penetration_standard_error": self.rate_of_penetration_standard_error,
@@ -247,9 +251,10 @@ class Result:
             BY_CELLS: self.scene.is_undamped,
             "rate_of_penetration_fixed_window": self.rate_of_penetration_fixed_window,
             "rate_of_penetration_fixed_window_error": self.rate_of_penetration_fixed_window_error,
-            **numbers_over(self.counted),
-            "standard_errors": self.standard_errors,
-            "errors": self.errors,
+            **over_blows,
+            "specific_energy": by_volume(over_blows, hole).get("specific_energy"),
+            "standard_errors": standard_errors | by_volume(standard_errors, hole),
+            "errors": self.errors | by_volume(self.errors, hole),
             "energy": self.energy,
             "blows": len(self.blows),
             "blows_after_settling": len(self.counted),
@@ -271,7 +276,7 @@ class Result:
             "warnings": self.warnings,
         }
         values: dict[str, Any] = plain(numbers)
-        return values
+        return values | {"driller_numbers": driller_numbers(values)}
 
     def to_pandas(self) -> pandas.DataFrame:
         """Blow table as a data frame."""

@@ -32,7 +32,10 @@ ABOUT = "≈"
 ABOUT_NUMBER = f"{ABOUT} stands before a number whose error is not known"
 ABOUT_CHANGE = f"{ABOUT_NUMBER}, and before a difference of which one of the numbers has none."
 # Numbers that depend on the cells where waves are not damped, and the flag of a summary for it.
-OF_THE_CELLS = ("rate_of_penetration", "rate_of_penetration_fixed_window", "penetration_per_blow")
+OF_THE_CELLS = (
+    "rate_of_penetration", "rate_of_penetration_fixed_window", "penetration_per_blow",
+    "energy_per_advance", "specific_energy",
+)  # fmt: skip
 BY_CELLS = "rate_of_penetration_depends_on_cells"
 NOT_ESTIMATED = "error not estimated"
 # What stands below tables of means.

@@ -51,7 +51,7 @@ slaves[0].freeInstance()
 assert len(values) == 1
 sys.stderr.write(repr(values.pop()))
 """
-ABSENT = "percussion_model,fmu_src,pythonfmu,scipy,pandas,matplotlib,typer,rich,tomli_w"
+ABSENT = "percussion_model,fmu_src,pythonfmu,scipy,pandas,matplotlib,typer,rich,tomli_w,pint"
 
 
 def host(fmu, cwd, output="blow_position", absent=ABSENT, **environment):

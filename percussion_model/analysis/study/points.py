@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from percussion_model.scene.parameters import find_row
+from percussion_model.scene.parameters import find_row, read_number
+from percussion_model.scene.rows import shortened
 from percussion_model.scene.scene import Scene, SceneError
 
 __all__ = ["Points", "grid", "latin_hypercube", "read_axis", "table"]
@@ -147,7 +148,7 @@ def read_axis(text: str) -> tuple[str, np.ndarray]:
     ----------
     text : str
         `KEY=FIRST:LAST:COUNT`, with `log` after the count for even steps of the
-        logarithm, or `KEY=A,B,C`.
+        logarithm, or `KEY=A,B,C`. Values are SI numbers, or all have their unit, as 0.5kN.
 
     Returns
     -------
@@ -159,15 +160,34 @@ def read_axis(text: str) -> tuple[str, np.ndarray]:
         if not (key and equals and right):
             raise ValueError
         if ":" not in right:
-            return key, np.array([float(part) for part in right.split(",")])
+            return key, np.array(_numbers(key, right.split(","), text))
         first, last, count = right.split(":")
-        return key, _spread(text, float(first), float(last), count)
+        ends = _numbers(key, [first, last], text)
+        return key, _spread(text, ends[0], ends[1], count)
     except SceneError:
         raise
     except ValueError:
         raise SceneError(
             f"--over {text}: must be KEY=FIRST:LAST:COUNT, KEY=FIRST:LAST:COUNTlog or KEY=A,B,C"
         ) from None
+
+
+def _numbers(key: str, words: Sequence[str], text: str) -> list[float]:
+    """Values of an axis. What has a unit beside what has none would be off by a factor."""
+    with_unit = [not _is_float(word) for word in words]
+    if any(with_unit) and not all(with_unit):
+        raise SceneError(f"--over {shortened(text)}: give each value its unit, or none (SI)")
+    if not any(with_unit):
+        return [float(word) for word in words]
+    return [read_number(key.strip(), word) for word in words]
+
+
+def _is_float(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
 
 
 def _spread(text: str, first: float, last: float, count: str) -> np.ndarray:
@@ -203,6 +223,8 @@ def refuse_unknown(scene: Scene, points: Points) -> None:
 
 
 def _column(key: str, values: Any) -> np.ndarray:
+    if not isinstance(values, str) and any(isinstance(value, str) for value in values):
+        values = [read_number(key, one) if isinstance(one, str) else one for one in values]
     try:
         column = np.atleast_1d(np.asarray(values, dtype=float))
     except (TypeError, ValueError):

@@ -50,7 +50,9 @@ def calibrate(
     ranges: Annotated[
         list[str] | None,
         typer.Option(
-            "--range", metavar="KEY=LOW:HIGH", help="Search a parameter there only, SI units."
+            "--range",
+            metavar="KEY=LOW:HIGH",
+            help="Search a parameter there only; in SI, or with units.",
         ),
     ] = None,
     out: Annotated[
@@ -158,15 +160,20 @@ def _check_file(option: str, path: Path | None, force: bool) -> None:
 
 def _read_range(word: str) -> tuple[str, tuple[float, float]]:
     from percussion_model.analysis.fitting import FitError
+    from percussion_model.scene.parameters import read_number
+    from percussion_model.scene.rows import SceneError
 
     key, _, ends = word.partition("=")
     low, colon, high = ends.partition(":")
     try:
         if not colon:
             raise ValueError
-        return key.strip(), (float(low), float(high))
+        key = key.strip()
+        return key, (read_number(key, low), read_number(key, high))
+    except SceneError as error:
+        raise FitError(f"--range {word}: {error}") from None
     except ValueError:
-        raise FitError(f"--range {word}: must be KEY=LOW:HIGH, SI units") from None
+        raise FitError(f"--range {word}: must be KEY=LOW:HIGH, in SI or with units") from None
 
 
 def _show(found: Fit, scene: Scene) -> None:

@@ -29,6 +29,29 @@ FEW_FILES = 3
 
 _own_process = False
 
+
+class BadValue(typer.BadParameter):
+    """A bad value of an option, whose message names the option and is told as it is.
+
+    What a parser of typer raises must be no `ValueError`: of these it drops the message.
+    """
+
+
+def number_of(key: str, option: str) -> Callable[[str], float]:
+    """Return what reads an option whose value is that of a parameter, with its unit or in SI."""
+
+    def read(text: str) -> float:
+        from percussion_model.scene.parameters import read_number
+        from percussion_model.scene.rows import SceneError
+
+        try:
+            return read_number(key, text, option)
+        except SceneError as error:
+            raise BadValue(str(error)) from None
+
+    return read
+
+
 SceneFile = Annotated[
     Path, typer.Argument(metavar="SCENE", help="A scene file (TOML), or a preset, as reference.")
 ]
@@ -44,12 +67,17 @@ Settings = Annotated[
     typer.Option(
         "--set",
         metavar="KEY=VALUE",
-        help="Set any parameter, as in rock.unloading_ratio=10; may be repeated.",
+        help="Set any parameter, as in rock.unloading_ratio=10 or feed.force=5kN; may be repeated.",
     ),
 ]
 Accuracy = Annotated[
     float | None,
-    typer.Option("--accuracy", help="Wanted relative error of the rate, in place of cells."),
+    typer.Option(
+        "--accuracy",
+        metavar="ERROR",
+        parser=number_of("solver.accuracy", "--accuracy"),
+        help="Wanted relative error of the rate, in place of cells.",
+    ),
 ]
 Check = Annotated[
     bool | None, typer.Option("--check/--no-check", help="Verify --accuracy by a finer run.")
@@ -61,8 +89,24 @@ ErrorEstimate = Annotated[
         help="Estimate the error of the rate by short runs on coarser cells.",
     ),
 ]
-Duration = Annotated[float | None, typer.Option("--duration", help="Simulated time, in s.")]
-Settle = Annotated[float | None, typer.Option("--settle", help="Time before blows count, in s.")]
+Duration = Annotated[
+    float | None,
+    typer.Option(
+        "--duration",
+        metavar="TIME",
+        parser=number_of("run.duration", "--duration"),
+        help="Simulated time, in s or with its unit.",
+    ),
+]
+Settle = Annotated[
+    float | None,
+    typer.Option(
+        "--settle",
+        metavar="TIME",
+        parser=number_of("run.settle", "--settle"),
+        help="Time before blows count, in s or with its unit.",
+    ),
+]
 JsonFile = Annotated[
     str | None,
     typer.Option("--json", metavar="FILE|-", help="Write the summary as JSON; - for stdout."),
@@ -135,9 +179,31 @@ def load_scene(
     if cells is not None:
         key = "fem.elements" if scene.solver_name == "fem" else "solver.cells"
         scene = scene.replace(**{key: cells})
+    hint_at_unusual(scene)
     if is_run:
         tell_of_compiling(scene.solver_name)
     return scene
+
+
+# Parameters of which this process has hinted.
+_hinted: set[str] = set()
+
+
+def hint(key: str, text: str) -> None:
+    """Print a hint on stderr, once for each parameter of all sections and scenes."""
+    from percussion_model.scene.rows import generic_key
+
+    if text and generic_key(key) not in _hinted:
+        _hinted.add(generic_key(key))
+        print_message(f"hint: {text}")
+
+
+def hint_at_unusual(scene: Scene) -> None:
+    """Hint at values of a scene that are far from what is usual, as by a slip of the unit."""
+    from percussion_model.scene.typical import unusual_values
+
+    for key, text in unusual_values(scene):
+        hint(key, text)
 
 
 # Solvers of whose compilation this process has told: many scenes may be read before it begins.

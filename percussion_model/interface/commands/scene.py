@@ -182,6 +182,7 @@ def plot(
             claimed = common.claim("plot", out, None, force, result=numbers)
     else:
         scene = Scene.from_toml(file)
+        common.hint_at_unusual(scene)
         common.tell_of_compiling(scene.solver_name)
         made_from = _made_from(scene, duration, settle)
         # its figures belong to the result of that run, and may stand beside it

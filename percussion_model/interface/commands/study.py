@@ -27,8 +27,8 @@ def study(
         typer.Option(
             "--over",
             metavar="KEY=FIRST:LAST:COUNT",
-            help="Values of a parameter; COUNTlog for even steps of its logarithm, or KEY=A,B,C. "
-            "May be repeated: the study runs all combinations.",
+            help="Values of a parameter, in SI or with units; COUNTlog for even steps of its "
+            "logarithm, or KEY=A,B,C. May be repeated: the study runs all combinations.",
         ),
     ],
     out: Annotated[
@@ -62,6 +62,7 @@ def study(
     from percussion_model.analysis.study import grid, latin_hypercube, read_axis
     from percussion_model.analysis.study import study as run_study
     from percussion_model.interface.terminal import count_bar, progress, show_study
+    from percussion_model.scene.typical import hint_of
 
     missing = [name for name in NEEDED if importlib.util.find_spec(name) is None]
     if missing:
@@ -82,6 +83,8 @@ def study(
         points = latin_hypercube(ends, samples, seed, logarithmic)
     common.check_outputs(out, None)
     chosen = common.load_scene(scene, solver, cells, settings)
+    for key, column in zip(points.keys, points.values.T, strict=True):
+        common.hint(key, hint_of(key, column.tolist()))
     try:
         with common.interruptible():
             with count_bar("points") as report_count:

@@ -17,16 +17,18 @@ from percussion_model.scene.rows import Row, SceneError, shortened
 from percussion_model.scene.scene import Scene
 from percussion_model.scene.text import read_setting
 
-# Numbers with a slider, in the order of the page.
-KEYS = (
-    "feed.force",
-    "drive.force",
-    "drive.reversal_distance",
-    "drive.external_force",
-    "rock.loading_stiffness",
-    "rock.unloading_ratio",
-    "rock.barrier_energy",
-)
+# Numbers with a slider, in the order of the page, and where it reaches from and to [SI]: what is
+# worth trying. The field beside it takes all that the table of parameters allows.
+SLIDERS = {
+    "feed.force": (0.0, 20e3),
+    "drive.force": (500.0, 20e3),
+    "drive.reversal_distance": (0.005, 0.1),
+    "drive.external_force": (-20e3, 20e3),
+    "rock.loading_stiffness": (1e8, 3e9),
+    "rock.unloading_ratio": (1.1, 20.0),
+    "rock.barrier_energy": (0.0, 0.5),
+}
+LENGTH = (0.02, 0.5)
 BARS = ("piston", "bit")
 # So many sections of a bar have a slider; the lengths of others stay those of the scene.
 MOST_SECTIONS = 6
@@ -61,10 +63,10 @@ def label_of(row: Row, key: str) -> str:
     return f"{place}{row.description}{unit}"
 
 
-def range_of(row: Row, value: float) -> tuple[float, float, float]:
-    """Start, end and step of a slider that reaches a value: where hammers and rocks lie."""
-    assert row.usual is not None
-    start, end = min(row.usual[0], value), max(row.usual[1], value)
+def range_of(key: str, value: float) -> tuple[float, float, float]:
+    """Start, end and step of the slider of a number, so that it reaches a value."""
+    low, high = SLIDERS.get(key, LENGTH)
+    start, end = min(low, value), max(high, value)
     step = 10.0 ** math.floor(math.log10((end - start) / STEPS))
     step *= next(m for m in (1.0, 2.0, 5.0, 10.0) if m * step * STEPS >= 0.99 * (end - start))
     return start, end, step
@@ -85,7 +87,7 @@ class Entry:
         self.key, self.change = key, change
         self.row = scene.row_of(key)
         value = float(scene[key])
-        start, end, step = range_of(self.row, value)
+        start, end, step = range_of(self.key, value)
         self.slider = Slider(
             start=start, end=end, step=step, value=value,
             show_value=False, tooltips=False, name=key, stylesheets=[WIDGETS],
@@ -122,7 +124,7 @@ class Entry:
     def start(self, scene: Scene) -> None:
         """Take the value of a scene to start from."""
         value = float(scene[self.key])
-        start, end, step = range_of(self.row, value)
+        start, end, step = range_of(self.key, value)
         self._set(self.slider, value, start=start, end=end, step=step)
         self._set(self.field, short(value))
         self._tell("")
@@ -156,7 +158,7 @@ class Entry:
             return
         refused = self.change(self.key, value)
         if not refused:
-            start, end, step = range_of(self.row, float(value))
+            start, end, step = range_of(self.key, float(value))
             self._set(self.slider, float(value), start=start, end=end, step=step)
         self._tell(refused)
 
@@ -236,7 +238,7 @@ class Switch:
 
 def keys_of(scene: Scene) -> Iterator[str]:
     """Keys that have a slider in a scene."""
-    yield from KEYS
+    yield from SLIDERS
     for bar in BARS:
         for k in range(min(len(scene[f"{bar}.sections"]), MOST_SECTIONS)):
             yield f"{bar}.sections.{k}.length"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from typing import Any
 
 import numpy as np
@@ -22,13 +21,7 @@ from bokeh.palettes import interp_palette
 from percussion_model.interface.plotting import FEWEST_BLOWS, style
 from percussion_model.interface.plotting.interactive import hover, legend, line, panel, rule, shade
 from percussion_model.interface.plotting.style import KN, MM, MPA, MS, US
-from percussion_model.interface.plotting.window import (
-    NotRepeatable,
-    StressField,
-    Window,
-    last_blow_window,
-    stress_fields,
-)
+from percussion_model.interface.plotting.window import StressField, Window
 from percussion_model.physics.records import Mode
 from percussion_model.simulation.result import Result
 from percussion_model.simulation.uncertain import rate_text, shown_error
@@ -39,18 +32,24 @@ STRESS_COLOURS = ("#053061", "#4393C3", "#F7F7F7", "#D6604D", "#67001F")
 MOST_ROWS = 240
 
 
-def interactive_figures(result: Result) -> dict[str, LayoutDOM]:
-    """Draw the figures of a result, by the names of `CAPTIONS`."""
+def interactive_figures(
+    result: Result, blow: tuple[Window, dict[str, StressField]] | None
+) -> dict[str, LayoutDOM]:
+    """Draw the figures of a result, by the names of `CAPTIONS`.
+
+    Parameters
+    ----------
+    result : Result
+    blow : (Window, dict of StressField) or None
+        As from `last_blow`.
+    """
     made: dict[str, LayoutDOM] = {}
     if len(result.blows) >= FEWEST_BLOWS:
         made["overview"] = _overview(result)
-    try:
-        window = last_blow_window(result)
-    except NotRepeatable as error:
-        warnings.warn(f"no detailed figures: {error}", stacklevel=2)
+    if blow is None:
         return made
+    window, fields = blow
     made["bit_motion"] = _motion(window)
-    fields = stress_fields(window)
     if fields:
         made["stress_waves"] = _stress(window, fields)
     return made

@@ -7,10 +7,12 @@ than keeping every sample of every run. Without blows, the first contact is show
 from __future__ import annotations
 
 import math
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
 
+from percussion_model.analysis.drill_string import BarStress, bar_stress
 from percussion_model.physics.records import EventKind, Mode
 from percussion_model.scene.bar_groups import Bar
 from percussion_model.scene.scene import Scene
@@ -110,6 +112,26 @@ class StressField:
     time_edges: np.ndarray  # [s] since the window's origin
     depth_edges: np.ndarray  # [m] from the top of the bar
     stress: np.ndarray  # [Pa], a row for each cell
+
+
+def last_blow(result: Result) -> tuple[Window, dict[str, StressField]] | None:
+    """Window and stress of the last blow; None, with a warning, where it cannot be repeated."""
+    try:
+        window = last_blow_window(result)
+    except NotRepeatable as error:
+        warnings.warn(f"no detailed figures: {error}", stacklevel=2)
+        return None
+    return window, stress_fields(window)
+
+
+def peak_stresses(fields: dict[str, StressField]) -> dict[str, BarStress]:
+    """Where the bars of a window are pressed and pulled most, by bar."""
+    return {
+        name: bar_stress(
+            one.stress.T, one.depth_edges, 0.5 * (one.time_edges[1:] + one.time_edges[:-1])
+        )
+        for name, one in fields.items()
+    }
 
 
 def last_blow_window(result: Result) -> Window:

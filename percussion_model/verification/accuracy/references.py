@@ -174,11 +174,11 @@ class Reference:
 def fingerprint(scene: Scene) -> str:
     """Tell scenes apart by what changes their motion: values that are not the defaults.
 
-    Title, solver and, but for a drop, run times do not count; so parameters that come
-    later, at their defaults, leave the fingerprint as it is.
+    Title, hole diameter, solver and, but for a drop, run times do not count; so parameters that
+    come later, at their defaults, leave the fingerprint as it is.
     """
     tree, usual = (asdict(one) for one in (scene, Scene()))
-    apart = {"title", "solver", "fem"}
+    apart = {"title", "hole_diameter", "solver", "fem"}
     if scene.piston.model != "absent":
         apart.add("run")
     found = {
