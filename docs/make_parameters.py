@@ -20,8 +20,9 @@ and rods are counted from 0, as in `--set piston.sections.0.length=0.2`. All bar
 as one list instead, `[[bars]]`, from the drive to the rock: the first is the piston, the last
 the bit, and those between them are `string.rods`.
 
-*Typical* is the range of the [sources of hammers](data/hammer_sources.md), of the paper and of steel. It is no bound: commands hint, once for each key, at a value that is ten
-times beyond, since that is mostly a slip of the unit.
+*Typical* is the range of the [sources of hammers](data/hammer_sources.md), of the paper and of
+steel. It is no bound: commands hint, once for each key, at a value that is ten times beyond, since
+that is mostly a slip of the unit.
 
 This page is written by `python docs/make_parameters.py`; change
 `percussion_model/scene/parameters.py` or `bar_groups.py` instead.
