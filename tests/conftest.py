@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import tempfile
-import time
 from pathlib import Path
 
 import pytest
@@ -13,9 +12,6 @@ from hypothesis import HealthCheck, settings
 from fmu_src.native.library import library_here
 from percussion_model import Result, Scene, simulate
 from percussion_model.interface import progress
-
-# Compiling the library takes minutes; another worker waits for it so long [s].
-LONGEST_WAIT = 900.0
 
 # How long an example takes says nothing on a machine that others use too.
 settings.register_profile("shared", deadline=None, suppress_health_check=[HealthCheck.too_slow])
@@ -52,21 +48,9 @@ def reference_by_waves() -> Result:
 
 
 @pytest.fixture(scope="session")
-def built_library(tmp_path_factory):
+def built_library():
     """Library of FMUs by platform, none without a compiler. One worker compiles, others wait."""
-    lock = tmp_path_factory.getbasetemp().parent / "native.lock"
-    deadline = time.monotonic() + LONGEST_WAIT
-    while True:
-        try:
-            lock.open("x").close()
-            break
-        except FileExistsError:
-            assert time.monotonic() < deadline, f"{lock}: its worker has not ended"
-            time.sleep(0.2)
-    try:
-        return library_here()
-    finally:
-        lock.unlink()
+    return library_here()
 
 
 @pytest.fixture

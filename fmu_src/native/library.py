@@ -63,9 +63,9 @@ class Platform(NamedTuple):
 PLATFORMS = {
     "x86_64-linux": Platform("x86_64-unknown-linux-gnu", "x86_64-linux-gnu.2.17", ".so"),
     "x86_64-windows": Platform("x86_64-pc-windows-gnu", "x86_64-windows-gnu", ".dll"),
-    "x86_64-darwin": Platform("x86_64-apple-macosx11.0", "x86_64-macos", ".dylib"),
+    "x86_64-darwin": Platform("x86_64-apple-macosx11.0", "x86_64-macos.11.0", ".dylib"),
     "aarch64-linux": Platform("aarch64-unknown-linux-gnu", "aarch64-linux-gnu.2.17", ".so"),
-    "aarch64-darwin": Platform("arm64-apple-macosx11.0", "aarch64-macos", ".dylib"),
+    "aarch64-darwin": Platform("arm64-apple-macosx11.0", "aarch64-macos.11.0", ".dylib"),
 }
 
 

@@ -218,7 +218,7 @@ def find_fault(base, moving, t, facts):
         return fault
     if not arrays_are_bounded(base, moving, WP, 2):
         return Fault.WORKSPACE.value
-    s, longest = state_in(moving)[0], 4 ** parameters(base)[0].leaps - 1
+    s, longest = state_in(moving)[0], (1 << 2 * parameters(base)[0].leaps) - 1
     facts[1] = s.step
     if s.leap_end >= 0:
         most = min(longest, LOOKAHEAD) if s.leap_kind == LeapKind.CONTACT else longest
