@@ -21,7 +21,8 @@ from typing import Any
 
 ROOT = Path(__file__).resolve().parent
 VENV = ROOT / ".venv"
-STAMP = VENV / "percussion_model.stamp"
+STAMP = VENV / "percussion_model.stamp"  # what is installed
+COMPILED = VENV / "percussion_model.compiled"  # what compiling beforehand was done for
 OLDEST_PYTHON = (3, 11)
 INTERRUPTED = 130  # what shells report for Ctrl-C
 EVERY = 3.0  # between lines that say that a silent program still runs [s]
@@ -72,7 +73,7 @@ def wanted_stamp(pyproject: bytes, version: tuple[int, ...]) -> str:
     return f"{shown} {hashlib.sha256(pyproject).hexdigest()}"
 
 
-def setup() -> int:
+def install() -> int:
     """Make .venv and install the package with what development needs, unless that is done."""
     lacking = missing_requirement(
         sys.version_info[:3],
@@ -81,8 +82,7 @@ def setup() -> int:
     if lacking:
         print(lacking, file=sys.stderr)
         return 1
-    wanted = wanted_stamp((ROOT / "pyproject.toml").read_bytes(), sys.version_info[:3])
-    found = STAMP.read_text(encoding="utf-8") if STAMP.exists() else ""
+    wanted, found = stamp_now(), stamp_in(STAMP)
     if found == wanted and tool("python").exists():
         return 0
     made = make_venv(renew=bool(found) and found.split()[0] != wanted.split()[0])
@@ -95,13 +95,31 @@ def setup() -> int:
         print("The installation failed, see above. Is the network up? Then run this again.",
               file=sys.stderr)  # fmt: skip
         return code
+    STAMP.write_text(wanted, encoding="utf-8")
+    return 0
+
+
+def setup() -> int:
+    """Install, and compile what later starts only load, unless that is done."""
+    code = install()
+    if code != 0 or stamp_in(COMPILED) == stamp_now():
+        return code
     print("Compiling the kernels, and the library of FMUs (once, some minutes) ...", flush=True)
     code = call([tool("python"), "-m", WARM_UP], silent="compiling")
-    if code != 0:
-        return code
-    STAMP.write_text(wanted, encoding="utf-8")
-    print("Ready.", flush=True)
-    return 0
+    if code == 0:
+        COMPILED.write_text(stamp_now(), encoding="utf-8")
+        print("Ready.", flush=True)
+    return code
+
+
+def stamp_now() -> str:
+    """What the stamp of an up-to-date .venv says."""
+    return wanted_stamp((ROOT / "pyproject.toml").read_bytes(), sys.version_info[:3])
+
+
+def stamp_in(file: Path) -> str:
+    """What a stamp says; nothing where there is none."""
+    return file.read_text(encoding="utf-8") if file.exists() else ""
 
 
 def make_venv(renew: bool) -> int:
@@ -148,7 +166,7 @@ def system(extra: list[str]) -> int:
 
 def docs(extra: list[str]) -> int:
     """Build the documentation site; what is wrong in a page or a link fails."""
-    code = setup()
+    code = install()
     if code != 0:
         return code
     page = ROOT / "out" / "docs" / "index.html"
@@ -162,7 +180,7 @@ def docs(extra: list[str]) -> int:
 
 def test(extra: list[str]) -> int:
     """Run lint, type checks and tests, all of them; return the first failure."""
-    code = setup()
+    code = install()
     if code != 0:
         return code
     checks: list[tuple[str, list[str | Path]]] = [
@@ -196,7 +214,7 @@ def test(extra: list[str]) -> int:
 
 def bench(extra: list[str]) -> int:
     """Measure speed."""
-    code = setup()
+    code = install()
     if code != 0:
         return code
     with tempfile.TemporaryDirectory(prefix="percussion-numba-") as cache:

@@ -21,6 +21,7 @@ def build(monkeypatch, tmp_path):
     spec.loader.exec_module(module)
     monkeypatch.setattr(module, "VENV", tmp_path / ".venv")
     monkeypatch.setattr(module, "STAMP", tmp_path / ".venv" / "stamp")
+    monkeypatch.setattr(module, "COMPILED", tmp_path / ".venv" / "compiled")
     return module
 
 
@@ -83,14 +84,19 @@ def test_setup_installs_once(build, monkeypatch):
         return 0
 
     monkeypatch.setattr(build, "call", pretend)
+    assert build.install() == 0
+    assert [words[-1] for words in calls] == [str(build.VENV), ".[dev]"]
     assert build.setup() == 0
-    assert [words[-1] for words in calls] == [
-        str(build.VENV),
-        ".[dev]",
-        "fmu_src.warm_up",
-    ]
+    assert calls[2][-1] == "fmu_src.warm_up"
     assert build.setup() == 0
     assert len(calls) == 3
+
+
+def test_compiling_that_failed_is_tried_again(build, monkeypatch):
+    monkeypatch.setattr(build, "install", lambda: 0)
+    monkeypatch.setattr(build, "call", lambda command, **variables: 3)
+    assert build.setup() == 3
+    assert not build.COMPILED.exists()
 
 
 def test_a_failed_installation_is_tried_again(build, monkeypatch):
@@ -118,7 +124,7 @@ def test_test_runs_every_step_and_reports_the_first_failure(build, monkeypatch, 
         assert Path(variables["NUMBA_CACHE_DIR"]).is_dir()
         return {"mypy": 7, "pytest": 1}.get(names[-1], 0)
 
-    monkeypatch.setattr(build, "setup", lambda: 0)
+    monkeypatch.setattr(build, "install", lambda: 0)
     monkeypatch.setattr(build, "call", pretend)
     assert build.main(["test", "-k", "rock"]) == 7
     assert names[-1] == "pytest"  # whose closing line is to be the last
