@@ -42,6 +42,7 @@ class Figures:
         self.border, self.closed = _pairs(), _pairs()
         self.stress = self._stress()
         self.contact, self.force, self.path = _line(), _by_mode(), _by_mode()
+        # each change of a column is a message: lines of all modes share one
         self.pinned = {name: _line() for name in ("contact", "force", "path")}
         self.forces = panel(
             "Forces over time", "time [ms]",
@@ -55,12 +56,13 @@ class Figures:
         _draw(self.forces, self.pinned["force"], style.RULE_COLOUR)
         _draw(self.law, self.pinned["path"], style.RULE_COLOUR)
         _draw(self.forces, self.contact, style.PISTON_COLOUR, line_dash="dotted")
-        for mode, colour in style.MODE_COLOURS.items():
-            _draw(self.forces, self.force[mode], colour)
-            _draw(self.law, self.path[mode], colour)
+        for made, columns in ((self.forces, self.force), (self.law, self.path)):
+            made.multi_line("x", "y", color="colour", source=columns, line_width=2)
         for made, x in ((self.forces, "ms"), (self.law, "mm")):
             shown = [("", f"$x{{0.000}} {x}, $y{{0.0}} kN")]
             made.add_tools(HoverTool(tooltips=shown, mode="mouse"))
+        for made in (self.stress, self.forces, self.law):
+            made.js_event_callbacks = {}  # a double click would go back to axes of nothing
 
     def _stress(self) -> Any:
         made = panel(
@@ -85,14 +87,8 @@ class Figures:
         curves = _curves(window)
         self.contact.data = curves["contact"]
         self._draw_stress(response)
-        for sources, (x, y, modes) in (
-            (self.force, _force(window)),
-            (self.path, _path(window)),
-        ):
-            lines = {mode: (xs, ys) for mode, xs, ys in style.by_mode(x, y, modes)}
-            for mode, columns in sources.items():
-                xs, ys = lines.get(mode, (EMPTY, EMPTY))
-                columns.data = _columns(xs, ys)
+        for columns, line in ((self.force, _force(window)), (self.path, _path(window))):
+            columns.data = _mode_columns(*line)
         self._fit()
         if window is None:
             return
@@ -108,12 +104,13 @@ class Figures:
 
     def _fit(self) -> None:
         """Let the axes of forces span what is drawn, now and pinned."""
+        pinned = {name: columns.data["y"] for name, columns in self.pinned.items()}
+        forces = self.contact.data["y"], *self.force.data["y"], pinned["contact"], pinned["force"]
         for made, drawn in (
-            (self.forces, (self.contact, *self.force.values(), self.pinned["contact"],
-                           self.pinned["force"])),
-            (self.law, (*self.path.values(), self.pinned["path"])),
-        ):  # fmt: skip
-            values = np.concatenate([columns.data["y"] for columns in drawn])
+            (self.forces, forces),
+            (self.law, (*self.path.data["y"], pinned["path"])),
+        ):
+            values = np.concatenate(drawn)
             values = values[np.isfinite(values)]
             low, high = (float(values.min()), float(values.max())) if len(values) else (0.0, 1.0)
             room = ROOM * (high - low) or 1.0
@@ -167,8 +164,18 @@ def _pairs() -> ColumnDataSource:
     return ColumnDataSource({"x": [], "y": []})
 
 
-def _by_mode() -> dict[Mode, ColumnDataSource]:
-    return {mode: _line() for mode in style.MODE_COLOURS}
+def _by_mode() -> ColumnDataSource:
+    return ColumnDataSource(_mode_columns(EMPTY, EMPTY, EMPTY))
+
+
+def _mode_columns(x: np.ndarray, y: np.ndarray, modes: np.ndarray) -> dict[str, list[Any]]:
+    """Lines of all modes that occur, and their colours."""
+    lines = list(style.by_mode(x, y, modes))
+    return {
+        "x": [np.asarray(xs, np.float32) for _, xs, _ in lines],
+        "y": [np.asarray(ys, np.float32) for _, _, ys in lines],
+        "colour": [style.MODE_COLOURS[mode] for mode, _, _ in lines],
+    }
 
 
 def _draw(to: Any, columns: ColumnDataSource, colour: str, **more: Any) -> None:
@@ -176,8 +183,9 @@ def _draw(to: Any, columns: ColumnDataSource, colour: str, **more: Any) -> None:
 
 
 def _move(to: Range1d, start: float, end: float) -> None:
-    """Show a stretch of an axis, also after a double click."""
-    to.update(start=start, end=end, reset_start=start, reset_end=end)
+    """Show a stretch of an axis."""
+    changed = {"start": start, "end": end}
+    to.update(**{name: at for name, at in changed.items() if getattr(to, name) != at})
 
 
 Line = tuple[np.ndarray, np.ndarray, np.ndarray]
