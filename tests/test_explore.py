@@ -278,7 +278,7 @@ def test_more_pages_than_the_limit_are_refused():
 def test_ctrl_c_ends_it_as_other_commands():
     made = Served()
     code, told = made.end()
-    assert code == 130
+    assert code == 130, told
     assert told.splitlines()[-1] == "percussion: ended"
     assert "Traceback" not in told
 
