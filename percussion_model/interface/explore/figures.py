@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,8 @@ from percussion_model.physics.records import Mode
 TOOLS = "save"
 EMPTY = np.zeros(0, np.float32)
 ROOM = 0.05
+# Forces are drawn beyond the time for which the bit is active, since the axis is rounded.
+REACH = 1.25
 CAPTIONS = {
     "stress": (
         "Stress along piston and bit, top to bottom, from the impact on. Red is compression, blue "
@@ -92,8 +95,9 @@ class Figures:
         self._fit()
         if window is None:
             return
-        _move(self.forces.x_range, min(0.0, float(window.time[0])) * MS, window.active_until * MS)
-        _move(self.law.x_range, *_touching(window))
+        start, end = min(0.0, float(window.time[0])), window.active_until
+        _move(self.forces.x_range, *_rounded(start * MS, end * MS))
+        _move(self.law.x_range, *_rounded(*_touching(window)))
 
     def pin(self, response: Response | None) -> None:
         """Keep the curves of a response in grey, or of none."""
@@ -114,7 +118,7 @@ class Figures:
             values = values[np.isfinite(values)]
             low, high = (float(values.min()), float(values.max())) if len(values) else (0.0, 1.0)
             room = ROOM * (high - low) or 1.0
-            _move(made.y_range, low - room, high + room)
+            _move(made.y_range, *_rounded(low - room, high + room))
 
     def _draw_stress(self, response: Response) -> None:
         fields, window = response.fields, response.window
@@ -132,7 +136,9 @@ class Figures:
         self.images.data = images
         if fields and window is not None:
             limit = max(float(np.abs(one.stress).max(initial=0.0)) for one in fields.values())
-            self.mapper.update(low=-limit / MPA or -1.0, high=limit / MPA or 1.0)
+            _, limit = _rounded(0.0, limit / MPA or 1.0)
+            if self.mapper.high != limit:
+                self.mapper.update(low=-limit, high=limit)
             end = float(next(iter(fields.values())).time_edges[-1]) * US
             _move(self.stress.x_range, 0.0, end)
             _move(self.stress.y_range, top, 0.0)
@@ -182,6 +188,12 @@ def _draw(to: Any, columns: ColumnDataSource, colour: str, **more: Any) -> None:
     to.line("x", "y", source=columns, color=colour, line_width=2, **more)
 
 
+def _rounded(start: float, end: float) -> tuple[float, float]:
+    """Round a stretch outwards, so that axes stand still while a slider moves by little."""
+    unit = 10.0 ** math.floor(math.log10(end - start)) / 4.0
+    return unit * math.floor(start / unit), unit * math.ceil(end / unit)
+
+
 def _move(to: Range1d, start: float, end: float) -> None:
     """Show a stretch of an axis."""
     changed = {"start": start, "end": end}
@@ -196,7 +208,7 @@ def _force(window: Window | None) -> Line:
     """Time [ms], force on the rock [kN] and mode, as far as the bit is active."""
     if window is None:
         return _NOTHING
-    shown = window.time <= (1.0 + ROOM) * window.active_until
+    shown = window.time <= REACH * window.active_until
     force, modes = window.samples["bit_force"], window.samples["drilling_mode"]
     return window.time[shown] * MS, force[shown] / KN, modes[shown]
 
