@@ -278,7 +278,7 @@ def test_more_pages_than_the_limit_are_refused():
 def test_ctrl_c_ends_it_as_other_commands():
     made = Served()
     code, told = made.end()
-    assert code == 130
+    assert code == 130, told
     assert told.splitlines()[-1] == "percussion: ended"
     assert "Traceback" not in told
 
@@ -405,6 +405,13 @@ def test_keys_move_a_slider_and_bad_values_change_nothing(served, tmp_path):
             assert await shown_numbers(page) == before
             assert await page.ask(f"{MODEL}('toml').value") == toml
             assert await page.ask(f"{MODEL}('{key}').value") == Scene().rock.unloading_ratio
+            # a number with a unit becomes one in that of the table
+            await page.ask(FOCUS % json.dumps("drive force"))
+            await page.call("Input.insertText", text="4 kN")
+            await page.press("Enter", "\r")
+            await page.until(f"{MODEL}('drive.force').value === 4000")
+            assert await page.ask(f"{MODEL}('drive.force field').value") == "4000"
+            await settled_page(page)
             # back in the slider: an arrow is one step
             await page.ask(FOCUS % json.dumps("feed force"))
             for _ in range(30):
@@ -417,7 +424,9 @@ def test_keys_move_a_slider_and_bad_values_change_nothing(served, tmp_path):
             await settled_page(page)
             step = await page.ask(f"{MODEL}('feed.force').step")
             assert await page.ask(f"{MODEL}('feed.force').value") == 2500.0 + step
-            assert await shown_numbers(page) == expected(Scene(feed={"force": 2500.0 + step}))
+            assert await shown_numbers(page) == expected(
+                Scene(feed={"force": 2500.0 + step}, drive={"force": 4000.0})
+            )
             without_faults(page.found, served.url)
             return told
 

@@ -50,8 +50,8 @@ def explore(
         raise common.refusal(str(error)) from None
     with progress("preparing"):
         respond(first)  # compiles the kernels, so that the first slider does not wait
-    print(f"{served.url} follows the sliders; Ctrl-C ends it", flush=True)
     try:
+        print(f"{served.url} follows the sliders; Ctrl-C ends it", flush=True)
         served.run(browser)
     except KeyboardInterrupt:
         raise typer.Exit(common.print_message("ended", common.INTERRUPTED)) from None

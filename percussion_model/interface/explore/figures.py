@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,8 @@ from percussion_model.physics.records import Mode
 TOOLS = "save"
 EMPTY = np.zeros(0, np.float32)
 ROOM = 0.05
+# Forces are drawn beyond the time for which the bit is active, since the axis is rounded.
+REACH = 1.25
 CAPTIONS = {
     "stress": (
         "Stress along piston and bit, top to bottom, from the impact on. Red is compression, blue "
@@ -42,6 +45,7 @@ class Figures:
         self.border, self.closed = _pairs(), _pairs()
         self.stress = self._stress()
         self.contact, self.force, self.path = _line(), _by_mode(), _by_mode()
+        # each change of a column is a message: lines of all modes share one
         self.pinned = {name: _line() for name in ("contact", "force", "path")}
         self.forces = panel(
             "Forces over time", "time [ms]",
@@ -55,12 +59,13 @@ class Figures:
         _draw(self.forces, self.pinned["force"], style.RULE_COLOUR)
         _draw(self.law, self.pinned["path"], style.RULE_COLOUR)
         _draw(self.forces, self.contact, style.PISTON_COLOUR, line_dash="dotted")
-        for mode, colour in style.MODE_COLOURS.items():
-            _draw(self.forces, self.force[mode], colour)
-            _draw(self.law, self.path[mode], colour)
+        for made, columns in ((self.forces, self.force), (self.law, self.path)):
+            made.multi_line("x", "y", color="colour", source=columns, line_width=2)
         for made, x in ((self.forces, "ms"), (self.law, "mm")):
             shown = [("", f"$x{{0.000}} {x}, $y{{0.0}} kN")]
             made.add_tools(HoverTool(tooltips=shown, mode="mouse"))
+        for made in (self.stress, self.forces, self.law):
+            made.js_event_callbacks = {}  # a double click would go back to axes of nothing
 
     def _stress(self) -> Any:
         made = panel(
@@ -85,19 +90,14 @@ class Figures:
         curves = _curves(window)
         self.contact.data = curves["contact"]
         self._draw_stress(response)
-        for sources, (x, y, modes) in (
-            (self.force, _force(window)),
-            (self.path, _path(window)),
-        ):
-            lines = {mode: (xs, ys) for mode, xs, ys in style.by_mode(x, y, modes)}
-            for mode, columns in sources.items():
-                xs, ys = lines.get(mode, (EMPTY, EMPTY))
-                columns.data = _columns(xs, ys)
+        for columns, line in ((self.force, _force(window)), (self.path, _path(window))):
+            columns.data = _mode_columns(*line)
         self._fit()
         if window is None:
             return
-        _move(self.forces.x_range, min(0.0, float(window.time[0])) * MS, window.active_until * MS)
-        _move(self.law.x_range, *_touching(window))
+        start, end = min(0.0, float(window.time[0])), window.active_until
+        _move(self.forces.x_range, *_rounded(start * MS, end * MS))
+        _move(self.law.x_range, *_rounded(*_touching(window)))
 
     def pin(self, response: Response | None) -> None:
         """Keep the curves of a response in grey, or of none."""
@@ -108,16 +108,17 @@ class Figures:
 
     def _fit(self) -> None:
         """Let the axes of forces span what is drawn, now and pinned."""
+        pinned = {name: columns.data["y"] for name, columns in self.pinned.items()}
+        forces = self.contact.data["y"], *self.force.data["y"], pinned["contact"], pinned["force"]
         for made, drawn in (
-            (self.forces, (self.contact, *self.force.values(), self.pinned["contact"],
-                           self.pinned["force"])),
-            (self.law, (*self.path.values(), self.pinned["path"])),
-        ):  # fmt: skip
-            values = np.concatenate([columns.data["y"] for columns in drawn])
+            (self.forces, forces),
+            (self.law, (*self.path.data["y"], pinned["path"])),
+        ):
+            values = np.concatenate(drawn)
             values = values[np.isfinite(values)]
             low, high = (float(values.min()), float(values.max())) if len(values) else (0.0, 1.0)
             room = ROOM * (high - low) or 1.0
-            _move(made.y_range, low - room, high + room)
+            _move(made.y_range, *_rounded(low - room, high + room))
 
     def _draw_stress(self, response: Response) -> None:
         fields, window = response.fields, response.window
@@ -135,7 +136,9 @@ class Figures:
         self.images.data = images
         if fields and window is not None:
             limit = max(float(np.abs(one.stress).max(initial=0.0)) for one in fields.values())
-            self.mapper.update(low=-limit / MPA or -1.0, high=limit / MPA or 1.0)
+            _, limit = _rounded(0.0, limit / MPA or 1.0)
+            if self.mapper.high != limit:
+                self.mapper.update(low=-limit, high=limit)
             end = float(next(iter(fields.values())).time_edges[-1]) * US
             _move(self.stress.x_range, 0.0, end)
             _move(self.stress.y_range, top, 0.0)
@@ -167,17 +170,34 @@ def _pairs() -> ColumnDataSource:
     return ColumnDataSource({"x": [], "y": []})
 
 
-def _by_mode() -> dict[Mode, ColumnDataSource]:
-    return {mode: _line() for mode in style.MODE_COLOURS}
+def _by_mode() -> ColumnDataSource:
+    return ColumnDataSource(_mode_columns(EMPTY, EMPTY, EMPTY))
+
+
+def _mode_columns(x: np.ndarray, y: np.ndarray, modes: np.ndarray) -> dict[str, list[Any]]:
+    """Lines of all modes that occur, and their colours."""
+    lines = list(style.by_mode(x, y, modes))
+    return {
+        "x": [np.asarray(xs, np.float32) for _, xs, _ in lines],
+        "y": [np.asarray(ys, np.float32) for _, _, ys in lines],
+        "colour": [style.MODE_COLOURS[mode] for mode, _, _ in lines],
+    }
 
 
 def _draw(to: Any, columns: ColumnDataSource, colour: str, **more: Any) -> None:
     to.line("x", "y", source=columns, color=colour, line_width=2, **more)
 
 
+def _rounded(start: float, end: float) -> tuple[float, float]:
+    """Round a stretch outwards, so that axes stand still while a slider moves by little."""
+    unit = 10.0 ** math.floor(math.log10(end - start)) / 4.0
+    return unit * math.floor(start / unit), unit * math.ceil(end / unit)
+
+
 def _move(to: Range1d, start: float, end: float) -> None:
-    """Show a stretch of an axis, also after a double click."""
-    to.update(start=start, end=end, reset_start=start, reset_end=end)
+    """Show a stretch of an axis."""
+    changed = {"start": start, "end": end}
+    to.update(**{name: at for name, at in changed.items() if getattr(to, name) != at})
 
 
 Line = tuple[np.ndarray, np.ndarray, np.ndarray]
@@ -188,7 +208,7 @@ def _force(window: Window | None) -> Line:
     """Time [ms], force on the rock [kN] and mode, as far as the bit is active."""
     if window is None:
         return _NOTHING
-    shown = window.time <= (1.0 + ROOM) * window.active_until
+    shown = window.time <= REACH * window.active_until
     force, modes = window.samples["bit_force"], window.samples["drilling_mode"]
     return window.time[shown] * MS, force[shown] / KN, modes[shown]
 

@@ -131,7 +131,8 @@ class Entry:
         self.show_use(scene)
 
     def show_use(self, scene: Scene) -> None:
-        """Grey out what has no effect in a scene, and say what it needs."""
+        """Take the value of a scene; grey out what has no effect there, and say what it needs."""
+        self.value = float(scene[self.key])
         needed = scene.matters(self.key)
         for widget in (self.slider, self.field):
             if widget.disabled == needed:
@@ -158,8 +159,10 @@ class Entry:
             return
         refused = self.change(self.key, value)
         if not refused:
-            start, end, step = range_of(self.key, float(value))
-            self._set(self.slider, float(value), start=start, end=end, step=step)
+            # as the scene has it: it may have been written with a unit
+            start, end, step = range_of(self.key, self.value)
+            self._set(self.slider, self.value, start=start, end=end, step=step)
+            self._set(self.field, short(self.value))
         self._tell(refused)
 
     def _set(self, widget: Any, value: Any, **more: Any) -> None:

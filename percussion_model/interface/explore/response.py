@@ -25,8 +25,9 @@ MOST_TIME = 2.0
 # What has taken so long gives way to a newer wish; less would leave a moved slider without
 # any picture until it rests [s].
 PATIENCE = 0.5
-# Steps of the solver from sample to sample: a third of the points cannot be told from all.
-EVERY = 3
+# Steps of the solver from sample to sample of the forces, and from column to column of the
+# stress: fewer points cannot be told from all.
+SAMPLES, COLUMNS = 4, 3
 # Of the rate, in its second unit.
 METRES_AN_HOUR = 3600.0
 
@@ -114,9 +115,9 @@ def respond(
         look()
         # the run stopped where its last blow ended: a whole one more is sure to end it again
         after = float(found.blows[-1]["period"]) if len(found.blows) else 0.0
-        window = blow_window(scene, found.blows, found.duration + after, EVERY)
+        window = blow_window(scene, found.blows, found.duration + after, SAMPLES)
         look()
-        fields = stress_fields(window, EVERY)
+        fields = stress_fields(window, COLUMNS)
     except (SceneError, SimulationError, NotRepeatable) as error:
         text = str(error)
         if time.thread_time() - used > most_time:
