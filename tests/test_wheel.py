@@ -7,8 +7,11 @@ from __future__ import annotations
 
 import json
 import os
+import signal
+import subprocess
 import sys
 import sysconfig
+import urllib.request
 import zipfile
 from email import message_from_bytes
 
@@ -59,7 +62,7 @@ def test_users_get_no_tools_of_development(wheel):
     (name,) = (one for one in archive.namelist() if one.endswith("/METADATA"))
     needed = message_from_bytes(archive.read(name)).get_all("Requires-Dist")
     plain = {text.partition(">")[0] for text in needed if "extra ==" not in text}
-    assert plain == {"numpy", "scipy", "numba", "typer", "rich", "tomli-w"}
+    assert plain == {"numpy", "scipy", "numba", "typer", "rich", "tomli-w", "pint"}
     of_all = [text for text in needed if "extra == 'all'" in text]
     assert of_all
     for tool in ("ruff", "mypy", "pytest", "hypothesis", "import-linter", "ecospy", "hatchling"):
@@ -110,6 +113,27 @@ def test_a_system_is_built_valid_and_runs(installed):
     assert found["time"] == pytest.approx(0.4)
     assert found["depth"] > 1e-3
     assert (installed.empty / "out" / "FeedControlRigid" / "signals.csv").is_file()
+
+
+def test_a_study_is_made(installed):
+    installed.percussion("study", "rigid", "--over", "feed.force=2kN:4kN:3", "--out", "map")
+    assert (installed.empty / "map" / "report.html").is_file()
+
+
+def test_the_explorer_answers(installed):
+    words = [installed.program("percussion"), "explore", "rigid", "--no-browser", "--port", "0"]
+    serving = subprocess.Popen(
+        words, cwd=installed.empty, env=installed.variables, text=True,
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True,
+    )  # fmt: skip
+    try:
+        url = serving.stdout.readline().split()[0]
+        with urllib.request.urlopen(url, timeout=60) as answer:
+            assert "Percussion explorer" in answer.read().decode()
+    finally:
+        serving.send_signal(signal.SIGINT)
+        told = serving.communicate(timeout=60)[1]
+    assert serving.returncode == 130, told
 
 
 @pytest.mark.skipif(
