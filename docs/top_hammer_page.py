@@ -24,7 +24,7 @@ HERE = Path(__file__).resolve().parent
 PAGE = HERE / "top_hammer.md"
 DATA = HERE / "data" / "top_hammer.md"
 # What is written into which page, by the names of its marks.
-BLOCKS = {PAGE: ("rock", "joints", "shares", "changes"), DATA: ("presets", "stresses")}
+BLOCKS = {PAGE: ("rock", "shares", "changes"), DATA: ("presets", "stresses", "joints")}
 DPI = 100
 DURATION, SETTLE = 4.0, 1.0  # [s]
 RODS = (1, 2, 4, 6, 8)

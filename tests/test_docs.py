@@ -114,7 +114,7 @@ def test_pictures_are_small():
 
 
 def test_every_equation_has_its_place_and_every_place_its_functions():
-    text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs" / "data" / "equations.md").read_text(encoding="utf-8")
     placed = set()
     for line in text.splitlines():
         row = re.fullmatch(r"\| ([\d, ]+) [^|]* \| ([^|]+) \| ([^|]+) \|", line)

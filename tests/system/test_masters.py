@@ -104,7 +104,8 @@ def test_another_master_drills_as_deep(feed_control, ours, package, script, tmp_
 
 
 @pytest.mark.skipif(
-    not OMSIMULATOR, reason="PERCUSSION_OMSIMULATOR names no library of OMSimulator (docs/hosts.md)"
+    not OMSIMULATOR,
+    reason="PERCUSSION_OMSIMULATOR names no library of OMSimulator (docs/data/host_sources.md)",
 )
 def test_omsimulator_drills_as_deep(feed_control, ours, tmp_path):
     """It orders its calls by the description: outputs that may depend on all inputs are a loop."""

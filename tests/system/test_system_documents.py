@@ -9,13 +9,16 @@ from pathlib import Path
 from typer.main import get_command
 
 from docs import make_system
+from fmu_src.command_line import app
+from fmu_src.commands.scenario import _scripts
 from fmu_src.system.archive import read_plan
-from percussion_model.interface.cli import app
+from percussion_model.scene.presets import scenario_folder
 
 PAGE = Path(make_system.__file__).with_name("system.md")
 HOW_TO = PAGE.parent / "how_to"
 CONTROLLER, SYSTEM = HOW_TO / "couple_a_controller.md", HOW_TO / "write_a_system.md"
-PAGES = (PAGE, CONTROLLER, SYSTEM, HOW_TO / "run_the_scenarios.md")
+SCENARIOS = HOW_TO / "run_the_scenarios.md"
+PAGES = (PAGE, CONTROLLER, SYSTEM, SCENARIOS)
 
 
 def test_the_tables_are_current():
@@ -25,16 +28,36 @@ def test_the_tables_are_current():
     assert make_system.variables_page() == written, told
 
 
-def test_commands_are_those_of_the_venv_and_exist():
-    """As README has them: they run from a clone, as they are printed."""
-    text = "\n".join(page.read_text(encoding="utf-8") for page in PAGES)
-    assert not re.findall(r"(?m)(?:^    |`)(?:python|percussion) .*(?:-m|dist|--out)", text)
-    modules = re.findall(r"\.venv/bin/python -m ([\w.]+)", text)
-    assert len(modules) > 8
-    assert [name for name in modules if importlib.util.find_spec(name) is None] == []
-    words = re.findall(r"\.venv/bin/percussion ([\w-]+)", text)
+def test_commands_exist():
+    """As users have them: `percussion`, which the clone has in its venv; modules from the clone."""
+    texts = {page.name: page.read_text(encoding="utf-8") for page in PAGES}
     known = get_command(app).commands
-    assert set(words) == {"couple", "bench-controller"} <= set(known)
+    used = set()
+    for name, text in texts.items():
+        assert re.findall(r"\.venv/bin/percussion\b", text) == [".venv/bin/percussion"], name
+        shown = "".join(re.findall(r"(?s)```sh\n(.*?)```", text)).replace("\\\n", " ").splitlines()
+        shown += re.findall(r"`([^`\n]+)`", text)
+        for line in shown:
+            found = re.match(r" *percussion ([\w-]+)(.*)", line)
+            if not found:
+                continue
+            word, rest = found.groups()
+            used.add(word)
+            options = {one for p in known[word].params for one in p.opts + p.secondary_opts}
+            assert set(re.findall(r"(?<=\s)--?[a-z][\w-]*", rest)) <= options, (name, line)
+    assert used == {"system", "couple", "bench-controller", "scenario"}
+    text = "\n".join(texts.values())
+    assert not re.findall(r"(?<!\.venv/bin/)python3? -m|build\.py", text)
+    modules = re.findall(r"\.venv/bin/python -m ([\w.]+)", text)
+    assert len(modules) > 1
+    assert [name for name in modules if importlib.util.find_spec(name) is None] == []
+
+
+def test_every_scenario_is_listed_and_no_other():
+    text = SCENARIOS.read_text(encoding="utf-8")
+    listed = re.findall(r"(?m)^\| `(\w+)` \|", text)
+    assert sorted(listed) == sorted(_scripts(scenario_folder()))
+    assert set(re.findall(r"percussion scenario (\w+)", text)) < set(listed)
 
 
 def test_the_example_runs(feed_control, brief, capsys):
@@ -55,9 +78,9 @@ def test_the_example_runs(feed_control, brief, capsys):
 def test_the_system_file_of_the_page_is_one(tmp_path):
     (text,) = re.findall(r"```toml\n(.*?)```", SYSTEM.read_text(encoding="utf-8"), re.DOTALL)
     base = PAGE.parents[1] / "scenarios" / "systems" / "feed_control.toml"
-    assert f'base = "{base.name}"' in text
+    assert f'base = "{base.stem}"' in text
     path = tmp_path / "hard_rock.toml"
-    path.write_text(text.replace(base.name, base.as_posix()), encoding="utf-8")
+    path.write_text(text, encoding="utf-8")
     plan, before = read_plan(path), read_plan(base)
     assert plan.name == "HardRock"
     assert plan.hammer.is_file()
