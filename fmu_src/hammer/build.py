@@ -135,7 +135,7 @@ def about_hammer(scene: Scene, path: Path) -> About:
     title = f": {scene.title}" if scene.title else ""
     return About(
         model=path.stem,
-        description=f"Percussive drill with travelling waves{title}",
+        description=f"Percussive drill, piston, bit and rock, blow by blow{title}",
         stop_time=scene.run.duration,
         step_size=min(STEP_SIZE, scene.run.duration),
         version=f"{version('percussion_model')}, interface {VERSION}",
