@@ -17,7 +17,7 @@ from percussion_model.scene.group import (
 )
 from percussion_model.scene.rows import choice, quantity, rod_list, section_list
 
-# Table II of the paper as repaired in docs/model.md.
+# Table II of the paper as repaired in docs/data/reference_configuration.md.
 STEEL_YOUNGS_MODULUS = 210e9
 STEEL_DENSITY = 7850.0
 REFERENCE_AREA = 5.5e-3

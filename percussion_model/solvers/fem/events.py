@@ -1,8 +1,9 @@
 """First event of a step: Hermite interpolation, driven just past it.
 
-Every event function is positive until its event. Values and slopes at both ends
-of a bracket make a cubic; a step to its root is tried, and the bracket shrinks
-until its end lies past the event by no more than the tolerance.
+Every event function is positive until its event. Values at both ends of a bracket, and slopes
+from the stages, make a cubic; a step to its first root is tried, and the bracket shrinks until
+its end lies past the event by no more than the tolerance, or is narrower than that of time.
+Cubics are lowered by half the tolerance, so the new mode never sees its own threshold.
 """
 
 from __future__ import annotations
