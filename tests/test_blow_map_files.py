@@ -387,4 +387,6 @@ def test_a_scene_outside_its_own_table_is_told_before_the_table_is_made(cache, t
     mapped(**TINY, feed__force=100.0).to_toml(path)
     arguments = ["blow-map", str(path), "--workers", "1"]
     assert not _guarded(lambda: app(arguments, standalone_mode=False))
-    assert capsys.readouterr().err.startswith("percussion: warning: feed.force = 100 N: the blow")
+    hint, warning = capsys.readouterr().err.split("percussion: ")[1:3]
+    assert hint.startswith("hint: feed.force = 100 N: 2500 to")  # it is far from what is usual
+    assert warning.startswith("warning: feed.force = 100 N: the blow")

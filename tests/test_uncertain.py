@@ -181,8 +181,8 @@ def test_tables_of_runs(aperiodic, hidden, capsys, monkeypatch):
     assert "undecided" in capsys.readouterr().out
     show_settled(settled(BOUNCING, most_blows=60))
     shown = capsys.readouterr().out
-    # rate and period, both in the units of drillers too, power, and what ± is
-    assert sum("±" in line for line in shown.splitlines()) == 6
+    # rate, period, frequency, velocity, efficiency, three in the units of drillers, what ± is
+    assert sum("±" in line for line in shown.splitlines()) == 9
     assert "by the scatter of blows alone" in " ".join(shown.split())
 
 

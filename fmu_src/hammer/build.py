@@ -93,7 +93,7 @@ def refuse_other(path: Path, scene: Scene, with_map: bool, force: bool = False) 
         with zipfile.ZipFile(path) as archive:
             found = json.loads(archive.read(SCENE))
             has_map = BLOW_MAP in archive.namelist() or found.get("blow_map") is True
-            given = json.loads(to_json(scene.given_values()))
+            given = json.loads(to_json(given_values(scene)))
             same = (found["given"], has_map) == (given, with_map)
     except (
         OSError,
@@ -113,7 +113,7 @@ def refuse_other(path: Path, scene: Scene, with_map: bool, force: bool = False) 
         )
 
 
-def _given(scene: Scene) -> dict[str, object]:
+def given_values(scene: Scene) -> dict[str, object]:
     """What was given of a scene, as an FMU has it: of the hole's diameter nothing depends there."""
     return scene.replace(hole_diameter=None).given_values()
 
@@ -145,6 +145,6 @@ def about_hammer(scene: Scene, path: Path) -> About:
 def _scene(scene: Scene, variables: list[Variable], bundle: str) -> dict[str, object]:
     """What an instance needs of the scene, besides its variables."""
     return {
-        "given": _given(scene),
+        "given": given_values(scene),
         "identity": [bundle, [variable.name for variable in variables]],
     }

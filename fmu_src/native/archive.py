@@ -9,6 +9,7 @@ from typing import Literal
 
 from fmu_src.archive import HERE, MODEL, SCENE, digest, licence, write_described
 from fmu_src.description import About
+from fmu_src.hammer.build import given_values
 from fmu_src.hammer.variables import hammer_variables
 from fmu_src.native.description import write_native_description
 from fmu_src.native.description3 import write_description3
@@ -58,7 +59,7 @@ def write_native_fmu(
         "documentation/licenses/license.txt": licence(),
         MODEL: model(""),
         # what nothing that runs reads: whose FMU this is
-        SCENE: to_json({"given": scene.given_values(), "blow_map": with_map}).encode(),
+        SCENE: to_json({"given": given_values(scene), "blow_map": with_map}).encode(),
         **_pictures(version),
     }
     for platform, library in libraries.items():

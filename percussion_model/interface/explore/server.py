@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import signal
 import threading
 import webbrowser
 from collections.abc import Callable, Mapping
@@ -142,11 +143,22 @@ class Explored:
 
     def run(self, browser: bool) -> None:
         """Serve until Ctrl-C, which is a `KeyboardInterrupt`."""
-        self.server.start()
-        if browser:  # some do not return before they are closed
-            threading.Thread(target=webbrowser.open, args=(self.url,), daemon=True).start()
+        interrupted = threading.Event()
+
+        def interrupt(*_: Any) -> None:
+            interrupted.set()
+            self.loop.add_callback(self.loop.stop)
+
+        # one that is raised within a callback of others may be lost there
+        before = signal.signal(signal.SIGINT, interrupt)
         try:
+            self.server.start()
+            if browser:  # some do not return before they are closed
+                threading.Thread(target=webbrowser.open, args=(self.url,), daemon=True).start()
             self.loop.start()
         finally:
+            signal.signal(signal.SIGINT, before)
             self.worker.stop()
             self.server.stop()
+        if interrupted.is_set():
+            raise KeyboardInterrupt
