@@ -51,8 +51,10 @@ def explore(
     with progress("preparing"):
         respond(first)  # compiles the kernels, so that the first slider does not wait
     try:
-        print(f"{served.url} follows the sliders; Ctrl-C ends it", flush=True)
-        served.run(browser)
+        served.run(
+            browser,
+            lambda: print(f"{served.url} follows the sliders; Ctrl-C ends it", flush=True),
+        )
     except KeyboardInterrupt:
         raise typer.Exit(common.print_message("ended", common.INTERRUPTED)) from None
 

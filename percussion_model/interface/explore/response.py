@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 from percussion_model.analysis.stationary import Settled, settled
 from percussion_model.interface.plotting.window import (
@@ -17,6 +18,7 @@ from percussion_model.interface.plotting.window import (
 )
 from percussion_model.interface.terminal import RATE, SHOWN, on_other_grids, settled_error
 from percussion_model.scene.scene import Scene, SceneError
+from percussion_model.simulation.driller_numbers import DRILLER_NUMBERS, driller_text
 from percussion_model.simulation.simulate import SimulationError
 from percussion_model.simulation.uncertain import UNDECIDED, mean_text, rate_text
 
@@ -28,8 +30,6 @@ PATIENCE = 0.5
 # Steps of the solver from sample to sample of the forces, and from column to column of the
 # stress: fewer points cannot be told from all.
 SAMPLES, COLUMNS = 4, 3
-# Of the rate, in its second unit.
-METRES_AN_HOUR = 3600.0
 
 
 class Overtaken(Exception):
@@ -140,13 +140,25 @@ def numbers(found: Settled) -> dict[str, str]:
         shown[RATE[0]] = (
             UNDECIDED
             if found.rate_of_penetration_undecided
-            else f"{rate_text(summary)} {RATE[3]}; {rate_text(summary, METRES_AN_HOUR)} m/h"
+            else f"{rate_text(summary)} {RATE[3]}{_in_driller_unit(summary, RATE[1], '; ')}"
         )
     for name, key, factor, unit in SHOWN:
         if summary.get(key) is not None:
             text = mean_text(summary, key, factor)
-            shown[name] = UNDECIDED if text.startswith(UNDECIDED) else f"{text} {unit}"
+            behind = _in_driller_unit(summary, key, "; ")
+            shown[name] = UNDECIDED if text.startswith(UNDECIDED) else f"{text} {unit}{behind}"
+    for key, one in DRILLER_NUMBERS.items():
+        if not one.behind and summary.get(key) is not None:
+            text = _in_driller_unit(summary, key)
+            shown[one.name] = UNDECIDED if text.startswith(UNDECIDED) else text
     return shown
+
+
+def _in_driller_unit(summary: Mapping[str, Any], key: str, before: str = "") -> str:
+    """A number in the unit of drillers; empty where they have no other."""
+    if key not in DRILLER_NUMBERS:
+        return ""
+    return f"{before}{driller_text(summary, key)} {DRILLER_NUMBERS[key].unit}"
 
 
 def motion(found: Settled) -> str:

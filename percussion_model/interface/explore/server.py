@@ -141,8 +141,16 @@ class Explored:
     def _close(self, _: Any) -> None:
         self.pages -= 1
 
-    def run(self, browser: bool) -> None:
-        """Serve until Ctrl-C, which is a `KeyboardInterrupt`."""
+    def run(self, browser: bool, ready: Callable[[], None]) -> None:
+        """Serve until Ctrl-C, which is a `KeyboardInterrupt`.
+
+        Parameters
+        ----------
+        browser : bool
+            Open the page.
+        ready : callable
+            Called when pages are answered and Ctrl-C is heard.
+        """
         interrupted = threading.Event()
 
         def interrupt(*_: Any) -> None:
@@ -153,6 +161,7 @@ class Explored:
         before = signal.signal(signal.SIGINT, interrupt)
         try:
             self.server.start()
+            ready()
             if browser:  # some do not return before they are closed
                 threading.Thread(target=webbrowser.open, args=(self.url,), daemon=True).start()
             self.loop.start()
