@@ -73,7 +73,7 @@ def test_numbers_are_those_that_settled_prints(capsys):
     shown = numbers(respond(scene).found)
     show_settled(settled(scene, error_estimate=True))
     printed = " ".join(capsys.readouterr().out.split())
-    assert len(shown) == 5
+    assert len(shown) == 6
     for name, text in shown.items():
         assert f"{name} {text.split('; ')[0]}".replace(" ", "") in re.sub(r"[ │|]", "", printed)
 

@@ -84,7 +84,7 @@ def test_requests_are_met_or_said_not_to_be(seed, monkeypatch):
         judge(scene, rate, unsure, **request)
 
 
-@pytest.mark.skipif(not LONG, reason="half an hour; set PERCUSSION_LONG=1")
+@pytest.mark.skipif(not LONG, reason="a minute; set PERCUSSION_LONG=1")
 @pytest.mark.parametrize("seed", range(20))
 def test_requests_are_met_or_said_not_to_be_on_all(seed):
     scene = drawn(seed)

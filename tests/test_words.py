@@ -233,3 +233,10 @@ def test_the_communication_step_of_the_readme_is_set_by_an_option_that_sets_it()
     words = shlex.split(line)
     assert "--step-size" not in words
     assert words[words.index("--output-interval") + 1] == "1e-3"
+
+
+def test_a_rebound_is_told_only_of_a_bit_that_nothing_can_strike(drop):
+    """That of a short run with a piston went with its duration."""
+    assert drop.fall["rebound_velocity"] > 2.0
+    for duration in (1e-3, 5e-3):
+        assert "rebound_velocity" not in simulate(REFERENCE, duration, settle=0.0).fall

@@ -218,8 +218,8 @@ class Result:
             `depth` of the bit's end below the rock as it was, unless the bit is in the air at
             the end of the run [m]; `first_contact` with the
             rock [s]; `rebound_velocity` with which the mean bit leaves it for the first
-            time, upwards [m/s]; `rest_time`, from which it stands still [s]; `crushed`
-            energy [J]. Only what is known.
+            time, upwards, where no piston can strike it [m/s]; `rest_time`, from which it
+            stands still [s]; `crushed` energy [J]. Only what is known.
         """
         return {} if len(self.blows) else _fall(self)
 
@@ -324,7 +324,8 @@ def _fall(result: Result) -> dict[str, float]:
     if len(touching):
         found["first_contact"] = float(modes["time"][touching[0]])
         left = np.flatnonzero(modes["kind"][touching[0] :] == Mode.FF) + touching[0]
-        if len(left) and not any(scene[f"effects.{effect.name}"] for effect in EFFECTS):
+        pushed = any(scene[f"effects.{effect.name}"] for effect in EFFECTS)
+        if len(left) and not pushed and scene.piston.model == "absent":  # a flight undisturbed
             found["rebound_velocity"] = _leaving_velocity(result, modes, int(left[0]))
         if modes["kind"][-1] == Mode.SS:
             found["rest_time"] = float(modes["time"][-1])
