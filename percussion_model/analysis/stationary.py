@@ -69,8 +69,7 @@ MEANS = (
     *("percussive_power", "energy_per_advance"),
 )
 JUDGED = (_RATE, _PERIOD, *MEANS)
-# Grids are compared over so many blows at least; where the motion is periodic, over the last
-# of them, so that settling does not count as scatter.
+# Least blows that grids are compared over, and the share that counts where motion is periodic.
 FEWEST_JUDGED, JUDGED_SHARE = 12, 0.5
 # Share of the blows of an aperiodic motion that is left out as settling.
 SETTLING_SHARE = 0.2

@@ -64,8 +64,7 @@ SHOWN = (
     ("Peak contact force", "peak_contact_force", 1e-3, "kN"),
     ("Standstill bit force", "standstill_bit_force", 1e-3, "kN"),
 )
-# Behind them those in the units of drillers, by the key of the summary: the same number once
-# more, or another one.
+# The key of the number in the units of drillers that stands behind one of these.
 BEHIND = {
     "rate_of_penetration": "rate_of_penetration",
     "blow_frequency": "blow_frequency",
