@@ -1,7 +1,7 @@
 /* Memory that kernels ask for: motions, and arrays that live while one is made.
  *
- * Numba counts who holds an array in a record before its numbers, and calls the functions below
- * by these names. Its own count goes by instructions of the processor, so threads are no matter.
+ * Numba's code counts who holds an array in a record before its numbers (fmu_src/native/objects.py),
+ * and calls the functions below by these names.
  */
 #include "shell.h"
 

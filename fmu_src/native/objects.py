@@ -145,7 +145,63 @@ def compile_entries() -> str:
         # what nothing calls yet is left out: so what calls comes before what is called
         for library in reversed(libraries.values()):
             whole.link_in(library._get_module_for_linking(), preserve=True)
-    return _without_words(str(whole))
+    return _counting_plainly(_without_words(str(whole)))
+
+
+# How numba's code counts who holds an array. Its own functions are never put into their callers,
+# so that each view of plain memory, which nobody holds, costs some calls; and they count for
+# several threads at once, where an array of the library lives within one call.
+_COUNTING = """
+define linkonce_odr void @NRT_incref(ptr %array) alwaysinline {
+  %none = icmp eq ptr %array, null
+  br i1 %none, label %end, label %some
+some:
+  %before = load i64, ptr %array
+  %count = add i64 %before, 1
+  store i64 %count, ptr %array
+  br label %end
+end:
+  ret void
+}
+define linkonce_odr void @NRT_decref(ptr %array) alwaysinline {
+  %none = icmp eq ptr %array, null
+  br i1 %none, label %end, label %some
+some:
+  call void @native_let_go(ptr %array)
+  br label %end
+end:
+  ret void
+}
+define internal void @native_let_go(ptr %array) noinline {
+  %before = load i64, ptr %array
+  %count = sub i64 %before, 1
+  store i64 %count, ptr %array
+  %unheld = icmp eq i64 %count, 0
+  br i1 %unheld, label %free, label %end
+free:
+  tail call void @NRT_MemInfo_call_dtor(ptr %array)
+  br label %end
+end:
+  ret void
+}
+"""
+_NUMBAS_COUNTING = re.compile(
+    r"^define [^\n]*@NRT_(?:inc|dec)ref\(.*?^\}$", re.MULTILINE | re.DOTALL
+)
+
+
+def _counting_plainly(text: str) -> str:
+    """The module with counts of arrays in its functions themselves.
+
+    Raises
+    ------
+    ValueError
+        If numba counts in another way.
+    """
+    text, found = _NUMBAS_COUNTING.subn("", text)
+    if found != 2:
+        raise ValueError(f"numba counts arrays with {found} functions here, not 2")
+    return text + _COUNTING
 
 
 # Functions that put the words of an error together, for Python: an error is a status here.
