@@ -1,0 +1,394 @@
+"""Published experiments, stored beside this file as TOML: one file each.
+
+A file holds the rig as a scene, what was measured, what is fitted to which measurements, what is
+predicted then, and the criterion of each, fixed before anything was computed. Keys are those of
+the classes below; values and errors carry their units.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from percussion_model.scene.rows import shortened
+from percussion_model.scene.scene import Scene, SceneError
+from percussion_model.scene.text import read_toml
+from percussion_model.scene.units import UnitError, in_si
+from percussion_model.verification.measured.quantities import QUANTITIES
+
+_HERE = Path(__file__).resolve().parent
+# Not an experiment: what could not be read.
+WANTED = "wanted"
+# Where a number comes from.
+KINDS = ("measured", "computed", "mixed")
+# Rock laws, and the parameters that a fit may move; SI units.
+LAWS: dict[str, dict[str, tuple[float, float]]] = {
+    "bilinear": {
+        "rock.loading_stiffness": (1e6, 1e10),
+        "rock.unloading_ratio": (1.001, 1e4),
+    },
+}
+MOST_ENTRIES = 100
+LONGEST_TEXT = 2000
+
+
+class ExperimentError(ValueError):
+    """An experiment that cannot be read; the message says why."""
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """One number of an experiment, SI units.
+
+    Attributes
+    ----------
+    id : str
+        By which fits name it.
+    quantity : str
+        One of `QUANTITIES`.
+    value, error : float
+        Error: of the measurement and of reading it, together.
+    kind : str
+        One of `KINDS`: measured; computed by others; or points of both, not told apart.
+    read : str
+        Where and how the number was read.
+    speed : float or None
+        Of the piston [m/s]; None where the scene alone tells.
+    second_hand : bool
+        Whether it was read in a quotation, not in the publication itself.
+    within : float or None
+        Criterion: share of the value, or a difference where the quantity is not relative.
+    no_criterion : str
+        Why there is none.
+    """
+
+    id: str
+    quantity: str
+    value: float
+    error: float
+    kind: str
+    read: str
+    speed: float | None = None
+    second_hand: bool = False
+    within: float | None = None
+    no_criterion: str = ""
+
+    @property
+    def source_text(self) -> str:
+        """Kind in words."""
+        return self.kind + (", second hand" if self.second_hand else "")
+
+
+@dataclass(frozen=True)
+class FitPlan:
+    """What is fitted to what, and what is predicted with it.
+
+    Attributes
+    ----------
+    name : str
+    law : str
+        Rock law, one of `LAWS`.
+    parameters : tuple of str
+        Keys that are fitted, as many as there are measurements in `to`.
+    to, predicts : tuple of str
+        Measurements by their ids.
+    start : str
+        Fit whose parameters hold for all others; empty: those of the scene.
+    """
+
+    name: str
+    law: str
+    parameters: tuple[str, ...]
+    to: tuple[str, ...]
+    predicts: tuple[str, ...] = ()
+    start: str = ""
+
+
+@dataclass(frozen=True)
+class Variant:
+    """Another rig, or another place where it is read, to see what the choice is worth.
+
+    Attributes
+    ----------
+    name, why : str
+    changes : dict
+        Of the scene, by dotted keys.
+    gauge : float or None
+        Place of the gauge in place of the experiment's [m].
+    end : bool
+        Whether speeds are those of the bit's lower end in place of its mean.
+    """
+
+    name: str
+    why: str
+    changes: dict[str, Any] = field(default_factory=dict)
+    gauge: float | None = None
+    end: bool = False
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """One experiment.
+
+    Attributes
+    ----------
+    name, title, rock, about : str
+    source : dict of str
+        `published`, `doi` and `read_in`.
+    scene : Scene
+        The rig: one blow.
+    gauge : float or None
+        From the top of the bit [m]; None: its middle.
+    measured : dict of Measurement
+        By id.
+    fits : tuple of FitPlan
+    variants : tuple of Variant
+    """
+
+    name: str
+    title: str
+    rock: str
+    about: str
+    source: dict[str, str]
+    scene: Scene
+    gauge: float | None
+    measured: dict[str, Measurement]
+    fits: tuple[FitPlan, ...]
+    variants: tuple[Variant, ...] = ()
+
+
+def stored() -> tuple[str, ...]:
+    """Names of the experiments that are stored here."""
+    return tuple(sorted(path.stem for path in _HERE.glob("*.toml") if path.stem != WANTED))
+
+
+def load(names: Iterable[str] = ()) -> list[Experiment]:
+    """Experiments by name, or files of them; all that are stored where none is named.
+
+    Raises
+    ------
+    ExperimentError
+        If there is none, or it makes no sense.
+    """
+    return [_load(name) for name in list(names) or stored()]
+
+
+def _load(name: str) -> Experiment:
+    if name in stored():
+        return read_experiment(_HERE / f"{name}.toml")
+    if not name.endswith(".toml"):
+        raise ExperimentError(
+            f"experiment {shortened(name)!r}: must be one of {', '.join(stored())}, or a TOML file"
+        )
+    return read_experiment(Path(name))
+
+
+def wanted() -> list[dict[str, str]]:
+    """What could not be read: `what`, `where` and `why` of each."""
+    rows = read_toml(_HERE / f"{WANTED}.toml")["wanted"]
+    return [{key: str(row[key]) for key in ("what", "where", "why")} for row in rows]
+
+
+def read_experiment(path: Path) -> Experiment:
+    """Read a file.
+
+    Raises
+    ------
+    ExperimentError
+        If it cannot be read or makes no sense; one line that names the key.
+    """
+    try:
+        tree = read_toml(path)
+        return _experiment(path.stem, tree)
+    except (SceneError, ExperimentError) as error:
+        text = str(error)
+        raise ExperimentError(text if path.name in text else f"{path}: {text}") from None
+
+
+def _experiment(name: str, tree: dict[str, Any]) -> Experiment:
+    texts = ("title", "rock", "about")
+    _refuse_keys("", tree, (*texts, "source", "scene", "measured", "fits"), ("gauge", "variants"))
+    if not isinstance(tree["scene"], dict):
+        raise ExperimentError("scene: must be a table")
+    scene = Scene(**tree["scene"])
+    source = _table(tree, "source")
+    _refuse_keys("source.", source, ("published", "doi", "read_in"))
+    gauge = _length(tree, "gauge", scene)
+    rows = _rows(tree, "measured")
+    measured = [_measurement(f"measured.{k}", row) for k, row in enumerate(rows)]
+    by_id = {one.id: one for one in measured}
+    if len(by_id) < len(measured):
+        raise ExperimentError("measured: every id must be there once")
+    fits: list[FitPlan] = []
+    for k, row in enumerate(_rows(tree, "fits")):
+        fits.append(_fit(f"fits.{k}", row, by_id, [one.name for one in fits]))
+    variants = [
+        _variant(f"variants.{k}", row, scene) for k, row in enumerate(_rows(tree, "variants"))
+    ]
+    told = {key: _text("", tree, key) for key in texts}
+    return Experiment(
+        name, **told, source={key: _text("source.", source, key) for key in source}, scene=scene,
+        gauge=gauge, measured=by_id, fits=tuple(fits), variants=tuple(variants),
+    )  # fmt: skip
+
+
+def _measurement(where: str, row: dict[str, Any]) -> Measurement:
+    _refuse_keys(
+        f"{where}.", row, ("id", "quantity", "value", "error", "kind", "read"),
+        ("speed", "second_hand", "within", "no_criterion"),
+    )  # fmt: skip
+    name = _choice(where, row, "quantity", tuple(QUANTITIES))
+    quantity = QUANTITIES[name]
+    value = _number(where, row, "value", quantity.si)
+    error = _number(where, row, "error", quantity.si)
+    speed = _number(where, row, "speed", "m/s") if "speed" in row else None
+    if not (value > 0.0 and 0.0 < error <= value):
+        raise ExperimentError(
+            f"{where}: value and error must be above 0, and the error no more than the value, not "
+            f"{value:g} and {error:g}"
+        )
+    if speed is not None and not speed > 0.0:
+        raise ExperimentError(f"{where}.speed = {speed:g} m/s: must be above 0")
+    if ("within" in row) == ("no_criterion" in row):
+        raise ExperimentError(f"{where}: must have either within or no_criterion")
+    within = _number(where, row, "within", "-") if "within" in row else None
+    if within is not None and not 0.0 < within < 1.0:
+        raise ExperimentError(f"{where}.within = {within:g}: must be above 0 and below 1")
+    second_hand = row.get("second_hand", False)
+    if not isinstance(second_hand, bool):
+        raise ExperimentError(f"{where}.second_hand = {second_hand!r}: must be true or false")
+    return Measurement(
+        id=_text(f"{where}.", row, "id"), quantity=name, value=value, error=error,
+        kind=_choice(where, row, "kind", KINDS), read=_text(f"{where}.", row, "read"),
+        speed=speed, second_hand=second_hand, within=within,
+        no_criterion=_text(f"{where}.", row, "no_criterion") if "no_criterion" in row else "",
+    )  # fmt: skip
+
+
+def _fit(
+    where: str, row: dict[str, Any], measured: Mapping[str, Measurement], before: Sequence[str]
+) -> FitPlan:
+    _refuse_keys(f"{where}.", row, ("name", "law", "parameters", "to"), ("predicts", "start"))
+    law = _choice(where, row, "law", tuple(LAWS))
+    parameters = _words(where, row, "parameters", tuple(LAWS[law]))
+    to = _words(where, row, "to", tuple(measured))
+    predicts = _words(where, row, "predicts", tuple(measured)) if "predicts" in row else ()
+    if not parameters or len(parameters) != len(to):
+        raise ExperimentError(
+            f"{where}: {len(parameters)} parameters to {len(to)} measurements: must be as many"
+        )
+    both = sorted(set(to) & set(predicts))
+    if both:
+        raise ExperimentError(f"{where}: {both[0]!r} is both fitted and predicted")
+    start = _choice(where, row, "start", tuple(before)) if "start" in row else ""
+    name = _text(f"{where}.", row, "name")
+    if name in before:
+        raise ExperimentError(f"{where}.name = {name!r}: another fit has this name")
+    return FitPlan(name, law, parameters, to, predicts, start)
+
+
+def _variant(where: str, row: dict[str, Any], scene: Scene) -> Variant:
+    _refuse_keys(f"{where}.", row, ("name", "why"), ("changes", "gauge", "end"))
+    changes = row.get("changes", {})
+    end = row.get("end", False)
+    if not isinstance(changes, dict) or not isinstance(end, bool):
+        raise ExperimentError(f"{where}: changes must be a table, and end true or false")
+    changed = scene.replace(**changes)
+    gauge = _length(row, "gauge", changed)
+    name, why = (_text(f"{where}.", row, key) for key in ("name", "why"))
+    return Variant(name, why, changes, gauge, end)
+
+
+def _refuse_keys(
+    where: str, row: Mapping[str, Any], needed: Sequence[str], others: Sequence[str] = ()
+) -> None:
+    for key in row:
+        if key not in (*needed, *others):
+            raise ExperimentError(
+                f"{where}{shortened(key)}: unknown key; must be one of "
+                f"{', '.join((*needed, *others))}"
+            )
+    for key in needed:
+        if key not in row:
+            raise ExperimentError(f"{where}{key}: is missing")
+
+
+def _table(tree: Mapping[str, Any], key: str) -> dict[str, Any]:
+    if not isinstance(tree[key], dict):
+        raise ExperimentError(f"{key}: must be a table")
+    return dict(tree[key])
+
+
+def _rows(tree: Mapping[str, Any], key: str) -> list[dict[str, Any]]:
+    rows = tree.get(key, [])
+    if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
+        raise ExperimentError(f"{key}: must be a list of tables")
+    if len(rows) > MOST_ENTRIES:
+        raise ExperimentError(f"{key}: {len(rows)} entries are more than {MOST_ENTRIES}")
+    return rows
+
+
+def _text(where: str, row: Mapping[str, Any], key: str) -> str:
+    value = row[key]
+    if not isinstance(value, str) or not 0 < len(value) <= LONGEST_TEXT or not value.isprintable():
+        raise ExperimentError(
+            f"{where}{key} = {shortened(repr(value))}: must be one line of text, of at most "
+            f"{LONGEST_TEXT} characters"
+        )
+    return value
+
+
+def _choice(where: str, row: Mapping[str, Any], key: str, allowed: Sequence[str]) -> str:
+    value = row[key]
+    if value not in allowed:
+        raise ExperimentError(
+            f"{where}.{key} = {shortened(repr(value))}: must be one of {', '.join(allowed)}"
+        )
+    return str(value)
+
+
+def _words(where: str, row: Mapping[str, Any], key: str, allowed: Sequence[str]) -> tuple[str, ...]:
+    words = row[key]
+    if not isinstance(words, list):
+        raise ExperimentError(f"{where}.{key}: must be a list")
+    for word in words:
+        if word not in allowed:
+            raise ExperimentError(
+                f"{where}.{key}: {shortened(repr(word))} must be one of {', '.join(allowed)}"
+            )
+    if len(set(words)) < len(words):
+        raise ExperimentError(f"{where}.{key}: each may be there once")
+    return tuple(words)
+
+
+def _number(where: str, row: Mapping[str, Any], key: str, si: str) -> float:
+    """A number in SI of a text with its unit; a plain number is in SI."""
+    value = row[key]
+    try:
+        if isinstance(value, bool):
+            raise ValueError
+        number = in_si(value, si) if isinstance(value, str) else float(value)
+    except (TypeError, ValueError, UnitError):
+        unit = "" if si == "-" else f", with its unit or in {si}"
+        raise ExperimentError(
+            f"{where}.{key} = {shortened(repr(value))}: must be a number{unit}"
+        ) from None
+    if not math.isfinite(number):
+        raise ExperimentError(f"{where}.{key}: must be finite")
+    return number
+
+
+def _length(row: Mapping[str, Any], key: str, scene: Scene) -> float | None:
+    """Place of a gauge on the bit [m]."""
+    if key not in row:
+        return None
+    place = _number("", row, key, "m")
+    if not 0.0 < place < scene.bit.length:
+        raise ExperimentError(
+            f"{key} = {place:g} m: must be above 0 and below {scene.bit.length:g} m, the bit's "
+            "length"
+        )
+    return place
