@@ -1,5 +1,12 @@
 """Published experiments: what was measured, and criteria that were fixed before any run."""
 
+from percussion_model.verification.measured.comparison import (
+    Comparison,
+    FoundFit,
+    Row,
+    VariantRow,
+    compare,
+)
 from percussion_model.verification.measured.experiments import (
     Experiment,
     ExperimentError,
@@ -15,12 +22,17 @@ from percussion_model.verification.measured.quantities import QUANTITIES, Quanti
 
 __all__ = [
     "QUANTITIES",
+    "Comparison",
     "Experiment",
     "ExperimentError",
     "FitPlan",
+    "FoundFit",
     "Measurement",
     "Quantity",
+    "Row",
     "Variant",
+    "VariantRow",
+    "compare",
     "load",
     "read_experiment",
     "stored",

@@ -120,6 +120,10 @@ class Variant:
         Place of the gauge in place of the experiment's [m].
     end : bool
         Whether speeds are those of the bit's lower end in place of its mean.
+    slope_to : float
+        Share of the greatest displacement to which the slope of indentation is taken.
+    after_run : bool
+        Whether it was thought of after the experiment had been computed.
     """
 
     name: str
@@ -127,6 +131,8 @@ class Variant:
     changes: dict[str, Any] = field(default_factory=dict)
     gauge: float | None = None
     end: bool = False
+    slope_to: float = 0.9
+    after_run: bool = False
 
 
 @dataclass(frozen=True)
@@ -214,6 +220,11 @@ def _experiment(name: str, tree: dict[str, Any]) -> Experiment:
     if not isinstance(tree["scene"], dict):
         raise ExperimentError("scene: must be a table")
     scene = Scene(**tree["scene"])
+    for bar, allowed in (("piston", ("elastic", "absent")), ("bit", ("elastic",))):
+        if scene[f"{bar}.model"] not in allowed:
+            raise ExperimentError(
+                f'scene.{bar}.model = "{scene[f"{bar}.model"]}": must be {" or ".join(allowed)}'
+            )
     source = _table(tree, "source")
     _refuse_keys("source.", source, ("published", "doi", "read_in"))
     gauge = _length(tree, "gauge", scene)
@@ -291,15 +302,19 @@ def _fit(
 
 
 def _variant(where: str, row: dict[str, Any], scene: Scene) -> Variant:
-    _refuse_keys(f"{where}.", row, ("name", "why"), ("changes", "gauge", "end"))
+    others = ("changes", "gauge", "end", "slope_to", "after_run")
+    _refuse_keys(f"{where}.", row, ("name", "why"), others)
     changes = row.get("changes", {})
-    end = row.get("end", False)
-    if not isinstance(changes, dict) or not isinstance(end, bool):
-        raise ExperimentError(f"{where}: changes must be a table, and end true or false")
+    end, after_run = row.get("end", False), row.get("after_run", False)
+    if not isinstance(changes, dict) or not (isinstance(end, bool) and isinstance(after_run, bool)):
+        raise ExperimentError(f"{where}: changes must be a table, end and after_run true or false")
+    slope_to = _number(where, row, "slope_to", "-") if "slope_to" in row else 0.9
+    if not 0.2 <= slope_to <= 1.0:
+        raise ExperimentError(f"{where}.slope_to = {slope_to:g}: must be from 0.2 to 1")
     changed = scene.replace(**changes)
     gauge = _length(row, "gauge", changed)
     name, why = (_text(f"{where}.", row, key) for key in ("name", "why"))
-    return Variant(name, why, changes, gauge, end)
+    return Variant(name, why, changes, gauge, end, slope_to, after_run)
 
 
 def _refuse_keys(

@@ -53,7 +53,7 @@ QUANTITIES = {
     "rebound_velocity": Quantity(
         "rebound speed", "m/s", "m/s", 1.0,
         "upward mean velocity of the bit in its longest free flight after the greatest "
-        "penetration, when nothing touches it",
+        "penetration, before the piston strikes it again",
     ),
     "restitution": Quantity(
         "restitution", "-", "-", 1.0, "rebound speed by indentation speed", False

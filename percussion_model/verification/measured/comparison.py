@@ -1,0 +1,377 @@
+"""Computed blows beside measured ones: fits, predictions, and what each criterion says."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import numpy as np
+
+from percussion_model.analysis.fitting.likelihood import Likelihood, Series
+from percussion_model.analysis.fitting.search import descend
+from percussion_model.scene.scene import Scene
+from percussion_model.verification.measured.blow import Reading, Rig
+from percussion_model.verification.measured.experiments import (
+    LAWS,
+    Experiment,
+    FitPlan,
+    Measurement,
+)
+from percussion_model.verification.measured.quantities import QUANTITIES
+
+# A fit has as many parameters as numbers: it is to hit them, and not to come within their
+# errors, so these are made smaller for the search.
+SHARPER = 1e-3
+# The same blow with a step this much longer tells the numerical error: of first order in the
+# step, the error is no more than what that changes.
+COARSER = 2.0
+# Steps of the slopes that carry the errors of fitted numbers over, in the logarithm: times are
+# read from sample to sample, so that shorter ones would find none.
+SLOPE_STEP = 0.02
+
+FITTED, PREDICTED = "fitted", "predicted"
+MET, MISSED, UNDECIDED, NO_CRITERION = "met", "missed", "undecided", "no criterion"
+
+
+@dataclass(frozen=True)
+class Row:
+    """One number: measured, computed, and whether its criterion is met. SI units.
+
+    Attributes
+    ----------
+    experiment, rock, law, fit : str
+    role : str
+        `fitted` or `predicted`.
+    id, quantity : str
+        Of the measurement.
+    speed : float or None
+        Of the piston [m/s].
+    measured, error : float
+    source : str
+        Measured or computed by others, and whether second hand.
+    computed : float
+        NaN where the blow has no such thing.
+    numerical_error : float
+        Of the computed number, by the time step.
+    fit_error : float
+        Of the computed number, by the errors of the numbers that were fitted.
+    deviation : float
+        Share of the measured value, or the difference where the quantity is not relative.
+    within : float or None
+        Criterion, as the deviation.
+    verdict : str
+        `met`, `missed`, `undecided`, `no criterion`; `fitted` for what was fitted and reached.
+    reason : str
+        Why there is no criterion.
+    """
+
+    experiment: str
+    rock: str
+    law: str
+    fit: str
+    role: str
+    id: str
+    quantity: str
+    speed: float | None
+    measured: float
+    error: float
+    source: str
+    computed: float
+    numerical_error: float
+    fit_error: float
+    deviation: float
+    within: float | None
+    verdict: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class FoundFit:
+    """Parameters that a fit found, and those that it kept.
+
+    Attributes
+    ----------
+    experiment, law, name : str
+    fitted : tuple of str
+    values : dict of float
+        Of all parameters of the law, SI units.
+    errors : dict of float
+        Standard errors of the fitted ones, by the errors of the measurements.
+    prediction_errors : dict of float
+        The same of each predicted number, by the id of its measurement.
+    to : tuple of str
+    scene : Scene
+        With these parameters.
+    """
+
+    experiment: str
+    law: str
+    name: str
+    fitted: tuple[str, ...]
+    values: dict[str, float]
+    errors: dict[str, float]
+    prediction_errors: dict[str, float]
+    to: tuple[str, ...]
+    scene: Scene = field(repr=False)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, without the scene."""
+        tree = {key: value for key, value in vars(self).items() if key != "scene"}
+        return {key: list(one) if isinstance(one, tuple) else one for key, one in tree.items()}
+
+
+@dataclass(frozen=True)
+class VariantRow:
+    """What one number is with another rig or reading, fitted anew."""
+
+    experiment: str
+    variant: str
+    fit: str
+    id: str
+    quantity: str
+    role: str
+    measured: float
+    base: float
+    computed: float
+
+
+@dataclass(frozen=True, repr=False)
+class Comparison:
+    """All experiments compared.
+
+    Attributes
+    ----------
+    experiments : list of Experiment
+    rows : list of Row
+    fits : list of FoundFit
+    variants : list of VariantRow
+    """
+
+    experiments: list[Experiment]
+    rows: list[Row]
+    fits: list[FoundFit]
+    variants: list[VariantRow]
+
+    def counts(self) -> dict[str, int]:
+        """How many predictions met and missed their criteria, were undecided or have none."""
+        of = [row.verdict for row in self.rows if row.role == PREDICTED]
+        return {name: of.count(name) for name in (MET, MISSED, UNDECIDED, NO_CRITERION)}
+
+    def of(self, experiment: str, fit: str | None = None) -> list[Row]:
+        """Rows of an experiment, or of one fit of it."""
+        return [r for r in self.rows if r.experiment == experiment and fit in (None, r.fit)]
+
+    def found(self, experiment: str, fit: str) -> FoundFit:
+        """A fit by name."""
+        (one,) = (f for f in self.fits if (f.experiment, f.name) == (experiment, fit))
+        return one
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values for JSON, SI units."""
+        return {
+            "predictions": self.counts(),
+            "rows": [asdict(row) for row in self.rows],
+            "fits": [one.to_dict() for one in self.fits],
+            "variants": [asdict(row) for row in self.variants],
+            "sources": {
+                one.name: {"title": one.title, "about": one.about, **one.source}
+                for one in self.experiments
+            },
+        }
+
+
+def compare(
+    experiments: Sequence[Experiment],
+    variants: bool = True,
+    progress: Callable[[int, int], None] | None = None,
+) -> Comparison:
+    """Fit, predict and compare.
+
+    Parameters
+    ----------
+    experiments : sequence of Experiment
+    variants : bool
+        Whether variants of the rigs are computed as well.
+    progress : callable, optional
+        Is told how many fits are done, and of how many.
+
+    Returns
+    -------
+    Comparison
+    """
+    plans = [(one, plan) for one in experiments for plan in one.fits]
+    others = [
+        (one, k, plan)
+        for one in experiments
+        for k in range(len(one.variants) if variants else 0)
+        for plan in one.fits
+        if not plan.start
+    ]
+    done, count = 0, len(plans) + len(others)
+    fits: list[FoundFit] = []
+    rows: list[Row] = []
+    rigs = {one.name: Rig(Reading(one.gauge)) for one in experiments}
+    for one, plan in plans:
+        rig = rigs[one.name]
+        found = fit(one, plan, rig, [f for f in fits if f.experiment == one.name])
+        fits.append(found)
+        rows += _rows(one, plan, found, rig)
+        done = _told(progress, done, count)
+    varied: list[VariantRow] = []
+    for one, k, plan in others:
+        base = {row.id: row.computed for row in rows if _is_of(row, one, plan)}
+        varied += _variant_rows(one, k, plan, base)
+        done = _told(progress, done, count)
+    return Comparison(list(experiments), rows, fits, varied)
+
+
+def _told(progress: Callable[[int, int], None] | None, done: int, count: int) -> int:
+    if progress is not None:
+        progress(done + 1, count)
+    return done + 1
+
+
+def _is_of(row: Row, one: Experiment, plan: FitPlan) -> bool:
+    return row.experiment == one.name and row.fit == plan.name
+
+
+def fit(
+    experiment: Experiment, plan: FitPlan, rig: Rig, before: Sequence[FoundFit] = ()
+) -> FoundFit:
+    """Fit parameters of the rock to as many measurements.
+
+    Parameters
+    ----------
+    experiment : Experiment
+    plan : FitPlan
+    rig : Rig
+        That computes the blows.
+    before : sequence of FoundFit
+        Among which is that which this one starts from.
+    """
+    scene = experiment.scene
+    for one in before:
+        if one.name == plan.start:
+            scene = scene.replace(**one.values)
+    targets = [experiment.measured[name] for name in plan.to]
+    box = np.log([LAWS[plan.law][key] for key in plan.parameters])
+    series = [_series(one, rig) for one in targets]
+    like = Likelihood(scene, series, plan.parameters, box, lambda: None)
+    start = np.log([float(scene[key]) for key in plan.parameters])
+    place, _ = descend(like, np.clip(start, *box.T), range(len(plan.parameters)))
+    best = like.scene_at(place.at)
+    values = {key: float(best[key]) for key in LAWS[plan.law]}
+    errors, carried = _errors(experiment, plan, best, rig)
+    return FoundFit(
+        experiment.name, plan.law, plan.name, plan.parameters, values, errors, carried, plan.to,
+        best,
+    )  # fmt: skip
+
+
+def _series(one: Measurement, rig: Rig) -> Series:
+    def model(scene: Scene) -> np.ndarray:
+        return np.array([rig.read(scene, one.quantity, one.speed)])
+
+    return Series(one.id, np.array([one.value]), SHARPER * one.error, model)
+
+
+def _rows(experiment: Experiment, plan: FitPlan, found: FoundFit, rig: Rig) -> Iterator[Row]:
+    coarse = Rig(rig.reading, COARSER * rig.step)
+    names = (*plan.to, *plan.predicts)
+    for name in names:
+        one = experiment.measured[name]
+        computed = rig.read(found.scene, one.quantity, one.speed)
+        other = coarse.read(found.scene, one.quantity, one.speed)
+        off = deviation(one, computed)
+        numerical = abs(computed - other)
+        role = FITTED if name in plan.to else PREDICTED
+        yield Row(
+            experiment=experiment.name, rock=experiment.rock, law=plan.law, fit=plan.name,
+            role=role, id=name, quantity=one.quantity, speed=one.speed, measured=one.value,
+            error=one.error, source=one.source_text, computed=computed,
+            numerical_error=numerical,
+            fit_error=found.prediction_errors.get(name, math.nan), deviation=off,
+            within=one.within, verdict=verdict(one, off, numerical, role), reason=one.no_criterion,
+        )  # fmt: skip
+
+
+def _errors(
+    experiment: Experiment, plan: FitPlan, scene: Scene, rig: Rig
+) -> tuple[dict[str, float], dict[str, float]]:
+    """Standard errors of parameters and of predictions by those of what was fitted.
+
+    NaN where what was fitted does not tell the parameters.
+    """
+    names = (*plan.to, *plan.predicts)
+    here = _read_all(experiment, names, scene, rig)
+    slopes = {}
+    for key in plan.parameters:
+        moved = scene.replace(**{key: float(scene[key]) * math.exp(SLOPE_STEP)})
+        there = _read_all(experiment, names, moved, rig)
+        slopes[key] = {name: (there[name] - here[name]) / SLOPE_STEP for name in names}
+    of_fitted = np.array([[slopes[key][name] for key in plan.parameters] for name in plan.to])
+    sizes = np.array([experiment.measured[name].error for name in plan.to])
+    try:
+        inverse = np.linalg.inv(of_fitted) * sizes
+    except np.linalg.LinAlgError:
+        inverse = np.full_like(of_fitted, math.nan)
+    shares = np.linalg.norm(inverse, axis=1)
+    parameters = {
+        key: float(scene[key]) * float(share)
+        for key, share in zip(plan.parameters, shares, strict=True)
+    }
+    predicted = {}
+    for name in plan.predicts:
+        own = np.array([slopes[key][name] for key in plan.parameters])
+        predicted[name] = float(np.linalg.norm(own @ inverse))
+    return parameters, predicted
+
+
+def _read_all(
+    experiment: Experiment, names: Sequence[str], scene: Scene, rig: Rig
+) -> dict[str, float]:
+    rows = ((name, experiment.measured[name]) for name in names)
+    return {name: rig.read(scene, one.quantity, one.speed) for name, one in rows}
+
+
+def deviation(one: Measurement, computed: float) -> float:
+    """Share of the measured value by which a number is off, or the difference."""
+    off = computed - one.value
+    return off / one.value if QUANTITIES[one.quantity].relative else off
+
+
+def verdict(one: Measurement, off: float, numerical: float, role: str = PREDICTED) -> str:
+    """What the criterion of a measurement says; undecided where the numerical error decides.
+
+    What was fitted is no success: it is `fitted`, or missed where the fit did not reach it.
+    """
+    if one.within is None:
+        return NO_CRITERION
+    if not math.isfinite(off):
+        return MISSED
+    if role == FITTED:
+        return FITTED if abs(off) <= one.within else MISSED
+    reach = numerical / one.value if QUANTITIES[one.quantity].relative else numerical
+    if abs(abs(off) - one.within) <= reach:
+        return UNDECIDED
+    return MET if abs(off) <= one.within else MISSED
+
+
+def _variant_rows(
+    experiment: Experiment, k: int, plan: FitPlan, base: Mapping[str, float]
+) -> Iterator[VariantRow]:
+    variant = experiment.variants[k]
+    changed = experiment.scene.replace(**variant.changes)
+    gauge = experiment.gauge if variant.gauge is None else variant.gauge
+    rig = Rig(Reading(gauge, variant.end, variant.slope_to))
+    other = Experiment(**{**vars(experiment), "scene": changed, "gauge": gauge})
+    found = fit(other, plan, rig)
+    for name in (*plan.to, *plan.predicts):
+        one = experiment.measured[name]
+        yield VariantRow(
+            experiment.name, variant.name, plan.name, name, one.quantity,
+            FITTED if name in plan.to else PREDICTED, one.value, base[name],
+            rig.read(found.scene, one.quantity, one.speed),
+        )  # fmt: skip
