@@ -32,6 +32,7 @@ from percussion_model.interface.commands.paper import paper
 from percussion_model.interface.commands.scene import explain, new, plot, run, settled
 from percussion_model.interface.commands.stability import stability
 from percussion_model.interface.commands.study import study
+from percussion_model.interface.commands.validate import validate
 from percussion_model.interface.messages import usage_text
 from percussion_model.interface.progress import lines
 
@@ -120,6 +121,7 @@ for _command in (
     accuracy,
     effects,
     paper,
+    validate,
     calibrate,
     stability,
     couple,

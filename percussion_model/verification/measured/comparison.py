@@ -94,6 +94,8 @@ class FoundFit:
     Attributes
     ----------
     experiment, law, name : str
+    start : str
+        Fit whose parameters hold for all others; empty: those of the scene.
     fitted : tuple of str
     values : dict of float
         Of all parameters of the law, SI units.
@@ -109,6 +111,7 @@ class FoundFit:
     experiment: str
     law: str
     name: str
+    start: str
     fitted: tuple[str, ...]
     values: dict[str, float]
     errors: dict[str, float]
@@ -154,9 +157,17 @@ class Comparison:
     fits: list[FoundFit]
     variants: list[VariantRow]
 
-    def counts(self) -> dict[str, int]:
-        """How many predictions met and missed their criteria, were undecided or have none."""
-        of = [row.verdict for row in self.rows if row.role == PREDICTED]
+    def counts(self, anew: bool = False) -> dict[str, int]:
+        """How many predictions met and missed their criteria, were undecided or have none.
+
+        Those of whole fits; `anew`: those of fits that move some parameters of another one.
+        """
+        chosen = {(f.experiment, f.name) for f in self.fits if bool(f.start) == anew}
+        of = [
+            row.verdict
+            for row in self.rows
+            if row.role == PREDICTED and (row.experiment, row.fit) in chosen
+        ]
         return {name: of.count(name) for name in (MET, MISSED, UNDECIDED, NO_CRITERION)}
 
     def of(self, experiment: str, fit: str | None = None) -> list[Row]:
@@ -172,6 +183,7 @@ class Comparison:
         """Plain values for JSON, SI units."""
         return {
             "predictions": self.counts(),
+            "predictions_anew": self.counts(anew=True),
             "rows": [asdict(row) for row in self.rows],
             "fits": [one.to_dict() for one in self.fits],
             "variants": [asdict(row) for row in self.variants],
@@ -251,7 +263,7 @@ def fit(
     before : sequence of FoundFit
         Among which is that which this one starts from.
     """
-    scene = experiment.scene
+    scene = experiment.scene.replace(**{"effects.rock": plan.law})
     for one in before:
         if one.name == plan.start:
             scene = scene.replace(**one.values)
@@ -265,8 +277,8 @@ def fit(
     values = {key: float(best[key]) for key in LAWS[plan.law]}
     errors, carried = _errors(experiment, plan, best, rig)
     return FoundFit(
-        experiment.name, plan.law, plan.name, plan.parameters, values, errors, carried, plan.to,
-        best,
+        experiment.name, plan.law, plan.name, plan.start, plan.parameters, values, errors, carried,
+        plan.to, best,
     )  # fmt: skip
 
 

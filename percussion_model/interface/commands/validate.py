@@ -1,0 +1,110 @@
+"""Command `validate`: published experiments computed, with criteria that were fixed before."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from percussion_model.interface.commands import common
+
+if TYPE_CHECKING:
+    from percussion_model.verification.measured import Comparison
+
+# Columns of numbers.
+RIGHT = ("measured", "computed", "by fit", "off", "criterion")
+
+
+def validate(
+    experiments: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="[EXPERIMENT]...",
+            help="Stored experiments, or TOML files of own ones; all stored ones if left out.",
+        ),
+    ] = None,
+    out: common.Out = None,
+    json_file: common.JsonFile = None,
+    force: common.Force = False,
+    variants: Annotated[bool, typer.Option(help="Compute other rigs and readings as well.")] = True,
+    figures: Annotated[bool, typer.Option(help="Draw a figure for each experiment.")] = True,
+) -> None:
+    """Compare with published experiments: what is fitted, what is predicted, and what is missed.
+
+    Exit code 0 whatever is missed: that is a finding.
+    """
+    from percussion_model.interface.terminal import count_bar
+    from percussion_model.verification.measured import compare, load
+
+    common.check_outputs(out, json_file)
+    common.load_numba()
+    chosen = load(experiments or ())
+    solvers = {"chain" if one.scene.effects.string else "wave" for one in chosen}
+    claimed = None
+    if out is not None:
+        scenes = {one.name: one.scene for one in chosen}
+        claimed = common.claim("validate", out, None, force, variants=variants, **scenes)
+    common.tell_of_compiling(*sorted(solvers))
+    with count_bar("fits") as progress:
+        found = compare(chosen, variants, progress)
+    common.write_json(json_file, found.to_dict())
+    if json_file != "-":
+        show_validation(found)
+    if claimed is not None:
+        _write(found, claimed.folder, figures)
+        common.list_files([claimed.sign()])
+
+
+def _write(found: Comparison, folder: Path, figures: bool) -> None:
+    """Write the table as CSV and JSON, and the figures, into a folder."""
+    from percussion_model.interface.terminal import progress
+    from percussion_model.simulation.files import staged_text, to_json
+    from percussion_model.verification.measured.table import as_csv
+
+    files = [folder / "validation.csv", folder / "validation.json"]
+    staged_text(files[0], as_csv(found))
+    staged_text(files[1], to_json(found.to_dict()) + "\n")
+    common.list_files(files)
+    if not figures:
+        return
+    with common.if_drawable():
+        from percussion_model.interface.plotting.style import save_figures
+        from percussion_model.interface.plotting.validation import draw_all
+
+        names = [one.name for one in found.experiments]
+        with progress("drawing") as report:
+            drawn = save_figures(lambda: draw_all(found), folder, names=names, report=report)
+        common.list_files(drawn)
+
+
+def show_validation(found: Comparison) -> None:
+    """Print the table, fit after fit, and what its errors are."""
+    from rich.box import SIMPLE_HEAD
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.table import Table
+
+    from percussion_model.interface.messages import wrapped
+    from percussion_model.interface.tables import print_table
+    from percussion_model.interface.terminal import show_note
+    from percussion_model.verification.measured import table as texts
+
+    console = Console()
+    titles = {one.name: one.title for one in found.experiments}
+    for fit in found.fits:
+        head = f"{titles[fit.experiment]}. Law {fit.law}, fit {fit.name}:"
+        console.print(f"[bold]{escape(wrapped(head))}[/bold]", highlight=False)
+        console.print(wrapped(texts.parameters_text(fit)), highlight=False)
+        table = Table(box=SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=0)
+        for k, heading in enumerate(texts.HEADINGS):
+            justify = "right" if heading in RIGHT else "left"
+            table.add_column(heading, justify=justify, no_wrap=k > 0)  # type: ignore[arg-type]
+        for row in found.of(fit.experiment, fit.name):
+            table.add_row(*texts.cells(row))
+        print_table(table, console)
+        console.print()
+    for why, ids in texts.reasons(found).items():
+        show_note(console, f"no criterion for {', '.join(ids)}", why)
+    for note in (*texts.NOTES, texts.count_text(found)):
+        console.print(wrapped(note), highlight=False)

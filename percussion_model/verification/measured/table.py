@@ -1,0 +1,216 @@
+"""Measured and computed numbers as text: one table, for terminals and pages."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Iterator
+from dataclasses import asdict, fields
+
+from percussion_model.simulation.uncertain import in_digits, with_short_error
+from percussion_model.verification.measured.comparison import (
+    MET,
+    MISSED,
+    NO_CRITERION,
+    PREDICTED,
+    UNDECIDED,
+    Comparison,
+    FoundFit,
+    Row,
+)
+from percussion_model.verification.measured.experiments import Measurement
+from percussion_model.verification.measured.quantities import QUANTITIES, Quantity
+
+HEADINGS = (
+    "number", "role", "measured", "kind", "computed", "by fit", "off", "criterion", "verdict",
+)  # fmt: skip
+# Of a source, and the sign for it.
+SECOND_HAND, STAR = ", second hand", "*"
+# A smaller error, relative to the number, is not shown.
+LEAST_ERROR = 1e-3
+# Names, units and scales of parameters that are not shown in SI.
+SYMBOLS = {
+    "rock.loading_stiffness": ("loading stiffness", "kN/mm", 1e6),
+    "rock.unloading_ratio": ("unloading ratio", "", 1.0),
+}
+NOTES = (
+    "measured ± is what the source and its reading leave open; kind tells whether the number was "
+    "measured, computed by others, or read among points of both; * is second hand.",
+    "computed ± is the numerical error, by the time step; by fit ± is what the errors of the "
+    "fitted numbers leave open. Neither says whether model and rock are right.",
+    "off and criterion are shares of the measured number; of a restitution, differences.",
+    "What is fitted is no success: a fit has as many parameters as numbers.",
+)
+
+
+def shown(quantity: Quantity, value: float, error: float) -> str:
+    """A number with its error in the unit of tables, without that unit."""
+    value, error = value / quantity.scale, error / quantity.scale
+    if not math.isfinite(value):
+        return "none"
+    if not math.isfinite(error) or error <= LEAST_ERROR * abs(value):
+        return in_digits(value, 4)
+    return with_short_error(value, error)
+
+
+def measured_text(one: Row | Measurement) -> str:
+    """A measured number with its error and unit."""
+    quantity = QUANTITIES[one.quantity]
+    value = one.measured if isinstance(one, Row) else one.value
+    unit = "" if quantity.unit == "-" else f" {quantity.unit.replace('us', 'µs')}"
+    return shown(quantity, value, one.error) + unit
+
+
+def off_text(row: Row) -> str:
+    """Deviation in per cent, or as a difference."""
+    if not math.isfinite(row.deviation):
+        return "–"
+    relative = QUANTITIES[row.quantity].relative
+    text = f"{100 * row.deviation:+.1f} %" if relative else f"{row.deviation:+.3f}"
+    return text.lstrip("+-") if text.strip("+-0. %") == "" else text
+
+
+def criterion_text(row: Row) -> str:
+    """Criterion in per cent, or as a difference."""
+    if row.within is None:
+        return "none"
+    relative = QUANTITIES[row.quantity].relative
+    return f"±{100 * row.within:.0f} %" if relative else f"±{row.within:g}"
+
+
+def cells(row: Row) -> list[str]:
+    """Texts of a row, one for each of `HEADINGS`."""
+    quantity = QUANTITIES[row.quantity]
+    by_fit = "–"
+    if row.role == PREDICTED and row.fit_error > 0.0:
+        by_fit = f"±{in_digits(row.fit_error / quantity.scale, 2)}"
+    return [
+        row.id, row.role, measured_text(row), row.source.replace(SECOND_HAND, STAR),
+        shown(quantity, row.computed, row.numerical_error), by_fit, off_text(row),
+        criterion_text(row), row.verdict,
+    ]  # fmt: skip
+
+
+def parameters_text(found: FoundFit) -> str:
+    """Parameters of a fit with their errors, and which were kept."""
+    parts = []
+    for key, value in found.values.items():
+        row = found.scene.row_of(key)
+        plain = (key.rpartition(".")[2].replace("_", " "), row.unit.strip("-"), 1.0)
+        name, unit, scale = SYMBOLS.get(key, plain)
+        unit = f" {unit}" if unit else ""
+        if key in found.fitted:
+            shape = Quantity("", "", "", scale, "")
+            parts.append(f"{name} {shown(shape, value, found.errors[key])}{unit}")
+        else:
+            parts.append(f"{name} {in_digits(value / scale, 4)}{unit} (kept)")
+    return "; ".join(parts)
+
+
+def count_text(found: Comparison) -> str:
+    """How many predictions met their criteria."""
+    counts = found.counts()
+    decided = sum(counts.values()) - counts[NO_CRITERION]
+    text = (
+        f"Predictions with a criterion: {decided}, of which {counts[MET]} meet it and "
+        f"{counts[MISSED]} miss it"
+    )
+    if counts[UNDECIDED]:
+        text += f"; {counts[UNDECIDED]} are undecided"
+    text += f". Without a criterion: {counts[NO_CRITERION]}."
+    again = found.counts(anew=True)
+    more = sum(again.values()) - again[NO_CRITERION]
+    if more:
+        text += (
+            f" With one parameter fitted anew at another speed: {more}, of which {again[MET]} "
+            f"meet it and {again[MISSED]} miss it."
+        )
+    return text
+
+
+def reasons(found: Comparison) -> dict[str, list[str]]:
+    """Why numbers have no criterion: ids by reason."""
+    told: dict[str, list[str]] = {}
+    for row in found.rows:
+        if row.reason and row.id not in told.setdefault(row.reason, []):
+            told[row.reason].append(row.id)
+    return told
+
+
+def as_csv(found: Comparison) -> str:
+    """All rows, SI units."""
+    text = io.StringIO()
+    names = [one.name for one in fields(Row)]
+    writer = csv.DictWriter(text, names, lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(asdict(row) for row in found.rows)
+    return text.getvalue()
+
+
+def markdown(found: Comparison) -> Iterator[str]:
+    """Lines of the tables of a page: an experiment after the other."""
+    yield count_text(found)
+    yield ""
+    for one in found.experiments:
+        yield f"### {one.title}"
+        yield ""
+        yield f"{one.about} Source: {one.source['published']}; doi {one.source['doi']}."
+        yield f"Read in {one.source['read_in']}."
+        yield ""
+        for plan in one.fits:
+            fit = found.found(one.name, plan.name)
+            yield f"**Law {plan.law}, fit {plan.name}**: {parameters_text(fit)}."
+            yield ""
+            yield "| " + " | ".join(HEADINGS) + " |"
+            yield "|---|---|---:|---|---:|---:|---:|---:|---|"
+            for row in found.of(one.name, plan.name):
+                yield "| " + " | ".join(_emphasised(row)) + " |"
+            yield ""
+    for why, ids in reasons(found).items():
+        yield f"- No criterion for {', '.join(ids)}: {why}."
+    yield ""
+    yield from _variants(found)
+
+
+def _emphasised(row: Row) -> list[str]:
+    texts = cells(row)
+    if row.verdict == MISSED:
+        texts[-1] = f"**{texts[-1]}**"
+    return texts
+
+
+def _variants(found: Comparison) -> Iterator[str]:
+    """What other rigs and readings change, a table for each experiment and fit."""
+    for one in found.experiments:
+        for plan in one.fits:
+            rows = [r for r in found.variants if (r.experiment, r.fit) == (one.name, plan.name)]
+            rows = [r for r in rows if r.role == PREDICTED]
+            if not rows:
+                continue
+            ids = list(dict.fromkeys(r.id for r in rows))
+            yield f"### {one.title}, {plan.name}: other rigs and readings"
+            yield ""
+            yield "| | " + " | ".join(ids) + " |"
+            yield "|---|" + "---:|" * len(ids)
+            first = {r.id: r for r in rows}
+            yield _line("measured", [first[name].measured for name in ids], first, ids)
+            yield _line("as above", [first[name].base for name in ids], first, ids)
+            for variant in one.variants:
+                own = {r.id: r.computed for r in rows if r.variant == variant.name}
+                late = " (added after the first run)" if variant.after_run else ""
+                yield _line(variant.name + late, [own[name] for name in ids], first, ids)
+            yield ""
+        for variant in one.variants:
+            yield f"- *{variant.name}*: {variant.why}"
+        if one.variants:
+            yield ""
+
+
+def _line(name: str, values: list[float], first: dict, ids: list[str]) -> str:
+    texts = []
+    for key, value in zip(ids, values, strict=True):
+        quantity = QUANTITIES[first[key].quantity]
+        unit = "" if quantity.unit == "-" else f" {quantity.unit.replace('us', 'µs')}"
+        texts.append(in_digits(value / quantity.scale, 3) + unit)
+    return f"| {name} | " + " | ".join(texts) + " |"

@@ -1,0 +1,213 @@
+"""Fits and predictions beside published blows: the table, its verdicts, its page, the command."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from docs import make_validation
+from percussion_model.verification.measured import Measurement, compare, load
+from percussion_model.verification.measured.blow import Reading, Rig, rebound, strike
+from percussion_model.verification.measured.comparison import (
+    FITTED,
+    MET,
+    MISSED,
+    NO_CRITERION,
+    PREDICTED,
+    UNDECIDED,
+    fit,
+    verdict,
+)
+from percussion_model.verification.measured.table import as_csv, cells
+from tests.commands import percussion
+
+STIFFNESS, RATIO = "rock.loading_stiffness", "rock.unloading_ratio"
+
+
+@pytest.fixture(scope="module")
+def found():
+    return compare(load(), variants=False)
+
+
+@pytest.fixture(scope="module")
+def kuru():
+    return load(["single_insert_kuru"])[0]
+
+
+def test_the_table_has_every_number_of_every_fit(found):
+    rows = {(row.experiment, row.fit, row.id): row.role for row in found.rows}
+    wanted = {
+        (one.name, plan.name, name): role
+        for one in found.experiments
+        for plan in one.fits
+        for names, role in ((plan.to, FITTED), (plan.predicts, PREDICTED))
+        for name in names
+    }
+    assert rows == wanted
+    assert all(row.law == "bilinear" and row.computed > 0.0 for row in found.rows)
+    assert len(list(csv.DictReader(as_csv(found).splitlines()))) == len(rows)
+    counted = sum(found.counts().values()) + sum(found.counts(anew=True).values())
+    assert counted == sum(role == PREDICTED for role in rows.values())
+
+
+def test_what_was_fitted_is_reached(found):
+    for row in found.rows:
+        if row.role == FITTED:
+            assert abs(row.deviation) < 1e-3, row.id
+            assert row.verdict == FITTED
+
+
+def test_the_page_has_these_numbers(found):
+    page = make_validation.PAGE.read_text(encoding="utf-8")
+    assert page.count(make_validation.BEGIN) == page.count(make_validation.END) == 1
+    for row in found.rows:
+        line = "| " + " | ".join(cells(row)[:-1])
+        assert line in page, f"run: python -m docs.make_validation ({row.experiment}, {row.id})"
+    by_hand = page.partition(make_validation.BEGIN)[0] + page.partition(make_validation.END)[2]
+    assert len(by_hand.split()) <= 900
+
+
+def test_a_fit_finds_the_rock_that_made_the_numbers(kuru):
+    rig = Rig(Reading(kuru.gauge))
+    made = kuru.scene.replace(**{STIFFNESS: 1.3e8, RATIO: 4.2})
+    plan = kuru.fits[0]
+    measured = dict(kuru.measured)
+    for name in plan.to:
+        one = measured[name]
+        measured[name] = replace(one, value=rig.read(made, one.quantity, one.speed))
+    found = fit(replace(kuru, measured=measured), plan, rig)
+    assert found.values[STIFFNESS] == pytest.approx(1.3e8, rel=1e-4)
+    assert found.values[RATIO] == pytest.approx(4.2, rel=1e-3)
+
+
+def test_errors_of_a_fit_are_those_of_what_was_fitted(found, kuru):
+    """Twice the errors, twice the errors; and the share of one speed is that of another."""
+    one = found.found("single_insert_kuru", "to 9 m/s")
+    measured = dict(kuru.measured)
+    for name in one.to:
+        measured[name] = replace(measured[name], error=2.0 * measured[name].error)
+    doubled = fit(replace(kuru, measured=measured), kuru.fits[0], Rig(Reading(kuru.gauge)))
+    for key in (STIFFNESS, RATIO):
+        assert doubled.errors[key] == pytest.approx(2.0 * one.errors[key], rel=1e-2)
+    # numbers are proportional to the speed, so that of 5 m/s is off by the same share
+    share = kuru.measured["penetration at 9 m/s"].error / 1e-3
+    carried = one.prediction_errors["penetration at 5 m/s"]
+    assert carried == pytest.approx(share * 1e-3 * 5.0 / 9.0, rel=1e-2)
+
+
+@pytest.mark.parametrize(("piston", "bit"), [(7.0e-4, 7.0e-4), (5.0e-4, 8.0e-4)])
+def test_the_first_wave_is_that_of_impedances(kuru, piston, bit):
+    # as many cells in both, so that no wave speed is off
+    scene = kuru.scene.replace(
+        **{
+            "piston.sections.0.area": piston,
+            "bit.sections.0.area": bit,
+            "bit.sections.0.length": 0.26,
+            "loss.time": 1e-9,
+        }
+    )
+    found = Rig(Reading(0.12)).read(scene, "first_wave", 9.0)
+    density, modulus = 7850.0, 200e9
+    exact = math.sqrt(density * modulus) * 9.0 * piston / (piston + bit)
+    assert found == pytest.approx(exact, rel=1e-6)
+    if piston == bit:
+        assert exact == pytest.approx(math.sqrt(density * modulus) * 9.0 / 2.0)
+
+
+def test_the_bilinear_law_has_no_speed_of_its_own(kuru):
+    rig = Rig(Reading(kuru.gauge))
+    slow, fast = (
+        {
+            name: rig.read(kuru.scene, name, speed)
+            for name in ("penetration", "rebound_velocity", "restitution", "peak_force")
+        }
+        for speed in (5.0, 10.0)
+    )
+    assert fast["restitution"] == pytest.approx(slow["restitution"], rel=1e-9)
+    for name in ("penetration", "rebound_velocity", "peak_force"):
+        assert fast[name] == pytest.approx(2.0 * slow[name], rel=1e-9)
+
+
+def test_one_unloading_ratio_cannot_be_at_two_speeds(found):
+    needed = [
+        found.found("single_insert_kuru", name)
+        for name in ("to 9 m/s", "unloading ratio to 11 m/s")
+    ]
+    low, high = (one.values[RATIO] for one in needed)
+    errors = [one.errors[RATIO] for one in needed]
+    assert high - low > 10.0 * math.hypot(*errors)
+
+
+def test_the_rebound_ends_where_the_piston_strikes_again(kuru):
+    rig = Rig(Reading(kuru.gauge))
+    blow = rig.blow(kuru.scene, 9.0)
+    flight, speed = rebound(blow, rig.reading)
+    again = flight.stop + int(np.argmax(blow.struck[flight.stop :]))
+    assert blow.struck[again]
+    assert again - flight.stop <= 2
+    # forces are means of the time step, in the first of which the bit lets go
+    assert np.all(blow.force[flight][1:] == 0.0)
+    steady = -np.diff(blow.mean[flight]) / np.diff(blow.time[flight])
+    assert steady == pytest.approx(speed, rel=1e-6)
+
+
+def test_a_wave_on_a_plate_is_that_of_its_equation(found):
+    """m p'' + Z p' + K p = 2 F while the wave comes: its greatest penetration."""
+    from scipy.integrate import solve_ivp
+
+    one = found.found("one_button_flat", "to the penetrations")
+    rod = one.scene.string.rods[0].sections[0]
+    impedance, mass = rod.impedance, one.scene.bit.mass
+    stiffness, force = one.values[STIFFNESS], one.scene.string.pulse_force
+
+    def slope(t, y):
+        return [y[1], (2.0 * force - impedance * y[1] - stiffness * y[0]) / mass]
+
+    exact = solve_ivp(slope, (0.0, one.scene.string.pulse_duration), [0.0, 0.0], rtol=1e-9)
+    assert exact.y[0].max() == pytest.approx(0.35e-3, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("off", "numerical", "role", "word"),
+    [
+        (0.09, 0.001, PREDICTED, MET),
+        (-0.11, 0.001, PREDICTED, MISSED),
+        (0.1, 0.02, PREDICTED, UNDECIDED),
+        (math.nan, 0.0, PREDICTED, MISSED),
+        (0.0, 0.0, FITTED, FITTED),
+        (0.2, 0.0, FITTED, MISSED),
+    ],
+)
+def test_verdicts(off, numerical, role, word):
+    one = Measurement("a", "restitution", 0.5, 0.1, "measured", "read", within=0.1)
+    assert verdict(one, off, numerical, role) == word
+    assert verdict(replace(one, within=None), off, numerical, role) == NO_CRITERION
+
+
+def test_a_bit_that_never_leaves_the_rock_has_no_rebound(kuru):
+    scene = Rig(Reading()).blow(kuru.scene, 9.0).scene
+    short = strike(scene.replace(**{"run.duration": 2e-4}))
+    assert math.isnan(rebound(short, Reading())[1])
+
+
+def test_the_command_writes_table_and_figure(tmp_path, capsys):
+    out = tmp_path / "out"
+    assert percussion("validate", "triple_button_kuru", "--out", out) == 0
+    assert "missed" in capsys.readouterr().out
+    names = {path.name for path in out.iterdir()}
+    assert {"validation.csv", "validation.json", "triple_button_kuru.png"} <= names
+    tree = json.loads((out / "validation.json").read_text(encoding="utf-8"))
+    assert len(tree["rows"]) == 5
+
+
+def test_bad_input_is_one_line(tmp_path, capsys):
+    assert percussion("validate", "nothing", "--out", tmp_path / "out") == 2
+    told = capsys.readouterr().err.strip()
+    assert told.startswith("percussion: experiment 'nothing': must be one of")
+    assert len(told.splitlines()) == 1
+    assert not (tmp_path / "out").exists()
