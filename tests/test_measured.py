@@ -78,6 +78,9 @@ def changed(tmp_path, change):
         (lambda t: t["fits"][0].update(predicts=["loading stiffness"]), "both fitted and"),
         (lambda t: t["scene"]["rock"].update(loading_stiffness=-1.0), "loading_stiffness"),
         (lambda t: t.update(gauge="3 m"), "the bit's length"),
+        (lambda t: t["scene"]["run"].update(duration=2.0), "must be at most 0.05 s"),
+        (lambda t: t["scene"].update(piston={"model": "rigid"}), "elastic or absent"),
+        (lambda t: t["measured"][1].update(id="a\nb"), "must be one line of text"),
     ],
 )
 def test_bad_experiments_are_refused_in_one_line(tmp_path, change, message):
@@ -93,5 +96,7 @@ def test_bad_experiments_are_refused_in_one_line(tmp_path, change, message):
 def test_unknown_experiments_are_refused():
     with pytest.raises(ExperimentError, match="must be one of one_button_flat"):
         load(["nothing"])
-    with pytest.raises(ExperimentError, match="no such scene file"):
+    with pytest.raises(ExperimentError, match="no such file"):
         load(["nothing.toml"])
+    with pytest.raises(ExperimentError, match="is there twice"):
+        load(["one_button_flat"] * 2)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from docs import make_validation
-from percussion_model.verification.measured import Measurement, compare, load
+from percussion_model.verification.measured import Measurement, compare, load, wanted
 from percussion_model.verification.measured.blow import Reading, Rig, rebound, strike
 from percussion_model.verification.measured.comparison import (
     FITTED,
@@ -23,7 +23,12 @@ from percussion_model.verification.measured.comparison import (
     fit,
     verdict,
 )
-from percussion_model.verification.measured.table import as_csv, cells
+from percussion_model.verification.measured.table import (
+    as_csv,
+    cells,
+    count_text,
+    parameters_text,
+)
 from tests.commands import percussion
 
 STIFFNESS, RATIO = "rock.loading_stiffness", "rock.unloading_ratio"
@@ -68,6 +73,10 @@ def test_the_page_has_these_numbers(found):
     for row in found.rows:
         line = "| " + " | ".join(cells(row)[:-1])
         assert line in page, f"run: python -m docs.make_validation ({row.experiment}, {row.id})"
+    for one in found.fits:
+        assert parameters_text(one) in page
+    assert all(f"{row['what']}: {row['where']}. Not had: {row['why']}." in page for row in wanted())
+    assert count_text(found) in page
     by_hand = page.partition(make_validation.BEGIN)[0] + page.partition(make_validation.END)[2]
     assert len(by_hand.split()) <= 900
 

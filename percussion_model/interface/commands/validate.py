@@ -43,8 +43,11 @@ def validate(
     solvers = {"chain" if one.scene.effects.string else "wave" for one in chosen}
     claimed = None
     if out is not None:
-        scenes = {one.name: one.scene for one in chosen}
-        claimed = common.claim("validate", out, None, force, variants=variants, **scenes)
+        claimed = common.claim(
+            "validate", out, None, force, variants=variants,
+            scenes={one.name: one.scene for one in chosen},
+            files={name: common.digest(Path(name)) for name in experiments or ()},
+        )  # fmt: skip
     common.tell_of_compiling(*sorted(solvers))
     with count_bar("fits") as progress:
         found = compare(chosen, variants, progress)

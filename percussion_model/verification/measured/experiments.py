@@ -32,6 +32,8 @@ LAWS: dict[str, dict[str, tuple[float, float]]] = {
     },
 }
 MOST_ENTRIES = 100
+# A blow is over by then [s].
+MOST_DURATION = 0.05
 LONGEST_TEXT = 2000
 
 
@@ -179,7 +181,13 @@ def load(names: Iterable[str] = ()) -> list[Experiment]:
     ExperimentError
         If there is none, or it makes no sense.
     """
-    return [_load(name) for name in list(names) or stored()]
+    found = [_load(name) for name in list(names) or stored()]
+    seen: set[str] = set()
+    for one in found:
+        if one.name in seen:
+            raise ExperimentError(f"experiment {one.name!r}: is there twice; name files otherwise")
+        seen.add(one.name)
+    return found
 
 
 def _load(name: str) -> Experiment:
@@ -189,7 +197,10 @@ def _load(name: str) -> Experiment:
         raise ExperimentError(
             f"experiment {shortened(name)!r}: must be one of {', '.join(stored())}, or a TOML file"
         )
-    return read_experiment(Path(name))
+    path = Path(name)
+    if not path.exists():
+        raise ExperimentError(f"{name}: there is no such file")
+    return read_experiment(path)
 
 
 def wanted() -> list[dict[str, str]]:
@@ -225,11 +236,19 @@ def _experiment(name: str, tree: dict[str, Any]) -> Experiment:
             raise ExperimentError(
                 f'scene.{bar}.model = "{scene[f"{bar}.model"]}": must be {" or ".join(allowed)}'
             )
+    if scene.run.duration > MOST_DURATION:
+        raise ExperimentError(
+            f"scene.run.duration = {scene.run.duration:g} s: must be at most {MOST_DURATION:g} s, "
+            "which one blow does not take"
+        )
     source = _table(tree, "source")
     _refuse_keys("source.", source, ("published", "doi", "read_in"))
     gauge = _length(tree, "gauge", scene)
     rows = _rows(tree, "measured")
     measured = [_measurement(f"measured.{k}", row) for k, row in enumerate(rows)]
+    for k, one in enumerate(measured):
+        if one.speed is not None and scene.piston.model == "absent":
+            raise ExperimentError(f"measured.{k}.speed: the scene has no piston")
     by_id = {one.id: one for one in measured}
     if len(by_id) < len(measured):
         raise ExperimentError("measured: every id must be there once")
