@@ -10,6 +10,7 @@ from dataclasses import asdict, fields
 
 from percussion_model.simulation.uncertain import in_digits, with_short_error
 from percussion_model.verification.measured.comparison import (
+    FITTED,
     MET,
     MISSED,
     NO_CRITERION,
@@ -23,7 +24,7 @@ from percussion_model.verification.measured.experiments import Measurement
 from percussion_model.verification.measured.quantities import QUANTITIES, Quantity
 
 HEADINGS = (
-    "number", "role", "measured", "kind", "computed", "by fit", "off", "criterion", "verdict",
+    "number", "verdict", "measured", "kind", "computed", "by fit", "off", "criterion",
 )  # fmt: skip
 # Of a source, and the sign for it.
 SECOND_HAND, STAR = ", second hand", "*"
@@ -79,6 +80,13 @@ def criterion_text(row: Row) -> str:
     return f"±{100 * row.within:.0f} %" if relative else f"±{row.within:g}"
 
 
+def verdict_text(row: Row) -> str:
+    """Whether a number was fitted or predicted, and what its criterion says."""
+    if row.verdict in (FITTED, NO_CRITERION):
+        return row.role
+    return f"{row.role}, {row.verdict}"
+
+
 def cells(row: Row) -> list[str]:
     """Texts of a row, one for each of `HEADINGS`."""
     quantity = QUANTITIES[row.quantity]
@@ -86,9 +94,9 @@ def cells(row: Row) -> list[str]:
     if row.role == PREDICTED and row.fit_error > 0.0:
         by_fit = f"±{in_digits(row.fit_error / quantity.scale, 2)}"
     return [
-        row.id, row.role, measured_text(row), row.source.replace(SECOND_HAND, STAR),
+        row.id, verdict_text(row), measured_text(row), row.source.replace(SECOND_HAND, STAR),
         shown(quantity, row.computed, row.numerical_error), by_fit, off_text(row),
-        criterion_text(row), row.verdict,
+        criterion_text(row),
     ]  # fmt: skip
 
 
@@ -163,7 +171,7 @@ def markdown(found: Comparison) -> Iterator[str]:
             yield f"**Law {plan.law}, fit {plan.name}**: {parameters_text(fit)}."
             yield ""
             yield "| " + " | ".join(HEADINGS) + " |"
-            yield "|---|---|---:|---|---:|---:|---:|---:|---|"
+            yield "|---|---|---:|---|---:|---:|---:|---:|"
             for row in found.of(one.name, plan.name):
                 yield "| " + " | ".join(_emphasised(row)) + " |"
             yield ""
@@ -175,8 +183,7 @@ def markdown(found: Comparison) -> Iterator[str]:
 
 def _emphasised(row: Row) -> list[str]:
     texts = cells(row)
-    if row.verdict == MISSED:
-        texts[-1] = f"**{texts[-1]}**"
+    texts[1] = texts[1].replace(MISSED, f"**{MISSED}**")
     return texts
 
 
