@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from percussion_model import Scene
+from percussion_model import Scene, SceneError
 from percussion_model.interface.cli import BAD_INPUT
 from percussion_model.scene.presets import scene_file, scene_presets, system_file, system_presets
 from tests.commands import percussion
@@ -37,7 +37,36 @@ def test_a_file_wins_over_a_preset_and_a_folder_does_not(empty_folder):
     name.rmdir()
     Scene(title="mine").to_toml(name)
     assert scene_file(name) == name
-    assert Scene.from_toml(scene_file(name)).title == "mine"
+    assert Scene.from_toml(name).title == "mine"
+
+
+def test_python_takes_the_names_of_the_command_line():
+    for name, path in scene_presets().items():
+        assert Scene.from_toml(name) == Scene.from_toml(path)
+    with pytest.raises(SceneError, match="nosuch: there is no such scene file, and no preset"):
+        Scene.from_toml("nosuch")
+
+
+@pytest.mark.parametrize(
+    ("words", "meant"),
+    [
+        (["run", "refernce"], "reference"),
+        (["explain", "Top_Hammer"], "top_hammer"),
+        (["system", "FeedControlrigid"], "FeedControlRigid"),
+        (["scenario", "laered_rock"], "layered_rock"),
+    ],
+)
+def test_a_misspelt_name_is_told_the_one_that_was_meant(words, meant, capsys):
+    assert percussion(*words) == BAD_INPUT
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert f": did you mean {meant}? They are " in said
+
+
+def test_a_name_that_no_file_can_have_is_refused():
+    for name in ("x" * 5000, "a\0b", "x" * 5000 + ".toml"):
+        with pytest.raises(SceneError):
+            Scene.from_toml(name)
 
 
 @pytest.mark.parametrize(

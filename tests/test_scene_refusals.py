@@ -147,6 +147,25 @@ def test_a_key_with_an_underline_for_its_point_is_understood():
         Scene().replace(feed_force=3.0)
 
 
+@pytest.mark.parametrize(
+    ("section", "lines"),
+    [
+        ({"lenght": 0.1, "area": 5e-3}, ["unknown key piston.sections.0.lenght: did you mean "
+                                         "piston.sections.0.length?"]),
+        ({"lenght": 0.1}, ["piston.sections.0.area is missing", "unknown key"]),
+        ({"xyzzy": 0.1, "area": 5e-3}, ["piston.sections.0.length is missing", "unknown key"]),
+        ({1: 2, "length": 0.1, "area": 5e-3}, ["unknown key piston.sections.0.1"]),
+    ],
+)  # fmt: skip
+def test_a_misspelt_key_of_a_list_is_not_missing_as_well(section, lines):
+    with pytest.raises(SceneError) as caught:
+        Scene(piston={"sections": [section]})
+    told = str(caught.value).splitlines()
+    assert len(told) == len(lines)
+    for line, begin in zip(told, lines, strict=True):
+        assert line.startswith(begin)
+
+
 def test_a_folder_that_is_missing_is_made(tmp_path):
     Scene().to_toml(tmp_path / "missing" / "scene.toml")
     assert Scene.from_toml(tmp_path / "missing" / "scene.toml") == Scene()

@@ -27,6 +27,7 @@ def scenario(
 ) -> None:
     """Run a scripted scenario of FMUs, as layered rock, or list them."""
     from percussion_model.scene.presets import scenario_folder
+    from percussion_model.scene.rows import said_among, shortened
 
     folder = scenario_folder()
     about = _scripts(folder)
@@ -36,7 +37,9 @@ def scenario(
             typer.echo(f"{one:{width}s}  {text}")
         return
     if name not in about:
-        raise common.refusal(f"scenario {name}: must be one of {', '.join(about)}")
+        raise common.refusal(
+            f"scenario {shortened(name)}: there is none: {said_among(name, about)}"
+        )
     sys.argv[1:] = words or []
     with common.needing("all"):
         runpy.run_module(f"{folder.name}.{name}", run_name="__main__", alter_sys=True)

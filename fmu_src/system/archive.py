@@ -16,7 +16,7 @@ from fmu_src.parts.build import PARTS, build_part
 from fmu_src.units import UNITS
 from percussion_model.interface.commands.blow_map import ready_map
 from percussion_model.scene.presets import scenario_folder, scene_file, system_file
-from percussion_model.scene.rows import shortened, show_value, unprintable
+from percussion_model.scene.rows import said_among, shortened, show_value, unprintable
 from percussion_model.scene.scene import Scene
 from percussion_model.scene.text import read_toml
 
@@ -337,7 +337,7 @@ def find_plan(named: Path) -> SystemPlan:
     if named.name not in found:
         raise SystemPlanError(
             f"{shortened(str(named))}: there is no such file of a system, and no preset of that "
-            f"name: they are {', '.join(found)}"
+            f"name: {said_among(named.name, found)}"
         )
     return found[named.name]
 

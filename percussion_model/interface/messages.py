@@ -44,7 +44,7 @@ def usage_text(error: Any) -> str:
         option = max([*error.param.opts, error.param.name], key=len)
         told = f"{option} {fault['input']!r}: {_allowed(fault)}"
     if error.ctx is not None:
-        told += f"; see {error.ctx.command_path} --help"
+        told += f"{'' if told.endswith('?') else ';'} see {error.ctx.command_path} --help"
     return told
 
 

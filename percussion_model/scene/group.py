@@ -12,6 +12,7 @@ from percussion_model.scene.rows import (
     Needs,
     Row,
     generic_key,
+    nearest,
     show_value,
 )
 from percussion_model.scene.units import read_value, refuse
@@ -81,9 +82,12 @@ class Parameters:
         kept, rows = self.__dict__, self.rows
         kept.update(self._defaults)
         kept["_given"] = frozenset(values)
+        unknown = [name for name in values if name not in rows]
+        # a misspelt key is one fault, and not that it is missing as well
+        meant = {nearest(str(name), rows) for name in unknown[: len(rows)]}
         for name, row in rows.items():
             if name not in values:
-                if row.required:
+                if row.required and name not in meant:
                     faults.add(_refuse_missing, row, f"{key}.{name}")
             elif row.kind in LISTED:
                 kept[name] = _entries(row, f"{key}.{name}", values[name], faults)
@@ -91,9 +95,8 @@ class Parameters:
                 kept[name] = found = read_value(row, values[name])
                 if found is REFUSED:
                     faults.add(refuse, row, f"{key}.{name}", values[name])
-        for name in values:
-            if name not in rows:
-                faults.add(Parameters.say_unknown, f"{key}.{name}")
+        for name in unknown:
+            faults.add(Parameters.say_unknown, f"{key}.{name}")
 
     @property
     def telling(self) -> tuple[str, ...]:

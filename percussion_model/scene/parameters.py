@@ -45,6 +45,7 @@ from percussion_model.scene.group import (
     Parameters,
 )
 from percussion_model.scene.rows import (
+    SIMILAR_ENOUGH,
     Needs,
     Row,
     SceneError,
@@ -52,14 +53,12 @@ from percussion_model.scene.rows import (
     count,
     flag,
     generic_key,
+    nearest,
     quantity,
     shortened,
 )
 from percussion_model.scene.solver_names import SOLVER_NAMES
 from percussion_model.scene.units import UnitError, in_si, refuse
-
-# Below this similarity a guess at a misspelt key misleads more than it helps.
-_SIMILAR_ENOUGH = 0.6
 
 # The paper damps the highest frequency of its 58-element bit by this ratio.
 _PAPER_DAMPING_RATIO = 0.5
@@ -207,7 +206,13 @@ class Start(Parameters):
     rock_gap: float = quantity(
         1e-5, "m", "gap P_u between bit and rock", ROCK_PRESENT, ge=0, le=100
     )
-    depth: float = quantity(0.0, "m", "depth of the hole", ge=0, le=20000)
+    depth: float = quantity(
+        0.0,
+        "m",
+        "depth of the hole at the start; only a note, nothing computed depends on it",
+        ge=0,
+        le=20000,
+    )
     drive_direction: int = choice(
         1, (1, -1), "alpha of the pressure law: 1 down, -1 up", DRIVE_PRESSURE
     )
@@ -490,15 +495,13 @@ def unknown_key(key: str) -> str:
     keys = rows_by_key()
     siblings = [one.removeprefix(prefix) for one in keys if one.startswith(prefix)]
     siblings = [one for one in siblings if "." not in one]
-    near = [one for one in siblings if one.startswith(name)]  # a shortened name
-    near += difflib.get_close_matches(name, siblings, 1, _SIMILAR_ENOUGH)
-    if near and parent:
-        return f"unknown key {key}: did you mean {parent}.{near[0]}?"
+    if parent and (meant := nearest(name, siblings)):
+        return f"unknown key {key}: did you mean {parent}.{meant}?"
     underlined = {one.replace(".", "_"): one for one in keys}
     if key in underlined:  # as keyword arguments of Python are written
         return f"unknown key {key}: did you mean {underlined[key]}?"
     known = list(keys) if parent else ["title", HOLE_DIAMETER.key, *GROUPS]
-    near = difflib.get_close_matches(generic_key(key), known, 1, _SIMILAR_ENOUGH)
+    near = difflib.get_close_matches(generic_key(key), known, 1, SIMILAR_ENOUGH)
     if near:
         return f"unknown key {key}: did you mean {near[0].replace('.*', '.0')}?"
     if siblings and parent:

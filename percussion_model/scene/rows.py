@@ -6,12 +6,13 @@ Standard library only: every FMU takes this module along.
 from __future__ import annotations
 
 import dataclasses
+import difflib
 import json
 import math
 import numbers
 import reprlib
 import unicodedata
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, Literal
@@ -20,6 +21,8 @@ Kind = Literal["number", "whole number", "flag", "choice", "sections", "rods"]
 
 # Of a key or of a parser's words, no more than this is repeated in a message.
 _LONGEST_WORDS = 200
+# Below this similarity a guess at a misspelt name misleads more than it helps.
+SIMILAR_ENOUGH = 0.6
 # More faults of one scene than this are counted, not told.
 _MOST_FAULTS = 30
 # No characters by Unicode, and refused by XML.
@@ -246,6 +249,20 @@ def unprintable(text: str) -> str:
 def shortened(text: str) -> str:
     """Text of others, no longer than a message bears."""
     return text if len(text) <= _LONGEST_WORDS else text[:_LONGEST_WORDS] + "..."
+
+
+def nearest(name: str, known: Collection[str]) -> str:
+    """The known name that a misspelt or shortened one was meant to be; empty if none is near."""
+    name = shortened(name)
+    near = [one for one in known if one.startswith(name)]  # as far as it was written
+    near += difflib.get_close_matches(name, known, 1, SIMILAR_ENOUGH)
+    return near[0] if near else ""
+
+
+def said_among(name: str, known: Collection[str]) -> str:
+    """Say which names there are, and before them the one that was meant, if one is near."""
+    near, names = nearest(name, known), ", ".join(known)
+    return f"did you mean {near}? They are {names}" if near else f"they are {names}"
 
 
 def refuse_value(row: Row, key: str, value: Any) -> str:

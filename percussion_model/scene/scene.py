@@ -123,19 +123,21 @@ class Scene:
 
     @classmethod
     def from_toml(cls, path: str | Path) -> Self:
-        """Read a scene file.
+        """Read a scene file, or a scene that ships.
 
         Parameters
         ----------
         path : str or Path
-            A TOML file.
+            A TOML file, or the name of a preset, as "reference"; a file of that name comes first.
 
         Raises
         ------
         SceneError
-            If the file cannot be read or is no sensible scene.
+            If there is no such file or preset, or it is no sensible scene.
         """
-        path = Path(path)
+        from percussion_model.scene.presets import scene_file  # no run needs it
+
+        path = scene_file(Path(path))
         tree = read_toml(path)
         try:
             return cls(**tree)

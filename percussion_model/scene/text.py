@@ -30,7 +30,7 @@ _HEADER = (
 
 def read_toml(path: Path) -> dict[str, Any]:
     """Read a TOML file, with a clear error for what can go wrong."""
-    if path.is_dir():
+    if os.path.isdir(path):  # unlike Path, it bears a name that is too long
         raise SceneError(f"{path} is a folder: give the scene file in it")
     try:
         with path.open("rb") as file:  # no more than the limit, of a device without end as well

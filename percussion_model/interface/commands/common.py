@@ -163,12 +163,11 @@ def load_scene(
 
     Where the solver that the scene names will run it, tell of its kernels.
     """
-    from percussion_model.scene.presets import scene_file
     from percussion_model.scene.scene import Scene
     from percussion_model.scene.text import read_setting
 
     load_numba()
-    scene = Scene() if path is None else Scene.from_toml(scene_file(path))
+    scene = Scene() if path is None else Scene.from_toml(path)
     changes: dict[str, Any] = dict(read_setting(text) for text in settings or ())
     if solver is not None:
         scene = scene.computed_by(solver, **changes)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from pathlib import Path
 
-from percussion_model.scene.rows import SceneError, shortened
+from percussion_model.scene.rows import SceneError, said_among, shortened, unprintable
 
 # The folder lies beside the package: as it is installed, or in a clone.
 _BESIDE = Path(__file__).resolve().parents[3]
@@ -59,16 +60,18 @@ def system_file(named: Path) -> Path:
 
 
 def _file(named: Path, kind: str, presets: Callable[[], dict[str, Path]]) -> Path:
-    if named.suffix or named.name != str(named) or named.is_file():
+    if named.suffix or named.name != str(named) or unprintable(str(named)):
+        return named
+    if os.path.isfile(named):  # unlike Path, it bears a name that is too long
         return named
     known = presets()
     if named.name in known:
         return known[named.name]
-    if named.is_dir():
+    if os.path.isdir(named):
         return named  # which its reader refuses
     raise SceneError(
-        f"{shortened(str(named))}: there is no such {kind} file, and no preset of that name: they "
-        f"are {', '.join(known)}"
+        f"{shortened(str(named))}: there is no such {kind} file, and no preset of that name: "
+        f"{said_among(named.name, known)}"
     )
 
 
