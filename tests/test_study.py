@@ -111,7 +111,9 @@ def test_a_rate_has_its_error_where_that_shows(whole):
     assert made.rate_text(0) == "12.3 mm/s"
     assert made.rate_text(1) == "12.3 mm/s, error not estimated"
     told = dict(made.headlines())
-    assert "12.3 mm/s" in told["Lowest rate"]
+    assert told["Lowest rate"] == (
+        "12.3 mm/s (44.4 m/h) at feed.force = 1500 N, rock.loading_stiffness = 3e+08 N/m"
+    )
     rows["rate_of_penetration_error"] = 2e-4
     assert made.rate_text(0) == "12.35 ± 0.20 mm/s"
     assert "nor are those of the other numbers" in told["These errors"]
@@ -156,7 +158,33 @@ def test_another_study_is_not_mixed_in(tmp_path):
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "letter.txt").write_text("dear")
     with pytest.raises(ResultError, match="is not empty"):
-        study(SCENE, grid(AXES), tmp_path / "full")
+        study(SCENE, grid(AXES), tmp_path / "full", force=True)
+    assert (tmp_path / "full" / "letter.txt").read_text() == "dear"
+
+
+def test_force_replaces_another_study_and_nothing_else(tmp_path):
+    scene, out = tmp_path / "scene.toml", tmp_path / "out"
+    SCENE.to_toml(scene)
+
+    def run(over, *more):
+        words = ["study", str(scene), "--over", over, "--processes", "1", "--out", str(out)]
+        return CliRunner().invoke(app, [*words, "--no-report", *more])
+
+    assert run("feed.force=1500,2500,4000").exit_code == 0
+    (out / "notes.txt").write_text("dear")
+    refused = run("feed.force=2500")
+    assert isinstance(refused.exception, ResultError)
+    assert "--force replaces it" in str(refused.exception)
+    assert run("feed.force=nonsense", "--force").exit_code != 0
+    assert len(study(SCENE, grid({"feed.force": [1500.0, 2500.0, 4000.0]}), out).rows) == 3
+    done = run("feed.force=2500", "--force")
+    assert done.exit_code == 0
+    assert "1: 1 periodic" in done.stdout
+    assert (out / "notes.txt").read_text() == "dear"
+    assert len(list((out / PARTS).iterdir())) == 1
+    kept = next((out / PARTS).iterdir()).stat().st_mtime_ns
+    assert run("feed.force=2500", "--force").exit_code == 0  # the same study goes on
+    assert next((out / PARTS).iterdir()).stat().st_mtime_ns == kept
 
 
 def interrupted(folder):
@@ -176,7 +204,7 @@ def test_points_of_other_sources_are_not_mixed_in(tmp_path, monkeypatch):
     folder = tmp_path / "out"
     kept = interrupted(folder)
     monkeypatch.setattr("percussion_model.analysis.study.sources_digest", lambda patterns: "edited")
-    with pytest.raises(ResultError, match=r"other sources .* than those of now: give another"):
+    with pytest.raises(ResultError, match=r"other sources .* than those of now: --force"):
         study(SCENE, grid(AXES), folder, processes=1)
     monkeypatch.undo()
     plan = json.loads((folder / PLAN).read_text())
@@ -242,6 +270,23 @@ def test_a_worker_that_is_killed_loses_nothing(tmp_path):
     tasks = [(str(tmp_path / "flag"), number) for number in range(6)]
     found = dict(workers.on_this_machine(die_once, tasks, 2))
     assert found == {number: number**2 for number in range(6)}
+
+
+def test_a_script_that_workers_run_again_is_told_so(tmp_path):
+    script = tmp_path / "script.py"
+    script.write_text(
+        "from percussion_model import Scene\n"
+        "from percussion_model.analysis.study import study, table\n"
+        "scene = Scene().computed_by('rigid')\n"
+        "study(scene, table({'feed.force': range(2000, 2040)}), 'out', processes=2)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, str(script)], cwd=tmp_path, capture_output=True, text=True, check=False,
+        timeout=120,
+    )  # fmt: skip
+    assert done.returncode == 1
+    assert done.stderr.splitlines()[-1].endswith('under `if __name__ == "__main__":`')
+    assert done.stderr.count("Traceback") == 1  # of the script, none of its workers
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Ctrl-C is sent to a group of processes")

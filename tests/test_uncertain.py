@@ -442,7 +442,7 @@ def test_a_study_knows_what_is_undecided():
     assert found.undecided.tolist() == blind.tolist()
     lines = dict(found.headlines())
     assert "±" in lines["Lowest rate"]
-    assert "feed.force = 100, drive.reversal_distance = 0.02" in lines["Lowest rate"]
+    assert "feed.force = 100 N, drive.reversal_distance = 0.02 m" in lines["Lowest rate"]
     assert lines["Undecided"].startswith("2 ")
     assert found.to_pandas()["undecided"].tolist() == blind.tolist()
     assert found.to_xarray()["undecided"].values.ravel().tolist() == blind.tolist()

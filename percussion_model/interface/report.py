@@ -391,9 +391,7 @@ def render_study_report(found: Study) -> str:
         headlines=found.headlines(),
         axes=[_axis(found, k) for k in range(len(points.keys))],
         failures=[
-            (", ".join(f"{key} = {value:.6g}" for key, value in points.changes(k).items()),
-             found.failures[k])
-            for k in failed[:MOST_FAILURES]
+            (found.place(k), found.failures[k]) for k in failed[:MOST_FAILURES]
         ],
         failed=len(failed),
         figures=blocks,

@@ -210,9 +210,7 @@ def show_study(found: Study) -> None:
     print_table(table, console)
     failed = [k for k, text in enumerate(found.failures) if text]
     if failed:
-        at = found.points.changes(failed[0]).items()
-        place = ", ".join(f"{key} = {value:.5g}" for key, value in at)
-        first = f"{place}: {found.failures[failed[0]]}"
+        first = f"{found.place(failed[0])}: {found.failures[failed[0]]}"
         count = f"{len(failed)} of {len(found.points)} points failed"
         show_warnings(console, [f"{count}, the first at {first}"])
 

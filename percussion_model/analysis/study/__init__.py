@@ -24,7 +24,9 @@ from percussion_model.analysis.study.points import (
 from percussion_model.analysis.study.response import COMPUTING, FOUND, KINDS, run_points
 from percussion_model.analysis.study.store import Store
 from percussion_model.analysis.study.workers import on_a_cluster, on_this_machine
+from percussion_model.scene.rows import unit_suffix
 from percussion_model.scene.scene import Scene
+from percussion_model.simulation.driller_numbers import DRILLER_NUMBERS
 from percussion_model.simulation.files import ResultError, staged
 from percussion_model.simulation.uncertain import (
     NOT_ESTIMATED,
@@ -54,6 +56,8 @@ PARTS_A_PROCESS = 8
 LARGE_ERROR = 1e-3
 # Smaller errors of a rate, relative to it, do not show in its three digits.
 LEAST_ERROR = 1e-3
+# The rate of penetration as drillers know it.
+PER_HOUR = DRILLER_NUMBERS["rate_of_penetration"]
 # What errors there are, behind "those of the rate".
 KNOWN_ERRORS = (
     "are of convergence and scatter; that of the grid is not estimated, nor are those of the "
@@ -116,10 +120,20 @@ class Study:
             return np.full(len(points), self.scene.is_undamped)
         return np.asarray(self.scene.has_waves & (points.values[:, points.keys.index(key)] == 0.0))
 
-    def rate_text(self, k: int, unit: str = " mm/s") -> str:
-        """Rate of a point [mm/s] with its error of convergence and scatter, where that shows."""
+    def place(self, k: int) -> str:
+        """Parameters of a point with their values and units."""
+        return ", ".join(
+            f"{key} = {value:.5g}{unit_suffix(self.scene.row_of(key).unit)}"
+            for key, value in self.points.changes(k).items()
+        )
+
+    def rate_text(self, k: int, unit: str = " mm/s", factor: float = 1e3) -> str:
+        """Rate of a point with its error of convergence and scatter, where that shows.
+
+        `factor` makes it one in `unit`, of m/s.
+        """
         row = self.rows[k]
-        rate, error = (1e3 * float(row[f"rate_of_penetration{end}"]) for end in ("", "_error"))
+        rate, error = (factor * float(row[f"rate_of_penetration{end}"]) for end in ("", "_error"))
         if not math.isfinite(error):
             return f"{in_digits(rate)}{unit}, {NOT_ESTIMATED}"
         if error <= LEAST_ERROR * abs(rate):
@@ -141,10 +155,10 @@ class Study:
                 ("Lowest rate", np.nanargmin(rate)),
                 ("Highest rate", np.nanargmax(rate)),
             ):
-                at = ", ".join(
-                    f"{key} = {value:.5g}" for key, value in self.points.changes(int(k)).items()
+                in_an_hour = self.rate_text(int(k), f" {PER_HOUR.unit}", PER_HOUR.factor)
+                lines.append(
+                    (name, f"{self.rate_text(int(k))} ({in_an_hour}) at {self.place(int(k))}")
                 )
-                lines.append((name, f"{self.rate_text(int(k))} at {at}"))
         if undecided.any():
             of_cells = int(np.count_nonzero(undecided & self.depends_on_cells))
             hidden = int(np.count_nonzero(undecided)) - of_cells
@@ -229,6 +243,7 @@ def study(
     processes: int | None = None,
     cluster: str | None = None,
     progress: Callable[[int, int], None] | None = None,
+    force: bool = False,
 ) -> Study:
     """Find the stationary response at many points.
 
@@ -253,6 +268,8 @@ def study(
         Address of a Dask scheduler that does the work instead.
     progress : callable, optional
         Called with points done and their number.
+    force : bool
+        Remove another study that the folder holds.
 
     Returns
     -------
@@ -269,7 +286,7 @@ def study(
     """
     refuse_unknown(scene, points)
     check_request(scene, tolerance, most_blows, scatter)
-    store = Store(Path(folder), _plan(scene, points, tolerance, most_blows, scatter))
+    store = Store(Path(folder), _plan(scene, points, tolerance, most_blows, scatter), force)
     _rows, _failures, done = store.read(len(points))
     order = points.in_cheap_order()
     order = order[~done[order]]

@@ -10,9 +10,13 @@ import numpy as np
 
 from percussion_model.analysis.study.response import ROW
 from percussion_model.simulation.files import ResultError, load_arrays, reason, staged, to_json
+from percussion_model.simulation.result import REPORT
 
 PLAN = "study.json"
 PARTS = "parts"
+# What a finished study has beside its parts.
+WRITTEN = ("points.parquet", "points.nc", REPORT)
+_WAYS_OUT = "--force replaces it, another --out keeps it"
 # Entries of a plan that say which sources compute, not what.
 OF_SOURCES = ("version", "sources")
 
@@ -27,18 +31,22 @@ class Store:
     plan : dict
         What makes the study what it is, and the sources that compute it. A folder with
         another plan is refused.
+    force : bool
+        Remove another study instead. A folder that holds none is refused all the same.
     """
 
-    def __init__(self, folder: Path, plan: dict[str, Any]) -> None:
+    def __init__(self, folder: Path, plan: dict[str, Any], force: bool = False) -> None:
         self.folder = folder
         path = folder / PLAN
         text = to_json(plan) + "\n"
         if path.exists():
             if path.read_text(encoding="utf-8") != text:
-                raise ResultError(f"{folder}: {_difference(path, plan)}")
-        else:
-            if folder.exists() and any(folder.iterdir()):
-                raise ResultError(f"{folder}: is not empty and holds no study")
+                if not force:
+                    raise ResultError(f"{folder}: {_difference(path, plan)}")
+                _remove(folder)
+        elif folder.exists() and any(folder.iterdir()):
+            raise ResultError(f"{folder}: is not empty and holds no study: give another --out")
+        if not path.exists():
             with staged(folder) as draft:
                 (draft / PLAN).write_text(text, encoding="utf-8")
         (folder / PARTS).mkdir(exist_ok=True)
@@ -83,6 +91,14 @@ class Store:
         return rows, failures, done
 
 
+def _remove(folder: Path) -> None:
+    """Remove a study, its plan last: what an interruption leaves is still known as one."""
+    for path in (folder / PARTS).glob("*.npz"):
+        path.unlink()
+    for name in (*WRITTEN, PLAN):
+        (folder / name).unlink(missing_ok=True)
+
+
 def _difference(path: Path, plan: dict[str, Any]) -> str:
     """Say in what a plan that was found differs, and what to do."""
     try:
@@ -92,8 +108,8 @@ def _difference(path: Path, plan: dict[str, Any]) -> str:
     except (ValueError, AttributeError):
         same = False
     if not same:
-        return f"holds another study (see {PLAN} there): give another folder"
+        return f"holds another study (see {PLAN} there): {_WAYS_OUT}"
     return (
-        "its points were computed by other sources of percussion_model than those of now: give "
-        "another folder, or delete this one to compute them again"
+        "its points were computed by other sources of percussion_model than those of now: "
+        f"{_WAYS_OUT}"
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
@@ -14,6 +15,8 @@ from typing import Any
 
 from percussion_model.scene.inputs import SimulationError
 
+# Exit code of a worker that came to start workers itself, since it ran the script again.
+STARTED_AGAIN = 97
 # A pool whose workers die is made anew so often.
 MOST_RESTARTS = 3
 # One thread a process: their matrices are small, and the processes fill the machine.
@@ -55,12 +58,25 @@ def _in_a_pool(
     others = set(active_children())
     with _one_thread_each(), _interrupts_left_to_this_process():
         pool = ProcessPoolExecutor(processes, mp_context=get_context("spawn"))
-        running = {pool.submit(work, *task): number for number, task in tasks.items()}
+        try:
+            running = {pool.submit(work, *task): number for number, task in tasks.items()}
+        except RuntimeError as error:
+            if "bootstrapping" not in str(error):
+                raise
+            sys.exit(STARTED_AGAIN)  # multiprocessing starts none while a worker reads its script
+    workers = set(active_children()) - others
     try:
         while running:
             ended, _ = wait(running, return_when=FIRST_COMPLETED)
             for future in ended:
                 yield running.pop(future), future.result()
+    except BrokenProcessPool:
+        if any(worker.exitcode == STARTED_AGAIN for worker in workers):
+            raise SimulationError(
+                "worker processes read the script again, and would start workers themselves: put "
+                'what the script does under `if __name__ == "__main__":`'
+            ) from None
+        raise
     finally:
         if running:  # interrupted: what workers have begun is not waited for
             for worker in set(active_children()) - others:

@@ -57,6 +57,9 @@ def study(
         str | None,
         typer.Option("--cluster", metavar="ADDRESS", help="Dask scheduler, as tcp://host:8786."),
     ] = None,
+    force: Annotated[
+        bool, typer.Option("--force", help="Replace another study that is in the folder.")
+    ] = False,
 ) -> None:
     """Map the stationary response over parameters: points.parquet and points.nc."""
     from percussion_model.analysis.study import grid, latin_hypercube, read_axis
@@ -97,6 +100,7 @@ def study(
                     processes=processes,
                     cluster=cluster,
                     progress=report_count,
+                    force=force,
                 )
             files = found.save(out)
             if report:
