@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from percussion_model import Scene, SceneError, compare
-from percussion_model.analysis.comparison import COMPARED, Comparison, read_solvers
+from percussion_model.analysis.comparison import COMPARED, Comparison, read_solvers, usual_solvers
 from percussion_model.interface.cli import app
 from percussion_model.interface.commands import common
 from percussion_model.simulation.warnings import find_warnings
@@ -115,6 +115,13 @@ def test_command_gives_json_alone(tmp_path):
 def test_bad_lists_of_solvers_are_refused(text, reason):
     with pytest.raises(SceneError, match=reason):
         read_solvers(text)
+
+
+def test_a_scene_is_compared_with_its_own_solver_first():
+    assert usual_solvers(Scene()) == ("modal", "wave", "fem", "rigid")
+    assert usual_solvers(Scene().computed_by("wave"))[0] == "wave"
+    with pytest.raises(SceneError, match="only rigid computes this scene"):
+        usual_solvers(Scene.from_toml(RIGID))
 
 
 def test_a_solver_that_cannot_is_named_before_anything_runs():

@@ -101,7 +101,7 @@ def test_fmus_without_python_are_made(installed, built_library):
         pytest.skip("no C compiler, and no ziglang")
     said = installed.percussion("native", "rigid", "-o", "native").splitlines()
     assert len(said) == 2
-    assert all(line.endswith("}: written") for line in said)
+    assert all(line.endswith("}: written, from the scene rigid") for line in said)
 
 
 def test_a_system_is_built_valid_and_runs(installed):

@@ -79,7 +79,8 @@ def write_hammer(
     before = content(path)
     with progress("building the FMU"):
         guid = build_hammer(chosen, path, table, libraries)
-    typer.echo(f"{path} {{{guid}}}: {state_of(path, before)}")
+    source = options.baked_from(scene, scene_option)
+    typer.echo(f"{path} {{{guid}}}: {state_of(path, before)}, {source}")
     return path
 
 

@@ -54,8 +54,9 @@ def native(
         with progress(COMPILING):
             made = libraries(names)
         table = options.table_for(chosen, blow_map)
+        source = options.baked_from(scene, scene_option)
         for version, path in files.items():
             before = content(path)
             with progress(f"building the FMU of FMI {version}"):
                 guid = build_native(chosen, path, version, made, table)
-            typer.echo(f"{path} {{{guid}}}: {state_of(path, before)}")
+            typer.echo(f"{path} {{{guid}}}: {state_of(path, before)}, {source}")

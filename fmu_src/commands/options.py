@@ -42,6 +42,12 @@ def baked_scene(named: Path | None, option: Path | None) -> tuple[Path, Scene]:
     return file, Scene.from_toml(file)
 
 
+def baked_from(named: Path | None, option: Path | None) -> str:
+    """Say which scene was baked, for the line that tells of the FMU."""
+    chosen = named or option
+    return f"from the scene {chosen or REFERENCE}{'' if chosen else ', since none was named'}"
+
+
 def table_for(scene: Scene, wanted: bool) -> BlowTable | None:
     """Blow map that the FMU of a scene brings along, if it does."""
     if not wanted and scene.solver_name != "blow-map":

@@ -18,7 +18,7 @@ def system(
         list[Path] | None,
         typer.Argument(
             metavar="SYSTEM",
-            help="Files (TOML), or presets, as FeedControlRigid; left out: all of these.",
+            help="Files (TOML), or presets, as FeedControlRigid; left out: all of the presets.",
         ),
     ] = None,
     output: Annotated[
@@ -40,11 +40,15 @@ def system(
         checked = set()
         chosen = [find_plan(path) for path in systems or ()] or plans()
         common.check_outputs(output, None)
+        if not systems:
+            names = ", ".join(plan.name for plan in chosen)
+            common.print_message(f"no system is named, so all {len(chosen)} are built: {names}")
         with progress(COMPILING):
             library_here()
-        for plan in chosen:
+        for number, plan in enumerate(chosen, 1):
+            of_all = f" ({number} of {len(chosen)})" if len(chosen) > 1 else ""
             before = {path: content(path) for path in output.glob("*.*")}
-            with progress(f"building {plan.name}"):
+            with progress(f"building {plan.name}{of_all}"):
                 fmus = build_fmus(plan, output, force)
             for fmu in fmus.values():
                 if fmu in checked:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,6 +20,7 @@ __all__ = [
     "compare",
     "read_solvers",
     "solver_names",
+    "usual_solvers",
 ]
 
 # Numbers of a summary that solvers are compared by.
@@ -39,6 +41,9 @@ COMPARED = (
     "standstill_bit_force",
     "mean_bit_force",
 )
+
+# Compared where nothing else is asked for, behind the solver that the scene takes by itself.
+USUAL = ("modal", "wave", "fem", "rigid")
 
 # Numbers of the fall of a bit that nothing strikes, of a `Result.fall`.
 OF_FALL = ("depth", "first_contact", "rebound_velocity", "rest_time", "crushed")
@@ -209,6 +214,24 @@ def compare(
 def solver_names() -> tuple[str, ...]:
     """Names of all solvers, as a scene is computed by them."""
     return (*(name for name in SOLVER_NAMES if name != "auto"), "blow-map")
+
+
+def usual_solvers(scene: Scene) -> tuple[str, ...]:
+    """Solvers to compare a scene by where none are named: its own, then others that compute it.
+
+    Raises
+    ------
+    SceneError
+        If there is only its own.
+    """
+    names = [scene.solver_name]
+    for name in USUAL:
+        with suppress(SceneError):
+            scene.computed_by(name)
+            names += [name] * (name not in names)
+    if len(names) == 1:
+        raise SceneError(f"of the solvers {', '.join(USUAL)} only {names[0]} computes this scene")
+    return tuple(names)
 
 
 def read_solvers(text: str) -> tuple[str, ...]:

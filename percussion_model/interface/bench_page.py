@@ -21,11 +21,11 @@ from percussion_model.coupling.bench import (
     MOST_ERROR,
     MOST_VIOLATION,
     SETTLING,
-    TRIALS,
     Score,
 )
 from percussion_model.interface.bench_text import (
     COLUMNS,
+    TEXTS,
     about_errors,
     cells,
     mean_text,
@@ -43,7 +43,6 @@ STYLE = (
     "dl{display:grid;grid-template-columns:max-content auto;gap:.1em 1em}dd{margin:0}"
 )
 PAGE = "index.html"
-TEXTS = {trial.name: trial.text for trial in TRIALS}
 VOID_COLOUR, LIMIT_COLOUR = "#dddddd", "#bb0000"
 
 

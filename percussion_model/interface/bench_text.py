@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from percussion_model.coupling.bench import (
     STEP,
+    TRIALS,
     WITHIN_A_BLOW,
     Score,
     mean_points,
@@ -25,6 +26,8 @@ COLUMNS = (
     ("peak_force", "peak force [kN]", 1e-3, "greatest force of the rock on the bit"),
     ("violations", "beyond limits [s]", 1.0, "time beyond the limits of feed and torque"),
 )
+# What happens in each run.
+TEXTS = {trial.name: trial.text for trial in TRIALS}
 # A smaller error, by the number, does not show in three digits.
 SMALL = 5e-4
 # Points have one decimal; with an error that could change it they have more.
@@ -56,6 +59,19 @@ def points_text(points: float, error: float | None) -> str:
 def mean_text(scores: Sequence[Score]) -> str:
     """Return the mean of the points with its error."""
     return points_text(mean_points(scores), mean_points_error(scores))
+
+
+def about_columns() -> str:
+    """What each column is."""
+    texts = [f"{head.partition(' [')[0]}, {text}" for _, head, _, text in COLUMNS]
+    points = "points, 100 less what the feed error and time beyond the limits take"
+    return f"Columns: {'; '.join([points, *texts])}."
+
+
+def about_runs(scores: Sequence[Score]) -> str:
+    """What happens in the runs."""
+    texts = [f"{one.trial}, {TEXTS.get(one.trial, 'one of your own')}" for one in scores]
+    return f"Runs: {'; '.join(texts)}."
 
 
 def about_errors(scores: Sequence[Score]) -> str:

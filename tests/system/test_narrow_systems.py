@@ -11,6 +11,7 @@ from narrow import Printed, faults
 
 from percussion_model.coupling.master import Coupling
 from percussion_model.interface import progress
+from percussion_model.interface.bench_text import COLUMNS
 from percussion_model.interface.cli import INTERRUPTED, _guarded, app
 
 COMMANDS = {
@@ -56,10 +57,14 @@ def test_a_table_of_a_bench_is_whole_and_its_runs_are_told_elsewhere(
     begins = [k for k, row in enumerate(rows) if row[0] == "run"]
     assert len(begins) == 2
     for k in begins:
-        assert [row[0] for row in rows[k + 1 : k + 3]] == ["soft", "rod"]
-    assert rows[begins[-1] + 3][:4] == ["mean", "of", "the", "points:"]
+        assert [row[0] for row in rows[k + 2 : k + 4]] == ["soft", "rod"]  # below a rule
+    assert rows[begins[-1] + 4][:4] == ["mean", "of", "the", "points:"]
     units = [word for row in rows for word in row if word.startswith("[")]
     assert units == ["[mm]", "[MJ/m]", "[%]", "[%]", "[%]", "[s]", "[kN]", "[s]"]
+    said = " ".join(word for row in rows for word in row)
+    assert "Runs: soft, rock a third as stiff; rod, a rod is added." in said
+    for meaning in ("points, 100 less", *(text for *_, text in COLUMNS)):
+        assert meaning in said
 
 
 @pytest.mark.parametrize("name", COMMANDS)

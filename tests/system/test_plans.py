@@ -4,6 +4,8 @@ from pathlib import Path
 
 import pytest
 
+from fmu_src.native import library
+from fmu_src.system import archive
 from fmu_src.system.archive import SYSTEMS, find_plan, plans, read_plan
 from percussion_model.scene.presets import scene_presets
 from tests.commands import percussion
@@ -67,3 +69,16 @@ def test_systems_that_ship_go_by_name(capsys):
     assert said.count("\n") == 1
     for one in plans():
         assert one.name in said
+
+
+def test_without_a_name_all_are_built_and_named_first(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(archive, "build_fmus", lambda plan, folder, force: {})
+    monkeypatch.setattr(archive, "write_system", lambda plan, fmus, path: path)
+    monkeypatch.setattr(library, "library_here", dict)
+    assert percussion("system", "-o", tmp_path) == 0
+    said = capsys.readouterr()
+    names = [plan.name for plan in plans()]
+    assert f"all {len(names)} are built: {', '.join(names)}" in " ".join(said.err.split())
+    assert [Path(line.partition(":")[0]).stem for line in said.out.splitlines()] == names
+    assert percussion("system", "FeedControl", "-o", tmp_path) == 0
+    assert "no system is named" not in capsys.readouterr().err

@@ -14,8 +14,14 @@ from percussion_model.interface.commands.blow_map import prepare_map
 def compare(
     scene: common.SceneFile,
     solvers: Annotated[
-        str, typer.Option("--solvers", metavar="A,B", help="Solvers, the first to compare with.")
-    ] = "wave,fem,rigid",
+        str | None,
+        typer.Option(
+            "--solvers",
+            metavar="A,B",
+            help="Solvers, the first to compare with; left out: the scene's own, and modal, "
+            "wave, fem and rigid as far as they compute it.",
+        ),
+    ] = None,
     duration: common.Duration = None,
     settle: common.Settle = None,
     settings: common.Settings = None,
@@ -26,11 +32,12 @@ def compare(
 ) -> None:
     """Run a scene with several solvers: a table, and a figure in out/SCENE-compared."""
     from percussion_model.analysis.comparison import compare as run_all
-    from percussion_model.analysis.comparison import read_solvers
+    from percussion_model.analysis.comparison import read_solvers, usual_solvers
     from percussion_model.interface.terminal import progress, progress_bar, show_comparison
 
-    names = read_solvers(solvers)
+    asked = None if solvers is None else read_solvers(solvers)
     chosen = common.load_scene(scene, settings=settings, is_run=False)
+    names = asked or usual_solvers(chosen)
     for name in names:
         chosen.computed_by(name)  # refuses before anything is claimed or compiled
     common.check_json(json_file)

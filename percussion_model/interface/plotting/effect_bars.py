@@ -81,7 +81,7 @@ def _handles(found: EffectsStudy) -> list[Patch | Line2D]:
     changes = [found.change(trial, key) for trial in found.trials for key in found.changed]
     known = [one for one in changes if one.value is not None and not one.is_undecided]
     handles: list[Patch | Line2D] = [
-        Patch(facecolor=COST_COLOUR, label="computing time by that of the scene as it is"),
+        Patch(facecolor=COST_COLOUR, label="computing time divided by that of the scene as it is"),
         Patch(facecolor=MORE_COLOUR, label="more than in the scene as it is"),
         Patch(facecolor=LESS_COLOUR, label="less than in it"),
     ]
