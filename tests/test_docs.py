@@ -108,6 +108,24 @@ def test_what_scripts_write_into_a_page_has_its_marks(name):
     assert text.index(module.BEGIN) < text.index(module.END)
 
 
+def words_by_hand(text):
+    """Count words outside of code, equations on lines of their own, and what scripts write."""
+    text = re.sub(r"<!-- (tables: )?begin.*?<!-- (tables: )?end -->", "", text, flags=re.DOTALL)
+    text = re.sub(r"<!-- (\w+) -->.*?<!-- end of \1 -->", "", text, flags=re.DOTALL)
+    text = re.sub(r"```.*?```|\$\$.*?\$\$", "", text, flags=re.DOTALL)
+    return sum(bool(re.search(r"[A-Za-z0-9]", word)) for word in text.split())
+
+
+def test_guides_are_short():
+    docs = ROOT / "docs"
+    written = {docs / "parameters.md", docs / "stability_record.md"}  # by scripts; a record
+    pages = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", docs / "reference" / "api.md"]
+    pages += sorted({*docs.glob("*.md")} - written)
+    pages += [*docs.glob("tutorials/*.md"), *docs.glob("how_to/*.md")]
+    assert len(pages) > 30
+    assert sum(words_by_hand(page.read_text(encoding="utf-8")) for page in pages) <= 25_000
+
+
 def test_pictures_are_small():
     for path in (ROOT / "docs" / "images").iterdir():
         assert path.stat().st_size < 300_000, path.name
