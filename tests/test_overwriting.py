@@ -42,16 +42,16 @@ def contents(folder):
 def test_another_setting_does_not_replace_what_a_named_folder_holds(percussion):
     assert percussion(*RUN, "--no-figures", "--out", "x")[0] == 0
     before = contents("x")
-    code, said = percussion(*RUN, "--no-figures", "--out", "x", "--set", "feed.force=150")
+    code, said = percussion(*RUN, "--no-figures", "--out", "x", "--set", "feed.force=1500")
     assert code == 2
     assert said == (
-        "percussion: x holds another result (feed.force 2500.0, now 150.0): "
+        "percussion: x holds another result (feed.force 2500.0 N, now 1500.0 N): "
         "--force replaces it, another --out keeps it"
     )
     assert contents("x") == before
-    forced = [*RUN, "--no-figures", "--out", "x", "--set", "feed.force=150", "--force"]
+    forced = [*RUN, "--no-figures", "--out", "x", "--set", "feed.force=1500", "--force"]
     assert percussion(*forced)[0] == 0
-    assert "force = 150.0" in Path("x/scene.toml").read_text()
+    assert "force = 1500.0" in Path("x/scene.toml").read_text()
     # what made it is known from now on: no --force is needed again
     assert percussion(*forced[:-1])[0] == 0
 

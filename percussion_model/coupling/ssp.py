@@ -57,7 +57,9 @@ def unpack(path: Path, folder: str, allowance: Allowance) -> Archive:
         What the archive may take; one that is trusted may name FMUs outside of it.
     """
     if not path.is_file():
-        raise CouplingError(f"{path}: no such file; `percussion system` makes archives in dist")
+        raise CouplingError(
+            f"{path}: no such file; `percussion system {path.stem}` makes it in dist, if it ships"
+        )
     try:
         unpack_zip(path, Path(folder), allowance)
         _check_files(path.name, Path(folder), allowance)

@@ -14,6 +14,8 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from percussion_model.scene.parameters import find_row
+from percussion_model.scene.rows import unit_suffix
 from percussion_model.simulation.files import ResultError, check_writable, staged_text, to_json
 
 ORIGIN = "made_by.json"
@@ -118,12 +120,19 @@ def _other_than(folder: Path, origin: Mapping[str, Any]) -> str:
         return f"holds the result of `{_typed(found.get('command'))}`"
     keys = sorted(key for key in found.keys() | origin.keys() if found.get(key) != origin.get(key))
     shown = [
-        f"{key.removeprefix('scene.')} {found.get(key, 'not set')}, "
-        f"now {origin.get(key, 'not set')}"
+        f"{key.removeprefix('scene.')} {_told(key, found)}, now {_told(key, origin)}"
         for key in keys
     ]
     more = f", and {len(keys) - SHOWN} more" if len(keys) > SHOWN else ""
     return f"holds another result ({'; '.join(shown[:SHOWN])}{more})"
+
+
+def _told(key: str, origin: Mapping[str, Any]) -> str:
+    """An entry as text, with its unit where it is a number of a scene."""
+    if key not in origin:
+        return "not set"
+    row = find_row(key.removeprefix("scene."))
+    return f"{origin[key]}{unit_suffix(row.unit) if row is not None else ''}"
 
 
 def _typed(command: Any) -> str:
