@@ -114,7 +114,7 @@ def whole_environment(folder: Path, wheel: Path, python: str, extra: str) -> Env
     subprocess.run([python, "-m", "venv", str(folder / "venv")], check=True)
     made = _environment(folder)
     pip = [str(made.program("python")), "-m", "pip", "install", "-q"]
-    subprocess.run([*pip, f"{wheel}[{extra}]"], check=True)
+    subprocess.run([*pip, f"{wheel}[{extra}]"], check=True, env=made.variables)
     return made
 
 
