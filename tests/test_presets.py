@@ -60,7 +60,7 @@ def test_a_misspelt_name_is_told_the_one_that_was_meant(words, meant, capsys):
     assert percussion(*words) == BAD_INPUT
     said = capsys.readouterr().err
     assert said.count("\n") == 1
-    assert f": did you mean {meant}? They are " in said
+    assert f": did you mean {meant}? Known are " in said
 
 
 def test_a_name_that_no_file_can_have_is_refused():

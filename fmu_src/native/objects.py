@@ -148,9 +148,9 @@ def compile_entries() -> str:
     return _counting_plainly(_without_words(str(whole)))
 
 
-# How numba's code counts who holds an array. Its own functions are never put into their callers,
-# so that each view of plain memory, which nobody holds, costs some calls; and they count for
-# several threads at once, where an array of the library lives within one call.
+# How numba's code counts who holds an array. Numba's own two functions are never inlined, so that
+# each view of plain memory, which nobody holds, costs some calls. Inlined, a count of nothing is
+# left out. Nor need the count be atomic: an array lives within one call, in one thread.
 _COUNTING = """
 define linkonce_odr void @NRT_incref(ptr %array) alwaysinline {
   %none = icmp eq ptr %array, null

@@ -262,7 +262,7 @@ def nearest(name: str, known: Collection[str]) -> str:
 def said_among(name: str, known: Collection[str]) -> str:
     """Say which names there are, and before them the one that was meant, if one is near."""
     near, names = nearest(name, known), ", ".join(known)
-    return f"did you mean {near}? They are {names}" if near else f"they are {names}"
+    return f"did you mean {near}? Known are {names}" if near else f"known are {names}"
 
 
 def refuse_value(row: Row, key: str, value: Any) -> str:

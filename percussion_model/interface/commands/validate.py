@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,9 +12,6 @@ from percussion_model.interface.commands import common
 
 if TYPE_CHECKING:
     from percussion_model.verification.measured import Comparison
-
-# Columns of numbers.
-RIGHT = ("measured", "computed", "by fit", "off", "criterion")
 
 
 def validate(
@@ -94,19 +92,28 @@ def show_validation(found: Comparison) -> None:
     from percussion_model.verification.measured import table as texts
 
     console = Console()
+
+    def print_rows(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
+        table = Table(box=SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=0)
+        for k, heading in enumerate(headings):
+            justify = "right" if texts.is_number(heading) else "left"
+            table.add_column(heading, justify=justify, no_wrap=k > 0)  # type: ignore[arg-type]
+        for row in rows:
+            table.add_row(*row)
+        print_table(table, console)
+        console.print()
+
     titles = {one.name: one.title for one in found.experiments}
     for fit in found.fits:
         head = f"{titles[fit.experiment]}. Law {fit.law}, fit {fit.name}:"
         console.print(f"[bold]{escape(wrapped(head))}[/bold]", highlight=False)
         console.print(wrapped(texts.parameters_text(fit)), highlight=False)
-        table = Table(box=SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=0)
-        for k, heading in enumerate(texts.HEADINGS):
-            justify = "right" if heading in RIGHT else "left"
-            table.add_column(heading, justify=justify, no_wrap=k > 0)  # type: ignore[arg-type]
-        for row in found.of(fit.experiment, fit.name):
-            table.add_row(*texts.cells(row))
-        print_table(table, console)
-        console.print()
+        print_rows(texts.HEADINGS, map(texts.cells, found.of(fit.experiment, fit.name)))
+    for title, headings, rows in texts.variant_tables(found):
+        console.print(f"[bold]{escape(wrapped(title))}[/bold]", highlight=False)
+        print_rows(headings, rows)
+    for name, why in texts.reasons_of_variants(found).items():
+        show_note(console, name, why)
     for why, ids in texts.reasons(found).items():
         show_note(console, f"no criterion for {', '.join(ids)}", why)
     for note in (*texts.NOTES, texts.count_text(found)):

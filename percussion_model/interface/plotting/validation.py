@@ -134,7 +134,7 @@ def _displacements(
             let_go = blow.time[np.argmax(blow.in_flight & (blow.time > blow.time[deepest(blow)]))]
             _measured(ax, let_go * US, row.measured * MM, row.error * MM, colour)
     ax.legend(loc="best")
-    title = "Displacement of the bit's lower end, and thin of its mean"
+    title = "Displacement of the bit's lower end, thin: of its mean"
     style.label(ax, "time [µs]", "down [mm]", title)
 
 
@@ -246,7 +246,7 @@ def _deviations(ax: Axes, rows: list[Row]) -> None:
     ax.tick_params(axis="y", length=0)
     ax.set_ylim(len(names) - 0.4, -0.6)
     ax.axvline(0.0, color=style.RULE_COLOUR, linewidth=0.8)
-    style.label(ax, "computed less measured, by the criterion", "", "Deviations")
+    style.label(ax, "computed less measured, divided by the criterion", "", "Deviations")
 
 
 def _deviation(ax: Axes, row: Row, y: int) -> None:

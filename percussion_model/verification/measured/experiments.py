@@ -17,6 +17,7 @@ from percussion_model.scene.rows import shortened
 from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.scene.text import read_toml
 from percussion_model.scene.units import UnitError, in_si
+from percussion_model.verification.measured.blow import SLOPE_TO
 from percussion_model.verification.measured.quantities import QUANTITIES
 
 _HERE = Path(__file__).resolve().parent
@@ -133,7 +134,7 @@ class Variant:
     changes: dict[str, Any] = field(default_factory=dict)
     gauge: float | None = None
     end: bool = False
-    slope_to: float = 0.9
+    slope_to: float = SLOPE_TO
     after_run: bool = False
 
 
@@ -243,7 +244,7 @@ def _experiment(name: str, tree: dict[str, Any]) -> Experiment:
         )
     source = _table(tree, "source")
     _refuse_keys("source.", source, ("published", "doi", "read_in"))
-    gauge = _length(tree, "gauge", scene)
+    gauge = _gauge("", tree, scene)
     rows = _rows(tree, "measured")
     measured = [_measurement(f"measured.{k}", row) for k, row in enumerate(rows)]
     for k, one in enumerate(measured):
@@ -270,11 +271,11 @@ def _measurement(where: str, row: dict[str, Any]) -> Measurement:
         f"{where}.", row, ("id", "quantity", "value", "error", "kind", "read"),
         ("speed", "second_hand", "within", "no_criterion"),
     )  # fmt: skip
-    name = _choice(where, row, "quantity", tuple(QUANTITIES))
+    name = _choice(f"{where}.", row, "quantity", tuple(QUANTITIES))
     quantity = QUANTITIES[name]
-    value = _number(where, row, "value", quantity.si)
-    error = _number(where, row, "error", quantity.si)
-    speed = _number(where, row, "speed", "m/s") if "speed" in row else None
+    value = _number(f"{where}.", row, "value", quantity.si)
+    error = _number(f"{where}.", row, "error", quantity.si)
+    speed = _number(f"{where}.", row, "speed", "m/s") if "speed" in row else None
     if not (value > 0.0 and 0.0 < error <= value):
         raise ExperimentError(
             f"{where}: value and error must be above 0, and the error no more than the value, not "
@@ -284,7 +285,7 @@ def _measurement(where: str, row: dict[str, Any]) -> Measurement:
         raise ExperimentError(f"{where}.speed = {speed:g} m/s: must be above 0")
     if ("within" in row) == ("no_criterion" in row):
         raise ExperimentError(f"{where}: must have either within or no_criterion")
-    within = _number(where, row, "within", "-") if "within" in row else None
+    within = _number(f"{where}.", row, "within", "-") if "within" in row else None
     if within is not None and not 0.0 < within < 1.0:
         raise ExperimentError(f"{where}.within = {within:g}: must be above 0 and below 1")
     second_hand = row.get("second_hand", False)
@@ -292,7 +293,7 @@ def _measurement(where: str, row: dict[str, Any]) -> Measurement:
         raise ExperimentError(f"{where}.second_hand = {second_hand!r}: must be true or false")
     return Measurement(
         id=_text(f"{where}.", row, "id"), quantity=name, value=value, error=error,
-        kind=_choice(where, row, "kind", KINDS), read=_text(f"{where}.", row, "read"),
+        kind=_choice(f"{where}.", row, "kind", KINDS), read=_text(f"{where}.", row, "read"),
         speed=speed, second_hand=second_hand, within=within,
         no_criterion=_text(f"{where}.", row, "no_criterion") if "no_criterion" in row else "",
     )  # fmt: skip
@@ -302,10 +303,10 @@ def _fit(
     where: str, row: dict[str, Any], measured: Mapping[str, Measurement], before: Sequence[str]
 ) -> FitPlan:
     _refuse_keys(f"{where}.", row, ("name", "law", "parameters", "to"), ("predicts", "start"))
-    law = _choice(where, row, "law", tuple(LAWS))
-    parameters = _words(where, row, "parameters", tuple(LAWS[law]))
-    to = _words(where, row, "to", tuple(measured))
-    predicts = _words(where, row, "predicts", tuple(measured)) if "predicts" in row else ()
+    law = _choice(f"{where}.", row, "law", tuple(LAWS))
+    parameters = _words(f"{where}.", row, "parameters", tuple(LAWS[law]))
+    to = _words(f"{where}.", row, "to", tuple(measured))
+    predicts = _words(f"{where}.", row, "predicts", tuple(measured)) if "predicts" in row else ()
     if not parameters or len(parameters) != len(to):
         raise ExperimentError(
             f"{where}: {len(parameters)} parameters to {len(to)} measurements: must be as many"
@@ -313,7 +314,7 @@ def _fit(
     both = sorted(set(to) & set(predicts))
     if both:
         raise ExperimentError(f"{where}: {both[0]!r} is both fitted and predicted")
-    start = _choice(where, row, "start", tuple(before)) if "start" in row else ""
+    start = _choice(f"{where}.", row, "start", tuple(before)) if "start" in row else ""
     name = _text(f"{where}.", row, "name")
     if name in before:
         raise ExperimentError(f"{where}.name = {name!r}: another fit has this name")
@@ -327,11 +328,11 @@ def _variant(where: str, row: dict[str, Any], scene: Scene) -> Variant:
     end, after_run = row.get("end", False), row.get("after_run", False)
     if not isinstance(changes, dict) or not (isinstance(end, bool) and isinstance(after_run, bool)):
         raise ExperimentError(f"{where}: changes must be a table, end and after_run true or false")
-    slope_to = _number(where, row, "slope_to", "-") if "slope_to" in row else 0.9
+    slope_to = _number(f"{where}.", row, "slope_to", "-") if "slope_to" in row else SLOPE_TO
     if not 0.2 <= slope_to <= 1.0:
         raise ExperimentError(f"{where}.slope_to = {slope_to:g}: must be from 0.2 to 1")
     changed = scene.replace(**changes)
-    gauge = _length(row, "gauge", changed)
+    gauge = _gauge(f"{where}.", row, changed)
     name, why = (_text(f"{where}.", row, key) for key in ("name", "why"))
     return Variant(name, why, changes, gauge, end, slope_to, after_run)
 
@@ -379,7 +380,7 @@ def _choice(where: str, row: Mapping[str, Any], key: str, allowed: Sequence[str]
     value = row[key]
     if value not in allowed:
         raise ExperimentError(
-            f"{where}.{key} = {shortened(repr(value))}: must be one of {', '.join(allowed)}"
+            f"{where}{key} = {shortened(repr(value))}: must be one of {', '.join(allowed)}"
         )
     return str(value)
 
@@ -387,14 +388,14 @@ def _choice(where: str, row: Mapping[str, Any], key: str, allowed: Sequence[str]
 def _words(where: str, row: Mapping[str, Any], key: str, allowed: Sequence[str]) -> tuple[str, ...]:
     words = row[key]
     if not isinstance(words, list):
-        raise ExperimentError(f"{where}.{key}: must be a list")
+        raise ExperimentError(f"{where}{key}: must be a list")
     for word in words:
         if word not in allowed:
             raise ExperimentError(
-                f"{where}.{key}: {shortened(repr(word))} must be one of {', '.join(allowed)}"
+                f"{where}{key}: {shortened(repr(word))} must be one of {', '.join(allowed)}"
             )
     if len(set(words)) < len(words):
-        raise ExperimentError(f"{where}.{key}: each may be there once")
+        raise ExperimentError(f"{where}{key}: each may be there once")
     return tuple(words)
 
 
@@ -408,21 +409,21 @@ def _number(where: str, row: Mapping[str, Any], key: str, si: str) -> float:
     except (TypeError, ValueError, UnitError):
         unit = "" if si == "-" else f", with its unit or in {si}"
         raise ExperimentError(
-            f"{where}.{key} = {shortened(repr(value))}: must be a number{unit}"
+            f"{where}{key} = {shortened(repr(value))}: must be a number{unit}"
         ) from None
     if not math.isfinite(number):
-        raise ExperimentError(f"{where}.{key}: must be finite")
+        raise ExperimentError(f"{where}{key}: must be finite")
     return number
 
 
-def _length(row: Mapping[str, Any], key: str, scene: Scene) -> float | None:
+def _gauge(where: str, row: Mapping[str, Any], scene: Scene) -> float | None:
     """Place of a gauge on the bit [m]."""
-    if key not in row:
+    if "gauge" not in row:
         return None
-    place = _number("", row, key, "m")
+    place = _number(where, row, "gauge", "m")
     if not 0.0 < place < scene.bit.length:
         raise ExperimentError(
-            f"{key} = {place:g} m: must be above 0 and below {scene.bit.length:g} m, the bit's "
-            "length"
+            f"{where}gauge = {place:g} m: must be above 0 and below {scene.bit.length:g} m, the "
+            "bit's length"
         )
     return place

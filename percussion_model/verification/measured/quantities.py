@@ -56,7 +56,7 @@ QUANTITIES = {
         "penetration, before the piston strikes it again",
     ),
     "restitution": Quantity(
-        "restitution", "-", "-", 1.0, "rebound speed by indentation speed", False
+        "restitution", "-", "-", 1.0, "rebound speed divided by indentation speed", False
     ),
     "loading_end": Quantity(
         "end of loading", "s", "us", 1e-6,
@@ -68,6 +68,6 @@ QUANTITIES = {
         "slope of force over penetration between 10 and 90 % of the peak force while it rises",
     ),
     "secant_stiffness": Quantity(
-        "secant stiffness", "N/m", "kN/mm", 1e6, "peak force by the penetration then"
+        "secant stiffness", "N/m", "kN/mm", 1e6, "peak force divided by the penetration then"
     ),
 }  # fmt: skip

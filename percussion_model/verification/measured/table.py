@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, fields
 
 from percussion_model.simulation.uncertain import in_digits, with_short_error
@@ -19,6 +19,7 @@ from percussion_model.verification.measured.comparison import (
     Comparison,
     FoundFit,
     Row,
+    VariantRow,
 )
 from percussion_model.verification.measured.experiments import Measurement
 from percussion_model.verification.measured.quantities import QUANTITIES, Quantity
@@ -26,6 +27,8 @@ from percussion_model.verification.measured.quantities import QUANTITIES, Quanti
 HEADINGS = (
     "number", "verdict", "measured", "kind", "computed", "by fit", "off", "criterion",
 )  # fmt: skip
+# Those of words; all others are of numbers.
+OF_WORDS = ("", "number", "verdict", "kind")
 # Of a source, and the sign for it.
 SECOND_HAND, STAR = ", second hand", "*"
 # A smaller error, relative to the number, is not shown.
@@ -43,6 +46,11 @@ NOTES = (
     "off and criterion are shares of the measured number; of a restitution, differences.",
     "What is fitted is no success: a fit has as many parameters as numbers.",
 )
+
+
+def is_number(heading: str) -> bool:
+    """Whether a column has numbers, which stand at its right."""
+    return heading not in OF_WORDS
 
 
 def shown(quantity: Quantity, value: float, error: float) -> str:
@@ -170,15 +178,17 @@ def markdown(found: Comparison) -> Iterator[str]:
             fit = found.found(one.name, plan.name)
             yield f"**Law {plan.law}, fit {plan.name}**: {parameters_text(fit)}."
             yield ""
-            yield "| " + " | ".join(HEADINGS) + " |"
-            yield "|---|---|---:|---|---:|---:|---:|---:|"
-            for row in found.of(one.name, plan.name):
-                yield "| " + " | ".join(_emphasised(row)) + " |"
-            yield ""
+            yield from _table(HEADINGS, map(_emphasised, found.of(one.name, plan.name)))
     for why, ids in reasons(found).items():
         yield f"- No criterion for {', '.join(ids)}: {why}."
     yield ""
-    yield from _variants(found)
+    for title, headings, rows in variant_tables(found):
+        yield f"### {title}"
+        yield ""
+        yield from _table(headings, rows)
+    for name, why in reasons_of_variants(found).items():
+        yield f"- *{name}*: {why}"
+    yield ""
 
 
 def _emphasised(row: Row) -> list[str]:
@@ -187,37 +197,54 @@ def _emphasised(row: Row) -> list[str]:
     return texts
 
 
-def _variants(found: Comparison) -> Iterator[str]:
-    """What other rigs and readings change, a table for each experiment and fit."""
+def variant_tables(found: Comparison) -> Iterator[tuple[str, list[str], list[list[str]]]]:
+    """What other rigs and readings change: title, headings and rows, for each fit that has them."""
     for one in found.experiments:
         for plan in one.fits:
-            rows = [r for r in found.variants if (r.experiment, r.fit) == (one.name, plan.name)]
-            rows = [r for r in rows if r.role == PREDICTED]
+            rows = [
+                r
+                for r in found.variants
+                if (r.experiment, r.fit, r.role) == (one.name, plan.name, PREDICTED)
+            ]
             if not rows:
                 continue
-            ids = list(dict.fromkeys(r.id for r in rows))
-            yield f"### {one.title}, {plan.name}: other rigs and readings"
-            yield ""
-            yield "| | " + " | ".join(ids) + " |"
-            yield "|---|" + "---:|" * len(ids)
             first = {r.id: r for r in rows}
-            yield _line("measured", [first[name].measured for name in ids], first, ids)
-            yield _line("as above", [first[name].base for name in ids], first, ids)
+            lines = [
+                ("measured", {r.id: r.measured for r in rows}),
+                ("as above", {r.id: r.base for r in rows}),
+            ]
             for variant in one.variants:
-                own = {r.id: r.computed for r in rows if r.variant == variant.name}
                 late = " (added after the first run)" if variant.after_run else ""
-                yield _line(variant.name + late, [own[name] for name in ids], first, ids)
-            yield ""
-        for variant in one.variants:
-            yield f"- *{variant.name}*: {variant.why}"
-        if one.variants:
-            yield ""
+                own = {r.id: r.computed for r in rows if r.variant == variant.name}
+                lines.append((variant.name + late, own))
+            yield (
+                f"{one.title}, {plan.name}: other rigs and readings",
+                ["", *first],
+                [[name, *(_text(first[key], own[key]) for key in first)] for name, own in lines],
+            )
 
 
-def _line(name: str, values: list[float], first: dict, ids: list[str]) -> str:
-    texts = []
-    for key, value in zip(ids, values, strict=True):
-        quantity = QUANTITIES[first[key].quantity]
-        unit = "" if quantity.unit == "-" else f" {quantity.unit.replace('us', 'µs')}"
-        texts.append(in_digits(value / quantity.scale, 3) + unit)
-    return f"| {name} | " + " | ".join(texts) + " |"
+def _text(row: VariantRow, value: float) -> str:
+    quantity = QUANTITIES[row.quantity]
+    unit = "" if quantity.unit == "-" else f" {quantity.unit.replace('us', 'µs')}"
+    return in_digits(value / quantity.scale, 3) + unit
+
+
+def reasons_of_variants(found: Comparison) -> dict[str, str]:
+    """Why each other rig or reading was tried, by its name."""
+    tried = {row.variant for row in found.variants}
+    return {
+        variant.name: variant.why
+        for one in found.experiments
+        for variant in one.variants
+        if variant.name in tried
+    }
+
+
+def _table(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> Iterator[str]:
+    """Lines of a table in Markdown."""
+    yield f"| {' | '.join(headings)} |"
+    yield f"|{'|'.join('---:' if is_number(one) else '---' for one in headings)}|"
+    for row in rows:
+        yield f"| {' | '.join(row)} |"
+    yield ""
