@@ -55,6 +55,8 @@ def shown(capsys, tmp_path, monkeypatch):
         ["settled", REFERENCE],
         ["settled", RIGID, "--set", "drive.reversal_distance=0.002"],
         ["explain", REFERENCE],
+        ["rocks"],
+        ["rocks", "kuru-granite:10"],
         ["explain", str(ROOT / "scenarios" / "top_hammer.toml"), "--solver", "rigid"],
         ["effects", RIGID, *SHORT, "--no-figures"],
         [
@@ -71,7 +73,7 @@ def shown(capsys, tmp_path, monkeypatch):
         ],
         ["new", "mine.toml"],
     ],
-    ids=lambda words: f"{words[0]} {Path(words[1]).stem}",
+    ids=lambda words: " ".join(Path(word).stem for word in words[:2]),
 )
 def test_commands_fit(shown, arguments):
     code, text = shown(*arguments)

@@ -40,6 +40,7 @@ def fmu(
         bool, typer.Option("--no-reference", help="Do not run it for _in.csv and _ref.csv.")
     ] = False,
     force: options.Force = False,
+    rock: common.RockName = None,
     scene_option: options.BakedToo = None,
 ) -> None:
     """Bake a scene into an FMU for co-simulation, FMI 2.0, which runs Python.
@@ -50,7 +51,7 @@ def fmu(
         if pneumatics:
             write_drive(output)
             return
-        path = write_hammer(scene, output, platforms, blow_map, force, scene_option)
+        path = write_hammer(scene, output, platforms, blow_map, force, scene_option, rock)
         if not no_reference:
             _write_reference(path)
 
@@ -62,13 +63,14 @@ def write_hammer(
     blow_map: bool = False,
     force: bool = False,
     scene_option: Path | None = None,
+    rock: str | None = None,
 ) -> Path:
     """Write the FMU of a scene and say so; the parameters are those of `fmu`."""
     from fmu_src.archive import content, state_of
     from fmu_src.hammer.build import about_hammer, build_hammer, hammer_name, refuse_other
     from percussion_model.interface.terminal import progress
 
-    file, chosen = options.baked_scene(scene, scene_option)
+    file, chosen = options.baked_scene(scene, scene_option, rock)
     names = None if platforms is None else _export_platforms(platforms)
     path = output or options.DIST / hammer_name(file, "Ladder" if blow_map else "")
     refuse_other(path, chosen, blow_map or chosen.solver_name == "blow-map", force)
@@ -79,7 +81,7 @@ def write_hammer(
     before = content(path)
     with progress("building the FMU"):
         guid = build_hammer(chosen, path, table, libraries)
-    source = options.baked_from(scene, scene_option)
+    source = options.baked_from(scene, scene_option, rock)
     typer.echo(f"{path} {{{guid}}}: {state_of(path, before)}, {source}")
     return path
 

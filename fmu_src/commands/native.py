@@ -26,6 +26,7 @@ def native(
     ] = None,
     blow_map: options.BlowMap = False,
     force: options.Force = False,
+    rock: common.RockName = None,
     scene_option: options.BakedToo = None,
 ) -> None:
     """Bake a scene into FMUs that need no Python, of FMI 2.0 and 3.0.
@@ -44,7 +45,7 @@ def native(
             raise common.refusal(
                 f"-o {output}: must be a folder, which two FMUs go to, of FMI 2.0 and of FMI 3.0"
             )
-        file, chosen = options.baked_scene(scene, scene_option)
+        file, chosen = options.baked_scene(scene, scene_option, rock)
         names = platform_names((platforms or this_platform()).split(","))
         files = native_files(file, output, blow_map)
         with_map = blow_map or chosen.solver_name == "blow-map"
@@ -54,7 +55,7 @@ def native(
         with progress(COMPILING):
             made = libraries(names)
         table = options.table_for(chosen, blow_map)
-        source = options.baked_from(scene, scene_option)
+        source = options.baked_from(scene, scene_option, rock)
         for version, path in files.items():
             before = content(path)
             with progress(f"building the FMU of FMI {version}"):

@@ -30,8 +30,10 @@ BlowMap = Annotated[
 Force = Annotated[bool, typer.Option("--force", help="Replace the FMU of another scene.")]
 
 
-def baked_scene(named: Path | None, option: Path | None) -> tuple[Path, Scene]:
-    """File of the scene to bake, and the scene."""
+def baked_scene(
+    named: Path | None, option: Path | None, rock: str | None = None
+) -> tuple[Path, Scene]:
+    """File of the scene to bake, and the scene, with the rock that is asked for."""
     from percussion_model.scene.presets import scene_file
     from percussion_model.scene.scene import Scene
 
@@ -39,13 +41,14 @@ def baked_scene(named: Path | None, option: Path | None) -> tuple[Path, Scene]:
         raise common.refusal(f"--scene {option}: a scene is given already, {named}")
     common.load_numba()
     file = scene_file(named or option or REFERENCE)
-    return file, Scene.from_toml(file)
+    return file, Scene.from_toml(file).replace(**common.rock_changes(rock))
 
 
-def baked_from(named: Path | None, option: Path | None) -> str:
+def baked_from(named: Path | None, option: Path | None, rock: str | None = None) -> str:
     """Say which scene was baked, for the line that tells of the FMU."""
     chosen = named or option
-    return f"from the scene {chosen or REFERENCE}{'' if chosen else ', since none was named'}"
+    told = f"from the scene {chosen or REFERENCE}{'' if chosen else ', since none was named'}"
+    return told if rock is None else f"{told}, with the rock {rock}"
 
 
 def table_for(scene: Scene, wanted: bool) -> BlowTable | None:

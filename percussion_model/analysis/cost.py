@@ -10,6 +10,7 @@ from typing import Any
 
 from percussion_model.analysis.blow_maps import MapCost, kept_map, map_cost
 from percussion_model.analysis.stationary import MOST_BLOWS
+from percussion_model.scene.rocks import rock_of
 from percussion_model.scene.scales import scales
 from percussion_model.scene.scene import Scene
 from percussion_model.simulation.accuracy_control import has_grid, planned_cells, with_cells
@@ -218,6 +219,7 @@ def explained(scene: Scene, found: Forecast) -> dict[str, Any]:
         "effects_on": list(scene.effects_on),
         "effects_off": list(scene.effects_off),
         "without_effect": list(scene.unused),
+        "rock": rock_of(scene) or None,
         "scales": {name: scale.value for name, scale in scales(scene).items()},
         "solver": solver.name if solver else scene.solver_name,
         "cells": (solver.cells or None) if solver else None,

@@ -29,6 +29,7 @@ from percussion_model.interface.commands.couple import couple
 from percussion_model.interface.commands.effects import effects
 from percussion_model.interface.commands.explore import explore
 from percussion_model.interface.commands.paper import paper
+from percussion_model.interface.commands.rocks import rocks
 from percussion_model.interface.commands.scene import explain, new, plot, run, settled
 from percussion_model.interface.commands.stability import stability
 from percussion_model.interface.commands.study import study
@@ -127,6 +128,7 @@ for _command in (
     couple,
     bench_controller,
     new,
+    rocks,
 ):
     add(_command)
 add(blow_map, "blow-map")

@@ -237,6 +237,7 @@ def show_explanation(scene: Scene, found: Forecast) -> None:
     """Print what a scene computes, and its cost estimate."""
     from percussion_model.analysis.cost import FACTOR
     from percussion_model.analysis.stationary import MOST_TIME
+    from percussion_model.scene.rocks import rock_of
     from percussion_model.solvers.wave.resolution import FITS
 
     solver = found.solver
@@ -247,7 +248,9 @@ def show_explanation(scene: Scene, found: Forecast) -> None:
     table.add_row("Effects off", ", ".join(scene.effects_off) or "none")
     table.add_row("Without effect here", ", ".join(scene.unused) or "none")
     effects = scene.effects
-    table.add_row("Drive, rock", f"{effects.drive}, {effects.rock}")
+    named = rock_of(scene)
+    whose = f" (numbers of {named})" if named else ""
+    table.add_row("Drive, rock", f"{effects.drive}, {effects.rock}{whose}")
     table.add_row("Piston, bit", f"{scene.piston.model}, {scene.bit.model}")
     for name, text in _scale_rows(scene):
         table.add_row(name, text)

@@ -33,6 +33,7 @@ def accuracy(
         typer.Option("--make-references", help="Make the stored references of the scenes anew."),
     ] = False,
     settings: common.Settings = None,
+    rock: common.RockName = None,
     out: common.OutOrDefault = None,
     json_file: common.JsonFile = None,
     force: common.Force = False,
@@ -56,14 +57,15 @@ def accuracy(
     from percussion_model.verification.accuracy.study import solvers_of
 
     chosen = [
-        (path.stem, common.load_scene(path, settings=settings, is_run=False))
+        (path.stem, common.load_scene(path, settings=settings, is_run=False, rock=rock))
         for path in scenes or ()
     ]
     if not chosen:
         title = "The reference scene"
         chosen = [("reference", Scene(title=title))]
-        if settings:
-            raise common.refusal("--set needs a SCENE to change")
+        for option, given in (("--set", settings), ("--rock", rock)):
+            if given:
+                raise common.refusal(f"{option} needs a SCENE to change")
     names = [name for name, _ in chosen]
     if len(set(names)) < len(names):
         raise common.refusal(

@@ -29,6 +29,7 @@ def blow_map(
         typer.Argument(help="Make the table; tell about it; tell its file."),
     ] = "build",
     settings: common.Settings = None,
+    rock: common.RockName = None,
     workers: Annotated[
         int | None, typer.Option("--workers", min=1, help="Processes; left out: one a processor.")
     ] = None,
@@ -38,7 +39,7 @@ def blow_map(
     from percussion_model.analysis.blow_maps import kept_map, map_file
 
     common.check_json(json_file)
-    chosen = common.load_scene(scene, settings=settings)
+    chosen = common.load_scene(scene, settings=settings, rock=rock)
     if action == "where":
         typer.echo(str(map_file(chosen)))
         return

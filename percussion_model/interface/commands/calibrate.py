@@ -70,6 +70,7 @@ def calibrate(
     solver: common.SolverName = None,
     cells: common.Cells = None,
     settings: common.Settings = None,
+    rock: common.RockName = None,
     json_file: common.JsonFile = None,
 ) -> None:
     """Fit the rock of a scene to a slow test, drop tests and single numbers, all together.
@@ -88,7 +89,7 @@ def calibrate(
     common.check_json(json_file)
     for option, path in (("--out", out), ("--figure", figure)):
         _check_file(option, path, force)
-    chosen = common.load_scene(scene, solver, cells, settings)
+    chosen = common.load_scene(scene, solver, cells, settings, rock=rock)
     slow = None if curve is None else read_curve(curve)
     drops = [read_drop(word, gauge) for word in drop or ()]
     numbers = [read_reading(word) for word in measured or ()]

@@ -70,6 +70,15 @@ Settings = Annotated[
         help="Set any parameter, as in rock.unloading_ratio=10 or feed.force=5kN; may be repeated.",
     ),
 ]
+RockName = Annotated[
+    str | None,
+    typer.Option(
+        "--rock",
+        metavar="NAME[:BUTTONS]",
+        help="Take law and numbers of a rock, as kuru-granite:10 for a bit of 10 buttons; --set "
+        "wins. `percussion rocks` lists them.",
+    ),
+]
 Accuracy = Annotated[
     float | None,
     typer.Option(
@@ -158,6 +167,7 @@ def load_scene(
     accuracy: float | None = None,
     check: bool | None = None,
     is_run: bool = True,
+    rock: str | None = None,
 ) -> Scene:
     """Read a scene (a file, a preset, else the reference), and apply what the command line changes.
 
@@ -168,7 +178,8 @@ def load_scene(
 
     load_numba()
     scene = Scene() if path is None else Scene.from_toml(path)
-    changes: dict[str, Any] = dict(read_setting(text) for text in settings or ())
+    changes: dict[str, Any] = rock_changes(rock)
+    changes |= dict(read_setting(text) for text in settings or ())
     if solver is not None:
         scene = scene.computed_by(solver, **changes)
     elif changes:
@@ -182,6 +193,26 @@ def load_scene(
     if is_run:
         tell_of_compiling(scene.solver_name)
     return scene
+
+
+def rock_changes(text: str | None) -> dict[str, Any]:
+    """Law and numbers of the rock that --rock names, by their keys; none where it is left out.
+
+    Hint at the number of buttons where none is asked for.
+    """
+    from percussion_model.scene.rocks import read_rock
+
+    if text is None:
+        return {}
+    rock = read_rock(text)
+    if rock.asked is None and rock.buttons is not None:
+        many = "button" if rock.buttons == 1 else "buttons"
+        hint(
+            "--rock",
+            f"rock {rock.name}: its stiffness is that of {rock.buttons} {many}: for a bit of 10 "
+            f"ask for {rock.name}:10",
+        )
+    return rock.parameters
 
 
 # Parameters of which this process has hinted.

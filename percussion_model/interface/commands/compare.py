@@ -25,6 +25,7 @@ def compare(
     duration: common.Duration = None,
     settle: common.Settle = None,
     settings: common.Settings = None,
+    rock: common.RockName = None,
     out: common.OutOrDefault = None,
     json_file: common.JsonFile = None,
     force: common.Force = False,
@@ -36,7 +37,7 @@ def compare(
     from percussion_model.interface.terminal import progress, progress_bar, show_comparison
 
     asked = None if solvers is None else read_solvers(solvers)
-    chosen = common.load_scene(scene, settings=settings, is_run=False)
+    chosen = common.load_scene(scene, settings=settings, is_run=False, rock=rock)
     names = asked or usual_solvers(chosen)
     for name in names:
         chosen.computed_by(name)  # refuses before anything is claimed or compiled

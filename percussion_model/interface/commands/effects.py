@@ -30,6 +30,7 @@ def effects(
     solver: common.SolverName = None,
     cells: common.Cells = None,
     settings: common.Settings = None,
+    rock: common.RockName = None,
     out: common.OutOrDefault = None,
     json_file: common.JsonFile = None,
     force: common.Force = False,
@@ -42,7 +43,7 @@ def effects(
     from percussion_model.analysis.effect_study import by_one_solver, study_effects
     from percussion_model.interface.terminal import progress
 
-    chosen = common.load_scene(scene, solver, cells, settings)
+    chosen = common.load_scene(scene, solver, cells, settings, rock=rock)
     common.check_json(json_file)
     if figures:
         claimed = common.claim(

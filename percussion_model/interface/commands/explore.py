@@ -24,6 +24,7 @@ def explore(
         typer.Argument(metavar="[SCENE]", help="A scene file, or a preset; left out: reference."),
     ] = None,
     settings: common.Settings = None,
+    rock: common.RockName = None,
     solver: common.SolverName = None,
     port: Annotated[
         int, typer.Option("--port", min=0, max=65535, help="Port to serve on; 0 takes a free one.")
@@ -41,7 +42,7 @@ def explore(
         raise common.refusal(f"no page, since {common.needs_extra(error, 'report')}") from None
     from percussion_model.interface.explore.response import refuse_scene, respond
 
-    scenes = _scenes(scene, solver, settings)
+    scenes = _scenes(scene, solver, settings, rock)
     first = next(iter(scenes.values()))()
     refuse_scene(first)
     try:
@@ -60,15 +61,15 @@ def explore(
 
 
 def _scenes(
-    path: Path | None, solver: str | None, settings: list[str] | None
+    path: Path | None, solver: str | None, settings: list[str] | None, rock: str | None
 ) -> dict[str, Callable[[], Scene]]:
     """Scenes to start from, by name; the first is shown."""
     from percussion_model.scene.hammers import hammer, hammers
     from percussion_model.scene.scene import Scene
 
-    own = common.load_scene(path, solver, settings=settings)
+    own = common.load_scene(path, solver, settings=settings, rock=rock)
     found: dict[str, Callable[[], Scene]] = {}
-    if path is not None or settings or solver:
+    if path is not None or settings or solver or rock:
         found[OWN] = lambda: own
     found[REFERENCE] = Scene
     for name in hammers():

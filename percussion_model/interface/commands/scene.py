@@ -37,6 +37,7 @@ def run(
     check: common.Check = None,
     error_estimate: common.ErrorEstimate = None,
     settings: common.Settings = None,
+    rock: common.RockName = None,
     trace: Annotated[
         float | None,
         typer.Option("--trace", metavar="DT", help="Keep a trace, sampled every DT, in s."),
@@ -52,7 +53,7 @@ def run(
     from percussion_model.interface import terminal
     from percussion_model.simulation.simulate import simulate
 
-    chosen = common.load_scene(scene, solver, cells, settings, accuracy, check)
+    chosen = common.load_scene(scene, solver, cells, settings, accuracy, check, rock=rock)
     common.check_outputs(out, json_file)
     made_from = _made_from(chosen, duration, settle)
     made_from |= {"trace": trace, "error_estimate": error_estimate}
@@ -97,6 +98,7 @@ def settled(
     solver: common.SolverName = None,
     cells: common.Cells = None,
     settings: common.Settings = None,
+    rock: common.RockName = None,
     tolerance: common.Tolerance = 1e-4,
     most_time: Annotated[
         float,
@@ -109,7 +111,7 @@ def settled(
     from percussion_model.interface.terminal import progress, show_settled
 
     common.check_json(json_file)
-    chosen = common.load_scene(scene, solver, cells, settings)
+    chosen = common.load_scene(scene, solver, cells, settings, rock=rock)
     prepare_map(chosen)
     with progress("preparing") as report:
         found = run_until_settled(
@@ -131,13 +133,14 @@ def explain(
     accuracy: common.Accuracy = None,
     check: common.Check = None,
     settings: common.Settings = None,
+    rock: common.RockName = None,
     json_file: common.JsonFile = None,
 ) -> None:
     """Tell what a scene computes, how, and what the run will cost; makes no blow map."""
     from percussion_model.analysis.cost import explained, forecast
     from percussion_model.interface.terminal import progress, show_explanation
 
-    chosen = common.load_scene(scene, solver, cells, settings, accuracy, check)
+    chosen = common.load_scene(scene, solver, cells, settings, accuracy, check, rock=rock)
     common.check_json(json_file)
     if chosen.solver_name == "blow-map":
         warn_of_outside(chosen)
@@ -211,6 +214,7 @@ def new(
     kind: Annotated[
         Kind, typer.Option("--kind", help="hammer, or hopkinson: a striker, a bar and rock.")
     ] = Kind.HAMMER,
+    rock: common.RockName = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")] = False,
 ) -> None:
     """Write a commented scene to start from: the reference hammer, or another."""
@@ -229,6 +233,8 @@ def new(
         raise common.refusal("--rods needs --hammer: one of the top hammers")
     else:
         scene = Scene(title=_NEW_TITLE)
+    if changes := common.rock_changes(rock):
+        scene = scene.replace(**changes)
     scene.to_toml(file, comments=True)
     typer.echo(f"wrote {file}")
 

@@ -42,6 +42,7 @@ def study(
     solver: common.SolverName = None,
     cells: common.Cells = None,
     settings: common.Settings = None,
+    rock: common.RockName = None,
     tolerance: common.Tolerance = 1e-4,
     scatter: Annotated[
         float,
@@ -85,7 +86,7 @@ def study(
         ends = {key: (float(min(values)), float(max(values))) for key, values in axes.items()}
         points = latin_hypercube(ends, samples, seed, logarithmic)
     common.check_outputs(out, None)
-    chosen = common.load_scene(scene, solver, cells, settings)
+    chosen = common.load_scene(scene, solver, cells, settings, rock=rock)
     for key, column in zip(points.keys, points.values.T, strict=True):
         common.hint(key, hint_of(key, column.tolist()))
     try:

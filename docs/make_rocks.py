@@ -1,0 +1,110 @@
+"""Write docs/rocks.md from the rocks that are stored: `python -m docs.make_rocks`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from textwrap import fill
+
+from percussion_model.interface.commands.rocks import (
+    HEADINGS,
+    NOTES,
+    cells,
+    interval_text,
+    kind_text,
+)
+from percussion_model.scene.rocks import STIFFNESS, Number, Rock, rock, rocks
+from percussion_model.scene.rocks.derived import button_stiffness, mean_factor, pressure_factors
+
+PAGE = Path(__file__).with_name("rocks.md")
+HEAD = f"""# Rocks
+
+`percussion run SCENE --rock kuru-granite:10` takes law and numbers of a rock, for a bit of ten
+buttons; `--set` wins over it. All commands that take a scene take it, and so do `new`, `fmu` and
+`native`. In Python: `Scene().replace(**rock("kuru-granite", buttons=10).parameters)`, with `rock`
+of `percussion_model.scene.rocks`. `percussion rocks` prints this table, `percussion rocks NAME`
+all of one.
+
+{fill(" ".join(NOTES), 110)}
+
+`python -m docs.make_rocks` writes this page from the files in `percussion_model/scene/rocks`.
+"""
+DERIVED = """
+## Stiffness by strength
+
+Where no slope was found, it is derived. Rock below a spherical button is taken as fully plastic,
+with a mean pressure of C times the compressive strength σ. A button of radius R has the area 2πRp
+at a small penetration p, so K = 2πRCσ. The rocks with a slope have C from {low:.2g} to {high:.2g};
+their geometric mean {mean:.2g} is taken, and the intervals of derived numbers cover the range.
+Strength says little of a slope, as the last column shows: calibrate where you can.
+"""
+
+
+def table(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
+    """Lines of a table, with a blank line before it."""
+    lines = [f"| {' | '.join(row)} |" for row in rows]
+    return ["", f"| {' | '.join(headings)} |", "|" + "---|" * len(headings), *lines]
+
+
+def numbers(chosen: Iterable[Rock]) -> list[str]:
+    """Lines of the table that the command prints."""
+    return table(HEADINGS, ((f"`{name}`", *rest) for name, *rest in map(cells, chosen)))
+
+
+def sources(chosen: Iterable[Rock]) -> list[str]:
+    """Lines of the tables of bits, blows, intervals and publications."""
+    lines = []
+    for one in chosen:
+        known = (*one.numbers, *([one.strength] if one.strength else []))
+        lines += [f"\n## {one.title}", "", f"`{one.name}`: {one.rock} ({one.origin}).", ""]
+        lines += ["| | |", "|---|---|"]
+        lines += [f"| bit | {one.indenter} |", f"| fitted to | {one.fitted_to} |"]
+        lines += [f"| holds for | {one.holds_for} |"]
+        lines += [f"| {of(number.key)} | {told(number)} |" for number in known]
+        lines += [f"| source | {one.source['published']}; doi: {one.source['doi']} |"]
+        lines += [f"| read in | {one.source['read_in']} |"]
+    return lines
+
+
+def check(factors: dict[str, float]) -> list[str]:
+    """Lines of the table of what the strength of rocks with a slope would have told."""
+    rows, mean = [], mean_factor(factors.values())
+    for name, factor in factors.items():
+        one = rock(name)
+        assert one.strength is not None
+        assert one.buttons is not None
+        assert one.button_radius is not None
+        known = one.number(STIFFNESS).value / one.buttons
+        guess = button_stiffness(one.button_radius, one.strength.value, mean)
+        radius, strength = 1e3 * one.button_radius, 1e-6 * one.strength.value
+        row = (f"{radius:.3g}", f"{strength:.3g}", f"{factor:.2g}", f"{known / 1e6:.3g}")
+        off = f"{100 * (guess / known - 1):+.0f} %"
+        rows.append((f"`{name}`", *row, f"{guess / 1e6:.2g}", off))
+    headings = (
+        "rock", "R, mm", "σ, MPa", "C", "slope of one button, kN/mm", "by strength, kN/mm", "off",
+    )  # fmt: skip
+    return table(headings, rows)
+
+
+def of(key: str) -> str:
+    """Name of a number in these tables."""
+    return "strength" if key == "strength" else f"`{key}`"
+
+
+def told(one: Number) -> str:
+    """A number with its unit, kind and reason."""
+    unit = {STIFFNESS: " kN/mm", "strength": " MPa"}.get(one.key, "")
+    return f"{interval_text(one)}{unit}, {kind_text(one)}: {one.why}"
+
+
+def page() -> str:
+    """Text of the page."""
+    chosen, factors = [rock(name) for name in rocks()], pressure_factors()
+    values = factors.values()
+    words = DERIVED.format(mean=mean_factor(values), low=min(values), high=max(values))
+    lines = [HEAD.rstrip(), *numbers(chosen), words.rstrip(), *check(factors), *sources(chosen)]
+    return "\n".join(lines) + "\n"
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page(), encoding="utf-8")

@@ -1,0 +1,147 @@
+"""Command `rocks`: the rocks that --rock takes, with intervals and sources."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from percussion_model.interface.commands import common
+
+if TYPE_CHECKING:
+    from percussion_model.scene.rocks import Number, Rock
+
+STIFFNESS, RATIO = "rock.loading_stiffness", "rock.unloading_ratio"
+# Names, units and scales of what is shown.
+SHOWN = {
+    STIFFNESS: ("loading stiffness", "kN/mm", 1e6),
+    RATIO: ("unloading ratio", "", 1.0),
+    "rock.loading_exponent": ("loading exponent", "", 1.0),
+    "rock.reference_penetration": ("reference penetration", "mm", 1e-3),
+    "rock.unloading_exponent": ("unloading exponent", "", 1.0),
+    "strength": ("strength", "MPa", 1e6),
+}
+SECOND_HAND = "*"
+HEADINGS = (
+    "rock", "law", "buttons", "stiffness, kN/mm", "kind", "unloading ratio", "kind",
+    "source", "fitted to",
+)  # fmt: skip
+# Of these, columns that stay in one block of a narrow terminal.
+GROUPS = (4, 2, 2)
+WORDS = ("source", "fitted to")
+NOTES = (
+    "In brackets is the interval that the number is believed to lie in. Kinds: fitted to measured "
+    "or to computed numbers of others; derived from the strength of the rock; assumed, as no "
+    "source has it; * is second hand.",
+    "A bit of N buttons is about N times as stiff as one: NAME:N asks for it. The energy barrier "
+    "stays that of the scene.",
+)
+
+
+def rocks(
+    name: Annotated[
+        str | None,
+        typer.Argument(metavar="[NAME[:BUTTONS]]", help="One of them; left out: lists all."),
+    ] = None,
+    json_file: common.JsonFile = None,
+) -> None:
+    """List the rocks that --rock takes: law, numbers with intervals, sources; or tell of one."""
+    from percussion_model.scene.rocks import read_rock, rock
+    from percussion_model.scene.rocks import rocks as names
+
+    common.check_json(json_file)
+    chosen = [rock(one) for one in names()] if name is None else [read_rock(name)]
+    common.write_json(json_file, {one.name: as_values(one) for one in chosen})
+    if json_file == "-":
+        return
+    if name is None:
+        show_rocks(chosen)
+    else:
+        show_rock(chosen[0])
+
+
+def as_values(rock: Rock) -> dict[str, Any]:
+    """Return a rock as plain values, SI units."""
+    return asdict(rock) | {"parameters": rock.parameters}
+
+
+def interval_text(one: Number) -> str:
+    """Return a number and its interval, without the unit."""
+    _, _, scale = SHOWN[one.key]
+    value, low, high = (f"{number / scale:.4g}" for number in (one.value, one.low, one.high))
+    return f"{value} ({low} to {high})"
+
+
+def kind_text(one: Number) -> str:
+    """Return the kind of a number, with a star where it is second hand."""
+    return one.kind + SECOND_HAND * one.second_hand
+
+
+def cells(rock: Rock) -> tuple[str, ...]:
+    """Return the texts of a row, by `HEADINGS`."""
+    stiffness, ratio = rock.number(STIFFNESS), rock.number(RATIO)
+    return (
+        rock.name, rock.law, str(rock.buttons or "not told"),
+        interval_text(stiffness), kind_text(stiffness), interval_text(ratio), kind_text(ratio),
+        rock.source["cited"], rock.fitted_to,
+    )  # fmt: skip
+
+
+def details(rock: Rock) -> Iterable[tuple[str, str]]:
+    """Go through all that is known of a rock, as names and texts."""
+    yield "Rock", f"{rock.rock} ({rock.origin})"
+    yield "Law", rock.law
+    if rock.asked is not None:
+        yield "Buttons", f"{rock.asked}; the reason behind the stiffness is for {rock.buttons}"
+    for one in (*rock.numbers, *([rock.strength] if rock.strength else [])):
+        name, unit, _ = SHOWN[one.key]
+        told = f"{interval_text(one)} {unit}".rstrip()
+        yield name.capitalize(), f"{told}, {kind_text(one)}: {one.why}"
+    yield "Bit", rock.indenter
+    yield "Fitted to", rock.fitted_to
+    yield "Holds for", rock.holds_for
+    yield "Source", f"{rock.source['published']}; doi: {rock.source['doi']}"
+    yield "Read in", rock.source["read_in"]
+
+
+def show_rocks(chosen: Sequence[Rock]) -> None:
+    """Print the table of rocks, and what its words mean."""
+    from rich.box import SIMPLE_HEAD
+    from rich.console import Console
+    from rich.table import Table
+
+    from percussion_model.interface.messages import wrapped
+    from percussion_model.interface.tables import print_table
+
+    console = Console()
+    table = Table(box=SIMPLE_HEAD, show_edge=False, pad_edge=False)
+    for heading in HEADINGS:
+        table.add_column(heading, no_wrap=heading not in WORDS)
+    for one in chosen:
+        table.add_row(*cells(one))
+    print_table(table, console, groups=GROUPS)
+    console.print()
+    for note in (*NOTES, "`percussion rocks NAME` tells all of one."):
+        console.print(wrapped(note), highlight=False)
+
+
+def show_rock(chosen: Rock) -> None:
+    """Print all that is known of a rock."""
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.table import Table
+
+    from percussion_model.interface.messages import wrapped
+    from percussion_model.interface.tables import print_table
+
+    console = Console()
+    table = Table(title=escape(chosen.title), show_header=False)
+    table.add_column(no_wrap=True)
+    table.add_column()
+    for name, text in details(chosen):
+        table.add_row(name, escape(text))
+    print_table(table, console)
+    for note in NOTES:
+        console.print(wrapped(note), highlight=False)

@@ -1,0 +1,204 @@
+"""Rocks by name: law and numbers of the bit's force, with intervals and sources."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from percussion_model.scene.rows import SceneError, said_among, shortened
+from percussion_model.scene.scene import Scene
+from percussion_model.scene.text import read_toml
+
+_HERE = Path(__file__).parent
+# More buttons than any bit has.
+MOST_BUTTONS = 1000
+# A number is that of a rock if it differs by rounding alone.
+SAME = 1e-9
+LAW, STIFFNESS = "effects.rock", "rock.loading_stiffness"
+KINDS = ("measured", "computed", "derived", "assumed")
+
+
+@dataclass(frozen=True)
+class Number:
+    """One number of a rock, SI units.
+
+    Attributes
+    ----------
+    key : str
+        Dotted key of the parameter table; or "strength".
+    value, low, high : float
+        The number, and the interval that it is believed to lie in.
+    kind : str
+        One of `KINDS`: fitted to measured or to computed numbers of others; derived from other
+        properties of the rock; or assumed, as no source has it.
+    second_hand : bool
+        Whether its source was read in a quotation.
+    why : str
+        Where the interval comes from.
+    """
+
+    key: str
+    value: float
+    low: float
+    high: float
+    kind: str
+    why: str
+    second_hand: bool = False
+
+
+@dataclass(frozen=True)
+class Rock:
+    """A rock under one kind of bit.
+
+    Attributes
+    ----------
+    name, title, rock, origin : str
+        Name of the preset; what it is; the rock; where that comes from.
+    law : str
+        Value of `effects.rock`.
+    numbers : tuple of Number
+        Parameters of that law.
+    indenter, fitted_to, holds_for : str
+        Bit that the numbers belong to; what they were fitted to; blows that they hold for.
+    buttons : int or None
+        Of that bit; None where they are not known.
+    button_radius : float or None
+        Radius of a spherical button [m].
+    strength : Number or None
+        Compressive strength of the rock [Pa].
+    source : dict of str
+        `cited`, `published`, `doi` and `read_in`.
+    asked : int or None
+        Buttons of the bit that it was asked for.
+    """
+
+    name: str
+    title: str
+    rock: str
+    origin: str
+    law: str
+    numbers: tuple[Number, ...]
+    indenter: str
+    fitted_to: str
+    holds_for: str
+    source: dict[str, str]
+    buttons: int | None = None
+    button_radius: float | None = None
+    strength: Number | None = None
+    asked: int | None = None
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """Law and numbers by their dotted keys, as `Scene.replace` takes them."""
+        return {LAW: self.law, **{one.key: one.value for one in self.numbers}}
+
+    def number(self, key: str) -> Number:
+        """Return a number by its key."""
+        return next(one for one in self.numbers if one.key == key)
+
+    def of_buttons(self, count: int) -> Rock:
+        """Return the same rock under a bit of `count` buttons, each of which takes its share.
+
+        Raises
+        ------
+        SceneError
+            If there cannot be so many, or the buttons behind the numbers are not known.
+        """
+        if not 1 <= count <= MOST_BUTTONS:
+            raise SceneError(f"rock {self.name}: {count} buttons: must be from 1 to {MOST_BUTTONS}")
+        if self.buttons is None:
+            raise SceneError(
+                f"rock {self.name}: its numbers are those of a whole bit of unknown buttons: ask "
+                "for it without a number of buttons"
+            )
+        share = count / self.buttons
+        numbers = tuple(
+            replace(one, value=share * one.value, low=share * one.low, high=share * one.high)
+            if one.key == STIFFNESS
+            else one
+            for one in self.numbers
+        )
+        return replace(self, numbers=numbers, asked=count)
+
+
+def rocks() -> list[str]:
+    """Names of the rocks that there are."""
+    return sorted(path.stem for path in _HERE.glob("*.toml"))
+
+
+def rock(name: str, buttons: int | None = None) -> Rock:
+    """Return a rock.
+
+    Parameters
+    ----------
+    name : str
+        One of `rocks()`.
+    buttons : int, optional
+        Of the bit; that of the source if left out.
+
+    Raises
+    ------
+    SceneError
+        If there is no such rock, or it cannot be had for so many buttons.
+    """
+    if name not in rocks():
+        raise SceneError(
+            f"rock {shortened(name)}: there is none of that name: {said_among(name, rocks())}"
+        )
+    found = _read(name, read_toml(_HERE / f"{name}.toml"))
+    return found if buttons is None else found.of_buttons(buttons)
+
+
+def read_rock(text: str) -> Rock:
+    """Return the rock that "NAME" or "NAME:BUTTONS" asks for.
+
+    Raises
+    ------
+    SceneError
+        As `rock` does, or if the buttons are no whole number.
+    """
+    name, colon, count = (part.strip() for part in text.partition(":"))
+    if not colon:
+        return rock(name)
+    found = rock(name)
+    if not (count.isascii() and count.isdecimal() and len(count) < 10):
+        raise SceneError(
+            f"rock {shortened(text)}: must be NAME or NAME:BUTTONS, as in {name}:10, with a whole "
+            f"number from 1 to {MOST_BUTTONS}"
+        )
+    return found.of_buttons(int(count))
+
+
+def rock_of(scene: Scene) -> str:
+    """Name of the rock whose law and numbers a scene has, as `read_rock` takes it; or empty."""
+    if scene[LAW] not in ("bilinear", "power"):
+        return ""
+    found = []
+    for one in map(rock, rocks()):
+        if scene[LAW] != one.law or not all(
+            _same(scene[number.key], number.value)
+            for number in one.numbers
+            if number.key != STIFFNESS
+        ):
+            continue
+        share = scene[STIFFNESS] / one.number(STIFFNESS).value
+        if _same(share, 1.0):
+            return one.name
+        count = share * (one.buttons or math.nan)
+        if count <= MOST_BUTTONS and _same(count, max(round(count), 1)):
+            found.append((round(count), f"{one.name}:{round(count)}"))
+    return min(found)[1] if found else ""
+
+
+def _same(value: float, other: float) -> bool:
+    return math.isclose(value, other, rel_tol=SAME)
+
+
+def _read(name: str, tree: Mapping[str, Any]) -> Rock:
+    """Rock of a file; these files are our own, and a test reads them all."""
+    numbers = tuple(Number(key, **one) for key, one in tree["parameters"].items())
+    strength = Number("strength", **tree["strength"]) if "strength" in tree else None
+    return Rock(name, **tree["rock"], numbers=numbers, strength=strength, source=tree["source"])
