@@ -36,7 +36,9 @@ Where no slope was found, it is derived. Rock below a spherical button is taken 
 with a mean pressure of C times the compressive strength σ. A button of radius R has the area 2πRp
 at a small penetration p, so K = 2πRCσ. The rocks with a slope have C from {low:.2g} to {high:.2g};
 their geometric mean {mean:.2g} is taken, and the intervals of derived numbers cover the range.
-Strength says little of a slope, as the last column shows: calibrate where you can.
+Strength says little of a slope, as the last column shows: calibrate where you can. On nine rocks
+a button of 14 mm met slopes about 20 % steeper under impact than under slow loading (S. Okubo et
+al. 1992, as quoted by S. Okubo, K. Fukui, A. Ota, J. of MMIJ 115 (1999) 661).
 """
 
 
@@ -47,8 +49,16 @@ def table(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
 
 
 def numbers(chosen: Iterable[Rock]) -> list[str]:
-    """Lines of the table that the command prints."""
-    return table(HEADINGS, ((f"`{name}`", *rest) for name, *rest in map(cells, chosen)))
+    """Lines of what the command prints, in two tables that fit a page."""
+    rows = [(f"`{name}`", *rest) for name, *rest in map(cells, chosen)]
+    values = [
+        (name, buttons, f"{stiffness}, {kind}", f"{ratio}, {other}")
+        for name, _, buttons, stiffness, kind, ratio, other, _, _ in rows
+    ]
+    rock_, law, buttons, stiffness, _, ratio, _, source, fitted = HEADINGS
+    lines = table((rock_, buttons, stiffness, ratio), values)
+    others = [(row[0], row[1], row[-1], row[-2]) for row in rows]
+    return lines + table((rock_, law, fitted, source), others)
 
 
 def sources(chosen: Iterable[Rock]) -> list[str]:

@@ -35,8 +35,9 @@ NOTES = (
     "In brackets is the interval that the number is believed to lie in. Kinds: fitted to measured "
     "or to computed numbers of others; derived from the strength of the rock; assumed, as no "
     "source has it; * is second hand.",
-    "A bit of N buttons is about N times as stiff as one: NAME:N asks for it. The energy barrier "
-    "stays that of the scene.",
+    "A bit of N buttons is about N times as stiff as one: NAME:N asks for it. The law power has "
+    "the stiffness of one, at its reference penetration. The energy barrier stays that of the "
+    "scene.",
 )
 
 
@@ -68,10 +69,10 @@ def as_values(rock: Rock) -> dict[str, Any]:
 
 
 def interval_text(one: Number) -> str:
-    """Return a number and its interval, without the unit."""
+    """Return a number, and its interval where one is known, without the unit."""
     _, _, scale = SHOWN[one.key]
     value, low, high = (f"{number / scale:.4g}" for number in (one.value, one.low, one.high))
-    return f"{value} ({low} to {high})"
+    return value if one.low == one.high else f"{value} ({low} to {high})"
 
 
 def kind_text(one: Number) -> str:
