@@ -5,12 +5,18 @@ Table 1 of docs/model.md, with the readings given there.
 
 from __future__ import annotations
 
+from percussion_model.physics.elementary import exp, log
 from percussion_model.physics.kernel import inlined, kernel, merged
 from percussion_model.physics.records import Mode, RockKind
 
 # A velocity below this counts as zero: the ringing left after a long
 # standstill is of this size, its sign means nothing [m/s].
 REST_VELOCITY = 1e-9
+
+# Below this share of the reference penetration, or of the force there, the power law goes on as
+# a straight line: nothing that moves a bit is so small.
+LEAST_SHARE = 1e-9
+TINY_FORCE = 1e-200  # [N], against a division by zero
 
 # A drilling cycle counts when it crushed more than this share of W_R.
 COUNTED_CYCLE = 0.01
@@ -43,15 +49,60 @@ def origin(s):
 
 
 @inlined
-def spring_force(s):
+def is_loading(s):
+    """Whether the rock is in a drilling cycle: DFC or FC."""
+    return s.mode == Mode.DFC or s.mode == Mode.FC
+
+
+@inlined
+def growth(par, p):
+    """Secant stiffness at a penetration, divided by that at the reference penetration."""
+    return exp((par.exponent - 1.0) * log(max(p / par.reference_penetration, LEAST_SHARE)))
+
+
+@inlined
+def loading_force(par, s, p):
+    """Force of the rock at a penetration in a drilling cycle (docs/model.md, eq. 15, 15a) [N]."""
+    if par.power == 0:
+        return s.k_r * p
+    return s.k_r * p * growth(par, p)
+
+
+@inlined
+def recovered_share(par, s, force):
+    """Penetration that the rock gives back from a peak force, divided by that at the peak.
+
+    1/gamma at the force of the reference penetration, a power of the force beside it; never so
+    much that unloading would give back more energy than loading took (docs/model.md, eq. 15b).
+    """
+    share = 1.0 / s.gamma
+    if par.unloading_exponent > 0.0:
+        relative = max(force / (s.k_r * par.reference_penetration), LEAST_SHARE)
+        share *= exp(-par.unloading_exponent * log(relative))
+    return min(share, 2.0 / (par.exponent + 1.0))
+
+
+@inlined
+def spring_force(par, s):
     """Force of the rock without its damping, K (p - P_R) of docs/model.md, eq. 15 [N]."""
+    if par.power == 1 and is_loading(s):
+        return loading_force(par, s, s.p)
     return stiffness(s) * (s.p - origin(s))
 
 
 @inlined
-def recoverable_at(s, p):
+def recoverable_by_power(par, s, p):
+    """`recoverable_at` in a drilling cycle of the power law [J]."""
+    force = loading_force(par, s, p)
+    return 0.5 * force * p * recovered_share(par, s, force) + s.kept
+
+
+@inlined
+def recoverable_at(par, s, p):
     """Energy that the rock would give back from `p` in this mode (docs/model.md, eq. 21) [J]."""
-    if s.mode == Mode.DFC or s.mode == Mode.FC:
+    if is_loading(s):
+        if par.power == 1:
+            return recoverable_by_power(par, s, p)
         return 0.5 * s.k_r * p * p / s.gamma
     if s.mode == Mode.FF and p <= s.p_u:
         return 0.0
@@ -60,9 +111,24 @@ def recoverable_at(s, p):
 
 
 @inlined
-def recoverable(s):
+def recoverable(par, s):
     """Energy that the rock would give back on unloading [J]."""
-    return recoverable_at(s, s.p)
+    return recoverable_at(par, s, s.p)
+
+
+@inlined
+def loading_work(par, s, p):
+    """Work on the rock from no penetration to `p` in a drilling cycle of the power law [J]."""
+    return loading_force(par, s, p) * p / (par.exponent + 1.0)
+
+
+@inlined
+def unloaded_penetration(par, s):
+    """Penetration at which the rock would be unloaded, in a drilling cycle [m]."""
+    if par.power == 0:
+        return s.p * (s.gamma - 1.0) / s.gamma
+    force = max(loading_force(par, s, s.p), TINY_FORCE)
+    return s.p - 2.0 * recoverable_by_power(par, s, s.p) / force
 
 
 @inlined
@@ -71,8 +137,8 @@ def hole_depth(par, s):
     if par.rock != RockKind.BILINEAR:
         return 0.0
     surface = s.p_u
-    if s.mode == Mode.DFC or s.mode == Mode.FC:
-        surface = s.p * (s.gamma - 1.0) / s.gamma
+    if is_loading(s):
+        surface = unloaded_penetration(par, s)
     return s.x_r - s.hole_start + surface
 
 
@@ -96,6 +162,7 @@ def start_cycle(s, barrier, p):
     s.w = 0.0
     s.crushed = 0.0
     s.cycle_counted = 0
+    s.kept = 0.0
     s.k_r = s.next_k_r
     s.gamma = s.next_gamma
     s.c_r = s.next_c_r
@@ -106,22 +173,43 @@ def start_cycle(s, barrier, p):
         s.mode = Mode.FC
 
 
+@inlined
+def penetration_at(par, k, force):
+    """Penetration of a drilling cycle at a force, with a loading stiffness [m]."""
+    if par.power == 0:
+        return force / k
+    relative = max(force / (k * par.reference_penetration), LEAST_SHARE)
+    return par.reference_penetration * exp(log(relative) / par.exponent)
+
+
 @kernel
-def resume_cycle(s, barrier):
+def resume_cycle(par, s):
     """Begin a cycle from contact: the elastic force stays the same (docs/model.md, eq. 19)."""
     force = s.gamma * s.k_r * (s.p - s.p_u)  # that of the spring, in BC and SS
-    before = recoverable(s)
+    before = recoverable(par, s)
+    if par.power == 1:
+        start_cycle(s, par.barrier, penetration_at(par, s.next_k_r, force))
+        # what the rock gives back goes on from what it would give now
+        s.kept = before - recoverable(par, s)
+        return
     # Other rock under the same force springs back otherwise, which crushes nothing.
     s.hole_start += force / (s.gamma * s.k_r) - force / (s.next_gamma * s.next_k_r)
-    start_cycle(s, barrier, force / s.next_k_r)
+    start_cycle(s, par.barrier, force / s.next_k_r)
     # With other rock than before, what can be recovered changes at once.
-    s.e_crushing += before - recoverable(s)
+    s.e_crushing += before - recoverable(par, s)
 
 
 @inlined
-def end_loading(s):
-    """Unloading begins at the peak of a drilling cycle (docs/model.md, eq. 20)."""
-    s.p_u = s.p * (s.gamma - 1.0) / s.gamma
+def end_loading(par, s):
+    """Unloading begins at the peak of a drilling cycle (docs/model.md, eq. 20).
+
+    By the power law stiffness and ratio become those of the straight line on which this cycle
+    unloads: K is the secant of the peak.
+    """
+    s.p_u = unloaded_penetration(par, s)
+    if par.power == 1:
+        s.k_r *= growth(par, s.p)
+        s.gamma = s.p / (s.p - s.p_u) if s.p > s.p_u else par.exponent
     s.mode = Mode.BC
 
 
@@ -129,7 +217,7 @@ def end_loading(s):
 def end_unloading(par, s, energy):
     """The bit turns downward while unloading: a new cycle, or standstill."""
     if overcomes_barrier(par, s, energy):
-        resume_cycle(s, par.barrier)
+        resume_cycle(par, s)
     else:
         s.mode = Mode.SS
 
@@ -154,7 +242,7 @@ def leave_by_velocity(par, s, v, energy):
         return 0
     if s.mode == Mode.DFC or s.mode == Mode.FC:
         if v < -REST_VELOCITY:
-            end_loading(s)
+            end_loading(par, s)
             return 1
     elif s.mode == Mode.BC and v > REST_VELOCITY:
         end_unloading(par, s, energy)
@@ -171,7 +259,7 @@ def close_interface(par, s, energy):
     elif par.rock == RockKind.WALL:
         s.mode = Mode.SS
     elif overcomes_barrier(par, s, energy):
-        s.e_standstill += recoverable(s)
+        s.e_standstill += recoverable(par, s)
         start_cycle(s, par.barrier, 0.0)
     else:
         s.mode = Mode.SS
@@ -183,7 +271,7 @@ def leave_standstill(par, s, v):
     if v < -REST_VELOCITY:
         s.mode = Mode.BC
     else:
-        resume_cycle(s, par.barrier)
+        resume_cycle(par, s)
 
 
 @inlined
@@ -208,7 +296,11 @@ def crush(par, s, p_before):
     """Book the irrecoverable part of loading from `p_before` to s.p, if this is loading [J]."""
     if par.rock != RockKind.BILINEAR or (s.mode != Mode.DFC and s.mode != Mode.FC):
         return 0.0
-    work = 0.5 * s.k_r * (s.p - p_before) * (s.p + p_before) * (1.0 - 1.0 / s.gamma)
+    if par.power == 1:
+        work = loading_work(par, s, s.p) - loading_work(par, s, p_before)
+        work -= recoverable(par, s) - recoverable_at(par, s, p_before)
+    else:
+        work = 0.5 * s.k_r * (s.p - p_before) * (s.p + p_before) * (1.0 - 1.0 / s.gamma)
     s.e_crushing += work
     s.crushed += work
     if s.cycle_counted == 0 and s.crushed > COUNTED_CYCLE * s.w_r:

@@ -23,6 +23,10 @@ COMMON_PARAMETERS = [
     ("drive", "i8"),  # DriveKind
     ("rock", "i8"),  # RockKind
     ("barrier", "i8"),  # 1: the energy barrier is on
+    ("power", "i8"),  # 1: the rock is loaded by a power law
+    ("exponent", "f8"),  # n and q of the power law
+    ("unloading_exponent", "f8"),
+    ("reference_penetration", "f8"),  # [m]
     ("release", "i8"),  # 1: standstill leaves to free flight when F_R reaches 0
     ("effects", "i8"),  # 1: there are effects that hold a force
     *[(f"{effect.name}_{name}", "f8") for effect in EFFECTS for name in effect.parameters],
@@ -69,6 +73,7 @@ _MOTION = [
     ("x_r", "f8"),  # position of the moving datum of p since the start [m]
     ("hole_start", "f8"),  # surface of the rock from which the depth of the hole counts [m]
     ("w", "f8"),  # work of the barrier dashpot in this cycle [J]
+    ("kept", "f8"),  # recoverable beside what the power law of this cycle gives back [J]
     ("crushed", "f8"),  # by this drilling cycle [J]
     ("v_p", "f8"),  # mean velocities [m/s]
     ("v_b", "f8"),

@@ -135,7 +135,7 @@ TEXTS = {
     Rule.ACCURACY_WITHOUT_LOSS_TIME: _OF_RATE
     + f"has no limit with finer cells where loss.time = 0.0 s {_FINER}",
     Rule.BARRIER: (
-        'effects.barrier = true needs effects.rock = "bilinear", not "{effects.rock}": '
+        'effects.barrier = true needs effects.rock = "bilinear" or "power", not "{effects.rock}": '
         "set effects.barrier = false"
     ),
     Rule.SETTLE: ("run.settle = {run.settle!r} s: must be below run.duration = {run.duration!r} s"),
@@ -159,7 +159,7 @@ def _place(key: str, word: str) -> int:
 ELASTIC, RIGID = _place("bit.model", "elastic"), _place("bit.model", "rigid")
 PISTON_ELASTIC, PISTON_ABSENT = (_place("piston.model", word) for word in ("elastic", "absent"))
 NO_DRIVE, PRESSURE = (_place("effects.drive", word) for word in ("none", "pressure"))
-BILINEAR = _place("effects.rock", "bilinear")
+BILINEAR, POWER = (_place("effects.rock", word) for word in ("bilinear", "power"))
 AUTO, FEM, CHAIN = (_place("solver.name", word) for word in ("auto", "fem", "chain"))
 WAVE, BLOW_MAP = (_place("solver.fidelity", word) for word in ("wave", "blow-map"))
 
@@ -194,7 +194,8 @@ def find_contradiction(
         found = _in_accuracy(v)
     if found != Rule.NOTHING:
         return found
-    if v.effects_barrier and v.effects_rock != BILINEAR and is_barrier_given:
+    is_crushed = v.effects_rock == BILINEAR or v.effects_rock == POWER
+    if v.effects_barrier and not is_crushed and is_barrier_given:
         return Rule.BARRIER
     return Rule.SETTLE if v.run_settle >= v.run_duration else Rule.NOTHING
 

@@ -36,7 +36,8 @@ from percussion_model.scene.group import (
     HAS_WAVES,
     LISTED,
     LOSS_ON,
-    ROCK_BILINEAR,
+    ROCK_CRUSHED,
+    ROCK_POWER,
     ROCK_PRESENT,
     ROCK_SPRINGY,
     SOLVER_FEM,
@@ -93,17 +94,17 @@ class Effects(Parameters):
         "force on the piston: switching pressure law, a given force or none",
     )
     loss: bool = flag(True, "structural (Kelvin-Voigt) loss in the elastic bars", HAS_WAVES)
-    barrier: bool = flag(True, "energy barrier of the bilinear rock law", ROCK_BILINEAR)
+    barrier: bool = flag(True, "energy barrier of the rock law, bilinear or power", ROCK_CRUSHED)
     rock: str = choice(
         "bilinear",
-        ("bilinear", "spring", "wall", "none"),
-        "what the bit meets: bilinear law, linear spring, rigid wall or nothing",
+        ("bilinear", "spring", "wall", "none", "power"),
+        "what the bit meets: bilinear law, linear spring, rigid wall, nothing, or power law",
     )
     standstill_tension: str = choice(
         "release",
         ("release", "paper"),
         "in standstill: let go of the rock when the force vanishes, or pull as in the paper",
-        ROCK_BILINEAR,
+        ROCK_CRUSHED,
     )
     string: bool = flag(False, "bars between piston and bit (string.rods)", HAS_WAVES)
     joints: bool = flag(True, "joints of the drill string; off: all are perfect", STRING_ON)
@@ -175,9 +176,28 @@ class RockLaw(Parameters):
         5.0,
         "-",
         "gamma: unloading by loading stiffness",
-        ROCK_BILINEAR,
+        ROCK_CRUSHED,
         gt=1,
         le=1e4,
+    )
+    loading_exponent: float = quantity(
+        1.5, "-", "n of the power law: force grows as penetration^n", ROCK_POWER, ge=1, le=4
+    )
+    reference_penetration: float = quantity(
+        1e-3,
+        "m",
+        "penetration at which K_R and gamma of the power law hold",
+        ROCK_POWER,
+        ge=1e-6,
+        le=1,
+    )
+    unloading_exponent: float = quantity(
+        0.0,
+        "-",
+        "q of the power law: gamma grows as (peak force)^q",
+        ROCK_POWER,
+        ge=0,
+        le=4,
     )
     barrier_damping: float = quantity(
         1e4, "N s/m", "damping C_R of the energy barrier", BARRIER_ON, ge=0, le=1e9

@@ -36,7 +36,7 @@ def scales(scene: Scene) -> dict[str, Scale]:
         found["piston_transit_time"] = Scale("T_1", piston.transit_time, "s")
         found["piston_length"] = Scale("L_1", piston.length, "m")
     found["bit_transit_time"] = Scale("T_2", bit.transit_time, "s")
-    soft = scene.effects.rock in ("bilinear", "spring")
+    soft = scene.effects.rock in ("bilinear", "spring", "power")
     if soft:
         cycle = math.sqrt(bit.mass / rock.loading_stiffness)
         ratio = rock.loading_stiffness * bar_compliance(bit.numbers)

@@ -350,6 +350,7 @@ class Scene:
         found = why_waves(
             self.piston.model == "rigid",
             self.effects.rock == "wall",
+            self.effects.rock == "power",
             self.effects.loss,
             self.loss.time,
             self.piston.transit_time if self.piston.model == "elastic" else bit,
@@ -375,7 +376,7 @@ class Scene:
     @property
     def barrier_on(self) -> bool:
         """Whether the rock law has an energy barrier (mode DFC)."""
-        wanted = self.effects.barrier and self.effects.rock == "bilinear"
+        wanted = self.effects.barrier and self.effects.rock in ("bilinear", "power")
         return bool(wanted and self.rock.barrier_energy > 0 and self.rock.barrier_damping > 0)
 
     @property

@@ -22,12 +22,14 @@ class WhyWaves(IntEnum):
     UNLIKE = 4
     LITTLE_LOSS = 5
     MUCH_LOSS = 6
+    POWER = 7
 
 
 REASONS = {
     WhyWaves.NOT: "",
     WhyWaves.RIGID_PISTON: "the piston is rigid",
     WhyWaves.WALL: "the rock is a wall",
+    WhyWaves.POWER: "the rock has a power law",
     WhyWaves.NO_LOSS: "loss is off",
     WhyWaves.UNLIKE: f"one bar is more than {MOST_UNLIKE:g} times as long by transit time",
     WhyWaves.LITTLE_LOSS: f"loss.time is below {LEAST_LOSS:g} of the shorter transit time",
@@ -36,14 +38,20 @@ REASONS = {
 
 
 def why_waves(
-    is_rigid: bool, is_wall: bool, has_loss: bool, loss_time: float, piston: float, bit: float
+    is_rigid: bool,
+    is_wall: bool,
+    is_power: bool,
+    has_loss: bool,
+    loss_time: float,
+    piston: float,
+    bit: float,
 ) -> WhyWaves:
     """Tell why waves drill better than as many modes.
 
     Parameters
     ----------
-    is_rigid, is_wall, has_loss : bool
-        Of the piston, the rock and the bars.
+    is_rigid, is_wall, is_power, has_loss : bool
+        Of the piston, of the rock, which may be a wall or have a power law, and of the bars.
     loss_time : float
         [s]
     piston, bit : float
@@ -53,6 +61,8 @@ def why_waves(
         return WhyWaves.RIGID_PISTON
     if is_wall:
         return WhyWaves.WALL
+    if is_power:
+        return WhyWaves.POWER
     if not has_loss:
         return WhyWaves.NO_LOSS
     if max(piston, bit) > MOST_UNLIKE * min(piston, bit):

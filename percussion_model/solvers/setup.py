@@ -27,7 +27,10 @@ MOST_CELLS = 1_000_000
 # What the choices of the parameter table mean, in their order.
 PISTONS = (Piston.ELASTIC, Piston.RIGID, Piston.ABSENT)
 DRIVES = (DriveKind.PRESSURE, DriveKind.EXTERNAL, DriveKind.NONE)
-ROCKS = (RockKind.BILINEAR, RockKind.SPRING, RockKind.WALL, RockKind.NONE)
+ROCKS = (
+    RockKind.BILINEAR, RockKind.SPRING, RockKind.WALL, RockKind.NONE, RockKind.BILINEAR,
+)  # fmt: skip
+POWER = 4  # the choice of the power law, which has the modes of the bilinear one
 DIRECTIONS = (1, -1)
 
 
@@ -133,8 +136,19 @@ def fill_parameters(p: Any, numbers: Numbers, with_piston: bool) -> None:
     p["drive"] = DRIVES[values.effects_drive]
     p["rock"] = ROCKS[values.effects_rock]
     p["barrier"] = barrier_on(numbers)
+    fill_power(p, values)
     p["release"] = values.effects_standstill_tension == StandstillTension.RELEASE
     fill_effects(p, values)
+
+
+def fill_power(p: Any, values: Any) -> None:
+    """Fill the parameters of the power law; with both exponents plain it is the bilinear one."""
+    p["exponent"], p["unloading_exponent"], p["reference_penetration"] = 1.0, 0.0, 1.0
+    if values.effects_rock == POWER:
+        p["exponent"] = values.rock_loading_exponent
+        p["unloading_exponent"] = values.rock_unloading_exponent
+        p["reference_penetration"] = values.rock_reference_penetration
+    p["power"] = p["exponent"] != 1.0 or p["unloading_exponent"] != 0.0
 
 
 def any_effect(values: Any) -> bool:

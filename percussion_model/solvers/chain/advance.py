@@ -43,7 +43,7 @@ def stored(par, s, chain, waves):
 def read_at(par, s, chain, waves, time, blows, events, row):
     """Read the ledger at the grid point, then let the ends meet up to `time` and read the rest."""
     kinetic, elastic = stored(par, s, chain, waves)
-    fill_ledger(s, row, kinetic, elastic, recoverable(s))
+    fill_ledger(s, row, kinetic, elastic, recoverable(par, s))
     row.bit_kinetic_energy = kinetic_of_bar(chain, waves, s.step, par.bars - 1)
     tau = max(time - time_of(par, s), SHORTEST * par.dt)
     bit, contact = s.i_bit, s.i_contact

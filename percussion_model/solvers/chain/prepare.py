@@ -73,4 +73,4 @@ def begin(p, s, chain, waves, numbers):
     if p.piston != Piston.ABSENT:
         s.u_r = s.u_0 = -s.gap
     kinetic, elastic = stored(p, s, chain, waves)
-    s.e_start = kinetic + elastic + recoverable(s)
+    s.e_start = kinetic + elastic + recoverable(p, s)

@@ -90,7 +90,7 @@ def read_here(par, s, w, c, time, row):
     row.e_numerical += numerical
     fill_motion(par, s, row, time, s.x_r + s.mean_p + par.start_gap, bit_position(s))
     row.bit_end_velocity = s.v_end
-    row.bit_force = bit_force(s)
+    row.bit_force = bit_force(par, s)
     row.contact_force = contact_force(par, s)
     row.bit_kinetic_energy = kinetic_energy(c, w, par.n_p, par.n_b)
 

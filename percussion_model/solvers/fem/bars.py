@@ -95,7 +95,7 @@ def stored_energy(par, s, w, c):
     if par.n_p > 0:
         kinetic += kinetic_energy(c, w, 0, par.n_p)
     elastic = elastic_energy(c, w, par.n_p + par.n_b) + contact_energy(par, s)
-    return kinetic, elastic, recoverable(s)
+    return kinetic, elastic, recoverable(par, s)
 
 
 @kernel

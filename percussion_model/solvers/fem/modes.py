@@ -58,19 +58,19 @@ def change_contact(par, s, w, c, blows, events):
 def close_on_rock(par, s, energy):
     """The flying bit meets the rock."""
     rebounding = s.rebounding
-    standstill = s.e_standstill + recoverable(s)
+    standstill = s.e_standstill + recoverable(par, s)
     close_interface(par, s, energy)
     s.rebounding = 0
     if rebounding == 0:
         # what flight and law take for rock still pressed in is overshoot
         s.e_standstill = standstill
-        s.e_overshoot -= recoverable(s)
+        s.e_overshoot -= recoverable(par, s)
 
 
 @merged
-def lift_off(s):
+def lift_off(par, s):
     """The bit leaves the rock, which may still be pressed in."""
-    left = recoverable(s)
+    left = recoverable(par, s)
     s.mode = Mode.FF
     if s.p > s.p_u:
         s.rebounding = 1
@@ -98,20 +98,20 @@ def change_rock(par, s, w, c):
     if par.rock == RockKind.SPRING:
         if s.p >= 0.0:
             return 0
-        lift_off(s)
+        lift_off(par, s)
         return 1
     if s.mode == Mode.DFC and s.w >= s.w_r:
         s.mode = Mode.FC
         return 1
     if s.mode == Mode.BC and s.p < s.p_u:
-        lift_off(s)
+        lift_off(par, s)
         return 1
     if s.mode == Mode.SS:
         if overcomes_barrier(par, s, s.kinetic):
             leave_standstill(par, s, v)
             return 1
-        if par.release == 1 and spring_force(s) + damping(s) * v < 0.0:
-            lift_off(s)
+        if par.release == 1 and spring_force(par, s) + damping(s) * v < 0.0:
+            lift_off(par, s)
             return 1
         return 0
     return leave_by_velocity(par, s, v, energy)
@@ -144,7 +144,7 @@ def change_modes(par, s, w, c, blows, events):
             if s.mode == Mode.SS:
                 enter_standstill(s, s.time)
                 s.kinetic = kinetic_energy(c, w, par.n_p, par.n_b)
-            push_event(s, events, s.time, s.mode, spring_force(s))
+            push_event(s, events, s.time, s.mode, spring_force(par, s))
         if changed == 0:
             s.skip_events = 0
             return

@@ -95,11 +95,11 @@ def book_rock(par, s, x, w, h):
 
 
 @inlined
-def bit_force(s):
+def bit_force(par, s):
     """Force of the bit on the rock, compression positive [N]."""
     if s.mode == Mode.FF:
         return 0.0
-    return spring_force(s) + damping(s) * s.v_end
+    return spring_force(par, s) + damping(s) * s.v_end
 
 
 @inlined
@@ -113,7 +113,7 @@ def contact_force(par, s):
 @inlined
 def note_forces(par, s):
     """Keep the greatest forces at the ends of steps: of the blow, and of an observer."""
-    bit = bit_force(s)
+    bit = bit_force(par, s)
     contact = contact_force(par, s)
     s.b_peak_bit = max(s.b_peak_bit, bit)
     s.b_peak_contact = max(s.b_peak_contact, contact)
@@ -126,7 +126,7 @@ def note_forces(par, s):
 def take_step(par, s, w, c, x, h):
     """Make the tried step the state, and book it."""
     n_p = par.n_p
-    before = recoverable(s)
+    before = recoverable(par, s)
     p_before = s.p
     if s.mode != Mode.FF:
         book_rock(par, s, x, w, h)
@@ -143,7 +143,7 @@ def take_step(par, s, w, c, x, h):
     read_nodes(par, s, w)
     if s.mode == Mode.FF:
         # a rock that was still rebounding back relaxes without doing work
-        s.e_standstill += before - recoverable(s)
+        s.e_standstill += before - recoverable(par, s)
     else:
         crush(par, s, p_before)
     if -s.u_r > s.b_stroke and n_p > 0:

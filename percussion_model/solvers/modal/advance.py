@@ -129,7 +129,7 @@ def read_at(par, s, bars, time, row):
             own = kinetic_of(bars.wp, bars.wp.shape[1])
             kinetic += own
             elastic += piston_vibration(bars) - own
-    fill_ledger(s, row, kinetic, elastic, recoverable(s))
+    fill_ledger(s, row, kinetic, elastic, recoverable(par, s))
     fill_motion(par, s, row, time, s.u_p + par.start_gap, s.u_b)
     row.bit_end_velocity = s.v_low
     row.bit_force = s.f_rock

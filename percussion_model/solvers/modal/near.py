@@ -203,7 +203,7 @@ def book_flight(par, s, h, v_b, look):
 @kernel
 def book_way(par, s, bars, ticks, look):
     """Book what bit and piston did up to a look that is `ticks` after the state."""
-    h, before, p, v_b, sums = ticks * par.tick, recoverable(s), s.p, s.v_b, look.sums
+    h, before, p, v_b, sums = ticks * par.tick, recoverable(par, s), s.p, s.v_b, look.sums
     s.v_b = sum_of(bars.laws.ends[s.law], BIT_SPEED, bars.w, s.pairs) / par.mass_b
     way_b = (sums.bit - s.at_b) / par.mass_b
     book_bit_load(par, s, way_b)
@@ -212,7 +212,7 @@ def book_way(par, s, bars, ticks, look):
     s.p, s.f_rock, s.f_contact = look.p, look.force, 0.0
     if s.mode == Mode.FF:
         s.f_rock = 0.0
-        s.e_standstill += before - recoverable(s)
+        s.e_standstill += before - recoverable(par, s)
     else:
         s.i_bit += par.mass_b * (h * s.a_b - (s.v_b - v_b))
         s.rock_work += 0.5 * stiffness(s) * (s.p - p) * (s.p + p - 2.0 * origin(s))

@@ -47,7 +47,7 @@ def end_standstill(par, s, bars, events):
         # before a front can be there, modes ring
         leave_standstill(par, s, s.v_low if s.time >= s.rest_until else 0.0)
         change_spring(par, s, bars)
-        push_event(s, events, time_of(par, s), s.mode, spring_force(s))
+        push_event(s, events, time_of(par, s), s.mode, spring_force(par, s))
 
 
 @kernel
@@ -59,7 +59,7 @@ def next_mode(par, s, energy):
     energy : float
         Kinetic energy of the bit [J].
     """
-    left, before = s.mode, recoverable(s)
+    left, before = s.mode, recoverable(par, s)
     if s.mode == Mode.FF:
         if par.rock == RockKind.WALL:
             s.e_standstill += before
@@ -73,7 +73,7 @@ def next_mode(par, s, energy):
         s.mode = Mode.FC
     elif s.mode == Mode.SS:
         s.mode = Mode.FF
-        s.e_standstill += before - recoverable(s)
+        s.e_standstill += before - recoverable(par, s)
     elif s.mode == Mode.BC and s.p < s.p_u:
         s.mode = Mode.FF
     else:
@@ -91,7 +91,7 @@ def note_mode(par, s, events):
     if s.mode == Mode.SS:
         enter_standstill(s, time)
         push_checkpoint(s, time)
-    push_event(s, events, time, s.mode, spring_force(s))
+    push_event(s, events, time, s.mode, spring_force(par, s))
 
 
 @kernel

@@ -152,7 +152,7 @@ def book_rock(par, s, trial, before, v_low):
         Velocity of the rock end then [m/s].
     """
     if s.mode == Mode.FF:
-        s.e_standstill += before - recoverable(s)
+        s.e_standstill += before - recoverable(par, s)
         return
     s.rock_work += trial.force * trial.path
     book_dashpot(s, trial.work)
@@ -168,7 +168,7 @@ def book_rock(par, s, trial, before, v_low):
 @kernel
 def make(par, s, bars, level, trial, push, events):
     """Make a step that was tried."""
-    begin, before, h, v_low = time_of(par, s), recoverable(s), trial.h, s.v_low
+    begin, before, h, v_low = time_of(par, s), recoverable(par, s), trial.h, s.v_low
     ends = trial.ends
     s.time += 1 << level
     s.count_steps += 1

@@ -129,5 +129,5 @@ def read(par_, state, t, blows, events, reading):
     if s.held == 1:
         row.contact_force = contact_force(par, s, acceleration(par, s))
     row.bit_kinetic_energy = 0.5 * par.mass_b * s.v_b * s.v_b
-    fill_ledger(s, row, kinetic_energy(par, s.v_p, s.v_b), 0.0, recoverable(s))
+    fill_ledger(s, row, kinetic_energy(par, s.v_p, s.v_b), 0.0, recoverable(par, s))
     return status

@@ -136,17 +136,17 @@ def change_mode(par, s, events, kind, moved):
     elif kind == Next.BARRIER:
         s.mode = Mode.FC
     elif kind == Next.PEAK:
-        end_loading(s)
+        end_loading(par, s)
     elif kind == Next.LIFT:
         if moved and (s.mode == Mode.BC or par.rock == RockKind.SPRING):
             s.p = s.p_u  # exactly unloaded; else it already was in tension
-        lift_off(s)
+        lift_off(par, s)
     elif kind == Next.TURN:
         end_unloading(par, s, 0.5 * par.mass_b * s.v_b * s.v_b)
         if s.mode == Mode.SS:
             begin_standstill(s)
     elif kind == Next.LEAVE_DOWN:
-        resume_cycle(s, par.barrier)
+        resume_cycle(par, s)
     else:
         s.mode = Mode.BC
     force = bit_force(par, s, s.p, s.v_b)

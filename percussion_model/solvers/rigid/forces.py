@@ -94,11 +94,11 @@ def bit_force(par, s, p, v):
 
 
 @kernel
-def lift_off(s):
+def lift_off(par, s):
     """Free flight begins; a rock in tension gives its energy up."""
-    before = recoverable(s)
+    before = recoverable(par, s)
     s.mode = Mode.FF
-    s.e_standstill += before - recoverable(s)
+    s.e_standstill += before - recoverable(par, s)
 
 
 @kernel

@@ -186,7 +186,7 @@ def book_rock(par, s, p_before, taken):
     taken : float
         By the dashpot meanwhile [J].
     """
-    change = recoverable(s) - recoverable_at(s, p_before)
+    change = recoverable(par, s) - recoverable_at(par, s, p_before)
     if s.mode == Mode.FF:
         # Rock that springs back without the bit relaxes on its dashpot.
         s.e_standstill -= change

@@ -17,6 +17,7 @@ from percussion_model.physics.rock import (
     crush,
     damping,
     enter_standstill,
+    is_loading,
     leave_by_velocity,
     leave_standstill,
     origin,
@@ -25,6 +26,7 @@ from percussion_model.physics.rock import (
     spring_force,
     stiffness,
 )
+from percussion_model.solvers.wave.power_loading import loading_stretch
 
 
 @merged
@@ -104,7 +106,7 @@ def contact_stretch(par, s, v_free, z, rest, time):
     crush(par, s, p_before)
     if next_mode == Mode.FF and y < 0.0:
         # standstill had pulled the bit when its unloading began: the rock lets go
-        s.e_standstill += recoverable(s)
+        s.e_standstill += recoverable(par, s)
     elif next_mode == Mode.FF and s.mode != Mode.SS:
         s.p = start  # exactly unloaded
     last = z * (v_free - v * (1.0 - fade))
@@ -125,7 +127,7 @@ def flight_stretch(par, s, v_free, rest):
     closes : int
         1 where it ends in contact.
     """
-    before = recoverable(s)
+    before = recoverable(par, s)
     t = rest
     closes = 0
     if par.rock != RockKind.NONE and v_free > 0.0:
@@ -138,7 +140,7 @@ def flight_stretch(par, s, v_free, rest):
     else:
         s.p += v_free * t
     # A rock that was still springing back relaxes without doing work.
-    s.e_standstill += before - recoverable(s)
+    s.e_standstill += before - recoverable(par, s)
     return t, closes
 
 
@@ -149,7 +151,7 @@ def asks_for_energy(par, s, v_free, z, tau):
         return par.rock == RockKind.BILINEAR
     if s.mode == Mode.FF:
         return s.p_u - s.p < v_free * tau
-    return s.mode == Mode.BC and z * v_free - spring_force(s) > 0.0
+    return s.mode == Mode.BC and z * v_free - spring_force(par, s) > 0.0
 
 
 @inlined
@@ -177,7 +179,7 @@ def rock_step(par, s, energy, v_free, z, tau, time, events):
     """
     if s.mode == Mode.SS and par.rock == RockKind.BILINEAR:
         if overcomes_barrier(par, s, energy):
-            force = spring_force(s)
+            force = spring_force(par, s)
             leave_standstill(par, s, (z * v_free - force) / (z + s.c_r))
             push_event(s, events, time, s.mode, force)
     rest = tau
@@ -211,16 +213,19 @@ def rock_step(par, s, energy, v_free, z, tau, time, events):
         if end_of_mode(par, s, energy, v_free, z) == 1:
             if s.mode == Mode.SS:
                 enter_standstill(s, here)
-            push_event(s, events, here, s.mode, spring_force(s))
+            push_event(s, events, here, s.mode, spring_force(par, s))
             continue
-        t, step, square, next_mode = contact_stretch(par, s, v_free, z, rest, here)
+        if par.power == 1 and is_loading(s):
+            t, step, square, next_mode = loading_stretch(par, s, v_free, z, rest, here)
+        else:
+            t, step, square, next_mode = contact_stretch(par, s, v_free, z, rest, here)
         d += step
         q += square
         rest -= t
         if next_mode < 0:
             return d, q
         s.mode = next_mode
-        push_event(s, events, here + t, s.mode, spring_force(s))
+        push_event(s, events, here + t, s.mode, spring_force(par, s))
     s.count_locked += 1
     return d, q
 
@@ -228,5 +233,5 @@ def rock_step(par, s, energy, v_free, z, tau, time, events):
 @merged
 def end_of_mode(par, s, energy, v_free, z):
     """Whether the sign of the velocity ends the mode at once; sets the next."""
-    v = (z * v_free - spring_force(s)) / (z + damping(s))
+    v = (z * v_free - spring_force(par, s)) / (z + damping(s))
     return leave_by_velocity(par, s, v, energy)

@@ -56,7 +56,7 @@ def stored_energy(par, s, bars):
         elastic += elastic_energy(bars.wp, bars.cp, par.n_p, r)
     elif par.piston == Piston.RIGID:
         kinetic += 0.5 * par.mass_p * s.v_p * s.v_p
-    return kinetic, elastic, recoverable(s)
+    return kinetic, elastic, recoverable(par, s)
 
 
 @kernel

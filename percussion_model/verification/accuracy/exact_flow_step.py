@@ -379,7 +379,7 @@ def read_here(par, s, f, x, time, row):
     """Write what is seen of a state."""
     u_b = read_means(par, s, f, x)
     kinetic = kinetic_energy(par, f, x)
-    fill_ledger(s, row, kinetic, 0.0, recoverable(s))
+    fill_ledger(s, row, kinetic, 0.0, recoverable(par, s))
     fill_motion(par, s, row, time, s.u_r + u_b + par.start_gap, u_b)
     row.bit_end_velocity = x[2 * par.n_p + 2 * par.n_b - 1]
     row.bit_kinetic_energy = kinetic

@@ -174,9 +174,9 @@ def meet(par, s, runs, fits, bars, joints, v, j, blows, events):
 
 
 @inlined
-def rock_energy(s):
+def rock_energy(par, s):
     """Where the work on the rock has gone [J]."""
-    return s.e_crushing + s.e_barrier + s.e_standstill + recoverable(s)
+    return s.e_crushing + s.e_barrier + s.e_standstill + recoverable(par, s)
 
 
 @inlined
@@ -184,12 +184,12 @@ def meet_rock(par, s, runs, bars, w, v, events):
     """Let the bit's lower end meet the rock."""
     last = runs.shape[0] - 1
     before, free = s.v_end, runs[last].low
-    work, gone = s.rock_work, rock_energy(s)
+    work, gone = s.rock_work, rock_energy(par, s)
     step_rock_end(par, s, runs, w, v, (free - before) / par.dt, events)
     runs[last].low = s.v_end
     impulse, work = par.end_mass * (free - s.v_end), s.rock_work - work
     s.e_numerical += 0.5 * impulse * (before + s.v_end) - work
-    s.e_overshoot += work - (rock_energy(s) - gone)
+    s.e_overshoot += work - (rock_energy(par, s) - gone)
     bars[BELOW, par.bars - 1] = impulse
 
 
@@ -374,7 +374,7 @@ def begin(par_, state, runs, mass, bars, joints, rows):
     s.alert = 1
     prepare_mode(par, s)
     kinetic, elastic = stored(par, s, runs, joints, rows[0], rows[2])
-    s.e_start = kinetic + elastic + recoverable(s)
+    s.e_start = kinetic + elastic + recoverable(par, s)
 
 
 @kernel
@@ -385,7 +385,7 @@ def run(reads, par_, state, runs, fits, mass, bars, joints, rows, time, blows, e
         return advance_to(par, s, runs, fits, mass, bars, joints, rows, time, blows, events)
     row, w, v = reading[0], rows[s.flip], rows[2]
     kinetic, elastic = stored(par, s, runs, joints, w, v)
-    fill_ledger(s, row, kinetic, elastic, recoverable(s))
+    fill_ledger(s, row, kinetic, elastic, recoverable(par, s))
     fill_motion(par, s, row, time, bars[POSITION, 0] + par.start_gap, bars[POSITION, par.bars - 1])
     row.bit_end_velocity = s.v_end
     row.bit_kinetic_energy = kinetic_energy(par, s, runs, w, v, 0.0)

@@ -248,7 +248,7 @@ def move_end(par, s, a, p, v, h):
         crush(par, s, before)
     s.p = p
     s.v_end = v
-    s.force = spring_force(s) + damping(s) * v
+    s.force = spring_force(par, s) + damping(s) * v
     s.b_peak_bit = max(s.b_peak_bit, s.force)
     s.peak_bit_force = max(s.peak_bit_force, s.force)
 
@@ -268,7 +268,7 @@ def change_mode(par, s, energy, time, events):
         leave_by_velocity(par, s, s.v_end, energy)
     s.alert = 1
     prepare_mode(par, s)
-    push_event(s, events, time, s.mode, spring_force(s))
+    push_event(s, events, time, s.mode, spring_force(par, s))
 
 
 @kernel
@@ -314,7 +314,7 @@ def step_rock_end(par, s, runs, w, v, a, events):
     if alert and overcomes_barrier(par, s, kinetic_energy(par, s, runs, w, v, 0.0)):
         leave_standstill(par, s, s.v_end)
         prepare_mode(par, s)
-        push_event(s, events, s.time - 0.5 * par.dt, s.mode, spring_force(s))
+        push_event(s, events, s.time - 0.5 * par.dt, s.mode, spring_force(par, s))
     if s.mode == Mode.FF:
         p = s.p + par.dt * (s.v_end + 0.5 * par.dt * a)
         speed = s.v_end + par.dt * a
@@ -480,7 +480,7 @@ def standing_energy(par, s, runs, w, v):
             off = stiff * (w[i + 1] - w[i]) + load * (above + runs[r].half)
             energy += 0.5 * off * off / stiff
             above += mass
-    off = spring_force(s) - load * par.mass_b
+    off = spring_force(par, s) - load * par.mass_b
     return energy + 0.5 * off * off / stiffness(s)
 
 
@@ -524,7 +524,7 @@ def look(par, s, runs, w, v, events):
                 w[i] -= par.eta * v[i]
                 v[i] = 0.0
             s.v_end = 0.0
-            s.force = s.force_before = spring_force(s)
+            s.force = s.force_before = spring_force(par, s)
     flying = s.closed == 0 and s.quiet_p == 0 and par.uppers > 0
     if flying and flying_energy(par, s, runs, w, v) < QUIET:
         s.quiet_p = 1
@@ -587,7 +587,7 @@ def run(reads, par_, state, runs, first, second, v, time, blows, events, reading
     s.u_r = u_p - u_b
     row = reading[0]
     kinetic = kinetic_energy(par, s, runs, w, v, 0.0)
-    fill_ledger(s, row, kinetic, 0.0, recoverable(s))
+    fill_ledger(s, row, kinetic, 0.0, recoverable(par, s))
     fill_motion(par, s, row, time, u_p + par.start_gap, u_b)
     row.bit_end_position = s.x_r + s.p + (time - s.time + 0.5 * par.dt) * s.v_end
     row.bit_end_velocity = s.v_end

@@ -69,7 +69,7 @@ def bit_bounds(par, s, wb, cb):
             return 0.0, 0.0, spread, math.inf, math.sqrt(2.0 * energy / par.mass_b)
     r = 2 * s.parity
     energy = kinetic_energy(wb, cb, par.n_b, r) + elastic_energy(wb, cb, par.n_b, r)
-    energy += recoverable(s)
+    energy += recoverable(par, s)
     speed = math.sqrt(2.0 * energy / par.mass_b)
     fall = speed * HORIZON + 0.5 * abs(a) * HORIZON * HORIZON
     energy += par.mass_b * abs(a) * fall

@@ -188,7 +188,7 @@ def leap_flight(par, s, wb, cb, ops, steps, scratch):
     a = bit_acceleration(par, s)
     time = steps * par.dt
     offset = strain_offset(wb, cb, par.n_b, r, Coef.BOTTOM)
-    unloading = recoverable(s)
+    unloading = recoverable(par, s)
     v0 = s.v_b
     s.v_b = v0 + a * time
     path = (v0 + 0.5 * a * time) * time
@@ -197,7 +197,7 @@ def leap_flight(par, s, wb, cb, ops, steps, scratch):
         par, s, wb, cb, par.n_b, par.mass_b, v0, s.v_b, steps, powers, loss, size, scratch
     )
     s.p += path - (strain_offset(wb, cb, par.n_b, r, Coef.BOTTOM) - offset)
-    s.e_standstill += unloading - recoverable(s)
+    s.e_standstill += unloading - recoverable(par, s)
     return path
 
 

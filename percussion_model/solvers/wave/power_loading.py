@@ -1,0 +1,159 @@
+"""Loading of the rock by the power law, followed through one step.
+
+The bit end obeys F_R = z (v_free - v) and the rock answers with F(p) + C v, so that
+(z + C) dp/dt = z v_free - F(p): one autonomous equation, whose velocity keeps its sign and
+falls. It is integrated by the three stages of Gauss, which are of order six (E. Hairer, S. P.
+Norsett, G. Wanner, Solving Ordinary Differential Equations I, section II.7).
+"""
+
+from __future__ import annotations
+
+import math
+
+from percussion_model.physics.kernel import inlined, kernel
+from percussion_model.physics.records import Mode
+from percussion_model.physics.rock import book_dashpot, crush, damping, loading_force
+
+ROOT = math.sqrt(15.0)
+# Weights of the stages in each other, and in the whole.
+A_11, A_12, A_13 = 5.0 / 36.0, 2.0 / 9.0 - ROOT / 15.0, 5.0 / 36.0 - ROOT / 30.0
+A_21, A_22, A_23 = 5.0 / 36.0 + ROOT / 24.0, 2.0 / 9.0, 5.0 / 36.0 - ROOT / 24.0
+A_31, A_32, A_33 = 5.0 / 36.0 + ROOT / 30.0, 2.0 / 9.0 + ROOT / 15.0, 5.0 / 36.0
+B_1, B_2 = 5.0 / 18.0, 4.0 / 9.0
+# Newton's steps, and where they end: relative to the first velocity.
+MOST_TURNS, SETTLED = 20, 1e-14
+# A step is cut where the rock changes by more than this share of the end's impedance in it.
+LARGEST_SHARE = 0.5
+MOST_PARTS = 1000
+
+
+@inlined
+def _answer(par, s, push, z, p):
+    """Velocity of the end at a penetration, and how it changes with that [m/s, 1/s]."""
+    force = loading_force(par, s, p)
+    slope = par.exponent * force / p if p > 0.0 else s.k_r
+    return (push - force) / z, -slope / z
+
+
+@kernel
+def _part(par, s, push, z, p, h):
+    """Integrals of the velocity [m] and of its square [m2/s] over `h` from `p` on."""
+    start, slope = _answer(par, s, push, z, p)
+    # the linear answer at the stages is a good guess
+    mid = start / (1.0 - 0.5 * h * slope)
+    v_1, v_2, v_3 = 0.5 * (start + mid), mid, mid + 0.5 * (mid - start)
+    for _ in range(MOST_TURNS):
+        f_1, g_1 = _answer(par, s, push, z, p + h * (A_11 * v_1 + A_12 * v_2 + A_13 * v_3))
+        f_2, g_2 = _answer(par, s, push, z, p + h * (A_21 * v_1 + A_22 * v_2 + A_23 * v_3))
+        f_3, g_3 = _answer(par, s, push, z, p + h * (A_31 * v_1 + A_32 * v_2 + A_33 * v_3))
+        a_11, a_12, a_13 = 1.0 - h * g_1 * A_11, -h * g_1 * A_12, -h * g_1 * A_13
+        a_21, a_22, a_23 = -h * g_2 * A_21, 1.0 - h * g_2 * A_22, -h * g_2 * A_23
+        a_31, a_32, a_33 = -h * g_3 * A_31, -h * g_3 * A_32, 1.0 - h * g_3 * A_33
+        r_1, r_2, r_3 = f_1 - v_1, f_2 - v_2, f_3 - v_3
+        m_11, m_12, m_13 = (
+            a_22 * a_33 - a_23 * a_32,
+            a_23 * a_31 - a_21 * a_33,
+            a_21 * a_32 - a_22 * a_31,
+        )
+        whole = a_11 * m_11 + a_12 * m_12 + a_13 * m_13
+        d_1 = (
+            r_1 * m_11 + a_12 * (a_23 * r_3 - r_2 * a_33) + a_13 * (r_2 * a_32 - a_22 * r_3)
+        ) / whole
+        d_2 = (
+            a_11 * (r_2 * a_33 - a_23 * r_3) + r_1 * m_12 + a_13 * (a_21 * r_3 - r_2 * a_31)
+        ) / whole
+        d_3 = (
+            a_11 * (a_22 * r_3 - r_2 * a_32) + a_12 * (r_2 * a_31 - a_21 * r_3) + r_1 * m_13
+        ) / whole
+        v_1 += d_1
+        v_2 += d_2
+        v_3 += d_3
+        if abs(d_1) + abs(d_2) + abs(d_3) <= SETTLED * abs(start):
+            break
+    d = h * (B_1 * (v_1 + v_3) + B_2 * v_2)
+    return d, h * (B_1 * (v_1 * v_1 + v_3 * v_3) + B_2 * v_2 * v_2)
+
+
+@kernel
+def load(par, s, push, z, time):
+    """Integrals of the velocity [m] and of its square [m2/s] over a time of loading.
+
+    Parameters
+    ----------
+    push : float
+        Force of the end if it were held [N].
+    z : float
+        Its impedance, with the damping of the mode [N s/m].
+    time : float
+        [s]
+    """
+    speed = (push - loading_force(par, s, s.p)) / z
+    most = s.p + max(speed, 0.0) * time
+    stiffest = par.exponent * loading_force(par, s, most) / most if most > 0.0 else s.k_r
+    parts = min(math.ceil(time * stiffest / (z * LARGEST_SHARE)), MOST_PARTS)
+    parts = max(parts, 1)
+    d = q = 0.0
+    for _ in range(parts):
+        step, square = _part(par, s, push, z, s.p + d, time / parts)
+        d += step
+        q += square
+    return d, q
+
+
+@kernel
+def time_to_break(par, s, push, z, rest, square):
+    """When the barrier is broken: the dashpot has taken W_R; `rest` if not before.
+
+    Parameters
+    ----------
+    square : float
+        Integral of the velocity's square over `rest` [m2/s].
+    """
+    wanted = (s.w_r - s.w) / s.c_r
+    if wanted <= 0.0:
+        return 0.0
+    low, high, t = 0.0, rest, rest * wanted / square
+    for _ in range(60):
+        d, q = load(par, s, push, z, t)
+        if q < wanted:
+            low = t
+        else:
+            high = t
+        v = (push - loading_force(par, s, s.p + d)) / z
+        change = (wanted - q) / (v * v) if v != 0.0 else math.inf
+        t += change
+        if not low < t < high:
+            t = 0.5 * (low + high)
+        if abs(change) <= 1e-13 * rest or high - low <= 1e-15 * rest:
+            break
+    return t
+
+
+@kernel
+def loading_stretch(par, s, v_free, z, rest, time):
+    """Follow a drilling cycle until the barrier is broken or the step ends.
+
+    Parameters and results are those of `rock_end.contact_stretch`.
+    """
+    C = damping(s)
+    push, whole = z * v_free, z + C
+    t, next_mode = rest, -1
+    d, q = load(par, s, push, whole, rest)
+    if s.mode == Mode.DFC and s.w + C * q >= s.w_r:
+        t, next_mode = time_to_break(par, s, push, whole, rest, q), Mode.FC.value
+        d, q = load(par, s, push, whole, t)
+    first = push - z * (push - loading_force(par, s, s.p)) / whole
+    if time < s.peak_from < time + t:
+        before, _ = load(par, s, push, whole, s.peak_from - time)
+        seen = push - z * (push - loading_force(par, s, s.p + before)) / whole
+    else:
+        seen = first
+    p_before = s.p
+    s.p += d
+    book_dashpot(s, C * q)
+    crush(par, s, p_before)
+    last = push - z * (push - loading_force(par, s, s.p)) / whole
+    s.b_peak_bit = max(s.b_peak_bit, first, last)
+    if time + t > s.peak_from:
+        s.peak_bit_force = max(s.peak_bit_force, seen, last)
+    return t, d, q, next_mode
