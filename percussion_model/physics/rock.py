@@ -263,6 +263,9 @@ def close_interface(par, s, energy):
         start_cycle(s, par.barrier, 0.0)
     else:
         s.mode = Mode.SS
+        if par.power == 1 and s.p <= s.p_u:
+            # unloaded rock: the stiffness of the last peak's line has no say any more
+            s.k_r, s.gamma = s.next_k_r, s.next_gamma
 
 
 @merged

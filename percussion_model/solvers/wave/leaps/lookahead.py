@@ -30,7 +30,7 @@ LOOKAHEAD_LEVELS = 4
 @merged
 def has_operators(par, s):
     """Whether operators exist for the mode and the rock law in force."""
-    if s.gamma * s.k_r != par.ss_stiffness:
+    if s.gamma * s.k_r != par.ss_stiffness or (par.power == 1 and s.mode != Mode.SS):
         return False
     if s.mode != Mode.SS and s.k_r != par.ss_loading:
         return False
