@@ -20,10 +20,12 @@ A_11, A_12, A_13 = 5.0 / 36.0, 2.0 / 9.0 - ROOT / 15.0, 5.0 / 36.0 - ROOT / 30.0
 A_21, A_22, A_23 = 5.0 / 36.0 + ROOT / 24.0, 2.0 / 9.0, 5.0 / 36.0 - ROOT / 24.0
 A_31, A_32, A_33 = 5.0 / 36.0 + ROOT / 30.0, 2.0 / 9.0 + ROOT / 15.0, 5.0 / 36.0
 B_1, B_2 = 5.0 / 18.0, 4.0 / 9.0
-# Newton's steps, and where they end: relative to the first velocity.
-MOST_TURNS, SETTLED = 20, 1e-14
-# A step is cut where the rock changes by more than this share of the end's impedance in it.
-LARGEST_SHARE = 0.5
+# Newton's steps, and where they end, relative to the first velocity or to the step.
+MOST_TURNS, SETTLED = 60, 1e-14
+# A step is cut where the rock changes by more than this share of the end's impedance in it, and
+# where the penetration grows by more than this share of it: a power has no series about zero.
+# From nothing on it may come to a share of the reference penetration.
+LARGEST_SHARE, GROWTH, LEAST_SHARE = 0.25, 0.5, 1e-3
 MOST_PARTS = 1000
 
 
@@ -87,16 +89,18 @@ def load(par, s, push, z, time):
     time : float
         [s]
     """
-    speed = (push - loading_force(par, s, s.p)) / z
-    most = s.p + max(speed, 0.0) * time
-    stiffest = par.exponent * loading_force(par, s, most) / most if most > 0.0 else s.k_r
-    parts = min(math.ceil(time * stiffest / (z * LARGEST_SHARE)), MOST_PARTS)
-    parts = max(parts, 1)
-    d = q = 0.0
-    for _ in range(parts):
-        step, square = _part(par, s, push, z, s.p + d, time / parts)
+    d = q = done = 0.0
+    while done < time:
+        p = s.p + d
+        v, slope = _answer(par, s, push, z, p)
+        h = min(time - done, max(-LARGEST_SHARE / slope, time / MOST_PARTS))
+        growth = max(GROWTH * p, LEAST_SHARE * par.reference_penetration)
+        if v * h > growth:
+            h = max(growth / v, time / MOST_PARTS)
+        step, square = _part(par, s, push, z, p, h)
         d += step
         q += square
+        done += h
     return d, q
 
 
@@ -113,7 +117,7 @@ def time_to_break(par, s, push, z, rest, square):
     if wanted <= 0.0:
         return 0.0
     low, high, t = 0.0, rest, rest * wanted / square
-    for _ in range(60):
+    for _ in range(MOST_TURNS):
         d, q = load(par, s, push, z, t)
         if q < wanted:
             low = t
@@ -122,10 +126,10 @@ def time_to_break(par, s, push, z, rest, square):
         v = (push - loading_force(par, s, s.p + d)) / z
         change = (wanted - q) / (v * v) if v != 0.0 else math.inf
         t += change
+        if abs(change) <= SETTLED * rest:
+            break
         if not low < t < high:
             t = 0.5 * (low + high)
-        if abs(change) <= 1e-13 * rest or high - low <= 1e-15 * rest:
-            break
     return t
 
 
