@@ -147,6 +147,8 @@ FEM_STATE = np.dtype(
         ("next_kinetic", "f8"),  # the same three at the end of the step tried last
         ("next_p", "f8"),
         ("next_b", "f8"),
+        ("chord_stiffness", "f8"),  # of the power law in the present step [N/m]
+        ("chord_origin", "f8"),  # [m]
         ("rebounding", "i8"),  # 1: in flight, rock still pressed in
         ("inputs_changed", "i8"),  # 1: inputs were changed, modes may have to follow
         ("skip_events", "i8"),  # modes did not settle: no events in the next step

@@ -14,12 +14,16 @@ from percussion_model.physics.rock import (
     book_dashpot,
     crush,
     damping,
-    origin,
     recoverable,
     spring_force,
-    stiffness,
 )
 from percussion_model.solvers.fem.bars import read_nodes
+from percussion_model.solvers.fem.power_chord import (
+    chord_work,
+    has_chord,
+    rock_origin,
+    rock_stiffness,
+)
 from percussion_model.solvers.fem.records import Mesh, Node, Trial
 from percussion_model.solvers.fem.scheme import rate_bend
 
@@ -80,11 +84,11 @@ def book_contact(par, s, x, w, h):
 def book_rock(par, s, x, w, h):
     """Impulse and works of the rock, by the quadrature of the scheme."""
     i = par.n_p + par.n_b - 1
-    K = stiffness(s)
+    K = rock_stiffness(par, s)
     C = damping(s)
     bend = rate_bend(par, x, i, h)
     path = x[Node.U, i] - w[Node.U, i]
-    y = s.p - origin(s)
+    y = s.p - rock_origin(par, s)
     after = y + path
     defect = 0.5 * h * h * par.dissipation * K * bend * bend
     dashpot = dashpot_work(par, s, x, w, h)
@@ -145,7 +149,9 @@ def take_step(par, s, w, c, x, h):
         # a rock that was still rebounding back relaxes without doing work
         s.e_standstill += before - recoverable(par, s)
     else:
-        crush(par, s, p_before)
+        crushed = crush(par, s, p_before)
+        if has_chord(par, s):
+            s.e_numerical += chord_work(s, p_before) - (recoverable(par, s) - before) - crushed
     if -s.u_r > s.b_stroke and n_p > 0:
         s.b_stroke = -s.u_r
     s.time += h

@@ -76,7 +76,7 @@ def advance(par_, state, t, blows, events):
             s.standing_events = 0
         else:
             s.standing_events += 1
-        if s.next_kind != Next.HOLD:
+        if s.next_kind != Next.HOLD and s.next_kind != Next.LINE:
             count_event(par, s)
         process_event(par, s, blows, events)
         s.scheduled = 0

@@ -32,6 +32,7 @@ from percussion_model.solvers.rigid.forces import (
     note_standstill_force,
     storm_persists,
 )
+from percussion_model.solvers.rigid.power_lines import begin_loading, take_line
 from percussion_model.solvers.rigid.records import Next
 
 # Pressed together, a rebound slower than this ends the bouncing: what is left of a blow
@@ -149,6 +150,8 @@ def change_mode(par, s, events, kind, moved):
         resume_cycle(par, s)
     else:
         s.mode = Mode.BC
+    if kind != Next.BARRIER:
+        begin_loading(par, s)
     force = bit_force(par, s, s.p, s.v_b)
     s.b_peak_bit = max(s.b_peak_bit, force)
     push_event(s, events, s.time, EventKind.MODE_FF + s.mode, force)
@@ -166,6 +169,9 @@ def process_event(par, s, blows, events):
         mark_standstill(s)
     elif kind == Next.SWITCH:
         turn_drive(s, events, s.time, -s.gap)
+    elif kind == Next.LINE:
+        s.p = s.line_end
+        take_line(par, s, s.line + 1)
     elif kind == Next.HOLD:
         note_standstill_force(par, s)
         mark_standstill(s)

@@ -12,6 +12,8 @@ from percussion_model.physics.records import Mode, Piston, RockKind
 from percussion_model.physics.rock import (
     damping,
     enter_standstill,
+    is_loading,
+    loading_force,
     origin,
     recoverable,
     stiffness,
@@ -46,6 +48,8 @@ def rock_terms(par, s):
     """Stiffness K, damping C and origin P_R of the present mode; K = 0 off the rock."""
     if s.mode == Mode.FF or par.rock == RockKind.WALL:
         return 0.0, 0.0, 0.0
+    if par.power == 1 and is_loading(s):
+        return s.line_stiffness, damping(s), s.line_origin
     return stiffness(s), damping(s), origin(s)
 
 
@@ -89,6 +93,8 @@ def bit_force(par, s, p, v):
     if on_wall(par, s):
         F, _ = loads(par, s)
         return F
+    if par.power == 1 and is_loading(s):
+        return loading_force(par, s, p) + damping(s) * v
     K, C, P = rock_terms(par, s)
     return K * (p - P) + C * v
 

@@ -8,7 +8,13 @@ from percussion_model.physics.body import book_bit_load, book_piston_load, pisto
 from percussion_model.physics.drive import drive_force
 from percussion_model.physics.kernel import kernel
 from percussion_model.physics.records import Mode, Piston, RockKind
-from percussion_model.physics.rock import book_dashpot, crush, recoverable, recoverable_at
+from percussion_model.physics.rock import (
+    book_dashpot,
+    crush,
+    is_loading,
+    recoverable,
+    recoverable_at,
+)
 from percussion_model.solvers.rigid.forces import (
     acceleration,
     bit_force,
@@ -24,6 +30,7 @@ from percussion_model.solvers.rigid.motion import (
     oscillate_with_loss,
     zero_time,
 )
+from percussion_model.solvers.rigid.power_lines import line_work
 
 
 @kernel
@@ -192,7 +199,12 @@ def book_rock(par, s, p_before, taken):
         s.e_standstill -= change
         return
     book_dashpot(s, taken)
-    s.rock_work += change + taken + crush(par, s, p_before)
+    given = change + crush(par, s, p_before)
+    if par.power == 1 and is_loading(s):
+        work = line_work(s, p_before)
+        s.e_numerical += work - given
+        given = work
+    s.rock_work += given + taken
 
 
 @kernel

@@ -32,7 +32,8 @@ class Next(IntEnum):
     TURN = 9  # the bit turns downward while unloading
     LEAVE_DOWN = 10  # KE_b > W_R in standstill, bit moves down or rests
     LEAVE_UP = 11  # the same, bit moves up
-    HOLD = 12  # none, but forces that effects hold are taken anew
+    LINE = 12  # none, but another line of the power law begins
+    HOLD = 13  # none, but forces that effects hold are taken anew
 
 
 # Rows that one event can add to the list: closed, drive up, opened, change of mode.
@@ -67,6 +68,10 @@ RIGID_STATE = np.dtype(
         ("ss_v", "f8"),
         ("ss_force", "f8"),  # mean bit force at the end of the last standstill [N]
         ("start_gap", "f8"),  # g_0 [m]
+        ("line", "i8"),  # of the power law, from 0
+        ("line_stiffness", "f8"),  # [N/m]
+        ("line_origin", "f8"),  # where its force would be 0 [m]
+        ("line_end", "f8"),  # [m]
         ("count_storms", "i8"),
         *COMMON_STATE,
     ],
@@ -84,6 +89,8 @@ RIGID_LIMITS = Limits(
         "standing_events": COUNT,
         "window_events": COUNT,
         "late": FLAG,
+        "line": (0, 1000),
+        "line_end": (-LARGEST, INFINITE),
         "count_storms": COUNT,
     },
     undefined=("ss_force", "peak_contact_force"),

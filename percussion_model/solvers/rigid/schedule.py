@@ -222,6 +222,10 @@ def schedule(par, s):
             tau, kind = fall_time(y, s.v_b, 0.0, k, -F / K), Next.LIFT
         elif s.mode == Mode.DFC or s.mode == Mode.FC:
             tau, kind = loading_event(s, y, acc, beta, k, M)
+            if par.power == 1 and tau > 0.0:
+                end = fall_time(-y, -s.v_b, beta, k, P + F / K - s.line_end)
+                if end < tau:
+                    tau, kind = end, Next.LINE
         elif s.mode == Mode.BC:
             tau, kind = unloading_event(s, y, acc, k, -F / K)
         else:

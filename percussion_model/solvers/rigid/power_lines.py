@@ -1,0 +1,52 @@
+"""Loading by the power law as straight lines, on which rigid bodies move in closed form.
+
+Lines follow each other at fixed penetrations, so that a run does not depend on how it is cut
+into calls. Each does the work of the law over its range: errors of the motion are of fourth
+order in the ratio of its ends, and jumps of the force where lines meet of second.
+"""
+
+from __future__ import annotations
+
+import math
+
+from percussion_model.physics.elementary import exp, log
+from percussion_model.physics.kernel import kernel
+from percussion_model.physics.rock import is_loading, loading_force, loading_work
+
+# Ratio of the ends of a line. The first goes from nothing to this share of the reference
+# penetration.
+RATIO, FIRST = 1.02, 1e-3
+# More lines than this reach beyond what any blow does.
+MOST_LINES = 1000
+
+
+@kernel
+def line_end(par, line):
+    """Penetration at which a line ends [m]."""
+    return FIRST * par.reference_penetration * exp(line * math.log(RATIO))
+
+
+@kernel
+def take_line(par, s, line):
+    """Move on a line from now on."""
+    s.line = line
+    a, b = line_end(par, line - 1) if line > 0 else 0.0, line_end(par, line)
+    s.line_stiffness = (loading_force(par, s, b) - loading_force(par, s, a)) / (b - a)
+    mean = (loading_work(par, s, b) - loading_work(par, s, a)) / (b - a)
+    s.line_origin = 0.5 * (a + b) - mean / s.line_stiffness
+    s.line_end = b if line < MOST_LINES else math.inf
+
+
+@kernel
+def begin_loading(par, s):
+    """Take the line of the present penetration, where a drilling cycle by the power law begins."""
+    if par.power == 1 and is_loading(s):
+        share = s.p / (FIRST * par.reference_penetration)
+        line = math.ceil(log(share) / math.log(RATIO)) if share > 1.0 else 0
+        take_line(par, s, min(line, MOST_LINES))
+
+
+@kernel
+def line_work(s, p_before):
+    """Work on the rock along the present line from `p_before` to now [J]."""
+    return s.line_stiffness * (s.p - p_before) * (0.5 * (s.p + p_before) - s.line_origin)
