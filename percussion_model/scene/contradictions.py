@@ -43,6 +43,7 @@ class Rule(IntEnum):
     ACCURACY_WITHOUT_LOSS_TIME = 24
     BARRIER = 25
     SETTLE = 26
+    MODES_OF_POWER = 27
 
 
 _OF_STRING = (
@@ -138,6 +139,10 @@ TEXTS = {
         'effects.barrier = true needs effects.rock = "bilinear" or "power", not "{effects.rock}": '
         "set effects.barrier = false"
     ),
+    Rule.MODES_OF_POWER: (
+        'solver.name = "modal" with effects.rock = "power": bars have modes on a rock of one '
+        'stiffness; set solver.name = "wave" or "auto"'
+    ),
     Rule.SETTLE: ("run.settle = {run.settle!r} s: must be below run.duration = {run.duration!r} s"),
 }
 
@@ -160,7 +165,9 @@ ELASTIC, RIGID = _place("bit.model", "elastic"), _place("bit.model", "rigid")
 PISTON_ELASTIC, PISTON_ABSENT = (_place("piston.model", word) for word in ("elastic", "absent"))
 NO_DRIVE, PRESSURE = (_place("effects.drive", word) for word in ("none", "pressure"))
 BILINEAR, POWER = (_place("effects.rock", word) for word in ("bilinear", "power"))
-AUTO, FEM, CHAIN = (_place("solver.name", word) for word in ("auto", "fem", "chain"))
+AUTO, FEM, CHAIN, MODAL = (
+    _place("solver.name", word) for word in ("auto", "fem", "chain", "modal")
+)
 WAVE, BLOW_MAP = (_place("solver.fidelity", word) for word in ("wave", "blow-map"))
 
 
@@ -197,6 +204,8 @@ def find_contradiction(
     is_crushed = v.effects_rock == BILINEAR or v.effects_rock == POWER
     if v.effects_barrier and not is_crushed and is_barrier_given:
         return Rule.BARRIER
+    if v.effects_rock == POWER and v.solver_name == MODAL:
+        return Rule.MODES_OF_POWER
     return Rule.SETTLE if v.run_settle >= v.run_duration else Rule.NOTHING
 
 
