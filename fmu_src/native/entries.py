@@ -59,7 +59,14 @@ from percussion_model.solvers.chain.records import CHAIN_STATE
 from percussion_model.solvers.fem.records import FEM_STATE
 from percussion_model.solvers.modal.records import MODAL_STATE
 from percussion_model.solvers.rigid.records import RIGID_STATE
-from percussion_model.solvers.setup import DRIVES, PISTONS, ROCKS, any_effect, barrier_on
+from percussion_model.solvers.setup import (
+    DRIVES,
+    PISTONS,
+    ROCKS,
+    any_effect,
+    barrier_on,
+    rock_numbers,
+)
 from percussion_model.solvers.state import is_bounded, words_of
 from percussion_model.solvers.wave.records import WAVE_STATE
 
@@ -139,7 +146,7 @@ def _fill_barrier(head, numbers):
         return
     share = values.rock_barrier_energy / energy
     took = share * bar_mass(numbers.piston) / values.rock_barrier_damping
-    cycle = math.sqrt(bar_mass(numbers.bit) / values.rock_loading_stiffness)
+    cycle = math.sqrt(bar_mass(numbers.bit) / rock_numbers(numbers).k_r)
     head.time_share, head.energy_share = took / cycle, share
 
 

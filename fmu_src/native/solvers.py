@@ -37,5 +37,8 @@ def kind_of(numbers):
     top = bar_transit_time(numbers.piston) if piston == Piston.ELASTIC else bit
     is_wall = ROCKS[values.effects_rock] == RockKind.WALL
     is_power, has_loss = values.effects_rock == POWER, values.effects_loss != 0
-    why = why_waves(piston == Piston.RIGID, is_wall, is_power, has_loss, values.loss_time, top, bit)
+    cuttings = ROCKS[values.effects_rock] == RockKind.BILINEAR and values.effects_cuttings != 0
+    why = why_waves(
+        piston == Piston.RIGID, is_wall, is_power, cuttings, has_loss, values.loss_time, top, bit
+    )
     return Kind.MODAL.value if why == WhyWaves.NOT else Kind.WAVE.value

@@ -5,17 +5,21 @@ Table 1 of docs/model.md, with the readings given there.
 
 from __future__ import annotations
 
-from percussion_model.physics.elementary import exp, log
+from percussion_model.physics.cuttings import left_depth
 from percussion_model.physics.kernel import inlined, kernel, merged
+from percussion_model.physics.power_law import (
+    loading_force,
+    loading_work,
+    penetration_at,
+    recoverable_by_power,
+    start_loading,
+)
 from percussion_model.physics.records import Mode, RockKind
 
 # A velocity below this counts as zero: the ringing left after a long
 # standstill is of this size, its sign means nothing [m/s].
 REST_VELOCITY = 1e-9
 
-# Below this share of the reference penetration, or of the force there, the power law goes on as
-# a straight line: nothing that moves a bit is so small.
-LEAST_SHARE = 1e-9
 TINY_FORCE = 1e-200  # [N], against a division by zero
 
 # A drilling cycle counts when it crushed more than this share of W_R.
@@ -55,46 +59,11 @@ def is_loading(s):
 
 
 @inlined
-def growth(par, p):
-    """Secant stiffness at a penetration, divided by that at the reference penetration."""
-    return exp((par.exponent - 1.0) * log(max(p / par.reference_penetration, LEAST_SHARE)))
-
-
-@inlined
-def loading_force(par, s, p):
-    """Force of the rock at a penetration in a drilling cycle (docs/model.md, eq. 15, 15a) [N]."""
-    if par.power == 0:
-        return s.k_r * p
-    return s.k_r * p * growth(par, p)
-
-
-@inlined
-def recovered_share(par, s, force):
-    """Penetration that the rock gives back from a peak force, divided by that at the peak.
-
-    1/gamma at the force of the reference penetration, a power of the force beside it; never so
-    much that unloading would give back more energy than loading took (docs/model.md, eq. 15b).
-    """
-    share = 1.0 / s.gamma
-    if par.unloading_exponent > 0.0:
-        relative = max(force / (s.k_r * par.reference_penetration), LEAST_SHARE)
-        share *= exp(-par.unloading_exponent * log(relative))
-    return min(share, 2.0 / (par.exponent + 1.0))
-
-
-@inlined
 def spring_force(par, s):
     """Force of the rock without its damping, K (p - P_R) of docs/model.md, eq. 15 [N]."""
     if par.power == 1 and is_loading(s):
         return loading_force(par, s, s.p)
     return stiffness(s) * (s.p - origin(s))
-
-
-@inlined
-def recoverable_by_power(par, s, p):
-    """`recoverable_at` in a drilling cycle of the power law [J]."""
-    force = loading_force(par, s, p)
-    return 0.5 * force * p * recovered_share(par, s, force) + s.kept
 
 
 @inlined
@@ -114,12 +83,6 @@ def recoverable_at(par, s, p):
 def recoverable(par, s):
     """Energy that the rock would give back on unloading [J]."""
     return recoverable_at(par, s, s.p)
-
-
-@inlined
-def loading_work(par, s, p):
-    """Work on the rock from no penetration to `p` in a drilling cycle of the power law [J]."""
-    return loading_force(par, s, p) * p / (par.exponent + 1.0)
 
 
 @inlined
@@ -155,46 +118,42 @@ def overcomes_barrier(par, s, energy):
 
 
 @kernel
-def start_cycle(s, barrier, p):
-    """Begin a drilling cycle whose penetration starts at `p` (docs/model.md, eq. 19)."""
+def start_cycle(par, s, force):
+    """Begin a drilling cycle that starts under a force [N] (docs/model.md, eq. 19)."""
+    s.k_r = par.buttons * s.next_k_r
+    s.gamma = s.next_gamma
+    s.c_r = s.next_c_r
+    s.w_r = s.next_w_r
+    p = force / s.k_r
+    if par.power == 1:
+        left = left_depth(par, s.p_u if force > 0.0 else s.p)
+        start_loading(par, s, left)
+        p = penetration_at(par, s, force) if force > 0.0 else left
     s.x_r += s.p - p
     s.p = p
     s.w = 0.0
     s.crushed = 0.0
     s.cycle_counted = 0
     s.kept = 0.0
-    s.k_r = s.next_k_r
-    s.gamma = s.next_gamma
-    s.c_r = s.next_c_r
-    s.w_r = s.next_w_r
-    if barrier == 1 and s.c_r > 0.0 and s.w_r > 0.0:
+    if par.barrier == 1 and s.c_r > 0.0 and s.w_r > 0.0:
         s.mode = Mode.DFC
     else:
         s.mode = Mode.FC
 
 
-@inlined
-def penetration_at(par, k, force):
-    """Penetration of a drilling cycle at a force, with a loading stiffness [m]."""
-    if par.power == 0:
-        return force / k
-    relative = max(force / (k * par.reference_penetration), LEAST_SHARE)
-    return par.reference_penetration * exp(log(relative) / par.exponent)
-
-
 @kernel
 def resume_cycle(par, s):
     """Begin a cycle from contact: the elastic force stays the same (docs/model.md, eq. 19)."""
-    force = s.gamma * s.k_r * (s.p - s.p_u)  # that of the spring, in BC and SS
+    stiff = s.gamma * s.k_r
+    force = stiff * (s.p - s.p_u)  # that of the spring, in BC and SS
     before = recoverable(par, s)
+    start_cycle(par, s, force)
     if par.power == 1:
-        start_cycle(s, par.barrier, penetration_at(par, s.next_k_r, force))
         # what the rock gives back goes on from what it would give now
         s.kept = before - recoverable(par, s)
         return
     # Other rock under the same force springs back otherwise, which crushes nothing.
-    s.hole_start += force / (s.gamma * s.k_r) - force / (s.next_gamma * s.next_k_r)
-    start_cycle(s, par.barrier, force / s.next_k_r)
+    s.hole_start += force / stiff - force / (s.gamma * s.k_r)
     # With other rock than before, what can be recovered changes at once.
     s.e_crushing += before - recoverable(par, s)
 
@@ -208,7 +167,8 @@ def end_loading(par, s):
     """
     s.p_u = unloaded_penetration(par, s)
     if par.power == 1:
-        s.k_r *= growth(par, s.p)
+        if s.p > 0.0:
+            s.k_r = loading_force(par, s, s.p) / s.p
         s.gamma = s.p / (s.p - s.p_u) if s.p > s.p_u else par.exponent
     s.mode = Mode.BC
 
@@ -254,18 +214,18 @@ def leave_by_velocity(par, s, v, energy):
 def close_interface(par, s, energy):
     """Contact with the rock begins: a new cycle, standstill, spring or wall."""
     if par.rock == RockKind.SPRING:
-        s.k_r = s.next_k_r
+        s.k_r = par.buttons * s.next_k_r
         s.mode = Mode.FC
     elif par.rock == RockKind.WALL:
         s.mode = Mode.SS
     elif overcomes_barrier(par, s, energy):
         s.e_standstill += recoverable(par, s)
-        start_cycle(s, par.barrier, 0.0)
+        start_cycle(par, s, 0.0)
     else:
         s.mode = Mode.SS
         if par.power == 1 and s.p <= s.p_u:
             # unloaded rock: the stiffness of the last peak's line has no say any more
-            s.k_r, s.gamma = s.next_k_r, s.next_gamma
+            s.k_r, s.gamma = par.buttons * s.next_k_r, s.next_gamma
 
 
 @merged

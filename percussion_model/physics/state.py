@@ -27,6 +27,12 @@ COMMON_PARAMETERS = [
     ("exponent", "f8"),  # n and q of the power law
     ("unloading_exponent", "f8"),
     ("reference_penetration", "f8"),  # [m]
+    ("buttons", "f8"),  # that share the load of a power law
+    ("chipping_force", "f8"),  # of all buttons [N]
+    ("chipping_penetration", "f8"),  # over which they chip, 0 where they do not [m]
+    ("cuttings", "i8"),  # 1: cuttings stay in the crater
+    ("removed_share", "f8"),  # of a crater of 1 mm
+    ("removal_exponent", "f8"),
     ("release", "i8"),  # 1: standstill leaves to free flight when F_R reaches 0
     ("effects", "i8"),  # 1: there are effects that hold a force
     *[(f"{effect.name}_{name}", "f8") for effect in EFFECTS for name in effect.parameters],
@@ -73,6 +79,10 @@ _MOTION = [
     ("x_r", "f8"),  # position of the moving datum of p since the start [m]
     ("hole_start", "f8"),  # surface of the rock from which the depth of the hole counts [m]
     ("w", "f8"),  # work of the barrier dashpot in this cycle [J]
+    ("chipping_from", "f8"),  # penetration at which this cycle begins to chip [m]
+    ("reload_from", "f8"),  # penetration in which cuttings are compressed again, from and to [m]
+    ("reload_to", "f8"),
+    ("reload_stiffness", "f8"),  # [N/m]
     ("kept", "f8"),  # recoverable beside what the power law of this cycle gives back [J]
     ("crushed", "f8"),  # by this drilling cycle [J]
     ("v_p", "f8"),  # mean velocities [m/s]

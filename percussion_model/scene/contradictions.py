@@ -44,6 +44,8 @@ class Rule(IntEnum):
     BARRIER = 25
     SETTLE = 26
     MODES_OF_POWER = 27
+    MODES_OF_CUTTINGS = 28
+    MAPPED_CUTTINGS = 29
 
 
 _OF_STRING = (
@@ -143,6 +145,13 @@ TEXTS = {
         'solver.name = "modal" with effects.rock = "power": bars have modes on a rock of one '
         'stiffness; set solver.name = "wave" or "auto"'
     ),
+    Rule.MODES_OF_CUTTINGS: (
+        'solver.name = "modal" with effects.cuttings = true: set solver.name = "wave" or "auto", '
+        "which follow them"
+    ),
+    Rule.MAPPED_CUTTINGS: (
+        'solver.fidelity = "blow-map" knows no cuttings in the crater: set effects.cuttings = false'
+    ),
     Rule.SETTLE: ("run.settle = {run.settle!r} s: must be below run.duration = {run.duration!r} s"),
 }
 
@@ -206,6 +215,8 @@ def find_contradiction(
         return Rule.BARRIER
     if v.effects_rock == POWER and v.solver_name == MODAL:
         return Rule.MODES_OF_POWER
+    if v.effects_cuttings and v.effects_rock == BILINEAR and v.solver_name == MODAL:
+        return Rule.MODES_OF_CUTTINGS
     return Rule.SETTLE if v.run_settle >= v.run_duration else Rule.NOTHING
 
 
@@ -236,6 +247,8 @@ def _in_fidelity(v: Any, has_effects: bool) -> Rule:
         return Rule.MAPPED_DRIVE
     if v.effects_rock != BILINEAR:
         return Rule.MAPPED_ROCK
+    if v.effects_cuttings:
+        return Rule.MAPPED_CUTTINGS
     if v.bit_model != ELASTIC:
         return Rule.MAPPED_BIT
     if has_effects:

@@ -34,6 +34,7 @@ ROCK_POWER: Needs = {"effects.rock": ("power",)}
 ROCK_SPRINGY: Needs = {"effects.rock": ("bilinear", "spring", "power")}
 ROCK_PRESENT: Needs = {"effects.rock": ("bilinear", "spring", "wall", "power")}
 BARRIER_ON: Needs = {"effects.barrier": (True,), **ROCK_CRUSHED}
+CUTTINGS_ON: Needs = {"effects.cuttings": (True,), **ROCK_CRUSHED}
 STRING_ON: Needs = {"effects.string": (True,), **HAS_WAVES}
 JOINTS_ON: Needs = {"effects.joints": (True,), **STRING_ON}
 DAMPER_ON: Needs = {"effects.damper": (True,), **STRING_ON}

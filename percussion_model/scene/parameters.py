@@ -28,6 +28,7 @@ from percussion_model.scene.group import (
     ALL_RIGID,
     BARRIER_ON,
     BLOW_MAP,
+    CUTTINGS_ON,
     DRIVE_EXTERNAL,
     DRIVE_PRESSURE,
     FEED_ON,
@@ -100,6 +101,7 @@ class Effects(Parameters):
         ("bilinear", "spring", "wall", "none", "power"),
         "what the bit meets: bilinear law, linear spring, rigid wall, nothing, or power law",
     )
+    cuttings: bool = flag(False, "cuttings that flushing leaves in the crater", ROCK_CRUSHED)
     standstill_tension: str = choice(
         "release",
         ("release", "paper"),
@@ -198,6 +200,30 @@ class RockLaw(Parameters):
         ROCK_POWER,
         ge=0,
         le=4,
+    )
+    buttons: int = count(
+        1,
+        "buttons that share the force; K_R of the power law is that of one",
+        ROCK_POWER,
+        ge=1,
+        le=1000,
+    )
+    chipping_force: float = quantity(
+        1e5, "N", "force on one button at which the rock chips", ROCK_POWER, gt=0, le=1e9
+    )
+    chipping_penetration: float = quantity(
+        0.0, "m", "penetration gained while it chips; 0 without chipping", ROCK_POWER, ge=0, le=1
+    )
+    removed_share: float = quantity(
+        0.5,
+        "-",
+        "share of a crater 1 mm deep that flushing removes",
+        CUTTINGS_ON,
+        ge=0,
+        le=1,
+    )
+    removal_exponent: float = quantity(
+        1.0, "-", "removed depth grows as (depth of the crater)^this", CUTTINGS_ON, ge=0, le=4
     )
     barrier_damping: float = quantity(
         1e4, "N s/m", "damping C_R of the energy barrier", BARRIER_ON, ge=0, le=1e9

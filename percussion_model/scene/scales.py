@@ -38,8 +38,8 @@ def scales(scene: Scene) -> dict[str, Scale]:
     found["bit_transit_time"] = Scale("T_2", bit.transit_time, "s")
     soft = scene.effects.rock in ("bilinear", "spring", "power")
     if soft:
-        cycle = math.sqrt(bit.mass / rock.loading_stiffness)
-        ratio = rock.loading_stiffness * bar_compliance(bit.numbers)
+        cycle = math.sqrt(bit.mass / scene.loading_stiffness)
+        ratio = scene.loading_stiffness * bar_compliance(bit.numbers)
         found["drilling_cycle_time"] = Scale("T_4", cycle, "s")
         found["stiffness_ratio"] = Scale("eta = K_R L_b/(EA)", ratio, "-")
     energy = drive.force * drive.reversal_distance
@@ -47,7 +47,7 @@ def scales(scene: Scene) -> dict[str, Scale]:
         flight = math.sqrt(piston.mass * drive.reversal_distance / drive.force)
         found["piston_flight_time"] = Scale("T_3", flight, "s")
         if soft:
-            depth = math.sqrt(energy / rock.loading_stiffness)
+            depth = math.sqrt(energy / scene.loading_stiffness)
             found["penetration_scale"] = Scale("L_2", depth, "m")
         if scene.barrier_on:
             share = rock.barrier_energy / energy

@@ -351,6 +351,7 @@ class Scene:
             self.piston.model == "rigid",
             self.effects.rock == "wall",
             self.effects.rock == "power",
+            self.cuttings_on,
             self.effects.loss,
             self.loss.time,
             self.piston.transit_time if self.piston.model == "elastic" else bit,
@@ -380,6 +381,17 @@ class Scene:
         return bool(wanted and self.rock.barrier_energy > 0 and self.rock.barrier_damping > 0)
 
     @property
+    def loading_stiffness(self) -> float:
+        """Loading stiffness of the rock under all buttons [N/m]."""
+        buttons = self.rock.buttons if self.effects.rock == "power" else 1
+        return buttons * self.rock.loading_stiffness
+
+    @property
+    def cuttings_on(self) -> bool:
+        """Whether cuttings that flushing leaves stay in the crater."""
+        return self.effects.cuttings and self.effects.rock in ("bilinear", "power")
+
+    @property
     def effects_on(self) -> tuple[str, ...]:
         """Names of the effects that are computed."""
         return tuple(name for name, is_on in self._switches().items() if is_on)
@@ -397,6 +409,7 @@ class Scene:
             "loss": self.loss_on,
             **self._string_switches(),
             "barrier": self.barrier_on,
+            "cuttings": self.cuttings_on,
             "rock": self.effects.rock != "none",
             **{effect.name: getattr(self.effects, effect.name) for effect in EFFECTS},
         }

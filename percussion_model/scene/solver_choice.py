@@ -23,6 +23,7 @@ class WhyWaves(IntEnum):
     LITTLE_LOSS = 5
     MUCH_LOSS = 6
     POWER = 7
+    CUTTINGS = 8
 
 
 REASONS = {
@@ -30,6 +31,7 @@ REASONS = {
     WhyWaves.RIGID_PISTON: "the piston is rigid",
     WhyWaves.WALL: "the rock is a wall",
     WhyWaves.POWER: "the rock has a power law",
+    WhyWaves.CUTTINGS: "cuttings stay in the crater",
     WhyWaves.NO_LOSS: "loss is off",
     WhyWaves.UNLIKE: f"one bar is more than {MOST_UNLIKE:g} times as long by transit time",
     WhyWaves.LITTLE_LOSS: f"loss.time is below {LEAST_LOSS:g} of the shorter transit time",
@@ -41,6 +43,7 @@ def why_waves(
     is_rigid: bool,
     is_wall: bool,
     is_power: bool,
+    has_cuttings: bool,
     has_loss: bool,
     loss_time: float,
     piston: float,
@@ -50,8 +53,9 @@ def why_waves(
 
     Parameters
     ----------
-    is_rigid, is_wall, is_power, has_loss : bool
-        Of the piston, of the rock, which may be a wall or have a power law, and of the bars.
+    is_rigid, is_wall, is_power, has_cuttings, has_loss : bool
+        Of the piston, of the rock, which may be a wall, have a power law or leave cuttings, and
+        of the bars.
     loss_time : float
         [s]
     piston, bit : float
@@ -63,6 +67,8 @@ def why_waves(
         return WhyWaves.WALL
     if is_power:
         return WhyWaves.POWER
+    if has_cuttings:
+        return WhyWaves.CUTTINGS
     if not has_loss:
         return WhyWaves.NO_LOSS
     if max(piston, bit) > MOST_UNLIKE * min(piston, bit):

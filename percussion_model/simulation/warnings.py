@@ -166,7 +166,7 @@ def _about_validity(result: Result) -> Iterator[str]:
         return
     if scene.effects.rock != "wall" and len(result.blows):
         peak = float(result.blows["peak_bit_force"].max())
-        yield from button_note(peak, scene.rock.loading_stiffness)
+        yield from button_note(peak, scene.loading_stiffness)
     if result.solver != "blow-map":  # there the bit stands on the rock between blows
         yield from flight_note(longest_flight(result))
     yield from rate_note(result.rate_of_penetration)

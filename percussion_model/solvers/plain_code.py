@@ -40,6 +40,7 @@ for _function in (
     setup.barrier_on,
     setup.kelvin_voigt_time,
     setup.rock_numbers,
+    setup.fill_cuttings,
     setup.fill_power,
     setup.fill_parameters,
     setup.fill_start,

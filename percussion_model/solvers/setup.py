@@ -49,7 +49,7 @@ class StandstillTension(IntEnum):
 
 
 class RockNumbers(NamedTuple):
-    """Rock law as the kernels take it: K_R [N/m], gamma, C_R [N s/m] and W_R [J]."""
+    """Rock law as the kernels take it: K_R of all buttons [N/m], gamma, C_R [N s/m], W_R [J]."""
 
     k_r: float
     gamma: float
@@ -83,8 +83,9 @@ def rock_numbers(numbers: Numbers) -> RockNumbers:
     """Numbers of the rock law."""
     values, barrier = numbers.values, barrier_on(numbers)
     kind = ROCKS[values.effects_rock]
+    buttons = values.rock_buttons if values.effects_rock == POWER else 1.0
     return RockNumbers(
-        values.rock_loading_stiffness if kind != RockKind.NONE else 0.0,
+        buttons * values.rock_loading_stiffness if kind != RockKind.NONE else 0.0,
         values.rock_unloading_ratio if kind == RockKind.BILINEAR else 1.0,
         values.rock_barrier_damping if barrier else 0.0,
         values.rock_barrier_energy if barrier else 0.0,
@@ -142,13 +143,30 @@ def fill_parameters(p: Any, numbers: Numbers, with_piston: bool) -> None:
 
 
 def fill_power(p: Any, values: Any) -> None:
-    """Fill the parameters of the power law; with both exponents plain it is the bilinear one."""
-    p["exponent"], p["unloading_exponent"], p["reference_penetration"] = 1.0, 0.0, 1.0
+    """Fill the parameters of the power law; with plain exponents it is the bilinear one."""
+    p["exponent"], p["unloading_exponent"], p["reference_penetration"] = 1.0, 0.0, 1e-3
+    p["buttons"], p["chipping_force"], p["chipping_penetration"] = 1.0, 0.0, 0.0
     if values.effects_rock == POWER:
         p["exponent"] = values.rock_loading_exponent
         p["unloading_exponent"] = values.rock_unloading_exponent
         p["reference_penetration"] = values.rock_reference_penetration
-    p["power"] = p["exponent"] != 1.0 or p["unloading_exponent"] != 0.0
+        p["buttons"] = values.rock_buttons
+        p["chipping_force"] = values.rock_buttons * values.rock_chipping_force
+        p["chipping_penetration"] = values.rock_chipping_penetration
+    curved = p["exponent"] != 1.0 or p["unloading_exponent"] != 0.0
+    p["power"] = curved or p["chipping_penetration"] > 0.0
+    fill_cuttings(p, values)
+
+
+def fill_cuttings(p: Any, values: Any) -> None:
+    """Fill the parameters of cuttings that stay in the crater: with them loading has two lines."""
+    share, exponent = values.rock_removed_share, values.rock_removal_exponent
+    stay = share < 1.0 or exponent != 1.0
+    is_crushed = ROCKS[values.effects_rock] == RockKind.BILINEAR
+    p["cuttings"] = is_crushed and values.effects_cuttings != 0 and stay
+    p["removed_share"], p["removal_exponent"] = share, exponent
+    if p["cuttings"]:
+        p["power"] = 1
 
 
 def any_effect(values: Any) -> bool:
@@ -185,7 +203,9 @@ def fill_start(s: Any, numbers: Numbers) -> None:
     s["drive_force"] = values.drive_force
     s["reversal"] = values.drive_reversal_distance
     s["external"] = values.drive_external_force
-    s["k_r"] = s["next_k_r"] = rock.k_r
+    s["k_r"] = rock.k_r
+    # of one button
+    s["next_k_r"] = values.rock_loading_stiffness if rock.k_r > 0.0 else 0.0
     s["gamma"] = s["next_gamma"] = rock.gamma
     s["c_r"] = s["next_c_r"] = rock.c_r
     s["w_r"] = s["next_w_r"] = rock.w_r

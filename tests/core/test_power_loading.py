@@ -8,13 +8,12 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from percussion_model.physics.power_law import loading_force, loading_work
 from percussion_model.physics.records import Mode, RockKind
 from percussion_model.physics.rock import (
     crush,
     end_loading,
     hole_depth,
-    loading_force,
-    loading_work,
     recoverable,
     resume_cycle,
     spring_force,
@@ -33,6 +32,7 @@ def make(exponent: float, unloading: float = 0.0, p: float = 0.0, mode: int = Mo
     s["mode"], s["p"] = mode, p
     s["k_r"] = s["next_k_r"] = K
     s["gamma"] = s["next_gamma"] = GAMMA
+    par["buttons"] = 1.0
     return par, s
 
 

@@ -7,13 +7,8 @@ which the present velocity leads.
 from __future__ import annotations
 
 from percussion_model.physics.kernel import inlined, kernel
-from percussion_model.physics.rock import (
-    is_loading,
-    loading_force,
-    loading_work,
-    origin,
-    stiffness,
-)
+from percussion_model.physics.power_law import loading_force, loading_work
+from percussion_model.physics.rock import is_loading, origin, stiffness
 
 # A line is no shorter than this share of the reference penetration: where the bit turns, it is
 # the tangent.

@@ -171,7 +171,7 @@ def process_event(par, s, blows, events):
         turn_drive(s, events, s.time, -s.gap)
     elif kind == Next.LINE:
         s.p = s.line_end
-        take_line(par, s, s.line + 1)
+        take_line(par, s)
     elif kind == Next.HOLD:
         note_standstill_force(par, s)
         mark_standstill(s)

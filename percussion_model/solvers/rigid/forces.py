@@ -8,12 +8,12 @@ from percussion_model.physics.blows import LAST_SHARE
 from percussion_model.physics.body import bit_load, piston_acceleration
 from percussion_model.physics.drive import drive_force
 from percussion_model.physics.kernel import kernel
+from percussion_model.physics.power_law import loading_force
 from percussion_model.physics.records import Mode, Piston, RockKind
 from percussion_model.physics.rock import (
     damping,
     enter_standstill,
     is_loading,
-    loading_force,
     origin,
     recoverable,
     stiffness,

@@ -11,11 +11,20 @@ import math
 
 from percussion_model.physics.elementary import exp, log
 from percussion_model.physics.kernel import kernel
-from percussion_model.physics.rock import is_loading, loading_force, loading_work
+from percussion_model.physics.power_law import (
+    is_chipping,
+    loading_force,
+    loading_part,
+    loading_work,
+    next_kink,
+)
+from percussion_model.physics.rock import is_loading
 
 # Ratio of the ends of a line. The first goes from nothing to this share of the reference
 # penetration.
 RATIO, FIRST = 1.02, 1e-3
+# A penetration so close below the end of a line is there, as a share of it.
+CLOSE = 1e-9
 # More lines than this reach beyond what any blow does.
 MOST_LINES = 1000
 
@@ -27,10 +36,29 @@ def line_end(par, line):
 
 
 @kernel
-def take_line(par, s, line):
-    """Move on a line from now on."""
-    s.line = line
-    a, b = line_end(par, line - 1) if line > 0 else 0.0, line_end(par, line)
+def take_line(par, s):
+    """Move on a line from the present penetration on.
+
+    Lines have their ends where what loads the rock does not depend on chipping, and where the
+    rock begins and ends to chip.
+    """
+    a = s.p
+    kink = next_kink(par, s, a)
+    if kink - a <= CLOSE * a:
+        a = kink
+        kink = next_kink(par, s, a)
+    if a < s.reload_to:
+        s.line_stiffness, s.line_origin = s.reload_stiffness, s.reload_from
+        s.line_end = s.reload_to
+        return
+    part = loading_part(par, s, a)
+    line = 0
+    if part > (1.0 - CLOSE) * FIRST * par.reference_penetration:
+        place = log(part / (FIRST * par.reference_penetration)) / math.log(RATIO)
+        line = min(int(place + 1.0 + CLOSE / math.log(RATIO)), MOST_LINES)
+    b = a + line_end(par, line) - part
+    if b > kink or is_chipping(par, s, a):
+        b = kink
     s.line_stiffness = (loading_force(par, s, b) - loading_force(par, s, a)) / (b - a)
     mean = (loading_work(par, s, b) - loading_work(par, s, a)) / (b - a)
     s.line_origin = 0.5 * (a + b) - mean / s.line_stiffness
@@ -41,9 +69,7 @@ def take_line(par, s, line):
 def begin_loading(par, s):
     """Take the line of the present penetration, where a drilling cycle by the power law begins."""
     if par.power == 1 and is_loading(s):
-        share = s.p / (FIRST * par.reference_penetration)
-        line = math.ceil(log(share) / math.log(RATIO)) if share > 1.0 else 0
-        take_line(par, s, min(line, MOST_LINES))
+        take_line(par, s)
 
 
 @kernel

@@ -68,8 +68,7 @@ RIGID_STATE = np.dtype(
         ("ss_v", "f8"),
         ("ss_force", "f8"),  # mean bit force at the end of the last standstill [N]
         ("start_gap", "f8"),  # g_0 [m]
-        ("line", "i8"),  # of the power law, from 0
-        ("line_stiffness", "f8"),  # [N/m]
+        ("line_stiffness", "f8"),  # of the line of the power law [N/m]
         ("line_origin", "f8"),  # where its force would be 0 [m]
         ("line_end", "f8"),  # [m]
         ("count_storms", "i8"),
@@ -89,7 +88,6 @@ RIGID_LIMITS = Limits(
         "standing_events": COUNT,
         "window_events": COUNT,
         "late": FLAG,
-        "line": (0, 1000),
         "line_end": (-LARGEST, INFINITE),
         "count_storms": COUNT,
     },

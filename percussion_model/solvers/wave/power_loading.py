@@ -11,8 +11,9 @@ from __future__ import annotations
 import math
 
 from percussion_model.physics.kernel import inlined, kernel
+from percussion_model.physics.power_law import loading_force, loading_slope, next_kink
 from percussion_model.physics.records import Mode
-from percussion_model.physics.rock import book_dashpot, crush, damping, loading_force
+from percussion_model.physics.rock import book_dashpot, crush, damping
 
 ROOT = math.sqrt(15.0)
 # Weights of the stages in each other, and in the whole.
@@ -27,14 +28,14 @@ MOST_TURNS, SETTLED = 60, 1e-14
 # From nothing on it may come to a share of the reference penetration.
 LARGEST_SHARE, GROWTH, LEAST_SHARE = 0.25, 0.5, 1e-3
 MOST_PARTS = 1000
+# A penetration so close below where the rock begins or ends to chip is there, as a share of it.
+CLOSE = 1e-12
 
 
 @inlined
 def _answer(par, s, push, z, p):
     """Velocity of the end at a penetration, and how it changes with that [m/s, 1/s]."""
-    force = loading_force(par, s, p)
-    slope = par.exponent * force / p if p > 0.0 else s.k_r
-    return (push - force) / z, -slope / z
+    return (push - loading_force(par, s, p)) / z, -loading_slope(par, s, p) / z
 
 
 @kernel
@@ -77,6 +78,32 @@ def _part(par, s, push, z, p, h):
 
 
 @kernel
+def _time_to_kink(par, s, push, z, p, kink, h, step):
+    """When the penetration comes to where the rock begins or ends to chip [s].
+
+    Parameters
+    ----------
+    h, step : float
+        A time by which it is past that place, and the way until then [s, m].
+    """
+    low, high, t = 0.0, h, h * (kink - p) / step
+    v = (push - loading_force(par, s, kink)) / z
+    for _ in range(MOST_TURNS):
+        step, _ = _part(par, s, push, z, p, t)
+        left = kink - p - step
+        if left > 0.0:
+            low = t
+        else:
+            high = t
+        if abs(left) <= SETTLED * kink:
+            break
+        t += left / v
+        if not low < t < high:
+            t = 0.5 * (low + high)
+    return t
+
+
+@kernel
 def load(par, s, push, z, time):
     """Integrals of the velocity [m] and of its square [m2/s] over a time of loading.
 
@@ -97,7 +124,13 @@ def load(par, s, push, z, time):
         growth = max(GROWTH * p, LEAST_SHARE * par.reference_penetration)
         if v * h > growth:
             h = max(growth / v, time / MOST_PARTS)
+        kink = next_kink(par, s, p)
+        if kink - p <= CLOSE * p:
+            kink = next_kink(par, s, kink)
         step, square = _part(par, s, push, z, p, h)
+        if step > kink - p:
+            h = _time_to_kink(par, s, push, z, p, kink, h, step)
+            step, square = _part(par, s, push, z, p, h)
         d += step
         q += square
         done += h

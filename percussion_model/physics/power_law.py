@@ -1,0 +1,189 @@
+"""Loading and unloading of the rock by a power law, with chipping and with cuttings.
+
+Eqs 20b to 20e of docs/model.md. Of the penetration a part loads the rock: all of it, but for
+the step in which the rock chips at a nearly constant force. Cuttings that are left are first
+compressed again, on the line on which rock unloads from there.
+"""
+
+from __future__ import annotations
+
+import math
+
+from percussion_model.physics.elementary import exp, log
+from percussion_model.physics.kernel import inlined, kernel
+
+# Below this share of the reference penetration, or of the force there, the power law goes on as
+# a straight line: nothing that moves a bit is so small.
+LEAST_SHARE = 1e-9
+# While the rock chips this share of the way still loads it: so a force has one penetration.
+CHIPPING_SLOPE = 1e-4
+# Halvings that find a penetration to rounding.
+MOST_TURNS = 60
+
+
+@inlined
+def growth(par, p):
+    """Secant stiffness at a penetration that loads, by that at the reference penetration."""
+    return exp((par.exponent - 1.0) * log(max(p / par.reference_penetration, LEAST_SHARE)))
+
+
+@inlined
+def loading_part(par, s, p):
+    """Part of a penetration that loads the rock [m]."""
+    if par.chipping_penetration == 0.0 or p <= s.chipping_from:
+        return p
+    way = p - s.chipping_from
+    if way <= par.chipping_penetration:
+        return s.chipping_from + CHIPPING_SLOPE * way
+    return p - (1.0 - CHIPPING_SLOPE) * par.chipping_penetration
+
+
+@inlined
+def loading_force(par, s, p):
+    """Force of the rock at a penetration in a drilling cycle (docs/model.md, eqs 15, 20b) [N]."""
+    if par.power == 0:
+        return s.k_r * p
+    if p < s.reload_to:
+        return s.reload_stiffness * (p - s.reload_from)
+    return fresh_force(par, s, p)
+
+
+@inlined
+def fresh_force(par, s, p):
+    """Force of rock that no cuttings cover [N]."""
+    part = loading_part(par, s, p)
+    return s.k_r * part * growth(par, part)
+
+
+@inlined
+def loading_slope(par, s, p):
+    """How that force grows with the penetration [N/m]."""
+    if p < s.reload_to:
+        return s.reload_stiffness
+    part = loading_part(par, s, p)
+    slope = par.exponent * s.k_r * growth(par, part)
+    return CHIPPING_SLOPE * slope if is_chipping(par, s, p) else slope
+
+
+@inlined
+def is_chipping(par, s, p):
+    """Whether the rock chips at a penetration."""
+    return (
+        par.chipping_penetration > 0.0
+        and s.chipping_from <= p < s.chipping_from + par.chipping_penetration
+    )
+
+
+@inlined
+def next_kink(par, s, p):
+    """Penetration above `p` at which cuttings or chipping next bend the loading [m]."""
+    if p < s.reload_to:
+        return s.reload_to
+    if par.chipping_penetration == 0.0 or p >= s.chipping_from + par.chipping_penetration:
+        return math.inf
+    return s.chipping_from if p < s.chipping_from else s.chipping_from + par.chipping_penetration
+
+
+@inlined
+def loading_work(par, s, p):
+    """Work on the rock in a drilling cycle of the power law, up to a constant of the cycle [J]."""
+    if p < s.reload_to:
+        # what is missing to the end of this line
+        way, last = s.reload_to - p, s.reload_to - s.reload_from
+        return fresh_work(par, s, s.reload_to) - s.reload_stiffness * way * (last - 0.5 * way)
+    return fresh_work(par, s, p)
+
+
+@inlined
+def fresh_work(par, s, p):
+    """Work from no penetration to `p` on rock that no cuttings cover [J]."""
+    part = loading_part(par, s, p)
+    work = s.k_r * part * part * growth(par, part) / (par.exponent + 1.0)
+    if par.chipping_penetration > 0.0 and p > s.chipping_from:
+        first = s.chipping_from
+        last = first + CHIPPING_SLOPE * min(p - first, par.chipping_penetration)
+        # the same forces over a longer way
+        more = last * last * growth(par, last) - first * first * growth(par, first)
+        work += (1.0 / CHIPPING_SLOPE - 1.0) * s.k_r * more / (par.exponent + 1.0)
+    return work
+
+
+@inlined
+def recovered_share(par, s, force):
+    """Penetration that the rock gives back from a peak force, by the part that loaded it.
+
+    1/gamma at the force of the reference penetration, a power of the force beside it; never so
+    much that unloading would give back more energy than loading took (docs/model.md, eq. 20b).
+    """
+    share = 1.0 / s.gamma
+    if par.unloading_exponent > 0.0:
+        relative = max(force / (s.k_r * par.reference_penetration), LEAST_SHARE)
+        share *= exp(-par.unloading_exponent * log(relative))
+    return min(share, 2.0 / (par.exponent + 1.0))
+
+
+@inlined
+def recoverable_by_power(par, s, p):
+    """Energy that the rock would give back in a drilling cycle of the power law [J]."""
+    if p < s.reload_to:
+        way = p - s.reload_from
+        return 0.5 * s.reload_stiffness * way * way + s.kept
+    force = fresh_force(par, s, p)
+    return 0.5 * force * loading_part(par, s, p) * recovered_share(par, s, force) + s.kept
+
+
+@kernel
+def part_at(par, k, force):
+    """Part of the penetration that loads at a force, with a loading stiffness `k` [m]."""
+    relative = max(force / (k * par.reference_penetration), LEAST_SHARE)
+    return par.reference_penetration * exp(log(relative) / par.exponent)
+
+
+@inlined
+def given_back(par, s, p):
+    """Penetration that rock without cuttings gives back from a peak [m]."""
+    return loading_part(par, s, p) * recovered_share(par, s, fresh_force(par, s, p))
+
+
+@kernel
+def peak_above(par, s, left):
+    """Penetration from which the rock would unload to `left` [m]."""
+    low, high = left, 2.0 * left
+    for _ in range(MOST_TURNS):
+        if high - given_back(par, s, high) >= left:
+            break
+        low, high = high, 2.0 * high
+    for _ in range(MOST_TURNS):
+        mid = 0.5 * (low + high)
+        if mid - given_back(par, s, mid) < left:
+            low = mid
+        else:
+            high = mid
+    return high
+
+
+@kernel
+def start_loading(par, s, left):
+    """Find the lines of a cycle that begins, with what is `left` of the crater [m]."""
+    if par.chipping_penetration > 0.0:
+        s.chipping_from = part_at(par, s.k_r, par.chipping_force)
+    s.reload_from = s.reload_to = left
+    if left > LEAST_SHARE * par.reference_penetration:
+        s.reload_to = peak_above(par, s, left)
+        s.reload_stiffness = fresh_force(par, s, s.reload_to) / (s.reload_to - left)
+
+
+@kernel
+def penetration_at(par, s, force):
+    """Penetration of a drilling cycle at a force [m]."""
+    if s.reload_to > s.reload_from:
+        way = force / s.reload_stiffness
+        if s.reload_from + way <= s.reload_to:
+            return s.reload_from + way
+    part = part_at(par, s.k_r, force)
+    if par.chipping_penetration == 0.0 or part <= s.chipping_from:
+        return part
+    way = (part - s.chipping_from) / CHIPPING_SLOPE
+    if way <= par.chipping_penetration:
+        return s.chipping_from + way
+    return part + (1.0 - CHIPPING_SLOPE) * par.chipping_penetration
