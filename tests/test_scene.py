@@ -50,9 +50,9 @@ def test_solvers_and_effects_of_the_stored_scenes():
     )
     every = ("gravity", "feed", "drive", "loss", "barrier", "rock")
     assert (reference.solver_name, reference.effects_on) == ("modal", every)
-    assert (drop.solver_name, drop.effects_off) == ("modal", ("drive",))
-    assert (rigid.solver_name, rigid.effects_off) == ("rigid", ("loss",))
-    assert (undamped.solver_name, undamped.effects_off) == ("wave", ("loss",))
+    assert (drop.solver_name, drop.effects_off) == ("modal", ("drive", "cuttings"))
+    assert (rigid.solver_name, rigid.effects_off) == ("rigid", ("loss", "cuttings"))
+    assert (undamped.solver_name, undamped.effects_off) == ("wave", ("loss", "cuttings"))
 
 
 # ------------------------------------------------------------------ round trip

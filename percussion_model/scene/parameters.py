@@ -202,11 +202,7 @@ class RockLaw(Parameters):
         le=4,
     )
     buttons: int = count(
-        1,
-        "buttons that share the force; K_R of the power law is that of one",
-        ROCK_POWER,
-        ge=1,
-        le=1000,
+        1, "-", "buttons that share the force; K_R is that of one", ROCK_POWER, ge=1, le=1000
     )
     chipping_force: float = quantity(
         1e5, "N", "force on one button at which the rock chips", ROCK_POWER, gt=0, le=1e9
