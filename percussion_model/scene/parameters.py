@@ -199,7 +199,7 @@ class RockLaw(Parameters):
         "q of the power law: gamma grows as (peak force)^q",
         ROCK_POWER,
         ge=0,
-        le=4,
+        le=12,
     )
     buttons: int = count(
         1, "-", "buttons that share the force; K_R is that of one", ROCK_POWER, ge=1, le=1000
