@@ -17,6 +17,8 @@ from percussion_model.physics.kernel import inlined, kernel
 LEAST_SHARE = 1e-9
 # While the rock chips this share of the way still loads it: so a force has one penetration.
 CHIPPING_SLOPE = 1e-4
+# By a power of the force rock gives back no less, which is 1/gamma of the greatest gamma.
+LEAST_RECOVERED = 1e-4
 # Halvings that find a penetration to rounding.
 MOST_TURNS = 60
 
@@ -113,12 +115,12 @@ def recovered_share(par, s, force):
     """Penetration that the rock gives back from a peak force, by the part that loaded it.
 
     1/gamma at the force of the reference penetration, a power of the force beside it; never so
-    much that unloading would give back more energy than loading took (docs/model.md, eq. 20b).
+    much that unloading would give back more energy than loading took (docs/model.md, eq. 20c).
     """
     share = 1.0 / s.gamma
     if par.unloading_exponent > 0.0:
         relative = max(force / (s.k_r * par.reference_penetration), LEAST_SHARE)
-        share *= exp(-par.unloading_exponent * log(relative))
+        share = max(share * exp(-par.unloading_exponent * log(relative)), LEAST_RECOVERED)
     return min(share, 2.0 / (par.exponent + 1.0))
 
 
@@ -169,8 +171,9 @@ def start_loading(par, s, left):
         s.chipping_from = part_at(par, s.k_r, par.chipping_force)
     s.reload_from = s.reload_to = left
     if left > LEAST_SHARE * par.reference_penetration:
-        s.reload_to = peak_above(par, s, left)
-        s.reload_stiffness = fresh_force(par, s, s.reload_to) / (s.reload_to - left)
+        peak = peak_above(par, s, left)
+        s.reload_to = peak
+        s.reload_stiffness = fresh_force(par, s, peak) / given_back(par, s, peak)
 
 
 @kernel
