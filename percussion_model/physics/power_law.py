@@ -115,23 +115,37 @@ def recovered_share(par, s, force):
     """Penetration that the rock gives back from a peak force, by the part that loaded it.
 
     1/gamma at the force of the reference penetration, a power of the force beside it; never so
-    much that unloading would give back more energy than loading took (docs/model.md, eq. 20c).
+    much that rock would unload softer than it loads there (docs/model.md, eq. 20c).
     """
     share = 1.0 / s.gamma
     if par.unloading_exponent > 0.0:
         relative = max(force / (s.k_r * par.reference_penetration), LEAST_SHARE)
         share = max(share * exp(-par.unloading_exponent * log(relative)), LEAST_RECOVERED)
-    return min(share, 2.0 / (par.exponent + 1.0))
+    return min(share, 1.0 / par.exponent)
+
+
+@inlined
+def fresh_recovery(par, s, p):
+    """Penetration that rock gives back from a peak, in a cycle that began without a force [m]."""
+    if p < s.reload_to:
+        return p - s.reload_from
+    return loading_part(par, s, p) * recovered_share(par, s, fresh_force(par, s, p))
+
+
+@inlined
+def recovery(par, s, p, force):
+    """Penetration that rock gives back from a peak and its force (docs/model.md, eq. 20c) [m]."""
+    given_back = fresh_recovery(par, s, p)
+    if s.resumed_force > 0.0:
+        given_back *= 1.0 - (1.0 - s.resumed_share) * s.resumed_force / max(force, s.resumed_force)
+    return given_back
 
 
 @inlined
 def recoverable_by_power(par, s, p):
     """Energy that the rock would give back in a drilling cycle of the power law [J]."""
-    if p < s.reload_to:
-        way = p - s.reload_from
-        return 0.5 * s.reload_stiffness * way * way + s.kept
-    force = fresh_force(par, s, p)
-    return 0.5 * force * loading_part(par, s, p) * recovered_share(par, s, force) + s.kept
+    force = loading_force(par, s, p)
+    return 0.5 * force * recovery(par, s, p, force)
 
 
 @kernel
@@ -141,23 +155,17 @@ def part_at(par, k, force):
     return par.reference_penetration * exp(log(relative) / par.exponent)
 
 
-@inlined
-def given_back(par, s, p):
-    """Penetration that rock without cuttings gives back from a peak [m]."""
-    return loading_part(par, s, p) * recovered_share(par, s, fresh_force(par, s, p))
-
-
 @kernel
 def peak_above(par, s, left):
     """Penetration from which the rock would unload to `left` [m]."""
     low, high = left, 2.0 * left
     for _ in range(MOST_TURNS):
-        if high - given_back(par, s, high) >= left:
+        if high - fresh_recovery(par, s, high) >= left:
             break
         low, high = high, 2.0 * high
     for _ in range(MOST_TURNS):
         mid = 0.5 * (low + high)
-        if mid - given_back(par, s, mid) < left:
+        if mid - fresh_recovery(par, s, mid) < left:
             low = mid
         else:
             high = mid
@@ -169,11 +177,31 @@ def start_loading(par, s, left):
     """Find the lines of a cycle that begins, with what is `left` of the crater [m]."""
     if par.chipping_penetration > 0.0:
         s.chipping_from = part_at(par, s.k_r, par.chipping_force)
-    s.reload_from = s.reload_to = left
+    s.resumed_force = 0.0
+    s.reload_from = s.reload_to = 0.0
     if left > LEAST_SHARE * par.reference_penetration:
         peak = peak_above(par, s, left)
-        s.reload_to = peak
-        s.reload_stiffness = fresh_force(par, s, peak) / given_back(par, s, peak)
+        s.reload_stiffness = fresh_force(par, s, peak) / fresh_recovery(par, s, peak)
+        s.reload_from, s.reload_to = left, peak
+
+
+@kernel
+def resume_loading(par, s, force, given_back):
+    """Go on with what the rock would give back under a force, where a cycle begins under it.
+
+    Of its own such a cycle would give back more, or less: that share fades as the force grows.
+    More than its own it cannot: what is too much is crushed.
+
+    Parameters
+    ----------
+    force : float
+        [N]
+    given_back : float
+        Penetration that the rock would give back from it [m].
+    """
+    if force > 0.0:
+        s.resumed_share = min(given_back / fresh_recovery(par, s, s.p), 1.0)
+        s.resumed_force = force
 
 
 @kernel

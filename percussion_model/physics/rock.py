@@ -12,6 +12,8 @@ from percussion_model.physics.power_law import (
     loading_work,
     penetration_at,
     recoverable_by_power,
+    recovery,
+    resume_loading,
     start_loading,
 )
 from percussion_model.physics.records import Mode, RockKind
@@ -19,8 +21,6 @@ from percussion_model.physics.records import Mode, RockKind
 # A velocity below this counts as zero: the ringing left after a long
 # standstill is of this size, its sign means nothing [m/s].
 REST_VELOCITY = 1e-9
-
-TINY_FORCE = 1e-200  # [N], against a division by zero
 
 # A drilling cycle counts when it crushed more than this share of W_R.
 COUNTED_CYCLE = 0.01
@@ -90,8 +90,8 @@ def unloaded_penetration(par, s):
     """Penetration at which the rock would be unloaded, in a drilling cycle [m]."""
     if par.power == 0:
         return s.p * (s.gamma - 1.0) / s.gamma
-    force = max(loading_force(par, s, s.p), TINY_FORCE)
-    return s.p - 2.0 * recoverable_by_power(par, s, s.p) / force
+    force = loading_force(par, s, s.p)
+    return s.p - recovery(par, s, s.p, force)
 
 
 @inlined
@@ -134,7 +134,6 @@ def start_cycle(par, s, force):
     s.w = 0.0
     s.crushed = 0.0
     s.cycle_counted = 0
-    s.kept = 0.0
     if par.barrier == 1 and s.c_r > 0.0 and s.w_r > 0.0:
         s.mode = Mode.DFC
     else:
@@ -147,13 +146,14 @@ def resume_cycle(par, s):
     stiff = s.gamma * s.k_r
     force = stiff * (s.p - s.p_u)  # that of the spring, in BC and SS
     before = recoverable(par, s)
+    depth = hole_depth(par, s)
     start_cycle(par, s, force)
     if par.power == 1:
-        # what the rock gives back goes on from what it would give now
-        s.kept = before - recoverable(par, s)
-        return
-    # Other rock under the same force springs back otherwise, which crushes nothing.
-    s.hole_start += force / stiff - force / (s.gamma * s.k_r)
+        resume_loading(par, s, force, force / stiff)
+        s.hole_start += hole_depth(par, s) - depth
+    else:
+        # Other rock under the same force springs back otherwise, which crushes nothing.
+        s.hole_start += force / stiff - force / (s.gamma * s.k_r)
     # With other rock than before, what can be recovered changes at once.
     s.e_crushing += before - recoverable(par, s)
 

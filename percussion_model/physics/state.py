@@ -83,7 +83,8 @@ _MOTION = [
     ("reload_from", "f8"),  # penetration in which cuttings are compressed again, from and to [m]
     ("reload_to", "f8"),
     ("reload_stiffness", "f8"),  # [N/m]
-    ("kept", "f8"),  # recoverable beside what the power law of this cycle gives back [J]
+    ("resumed_force", "f8"),  # under which this cycle began [N]
+    ("resumed_share", "f8"),  # of what it would give back of its own then
     ("crushed", "f8"),  # by this drilling cycle [J]
     ("v_p", "f8"),  # mean velocities [m/s]
     ("v_b", "f8"),

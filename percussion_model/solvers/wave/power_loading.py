@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 
 from percussion_model.physics.kernel import inlined, kernel
-from percussion_model.physics.power_law import loading_force, loading_slope, next_kink
+from percussion_model.physics.power_law import loading_force, loading_slope, loading_work, next_kink
 from percussion_model.physics.records import Mode
 from percussion_model.physics.rock import book_dashpot, crush, damping
 
@@ -187,6 +187,8 @@ def loading_stretch(par, s, v_free, z, rest, time):
         seen = first
     p_before = s.p
     s.p += d
+    # by the energy that the rock has taken, so that the ledger closes
+    q = (push * d - loading_work(par, s, s.p) + loading_work(par, s, p_before)) / whole
     book_dashpot(s, C * q)
     crush(par, s, p_before)
     last = push - z * (push - loading_force(par, s, s.p)) / whole
