@@ -162,14 +162,16 @@ def resume_cycle(par, s):
 def end_loading(par, s):
     """Unloading begins at the peak of a drilling cycle (docs/model.md, eq. 20).
 
-    By the power law stiffness and ratio become those of the straight line on which this cycle
-    unloads: K is the secant of the peak.
+    By the power law K_R becomes that of the straight line on which this cycle unloads.
     """
-    s.p_u = unloaded_penetration(par, s)
     if par.power == 1:
-        if s.p > 0.0:
-            s.k_r = loading_force(par, s, s.p) / s.p
-        s.gamma = s.p / (s.p - s.p_u) if s.p > s.p_u else par.exponent
+        force = loading_force(par, s, s.p)
+        given_back = recovery(par, s, s.p, force)
+        s.p_u = s.p - given_back
+        if given_back != 0.0:
+            s.k_r = force / (s.gamma * given_back)
+    else:
+        s.p_u = unloaded_penetration(par, s)
     s.mode = Mode.BC
 
 
