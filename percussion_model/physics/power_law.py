@@ -41,11 +41,17 @@ def loading_part(par, s, p):
 
 
 @inlined
+def is_reloading(s, p):
+    """Whether a bit at a penetration still compresses what is left of the crater."""
+    return s.reload_from < s.reload_to and p < s.reload_to
+
+
+@inlined
 def loading_force(par, s, p):
     """Force of the rock at a penetration in a drilling cycle (docs/model.md, eqs 15, 20b) [N]."""
     if par.power == 0:
         return s.k_r * p
-    if p < s.reload_to:
+    if is_reloading(s, p):
         return s.reload_stiffness * (p - s.reload_from)
     return fresh_force(par, s, p)
 
@@ -60,7 +66,7 @@ def fresh_force(par, s, p):
 @inlined
 def loading_slope(par, s, p):
     """How that force grows with the penetration [N/m]."""
-    if p < s.reload_to:
+    if is_reloading(s, p):
         return s.reload_stiffness
     part = loading_part(par, s, p)
     slope = par.exponent * s.k_r * growth(par, part)
@@ -79,7 +85,7 @@ def is_chipping(par, s, p):
 @inlined
 def next_kink(par, s, p):
     """Penetration above `p` at which cuttings or chipping next bend the loading [m]."""
-    if p < s.reload_to:
+    if is_reloading(s, p):
         return s.reload_to
     if par.chipping_penetration == 0.0 or p >= s.chipping_from + par.chipping_penetration:
         return math.inf
@@ -89,7 +95,7 @@ def next_kink(par, s, p):
 @inlined
 def loading_work(par, s, p):
     """Work on the rock in a drilling cycle of the power law, up to a constant of the cycle [J]."""
-    if p < s.reload_to:
+    if is_reloading(s, p):
         # what is missing to the end of this line
         way, last = s.reload_to - p, s.reload_to - s.reload_from
         return fresh_work(par, s, s.reload_to) - s.reload_stiffness * way * (last - 0.5 * way)
@@ -127,7 +133,7 @@ def recovered_share(par, s, force):
 @inlined
 def fresh_recovery(par, s, p):
     """Penetration that rock gives back from a peak, in a cycle that began without a force [m]."""
-    if p < s.reload_to:
+    if is_reloading(s, p):
         return p - s.reload_from
     return loading_part(par, s, p) * recovered_share(par, s, fresh_force(par, s, p))
 

@@ -13,6 +13,7 @@ from percussion_model.physics.elementary import exp, log
 from percussion_model.physics.kernel import kernel
 from percussion_model.physics.power_law import (
     is_chipping,
+    is_reloading,
     loading_force,
     loading_part,
     loading_work,
@@ -47,7 +48,7 @@ def take_line(par, s):
     if kink - a <= CLOSE * a:
         a = kink
         kink = next_kink(par, s, a)
-    if a < s.reload_to:
+    if is_reloading(s, a):
         s.line_stiffness, s.line_origin = s.reload_stiffness, s.reload_from
         s.line_end = s.reload_to
         return
