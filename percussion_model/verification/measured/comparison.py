@@ -14,6 +14,7 @@ from percussion_model.analysis.fitting.search import descend
 from percussion_model.scene.scene import Scene
 from percussion_model.verification.measured.blow import Reading, Rig
 from percussion_model.verification.measured.experiments import (
+    FIXED,
     LAWS,
     Experiment,
     FitPlan,
@@ -30,6 +31,11 @@ COARSER = 2.0
 # Steps of the slopes that carry the errors of fitted numbers over, in the logarithm: times are
 # read from sample to sample, so that shorter ones would find none.
 SLOPE_STEP = 0.02
+
+# Law by which variants of a rig are fitted.
+PLAIN = "bilinear"
+# Parameters of every law, which are told with each fit.
+BOTH_LAWS = ("rock.loading_stiffness", "rock.unloading_ratio")
 
 FITTED, PREDICTED = "fitted", "predicted"
 MET, MISSED, UNDECIDED, NO_CRITERION = "met", "missed", "undecided", "no criterion"
@@ -98,7 +104,7 @@ class FoundFit:
         Fit whose parameters hold for all others; empty: those of the scene.
     fitted : tuple of str
     values : dict of float
-        Of all parameters of the law, SI units.
+        Of the parameters that the fit moved, set or took over, SI units.
     errors : dict of float
         Standard errors of the fitted ones, by the errors of the measurements.
     prediction_errors : dict of float
@@ -157,12 +163,22 @@ class Comparison:
     fits: list[FoundFit]
     variants: list[VariantRow]
 
-    def counts(self, anew: bool = False) -> dict[str, int]:
+    @property
+    def laws(self) -> tuple[str, ...]:
+        """Rock laws that were fitted."""
+        return tuple(dict.fromkeys(f.law for f in self.fits))
+
+    def counts(self, law: str | None = None, anew: bool = False) -> dict[str, int]:
         """How many predictions met and missed their criteria, were undecided or have none.
 
-        Those of whole fits; `anew`: those of fits that move some parameters of another one.
+        Those of whole fits by a law, or by all; `anew`: those of fits that move some parameters
+        of another one.
         """
-        chosen = {(f.experiment, f.name) for f in self.fits if bool(f.start) == anew}
+        chosen = {
+            (f.experiment, f.name)
+            for f in self.fits
+            if bool(f.start) == anew and law in (None, f.law)
+        }
         of = [
             row.verdict
             for row in self.rows
@@ -182,7 +198,7 @@ class Comparison:
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON, SI units."""
         return {
-            "predictions": self.counts(),
+            "predictions": {law: self.counts(law) for law in self.laws},
             "predictions_anew": self.counts(anew=True),
             "rows": [asdict(row) for row in self.rows],
             "fits": [one.to_dict() for one in self.fits],
@@ -219,7 +235,7 @@ def compare(
         for one in experiments
         for k in range(len(one.variants) if variants else 0)
         for plan in one.fits
-        if not plan.start
+        if not plan.start and plan.law == PLAIN
     ]
     done, count = 0, len(plans) + len(others)
     fits: list[FoundFit] = []
@@ -264,17 +280,21 @@ def fit(
         Among which is that which this one starts from.
     """
     scene = experiment.scene.replace(**{"effects.rock": plan.law})
+    told = {*BOTH_LAWS, *plan.parameters, *plan.fixed}
     for one in before:
         if one.name == plan.start:
             scene = scene.replace(**one.values)
+            told |= set(one.values)
+    scene = scene.replace(**plan.fixed)
     targets = [experiment.measured[name] for name in plan.to]
     box = np.log([LAWS[plan.law][key] for key in plan.parameters])
     series = [_series(one, rig) for one in targets]
     like = Likelihood(scene, series, plan.parameters, box, lambda: None)
-    start = np.log([float(scene[key]) for key in plan.parameters])
+    with np.errstate(divide="ignore"):  # what starts at 0 starts at its lower end
+        start = np.log([float(scene[key]) for key in plan.parameters])
     place, _ = descend(like, np.clip(start, *box.T), range(len(plan.parameters)))
     best = like.scene_at(place.at)
-    values = {key: float(best[key]) for key in LAWS[plan.law]}
+    values = {key: best[key] for key in (*LAWS[plan.law], *FIXED[plan.law]) if key in told}
     errors, carried = _errors(experiment, plan, best, rig)
     return FoundFit(
         experiment.name, plan.law, plan.name, plan.start, plan.parameters, values, errors, carried,

@@ -26,11 +26,20 @@ WANTED = "wanted"
 # Where a number comes from.
 KINDS = ("measured", "computed", "mixed")
 # Rock laws, and the parameters that a fit may move; SI units.
+_LINES = {"rock.loading_stiffness": (1e6, 1e10), "rock.unloading_ratio": (1.001, 1e4)}
 LAWS: dict[str, dict[str, tuple[float, float]]] = {
-    "bilinear": {
-        "rock.loading_stiffness": (1e6, 1e10),
-        "rock.unloading_ratio": (1.001, 1e4),
+    "bilinear": _LINES,
+    "power": {
+        **_LINES,
+        "rock.loading_exponent": (1.0, 4.0),
+        "rock.unloading_exponent": (1e-3, 12.0),
+        "rock.chipping_penetration": (1e-6, 1e-2),
     },
+}
+# Parameters of a law that a fit may set, beside those that it may move.
+FIXED: dict[str, tuple[str, ...]] = {
+    "bilinear": (),
+    "power": ("rock.reference_penetration", "rock.buttons", "rock.chipping_force"),
 }
 MOST_ENTRIES = 100
 # A blow is over by then [s].
@@ -100,6 +109,8 @@ class FitPlan:
         Measurements by their ids.
     start : str
         Fit whose parameters hold for all others; empty: those of the scene.
+    fixed : dict of float
+        Parameters that were chosen before the fit, SI units.
     """
 
     name: str
@@ -108,6 +119,7 @@ class FitPlan:
     to: tuple[str, ...]
     predicts: tuple[str, ...] = ()
     start: str = ""
+    fixed: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -302,7 +314,8 @@ def _measurement(where: str, row: dict[str, Any]) -> Measurement:
 def _fit(
     where: str, row: dict[str, Any], measured: Mapping[str, Measurement], before: Sequence[str]
 ) -> FitPlan:
-    _refuse_keys(f"{where}.", row, ("name", "law", "parameters", "to"), ("predicts", "start"))
+    others = ("predicts", "start", "fixed")
+    _refuse_keys(f"{where}.", row, ("name", "law", "parameters", "to"), others)
     law = _choice(f"{where}.", row, "law", tuple(LAWS))
     parameters = _words(f"{where}.", row, "parameters", tuple(LAWS[law]))
     to = _words(f"{where}.", row, "to", tuple(measured))
@@ -318,7 +331,21 @@ def _fit(
     name = _text(f"{where}.", row, "name")
     if name in before:
         raise ExperimentError(f"{where}.name = {name!r}: another fit has this name")
-    return FitPlan(name, law, parameters, to, predicts, start)
+    fixed = _fixed(where, row, law, parameters)
+    return FitPlan(name, law, parameters, to, predicts, start, fixed)
+
+
+def _fixed(
+    where: str, row: dict[str, Any], law: str, parameters: tuple[str, ...]
+) -> dict[str, float]:
+    """Parameters that a fit sets; a scene with them tells whether they make sense."""
+    table = row.get("fixed", {})
+    if not isinstance(table, dict):
+        raise ExperimentError(f"{where}.fixed: must be a table")
+    allowed = [key for key in (*LAWS[law], *FIXED[law]) if key not in parameters]
+    _refuse_keys(f"{where}.fixed.", table, (), allowed)
+    scene = Scene(effects={"rock": law}).replace(**table)
+    return {key: scene[key] for key in table}
 
 
 def _variant(where: str, row: dict[str, Any], scene: Scene) -> Variant:

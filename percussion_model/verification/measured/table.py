@@ -37,6 +37,11 @@ LEAST_ERROR = 1e-3
 SYMBOLS = {
     "rock.loading_stiffness": ("loading stiffness", "kN/mm", 1e6),
     "rock.unloading_ratio": ("unloading ratio", "", 1.0),
+    "rock.loading_exponent": ("n", "", 1.0),
+    "rock.unloading_exponent": ("q", "", 1.0),
+    "rock.chipping_force": ("chipping force", "kN", 1e3),
+    "rock.chipping_penetration": ("chipping penetration", "mm", 1e-3),
+    "rock.reference_penetration": ("reference penetration", "mm", 1e-3),
 }
 NOTES = (
     "measured ± is what the source and its reading leave open; kind tells whether the number was "
@@ -126,23 +131,47 @@ def parameters_text(found: FoundFit) -> str:
 
 def count_text(found: Comparison) -> str:
     """How many predictions met their criteria."""
-    counts = found.counts()
-    decided = sum(counts.values()) - counts[NO_CRITERION]
-    text = (
-        f"Predictions with a criterion: {decided}, of which {counts[MET]} meet it and "
-        f"{counts[MISSED]} miss it"
-    )
-    if counts[UNDECIDED]:
-        text += f"; {counts[UNDECIDED]} are undecided"
-    text += f". Without a criterion: {counts[NO_CRITERION]}."
+    texts = []
+    for law in found.laws:
+        counts = found.counts(law)
+        decided = sum(counts.values()) - counts[NO_CRITERION]
+        text = (
+            f"Law {law}: {decided} predictions with a criterion, of which {counts[MET]} meet it "
+            f"and {counts[MISSED]} miss it"
+        )
+        if counts[UNDECIDED]:
+            text += f"; {counts[UNDECIDED]} are undecided"
+        texts.append(f"{text}; {counts[NO_CRITERION]} without.")
     again = found.counts(anew=True)
     more = sum(again.values()) - again[NO_CRITERION]
     if more:
-        text += (
-            f" With one parameter fitted anew at another speed: {more}, of which {again[MET]} "
+        texts.append(
+            f"With one parameter fitted anew at another speed: {more}, of which {again[MET]} "
             f"meet it and {again[MISSED]} miss it."
         )
-    return text
+    return " ".join(texts)
+
+
+def laws_side_by_side(found: Comparison, name: str) -> tuple[list[str], list[list[str]]]:
+    """Numbers of an experiment by all its whole fits: headings and rows; none for one fit."""
+    fits = [f for f in found.fits if f.experiment == name and not f.start]
+    if len({f.law for f in fits}) < 2:
+        return [], []
+    by_fit = [{row.id: row for row in found.of(name, f.name)} for f in fits]
+    ids = dict.fromkeys(key for rows in by_fit for key in rows)
+    headings = ["number", "measured", *(f"{f.law}, {f.name}" for f in fits)]
+    table = []
+    for key in ids:
+        rows = [each.get(key) for each in by_fit]
+        any_row = next(row for row in rows if row is not None)
+        texts = ["–" if row is None else _by_law(row) for row in rows]
+        table.append([key, measured_text(any_row), *texts])
+    return headings, table
+
+
+def _by_law(row: Row) -> str:
+    text = shown(QUANTITIES[row.quantity], row.computed, row.numerical_error)
+    return f"{text}, {'fitted' if row.role == FITTED else row.verdict}"
 
 
 def reasons(found: Comparison) -> dict[str, list[str]]:
@@ -179,6 +208,11 @@ def markdown(found: Comparison) -> Iterator[str]:
             yield f"**Law {plan.law}, fit {plan.name}**: {parameters_text(fit)}."
             yield ""
             yield from _table(HEADINGS, map(_emphasised, found.of(one.name, plan.name)))
+        headings, rows = laws_side_by_side(found, one.name)
+        if rows:
+            yield "**Laws side by side**"
+            yield ""
+            yield from _table(headings, rows)
     for why, ids in reasons(found).items():
         yield f"- No criterion for {', '.join(ids)}: {why}."
     yield ""
