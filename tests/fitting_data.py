@@ -5,31 +5,61 @@ from __future__ import annotations
 import numpy as np
 
 from percussion_model import Scene
-from percussion_model.analysis.fitting import Curve, DropTest, bilinear_force, drop_test_signal
-from percussion_model.analysis.fitting.found import DAMPING, ENERGY
-from percussion_model.analysis.fitting.likelihood import RATIO, STIFFNESS
+from percussion_model.analysis.fitting import (
+    Curve,
+    DropTest,
+    SlowLaw,
+    drop_test_signal,
+    slow_force,
+)
+from percussion_model.analysis.fitting.found import LAWS
+from percussion_model.analysis.fitting.likelihood import (
+    DAMPING,
+    ENERGY,
+    EXPONENT,
+    RATIO,
+    STIFFNESS,
+    UNLOADING,
+    coordinates,
+    values_at,
+)
 
-KEYS = (STIFFNESS, RATIO, DAMPING, ENERGY)
+KEYS = LAWS["bilinear"]
 TRUTH = dict(zip(KEYS, (6e8, 6.0, 1.5e4, 0.1), strict=True))
-# Truths of the trials lie between these, evenly in the logarithm.
+POWER = {"effects.rock": "power"}
+POWER_TRUTH = TRUTH | {EXPONENT: 1.6, UNLOADING: 0.3}
+# Truths of the trials lie between these, evenly in the logarithm; exponents evenly.
 DRAWN = {STIFFNESS: (2e8, 1.5e9), RATIO: (3.0, 12.0), DAMPING: (3e3, 1e5), ENERGY: (0.02, 0.5)}
+POWER_DRAWN = DRAWN | {EXPONENT: (1.2, 2.5), UNLOADING: (0.1, 0.6)}
 DEPTH, FORCE_NOISE, POSITION_NOISE, DATUM = 8e-4, 4e3, 1e-5, 5e-5
+# Slow tests of the power law go to the first and to a second peak.
+SHALLOW = 4e-4
 SPEEDS = (5.25, 3.0)
 END = 45e-3
 
 
-def drawn_truth(seed):
+def drawn_truth(seed, drawn=DRAWN):
     draw = np.random.default_rng(seed).uniform
-    return {key: float(np.exp(draw(*np.log(ends)))) for key, ends in DRAWN.items()}
+    ends = {key: coordinates([key, key], ends) for key, ends in drawn.items()}
+    return {key: float(values_at(key, draw(*pair))) for key, pair in ends.items()}
 
 
-def noisy_curve(seed, truth=TRUTH, noise=FORCE_NOISE):
+def slow_law(truth):
+    """What a slow test shows of a rock that is given by its parameters."""
+    law = {} if EXPONENT not in truth else {"effects.rock": "power"}
+    return SlowLaw.of(Scene().replace(**law, **truth))
+
+
+def noisy_curve(seed, truth=TRUTH, noise=FORCE_NOISE, depth=DEPTH):
     """A slow test whose gauge begins above the rock; the peak lies between two readings."""
-    up = np.linspace(0.0, DATUM + 0.998 * DEPTH, 60)
-    down = DATUM + DEPTH * np.linspace(0.999, 1.0 - 1.0 / truth[RATIO], 40)
+    law = slow_law(truth)
+    given_back = law.recovered_share(float(law.loading(depth)))
+    up = np.linspace(0.0, DATUM + 0.998 * depth, 60)
+    down = DATUM + depth * np.linspace(0.999, 1.0 - given_back, 40)
     p = np.concatenate([up, down])
-    force = bilinear_force(p, truth[STIFFNESS], truth[RATIO], DATUM, DATUM + DEPTH)
-    return Curve(p, force + np.random.default_rng(seed).normal(0.0, noise, len(p)))
+    force = slow_force(p, law, DATUM, DATUM + depth)
+    name = f"to {1e3 * depth:g} mm"
+    return Curve(p, force + np.random.default_rng(seed).normal(0.0, noise, len(p)), name)
 
 
 def bit(solver="rigid", **changes):

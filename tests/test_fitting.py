@@ -20,7 +20,7 @@ from percussion_model.analysis.fitting import (
     drop_test_signal,
     fit_rock,
 )
-from percussion_model.analysis.fitting.curve import best_datum_and_peak
+from percussion_model.analysis.fitting.curve import SlowLaw, best_datum_and_peak
 from percussion_model.analysis.fitting.found import (
     DETERMINED,
     OPEN,
@@ -61,7 +61,8 @@ def test_force_rises_with_one_slope_and_falls_with_another():
 
 def test_datum_and_peak_of_a_curve_without_noise_are_found():
     curve = noisy_curve(0, noise=0.0)
-    found = best_datum_and_peak(curve, TRUTH[STIFFNESS], TRUTH[RATIO], (0.0, DEPTH))
+    law = SlowLaw(TRUTH[STIFFNESS], TRUTH[RATIO])
+    found = best_datum_and_peak(curve, law, (0.0, DEPTH))
     assert found == pytest.approx((DATUM, DATUM + DEPTH), rel=1e-9)
 
 
@@ -378,7 +379,7 @@ def test_a_place_is_given_up_only_where_it_is_above_the_limit():
     computed = []
 
     def series(k, source):
-        made = curve_series(source) if k == 0 else drop_series(source)
+        made = curve_series(source, (DATUM, DATUM + DEPTH)) if k == 0 else drop_series(source)
         return replace(made, model=lambda scene: computed.append(k) or made.model(scene))
 
     every = [series(k, source) for k, source in enumerate(sources)]

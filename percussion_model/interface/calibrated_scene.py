@@ -31,7 +31,7 @@ def commented_fit(found: Fit, written: Mapping[str, float], scene: str) -> str:
     str
         Lines that begin with #, the last one empty.
     """
-    from percussion_model.analysis.fitting.found import NAMES
+    from percussion_model.analysis.fitting.found import LAWS, NAMES
 
     lines = [f"Calibrated by `percussion calibrate {scene}`, from:"]
     for one in found.explained:
@@ -40,8 +40,8 @@ def commented_fit(found: Fit, written: Mapping[str, float], scene: str) -> str:
         lines.append(f"  {one.name}: {data}, noise {one.noise_text()} {one.unit} ({kind})")
     kind = "widened" if found.is_widened else f"{100 * found.confidence:g} %"
     lines += ["", f"Parameters and their {kind} intervals, all together:"]
-    for key, symbol in NAMES.items():
-        estimate, unit = found.estimates.get(key), rows_by_key()[key].unit
+    for key in LAWS[found.law]:
+        symbol, estimate, unit = NAMES[key], found.estimates.get(key), rows_by_key()[key].unit
         if estimate is None:
             lines.append(f"  {key} ({symbol}): not fitted, kept as in {scene}")
             continue

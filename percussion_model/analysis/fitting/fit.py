@@ -11,11 +11,13 @@ import numpy as np
 from percussion_model.analysis.fitting.curve import first_sight
 from percussion_model.analysis.fitting.found import (
     DETERMINED,
+    LAWS,
     OPEN,
     OPEN_ABOVE,
     OPEN_BELOW,
     RIVALLED,
     ROUGH_FACTOR,
+    TOLD,
     WIDE,
     Estimate,
     Explained,
@@ -26,14 +28,17 @@ from percussion_model.analysis.fitting.found import (
 from percussion_model.analysis.fitting.likelihood import (
     DAMPING,
     ENERGY,
+    EXPONENT,
+    EXPONENTS,
     RATIO,
+    SLOW,
     STIFFNESS,
+    UNLOADING,
     Likelihood,
     Place,
-    Series,
-    curve_series,
-    drop_series,
-    reading_series,
+    coordinates,
+    decades,
+    values_at,
 )
 from percussion_model.analysis.fitting.measurements import (
     Curve,
@@ -64,52 +69,34 @@ from percussion_model.analysis.fitting.sampling import (
 )
 from percussion_model.analysis.fitting.search import (
     descend,
-    design,
-    distinct,
-    grid,
     polish,
     roughness,
 )
+from percussion_model.analysis.fitting.survey import Counter, minima_of, series_of
 from percussion_model.scene.scene import Scene
 
 # What can be fitted, and where it is searched; SI units.
 RANGES = {
     STIFFNESS: (1e6, 1e11),
+    EXPONENT: (1.0, 4.0),
     RATIO: (1.01, 100.0),
+    UNLOADING: (0.0, 2.0),
     DAMPING: (1e2, 1e7),
     ENERGY: (1e-4, 10.0),
 }
-# With a curve, a grid of C_R and W_R is computed for its K_R and gamma and for those this share
-# of their standard errors beside, and so many of the best places with K_R and gamma moved.
-CURVE_ERRORS, RELAXED = 0.3, 48
-VALUES = {DAMPING: 11, ENERGY: 16}
-# Without, so many points with K_R and gamma within this factor of the scene's, with so many
-# values of W_R at each: it decides on the number of drilling cycles.
-POINTS, FACTOR, LEVELS = 128, 10.0, 20
-SLOW_STEP = 3e-3
-# Around so many of the best places finer grids follow, these shares of `ZOOM` to each side, in
-# the logarithm; of each so many of the best places are computed.
-ZOOMS, ZOOMED, ZOOM_RELAXED = (1.0, 0.3), 3, 8
-ZOOM_VALUES = {DAMPING: 6, ENERGY: 6}
-# The search goes down from so many places, in so many samples of each drop, then from the best
-# few in all samples. Places nearer to each other than this are one, in the logarithm.
-SEARCH_SAMPLES = 50
-STARTS, FINALISTS = 8, 4
-ZOOM = {STIFFNESS: 0.5, RATIO: 0.3, DAMPING: 1.0, ENERGY: 0.6}
-# The last of these grids is of all samples.
-LAST_ZOOM, LAST_STEP = 0.12, 2e-4
-# Minima are told up to this deviance above the best: less likely by exp(-10).
-TOLD = 20.0
 # Walks in turn, each from the best so far: shares of all steps. The search met all there is
 # where the last one finds nothing better by this share of the threshold.
 ROUNDS, BETTER = (0.4, 0.6), 0.25
-# A parameter whose interval is wider than this factor is not called determined.
-MOST_WIDTH = 10.0
+# Peaks of slow tests within this factor are one: they tell gamma there, and q not at all.
+ONE_PEAK = 1.02
+# A parameter whose interval is wider than a factor of ten is not called determined; an exponent,
+# where a force ten times as large would leave a factor of ten.
+MOST_DECADES = 1.0
 
 
 def fit_rock(
     scene: Scene,
-    curve: Curve | None = None,
+    curve: Curve | Sequence[Curve] | None = None,
     drops: Sequence[DropTest] = (),
     readings: Sequence[Reading] = (),
     parameters: Sequence[str] | None = None,
@@ -130,12 +117,15 @@ def fit_rock(
     Parameters
     ----------
     scene : Scene
-        Of the bit, with or without its hammer. Its rock stays where nothing is fitted.
-    curve : Curve, optional
+        Of the bit, with or without its hammer. Its rock, which follows the bilinear law or the
+        power law, stays where nothing is fitted.
+    curve : Curve, or sequence of them, optional
+        Each one loading and unloading, of rock that was not pressed before.
     drops : sequence of DropTest
     readings : sequence of Reading
     parameters : sequence of str, optional
-        Keys of `RANGES` that are fitted; default K_R and gamma for a curve alone, else all.
+        Keys of `RANGES` that are fitted; default K_R and gamma for a curve alone, else all. By
+        the power law n, and q unless all peaks are of about one force, as well.
     ranges : mapping, optional
         Where a parameter is searched, in place of `RANGES`: what is known beforehand.
     confidence : float
@@ -157,25 +147,34 @@ def fit_rock(
     """
     if not 0 < confidence < 1:
         raise FitError(f"confidence = {confidence!r}: must be a number above 0 and below 1")
-    curve = None if curve is None else checked_curve(curve)
-    sources: list[Source] = [
-        *([] if curve is None else [curve]),
-        *map(checked_drop, drops),
-        *readings,
-    ]
+    given = [curve] if isinstance(curve, Curve) else list(curve or ())
+    curves = [checked_curve(one) for one in given]
+    sources: list[Source] = [*curves, *map(checked_drop, drops), *readings]
     for reading in readings:
         check_reading(reading)
     if not sources:
         raise FitError("nothing to fit: a curve, a drop or a reading is needed")
     names = _chosen(scene, sources, parameters)
+    sight = first_sight(curves, scene) if curves else None
+    untold: tuple[str, ...] = ()
+    both = RATIO in names and UNLOADING in names
+    # what is known of q beforehand may tell it
+    if both and UNLOADING not in (ranges or {}) and _of_one_peak(sources):
+        if parameters is not None:
+            raise FitError(
+                f"{UNLOADING}: peaks of about one force do not tell it and {RATIO} both; give a "
+                "range of it, or fit one of them"
+            )
+        untold = (UNLOADING,)
+        names = tuple(name for name in names if name not in untold)
     box = _box(scene, names, ranges or {})
-    counter = _Counter(progress, stage)
-    whole = Likelihood(scene, [_series(one) for one in sources], names, box, counter.tick)
-    minima = _minima(whole, sources, counter)
+    counter = Counter(progress, stage)
+    whole = Likelihood(scene, series_of(sources, sight), names, box, counter.tick)
+    minima = minima_of(whole, sources, sight, counter)
     quantile = _quantile(confidence, len(names))
     found = _explored(whole, minima, quantile, counter)
     counter.begin("check with finer cells")
-    return _result(whole, sources, found, confidence, quantile, counter.done)
+    return _result(whole, sources, found, confidence, quantile, counter.done, untold)
 
 
 def _quantile(confidence: float, free: int) -> float:
@@ -189,43 +188,24 @@ def _quantile(confidence: float, free: int) -> float:
     return float(chi2.ppf(confidence, free))
 
 
-class _Counter:
-    """Computations done and stages that begin, passed on."""
-
-    def __init__(
-        self,
-        progress: Callable[[int], None] | None,
-        stage: Callable[[str, int], None] | None,
-    ) -> None:
-        self.done, self._progress, self._stage = 0, progress, stage
-
-    def begin(self, name: str, most: int = 0) -> None:
-        """Tell what begins, and how many computations it takes at most; 0: that is not known."""
-        if self._stage is not None:
-            self._stage(name, most)
-
-    def tick(self) -> None:
-        """Count one more."""
-        self.done += 1
-        if self._progress is not None:
-            self._progress(self.done)
-
-
 def _chosen(
     scene: Scene, sources: Sequence[Source], parameters: Sequence[str] | None
 ) -> tuple[str, ...]:
     """Free parameters; refuses scenes and choices that make no sense."""
     slow = all(isinstance(one, Curve) for one in sources)
-    names = tuple(parameters) if parameters is not None else tuple(RANGES)[: 2 if slow else 4]
+    law = scene.effects.rock
+    if law not in LAWS:
+        raise FitError(f'effects.rock = "{law}": must be one of {", ".join(LAWS)}')
+    possible = LAWS[law]
+    default = tuple(name for name in possible if name in SLOW or not slow)
+    names = default if parameters is None else tuple(parameters)
     for name in names:
-        if name not in RANGES:
-            raise FitError(f"{name} cannot be fitted: must be one of {', '.join(RANGES)}")
+        if name not in possible:
+            raise FitError(f"{name} cannot be fitted: must be one of {', '.join(possible)}")
         if names.count(name) > 1:
             raise FitError(f"{name} is to be fitted {names.count(name)} times: name it once")
     if not names:
-        raise FitError(f"parameters: at least one of {', '.join(RANGES)} is needed")
-    if scene.effects.rock != "bilinear":
-        raise FitError(f'effects.rock = "{scene.effects.rock}": must be "bilinear"')
+        raise FitError(f"parameters: at least one of {', '.join(possible)} is needed")
     if not slow and not scene.effects.barrier:
         raise FitError("the scene has no energy barrier: effects.barrier must be true")
     hammer = [one for one in sources if isinstance(one, Reading) and one.speed is None]
@@ -237,7 +217,7 @@ def _chosen(
 def _box(
     scene: Scene, names: Sequence[str], ranges: Mapping[str, tuple[float, float]]
 ) -> np.ndarray:
-    """Logarithms between which each parameter is searched."""
+    """Coordinates between which each parameter is searched."""
     for name in ranges:
         if name not in names:
             raise FitError(f"range of {name}: it is not fitted; fitted are {', '.join(names)}")
@@ -246,113 +226,19 @@ def _box(
         low, high = ranges.get(name, RANGES[name])
         row = scene.row_of(name)
         least, most = row.lower or 0.0, row.upper or math.inf
-        if not (0 < low < high and least <= low and high <= most):
+        above = low > 0 or name in EXPONENTS
+        if not (above and low < high and least <= low and high <= most):
             raise FitError(
                 f"range of {name} = {low!r} to {high!r}: must rise, between {least:g} and {most:g}"
             )
-        box[k] = np.log([low, high])
+        box[k] = coordinates([name, name], [low, high])
     return box
 
 
-def _series(source: Source, most: int | None = None) -> Series:
-    if isinstance(source, Curve):
-        return curve_series(source)
-    if isinstance(source, DropTest):
-        return drop_series(source, most)
-    return reading_series(source)
-
-
-def _minima(whole: Likelihood, sources: Sequence[Source], counter: _Counter) -> list[Place]:
-    """Find minima that may be the best, the deepest first."""
-    thin = Likelihood(
-        whole.scene,
-        [_series(one, SEARCH_SAMPLES) for one in sources],
-        whole.names,
-        np.stack([whole.low, whole.high], axis=1),
-        counter.tick,
-    )
-    simple = all(isinstance(one, Curve) for one in sources)
-    every = range(len(whole.names))
-    sizes = np.array([ZOOM[name] for name in whole.names])
-    counter.begin("search of the whole range", _most_surveyed(whole.names, sources))
-    starts = distinct(_survey(thin, sources), ZOOMS[-1] * sizes, STARTS)
-    counter.begin("descent from the best places")
-    lower = [descend(thin, one.at, every, rounds=2)[0] for one in starts]
-    found = distinct(lower, 0.25 * sizes, STARTS)
-    # few samples tell less: what is far above the best in them is so in all
-    near = [one for one in found if one.deviance - found[0].deviance < TOLD]
-    places = distinct([whole.at(one.at) for one in near], 0.0 * sizes, FINALISTS)
-    deep = [descend(whole, one.at, every, rounds=2)[0] for one in places]
-    if not simple:
-        best = min(deep, key=lambda one: one.deviance)
-        steps = np.array([0.0 if name in ZOOM_VALUES else LAST_STEP for name in whole.names])
-        closer = _zoom(whole, best.at, LAST_ZOOM * sizes, steps)
-        deep += [descend(whole, one.at, every, rounds=2)[0] for one in closer[:1]]
-    return distinct(deep, 0.1 * sizes, FINALISTS)
-
-
-def _survey(thin: Likelihood, sources: Sequence[Source]) -> list[Place]:
-    """Places all over what is searched, and more of them around the best."""
-    names = thin.names
-    guess = np.log([thin.scene[name] or 1.0 for name in names])
-    box = np.stack([thin.low, thin.high], axis=1)
-    slow = [k for k, name in enumerate(names) if name in (STIFFNESS, RATIO)]
-    rough = [k for k in range(len(names)) if k not in slow]
-    curves = [one for one in sources if isinstance(one, Curve)]
-    steps = np.zeros(len(names))
-    steps[slow] = SLOW_STEP
-    places = [thin.at(guess)]
-    if slow and curves:
-        sight = dict(zip((STIFFNESS, RATIO), first_sight(curves[0])[:2], strict=True))
-        guess[slow] = np.log([sight[names[k]] for k in slow])
-        alone = Likelihood(thin.scene, [_series(curves[0])], names, box, lambda: None)
-        place, spread = descend(alone, np.clip(guess, thin.low, thin.high), slow)
-        places = [thin.at(place.at)]
-        if len(sources) == len(curves) or not rough:
-            return places
-        steps[slow] = CURVE_ERRORS * np.sqrt(np.diag(spread))
-        axes = {k: np.linspace(box[k, 0], box[k, 1], VALUES[names[k]]) for k in rough}
-        places += [thin.at(at) for at in grid(thin, place.at, axes, slow, steps)[:RELAXED]]
-    else:
-        for k in slow:
-            box[k] = np.clip(guess[k] + math.log(FACTOR) * np.array([-1.0, 1.0]), *box[k])
-        rows = design(box, POINTS, names.index(ENERGY) if ENERGY in names else -1, LEVELS)
-        places += [thin.at(at) for at in rows]
-    for share in ZOOMS:
-        sizes = share * np.array([ZOOM[name] for name in names])
-        for centre in distinct(places, sizes, ZOOMED):
-            places += _zoom(thin, centre.at, sizes, share * steps)
-    return places
-
-
-def _most_surveyed(names: Sequence[str], sources: Sequence[Source]) -> int:
-    """Most computations of `_survey`."""
-    rough = [name for name in names if name in VALUES]
-    moved = 1 + len(names) - len(rough)
-    curves = sum(isinstance(one, Curve) for one in sources)
-    if moved > 1 and curves:
-        if len(sources) == curves or not rough:
-            return 2
-        first = 1 + moved * math.prod(VALUES[name] for name in rough) + RELAXED
-    elif ENERGY in names:
-        first = LEVELS if len(names) == 1 else POINTS * LEVELS
-    else:
-        first = POINTS
-    zoom = moved * math.prod(ZOOM_VALUES[name] for name in rough) + ZOOM_RELAXED
-    return 1 + first + (len(ZOOMS) * ZOOMED * zoom if rough else 0)
-
-
-def _zoom(like: Likelihood, at: np.ndarray, sizes: np.ndarray, steps: np.ndarray) -> list[Place]:
-    """The best places of a grid of C_R and W_R around a place; K_R and gamma follow."""
-    axes = {}
-    for k, name in enumerate(like.names):
-        if name in ZOOM_VALUES:
-            row = at[k] + sizes[k] * np.linspace(-1.0, 1.0, ZOOM_VALUES[name])
-            axes[k] = np.clip(row, like.low[k], like.high[k])
-    if not axes:
-        return []
-    slow = [k for k in range(len(at)) if k not in axes]
-    return [like.at(one) for one in grid(like, at, axes, slow, steps)[:ZOOM_RELAXED]]
+def _of_one_peak(sources: Sequence[Source]) -> bool:
+    """Whether all data are slow tests to about the same force."""
+    peaks = [float(one.force.max()) for one in sources if isinstance(one, Curve)]
+    return len(peaks) == len(sources) and max(peaks) < ONE_PEAK * min(peaks)
 
 
 class Explored(NamedTuple):
@@ -366,9 +252,7 @@ class Explored(NamedTuple):
     settled: bool
 
 
-def _explored(
-    like: Likelihood, minima: list[Place], quantile: float, counter: _Counter
-) -> Explored:
+def _explored(like: Likelihood, minima: list[Place], quantile: float, counter: Counter) -> Explored:
     """Walk from the best of all minima, twice: the second knows how wide the first went."""
     every, rng = range(len(like.names)), np.random.default_rng(0)
     walked = Walk.of(minima)
@@ -419,15 +303,16 @@ def _result(
     confidence: float,
     quantile: float,
     runs: int,
+    untold: Sequence[str],
 ) -> Fit:
     """Put a fit together."""
     best, spread, profiles, minima, threshold, settled = explored
     estimates, curves = {}, {}
     for k, (name, found) in enumerate(zip(like.names, profiles, strict=True)):
-        estimates[name] = _estimate(best.at[k], found, like.low[k], like.high[k])
-        curves[name] = np.exp(found.values), found.deviance
+        estimates[name] = _estimate(name, best.at[k], found, like.low[k], like.high[k])
+        curves[name] = values_at(name, found.values), found.deviance
     rivals = [
-        Rival(dict(zip(like.names, np.exp(one.at).tolist(), strict=True)), above)
+        Rival({key: float(like.scene_at(one.at)[key]) for key in like.names}, above)
         for one in minima[1:]
         if (above := one.deviance - best.deviance) < TOLD + threshold and _outside(one, profiles)
     ]
@@ -439,7 +324,7 @@ def _result(
     ]
     warnings = [
         *interval_notes(estimates, like),
-        *kept_notes(like, all(isinstance(one, Curve) for one in sources)),
+        *kept_notes(like, all(isinstance(one, Curve) for one in sources), untold),
         *([] if settled else [UNSETTLED]),
         *rough_notes((threshold - quantile) / ROUGH_FACTOR),
         *gap_notes(like, profiles),
@@ -448,11 +333,12 @@ def _result(
         *grid_notes(like, best, spread, profiles),
     ]
     return Fit(
-        estimates, confidence, quantile, threshold, explained, rivals, curves, runs, warnings
-    )
+        like.scene.effects.rock, estimates, confidence, quantile, threshold, explained, rivals,
+        curves, runs, warnings,
+    )  # fmt: skip
 
 
-def _estimate(at: float, found: Profile, low: float, high: float) -> Estimate:
+def _estimate(name: str, at: float, found: Profile, low: float, high: float) -> Estimate:
     open_below, open_above = math.isinf(found.low), math.isinf(found.high)
     verdict = {
         (False, False): RIVALLED if found.gap else DETERMINED,
@@ -460,7 +346,9 @@ def _estimate(at: float, found: Profile, low: float, high: float) -> Estimate:
         (False, True): OPEN_ABOVE,
         (True, True): OPEN,
     }[open_below, open_above]
-    ends = (math.exp(max(found.low, low)), math.exp(min(found.high, high)))
-    if verdict in (DETERMINED, RIVALLED) and ends[1] > MOST_WIDTH * ends[0]:
+    value, least, most = (
+        float(values_at(name, one)) for one in (at, max(found.low, low), min(found.high, high))
+    )
+    if verdict in (DETERMINED, RIVALLED) and decades(name, least, most) > MOST_DECADES:
         verdict = WIDE
-    return Estimate(math.exp(at), *ends, verdict)
+    return Estimate(value, least, most, verdict)

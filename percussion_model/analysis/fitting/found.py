@@ -9,7 +9,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from percussion_model.analysis.fitting.likelihood import DAMPING, ENERGY, RATIO, STIFFNESS
+from percussion_model.analysis.fitting.likelihood import (
+    DAMPING,
+    ENERGY,
+    EXPONENT,
+    RATIO,
+    STIFFNESS,
+    UNLOADING,
+)
 from percussion_model.analysis.fitting.measurements import (
     QUANTITIES,
     SIGNALS,
@@ -19,12 +26,26 @@ from percussion_model.analysis.fitting.measurements import (
 )
 from percussion_model.simulation.uncertain import ABOUT, SHOWN_DIGITS, in_digits
 
-NAMES = {STIFFNESS: "K_R", RATIO: "gamma", DAMPING: "C_R", ENERGY: "W_R"}
+NAMES = {
+    STIFFNESS: "K_R",
+    EXPONENT: "n",
+    RATIO: "gamma",
+    UNLOADING: "q",
+    DAMPING: "C_R",
+    ENERGY: "W_R",
+}
+# Parameters of each rock law that can be fitted.
+LAWS = {
+    "bilinear": (STIFFNESS, RATIO, DAMPING, ENERGY),
+    "power": (STIFFNESS, EXPONENT, RATIO, UNLOADING, DAMPING, ENERGY),
+}
 
 Source = Curve | DropTest | Reading
 DETERMINED, RIVALLED = "determined", "rival"
 OPEN_ABOVE, OPEN_BELOW, OPEN = "open above", "open below", "open"
 WIDE = "not determined"
+# Minima are told up to this deviance above the best: less likely by exp(-10).
+TOLD = 20.0
 # Digits of a parameter that is not determined.
 FEW_DIGITS = 2
 # The deviance may be off by the roughness at the best place and at the other: the threshold is
@@ -45,7 +66,7 @@ class Estimate(NamedTuple):
 
     @property
     def determined(self) -> bool:
-        """Whether the interval is closed, and no wider than `fit.MOST_WIDTH`."""
+        """Whether the interval is closed, and no wider than `fit.MOST_DECADES`."""
         return self.verdict in (DETERMINED, RIVALLED)
 
     def texts(self) -> tuple[str, str, str]:
@@ -125,6 +146,8 @@ class Fit:
 
     Attributes
     ----------
+    law : str
+        Rock law, one of `LAWS`.
     estimates : dict of Estimate
         By the dotted key of the parameter.
     confidence : float
@@ -146,6 +169,7 @@ class Fit:
         What one should know before using the numbers.
     """
 
+    law: str
     estimates: dict[str, Estimate]
     confidence: float
     quantile: float
@@ -166,6 +190,11 @@ class Fit:
         """Whether that makes the intervals wider than those of `confidence`."""
         return self.roughness >= ROUGH
 
+    @property
+    def kept(self) -> list[str]:
+        """Parameters of the law that were not fitted."""
+        return [key for key in LAWS[self.law] if key not in self.estimates]
+
     def changes(self, undetermined: bool = False) -> dict[str, float]:
         """Fitted parameters for `Scene.replace`; without those that are not determined."""
         return {
@@ -177,6 +206,7 @@ class Fit:
     def summary(self) -> dict[str, Any]:
         """Return the numbers as plain values for JSON."""
         return {
+            "law": self.law,
             "estimates": {key: found._asdict() for key, found in self.estimates.items()},
             "confidence": self.confidence,
             "quantile": self.quantile,

@@ -6,14 +6,11 @@ import math
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
-from percussion_model.analysis.fitting.curve import (
-    best_datum_and_peak,
-    bilinear_force,
-    first_sight,
-)
+from percussion_model.analysis.fitting.curve import SlowLaw, best_datum_and_peak, slow_force
 from percussion_model.analysis.fitting.measurements import Curve, DropTest, Reading
 from percussion_model.analysis.fitting.predictions import (
     DropOnRocks,
@@ -24,12 +21,38 @@ from percussion_model.scene.inputs import SimulationError
 from percussion_model.scene.scene import Scene
 
 STIFFNESS, RATIO = "rock.loading_stiffness", "rock.unloading_ratio"
+EXPONENT, UNLOADING = "rock.loading_exponent", "rock.unloading_exponent"
 DAMPING, ENERGY = "rock.barrier_damping", "rock.barrier_energy"
+# What a slow test tells; the barrier it does not.
+SLOW = (STIFFNESS, EXPONENT, RATIO, UNLOADING)
+# Coordinates of the search are logarithms, but of exponents, which are so already: those of
+# powers, and so logarithms of what they do to a force.
+EXPONENTS = (EXPONENT, UNLOADING)
 # No noise is taken to be smaller than this share of the data's spread: data of a model
 # without noise would have an infinite likelihood.
 LEAST_NOISE = 1e-8
 # Points that are not computed again.
 KEPT = 256
+
+
+def coordinates(names: Sequence[str], values: Sequence[float]) -> np.ndarray:
+    """Where values of parameters lie in the search."""
+    return np.array(
+        [
+            value if name in EXPONENTS else math.log(value)
+            for name, value in zip(names, values, strict=True)
+        ]
+    )
+
+
+def values_at(name: str, at: Any) -> Any:
+    """Value of a parameter at a coordinate of the search, or at several."""
+    return at if name in EXPONENTS else np.exp(at)
+
+
+def decades(name: str, low: float, high: float) -> float:
+    """How far two values are apart, in powers of ten of what they do to a force."""
+    return high - low if name in EXPONENTS else math.log10(high / low)
 
 
 @dataclass(frozen=True)
@@ -56,7 +79,7 @@ class Place:
     Attributes
     ----------
     at : ndarray
-        Logarithms of the parameters.
+        Coordinates of the parameters: logarithms, but of `EXPONENTS`.
     deviance : float
         Twice the negative logarithm of the likelihood, noise at its best, but for a constant.
     residuals : list of ndarray
@@ -81,7 +104,7 @@ class Likelihood:
     names : sequence of str
         Dotted keys of the free parameters.
     ranges : ndarray, shape (parameters, 2)
-        Logarithms between which they lie.
+        Coordinates between which they lie.
     tick : callable
         Called once for each place that is computed.
     """
@@ -96,12 +119,25 @@ class Likelihood:
     ) -> None:
         self.scene, self.series, self.names = scene, series, tuple(names)
         self.low, self.high = ranges.T
+        # below that the law itself has no values, so that nothing is open there
+        self.ends_low = np.array(
+            [
+                name in EXPONENTS and low == scene.row_of(name).lower
+                for name, low in zip(names, self.low, strict=True)
+            ],
+            bool,
+        )
         self._tick = tick
         self._known: OrderedDict[bytes, Place] = OrderedDict()
         self._least = [math.inf] * len(series)  # deviance of each that was seen
 
+    def with_series(self, series: Sequence[Series]) -> Likelihood:
+        """That of other measurements, with the same parameters."""
+        ranges = np.stack([self.low, self.high], axis=1)
+        return Likelihood(self.scene, series, self.names, ranges, self._tick)
+
     def at(self, at: np.ndarray) -> Place:
-        """Compute the place of parameters (logarithms), within their ranges."""
+        """Compute the place of parameters (coordinates), within their ranges."""
         found = self.below(at, math.inf, 0.0)
         assert found is not None
         return found
@@ -127,8 +163,10 @@ class Likelihood:
 
     def scene_at(self, at: np.ndarray) -> Scene:
         """Scene with these parameters."""
-        values = np.exp(at).tolist()
-        return self.scene.replace(**dict(zip(self.names, values, strict=True)))
+        values = {
+            name: float(values_at(name, one)) for name, one in zip(self.names, at, strict=True)
+        }
+        return self.scene.replace(**values)
 
     def _residuals(self, scene: Scene, limit: float, slack: float) -> list[np.ndarray] | None:
         """Data less model of each series; None where `below` gives up."""
@@ -167,14 +205,12 @@ def _finite(one: Series, scene: Scene) -> np.ndarray:
     return one.data + 10.0 * (float(np.ptp(one.data)) or float(np.abs(one.data).max()))
 
 
-def curve_series(curve: Curve) -> Series:
-    """Series of a slow curve; its datum and peak are at their best for any K_R and gamma."""
-    guess = first_sight(curve)[2:]
+def curve_series(curve: Curve, guess: tuple[float, float]) -> Series:
+    """Series of a slow curve; its datum and peak, guessed, are at their best for any rock."""
 
     def model(scene: Scene) -> np.ndarray:
-        stiffness, ratio = scene[STIFFNESS], scene[RATIO]
-        places = best_datum_and_peak(curve, stiffness, ratio, guess)
-        return bilinear_force(curve.penetration, stiffness, ratio, *places)
+        law = SlowLaw.of(scene)
+        return slow_force(curve.penetration, law, *best_datum_and_peak(curve, law, guess))
 
     return Series(curve.name, curve.force, None, model, simulated=False)
 

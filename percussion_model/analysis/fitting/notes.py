@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from percussion_model.analysis.fitting.found import (
+    LAWS,
     NAMES,
     OPEN,
     OPEN_ABOVE,
@@ -19,10 +20,12 @@ from percussion_model.analysis.fitting.found import (
     Rival,
 )
 from percussion_model.analysis.fitting.likelihood import (
-    DAMPING,
-    ENERGY,
+    EXPONENTS,
+    SLOW,
     Likelihood,
     Place,
+    decades,
+    values_at,
 )
 from percussion_model.analysis.fitting.sampling import Profile
 from percussion_model.analysis.fitting.search import LEAST_STEP, MOST_STEP, STEP_SHARE
@@ -33,7 +36,8 @@ UNSETTLED = (
     "the search met ever better places and no end of it: the best may not be among them, "
     "and intervals may be too narrow"
 )
-# An interval whose ends differ by this factor is said to be wide.
+# An interval whose ends differ by this factor is said to be wide; exponents that differ by its
+# logarithm leave it at ten times the force.
 ROUGHLY = 2.0
 # Residuals that follow from each other by so many standard errors are no independent noise.
 MOST_CORRELATION = 4.0
@@ -47,31 +51,52 @@ def interval_notes(estimates: Mapping[str, Estimate], like: Likelihood) -> list[
     for name, one in estimates.items():
         unit = like.scene.row_of(name).unit.replace("-", "")
         low, high = (f"{end} {unit}".rstrip() for end in one.texts()[1:])
-        factor = f"a factor of {in_digits(one.high / one.low, 2)}"
+        apart = decades(name, one.low, one.high)
+        if name in EXPONENTS:
+            width, roughly = f"a range of {in_digits(apart, 2)}", f"within {in_digits(apart, 2)}"
+        else:
+            width = roughly = f"a factor of {in_digits(one.high / one.low, 2)}"
         told = {
             OPEN_ABOVE: f"is not determined: the data tell only that it is above {low}",
             OPEN_BELOW: f"is not determined: the data tell only that it is below {high}",
             OPEN: "is not determined: its interval reaches over the whole range that was searched, "
             f"{low} to {high}",
-            WIDE: f"is not determined: {factor}, {low} to {high}, explains the data",
+            WIDE: f"is not determined: {width}, {low} to {high}, explains the data",
         }.get(one.verdict)
-        if told is None and one.high > ROUGHLY * one.low:
-            told = f"is determined only to {factor}: {low} to {high}"
+        if told is None and apart > math.log10(ROUGHLY):
+            told = f"is determined only to {roughly}: {low} to {high}"
         if told is not None:
             notes.append(f"{NAMES[name]} ({name}) {told}")
     return notes
 
 
-def kept_notes(like: Likelihood, slow: bool) -> list[str]:
-    """Say what is kept as the scene has it: not told by the data, or taken to be right."""
-    kept = [key for key in NAMES if key not in like.names]
-    silent = [key for key in kept if slow and key in (DAMPING, ENERGY)]
-    given = [key for key in kept if key not in silent and like.scene[key] is not None]
+def kept_notes(like: Likelihood, slow: bool, untold: Sequence[str] = ()) -> list[str]:
+    """Say what is kept as the scene has it: not told by the data, or taken to be right.
+
+    Parameters
+    ----------
+    like : Likelihood
+    slow : bool
+        Whether all data are slow tests.
+    untold : sequence of str
+        Parameters that were to be fitted, but that these do not tell.
+    """
+    kept = [key for key in LAWS[like.scene.effects.rock] if key not in like.names]
+    silent = [key for key in kept if slow and key not in SLOW]
+    given = [key for key in kept if key not in (*silent, *untold) and like.scene[key] is not None]
     notes = []
     if silent:
         notes.append(f"{_values_of(like, silent)} kept: a slow test does not tell them")
+    if untold:
+        notes.append(
+            f"{_values_of(like, untold)} kept: peaks of about one force do not tell it, and gamma "
+            "holds at this force only"
+        )
     if given:
         notes.append(f"{_values_of(like, given)} kept: the intervals hold only if that is right")
+    if like.scene.effects.rock == "power":
+        place = like.scene.rock.reference_penetration
+        notes.append(f"P_0 = {place:.4g} m kept: K_R and gamma are those of this penetration")
     return notes
 
 
@@ -101,7 +126,8 @@ def gap_notes(like: Likelihood, profiles: Sequence[Profile]) -> list[str]:
     for name, one in zip(like.names, profiles, strict=True):
         if one.gap is not None:
             unit = like.scene.row_of(name).unit.replace("-", "")
-            low, high = (f"{in_digits(math.exp(end))} {unit}".rstrip() for end in one.gap)
+            ends = (values_at(name, end) for end in one.gap)
+            low, high = (f"{in_digits(end)} {unit}".rstrip() for end in ends)
             notes.append(
                 f"{NAMES[name]} ({name}) lies below {low} or above {high}: "
                 "what lies between explains the data less well"

@@ -147,14 +147,27 @@ def predicted_reading(scene: Scene, reading: Reading) -> float:
 
 def _rebound_velocity(scene: Scene, speed: float) -> float:
     """Greatest upward mean velocity of the bit, which it has when it leaves the rock [m/s]."""
-    half_period = math.pi * math.sqrt(scene.bit.mass / scene.rock.loading_stiffness)
-    end = scene.start.rock_gap / speed + HALF_PERIODS * half_period
+    end = scene.start.rock_gap / speed + HALF_PERIODS * _half_period(scene, speed)
     first = _falling(scene, speed, record_events=True)
     first.advance(end)
     events = first.events
     leaves = events["time"][events["kind"] == EventKind.MODE_FF]
     times = np.append(leaves, end)
     return float(-_falling(scene, speed).sample(times)["bit_velocity"].min())
+
+
+def _half_period(scene: Scene, speed: float) -> float:
+    """Time of loading and of unloading at most, of a rigid bit without feed [s].
+
+    pi/2 each by the greatest penetration over the speed where the force is in proportion to
+    penetration; by the power law less.
+    """
+    rock = scene.rock
+    if scene.effects.rock != "power":
+        return math.pi * math.sqrt(scene.bit.mass / rock.loading_stiffness)
+    n, place = rock.loading_exponent, rock.reference_penetration
+    share = 0.5 * (n + 1.0) * scene.bit.mass * speed**2 / (rock.loading_stiffness * place**2)
+    return math.pi * place * share ** (1.0 / (n + 1.0)) / speed
 
 
 def _falling(scene: Scene, speed: float, record_events: bool = False) -> Simulation:

@@ -18,8 +18,9 @@ SHORTEST, LONGEST = 0.05, 3.0
 # From so many steps on, and again after so many, the spread is that of the later part.
 FIRST_LOOK, NEXT_LOOK = 200, 100
 EARLY = 0.25
-# So near to the edge of the range, in the logarithm, an interval is open.
-AT_EDGE = 0.1
+# So near to the edge of the range, in the logarithm, an interval is open. Where the law itself
+# ends it is closed, and reaches to that end from this share of its width.
+AT_EDGE, AT_END = 0.1, 0.05
 # Of the width of an interval: a gap this wide without any place parts two minima.
 PARTED = 0.33
 # Ends of intervals wider than this, in the logarithm, are pushed out by this share of the width
@@ -197,9 +198,10 @@ def pushed_out(
         if width < WORTH_A_PUSH:
             continue
         others = [j for j in range(inside.shape[1]) if j != k]
+        low = like.low[k] + (0.0 if like.ends_low[k] else AT_EDGE)
         for row, sign in ((inside[:, k].argmin(), -1.0), (inside[:, k].argmax(), 1.0)):
             at, step = inside[row], PUSH * width
-            while like.low[k] + AT_EDGE < at[k] < like.high[k] - AT_EDGE:
+            while low < at[k] < like.high[k] - AT_EDGE:
                 at = at.copy()
                 at[k] = np.clip(at[k] + sign * step, like.low[k], like.high[k])
                 place = lowest(at, others, 1) if others else like.at(at)
@@ -228,11 +230,18 @@ def profiles_of(like: Likelihood, walked: Walk, threshold: float) -> list[Profil
     for k, values in enumerate(walked.at.T):
         allowed = np.sort(values[inside])
         low, high = allowed[[0, -1]]
+        closed = like.ends_low[k]
+        if closed and low - like.low[k] < AT_END * (high - low):
+            low = like.low[k]
         shown = above < SHOWN * threshold
+        open_above = not high < like.high[k] - AT_EDGE
+        open_below = not (closed or low > like.low[k] + AT_EDGE)
+        if open_above and low == like.low[k]:
+            open_below = True  # the whole range
         found.append(
             Profile(
-                low if low > like.low[k] + AT_EDGE else -math.inf,
-                high if high < like.high[k] - AT_EDGE else math.inf,
+                -math.inf if open_below else low,
+                math.inf if open_above else high,
                 _gap(allowed),
                 *_lowest(values[shown], above[shown]),
             )

@@ -19,7 +19,8 @@ ROUNDS, TRIALS = 4, 5
 LEAST_GAIN = 1e-4
 # It has arrived when a round gains less than this in the deviance.
 ARRIVED = 0.1
-# The search without derivatives: its longest first step, in the logarithm, and how long it is.
+# The search without derivatives: its longest first step, in the logarithm, which is the longest
+# that tells how rough the deviance is too, and how long it is.
 MOST_POLISH, POLISH_TRIALS = 0.3, 12  # trials a parameter
 # On a grid, parameters that a curve tells are moved by so many steps at most; the weights
 # follow the residuals so often.
@@ -138,9 +139,16 @@ def roughness(like: Likelihood, best: Place, spread: np.ndarray) -> tuple[float,
     """
     normal = np.random.default_rng(0).normal(0.0, 1.0, (CHANGES, len(best.at)))
     seen = [best.deviance, *(like.at(best.at + TINY * one).deviance for one in normal)]
-    factor = DIPS * np.linalg.cholesky(spread)
+    variances, directions = np.linalg.eigh(spread)
+    errors = np.sqrt(variances)
+    # far along a direction that is not told the deviance is no parabola, whether rough or not
+    shares = np.minimum(DIPS, MOST_POLISH / errors)
     off = [
-        abs(like.at(best.at + factor @ one).deviance - best.deviance - DIPS**2 * float(one @ one))
+        abs(
+            like.at(best.at + directions @ (shares * errors * one)).deviance
+            - best.deviance
+            - float((shares * one) @ (shares * one))
+        )
         for one in normal
     ]
     return max(seen) - min(seen), float(np.median(off))

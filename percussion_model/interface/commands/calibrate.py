@@ -18,8 +18,13 @@ if TYPE_CHECKING:
 def calibrate(
     scene: common.SceneFile,
     curve: Annotated[
-        Path | None,
-        typer.Option("--curve", metavar="CSV", help="Slow test: penetration [mm], force [kN]."),
+        list[Path] | None,
+        typer.Option(
+            "--curve",
+            metavar="CSV",
+            help="Slow test: penetration [mm], force [kN]. May be repeated: fresh rock, to other "
+            "peaks.",
+        ),
     ] = None,
     drop: Annotated[
         list[str] | None,
@@ -84,13 +89,13 @@ def calibrate(
     from percussion_model.interface.terminal import progress
     from percussion_model.simulation.files import staged_text
 
-    if curve is None and not drop and not measured:
+    if not curve and not drop and not measured:
         raise common.refusal("nothing to fit: give --curve, --drop or --measured")
     common.check_json(json_file)
     for option, path in (("--out", out), ("--figure", figure)):
         _check_file(option, path, force)
     chosen = common.load_scene(scene, solver, cells, settings, rock=rock)
-    slow = None if curve is None else read_curve(curve)
+    slow = [read_curve(path) for path in curve or ()]
     drops = [read_drop(word, gauge) for word in drop or ()]
     numbers = [read_reading(word) for word in measured or ()]
     limits = dict(_read_range(word) for word in ranges or ())
@@ -195,10 +200,9 @@ def _show(found: Fit, scene: Scene) -> None:
         unit = scene.row_of(key).unit
         value, low, high = one.texts()
         table.add_row(NAMES[key], unit, value, f"{low} to {high}", one.verdict)
-    for key in NAMES:
-        if key not in found.estimates:
-            unit = scene.row_of(key).unit
-            table.add_row(NAMES[key], unit, f"{scene[key]:.4g}", "not fitted", "kept")
+    for key in found.kept:
+        unit = scene.row_of(key).unit
+        table.add_row(NAMES[key], unit, f"{scene[key]:.4g}", "not fitted", "kept")
     console = Console()
     print_table(table, console)
     noises = Table("measurement", "data", "noise", "", box=None)

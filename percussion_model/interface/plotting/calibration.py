@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 
 from percussion_model.analysis.fitting import Curve, DropTest, Explained, Fit
 from percussion_model.analysis.fitting.found import OPEN, OPEN_ABOVE, OPEN_BELOW
+from percussion_model.analysis.fitting.likelihood import EXPONENTS
 from percussion_model.interface.plotting import style
 from percussion_model.interface.plotting.style import KN, MM, MPA, MS
 from percussion_model.simulation.files import staged
@@ -19,7 +20,9 @@ from percussion_model.simulation.uncertain import in_digits
 
 SYMBOLS = {
     "rock.loading_stiffness": ("$K_R$", " [N/m]"),
+    "rock.loading_exponent": ("$n$", ""),
     "rock.unloading_ratio": ("$\\gamma$", ""),
+    "rock.unloading_exponent": ("$q$", ""),
     "rock.barrier_damping": ("$C_R$", " [N s/m]"),
     "rock.barrier_energy": ("$W_R$", " [J]"),
 }
@@ -115,7 +118,7 @@ def _profile(ax: Axes, found: Fit, key: str) -> None:
     rivals = [(one.values[key], one.deviance) for one in found.rivals if one.deviance < top]
     if rivals:
         ax.plot(*zip(*rivals, strict=True), "x", color=RIVAL, markersize=6, label="other minimum")
-    if estimate.high > LOGARITHMIC * estimate.low:
+    if key not in EXPONENTS and estimate.high > LOGARITHMIC * estimate.low:
         ax.set_xscale("log")
     else:
         ax.ticklabel_format(useOffset=False)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from percussion_model.analysis.fitting.likelihood import Likelihood, Series
+from percussion_model.analysis.fitting.likelihood import Likelihood, Series, coordinates
 from percussion_model.analysis.fitting.search import descend
 from percussion_model.scene.scene import Scene
 from percussion_model.verification.measured.blow import Reading, Rig
@@ -287,11 +287,11 @@ def fit(
             told |= set(one.values)
     scene = scene.replace(**plan.fixed)
     targets = [experiment.measured[name] for name in plan.to]
-    box = np.log([LAWS[plan.law][key] for key in plan.parameters])
+    ends = zip(*(LAWS[plan.law][key] for key in plan.parameters), strict=True)
+    box = np.stack([coordinates(plan.parameters, one) for one in ends], axis=1)
     series = [_series(one, rig) for one in targets]
     like = Likelihood(scene, series, plan.parameters, box, lambda: None)
-    with np.errstate(divide="ignore"):  # what starts at 0 starts at its lower end
-        start = np.log([float(scene[key]) for key in plan.parameters])
+    start = coordinates(plan.parameters, [float(scene[key]) for key in plan.parameters])
     place, _ = descend(like, np.clip(start, *box.T), range(len(plan.parameters)))
     best = like.scene_at(place.at)
     values = {key: best[key] for key in (*LAWS[plan.law], *FIXED[plan.law]) if key in told}

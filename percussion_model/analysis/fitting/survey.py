@@ -1,0 +1,277 @@
+"""Search of the whole range of a rock's parameters: where its minima are."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from percussion_model.analysis.fitting.curve import Sight
+from percussion_model.analysis.fitting.found import TOLD, Source
+from percussion_model.analysis.fitting.likelihood import (
+    DAMPING,
+    ENERGY,
+    EXPONENT,
+    EXPONENTS,
+    RATIO,
+    SLOW,
+    STIFFNESS,
+    UNLOADING,
+    Likelihood,
+    Place,
+    Series,
+    coordinates,
+    curve_series,
+    drop_series,
+    reading_series,
+)
+from percussion_model.analysis.fitting.measurements import LEAST_DATA, Curve, DropTest
+from percussion_model.analysis.fitting.search import LEAST_STEP, descend, design, distinct, grid
+
+# With a curve, a grid of C_R and W_R is computed for its K_R and gamma and for those this share
+# of their standard errors beside, or this much, and so many of the best places with K_R and gamma
+# moved.
+CURVE_ERRORS, MOST_CURVE_STEP, RELAXED = 0.3, 0.05, 48
+VALUES = {DAMPING: 11, ENERGY: 16}
+# Without, so many points with K_R and gamma within this factor of the scene's, with so many
+# values of W_R at each: it decides on the number of drilling cycles. They are enough for so many
+# parameters beside W_R; each further one doubles them.
+POINTS, OF_POINTS, FACTOR, LEVELS = 128, 3, 10.0, 20
+SLOW_STEP = 3e-3
+# Around so many of the best places finer grids follow, these shares of `ZOOM` to each side, in
+# the logarithm; of each so many of the best places are computed.
+ZOOMS, ZOOMED, ZOOM_RELAXED = (1.0, 0.3), 3, 8
+ZOOM_VALUES = {DAMPING: 6, ENERGY: 6}
+# The search goes down from so many places, in so many samples of each drop, then from the best
+# few in all samples. Places nearer to each other than this are one, in the logarithm.
+SEARCH_SAMPLES = 50
+STARTS, FINALISTS = 8, 4
+ZOOM = {STIFFNESS: 0.5, EXPONENT: 0.3, RATIO: 0.3, UNLOADING: 0.3, DAMPING: 1.0, ENERGY: 0.6}
+# The last of these grids is of all samples.
+LAST_ZOOM, LAST_STEP = 0.12, 2e-4
+# Later bounces tell the exponents of the power law so well that nothing nearby fits them: the
+# search begins with these shares of each drop, and so many of the best places of each go on. From
+# each of these, and from so many of a grid with so many values, it goes down.
+SHARES, CARRIED, TRIED = (1 / 16, 1 / 8, 1 / 4, 1 / 2), 3, 3
+
+
+def series_of(
+    sources: Sequence[Source], sight: Sight | None, most: int | None = None
+) -> list[Series]:
+    """Series of measurements, of each drop at most so many samples."""
+    places = iter(sight.places if sight is not None else ())
+    series = []
+    for source in sources:
+        if isinstance(source, Curve):
+            series.append(curve_series(source, next(places)))
+        elif isinstance(source, DropTest):
+            series.append(drop_series(source, most))
+        else:
+            series.append(reading_series(source))
+    return series
+
+
+def seen(sight: Sight, names: Sequence[str], like: Likelihood) -> np.ndarray:
+    """Coordinates of what curves show at first sight, for parameters that a slow test tells."""
+    law = sight.law
+    values = dict(
+        zip(SLOW, (law.stiffness, law.exponent, law.ratio, law.unloading_exponent), strict=True)
+    )
+    kept = [k for k, name in enumerate(like.names) if name in names]
+    at = coordinates(names, [values[name] for name in names])
+    return np.clip(at, like.low[kept], like.high[kept])
+
+
+class Counter:
+    """Computations done and stages that begin, passed on."""
+
+    def __init__(
+        self,
+        progress: Callable[[int], None] | None,
+        stage: Callable[[str, int], None] | None,
+    ) -> None:
+        self.done, self._progress, self._stage = 0, progress, stage
+
+    def begin(self, name: str, most: int = 0) -> None:
+        """Tell what begins, and how many computations it takes at most; 0: that is not known."""
+        if self._stage is not None:
+            self._stage(name, most)
+
+    def tick(self) -> None:
+        """Count one more."""
+        self.done += 1
+        if self._progress is not None:
+            self._progress(self.done)
+
+
+def minima_of(
+    whole: Likelihood, sources: Sequence[Source], sight: Sight | None, counter: Counter
+) -> list[Place]:
+    """Find minima that may be the best, the deepest first."""
+    thin = Likelihood(
+        whole.scene,
+        series_of(sources, sight, SEARCH_SAMPLES),
+        whole.names,
+        np.stack([whole.low, whole.high], axis=1),
+        counter.tick,
+    )
+    simple = all(isinstance(one, Curve) for one in sources)
+    every = range(len(whole.names))
+    sizes = np.array([ZOOM[name] for name in whole.names])
+    counter.begin("search of the whole range", _most_surveyed(whole.names, sources))
+    starts = distinct(_survey(thin, sources, sight), ZOOMS[-1] * sizes, STARTS)
+    counter.begin("descent from the best places")
+    lower = [descend(thin, one.at, every, rounds=2)[0] for one in starts]
+    found = distinct(lower, 0.25 * sizes, STARTS)
+    # few samples tell less: what is far above the best in them is so in all
+    near = [one for one in found if one.deviance - found[0].deviance < TOLD]
+    places = distinct([whole.at(one.at) for one in near], 0.0 * sizes, FINALISTS)
+    deep = [descend(whole, one.at, every, rounds=2)[0] for one in places]
+    if not simple:
+        best = min(deep, key=lambda one: one.deviance)
+        steps = np.array([0.0 if name in ZOOM_VALUES else LAST_STEP for name in whole.names])
+        closer = _zoom(whole, best.at, LAST_ZOOM * sizes, steps)
+        deep += [descend(whole, one.at, every, rounds=2)[0] for one in closer[:1]]
+    return distinct(deep, 0.1 * sizes, FINALISTS)
+
+
+def _survey(thin: Likelihood, sources: Sequence[Source], sight: Sight | None) -> list[Place]:
+    """Places all over what is searched, and more of them around the best."""
+    names = thin.names
+    guess = coordinates(
+        names, [thin.scene[name] or (0.0 if name in EXPONENTS else 1.0) for name in names]
+    )
+    box = np.stack([thin.low, thin.high], axis=1)
+    slow = [k for k, name in enumerate(names) if name in SLOW]
+    rough = [k for k in range(len(names)) if k not in slow]
+    curves = [one for one in sources if isinstance(one, Curve)]
+    steps = np.zeros(len(names))
+    steps[slow] = SLOW_STEP
+    places = [thin.at(guess)]
+    axes = {k: np.linspace(box[k, 0], box[k, 1], VALUES[names[k]]) for k in rough}
+    if slow and sight is not None:
+        guess[slow] = seen(sight, [names[k] for k in slow], thin)
+        alone = Likelihood(thin.scene, series_of(curves, sight), names, box, lambda: None)
+        place, spread = descend(alone, np.clip(guess, thin.low, thin.high), slow)
+        places = [thin.at(place.at)]
+        if len(sources) == len(curves):
+            return places
+        steps[slow] = np.minimum(CURVE_ERRORS * np.sqrt(np.diag(spread)), MOST_CURVE_STEP)
+        if lengthens(names, sources):
+            longest, steps = _lengthened(thin, sources, sight, [place.at], steps)
+            places += [thin.at(at) for at in longest]
+            place = min(places, key=lambda one: one.deviance)
+        if not rough:
+            return places
+        places += [thin.at(at) for at in grid(thin, place.at, axes, slow, steps)[:RELAXED]]
+    else:
+        for k in slow:
+            if names[k] not in EXPONENTS:
+                box[k] = np.clip(guess[k] + math.log(FACTOR) * np.array([-1.0, 1.0]), *box[k])
+        rows = design(box, _points(names), names.index(ENERGY) if ENERGY in names else -1, LEVELS)
+        if lengthens(names, sources):
+            first = _shortened(thin, sources, sight, SHARES[0])
+            sizes = np.array([ZOOM[name] for name in names])
+            best = distinct([first.at(at) for at in rows], sizes, STARTS)
+            longest, steps = _lengthened(thin, sources, sight, [one.at for one in best], steps)
+            places += [thin.at(at) for at in longest]
+            place = min(places, key=lambda one: one.deviance)
+            if rough:
+                places += [thin.at(at) for at in grid(thin, place.at, axes, slow, steps)[:RELAXED]]
+        else:
+            places += [thin.at(at) for at in rows]
+    for share in ZOOMS:
+        sizes = share * np.array([ZOOM[name] for name in names])
+        for centre in distinct(places, sizes, ZOOMED):
+            places += _zoom(thin, centre.at, sizes, share * steps)
+    return places
+
+
+def lengthens(names: Sequence[str], sources: Sequence[Source]) -> bool:
+    """Whether the search begins with a first part of each drop."""
+    return any(name in EXPONENTS for name in names) and any(
+        isinstance(one, DropTest) for one in sources
+    )
+
+
+def _shortened(
+    thin: Likelihood, sources: Sequence[Source], sight: Sight | None, share: float
+) -> Likelihood:
+    """Likelihood of a first part of each drop, and of all else; of whole drops if they are thin."""
+    parts = []
+    for one in sources:
+        if isinstance(one, DropTest):
+            kept = one.time <= share * one.time[-1]
+            if np.count_nonzero(kept) >= LEAST_DATA:
+                one = replace(one, time=one.time[kept], values=one.values[kept])
+        parts.append(one)
+    return thin.with_series(series_of(parts, sight, SEARCH_SAMPLES))
+
+
+def _lengthened(
+    thin: Likelihood,
+    sources: Sequence[Source],
+    sight: Sight | None,
+    starts: Sequence[np.ndarray],
+    steps: np.ndarray,
+) -> tuple[list[np.ndarray], np.ndarray]:
+    """Places that fit ever longer parts of the drops, and steps of slopes there."""
+    names = thin.names
+    slow = [k for k, name in enumerate(names) if name in SLOW]
+    axes = {
+        k: np.linspace(thin.low[k], thin.high[k], ZOOM_VALUES[name])
+        for k, name in enumerate(names)
+        if name in ZOOM_VALUES
+    }
+    sizes = ZOOMS[-1] * np.array([ZOOM[name] for name in names])
+    carried = list(starts)
+    for share in SHARES:
+        like = _shortened(thin, sources, sight, share)
+        found = []
+        for at in carried:
+            tried = grid(like, at, axes, slow, steps)[:TRIED] if axes else []
+            found += [descend(like, one, range(len(names))) for one in (at, *tried)]
+        best, spread = min(found, key=lambda pair: pair[0].deviance)
+        steps = steps.copy()
+        errors = np.sqrt(np.diag(spread))[slow]
+        steps[slow] = np.clip(CURVE_ERRORS * errors, LEAST_STEP, MOST_CURVE_STEP)
+        kept = distinct([place for place, _ in found], sizes, CARRIED)
+        carried = [one.at for one in kept if one.deviance - best.deviance < TOLD]
+    return carried, steps
+
+
+def _points(names: Sequence[str]) -> int:
+    """Points of a search without a curve, a power of 2."""
+    return POINTS << max(sum(name != ENERGY for name in names) - OF_POINTS, 0)
+
+
+def _most_surveyed(names: Sequence[str], sources: Sequence[Source]) -> int:
+    """Most computations of `_survey`."""
+    rough = [name for name in names if name in VALUES]
+    moved = 1 + len(names) - len(rough)
+    curves = sum(isinstance(one, Curve) for one in sources)
+    if moved > 1 and curves:
+        if len(sources) == curves or not rough:
+            return 2
+        first = 1 + moved * math.prod(VALUES[name] for name in rough) + RELAXED
+    elif ENERGY in names:
+        first = LEVELS if len(names) == 1 else _points(names) * LEVELS
+    else:
+        first = _points(names)
+    zoom = moved * math.prod(ZOOM_VALUES[name] for name in rough) + ZOOM_RELAXED
+    return 1 + first + (len(ZOOMS) * ZOOMED * zoom if rough else 0)
+
+
+def _zoom(like: Likelihood, at: np.ndarray, sizes: np.ndarray, steps: np.ndarray) -> list[Place]:
+    """The best places of a grid of C_R and W_R around a place; K_R and gamma follow."""
+    axes = {}
+    for k, name in enumerate(like.names):
+        if name in ZOOM_VALUES:
+            row = at[k] + sizes[k] * np.linspace(-1.0, 1.0, ZOOM_VALUES[name])
+            axes[k] = np.clip(row, like.low[k], like.high[k])
+    if not axes:
+        return []
+    slow = [k for k in range(len(at)) if k not in axes]
+    return [like.at(one) for one in grid(like, at, axes, slow, steps)[:ZOOM_RELAXED]]
