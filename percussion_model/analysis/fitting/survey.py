@@ -120,7 +120,8 @@ def minima_of(
     simple = all(isinstance(one, Curve) for one in sources)
     every = range(len(whole.names))
     sizes = np.array([ZOOM[name] for name in whole.names])
-    counter.begin("search of the whole range", _most_surveyed(whole.names, sources))
+    most = 0 if lengthens(whole.names, sources) else _most_surveyed(whole.names, sources)
+    counter.begin("search of the whole range", most)
     starts = distinct(_survey(thin, sources, sight), ZOOMS[-1] * sizes, STARTS)
     counter.begin("descent from the best places")
     lower = [descend(thin, one.at, every, rounds=2)[0] for one in starts]
@@ -248,7 +249,7 @@ def _points(names: Sequence[str]) -> int:
 
 
 def _most_surveyed(names: Sequence[str], sources: Sequence[Source]) -> int:
-    """Most computations of `_survey`."""
+    """Most computations of `_survey`, where it takes whole drops from the first."""
     rough = [name for name in names if name in VALUES]
     moved = 1 + len(names) - len(rough)
     curves = sum(isinstance(one, Curve) for one in sources)
