@@ -29,6 +29,8 @@ PATIENCE = 100.0
 PATIENCE_AT_START = 1800.0
 # Cases between two writings of the record.
 CHUNK = 100
+# Solvers that cases are computed by, each compiled at its first.
+SOLVERS = ("wave", "modal", "fem", "rigid")
 PACKAGES = ("numpy", "numba", "llvmlite", "scipy")
 
 
@@ -90,7 +92,7 @@ class Worker:
         if self._process is None:
             self._start()
         self._pipe.send(index)
-        patience = PATIENCE if len(self._kinds) == 3 else PATIENCE_AT_START
+        patience = PATIENCE if len(self._kinds) == len(SOLVERS) else PATIENCE_AT_START
         try:
             if self._pipe.poll(patience):
                 outcome = self._pipe.recv()

@@ -28,6 +28,14 @@ WIDE: dict[str, tuple[Any, ...]] = {
     "rock.unloading_ratio": (1.0 + 1e-9, 1000.0),
     "rock.barrier_damping": (1.0, 1e7, ZERO),
     "rock.barrier_energy": (1e-9, 100.0, ZERO),
+    "rock.loading_exponent": (1.0, 4.0),
+    "rock.reference_penetration": (1e-6, 1.0),
+    "rock.unloading_exponent": (1e-3, 12.0, ZERO),
+    "rock.buttons": (1.0, 1000.0),
+    "rock.chipping_force": (1.0, 1e9),
+    "rock.chipping_penetration": (1e-9, 1.0, ZERO),
+    "rock.removed_share": (1e-6, 1.0, ZERO),
+    "rock.removal_exponent": (1e-3, 4.0, ZERO),
     "contact.restitution": (1e-6, 1.0, ZERO),
     "start.piston_velocity": (1e-12, 30.0, BOTH_SIGNS, ZERO),
     "start.bit_velocity": (1e-12, 30.0, BOTH_SIGNS, ZERO),
@@ -48,6 +56,8 @@ SECTION = {
     "youngs_modulus": (1e8, 1e12),
     "density": (300.0, 3e4),
 }
+# Rocks that are crushed.
+CRUSHED = ("bilinear", "power")
 NEAR = 2.0  # "near" is the default by or over this
 
 
@@ -55,6 +65,12 @@ def number(source: Source, key: str, reach: str) -> float | None:
     """A value for a key: its default, near it, wide, or anything that the table allows."""
     row = find_row(key)
     assert row is not None
+    value = any_number(source, key, row, reach)
+    return value if row.kind != "whole number" or value is None else round(value)
+
+
+def any_number(source: Source, key: str, row: Any, reach: str) -> float | None:
+    """The same before a count is made whole."""
     kind = source.pick(("default", "near", "wide", "wide", "bound" if reach == "any" else "near"))
     if kind == "default":
         return row.default
@@ -163,10 +179,13 @@ def draw_scene(source: Source, reach: str) -> Scene:
         changes |= {"solver.name": "auto", "solver.fidelity": "rigid", "bit.model": "elastic"}
     drives = ("none",) if piston == "absent" else ("pressure",) * 4 + ("external", "none")
     changes["effects.drive"] = source.pick(drives)
-    changes["effects.rock"] = source.pick(("bilinear",) * 5 + ("spring", "wall", "none"))
+    rocks = ("bilinear",) * 4 + ("power",) * 4 + ("spring", "wall", "none")
+    changes["effects.rock"] = source.pick(rocks)
     for name in ("gravity", "feed", "loss", "barrier"):
         changes[f"effects.{name}"] = not chance(source, 15)
-    if changes["effects.rock"] != "bilinear":
+    is_crushed = changes["effects.rock"] in CRUSHED
+    changes["effects.cuttings"] = is_crushed and chance(source, 40)
+    if not is_crushed:
         changes["effects.barrier"] = False
     changes["effects.standstill_tension"] = source.pick(("release", "paper"))
     changes["start.drive_direction"] = source.pick((1, -1))
