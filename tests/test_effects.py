@@ -7,6 +7,7 @@ import math
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from matplotlib.figure import Figure
 from typer.testing import CliRunner
@@ -33,6 +34,8 @@ from percussion_model.simulation.uncertain import with_short_error
 
 DROP = Path(__file__).parents[1] / "scenarios" / "drop_test.toml"
 RIGID = {"piston.model": "rigid", "bit.model": "rigid"}
+# Effects that a scene calls by the name of their variant.
+TURNED = ("gravity", "feed", "drive", "barrier", "cuttings", "rock", "loss")
 SHORT = {"run.duration": 0.6, "run.settle": 0.1}
 
 
@@ -56,6 +59,10 @@ def test_every_effect_of_the_reference_is_turned():
         "drive": "off",
         "barrier": "off",
         "standstill tension": "as in the paper",
+        "loading": "n = 1.5",
+        "unloading": "q = 0.5",
+        "chipping": "by 0.1 mm",
+        "cuttings": "half removed",
         "rock law": "linear spring",
         "rock": "off",
         "loss": "off",
@@ -77,6 +84,13 @@ def test_every_effect_of_the_reference_is_turned():
         {"effects.rock": "none"},
         {"effects.rock": "spring"},
         {"effects.rock": "wall"},
+        {"effects.rock": "power", "rock.buttons": 12, "rock.loading_exponent": 1.0},
+        {
+            "effects.rock": "power",
+            "rock.chipping_penetration": 1e-3,
+            "rock.unloading_exponent": 2.0,
+        },
+        {"effects.cuttings": True, "rock.removed_share": 0.0},
         {"piston.model": "rigid"},
         {"piston.model": "absent", "effects.drive": "none"},
         {"solver.name": "fem"},
@@ -94,9 +108,32 @@ def test_each_turn_makes_a_scene_that_differs_in_it(changes):
         assert changed != scene
         gone = set(scene.effects_on) - set(changed.effects_on)
         new = set(changed.effects_on) - set(scene.effects_on)
-        if variant.effect in ("gravity", "feed", "drive", "barrier", "rock", "loss"):
+        if variant.effect in TURNED:
             assert variant.effect in (gone if variant.setting == "off" else new)
             assert variant.off == (variant.setting == "off")
+
+
+def test_parts_of_the_power_law_change_that_part_alone():
+    """Without any of them the law is the bilinear one, under as many buttons."""
+    keys = {"loading": "loading_exponent", "unloading": "unloading_exponent",
+            "chipping": "chipping_penetration"}  # fmt: skip
+    changes = {"effects.rock": "power", "rock.buttons": 12, "rock.loading_stiffness": 6e7}
+    for scene in (Scene(), Scene().replace(**changes)):
+        for effect, key in keys.items():
+            rock = variant_of(scene, effect).apply(scene).rock
+            found = {name for name in keys.values() if getattr(rock, name) not in (0.0, 1.0)}
+            was_on = {"loading_exponent"} if scene.effects.rock == "power" else set()
+            assert found == was_on ^ {key}
+            assert rock.buttons == scene.rock.buttons
+    spring = variant_of(scene, "rock law").apply(scene)
+    assert spring.loading_stiffness == scene.loading_stiffness == 12 * 6e7
+
+
+def test_the_blows_of_the_reference_reach_the_force_at_which_rock_chips(rigid):
+    trial = next(trial for trial in rigid.trials if trial.variant.effect == "chipping")
+    chipping = trial.result.scene.rock.chipping_force
+    assert np.all(trial.result.counted["peak_bit_force"] > 1.5 * chipping)
+    assert rigid.changes(trial)["rate_of_penetration"] > 0.0
 
 
 # ---------------------------------------------------------------------------- study

@@ -66,6 +66,13 @@ _NO_REBOUND = "the bit does not leave the rock"
 _NO_REST = "the bit has not come to rest when the run ends"
 _NO_CRUSHING = "a linear spring gives all back: nothing is crushed"
 _BARRIER = ("rock.barrier_energy", "rock.barrier_damping")
+# Parts of the power law: their key, its value without them and with, and words for both.
+_PARTS_OF_POWER: dict[str, tuple[str, float, float, str, str]] = {
+    "loading": ("rock.loading_exponent", 1.0, 1.5, "n = 1", "n = 1.5"),
+    "unloading": ("rock.unloading_exponent", 0.0, 0.5, "q = 0", "q = 0.5"),
+    "chipping": ("rock.chipping_penetration", 0.0, 1e-4, "off", "by 0.1 mm"),
+}
+_HALF_REMOVED = {"rock.removed_share": 0.5, "rock.removal_exponent": 1.0}
 
 
 @dataclass(frozen=True)
@@ -141,7 +148,7 @@ def _drive(scene: Scene) -> Iterator[Variant]:
 
 def _rock(scene: Scene) -> Iterator[Variant]:
     rock = scene.effects.rock
-    if rock == "bilinear":
+    if scene.matters("rock.unloading_ratio"):
         if scene.barrier_on:
             yield Variant("barrier", "off", {"effects.barrier": False}, off=True)
         else:
@@ -149,10 +156,20 @@ def _rock(scene: Scene) -> Iterator[Variant]:
         other = "paper" if scene.effects.standstill_tension == "release" else "release"
         words = "as in the paper" if other == "paper" else "released"
         yield Variant("standstill tension", words, {"effects.standstill_tension": other})
+        yield from _power_law(scene)
+        if scene.cuttings_on:
+            yield Variant("cuttings", "off", {"effects.cuttings": False}, off=True)
+        else:
+            yield Variant("cuttings", "half removed", {"effects.cuttings": True, **_HALF_REMOVED})
         yield Variant(
             "rock law",
             "linear spring",
-            {"effects.rock": "spring", "effects.barrier": False},
+            {
+                "effects.rock": "spring",
+                "effects.barrier": False,
+                # a spring has no buttons
+                "rock.loading_stiffness": scene.loading_stiffness,
+            },
             off=True,
             no_penetration=_NO_CRUSHING,
         )
@@ -161,6 +178,18 @@ def _rock(scene: Scene) -> Iterator[Variant]:
     else:
         changes = {"effects.rock": "none", "effects.barrier": False}
         yield Variant("rock", "off", changes, off=True, no_blows=_NO_ROCK)
+
+
+def _power_law(scene: Scene) -> Iterator[Variant]:
+    """Parts of the power law, one by one: without any it is the bilinear law."""
+    plain: dict[str, Any] = {}
+    if scene.effects.rock == "bilinear":
+        plain = {key: without for key, without, *_ in _PARTS_OF_POWER.values()}
+        plain |= {"effects.rock": "power", "rock.buttons": 1}
+    for effect, (key, without, value, off, on) in _PARTS_OF_POWER.items():
+        is_on = not plain and scene[key] != without
+        changes = {**plain, key: without if is_on else value}
+        yield Variant(effect, off if is_on else on, changes, off=is_on)
 
 
 def _bars(scene: Scene) -> Iterator[Variant]:

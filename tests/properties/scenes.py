@@ -56,8 +56,6 @@ SECTION = {
     "youngs_modulus": (1e8, 1e12),
     "density": (300.0, 3e4),
 }
-# Rocks that are crushed.
-CRUSHED = ("bilinear", "power")
 NEAR = 2.0  # "near" is the default by or over this
 
 
@@ -183,7 +181,7 @@ def draw_scene(source: Source, reach: str) -> Scene:
     changes["effects.rock"] = source.pick(rocks)
     for name in ("gravity", "feed", "loss", "barrier"):
         changes[f"effects.{name}"] = not chance(source, 15)
-    is_crushed = changes["effects.rock"] in CRUSHED
+    is_crushed = changes["effects.rock"] in ("bilinear", "power")
     changes["effects.cuttings"] = is_crushed and chance(source, 40)
     if not is_crushed:
         changes["effects.barrier"] = False

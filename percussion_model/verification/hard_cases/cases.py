@@ -104,7 +104,7 @@ class HardCase:
 def hard_cases() -> dict[str, HardCase]:
     """All hard cases by name, in the order of the files and of the tables in them."""
     found: dict[str, HardCase] = {}
-    for group in ("rock", "drive", "bars", "contact", "inputs", "chains"):
+    for group in ("rock", "laws", "drive", "bars", "contact", "inputs", "chains"):
         text = resources.files(__package__).joinpath(f"{group}.toml").read_text(encoding="utf-8")
         for name, table in tomllib.loads(text).items():
             if name in found:

@@ -261,7 +261,8 @@ def _mechanics(
     if scene.piston.model != "absent":
         found["contact_tension"] = _pull(samples["contact_force"])
         deep.append(-float(samples["gap"].min()))
-    if scene.effects.standstill_tension == "release" or scene.effects.rock != "bilinear":
+    may_pull = scene.effects.standstill_tension == "paper"
+    if not (may_pull and scene.matters("effects.standstill_tension")):
         found["rock_tension"] = _pull(samples["bit_force"])
     if scene.effects.rock == "wall":
         deep.append(float(samples["bit_end_position"].max()) - scene.start.rock_gap)

@@ -17,6 +17,7 @@ from percussion_model.verification.hard_cases.refinement import LEAST_CHANCE, RA
 
 GROUPS = {
     "rock": "The rock law",
+    "laws": "Power law, chipping and cuttings",
     "drive": "Drive, feed and weight",
     "bars": "Bars and their cells",
     "contact": "Starts that graze, rest or bounce",
