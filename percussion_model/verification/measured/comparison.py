@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
@@ -9,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from percussion_model.analysis.fitting.likelihood import Likelihood, Series, coordinates
+from percussion_model.analysis.fitting.likelihood import Likelihood, Place, Series, coordinates
 from percussion_model.analysis.fitting.search import descend
 from percussion_model.scene.scene import Scene
 from percussion_model.verification.measured.blow import Reading, Rig
@@ -28,6 +29,10 @@ SHARPER = 1e-3
 # The same blow with a step this much longer tells the numerical error: of first order in the
 # step, the error is no more than what that changes.
 COARSER = 2.0
+# Where searches start, as shares of the range of a parameter; and when the numbers are met, in
+# their sharpened errors.
+STARTS = (0.1, 0.4, 0.7)
+REACHED = 10.0
 # Steps of the slopes that carry the errors of fitted numbers over, in the logarithm: times are
 # read from sample to sample, so that shorter ones would find none.
 SLOPE_STEP = 0.02
@@ -291,8 +296,7 @@ def fit(
     box = np.stack([coordinates(plan.parameters, one) for one in ends], axis=1)
     series = [_series(one, rig) for one in targets]
     like = Likelihood(scene, series, plan.parameters, box, lambda: None)
-    start = coordinates(plan.parameters, [float(scene[key]) for key in plan.parameters])
-    place, _ = descend(like, np.clip(start, *box.T), range(len(plan.parameters)))
+    place = _best_place(like, plan, scene, box)
     best = like.scene_at(place.at)
     values = {key: best[key] for key in (*LAWS[plan.law], *FIXED[plan.law]) if key in told}
     errors, carried = _errors(experiment, plan, best, rig)
@@ -300,6 +304,34 @@ def fit(
         experiment.name, plan.law, plan.name, plan.start, plan.parameters, values, errors, carried,
         plan.to, best,
     )  # fmt: skip
+
+
+def _best_place(like: Likelihood, plan: FitPlan, scene: Scene, box: np.ndarray) -> Place:
+    """Where the numbers are met, or else the best of several searches.
+
+    They start from the scene; then from other values of what only bends the lines of the law,
+    since a search that starts far from the right bend ends beside it.
+    """
+    names = plan.parameters
+    inside = [np.clip(float(scene[key]), *LAWS[plan.law][key]) for key in names]
+    begin = coordinates(names, inside)
+    bends = [k for k, key in enumerate(names) if key not in BOTH_LAWS]
+    lines = [k for k in range(len(names)) if k not in bends]
+    starts = [begin]
+    for shares in itertools.product(STARTS, repeat=len(bends)) if bends else ():
+        other = begin.copy()
+        other[bends] = box[bends, 0] + np.array(shares) * (box[bends, 1] - box[bends, 0])
+        starts.append(descend(like, other, lines)[0].at if lines else other)
+    best: Place | None = None
+    for start in starts:
+        found, _ = descend(like, start, range(len(names)))
+        if best is None or found.deviance < best.deviance:
+            best = found
+        pairs = zip(best.residuals, like.series, strict=True)
+        if all(abs(off[0]) <= REACHED * (one.error or 0.0) for off, one in pairs):
+            break
+    assert best is not None
+    return best
 
 
 def _series(one: Measurement, rig: Rig) -> Series:
