@@ -8,7 +8,6 @@ from percussion_model import Scene
 from percussion_model.analysis.fitting import (
     Curve,
     DropTest,
-    SlowLaw,
     drop_test_signal,
     slow_force,
 )
@@ -44,20 +43,23 @@ def drawn_truth(seed, drawn=DRAWN):
     return {key: float(values_at(key, draw(*pair))) for key, pair in ends.items()}
 
 
-def slow_law(truth):
-    """What a slow test shows of a rock that is given by its parameters."""
-    law = {} if EXPONENT not in truth else {"effects.rock": "power"}
-    return SlowLaw.of(Scene().replace(**law, **truth))
+def rock_of(truth):
+    """Scene with a rock that is given by its parameters."""
+    return Scene().replace(**({} if EXPONENT not in truth else POWER), **truth)
+
+
+def given_back(truth, depth):
+    """Share of a peak's depth that the rock gives back, in closed form."""
+    n, q = truth.get(EXPONENT, 1.0), truth.get(UNLOADING, 0.0)
+    return min((depth / 1e-3) ** (-n * q) / truth[RATIO], 1.0 / n)
 
 
 def noisy_curve(seed, truth=TRUTH, noise=FORCE_NOISE, depth=DEPTH):
     """A slow test whose gauge begins above the rock; the peak lies between two readings."""
-    law = slow_law(truth)
-    given_back = law.recovered_share(float(law.loading(depth)))
     up = np.linspace(0.0, DATUM + 0.998 * depth, 60)
-    down = DATUM + depth * np.linspace(0.999, 1.0 - given_back, 40)
+    down = DATUM + depth * np.linspace(0.999, 1.0 - given_back(truth, depth), 40)
     p = np.concatenate([up, down])
-    force = slow_force(p, law, DATUM, DATUM + depth)
+    force = slow_force(p, rock_of(truth), DATUM, DATUM + depth)
     name = f"to {1e3 * depth:g} mm"
     return Curve(p, force + np.random.default_rng(seed).normal(0.0, noise, len(p)), name)
 

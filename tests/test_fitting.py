@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from fitting_data import DATUM, DEPTH, KEYS, TRUTH, bit, drawn_truth, drops, noisy_curve
+from fitting_data import DATUM, DEPTH, KEYS, TRUTH, bit, drawn_truth, drops, noisy_curve, rock_of
 from scipy.stats import binom
 
 from percussion_model import Scene
@@ -20,7 +20,7 @@ from percussion_model.analysis.fitting import (
     drop_test_signal,
     fit_rock,
 )
-from percussion_model.analysis.fitting.curve import SlowLaw, best_datum_and_peak
+from percussion_model.analysis.fitting.curve import best_datum_and_peak
 from percussion_model.analysis.fitting.found import (
     DETERMINED,
     OPEN,
@@ -61,8 +61,7 @@ def test_force_rises_with_one_slope_and_falls_with_another():
 
 def test_datum_and_peak_of_a_curve_without_noise_are_found():
     curve = noisy_curve(0, noise=0.0)
-    law = SlowLaw(TRUTH[STIFFNESS], TRUTH[RATIO])
-    found = best_datum_and_peak(curve, law, (0.0, DEPTH))
+    found = best_datum_and_peak(curve, rock_of(TRUTH), (0.0, DEPTH))[:2]
     assert found == pytest.approx((DATUM, DATUM + DEPTH), rel=1e-9)
 
 

@@ -19,13 +19,14 @@ from fitting_data import (
     bit,
     drawn_truth,
     drops,
+    given_back,
     noisy_curve,
-    slow_law,
+    rock_of,
 )
 from typer.testing import CliRunner
 
 from percussion_model import Scene
-from percussion_model.analysis.fitting import FitError, Reading, SlowLaw, fit_rock
+from percussion_model.analysis.fitting import FitError, Reading, fit_rock
 from percussion_model.analysis.fitting.curve import best_datum_and_peak, first_sight, slow_force
 from percussion_model.analysis.fitting.likelihood import (
     EXPONENT,
@@ -38,13 +39,9 @@ from percussion_model.analysis.fitting.likelihood import (
 from percussion_model.analysis.fitting.predictions import predicted_reading
 from percussion_model.interface.cli import app
 from percussion_model.interface.plotting.calibration import draw_calibration
-from percussion_model.physics.records import Mode, RockKind
-from percussion_model.physics.rock import end_loading, loading_force, recovered_share, spring_force
-from percussion_model.solvers.wave.records import WAVE_PAR, WAVE_STATE
 
 LONG = "PERCUSSION_LONG" in os.environ
 SCENE = bit("wave", **POWER)
-LAW = slow_law(POWER_TRUTH)
 
 
 def two_curves(seed, truth=POWER_TRUTH, noise=4e3):
@@ -56,37 +53,39 @@ def two_curves(seed, truth=POWER_TRUTH, noise=4e3):
 @pytest.mark.parametrize("exponent", [1.0, 1.6, 3.0])
 @pytest.mark.parametrize("unloading", [0.0, 0.3, 2.0])
 @pytest.mark.parametrize("depth", [5e-5, 8e-4, 2e-3])
-def test_a_slow_test_is_that_of_the_kernels(exponent, unloading, depth):
-    """At weak peaks nothing is crushed: there the bound of the given back share holds."""
-    law = SlowLaw(6e8, 6.0, exponent, unloading, 1e-3)
-    par, s = np.zeros(1, WAVE_PAR)[0], np.zeros(1, WAVE_STATE)[0]
-    par["rock"], par["power"], par["reference_penetration"] = RockKind.BILINEAR, 1, 1e-3
-    par["exponent"], par["unloading_exponent"] = exponent, unloading
-    s["mode"], s["p"], s["k_r"], s["gamma"] = Mode.FC, depth, 6e8, 6.0
-    half, peak = loading_force(par, s, 0.5 * depth), loading_force(par, s, depth)
-    assert law.recovered_share(peak) == pytest.approx(recovered_share(par, s, peak), rel=1e-12)
-    end_loading(par, s)
-    back = 0.9 * depth + 0.1 * s["p_u"]
-    s["p"] = back
-    found = slow_force([0.5 * depth, depth, back, 0.99 * s["p_u"]], law)
-    assert found == pytest.approx([half, peak, spring_force(par, s), 0.0], rel=1e-9)
+def test_a_slow_test_is_that_of_the_power_law(exponent, unloading, depth):
+    """In closed form, for three buttons; weak peaks unload as stiffly as they load there."""
+    truth = POWER_TRUTH | {EXPONENT: exponent, UNLOADING: unloading}
+    peak, back = 3.0 * 6e8 * 1e-3 * (depth / 1e-3) ** exponent, given_back(truth, depth) * depth
+    p = np.array([0.0, 0.5, 1.0, 1.0, 1.0]) * depth - np.array([0.0, 0.0, 0.0, 0.3, 1.1]) * back
+    found = slow_force(p + 1e-4, rock_of(truth | {"rock.buttons": 3}), datum=1e-4)
+    assert found == pytest.approx([0.0, peak * 0.5**exponent, peak, 0.7 * peak, 0.0], rel=1e-9)
+
+
+def test_a_slow_test_chips():
+    """Above 2e5 N the rock gives way for 0.2 mm, and goes on where it was then."""
+    truth = POWER_TRUTH | {"rock.chipping_force": 2e5, "rock.chipping_penetration": 2e-4}
+    begins = 1e-3 * (2e5 / 6e5) ** (1.0 / 1.6)
+    found = slow_force([begins, begins + 1e-4, begins + 2e-4, 1e-3], rock_of(truth))
+    assert found[:3] == pytest.approx(2e5, rel=1e-3)
+    assert found[3] == pytest.approx(6e5 * 0.8**1.6, rel=1e-3)
 
 
 def test_datum_and_peak_are_found_far_from_the_guess():
     curve = noisy_curve(0, POWER_TRUTH, noise=0.0)
-    found = best_datum_and_peak(curve, LAW, (2e-4, 9e-4))
+    found = best_datum_and_peak(curve, rock_of(POWER_TRUTH), (2e-4, 9e-4))[:2]
     assert found == pytest.approx((DATUM, DATUM + DEPTH), rel=1e-9)
 
 
 def test_first_sight_is_near_for_exponents_all_over_their_range():
     for n in (1.0, 1.5, 2.5, 3.9):
         for q in (0.0, 0.5):
-            truth = POWER_TRUTH | {EXPONENT: n, UNLOADING: q, RATIO: 15.0}
-            law = first_sight(two_curves(1, truth, noise=0.0), SCENE).law
-            assert law.exponent == pytest.approx(n, abs=0.03)
-            assert law.stiffness == pytest.approx(6e8, rel=0.02)
-            assert law.ratio == pytest.approx(15.0, rel=0.05)
-            assert law.unloading_exponent == pytest.approx(q, abs=0.05)
+            truth = POWER_TRUTH | {EXPONENT: n, UNLOADING: q, RATIO: 60.0}
+            rock = first_sight(two_curves(1, truth, noise=0.0), SCENE).rock
+            assert rock[EXPONENT] == pytest.approx(n, abs=0.03)
+            assert rock[STIFFNESS] == pytest.approx(6e8, rel=0.02)
+            assert rock[RATIO] == pytest.approx(60.0, rel=0.05)
+            assert rock[UNLOADING] == pytest.approx(q, abs=0.05)
 
 
 def test_one_peak_keeps_q_and_tells_gamma_there():
@@ -98,8 +97,7 @@ def test_one_peak_keeps_q_and_tells_gamma_there():
         (note,) = (text for text in fit.warnings if text.startswith("q = "))
         assert note.startswith(f"q = {q:g} kept: peaks of about one force do not tell it")
         assert any(text.startswith("P_0 = 0.001 m kept") for text in fit.warnings)
-        found = slow_law(fit.changes() | {UNLOADING: q})
-        shares = [law.recovered_share(float(law.loading(DEPTH))) for law in (found, LAW)]
+        shares = [given_back(one, DEPTH) for one in (fit.changes() | {UNLOADING: q}, POWER_TRUTH)]
         assert shares[0] == pytest.approx(shares[1], rel=0.005)
     with pytest.raises(FitError, match=f"{UNLOADING}: peaks of about one force do not tell it"):
         fit_rock(SCENE, curves, parameters=[RATIO, UNLOADING])
@@ -134,29 +132,30 @@ def test_a_bilinear_rock_has_exponents_at_the_ends_of_the_power_law():
     assert q.high < 0.2
 
 
-def test_a_weak_peak_of_which_nothing_is_crushed_leaves_q_undetermined():
-    """Where all is given back the share is that of the bound, whatever gamma and q are."""
+def test_peaks_that_unload_as_they_load_leave_q_undetermined():
+    """Where it unloads as stiffly as it loads the share is 1/n, whatever gamma and q are."""
     truth = POWER_TRUTH | {RATIO: 1.1, UNLOADING: 1.0}
-    assert slow_law(truth).recovered_share(4e5) == 2.0 / 2.6
+    assert given_back(truth, DEPTH) == 1.0 / 1.6
     fit = fit_rock(SCENE, two_curves(2, truth), parameters=[UNLOADING, RATIO])
     assert not fit.estimates[UNLOADING].determined
 
 
-@pytest.mark.parametrize("seed", range(60 if LONG else 1))
+@pytest.mark.parametrize("seed", range(60) if LONG else [1])
 def test_intervals_of_two_slow_tests_hold_the_truth(seed):
     truth = drawn_truth(seed, POWER_DRAWN)
     fit = fit_rock(SCENE, two_curves(seed, truth))
     for key in SLOW:
         one = fit.estimates[key]
         assert one.low <= truth[key] <= one.high, (key, truth[key], one)
-        assert decades(key, one.low, one.high) < 0.5
+    for key in (STIFFNESS, EXPONENT):  # peaks that unload as they load tell no more
+        assert decades(key, fit.estimates[key].low, fit.estimates[key].high) < 0.6
 
 
 def test_two_drops_tell_both_exponents():
-    """Of a rigid bit, whose other parameters are known."""
-    scene = bit(**POWER)
+    """Of rock whose other parameters are known."""
+    scene = bit("wave", **POWER, **{"solver.cells": 2})
     known = {key: value for key, value in POWER_TRUTH.items() if key not in (EXPONENT, UNLOADING)}
-    tests = drops(scene, 0, POWER_TRUTH, samples=60, end=8e-3)
+    tests = drops(scene, 0, POWER_TRUTH, samples=60, end=5e-3)
     fit = fit_rock(scene.replace(**known), None, tests, parameters=[EXPONENT, UNLOADING])
     for key in (EXPONENT, UNLOADING):
         one = fit.estimates[key]
@@ -171,7 +170,7 @@ def test_a_rigid_bit_rebounds_with_what_the_peak_gives_back(speed):
     scene = scene.replace(**{"effects.barrier": False})
     n, place, energy = POWER_TRUTH[EXPONENT], 1e-3, 0.5 * scene.bit.mass * speed**2
     depth = place * ((n + 1.0) * energy / (6e8 * place**2)) ** (1.0 / (n + 1.0))
-    share = LAW.recovered_share(float(LAW.loading(depth)))
+    share = given_back(POWER_TRUTH, depth)
     found = predicted_reading(scene, Reading("rebound_velocity", 1.0, 0.1, speed))
     assert found == pytest.approx(speed * math.sqrt(0.5 * (n + 1.0) * share), rel=1e-3)
 

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from percussion_model.analysis.fitting.measurements import Curve, FitError
+from percussion_model.analysis.fitting.slow_test import SlowRock
 from percussion_model.scene.scene import Scene
 
 # Data that each branch must have with force on the rock.
@@ -22,66 +23,12 @@ LEAST_GAIN, MOST_ROUNDS, MOST_HALVINGS = 1e-7, 30, 12
 LEAST_DETERMINANT = 1e-12
 # Exponents that the first sight of a loading branch tries.
 TRIED_EXPONENTS = np.linspace(1.0, 4.0, 121)
-
-
-class SlowLaw(NamedTuple):
-    """What a slow test shows of a rock: eqs 15, 20b and 20c of docs/model.md, SI units.
-
-    Attributes
-    ----------
-    stiffness : float
-        K_R [N/m].
-    ratio : float
-        gamma.
-    exponent, unloading_exponent : float
-        n and q; 1 and 0 are the bilinear law.
-    reference : float
-        Penetration P_0 at which K_R and gamma hold [m].
-    """
-
-    stiffness: float
-    ratio: float
-    exponent: float = 1.0
-    unloading_exponent: float = 0.0
-    reference: float = 1e-3
-
-    @classmethod
-    def of(cls, scene: Scene) -> SlowLaw:
-        """That of a scene."""
-        rock = scene.rock
-        if scene.effects.rock != "power":
-            return cls(rock.loading_stiffness, rock.unloading_ratio)
-        return cls(
-            rock.loading_stiffness, rock.unloading_ratio, rock.loading_exponent,
-            rock.unloading_exponent, rock.reference_penetration,
-        )  # fmt: skip
-
-    def loading(self, penetration: Any) -> Any:
-        """Force at a penetration while loading [N]."""
-        share = np.maximum(penetration, 0.0) / self.reference
-        return self.stiffness * self.reference * share**self.exponent
-
-    @property
-    def bound(self) -> float:
-        """Share of the penetration that is given back where nothing is crushed."""
-        return 2.0 / (self.exponent + 1.0)
-
-    def is_bound(self, force: float) -> bool:
-        """Whether nothing is crushed at a peak force."""
-        return self.recovered_share(force) == self.bound
-
-    def recovered_share(self, force: float) -> float:
-        """Share of the penetration that the rock gives back from a peak force."""
-        bound = self.bound
-        relative = force / (self.stiffness * self.reference)
-        if self.unloading_exponent == 0.0 or not relative > 0.0:
-            return min(1.0 / self.ratio, bound)
-        logarithm = -math.log(self.ratio) - self.unloading_exponent * math.log(relative)
-        return min(math.exp(min(logarithm, 0.0)), bound)
+# Unloading ratio of the first guess, at least.
+LEAST_RATIO = 1.01
 
 
 def slow_force(
-    penetration: Any, law: SlowLaw, datum: float = 0.0, peak: float | None = None
+    penetration: Any, scene: Scene, datum: float = 0.0, peak: float | None = None
 ) -> np.ndarray:
     """Force of one slow loading and unloading (docs/model.md, table 1: FC, then BC).
 
@@ -89,7 +36,8 @@ def slow_force(
     ----------
     penetration : array_like
         In the order of time: rising, then falling [m].
-    law : SlowLaw
+    scene : Scene
+        With the rock, by the bilinear law or the power law.
     datum : float
         Penetration at which the rock is touched [m].
     peak : float, optional
@@ -101,13 +49,10 @@ def slow_force(
         [N].
     """
     p = np.asarray(penetration, dtype=float)
-    turn = int(np.argmax(p))
-    peak = float(p[turn]) if peak is None else peak
+    peak = float(p.max()) if peak is None else peak
     if not peak > datum:
         return np.zeros(len(p))
-    force, slope = _peak_and_slope(law, peak - datum)
-    unloading = force - slope * (peak - p)
-    return np.maximum(np.where(np.arange(len(p)) <= turn, law.loading(p - datum), unloading), 0.0)
+    return SlowRock(scene).weigh(p, np.zeros(len(p)), int(np.argmax(p)) + 1, datum, peak)[0]
 
 
 def bilinear_force(
@@ -137,19 +82,20 @@ def bilinear_force(
     ndarray
         [N].
     """
-    return slow_force(penetration, SlowLaw(stiffness, ratio), datum, peak)
+    rock = {"rock.loading_stiffness": stiffness, "rock.unloading_ratio": ratio}
+    return slow_force(penetration, Scene().replace(**rock), datum, peak)
 
 
-def _peak_and_slope(law: SlowLaw, depth: float) -> tuple[float, float]:
-    """Force at the peak of a loading [N], and slope of the line on which it unloads [N/m]."""
-    force = float(law.loading(depth))
-    return force, force / (depth * law.recovered_share(force))
+class SlowFit(NamedTuple):
+    """Where a curve fits a rock best [m], and the force there [N]."""
+
+    datum: float
+    peak: float
+    force: np.ndarray
 
 
-def best_datum_and_peak(
-    curve: Curve, law: SlowLaw, guess: tuple[float, float]
-) -> tuple[float, float]:
-    """Find where the rock is touched and where unloading begins, for a given law.
+def best_datum_and_peak(curve: Curve, scene: Scene, guess: tuple[float, float]) -> SlowFit:
+    """Find where the rock is touched and where unloading begins, for a given rock.
 
     The zero of the gauge is rarely that of the rock, and the greatest reading rarely the
     peak. Gauss and Newton's steps; by the bilinear law force is linear in both as long as the
@@ -159,91 +105,54 @@ def best_datum_and_peak(
     ----------
     curve : Curve
         Checked.
-    law : SlowLaw
+    scene : Scene
+        With the rock.
     guess : (float, float)
         Datum and peak [m].
 
     Returns
     -------
-    datum, peak : float
-        [m]
+    SlowFit
+        At the guess where too few data carry load there.
     """
+    rock, first = SlowRock(scene), int(np.argmax(curve.penetration)) + 1
+
+    def at(place: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
+        return rock.weigh(curve.penetration, curve.force, first, *place)
+
     best = guess
-    here = _misfit(curve, law, *best)
+    model, sums = at(best)
     for _ in range(MOST_ROUNDS):
-        step, gain = here.step()
-        if gain <= LEAST_GAIN * here.squares:
+        datum, peak, gain = _step(sums)
+        if gain <= LEAST_GAIN * sums[0]:
             break
         for _ in range(MOST_HALVINGS):
-            there = best[0] + step[0], best[1] + step[1]
-            found = _misfit(curve, law, *there)
-            if found.is_told and found.squares <= here.squares:
-                best, here = there, found
-                break
-            step = 0.5 * step[0], 0.5 * step[1]
+            there = best[0] + datum, best[1] + peak
+            if there[1] > there[0]:
+                found, others = at(there)
+                if others[6] >= LEAST_BRANCH and others[0] <= sums[0]:
+                    best, model, sums = there, found, others
+                    break
+            datum, peak = 0.5 * datum, 0.5 * peak
         else:
             break
-    return best
+    return SlowFit(*best, model)
 
 
-class _Misfit(NamedTuple):
-    """Sum of squares of measured less computed force, and its normal equations.
-
-    For datum and peak: `matrix` has its first row and the end of its second.
-    """
-
-    squares: float
-    is_told: bool
-    matrix: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    right: tuple[float, float] = (0.0, 0.0)
-
-    def step(self) -> tuple[tuple[float, float], float]:
-        """Step of least squares, and what it would gain; none where the data do not tell it."""
-        (a, b, c), (x, y) = self.matrix, self.right
-        determinant = a * c - b * b
-        if not determinant > LEAST_DETERMINANT * a * c:
-            return (0.0, 0.0), 0.0
-        datum, peak = (c * x - b * y) / determinant, (a * y - b * x) / determinant
-        return (datum, peak), x * datum + y * peak
-
-
-def _misfit(curve: Curve, law: SlowLaw, datum: float, peak: float) -> _Misfit:
-    """How far off a curve is; not told where too few data carry load."""
-    p, force = curve.penetration, curve.force
-    first = int(np.argmax(p)) + 1
-    depth = peak - datum
-    if not depth > 0.0:
-        return _Misfit(float(force @ force), False)
-    top, slope = _peak_and_slope(law, depth)
-    n = law.exponent
-    ahead, behind = p[:first] - datum, peak - p[first:]
-    rising, falling = law.loading(ahead), top - slope * behind
-    carries = falling > 0.0
-    off_rising, off_falling = force[:first] - rising, force[first:] - carries * falling
-    squares = float(off_rising @ off_rising + off_falling @ off_falling)
-    if min(np.count_nonzero(rising), np.count_nonzero(carries)) < LEAST_BRANCH:
-        return _Misfit(squares, False)
-    # slope of the slope by the depth of the peak
-    power = n - 1.0 + (0.0 if law.is_bound(top) else n * law.unloading_exponent)
-    by_depth = carries * (n * top / depth - power * slope / depth * behind)
-    by_datum = np.divide(-n * rising, ahead, out=np.zeros(first), where=ahead > 0.0)
-    by_peak = by_depth - slope * carries
-    return _Misfit(
-        squares,
-        True,
-        (
-            float(by_datum @ by_datum + by_depth @ by_depth),
-            -float(by_depth @ by_peak),
-            float(by_peak @ by_peak),
-        ),
-        (float(by_datum @ off_rising - by_depth @ off_falling), float(by_peak @ off_falling)),
-    )
+def _step(sums: np.ndarray) -> tuple[float, float, float]:
+    """Step of least squares of datum and peak, and what it gains; none if the data tell none."""
+    _, a, b, c, x, y, least = sums.tolist()
+    determinant = a * c - b * b
+    if least < LEAST_BRANCH or not determinant > LEAST_DETERMINANT * a * c:
+        return 0.0, 0.0, 0.0
+    datum, peak = (c * x - b * y) / determinant, (a * y - b * x) / determinant
+    return datum, peak, x * datum + y * peak
 
 
 class Sight(NamedTuple):
-    """A rock at first sight, and datum and peak of each curve [m]."""
+    """A rock at first sight by key, and datum and peak of each curve [m]."""
 
-    law: SlowLaw
+    rock: dict[str, float]
     places: list[tuple[float, float]]
 
 
@@ -252,6 +161,7 @@ def first_sight(curves: Sequence[Curve], scene: Scene) -> Sight:
 
     By the power law the lines are of a root of the force, with the exponent that leaves the
     least; unloading at several peaks tells gamma and q. One peak leaves q as the scene has it.
+    Chipping is overlooked.
 
     Raises
     ------
@@ -259,44 +169,46 @@ def first_sight(curves: Sequence[Curve], scene: Scene) -> Sight:
         If the data are no loading and unloading.
     """
     lines = [_lines(curve) for curve in curves]
-    if scene.effects.rock != "power":
-        stiffness, ratio = (
-            math.exp(math.fsum(map(math.log, row)) / len(row))
-            for row in zip(*((one[0], one[2] / one[0]) for one in lines), strict=True)
-        )
-        peaks = (float(curve.penetration.max()) for curve in curves)
-        places = [(-one[1] / one[0], peak) for one, peak in zip(lines, peaks, strict=True)]
-        return Sight(SlowLaw(stiffness, ratio), places)
-    return _first_sight_by_power(curves, [one[2] for one in lines], SlowLaw.of(scene))
+    peaks = [float(curve.penetration.max()) for curve in curves]
+    if scene.effects.rock == "power":
+        return _first_sight_by_power(curves, peaks, [one[2] for one in lines], scene)
+    rock = {
+        "rock.loading_stiffness": _mean([one[0] for one in lines]),
+        "rock.unloading_ratio": _mean([one[2] / one[0] for one in lines]),
+    }
+    return Sight(rock, [(-one[1] / one[0], peak) for one, peak in zip(lines, peaks, strict=True)])
+
+
+def _mean(values: Sequence[float]) -> float:
+    """Geometric mean."""
+    return math.exp(math.fsum(map(math.log, values)) / len(values))
 
 
 def _first_sight_by_power(
-    curves: Sequence[Curve], slopes: Sequence[float], given: SlowLaw
+    curves: Sequence[Curve], peaks: Sequence[float], slopes: Sequence[float], scene: Scene
 ) -> Sight:
     """By the power law; slopes of unloading of each curve [N/m]."""
     tried = [[_by_root(curve, n) for n in TRIED_EXPONENTS] for curve in curves]
     left = sum(np.array([one[2] for one in row]) for row in tried)
     k = int(np.argmin(left))
-    n = float(TRIED_EXPONENTS[k])
-    data = [row[k][:2] for row in tried]
-    stiffness = math.exp(sum(math.log(factor) for factor, _ in data) / len(data))
-    stiffness *= given.reference ** (n - 1.0)
-    law = given._replace(stiffness=stiffness, exponent=n)
-    places = [
-        (datum, float(curve.penetration.max()))
-        for curve, (_, datum) in zip(curves, data, strict=True)
-    ]
-    rows = []
+    n, place = float(TRIED_EXPONENTS[k]), scene.rock.reference_penetration
+    factor = _mean([row[k][0] for row in tried])
+    places = [(row[k][1], peak) for row, peak in zip(tried, peaks, strict=True)]
+    forces, ratios = [], []
     for slope, (datum, peak) in zip(slopes, places, strict=True):
-        force = float(law.loading(peak - datum))
-        ratio = slope * (peak - datum) / force
-        rows.append((math.log(force / (stiffness * given.reference)), math.log(max(ratio, 1.01))))
-    x, y = np.array(rows).T
-    q = given.unloading_exponent
+        forces.append((peak - datum) ** n / place**n)  # by that at the reference penetration
+        ratios.append(max(slope / (factor * (peak - datum) ** (n - 1.0)), LEAST_RATIO))
+    x, y = np.log(forces), np.log(ratios)
+    q = scene.rock.unloading_exponent
     if np.ptp(x) > 0.0:
         q = max(float(np.polyfit(x, y, 1)[0]), 0.0)
-    ratio = math.exp(float(np.mean(y - q * x)))
-    return Sight(law._replace(ratio=max(ratio, 1.01), unloading_exponent=q), places)
+    rock = {
+        "rock.loading_stiffness": factor * place ** (n - 1.0) / scene.rock.buttons,
+        "rock.loading_exponent": n,
+        "rock.unloading_ratio": max(math.exp(float(np.mean(y - q * x))), LEAST_RATIO),
+        "rock.unloading_exponent": q,
+    }
+    return Sight(rock, places)
 
 
 def _by_root(curve: Curve, n: float) -> tuple[float, float, float]:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from percussion_model.analysis.fitting.curve import SlowLaw, best_datum_and_peak, slow_force
+from percussion_model.analysis.fitting.curve import best_datum_and_peak
 from percussion_model.analysis.fitting.measurements import Curve, DropTest, Reading
 from percussion_model.analysis.fitting.predictions import (
     DropOnRocks,
@@ -39,7 +39,7 @@ def coordinates(names: Sequence[str], values: Sequence[float]) -> np.ndarray:
     """Where values of parameters lie in the search."""
     return np.array(
         [
-            value if name in EXPONENTS else math.log(value)
+            value if name in EXPONENTS else math.log(value) if value > 0.0 else -math.inf
             for name, value in zip(names, values, strict=True)
         ]
     )
@@ -209,8 +209,7 @@ def curve_series(curve: Curve, guess: tuple[float, float]) -> Series:
     """Series of a slow curve; its datum and peak, guessed, are at their best for any rock."""
 
     def model(scene: Scene) -> np.ndarray:
-        law = SlowLaw.of(scene)
-        return slow_force(curve.penetration, law, *best_datum_and_peak(curve, law, guess))
+        return best_datum_and_peak(curve, scene, guess).force
 
     return Series(curve.name, curve.force, None, model, simulated=False)
 

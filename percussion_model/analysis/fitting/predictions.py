@@ -162,12 +162,13 @@ def _half_period(scene: Scene, speed: float) -> float:
     pi/2 each by the greatest penetration over the speed where the force is in proportion to
     penetration; by the power law less.
     """
-    rock = scene.rock
+    rock, stiffness = scene.rock, scene.loading_stiffness
     if scene.effects.rock != "power":
-        return math.pi * math.sqrt(scene.bit.mass / rock.loading_stiffness)
+        return math.pi * math.sqrt(scene.bit.mass / stiffness)
     n, place = rock.loading_exponent, rock.reference_penetration
-    share = 0.5 * (n + 1.0) * scene.bit.mass * speed**2 / (rock.loading_stiffness * place**2)
-    return math.pi * place * share ** (1.0 / (n + 1.0)) / speed
+    share = 0.5 * (n + 1.0) * scene.bit.mass * speed**2 / (stiffness * place**2)
+    most = place * share ** (1.0 / (n + 1.0)) + rock.chipping_penetration
+    return math.pi * most / speed
 
 
 def _falling(scene: Scene, speed: float, record_events: bool = False) -> Simulation:

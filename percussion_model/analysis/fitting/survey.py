@@ -75,12 +75,8 @@ def series_of(
 
 def seen(sight: Sight, names: Sequence[str], like: Likelihood) -> np.ndarray:
     """Coordinates of what curves show at first sight, for parameters that a slow test tells."""
-    law = sight.law
-    values = dict(
-        zip(SLOW, (law.stiffness, law.exponent, law.ratio, law.unloading_exponent), strict=True)
-    )
     kept = [k for k, name in enumerate(like.names) if name in names]
-    at = coordinates(names, [values[name] for name in names])
+    at = coordinates(names, [sight.rock[name] for name in names])
     return np.clip(at, like.low[kept], like.high[kept])
 
 
