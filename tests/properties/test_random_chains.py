@@ -65,6 +65,18 @@ def draw_joint(source: Source) -> dict[str, Any]:
     return joint
 
 
+def draw_power(source: Source) -> dict[str, Any]:
+    """A power law, which may chip, of one button or several."""
+    return {
+        "loading_exponent": source.between(1.0, 4.0),
+        "reference_penetration": decades(source, 1e-6, 1.0),
+        "unloading_exponent": source.pick((0.0, source.between(0.0, 12.0))),
+        "buttons": source.count(1, 30),
+        "chipping_force": decades(source, 1.0, 1e7),
+        "chipping_penetration": source.pick((0.0, decades(source, 1e-6, 1.0))),
+    }
+
+
 def draw_scene(source: Source) -> Scene:
     """A chain of two to eight bars."""
     model = source.pick(("elastic", "elastic", "rigid", "absent"))
@@ -81,13 +93,14 @@ def draw_scene(source: Source) -> Scene:
         "gravity": chance(source, 50),
         "feed": chance(source, 60),
         "loss": chance(source, 50),
-        "rock": source.pick(("bilinear", "bilinear", "spring", "wall", "none")),
+        "rock": source.pick(("bilinear", "power", "power", "spring", "wall", "none")),
         "damper": chance(source, 40),
         "joints": not chance(source, 5),
         "drive": "none",
     }
-    if effects["rock"] == "bilinear":
+    if effects["rock"] in ("bilinear", "power"):
         effects["barrier"] = chance(source, 50)
+        effects["cuttings"] = chance(source, 40)
     start = {
         "bit_velocity": source.pick((0.0, source.between(-2.0, 2.0))),
         "rock_gap": source.pick((0.0, 1e-5, 1e-3)),
@@ -112,8 +125,15 @@ def draw_scene(source: Source) -> Scene:
         }
     if effects["loss"]:
         groups["loss"] = {"time": decades(source, 1e-9, 1e-6)}
-    if effects["rock"] in ("bilinear", "spring"):
+    if effects["rock"] in ("bilinear", "power", "spring"):
         groups["rock"] = {"loading_stiffness": decades(source, 1e6, 1e10)}
+    if effects["rock"] == "power":
+        groups["rock"] |= draw_power(source)
+    if effects.get("cuttings"):
+        groups["rock"] |= {
+            "removed_share": source.between(0.0, 1.0),
+            "removal_exponent": source.pick((1.0, source.between(0.0, 4.0))),
+        }
     if chance(source, 50):
         groups["solver"] = {"cells": round(source.between(2.0, 40.0))}
     if effects["feed"]:
