@@ -54,17 +54,23 @@ def test_the_table_has_every_number_of_every_fit(found):
         for name in names
     }
     assert rows == wanted
-    assert all(row.law == "bilinear" and row.computed > 0.0 for row in found.rows)
+    assert {row.law for row in found.rows} == {"bilinear", "power"}
+    assert all(row.computed > 0.0 for row in found.rows)
     assert len(list(csv.DictReader(as_csv(found).splitlines()))) == len(rows)
     counted = sum(found.counts().values()) + sum(found.counts(anew=True).values())
     assert counted == sum(role == PREDICTED for role in rows.values())
 
 
 def test_what_was_fitted_is_reached(found):
+    missed = set()
     for row in found.rows:
-        if row.role == FITTED:
-            assert abs(row.deviation) < 1e-3, row.id
-            assert row.verdict == FITTED
+        if row.role == FITTED and row.verdict != FITTED:
+            assert row.verdict == MISSED
+            missed.add(row.fit)
+        elif row.role == FITTED:
+            assert abs(row.deviation) < (1e-3 if row.law == "bilinear" else 6e-3), row.id
+    # with this chipping force no unloading that the law allows is enough at 11 m/s
+    assert missed == {"n = 1.5 and chipping at 115 kN, to 9, 11 and 13 m/s"}
 
 
 def test_the_page_has_these_numbers(found):
@@ -213,7 +219,7 @@ def test_the_command_writes_table_and_figure(tmp_path, capsys):
     names = {path.name for path in out.iterdir()}
     assert {"validation.csv", "validation.json", "triple_button_kuru.png"} <= names
     tree = json.loads((out / "validation.json").read_text(encoding="utf-8"))
-    assert len(tree["rows"]) == 5
+    assert len(tree["rows"]) == 10
 
 
 def test_bad_input_is_one_line(tmp_path, capsys):

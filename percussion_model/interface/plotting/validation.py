@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -48,6 +49,8 @@ VERDICT_COLOURS = {
 RATIO = "rock.unloading_ratio"
 # Unloading ratios of the curve of restitution.
 RATIOS = np.geomspace(1.2, 40.0, 25)
+# Of the lines by each law.
+DASHES = ("-", (0, (4.0, 2.0)), ":")
 # Samples of a record of a gauge.
 SAMPLES = 400
 
@@ -63,12 +66,12 @@ def draw_experiment(found: Comparison, one: Experiment) -> Figure:
     fig = Figure(figsize=(12.5, 8.4), layout="constrained")
     axes = fig.subplots(2, 2)
     rig = Rig(Reading(one.gauge))
-    fits = [found.found(one.name, plan.name) for plan in one.fits if not plan.start]
+    fits = _drawn(found, one)
     lines = [(fit, speed) for fit in fits for speed in _speeds(found, fit)]
     _displacements(axes[0, 0], found, rig, lines)
     _forces(axes[0, 1], found, rig, lines)
     third = axes[1, 0]
-    rows = found.of(one.name)
+    rows = [row for fit in fits for row in found.of(one.name, fit.name)]
     if len({row.speed for row in rows if row.quantity == "restitution"}) > 1:
         _restitution(third, found, one, rig)
     elif any(row.quantity == "first_wave" for row in rows):
@@ -101,39 +104,61 @@ def _speeds(found: Comparison, fit: FoundFit) -> list[float | None]:
     return sorted({row.speed for row in rows}, key=lambda speed: speed or 0.0)
 
 
-def _name(fit: FoundFit, speed: float | None, several: bool) -> str:
-    parts = ([] if speed is None else [f"{speed:g} m/s"]) + ([fit.name] if several else [])
-    return ", ".join(parts) or "computed"
+def _drawn(found: Comparison, one: Experiment) -> list[FoundFit]:
+    """Of the whole fits by each law the one that meets most criteria: the table has all."""
+    best: dict[str, tuple[int, FoundFit]] = {}
+    for plan in one.fits:
+        if plan.start:
+            continue
+        met = sum(row.verdict == MET for row in found.of(one.name, plan.name))
+        if plan.law not in best or met > best[plan.law][0]:
+            best[plan.law] = met, found.found(one.name, plan.name)
+    return [fit for _, fit in best.values()]
 
 
 def _named(
     lines: list[tuple[FoundFit, float | None]],
-) -> Iterator[tuple[FoundFit, float | None, str, str]]:
-    several = len({fit.name for fit, _ in lines}) > 1
-    for k, (fit, speed) in enumerate(lines):
-        yield (
-            fit,
-            speed,
-            style.LINE_COLOURS[k % len(style.LINE_COLOURS)],
-            _name(fit, speed, several),
-        )
+) -> Iterator[tuple[FoundFit, float | None, dict[str, Any]]]:
+    """Fits and speeds with the look of their lines: a colour a speed, dashes a law."""
+    speeds = list(dict.fromkeys(speed for _, speed in lines))
+    laws = list(dict.fromkeys(fit.law for fit, _ in lines))
+    for fit, speed in lines:
+        k = speeds.index(speed) if len(speeds) > 1 else laws.index(fit.law)
+        look = {
+            "color": style.LINE_COLOURS[k % len(style.LINE_COLOURS)],
+            "linestyle": DASHES[laws.index(fit.law) % len(DASHES)],
+        }
+        yield fit, speed, look
+
+
+def _legend(ax: Axes, lines: list[tuple[FoundFit, float | None]]) -> None:
+    """Say which colour is which speed, and which dashes are which law."""
+    speeds, laws = {}, {}
+    several = len({speed for _, speed in lines}) > 1
+    for fit, speed, look in _named(lines):
+        if several:
+            speeds[f"{speed:g} m/s"] = Line2D([], [], color=look["color"])
+        law = {**look, "color": "black"} if several else look
+        laws[f"{fit.law} law"] = Line2D([], [], **law)
+    handles = speeds | laws
+    ax.legend(handles.values(), handles.keys(), loc="best")
 
 
 def _displacements(
     ax: Axes, found: Comparison, rig: Rig, lines: list[tuple[FoundFit, float | None]]
 ) -> None:
-    for fit, speed, colour, name in _named(lines):
+    for fit, speed, look in _named(lines):
         blow = rig.blow(fit.scene, speed)
         shown = slice(0, _until(blow, rig.reading))
-        ax.plot(blow.time[shown] * US, blow.end[shown] * MM, color=colour, label=name)
-        ax.plot(blow.time[shown] * US, blow.mean[shown] * MM, color=colour, linewidth=0.7)
+        ax.plot(blow.time[shown] * US, blow.end[shown] * MM, **look)
+        ax.plot(blow.time[shown] * US, blow.mean[shown] * MM, linewidth=0.7, **look)
         at = blow.time[deepest(blow)] * US
         for row in _rows(found, fit, speed, "penetration"):
-            _measured(ax, at, row.measured * MM, row.error * MM, colour)
+            _measured(ax, at, row.measured * MM, row.error * MM, look["color"])
         for row in _rows(found, fit, speed, "residual_penetration"):
             let_go = blow.time[np.argmax(blow.in_flight & (blow.time > blow.time[deepest(blow)]))]
-            _measured(ax, let_go * US, row.measured * MM, row.error * MM, colour)
-    ax.legend(loc="best")
+            _measured(ax, let_go * US, row.measured * MM, row.error * MM, look["color"])
+    _legend(ax, lines)
     title = "Displacement of the bit's lower end, thin: of its mean"
     style.label(ax, "time [µs]", "down [mm]", title)
 
@@ -147,27 +172,27 @@ def _until(blow: Blow, how: Reading) -> int:
 def _forces(
     ax: Axes, found: Comparison, rig: Rig, lines: list[tuple[FoundFit, float | None]]
 ) -> None:
-    for fit, speed, colour, _ in _named(lines):
+    for fit, speed, look in _named(lines):
         blow = rig.blow(fit.scene, speed)
         touched = blow.force > 0.0
-        ax.plot(blow.end[touched] * MM, blow.force[touched] / KN, color=colour)
+        ax.plot(blow.end[touched] * MM, blow.force[touched] / KN, **look)
         depths = _rows(found, fit, speed, "penetration")
         for row in _rows(found, fit, speed, "peak_force"):
             if not depths:
                 continue
-            _measured(ax, depths[0].measured * MM, row.measured / KN, row.error / KN, colour)
+            _measured(ax, depths[0].measured * MM, row.measured / KN, row.error / KN, look["color"])
     style.label(ax, "penetration [mm]", "force on the rock [kN]", "Force over penetration")
 
 
 def _force_in_time(
     ax: Axes, found: Comparison, rig: Rig, lines: list[tuple[FoundFit, float | None]]
 ) -> None:
-    for fit, speed, colour, _ in _named(lines):
+    for fit, speed, look in _named(lines):
         blow = rig.blow(fit.scene, speed)
-        ax.plot(blow.time * US, blow.force / KN, color=colour)
+        ax.plot(blow.time * US, blow.force / KN, **look)
         at = blow.time[int(np.argmax(blow.force))] * US
         for row in _rows(found, fit, speed, "peak_force"):
-            _measured(ax, at, row.measured / KN, row.error / KN, colour, row.within is None)
+            _measured(ax, at, row.measured / KN, row.error / KN, look["color"], row.within is None)
     style.label(ax, "time [µs]", "force on the rock [kN]", "Force in time")
 
 
@@ -236,8 +261,8 @@ def _deviations(ax: Axes, rows: list[Row]) -> None:
         drawn = [row for row in rows if row.fit == fit and row.within is not None]
         if not drawn:
             continue
-        ax.text(0.01, len(names), f"fit {fit}", transform=ax.get_yaxis_transform(), va="center",
-                fontsize=7.5, fontweight="bold")  # fmt: skip
+        ax.text(0.01, len(names), f"{drawn[0].law}, {fit}", va="center", fontsize=7.5,
+                fontweight="bold", transform=ax.get_yaxis_transform())  # fmt: skip
         names.append("")
         for row in drawn:
             _deviation(ax, row, len(names))

@@ -42,6 +42,9 @@ PLAIN = "bilinear"
 # Parameters of every law, which are told with each fit.
 BOTH_LAWS = ("rock.loading_stiffness", "rock.unloading_ratio")
 
+# Share of its error within which a number counts as reached by the fit to it.
+HIT = 0.1
+
 FITTED, PREDICTED = "fitted", "predicted"
 MET, MISSED, UNDECIDED, NO_CRITERION = "met", "missed", "undecided", "no criterion"
 
@@ -416,7 +419,8 @@ def verdict(one: Measurement, off: float, numerical: float, role: str = PREDICTE
     if not math.isfinite(off):
         return MISSED
     if role == FITTED:
-        return FITTED if abs(off) <= one.within else MISSED
+        error = one.error / one.value if QUANTITIES[one.quantity].relative else one.error
+        return FITTED if abs(off) <= HIT * error else MISSED
     reach = numerical / one.value if QUANTITIES[one.quantity].relative else numerical
     if abs(abs(off) - one.within) <= reach:
         return UNDECIDED
