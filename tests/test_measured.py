@@ -63,6 +63,19 @@ def changed(tmp_path, change):
     return path
 
 
+def fixing(values, law="power"):
+    return lambda tree: tree["fits"][0].update(law=law, fixed=values)
+
+
+def test_a_fit_by_the_power_law_is_read_with_what_it_fixes(tmp_path):
+    fixed = {"rock.reference_penetration": "0.5 mm", "rock.loading_exponent": 1.7}
+    plan = read_experiment(changed(tmp_path, fixing(fixed))).fits[0]
+    assert plan.law == "power"
+    assert plan.fixed == pytest.approx(
+        {"rock.reference_penetration": 5e-4, "rock.loading_exponent": 1.7}
+    )
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
@@ -73,10 +86,17 @@ def changed(tmp_path, change):
         (lambda t: t["measured"][0].update(kind="heard"), "must be one of measured, computed"),
         (lambda t: t["measured"][0].pop("within"), "either within or no_criterion"),
         (lambda t: t["measured"].append(t["measured"][0]), "every id must be there once"),
-        (lambda t: t["fits"][0].update(law="cubic"), "must be one of bilinear"),
+        (lambda t: t["fits"][0].update(law="cubic"), "must be one of bilinear, power"),
         (lambda t: t["fits"][0].update(to=[]), "must be as many"),
         (lambda t: t["fits"][0].update(predicts=["loading stiffness"]), "both fitted and"),
         (lambda t: t["scene"]["rock"].update(loading_stiffness=-1.0), "loading_stiffness"),
+        (lambda t: t["fits"][0].update(parameters=["rock.loading_exponent"]), "must be one of roc"),
+        (fixing({"rock.loading_exponent": 0.5}), "loading_exponent = 0.5: must be a number"),
+        (fixing({"rock.loading_exponent": "much"}), 'loading_exponent = "much": must be a number'),
+        (fixing({"rock.barrier_energy": 0.1}), "fixed.rock.barrier_energy: unknown key"),
+        (fixing({"rock.loading_stiffness": 1e8}), "rock.loading_stiffness: unknown key; must be"),
+        (fixing({"rock.loading_exponent": 1.5}, "bilinear"), "rock.loading_exponent: unknown key"),
+        (lambda t: t["fits"][0].update(fixed=1.5), "fits.0.fixed: must be a table"),
         (lambda t: t.update(gauge="3 m"), "the bit's length"),
         (lambda t: t["scene"]["run"].update(duration=2.0), "must be at most 0.05 s"),
         (lambda t: t["scene"].update(piston={"model": "rigid"}), "elastic or absent"),

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from docs import make_validation
-from percussion_model.verification.measured import Measurement, compare, load, wanted
+from percussion_model.verification.measured import FitPlan, Measurement, compare, load, wanted
 from percussion_model.verification.measured.blow import Reading, Rig, rebound, strike
 from percussion_model.verification.measured.comparison import (
     FITTED,
@@ -100,6 +100,56 @@ def test_a_fit_finds_the_rock_that_made_the_numbers(kuru):
     found = fit(replace(kuru, measured=measured), plan, rig)
     assert found.values[STIFFNESS] == pytest.approx(1.3e8, rel=1e-4)
     assert found.values[RATIO] == pytest.approx(4.2, rel=1e-3)
+
+
+N, Q = "rock.loading_exponent", "rock.unloading_exponent"
+POWER = {STIFFNESS: 1.3e8, RATIO: 4.2, N: 1.7, Q: 0.4}
+PLACE = {"rock.reference_penetration": 5e-4}
+
+
+def made_up(kuru, rock, plans):
+    """An experiment whose numbers are computed with a rock by the power law."""
+    made, rig = kuru.scene.replace(**{"effects.rock": "power"}, **rock), Rig(Reading(kuru.gauge))
+    measured = {}
+    for name, one in kuru.measured.items():
+        value = rig.read(made, one.quantity, one.speed)
+        measured[name] = replace(one, value=value, error=0.02 * value)
+    return replace(kuru, measured=measured, fits=tuple(plans), variants=())
+
+
+def test_a_fit_finds_the_power_law_that_made_the_numbers(kuru):
+    """All four parameters from two speeds; then one of them, from what the first fit found."""
+    to = ("penetration at 5 m/s", "penetration at 13 m/s", "rebound speed at 9 m/s",
+          "rebound speed at 11 m/s")  # fmt: skip
+    whole = FitPlan("whole", "power", tuple(POWER), to, ("penetration at 9 m/s",), fixed=PLACE)
+    ratio = FitPlan("ratio", "power", (RATIO,), to[2:3], to[3:], "whole", {STIFFNESS: 1.4e8})
+    found = compare([made_up(kuru, POWER | PLACE, [whole, ratio])])
+    first, second = found.fits
+    assert first.values == pytest.approx(POWER | PLACE, rel=1e-3)
+    assert np.isfinite(list(first.errors.values())).all()
+    (predicted,) = (row for row in found.rows if row.role == PREDICTED and row.fit == "whole")
+    assert predicted.deviation == pytest.approx(0.0, abs=1e-4)
+    # the rest is from the first fit; gamma makes up for the stiffness
+    for key in (N, Q, *PLACE):
+        assert second.values[key] == first.values[key]
+    assert second.values[STIFFNESS] == 1.4e8
+    assert abs(second.values[RATIO] / 4.2 - 1.0) > 1e-3
+    text = parameters_text(second)
+    assert "n 1.700 (kept)" in text
+    assert "reference penetration 0.5000 mm (kept)" in text
+
+
+@pytest.mark.parametrize(("key", "value"), [(Q, 0.0), (N, 4.0)])
+def test_an_exponent_at_an_end_of_its_range_has_an_error(kuru, key, value):
+    """q = 0 has no logarithm; beyond the greatest n there is no law."""
+    rock = POWER | PLACE | {key: value}
+    name = "rebound speed at 9 m/s"
+    fixed = {other: one for other, one in rock.items() if other != key}
+    plan = FitPlan("end", "power", (key,), (name,), fixed=fixed)
+    found = fit(made_up(kuru, rock, [plan]), plan, Rig(Reading(kuru.gauge)))
+    assert found.values[key] == pytest.approx(value, abs=2e-3)
+    # of 2 % of the rebound, which goes with the root of what is given back
+    assert 1e-3 < found.errors[key] < 1.0
 
 
 def test_errors_of_a_fit_are_those_of_what_was_fitted(found, kuru):

@@ -10,7 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from percussion_model.analysis.fitting.likelihood import Likelihood, Place, Series, coordinates
+from percussion_model.analysis.fitting.likelihood import (
+    EXPONENTS,
+    Likelihood,
+    Place,
+    Series,
+    coordinates,
+    values_at,
+)
 from percussion_model.analysis.fitting.search import descend
 from percussion_model.scene.scene import Scene
 from percussion_model.verification.measured.blow import Reading, Rig
@@ -315,19 +322,9 @@ def _best_place(like: Likelihood, plan: FitPlan, scene: Scene, box: np.ndarray) 
     They start from the scene; then from other values of what only bends the lines of the law,
     since a search that starts far from the right bend ends beside it.
     """
-    names = plan.parameters
-    inside = [np.clip(float(scene[key]), *LAWS[plan.law][key]) for key in names]
-    begin = coordinates(names, inside)
-    bends = [k for k, key in enumerate(names) if key not in BOTH_LAWS]
-    lines = [k for k in range(len(names)) if k not in bends]
-    starts = [begin]
-    for shares in itertools.product(STARTS, repeat=len(bends)) if bends else ():
-        other = begin.copy()
-        other[bends] = box[bends, 0] + np.array(shares) * (box[bends, 1] - box[bends, 0])
-        starts.append(descend(like, other, lines)[0].at if lines else other)
     best: Place | None = None
-    for start in starts:
-        found, _ = descend(like, start, range(len(names)))
+    for start in _starts(like, plan, scene, box):
+        found, _ = descend(like, start, range(len(plan.parameters)))
         if best is None or found.deviance < best.deviance:
             best = found
         pairs = zip(best.residuals, like.series, strict=True)
@@ -335,6 +332,20 @@ def _best_place(like: Likelihood, plan: FitPlan, scene: Scene, box: np.ndarray) 
             break
     assert best is not None
     return best
+
+
+def _starts(like: Likelihood, plan: FitPlan, scene: Scene, box: np.ndarray) -> Iterator[np.ndarray]:
+    """Where searches start, one after the other."""
+    names = plan.parameters
+    inside = [np.clip(float(scene[key]), *LAWS[plan.law][key]) for key in names]
+    begin = coordinates(names, inside)
+    yield begin
+    bends = [k for k, key in enumerate(names) if key not in BOTH_LAWS]
+    lines = [k for k in range(len(names)) if k not in bends]
+    for shares in itertools.product(STARTS, repeat=len(bends)) if bends else ():
+        other = begin.copy()
+        other[bends] = box[bends, 0] + np.array(shares) * (box[bends, 1] - box[bends, 0])
+        yield descend(like, other, lines)[0].at if lines else other
 
 
 def _series(one: Measurement, rig: Rig) -> Series:
@@ -375,9 +386,9 @@ def _errors(
     here = _read_all(experiment, names, scene, rig)
     slopes = {}
     for key in plan.parameters:
-        moved = scene.replace(**{key: float(scene[key]) * math.exp(SLOPE_STEP)})
+        step, moved = _moved(plan.law, key, scene)
         there = _read_all(experiment, names, moved, rig)
-        slopes[key] = {name: (there[name] - here[name]) / SLOPE_STEP for name in names}
+        slopes[key] = {name: (there[name] - here[name]) / step for name in names}
     of_fitted = np.array([[slopes[key][name] for key in plan.parameters] for name in plan.to])
     sizes = np.array([experiment.measured[name].error for name in plan.to])
     try:
@@ -386,7 +397,7 @@ def _errors(
         inverse = np.full_like(of_fitted, math.nan)
     shares = np.linalg.norm(inverse, axis=1)
     parameters = {
-        key: float(scene[key]) * float(share)
+        key: (1.0 if key in EXPONENTS else float(scene[key])) * float(share)
         for key, share in zip(plan.parameters, shares, strict=True)
     }
     predicted = {}
@@ -394,6 +405,19 @@ def _errors(
         own = np.array([slopes[key][name] for key in plan.parameters])
         predicted[name] = float(np.linalg.norm(own @ inverse))
     return parameters, predicted
+
+
+def _moved(law: str, key: str, scene: Scene) -> tuple[float, Scene]:
+    """A step of one parameter, in the coordinate of the search, and the scene after it.
+
+    Of an exponent a share, or of 1 where it is less, as it may be 0; downward at its greatest.
+    """
+    value = float(scene[key])
+    step = SLOPE_STEP * max(value, 1.0) if key in EXPONENTS else SLOPE_STEP
+    (at,) = coordinates([key], [value])
+    if values_at(key, at + step) > LAWS[law][key][1]:
+        step = -step
+    return step, scene.replace(**{key: float(values_at(key, at + step))})
 
 
 def _read_all(

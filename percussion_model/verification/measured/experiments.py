@@ -32,7 +32,7 @@ LAWS: dict[str, dict[str, tuple[float, float]]] = {
     "power": {
         **_LINES,
         "rock.loading_exponent": (1.0, 4.0),
-        "rock.unloading_exponent": (1e-3, 12.0),
+        "rock.unloading_exponent": (0.0, 12.0),
         "rock.chipping_penetration": (1e-6, 1e-2),
     },
 }
