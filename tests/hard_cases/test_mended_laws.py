@@ -1,0 +1,135 @@
+"""Scenes of the power law and of cuttings that once failed: found at random, then made small."""
+
+from __future__ import annotations
+
+import pytest
+
+from percussion_model import Scene
+from tests.properties.checks import check_case
+from tests.properties.scenes import Case
+
+RIGID = {"model": "rigid"}
+# What each scene differs in from the reference, its length [s], and inputs that change.
+SCENES = {
+    "less is given back the harder the blow, and the cycle resumes with less than the law gives": (
+        {
+            "effects": {"rock": "power"},
+            "loss": {"time": 5e-8},
+            "rock": {
+                "loading_exponent": 2.0, "reference_penetration": 5.8e-4,
+                "unloading_exponent": 4.4, "buttons": 2,
+            },
+            "start": {"piston_velocity": 14.0, "bit_velocity": 16.0, "rock_gap": 2e-15},
+        },
+        3.8e-4,
+    ),
+    "next to nothing is given back, by elements": (
+        {
+            "effects": {"rock": "power", "cuttings": True},
+            "rock": {
+                "unloading_exponent": 12.0, "reference_penetration": 1e-4, "removed_share": 0.3,
+            },
+            "solver": {"name": "fem"},
+        },
+        0.5,
+    ),
+    "the reference penetration is far beyond that of the blow": (
+        {
+            "effects": {"rock": "power"},
+            "rock": {
+                "loading_stiffness": 7e10, "reference_penetration": 0.04, "barrier_damping": 50.0,
+            },
+            "solver": {"cells": 1},
+        },
+        1.1e-3,
+    ),
+    "stiff rock under a thin bit": (
+        {
+            "effects": {"drive": "external", "rock": "power"},
+            "piston": {
+                "sections": [{"length": 0.145, "area": 5e-5}, {"length": 0.2, "area": 0.007}],
+            },
+            "bit": {"sections": [{"length": 0.2, "area": 5e-5}]},
+            "rock": {"loading_stiffness": 1.4e5, "unloading_exponent": 3.0, "buttons": 91},
+        },
+        4.6e-4,
+    ),
+    "stiff rock under two cells": (
+        {
+            "effects": {"drive": "external", "rock": "power"},
+            "rock": {"buttons": 37, "barrier_energy": 0.0},
+            "start": {"piston_velocity": 0.0},
+            "solver": {"cells": 2},
+        },
+        0.013,
+        (0.0745, {"loading_stiffness": 4.36e10}),
+    ),
+    "the end of the chipping step is reached within a step of the waves": (
+        {
+            "effects": {"rock": "power"},
+            "piston": RIGID,
+            "bit": {"sections": [{"length": 0.23, "area": 4.8e-5}]},
+            "rock": {
+                "loading_stiffness": 8.4e10, "buttons": 4, "chipping_force": 23.0,
+                "chipping_penetration": 2.8e-3,
+            },
+        },
+        0.05,
+    ),
+    "the bit turns before it meets the cuttings, by elements of long steps": (
+        {
+            "effects": {"cuttings": True},
+            "piston": {
+                "sections": [{"length": 0.35, "area": 0.007}, {"length": 0.2, "area": 0.003}],
+            },
+            "bit": {"sections": [{"length": 0.2, "area": 0.0055}, {"length": 0.2, "area": 0.0055}]},
+            "rock": {
+                "loading_stiffness": 6e8, "unloading_ratio": 800.0, "removed_share": 0.3,
+                "barrier_energy": 0.09,
+            },
+            "start": {"piston_velocity": 6.0, "rock_gap": 9e-13},
+            "solver": {"name": "fem"},
+            "fem": {"elements": 5, "courant": 40.0},
+        },
+        6.6e-3,
+    ),
+    "the barrier breaks above the surface of the rock, by elements": (
+        {
+            "effects": {"drive": "none", "rock": "power"},
+            "piston": {"model": "absent"},
+            "bit": {"sections": [{"length": 0.19, "area": 7e-5, "youngs_modulus": 1.2e10}]},
+            "feed": {"force": 8500.0},
+            "rock": {
+                "loading_exponent": 1.02, "reference_penetration": 5e-5, "buttons": 53,
+                "barrier_energy": 0.06, "barrier_damping": 27.7,
+            },
+            "start": {"rock_gap": 0.09},
+            "solver": {"name": "fem"},
+            "fem": {"elements": 8, "courant": 0.11, "spectral_radius": 0.27},
+        },
+        1.7e-3,
+    ),
+    "a cycle resumes on a stiffer line than that of the cuttings": (
+        {
+            "effects": {"rock": "power", "cuttings": True},
+            "piston": {"sections": [{"length": 0.09, "area": 0.005, "youngs_modulus": 1e9}]},
+            "bit": {"sections": [{"length": 0.009, "area": 1e-5}]},
+            "feed": {"force": 400.0},
+            "rock": {
+                "reference_penetration": 2e-3, "unloading_exponent": 0.15, "removed_share": 2e-5,
+            },
+            "start": {"piston_velocity": -0.02},
+            "solver": {"cells": 5},
+        },
+        6.1e-3,
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_what_must_hold_of_any_scene(name):
+    groups, length, *inputs = SCENES[name]
+    scene = Scene(run={"duration": length, "settle": 0.0}, **groups)
+    reads = [(share, "read", "energy") for share in (0.2, 0.4, 0.6, 0.8)]
+    calls = [*reads, *((share, "inputs", values) for share, values in inputs)]
+    check_case(Case(scene, length, sorted(calls, key=lambda call: call[0]), "wide"))
