@@ -171,7 +171,7 @@ def laws_side_by_side(found: Comparison, name: str) -> tuple[list[str], list[lis
 
 def _by_law(row: Row) -> str:
     text = shown(QUANTITIES[row.quantity], row.computed, row.numerical_error)
-    return f"{text}, {'fitted' if row.role == FITTED else row.verdict}"
+    return f"{text}, {verdict_text(row).removeprefix(f'{PREDICTED}, ')}"
 
 
 def reasons(found: Comparison) -> dict[str, list[str]]:
