@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from percussion_model.physics.elementary import exp, log
-from percussion_model.physics.kernel import inlined, kernel
+from percussion_model.physics.kernel import kernel, merged
 
 # Below this share of the reference penetration, or of the force there, the power law goes on as
 # a straight line: nothing that moves a bit is so small.
@@ -23,13 +23,13 @@ LEAST_RECOVERED = 1e-4
 MOST_TURNS = 60
 
 
-@inlined
+@kernel
 def growth(par, p):
     """Secant stiffness at a penetration that loads, by that at the reference penetration."""
     return exp((par.exponent - 1.0) * log(max(p / par.reference_penetration, LEAST_SHARE)))
 
 
-@inlined
+@kernel
 def loading_part(par, s, p):
     """Part of a penetration that loads the rock [m]."""
     if par.chipping_penetration == 0.0 or p <= s.chipping_from:
@@ -40,13 +40,13 @@ def loading_part(par, s, p):
     return p - (1.0 - CHIPPING_SLOPE) * par.chipping_penetration
 
 
-@inlined
+@kernel
 def is_reloading(s, p):
     """Whether a bit at a penetration still compresses what is left of the crater."""
     return s.reload_from < s.reload_to and p < s.reload_to
 
 
-@inlined
+@kernel
 def loading_force(par, s, p):
     """Force of the rock at a penetration in a drilling cycle (docs/model.md, eqs 15, 20b) [N]."""
     if par.power == 0:
@@ -56,14 +56,14 @@ def loading_force(par, s, p):
     return fresh_force(par, s, p)
 
 
-@inlined
+@kernel
 def fresh_force(par, s, p):
     """Force of rock that no cuttings cover [N]."""
     part = loading_part(par, s, p)
     return s.k_r * part * growth(par, part)
 
 
-@inlined
+@kernel
 def loading_slope(par, s, p):
     """How that force grows with the penetration [N/m]."""
     if is_reloading(s, p):
@@ -73,7 +73,7 @@ def loading_slope(par, s, p):
     return CHIPPING_SLOPE * slope if is_chipping(par, s, p) else slope
 
 
-@inlined
+@kernel
 def is_chipping(par, s, p):
     """Whether the rock chips at a penetration."""
     return (
@@ -82,7 +82,7 @@ def is_chipping(par, s, p):
     )
 
 
-@inlined
+@kernel
 def next_kink(par, s, p):
     """Penetration above `p` at which cuttings or chipping next bend the loading [m]."""
     if is_reloading(s, p):
@@ -92,7 +92,7 @@ def next_kink(par, s, p):
     return s.chipping_from if p < s.chipping_from else s.chipping_from + par.chipping_penetration
 
 
-@inlined
+@kernel
 def loading_work(par, s, p):
     """Work on the rock in a drilling cycle of the power law, up to a constant of the cycle [J]."""
     if is_reloading(s, p):
@@ -102,7 +102,7 @@ def loading_work(par, s, p):
     return fresh_work(par, s, p)
 
 
-@inlined
+@kernel
 def fresh_work(par, s, p):
     """Work from no penetration to `p` on rock that no cuttings cover [J]."""
     part = loading_part(par, s, p)
@@ -116,7 +116,7 @@ def fresh_work(par, s, p):
     return work
 
 
-@inlined
+@kernel
 def recovered_share(par, s, force):
     """Penetration that the rock gives back from a peak force, by the part that loaded it.
 
@@ -130,7 +130,7 @@ def recovered_share(par, s, force):
     return min(share, 1.0 / par.exponent)
 
 
-@inlined
+@kernel
 def fresh_recovery(par, s, p):
     """Penetration that rock gives back from a peak, in a cycle that began without a force [m]."""
     if is_reloading(s, p):
@@ -138,7 +138,7 @@ def fresh_recovery(par, s, p):
     return loading_part(par, s, p) * recovered_share(par, s, fresh_force(par, s, p))
 
 
-@inlined
+@kernel
 def recovery(par, s, p, force):
     """Penetration that rock gives back from a peak and its force (docs/model.md, eq. 20c) [m]."""
     given_back = fresh_recovery(par, s, p)
@@ -147,7 +147,7 @@ def recovery(par, s, p, force):
     return given_back
 
 
-@inlined
+@kernel
 def recoverable_by_power(par, s, p):
     """Energy that the rock would give back in a drilling cycle of the power law [J]."""
     force = loading_force(par, s, p)
@@ -161,7 +161,7 @@ def part_at(par, k, force):
     return par.reference_penetration * exp(log(relative) / par.exponent)
 
 
-@kernel
+@merged
 def peak_above(par, s, left):
     """Penetration from which the rock would unload to `left` [m]."""
     low, high = left, 2.0 * left
@@ -178,7 +178,7 @@ def peak_above(par, s, left):
     return high
 
 
-@kernel
+@merged
 def start_loading(par, s, left):
     """Find the lines of a cycle that begins, with what is `left` of the crater [m]."""
     if par.chipping_penetration > 0.0:
@@ -191,7 +191,7 @@ def start_loading(par, s, left):
         s.reload_from, s.reload_to = left, peak
 
 
-@kernel
+@merged
 def resume_loading(par, s, force, given_back):
     """Go on with what the rock would give back under a force, where a cycle begins under it.
 
@@ -210,7 +210,7 @@ def resume_loading(par, s, force, given_back):
         s.resumed_force = force
 
 
-@kernel
+@merged
 def penetration_at(par, s, force):
     """Penetration of a drilling cycle at a force [m]."""
     if s.reload_to > s.reload_from:

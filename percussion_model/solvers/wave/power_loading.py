@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 
-from percussion_model.physics.kernel import inlined, kernel
+from percussion_model.physics.kernel import inlined, kernel, merged
 from percussion_model.physics.power_law import loading_force, loading_slope, loading_work, next_kink
 from percussion_model.physics.records import Mode
 from percussion_model.physics.rock import book_dashpot, crush, damping
@@ -77,7 +77,7 @@ def _part(par, s, push, z, p, h):
     return d, h * (B_1 * (v_1 * v_1 + v_3 * v_3) + B_2 * v_2 * v_2)
 
 
-@kernel
+@merged
 def _time_to_kink(par, s, push, z, p, kink, h, step):
     """When the penetration comes to where the rock begins or ends to chip [s].
 
@@ -137,7 +137,7 @@ def load(par, s, push, z, time):
     return d, q
 
 
-@kernel
+@merged
 def time_to_break(par, s, push, z, rest, square):
     """When the barrier is broken: the dashpot has taken W_R; `rest` if not before.
 
@@ -166,7 +166,7 @@ def time_to_break(par, s, push, z, rest, square):
     return t
 
 
-@kernel
+@merged
 def loading_stretch(par, s, v_free, z, rest, time):
     """Follow a drilling cycle until the barrier is broken or the step ends.
 
