@@ -8,7 +8,6 @@ from percussion_model import Scene
 from tests.properties.checks import check_case
 from tests.properties.scenes import Case
 
-RIGID = {"model": "rigid"}
 # What each scene differs in from the reference, its length [s], and inputs that change.
 SCENES = {
     "less is given back the harder the blow, and the cycle resumes with less than the law gives": (
@@ -63,18 +62,6 @@ SCENES = {
         },
         0.013,
         (0.0745, {"loading_stiffness": 4.36e10}),
-    ),
-    "the end of the chipping step is reached within a step of the waves": (
-        {
-            "effects": {"rock": "power"},
-            "piston": RIGID,
-            "bit": {"sections": [{"length": 0.23, "area": 4.8e-5}]},
-            "rock": {
-                "loading_stiffness": 8.4e10, "buttons": 4, "chipping_force": 23.0,
-                "chipping_penetration": 2.8e-3,
-            },
-        },
-        0.05,
     ),
     "the bit turns before it meets the cuttings, by elements of long steps": (
         {
