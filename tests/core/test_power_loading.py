@@ -53,6 +53,39 @@ def test_a_stretch_is_that_of_a_general_integrator(exponent, start):
         assert q == pytest.approx(found.y[1, -1], rel=1e-7)
 
 
+@pytest.mark.parametrize(
+    ("exponent", "reference", "stiffness", "z", "chipping"),
+    [
+        # far beyond the blow; within micrometres; stiff rock under a thin bar
+        (1.5, 0.04, 7e10, 2e5, (0.0, 0.0)),
+        (4.0, 3e-3, 4e11, 2e5, (0.0, 0.0)),
+        (3.0, 1e-6, 7.5e8, 2e5, (0.0, 0.0)),
+        (1.5, 1e-3, 3e11, 2e3, (0.0, 0.0)),
+        # from next to no stiffness to that of a wall, in the middle of a step
+        (1.5, 1e-3, 3e11, 2e3, (4e-8, 5e-5)),
+        (4.0, 1e-4, 1e11, 2e5, (4e-8, 5e-5)),
+    ],
+)
+def test_a_stretch_is_right_for_any_rock(exponent, reference, stiffness, z, chipping):
+    par, s = make(exponent)
+    par["reference_penetration"], s["k_r"] = reference, stiffness
+    s["chipping_from"], par["chipping_penetration"] = chipping
+    push = 10.0 * z
+
+    def motion(_, y):
+        v = (push - float(loading_force(par, s, y[0]))) / z
+        return [v, v * v]
+
+    for time in (1e-6, 8e-6, 4e-5):
+        settings = {"rtol": 1e-10, "atol": 1e-20, "max_step": 5e-8}
+        found = solve_ivp(motion, (0.0, time), [0.0, 0.0], "Radau", **settings)
+        d, q = load(par, s, push, z, time)
+        assert d == pytest.approx(found.y[0, -1], rel=1e-6)
+        assert q == pytest.approx(found.y[1, -1], rel=1e-6)
+        given = push * d - z * q
+        assert given == pytest.approx(float(loading_work(par, s, d)), rel=1e-6, abs=1e-8 * push * d)
+
+
 def test_the_square_law_has_a_closed_form():
     # z dp/dt = F - K p^2 / P from p = 0: a hyperbolic tangent
     par, s = make(2.0)

@@ -11,7 +11,17 @@ from __future__ import annotations
 import math
 
 from percussion_model.physics.kernel import inlined, kernel, merged
-from percussion_model.physics.power_law import loading_force, loading_slope, loading_work, next_kink
+from percussion_model.physics.power_law import (
+    CHIPPING_SLOPE,
+    is_chipping,
+    is_reloading,
+    loading_force,
+    loading_part,
+    loading_slope,
+    loading_work,
+    next_kink,
+    part_at,
+)
 from percussion_model.physics.records import Mode
 from percussion_model.physics.rock import book_dashpot, crush, damping
 
@@ -24,10 +34,11 @@ B_1, B_2 = 5.0 / 18.0, 4.0 / 9.0
 # Newton's steps, and where they end, relative to the first velocity or to the step.
 MOST_TURNS, SETTLED = 60, 1e-14
 # A step is cut where the rock changes by more than this share of the end's impedance in it, and
-# where the penetration grows by more than this share of it: a power has no series about zero.
-# From nothing on it may come to a share of the reference penetration.
+# where what loads the rock grows by more than a share of it, an nth part of `GROWTH`: a power has
+# no series about zero. From nothing on it may come to a share of where it balances the push.
 LARGEST_SHARE, GROWTH, LEAST_SHARE = 0.25, 0.5, 1e-3
-MOST_PARTS = 1000
+# A velocity that has fallen to this share of the first moves nothing any more.
+SPENT = 1e-16
 # A penetration so close below where the rock begins or ends to chip is there, as a share of it.
 CLOSE = 1e-12
 
@@ -77,30 +88,13 @@ def _part(par, s, push, z, p, h):
     return d, h * (B_1 * (v_1 * v_1 + v_3 * v_3) + B_2 * v_2 * v_2)
 
 
-@merged
-def _time_to_kink(par, s, push, z, p, kink, h, step):
-    """When the penetration comes to where the rock begins or ends to chip [s].
-
-    Parameters
-    ----------
-    h, step : float
-        A time by which it is past that place, and the way until then [s, m].
-    """
-    low, high, t = 0.0, h, h * (kink - p) / step
-    v = (push - loading_force(par, s, kink)) / z
-    for _ in range(MOST_TURNS):
-        step, _ = _part(par, s, push, z, p, t)
-        left = kink - p - step
-        if left > 0.0:
-            low = t
-        else:
-            high = t
-        if abs(left) <= SETTLED * kink:
-            break
-        t += left / v
-        if not low < t < high:
-            t = 0.5 * (low + high)
-    return t
+@inlined
+def _longest(par, s, p, least):
+    """Way in which what loads the rock grows little enough [m]."""
+    if is_reloading(s, p):
+        return math.inf
+    way = max(GROWTH / par.exponent * loading_part(par, s, p), least)
+    return way / CHIPPING_SLOPE if is_chipping(par, s, p) else way
 
 
 @kernel
@@ -116,21 +110,24 @@ def load(par, s, push, z, time):
     time : float
         [s]
     """
-    d = q = done = 0.0
+    d = q = done = first = 0.0
+    balance = part_at(par, s.k_r, max(push, 0.0))
+    least = LEAST_SHARE * min(par.reference_penetration, balance)
     while done < time:
         p = s.p + d
-        v, slope = _answer(par, s, push, z, p)
-        h = min(time - done, max(-LARGEST_SHARE / slope, time / MOST_PARTS))
-        growth = max(GROWTH * p, LEAST_SHARE * par.reference_penetration)
-        if v * h > growth:
-            h = max(growth / v, time / MOST_PARTS)
         kink = next_kink(par, s, p)
         if kink - p <= CLOSE * p:
-            kink = next_kink(par, s, kink)
+            p = kink  # what comes next is of the rock behind it
+            kink = next_kink(par, s, p)
+        v, slope = _answer(par, s, push, z, p)
+        first = max(first, abs(v))
+        if abs(v) <= SPENT * first:
+            break
+        h = min(time - done, -LARGEST_SHARE / slope)
+        if v > 0.0:
+            # never past a kink: no series knows what comes behind it
+            h = min(h, _longest(par, s, p, least) / v, (kink - p) / v)
         step, square = _part(par, s, push, z, p, h)
-        if step > kink - p:
-            h = _time_to_kink(par, s, push, z, p, kink, h, step)
-            step, square = _part(par, s, push, z, p, h)
         d += step
         q += square
         done += h
