@@ -166,7 +166,7 @@ def _about_validity(result: Result) -> Iterator[str]:
         return
     if scene.effects.rock != "wall" and len(result.blows):
         peak = float(result.blows["peak_bit_force"].max())
-        yield from button_note(peak, scene.loading_stiffness)
+        yield from button_note(peak, secant_stiffness(scene, peak))
     if result.solver != "blow-map":  # there the bit stands on the rock between blows
         yield from flight_note(longest_flight(result))
     yield from rate_note(result.rate_of_penetration)
@@ -175,6 +175,15 @@ def _about_validity(result: Result) -> Iterator[str]:
             f"loss.time = {scene.loss.time:.3g} s is longer than a wave takes through the bit: "
             "that is no structural loss, and waves do not travel"
         )
+
+
+def secant_stiffness(scene: Scene, force: float) -> float:
+    """Force of the rock by the penetration that loads it, at a force [N/m]."""
+    stiffness = scene.loading_stiffness
+    if scene.effects.rock != "power" or not force > 0.0:
+        return stiffness
+    relative = force / (stiffness * scene.rock.reference_penetration)
+    return float(stiffness * relative ** (1.0 - 1.0 / scene.rock.loading_exponent))
 
 
 def longest_flight(result: Result) -> float:
