@@ -9,6 +9,7 @@ import numpy as np
 
 from percussion_model.physics.records import EventKind, Mode
 from percussion_model.scene.scales import barrier_shares
+from percussion_model.scene.scene import Scene
 from percussion_model.simulation.rate import LARGE_ERROR, LEAST_BLOWS
 from percussion_model.simulation.result import Result, end_of, flight_acceleration
 from percussion_model.simulation.uncertain import in_digits
