@@ -35,8 +35,9 @@ NOTES = (
     "In brackets is the interval that the number is believed to lie in. Kinds: fitted to measured "
     "or to computed numbers of others; derived from the strength of the rock; assumed, as no "
     "source has it; * is second hand.",
-    "A bit of N buttons is about N times as stiff as one: NAME:N asks for it. The energy barrier "
-    "stays that of the scene.",
+    "A bit of N buttons is about N times as stiff as one: NAME:N asks for it. The law power has "
+    "the stiffness of one, at its reference penetration. The energy barrier stays that of the "
+    "scene.",
 )
 
 

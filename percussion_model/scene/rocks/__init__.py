@@ -17,7 +17,7 @@ _HERE = Path(__file__).parent
 MOST_BUTTONS = 1000
 # A number is that of a rock if it differs by rounding alone.
 SAME = 1e-9
-LAW, STIFFNESS = "effects.rock", "rock.loading_stiffness"
+LAW, STIFFNESS, BUTTONS = "effects.rock", "rock.loading_stiffness", "rock.buttons"
 KINDS = ("measured", "computed", "derived", "assumed")
 
 
@@ -93,7 +93,10 @@ class Rock:
     @property
     def parameters(self) -> dict[str, Any]:
         """Law and numbers by their dotted keys, as `Scene.replace` takes them."""
-        return {LAW: self.law, **{one.key: one.value for one in self.numbers}}
+        found = {LAW: self.law, **{one.key: one.value for one in self.numbers}}
+        if self.law == "power":  # whose stiffness is that of one button
+            found[BUTTONS] = self.asked or self.buttons
+        return found
 
     def number(self, key: str) -> Number:
         """Return a number by its key."""
@@ -114,7 +117,7 @@ class Rock:
                 f"rock {self.name}: its numbers are those of a whole bit of unknown buttons: ask "
                 "for it without a number of buttons"
             )
-        share = count / self.buttons
+        share = 1.0 if self.law == "power" else count / self.buttons
         numbers = tuple(
             replace(one, value=share * one.value, low=share * one.low, high=share * one.high)
             if one.key == STIFFNESS
@@ -181,7 +184,7 @@ def rock_of(scene: Scene) -> str:
         count = one.buttons
         if one.buttons is not None:
             share = scene[STIFFNESS] / one.number(STIFFNESS).value
-            count = round(one.buttons * share)
+            count = round(one.buttons * share) if one.law == "bilinear" else scene[BUTTONS]
             if not 1 <= count <= MOST_BUTTONS:
                 continue
         whole = one if count == one.buttons or count is None else one.of_buttons(count)
