@@ -245,7 +245,7 @@ def meet_piston(par, s, chain, waves, push, tau, time, blows, events):
     return impulse
 
 
-@inlined
+@merged
 def meet_rock(par, s, chain, waves, tau, time, events):
     """The bit's lower end on the rock; the impulse on the rock [N s]."""
     k, bit = par.sections - 1, par.bars - 1
@@ -314,7 +314,7 @@ def move_bars(par, s, chain, waves, damper, tau):
     return path
 
 
-@inlined
+@merged
 def meet(par, s, chain, waves, tau, blows, events):
     """Let all ends meet what they meet for `tau`, up to a whole step.
 

@@ -51,7 +51,7 @@ def portion(s, law):
     return (s.stride if s.law == law else FIRST_STRIDE) * WHOLE
 
 
-@kernel
+@merged
 def advance_to(par, s, bars, end, blows, events):
     """Advance to a tick, unless a leap, or what is done in one go, passes it; a `Status`."""
     s.n_blows = 0
@@ -83,7 +83,7 @@ def advance_to(par, s, bars, end, blows, events):
             leap(par, s, bars, events)
 
 
-@kernel
+@merged
 def commit_to(par, s, bars, end, blows, events):
     """Carry bit and piston to a tick, within what is pending."""
     s.n_blows = 0

@@ -211,7 +211,7 @@ def step(par, s, bars, most, blows, events):
         near = True
 
 
-@kernel
+@merged
 def go_on(par, s, bars, most, near, blows, events):
     """As `step`, or as far as is known to be before the event.
 

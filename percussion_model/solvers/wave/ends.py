@@ -119,7 +119,7 @@ def record_contact(par, s, wb, cb, opened, t_close, approach, peak, time, tau, b
         s.peak_contact_force = max(s.peak_contact_force, peak)
 
 
-@inlined
+@merged
 def meet_piston(par, s, bars, v_p, v_t, in_p, in_t, peak, tau, time, blows, events):
     """Contact of piston and bit over `tau`.
 
@@ -192,7 +192,7 @@ def time_to_cut(par, s, approach, tau, time):
     return reach
 
 
-@inlined
+@merged
 def meet(par, s, bars, tau, blows, events):
     """Let the ends meet what they meet for `tau`, up to a whole step.
 

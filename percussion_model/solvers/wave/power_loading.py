@@ -163,7 +163,7 @@ def time_to_break(par, s, push, z, rest, square):
     return t
 
 
-@merged
+@kernel
 def loading_stretch(par, s, v_free, z, rest, time):
     """Follow a drilling cycle until the barrier is broken or the step ends.
 

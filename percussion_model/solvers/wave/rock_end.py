@@ -154,7 +154,7 @@ def asks_for_energy(par, s, v_free, z, tau):
     return s.mode == Mode.BC and z * v_free - spring_force(par, s) > 0.0
 
 
-@inlined
+@merged
 def rock_step(par, s, energy, v_free, z, tau, time, events):
     """Advance the rock end of the bit by `tau`.
 
