@@ -36,7 +36,7 @@ def advance(pars, states, t, blows, events):
             return Status.BLOWS_FULL
         if s.events_on == 1 and s.n_events + 4 > len(events):
             return Status.EVENTS_FULL
-        force = spring_force(s) + damping(s) * s.v_b if s.mode != Mode.FF else 0.0
+        force = spring_force(par, s) + damping(s) * s.v_b if s.mode != Mode.FF else 0.0
         s.v_b += par.dt * (bit_acceleration(par, s) - force / par.mass_b)
         s.v_p += par.dt * piston_acceleration(par, drive_force(par, s))
         s.i_bit += par.dt * force
@@ -97,6 +97,8 @@ class EulerSolver(Solver):
     def read(self, state, t, reading, spare=None, peaks=True):
         """The state as it is after its last step."""
         s, row = state.record[0], reading[0]
-        fill_ledger(s, row, 0.5 * self.scene.bit.mass * s["v_b"] ** 2, 0.0, recoverable(s))
+        fill_ledger(
+            s, row, 0.5 * self.scene.bit.mass * s["v_b"] ** 2, 0.0, recoverable(self._par[0], s)
+        )
         fill_motion(self._par[0], s, row, t, s["x_r"] + s["p"] - s["gap"], s["x_r"] + s["p"])
         return state

@@ -529,10 +529,14 @@ def read_number(key: str, text: str, name: str = "") -> float:
     raise SceneError(refuse(row, name or key, text))
 
 
+# A key that a message names; beside it stand those that are known.
+LONGEST_KEY = 60
+
+
 def unknown_key(key: str) -> str:
     """Say that a key is not known, and which known one is nearest."""
-    key = shortened(key)
     parent, _, name = key.rpartition(".")
+    key = shortened(key, LONGEST_KEY)
     prefix = generic_key(parent) + "." if parent else ""
     keys = rows_by_key()
     siblings = [one.removeprefix(prefix) for one in keys if one.startswith(prefix)]

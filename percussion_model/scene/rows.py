@@ -246,9 +246,9 @@ def unprintable(text: str) -> str:
     return next((c for c in text if unicodedata.category(c) in ("Cc", "Cs") or c in NO_XML), "")
 
 
-def shortened(text: str) -> str:
+def shortened(text: str, most: int = _LONGEST_WORDS) -> str:
     """Text of others, no longer than a message bears."""
-    return text if len(text) <= _LONGEST_WORDS else text[:_LONGEST_WORDS] + "..."
+    return text if len(text) <= most else text[:most] + "..."
 
 
 def nearest(name: str, known: Collection[str]) -> str:

@@ -12,6 +12,7 @@ from percussion_model import Simulation
 from percussion_model.physics.records import SAMPLE_FIELDS, EventKind, Mode
 from percussion_model.solvers.modal.leaps import LONGEST
 from percussion_model.solvers.modal.records import STEP
+from percussion_model.solvers.wave.ends import WIDE
 from tests.properties.scenes import Case
 from tests.state_bits import run_bits
 
@@ -29,6 +30,8 @@ MOST_GIVE = 1e100
 # Events of one step: crossings of the rock, two of the contact, one of the drive, one
 # of the barrier (`percussion_model.solvers.wave.advance.EVENTS_A_STEP`).
 EVENTS_A_STEP = 36
+# A bar that rings may put off a closure for which a step was cut; the next is cut for it again.
+CUTS_A_CLOSURE = 2
 # Steps of the modal solver are halved down to the tick of an event, or of a call. It searches so
 # many ahead for the next event, and a call leaves it to search again.
 PIECES, AHEAD = STEP + 1, LONGEST >> STEP
@@ -277,6 +280,14 @@ def check_events(events: np.ndarray, scene: Any) -> None:
         assert np.all(np.diff(contact) != 0), "contact closed or opened twice"
 
 
+def cuts_of(simulation: Simulation) -> int:
+    """How often steps may be cut: before each blow, or each closure (docs/numerics.md, 6)."""
+    if getattr(simulation.solver, "place_of_closure", 0.0) < WIDE:
+        return len(simulation.blows)
+    closures = np.count_nonzero(simulation.events["kind"] == EventKind.CONTACT_CLOSED)
+    return CUTS_A_CLOSURE * (int(closures) + 1)  # the next may be near
+
+
 def check_effort(counts: dict[str, int], simulation: Simulation, case: Case) -> None:
     """Steps and events stay below their ceilings."""
     length = case.length
@@ -287,7 +298,7 @@ def check_effort(counts: dict[str, int], simulation: Simulation, case: Case) -> 
         return
     changes = len(case.calls)
     steps = counts["steps"] + counts.get("leap_steps", 0)
-    most = length / simulation.solver.time_step + len(simulation.blows) + changes + 3
+    most = length / simulation.solver.time_step + cuts_of(simulation) + changes + 3
     if case.scene.solver_name == "fem":
         most += counts["events"]  # a step ends at each
     pieces = 0

@@ -12,6 +12,7 @@ import math
 from percussion_model.physics.elementary import exp, log
 from percussion_model.physics.kernel import kernel
 from percussion_model.physics.power_law import (
+    CHIPPING_SLOPE,
     is_chipping,
     is_reloading,
     loading_force,
@@ -40,8 +41,8 @@ def line_end(par, line):
 def take_line(par, s):
     """Move on a line from the present penetration on.
 
-    Lines have their ends where what loads the rock does not depend on chipping, and where the
-    rock begins and ends to chip.
+    Lines have their ends where what loads the rock has those of rock that does not chip, and
+    where the rock begins and ends to chip.
     """
     a = s.p
     kink = next_kink(par, s, a)
@@ -57,9 +58,8 @@ def take_line(par, s):
     if part > (1.0 - CLOSE) * FIRST * par.reference_penetration:
         place = log(part / (FIRST * par.reference_penetration)) / math.log(RATIO)
         line = min(int(place + 1.0 + CLOSE / math.log(RATIO)), MOST_LINES)
-    b = a + line_end(par, line) - part
-    if b > kink or is_chipping(par, s, a):
-        b = kink
+    way = line_end(par, line) - part
+    b = min(a + (way / CHIPPING_SLOPE if is_chipping(par, s, a) else way), kink)
     s.line_stiffness = (loading_force(par, s, b) - loading_force(par, s, a)) / (b - a)
     mean = (loading_work(par, s, b) - loading_work(par, s, a)) / (b - a)
     s.line_origin = 0.5 * (a + b) - mean / s.line_stiffness
