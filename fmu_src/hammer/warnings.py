@@ -15,6 +15,7 @@ from percussion_model.simulation.validity import (
     ledger_note,
     numerical_note,
     rate_note,
+    stiffness_at,
 )
 
 # Time between two checks of a motion [s]; one costs as much as reading an output.
@@ -39,7 +40,7 @@ class Warnings:
         ----------
         motion : Motion
         loading_stiffness : float
-            Of the rock now [N/m].
+            Of the rock now, under one button [N/m].
         """
         if motion.time < self._next - INTERVAL:  # an older state has been restored
             self._next, self._pushed = motion.time, motion.time
@@ -62,9 +63,10 @@ class Warnings:
         if motion.blow_count == self._blows:
             return
         self._blows = motion.blow_count
-        rock = motion.scene.effects.rock
-        if rock in ("bilinear", "spring"):
-            for text in button_note(motion.blow["peak_bit_force"], stiffness):
+        rock, peak = motion.scene.effects.rock, motion.blow["peak_bit_force"]
+        if rock not in ("wall", "none"):
+            secant = stiffness_at(motion.scene, peak, stiffness)
+            for text in button_note(peak, secant):
                 yield "button", text
         period = motion.blow["period"]
         if rock != "none" and period > 0.0:

@@ -62,6 +62,7 @@ from percussion_model.solvers.rigid.records import RIGID_STATE
 from percussion_model.solvers.setup import (
     DRIVES,
     PISTONS,
+    POWER,
     ROCKS,
     any_effect,
     barrier_on,
@@ -134,6 +135,15 @@ def _fill_acts(head, numbers, values):
         for k in range(COUNT):
             if BARRIER[k]:
                 head.acts[k] = 0
+
+
+@preparing
+def _fill_bend(head, values):
+    """What the note about buttons needs of the power law."""
+    head.buttons, head.exponent, head.reference_penetration = 1.0, 1.0, 1.0
+    if values.effects_rock == POWER:
+        head.buttons, head.exponent = values.rock_buttons, values.rock_loading_exponent
+        head.reference_penetration = values.rock_reference_penetration
 
 
 @preparing
@@ -262,6 +272,7 @@ def create(image, table, table_size, motion, notes):
     head.peak_from_at, head.peak_bit_at, head.peak_contact_at = PEAKS_AT[kind]
     head.locked_at, head.storms_at = GUARDS_AT[kind]
     head.rock = ROCKS[numbers.values.effects_rock]
+    _fill_bend(head, numbers.values)
     _fill_acts(head, numbers, values)
     _fill_barrier(head, numbers)
     motion_of(base).acting[:] = _wanted(values)

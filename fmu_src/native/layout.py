@@ -97,6 +97,9 @@ HEAD = np.dtype(
         ("gauge_area", "f8"),  # [m2]
         ("time_share", "f8"),  # of the barrier, T_5/T_4
         ("energy_share", "f8"),  # W_R/(F_0 D_1)
+        ("buttons", "f8"),
+        ("exponent", "f8"),  # of loading, 1 but for the power law
+        ("reference_penetration", "f8"),  # [m]
         # of what was read last
         ("has_peaks", "i8"),
         ("has_stress", "i8"),

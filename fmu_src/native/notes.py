@@ -8,9 +8,11 @@ from fmu_src.native.messages import Note
 from fmu_src.native.motion import count_of, read
 from fmu_src.native.outputs import numerical, residual
 from percussion_model.physics.kernel import preparing
+from percussion_model.physics.power_law import secant_stiffness
 from percussion_model.physics.records import Mode, RockKind
 from percussion_model.simulation.validity import (
     BUTTON_LENGTH,
+    LEAST_BY_LINES,
     LEAST_NUMERICAL,
     LONGEST_FLIGHT,
     MOST_BARRIER,
@@ -64,7 +66,8 @@ def _of_blow(base, stiffness, notes):
     head, blow = head_records(base, 1)[0], last_blow(base)[0]
     head.blows_seen = motion_of(base).blow_count
     if head.rock == RockKind.BILINEAR or head.rock == RockKind.SPRING:
-        depth = blow.peak_bit_force / stiffness
+        force, bent = blow.peak_bit_force, (head.exponent, head.reference_penetration)
+        depth = force / secant_stiffness(force, head.buttons * stiffness, *bent)
         if depth > BUTTON_LENGTH:
             _tell(base, notes, Note.BUTTON, 1e3 * depth, 0.0)
     if head.rock != RockKind.NONE and blow.period > 0.0:
@@ -87,7 +90,8 @@ def _of_state(base, notes):
     if not abs(share) <= (MOST_MAP_RESIDUAL if is_map else MOST_RESIDUAL):
         _tell(base, notes, Note.MAP_LEDGER if is_map else Note.LEDGER, share, 0.0)
     taken = numerical(reading)
-    if not taken >= (-MOST_MAP_RESIDUAL if is_map else LEAST_NUMERICAL):
+    least = LEAST_BY_LINES if head.kind == Kind.RIGID else LEAST_NUMERICAL
+    if not taken >= (-MOST_MAP_RESIDUAL if is_map else least):
         _tell(base, notes, Note.GIVES_ENERGY, taken, 0.0)
     elif taken > MOST_NUMERICAL:
         _tell(base, notes, Note.TAKES_ENERGY + head.kind - 1, 100.0 * taken, 0.0)
@@ -111,7 +115,7 @@ def look(base, stiffness, notes):
     Parameters
     ----------
     stiffness : float
-        K_R of the rock now [N/m].
+        K_R of the rock now, under one button [N/m].
     notes : int
         Address of the notes.
     """

@@ -161,6 +161,26 @@ def part_at(par, k, force):
     return par.reference_penetration * exp(log(relative) / par.exponent)
 
 
+@kernel
+def secant_stiffness(force, stiffness, exponent, reference_penetration):
+    """Force of rock by the penetration that loads it, at a force [N/m].
+
+    Parameters
+    ----------
+    force : float
+        [N]
+    stiffness : float
+        That at the reference penetration, of all buttons [N/m].
+    exponent : float
+    reference_penetration : float
+        [m]
+    """
+    if exponent == 1.0 or not force > 0.0:
+        return stiffness
+    relative = force / (stiffness * reference_penetration)
+    return stiffness * exp((1.0 - 1.0 / exponent) * log(max(relative, LEAST_SHARE)))
+
+
 @merged
 def peak_above(par, s, left):
     """Penetration from which the rock would unload to `left` [m]."""

@@ -7,12 +7,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
+from percussion_model.physics.power_law import secant_stiffness
+from percussion_model.scene.scene import Scene
+
 # The ledger closes to rounding; more than this is an error of the solver.
 MOST_RESIDUAL = 1e-6
 # What the discretisation takes is never negative, but for the rounding of its sums ...
 LEAST_NUMERICAL = -1e-9
 # ... and above this share of the energy put in it shows in peaks and rates.
 MOST_NUMERICAL = 1e-2
+# Lines of the power law by rigid bodies take or give a little, which means nothing.
+LEAST_BY_LINES = -1e-4
 # Between the nodes of a blow map energy is kept as well as the map is interpolated.
 MOST_MAP_RESIDUAL = 1e-2
 # Buttons of a percussive bit stand out by 5 to 15 mm; deeper in, its face meets the rock,
@@ -40,7 +45,8 @@ def ledger_note(residual: float, solver: str) -> Iterator[str]:
 
 def numerical_note(share: float, solver: str) -> Iterator[str]:
     """Say that the discretisation took too much of the energy put in, or gave some."""
-    if not share >= (-MOST_MAP_RESIDUAL if solver == "blow-map" else LEAST_NUMERICAL):
+    least = {"blow-map": -MOST_MAP_RESIDUAL, "rigid": LEAST_BY_LINES}.get(solver, LEAST_NUMERICAL)
+    if not share >= least:
         yield (
             f"numerical is {share:.2g} of the energy put in: the discretisation gives energy, "
             "which it cannot; this is an error of the solver"
@@ -71,6 +77,24 @@ def guard_notes(statistics: Mapping[str, int]) -> Iterator[str]:
             f"{storms} storm{'s' if storms != 1 else ''} of events: more within a moment than can "
             "mean anything; rebounds were left out or events postponed: bounded but not exact"
         )
+
+
+def stiffness_at(scene: Scene, force: float, loading_stiffness: float) -> float:
+    """Force of the rock by the penetration that loads it, at a force [N/m].
+
+    Parameters
+    ----------
+    scene : Scene
+    force : float
+        [N]
+    loading_stiffness : float
+        Of one button, at the reference penetration [N/m].
+    """
+    if scene.effects.rock != "power":
+        return loading_stiffness
+    rock = scene.rock
+    bent = rock.loading_exponent, rock.reference_penetration
+    return float(secant_stiffness(force, rock.buttons * loading_stiffness, *bent))
 
 
 def button_note(peak_bit_force: float, loading_stiffness: float) -> Iterator[str]:

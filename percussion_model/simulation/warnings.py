@@ -9,7 +9,6 @@ import numpy as np
 
 from percussion_model.physics.records import EventKind, Mode
 from percussion_model.scene.scales import barrier_shares
-from percussion_model.scene.scene import Scene
 from percussion_model.simulation.rate import LARGE_ERROR, LEAST_BLOWS
 from percussion_model.simulation.result import Result, end_of, flight_acceleration
 from percussion_model.simulation.uncertain import in_digits
@@ -21,6 +20,7 @@ from percussion_model.simulation.validity import (
     ledger_note,
     numerical_note,
     rate_note,
+    stiffness_at,
 )
 
 # A larger error of the wave speed shows in the answers.
@@ -167,7 +167,7 @@ def _about_validity(result: Result) -> Iterator[str]:
         return
     if scene.effects.rock != "wall" and len(result.blows):
         peak = float(result.blows["peak_bit_force"].max())
-        yield from button_note(peak, secant_stiffness(scene, peak))
+        yield from button_note(peak, stiffness_at(scene, peak, scene.rock.loading_stiffness))
     if result.solver != "blow-map":  # there the bit stands on the rock between blows
         yield from flight_note(longest_flight(result))
     yield from rate_note(result.rate_of_penetration)
@@ -176,15 +176,6 @@ def _about_validity(result: Result) -> Iterator[str]:
             f"loss.time = {scene.loss.time:.3g} s is longer than a wave takes through the bit: "
             "that is no structural loss, and waves do not travel"
         )
-
-
-def secant_stiffness(scene: Scene, force: float) -> float:
-    """Force of the rock by the penetration that loads it, at a force [N/m]."""
-    stiffness = scene.loading_stiffness
-    if scene.effects.rock != "power" or not force > 0.0:
-        return stiffness
-    relative = force / (stiffness * scene.rock.reference_penetration)
-    return float(stiffness * relative ** (1.0 - 1.0 / scene.rock.loading_exponent))
 
 
 def longest_flight(result: Result) -> float:

@@ -183,6 +183,16 @@ def test_the_log_says_once_where_the_motion_leaves_the_model(make, values, words
     assert "at t = " in said[0]
 
 
+@pytest.mark.parametrize(("buttons", "deep"), [(1, 1), (1000, 0)])
+def test_the_log_knows_the_power_law_and_its_buttons(make, buttons, deep):
+    """2 MN/m of one button are too soft, those of a thousand are not."""
+    changes = {"effects__rock": "power", "rock__loading_exponent": 1.5, "rock__buttons": buttons}
+    instance = make(rock__loading_stiffness=2e6, **changes)
+    for _ in range(8):
+        instance.step(0.05)
+    assert len([text for text in instance.messages if "deeper than the buttons" in text]) == deep
+
+
 def test_the_log_says_once_that_the_barrier_is_not_small(make):
     instance = make(rock__barrier_energy=15.0)
     for _ in range(8):
