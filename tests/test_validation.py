@@ -31,6 +31,8 @@ from percussion_model.verification.measured.table import (
 )
 from tests.commands import percussion
 
+# All fits take a minute: of two workers one has them.
+one_worker = pytest.mark.xdist_group("fits of all plans")
 STIFFNESS, RATIO = "rock.loading_stiffness", "rock.unloading_ratio"
 
 
@@ -44,6 +46,7 @@ def kuru():
     return load(["single_insert_kuru"])[0]
 
 
+@one_worker
 def test_the_table_has_every_number_of_every_fit(found):
     rows = {(row.experiment, row.fit, row.id): row.role for row in found.rows}
     wanted = {
@@ -61,6 +64,7 @@ def test_the_table_has_every_number_of_every_fit(found):
     assert counted == sum(role == PREDICTED for role in rows.values())
 
 
+@one_worker
 def test_what_was_fitted_is_reached(found):
     missed = set()
     for row in found.rows:
@@ -73,6 +77,7 @@ def test_what_was_fitted_is_reached(found):
     assert missed == {"n = 1.5 and chipping at 115 kN, to 9, 11 and 13 m/s"}
 
 
+@one_worker
 def test_the_page_has_these_numbers(found):
     page = make_validation.PAGE.read_text(encoding="utf-8")
     assert page.count(make_validation.BEGIN) == page.count(make_validation.END) == 1
@@ -152,6 +157,7 @@ def test_an_exponent_at_an_end_of_its_range_has_an_error(kuru, key, value):
     assert 1e-3 < found.errors[key] < 1.0
 
 
+@one_worker
 def test_errors_of_a_fit_are_those_of_what_was_fitted(found, kuru):
     """Twice the errors, twice the errors; and the share of one speed is that of another."""
     one = found.found("single_insert_kuru", "to 9 m/s")
@@ -200,6 +206,7 @@ def test_the_bilinear_law_has_no_speed_of_its_own(kuru):
         assert fast[name] == pytest.approx(2.0 * slow[name], rel=1e-9)
 
 
+@one_worker
 def test_one_unloading_ratio_cannot_be_at_two_speeds(found):
     needed = [
         found.found("single_insert_kuru", name)
@@ -223,6 +230,7 @@ def test_the_rebound_ends_where_the_piston_strikes_again(kuru):
     assert steady == pytest.approx(speed, rel=1e-6)
 
 
+@one_worker
 def test_a_wave_on_a_plate_is_that_of_its_equation(found):
     """m p'' + Z p' + K p = 2 F while the wave comes: its greatest penetration."""
     from scipy.integrate import solve_ivp

@@ -31,6 +31,10 @@ RODS = [
     {"sections": [{"length": 0.4, "area": 3e-3}], "joint": "lossy", "transmission": 0.9},
     {"sections": [{"length": 0.3, "area": 4e-3}], "joint": "threaded", "preload": 2e4},
 ]
+POWER = {
+    "effects.rock": "power", "rock.loading_exponent": 1.5, "rock.unloading_exponent": 0.5,
+    "rock.buttons": 2, "effects.cuttings": True,
+}  # fmt: skip
 # One scene for each kind of motion, and for each solver.
 SCENES = {
     "reference": {},
@@ -66,6 +70,11 @@ SCENES = {
     "string without joints": {
         "string.rods": RODS, "effects.string": True, "effects.joints": False, "effects.loss": False,
     },
+    "power law": {**POWER, "rock.chipping_force": 5e4, "rock.chipping_penetration": 1e-4},
+    "power law in elements": {**POWER, "solver.name": "fem", "fem.elements": 12},
+    "power law of rigid bodies": {**POWER, "piston.model": "rigid", "bit.model": "rigid"},
+    "power law and a string": {**POWER, "string.rods": RODS, "effects.string": True},
+    "cuttings": {"effects.cuttings": True},
     "damper": {"effects.damper": True, "string.rods": RODS[:1], "effects.string": True},
 }  # fmt: skip
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import multiprocessing
 import subprocess
 import sys
 import venv
 import zipfile
+from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from pathlib import Path
 
@@ -124,9 +126,8 @@ def changed(path, name, files):
     return out
 
 
-def test_where_no_library_fits_numba_computes_and_the_log_says_why(write):
-    """Also in a process in which an equal FMU runs by its library, before and after."""
-    whole = write(RIGID)
+def run_without_library(whole):
+    """Run an FMU by its library, and by numba where that is missing or damaged."""
     with Instance(whole) as alive:
         alive.start()
         messages, wanted = told(whole)
@@ -143,6 +144,16 @@ def test_where_no_library_fits_numba_computes_and_the_log_says_why(write):
             assert words in said
         assert told(whole) == ([], wanted)
         alive.step(5e-3)
+
+
+def test_where_no_library_fits_numba_computes_and_the_log_says_why(write):
+    """Also in a process in which an equal FMU runs by its library, before and after.
+
+    A process of its own, since each says the reason once.
+    """
+    whole = write(RIGID)
+    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as fresh:
+        fresh.submit(run_without_library, whole).result()
 
 
 def test_damaged_tables_give_no_instance(write):

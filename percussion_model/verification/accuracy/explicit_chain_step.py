@@ -132,7 +132,7 @@ def note_contact(par, s, bars, before, gap, free, blows, events):
     close_gap(s, events, time, free)
 
 
-@inlined
+@merged
 def meet(par, s, runs, fits, bars, joints, v, j, blows, events):
     """Let the ends at a joint meet."""
     r = fits[j].upper
@@ -179,7 +179,7 @@ def rock_energy(par, s):
     return s.e_crushing + s.e_barrier + s.e_standstill + recoverable(par, s)
 
 
-@inlined
+@merged
 def meet_rock(par, s, runs, bars, w, v, events):
     """Let the bit's lower end meet the rock."""
     last = runs.shape[0] - 1
@@ -202,7 +202,7 @@ def damper_stored(par, s):
     return 0.5 * (force * force - par.damper_preload * par.damper_preload) / par.damper_stiffness
 
 
-@inlined
+@merged
 def move_means(par, s, bars, mass, damper):
     """Mean motion of bars and casing, and the work of body forces."""
     push = drive_force(par, s)
