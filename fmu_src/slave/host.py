@@ -22,6 +22,8 @@ def guarded(method: Callable) -> Callable:
 
     @functools.wraps(method)
     def call(self: Any, *arguments: Any) -> Any:
+        while self.start_notes:
+            self.warn(self.start_notes.pop(0))
         try:
             return method(self, *arguments)
         except Exception as error:
@@ -50,12 +52,12 @@ def finalise_in_time(folder: str) -> None:
 class Hosted(Fmi2Slave):
     """Base of all slaves: what they log, and how their calls fail."""
 
-    start_notes: ClassVar[list[str]] = []  # of the loader
+    # Of the loader; told by the first call. The export library crashes where it frees an instance
+    # that has logged and was never called, since it then logs after its logger has gone.
+    start_notes: ClassVar[list[str]] = []
 
     def __init__(self, **arguments: Any) -> None:
         super().__init__(**arguments)
-        while self.start_notes:
-            self.warn(self.start_notes.pop(0))
         folder = arguments["resources"]
         # The export library adds the folder for each instance; once loaded it is not needed.
         while folder in sys.path:

@@ -156,6 +156,17 @@ def test_where_no_library_fits_numba_computes_and_the_log_says_why(write):
         fresh.submit(run_without_library, whole).result()
 
 
+def let_go(path):
+    Instance(path).free()
+
+
+def test_an_instance_without_library_is_freed_before_any_call(write):
+    """In a process of its own, which a crash would end."""
+    path = changed(write(RIGID), "Bare", {})
+    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as fresh:
+        fresh.submit(let_go, path).result()
+
+
 def test_damaged_tables_give_no_instance(write):
     """They are no reason to compute something else."""
     whole = write(RIGID)
