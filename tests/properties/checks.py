@@ -297,9 +297,11 @@ def check_events(events: np.ndarray, scene: Any) -> None:
 def cuts_of(simulation: Simulation) -> int:
     """How often steps may be cut: before each blow, or each closure (docs/numerics.md, 6)."""
     if getattr(simulation.solver, "place_of_closure", 0.0) < WIDE:
-        return len(simulation.blows)
-    closures = np.count_nonzero(simulation.events["kind"] == EventKind.CONTACT_CLOSED)
-    return CUTS_A_CLOSURE * (int(closures) + 1)  # the next may be near
+        closures = len(simulation.blows)
+    else:
+        closures = np.count_nonzero(simulation.events["kind"] == EventKind.CONTACT_CLOSED)
+    # blows and events are those that are over: one more is under way, or near
+    return CUTS_A_CLOSURE * (int(closures) + 1) if simulation.solver.name == "wave" else 0
 
 
 def check_effort(counts: dict[str, int], simulation: Simulation, case: Case) -> None:

@@ -23,8 +23,9 @@ from percussion_model.physics.power_law import (
 from percussion_model.physics.rock import is_loading
 
 # Ratio of the ends of a line. The first goes from nothing to this share of the reference
-# penetration.
-RATIO, FIRST = 1.02, 1e-3
+# penetration, or to where rock has this share of its stiffness there: on a softer line the bit
+# would swing about a place so far away that its motion had no digits left.
+RATIO, FIRST, SOFTEST = 1.02, 1e-3, 1e-4
 # A penetration so close below the end of a line is there, as a share of it.
 CLOSE = 1e-9
 # More lines than this reach beyond what any blow does.
@@ -32,9 +33,18 @@ MOST_LINES = 1000
 
 
 @kernel
+def first_end(par):
+    """Penetration at which the first line ends [m]."""
+    share = FIRST
+    if par.exponent > 1.0:
+        share = max(FIRST, exp(math.log(SOFTEST) / (par.exponent - 1.0)))
+    return share * par.reference_penetration
+
+
+@kernel
 def line_end(par, line):
     """Penetration at which a line ends [m]."""
-    return FIRST * par.reference_penetration * exp(line * math.log(RATIO))
+    return first_end(par) * exp(line * math.log(RATIO))
 
 
 @kernel
@@ -55,8 +65,8 @@ def take_line(par, s):
         return
     part = loading_part(par, s, a)
     line = 0
-    if part > (1.0 - CLOSE) * FIRST * par.reference_penetration:
-        place = log(part / (FIRST * par.reference_penetration)) / math.log(RATIO)
+    if part > (1.0 - CLOSE) * first_end(par):
+        place = log(part / first_end(par)) / math.log(RATIO)
         line = min(int(place + 1.0 + CLOSE / math.log(RATIO)), MOST_LINES)
     way = line_end(par, line) - part
     b = min(a + (way / CHIPPING_SLOPE if is_chipping(par, s, a) else way), kink)

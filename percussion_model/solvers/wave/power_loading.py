@@ -37,8 +37,9 @@ MOST_TURNS, SETTLED = 60, 1e-14
 # where what loads the rock grows by more than a share of it, an nth part of `GROWTH`: a power has
 # no series about zero. From nothing on it may come to a share of where it balances the push.
 LARGEST_SHARE, GROWTH, LEAST_SHARE = 0.25, 0.5, 1e-3
-# A velocity that has fallen to this share of the first moves nothing any more.
-SPENT = 1e-16
+# A velocity that has fallen to this share of the first, or of that without rock, moves nothing
+# any more: it is rounding of the force.
+SPENT, ROUNDING = 1e-16, 1e-15
 # A penetration so close below where the rock begins or ends to chip is there, as a share of it.
 CLOSE = 1e-12
 
@@ -53,6 +54,7 @@ def _answer(par, s, push, z, p):
 def _part(par, s, push, z, p, h):
     """Integrals of the velocity [m] and of its square [m2/s] over `h` from `p` on."""
     start, slope = _answer(par, s, push, z, p)
+    enough = SETTLED * abs(start) + SPENT * abs(push) / z
     # the linear answer at the stages is a good guess
     mid = start / (1.0 - 0.5 * h * slope)
     v_1, v_2, v_3 = 0.5 * (start + mid), mid, mid + 0.5 * (mid - start)
@@ -82,7 +84,7 @@ def _part(par, s, push, z, p, h):
         v_1 += d_1
         v_2 += d_2
         v_3 += d_3
-        if abs(d_1) + abs(d_2) + abs(d_3) <= SETTLED * abs(start):
+        if abs(d_1) + abs(d_2) + abs(d_3) <= enough:
             break
     d = h * (B_1 * (v_1 + v_3) + B_2 * v_2)
     return d, h * (B_1 * (v_1 * v_1 + v_3 * v_3) + B_2 * v_2 * v_2)
@@ -121,7 +123,7 @@ def load(par, s, push, z, time):
             kink = next_kink(par, s, p)
         v, slope = _answer(par, s, push, z, p)
         first = max(first, abs(v))
-        if abs(v) <= SPENT * first:
+        if abs(v) <= max(SPENT * first, ROUNDING * abs(push) / z):
             break
         h = min(time - done, -LARGEST_SHARE / slope)
         if v > 0.0:
