@@ -13,7 +13,7 @@ from percussion_model.interface.commands.rocks import (
     interval_text,
     kind_text,
 )
-from percussion_model.scene.rocks import STIFFNESS, Number, Rock, rock, rocks
+from percussion_model.scene.rocks import REFERENCE, STIFFNESS, Number, Rock, rock, rocks
 from percussion_model.scene.rocks.derived import button_stiffness, mean_factor, pressure_factors
 
 PAGE = Path(__file__).with_name("rocks.md")
@@ -103,7 +103,7 @@ def of(key: str) -> str:
 
 def told(one: Number) -> str:
     """A number with its unit, kind and reason."""
-    unit = {STIFFNESS: " kN/mm", "strength": " MPa"}.get(one.key, "")
+    unit = {STIFFNESS: " kN/mm", "strength": " MPa", REFERENCE: " mm"}.get(one.key, "")
     return f"{interval_text(one)}{unit}, {kind_text(one)}: {one.why}"
 
 

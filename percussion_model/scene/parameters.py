@@ -81,6 +81,8 @@ DRIVE = (3000.0, 13100.0)  # the paper; tuned to the blow energies of hammers on
 REVERSAL = (0.0148, 0.04)  # the same; the greatest is the paper's
 # Three buttons on Kuru granite, Saksala et al. (2014); the paper's by the diameter, 6 inch.
 STIFFNESS = (1.62e8, 1.5e9)
+# From a flat button under a wave of 200 MPa to Kuru granite at 13 m/s (docs/validation.md).
+PENETRATION = (3.5e-4, 2.1e-3)
 HOLE = (0.048, 0.165)  # bits of those hammers
 
 
@@ -172,7 +174,13 @@ class RockLaw(Parameters):
     """The rock under the bit (docs/model.md, table 1)."""
 
     loading_stiffness: float = quantity(
-        7.5e8, "N/m", "loading stiffness K_R", ROCK_SPRINGY, STIFFNESS, ge=1, le=1e13
+        7.5e8,
+        "N/m",
+        "loading stiffness K_R; by the power law of one button, at P_0",
+        ROCK_SPRINGY,
+        STIFFNESS,
+        ge=1,
+        le=1e13,
     )
     unloading_ratio: float = quantity(
         5.0,
@@ -188,8 +196,9 @@ class RockLaw(Parameters):
     reference_penetration: float = quantity(
         1e-3,
         "m",
-        "penetration at which K_R and gamma of the power law hold",
+        "P_0, at which K_R and gamma of the power law hold",
         ROCK_POWER,
+        typical=PENETRATION,
         ge=1e-6,
         le=1,
     )
@@ -208,12 +217,18 @@ class RockLaw(Parameters):
         1e5, "N", "force on one button at which the rock chips", ROCK_POWER, gt=0, le=1e9
     )
     chipping_penetration: float = quantity(
-        0.0, "m", "penetration gained while it chips; 0 without chipping", ROCK_POWER, ge=0, le=1
+        0.0,
+        "m",
+        "penetration gained while it chips; 0 without chipping",
+        ROCK_POWER,
+        typical=PENETRATION,
+        ge=0,
+        le=1,
     )
     removed_share: float = quantity(
         0.5,
         "-",
-        "share of a crater 1 mm deep that flushing removes",
+        "share that flushing removes of a crater 1 mm deep, or of any with removal_exponent 1",
         CUTTINGS_ON,
         ge=0,
         le=1,

@@ -18,6 +18,7 @@ MOST_BUTTONS = 1000
 # A number is that of a rock if it differs by rounding alone.
 SAME = 1e-9
 LAW, STIFFNESS, BUTTONS = "effects.rock", "rock.loading_stiffness", "rock.buttons"
+CHIPPING, REFERENCE = "rock.chipping_penetration", "rock.reference_penetration"
 KINDS = ("measured", "computed", "derived", "assumed")
 
 
@@ -96,6 +97,7 @@ class Rock:
         found = {LAW: self.law, **{one.key: one.value for one in self.numbers}}
         if self.law == "power":  # whose stiffness is that of one button
             found[BUTTONS] = self.asked or self.buttons
+            found.setdefault(CHIPPING, 0.0)  # not that of the scene before
         return found
 
     def number(self, key: str) -> Number:
