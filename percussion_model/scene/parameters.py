@@ -221,7 +221,6 @@ class RockLaw(Parameters):
         "m",
         "penetration gained while it chips; 0 without chipping",
         ROCK_POWER,
-        typical=PENETRATION,
         ge=0,
         le=1,
     )
