@@ -196,6 +196,9 @@ def test_what_the_discretisation_takes_is_told_beyond_its_limits():
     assert not list(numerical_note(0.01, "wave"))
     assert not list(numerical_note(-1e-10, "wave"))
     assert not list(numerical_note(-1e-3, "blow-map"))  # interpolated
+    assert not list(numerical_note(-1e-5, "rigid", by_lines=True))
+    for share, by_lines in ((-1e-5, False), (-1e-3, True)):
+        assert "gives energy" in "".join(numerical_note(share, "rigid", by_lines))
     for share, words in ((0.0101, "1 % of the energy"), (-1.1e-9, "error of the solver")):
         assert words in "".join(numerical_note(share, "wave"))
 

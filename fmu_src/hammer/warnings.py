@@ -12,6 +12,7 @@ from percussion_model.simulation.validity import (
     button_note,
     flight_note,
     guard_notes,
+    is_curved,
     ledger_note,
     numerical_note,
     rate_note,
@@ -81,7 +82,8 @@ class Warnings:
                 yield "barrier", text
         for text in ledger_note(motion.residual(), motion.solver.name):
             yield "ledger", text
-        for text in numerical_note(motion.numerical(), motion.solver.name):
+        by_lines = is_curved(motion.scene)
+        for text in numerical_note(motion.numerical(), motion.solver.name, by_lines):
             yield "numerical", text
         for text in guard_notes(motion.solver.statistics(motion._state)):
             yield "guards", text

@@ -90,7 +90,8 @@ def _of_state(base, notes):
     if not abs(share) <= (MOST_MAP_RESIDUAL if is_map else MOST_RESIDUAL):
         _tell(base, notes, Note.MAP_LEDGER if is_map else Note.LEDGER, share, 0.0)
     taken = numerical(reading)
-    least = LEAST_BY_LINES if head.kind == Kind.RIGID else LEAST_NUMERICAL
+    by_lines = head.kind == Kind.RIGID and head.exponent > 1.0
+    least = LEAST_BY_LINES if by_lines else LEAST_NUMERICAL
     if not taken >= (-MOST_MAP_RESIDUAL if is_map else least):
         _tell(base, notes, Note.GIVES_ENERGY, taken, 0.0)
     elif taken > MOST_NUMERICAL:

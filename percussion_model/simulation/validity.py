@@ -43,9 +43,14 @@ def ledger_note(residual: float, solver: str) -> Iterator[str]:
         )
 
 
-def numerical_note(share: float, solver: str) -> Iterator[str]:
-    """Say that the discretisation took too much of the energy put in, or gave some."""
-    least = {"blow-map": -MOST_MAP_RESIDUAL, "rigid": LEAST_BY_LINES}.get(solver, LEAST_NUMERICAL)
+def numerical_note(share: float, solver: str, by_lines: bool = False) -> Iterator[str]:
+    """Say that the discretisation took too much of the energy put in, or gave some.
+
+    `by_lines`: whether the force of the rock is curved, which rigid bodies follow by lines.
+    """
+    least = -MOST_MAP_RESIDUAL if solver == "blow-map" else LEAST_NUMERICAL
+    if solver == "rigid" and by_lines:
+        least = LEAST_BY_LINES
     if not share >= least:
         yield (
             f"numerical is {share:.2g} of the energy put in: the discretisation gives energy, "
@@ -77,6 +82,11 @@ def guard_notes(statistics: Mapping[str, int]) -> Iterator[str]:
             f"{storms} storm{'s' if storms != 1 else ''} of events: more within a moment than can "
             "mean anything; rebounds were left out or events postponed: bounded but not exact"
         )
+
+
+def is_curved(scene: Scene) -> bool:
+    """Whether the force of the rock is no straight line of the penetration."""
+    return scene.effects.rock == "power" and scene.rock.loading_exponent > 1.0
 
 
 def stiffness_at(scene: Scene, force: float, loading_stiffness: float) -> float:

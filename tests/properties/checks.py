@@ -30,8 +30,6 @@ MOST_GIVE = 1e100
 # Events of one step: crossings of the rock, two of the contact, one of the drive, one
 # of the barrier (`percussion_model.solvers.wave.advance.EVENTS_A_STEP`).
 EVENTS_A_STEP = 36
-# A bar that rings may put off a closure for which a step was cut; the next is cut for it again.
-CUTS_A_CLOSURE = 2
 # Steps of the modal solver are halved down to the tick of an event, or of a call. It searches so
 # many ahead for the next event, and a call leaves it to search again.
 PIECES, AHEAD = STEP + 1, LONGEST >> STEP
@@ -238,26 +236,12 @@ def check_momentum(watch: Watch, seen: dict[str, np.ndarray]) -> None:
     if "feed_force" not in case.changes:
         push = feed + m_b * weight
         parts = (m_b * (seen["bit_velocity"] - seen["bit_velocity"][0]), -push * t, -contact, rock)
-        slack = abs(push) * late + rounding_of_penalty(watch, seen)
-        check_sum(parts, m_b * np.abs(seen["bit_velocity"]).max(), slack, "bit")
+        check_sum(parts, m_b * np.abs(seen["bit_velocity"]).max(), abs(push) * late, "bit")
     if scene.piston.model != "absent":
         push = m_p * weight
         parts = (m_p * (seen["piston_velocity"] - seen["piston_velocity"][0]), -push * t)
         parts += (contact, -drive)
-        slack = abs(push) * late + rounding_of_penalty(watch, seen)
-        check_sum(parts, m_p * np.abs(seen["piston_velocity"]).max(), slack, "piston")
-
-
-def rounding_of_penalty(watch: Watch, seen: dict[str, np.ndarray]) -> float:
-    """Impulse that the last digit of positions makes of a penalty, by chance in each step [N s].
-
-    Some 1e-12 N s where a bit stays near the rock; elements far away have fewer digits for a gap.
-    """
-    if watch.case.scene.solver_name != "fem":
-        return 0.0
-    reach = np.abs(seen["bit_end_position"]).max()
-    steps, dt = watch.simulation.statistics()["steps"], watch.simulation.solver.time_step
-    return watch.case.scene["fem.contact_stiffness"] * np.spacing(reach) * dt * np.sqrt(steps)
+        check_sum(parts, m_p * np.abs(seen["piston_velocity"]).max(), abs(push) * late, "piston")
 
 
 def check_sum(parts: tuple[np.ndarray, ...], scale: float, slack: float, what: str) -> None:
@@ -295,13 +279,10 @@ def check_events(events: np.ndarray, scene: Any) -> None:
 
 
 def cuts_of(simulation: Simulation) -> int:
-    """How often steps may be cut: before each blow, or each closure (docs/numerics.md, 6)."""
+    """How often steps may be cut: once before each blow, or each closure (docs/numerics.md, 6)."""
     if getattr(simulation.solver, "place_of_closure", 0.0) < WIDE:
-        closures = len(simulation.blows)
-    else:
-        closures = np.count_nonzero(simulation.events["kind"] == EventKind.CONTACT_CLOSED)
-    # blows and events are those that are over: one more is under way, or near
-    return CUTS_A_CLOSURE * (int(closures) + 1) if simulation.solver.name == "wave" else 0
+        return len(simulation.blows)
+    return int(np.count_nonzero(simulation.events["kind"] == EventKind.CONTACT_CLOSED))
 
 
 def check_effort(counts: dict[str, int], simulation: Simulation, case: Case) -> None:
