@@ -42,12 +42,6 @@ def first_end(par):
 
 
 @kernel
-def line_end(par, line):
-    """Penetration at which a line ends [m]."""
-    return first_end(par) * exp(line * math.log(RATIO))
-
-
-@kernel
 def take_line(par, s):
     """Move on a line from the present penetration on.
 
@@ -63,12 +57,11 @@ def take_line(par, s):
         s.line_stiffness, s.line_origin = s.reload_stiffness, s.reload_from
         s.line_end = s.reload_to
         return
-    part = loading_part(par, s, a)
-    line = 0
-    if part > (1.0 - CLOSE) * first_end(par):
-        place = log(part / first_end(par)) / math.log(RATIO)
+    part, first, line = loading_part(par, s, a), first_end(par), 0
+    if part > (1.0 - CLOSE) * first:
+        place = log(part / first) / math.log(RATIO)
         line = min(int(place + 1.0 + CLOSE / math.log(RATIO)), MOST_LINES)
-    way = line_end(par, line) - part
+    way = first * exp(line * math.log(RATIO)) - part
     b = min(a + (way / CHIPPING_SLOPE if is_chipping(par, s, a) else way), kink)
     s.line_stiffness = (loading_force(par, s, b) - loading_force(par, s, a)) / (b - a)
     mean = (loading_work(par, s, b) - loading_work(par, s, a)) / (b - a)
