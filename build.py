@@ -208,7 +208,7 @@ def test(extra: list[str]) -> int:
             codes.append(kernels.result())
         # pytest comes last, so that its closing line ends the output; it tells how far it is.
         print("== pytest", flush=True)
-        codes.append(call([tool("pytest"), "-n", "2", "--dist", "loadgroup", *extra], **variables))
+        codes.append(call([tool("pytest"), "-n", "2", *extra], **variables))
     return next((code for code in codes if code), 0)
 
 

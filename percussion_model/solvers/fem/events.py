@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from percussion_model.physics.kernel import inlined, kernel, merged
 from percussion_model.physics.records import DriveKind, Mode, RockKind
-from percussion_model.physics.rock import REST_VELOCITY, damping, origin, stiffness
+from percussion_model.physics.rock import REST_VELOCITY, damping, is_loading, origin, stiffness
 from percussion_model.solvers.fem.bars import relative_motion
 from percussion_model.solvers.fem.records import Column, Mesh, Node, Probe
 from percussion_model.solvers.fem.scheme import acceleration, try_step
@@ -108,8 +108,14 @@ def fill_values(par, s, w, x, h, q, column):
         q[Probe.CONTACT, column] = contact_value(par, s, x)
         q[Probe.DRIVE, column] = drive_value(par, s, s.next_p - s.next_b)
     work = dashpot_work(par, s, x, w, h) if s.mode == Mode.DFC else 0.0
-    q[Probe.ROCK, column] = rock_value(par, s, x[Node.U, last], x[Node.V, last], work)
-    q[Probe.TURN, column] = turn_value(par, s, x[Node.V, last], s.next_kinetic)
+    p, v = x[Node.U, last], x[Node.V, last]
+    q[Probe.ROCK, column] = rock_value(par, s, p, v, work)
+    # an end that came back has turned within the step, however it moves at its end
+    if is_loading(s):
+        mean = (p - s.p) / h
+        if mean < 0.0 < v:
+            v = mean
+    q[Probe.TURN, column] = turn_value(par, s, v, s.next_kinetic)
 
 
 @merged
