@@ -17,7 +17,7 @@ from percussion_model.solvers.fem.bars import (
     stored_energy,
 )
 from percussion_model.solvers.fem.events import end_of_step
-from percussion_model.solvers.fem.modes import change_modes
+from percussion_model.solvers.fem.modes import change_modes, keep_near
 from percussion_model.solvers.fem.records import FemTask
 from percussion_model.solvers.fem.step import bit_force, contact_force, note_forces, take_step
 
@@ -72,6 +72,7 @@ def advance_to(par, s, elements, time, whole, blows, events):
         h = end_of_step(par, s, elements, h)
         take_step(par, s, w, c, x, h)
         change_modes(par, s, w, c, blows, events)
+        keep_near(par, s, w)
         if h < tried:
             guard_events(par, s)
         note_forces(par, s)  # a dashpot may have come in

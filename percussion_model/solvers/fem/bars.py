@@ -113,7 +113,7 @@ def dissipated_in_nodes(par, w):
 def read_nodes(par, s, w):
     """Derive from nodes and sums what the modes look at: gap, penetration, mean motion."""
     last = par.n_p + par.n_b - 1
-    s.p = w[Node.U, last]
+    s.p = w[Node.U, last] + s.far
     s.v_end = w[Node.V, last]
     if par.n_p > 0:
         s.gap = w[Node.U, par.n_p] - w[Node.U, par.n_p - 1]
@@ -127,9 +127,9 @@ def read_nodes(par, s, w):
 @inlined
 def read_ahead(par, s, a, c):
     """Derive sums over the nodes of `a` that are the state's to come."""
-    s.next_b = moment(c, a, Node.U, par.n_p, par.n_b) / par.mass_b
+    s.next_b = moment(c, a, Node.U, par.n_p, par.n_b) / par.mass_b + s.far
     if par.n_p > 0:
-        s.next_p = moment(c, a, Node.U, 0, par.n_p) / par.mass_p
+        s.next_p = moment(c, a, Node.U, 0, par.n_p) / par.mass_p + s.far
     if s.mode == Mode.SS:
         s.next_kinetic = kinetic_energy(c, a, par.n_p, par.n_b)
 

@@ -108,7 +108,7 @@ def fill_values(par, s, w, x, h, q, column):
         q[Probe.CONTACT, column] = contact_value(par, s, x)
         q[Probe.DRIVE, column] = drive_value(par, s, s.next_p - s.next_b)
     work = dashpot_work(par, s, x, w, h) if s.mode == Mode.DFC else 0.0
-    p, v = x[Node.U, last], x[Node.V, last]
+    p, v = x[Node.U, last] + s.far, x[Node.V, last]
     q[Probe.ROCK, column] = rock_value(par, s, p, v, work)
     # an end that came back has turned within the step, however it moves at its end
     if is_loading(s):

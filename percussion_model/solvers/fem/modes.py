@@ -15,7 +15,7 @@ from percussion_model.physics.blows import (
     starts_blow,
 )
 from percussion_model.physics.drive import switch_drive
-from percussion_model.physics.kernel import kernel, merged
+from percussion_model.physics.kernel import inlined, kernel, merged
 from percussion_model.physics.records import Mode, RockKind
 from percussion_model.physics.rock import (
     close_interface,
@@ -29,6 +29,10 @@ from percussion_model.physics.rock import (
 )
 from percussion_model.solvers.fem.bars import bit_position, kinetic_energy, read_means
 from percussion_model.solvers.fem.records import Node
+
+# Nodes are counted from the datum of the drilling cycle nearer than this, and from where the
+# rock end was when it was further than that from where they are counted [m].
+NEAR, FAR = 0.5, 1.0
 
 
 @merged
@@ -117,17 +121,39 @@ def change_rock(par, s, w, c):
     return leave_by_velocity(par, s, v, energy)
 
 
+@inlined
+def shift_nodes(par, w, shift, end):
+    """Move all nodes, the rock end to `end`."""
+    last = par.n_p + par.n_b - 1
+    for i in range(last):
+        w[Node.U, i] += shift
+    w[Node.U, last] = end
+
+
 @merged
 def move_datum(par, s, w):
     """Count the nodes from the datum of the drilling cycle that has begun."""
-    last = par.n_p + par.n_b - 1
-    shift = s.p - w[Node.U, last]
+    shift = s.p - (w[Node.U, par.n_p + par.n_b - 1] + s.far)
     if shift != 0.0:
-        for i in range(last):
-            w[Node.U, i] += shift
-        w[Node.U, last] = s.p
+        shift_nodes(par, w, shift + s.far, s.p)
+        s.far = 0.0
         s.mean_p += shift
         s.mean_b += shift
+
+
+@merged
+def keep_near(par, s, w):
+    """Count the nodes of a bit far from the rock from where it is.
+
+    A stiff contact turns the rounding of a large displacement into a force.
+    """
+    here = w[Node.U, par.n_p + par.n_b - 1]
+    if s.far != 0.0 and abs(s.p) < NEAR:
+        shift_nodes(par, w, s.far, s.p)
+        s.far = 0.0
+    elif abs(here) > FAR:
+        shift_nodes(par, w, -here, 0.0)
+        s.far = s.p
 
 
 @kernel

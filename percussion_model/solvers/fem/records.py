@@ -144,6 +144,7 @@ FEM_STATE = np.dtype(
         ("kinetic", "f8"),  # energy of the bit while it stands still [J]
         ("mean_p", "f8"),  # mean displacements from the datum [m]
         ("mean_b", "f8"),
+        ("far", "f8"),  # of these and of the penetration, what the nodes do not have [m]
         ("next_kinetic", "f8"),  # the same three at the end of the step tried last
         ("next_p", "f8"),
         ("next_b", "f8"),

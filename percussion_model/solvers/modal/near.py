@@ -137,8 +137,8 @@ def touching(par, s, bars, ticks, h, v_p):
     contact = par.mass_p * (s.a_p + (v_p - then) / h)
     age = s.time + ticks - s.closed_at
     touch = contact if age < RINGING * WHOLE else par.mass_p * s.a_p - found.pull
-    # not at once
-    parts = touch < 0.0 and (age > 0 or h > par.tick)
+    # by the mean as well, since the force may have dipped between looks; not at once
+    parts = (touch < 0.0 or contact < 0.0) and (age > 0 or h > par.tick)
     return found.piston, then, contact, touch, parts
 
 

@@ -30,6 +30,8 @@ from percussion_model.solvers.setup import (
     rock_numbers,
 )
 
+# Longest step in half periods of the highest mode; one above would miss how the rock end turns.
+LONGEST_STEP = 1.5
 MOST_TICKS = 2.0**62  # that a number of a record holds
 
 
@@ -82,13 +84,39 @@ class Tables(NamedTuple):
 
 
 @plain
+def step_for(numbers, piston_mass, highest, coarsest):
+    """Step in which no mode goes far: few modes are rounded up to many more.
+
+    Parameters
+    ----------
+    piston_mass : float
+        0 where there is none [kg].
+    highest : float
+        Angular frequency up to which there are modes, before they are rounded up [rad/s].
+    coarsest : float
+        Step that this frequency asks for; halved until it is short enough [s].
+    """
+    piston = elastic_piston(numbers)
+    n_bit, n_piston, _ = mode_counts(numbers.bit, piston, piston_mass, highest)
+    least = bar_transit_time(numbers.bit) / n_bit
+    if n_piston > 0:
+        least = min(least, bar_transit_time(piston) / n_piston)
+    step = coarsest
+    while step > LONGEST_STEP * least:
+        step *= 0.5
+    return step
+
+
+@plain
 def fill_modal_parameters(p, numbers):
     """Fill a MODAL_PAR record; a `Request` for its tables."""
     fill_parameters(p, numbers, True)
     elastic = PISTONS[numbers.values.piston_model] == Piston.ELASTIC
     first = bar_transit_time(numbers.piston if elastic else numbers.bit)
     eta, rock = kelvin_voigt_time(numbers), rock_numbers(numbers)
-    dt = first / asked_modes(numbers)
+    coarsest = first / asked_modes(numbers)
+    highest = math.pi / coarsest
+    dt = step_for(numbers, p["mass_p"], highest, coarsest)
     tick = dt / (1 << STEP)
     p["eta"], p["dt"], p["tick"] = eta, dt, tick
     # a period of the highest of few modes; a rigid piston pushes hardest at once
@@ -108,7 +136,7 @@ def fill_modal_parameters(p, numbers):
     bilinear = p["rock"] == RockKind.BILINEAR
     loading = rock.k_r if bilinear or p["rock"] == RockKind.SPRING else 0.0
     springs = (loading, rock.gamma * rock.k_r if bilinear else 0.0)
-    return Request(p["mass_p"], springs, rock.c_r, math.pi / dt, eta, tick)
+    return Request(p["mass_p"], springs, rock.c_r, highest, eta, tick)
 
 
 @plain

@@ -247,7 +247,9 @@ def go_on(par, s, bars, most, near, blows, events):
             continue
         flip = False
         if piston and s.parked == 0:
-            flip = trial.touch < 0.0 if s.closed == 1 else trial.gap < 0.0
+            flip = trial.gap < 0.0
+            if s.closed == 1:  # by the mean as well, since the force may have dipped within
+                flip = trial.touch < 0.0 or trial.contact < 0.0
         # the barrier is passed within, and left at the next step
         bursts = stands and overcomes_barrier(par, s, bit_kinetic(s, bars, bars.rows))
         ends = passed(par, s, s.p + trial.path, trial.ends.speed, trial.work, trial.last)
