@@ -32,7 +32,7 @@ from percussion_model.solvers.fem.records import Node
 
 # Nodes are counted from the datum of the drilling cycle nearer than this, and from where the
 # rock end was when it was further than that from where they are counted [m].
-NEAR, FAR = 0.5, 1.0
+NEAR, FAR = 0.01, 0.02
 
 
 @merged

@@ -30,7 +30,7 @@ from percussion_model.solvers.setup import (
     rock_numbers,
 )
 
-# Longest step in half periods of the highest mode; one above would miss how the rock end turns.
+# Longest step in half periods of the highest mode: a longer one missed that the rock end turned.
 LONGEST_STEP = 1.5
 MOST_TICKS = 2.0**62  # that a number of a record holds
 
@@ -84,25 +84,19 @@ class Tables(NamedTuple):
 
 
 @plain
-def step_for(numbers, piston_mass, highest, coarsest):
-    """Step in which no mode goes far: few modes are rounded up to many more.
+def halved_for(first, modes, step):
+    """Halve a step until few modes, rounded up to more, go no further in it.
 
     Parameters
     ----------
-    piston_mass : float
-        0 where there is none [kg].
-    highest : float
-        Angular frequency up to which there are modes, before they are rounded up [rad/s].
-    coarsest : float
-        Step that this frequency asks for; halved until it is short enough [s].
+    first : float
+        Transit time of the bar that has the modes [s].
+    modes : int
+        As many as it has.
+    step : float
+        That as many as it was asked for need [s].
     """
-    piston = elastic_piston(numbers)
-    n_bit, n_piston, _ = mode_counts(numbers.bit, piston, piston_mass, highest)
-    least = bar_transit_time(numbers.bit) / n_bit
-    if n_piston > 0:
-        least = min(least, bar_transit_time(piston) / n_piston)
-    step = coarsest
-    while step > LONGEST_STEP * least:
+    while step * modes > LONGEST_STEP * first:
         step *= 0.5
     return step
 
@@ -114,9 +108,10 @@ def fill_modal_parameters(p, numbers):
     elastic = PISTONS[numbers.values.piston_model] == Piston.ELASTIC
     first = bar_transit_time(numbers.piston if elastic else numbers.bit)
     eta, rock = kelvin_voigt_time(numbers), rock_numbers(numbers)
-    coarsest = first / asked_modes(numbers)
-    highest = math.pi / coarsest
-    dt = step_for(numbers, p["mass_p"], highest, coarsest)
+    longest = first / asked_modes(numbers)
+    highest = math.pi / longest
+    n_bit, n_piston, _ = mode_counts(numbers.bit, elastic_piston(numbers), 0.0, highest)
+    dt = halved_for(first, n_piston if elastic else n_bit, longest)
     tick = dt / (1 << STEP)
     p["eta"], p["dt"], p["tick"] = eta, dt, tick
     # a period of the highest of few modes; a rigid piston pushes hardest at once

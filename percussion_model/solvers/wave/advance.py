@@ -103,7 +103,14 @@ def commit_to(par, s, bars, ops, scratch, time):
 
 @merged
 def read_at(par, s, bars, time, blows, events, row):
-    """Read the ledger at the grid point, then let the ends meet up to `time` and read the rest."""
+    """Read the ledger at the grid point, then let the ends meet up to `time` and read the rest.
+
+    Returns
+    -------
+    bool
+        False where the step was cut before: read again, from there.
+    """
+    begin = s.step
     kinetic, elastic, rock = stored_energy(par, s, bars)
     fill_ledger(s, row, kinetic, elastic, rock)
     row.e_loss += lost_in_faces(par, bars)
@@ -119,6 +126,10 @@ def read_at(par, s, bars, time, blows, events, row):
     if at_grid_point:  # nothing has moved in that instant
         fill_motion(par, s, row, time, s.u_r - s.u_start + before, before)
     step(par, s, bars, tau, blows, events)
+    if s.step > begin:
+        s.i_bit += bit
+        s.i_contact += contact
+        return False
     if at_grid_point:
         row.drilling_mode = s.mode
     else:
@@ -126,6 +137,7 @@ def read_at(par, s, bars, time, blows, events, row):
         fill_motion(par, s, row, time, s.u_r - s.u_start + here, here)
     row.bit_end_velocity = bars.wb[Row.FACE, par.n_b]
     fill_forces(s, row, tau, bit, contact, at_grid_point)
+    return True
 
 
 @kernel
@@ -162,7 +174,8 @@ def run(task, par_, state, bars_, ops_, scratch_, time, blows, events, reading):
     commit_to(par, s, bars, ops, scratch, time)
     if task == Task.READ:
         s.live = 0
-        read_at(par, s, bars, time, blows, events, reading[0])
+        while not read_at(par, s, bars, time, blows, events, reading[0]):
+            pass
     return Status.DONE
 
 

@@ -176,20 +176,20 @@ def meet_piston(par, s, bars, v_p, v_t, in_p, in_t, peak, tau, time, blows, even
 
 @merged
 def time_to_cut(par, s, approach, tau, time):
-    """Time at which to end the step for a closure to come, `tau` for the whole [s].
+    """Time at which to end the step for a closure to come, `tau` where it comes later [s].
 
     The next step then has the closure at `par.front` of its time. A cut mixes the
     waves of both bars: with little loss these ring with sharp fronts between the
     contacts of a blow, and only the quiet before a blow is cut.
     """
-    if s.live == 0 or s.closed == 1 or approach <= 0.0:
+    if s.closed == 1 or approach <= 0.0:
         return tau
-    reach = s.gap / approach - par.front * tau
-    if reach < SHORTEST_PART * tau or reach > (1.0 - SHORTEST_PART) * tau:
+    reach = s.gap / approach - par.front * par.dt
+    if reach < SHORTEST_PART * par.dt or reach > (1.0 - SHORTEST_PART) * par.dt:
         return tau
     if par.front < WIDE and not starts_blow(par, s, time + reach):
         return tau
-    return reach
+    return min(reach, tau)
 
 
 @merged

@@ -81,7 +81,7 @@ def step(par, s, bars, dt, blows, events):
     """Advance the state by one step of the transit time of a cell.
 
     A copy that is only read (s.live = 0) moves on by `dt` of a step: what its
-    ends meet, not the waves in its bars.
+    ends meet, not the waves in its bars. Where the step is cut before, it is made.
     """
     r = 2 * s.parity
     alpha = s.alpha
@@ -89,9 +89,9 @@ def step(par, s, bars, dt, blows, events):
     contact_before = s.i_contact
     push = drive_force(par, s)
     top, bottom, top_p, bottom_p, tau = meet(par, s, bars, dt, blows, events)
-    if s.live == 0:
+    if s.live == 0 and tau == dt:
         return
-    short = tau < dt
+    short = tau < par.dt
     loss_before = 0.0
     if short:
         loss_before = lost_in_faces(par, bars)
