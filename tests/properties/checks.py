@@ -13,6 +13,7 @@ from percussion_model.physics.records import SAMPLE_FIELDS, EventKind, Mode
 from percussion_model.solvers.modal.leaps import LONGEST
 from percussion_model.solvers.modal.records import STEP
 from percussion_model.solvers.wave.ends import WIDE
+from percussion_model.solvers.wave.records import MOST_CUTS
 from tests.properties.scenes import Case
 from tests.state_bits import run_bits
 
@@ -279,10 +280,11 @@ def check_events(events: np.ndarray, scene: Any) -> None:
 
 
 def cuts_of(simulation: Simulation) -> int:
-    """How often steps may be cut: once before each blow, or each closure (docs/numerics.md, 6)."""
+    """How often steps may be cut: twice before each blow, or each closure (docs/numerics.md, 6)."""
     if getattr(simulation.solver, "place_of_closure", 0.0) < WIDE:
-        return len(simulation.blows)
-    return int(np.count_nonzero(simulation.events["kind"] == EventKind.CONTACT_CLOSED))
+        return MOST_CUTS * len(simulation.blows)
+    closures = np.count_nonzero(simulation.events["kind"] == EventKind.CONTACT_CLOSED)
+    return MOST_CUTS * int(closures)
 
 
 def check_effort(counts: dict[str, int], simulation: Simulation, case: Case) -> None:

@@ -110,11 +110,10 @@ def fill_values(par, s, w, x, h, q, column):
     work = dashpot_work(par, s, x, w, h) if s.mode == Mode.DFC else 0.0
     p, v = x[Node.U, last] + s.far, x[Node.V, last]
     q[Probe.ROCK, column] = rock_value(par, s, p, v, work)
-    # an end that came back has turned within the step, however it moves at its end
-    if is_loading(s):
-        mean = (p - s.p) / h
-        if mean < 0.0 < v:
-            v = mean
+    # an end that came back has turned within the step, however it moves at its end: that is far
+    # past the event, not within its tolerance
+    if is_loading(s) and p < s.p and v > 0.0:
+        v = -(abs(s.v_end) + v)
     q[Probe.TURN, column] = turn_value(par, s, v, s.next_kinetic)
 
 

@@ -30,7 +30,7 @@ from percussion_model.solvers.wave.bar import (
 )
 from percussion_model.solvers.wave.contact import bar_contact, mass_contact
 from percussion_model.solvers.wave.loss import finish_loss, loss_substeps, smooth_cells
-from percussion_model.solvers.wave.records import Row
+from percussion_model.solvers.wave.records import MOST_CUTS, Row
 from percussion_model.solvers.wave.rock_end import asks_for_energy, rock_step
 from percussion_model.solvers.wave.totals import bit_position, time_of
 
@@ -106,6 +106,7 @@ def record_contact(par, s, wb, cb, opened, t_close, approach, peak, time, tau, b
         open_gap(s, events, time, approach)
     if t_close >= 0.0:
         closure = time + t_close
+        s.cuts = 0
         if starts_blow(par, s, closure):
             r = 2 * s.parity
             here = bit_position(s, wb, cb, par.n_b, r) + s.v_b * t_close
@@ -182,7 +183,7 @@ def time_to_cut(par, s, approach, tau, time):
     waves of both bars: with little loss these ring with sharp fronts between the
     contacts of a blow, and only the quiet before a blow is cut.
     """
-    if s.closed == 1 or approach <= 0.0:
+    if s.closed == 1 or approach <= 0.0 or s.cuts >= MOST_CUTS:
         return tau
     reach = s.gap / approach - par.front * par.dt
     if reach < SHORTEST_PART * par.dt or reach > (1.0 - SHORTEST_PART) * par.dt:

@@ -166,6 +166,9 @@ WAVE_PAR = np.dtype(
     align=True,
 )
 
+# Steps that are cut for a closure which the bars put off.
+MOST_CUTS = 2
+
 WAVE_STATE = np.dtype(
     [
         ("step", "i8"),  # number of steps done
@@ -178,6 +181,7 @@ WAVE_STATE = np.dtype(
         ("wake", "i8"),  # step before which it can meet nothing
         ("no_dormancy", "i8"),  # do not let it wait before this step
         ("parity", "i8"),  # which pair of wave rows is the present one (0 or 1)
+        ("cuts", "i8"),  # steps cut for a closure that has not come yet
         ("count_wakes", "i8"),
         ("count_leaps", "i8"),
         ("count_leap_steps", "i8"),
@@ -205,6 +209,7 @@ WAVE_LIMITS = Limits(
         "wake": (-MOST, MOST),
         "no_dormancy": (-MOST, MOST),
         "parity": FLAG,
+        "cuts": (0, MOST_CUTS),
         "count_wakes": COUNT,
         "count_leaps": COUNT,
         "count_leap_steps": COUNT,

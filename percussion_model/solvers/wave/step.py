@@ -102,6 +102,7 @@ def step(par, s, bars, dt, blows, events):
         outer_waves(par, bars.wp, bars.cp, par.n_p, r, top_p, bottom_p, z_t, z_b)
     given = piston_acceleration(par, push) * tau
     if short:
+        s.cuts += 1
         shorten_step(par, s, bars, tau, loss_before, push, given, s.v_b - v_b)
     if alpha != s.alpha and par.piston == Piston.ELASTIC:
         # what the waves got is the old force over the whole step
