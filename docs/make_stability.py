@@ -12,7 +12,7 @@ from pathlib import Path
 
 from percussion_model.interface.plotting.stability_dots import draw_stability
 from percussion_model.interface.plotting.style import save_figures
-from percussion_model.interface.terminal import count_bar
+from percussion_model.interface.progress import count_bar
 from percussion_model.verification.hard_cases import Collection, run_collection
 from percussion_model.verification.hard_cases.stability_page import page, verdict
 

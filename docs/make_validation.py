@@ -9,7 +9,7 @@ from pathlib import Path
 
 from percussion_model.interface.plotting.style import save_figures
 from percussion_model.interface.plotting.validation import draw_all
-from percussion_model.interface.terminal import count_bar
+from percussion_model.interface.progress import count_bar
 from percussion_model.verification.measured import Comparison, compare, load, wanted
 from percussion_model.verification.measured.table import NOTES, markdown
 

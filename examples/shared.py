@@ -14,8 +14,7 @@ from matplotlib.figure import Figure
 
 from percussion_model.interface.commands.common import end_script
 from percussion_model.interface.plotting import style
-from percussion_model.interface.progress import Report
-from percussion_model.interface.terminal import progress
+from percussion_model.interface.progress import Report, progress
 from percussion_model.simulation.files import staged, staged_text, to_json
 from percussion_model.simulation.origin import Claim
 

@@ -16,7 +16,7 @@ import numpy as np
 from fmu_src.archive import content, state_of
 from fmu_src.hammer.build import build_hammer, refuse_other
 from fmu_src.run import run_fmu
-from percussion_model.interface.terminal import progress
+from percussion_model.interface.progress import progress
 from percussion_model.scene.presets import scene_presets
 from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.simulation.simulate import simulate

@@ -19,7 +19,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from percussion_model.interface.terminal import progress
+from percussion_model.interface.progress import progress
 from percussion_model.simulation.files import staged_text
 
 from .drawing import in_style, save_png

@@ -15,8 +15,8 @@ from rich.table import Table
 
 from percussion_model.coupling import CoupledRun, Coupling, CouplingError
 from percussion_model.interface.messages import wrapped
+from percussion_model.interface.progress import progress, progress_bar
 from percussion_model.interface.tables import print_table
-from percussion_model.interface.terminal import progress, progress_bar
 from percussion_model.simulation.files import staged_text
 from percussion_model.simulation.uncertain import in_digits
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from percussion_model.coupling import Coupling
 from percussion_model.coupling.coupled_run import known_signals, summary
-from percussion_model.interface.terminal import progress
+from percussion_model.interface.progress import progress
 from percussion_model.simulation.uncertain import change_text, with_error
 from percussion_model.verification.accuracy.orders import Order, fitted_order
 

@@ -22,7 +22,7 @@ from fmpy.fmi2 import (
 )
 
 from percussion_model.coupling.component import COMPILING, WARNING
-from percussion_model.interface.terminal import progress
+from percussion_model.interface.progress import progress
 
 from . import results
 from .drawing import in_style, save_png, stacked

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from percussion_model.coupling import CoupledRun, Coupling
-from percussion_model.interface.terminal import progress
+from percussion_model.interface.progress import progress
 from percussion_model.simulation.files import staged_text
 from percussion_model.simulation.uncertain import change_text
 

@@ -16,8 +16,8 @@ import numpy as np
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
+from percussion_model.interface.progress import progress
 from percussion_model.interface.tables import print_table
-from percussion_model.interface.terminal import progress
 from percussion_model.scene.hammers import hammer
 from percussion_model.simulation.uncertain import in_digits
 

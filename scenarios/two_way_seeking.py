@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from percussion_model.coupling import CoupledRun, Coupling
-from percussion_model.interface.terminal import progress
+from percussion_model.interface.progress import progress
 from percussion_model.simulation.uncertain import with_error
 
 from .drawing import in_style, save_png

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from percussion_model.interface import terminal
+from percussion_model.interface import progress
 from percussion_model.interface.cli import BAD_INPUT, INTERRUPTED, _guarded, app
 from percussion_model.interface.commands import common
 from percussion_model.interface.commands.common import print_message
@@ -177,7 +177,7 @@ def test_explain_promises_runs_for_the_error_only_where_there_are_any(percussion
 
 @pytest.mark.parametrize("command", ["explain", "settled"])
 def test_a_bar_shows_what_a_command_waits_for(percussion, command, monkeypatch):
-    monkeypatch.setattr(terminal, "_PATIENCE", 0.0)
+    monkeypatch.setattr(progress, "_PATIENCE", 0.0)
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
     monkeypatch.setenv("TTY_COMPATIBLE", "1")
     module = importlib.import_module("percussion_model.analysis.cost")
@@ -436,7 +436,6 @@ def test_other_errors_of_the_system_stay_what_they_are(percussion, monkeypatch):
 TALKING = """
 import contextlib, sys
 import percussion_model.interface.progress as progress
-import percussion_model.interface.terminal as terminal
 progress.EVERY = 3600.0  # no lines but those of this test
 told = []
 
@@ -451,7 +450,7 @@ report.stage = lambda name, end: None
 def talk(end):
     yield report
 
-terminal.progress_bar = talk
+progress.progress_bar = talk
 from percussion_model.interface.cli import main
 main()
 """

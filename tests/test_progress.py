@@ -19,7 +19,7 @@ from fitting_data import noisy_curve
 from percussion_model import Scene, simulate
 from percussion_model.interface import progress
 from percussion_model.interface.cli import BAD_INPUT, INTERRUPTED, _guarded, app
-from percussion_model.interface.terminal import RunProgress, progress_bar
+from percussion_model.interface.progress import RunProgress, progress_bar
 from percussion_model.scene.solver_names import counted
 from percussion_model.simulation.accuracy_control import planned_cells
 from percussion_model.solvers.base import Solver

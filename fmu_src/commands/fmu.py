@@ -68,7 +68,7 @@ def write_hammer(
     """Write the FMU of a scene and say so; the parameters are those of `fmu`."""
     from fmu_src.archive import content, state_of
     from fmu_src.hammer.build import about_hammer, build_hammer, hammer_name, refuse_other
-    from percussion_model.interface.terminal import progress
+    from percussion_model.interface.progress import progress
 
     file, chosen = options.baked_scene(scene, scene_option, rock)
     names = None if platforms is None else _export_platforms(platforms)
@@ -118,7 +118,7 @@ def _export_platforms(words: str) -> dict[str, str]:
 def _libraries(names: dict[str, str] | None) -> dict[str, bytes]:
     """Libraries for platforms; for this one, if there is a compiler, where none are named."""
     from fmu_src.native.library import COMPILING, libraries, library_here
-    from percussion_model.interface.terminal import progress
+    from percussion_model.interface.progress import progress
 
     with progress(COMPILING):
         return library_here() if names is None else libraries(names)
@@ -126,7 +126,7 @@ def _libraries(names: dict[str, str] | None) -> dict[str, bytes]:
 
 def _write_reference(path: Path) -> None:
     from fmu_src.reference import write_reference
-    from percussion_model.interface.terminal import progress
+    from percussion_model.interface.progress import progress
 
     with progress("running the FMU; the first run compiles"):
         files = write_reference(path)

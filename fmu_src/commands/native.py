@@ -39,7 +39,7 @@ def native(
         from fmu_src.native.build import build_native, native_files
         from fmu_src.native.library import COMPILING, libraries, platform_names
         from fmu_src.slave.native import this_platform
-        from percussion_model.interface.terminal import progress
+        from percussion_model.interface.progress import progress
 
         if output.suffix == ".fmu":
             raise common.refusal(

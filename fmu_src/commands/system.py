@@ -33,7 +33,7 @@ def system(
         from fmu_src.archive import content, state_of
         from fmu_src.native.library import COMPILING, library_here
         from fmu_src.system.archive import build_fmus, find_plan, plans, write_system
-        from percussion_model.interface.terminal import progress
+        from percussion_model.interface.progress import progress
 
         common.load_numba()
         problems = 0

@@ -1,4 +1,4 @@
-"""Progress of a long command as lines on stderr, where that is no terminal."""
+"""Progress of a long command on stderr: a bar in a terminal, else lines."""
 
 from __future__ import annotations
 
@@ -22,6 +22,9 @@ EVEN = 1.5
 SAME_PLACE = 1e-3
 # Shorter times that are left are no number: they are as long as those between lines [s].
 A_FEW = 3.0
+
+# What ends sooner shows no bar [s].
+_PATIENCE = 2.0
 
 # Takes what is being done, and the share that is done of it; None where that is not known.
 Report = Callable[[str, float | None], None]
@@ -164,3 +167,117 @@ def _print(told: Lines, over: threading.Event, said: list[float]) -> None:
             print(told.line(), file=sys.stderr, flush=True)
         except (OSError, ValueError):
             return  # nobody reads it any more
+
+
+class RunProgress:
+    """Progress of a run, or of several one after the other.
+
+    Parameters
+    ----------
+    report : Report
+    end : float
+        Simulated time of the whole [s].
+    """
+
+    def __init__(self, report: Report, end: float) -> None:
+        self.report = report
+        self.name, self.end = "", end
+        self.before, self.whole = 0.0, 0.0
+
+    def __call__(self, t: float) -> None:
+        """Show the simulated time reached [s]."""
+        name = f"{self.name}, " if self.name else ""
+        end = max(t, self.end)
+        whole = self.whole or end
+        share = (self.before + t) / whole if whole else None
+        self.report(f"{name}{t:.4g} s of {end:g} s simulated", share)
+
+    def stage(self, name: str, end: float, before: float = 0.0, whole: float = 0.0) -> None:
+        """Take the run that begins now.
+
+        Parameters
+        ----------
+        name : str
+        end : float
+            Its simulated time [s].
+        before, whole : float
+            Simulated time of the runs before it and of all; without it the share is that of
+            this run [s].
+        """
+        self.name, self.end, self.before, self.whole = name, end, before, whole
+        self(0.0)
+
+
+@contextmanager
+def progress_bar(end: float) -> Iterator[RunProgress]:
+    """Show how far a run has come; see `progress`.
+
+    Parameters
+    ----------
+    end : float
+        Its simulated time [s].
+    """
+    with progress("preparing") as report:
+        yield RunProgress(report, end)
+
+
+@contextmanager
+def count_bar(what: str) -> Iterator[Callable[[int, int], None]]:
+    """Show how many of a number of things are done; see `progress`.
+
+    Yields
+    ------
+    callable
+        To be called with the number done and that of all.
+    """
+    with progress(what) as report:
+        yield lambda done, total: report(f"{done} of {total} {what}", done / total)
+
+
+@contextmanager
+def progress(text: str, done: float = 0.0) -> Iterator[Report]:
+    """Show on stderr what a long command does: a bar in a terminal, else lines.
+
+    Parameters
+    ----------
+    text : str
+        What it does until it says more.
+    done : float
+        Share that is done already.
+    """
+    if not sys.stderr.isatty():
+        with lines(text, done) as report:
+            yield report
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn
+    from rich.text import Text
+
+    told = Lines(text)
+    told.begin(text, done)
+
+    class Left(ProgressColumn):
+        """The time that is left, in the words of the lines."""
+
+        def render(self, task: Task) -> Text:
+            return Text(told.left())
+
+    words = TextColumn("{task.description}", markup=False)
+    bar = Progress(BarColumn(), Left(), words, console=Console(stderr=True), transient=True)
+    task = bar.add_task(text, total=None)
+    starter = threading.Timer(_PATIENCE, bar.start)
+    starter.daemon = True
+    starter.start()
+
+    def show(text: str, share: float | None) -> None:
+        told.show(text, share)
+        # where all is done but the end, how long that takes is not known
+        total = None if share is None or share >= 1.0 else 1.0
+        bar.update(task, description=text, completed=share or 0.0, total=total)
+
+    try:
+        yield show
+    finally:
+        starter.cancel()
+        starter.join()
+        bar.stop()

@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import math
-import sys
-import threading
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from rich.box import SIMPLE_HEAD
@@ -16,7 +13,6 @@ from rich.table import Table
 from rich.text import Text
 
 from percussion_model.interface.messages import wrapped
-from percussion_model.interface.progress import Lines, Report, lines
 from percussion_model.interface.tables import print_table
 from percussion_model.scene.solver_names import counted
 from percussion_model.simulation.driller_numbers import DRILLER_NUMBERS, driller_text
@@ -45,9 +41,6 @@ if TYPE_CHECKING:
     from percussion_model.solvers.base import Solver
     from percussion_model.verification.hard_cases import Collection
     from percussion_model.verification.paper.statements import Statement
-
-# What ends sooner shows no bar [s].
-_PATIENCE = 2.0
 
 RATE = ("Rate of penetration", "rate_of_penetration", 1e3, "mm/s")
 # Other rows of the table: name, key of the summary, factor, unit.
@@ -487,115 +480,3 @@ def show_statements(statements: list[Statement], errors: str) -> None:
     console = Console()
     print_table(table, console)
     console.print(errors, highlight=False)
-
-
-class RunProgress:
-    """Progress of a run, or of several one after the other.
-
-    Parameters
-    ----------
-    report : Report
-    end : float
-        Simulated time of the whole [s].
-    """
-
-    def __init__(self, report: Report, end: float) -> None:
-        self.report = report
-        self.name, self.end = "", end
-        self.before, self.whole = 0.0, 0.0
-
-    def __call__(self, t: float) -> None:
-        """Show the simulated time reached [s]."""
-        name = f"{self.name}, " if self.name else ""
-        end = max(t, self.end)
-        whole = self.whole or end
-        share = (self.before + t) / whole if whole else None
-        self.report(f"{name}{t:.4g} s of {end:g} s simulated", share)
-
-    def stage(self, name: str, end: float, before: float = 0.0, whole: float = 0.0) -> None:
-        """Take the run that begins now.
-
-        Parameters
-        ----------
-        name : str
-        end : float
-            Its simulated time [s].
-        before, whole : float
-            Simulated time of the runs before it and of all; without it the share is that of
-            this run [s].
-        """
-        self.name, self.end, self.before, self.whole = name, end, before, whole
-        self(0.0)
-
-
-@contextmanager
-def progress_bar(end: float) -> Iterator[RunProgress]:
-    """Show how far a run has come; see `progress`.
-
-    Parameters
-    ----------
-    end : float
-        Its simulated time [s].
-    """
-    with progress("preparing") as report:
-        yield RunProgress(report, end)
-
-
-@contextmanager
-def count_bar(what: str) -> Iterator[Callable[[int, int], None]]:
-    """Show how many of a number of things are done; see `progress`.
-
-    Yields
-    ------
-    callable
-        To be called with the number done and that of all.
-    """
-    with progress(what) as report:
-        yield lambda done, total: report(f"{done} of {total} {what}", done / total)
-
-
-@contextmanager
-def progress(text: str, done: float = 0.0) -> Iterator[Report]:
-    """Show on stderr what a long command does: a bar in a terminal, else lines.
-
-    Parameters
-    ----------
-    text : str
-        What it does until it says more.
-    done : float
-        Share that is done already.
-    """
-    if not sys.stderr.isatty():
-        with lines(text, done) as report:
-            yield report
-        return
-    from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn
-
-    told = Lines(text)
-    told.begin(text, done)
-
-    class Left(ProgressColumn):
-        """The time that is left, in the words of the lines."""
-
-        def render(self, task: Task) -> Text:
-            return Text(told.left())
-
-    words = TextColumn("{task.description}", markup=False)
-    bar = Progress(BarColumn(), Left(), words, console=Console(stderr=True), transient=True)
-    task = bar.add_task(text, total=None)
-    starter = threading.Timer(_PATIENCE, bar.start)
-    starter.daemon = True
-    starter.start()
-
-    def show(text: str, share: float | None) -> None:
-        told.show(text, share)
-        # where all is done but the end, how long that takes is not known
-        total = None if share is None or share >= 1.0 else 1.0
-        bar.update(task, description=text, completed=share or 0.0, total=total)
-
-    try:
-        yield show
-    finally:
-        starter.cancel()
-        starter.join()
-        bar.stop()

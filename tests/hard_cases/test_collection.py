@@ -45,14 +45,13 @@ DEAR = {("ratio_50", "fem"), ("fine", "fem"), ("fine", "wave")}
 TALKING = """
 import contextlib, sys
 import percussion_model.interface.progress as progress
-import percussion_model.interface.terminal as terminal
 progress.EVERY = 3600.0  # no lines but those of this test
 
 @contextlib.contextmanager
 def talk(what):
     yield lambda done, total: done == 1 and print("begun", file=sys.stderr, flush=True)
 
-terminal.count_bar = talk
+progress.count_bar = talk
 from percussion_model.interface.cli import main
 if __name__ == "__main__":
     main()

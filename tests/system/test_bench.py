@@ -22,7 +22,7 @@ from percussion_model.coupling.coupled_run import CoupledRun
 from percussion_model.interface.bench_page import write_bench_page
 from percussion_model.interface.bench_text import COLUMNS, about_errors, cells, points_text
 from percussion_model.interface.cli import main
-from percussion_model.interface.terminal import RunProgress
+from percussion_model.interface.progress import RunProgress
 
 COLUMN = {name: k for k, (name, *_) in enumerate(COLUMNS)}
 

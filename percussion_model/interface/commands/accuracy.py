@@ -49,7 +49,7 @@ def accuracy(
         show_contests,
         show_study,
     )
-    from percussion_model.interface.terminal import progress
+    from percussion_model.interface.progress import progress
     from percussion_model.scene.scene import Scene
     from percussion_model.verification.accuracy import study
     from percussion_model.verification.accuracy.ladders import chosen_ladders
@@ -130,7 +130,7 @@ def _draw(found: Study, folder: Path) -> list[Path]:
         draw_quantities,
     )
     from percussion_model.interface.plotting.style import save_figures
-    from percussion_model.interface.terminal import progress
+    from percussion_model.interface.progress import progress
 
     with progress("drawing the figures"):
         return save_figures(
@@ -144,7 +144,7 @@ def _draw(found: Study, folder: Path) -> list[Path]:
 
 def _make_reference(scene: Scene) -> Any:
     """Make the reference of a scene and keep it with the package."""
-    from percussion_model.interface.terminal import progress
+    from percussion_model.interface.progress import progress
     from percussion_model.verification.accuracy.problems import pose
     from percussion_model.verification.accuracy.references import (
         fingerprint,

@@ -47,7 +47,7 @@ def bench_controller(
     force: common.Force = False,
 ) -> int:
     """Put a controller of feed and pressure through standard runs: scores, figures, a page."""
-    from percussion_model.interface.terminal import progress, progress_bar
+    from percussion_model.interface.progress import progress, progress_bar
 
     try:
         from percussion_model.coupling.bench import STEP, bench, mean_points, mean_points_error

@@ -60,7 +60,7 @@ def ready_map(scene: Scene, workers: int | None = None) -> BlowTable:
     What of the scene lies outside is listed before it is made, which takes minutes.
     """
     from percussion_model.analysis.blow_maps import kept_map, make_map
-    from percussion_model.interface.terminal import count_bar
+    from percussion_model.interface.progress import count_bar
 
     kept = kept_map(scene)
     if kept is not None:
@@ -73,7 +73,7 @@ def ready_map(scene: Scene, workers: int | None = None) -> BlowTable:
 def prepare_map(scene: Scene, duration: float | None = None) -> None:
     """Make the table of a scene that asks for one; refuse first a run that it would not answer."""
     from percussion_model.analysis.blow_maps import kept_map, refused_run
-    from percussion_model.interface.terminal import progress
+    from percussion_model.interface.progress import progress
     from percussion_model.scene.inputs import SimulationError
 
     if scene.solver_name != "blow-map" or kept_map(scene) is not None:

@@ -86,7 +86,7 @@ def calibrate(
     from percussion_model.analysis.fitting import fit_rock
     from percussion_model.interface.calibrated_scene import commented_fit
     from percussion_model.interface.measured_files import read_curve, read_drop, read_reading
-    from percussion_model.interface.terminal import progress
+    from percussion_model.interface.progress import progress
     from percussion_model.simulation.files import staged_text
 
     if not curve and not drop and not measured:

@@ -34,7 +34,8 @@ def compare(
     """Run a scene with several solvers: a table, and a figure in out/SCENE-compared."""
     from percussion_model.analysis.comparison import compare as run_all
     from percussion_model.analysis.comparison import read_solvers, usual_solvers
-    from percussion_model.interface.terminal import progress, progress_bar, show_comparison
+    from percussion_model.interface.progress import progress, progress_bar
+    from percussion_model.interface.terminal import show_comparison
 
     asked = None if solvers is None else read_solvers(solvers)
     chosen = common.load_scene(scene, settings=settings, is_run=False, rock=rock)

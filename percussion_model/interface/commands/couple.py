@@ -82,7 +82,7 @@ def couple(
     Ends with 1 where the energies do not balance or the step is too long. Files go to
     out/SYSTEM.
     """
-    from percussion_model.interface.terminal import progress, progress_bar
+    from percussion_model.interface.progress import progress, progress_bar
     from percussion_model.simulation.files import ResultError
 
     try:

@@ -41,7 +41,7 @@ def effects(
     Prints a table, and draws a figure in out/SCENE-effects.
     """
     from percussion_model.analysis.effect_study import by_one_solver, study_effects
-    from percussion_model.interface.terminal import progress
+    from percussion_model.interface.progress import progress
 
     chosen = common.load_scene(scene, solver, cells, settings, rock=rock)
     common.check_json(json_file)

@@ -34,7 +34,7 @@ def explore(
     ] = True,
 ) -> None:
     """Open a page on which rate, waves and forces of one blow follow sliders."""
-    from percussion_model.interface.terminal import progress
+    from percussion_model.interface.progress import progress
 
     try:
         from percussion_model.interface.explore.server import Explored, PortError

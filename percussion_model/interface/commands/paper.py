@@ -32,7 +32,8 @@ def paper(
     force: common.Force = False,
 ) -> None:
     """Reproduce figures 4 and 6 to 9 of the paper, and check what it says one by one."""
-    from percussion_model.interface.terminal import progress, progress_bar, show_statements
+    from percussion_model.interface.progress import progress, progress_bar
+    from percussion_model.interface.terminal import show_statements
 
     common.check_outputs(out, json_file)
     common.load_numba()
@@ -124,7 +125,7 @@ def _parts(count: int) -> Iterator[str]:
 
 
 def _sweeps(out: Path, processes: int | None, part: Iterator[str]) -> dict[str, Study]:
-    from percussion_model.interface.terminal import count_bar
+    from percussion_model.interface.progress import count_bar
     from percussion_model.verification.paper.runs import SWEEPS, paper_scene, run_sweep
 
     found = {}

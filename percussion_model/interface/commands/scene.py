@@ -51,6 +51,7 @@ def run(
 ) -> None:
     """Run a scene; print a short table, write results with --out."""
     from percussion_model.interface import terminal
+    from percussion_model.interface.progress import progress, progress_bar
     from percussion_model.simulation.simulate import simulate
 
     chosen = common.load_scene(scene, solver, cells, settings, accuracy, check, rock=rock)
@@ -60,16 +61,16 @@ def run(
     claimed = None if out is None else common.claim("run", out, None, force, **made_from)
     end = chosen.run.duration if duration is None else duration
     prepare_map(chosen, duration)
-    with terminal.progress_bar(end) as progress:
+    with progress_bar(end) as bar:
         result = simulate(
             chosen,
             duration,
             settle,
             trace,
-            progress=progress,
+            progress=bar,
             on_interrupt="keep",
             error_estimate=error_estimate,
-            stage=progress.stage,
+            stage=bar.stage,
         )
     files: list[Path] = []
     if claimed is not None:
@@ -79,7 +80,7 @@ def run(
         files += result.save(claimed.folder)
         files.append(claimed.sign())
         if figures and not result.cut_short:
-            with terminal.progress("drawing") as report:
+            with progress("drawing") as report:
                 files += _draw(result, claimed.folder, report)
             claimed.sign()
     if json_file != "-":
@@ -108,7 +109,8 @@ def settled(
 ) -> None:
     """Run until the blows repeat: rate, period, order and stability of the cycle."""
     from percussion_model.analysis.stationary import settled as run_until_settled
-    from percussion_model.interface.terminal import progress, show_settled
+    from percussion_model.interface.progress import progress
+    from percussion_model.interface.terminal import show_settled
 
     common.check_json(json_file)
     chosen = common.load_scene(scene, solver, cells, settings, rock=rock)
@@ -138,7 +140,8 @@ def explain(
 ) -> None:
     """Tell what a scene computes, how, and what the run will cost; makes no blow map."""
     from percussion_model.analysis.cost import explained, forecast
-    from percussion_model.interface.terminal import progress, show_explanation
+    from percussion_model.interface.progress import progress
+    from percussion_model.interface.terminal import show_explanation
 
     chosen = common.load_scene(scene, solver, cells, settings, accuracy, check, rock=rock)
     common.check_json(json_file)
@@ -161,7 +164,7 @@ def plot(
     force: common.Force = False,
 ) -> None:
     """Draw the figures of a result, or run a scene and draw them."""
-    from percussion_model.interface.terminal import progress, progress_bar
+    from percussion_model.interface.progress import progress, progress_bar
     from percussion_model.scene.presets import scene_file
     from percussion_model.scene.scene import Scene
     from percussion_model.simulation.result import Result

@@ -36,7 +36,8 @@ def stability(
     force: common.Force = False,
 ) -> None:
     """Run the hard cases by every solver: what must hold, and where solvers disagree."""
-    from percussion_model.interface.terminal import count_bar, show_stability
+    from percussion_model.interface.progress import count_bar
+    from percussion_model.interface.terminal import show_stability
     from percussion_model.verification.hard_cases import ALL_SOLVERS, run_collection
 
     common.check_outputs(out, json_file)
@@ -61,7 +62,7 @@ def stability(
 
 def _write(found: Collection, folder: Path) -> None:
     """Write the page and its figure into a folder."""
-    from percussion_model.interface.terminal import progress
+    from percussion_model.interface.progress import progress
     from percussion_model.simulation.files import staged_text
     from percussion_model.verification.hard_cases.stability_page import page
 

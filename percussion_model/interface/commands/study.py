@@ -65,7 +65,8 @@ def study(
     """Map the stationary response over parameters: points.parquet and points.nc."""
     from percussion_model.analysis.study import grid, latin_hypercube, read_axis
     from percussion_model.analysis.study import study as run_study
-    from percussion_model.interface.terminal import count_bar, progress, show_study
+    from percussion_model.interface.progress import count_bar, progress
+    from percussion_model.interface.terminal import show_study
     from percussion_model.scene.typical import hint_of
 
     missing = [name for name in NEEDED if importlib.util.find_spec(name) is None]

@@ -32,7 +32,7 @@ def validate(
 
     Exit code 0 whatever is missed: that is a finding.
     """
-    from percussion_model.interface.terminal import count_bar
+    from percussion_model.interface.progress import count_bar
     from percussion_model.verification.measured import compare, load
 
     common.check_outputs(out, json_file)
@@ -59,7 +59,7 @@ def validate(
 
 def _write(found: Comparison, folder: Path, figures: bool) -> None:
     """Write the table as CSV and JSON, and the figures, into a folder."""
-    from percussion_model.interface.terminal import progress
+    from percussion_model.interface.progress import progress
     from percussion_model.simulation.files import staged_text, to_json
     from percussion_model.verification.measured.table import as_csv
 
