@@ -38,7 +38,7 @@ MOST_TURNS, SETTLED = 60, 1e-14
 # no series about zero. From nothing on it may come to a share of where it balances the push.
 LARGEST_SHARE, GROWTH, LEAST_SHARE = 0.25, 0.5, 1e-3
 # A velocity that has fallen to this share of the first, or of that without rock, moves nothing
-# any more: it is rounding of the force.
+# any more: it is rounding of the force. So is one whose whole way is rounding of the penetration.
 SPENT, ROUNDING = 1e-16, 1e-15
 # A penetration so close below where the rock begins or ends to chip is there, as a share of it.
 CLOSE = 1e-12
@@ -123,7 +123,8 @@ def load(par, s, push, z, time):
             kink = next_kink(par, s, p)
         v, slope = _answer(par, s, push, z, p)
         first = max(first, abs(v))
-        if abs(v) <= max(SPENT * first, ROUNDING * abs(push) / z):
+        spent = max(SPENT * first, ROUNDING * abs(push) / z, -slope * ROUNDING * abs(p))
+        if abs(v) <= spent:
             break
         h = min(time - done, -LARGEST_SHARE / slope)
         if v > 0.0:
