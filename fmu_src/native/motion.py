@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from fmu_src.native import kinds
 from fmu_src.native.layout import (
     ADVANCE,
@@ -158,8 +160,11 @@ def set_inputs(base, wanted):
     if not acts:
         return Status.DONE.value, in_vain
     _leave(base)
+    status, reached = Status.DONE.value, -math.inf
     t = kinds.grid_point_after(base, motion.time)
-    status = advance(base, t, NO_LIMIT)
+    while status == Status.DONE and t > reached:  # as `Runner` does it
+        status = advance(base, t, NO_LIMIT)
+        reached, t = t, kinds.grid_point_after(base, motion.time)
     if status == Status.DONE:
         status = _run(base, COMMIT, t, NO_LIMIT)
     if status == Status.DONE:

@@ -228,7 +228,9 @@ class Runner:
 
     def _commit_inputs(self, values: dict[str, float]) -> None:
         """Commit the state at its next grid point, and give it inputs that are checked."""
-        t = self.solver.grid_point_after(self._state, self._time)
-        self._advance_solver(t)
+        reached, t = -math.inf, self.solver.grid_point_after(self._state, self._time)
+        while t > reached:  # a step that is cut moves the grid: inputs never act before now
+            self._advance_solver(t)
+            reached, t = t, self.solver.grid_point_after(self._state, self._time)
         self._call_until_done(self.solver.commit, t)
         self.solver.set_inputs(self._state, **values)
