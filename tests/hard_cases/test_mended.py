@@ -175,3 +175,19 @@ def test_another_stiffness_reaches_a_spring_at_its_next_contact(solver):
     times = np.linspace(1e-3, 2e-3, 500)
     found, wanted = (run.sample(times)["bit_force"].max() for run in (simulation, other))
     assert found == pytest.approx(wanted, rel=1e-3)
+
+
+def test_no_input_acts_before_now_where_a_step_is_cut():
+    scene = Scene(run={"duration": 0.1, "settle": 0.0}, solver={"name": "wave"})
+    run = Simulation(scene)
+    run.advance(0.1)
+    step, kinds = run.solver.time_step, run.events["kind"]
+    closure = run.events["time"][kinds == EventKind.CONTACT_CLOSED][-1]
+    behind = 0
+    for share in np.linspace(0.05, 2.5, 50):
+        run = Simulation(scene)
+        run.advance(closure - share * step)
+        run.set_inputs(feed_force=1e5)
+        state = run.save().state
+        behind += run.solver.time(state) < run.time - 1e-3 * step
+    assert behind == 0

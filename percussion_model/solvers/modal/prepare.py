@@ -30,8 +30,8 @@ from percussion_model.solvers.setup import (
     rock_numbers,
 )
 
-# Longest step in half periods of the highest mode: a longer one missed that the rock end turned.
-LONGEST_STEP = 1.5
+# Steps in a transit time at least: with fewer a search missed that the rock end turned.
+FEWEST_STEPS = 12
 MOST_TICKS = 2.0**62  # that a number of a record holds
 
 
@@ -84,34 +84,16 @@ class Tables(NamedTuple):
 
 
 @plain
-def halved_for(first, modes, step):
-    """Halve a step until few modes, rounded up to more, go no further in it.
-
-    Parameters
-    ----------
-    first : float
-        Transit time of the bar that has the modes [s].
-    modes : int
-        As many as it has.
-    step : float
-        That as many as it was asked for need [s].
-    """
-    while step * modes > LONGEST_STEP * first:
-        step *= 0.5
-    return step
-
-
-@plain
 def fill_modal_parameters(p, numbers):
     """Fill a MODAL_PAR record; a `Request` for its tables."""
     fill_parameters(p, numbers, True)
     elastic = PISTONS[numbers.values.piston_model] == Piston.ELASTIC
     first = bar_transit_time(numbers.piston if elastic else numbers.bit)
     eta, rock = kelvin_voigt_time(numbers), rock_numbers(numbers)
-    longest = first / asked_modes(numbers)
-    highest = math.pi / longest
-    n_bit, n_piston, _ = mode_counts(numbers.bit, elastic_piston(numbers), 0.0, highest)
-    dt = halved_for(first, n_piston if elastic else n_bit, longest)
+    dt = first / asked_modes(numbers)
+    highest = math.pi / dt
+    while dt > first / FEWEST_STEPS:
+        dt *= 0.5
     tick = dt / (1 << STEP)
     p["eta"], p["dt"], p["tick"] = eta, dt, tick
     # a period of the highest of few modes; a rigid piston pushes hardest at once

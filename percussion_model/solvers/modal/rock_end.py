@@ -79,6 +79,7 @@ def next_mode(par, s, energy):
     else:
         leave_by_velocity(par, s, s.v_low, energy)
     if s.mode == Mode.FF:
+        s.f_rock = 0.0  # not what it was just past the end of contact
         if par.rock == RockKind.SPRING or left == Mode.BC:
             s.e_overshoot += before
     return s.mode != left
