@@ -1,4 +1,4 @@
-"""Terminal output of the command line: tables, warnings, progress bars."""
+"""Terminal output of the command line: tables and warnings."""
 
 from __future__ import annotations
 

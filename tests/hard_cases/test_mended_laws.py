@@ -110,7 +110,7 @@ SCENES = {
         },
         6.1e-3,
     ),
-    "two modes see the rock end turn, however closely they are read": (
+    "two modes, read closely, see the rock end turn": (
         {
             "effects": {"drive": "none"},
             "piston": {"model": "absent"},

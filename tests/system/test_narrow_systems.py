@@ -43,7 +43,7 @@ def test_a_table_of_a_bench_is_whole_and_its_runs_are_told_elsewhere(
     """Lines of progress come by the hundred; none of them stands in the table."""
     monkeypatch.chdir(tmp_path)
     lines = []
-    pipe = SimpleNamespace(write=lines.append, flush=lambda: None)
+    pipe = SimpleNamespace(write=lines.append, flush=lambda: None, isatty=lambda: False)
     monkeypatch.setattr(progress, "sys", SimpleNamespace(stderr=pipe))
     monkeypatch.setattr(progress, "EVERY", 5e-3)
     words = ["--trial", "rod", "--trial", "soft", "--out", "out"]
@@ -72,7 +72,7 @@ def test_they_say_on_a_pipe_that_they_run(name, feed_control, tmp_path, monkeypa
     """Runs of the system do not come back before two lines have been printed."""
     monkeypatch.chdir(tmp_path)
     lines = []
-    pipe = SimpleNamespace(write=lines.append, flush=lambda: None)
+    pipe = SimpleNamespace(write=lines.append, flush=lambda: None, isatty=lambda: False)
     monkeypatch.setattr(progress, "sys", SimpleNamespace(stderr=pipe))
     monkeypatch.setattr(progress, "EVERY", 5e-3)
 
@@ -101,7 +101,7 @@ def test_loading_what_draws_is_told_as_drawing(
 ):
     """It takes seconds, of which a line said "still running"."""
     monkeypatch.chdir(tmp_path)
-    pipe = SimpleNamespace(write=lambda text: None, flush=lambda: None)
+    pipe = SimpleNamespace(write=lambda text: None, flush=lambda: None, isatty=lambda: False)
     monkeypatch.setattr(progress, "sys", SimpleNamespace(stderr=pipe))
     told, load = [], builtins.__import__
 

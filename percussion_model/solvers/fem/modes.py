@@ -143,7 +143,7 @@ def move_datum(par, s, w):
 
 @merged
 def keep_near(par, s, w):
-    """Count the nodes of a bit far from the rock from where it is.
+    """Count the nodes of a bit far from the datum, as in a long flight, from where it is.
 
     A stiff contact turns the rounding of a large displacement into a force.
     """

@@ -9,6 +9,7 @@ from percussion_model.physics.records import Piston, RockKind
 from percussion_model.solvers import plain_code  # noqa: F401  # kernels call functions of scenes
 from percussion_model.solvers.fem.bars import read_all, stored_energy
 from percussion_model.solvers.fem.mesh import critical_frequency, shortest_transit
+from percussion_model.solvers.fem.modes import keep_near
 from percussion_model.solvers.fem.records import Node
 from percussion_model.solvers.setup import (
     MOST_CHANGES,
@@ -99,3 +100,4 @@ def begin(p, s, w, c, numbers):
         w[Node.U, i] -= values.start_gap
         w[Node.V, i] = values.start_piston_velocity
     refresh(p, s, w, c)
+    keep_near(p, s, w)

@@ -19,7 +19,7 @@ from percussion_model.solvers.state import Limits
 class Node(IntEnum):
     """Rows of the array that changes, one column for each node."""
 
-    U = 0  # displacement from the datum of the drilling cycle [m]
+    U = 0  # displacement from the datum of the drilling cycle, less `far` of the state [m]
     V = 1  # velocity [m/s]
     LOSS = 2  # energy lost so far in the element below a node [J]
     NUMERICAL = 3  # energy dissipated by the scheme so far, by node and element [J]
@@ -144,10 +144,10 @@ FEM_STATE = np.dtype(
         ("kinetic", "f8"),  # energy of the bit while it stands still [J]
         ("mean_p", "f8"),  # mean displacements from the datum [m]
         ("mean_b", "f8"),
-        ("far", "f8"),  # of these and of the penetration, what the nodes do not have [m]
         ("next_kinetic", "f8"),  # the same three at the end of the step tried last
         ("next_p", "f8"),
         ("next_b", "f8"),
+        ("far", "f8"),  # of these means and of the penetration, what the nodes do not have [m]
         ("chord_stiffness", "f8"),  # of the power law in the present step [N/m]
         ("chord_origin", "f8"),  # [m]
         ("rebounding", "i8"),  # 1: in flight, rock still pressed in

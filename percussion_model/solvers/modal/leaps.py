@@ -42,7 +42,7 @@ class Far(NamedTuple):
 def far_touching(par, s):
     """As `far_ticks` of a piston that touches the bit."""
     age = s.time - s.closed_at
-    if age < RINGING * WHOLE or age * par.tick < RINGING * par.window:
+    if age < par.ringing or age * par.tick < RINGING * par.window:
         return Far(0, 0)
     if par.drive != DriveKind.PRESSURE:
         return Far(0, LONGEST)

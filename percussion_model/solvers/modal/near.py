@@ -58,7 +58,6 @@ from percussion_model.solvers.modal.pairs import (
     touch_of,
 )
 from percussion_model.solvers.modal.piston import (
-    RINGING,
     WHOLE,
     at_rest,
     book_contact,
@@ -136,7 +135,7 @@ def touching(par, s, bars, ticks, h, v_p):
     then = found.speed / par.mass_p
     contact = par.mass_p * (s.a_p + (v_p - then) / h)
     age = s.time + ticks - s.closed_at
-    touch = contact if age < RINGING * WHOLE else par.mass_p * s.a_p - found.pull
+    touch = contact if age < par.ringing else par.mass_p * s.a_p - found.pull
     # by the mean as well, since the force may have dipped between looks; not at once
     parts = (touch < 0.0 or contact < 0.0) and (age > 0 or h > par.tick)
     return found.piston, then, contact, touch, parts

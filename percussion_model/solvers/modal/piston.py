@@ -27,7 +27,7 @@ from percussion_model.solvers.modal.forms import gap_of, join, part
 from percussion_model.solvers.modal.records import LOOK, STEP
 
 WHOLE = 1 << STEP
-# Of a contact, so many steps are told to end by their mean force: fronts ring.
+# Of a contact, so many steps of the modes asked for end by their mean force: fronts ring.
 RINGING = 2
 # Steps after which it is tried again to let the piston wait.
 PATIENCE = 8

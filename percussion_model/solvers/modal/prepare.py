@@ -13,6 +13,7 @@ from percussion_model.scene.bars import bar_transit_time
 from percussion_model.solvers import plain_code  # noqa: F401  # kernels call functions of scenes
 from percussion_model.solvers.modal.laws import laws_of
 from percussion_model.solvers.modal.modes import Modes
+from percussion_model.solvers.modal.piston import RINGING
 from percussion_model.solvers.modal.records import STEP, Forms, Laws
 from percussion_model.solvers.modal.resolution import asked_modes, default_modes
 from percussion_model.solvers.modal.tables import (
@@ -30,7 +31,8 @@ from percussion_model.solvers.setup import (
     rock_numbers,
 )
 
-# Steps in a transit time at least: with fewer a search missed that the rock end turned.
+# Steps in the transit time of the first bar at least: with fewer a search missed that the rock end
+# turned.
 FEWEST_STEPS = 12
 MOST_TICKS = 2.0**62  # that a number of a record holds
 
@@ -92,8 +94,10 @@ def fill_modal_parameters(p, numbers):
     eta, rock = kelvin_voigt_time(numbers), rock_numbers(numbers)
     dt = first / asked_modes(numbers)
     highest = math.pi / dt
+    p["ringing"] = RINGING << STEP
     while dt > first / FEWEST_STEPS:
         dt *= 0.5
+        p["ringing"] *= 2
     tick = dt / (1 << STEP)
     p["eta"], p["dt"], p["tick"] = eta, dt, tick
     # a period of the highest of few modes; a rigid piston pushes hardest at once

@@ -230,6 +230,7 @@ MODAL_PAR = np.dtype(
     [
         ("tick", "f8"),  # unit of time [s]
         ("dt", "f8"),  # 2^STEP ticks
+        ("ringing", "i8"),  # after a closure only the mean of contact counts so long [ticks]
         ("eta", "f8"),  # Kelvin-Voigt time [s]
         ("transit", "i8"),  # of a wave through the bit [ticks]
         ("window", "f8"),  # over which a peak of the contact force is a mean [s]

@@ -393,6 +393,8 @@ def look_through(par, s, bars, law, beside, ticks, level, count, taken, sampled,
             if beside.touches:
                 apart -= bars.rows[SIDE, kept]
                 speed_p = (bars.rows[SIDE + 1, kept] + beside.pull * t) / par.mass_p
+                # by the mean since the look before as well
+                apart = min(apart, par.mass_p * (s.a_p - (speed_p - touch.speed) / h))
             else:
                 apart += bars.rows[SIDE, kept] + 0.5 * beside.pull * t * t
                 apart -= (since + t) * (s.v_p + 0.5 * (since + t) * s.a_p)

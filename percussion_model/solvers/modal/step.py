@@ -41,8 +41,6 @@ from percussion_model.solvers.modal.between import late_force
 from percussion_model.solvers.modal.forms import refresh_loads
 from percussion_model.solvers.modal.lanes import WIDTH
 from percussion_model.solvers.modal.piston import (
-    RINGING,
-    WHOLE,
     book_contact,
     flip_contact,
     has_piston,
@@ -125,7 +123,7 @@ def try_step(par, s, bars, level):
         way_p = (ends.piston - s.at_p) / par.mass_p
         contact = par.mass_p * (s.a_p + (s.v_p - ends.piston_speed / par.mass_p) / h)
         touch = contact
-        if s.time - s.closed_at >= RINGING * WHOLE:
+        if s.time - s.closed_at >= par.ringing:
             touch = par.mass_p * s.a_p - ends.pull
     elif has_piston(par):
         way_p = h * (s.v_p + 0.5 * h * s.a_p)

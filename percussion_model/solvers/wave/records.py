@@ -166,7 +166,7 @@ WAVE_PAR = np.dtype(
     align=True,
 )
 
-# Steps that are cut for a closure which the bars put off.
+# So many steps at most are cut for a closure that the bars put off.
 MOST_CUTS = 2
 
 WAVE_STATE = np.dtype(

@@ -183,6 +183,7 @@ def start_periodic(drill: Drill, problem: Problem) -> None:
     state = simulation.solver.read(simulation.save().state, simulation.time, np.zeros(1, READING))
     record, nodes = state.record[0], state.workspace.reshape(len(Node), -1)
     drill.y[: drill.n], drill.y[drill.n : 2 * drill.n] = nodes[Node.U], nodes[Node.V]
+    drill.y[: drill.n] += float(record["far"])
     drill.y[-2:] = float(record["w"]), 0.0
     drill.mode, drill.closed = Mode(int(record["mode"])), bool(record["closed"])
     drill.alpha, drill.p_u = int(record["alpha"]), float(record["p_u"])
