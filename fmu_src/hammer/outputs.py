@@ -95,7 +95,7 @@ OUTPUTS: dict[str, Output] = {
     "casing.impulse": Output("N.s", -_FORCE, _FORCE, 1e2, "running integral of casing_force since the start", _sample("drive_impulse", -1.0)),
     "gauge_stress": Output("Pa", -1e13, 1e13, 1e8, "axial stress at the gauge at the last grid point, compression positive; 0 in a rigid bar", lambda motion: motion.stress()),
     "energy_residual": Output("1", -1.0, 1.0, 1e-10, "share of the energy put in so far that the ledger leaves unexplained", lambda motion: motion.residual()),
-    "blow_count": Output(None, 0, 2**31 - 1, None, "whole blows so far; when it rises, all numbers of a blow are new", lambda motion: motion.blow_count, "Integer"),
+    "blow_count": Output(None, 0, 2**31 - 1, None, "whole blows so far; rises at the first communication point behind the end of a blow, with all numbers of the blow", lambda motion: motion.blow_count, "Integer"),
     "drilling_mode": Output(None, int(min(Mode)), int(max(Mode)), None, "mode of the rock law", lambda motion: int(motion.read()[AT["drilling_mode"]]), "Enumeration", at_start=ALL),
     "off_bottom": Output(None, None, None, None, "whether the bit met no rock in the last communication step", lambda motion: motion.off_bottom(), "Boolean", at_start=ALL),
 }  # fmt: skip

@@ -114,10 +114,10 @@ def refuse_map(numbers, table, size, facts):
 def create(numbers, table):
     """Make the memory of a motion at time zero; its address, 0 where there is no memory left."""
     arrays = (np.zeros(ENTRIES), np.zeros(0))
-    base, tables_at = make_memory(Kind.MAP.value, PAR_BYTES, MOVING, table_bytes(arrays))
+    base, room_at, _ = make_memory(Kind.MAP.value, PAR_BYTES, MOVING, table_bytes(arrays), 0)
     if base == 0:
         return base
-    put_tables(base, directory(base), tables_at, arrays)
+    put_tables(base, directory(base), FOUND, room_at, arrays)
     head_records(base, 1)[0].table_address = table
     words = floats_at(table, 1 << 30)
     fill_map_parameters(parameters(base)[0], numbers, words)

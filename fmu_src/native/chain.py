@@ -113,11 +113,11 @@ def create(numbers, bar, place):
     came_at = joints_at + lines(8 * JOINT_ROWS * joints)
     rings_at = came_at + lines(8 * CAME_ROWS * came)
     moving = rings_at + lines(8 * network.rings)
-    base, tables_at = make_memory(Kind.CHAIN.value, PAR_BYTES, moving, table_bytes(arrays))
+    base, _, tables_at = make_memory(Kind.CHAIN.value, PAR_BYTES, moving, 0, table_bytes(arrays))
     if base == 0:
         return base
     d = directory(base)
-    put_tables(base, d, tables_at, arrays)
+    put_tables(base, d, 0, tables_at, arrays)
     enter(d, BARS, WORK, BAR_ROWS, bars)
     enter(d, JOINTS, joints_at, JOINT_ROWS, joints)
     enter(d, CAME, came_at, CAME_ROWS, came)

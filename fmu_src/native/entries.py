@@ -299,8 +299,12 @@ def _end(base, status, notes):
 
 @preparing
 def take_step(motion, image, flags, t, size, reached, notes):
-    """Advance a motion to a time; what is new of it is noted."""
+    """Advance a motion to a time; what is new of it is noted.
+
+    `reached` is the address of two numbers: the time that was reached, and how many blows ended.
+    """
     words_at(notes, 2)[:] = 0
+    count = motion_of(motion).blow_count
     begin_step(motion, flags)
     if flags & NEW_INPUTS:
         values = np.zeros(1, SCENE_NUMBERS)
@@ -316,8 +320,9 @@ def take_step(motion, image, flags, t, size, reached, notes):
         fault = _end(motion, status, notes)
         if fault != 0:
             return fault
-    status, there = step(motion, t, size, flags)
-    floats_at(reached, 1)[0] = there
+    status, there = step(motion, t, size, flags, count)
+    floats_at(reached, 2)[0] = there
+    floats_at(reached, 2)[1] = motion_of(motion).blow_count - count
     fault = _end(motion, status, notes)
     if fault == 0:
         look(motion, motion_of(motion).acting[STIFFNESS], notes)

@@ -33,6 +33,7 @@ from fmu_src.native.messages import Fault
 from percussion_model.physics.kernel import preparing
 from percussion_model.solvers.cells import find_cell
 from percussion_model.solvers.fem.advance import run
+from percussion_model.solvers.fem.advance import time_of_blow as blow_of
 from percussion_model.solvers.fem.bars import force_in
 from percussion_model.solvers.fem.mesh import cut_bars, elements_wanted, mesh_of
 from percussion_model.solvers.fem.prepare import begin, fill_fem_parameters
@@ -87,16 +88,18 @@ def create(numbers, bar, place):
     n = mesh.shape[1]
     par = np.zeros(1, FEM_PAR)
     fill_fem_parameters(par[0], numbers, bars)
-    arrays = (
-        mesh, np.zeros((FACTOR_ROWS, max(n, KEYS))), np.zeros((TRIALS, n)),
-        np.zeros((PROBES, COLUMNS)),
+    room = (
+        np.zeros((FACTOR_ROWS, max(n, KEYS))), np.zeros((TRIALS, n)), np.zeros((PROBES, COLUMNS)),
     )  # fmt: skip
     moving = WORK + lines(8 * ROWS * n)
-    base, tables_at = make_memory(Kind.FEM.value, PAR_BYTES, moving, table_bytes(arrays))
+    base, room_at, tables_at = make_memory(
+        Kind.FEM.value, PAR_BYTES, moving, table_bytes(room), table_bytes((mesh,))
+    )
     if base == 0:
         return base
     d = directory(base)
-    put_tables(base, d, tables_at, arrays)
+    put_tables(base, d, MESH, tables_at, (mesh,))
+    put_tables(base, d, FACTORS, room_at, room)
     enter(d, NODES, WORK, ROWS, n)
     parameters(base)[0] = par[0]
     hold(par)
@@ -116,6 +119,12 @@ def create(numbers, bar, place):
 def state_time(moving):
     """Time up to which a state is committed [s]."""
     return state_in(moving)[0].time
+
+
+@preparing
+def time_of_blow(base):
+    """Time at which the pending step is over, if a blow may start in it [s]; 0 if none may."""
+    return blow_of(parameters(base), state_in(base + head_records(base, 1)[0].state_at))
 
 
 @preparing

@@ -237,24 +237,22 @@ static void let_update(Instance *one, Stretch *stretch) {
 static Status step_by_blows(Instance *one, Stretch *stretch, bool stops_at_blow, bool *is_event) {
     int64_t flags = STOP_AT_BLOW;
     int idle = 0; /* stretches without a length: blows may end at the same time */
-    *is_event = false;
     while (stretch->reached < stretch->to) {
         double before = stretch->reached;
+        Reached now;
         Status status = advance(one, stretch->to, stretch->size - (stretch->end - stretch->to),
-                                flags, &stretch->reached);
+                                flags, &now);
         if (status != DONE) {
             return status;
         }
-        *is_event = stretch->reached < stretch->to;
-        idle = stretch->reached > before ? 0 : idle + 1;
+        stretch->reached = now.time;
+        *is_event |= now.is_blow;
+        idle = now.time > before ? 0 : idle + 1;
         flags = SAME_STEP | (idle < MOST_IDLE ? STOP_AT_BLOW : 0);
-        if (idle > 0) {
-            continue;
-        }
-        if (one->update != NULL) {
+        if (one->update != NULL && idle == 0) {
             let_update(one, stretch);
         }
-        if (*is_event && stops_at_blow) {
+        if (now.is_blow && stops_at_blow) {
             break;
         }
     }
@@ -273,7 +271,11 @@ static Status step3(Instance *one, double from, double size, bool *is_event, Str
     if (stops_at_blow || one->update != NULL) {
         return step_by_blows(one, stretch, stops_at_blow, is_event);
     }
-    return advance(one, stretch->end, size, 0, &stretch->reached);
+    Reached now;
+    status = advance(one, stretch->end, size, 0, &now);
+    stretch->reached = stretch->end;
+    *is_event = status == DONE && now.is_blow;
+    return status;
 }
 
 fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoint,

@@ -12,6 +12,8 @@ static const double SHARE_OF_STEP = 1e-3, LAST_PLACES = 8.0 * DBL_EPSILON;
 /* The longest step [s], as the longest run of the package: an error at once, instead of a call
  * that does not come back. */
 static const double LONGEST_STEP = 1e6;
+/* Beyond, a host's times are more than 2e-6 s apart, and its steps no longer what they seem [s]. */
+static const double LATEST_START = 1e10;
 
 static const char *const PHASE_WORDS[PHASES] = {
     "instantiated", "initialising", "stepping", "terminated", "failed", "in event mode",
@@ -238,8 +240,8 @@ bool is_phase(Instance *one, const char *call, Phase phase) {
 }
 
 Status set_up(Instance *one, double start, bool has_stop, double stop) {
-    if (!isfinite(start)) {
-        return refuse(one, "startTime = %r: must be a finite time in s", start);
+    if (!(fabs(start) <= LATEST_START)) {
+        return refuse(one, "startTime = %r: must be a time within 1e10 s of 0", start);
     }
     if (has_stop && !(stop >= start)) {
         return refuse(one, "stopTime = %r: must not lie before startTime = %r s", stop, start);
@@ -302,15 +304,29 @@ static bool is_motion_good(const int64_t *motion) {
     int64_t all = motion[MOTION_BYTES], begin_of = motion[STATE_BEGIN];
     int64_t size = motion[STATE_BYTES];
     return all > 0 && begin_of >= 0 && size >= 0 && begin_of <= all && size <= all - begin_of &&
-           begin_of % 8 == 0;
+           begin_of % 8 == 0 && motion[SHARED_BEGIN] >= begin_of + size &&
+           motion[SHARED_BEGIN] <= all;
+}
+
+/* Hash of all that a motion is made of. A blow map is no part of it: each has its own. */
+static void hash_image(const Tables *tables, const int64_t *image, uint8_t digest[DIGEST]) {
+    Hash hash;
+    hash_begin(&hash);
+    hash_add(&hash, image, tables->image_count * sizeof *image);
+    hash_end(&hash, digest);
 }
 
 Status make_motion(Instance *one, const double *values, const int64_t *image, int64_t **motion) {
     const Tables *tables = &one->tables;
     Status status = check_all(one, values, image);
+    uint8_t digest[DIGEST];
     *motion = NULL;
     if (status != DONE) {
         return status;
+    }
+    hash_image(tables, image, digest);
+    if (tables->map_count == 0 && (*motion = equal_motion(digest)) != NULL) {
+        return DONE;
     }
     int64_t fault = one->kernels.create(image, tables->map, (int64_t)tables->map_count, motion,
                                         one->notes);
@@ -326,6 +342,9 @@ Status make_motion(Instance *one, const double *values, const int64_t *image, in
         free_motion(*motion);
         *motion = NULL;
         return refuse(one, "the model has no good place for its state");
+    }
+    if (tables->map_count == 0 && (*motion = share_motion(*motion, digest)) == NULL) {
+        return out_of_memory(one);
     }
     tell_notes(one);
     return DONE;
@@ -385,20 +404,20 @@ Status check_step(Instance *one, const char *call, double from, double size) {
     return one->has_new ? check_drive(one, one->values) : DONE;
 }
 
-Status advance(Instance *one, double to, double size, int64_t flags, double *reached) {
-    double start = one->place.start, end = to - start;
+Status advance(Instance *one, double to, double size, int64_t flags, Reached *reached) {
+    double start = one->place.start, end = to - start, found[2] = {end, 0.0};
     flags |= one->has_new ? NEW_INPUTS : 0;
     one->filled = 0;
-    *reached = end;
-    int64_t fault = one->kernels.step(one->motion, one->image, flags, end, size, reached,
+    int64_t fault = one->kernels.step(one->motion, one->image, flags, end, size, found,
                                       one->notes);
     if (fault != 0) {
         one->place.phase = FAILED;
         return refuse_fault(one, fault);
     }
     one->has_new = false;
-    *reached = *reached < end ? start + *reached : to;
-    one->place.now = *reached;
+    reached->time = found[0] < end ? start + found[0] : to;
+    reached->is_blow = found[1] > 0.0;
+    one->place.now = reached->time;
     if (one->notes[0] != 0) {
         tell_notes(one);
     }
@@ -406,7 +425,7 @@ Status advance(Instance *one, double to, double size, int64_t flags, double *rea
 }
 
 Status do_step(Instance *one, const char *call, double from, double size) {
-    double reached;
+    Reached reached;
     Status status = check_step(one, call, from, size);
     if (status == DONE) {
         status = advance(one, from + size, size, 0, &reached);

@@ -111,6 +111,19 @@ def is_quiet(base, t):
 
 
 @preparing
+def time_of_blow(base):
+    """Time by which what is pending is over, if a blow may start in it [s]; 0 if none may."""
+    kind = head_records(base, 1)[0].kind
+    if kind == Kind.MODAL:
+        return modal.time_of_blow(base)
+    if kind == Kind.WAVE:
+        return wave.time_of_blow(base)
+    if kind == Kind.FEM:
+        return fem.time_of_blow(base)
+    return 0.0
+
+
+@preparing
 def go(base, task, t, room):
     """Do a task with the state, with room for so many blows; status and blows."""
     kind = head_records(base, 1)[0].kind

@@ -74,6 +74,11 @@ HEAD = np.dtype(
         ("state_at", "i8"),  # where what moves begins [bytes]
         ("state_bytes", "i8"),
         ("kind", "i8"),  # Kind
+        ("shared_at", "i8"),  # where tables begin that equal motions share: they never change
+        ("directory_at", "i8"),  # whose offsets the shell moves to shared tables
+        ("directory_rows", "i8"),
+        ("directory_words", "i8"),  # of a row
+        ("shared", "i8"),  # address of what the shell notes of shared tables; 0: none are
         # below, the shell looks no more
         ("par_at", "i8"),
         ("record_at", "i8"),  # of the solver's state, from the begin of what moves
@@ -211,7 +216,7 @@ def other_reading(base):
 
 
 @preparing
-def make_memory(kind, par_bytes, moving_bytes, tables_bytes):
+def make_memory(kind, par_bytes, moving_bytes, room_bytes, tables_bytes):
     """Memory of zeros for a motion, with its head.
 
     Parameters
@@ -222,32 +227,37 @@ def make_memory(kind, par_bytes, moving_bytes, tables_bytes):
         Of the solver's parameters.
     moving_bytes : int
         Of all that moves.
+    room_bytes : int
+        Of the room that a step works in.
     tables_bytes : int
-        Of the solver's tables.
+        Of tables that never change: equal motions share them.
 
     Returns
     -------
     base : int
         Address; 0 where there is no memory left.
-    tables_at : int
-        Offset of the tables.
+    room_at, tables_at : int
+        Offsets of the room and of the tables.
     """
     par_at = ENTRIES_AT + lines(8 * ENTRIES * ENTRY_WORDS)
     state_at = par_at + lines(par_bytes)
     moving_bytes = lines(moving_bytes)
     left_at = state_at + moving_bytes
     blows_at = left_at + 3 * moving_bytes
-    tables_at = blows_at + lines(BLOW_ROOM * BLOW_BYTES + EVENT_BYTES + 2 * READING_BYTES)
+    room_at = blows_at + lines(BLOW_ROOM * BLOW_BYTES + EVENT_BYTES + 2 * READING_BYTES)
+    tables_at = room_at + room_bytes
     total = tables_at + tables_bytes
     base = allocate(total)
     if base == 0:
-        return base, tables_at
+        return base, room_at, tables_at
     head = head_records(base, 1)[0]
+    head.shared_at, head.directory_at = tables_at, ENTRIES_AT
+    head.directory_rows, head.directory_words = ENTRIES, ENTRY_WORDS
     head.bytes, head.state_at, head.state_bytes, head.kind = total, state_at, moving_bytes, kind
     head.par_at, head.blows_at, head.record_at = par_at, blows_at, RECORD
     head.left_at, head.here_at = left_at, left_at + moving_bytes
     head.trial_at = left_at + 2 * moving_bytes
-    return base, tables_at
+    return base, room_at, tables_at
 
 
 @preparing

@@ -174,12 +174,12 @@ def table_bytes(arrays):
 
 
 @preparing
-def put_tables(base, entries, offset, arrays):
-    """Copy arrays of a tuple to an offset, and enter them in a directory from its first row on."""
-    at, k = offset, 0
+def put_tables(base, entries, first, offset, arrays):
+    """Copy arrays of a tuple to an offset, and enter them in rows from `first` on."""
+    at, k = offset, first
     for array in literal_unroll(arrays):
         at = put(base, entries, k, at, array)
-        k += 1  # noqa: SIM113  # numba unrolls no enumeration
+        k += 1  # numba unrolls no enumeration
 
 
 @preparing

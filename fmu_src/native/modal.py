@@ -41,6 +41,7 @@ from fmu_src.native.messages import Fault
 from percussion_model.physics.kernel import preparing
 from percussion_model.solvers.cells import find_cell
 from percussion_model.solvers.modal.advance import TICK_ROUNDING, portion, run
+from percussion_model.solvers.modal.advance import time_of_blow as blow_of
 from percussion_model.solvers.modal.faults import find_fault as state_fault
 from percussion_model.solvers.modal.fields import loads_of, places_of, take_rest, total
 from percussion_model.solvers.modal.modes import shapes_at
@@ -75,7 +76,7 @@ ROWS, PISTON_ROWS, ROOM = 8, 2, 8
 (
     SIZES, STIFF, SHAPE, MOVE, YIELDS, CHANGE, JOIN,
     LAW_SIZES, DASHPOT, LAW_MOVE, ENDS, OUT, INTO, TAKEN, REST, VIEWS, SCANS, SIDES, WAY, OVER,
-    PUSHED, SHAPE_P, MOVE_P, ROOM_AT, GAUGE_AT, W_AT, WP_AT,
+    PUSHED, SHAPE_P, MOVE_P, GAUGE_AT, ROOM_AT, W_AT, WP_AT,
 ) = range(27)  # fmt: skip
 
 
@@ -102,14 +103,14 @@ def bars_in(base, moving):
 
 
 @preparing
-def _arrays(made, room, gauge):
-    """What the directory lists, in its order."""
+def _tables(made, gauge):
+    """What never changes, in the order of the directory."""
     forms, laws = made.forms, made.laws
     return (
         forms.sizes, forms.stiff, forms.shape, forms.move, forms.yields, forms.change, forms.join,
         laws.sizes, laws.dashpot, laws.move, laws.ends, laws.out, laws.into, laws.taken, laws.rest,
         laws.views, laws.scans, laws.sides, laws.way, laws.over, laws.pushed,
-        made.shape_p, made.move_p, room, gauge,
+        made.shape_p, made.move_p, gauge,
     )  # fmt: skip
 
 
@@ -214,14 +215,17 @@ def create(numbers, bar, place):
     gauge, above, area = np.zeros((0, 0)), 0.0, 1.0
     if bar != GaugeBar.NONE:
         gauge, above, area = gauge_rows(numbers, made, par[0].dt, bar, place)
-    arrays = _arrays(made, np.zeros((ROOM, max(n, 2 * SCAN))), gauge)
+    tables, room = _tables(made, gauge), (np.zeros((ROOM, max(n, 2 * SCAN))),)
     wp_at = WORK + lines(8 * ROWS * n)
     moving = wp_at + lines(8 * PISTON_ROWS * n_p)
-    base, tables_at = make_memory(Kind.MODAL.value, PAR_BYTES, moving, table_bytes(arrays))
+    base, room_at, tables_at = make_memory(
+        Kind.MODAL.value, PAR_BYTES, moving, table_bytes(room), table_bytes(tables)
+    )
     if base == 0:
         return base
     d = directory(base)
-    put_tables(base, d, tables_at, arrays)
+    put_tables(base, d, 0, tables_at, tables)
+    put_tables(base, d, ROOM_AT, room_at, room)
     enter(d, W_AT, WORK, ROWS, n)
     enter(d, WP_AT, wp_at, PISTON_ROWS, n_p)
     parameters(base)[0] = par[0]
@@ -255,6 +259,13 @@ def is_quiet(base, t):
         return s.leap_end > end
     law = law_wanted(par, s, bars_in(base, moving).laws)
     return s.time + (portion(s, law) if law >= 0 else 1 << STEP) > end
+
+
+@preparing
+def time_of_blow(base):
+    """Time by which what is pending is over, if a blow may start in it [s]; 0 if none may."""
+    moving = base + head_records(base, 1)[0].state_at
+    return blow_of(parameters(base), state_in(moving), bars_in(base, moving))
 
 
 @preparing

@@ -48,13 +48,18 @@ def count_of(base, word):
 
 
 @preparing
-def _copy(base, to):
-    """Copy what moves to another place of the memory."""
-    head = head_records(base, 1)[0]
-    count = head.state_bytes // 8
-    there, here = words_at(base + to, count), words_at(base + head.state_at, count)
+def _carry(base, source, to):
+    """Copy what moves from one place of the memory to another."""
+    count = head_records(base, 1)[0].state_bytes // 8
+    there, here = words_at(base + to, count), words_at(base + source, count)
     for k in range(count):  # an assignment of all would look first whether they overlap
         there[k] = here[k]
+
+
+@preparing
+def _copy(base, to):
+    """Copy what moves to another place of the memory."""
+    _carry(base, head_records(base, 1)[0].state_at, to)
 
 
 @preparing
@@ -124,12 +129,39 @@ def _run(base, task, t, most):
 
 
 @preparing
+def _find_blow(base, t):
+    """Do what is pending at `t` if it comes to its end before, as at a blow; as `Runner` does it.
+
+    Returns
+    -------
+    bool
+        False: nothing was done, since no blow starts up to `t`.
+    """
+    end, head, motion = kinds.time_of_blow(base), head_records(base, 1)[0], motion_of(base)
+    if not end > t:
+        return False
+    _leave(base)
+    _copy(base, head.trial_at)
+    before, count = kinds.state_time(base, base + head.state_at), motion.blow_count
+    _run(base, ADVANCE, end, 1)
+    now = kinds.state_time(base, base + head.state_at)
+    if now > t:
+        _carry(base, head.trial_at, head.state_at)
+        return False
+    return now > before or motion.blow_count > count
+
+
+@preparing
 def advance(base, t, most):
     """Advance until so many blows more have ended, or else to a time; a `Status`."""
-    if kinds.is_quiet(base, t):
-        return Status.DONE.value
-    _leave(base)
-    return _run(base, ADVANCE, t, most)
+    motion = motion_of(base)
+    last, status, is_on = motion.blow_count + most, Status.DONE.value, True
+    while is_on:
+        if not kinds.is_quiet(base, t):
+            _leave(base)
+            status = _run(base, ADVANCE, t, last - motion.blow_count)
+        is_on = status == Status.DONE and motion.blow_count < last and _find_blow(base, t)
+    return status
 
 
 @preparing
@@ -178,7 +210,7 @@ def set_inputs(base, wanted):
 
 
 @preparing
-def step(base, t, size, flags):
+def step(base, t, size, flags, count):
     """Advance to a time, after inputs were set.
 
     Parameters
@@ -186,19 +218,22 @@ def step(base, t, size, flags):
     t, size : float
         End and size of the communication step [s].
     flags : int
+    count : int
+        Blows before the inputs were set: the change of an input can find one.
 
     Returns
     -------
     status : int
-        A `Status`; BLOWS_FULL: it stopped at the end of a blow.
+        A `Status`.
     reached : float
-        [s]
+        [s]; less than `t` where it stopped at the end of a blow.
     """
     motion, head = motion_of(base), head_records(base, 1)[0]
     t = max(t, motion.time)
-    stops = flags & STOP_AT_BLOW != 0
-    status, reached = advance(base, t, 1 if stops else NO_LIMIT), t
-    if stops and status == Status.BLOWS_FULL:
+    stops, status, reached = flags & STOP_AT_BLOW != 0, Status.DONE.value, t
+    if not (stops and motion.blow_count > count):
+        status = advance(base, t, 1 if stops else NO_LIMIT)
+    if stops and motion.blow_count > count:
         reached = min(t, max(motion.time, kinds.state_time(base, base + head.state_at)))
     motion.step_size = size - (t - reached)
     motion.time = reached

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from fmu_src.hammer.motion import INSTANT, NO_CONTACT
 from fmu_src.hammer.outputs import OUTPUTS
 from fmu_src.native.layout import last_blow, motion_of
 from fmu_src.native.motion import (
@@ -19,8 +20,6 @@ from percussion_model.solvers.state import words_of
 
 # Flags of a reading, as the shell has them (fmu_src/native/shell.h).
 WITH_PEAKS, WITH_STRESS, TO_SAVE = 1, 2, 4
-# An impulse below this in a communication step is no contact [N s].
-NO_CONTACT = 1e-9
 
 _WORD, _BLOW_WORD = words_of(READING), words_of(BLOW)
 # Words of a reading by the entry of the ledger that they are.
@@ -61,6 +60,7 @@ RATE, FREQUENCY, EFFICIENCY = (
     AT[name] for name in ("rate_of_penetration", "blow_frequency", "transfer_efficiency")
 )
 BIT_MEAN, CONTACT_MEAN = AT["bit.force_mean"], AT["contact.force_mean"]
+BIT_PEAK, CONTACT_PEAK = AT["bit.force_peak"], AT["contact.force_peak"]
 CASING, CASING_IMPULSE = AT["casing_force"], AT["casing.impulse"]
 STRESS, RESIDUAL = AT["gauge_stress"], AT["energy_residual"]
 BLOWS, OFF_BOTTOM = AT["blow_count"], AT["off_bottom"]
@@ -109,8 +109,10 @@ def numerical(reading):
 
 
 @preparing
-def mean_force(motion, impulse, before):
-    """Mean force over the last step, by the impulses at its end and start [N]."""
+def mean_force(motion, impulse, before, force):
+    """Mean force over the last step, by the impulses at its end and start; or that now [N]."""
+    if 0.0 < motion.step_size < INSTANT:
+        return force
     return (impulse - before) / motion.step_size if motion.step_size != 0.0 else 0.0
 
 
@@ -136,8 +138,12 @@ def fill_outputs(base, flags, out):
     out[FREQUENCY] = share / blow.period if share > 0.0 else 0.0
     energy = blow.blow_energy
     out[EFFICIENCY] = defined(blow.rock_energy) / energy if energy > 0.0 else 0.0
-    out[BIT_MEAN] = mean_force(motion, row.bit_impulse, motion.before[0])
-    out[CONTACT_MEAN] = mean_force(motion, row.contact_impulse, motion.before[1])
+    bit_force, contact_force = defined(row.bit_force), defined(row.contact_force)
+    out[BIT_MEAN] = mean_force(motion, row.bit_impulse, motion.before[0], bit_force)
+    out[CONTACT_MEAN] = mean_force(motion, row.contact_impulse, motion.before[1], contact_force)
+    if peaks and 0.0 < motion.step_size < INSTANT:
+        out[BIT_PEAK] = max(out[BIT_PEAK], bit_force)
+        out[CONTACT_PEAK] = max(out[CONTACT_PEAK], contact_force)
     out[CASING], out[CASING_IMPULSE] = -defined(row.drive_force), -defined(row.drive_impulse)
     if flags & WITH_STRESS:
         out[STRESS] = read_stress(base)

@@ -29,7 +29,7 @@ PAR_BYTES, MOVING = RIGID_PAR.itemsize, work_at(RIGID_STATE)
 @preparing
 def create(numbers):
     """Make the memory of a motion at time zero; its address, 0 where there is no memory left."""
-    base, _ = make_memory(Kind.RIGID.value, PAR_BYTES, MOVING, 0)
+    base = make_memory(Kind.RIGID.value, PAR_BYTES, MOVING, 0, 0)[0]
     if base == 0:
         return base
     fill_rigid_parameters(parameters(base)[0], numbers)

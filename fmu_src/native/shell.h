@@ -2,7 +2,7 @@
  *
  * The shell is the same for every scene. What is special to one stands in its tables
  * (model.bin); what computes are kernels, compiled elsewhere. FMI 2.0 and 3.0 are thin
- * layers on one core. Nothing is kept outside instances.
+ * layers on one core. Nothing is kept outside instances but the tables that equal ones share.
  */
 #ifndef SHELL_H
 #define SHELL_H
@@ -80,9 +80,20 @@ enum { MEMORY_FAULT = 1 };
 
 /* Words at the beginning of a motion, which a kernel makes. The state, which is all that moves,
  * lies in one piece; its first word tells whether what was read last belongs to it. */
-enum { MOTION_BYTES = 0, STATE_BEGIN = 1, STATE_BYTES = 2, SOLVER_KIND = 3 };
+enum {
+    MOTION_BYTES = 0,
+    STATE_BEGIN = 1,
+    STATE_BYTES = 2,
+    SOLVER_KIND = 3,
+    SHARED_BEGIN = 4,    /* from here on nothing changes any more */
+    DIRECTORY_BEGIN = 5, /* rows whose first word is an offset of an array */
+    DIRECTORY_ROWS = 6,
+    DIRECTORY_WORDS = 7,
+    SHARED = 8 /* for memory.c */
+};
 
-/* All return 0, or the number of a fault. */
+/* All return 0, or the number of a fault. A step gives the time that it has reached, and how many
+ * blows have ended. */
 typedef struct {
     int64_t (*check)(const int64_t *image, int64_t *notes);
     int64_t (*create)(const int64_t *image, const double *map, int64_t map_size,
@@ -98,8 +109,12 @@ Kernels kernels_of_machine(void);
 
 /* ---- memory.c: memory that kernels ask for ---------------------------------------- */
 
-/* Give back a motion that `create` has made. */
+/* Give back a motion. */
 void free_motion(int64_t *motion);
+/* A motion that `create` has made, but with tables that equal ones share. */
+int64_t *share_motion(int64_t *made, const uint8_t digest[DIGEST]);
+/* A new motion at time zero, equal to those with this hash; NULL if there are none. */
+int64_t *equal_motion(const uint8_t digest[DIGEST]);
 
 /* ---- tables.c: what is special to a scene ----------------------------------------- */
 
@@ -243,6 +258,7 @@ struct Instance {
 
     /* FMI 3.0 */
     bool has_events, returns_early;
+    bool is_step_mode_told; /* that discrete inputs belong to event mode */
     void (*update)(void); /* callback of intermediate values, or NULL */
 };
 
@@ -275,9 +291,15 @@ Status make_motion(Instance *one, const double *values, const int64_t *image, in
 Status need_motion(Instance *one);
 /* Refuse a step that cannot be; checks new inputs. */
 Status check_step(Instance *one, const char *call, double from, double size);
+/* How far a step has come. */
+typedef struct {
+    double time; /* of the host [s] */
+    bool is_blow; /* a blow has ended */
+} Reached;
+
 /* Advance the motion to a time of the host, or to the end of a blow before it; `size` is that
  * of the communication step. */
-Status advance(Instance *one, double to, double size, int64_t flags, double *reached);
+Status advance(Instance *one, double to, double size, int64_t flags, Reached *reached);
 Status do_step(Instance *one, const char *call, double from, double size);
 
 /* ---- values.c: variables ---------------------------------------------------------- */

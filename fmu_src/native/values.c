@@ -246,6 +246,17 @@ static Status check_phase(Instance *one, const Access *access) {
     }
 }
 
+/* FMI 3.0 sets discrete inputs in event mode. Hosts that set them before a step, as fmpy does, are
+ * understood: the value acts from the step on. */
+static void tell_of_step_mode(Instance *one, const Entry *entry) {
+    if (one->has_events && one->place.phase == STEPPING && entry->type != REAL &&
+        !one->is_step_mode_told) {
+        one->is_step_mode_told = true;
+        warn(one, "%s is discrete: with event mode, FMI 3.0 sets it in event mode; set in step "
+                  "mode, it acts from the next step on", one->tables.text + entry->name);
+    }
+}
+
 static void set_value(Instance *one, uint32_t member, double value) {
     const Variable *variable = &one->tables.variables[member];
     if (one->values[member] == value) {
@@ -294,6 +305,7 @@ Status set_values(Instance *one, const Access *access, const uint32_t *reference
     }
     for (size_t k = 0; status == DONE && k < count; k++) {
         const Entry *entry = find_entry(tables, references[k]);
+        tell_of_step_mode(one, entry);
         for (uint32_t m = 0; m < entry->member_count; m++) {
             double value = take(access->form, values, at++);
             if (entry->type == BOOLEAN) {

@@ -38,6 +38,7 @@ from percussion_model.physics.kernel import preparing
 from percussion_model.solvers.cells import find_cell
 from percussion_model.solvers.setup import MOST_CELLS
 from percussion_model.solvers.wave.advance import GRID_ROUNDING, run
+from percussion_model.solvers.wave.advance import time_of_blow as blow_of
 from percussion_model.solvers.wave.grid import Refused
 from percussion_model.solvers.wave.leaps.lookahead import LOOKAHEAD
 from percussion_model.solvers.wave.prepare import (
@@ -120,18 +121,22 @@ def create(numbers, bar, place):
     fill_wave_parameters(par[0], numbers, bars)
     ops = make_operators(par, numbers, bars)
     of_piston, of_bit = bars.piston.coefficients, bars.bit.coefficients
-    arrays = (
+    tables = (
         of_piston, of_bit, ops.piston, ops.bit, ops.lookahead, ops.sums, ops.top, ops.bottom,
-        ops.piston_loss, ops.loss, ops.squares, np.zeros((3, scratch_size(par[0]))),
+        ops.piston_loss, ops.loss, ops.squares,
     )  # fmt: skip
+    room = (np.zeros((3, scratch_size(par[0]))),)
     n_p, n_b = len(bars.piston.grid.mass) + 1, len(bars.bit.grid.mass) + 1
     wb_at = WORK + lines(8 * ROWS * n_p)
     moving = wb_at + lines(8 * ROWS * n_b)
-    base, tables_at = make_memory(Kind.WAVE.value, PAR_BYTES, moving, table_bytes(arrays))
+    base, room_at, tables_at = make_memory(
+        Kind.WAVE.value, PAR_BYTES, moving, table_bytes(room), table_bytes(tables)
+    )
     if base == 0:
         return base
     d = directory(base)
-    put_tables(base, d, tables_at, arrays)
+    put_tables(base, d, 0, tables_at, tables)
+    put_tables(base, d, SCRATCH, room_at, room)
     enter(d, WP, WORK, ROWS, n_p)
     enter(d, WB, wb_at, ROWS, n_b)
     parameters(base)[0] = par[0]
@@ -172,6 +177,12 @@ def is_quiet(base, t):
     s = state_in(base + head_records(base, 1)[0].state_at)[0]
     steps = (t - s.t_base) / parameters(base)[0].dt + GRID_ROUNDING
     return steps < (s.leap_end if s.leap_end >= 0 else s.step + 1)
+
+
+@preparing
+def time_of_blow(base):
+    """Time at which the pending step is over, if a blow may start in it [s]; 0 if none may."""
+    return blow_of(parameters(base), state_in(base + head_records(base, 1)[0].state_at))
 
 
 @preparing

@@ -35,6 +35,8 @@ from percussion_model.scene.rows import refuse_value
 # of a step, and some units in the last place of the time.
 SHARE_OF_STEP = 1e-3
 LAST_PLACES = 8 * sys.float_info.epsilon
+# Beyond, a host's times are more than 2e-6 s apart, and its steps no longer what they seem [s].
+LATEST_START = 1e10
 
 # Types that share a getter and a setter.
 REAL, INTEGER, BOOLEAN, STRING = ("Real",), ("Integer", "Enumeration"), ("Boolean",), ("String",)
@@ -293,8 +295,8 @@ class Slave(Hosted):
     ) -> None:
         """Take the start time."""
         self._require("fmi2SetupExperiment", Phase.INSTANTIATED)
-        if not abs(start_time) < inf:
-            raise ValueError(f"startTime = {start_time!r}: must be a finite time in s")
+        if not abs(start_time) <= LATEST_START:
+            raise ValueError(f"startTime = {start_time!r}: must be a time within 1e10 s of 0")
         if stop_time is not None and not stop_time >= start_time:
             raise ValueError(
                 f"stopTime = {stop_time!r}: must not lie before startTime = {start_time!r} s"

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from percussion_model.physics.kernel import inlined, kernel, merged
-from percussion_model.physics.records import DriveKind, EventKind, Mode
+from percussion_model.physics.records import DriveKind, EventKind, Mode, Piston
 from percussion_model.physics.rock import hole_depth
 from percussion_model.physics.state import CHECKPOINTS
 
@@ -139,6 +139,14 @@ def starts_blow(par, s, time):
     if s.b_started == 1 and time <= s.b_time:
         return False
     return s.armed == 1 or (par.drive != DriveKind.PRESSURE and time - s.t_open >= par.rearm_time)
+
+
+@inlined
+def end_with_blow(par, s, end):
+    """A time at which what is pending is over, if a closure before it may start a blow; else 0."""
+    if s.closed == 1 or par.piston == Piston.ABSENT or not starts_blow(par, s, end):
+        return 0.0
+    return end
 
 
 @merged

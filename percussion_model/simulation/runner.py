@@ -53,6 +53,7 @@ class Runner:
         self._time = 0.0
         self._blow_room = np.zeros(_BLOW_ROOM, BLOW)
         self._event_room = np.zeros(_EVENT_ROOM if record_events else 1, EVENT)
+        self._ahead: State | None = None  # an old copy of the state, to be used again
         self._can_sample = False
         if solver is None and self.solver.name not in _compiled:
             self._compile()
@@ -102,7 +103,7 @@ class Runner:
     def advance_blows(self, count: int, t: float) -> None:
         """Let the simulation run until so many more blows have ended, or else up to `t` [s].
 
-        It stops before the next one ends; the waves do so at the next grid point. What
+        It stops at the end of the solver's step in which the last of them ends. What
         follows has the same bits as if it had not stopped there.
 
         Parameters
@@ -117,10 +118,13 @@ class Runner:
         while count > 0:
             room = self._blow_room[:count]
             status, found = self._call(self.solver.advance, float(t), room)
+            if status == _DONE and found < count:
+                ahead = self._find_blow(float(t))
+                if ahead is None:
+                    break
+                found += ahead
             count -= found
-            if status == _DONE:
-                break
-        reached = float(t) if status == _DONE else self.solver.time(self._state)
+        reached = float(t) if count > 0 else self.solver.time(self._state)
         self._time = max(self._time, reached)
         self.wall_time += time.perf_counter() - began
 
@@ -132,6 +136,27 @@ class Runner:
 
     def _advance_solver(self, t: float) -> None:
         self._call_until_done(self.solver.advance, t)
+        while self._find_blow(t) is not None:
+            self._call_until_done(self.solver.advance, t)
+
+    def _find_blow(self, t: float) -> int | None:
+        """Do what is pending at `t` if it comes to its end before, as at a blow; blows that ended.
+
+        None: nothing was done, since no blow starts up to `t`. The bits stay the same: what is
+        pending would be done later otherwise, and blows be known late.
+        """
+        end = self.solver.time_of_blow(self._state)
+        if not end > t:
+            return None
+        ahead = self._ahead = self._state.copy(self._ahead)
+        room = self._blow_room[:1]
+        found = self.solver.advance(ahead, end, room, self._event_room, self.record_events)
+        before, now = self.solver.time(self._state), self.solver.time(ahead)
+        if now > t:
+            return None
+        self._state, self._ahead = ahead, self._state
+        blows = self._take(*found, room)[1]
+        return blows if now > before or blows > 0 else None
 
     def _call_until_done(self, method: Callable[..., tuple[int, int, int]], t: float) -> None:
         """Call the solver until it has reached `t`; its rows are kept whenever they are full."""

@@ -163,6 +163,13 @@ class Solver(ABC):
         """Time up to which `read` answers without advancing the state far [s]."""
         return self.time(state)
 
+    def time_of_blow(self, state: State) -> float:
+        """Time by which what is pending is over, if a blow may start in it [s]; 0 if none may.
+
+        What ends at the closure that starts it is over before.
+        """
+        return 0.0
+
     def reset_peaks(self, state: State, t: float) -> None:
         """Count the peak forces of `read` from `t` on [s]."""
         words, numbers = words_of(state.dtype), state.numbers

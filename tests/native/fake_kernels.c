@@ -22,6 +22,7 @@ typedef struct {
 /* Head, what does not move, what moves. */
 typedef struct {
     int64_t bytes, at, size, kind;
+    int64_t shared_at, directory_at, directory_rows, directory_words, shared;
     int64_t told;
     double rock_at_start, left, x_read; /* `left`: an impulse that is not known yet */
     Moving moving;
@@ -74,6 +75,7 @@ int64_t kernel_create_base(const int64_t *image, const double *map, int64_t map_
     made->bytes = sizeof *made;
     made->at = offsetof(Motion, moving);
     made->size = sizeof made->moving;
+    made->shared_at = sizeof *made; /* nothing is shared */
     made->rock_at_start = value(image, STIFFNESS);
     made->moving.force = value(image, FEED_FORCE);
     for (int64_t k = 0; k < map_size; k++) {
@@ -102,6 +104,7 @@ int64_t kernel_step_base(int64_t *motion, const int64_t *image, int64_t flags, d
         fault(notes + 8, 1, t, m->force);
     }
     double next = PERIOD * (double)(m->blows + 1), end = t;
+    int64_t before = m->blows;
     if ((flags & STOP_AT_BLOW) && next < t) {
         end = next;
     }
@@ -115,7 +118,8 @@ int64_t kernel_step_base(int64_t *motion, const int64_t *image, int64_t flags, d
     m->time = end;
     m->size = h - (t - end);
     m->is_read = 0;
-    *reached = end;
+    reached[0] = end;
+    reached[1] = (double)(m->blows - before);
     return 0;
 }
 

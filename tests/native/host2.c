@@ -201,7 +201,7 @@ static void test_sequence(void) {
             "stopTime = 0.5: must not lie before startTime = 1.0 s");
     REFUSED(two.SetupExperiment(c, 0, 0.0, 0.0, 1, NAN), "stopTime = nan");
     REFUSED(two.SetupExperiment(c, 0, 0.0, INFINITY, 0, 0.0),
-            "startTime = inf: must be a finite time in s");
+            "startTime = inf: must be a time within 1e10 s of 0");
     start(c, 0.0);
     REFUSED(two.SetupExperiment(c, 0, 0.0, 0.0, 0, 0.0), "fmi2SetupExperiment");
     REFUSED(two.EnterInitializationMode(c), "stepping");

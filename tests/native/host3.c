@@ -209,7 +209,7 @@ static void test_events(void) {
     one = start(made(true, false, NULL, 0, NULL, NULL)); /* no early return */
     OK(three.EnterStepMode(one));
     OK(step(one, 0.0, 0.1, &now));
-    CHECK(!now.early && now.time == 0.1 && blows(one) == 10);
+    CHECK(now.event && !now.early && now.time == 0.1 && blows(one) == 10);
     three.FreeInstance(one);
 }
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from percussion_model.physics.blows import push_checkpoint
+from percussion_model.physics.blows import end_with_blow, push_checkpoint
 from percussion_model.physics.body import hold_effects
 from percussion_model.physics.kernel import kernel, merged
 from percussion_model.physics.readings import fill_ledger, fill_motion
@@ -25,6 +25,15 @@ from percussion_model.solvers.fem.step import bit_force, contact_force, note_for
 GRID_ROUNDING = 1e-6
 # Spacing of the bit force's checkpoints while standing still [steps].
 CHECKPOINT_STEPS = 64
+
+
+@kernel
+def time_of_blow(par_, state):
+    """Time at which the pending step is over, if a blow may start in it [s]; 0 if none may.
+
+    One that is cut at the closure is over before.
+    """
+    return end_with_blow(par_[0], state[0], state[0].time + par_[0].dt)
 
 
 @merged

@@ -11,7 +11,7 @@ from percussion_model.scene.bar_groups import Bar
 from percussion_model.scene.numbers import kernel_numbers, section_numbers
 from percussion_model.scene.scene import Scene
 from percussion_model.solvers.base import Solver
-from percussion_model.solvers.fem.advance import run
+from percussion_model.solvers.fem.advance import run, time_of_blow
 from percussion_model.solvers.fem.bars import force_in
 from percussion_model.solvers.fem.mesh import (
     BarMesh,
@@ -112,6 +112,12 @@ class FemSolver(Solver):
     def time(self, state: State) -> float:
         """Time up to which the state is committed [s]."""
         return float(state.record[0]["time"])
+
+    def time_of_blow(self, state: State) -> float:
+        """As in `Solver`: a step may be cut at a closure."""
+        if state.record[0]["closed"] == 1:  # as the kernel asks, in a tenth of the time
+            return 0.0
+        return float(time_of_blow(self._par, state.record))
 
     def readable_until(self, state: State) -> float:
         """Time up to which `read` answers without advancing the state [s]."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from percussion_model.physics.blows import end_with_blow
 from percussion_model.physics.kernel import inlined, kernel, merged
 from percussion_model.physics.readings import fill_ledger, fill_motion
 from percussion_model.physics.records import Mode, Piston, Status
@@ -49,6 +50,20 @@ def full(s, blows, events):
 def portion(s, law):
     """Ticks that bars go by pairs beside a piston before it is looked again which they need."""
     return (s.stride if s.law == law else FIRST_STRIDE) * WHOLE
+
+
+@kernel
+def time_of_blow(par_, state, bars_):
+    """Time by which what is pending is over, if a blow may start in it [s]; 0 if none may.
+
+    A portion is made when all of it is past, some tenths of a millisecond after a closure in it.
+    """
+    par, s = par_[0], state[0]
+    if s.leap_end >= 0:
+        return 0.0
+    law = law_wanted(par, s, refer(bars_).laws)
+    ticks = portion(s, law) if law >= 0 else WHOLE
+    return end_with_blow(par, s, (s.time + ticks) * par.tick)
 
 
 @merged

@@ -30,6 +30,8 @@ from percussion_model.solvers.modal.records import JOINED, LEVELS, Forms, Move, 
 
 # Factors of a move below this are zero: what they leave would only slow down arithmetic.
 NOTHING = 1e-40
+# Squares of frequencies are 0 or above this [1/s2].
+LEAST_SQUARE = 1e-300
 # Nodes by which the loss over a tick is integrated.
 NODES = 8
 FORMS, SHAPES, MOVES = 2 * JOINED, len(Shape), len(Move)
@@ -128,8 +130,8 @@ def _shapes(modes, above):
     for k in range(n):
         w = modes.frequency[k]
         row[Shape.STIFF, k] = w * w
-        if w > 0.0:
-            row[Shape.SOFT, k] = 1.0 / (w * w)
+        # never divided by 0: compiled code divides before it asks, and some hosts trap that
+        row[Shape.SOFT, k] = 1.0 / max(w * w, LEAST_SQUARE) if w > 0.0 else 0.0
     row[Shape.BIT] = totals(modes, above, len(modes.mass) - above)
     row[Shape.PISTON] = modes.top_mass * shape_above(modes, 0)
     if above > 0:

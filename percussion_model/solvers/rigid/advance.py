@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from percussion_model.physics.blows import starts_blow
 from percussion_model.physics.kernel import kernel
 from percussion_model.physics.readings import fill_ledger, fill_motion
 from percussion_model.physics.records import Status
@@ -65,11 +64,10 @@ def advance(par_, state, t, blows, events):
         if not s.next_time <= t or s.next_kind == Next.NOTHING:
             return Status.DONE
         if s.live == 1:
+            if s.n_blows >= blows.shape[0]:
+                return Status.BLOWS_FULL
             if s.events_on == 1 and s.n_events + ROWS_AN_EVENT > events.shape[0]:
                 return Status.EVENTS_FULL
-            closes = s.next_kind == Next.CLOSE and s.b_started == 1
-            if closes and starts_blow(par, s, s.next_time) and s.n_blows >= blows.shape[0]:
-                return Status.BLOWS_FULL
         if s.next_tau > 0.0:
             move(par, s, s.next_tau)
             s.time = s.next_time

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from percussion_model.physics.blows import end_with_blow
 from percussion_model.physics.kernel import kernel, merged
 from percussion_model.physics.readings import fill_forces, fill_ledger, fill_motion
 from percussion_model.physics.records import Piston, Status
@@ -61,6 +62,16 @@ def plan(par, s, bars, ops, scratch):
 def ends_by(par, s, step, time):
     """Whether a step ends at `time` or before."""
     return (time - s.t_base) / par.dt + GRID_ROUNDING >= step
+
+
+@kernel
+def time_of_blow(par_, state):
+    """Time at which the pending step is over, if a blow may start in it [s]; 0 if none may.
+
+    One that is cut at the closure is over before.
+    """
+    par, s = par_[0], state[0]
+    return 0.0 if s.leap_end >= 0 else end_with_blow(par, s, s.t_base + (s.step + 1) * par.dt)
 
 
 @merged

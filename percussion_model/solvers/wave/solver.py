@@ -14,7 +14,7 @@ from percussion_model.scene.numbers import kernel_numbers, numbers_of, section_n
 from percussion_model.scene.scene import Scene
 from percussion_model.solvers.base import Solver
 from percussion_model.solvers.state import State, words_of
-from percussion_model.solvers.wave.advance import GRID_ROUNDING, run, sample
+from percussion_model.solvers.wave.advance import GRID_ROUNDING, run, sample, time_of_blow
 from percussion_model.solvers.wave.cutting import Grid
 from percussion_model.solvers.wave.grid import refuse, section_count
 from percussion_model.solvers.wave.leaps.lookahead import LOOKAHEAD
@@ -217,6 +217,12 @@ class WaveSolver(Solver):
     def time(self, state: State) -> float:
         """Time up to which the state is committed [s]."""
         return self._time_of(state, int(state.words[STEP]))
+
+    def time_of_blow(self, state: State) -> float:
+        """As in `Solver`: a step may be cut at a closure."""
+        if state.record[0]["closed"] == 1:  # as the kernel asks, in a tenth of the time
+            return 0.0
+        return float(time_of_blow(self._par, state.record))
 
     def readable_until(self, state: State) -> float:
         """Time up to which `read` answers without advancing the state [s]."""
