@@ -214,7 +214,7 @@ def sample(par_, state, bars, memory, spare, spare_bars, spare_memory, ops, scra
     status : int
         Of the last advance, a `Status`.
     count : int
-        Times that were read: fewer than all where blows or events were listed.
+        Times that were read: fewer than all where blows or events were listed, or a blow may start.
     """
     # as numbers of a type that `run` has been compiled for, not as constants of their own
     advance, read = np.int64(ADVANCE), np.int64(READ)
@@ -222,6 +222,8 @@ def sample(par_, state, bars, memory, spare, spare_bars, spare_memory, ops, scra
         status = run(advance, par_, state, bars, ops, scratch, times[k], blows, events, reading)
         if status != Status.DONE:
             return status, k
+        if k > 0 and time_of_blow(par_, state) > times[k]:  # it is looked for between two calls
+            return Status.DONE, k
         listed = state[0].n_blows + state[0].n_events
         for i in range(len(memory[0])):
             spare_memory[0][i] = memory[0][i]
