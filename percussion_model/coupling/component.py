@@ -58,6 +58,33 @@ def read_description(name: str, folder: str) -> Any:
     return found
 
 
+def find_variable(component: str, variables: Mapping[str, Any], name: str) -> Any:
+    """A variable by name; the error suggests another one."""
+    if name not in variables:
+        name = shortened(name)
+        near = difflib.get_close_matches(name, variables, 1)
+        hint = f"; did you mean {near[0]}?" if near else ""
+        raise CouplingError(f"{component} has no variable {name}{hint}")
+    return variables[name]
+
+
+def numbers_of_words(variable: Any) -> dict[str, int]:
+    """Numbers of an enumeration by their words; empty for another variable."""
+    items = variable.declaredType.items if variable.type == "Enumeration" else []
+    return {item.name: int(item.value) for item in items or []}
+
+
+def number_of_word(component: str, variable: Any, word: str) -> int:
+    """Number of a word of an enumeration."""
+    found = numbers_of_words(variable)
+    if word not in found:
+        kind = {"Boolean": "true or false"}.get(variable.type, "a number")
+        raise CouplingError(
+            f"{component}.{variable.name} = {shortened(word)}: must be {', '.join(found) or kind}"
+        )
+    return found[word]
+
+
 def check_library(name: str, folder: Path, identifier: str) -> None:
     """`CouplingError` unless an unpacked FMU has a whole library for this platform.
 
@@ -211,11 +238,12 @@ class Component:
         Of the component in the system.
     folder : str
         Of the unpacked FMU.
+    description : ModelDescription
+        Of `read_description`.
     """
 
-    def __init__(self, name: str, folder: str) -> None:
+    def __init__(self, name: str, folder: str, description: Any) -> None:
         self.name = name
-        description = read_description(name, folder)
         check_library(name, Path(folder), description.coSimulation.modelIdentifier)
         self.variables = {one.name: one for one in description.modelVariables}
         self.can_save = bool(description.coSimulation.canGetAndSetFMUstate)
@@ -258,12 +286,7 @@ class Component:
 
     def find(self, name: str) -> Any:
         """A variable by name; the error suggests another one."""
-        if name not in self.variables:
-            name = shortened(name)
-            near = difflib.get_close_matches(name, self.variables, 1)
-            hint = f"; did you mean {near[0]}?" if near else ""
-            raise CouplingError(f"{self.name} has no variable {name}{hint}")
-        return self.variables[name]
+        return find_variable(self.name, self.variables, name)
 
     def family(self, name: str) -> str:
         """Family of a variable by name: what its getter is called."""
@@ -279,8 +302,10 @@ class Component:
         for name, value in values.items():
             one = self.find(name)
             family = self.family(name)
+            if one.variability == "constant" or one.initial == "calculated":
+                raise CouplingError(f"{self.name}.{name} is calculated: it cannot be set")
             if isinstance(value, str):
-                value = self._number_of(one, value)
+                value = number_of_word(self.name, one, value)
             converted = self._converted(one, family, value)
             setter = getattr(self._slave, f"set{family}")
             self._guarded(setter, [one.valueReference], [converted])
@@ -300,15 +325,6 @@ class Component:
         ):
             raise CouplingError(f"{self.name}.{one.name} = {value!r}: must be of type {one.type}")
         return converted
-
-    def _number_of(self, one: Any, word: str) -> int:
-        """Number of a word of an enumeration."""
-        items = one.declaredType.items if one.type == "Enumeration" else []
-        found = {item.name: int(item.value) for item in items or []}
-        if word not in found:
-            allowed = ", ".join(found) or {"Boolean": "true or false"}.get(one.type, "a number")
-            raise CouplingError(f"{self.name}.{one.name} = {word}: must be {allowed}")
-        return found[word]
 
     def reader(self, names: Sequence[str]) -> Reader:
         """Return a reader of these variables, all at once."""

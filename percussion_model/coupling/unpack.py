@@ -30,8 +30,6 @@ LONGEST_NAME = 250
 # Where there is a folder of a plain name, besides that for temporary files.
 ELSEWHERE = ("/tmp", "/var/tmp", "/dev/shm")
 _ENTRY = b"PK\x01\x02"
-# What fmpy reads of an archive with its structure.
-_READ = ("ParameterBinding", "ParameterMapping", "SignalDictionary")
 
 
 class Allowance:
@@ -150,7 +148,7 @@ def _fault_of_path(path: str) -> str:
     return ""
 
 
-def check_xml(path: Path, name: str, allowance: Allowance) -> list[str]:
+def check_xml(path: Path, name: str, allowance: Allowance) -> None:
     """Go through an XML file without keeping it; `CouplingError` if it could grow in a parser.
 
     Parameters
@@ -159,16 +157,10 @@ def check_xml(path: Path, name: str, allowance: Allowance) -> list[str]:
         Of the file in messages.
     allowance : Allowance
         One that is trusted may have any size; a document type is refused all the same.
-
-    Returns
-    -------
-    list of str
-        Other files that the structure of a system names as sources of values.
     """
     if not path.is_file():
         raise CouplingError(f"{name}: is not there")
     allowance.parse(name, path.stat().st_size)
-    found: list[str] = []
     level = count = 0
 
     def begin(tag: str, attributes: dict[str, str]) -> None:
@@ -178,8 +170,6 @@ def check_xml(path: Path, name: str, allowance: Allowance) -> list[str]:
             raise CouplingError(f"{name}: has elements more than {DEEPEST} levels deep")
         if count > MOST_ELEMENTS and not allowance.trusted:
             raise _too_much(f"{name}: has more than {MOST_ELEMENTS} elements")
-        if "source" in attributes and tag.rpartition(":")[2] in _READ:
-            found.append(attributes["source"])
 
     def end(tag: str) -> None:
         nonlocal level
@@ -198,7 +188,6 @@ def check_xml(path: Path, name: str, allowance: Allowance) -> list[str]:
         if isinstance(error, CouplingError):
             raise
         raise CouplingError(f"{name}: is not valid XML: {_one_line(error)}") from None
-    return found
 
 
 def new_folder() -> str:
