@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from fmpy import platform, read_model_description, sharedLibraryExtension
 from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
+from lxml import etree
 
 from percussion_model.scene.rows import shortened
 
@@ -55,7 +56,21 @@ def read_description(name: str, folder: str) -> Any:
         raise CouplingError(f"{name}: modelDescription.xml cannot be read: {text}") from error
     if found.fmiVersion != "2.0" or found.coSimulation is None:
         raise CouplingError(f"{name}: this FMU has no co-simulation by FMI 2.0")
+    _mark_differences(found, Path(folder) / "modelDescription.xml")
     return found
+
+
+def _mark_differences(description: Any, path: Path) -> None:
+    """Set `relativeQuantity` of the variables, which fmpy 0.3.32 reads of their types alone."""
+    if b"relativeQuantity" not in path.read_bytes():
+        return
+    said = {
+        one.getparent().get("name"): one.get("relativeQuantity")
+        for one in etree.parse(str(path)).iterfind("ModelVariables/ScalarVariable/Real")
+    }
+    for variable in description.modelVariables:
+        if said.get(variable.name):
+            variable.relativeQuantity = said[variable.name] in ("true", "1")
 
 
 def find_variable(component: str, variables: Mapping[str, Any], name: str) -> Any:

@@ -1,6 +1,6 @@
 """Unpacked SSP archive: what it says of components, connections and values, and of the time.
 
-Whatever SSP 1.0 can say is applied, changes no number, or is refused here (docs/ssp.md).
+Whatever SSP 1.0 can say is applied, changes no number, or is refused here (docs/data/ssp.md).
 """
 
 from __future__ import annotations

@@ -102,7 +102,9 @@ def conversion(
         return None
     try:
         gain, shift = _factor_and_shift(given, wanted)
-    except UnitError:
+        if not (math.isfinite(gain) and math.isfinite(shift)):
+            raise UnitError
+    except (UnitError, OverflowError):
         names = f"{shortened(given.name)} to {shortened(wanted.name)}"
         raise UnitError(f"there is no conversion of {names}") from None
     found = Linear(gain, 0.0 if is_difference else shift)

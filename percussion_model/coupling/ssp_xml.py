@@ -106,7 +106,7 @@ def validated(root: Any, name: str, space: str) -> Any:
 def _as_of_1(root: Any) -> None:
     """Write what 2.0 says by other words than 1.0 by those of 1.0."""
     root.set("version", "1.0")
-    for node in list(root.iter(etree.Element)):
+    for node in list(root.iterdescendants(etree.Element)):
         space, _, word = node.tag.rpartition("}")
         if word in _REMARKS and space == f"{{{SPACES['ssc']}":
             node.getparent().remove(node)

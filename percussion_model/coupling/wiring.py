@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any, NamedTuple
@@ -15,7 +16,7 @@ from percussion_model.coupling.component import (
 )
 from percussion_model.coupling.ssp import SYSTEM, Archive, Connection, Connector, signal_name
 from percussion_model.coupling.ssp_units import Unit, conversion, units_of_fmu
-from percussion_model.coupling.ssp_values import Value
+from percussion_model.coupling.ssp_values import Value, unit_named
 from percussion_model.coupling.transformation import Change, Transformation, chained
 from percussion_model.scene.rows import shortened
 from percussion_model.scene.units import UnitError
@@ -95,21 +96,34 @@ class Wiring:
     def links(self) -> dict[str, list[Link]]:
         """Inputs of each component that are connected."""
         found: dict[str, list[Link]] = {name: [] for name in self._variables}
+        fed: set[tuple[str, str]] = set()
         for one in self.archive.connections:
-            if SYSTEM in (one.ends[0][0], one.ends[1][0]):
-                continue  # nothing is outside: what is bound there is among the values
             with _at(one):
-                ends = [self._end(*end) for end in one.ends]
-                source, sink = sorted(ends, key=lambda end: end.variable.causality != "output")
-                if (source.variable.causality, sink.variable.causality) != ("output", "input"):
-                    kinds = " and ".join(end.variable.causality for end in ends)
-                    raise CouplingError(f"must be of an output and an input, not of {kinds}")
-                link = Link(sink.name, source.component, source.name, _change(source, sink, one))
-            if link.input in [other.input for other in found[sink.component]]:
-                name = signal_name(sink.component, link.input)
-                raise CouplingError(f"{shortened(name)} has two connections")
-            found[sink.component].append(link)
+                ends = [self._end(*end) for end in one.ends if self._is_inside(*end)]
+                sinks = [end for end in ends if end.variable.causality == "input"]
+                if len(ends) == 2:
+                    sources = [end for end in ends if end.variable.causality == "output"]
+                    if not (sources and sinks):
+                        kinds = " and ".join(end.variable.causality for end in ends)
+                        raise CouplingError(f"must be of an output and an input, not of {kinds}")
+                    (source,), (sink,) = sources, sinks
+                    change = _change(source, sink, one)
+                    link = Link(sink.name, source.component, source.name, change)
+                    found[sink.component].append(link)
+            for end in sinks:
+                if end[:2] in fed:
+                    name = signal_name(end.component, end.name)
+                    raise CouplingError(f"{shortened(name)} has two connections")
+                fed.add(end[:2])
         return found
+
+    def _is_inside(self, element: str, name: str) -> bool:
+        """Whether an end is of a component. Those of the system move nothing in a run: nothing
+        is outside, and what is bound to them is among the values.
+        """
+        if element == SYSTEM and (SYSTEM, name) not in self.archive.connectors:
+            raise CouplingError(f"the system has no connector {shortened(name)}")
+        return element != SYSTEM
 
     def _end(self, component: str, name: str) -> End:
         """A variable of a component, as FMU and archive describe it."""
@@ -118,10 +132,7 @@ class Wiring:
             raise CouplingError(f"there is no component {shortened(component)}, only {known}")
         variable = find_variable(component, self._variables[component], name)
         units = self._units[component]
-        unit = units.get(variable.unit, Unit(variable.unit)) if variable.unit else None
-        if variable.declaredType is not None and unit is None:
-            declared = getattr(variable.declaredType, "unit", None)
-            unit = units.get(declared, Unit(declared)) if declared else None
+        unit = unit_named(variable.unit or getattr(variable.declaredType, "unit", None), units)
         said = self.archive.connectors.get((component, name))
         if said is None:
             return End(component, name, variable, unit)
@@ -142,6 +153,8 @@ class Wiring:
             for one in self.archive.connections:
                 if (SYSTEM, name) in one.ends:
                     other = one.ends[one.ends[0] == (SYSTEM, name)]
+                    if other[0] == SYSTEM:
+                        continue
                     with _at(one):
                         end = self._end(*other)
                         ends.append((end, self._passed(value, connector, end, one)))
@@ -227,6 +240,8 @@ def _changed(value: Value, unit: Unit | None, is_difference: bool) -> Any:
         if value.kind not in (("Real", "Integer") if kind == "Linear" else (kind,)):
             raise CouplingError(f"a transformation of {kind} values is none of {value.kind}")
         found = value.transformation.change(found)
+    if isinstance(found, float) and not math.isfinite(found):
+        raise CouplingError(f"{value.value}: is no finite number after its conversion")
     return found
 
 
