@@ -15,8 +15,8 @@ from urllib.parse import unquote, urlsplit
 from urllib.request import url2pathname
 
 from percussion_model.coupling.component import CouplingError
-from percussion_model.coupling.ssp_units import Unit, units_of
-from percussion_model.coupling.ssp_values import Value, bound_values, unit_named
+from percussion_model.coupling.ssp_units import Unit, unit_named, units_of
+from percussion_model.coupling.ssp_values import Value, bound_values
 from percussion_model.coupling.ssp_xml import (
     InvalidError,
     Reader,

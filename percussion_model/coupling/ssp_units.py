@@ -12,6 +12,8 @@ from percussion_model.coupling.ssp_xml import elements
 from percussion_model.scene.rows import shortened
 from percussion_model.scene.units import UnitError, factor
 
+# What a pure number is called where nothing defines it.
+PURE = ("1", "-")
 BASES = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
 
 
@@ -41,6 +43,13 @@ class Linear:
     def __call__(self, number: float) -> float:
         """Return what a number becomes."""
         return self.gain * number + self.shift
+
+
+def unit_named(name: str | None, known: Mapping[str, Unit]) -> Unit | None:
+    """A unit by name, None without one."""
+    if not name or name in known:
+        return known.get(name or "")
+    return Unit(name, (0,) * len(BASES) if name in PURE else None)
 
 
 def units_of(node: Any, path: str) -> dict[str, Unit]:
@@ -95,8 +104,8 @@ def conversion(
     """
     if given is None or wanted is None:
         known = given or wanted
-        if known is None or (known.powers, known[2:]) == (known.powers or (), (1.0, 0.0)):
-            return None  # numbers without a unit are SI where any are
+        if known is None or (known.powers is not None and known[2:] == (1.0, 0.0)):
+            return None  # plain SI is what numbers without a unit are
         raise UnitError(f"is in {shortened(known.name)}, and no unit is known of the other")
     if given.name == wanted.name and None in (given.powers, wanted.powers):
         return None

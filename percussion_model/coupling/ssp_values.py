@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from percussion_model.coupling.component import CouplingError
-from percussion_model.coupling.ssp_units import Unit, units_of
+from percussion_model.coupling.ssp_units import Unit, unit_named, units_of
 from percussion_model.coupling.ssp_xml import Reader, elements, is_true, tag, validated, word_of
 from percussion_model.coupling.transformation import Transformation, transformation_of
 from percussion_model.scene.rows import shortened
@@ -103,11 +103,6 @@ def _parameters(node: Any, units: dict[str, Unit]) -> dict[str, Value]:
             raise CouplingError(f"parameter {shortened(name)} = {text}: must be a finite number")
         found[name] = Value(kind, value, unit_named(content.get("unit"), known))
     return found
-
-
-def unit_named(name: str | None, known: dict[str, Unit]) -> Unit | None:
-    """A unit by name, None without one."""
-    return known.get(name, Unit(name)) if name else None
 
 
 def _mapped(values: dict[str, Value], node: Any) -> dict[str, Value]:

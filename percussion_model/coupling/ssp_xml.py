@@ -47,7 +47,7 @@ class Reader:
 
     def __init__(self, folder: Path, allowance: Allowance) -> None:
         self.folder, self.allowance = folder, allowance
-        self._read: dict[Path, Any] = {}
+        self._read: dict[tuple[Path, str], Any] = {}
 
     def structure(self, name: str) -> Any:
         """Root of the structure of the system, which stands at the top of the archive."""
@@ -58,11 +58,11 @@ class Reader:
         place, name = within(self.folder, source), shortened(source)
         if place is None:
             raise InvalidError(f"{name}: is no file within the archive")
-        if place not in self._read:
+        if (place, space) not in self._read:
             if len(self._read) == MOST_FILES:
                 raise CouplingError(f"names more than {MOST_FILES} files of values")
-            self._read[place] = self._root(place, name, space)
-        return self._read[place]
+            self._read[place, space] = self._root(place, name, space)
+        return self._read[place, space]
 
     def _root(self, place: Path, name: str, space: str) -> Any:
         try:

@@ -15,8 +15,8 @@ from percussion_model.coupling.component import (
     numbers_of_words,
 )
 from percussion_model.coupling.ssp import SYSTEM, Archive, Connection, Connector, signal_name
-from percussion_model.coupling.ssp_units import Unit, conversion, units_of_fmu
-from percussion_model.coupling.ssp_values import Value, unit_named
+from percussion_model.coupling.ssp_units import Unit, conversion, unit_named, units_of_fmu
+from percussion_model.coupling.ssp_values import Value
 from percussion_model.coupling.transformation import Change, Transformation, chained
 from percussion_model.scene.rows import shortened
 from percussion_model.scene.units import UnitError
