@@ -14,8 +14,8 @@ import fmpy
 from lxml import etree
 
 from percussion_model.coupling.component import CouplingError
-from percussion_model.coupling.unpack import Allowance, check_xml
-from percussion_model.scene.rows import shortened
+from percussion_model.coupling.unpack import Allowance, check_xml, one_line
+from percussion_model.scene.rows import shortened, unprintable
 
 SPACES = {
     f"ss{letter}": f"http://ssp-standard.org/SSP1/SystemStructure{name}"
@@ -29,6 +29,11 @@ MOST_FILES = 100
 _REMARKS = ("MetaData", "Signature")
 _SAME = {"Float64": "Real", "Int32": "Integer"}
 _TRUE = ("true", "1")
+# What messages repeat.
+_TOLD = (
+    *("name", "source", "target", "prefix", "unit", "type", "value"),
+    *("startElement", "startConnector", "endElement", "endConnector"),
+)
 
 
 class InvalidError(CouplingError):
@@ -73,7 +78,7 @@ class Reader:
         try:
             root = etree.parse(str(place), parser).getroot()
         except etree.XMLSyntaxError as error:  # what expat let pass
-            raise InvalidError(f"{name}: is not valid XML: {shortened(str(error))}") from None
+            raise InvalidError(f"{name}: is not valid XML: {one_line(error)}") from None
         return validated(root, name, space)
 
 
@@ -100,6 +105,13 @@ def validated(root: Any, name: str, space: str) -> Any:
             text = text.replace(f"{{{address}}}", f"{prefix}:")
         above = "; of SSP 2.0 that is read which 1.0 has" if version.startswith("2.") else ""
         raise InvalidError(f"{name}: line {fault.line}: {shortened(text)}{above}")
+    for node in root.iter(etree.Element):
+        for key in _TOLD:
+            if unprintable(value := node.get(key, "")):
+                raise InvalidError(
+                    f"{name}: line {node.sourceline}: {key} = {shortened(value)!r}: must be "
+                    "printable"
+                )
     return root
 
 

@@ -113,10 +113,10 @@ def _zip_errors(name: str) -> Iterator[None]:
     except CouplingError:
         raise
     except (BadZipFile, OSError, ValueError, EOFError, RuntimeError, OverflowError) as error:
-        raise CouplingError(f"{name}: cannot be unpacked: {_one_line(error)}") from error
+        raise CouplingError(f"{name}: cannot be unpacked: {one_line(error)}") from error
     except Exception as error:  # of zlib, struct and the decoding of names
         kind = type(error).__name__
-        raise CouplingError(f"{name}: cannot be unpacked: {kind}: {_one_line(error)}") from error
+        raise CouplingError(f"{name}: cannot be unpacked: {kind}: {one_line(error)}") from error
 
 
 def refuse_entries(name: str, entries: list[ZipInfo]) -> None:
@@ -187,7 +187,7 @@ def check_xml(path: Path, name: str, allowance: Allowance) -> None:
     except (expat.ExpatError, ValueError, LookupError) as error:
         if isinstance(error, CouplingError):
             raise
-        raise CouplingError(f"{name}: is not valid XML: {_one_line(error)}") from None
+        raise CouplingError(f"{name}: is not valid XML: {one_line(error)}") from None
 
 
 def new_folder() -> str:
@@ -208,5 +208,6 @@ def new_folder() -> str:
     )
 
 
-def _one_line(error: Exception) -> str:
+def one_line(error: Exception) -> str:
+    """What an error of others says, in one line of bearable length."""
     return shortened(" ".join(str(error).split()) or type(error).__name__)
