@@ -160,7 +160,7 @@ def native(extra: list[str]) -> int:
 
 
 def system(extra: list[str]) -> int:
-    """Build the systems of FMUs and their archives; paths count from where the user is."""
+    """Build systems of FMUs, or list them; paths count from where the user is."""
     return setup() or call([tool("percussion"), "system", *extra], folder=Path.cwd())
 
 
@@ -261,8 +261,8 @@ def main(arguments: list[str]) -> int:
                         add_help=False)  # fmt: skip
     commands.add_parser("native", help="bake a scene into FMUs that need no Python: SCENE, "
                         "--platforms NAMES", add_help=False)  # fmt: skip
-    commands.add_parser("system", help="build drilling systems of FMUs as SSP: -o FOLDER",
-                        add_help=False)  # fmt: skip
+    commands.add_parser("system", help="build drilling systems of FMUs as SSP: NAMES "
+                        "or all, -o FOLDER; no name: list them", add_help=False)  # fmt: skip
     commands.add_parser("docs", help="build the documentation site; more goes to sphinx-build")
     commands.add_parser("bench", help="measure speed; more goes to the benchmarks")
     choice, extra = parser.parse_known_args(arguments)

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from fmu_src.commands import options
 from percussion_model.interface.commands import common
 
+if TYPE_CHECKING:
+    from fmu_src.system.archive import SystemPlan
+
 INVALID = 1
+# The word for all that ship.
+ALL = Path("all")
 
 
 def system(
@@ -18,7 +24,8 @@ def system(
         list[Path] | None,
         typer.Argument(
             metavar="SYSTEM",
-            help="Files (TOML), or presets, as FeedControlRigid; left out: all of the presets.",
+            help="Files (TOML), presets, as FeedControlRigid, or the word all for all presets; "
+            "left out: lists them.",
         ),
     ] = None,
     output: Annotated[
@@ -26,7 +33,7 @@ def system(
     ] = options.DIST,
     force: Annotated[bool, typer.Option("--force", help="Replace FMUs of other hammers.")] = False,
 ) -> int:
-    """Build drilling systems of FMUs as SSP archives, and validate each FMU."""
+    """Build drilling systems of FMUs as SSP archives, and validate each FMU, or list them."""
     with common.needing("fmu"), options.refusing_faults():
         from fmpy.validation import validate_fmu
 
@@ -35,20 +42,22 @@ def system(
         from fmu_src.system.archive import build_fmus, find_plan, plans, write_system
         from percussion_model.interface.progress import progress
 
+        if not systems:
+            _list(plans())
+            return 0
         common.load_numba()
         problems = 0
         checked = set()
-        chosen = [find_plan(path) for path in systems or ()] or plans()
+        chosen = plans() if systems == [ALL] else [find_plan(path) for path in systems]
         common.check_outputs(output, None)
-        if not systems:
-            names = ", ".join(plan.name for plan in chosen)
-            common.print_message(f"no system is named, so all {len(chosen)} are built: {names}")
         with progress(COMPILING):
             library_here()
-        for number, plan in enumerate(chosen, 1):
-            of_all = f" ({number} of {len(chosen)})" if len(chosen) > 1 else ""
+        for number, plan in enumerate(chosen):
             before = {path: content(path) for path in output.glob("*.*")}
-            with progress(f"building {plan.name}{of_all}"):
+            text, share = f"building {plan.name}", number / len(chosen)
+            with progress(text, share) as report:
+                if len(chosen) > 1:
+                    report(f"{text} ({number + 1} of {len(chosen)})", share)
                 fmus = build_fmus(plan, output, force)
             for fmu in fmus.values():
                 if fmu in checked:
@@ -62,3 +71,10 @@ def system(
             path = write_system(plan, fmus, output / f"{plan.name}.ssp")
             typer.echo(f"{path}: {state_of(path, before.get(path))}")
         return INVALID if problems else 0
+
+
+def _list(found: Sequence[SystemPlan]) -> None:
+    """Print a line for each system."""
+    width = max(len(plan.name) for plan in found)
+    for plan in found:
+        typer.echo(f"{plan.name:{width}s}  {plan.description}")

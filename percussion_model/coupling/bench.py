@@ -314,6 +314,7 @@ def bench(
                 on_way=None if trial.on_way is None else trial.on_way(),
                 trust=trust,
             )
+            coupling.start = 0.0  # disturbances and scores count from there
             run = coupling.run(trial.duration, step, SIGNALS, step, progress=watch, tell=tell)
             runs.append(judge(trial, run))
             _refuse_changed(controller, kept)

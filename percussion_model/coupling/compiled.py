@@ -274,4 +274,7 @@ class CompiledStep:
 
 def can_compile(ports: Sequence[Port]) -> bool:
     """Whether all parts are FMUs, with nothing on the way."""
-    return all(isinstance(port.part, Component) and port.on_way is None for port in ports)
+    return all(
+        isinstance(port.part, Component) and port.on_way is None and not port.converts
+        for port in ports
+    )

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from fmpy import platform, read_model_description, sharedLibraryExtension
 from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
+from lxml import etree
 
 from percussion_model.scene.rows import shortened
 
@@ -55,7 +56,48 @@ def read_description(name: str, folder: str) -> Any:
         raise CouplingError(f"{name}: modelDescription.xml cannot be read: {text}") from error
     if found.fmiVersion != "2.0" or found.coSimulation is None:
         raise CouplingError(f"{name}: this FMU has no co-simulation by FMI 2.0")
+    _mark_differences(found, Path(folder) / "modelDescription.xml")
     return found
+
+
+def _mark_differences(description: Any, path: Path) -> None:
+    """Set `relativeQuantity` of the variables, which fmpy 0.3.32 reads of their types alone."""
+    if b"relativeQuantity" not in path.read_bytes():
+        return
+    said = {
+        one.getparent().get("name"): one.get("relativeQuantity")
+        for one in etree.parse(str(path)).iterfind("ModelVariables/ScalarVariable/Real")
+    }
+    for variable in description.modelVariables:
+        if said.get(variable.name):
+            variable.relativeQuantity = said[variable.name] in ("true", "1")
+
+
+def find_variable(component: str, variables: Mapping[str, Any], name: str) -> Any:
+    """A variable by name; the error suggests another one."""
+    if name not in variables:
+        name = shortened(name)
+        near = difflib.get_close_matches(name, variables, 1)
+        hint = f"; did you mean {near[0]}?" if near else ""
+        raise CouplingError(f"{component} has no variable {name}{hint}")
+    return variables[name]
+
+
+def numbers_of_words(variable: Any) -> dict[str, int]:
+    """Numbers of an enumeration by their words; empty for another variable."""
+    items = variable.declaredType.items if variable.type == "Enumeration" else []
+    return {item.name: int(item.value) for item in items or []}
+
+
+def number_of_word(component: str, variable: Any, word: str) -> int:
+    """Number of a word of an enumeration."""
+    found = numbers_of_words(variable)
+    if word not in found:
+        kind = {"Boolean": "true or false"}.get(variable.type, "a number")
+        raise CouplingError(
+            f"{component}.{variable.name} = {shortened(word)}: must be {', '.join(found) or kind}"
+        )
+    return found[word]
 
 
 def check_library(name: str, folder: Path, identifier: str) -> None:
@@ -211,11 +253,12 @@ class Component:
         Of the component in the system.
     folder : str
         Of the unpacked FMU.
+    description : ModelDescription
+        Of `read_description`.
     """
 
-    def __init__(self, name: str, folder: str) -> None:
+    def __init__(self, name: str, folder: str, description: Any) -> None:
         self.name = name
-        description = read_description(name, folder)
         check_library(name, Path(folder), description.coSimulation.modelIdentifier)
         self.variables = {one.name: one for one in description.modelVariables}
         self.can_save = bool(description.coSimulation.canGetAndSetFMUstate)
@@ -258,12 +301,7 @@ class Component:
 
     def find(self, name: str) -> Any:
         """A variable by name; the error suggests another one."""
-        if name not in self.variables:
-            name = shortened(name)
-            near = difflib.get_close_matches(name, self.variables, 1)
-            hint = f"; did you mean {near[0]}?" if near else ""
-            raise CouplingError(f"{self.name} has no variable {name}{hint}")
-        return self.variables[name]
+        return find_variable(self.name, self.variables, name)
 
     def family(self, name: str) -> str:
         """Family of a variable by name: what its getter is called."""
@@ -279,8 +317,10 @@ class Component:
         for name, value in values.items():
             one = self.find(name)
             family = self.family(name)
+            if one.variability == "constant" or one.initial == "calculated":
+                raise CouplingError(f"{self.name}.{name} is calculated: it cannot be set")
             if isinstance(value, str):
-                value = self._number_of(one, value)
+                value = number_of_word(self.name, one, value)
             converted = self._converted(one, family, value)
             setter = getattr(self._slave, f"set{family}")
             self._guarded(setter, [one.valueReference], [converted])
@@ -300,15 +340,6 @@ class Component:
         ):
             raise CouplingError(f"{self.name}.{one.name} = {value!r}: must be of type {one.type}")
         return converted
-
-    def _number_of(self, one: Any, word: str) -> int:
-        """Number of a word of an enumeration."""
-        items = one.declaredType.items if one.type == "Enumeration" else []
-        found = {item.name: int(item.value) for item in items or []}
-        if word not in found:
-            allowed = ", ".join(found) or {"Boolean": "true or false"}.get(one.type, "a number")
-            raise CouplingError(f"{self.name}.{one.name} = {word}: must be {allowed}")
-        return found[word]
 
     def reader(self, names: Sequence[str]) -> Reader:
         """Return a reader of these variables, all at once."""

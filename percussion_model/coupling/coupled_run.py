@@ -131,8 +131,8 @@ def summary(run: CoupledRun) -> dict[str, Any]:
     """
     columns = run.columns
     found: dict[str, Any] = {
-        "time": float(columns["time"][-1]), "step": run.step, "steps": run.steps,
-        "error": run.error,
+        "time": float(columns["time"][-1] - columns["time"][0]), "step": run.step,
+        "steps": run.steps, "error": run.error,
     }  # fmt: skip
     if "hammer.bit.position" in columns:
         found["depth"] = float(columns["hammer.bit.position"][-1])

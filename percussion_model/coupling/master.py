@@ -1,8 +1,8 @@
 """Co-simulation master: the loop over the parts of a system.
 
-fmpy reads the archive. Its own loop (`fmpy.ssp.simulation`) starts every input at 0, takes
-no parameters from the archive, keeps one order and every row, and loses all of them with
-the first error; so the loop is here, with the same meaning of a step.
+The loop of fmpy (`fmpy.ssp.simulation`) starts every input at 0, takes no parameters from
+the archive, keeps one order and every row, and loses all of them with the first error; so the
+loop is here, with the same meaning of a step.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from typing import Any, Literal
 import numpy as np
 
 from percussion_model.coupling.compiled import CompiledStep, can_compile
-from percussion_model.coupling.component import Component, CouplingError
+from percussion_model.coupling.component import Component, CouplingError, read_description
 from percussion_model.coupling.coupled_run import JUDGED, CoupledRun, known_signals
 from percussion_model.coupling.port import (
     OnWay,
@@ -29,11 +29,12 @@ from percussion_model.coupling.port import (
     check_pace,
     refuse_remainder,
 )
-from percussion_model.coupling.python_part import Given, PythonPart
+from percussion_model.coupling.python_part import Given, PythonPart, input_starts
 from percussion_model.coupling.rejection import StepControl
-from percussion_model.coupling.ssp import input_starts, unpack
+from percussion_model.coupling.ssp import unpack
 from percussion_model.coupling.unpack import Allowance, check_xml, new_folder, unpack_zip
 from percussion_model.coupling.verdict import Jumps
+from percussion_model.coupling.wiring import Wiring
 from percussion_model.simulation.simulate import stop_on_interrupt
 
 Order = Literal["jacobi", "gauss-seidel"]
@@ -71,6 +72,14 @@ class Coupling:
         Whether compiled code makes the calls where all parts are FMUs; the bits are the same.
     trust : bool
         Whether the archive may be of any size and name FMUs outside of it (docs/trust.md).
+
+    Attributes
+    ----------
+    start : float
+        Time at which the run begins [s]; that of the archive's default experiment, unless it is
+        set before the run.
+    stop : float or None
+        Where the default experiment ends [s].
     """
 
     def __init__(
@@ -103,29 +112,32 @@ class Coupling:
         archive = unpack(self.path, inside, allowance)
         for name in replaced.keys() - archive.sources.keys():
             raise CouplingError(f"{self.path.name} has no component {name}")
-        self._links = archive.links
+        folders, descriptions = {}, {}
         for name, source in archive.sources.items():
             chosen = replaced.get(name, source)
             fmu = source if callable(chosen) else Path(chosen)
-            folder = tempfile.mkdtemp(prefix="fmu-", dir=self._folder)
+            folders[name] = tempfile.mkdtemp(prefix="fmu-", dir=self._folder)
             with _named(name):
-                unpack_zip(fmu, Path(folder), allowance)
-                check_xml(Path(folder) / DESCRIPTION, DESCRIPTION, allowance)
-            if callable(chosen):
-                starts = input_starts(name, folder, archive.values.pop(name))
+                unpack_zip(fmu, Path(folders[name]), allowance)
+                check_xml(Path(folders[name]) / DESCRIPTION, DESCRIPTION, allowance)
+            descriptions[name] = read_description(name, folders[name])
+        others = {name for name, chosen in replaced.items() if not callable(chosen)}
+        with _named(str(self.path)):
+            wiring = Wiring(archive, descriptions, others)
+            self._links, values = wiring.links(), wiring.values()
+        self.start, self.stop = archive.start or 0.0, archive.stop
+        for name, description in descriptions.items():
+            if callable(chosen := replaced.get(name)):
+                starts = input_starts(name, description, values.pop(name))
                 self.parts[name] = PythonPart(name, chosen, starts)
-                continue
-            self.parts[name] = Component(name, folder)
-            if name in replaced:  # another FMU takes what it has
-                known = self.parts[name].variables
-                values = archive.values[name]
-                archive.values[name] = {key: values[key] for key in values if key in known}
-        self._parameters = archive.values
+            else:
+                self.parts[name] = Component(name, folders[name], description)
+        self._parameters = values
         for signal, value in given.items():  # before those of the archive
             component, _, variable = signal.partition(".")
-            if component not in archive.values:
+            if component not in values:
                 raise CouplingError(f"{signal}: there is no FMU {component} in {self.path.name}")
-            archive.values[component][variable] = value
+            values[component][variable] = value
 
     @property
     def outputs(self) -> dict[str, list[str]]:
@@ -148,7 +160,7 @@ class Coupling:
         on_interrupt: Literal["raise", "keep"] = "raise",
         tell: Callable[[str], object] | None = None,
     ) -> CoupledRun:
-        """Run the system from time zero, and end all its parts.
+        """Run the system from its `start`, and end all its parts.
 
         Parameters
         ----------
@@ -162,7 +174,7 @@ class Coupling:
             Greatest error of a step, by the size of each signal [1]: steps are shortened,
             and taken back, to keep to it. `step` is the longest one then.
         progress : callable, optional
-            Called with the time at each row [s].
+            Called with the time since the start at each row [s].
         on_interrupt : {"raise", "keep"}
             What Ctrl-C does when the present step is over: raise KeyboardInterrupt, or return
             what there is.
@@ -208,7 +220,8 @@ class Coupling:
         progress: Callable[[float], None] | None,
     ) -> CoupledRun:
         names = [f"{port.name}.{name}" for port in self.ports for name in port.taken + port.kept]
-        rows, jumps = [[0.0, *self._row()]], Jumps(self.ports, self.every)
+        start = self.start
+        rows, jumps = [[start, *self._row()]], Jumps(self.ports, self.every)
         go, error, done, interrupted = self._stepping(count, control), "", 0, False
         began, used = clock.perf_counter(), clock.process_time()
         with stop_on_interrupt(keep=True) as stop:
@@ -216,20 +229,20 @@ class Coupling:
                 has_row = (k + 1) % every == 0 or k + 1 == count
                 before = self._present() if has_row else None
                 try:
-                    go(k * step, step)
+                    go(start + k * step, step)
                 except CouplingError as failure:
-                    error = f"at {k * step:.6g} s: {failure}"
+                    error = f"at {start + k * step:.6g} s: {failure}"
                     break
                 done = k + 1
                 interrupted = stop()
                 if has_row or interrupted:
-                    rows.append([done * step, *self._row()])
+                    rows.append([start + done * step, *self._row()])
                     if before is not None:
                         jumps.add(before, self._present())
                     if progress is not None:
                         progress(done * step)
                 if interrupted:
-                    error = f"at {done * step:.6g} s it was interrupted"
+                    error = f"at {start + done * step:.6g} s it was interrupted"
                     break
         times = clock.perf_counter() - began, clock.process_time() - used
         table = np.array(rows, dtype=float)
@@ -295,7 +308,7 @@ class Coupling:
         for name, part in self.parts.items():
             if isinstance(part, Component):
                 part.set(self._parameters[name])
-                part.begin(0.0)
+                part.begin(self.start)
                 if tell is not None:
                     for text in part.compilation():
                         tell(text)
@@ -306,12 +319,12 @@ class Coupling:
                 if isinstance(port.part, Component):
                     port.read_outputs()
                 elif port.is_fed:
-                    port.set_inputs(0.0)
-                    port.step(0.0, 0.0)
+                    port.set_inputs(self.start)
+                    port.step(self.start, 0.0)
                     port.read_outputs()
             for port in self.ports:
                 if port.is_fed:
-                    port.set_inputs(0.0)
+                    port.set_inputs(self.start)
         for part in self.parts.values():
             if isinstance(part, Component):
                 part.end_initialisation()

@@ -8,7 +8,7 @@ from operator import itemgetter
 from typing import Any
 
 from percussion_model.coupling.component import Component, CouplingError
-from percussion_model.coupling.ssp import Link
+from percussion_model.coupling.wiring import Link
 
 OnWay = Callable[[str, float, Any], Any]
 
@@ -50,6 +50,10 @@ class Port:
         self.write: Callable[[Sequence[Any]], None] = self.writer.write
         self.begin = self.end = 0
         self._links = {link.input: (link.source, link.output) for link in links}
+        changes = {link.input: link.change for link in links}
+        self._changes = [changes[sink] for sink in self.writer.names]
+        # whether values are not as they were given
+        self.converts = any(self._changes)
 
     def connect(self, values: list[Any], places: dict[tuple[str, str], int]) -> None:
         """Find the places of inputs and outputs; `places` has those of all outputs."""
@@ -75,6 +79,9 @@ class Port:
     def set_inputs(self, time: float) -> None:
         """Set the inputs."""
         chosen = self._chosen(self.values)
+        if self.converts:
+            both = zip(chosen, self._changes, strict=True)
+            chosen = tuple(value if change is None else change(value) for value, change in both)
         if self.on_way is not None:
             change = self.on_way
             pairs = zip(self._signals, chosen, strict=True)

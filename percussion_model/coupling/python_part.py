@@ -89,6 +89,30 @@ class PythonSignals:
         self.part.inputs = self.part.starts | dict(zip(self.names, values, strict=True))
 
 
+def input_starts(name: str, description: Any, values: Mapping[str, Any]) -> dict[str, Any]:
+    """Start values of an FMU's inputs, after what the archive sets.
+
+    Parameters
+    ----------
+    name : str
+        Of the component.
+    description : ModelDescription
+    values : mapping
+        Of the archive, by variable.
+    """
+    kinds: dict[str, Callable[[str], Any]] = {
+        "Real": float, "Boolean": lambda text: text in ("true", "1")
+    }  # fmt: skip
+    found = {}
+    for one in description.modelVariables:
+        if one.causality == "input":
+            try:
+                found[one.name] = values.get(one.name, kinds.get(one.type, int)(one.start))
+            except (TypeError, ValueError):
+                raise CouplingError(f"{name}: {one.name} has no start value") from None
+    return found
+
+
 def _source_place(error: Exception) -> str:
     """File and line of a fault in a callable; faults of syntax have them in their text."""
     if isinstance(error, SyntaxError):

@@ -1,29 +1,68 @@
-"""Unpacked SSP archive: components, connections and parameter values of a system."""
+"""Unpacked SSP archive: what it says of components, connections and values, and of the time.
+
+Whatever SSP 1.0 can say is applied, changes no number, or is refused here (docs/data/ssp.md).
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
+from urllib.parse import unquote, urlsplit
+from urllib.request import url2pathname
 
-from fmpy.ssp.ssd import find_components, read_ssd
-
-from percussion_model.coupling.component import CouplingError, read_description
-from percussion_model.coupling.unpack import LONGEST_NAME, Allowance, check_xml, unpack_zip
+from percussion_model.coupling.component import CouplingError
+from percussion_model.coupling.ssp_units import Unit, unit_named, units_of
+from percussion_model.coupling.ssp_values import Value, bound_values
+from percussion_model.coupling.ssp_xml import (
+    InvalidError,
+    Reader,
+    elements,
+    is_true,
+    within,
+    word_of,
+)
+from percussion_model.coupling.transformation import Transformation, transformation_of
+from percussion_model.coupling.unpack import LONGEST_NAME, Allowance, unpack_zip
 from percussion_model.scene.rows import shortened
 
 STRUCTURE = "SystemStructure.ssd"
-# Of components, and of files with their values.
 MOST_PARTS = 100
+FMU = "application/x-fmu-sharedlibrary"
+# The element whose connectors are those of the system itself.
+SYSTEM = ""
 
 
-class Link(NamedTuple):
-    """A connection to an input of a component."""
+class Connector(NamedTuple):
+    """What an archive says of a variable: its causality, and type and unit where it has them."""
 
-    input: str
-    source: str  # component
-    output: str  # of that component
+    kind: str
+    type: str | None
+    unit: Unit | None
+
+
+class Connection(NamedTuple):
+    """A connection, in the order of the archive: that does not say which end is the source.
+
+    Attributes
+    ----------
+    ends : tuple
+        Element and connector of both.
+    transformation : Transformation or None
+    keeps_unit : bool
+        Whether no unit is converted.
+    """
+
+    ends: tuple[tuple[str, str], tuple[str, str]]
+    transformation: Transformation | None
+    keeps_unit: bool
+
+    def __str__(self) -> str:
+        one, other = (signal_name(*end) for end in self.ends)
+        return shortened(f"connection of {one} to {other}")
 
 
 @dataclass(frozen=True)
@@ -35,14 +74,25 @@ class Archive:
     sources : dict of Path
         FMU by component, in the order of the archive.
     values : dict of dict
-        What the archive sets, by component.
-    links : dict of list
-        Inputs of each component.
+        What the archive sets, by component, that of the whole system under `SYSTEM`.
+    connections : list of Connection
+    connectors : dict of Connector
+        By element and name.
+    start, stop : float or None
+        Of the default experiment [s].
     """
 
     sources: dict[str, Path]
-    values: dict[str, dict[str, Any]]
-    links: dict[str, list[Link]]
+    values: dict[str, dict[str, Value]]
+    connections: list[Connection]
+    connectors: dict[tuple[str, str], Connector]
+    start: float | None
+    stop: float | None
+
+
+def signal_name(element: str, name: str) -> str:
+    """How a variable of a component, or a connector of the system, is called."""
+    return f"{element}.{name}" if element else name
 
 
 def unpack(path: Path, folder: str, allowance: Allowance) -> Archive:
@@ -60,130 +110,127 @@ def unpack(path: Path, folder: str, allowance: Allowance) -> Archive:
         raise CouplingError(
             f"{path}: no such file; `percussion system {path.stem}` makes it in dist, if it ships"
         )
-    try:
+    reader = Reader(Path(folder), allowance)
+    with _named(f"{path}: no SSP archive"):
         unpack_zip(path, Path(folder), allowance)
-        _check_files(path.name, Path(folder), allowance)
-        system = read_ssd(str(path)).system
-        components = find_components(system)
-        values = {one.name: _bound(one) for one in components}
-    except CouplingError as error:
-        raise CouplingError(f"{path}: no SSP archive: {error}") from error
-    except Exception as error:  # fmpy has no errors of its own
-        text = shortened(" ".join(str(error).split()))
-        raise CouplingError(f"{path}: no SSP archive: {text}") from error
-    _check_names(path, [one.name for one in components])
-    sources = {
-        one.name: _source_of(one, path, Path(folder), allowance.trusted) for one in components
-    }
-    return Archive(sources, values, _links(path, list(sources), system.connections))
-
-
-def _check_files(name: str, folder: Path, allowance: Allowance) -> None:
-    """Check the structure and all that fmpy reads with it, before it does."""
-    others = check_xml(folder / STRUCTURE, STRUCTURE, allowance)
-    if len(others) > MOST_PARTS:
-        raise CouplingError(f"{name}: names more than {MOST_PARTS} files of values")
-    for source in others:
-        place = _within(folder, source)
-        if place is None:
-            raise CouplingError(f"{shortened(source)}: is no file within the archive")
-        check_xml(place, shortened(source), allowance)
-
-
-def _within(folder: Path, source: str) -> Path | None:
-    """File within a folder that a source names, None if it is none."""
     try:
-        place = folder / source
-        inside = place.resolve().is_relative_to(folder.resolve())
-        return place if inside and place.is_file() and not place.is_symlink() else None
-    except (OSError, ValueError):  # a name that no file can have
-        return None
+        return _read(path, reader)
+    except InvalidError as error:
+        raise CouplingError(f"{path}: no SSP archive: {error}") from error
+    except CouplingError as error:
+        raise CouplingError(f"{path}: {error}") from error
 
 
-def _check_names(path: Path, names: list[str]) -> None:
-    if not 0 < len(names) <= MOST_PARTS:
-        raise CouplingError(f"{path}: has {len(names)} components, not 1 to {MOST_PARTS}")
-    for name in names:
-        if not (name.isprintable() and 0 < len(name) <= LONGEST_NAME):
+def _read(path: Path, reader: Reader) -> Archive:
+    root = reader.structure(STRUCTURE)
+    (system,) = elements(root, "ssd:System")
+    components = _components(system)
+    units = units_of(root, "ssd:Units/ssc:Unit")
+    named = {SYSTEM: system} | components
+    return Archive(
+        {name: _source_of(node, reader, path) for name, node in components.items()},
+        {name: _values_of(name, node, reader, units) for name, node in named.items()},
+        [_connection(one) for one in elements(system, "ssd:Connections/ssd:Connection")],
+        _connectors(named, units),
+        *_experiment(root),
+    )
+
+
+@contextmanager
+def _named(where: str) -> Iterator[None]:
+    """Put the place before what is said of it."""
+    try:
+        yield
+    except CouplingError as error:
+        raise type(error)(f"{where}: {error}") from error
+
+
+def _components(system: Any) -> dict[str, Any]:
+    """Elements of the components by name; other elements, and other components, are refused."""
+    found: dict[str, Any] = {}
+    for node in elements(system, "ssd:Elements/*"):
+        name = node.get("name")
+        if not (name.isprintable() and len(name) <= LONGEST_NAME):
             raise CouplingError(
-                f"{path}: component {shortened(name)!r}: must have 1 to {LONGEST_NAME} characters "
-                "that can be printed"
+                f"component {shortened(name)!r}: must have 1 to {LONGEST_NAME} characters that "
+                "can be printed"
             )
-        if names.count(name) > 1:
-            raise CouplingError(f"{path}: has two components {name}")
+        if word_of(node) != "Component":
+            raise CouplingError(
+                f"{word_of(node)} {shortened(name)}: a system within the system, or a reference "
+                "to signals, is not computed: connect its components directly"
+            )
+        if name in found:
+            raise CouplingError(f"has two components {name}")
+        for key, allowed in (("type", (FMU,)), ("implementation", ("any", "CoSimulation"))):
+            if node.get(key, allowed[0]) not in allowed:
+                raise CouplingError(
+                    f"component {name}: {key} = {shortened(node.get(key))}: must be "
+                    f"{' or '.join(allowed)}"
+                )
+        found[name] = node
+    if not 0 < len(found) <= MOST_PARTS:
+        raise CouplingError(f"has {len(found)} components, not 1 to {MOST_PARTS}")
+    return found
 
 
-def _source_of(component: Any, path: Path, folder: Path, trusted: bool) -> Path:
+def _source_of(component: Any, reader: Reader, path: Path) -> Path:
     """File of a component's FMU; outside of the archive only where that is trusted."""
-    source = component.source or ""
-    found = _within(folder, source)
+    source, trusted = component.get("source"), reader.allowance.trusted
+    found = within(reader.folder, source)
     if found is None and trusted:
         try:
-            found = (path.parent / source).resolve()
+            is_uri = source.startswith("file:")
+            place = url2pathname(urlsplit(source).path) if is_uri else unquote(source)
+            found = (path.parent / place).resolve()
             found = found if found.is_file() else None
         except (OSError, ValueError):
             found = None
     if found is None:
         trust = "" if trusted else " (--trust allows others)"
         raise CouplingError(
-            f"{path}: component {component.name}: source = {shortened(source)!r}: must be an FMU "
+            f"component {component.get('name')}: source = {shortened(source)!r}: must be an FMU "
             f"within the archive{trust}, no folder and no link"
         )
     return found
 
 
-def _links(path: Path, names: list[str], connections: list[Any]) -> dict[str, list[Link]]:
-    """Connections by component; those to a component that is not there are refused."""
-    found: dict[str, list[Link]] = {name: [] for name in names}
-    for one in connections:
-        where = f"{one.startElement}.{one.startConnector} to {one.endElement}.{one.endConnector}"
-        for name in (one.startElement, one.endElement):
-            if name not in found:
-                raise CouplingError(
-                    f"{path}: connection of {shortened(where)}: there is no component "
-                    f"{shortened(str(name))}, only {shortened(', '.join(names))}"
-                )
-        link = Link(one.endConnector, one.startElement, one.startConnector)
-        if link.input in [other.input for other in found[one.endElement]]:
-            raise CouplingError(
-                f"{path}: {shortened(f'{one.endElement}.{link.input}')} has two connections"
-            )
-        found[one.endElement].append(link)
+def _values_of(name: str, node: Any, reader: Reader, units: dict[str, Unit]) -> dict[str, Value]:
+    with _named(f"component {name}" if name else "system"):
+        return bound_values(node, reader, units)
+
+
+def _connectors(named: dict[str, Any], units: dict[str, Unit]) -> dict[tuple[str, str], Connector]:
+    """Connectors of all components, and of the system."""
+    found: dict[tuple[str, str], Connector] = {}
+    for element, node in named.items():
+        for one in elements(node, "ssd:Connectors/ssd:Connector"):
+            key = element, one.get("name")
+            if key in found:
+                raise CouplingError(f"connector {shortened(signal_name(*key))}: stands there twice")
+            types = elements(one, "ssc:*")  # geometry and annotations are of another space
+            name = word_of(types[0]) if types else None
+            unit = unit_named(types[0].get("unit"), units) if types else None
+            found[key] = Connector(one.get("kind"), name, unit)
     return found
 
 
-def _bound(component: Any) -> dict[str, Any]:
-    """Values that the archive binds to a component; words are for enumerations."""
-    found: dict[str, Any] = {}
-    for binding in component.parameterBindings:
-        for values in binding.parameterValues:
-            for one in values.parameters:
-                if one.type == "Boolean":
-                    found[one.name] = one.value in ("true", "1")
-                else:
-                    is_word = one.type in ("Enumeration", "String")
-                    found[one.name] = one.value if is_word else float(one.value)
-    return found
+def _connection(node: Any) -> Connection:
+    ends = tuple(
+        (node.get(f"{end}Element", SYSTEM), node.get(f"{end}Connector")) for end in ("start", "end")
+    )
+    found = Connection(ends, None, is_true(node.get("suppressUnitConversion")))  # type: ignore[arg-type]
+    with _named(str(found)):
+        return found._replace(transformation=transformation_of(node))
 
 
-def input_starts(name: str, folder: str, values: Mapping[str, Any]) -> dict[str, Any]:
-    """Start values of an FMU's inputs, after what the archive sets.
-
-    Parameters
-    ----------
-    name, folder : str
-        Of the component, and of its unpacked FMU.
-    values : mapping
-        Of the archive, by variable.
-    """
-    kinds: dict[str, Callable[[str], Any]] = {
-        "Real": float, "Boolean": lambda text: text in ("true", "1")
-    }  # fmt: skip
-    found = {}
-    for one in read_description(name, folder).modelVariables:
-        if one.causality == "input":
-            try:
-                found[one.name] = values.get(one.name, kinds.get(one.type, int)(one.start))
-            except (TypeError, ValueError):
-                raise CouplingError(f"{name}: {one.name} has no start value") from None
-    return found
+def _experiment(root: Any) -> tuple[float | None, float | None]:
+    """Start and stop of the default experiment [s]."""
+    found: list[float | None] = []
+    for key in ("startTime", "stopTime"):
+        given = [one.get(key) for one in elements(root, "ssd:DefaultExperiment")]
+        found.append(float(given[0]) if given and given[0] else None)
+        if found[-1] is not None and not math.isfinite(found[-1]):
+            raise CouplingError(f"DefaultExperiment: {key} = {found[-1]}: must be finite")
+    start, stop = found
+    return start, stop

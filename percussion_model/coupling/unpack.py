@@ -30,8 +30,6 @@ LONGEST_NAME = 250
 # Where there is a folder of a plain name, besides that for temporary files.
 ELSEWHERE = ("/tmp", "/var/tmp", "/dev/shm")
 _ENTRY = b"PK\x01\x02"
-# What fmpy reads of an archive with its structure.
-_READ = ("ParameterBinding", "ParameterMapping", "SignalDictionary")
 
 
 class Allowance:
@@ -115,10 +113,10 @@ def _zip_errors(name: str) -> Iterator[None]:
     except CouplingError:
         raise
     except (BadZipFile, OSError, ValueError, EOFError, RuntimeError, OverflowError) as error:
-        raise CouplingError(f"{name}: cannot be unpacked: {_one_line(error)}") from error
+        raise CouplingError(f"{name}: cannot be unpacked: {one_line(error)}") from error
     except Exception as error:  # of zlib, struct and the decoding of names
         kind = type(error).__name__
-        raise CouplingError(f"{name}: cannot be unpacked: {kind}: {_one_line(error)}") from error
+        raise CouplingError(f"{name}: cannot be unpacked: {kind}: {one_line(error)}") from error
 
 
 def refuse_entries(name: str, entries: list[ZipInfo]) -> None:
@@ -150,7 +148,7 @@ def _fault_of_path(path: str) -> str:
     return ""
 
 
-def check_xml(path: Path, name: str, allowance: Allowance) -> list[str]:
+def check_xml(path: Path, name: str, allowance: Allowance) -> None:
     """Go through an XML file without keeping it; `CouplingError` if it could grow in a parser.
 
     Parameters
@@ -159,16 +157,10 @@ def check_xml(path: Path, name: str, allowance: Allowance) -> list[str]:
         Of the file in messages.
     allowance : Allowance
         One that is trusted may have any size; a document type is refused all the same.
-
-    Returns
-    -------
-    list of str
-        Other files that the structure of a system names as sources of values.
     """
     if not path.is_file():
         raise CouplingError(f"{name}: is not there")
     allowance.parse(name, path.stat().st_size)
-    found: list[str] = []
     level = count = 0
 
     def begin(tag: str, attributes: dict[str, str]) -> None:
@@ -178,8 +170,6 @@ def check_xml(path: Path, name: str, allowance: Allowance) -> list[str]:
             raise CouplingError(f"{name}: has elements more than {DEEPEST} levels deep")
         if count > MOST_ELEMENTS and not allowance.trusted:
             raise _too_much(f"{name}: has more than {MOST_ELEMENTS} elements")
-        if "source" in attributes and tag.rpartition(":")[2] in _READ:
-            found.append(attributes["source"])
 
     def end(tag: str) -> None:
         nonlocal level
@@ -197,8 +187,7 @@ def check_xml(path: Path, name: str, allowance: Allowance) -> list[str]:
     except (expat.ExpatError, ValueError, LookupError) as error:
         if isinstance(error, CouplingError):
             raise
-        raise CouplingError(f"{name}: is not valid XML: {_one_line(error)}") from None
-    return found
+        raise CouplingError(f"{name}: is not valid XML: {one_line(error)}") from None
 
 
 def new_folder() -> str:
@@ -219,5 +208,6 @@ def new_folder() -> str:
     )
 
 
-def _one_line(error: Exception) -> str:
+def one_line(error: Exception) -> str:
+    """What an error of others says, in one line of bearable length."""
     return shortened(" ".join(str(error).split()) or type(error).__name__)

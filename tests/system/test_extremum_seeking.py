@@ -145,7 +145,7 @@ def test_the_seeker_finds_the_best_feed_with_waves():
     """The same with elastic piston and bit, where the archive has been built."""
     system = DIST / "ExtremumSeeking.ssp"
     if not system.is_file():
-        pytest.skip("python3 build.py system makes the archive")
+        pytest.skip("python3 build.py system ExtremumSeeking makes the archive")
     hill = sweep(system, (2500.0, 2700.0, 2800.0, 2900.0, 3000.0, 3200.0), 4.0)
     run = seek(system, STARTS[0], 24.0)
     assert rate_over(run, 24.0 - LAST) > (1.0 - BOUND) * hill[:, 1].max()

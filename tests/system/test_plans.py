@@ -1,5 +1,6 @@
 """Files of systems that come from strangers: one error, and no file outside of the folder."""
 
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -7,6 +8,7 @@ import pytest
 from fmu_src.native import library
 from fmu_src.system import archive
 from fmu_src.system.archive import SYSTEMS, find_plan, plans, read_plan
+from percussion_model.interface import progress
 from percussion_model.scene.presets import scene_presets
 from tests.commands import percussion
 
@@ -71,14 +73,38 @@ def test_systems_that_ship_go_by_name(capsys):
         assert one.name in said
 
 
-def test_without_a_name_all_are_built_and_named_first(tmp_path, monkeypatch, capsys):
+def test_without_a_name_it_lists_what_there_is(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert percussion("system", "-o", "dist") == 0
+    said = capsys.readouterr()
+    assert [line.split()[0] for line in said.out.splitlines()] == [one.name for one in plans()]
+    assert max(map(len, said.out.splitlines())) <= 80
+    assert said.err == ""
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_it_builds_what_is_named_or_all_and_tells_the_share(tmp_path, monkeypatch, capsys):
+    told = []
+
+    @contextmanager
+    def noted(text, done=0.0):
+        yield lambda text, share: told.append((text, share))
+
     monkeypatch.setattr(archive, "build_fmus", lambda plan, folder, force: {})
     monkeypatch.setattr(archive, "write_system", lambda plan, fmus, path: path)
     monkeypatch.setattr(library, "library_here", dict)
-    assert percussion("system", "-o", tmp_path) == 0
-    said = capsys.readouterr()
+    monkeypatch.setattr(progress, "progress", noted)
     names = [plan.name for plan in plans()]
-    assert f"all {len(names)} are built: {', '.join(names)}" in " ".join(said.err.split())
-    assert [Path(line.partition(":")[0]).stem for line in said.out.splitlines()] == names
-    assert percussion("system", "FeedControl", "-o", tmp_path) == 0
-    assert "no system is named" not in capsys.readouterr().err
+    for words, wanted in (
+        (["all"], names),
+        (["FeedControl"], ["FeedControl"]),
+        (names[:2], names[:2]),
+    ):
+        told.clear()
+        assert percussion("system", *words, "-o", tmp_path) == 0
+        lines = capsys.readouterr().out.splitlines()
+        assert [Path(line.partition(":")[0]).stem for line in lines] == wanted
+        assert [share for _, share in told] == (
+            [k / len(wanted) for k in range(len(wanted))] if len(wanted) > 1 else []
+        )
+    assert told[1][0] == f"building {names[1]} (2 of 2)"

@@ -174,12 +174,12 @@ def test_only_what_unpacks_in_bounds_is_unpacked(entries, tmp_path):
         Coupling(path)
 
 
-@pytest.mark.parametrize("where", ["{folder}/RockProfile.fmu", "parts/RockProfile.fmu"])
+@pytest.mark.parametrize("where", ["{folder}/RockProfile.fmu", "{uri}", "parts/R%6FckProfile.fmu"])
 def test_trust_allows_fmus_elsewhere(where, entries, fmus, tmp_path):
     (tmp_path / "parts").mkdir()
     shutil.copy(fmus["rock"], tmp_path / "parts")
     path = tmp_path / "System.ssp"
-    source = where.format(folder=fmus["rock"].parent)
+    source = where.format(folder=fmus["rock"].parent, uri=fmus["rock"].as_uri())
     path.write_bytes(pack(with_source(source)(entries, tmp_path)))
     with pytest.raises(CouplingError, match="--trust"):
         Coupling(path)

@@ -18,6 +18,7 @@ from percussion_model.simulation.uncertain import (
 )
 
 if TYPE_CHECKING:
+    from percussion_model.coupling import Coupling
     from percussion_model.coupling.verdict import Verdict
 
 SystemFile = Annotated[Path, typer.Argument(metavar="SYSTEM.ssp", help="A system (SSP 1.0).")]
@@ -40,6 +41,8 @@ GIVEN = ("time", "step", "steps")
 SCATTER = "scatter alone"
 # Of a loss that its error may make.
 HIDDEN = "its error may be as large"
+# Of a run whose archive has no default experiment, and no --duration [s].
+DURATION = 6.0
 # Rows of a run without --interval.
 ROWS = 5000
 FAILED = 1
@@ -47,7 +50,17 @@ FAILED = 1
 
 def couple(
     system: SystemFile,
-    duration: Annotated[float, typer.Option("--duration", help="Simulated time, in s.")] = 6.0,
+    duration: Annotated[
+        float | None,
+        typer.Option(
+            "--duration",
+            help=f"Simulated time, in s; else that of the archive, or {DURATION:g}.",
+        ),
+    ] = None,
+    start: Annotated[
+        float | None,
+        typer.Option("--start", help="Time of the start, in s; else that of the archive, or 0."),
+    ] = None,
     step: Annotated[float, typer.Option("--step", help="Communication step, in s.")] = 1e-3,
     interval: Annotated[
         float | None, typer.Option("--interval", help=f"Time between rows, in s; else {ROWS} rows.")
@@ -99,9 +112,11 @@ def couple(
         trust=trust,
     )
     try:
+        duration = _set_time(coupling, start, duration)
         claimed = common.claim(
             "couple", out, Path("out") / system.stem, force, system=common.digest(system),
-            duration=duration, step=step, interval=interval, order=order, tolerance=tolerance,
+            start=coupling.start, duration=duration, step=step, interval=interval, order=order,
+            tolerance=tolerance,
             every=common.by_name(every), set=common.by_name(settings), signals=signals,
         )  # fmt: skip
     except ResultError:
@@ -132,6 +147,21 @@ def couple(
             common.list_files([figure])
     common.list_files([claimed.sign()])
     return _tell(run.verdict, common.INTERRUPTED if run.interrupted else FAILED)
+
+
+def _set_time(coupling: Coupling, start: float | None, duration: float | None) -> float:
+    """Set the start of a run; return its duration. The archive has its say where none is given."""
+    if start is not None:
+        coupling.start = start
+    if duration is not None or coupling.stop is None:
+        return DURATION if duration is None else duration
+    if coupling.stop <= coupling.start:
+        coupling.free()
+        raise common.refusal(
+            f"{coupling.path}: stopTime = {coupling.stop:g}: is not after the start at "
+            f"{coupling.start:g} s: give --duration"
+        )
+    return coupling.stop - coupling.start
 
 
 def _tell_of_rest(duration: float, step: float) -> None:

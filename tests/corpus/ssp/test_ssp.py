@@ -1,0 +1,174 @@
+"""Archives of SSP, one a feature: each gives what the standard says, or is refused in one line."""
+
+from __future__ import annotations
+
+import subprocess
+import tomllib
+from pathlib import Path
+
+import pytest
+from fmpy import platform, sharedLibraryExtension
+
+from fmu_src.native.library import NoCompilerError, compiler_for
+from fmu_src.slave.native import this_platform
+from percussion_model.coupling import Coupling, CouplingError
+from tests.commands import percussion
+from tests.properties.hostile import pack
+
+HERE = Path(__file__).parent
+CASES = tomllib.loads((HERE / "cases.toml").read_text(encoding="utf-8"))["case"]
+SPACES = " ".join(
+    f'xmlns:ss{letter}="http://ssp-standard.org/SSP1/SystemStructure{name}"'
+    for letter, name in (
+        ("c", "Common"), ("d", "Description"), ("v", "ParameterValues"), ("m", "ParameterMapping")
+    )
+)  # fmt: skip
+# Where the texts of a case stand; `others` are more elements, `after` follows the system.
+STRUCTURE = """<ssd:SystemStructureDescription SPACES version="1.0" name="case">
+<ssd:System name="case">{system}<ssd:Elements>
+<ssd:Component name="a" source="resources/Echo.fmu">{a}</ssd:Component>
+<ssd:Component name="b" source="resources/Workshop.fmu">{b}</ssd:Component>{others}
+</ssd:Elements>{connections}</ssd:System>{after}</ssd:SystemStructureDescription>"""
+WORDS = {
+    "VALUES_END": "BINDING_END</ssd:ParameterBindings>",
+    "VALUES": "<ssd:ParameterBindings>BINDING",
+    "BINDING_END": "</ssv:Parameters></ssv:ParameterSet></ssd:ParameterValues>"
+    "</ssd:ParameterBinding>",
+    "BINDING": '<ssd:ParameterBinding><ssd:ParameterValues><ssv:ParameterSet version="1.0" '
+    'name="own"><ssv:Parameters>',
+    "SPACES": SPACES,
+}
+# The second FMU: units of a workshop, and an enumeration in another order.
+WORKSHOP = {
+    '"N"': '"kN"', '"m"': '"mm"', '"K"': '"degC"', '"Hz"': '"rad/s"',
+    's="-2"/>': 's="-2" factor="1000"/>', 'm="1"/>': 'm="1" factor="0.001"/>',
+    'K="1"/>': 'K="1" offset="273.15"/>', 's="-1"/>': 's="-1" rad="1"/>',
+    'off" value="1"': 'off" value="2"', 'slow" value="2"': 'slow" value="3"',
+    'fast" value="3"': 'fast" value="1"',
+}  # fmt: skip
+
+
+@pytest.fixture(scope="session")
+def echoes(tmp_path_factory):
+    """Both FMUs as bytes."""
+    try:
+        compiler = compiler_for(this_platform())
+    except NoCompilerError as error:
+        pytest.skip(str(error))
+    library = tmp_path_factory.mktemp("echo") / f"Echo{sharedLibraryExtension}"
+    words = [*compiler, "-shared", "-O1", "-fPIC", HERE / "echo.c", "-o", library]
+    subprocess.run([str(word) for word in words], check=True)
+    text = (HERE / "echo.xml").read_text(encoding="utf-8")
+    other = text
+    for old, new in WORKSHOP.items():
+        assert old in other
+        other = other.replace(old, new)
+    entry = f"binaries/{platform}/{library.name}"
+    return [
+        pack({"modelDescription.xml": one.encode(), entry: library.read_bytes()})
+        for one in (text, other)
+    ]
+
+
+def write_case(case, echoes, path):
+    """Write the archive of a case."""
+    keys = ("system", "a", "b", "others", "connections", "after")
+    texts = {key: case.get(key, "") for key in keys}
+    if texts["connections"]:
+        texts["connections"] = f"<ssd:Connections>{texts['connections']}</ssd:Connections>"
+    structure = STRUCTURE.format(**texts)
+    for old, new in case.get("replace", ()):
+        assert old in structure
+        structure = structure.replace(old, new)
+    entries = {"SystemStructure.ssd": structure, **case.get("files", {})}
+    for name, text in entries.items():
+        for word, meaning in WORDS.items():
+            text = text.replace(word, meaning)
+        entries[name] = echoes[0] if text == "ECHO" else text.encode()
+    entries |= {"resources/Echo.fmu": echoes[0], "resources/Workshop.fmu": echoes[1]}
+    path.write_bytes(pack(entries))
+
+
+@pytest.mark.parametrize("case", CASES, ids=[case["id"] for case in CASES])
+def test_an_archive_gives_what_it_says_or_is_refused(case, echoes, tmp_path):
+    path = tmp_path / "case.ssp"
+    write_case(case, echoes, path)
+    if "refused" in case:
+        with pytest.raises(CouplingError, match=case["refused"]) as refused:
+            Coupling(path).run(2e-3, 1e-3)
+        assert "\n" not in str(refused.value)
+        return
+    coupling = Coupling(path)
+    duration = 2e-3 if coupling.stop is None else coupling.stop - coupling.start
+    run = coupling.run(duration, 1e-3, [name for name in case["right"] if name != "time"])
+    assert run.error == ""
+    found = {name: run[name][-1] for name in case["right"]}
+    assert found == pytest.approx(case["right"], rel=1e-14)
+
+
+def write_named(name, echoes, path):
+    """Write the archive of a case by its id."""
+    (case,) = [case for case in CASES if case["id"] == name]
+    write_case(case, echoes, path)
+    return path
+
+
+def test_another_fmu_and_a_python_part_have_their_units(echoes, tmp_path):
+    """Of b: the other FMU has SI itself, the Python part stands for that of the archive."""
+    path = write_named("connection between units", echoes, tmp_path / "case.ssp")
+    (tmp_path / "Other.fmu").write_bytes(echoes[0])
+    run = Coupling(path, replaced={"b": tmp_path / "Other.fmu"}).run(2e-3, 1e-3, ["b.force_out"])
+    assert run["b.force_out"][-1] == 2500.0
+    seen = {}
+
+    def work(inputs, time, step):
+        seen.update(inputs)
+        return {}
+
+    Coupling(path, replaced={"b": work}).run(2e-3, 1e-3)
+    assert (seen["force"], seen["heat"], seen["length"]) == pytest.approx((2.5, 27.0, 3.0))
+    path = write_named("bindings of the system go first, the last of them", echoes, path)
+    Coupling(path, replaced={"b": lambda inputs, time, step: seen.update(inputs) or {}}).run(
+        2e-3, 1e-3
+    )
+    assert seen["mode"] == 3
+
+
+def test_options_set_what_the_archive_does_too(echoes, tmp_path):
+    path = write_named("prefix", echoes, tmp_path / "case.ssp")
+    run = Coupling(path, {"b.force": 1.5}).run(2e-3, 1e-3, ["b.force_out"])
+    assert run["b.force_out"][-1] == 1.5
+    with pytest.raises(CouplingError, match=r"a\.force_out is calculated: it cannot be set"):
+        Coupling(path, {"a.force_out": 1.0}).run(2e-3, 1e-3)
+
+
+@pytest.fixture
+def timed(echoes, tmp_path, monkeypatch):
+    """Archive that says from when to when it is run."""
+    write_named("default experiment", echoes, tmp_path / "case.ssp")
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("words", "first", "last"),
+    [
+        ((), 1.0, 1.25),
+        (("--duration", "0.1"), 1.0, 1.1),
+        (("--start", "0"), 0.0, 1.25),
+        (("--start", "-1", "--duration", "0.5"), -1.0, -0.5),
+    ],
+)
+def test_options_go_before_the_default_experiment(words, first, last, timed):
+    percussion("couple", "case.ssp", "--signal", "a.clock_out", "--no-figures", *words)
+    lines = Path("out/case/signals.csv").read_text(encoding="utf-8").splitlines()
+    rows = [[float(word) for word in line.split(",")] for line in lines[1:]]
+    assert rows[0][0] == first
+    assert rows[-1] == pytest.approx([last, last])
+
+
+def test_a_start_after_the_stop_wants_a_duration(timed, capsys):
+    assert percussion("couple", "case.ssp", "--start", "2") == 2
+    assert "stopTime = 1.25: is not after the start at 2 s: give --duration" in " ".join(
+        capsys.readouterr().err.split()
+    )
+    assert not Path("out").exists()
