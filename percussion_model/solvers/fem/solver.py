@@ -36,8 +36,9 @@ from percussion_model.solvers.fem.records import (
     Trial,
 )
 from percussion_model.solvers.setup import refuse_many
-from percussion_model.solvers.state import State
+from percussion_model.solvers.state import State, words_of
 
+CLOSED = words_of(FEM_STATE)["closed"]
 # A state is no more than a step, and rounding, behind the present [steps].
 MOST_BEHIND = 2.0
 # Elements and contact stiffness of runs to compare with, by those of this one.
@@ -115,7 +116,7 @@ class FemSolver(Solver):
 
     def time_of_blow(self, state: State) -> float:
         """As in `Solver`: a step may be cut at a closure."""
-        if state.record[0]["closed"] == 1:  # as the kernel asks, in a tenth of the time
+        if state.words[CLOSED] == 1:  # as the kernel asks, in a tenth of the time
             return 0.0
         return float(time_of_blow(self._par, state.record))
 

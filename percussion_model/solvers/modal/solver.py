@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from percussion_model.physics.kernel import entry_of
+from percussion_model.physics.records import DriveKind
 from percussion_model.scene.bar_groups import Bar
 from percussion_model.scene.numbers import Numbers, numbers_of
 from percussion_model.scene.scene import Scene
@@ -45,7 +46,10 @@ from percussion_model.solvers.modal.resolution import (
 )
 from percussion_model.solvers.modal.tables import forms_of, piston_tables
 from percussion_model.solvers.setup import elastic_piston, refuse_many
-from percussion_model.solvers.state import State, aligned
+from percussion_model.solvers.state import State, aligned, words_of
+
+_WORD = words_of(MODAL_STATE)
+ARMED, CLOSED, LEAP_END = _WORD["armed"], _WORD["closed"], _WORD["leap_end"]
 
 # Tables that were made last; so many are kept.
 _kept: dict[tuple[Any, ...], Tables] = {}
@@ -108,6 +112,7 @@ class ModalSolver(Solver):
         self.cells["bit"] = int(made.forms.sizes[0])
         self.operator_bytes = sum(part.nbytes for part in (*made.forms, *made.laws))
         self._rows = aligned(np.zeros((8, max(made.forms.shape.shape[2], 2 * SCAN))))
+        self._must_arm = int(p["drive"]) == DriveKind.PRESSURE
         self._read_at: dict[str, Places] = {}
         self._entry: Callable[..., int] = entry_of(run)
 
@@ -222,8 +227,9 @@ class ModalSolver(Solver):
 
     def time_of_blow(self, state: State) -> float:
         """As in `Solver`: pairs of numbers carry the bars over many steps at once."""
-        s = state.record[0]
-        if s["closed"] == 1 or s["leap_end"] >= 0:  # as the kernel asks, in a tenth of the time
+        words = state.words  # as the kernel asks, in a tenth of the time
+        waits = self._must_arm and words[ARMED] == 0
+        if waits or words[CLOSED] == 1 or words[LEAP_END] >= 0:
             return 0.0
         return float(time_of_blow(self._par, state.record, self._bars(state)))
 

@@ -45,7 +45,7 @@ from percussion_model.solvers.wave.totals import resync
 _WORD = words_of(WAVE_STATE)
 LEAP_END, STEP, T_BASE = _WORD["leap_end"], _WORD["step"], _WORD["t_base"]
 EVENTS_ON, N_BLOWS, N_EVENTS = _WORD["events_on"], _WORD["n_blows"], _WORD["n_events"]
-PARITY, PEAK_FROM = _WORD["parity"], _WORD["peak_from"]
+PARITY, PEAK_FROM, CLOSED = _WORD["parity"], _WORD["peak_from"], _WORD["closed"]
 LEAP_WORDS = [
     _WORD[name] for name in ("step", "leap_end", "leap_kind", "dormant", "piston_step", "wake")
 ]
@@ -220,7 +220,7 @@ class WaveSolver(Solver):
 
     def time_of_blow(self, state: State) -> float:
         """As in `Solver`: a step may be cut at a closure."""
-        if state.record[0]["closed"] == 1:  # as the kernel asks, in a tenth of the time
+        if state.words[CLOSED] == 1:  # as the kernel asks, in a tenth of the time
             return 0.0
         return float(time_of_blow(self._par, state.record))
 
