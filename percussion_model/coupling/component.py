@@ -10,6 +10,7 @@ import contextlib
 import ctypes
 import difflib
 import functools
+import re
 import struct
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -19,9 +20,12 @@ import numpy as np
 from fmpy import platform, read_model_description, sharedLibraryExtension
 from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
 
-from percussion_model.scene.rows import shortened
+from percussion_model.scene.rows import shortened, unit_suffix
 
 # What fmpy calls the types that share a getter, and what their values are in C.
+# Number of a bar or a section within a key of a scene, and one in either way of writing.
+_PLACE = re.compile(r"\.([0-9]{1,4})(?=\.|$)")
+_COUNTED = re.compile(r"\.[0-9]|\[[0-9]")
 FAMILIES = {"Real": "Real", "Integer": "Integer", "Enumeration": "Integer", "Boolean": "Boolean"}
 ORDER = ("Real", "Integer", "Boolean")
 _IN_C: dict[str, tuple[Any, str]] = {
@@ -260,8 +264,12 @@ class Component:
         """A variable by name; the error suggests another one."""
         if name not in self.variables:
             name = shortened(name)
-            near = difflib.get_close_matches(name, self.variables, 1)
+            # as a scene writes it, which counts from 0
+            bracketed = _PLACE.sub(lambda place: f"[{int(place[1]) + 1}]", name)
+            near = difflib.get_close_matches(bracketed, self.variables, 1)
             hint = f"; did you mean {near[0]}?" if near else ""
+            if near and _COUNTED.search(name):
+                hint += " Bars and sections count from 1 in FMUs, from 0 in scenes"
             raise CouplingError(f"{self.name} has no variable {name}{hint}")
         return self.variables[name]
 
@@ -306,8 +314,10 @@ class Component:
         items = one.declaredType.items if one.type == "Enumeration" else []
         found = {item.name: int(item.value) for item in items or []}
         if word not in found:
-            allowed = ", ".join(found) or {"Boolean": "true or false"}.get(one.type, "a number")
-            raise CouplingError(f"{self.name}.{one.name} = {word}: must be {allowed}")
+            unit = unit_suffix(one.unit or "").replace(" ", " in ", 1)
+            number = f"a number{unit}, with a decimal point and no unit"
+            allowed = ", ".join(found) or {"Boolean": "true or false"}.get(one.type, number)
+            raise CouplingError(f"{self.name}.{one.name} = {shortened(word)}: must be {allowed}")
         return found[word]
 
     def reader(self, names: Sequence[str]) -> Reader:

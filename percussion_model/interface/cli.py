@@ -36,6 +36,7 @@ from percussion_model.interface.commands.study import study
 from percussion_model.interface.commands.validate import validate
 from percussion_model.interface.messages import usage_text
 from percussion_model.interface.progress import lines
+from percussion_model.interface.streams import end_process
 
 app = typer.Typer(
     help="Percussive drilling: elastic piston and bit, and rock, blow by blow.",
@@ -138,7 +139,7 @@ add(explore, waits=True)
 def main() -> None:
     """Run the command line; errors are one message and an exit code."""
     own_process()
-    sys.exit(_guarded(lambda: app(standalone_mode=False)))
+    end_process(lambda: _guarded(lambda: app(standalone_mode=False)))
 
 
 def _guarded(work: Callable[[], Any]) -> int:
