@@ -139,7 +139,7 @@ def _lines(path: Path) -> list[str]:
     except UnicodeDecodeError:
         # of older loggers, whose numbers are ASCII as well
         text = content.decode("cp1252", "replace")
-    if "\0" in text:
+    if "\0" in text or (wide and not text):
         raise FitError(f"{path}: cannot be read: not a text file in UTF-8")
     if not text.strip():
         raise FitError(f"{path}: is empty")

@@ -165,3 +165,29 @@ def test_sections_as_scenes_count_are_told_in_fmus():
         Component.find(part, "piston.sections.1.length")
     assert "did you mean piston.sections[2].length?" in str(refused.value)
     assert "from 1 in FMUs, from 0 in scenes" in str(refused.value)
+
+
+def test_what_a_command_reads_is_not_replaced(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    content = (ROOT / "scenarios" / "rigid.toml").read_bytes()
+    scene, drop = tmp_path / "X.toml", tmp_path / "drop.csv"
+    scene.write_bytes(content)
+    drop.write_bytes(b"time,bit position\n")
+    calibrate = ["calibrate", scene, "--drop", f"{drop}@5", "--force"]
+    commands = (
+        ("-o", "fmu", scene, "-o", "X.toml"),
+        ("-o", "fmu", "X.toml", "-o", scene, "--force"),
+        ("-o", "native", scene, "-o", "X.toml"),
+        ("--json", "run", scene, "--json", "X.toml"),
+        ("--json", "explain", scene, "--json", "./X.toml"),
+        ("--out", *calibrate, "--out", "X.toml"),
+        ("--figure", *calibrate, "--figure", "drop.csv"),
+    )
+    for option, *words in commands:
+        assert percussion(*words) == 2
+        said = capsys.readouterr().err
+        assert f"percussion: {option} " in said
+        assert "the command reads this file; name another one" in said
+        assert said.count("\n") == 1
+    assert scene.read_bytes() == content
+    assert sorted(tmp_path.iterdir()) == [scene, drop]
