@@ -110,7 +110,9 @@ def _refuse_output_over_input(options: Mapping[str, Any]) -> None:
         if written is None or not os.path.isfile(written):
             continue
         if any(os.path.samefile(written, file) for file in read):
-            raise refusal(f"{option} {written}: the command reads this file; name another one")
+            raise refusal(
+                f"{option} {written}: cannot be written: the command reads this file; name another"
+            )
 
 
 # Packages whose own errors are messages.

@@ -187,7 +187,7 @@ def test_what_a_command_reads_is_not_replaced(tmp_path, monkeypatch, capsys):
         assert percussion(*words) == 2
         said = capsys.readouterr().err
         assert f"percussion: {option} " in said
-        assert "the command reads this file; name another one" in said
+        assert "the command reads this file; name another" in said
         assert said.count("\n") == 1
     assert scene.read_bytes() == content
     assert sorted(tmp_path.iterdir()) == [scene, drop]
