@@ -183,12 +183,13 @@ def read_axis(text: str) -> tuple[str, np.ndarray]:
 
 
 def _refuse_no_number(row: Row, key: str) -> None:
-    """Raise `SceneError` for a choice or a switch."""
-    if row.kind not in ("number", "whole number"):
-        raise SceneError(
-            f"{key}: a study varies numbers, and this must be {row.allowed}: make a study of each, "
-            f"as with --set {key}={toml_value(row.default) if row.default is not None else '...'}"
-        )
+    """Raise `SceneError` for what is no number."""
+    if row.kind in ("number", "whole number"):
+        return
+    said = f"{key}: a study varies numbers, and this must be {row.allowed}"
+    if row.kind in ("choice", "flag"):
+        said += f": make a study of each, as with --set {key}={toml_value(row.default)}"
+    raise SceneError(said)
 
 
 def _numbers(key: str, words: Sequence[str], text: str) -> list[float]:
