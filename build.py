@@ -25,7 +25,8 @@ STAMP = VENV / "percussion_model.stamp"  # what is installed
 COMPILED = VENV / "percussion_model.compiled"  # what compiling beforehand was done for
 OLDEST_PYTHON = (3, 11)
 INTERRUPTED = 130  # what shells report for Ctrl-C
-EVERY = 3.0  # between lines that say that a silent program still runs [s]
+EVERY = 3.0  # until a line says that a silent program still runs [s]
+RARER = 10.0  # lines after it are so many times as far apart
 
 WARM_UP = "fmu_src.warm_up"
 REFERENCE_RUN = [
@@ -105,7 +106,7 @@ def setup() -> int:
     if code != 0 or stamp_in(COMPILED) == stamp_now():
         return code
     print("Compiling the kernels, and the library of FMUs (once, some minutes) ...", flush=True)
-    code = call([tool("python"), "-m", WARM_UP], silent="compiling")
+    code = call([tool("python"), "-m", WARM_UP])  # says itself how far it is
     if code == 0:
         COMPILED.write_text(stamp_now(), encoding="utf-8")
         print("Ready.", flush=True)
@@ -200,7 +201,7 @@ def test(extra: list[str]) -> int:
         with ThreadPoolExecutor(max_workers=1) as beside:  # the checks leave cores idle
             print("== kernels", flush=True)
             compiling: list[str | Path] = [tool("python"), "-m", WARM_UP]
-            kernels = beside.submit(call, compiling, silent="kernels", **variables)
+            kernels = beside.submit(call, compiling, **variables)
             codes = []
             for name, command in checks:
                 print(f"== {name}", flush=True)
@@ -233,12 +234,13 @@ def call(command: list[str | Path], folder: Path = ROOT, silent: str = "", **var
     except FileNotFoundError:
         print(f"{words[0]} is missing. Delete .venv and run this again.", file=sys.stderr)
         return 1
-    began = time.monotonic()
+    began, wait = time.monotonic(), EVERY
     try:
         while silent:
             try:
-                return child.wait(EVERY)
+                return child.wait(wait)
             except subprocess.TimeoutExpired:
+                wait = RARER * EVERY
                 print(f"{time.monotonic() - began:4.0f} s: {silent}", file=sys.stderr, flush=True)
         return child.wait()
     except KeyboardInterrupt:

@@ -16,7 +16,8 @@ SI. A number may also have its unit, as text: `force = "5 kN"`, `"1124 lbf"`, `"
 that are written out are in SI.
 Any of them can be set on the command line, as in `--set rock.unloading_ratio=10` or
 `--set feed.force=5kN`; sections
-and rods are counted from 0, as in `--set piston.sections.0.length=0.2`. All bars may be given
+and rods are counted from 0, as in `--set piston.sections.0.length=0.2` (in FMUs from 1:
+`piston.sections[1].length`). All bars may be given
 as one list instead, `[[bars]]`, from the drive to the rock: the first is the piston, the last
 the bit, and those between them are `string.rods`.
 

@@ -13,6 +13,7 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 from pythonfmu import Boolean, DefaultExperiment, Fmi2Causality, Fmi2Slave, Integer, Real
 from pythonfmu.enums import Fmi2Initial, Fmi2Variability
 
+from fmu_src.flat_names import flatten
 from fmu_src.units import write_units
 from fmu_src.variables import Variable
 
@@ -26,7 +27,7 @@ OPTIONS = {
 
 @dataclass(frozen=True)
 class About:
-    """What the head of a model description says; times in s."""
+    """What the head of a model description says; times in s. `flat` names have no dots."""
 
     model: str
     description: str
@@ -35,6 +36,7 @@ class About:
     version: str = version("percussion_model")
     author: str = "percussion_model developers"
     license: str = "BSD-3-Clause"
+    flat: bool = False
 
 
 class Described(Fmi2Slave):  # type: ignore[misc]
@@ -93,6 +95,8 @@ class Described(Fmi2Slave):  # type: ignore[misc]
         if any(variable.enumeration for variable in self.variables):
             root.insert(at + 1, _type_definitions(self.variables))
         _complete_structure(root, self.variables)
+        if self.about.flat:
+            flatten(root)
         return root
 
 

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from html import escape
 
 from fmu_src.description import About
+from fmu_src.flat_names import flat_name
 from fmu_src.variables import Variable
 from percussion_model.scene.scene import Scene
 
@@ -62,6 +64,8 @@ def write_page(
         f"Version {escape(about.version)}, licence {escape(about.license)}.</p>",
         INTRODUCTION + needs if scene is not None else "",
     ]
+    if about.flat:
+        variables = [replace(one, name=flat_name(one.name)) for one in variables]
     for causality in ("input", "output", "parameter"):
         rows = [variable for variable in variables if variable.causality == causality]
         if rows:

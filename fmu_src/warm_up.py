@@ -6,10 +6,11 @@ package, and the native library that FMUs bring along.
 
 from __future__ import annotations
 
-from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from typing import Any
 
 from fmu_src.native.library import library_here
+from percussion_model.interface.progress import lines
 from percussion_model.simulation.warm_up import SOLVERS, compile_blow_map, compile_kernels
 
 
@@ -19,8 +20,11 @@ def main() -> None:
         jobs: list[Future[Any]] = [pool.submit(library_here)]
         jobs += [pool.submit(compile_kernels, solver) for solver in SOLVERS]
         jobs.append(pool.submit(compile_blow_map))
-        for job in jobs:
-            job.result()
+        # processes are forked by now: none inherits the thread that prints
+        with lines("compiling") as report:
+            for done, job in enumerate(as_completed(jobs), 1):
+                job.result()
+                report(f"compiling, {done} of {len(jobs)} parts are ready", done / len(jobs))
 
 
 if __name__ == "__main__":

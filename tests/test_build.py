@@ -207,6 +207,7 @@ def test_ctrl_c_lets_the_program_finish_and_returns_130(tmp_path):
 
 def test_a_silent_program_is_said_to_run(build, monkeypatch, capsys):
     assert 0.0 < build.EVERY <= 5.0
+    assert build.EVERY * build.RARER == 30.0
     monkeypatch.setattr(build, "EVERY", 0.01)
     heard = "import sys; sys.exit(len(sys.stdin.readline()))"  # ends when it is told to
     sent = []

@@ -74,6 +74,20 @@ def test_lines_come_before_a_reader_takes_a_command_for_dead():
     assert 0.0 < BETWEEN_LINES <= 5.0
 
 
+def test_lines_after_the_first_are_rare(heard, monkeypatch):
+    """A compile of nine minutes had 180 of them."""
+    assert BETWEEN_LINES * progress.RARER == 30.0
+    monkeypatch.setattr(progress, "EVERY", 0.02)
+    monkeypatch.setattr(progress, "RARER", 1e4)
+    with progress.lines("compiling"):
+        heard.wait_for(1)
+        time.sleep(0.1)
+        assert heard.progress() == 1
+    with progress.lines("a second piece of work, right after it"):
+        time.sleep(0.1)
+        assert heard.progress() == 1
+
+
 @pytest.mark.parametrize(
     "arguments",
     [

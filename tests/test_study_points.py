@@ -55,7 +55,7 @@ def test_samples_fill_every_slice_and_repeat_with_their_seed():
         (lambda: latin_hypercube({"feed.force": (0, 1)}, 0), "count = 0"),
         (lambda: read_axis("feed.force"), "--over feed.force: must be"),
         (lambda: read_axis("feed.force=1:2"), "must be KEY=FIRST:LAST:COUNT"),
-        (lambda: read_axis("feed.force=1:2:0"), "COUNT must be a whole number from 1 on"),
+        (lambda: read_axis("feed.force=1:2:0"), "COUNT must be a whole number from 1 to"),
         (lambda: read_axis("feed.force=-1:2:3log"), "both ends must be above 0"),
     ],
 )

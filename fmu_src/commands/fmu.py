@@ -39,6 +39,7 @@ def fmu(
     no_reference: Annotated[
         bool, typer.Option("--no-reference", help="Do not run it for _in.csv and _ref.csv.")
     ] = False,
+    flat_names: options.FlatNames = False,
     force: options.Force = False,
     rock: common.RockName = None,
     scene_option: options.BakedToo = None,
@@ -49,9 +50,11 @@ def fmu(
     """
     with common.needing("fmu"), options.refusing_faults():
         if pneumatics:
-            write_drive(output)
+            write_drive(output, flat_names)
             return
-        path = write_hammer(scene, output, platforms, blow_map, force, scene_option, rock)
+        path = write_hammer(
+            scene, output, platforms, blow_map, force, scene_option, rock, flat_names
+        )
         if not no_reference:
             _write_reference(path)
 
@@ -64,6 +67,7 @@ def write_hammer(
     force: bool = False,
     scene_option: Path | None = None,
     rock: str | None = None,
+    flat_names: bool = False,
 ) -> Path:
     """Write the FMU of a scene and say so; the parameters are those of `fmu`."""
     from fmu_src.archive import content, state_of
@@ -73,20 +77,20 @@ def write_hammer(
     file, chosen = options.baked_scene(scene, scene_option, rock)
     names = None if platforms is None else _export_platforms(platforms)
     path = output or options.DIST / hammer_name(file, "Ladder" if blow_map else "")
+    about_hammer(chosen, path)  # refuses a name, before anything is compiled or --force offered
     refuse_other(path, chosen, blow_map or chosen.solver_name == "blow-map", force)
-    about_hammer(chosen, path)  # refuses a name before anything is compiled
     common.check_outputs(path.parent, None)
     libraries = _libraries(names)
     table = options.table_for(chosen, blow_map)
     before = content(path)
     with progress("building the FMU"):
-        guid = build_hammer(chosen, path, table, libraries)
+        guid = build_hammer(chosen, path, table, libraries, flat_names)
     source = options.baked_from(scene, scene_option, rock)
     typer.echo(f"{path} {{{guid}}}: {state_of(path, before)}, {source}")
     return path
 
 
-def write_drive(output: Path | None = None) -> Path:
+def write_drive(output: Path | None = None, flat_names: bool = False) -> Path:
     """Write the FMU of the pneumatic drive and say so."""
     from fmu_src.archive import content, state_of
     from fmu_src.parts import pneumatic_drive
@@ -94,7 +98,7 @@ def write_drive(output: Path | None = None) -> Path:
 
     path = output or options.DIST / DRIVE
     before = content(path)
-    guid = build_part(pneumatic_drive.TABLE, path)
+    guid = build_part(pneumatic_drive.TABLE, path, flat_names)
     typer.echo(f"{path} {{{guid}}}: {state_of(path, before)}")
     return path
 

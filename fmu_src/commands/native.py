@@ -25,6 +25,7 @@ def native(
         ),
     ] = None,
     blow_map: options.BlowMap = False,
+    flat_names: options.FlatNames = False,
     force: options.Force = False,
     rock: common.RockName = None,
     scene_option: options.BakedToo = None,
@@ -59,5 +60,5 @@ def native(
         for version, path in files.items():
             before = content(path)
             with progress(f"building the FMU of FMI {version}"):
-                guid = build_native(chosen, path, version, made, table)
+                guid = build_native(chosen, path, version, made, table, flat_names)
             typer.echo(f"{path} {{{guid}}}: {state_of(path, before)}, {source}")

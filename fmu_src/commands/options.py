@@ -27,6 +27,13 @@ BakedToo = Annotated[Path | None, typer.Option("--scene", hidden=True)]
 BlowMap = Annotated[
     bool, typer.Option("--blow-map", help="Bring the table that solver.fidelity needs along.")
 ]
+FlatNames = Annotated[
+    bool,
+    typer.Option(
+        "--flat-names",
+        help="Underscores for dots in names of variables, of which Simulink makes buses.",
+    ),
+]
 Force = Annotated[bool, typer.Option("--force", help="Replace the FMU of another scene.")]
 
 

@@ -36,6 +36,7 @@ def build_hammer(
     path: Path,
     blow_map: BlowTable | None = None,
     libraries: Mapping[str, bytes] | None = None,
+    flat: bool = False,
 ) -> str:
     """Write the FMU of a scene; return its GUID.
 
@@ -49,13 +50,15 @@ def build_hammer(
         Ends with `.fmu`; the rest of its name is the model identifier.
     libraries : dict of str, optional
         Native libraries by platform; that of this machine if left out.
+    flat : bool
+        Whether names of variables have no dots.
 
     Raises
     ------
     SceneError
         If the name is no C identifier.
     """
-    about = about_hammer(scene, path)
+    about = about_hammer(scene, path, flat)
     variables = hammer_variables(scene)
     bundle = stage("percussive_hammer", "hammer", with_model=True)
     resources: dict[str, str | bytes] = {
@@ -126,7 +129,7 @@ def hammer_name(scene: Path, suffix: str = "") -> str:
     return "PercussiveHammer.fmu" if stem == "Reference" else f"{stem}Hammer.fmu"
 
 
-def about_hammer(scene: Scene, path: Path) -> About:
+def about_hammer(scene: Scene, path: Path, flat: bool = False) -> About:
     """Head of the model description."""
     if path.suffix != ".fmu" or not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*", path.stem):
         raise SceneError(
@@ -139,6 +142,7 @@ def about_hammer(scene: Scene, path: Path) -> About:
         stop_time=scene.run.duration,
         step_size=min(STEP_SIZE, scene.run.duration),
         version=f"{version('percussion_model')}, interface {VERSION}",
+        flat=flat,
     )
 
 

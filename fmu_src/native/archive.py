@@ -60,7 +60,7 @@ def write_native_fmu(
         MODEL: model(""),
         # what nothing that runs reads: whose FMU this is
         SCENE: to_json({"given": given_values(scene), "blow_map": with_map}).encode(),
-        **_pictures(version),
+        **_pictures(version, about.flat),
     }
     for platform, library in libraries.items():
         entries[library_path(version, platform, about.model)] = library
@@ -89,12 +89,12 @@ def library_path(version: Version, platform: str, model: str) -> str:
     return f"binaries/{folder}/{model}{SUFFIXES[system]}"
 
 
-def _pictures(version: Version) -> dict[str, bytes]:
+def _pictures(version: Version, flat: bool) -> dict[str, bytes]:
     """Icon, and terminals where FMI has them."""
     icon = (HERE / "icon.png").read_bytes()
     if version == "2.0":
         return {"model.png": icon}
-    return {f"{FOLDER}/icon.png": icon, f"{FOLDER}/terminalsAndIcons.xml": write_terminals()}
+    return {f"{FOLDER}/icon.png": icon, f"{FOLDER}/terminalsAndIcons.xml": write_terminals(flat)}
 
 
 def add_files(path: Path, files: Mapping[str, bytes]) -> None:

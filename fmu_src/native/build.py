@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 from pathlib import Path
 
+from fmu_src.flat_names import flat_name
 from fmu_src.hammer.build import about_hammer, hammer_name
 from fmu_src.native.archive import Version, write_native_fmu
 from fmu_src.native.compare import refuse_difference
@@ -31,6 +32,7 @@ def build_native(
     version: Version,
     libraries: dict[str, bytes],
     blow_map: BlowTable | None = None,
+    flat: bool = False,
 ) -> str:
     """Write the native FMU of a scene, with reference results; return its GUID.
 
@@ -40,15 +42,18 @@ def build_native(
         By platform.
     blow_map : BlowTable, optional
         What `solver.fidelity = "blow-map"` needs.
+    flat : bool
+        Whether names of variables have no dots.
     """
     # the name of the file is no identifier, that of the model is
-    about = about_hammer(scene, path.with_name(f"{path.stem.partition('-')[0]}.fmu"))
+    about = about_hammer(scene, path.with_name(f"{path.stem.partition('-')[0]}.fmu"), flat)
     words = None if blow_map is None else blow_map.to_words()
     tables = functools.partial(model_tables, scene, blow_map=words)
     guid = write_native_fmu(
         path, version, about, scene, libraries, tables, with_map=blow_map is not None
     )
     if this_platform() in libraries:
-        refuse_difference(scene, path)
-        add_reference_results(path, scene, functools.partial(run_fmu, path))
+        named = flat_name if flat else str
+        refuse_difference(scene, path, named)
+        add_reference_results(path, scene, functools.partial(run_fmu, path), named)
     return guid

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -33,17 +34,20 @@ def package_outputs(scene: Scene, steps: int = STEPS, step: float = STEP) -> np.
     return np.array(rows)
 
 
-def fmu_outputs(path: Path, steps: int = STEPS, step: float = STEP) -> np.ndarray:
-    """The same by an FMU in fmpy."""
+def fmu_outputs(
+    path: Path, steps: int = STEPS, step: float = STEP, named: Callable[[str], str] = str
+) -> np.ndarray:
+    """The same by an FMU in fmpy; `named` gives the names that its variables have."""
+    names = list(map(named, OUTPUTS))
     found = run_fmu(
-        path, stop_time=steps * step, step_size=step, output_interval=step, output=list(OUTPUTS)
+        path, stop_time=steps * step, step_size=step, output_interval=step, output=names
     )
-    return np.array([[float(row[name]) for name in OUTPUTS] for row in found[1:]])
+    return np.array([[float(row[name]) for name in names] for row in found[1:]])
 
 
-def refuse_difference(scene: Scene, path: Path) -> None:
+def refuse_difference(scene: Scene, path: Path, named: Callable[[str], str] = str) -> None:
     """Raise `SceneError` if an FMU differs from the Python package in any bit."""
-    there, here = fmu_outputs(path), package_outputs(scene)
+    there, here = fmu_outputs(path, named=named), package_outputs(scene)
     names = [name for k, name in enumerate(OUTPUTS) if not np.array_equal(there[:, k], here[:, k])]
     if names:
         raise SceneError(

@@ -14,6 +14,7 @@ from fmu_src.description import (
     to_text,
     write_items,
 )
+from fmu_src.flat_names import flatten
 from fmu_src.native.description import GENERATION_TOOL, LOG_CATEGORIES
 from fmu_src.native.variables3 import Variable3
 from fmu_src.units import write_units
@@ -75,6 +76,8 @@ def _to_xml(about: About, variables: Sequence[Variable], arranged: Sequence[Vari
     for entry in arranged:
         nodes.append(_variable(entry, [by_name[name] for name in entry.members]))
     root.append(_structure(by_name, arranged))
+    if about.flat:
+        flatten(root)
     return root
 
 

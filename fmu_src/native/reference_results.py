@@ -108,7 +108,9 @@ def _held(inputs: Sequence[Variable], times: Sequence[float]) -> np.ndarray:
     return table
 
 
-def reference_results(scene: Scene, run: Run) -> dict[str, bytes]:
+def reference_results(
+    scene: Scene, run: Run, named: Callable[[str], str] = str
+) -> dict[str, bytes]:
     """Files for the archive, by their paths in it.
 
     Parameters
@@ -116,6 +118,8 @@ def reference_results(scene: Scene, run: Run) -> dict[str, bytes]:
     run : callable
         Runs the FMU: takes `stop_time`, `step_size`, `output_interval` and `input`, and
         returns a structured array with `time` and a column for each output.
+    named : callable
+        Gives the names that variables have in the FMU.
     """
     cases = experiments(scene)
     files = {
@@ -124,6 +128,7 @@ def reference_results(scene: Scene, run: Run) -> dict[str, bytes]:
         SCENE: scene.to_toml().encode(),
     }
     for case in cases:
+        case.signals.dtype.names = tuple(map(named, case.signals.dtype.names or ()))
         result = run(
             stop_time=DURATION,
             step_size=STEP_SIZE,
@@ -138,9 +143,11 @@ def reference_results(scene: Scene, run: Run) -> dict[str, bytes]:
     return {f"{FOLDER}/{name}": content for name, content in files.items()} | {PAGE: text.encode()}
 
 
-def add_reference_results(path: Path, scene: Scene, run: Run) -> None:
+def add_reference_results(
+    path: Path, scene: Scene, run: Run, named: Callable[[str], str] = str
+) -> None:
     """Run an FMU and put experiments and results into its archive."""
-    add_files(path, reference_results(scene, run))
+    add_files(path, reference_results(scene, run, named))
 
 
 def _write_experiments(cases: list[Experiment]) -> bytes:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from xml.etree.ElementTree import Element, SubElement
 
 from fmu_src.description import to_bytes
+from fmu_src.flat_names import flat_name
 from fmu_src.native.description3 import FMI_VERSION
 
 FOLDER = "terminalsAndIcons"
@@ -86,8 +87,8 @@ TERMINALS = (
 )
 
 
-def write_terminals() -> bytes:
-    """Text of the file."""
+def write_terminals(flat: bool = False) -> bytes:
+    """Text of the file; with flat names of the variables, if they are so in the FMU."""
     root = Element("fmiTerminalsAndIcons", {"fmiVersion": FMI_VERSION})
     graphics = SubElement(root, "GraphicalRepresentation")
     scale = {"suggestedScalingFactorTo_mm": MILLIMETRE}
@@ -102,6 +103,7 @@ def write_terminals() -> bytes:
         }
         node = SubElement(terminals, "Terminal", told)
         for member, variable in terminal.members.items():
-            names = {"variableName": variable, "memberName": member, "variableKind": "signal"}
+            shown = flat_name(variable) if flat else variable
+            names = {"variableName": shown, "memberName": member, "variableKind": "signal"}
             SubElement(node, "TerminalMemberVariable", names)
     return to_bytes(root)

@@ -90,10 +90,10 @@ def _real(part: PartTable, unit: str, **rest: Any) -> Variable:
     return Variable(type="Real", unit=shown, **given)
 
 
-def build_part(part: PartTable, path: Path) -> str:
-    """Write the FMU of a part; return its GUID."""
+def build_part(part: PartTable, path: Path, flat: bool = False) -> str:
+    """Write the FMU of a part, with `flat` names of variables or not; return its GUID."""
     variables = part_variables(part)
-    about = About(path.stem, part.description, part.stop_time, part.step_size)
+    about = About(path.stem, part.description, part.stop_time, part.step_size, flat=flat)
     bundle = stage(part.bundle, "parts", with_model=False)
     return write_fmu(
         path, about, variables, bundle, part.slave, {FILE: write_variables(variables)},

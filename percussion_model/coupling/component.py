@@ -10,6 +10,7 @@ import contextlib
 import ctypes
 import difflib
 import functools
+import re
 import struct
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -20,8 +21,11 @@ from fmpy import platform, read_model_description, sharedLibraryExtension
 from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
 from lxml import etree
 
-from percussion_model.scene.rows import shortened
+from percussion_model.scene.rows import shortened, unit_suffix
 
+# Number of a bar or a section within a key of a scene, and one in either way of writing.
+_PLACE = re.compile(r"\.([0-9]{1,4})(?=\.|$)")
+_COUNTED = re.compile(r"\.[0-9]|\[[0-9]")
 # What fmpy calls the types that share a getter, and what their values are in C.
 FAMILIES = {"Real": "Real", "Integer": "Integer", "Enumeration": "Integer", "Boolean": "Boolean"}
 ORDER = ("Real", "Integer", "Boolean")
@@ -77,8 +81,12 @@ def find_variable(component: str, variables: Mapping[str, Any], name: str) -> An
     """A variable by name; the error suggests another one."""
     if name not in variables:
         name = shortened(name)
-        near = difflib.get_close_matches(name, variables, 1)
+        # as a scene writes it, which counts from 0
+        bracketed = _PLACE.sub(lambda place: f"[{int(place[1]) + 1}]", name)
+        near = difflib.get_close_matches(bracketed, variables, 1)
         hint = f"; did you mean {near[0]}?" if near else ""
+        if near and _COUNTED.search(name):
+            hint += " Bars and sections count from 1 in FMUs, from 0 in scenes"
         raise CouplingError(f"{component} has no variable {name}{hint}")
     return variables[name]
 
@@ -93,7 +101,9 @@ def number_of_word(component: str, variable: Any, word: str) -> int:
     """Number of a word of an enumeration."""
     found = numbers_of_words(variable)
     if word not in found:
-        kind = {"Boolean": "true or false"}.get(variable.type, "a number")
+        unit = unit_suffix(variable.unit or "").replace(" ", " in ", 1)
+        number = f"a number{unit}, with a decimal point and no unit"
+        kind = {"Boolean": "true or false"}.get(variable.type, number)
         raise CouplingError(
             f"{component}.{variable.name} = {shortened(word)}: must be {', '.join(found) or kind}"
         )

@@ -9,6 +9,7 @@ from typing import Any
 
 from percussion_model.coupling.component import CouplingError
 from percussion_model.coupling.fresh import fresh
+from percussion_model.scene.rows import nearest
 
 Work = Callable[[dict[str, Any], float, float], Mapping[str, Any]]
 # What a user gives: a `Work`, or what makes one (see `fresh`).
@@ -19,7 +20,9 @@ class Inputs(dict[str, Any]):
     """Inputs by name; the error of a missing one names those that are there."""
 
     def __missing__(self, name: str) -> Any:
-        raise CouplingError(f"there is no input {name!r}, only {', '.join(self)}")
+        near = nearest(name, self)
+        meant = f"; did you mean {near}?" if near else ""
+        raise CouplingError(f"there is no input {name!r}, only {', '.join(self)}{meant}")
 
 
 class PythonPart:
@@ -81,7 +84,10 @@ class PythonSignals:
         found = self.part.outputs
         lacking = sorted(name for name in self.names if name not in found)
         if lacking:
-            raise CouplingError(f"{self.part.name} gave no {', '.join(lacking)}")
+            others = [name for name in found if name not in self.names]
+            near = [(name, nearest(name, others)) for name in lacking]
+            meant = "".join(f"; did you mean {name} by {one}?" for name, one in near if one)
+            raise CouplingError(f"{self.part.name} gave no {', '.join(lacking)}{meant}")
         return [found[name] for name in self.names]
 
     def write(self, values: Sequence[Any]) -> None:

@@ -6,9 +6,11 @@ Those that make FMUs are added by `fmu_src.command_line`, which stands above thi
 from __future__ import annotations
 
 import functools
+import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import nullcontext
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -23,6 +25,7 @@ from percussion_model.interface.commands.common import (
     is_interruption,
     own_process,
     print_message,
+    refusal,
 )
 from percussion_model.interface.commands.compare import compare
 from percussion_model.interface.commands.couple import couple
@@ -36,6 +39,7 @@ from percussion_model.interface.commands.study import study
 from percussion_model.interface.commands.validate import validate
 from percussion_model.interface.messages import usage_text
 from percussion_model.interface.progress import lines
+from percussion_model.interface.streams import end_process
 
 app = typer.Typer(
     help="Percussive drilling: elastic piston and bit, and rock, blow by blow.",
@@ -75,6 +79,7 @@ def _heard(command: Callable[..., Any], waits: bool = False) -> Callable[..., An
     def call(*words: Any, **options: Any) -> Any:
         try:
             with nullcontext() if waits or sys.stderr.isatty() else lines("still running"):
+                _refuse_output_over_input(options)
                 return command(*words, **options)
         except (KeyboardInterrupt, SystemError) as error:
             if not is_interruption(error):
@@ -82,6 +87,32 @@ def _heard(command: Callable[..., Any], waits: bool = False) -> Callable[..., An
             raise typer.Abort from None
 
     return call
+
+
+# Parameters of commands that name a file to write, by what users call them.
+_OUTPUTS = {"json_file": "--json", "out": "--out", "output": "-o", "figure": "--figure"}
+
+
+def _refuse_output_over_input(options: Mapping[str, Any]) -> None:
+    """Refuse a file to write that the command reads: nothing may replace that, --force neither."""
+    read = [
+        file
+        for name, value in options.items()
+        if name not in _OUTPUTS
+        for word in (value if isinstance(value, list) else [value])
+        if isinstance(word, str | Path)
+        # FILE@SPEED and FILE.py:NAME as well
+        for file in {str(word), str(word).rpartition("@")[0], str(word).rpartition(":")[0]}
+        if os.path.isfile(file)
+    ]
+    for name, option in _OUTPUTS.items():
+        written = options.get(name)
+        if written is None or not os.path.isfile(written):
+            continue
+        if any(os.path.samefile(written, file) for file in read):
+            raise refusal(
+                f"{option} {written}: cannot be written: the command reads this file; name another"
+            )
 
 
 # Packages whose own errors are messages.
@@ -138,7 +169,7 @@ add(explore, waits=True)
 def main() -> None:
     """Run the command line; errors are one message and an exit code."""
     own_process()
-    sys.exit(_guarded(lambda: app(standalone_mode=False)))
+    end_process(lambda: _guarded(lambda: app(standalone_mode=False)))
 
 
 def _guarded(work: Callable[[], Any]) -> int:

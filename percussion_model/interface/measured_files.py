@@ -1,9 +1,9 @@
-"""Files and words of measurements: separators, decimal commas, units."""
+"""Files and words of measurements."""
 
 from __future__ import annotations
 
-import csv
 import re
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -16,50 +16,34 @@ from percussion_model.analysis.fitting import (
     FitError,
     Reading,
 )
-from percussion_model.scene.units import factor
-from percussion_model.simulation.files import reason
+from percussion_model.interface.commands.common import print_message
+from percussion_model.interface.csv_tables import factor_of, read_columns
+from percussion_model.scene.units import with_point
 
-# SI unit, and units that may stand for it.
-UNITS = {
-    "m": ("m", "mm", "um", "cm", "in"),
-    "s": ("s", "ms", "us"),
-    "N": ("N", "kN", "MN", "lbf"),
-    "Pa": ("Pa", "kPa", "MPa", "GPa", "psi"),
-    "m/s": ("m/s", "mm/s", "km/h"),
-}
 CURVE_COLUMNS = {"penetration": "m", "force": "N"}
 DROP_COLUMNS = {"time": "s"} | {name: unit for name, (unit, _) in SIGNALS.items()}
-HEADING = re.compile(r"^(?P<name>[^\[\(]+?)\s*(?:[\[\(](?P<unit>[^\]\)]*)[\]\)])?$")
 MEASURED = re.compile(
     r"^(?P<name>\w+)\s*=\s*(?P<value>[^±@\s]+?)\s*(?:±|\+-|\+/-)\s*(?P<error>[^±@\s]+?)"
     r"\s*(?P<unit>[a-zA-Zµμ][a-zA-Z/]*)?\s*(?:@\s*(?P<speed>\S+))?$"
 )
 
 
-def factor_of(unit: str | None, si: str, where: str) -> float:
-    """Factor from a unit to SI; none given is SI.
-
-    Raises
-    ------
-    FitError
-        If it is no unit of that quantity.
-    """
-    plain = (unit or si).strip().replace("µ", "u").replace("μ", "u")
-    if plain not in UNITS[si]:
-        raise FitError(f"{where}: unit {unit!r} must be one of {', '.join(UNITS[si])}")
-    return 1.0 if plain == si else float(factor(plain, si))
-
-
 def read_curve(path: Path) -> Curve:
     """Read a slow test: columns penetration and force, in any order."""
-    columns = _columns(path, CURVE_COLUMNS)
-    if set(columns) != set(CURVE_COLUMNS):
-        raise FitError(f"{path}: the columns must be penetration, force, not {list(columns)}")
+    wanted = "penetration and force are wanted"
+    columns, others = read_columns(path, CURVE_COLUMNS, wanted)
+    for name in CURVE_COLUMNS:
+        if name not in columns:
+            raise FitError(f"{path}: no column is {name}: {wanted}{_found(columns, others)}")
+    _tell_of_others(path, others)
     return Curve(columns["penetration"], columns["force"], path.name)
 
 
 def read_drop(word: str, gauge: float | None = None) -> DropTest:
-    """Read a drop test, a word FILE@SPEED: columns time and one signal."""
+    """Read a drop test, a word FILE@SPEED: columns time and one signal.
+
+    What was recorded before time zero, as by a pre-trigger, is left out.
+    """
     file, at, speed = word.rpartition("@")
     try:
         if not at:
@@ -68,11 +52,31 @@ def read_drop(word: str, gauge: float | None = None) -> DropTest:
     except ValueError:
         raise FitError(f"--drop {word}: must be CSV@SPEED, as in drop.csv@5.25") from None
     path = Path(file)
-    columns = _columns(path, DROP_COLUMNS)
-    if "time" not in columns or len(columns) != 2:
-        raise FitError(f"{file}: the columns must be time and one signal, not {list(columns)}")
-    (signal,) = (name for name in columns if name != "time")
-    return DropTest(columns["time"], columns[signal], fast, signal, gauge, f"{path.name}@{speed}")
+    wanted = f"time is wanted, and one of the signals {', '.join(SIGNALS)}"
+    columns, others = read_columns(path, DROP_COLUMNS, wanted)
+    signals = [name for name in columns if name != "time"]
+    if "time" not in columns or len(signals) != 1:
+        why = "no column is time"
+        if "time" in columns:
+            why = f"{len(signals)} columns are signals" if signals else "no column is a signal"
+        raise FitError(f"{path}: {why}: {wanted}{_found(columns, others)}")
+    _tell_of_others(path, others)
+    kept = columns["time"] >= 0.0
+    if not kept.all():
+        print_message(f"{path}: {np.sum(~kept)} of {len(kept)} rows are before time 0: left out")
+    time, values = columns["time"][kept], columns[signals[0]][kept]
+    return DropTest(time, values, fast, signals[0], gauge, f"{path.name}@{speed}")
+
+
+def _found(columns: Iterable[str], others: Sequence[str]) -> str:
+    """What a file has instead of what is wanted."""
+    unknown = f"; unknown: {', '.join(others)}" if others else ""
+    return f"; found: {', '.join(columns)}{unknown}"
+
+
+def _tell_of_others(path: Path, others: Sequence[str]) -> None:
+    if others:
+        print_message(f"{path}: not read: {', '.join(others)}")
 
 
 def read_reading(word: str) -> Reading:
@@ -91,55 +95,8 @@ def read_reading(word: str) -> Reading:
         value, error = float(found["value"]), float(found["error"])
         speed = None if found["speed"] is None else float(found["speed"])
     except ValueError as wrong:
-        raise FitError(f"--measured {word!r}: {wrong}") from None
+        numbers = [one for one in (found["value"], found["error"], found["speed"]) if one]
+        pointed = next(filter(None, map(with_point, numbers)), "")
+        why = f"write {pointed}, with a decimal point" if pointed else wrong
+        raise FitError(f"--measured {word!r}: {why}") from None
     return Reading(name, factor * value, factor * error, speed)  # type: ignore[arg-type]
-
-
-def _columns(path: Path, known: dict[str, str]) -> dict[str, np.ndarray]:
-    """Columns of a file in SI by name; the separator is a comma, a semicolon or a tab."""
-    heading, rows, separator = _table(path)
-    columns: dict[str, np.ndarray] = {}
-    for k, title in enumerate(heading):
-        parts = HEADING.match(title)
-        name = (parts["name"] if parts else title).strip().lower().replace(" ", "_")
-        if name not in known:
-            raise FitError(
-                f"{path}: the columns must be of {', '.join(known)}, not {title!r}"
-                + (f" (separated by {separator!r})" if len(heading) < 2 else "")
-            )
-        if name in columns:
-            raise FitError(f"{path}: two columns are {name}")
-        factor = factor_of(parts["unit"] if parts else None, known[name], f"{path}, {title!r}")
-        numbers = [_number(path, n, row[k], separator) for n, row in enumerate(rows, 1)]
-        columns[name] = factor * np.array(numbers)
-    return columns
-
-
-def _table(path: Path) -> tuple[list[str], list[list[str]], str]:
-    """Heading, rows and separator of a file."""
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise FitError(f"{path}: cannot be read: {reason(error)}") from None
-    lines = [line for line in text.splitlines() if line.strip()]
-    if not lines:
-        raise FitError(f"{path}: is empty")
-    separator = next((mark for mark in (";", "\t") if mark in lines[0]), ",")
-    heading, *rows = [
-        [word.strip() for word in row] for row in csv.reader(lines, delimiter=separator)
-    ]
-    for number, row in enumerate(rows, 1):
-        if len(row) != len(heading):
-            raise FitError(
-                f"{path}: row {number} has {len(row)} columns, the heading {len(heading)}, "
-                f"separated by {separator!r} as the heading is; row: {lines[number].strip()!r}"
-            )
-    return heading, rows, separator
-
-
-def _number(path: Path, row: int, word: str, separator: str) -> float:
-    """Read a number, with a decimal comma where commas do not separate columns."""
-    try:
-        return float(word if separator == "," else word.replace(",", "."))
-    except ValueError:
-        raise FitError(f"{path}: row {row}: {word!r} is no number") from None

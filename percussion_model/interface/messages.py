@@ -54,4 +54,6 @@ def _allowed(fault: Any) -> str:
     if choice:
         return f"must be one of {choices}"
     words = _ALLOWED.get(fault["type"])
+    if words is not None and "," in str(fault["input"]):
+        words += ", with a decimal point"
     return fault["msg"] if words is None else words.format(**fault.get("ctx", {}))

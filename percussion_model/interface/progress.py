@@ -10,8 +10,10 @@ from bisect import bisect
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-# Time between lines [s]: a reader who sees none for five seconds takes the command for dead.
+# Time to the first line [s]: a reader who sees none for five seconds takes the command for dead.
 EVERY = 3.0
+# The lines after it are so many times as far apart: a log of an hour is to be read.
+RARER = 10.0
 # A command that is not heard of before its first work has loaded modules so long at most [s].
 LOADING = 2.0
 # Below this share of the work the time that is left cannot be told.
@@ -30,8 +32,8 @@ _PATIENCE = 2.0
 Report = Callable[[str, float | None], None]
 
 _running: list[Lines] = []
-# When the last piece of work ended, and since when nothing has been said [s].
-_before: list[tuple[float, float]] = []
+# When the last piece of work ended, and what `said` was then [s].
+_before: list[tuple[float, list[float]]] = []
 
 
 class Lines:
@@ -118,7 +120,7 @@ def _share_at(moment: float, marks: list[tuple[float, float]]) -> float:
 
 @contextmanager
 def lines(text: str, done: float = 0.0) -> Iterator[Report]:
-    """Print a line every few seconds; within a command that does so, say more of what it does.
+    """Print a line after a few seconds and then now and again; within what does so, tell more.
 
     Parameters
     ----------
@@ -139,7 +141,7 @@ def lines(text: str, done: float = 0.0) -> Iterator[Report]:
     own = Lines(text)
     own.begin(text, done)
     over = threading.Event()
-    said = [_silent_since(own.started)]
+    said = _silent_since(own.started)
     thread = threading.Thread(target=_print, args=(own, over, said), daemon=True)
     _running.append(own)
     thread.start()
@@ -149,19 +151,22 @@ def lines(text: str, done: float = 0.0) -> Iterator[Report]:
         over.set()
         thread.join()
         _running.remove(own)
-        _before[:] = [(time.monotonic(), said[-1])]
+        _before[:] = [(time.monotonic(), said[-2:])]
 
 
-def _silent_since(now: float) -> float:
-    """Since when nothing has been said: the start, or that of short pieces of work in a row."""
+def _silent_since(now: float) -> list[float]:
+    """The start, and the last line; of short pieces of work in a row those of all together."""
     if not _before:
-        return now - min(time.process_time(), LOADING)
-    ended, since = _before[-1]
-    return since if now - ended < EVERY else now
+        return [now - min(time.process_time(), LOADING)]
+    ended, said = _before[-1]
+    return said if now - ended < EVERY else [now]
 
 
 def _print(told: Lines, over: threading.Event, said: list[float]) -> None:
-    while not over.wait(max(said[-1] + EVERY - time.monotonic(), 0.0)):
+    while True:
+        wait = EVERY * (RARER if len(said) > 1 else 1.0)
+        if over.wait(max(said[-1] + wait - time.monotonic(), 0.0)):
+            return
         said.append(time.monotonic())
         try:
             print(told.line(), file=sys.stderr, flush=True)

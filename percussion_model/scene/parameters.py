@@ -10,6 +10,7 @@ from __future__ import annotations
 import dataclasses
 import difflib
 import math
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
 from typing import Any
@@ -549,14 +550,19 @@ LONGEST_KEY = 60
 
 def unknown_key(key: str) -> str:
     """Say that a key is not known, and which known one is nearest."""
+    # as an FMU writes it, which counts from 1
+    counted = re.sub(r"\[([1-9][0-9]{0,3})\]", lambda place: f".{int(place[1]) - 1}", key)
+    is_counted = counted != key and find_row(counted) is not None
     parent, _, name = key.rpartition(".")
     key = shortened(key, LONGEST_KEY)
+    if is_counted:
+        return f"unknown key {key}: did you mean {counted}? Scenes count from 0, FMUs from 1"
     prefix = generic_key(parent) + "." if parent else ""
     keys = rows_by_key()
     siblings = [one.removeprefix(prefix) for one in keys if one.startswith(prefix)]
     siblings = [one for one in siblings if "." not in one]
     if parent and (meant := nearest(name, siblings)):
-        return f"unknown key {key}: did you mean {parent}.{meant}?"
+        return f"unknown key {key}: did you mean {shortened(parent, LONGEST_KEY)}.{meant}?"
     underlined = {one.replace(".", "_"): one for one in keys}
     if key in underlined:  # as keyword arguments of Python are written
         return f"unknown key {key}: did you mean {underlined[key]}?"
@@ -565,6 +571,7 @@ def unknown_key(key: str) -> str:
     if near:
         return f"unknown key {key}: did you mean {near[0].replace('.*', '.0')}?"
     if siblings and parent:
+        parent = shortened(parent, LONGEST_KEY)
         return f"unknown key {key}: [{parent}] has the keys {', '.join(siblings)}"
     groups = [one for one in GROUPS if one in key.split(".")]
     if groups:

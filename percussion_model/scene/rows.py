@@ -21,6 +21,10 @@ Kind = Literal["number", "whole number", "flag", "choice", "sections", "rods"]
 
 # Of a key or of a parser's words, no more than this is repeated in a message.
 _LONGEST_WORDS = 200
+# Nor more of a value [characters].
+_LONGEST_VALUE = 60
+# A whole number of more is beyond all floats [bits].
+_LONGEST_WHOLE = 1024
 # Below this similarity a guess at a misspelt name misleads more than it helps.
 SIMILAR_ENOUGH = 0.6
 # More faults of one scene than this are counted, not told.
@@ -231,6 +235,8 @@ def toml_value(value: object) -> str:
     """
     if isinstance(value, (bool, str)):
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    if type(value) is int and value.bit_length() > _LONGEST_WHOLE:
+        return hex(value)  # Python refuses to write so many decimal digits
     if type(value) in (int, float):
         return repr(value)
     raise TypeError(f"{type(value).__name__} is no simple value")
@@ -274,11 +280,20 @@ def refuse_value(row: Row, key: str, value: Any) -> str:
 
 def show_value(value: Any) -> str:
     """Show a value as it stands in a scene file, shortened."""
+    if type(value) is int:
+        return shortened(toml_value(value), _LONGEST_VALUE)
     try:
         text = toml_value(value)
     except TypeError:
-        text = repr(value)
-    return text if len(text) <= 60 and "\n" not in text else reprlib.repr(value)
+        text = _python_value(value)
+    return text if len(text) <= _LONGEST_VALUE and "\n" not in text else reprlib.repr(value)
+
+
+def _python_value(value: Any) -> str:
+    try:
+        return repr(value)
+    except ValueError:  # holds a whole number of too many digits
+        return f"a {type(value).__name__}"
 
 
 class Faults:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import codecs
 import contextlib
 import os
 import re
+import sys
 import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict
@@ -13,6 +15,7 @@ from typing import Any
 
 from percussion_model.scene.parameters import HOLE_DIAMETER, parameter_table, rows_by_key
 from percussion_model.scene.rows import Row, SceneError, shortened, toml_value
+from percussion_model.scene.units import has_unit, with_point
 
 # A scene of a thousand sections has a tenth of it [bytes].
 LARGEST_FILE = 1_000_000
@@ -20,6 +23,13 @@ LARGEST_FILE = 1_000_000
 DEEPEST_KEY = 10
 _PART = r"""(?>[\w-]+|"[^"\n]*"|'[^'\n]*')[ \t]*+\.[ \t]*+"""
 _DEEP_KEY = re.compile(rf"(?<![\w-])(?:{_PART}){{{DEEPEST_KEY}}}", re.ASCII)
+
+# Marks at the beginning of a text in UTF-16, by the order of its bytes.
+_UTF_16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
+# Of the line that a message repeats [characters].
+LONGEST_LINE = 60
+_PLACE = re.compile(r"\(at line ([0-9]+), column [0-9]+\)$")
+_BARE_WORD = re.compile(r"(?!(?:true|false|inf|nan)$)[A-Za-z][A-Za-z-]*")
 
 _HEADER = (
     "# A scene for `percussion run`. SI units; positions and velocities point down,",
@@ -43,8 +53,10 @@ def read_toml(path: Path) -> dict[str, Any]:
         raise SceneError(f"{str(path)!r}: no file can have this name") from None
     if len(content) > LARGEST_FILE:
         raise SceneError(f"{path}: is larger than {LARGEST_FILE} bytes, which no scene needs")
+    if content.startswith(_UTF_16):
+        raise SceneError(f"{path}: is text in UTF-16, and TOML is UTF-8: save it as that")
     try:
-        text = content.decode("utf-8")
+        text = content.decode("utf-8-sig")  # editors of Windows put a mark before it
     except UnicodeDecodeError:
         raise SceneError(f"{path}: not a text file in UTF-8") from None
     if _DEEP_KEY.search(text):
@@ -55,8 +67,27 @@ def read_toml(path: Path) -> dict[str, Any]:
         return tomllib.loads(text)
     except RecursionError:
         raise SceneError(f"{path}: tables or lists are nested too deep") from None
-    except ValueError as error:  # of TOML, or a number of too many digits
-        raise SceneError(f"{path}: not valid TOML: {shortened(str(error))}") from None
+    except tomllib.TOMLDecodeError as error:
+        raise SceneError(f"{path}: not valid TOML: {_about_fault(str(error), text)}") from None
+    except ValueError:
+        raise SceneError(
+            f"{path}: a whole number has more than {sys.get_int_max_str_digits()} digits"
+        ) from None
+
+
+def _about_fault(told: str, text: str) -> str:
+    """What is wrong with a text of TOML: the parser's words, with the line they are of."""
+    place = _PLACE.search(told)
+    if place is None:
+        return shortened(told)
+    line = text.split("\n")[int(place[1]) - 1].strip()
+    value = line.partition("=")[2].partition("#")[0].strip()
+    hint = ""
+    if pointed := with_point(value):
+        hint = f": a decimal point is wanted, as in {pointed}"
+    elif _BARE_WORD.fullmatch(value) or has_unit(value):
+        hint = f': text stands in quotes, as in "{value}"'
+    return f"{shortened(told)}: {shortened(line, LONGEST_LINE)}{hint}"
 
 
 def write_text(path: Path, text: str) -> None:
@@ -85,7 +116,7 @@ def read_setting(text: str) -> tuple[str, Any]:
         raise SceneError(f"setting {text!r}: must be KEY=VALUE, as in rock.unloading_ratio=10")
     try:
         return key, tomllib.loads(f"value = {value_text}")["value"]
-    except tomllib.TOMLDecodeError:
+    except ValueError:  # of TOML, or a number of too many digits
         return key, value_text
 
 

@@ -7,6 +7,7 @@ there is such text, and given nothing but single names of units: it would evalua
 
 from __future__ import annotations
 
+import contextlib
 import math
 import re
 from functools import cache, lru_cache
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 # No number with its unit is longer [characters].
 LONGEST = 60
 _NUMBER = r"[+-]?(?:[0-9]{1,25}(?:\.[0-9]{0,25})?|\.[0-9]{1,25})(?:[eE][+-]?[0-9]{1,3})?"
+_NUMBER_ALONE = re.compile(_NUMBER)
 # A name of a unit, and a power of it; most of them a force by length and time.
 _FACTOR = r"(?:[A-Za-zµμ]{1,24}|%)(?:[²³]|\^?[1-9]|\^?-[1-9])?"
 _SIGN = r"(?:[ ]?[*·/][ ]?|[ ])"
@@ -142,7 +144,8 @@ def in_si(text: str, unit: str) -> float:
         raise NoQuantityError(f"is longer than {LONGEST} characters")
     found = _QUANTITY.fullmatch(text)
     if found is None:
-        raise NoQuantityError
+        pointed = with_point(text)
+        raise NoQuantityError(f'write "{pointed}", with a decimal point' if pointed else "")
     from fractions import Fraction
 
     value = Fraction(found["number"]) * factor(found["unit"], unit)
@@ -150,6 +153,18 @@ def in_si(text: str, unit: str) -> float:
         return float(value)
     except OverflowError:
         return math.inf if value > 0 else -math.inf
+
+
+def has_unit(text: str) -> bool:
+    """Whether a text is a number with a unit, of whatever dimension."""
+    return len(text) <= LONGEST and _QUANTITY.fullmatch(text) is not None
+
+
+def with_point(text: str) -> str:
+    """The same number with a decimal point, if it has a decimal comma; else nothing."""
+    pointed = text.strip().replace(",", ".", 1)
+    is_number = _NUMBER_ALONE.fullmatch(pointed) is not None or has_unit(pointed)
+    return pointed if "," in text and len(pointed) <= LONGEST and is_number else ""
 
 
 @lru_cache(maxsize=256)
@@ -170,10 +185,17 @@ def factor(unit: str, si: str) -> Fraction:
         if unit == "%":
             return Fraction(1, 100)
         raise UnitError
-    given, (wanted, kind) = _factor_and_dimension(unit, si), _factor_and_dimension(si, si)
-    if given[1] != kind:
-        raise UnitError
-    return given[0] / wanted
+    wanted, kind = _factor_and_dimension(si, si)
+    try:
+        given, own = _factor_and_dimension(unit, si)
+    except UnitError as error:
+        if str(error):
+            raise
+        own = None
+    if own != kind:
+        meant = _meant(unit, si)
+        raise UnitError(f"{unit} is another quantity{meant}" if meant else "")
+    return given / wanted
 
 
 def _factor_and_dimension(unit: str, si: str) -> tuple[Fraction, dict[str, int]]:
@@ -232,7 +254,11 @@ def _single(name: str, si: str, whole: str) -> tuple[Fraction, tuple[tuple[str, 
 
 
 def _meant(unit: str, si: str) -> str:
-    """Ask for a usual unit that is written with other letters, small or large."""
+    """Ask for a unit of the same quantity that is written with other letters, small or large."""
     usual = (*QUANTITIES[si].usual, si) if si in QUANTITIES else (si,)
     near = [one for one in usual if one.casefold() == unit.casefold()]
+    if not near and unit != unit.lower():  # BAR, Newton
+        with contextlib.suppress(UnitError):
+            factor(unit.lower(), si)
+            near = [unit.lower()]
     return f" (did you mean {near[0]}?)" if near else ""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -101,6 +102,23 @@ def test_another_master_drills_as_deep(feed_control, ours, package, script, tmp_
     if package == "ecospy" and not list(Path(sys.prefix, "lib").glob("libtbb.so.*")):
         pytest.skip("ecospy needs libtbb.so, which the package tbb brings along")
     check(script, feed_control, ours, tmp_path)
+
+
+def test_what_the_page_says_of_ecospy_runs_as_it_stands(feed_control, tmp_path):
+    if importlib.util.find_spec("ecospy") is None:
+        pytest.skip("ecospy is not installed (the extra `hosts` has it on Linux, x86-64)")
+    page = (Path(__file__).parents[2] / "docs" / "hosts.md").read_text(encoding="utf-8")
+    section = page[page.index("## 4 ") : page.index("## 5 ")]
+    (code,) = re.findall(r"```python\n(.*?)```", section, re.DOTALL)
+    (tmp_path / "dist").mkdir()
+    (tmp_path / "dist" / "FeedControl.ssp").symlink_to(feed_control)
+    short = code.replace("step(6000)", "step(50)")
+    assert short != code
+    done = subprocess.run(
+        [sys.executable, "-c", short], capture_output=True, text=True, check=False, cwd=tmp_path
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert float(done.stdout.split()[-1]) > 0.0
 
 
 @pytest.mark.skipif(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -10,14 +11,18 @@ from typing import Any
 import numpy as np
 
 from percussion_model.scene.parameters import find_row, read_number
-from percussion_model.scene.rows import shortened
+from percussion_model.scene.rows import Row, shortened, toml_value
 from percussion_model.scene.scene import Scene, SceneError
+from percussion_model.scene.units import with_point
 
 __all__ = ["Points", "grid", "latin_hypercube", "read_axis", "table"]
 
 # Scenes that differ in these alone share what is dear to set up (the leap operators).
 CHEAP_GROUPS = ("feed.", "drive.", "start.", "run.")
 CHEAP_KEYS = ("rock.barrier_energy",)
+
+# A computer has no room for the results of more, and nobody the time [points].
+MOST_POINTS = 1_000_000
 
 # A value that misses a whole number by this share is meant to be one.
 ROUNDING = 1e-13
@@ -80,6 +85,7 @@ def grid(axes: Mapping[str, Any]) -> Points:
     """
     columns = {key: _rising(key, _column(key, values)) for key, values in axes.items()}
     _refuse_empty(columns)
+    _refuse_many(math.prod(len(column) for column in columns.values()))
     mesh = np.meshgrid(*columns.values(), indexing="ij")
     values = np.stack([part.ravel() for part in mesh], axis=1)
     return Points(tuple(columns), values, tuple(len(column) for column in columns.values()))
@@ -120,10 +126,9 @@ def latin_hypercube(
     logarithmic : sequence of str
         Keys whose logarithm is spread evenly.
     """
-    from scipy.stats import qmc
-
     if count < 1:
         raise SceneError(f"count = {count!r}: must be a whole number from 1 on")
+    _refuse_many(count)
     ends = {key: _column(key, values) for key, values in ranges.items()}
     _refuse_empty(ends)
     for key, pair in ends.items():
@@ -131,6 +136,8 @@ def latin_hypercube(
             raise SceneError(f"range of {key}: must be two rising numbers, not {pair.tolist()}")
         if key in logarithmic and pair[0] <= 0:
             raise SceneError(f"range of {key}: must be above 0 to be spread by its logarithm")
+    from scipy.stats import qmc  # which takes its time
+
     share = qmc.LatinHypercube(len(ends), seed=seed).random(count)
     values = np.empty_like(share)
     for k, (key, (low, high)) in enumerate(ends.items()):
@@ -156,9 +163,12 @@ def read_axis(text: str) -> tuple[str, np.ndarray]:
     values : ndarray
     """
     key, equals, right = text.partition("=")
+    text = shortened(text)
     try:
         if not (key and equals and right):
             raise ValueError
+        if row := find_row(key.strip()):
+            _refuse_no_number(row, key)
         if ":" not in right:
             return key, np.array(_numbers(key, right.split(","), text))
         first, last, count = right.split(":")
@@ -172,14 +182,27 @@ def read_axis(text: str) -> tuple[str, np.ndarray]:
         ) from None
 
 
+def _refuse_no_number(row: Row, key: str) -> None:
+    """Raise `SceneError` for what is no number."""
+    if row.kind in ("number", "whole number"):
+        return
+    said = f"{key}: a study varies numbers, and this must be {row.allowed}"
+    if row.kind in ("choice", "flag"):
+        said += f": make a study of each, as with --set {key}={toml_value(row.default)}"
+    raise SceneError(said)
+
+
 def _numbers(key: str, words: Sequence[str], text: str) -> list[float]:
     """Values of an axis. What has a unit beside what has none would be off by a factor."""
-    with_unit = [not _is_float(word) for word in words]
+    with_unit = [not _is_float(word) and not with_point(word) for word in words]
     if any(with_unit) and not all(with_unit):
-        raise SceneError(f"--over {shortened(text)}: give each value its unit, or none (SI)")
-    if not any(with_unit):
-        return [float(word) for word in words]
-    return [read_number(key.strip(), word) for word in words]
+        raise SceneError(
+            f"--over {text}: give each value its unit, or none (SI); decimals have a point"
+        )
+    found = [read_number(key.strip(), word) for word in words]
+    if not np.isfinite(found).all():
+        raise SceneError(f"--over {text}: values must be finite numbers")
+    return found
 
 
 def _is_float(word: str) -> bool:
@@ -193,8 +216,8 @@ def _is_float(word: str) -> bool:
 def _spread(text: str, first: float, last: float, count: str) -> np.ndarray:
     """Values at even steps, of the logarithm where `count` says so."""
     number = int(count.removesuffix("log"))  # of values
-    if number < 1:
-        raise SceneError(f"--over {text}: COUNT must be a whole number from 1 on")
+    if not 1 <= number <= MOST_POINTS:
+        raise SceneError(f"--over {text}: COUNT must be a whole number from 1 to {MOST_POINTS:,}")
     if not count.endswith("log"):
         return _snapped(np.linspace(first, last, number))
     if not min(first, last) > 0:
@@ -212,8 +235,7 @@ def refuse_unknown(scene: Scene, points: Points) -> None:
     """Raise `SceneError` for what no point could set, before any of them is run."""
     for key, column in zip(points.keys, points.values.T, strict=True):
         row = scene.row_of(key)
-        if row.kind not in ("number", "whole number"):
-            raise SceneError(f"{key}: a study varies numbers, and this is a {row.kind}")
+        _refuse_no_number(row, key)
         broken = column[column != np.floor(column)]
         if row.kind == "whole number" and len(broken):
             raise SceneError(
@@ -241,6 +263,11 @@ def _rising(key: str, column: np.ndarray) -> np.ndarray:
     if len(twice):
         raise SceneError(f"{key}: {float(twice[0])!r} is given twice among the values of the grid")
     return column
+
+
+def _refuse_many(count: int) -> None:
+    if count > MOST_POINTS:
+        raise SceneError(f"a study of {count:.3g} points: must be at most {MOST_POINTS:,}")
 
 
 def _refuse_empty(columns: Mapping[str, np.ndarray]) -> None:

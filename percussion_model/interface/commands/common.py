@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import gc
 import hashlib
 import os
@@ -15,6 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn
 import typer
 
 from percussion_model.interface.messages import wrapped
+from percussion_model.interface.streams import end_process
 
 if TYPE_CHECKING:
     from percussion_model.scene.scene import Scene
@@ -416,19 +418,22 @@ def end_script(name: str, work: Callable[[], object]) -> NoReturn:
         Module of the script, as `python -m` takes it.
     work : callable
     """
-    code = 0
-    try:
-        work()
-    except (KeyboardInterrupt, SystemError) as error:
-        if not is_interruption(error):
-            raise
-        code = print_message("interrupted before there was a result", INTERRUPTED, name)
-    except ValueError as error:
-        package = type(error).__module__.partition(".")[0]
-        if package not in ("percussion_model", name.partition(".")[0]):
-            raise
-        code = print_message(str(error), BAD_INPUT, name)
-    sys.exit(code)
+
+    def coded() -> int:
+        try:
+            work()
+        except (KeyboardInterrupt, SystemError) as error:
+            if not is_interruption(error):
+                raise
+            return print_message("interrupted before there was a result", INTERRUPTED, name)
+        except ValueError as error:
+            package = type(error).__module__.partition(".")[0]
+            if package not in ("percussion_model", name.partition(".")[0]):
+                raise
+            return print_message(str(error), BAD_INPUT, name)
+        return 0
+
+    end_process(coded, name)
 
 
 def is_interruption(error: BaseException) -> bool:
@@ -468,5 +473,6 @@ def print_message(message: str, code: int = 0, program: str = "percussion") -> i
     What refuses bad input is one line, for scripts; others are broken to fit.
     """
     text = f"{program}: {message}"
-    print(text if code == BAD_INPUT else wrapped(text), file=sys.stderr)
+    with contextlib.suppress(OSError):  # the exit code tells it as well
+        print(text if code == BAD_INPUT else wrapped(text), file=sys.stderr)
     return code

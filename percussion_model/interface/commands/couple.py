@@ -10,6 +10,7 @@ import typer
 
 from percussion_model.interface.commands import common
 from percussion_model.interface.messages import wrapped
+from percussion_model.scene.rows import shortened
 from percussion_model.simulation.uncertain import (
     NOT_ESTIMATED,
     UNDECIDED,
@@ -46,6 +47,8 @@ DURATION = 6.0
 # Rows of a run without --interval.
 ROWS = 5000
 FAILED = 1
+# Of a number of steps; no run has so many.
+MOST_DIGITS = 9
 
 
 def couple(
@@ -224,6 +227,8 @@ def read_value(text: str) -> tuple[str, float | bool | str]:
 def _read_pace(text: str) -> tuple[str, int]:
     """Component and steps of `component=steps`."""
     name, _, steps = text.partition("=")
-    if not name or not steps.isdecimal():
-        raise common.refusal(f"--every {text}: must be COMPONENT=STEPS, a whole number from 1")
+    if not name or not steps.isdecimal() or len(steps) > MOST_DIGITS:
+        raise common.refusal(
+            f"--every {shortened(text)}: must be COMPONENT=STEPS, a whole number from 1"
+        )
     return name, int(steps)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import importlib.util
+import os
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,10 +13,16 @@ import typer
 from percussion_model.interface.commands import common
 
 if TYPE_CHECKING:
-    from percussion_model.analysis.study import Study
+    from percussion_model.analysis.study import Points, Study
+    from percussion_model.scene.scene import Scene
 
 # Packages that write tables and grids; checked before hours of work, not after.
 NEEDED = ("pandas", "pyarrow", "xarray", "h5netcdf", "h5py", "threadpoolctl")
+
+# From so many points on their cost is told before; to find it takes two of them.
+MANY = 1000
+# Units that a cost is told in [s].
+TIMES = ((86400.0, "days"), (3600.0, "h"), (60.0, "min"), (1.0, "s"))
 
 # Points have failed; what was found of the others is written.
 FAILED = 1
@@ -92,6 +100,8 @@ def study(
         common.hint(key, hint_of(key, column.tolist()))
     try:
         with common.interruptible():
+            if len(points) >= MANY and cluster is None:
+                _tell_of_cost(chosen, points, tolerance, scatter, processes)
             with count_bar("points") as report_count:
                 found = run_study(
                     chosen,
@@ -115,6 +125,33 @@ def study(
     common.list_files(files)
     if any(found.failures):
         raise typer.Exit(FAILED)
+
+
+def _tell_of_cost(
+    scene: Scene, points: Points, tolerance: float, scatter: float, processes: int | None
+) -> None:
+    """Say what all points will take, as the one in the middle does."""
+    from percussion_model.analysis.stationary import MOST_BLOWS
+    from percussion_model.analysis.study.points import refuse_unknown
+    from percussion_model.analysis.study.response import run_points
+    from percussion_model.interface.progress import progress
+    from percussion_model.simulation.uncertain import in_digits
+
+    refuse_unknown(scene, points)
+    middle = points.values[len(points) // 2 :][:1]
+    with progress("trying a point"):
+        for _ in range(2):  # the first one loads the kernels, or compiles them
+            begin = time.perf_counter()
+            run_points(scene, points.keys, middle, tolerance, MOST_BLOWS, scatter)
+            one = time.perf_counter() - begin
+    count = processes or os.cpu_count() or 1
+    whole = len(points) * one / count
+    size, unit = next(((size, unit) for size, unit in TIMES if whole >= size), TIMES[-1])
+    common.print_message(
+        f"{len(points):,} points take about {in_digits(whole / size, 2)} {unit} on {count} "
+        f"{'process' if count == 1 else 'processes'}, as the one in the middle does; Ctrl-C keeps "
+        "those that are finished"
+    )
 
 
 def _report(found: Study, folder: Path) -> list[Path]:
