@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import functools
 import sys
+import tempfile
 from collections.abc import Callable
 from contextlib import nullcontext
 from typing import Annotated, Any
@@ -20,6 +21,9 @@ from percussion_model.interface.commands.calibrate import calibrate
 from percussion_model.interface.commands.common import (
     BAD_INPUT,
     INTERRUPTED,
+    ended_by,
+    exit_code,
+    heed_termination,
     is_interruption,
     own_process,
     print_message,
@@ -36,6 +40,7 @@ from percussion_model.interface.commands.study import study
 from percussion_model.interface.commands.validate import validate
 from percussion_model.interface.messages import usage_text
 from percussion_model.interface.progress import lines
+from percussion_model.scene.writing import remove_abandoned
 
 app = typer.Typer(
     help="Percussive drilling: elastic piston and bit, and rock, blow by blow.",
@@ -138,14 +143,15 @@ add(explore, waits=True)
 def main() -> None:
     """Run the command line; errors are one message and an exit code."""
     own_process()
-    sys.exit(_guarded(lambda: app(standalone_mode=False)))
+    heed_termination()
+    remove_abandoned(tempfile.gettempdir())
+    sys.exit(ended_by(_guarded(lambda: app(standalone_mode=False))))
 
 
 def _guarded(work: Callable[[], Any]) -> int:
     """Turn errors that a user can mend into a message."""
     try:
-        code = work()
-        return code if isinstance(code, int) else 0
+        return exit_code(work())
     except (KeyboardInterrupt, typer.Abort):
         return print_message("interrupted before there was a result", INTERRUPTED)
     except Exception as error:

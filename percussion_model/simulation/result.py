@@ -361,7 +361,7 @@ def _write_result(result: Result, folder: Path) -> list[Path]:
     """
     was_result = all((folder / name).is_file() for name in _MARKS)
     left = (*_TRACES, ORIGIN, *_DERIVED) if was_result else (*_TRACES, ORIGIN)
-    with staged(folder) as draft:
+    with staged(folder, but=left) as draft:
         (draft / "summary.json").write_text(to_json(result.summary()) + "\n", encoding="utf-8")
         (draft / "scene.toml").write_text(result.scene.to_toml(), encoding="utf-8")
         blows = result.blows
@@ -370,9 +370,6 @@ def _write_result(result: Result, folder: Path) -> list[Path]:
         if result.trace is not None:
             _write_trace(draft, result.trace)
         names = sorted(path.name for path in draft.iterdir())
-    for name in left:
-        if name not in names:
-            (folder / name).unlink(missing_ok=True)
     return [folder / name for name in names]
 
 

@@ -14,6 +14,7 @@ from threading import current_thread, main_thread
 from typing import Any
 
 from percussion_model.scene.inputs import SimulationError
+from percussion_model.simulation.orphans import end_with_parent
 
 # Exit code of a worker that came to start workers itself, since it ran the script again.
 STARTED_AGAIN = 97
@@ -57,7 +58,9 @@ def _in_a_pool(
 ) -> Iterator[tuple[int, Any]]:
     others = set(active_children())
     with _one_thread_each(), _interrupts_left_to_this_process():
-        pool = ProcessPoolExecutor(processes, mp_context=get_context("spawn"))
+        pool = ProcessPoolExecutor(
+            processes, mp_context=get_context("spawn"), initializer=end_with_parent
+        )
         try:
             running = {pool.submit(work, *task): number for number, task in tasks.items()}
         except RuntimeError as error:

@@ -16,9 +16,6 @@ if TYPE_CHECKING:
 # Packages that write tables and grids; checked before hours of work, not after.
 NEEDED = ("pandas", "pyarrow", "xarray", "h5netcdf", "h5py", "threadpoolctl")
 
-# Points have failed; what was found of the others is written.
-FAILED = 1
-
 
 def study(
     scene: common.SceneFile,
@@ -114,7 +111,7 @@ def study(
     show_study(found)
     common.list_files(files)
     if any(found.failures):
-        raise typer.Exit(FAILED)
+        raise typer.Exit(common.FAILED)  # what was found of the others is written
 
 
 def _report(found: Study, folder: Path) -> list[Path]:
