@@ -113,7 +113,7 @@ def accuracy(
         if figures:
             with common.if_drawable():
                 common.list_files(_draw(result, claimed.folder / name))
-        common.list_files([claimed.sign()])
+        common.list_files(common.sign(claimed))
     if len(studies) > 1 and json_file != "-":
         show_contests(studies)
     common.write_json(json_file, found)

@@ -407,6 +407,18 @@ def write_folder(claimed: Claim, write: Callable[[Path], T]) -> T:
     return found[-1]
 
 
+def sign(claimed: Claim) -> list[Path]:
+    """Sign a claimed folder; where that cannot be what is there counts all the same."""
+    from percussion_model.simulation.files import ResultError
+
+    try:
+        return [claimed.sign()]
+    except ResultError as error:
+        print_message(str(error))
+        _missed.append(str(error))
+        return []
+
+
 def write_texts(claimed: Claim, texts: Mapping[str, str]) -> None:
     """Write texts by their names into the folder of a claim, as `write_folder`, and say so."""
     from percussion_model.simulation.files import staged_texts

@@ -131,7 +131,7 @@ def couple(
 
                 figure = save_signals(run, folder / "signals.png", system.stem)
             common.list_files([figure])
-    common.list_files([claimed.sign()])
+    common.list_files(common.sign(claimed))
     return _tell(run.verdict, common.INTERRUPTED if run.interrupted else common.FAILED)
 
 

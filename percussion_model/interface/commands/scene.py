@@ -78,11 +78,11 @@ def run(
             made_from["until"] = result.duration
             claimed = common.claim("run", None, out, force, **made_from)
         files += common.write_folder(claimed, result.save)
-        files.append(claimed.sign())
+        files += common.sign(claimed)
         if figures and not result.cut_short:
             with progress("drawing") as report:
                 files += _draw(result, claimed.folder, report)
-            claimed.sign()
+            common.sign(claimed)
     if json_file != "-":
         terminal.show_summary(result)
     if result.interrupted:

@@ -53,7 +53,7 @@ def stability(
         show_stability(found)
     if claimed is not None:
         _write(found, claimed)
-        common.list_files([claimed.sign()])
+        common.list_files(common.sign(claimed))
     if found.failures():
         raise typer.Exit(common.FAILED)
 

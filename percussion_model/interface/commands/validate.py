@@ -55,7 +55,7 @@ def validate(
         show_validation(found)
     if claimed is not None:
         _write(found, claimed, figures)
-        common.list_files([claimed.sign()])
+        common.list_files(common.sign(claimed))
 
 
 def _write(found: Comparison, claimed: Claim, figures: bool) -> None:
