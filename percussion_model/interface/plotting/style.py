@@ -262,7 +262,7 @@ def save_png(fig: Figure, path: Path, dpi: float) -> Path:
         staged_file(path, picture.getvalue())
         return path
     with staged(path.absolute().parent) as draft:
-        fig.savefig(draft / path.name, dpi=dpi, metadata=_METADATA["png"])
+        fig.savefig(draft / path.name, format="png", dpi=dpi, metadata=_METADATA["png"])
     return path
 
 
