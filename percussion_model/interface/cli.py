@@ -9,7 +9,7 @@ import functools
 import sys
 import tempfile
 from collections.abc import Callable
-from contextlib import nullcontext
+from contextlib import nullcontext, suppress
 from typing import Annotated, Any
 
 import typer
@@ -144,7 +144,8 @@ def main() -> None:
     """Run the command line; errors are one message and an exit code."""
     own_process()
     heed_termination()
-    remove_abandoned(tempfile.gettempdir())
+    with suppress(OSError):  # no such folder can be written
+        remove_abandoned(tempfile.gettempdir())
     sys.exit(ended_by(_guarded(lambda: app(standalone_mode=False))))
 
 

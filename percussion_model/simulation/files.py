@@ -60,9 +60,9 @@ def check_file(path: str | Path) -> None:
         raise ResultError(f"{path}: cannot be written: {error.strerror}") from None
     if target.is_dir():
         raise ResultError(f"{path}: cannot be written: it is a folder")
+    check_writable(target.parent)
     if not target.parent.is_dir():
         raise ResultError(f"{path}: cannot be written: there is no folder {target.parent}")
-    check_writable(target.parent)
 
 
 @contextmanager

@@ -14,7 +14,7 @@ from pathlib import Path
 # Where a folder is held already, as a clause.
 IS_HELD = "is being written by another process"
 
-_held: weakref.WeakValueDictionary[str, Hold] = weakref.WeakValueDictionary()
+_held: weakref.WeakValueDictionary[Path | None, Hold] = weakref.WeakValueDictionary()
 
 
 class Hold:
@@ -46,33 +46,36 @@ def hold(folder: Path, waits: bool = False) -> Hold | None:
     waits : bool
         Wait instead until the other one has let go.
     """
-    name = hashlib.sha256(os.path.realpath(folder).encode()).hexdigest()[:32]
-    found = _held.get(name)
+    try:
+        path: Path | None = _lock_file(folder)
+    except OSError:  # no place for it
+        path = None
+    found = _held.get(path)
     if found is None:
         try:
-            lock = _lock(_place() / name, waits)
+            lock = None if path is None else _lock(path, waits)
         except BlockingIOError:
             return None
-        except OSError:  # a system without locks, or no place for them: each writes as before
+        except OSError:  # a system without locks: each writes as before
             lock = None
-        _held[name] = found = Hold(lock)
+        _held[path] = found = Hold(lock)
     return found
 
 
-def _place() -> Path:
-    """Folder of the locks of this user."""
-    user = os.getuid() if sys.platform != "win32" else 0
-    folder = Path(tempfile.gettempdir()) / f"percussion_locks-{user}"
-    folder.mkdir(mode=0o700, exist_ok=True)
-    if folder.is_symlink() or folder.stat().st_uid != user:
-        raise PermissionError(f"{folder} is another user's")
-    return folder
+def _lock_file(folder: Path) -> Path:
+    user = os.getuid() if sys.platform != "win32" else ""
+    name = hashlib.sha256(f"{user} {os.path.realpath(folder)}".encode()).hexdigest()[:32]
+    return Path(tempfile.gettempdir()) / f"percussion_lock-{name}"
+
+
+def _open(path: str, flags: int) -> int:
+    return os.open(path, flags | getattr(os, "O_NOFOLLOW", 0), 0o600)
 
 
 def _lock(path: Path, waits: bool) -> FileIO:
     """Open and lock a file; `BlockingIOError` where another process has locked it."""
     while True:
-        file = FileIO(path, "a")
+        file = FileIO(path, "a", opener=_open)
         try:
             if sys.platform == "win32":
                 import msvcrt
