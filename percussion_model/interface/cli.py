@@ -78,6 +78,7 @@ def _heard(command: Callable[..., Any], waits: bool = False) -> Callable[..., An
 
     @functools.wraps(command)
     def call(*words: Any, **options: Any) -> Any:
+        _begun.append(command.__name__)
         try:
             with nullcontext() if waits or sys.stderr.isatty() else lines("still running"):
                 return command(*words, **options)
@@ -89,6 +90,8 @@ def _heard(command: Callable[..., Any], waits: bool = False) -> Callable[..., An
     return call
 
 
+# Commands that have begun: typer ends without a word on Ctrl-C before.
+_begun: list[str] = []
 # Packages whose own errors are messages.
 _packages: set[str] = set()
 
@@ -151,8 +154,12 @@ def main() -> None:
 
 def _guarded(work: Callable[[], Any]) -> int:
     """Turn errors that a user can mend into a message."""
+    _begun.clear()
     try:
-        return exit_code(work())
+        code = exit_code(work())
+        if code == INTERRUPTED and not _begun:
+            raise KeyboardInterrupt
+        return code
     except (KeyboardInterrupt, typer.Abort):
         return print_message("interrupted before there was a result", INTERRUPTED)
     except Exception as error:
