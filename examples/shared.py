@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from percussion_model.interface.commands.common import end_script
 from percussion_model.interface.plotting import style
 from percussion_model.interface.progress import Report, progress
-from percussion_model.simulation.files import staged, staged_text, to_json
+from percussion_model.simulation.files import staged, staged_texts, to_json
 from percussion_model.simulation.origin import Claim
 
 # What an example found, as JSON.
@@ -67,14 +67,14 @@ def write_example(
     claim = Claim(out, origin, force, numbered)
     if claim.moved:
         print(claim.moved, file=sys.stderr)
-    numbers = claim.folder / "found.json"
+    numbers = claim.folder / FOUND
     with progress(f"computing {name}") as report:
         _reports[:] = [report]
         try:
             found = main(claim.folder, quick)
         finally:
             _reports.clear()
-    staged_text(numbers, to_json(found) + "\n")
+    staged_texts(claim.folder, {FOUND: to_json(found) + "\n"})
     claim.sign()
     for path in (numbers, claim.folder / f"{name}.png"):
         print(f"wrote {path}", file=sys.stderr)

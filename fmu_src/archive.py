@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import errno
 import hashlib
-import os
+import io
 import zipfile
 from collections.abc import Callable, Mapping, Sequence
 from importlib.metadata import distribution
@@ -18,6 +18,7 @@ from fmu_src.description import About, write_description
 from fmu_src.staging import LIBRARY, Bundle, script
 from fmu_src.variables import Variable
 from percussion_model.scene.presets import is_clone
+from percussion_model.scene.writing import write_whole
 from percussion_model.simulation.files import reason
 
 HERE = Path(__file__).resolve().parent
@@ -135,15 +136,12 @@ def content(path: Path) -> bytes | None:
 
 def write_archive(path: Path, entries: Mapping[str, bytes]) -> None:
     """Write a zip archive whole or not at all; the same entries give the same bytes."""
+    whole = io.BytesIO()
+    with zipfile.ZipFile(whole, "w") as archive:
+        for name, content in entries.items():
+            info = zipfile.ZipInfo(name, DATE)
+            info.compress_type = zipfile.ZIP_DEFLATED
+            info.external_attr = PERMISSIONS
+            archive.writestr(info, content)
     path.parent.mkdir(parents=True, exist_ok=True)
-    draft = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        with zipfile.ZipFile(draft, "w") as archive:
-            for name, content in entries.items():
-                info = zipfile.ZipInfo(name, DATE)
-                info.compress_type = zipfile.ZIP_DEFLATED
-                info.external_attr = PERMISSIONS
-                archive.writestr(info, content)
-        draft.replace(path)
-    finally:
-        draft.unlink(missing_ok=True)
+    write_whole(path, whole.getvalue())

@@ -8,6 +8,7 @@ import numpy as np
 from fmpy import read_model_description
 
 from fmu_src.run import run_fmu
+from percussion_model.scene.writing import write_whole
 
 DURATION = 0.5  # [s]
 STEP_SIZE = 1e-3  # [s]
@@ -38,4 +39,4 @@ def write_reference(path: Path) -> list[Path]:
 def _write(path: Path, names: list[str], table: np.ndarray) -> None:
     header = ",".join(f'"{name}"' for name in names)
     lines = [header, *(",".join(repr(float(value)) for value in row) for row in table)]
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    write_whole(path, "\n".join(lines) + "\n")

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from percussion_model.interface.progress import progress
-from percussion_model.simulation.files import staged_text
+from percussion_model.simulation.files import staged_file
 
 from .drawing import in_style, save_png
 from .harness import Instance, fmu
@@ -178,7 +178,7 @@ def main(paths: Sequence[Path], folder: Path) -> list[Path]:
     print(table(found))
     figure = draw(found, folder / f"{NAME}.png")
     text = json.dumps(found, indent=1).replace("NaN", "null")
-    staged_text(figure.with_suffix(".json"), text + "\n")
+    staged_file(figure.with_suffix(".json"), text + "\n")
     return [figure, figure.with_suffix(".json")]
 
 

@@ -17,7 +17,7 @@ from percussion_model.coupling import CoupledRun, Coupling, CouplingError
 from percussion_model.interface.messages import wrapped
 from percussion_model.interface.progress import progress, progress_bar
 from percussion_model.interface.tables import print_table
-from percussion_model.simulation.files import staged_text
+from percussion_model.simulation.files import staged_texts
 from percussion_model.simulation.uncertain import in_digits
 
 from .drawing import in_style, save_png, stacked
@@ -121,6 +121,7 @@ def draw_runs(
 
 def save_runs(runs: Mapping[str, CoupledRun], name: str, folder: Path) -> list[Path]:
     """Write the signals of each run as `NAME_RUN.csv` into a folder."""
+    folder.mkdir(parents=True, exist_ok=True)
     return [
         one.write_csv(folder / f"{name}_{re.sub('[^a-z0-9]+', '_', label.lower())}.csv")
         for label, one in runs.items()
@@ -132,8 +133,7 @@ def save_table(columns: Mapping[str, np.ndarray], path: Path) -> Path:
     text = io.StringIO()
     np.savetxt(text, np.column_stack(list(columns.values())), delimiter=",",
                header=",".join(columns), comments="")  # fmt: skip
-    staged_text(path, text.getvalue())
-    return path
+    return staged_texts(path.parent, {path.name: text.getvalue()})[0]
 
 
 def write(

@@ -15,7 +15,7 @@ from typing import Any
 
 from percussion_model.coupling import CoupledRun, Coupling
 from percussion_model.interface.progress import progress
-from percussion_model.simulation.files import staged_text
+from percussion_model.simulation.files import staged_texts
 from percussion_model.simulation.uncertain import change_text
 
 from .coupled import whole
@@ -126,8 +126,7 @@ def main(paths: Sequence[Path], folder: Path) -> list[Path]:
         found = measure(*paths)
     text = table(*found)
     print(text)
-    staged_text(folder / f"{NAME}.md", text + "\n")
-    return [folder / f"{NAME}.md"]
+    return staged_texts(folder, {f"{NAME}.md": text + "\n"})
 
 
 if __name__ == "__main__":

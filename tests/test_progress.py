@@ -318,6 +318,8 @@ def test_the_parts_of_the_paper_are_told(heard, tmp_path, monkeypatch):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(runs, "run_sweep", sweep)
+    style = importlib.import_module("percussion_model.interface.plotting.style")
+    monkeypatch.setattr(style, "save_figures", lambda *words, **more: None)
     words = ["paper", "--out", str(tmp_path / "out")]
     assert _guarded(lambda: app(words, standalone_mode=False)) == INTERRUPTED
     count = 4 + len(runs.SWEEPS)

@@ -166,9 +166,10 @@ def test_a_misspelt_key_of_a_list_is_not_missing_as_well(section, lines):
         assert line.startswith(begin)
 
 
-def test_a_folder_that_is_missing_is_made(tmp_path):
-    Scene().to_toml(tmp_path / "missing" / "scene.toml")
-    assert Scene.from_toml(tmp_path / "missing" / "scene.toml") == Scene()
+def test_a_folder_that_is_missing_is_not_made(tmp_path):
+    with pytest.raises(SceneError, match="cannot be written: there is no folder"):
+        Scene().to_toml(tmp_path / "missing" / "scene.toml")
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_bad_arguments_get_the_same_errors():

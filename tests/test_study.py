@@ -213,8 +213,10 @@ def test_points_of_other_sources_are_not_mixed_in(tmp_path, monkeypatch):
     with pytest.raises(ResultError, match="other sources"):
         study(SCENE, grid(AXES), folder, processes=1)
     (folder / PLAN).write_text("[1]")
-    with pytest.raises(ResultError, match="holds another study"):
+    monkeypatch.setattr("percussion_model.analysis.study.sources_digest", lambda patterns: "edited")
+    with pytest.raises(ResultError, match="are not known to be of this study") as caught:
         study(SCENE, grid(AXES), folder, processes=1)
+    assert "--force" not in str(caught.value)  # it would lose the points
     assert len(list((folder / PARTS).iterdir())) == kept
 
 

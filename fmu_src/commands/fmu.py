@@ -79,7 +79,7 @@ def write_hammer(
     path = output or options.DIST / hammer_name(file, "Ladder" if blow_map else "")
     about_hammer(chosen, path)  # refuses a name, before anything is compiled or --force offered
     refuse_other(path, chosen, blow_map or chosen.solver_name == "blow-map", force)
-    common.check_outputs(path.parent, None)
+    check_fmu(output, path)
     libraries = _libraries(names)
     table = options.table_for(chosen, blow_map)
     before = content(path)
@@ -97,10 +97,17 @@ def write_drive(output: Path | None = None, flat_names: bool = False) -> Path:
     from fmu_src.parts.build import build_part
 
     path = output or options.DIST / DRIVE
+    check_fmu(output, path)
     before = content(path)
     guid = build_part(pneumatic_drive.TABLE, path, flat_names)
     typer.echo(f"{path} {{{guid}}}: {state_of(path, before)}")
     return path
+
+
+def check_fmu(output: Path | None, path: Path) -> None:
+    """Refuse a file that could not be written; the folder of one that is not named is made."""
+    common.check_file("-o", output)
+    common.check_outputs(path.parent if output is None else None, None)
 
 
 def _export_platforms(words: str) -> dict[str, str]:

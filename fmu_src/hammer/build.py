@@ -24,6 +24,7 @@ from fmu_src.slave.native import library_name
 from fmu_src.staging import stage
 from fmu_src.variables import FILE, Variable, to_json, write_variables
 from percussion_model.scene.scene import Scene, SceneError
+from percussion_model.scene.writing import is_special
 from percussion_model.solvers.base import added_solvers
 from percussion_model.solvers.blow_map.table import BlowTable, fixed_values
 
@@ -90,6 +91,8 @@ def refuse_other(path: Path, scene: Scene, with_map: bool, force: bool = False) 
     """
     if path.is_dir():
         raise SceneError(f"{path}: is a folder; -o names the FMU, as {path / 'Hammer.fmu'}")
+    if is_special(path):
+        raise SceneError(f"{path}: is no regular file, and an FMU is read again once it is written")
     if force or not path.exists():
         return
     try:

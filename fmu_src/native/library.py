@@ -24,6 +24,7 @@ from fmu_src.archive import ROOT
 from fmu_src.slave.native import this_platform
 from percussion_model.scene.presets import is_clone
 from percussion_model.scene.scene import SceneError
+from percussion_model.scene.writing import own_prefix
 from percussion_model.solvers.blow_map.builder import cache_folder
 
 HERE = Path(__file__).resolve().parent
@@ -197,7 +198,7 @@ def _compile(files: Mapping[str, Path], compilers: Mapping[str, Sequence[str]]) 
     """Compile libraries by platform."""
     if not files:
         return
-    with tempfile.TemporaryDirectory() as work:
+    with tempfile.TemporaryDirectory(prefix=own_prefix()) as work:
         make_objects(Path(work), list(files))
         for name, file in files.items():
             link(name, compilers[name], Path(work), file)
@@ -248,7 +249,7 @@ def link(name: str, compiler: Sequence[str], work: Path, out: Path) -> None:
         flags.append(f"-Wl,-install_name,@rpath/{out.name}")
     sources = sorted(HERE.glob("*.c"))
     # the name stands in some libraries, and some linkers put more beside them
-    with tempfile.TemporaryDirectory(dir=out.parent) as folder:
+    with tempfile.TemporaryDirectory(prefix=own_prefix(out.parent), dir=out.parent) as folder:
         draft = Path(folder) / out.name
         given = [*map(str, sources), *map(str, objects)]
         done = subprocess.run(

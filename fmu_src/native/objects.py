@@ -24,6 +24,7 @@ from numba.core.cpu import CPUContext
 
 from fmu_src.native import entries
 from fmu_src.native.library import PLATFORMS
+from percussion_model.simulation.orphans import end_with_parent
 
 _WORD, _NUMBER = types.int64, types.float64
 # Entries by their names in C, with the types of their arguments: pointers are addresses.
@@ -297,4 +298,5 @@ def main(folder: str, *platforms: str) -> None:
 
 
 if __name__ == "__main__":
+    end_with_parent()
     main(*sys.argv[1:])

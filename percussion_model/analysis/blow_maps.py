@@ -14,6 +14,7 @@ import numpy as np
 from percussion_model.analysis.study.workers import Task, on_this_machine
 from percussion_model.scene.inputs import SimulationError
 from percussion_model.scene.scene import Scene, SceneError
+from percussion_model.scene.writing import own_prefix
 from percussion_model.simulation.simulate import Simulation
 from percussion_model.solvers.blow_map.builder import (
     build_table,
@@ -148,7 +149,7 @@ def refused_run(scene: Scene, duration: float) -> str:
         small = scene.replace(**changes)
     except SceneError:  # of a feed of zero, say, there is nothing around
         return ""
-    with tempfile.TemporaryDirectory(prefix="percussion-") as folder:
+    with tempfile.TemporaryDirectory(prefix=own_prefix()) as folder:
         table = build_table(small, Path(folder) / "table.part")
     run = Simulation(small, record_events=False, solver=BlowMapSolver(small, table))
     try:

@@ -16,6 +16,7 @@ from zipfile import ZIP_DEFLATED, ZIP_STORED, BadZipFile, ZipFile, ZipInfo
 
 from percussion_model.coupling.component import CouplingError
 from percussion_model.scene.rows import shortened
+from percussion_model.scene.writing import own_prefix
 
 # Limits of an archive that is not trusted; docs/trust.md has them, too.
 LARGEST_FILE = 100_000_000  # as it lies on disk [bytes]
@@ -201,7 +202,7 @@ def new_folder() -> str:
         uri = Path(place).absolute().as_uri()
         plain = uri.replace("%20", " ")
         if unquote(plain) == plain and os.path.isdir(place) and os.access(place, os.W_OK):
-            return tempfile.mkdtemp(prefix="ssp-", dir=Path(place).absolute())
+            return tempfile.mkdtemp(prefix=own_prefix(place), dir=Path(place).absolute())
     raise CouplingError(
         f"{places[0]}: FMUs cannot be unpacked there, since they do not understand the letters of "
         "its name: let TMPDIR name a folder of plain letters"

@@ -8,8 +8,9 @@ from __future__ import annotations
 import functools
 import os
 import sys
+import tempfile
 from collections.abc import Callable, Mapping
-from contextlib import nullcontext
+from contextlib import nullcontext, suppress
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -22,6 +23,9 @@ from percussion_model.interface.commands.calibrate import calibrate
 from percussion_model.interface.commands.common import (
     BAD_INPUT,
     INTERRUPTED,
+    ended_by,
+    exit_code,
+    heed_termination,
     is_interruption,
     own_process,
     print_message,
@@ -40,6 +44,7 @@ from percussion_model.interface.commands.validate import validate
 from percussion_model.interface.messages import usage_text
 from percussion_model.interface.progress import lines
 from percussion_model.interface.streams import end_process
+from percussion_model.scene.writing import remove_abandoned
 
 app = typer.Typer(
     help="Percussive drilling: elastic piston and bit, and rock, blow by blow.",
@@ -77,6 +82,7 @@ def _heard(command: Callable[..., Any], waits: bool = False) -> Callable[..., An
 
     @functools.wraps(command)
     def call(*words: Any, **options: Any) -> Any:
+        _begun.append(command.__name__)
         try:
             with nullcontext() if waits or sys.stderr.isatty() else lines("still running"):
                 _refuse_output_over_input(options)
@@ -115,6 +121,8 @@ def _refuse_output_over_input(options: Mapping[str, Any]) -> None:
             )
 
 
+# Commands that have begun: typer ends without a word on Ctrl-C before.
+_begun: list[str] = []
 # Packages whose own errors are messages.
 _packages: set[str] = set()
 
@@ -169,14 +177,20 @@ add(explore, waits=True)
 def main() -> None:
     """Run the command line; errors are one message and an exit code."""
     own_process()
-    end_process(lambda: _guarded(lambda: app(standalone_mode=False)))
+    heed_termination()
+    with suppress(OSError):  # no such folder can be written
+        remove_abandoned(tempfile.gettempdir())
+    end_process(lambda: ended_by(_guarded(lambda: app(standalone_mode=False))))
 
 
 def _guarded(work: Callable[[], Any]) -> int:
     """Turn errors that a user can mend into a message."""
+    _begun.clear()
     try:
-        code = work()
-        return code if isinstance(code, int) else 0
+        code = exit_code(work())
+        if code == INTERRUPTED and not _begun:
+            raise KeyboardInterrupt
+        return code
     except (KeyboardInterrupt, typer.Abort):
         return print_message("interrupted before there was a result", INTERRUPTED)
     except Exception as error:

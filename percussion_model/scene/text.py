@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import codecs
-import contextlib
 import os
 import re
 import sys
@@ -16,6 +15,7 @@ from typing import Any
 from percussion_model.scene.parameters import HOLE_DIAMETER, parameter_table, rows_by_key
 from percussion_model.scene.rows import Row, SceneError, shortened, toml_value
 from percussion_model.scene.units import has_unit, with_point
+from percussion_model.scene.writing import write_whole
 
 # A scene of a thousand sections has a tenth of it [bytes].
 LARGEST_FILE = 1_000_000
@@ -92,14 +92,9 @@ def _about_fault(told: str, text: str) -> str:
 
 def write_text(path: Path, text: str) -> None:
     """Write a file in one go: whatever happens, no half-written file stays."""
-    draft = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        draft.write_text(text, encoding="utf-8")
-        draft.replace(path)
+        write_whole(path, text)
     except OSError as error:
-        with contextlib.suppress(OSError):
-            draft.unlink()
         raise SceneError(f"{path}: cannot be written: {error.strerror}") from None
 
 

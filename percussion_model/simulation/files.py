@@ -7,7 +7,7 @@ import math
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -16,6 +16,14 @@ from zipfile import ZipFile
 import numpy as np
 
 from percussion_model.scene.rows import shortened
+from percussion_model.scene.writing import (
+    draft_in,
+    followed,
+    is_special,
+    move_whole,
+    write_whole,
+)
+from percussion_model.simulation.one_writer import hold
 
 
 class ResultError(ValueError):
@@ -38,9 +46,37 @@ def check_writable(folder: str | Path) -> None:
         raise ResultError(f"{folder}: cannot be written: {error.strerror}") from None
 
 
+def check_file(path: str | Path) -> None:
+    """Raise `ResultError` unless a file can be written; its folder must be there. Leaves no trace.
+
+    A device, a pipe or an open file, as /dev/stdout, is written through.
+    """
+    path = Path(path)
+    try:
+        if is_special(path):
+            return
+        target = followed(path)
+    except OSError as error:
+        raise ResultError(f"{path}: cannot be written: {error.strerror}") from None
+    if target.is_dir():
+        raise ResultError(f"{path}: cannot be written: it is a folder")
+    check_writable(target.parent)
+    if not target.parent.is_dir():
+        raise ResultError(f"{path}: cannot be written: there is no folder {target.parent}")
+
+
 @contextmanager
-def staged(folder: Path) -> Iterator[Path]:
+def staged(folder: Path, but: Iterable[str] = ()) -> Iterator[Path]:
     """Give a draft folder whose files all move to `folder` at the end, or none.
+
+    Of several processes that do so at once one is after the other.
+
+    Parameters
+    ----------
+    folder : Path
+        Made if it is not there.
+    but : iterable of str
+        Files that are removed from it unless they are in the draft.
 
     Yields
     ------
@@ -48,24 +84,23 @@ def staged(folder: Path) -> Iterator[Path]:
         An empty folder on the same disk.
     """
     check_writable(folder)
-    folder = folder.absolute()
+    folder = Path(os.path.realpath(folder))
     try:
-        if folder.exists():
-            draft = folder / f".{os.getpid()}.part"
-        else:
-            folder.parent.mkdir(parents=True, exist_ok=True)
-            draft = folder.with_name(f".{folder.name}.{os.getpid()}.part")
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        draft = draft_in(folder if folder.exists() else folder.parent)
         draft.mkdir()
         try:
             yield draft
-            _move(draft, folder)
+            one = hold(folder / "moving", waits=True)
+            _move(draft, folder, but)
+            del one
         finally:
             shutil.rmtree(draft, ignore_errors=True)
     except OSError as error:
         raise ResultError(f"{folder}: cannot be written: {error.strerror or error}") from None
 
 
-def _move(draft: Path, folder: Path) -> None:
+def _move(draft: Path, folder: Path, but: Iterable[str]) -> None:
     if not folder.exists():
         draft.rename(folder)
         return
@@ -74,13 +109,26 @@ def _move(draft: Path, folder: Path) -> None:
         if source.is_dir():
             target.mkdir(exist_ok=True)
         else:
-            source.replace(target)
+            move_whole(source, target)
+            but = set(but) - {source.name}
+    for name in but:
+        (folder / name).unlink(missing_ok=True)
 
 
-def staged_text(path: Path, text: str) -> None:
-    """Write one file in one go, making its folder."""
-    with staged(path.absolute().parent) as draft:
-        (draft / path.name).write_text(text, encoding="utf-8")
+def staged_file(path: Path, content: str | bytes) -> None:
+    """Write one file whole or not at all, as `write_whole`; its folder must be there."""
+    try:
+        write_whole(path, content)
+    except OSError as error:
+        raise ResultError(f"{path}: cannot be written: {error.strerror or error}") from None
+
+
+def staged_texts(folder: Path, texts: Mapping[str, str]) -> list[Path]:
+    """Write texts by their names into a folder, all or none; it is made if it is not there."""
+    with staged(folder) as draft:
+        for name, text in texts.items():
+            (draft / name).write_bytes(text.encode())
+    return [folder / name for name in texts]
 
 
 # Files of results that are read [bytes]; arrays as they are unpacked.

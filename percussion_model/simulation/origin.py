@@ -16,7 +16,8 @@ from typing import Any
 
 from percussion_model.scene.parameters import find_row
 from percussion_model.scene.rows import unit_suffix
-from percussion_model.simulation.files import ResultError, check_writable, staged_text, to_json
+from percussion_model.simulation.files import ResultError, check_writable, staged_texts, to_json
+from percussion_model.simulation.one_writer import IS_HELD, Hold, hold
 
 ORIGIN = "made_by.json"
 # What commands begin with that are none of `percussion`: examples and scenarios.
@@ -58,17 +59,30 @@ class Claim:
     ) -> None:
         self.origin = flat(origin)
         self.folder, self.moved = folder, ""
-        other = _other_than(folder, self.origin)
-        if other and not force:
+        self._hold = hold(folder)
+        other = _other_than(folder, self.origin) if self._hold else IS_HELD
+        can_replace = "--force replaces it" if self._hold else ""
+        if other and not (force and self._hold):
             if not numbered:
-                raise ResultError(f"{folder} {other}: --force replaces it, another --out keeps it")
-            self.folder = _free_beside(folder, self.origin)
-            self.moved = f"{folder} {other}: this one goes to {self.folder} (--force replaces it)"
+                ways = ", ".join(filter(None, (can_replace, "another --out keeps it")))
+                raise ResultError(f"{folder} {other}: {ways}")
+            self.folder, self._hold = _free_beside(folder, self.origin)
+            self.moved = f"{folder} {other}: this one goes to {self.folder}"
+            self.moved += f" ({can_replace})" if can_replace else ""
         check_writable(self.folder)
+        self._note(bool(other and force))
+
+    def _note(self, replaces: bool) -> None:
+        """Take what the folder holds before anything is written."""
         self._before = _times(self.folder)
         # a list from elsewhere may name what lies outside, which is never removed
         self._left = [name for name in _read(self.folder)[1] if name in self._before]
-        self._replaces = bool(other and force)
+        self._replaces = replaces
+
+    def move_to(self, folder: Path) -> None:
+        """Take another folder, a new one, since the claimed one cannot be written any more."""
+        self.folder, self._hold = folder, hold(folder)
+        self._note(False)
 
     def sign(self) -> Path:
         """Say in the folder where its files are from, when they are written; return the file."""
@@ -84,8 +98,7 @@ class Claim:
             "version": version("percussion_model"),
             "files": sorted(set(made) - {ORIGIN}),
         }
-        staged_text(self.folder / ORIGIN, to_json(tree) + "\n")
-        return self.folder / ORIGIN
+        return staged_texts(self.folder, {ORIGIN: to_json(tree) + "\n"})[0]
 
 
 def flat(tree: Mapping[str, Any], above: str = "") -> dict[str, Any]:
@@ -113,6 +126,8 @@ def _other_than(folder: Path, origin: Mapping[str, Any]) -> str:
         more = ", ..." if len(files) > SHOWN else ""
         return f"holds files of unknown origin ({', '.join(files[:SHOWN])}{more})" if files else ""
     found = _read(folder)[0]
+    if not found:
+        return f"holds files of unknown origin ({ORIGIN} cannot be read)"
     origin = {key: _number(value) for key, value in origin.items()}
     if found == origin:
         return ""
@@ -140,12 +155,14 @@ def _typed(command: Any) -> str:
     return str(command) if str(command).startswith(PYTHON) else f"percussion {command}"
 
 
-def _free_beside(folder: Path, origin: Mapping[str, Any]) -> Path:
-    """The first numbered folder that is free or has this origin."""
+def _free_beside(folder: Path, origin: Mapping[str, Any]) -> tuple[Path, Hold]:
+    """The first numbered folder that is free or has this origin, and its hold."""
     number = 2
-    while _other_than(place := folder.with_name(f"{folder.name}-{number}"), origin):
+    while True:
+        place = folder.with_name(f"{folder.name}-{number}")
+        if (held := hold(place)) and not _other_than(place, origin):
+            return place, held
         number += 1
-    return place
 
 
 def _read(folder: Path) -> tuple[dict[str, Any], list[str]]:
@@ -182,5 +199,5 @@ def _times(folder: Path) -> dict[str, int]:
         str(one.relative_to(folder)): one.stat().st_mtime_ns
         for pattern in ("*", "*/*")
         for one in folder.glob(pattern)
-        if one.is_file()
+        if one.is_file() and not one.relative_to(folder).parts[0].startswith(".")  # no drafts
     }

@@ -16,6 +16,7 @@ from percussion_model.physics.effects import EFFECTS
 from percussion_model.physics.records import BLOW, EVENT, EventKind, Mode
 from percussion_model.scene.rows import shortened
 from percussion_model.scene.scene import Scene
+from percussion_model.scene.text import read_toml
 from percussion_model.simulation.driller_numbers import driller_numbers
 from percussion_model.simulation.files import (
     LARGEST_TABLE,
@@ -23,6 +24,7 @@ from percussion_model.simulation.files import (
     ResultError,
     load_arrays,
     plain,
+    reason,
     refuse_large,
     staged,
     to_json,
@@ -361,7 +363,7 @@ def _write_result(result: Result, folder: Path) -> list[Path]:
     """
     was_result = all((folder / name).is_file() for name in _MARKS)
     left = (*_TRACES, ORIGIN, *_DERIVED) if was_result else (*_TRACES, ORIGIN)
-    with staged(folder) as draft:
+    with staged(folder, but=left) as draft:
         (draft / "summary.json").write_text(to_json(result.summary()) + "\n", encoding="utf-8")
         (draft / "scene.toml").write_text(result.scene.to_toml(), encoding="utf-8")
         blows = result.blows
@@ -370,9 +372,6 @@ def _write_result(result: Result, folder: Path) -> list[Path]:
         if result.trace is not None:
             _write_trace(draft, result.trace)
         names = sorted(path.name for path in draft.iterdir())
-    for name in left:
-        if name not in names:
-            (folder / name).unlink(missing_ok=True)
     return [folder / name for name in names]
 
 
@@ -409,55 +408,99 @@ def _read_result(folder: Path) -> dict[str, Any]:
             f"{folder}: no result folder, it has no {' and no '.join(missing)}; "
             "percussion run SCENE --out DIR writes one"
         )
-    scene = Scene.from_toml(folder / "scene.toml")
-    refuse_large(folder / "summary.json", LARGEST_TEXT)
-    for name in ("blows.csv", "events.csv", "trace.csv"):
-        refuse_large(folder / name, LARGEST_TABLE)
+    for name in ("summary.json", "blows.csv", "events.csv", "trace.csv"):
+        refuse_large(folder / name, LARGEST_TEXT if name == "summary.json" else LARGEST_TABLE)
+    scene = _read_scene(folder / "scene.toml")
+    summary, fields = _read_summary(folder / "summary.json")
+    blows = _read_csv(folder / "blows.csv", float)
+    if not set(blows) >= _HOLE:
+        fields["warnings"].append(_NO_HOLE)
+        blows |= dict.fromkeys(_HOLE, [math.nan] * len(next(iter(blows.values()))))
+    tables = {"blows": _rows(folder / "blows.csv", blows, BLOW)}
+    count = summary.get("blows")
+    if count is not None and count != len(tables["blows"]):
+        raise _damaged(folder / "blows.csv", f"has {len(tables['blows'])} of {count} blows")
+    events = _read_csv(folder / "events.csv", _number_or_kind)
+    tables["events"] = _rows(folder / "events.csv", events, EVENT)
+    return {"scene": scene, **fields, **tables, "trace": _read_trace(folder)}
+
+
+def _damaged(path: Path, why: str) -> ResultError:
+    """What is said of a file that is cut off, or holds something else."""
+    return ResultError(f"{path}: not a complete result: {shortened(why)}")
+
+
+def _read_scene(path: Path) -> Scene:
+    """Scene of a result: its last table, which it always has, tells that it is whole."""
+    run = read_toml(path).get("run")
+    missing = [key for key in _LAST if not isinstance(run, dict) or key not in run]
+    if missing:
+        raise _damaged(path, f"has no run.{missing[0]}")
+    return Scene.from_toml(path)
+
+
+def _read_summary(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Summary, and the fields of a `Result` that are in it."""
     try:
-        summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
-        fields = {name: summary[name] for name in _FROM_SUMMARY}
-        fields["cells"] = fields["cells"] or {}
-        for name, value in fields["energy"].items():
-            fields["energy"][name] = math.nan if value is None else value
-        for name in _RATES:
-            value = summary.get(name)  # unknown to older files
-            fields[name] = math.nan if value is None else value
-        end = summary.get("end", {})
-        fields["end"] = {name: math.nan if value is None else value for name, value in end.items()}
-        fields["errors"] = dict(summary.get("errors", {}))
-        fields["interrupted"] = summary.get("interrupted", False)
-        blows = _read_csv(folder / "blows.csv", float)
-        if not set(blows) >= _HOLE:
-            fields["warnings"].append(_NO_HOLE)
-            blows |= dict.fromkeys(_HOLE, [math.nan] * len(blows["time"]))
-        events = _read_csv(folder / "events.csv", _number_or_kind)
-        tables = {"blows": _rows(blows, BLOW), "events": _rows(events, EVENT)}
-        return {"scene": scene, **fields, **tables, "trace": _read_trace(folder)}
+        summary = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
-        raise ResultError(f"{error.filename}: cannot be read: {error.strerror}") from None
-    except ResultError:
-        raise
-    except (LookupError, ValueError, TypeError, AttributeError, StopIteration, RecursionError,
-            OverflowError, csv.Error) as error:  # fmt: skip
-        text = shortened(repr(error))
-        raise ResultError(f"{folder}: not a complete result: {text}") from None
+        raise ResultError(f"{path}: cannot be read: {error.strerror}") from None
+    except (ValueError, RecursionError) as error:
+        raise _damaged(path, f"no JSON: {reason(error)}") from None
+    if not isinstance(summary, dict):
+        raise _damaged(path, "no table of names and values")
+    fields = {}
+    for name, (kind, allowed) in _FROM_SUMMARY.items():
+        if name not in summary and name not in _LATER:
+            raise _damaged(path, f"has no {name}")
+        fields[name] = value = summary.get(name, _LATER.get(name))
+        if not kind(value):
+            raise _damaged(path, f"{name} = {shortened(repr(value))}: must be {allowed}")
+    for name in ("energy", "end", "errors", "cells"):
+        given = fields[name] or {}
+        fields[name] = {key: math.nan if one is None else one for key, one in given.items()}
+    for name in _RATES:
+        value = summary.get(name)  # unknown to older files
+        fields[name] = math.nan if value is None else value
+    return summary, fields
 
 
-_FROM_SUMMARY = (
-    "solver",
-    "cells",
-    "time_step",
-    "wave_speed_error",
-    "duration",
-    "settle",
-    "energy",
-    "statistics",
-    "wall_time",
-    "setup_time",
-    "warnings",
-)
+def _is_number(value: Any) -> bool:
+    return value is None or (isinstance(value, (int, float)) and not isinstance(value, bool))
 
 
+def _are_numbers(value: Any) -> bool:
+    return isinstance(value, dict) and all(map(_is_number, value.values()))
+
+
+def _are_texts(value: Any) -> bool:
+    return isinstance(value, list) and all(isinstance(one, str) for one in value)
+
+
+_NUMBER = _is_number, "a number"
+_TIME = (lambda value: value is not None and _is_number(value)), "a number"
+_NUMBERS = _are_numbers, "numbers by their names"
+_OR_NONE = (lambda value: value is None or _are_numbers(value)), "numbers by their names, or null"
+_FROM_SUMMARY: dict[str, tuple[Callable[[Any], bool], str]] = {
+    "solver": (lambda value: isinstance(value, str), "a word"),
+    "cells": _OR_NONE,
+    "time_step": _NUMBER,
+    "wave_speed_error": _NUMBER,
+    "duration": _TIME,
+    "settle": _TIME,
+    "energy": _NUMBERS,
+    "statistics": _NUMBERS,
+    "wall_time": _NUMBER,
+    "setup_time": _NUMBER,
+    "warnings": (_are_texts, "a list of texts"),
+    "end": _NUMBERS,
+    "errors": _NUMBERS,
+    "interrupted": (lambda value: isinstance(value, bool), "true or false"),
+}
+# What summaries of older versions do not have.
+_LATER: dict[str, Any] = {"end": {}, "errors": {}, "interrupted": False}
+# Parameters that stand last in a scene which is written, and always.
+_LAST = ("duration", "settle")
 _RATES = ("rate_of_penetration_relative_error", "rate_of_penetration_fixed_window")
 # Columns that the blow tables of older files do not have, and what is said then.
 _HOLE = {"hole_depth", "hole_advance"}
@@ -473,25 +516,58 @@ def _number_or_kind(text: str) -> float:
 
 
 def _read_csv(path: Path, convert: Callable[[str], float]) -> dict[str, Sequence[float]]:
-    with path.open(encoding="utf-8", newline="") as file:
-        reader = csv.reader(file)
-        names = next(reader)
-        rows = [[convert(text) for text in row] for row in reader]
-    columns = list(zip(*rows, strict=True)) or [()] * len(names)
-    return dict(zip(names, columns, strict=True))
+    """Columns of a table by their headings; all lines are whole."""
+    try:
+        with path.open("rb") as file:
+            file.seek(max(0, path.stat().st_size - 1))
+            end = file.read()
+        with path.open(encoding="utf-8", newline="") as file:
+            head, *lines = [*csv.reader(file)] or [[]]
+    except OSError as error:
+        raise ResultError(f"{path}: cannot be read: {error.strerror}") from None
+    except (ValueError, csv.Error) as error:
+        raise _damaged(path, reason(error)) from None
+    if not head:
+        raise _damaged(path, "it is empty")
+    if end not in (b"\n", b"\r"):
+        raise _damaged(path, "its last line is cut off")
+    rows = []
+    for k, line in enumerate(lines, 2):
+        if len(line) != len(head):
+            raise _damaged(path, f"line {k} has {len(line)} of {len(head)} columns")
+        try:
+            rows.append([convert(text) for text in line])
+        except ValueError as error:
+            raise _damaged(path, f"line {k}: {error}") from None
+    columns = list(zip(*rows, strict=True)) or [()] * len(head)
+    return dict(zip(head, columns, strict=True))
 
 
-def _rows(columns: dict[str, Sequence[float]], dtype: np.dtype) -> np.ndarray:
-    rows = np.zeros(len(columns["time"]), dtype)
-    for name in dtype.names or ():
-        rows[name] = columns[name]
+def _rows(path: Path, columns: dict[str, Sequence[float]], dtype: np.dtype) -> np.ndarray:
+    names = dtype.names or ()
+    if missing := [name for name in names if name not in columns]:
+        raise _damaged(path, f"has no column {missing[0]}")
+    rows = np.zeros(len(columns[names[0]]), dtype)
+    for name in names:
+        try:
+            rows[name] = columns[name]
+        except (ValueError, OverflowError) as error:  # no whole number, or too large a one
+            raise _damaged(path, f"column {name}: {error}") from None
     return rows
 
 
 def _read_trace(folder: Path) -> dict[str, np.ndarray] | None:
-    if (folder / "trace.npz").exists():
-        return load_arrays(folder / "trace.npz")
-    if (folder / "trace.csv").exists():
-        columns = _read_csv(folder / "trace.csv", float)
-        return {name: np.array(column) for name, column in columns.items()}
-    return None
+    path = folder / "trace.npz"
+    if path.exists():
+        trace = load_arrays(path)
+    elif (path := folder / "trace.csv").exists():
+        columns = _read_csv(path, float)
+        trace = {name: np.array(column) for name, column in columns.items()}
+    else:
+        return None
+    if "time" not in trace:
+        raise _damaged(path, "has no column time")
+    for name, values in trace.items():
+        if values.shape != trace["time"].shape or values.ndim != 1 or values.dtype.kind != "f":
+            raise _damaged(path, f"column {name} is not one of numbers, as many as times")
+    return trace

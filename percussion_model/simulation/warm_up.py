@@ -10,6 +10,7 @@ from concurrent.futures import ProcessPoolExecutor
 import numpy as np
 
 from percussion_model.scene.scene import Scene
+from percussion_model.simulation.orphans import end_with_parent
 from percussion_model.simulation.simulate import Simulation
 from percussion_model.solvers.blow_map.records import ENTRIES
 from percussion_model.solvers.blow_map.solver import BlowMapSolver
@@ -43,7 +44,7 @@ def compile_blow_map() -> str:
 
 def main() -> None:
     """Compile the kernels of all solvers, two at a time."""
-    with ProcessPoolExecutor(max_workers=2) as pool:
+    with ProcessPoolExecutor(max_workers=2, initializer=end_with_parent) as pool:
         jobs = [pool.submit(compile_kernels, solver) for solver in SOLVERS]
         for job in [*jobs, pool.submit(compile_blow_map)]:
             job.result()

@@ -17,7 +17,7 @@ import numpy as np
 
 from percussion_model import Scene, Simulation
 from percussion_model.scene.numbers import numbers_of
-from percussion_model.simulation.files import staged_text
+from percussion_model.simulation.files import staged_file
 from percussion_model.solvers.base import Solver
 from percussion_model.solvers.modal.resolution import in_first_bar
 from percussion_model.verification.accuracy.explicit import ExplicitSolver
@@ -156,7 +156,7 @@ def main() -> None:
     made = {"date": time.strftime("%Y-%m-%d"), "settle": SETTLE}
     made |= {name: version(name) for name in ("percussion_model", "numpy", "numba")}
     tree = {"seed": SEED, "made": made, "geometries": found}
-    staged_text(STORE, json.dumps(tree, indent=1) + "\n")
+    staged_file(STORE, json.dumps(tree, indent=1) + "\n")
 
 
 if __name__ == "__main__":

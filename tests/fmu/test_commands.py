@@ -19,6 +19,7 @@ def test_any_scene_is_baked_in_and_its_signals_lie_beside(tmp_path, capsys):
     scene = Scene().replace(**RIGID, **{"feed.force": 4321.0, "title": "more feed"})
     scene.to_toml(tmp_path / "scene.toml")
     path = tmp_path / "dist" / "MoreFeed.fmu"
+    path.parent.mkdir()
     assert percussion("fmu", tmp_path / "scene.toml", "-o", path) == 0
     assert str(path) in capsys.readouterr().out
     model = read_model_description(str(path))

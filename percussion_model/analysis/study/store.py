@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import io
 import json
 from pathlib import Path
 from typing import Any
@@ -9,7 +11,17 @@ from typing import Any
 import numpy as np
 
 from percussion_model.analysis.study.response import ROW
-from percussion_model.simulation.files import ResultError, load_arrays, reason, staged, to_json
+from percussion_model.scene.writing import write_whole
+from percussion_model.simulation.files import (
+    LARGEST_TEXT,
+    ResultError,
+    load_arrays,
+    reason,
+    refuse_large,
+    staged_texts,
+    to_json,
+)
+from percussion_model.simulation.one_writer import IS_HELD, hold
 from percussion_model.simulation.result import REPORT
 
 PLAN = "study.json"
@@ -37,19 +49,48 @@ class Store:
 
     def __init__(self, folder: Path, plan: dict[str, Any], force: bool = False) -> None:
         self.folder = folder
-        path = folder / PLAN
+        self._hold = hold(folder)
+        if self._hold is None:
+            raise ResultError(f"{folder} {IS_HELD}: wait until it has ended, or give another --out")
         text = to_json(plan) + "\n"
-        if path.exists():
-            if path.read_text(encoding="utf-8") != text:
-                if not force:
-                    raise ResultError(f"{folder}: {_difference(path, plan)}")
-                _remove(folder)
-        elif folder.exists() and any(folder.iterdir()):
-            raise ResultError(f"{folder}: is not empty and holds no study: give another --out")
-        if not path.exists():
-            with staged(folder) as draft:
-                (draft / PLAN).write_text(text, encoding="utf-8")
-        (folder / PARTS).mkdir(exist_ok=True)
+        self._digest = hashlib.sha256(text.encode()).hexdigest()[:32]
+        path = folder / PLAN
+        refuse_large(path, LARGEST_TEXT)
+        found = _read_plan(path)
+        if found is None:
+            self._refuse_others(force)
+        elif found != json.loads(text):
+            if not force:
+                raise ResultError(f"{folder}: {_difference(found, json.loads(text))}")
+            _remove(folder)
+        if found is None or not path.exists():
+            staged_texts(folder, {PLAN: text})
+        try:
+            (folder / PARTS).mkdir(exist_ok=True)
+        except OSError as error:
+            raise ResultError(f"{folder}: cannot be written: {error.strerror}") from None
+
+    def _refuse_others(self, force: bool) -> None:
+        """Refuse a folder without a plan that can be read, unless all its parts are of this one."""
+        parts = sorted((self.folder / PARTS).glob("*.npz"))
+        others = sum(not self._is_own(path) for path in parts)
+        is_study = parts or (self.folder / PLAN).exists()
+        if not is_study and self.folder.exists() and any(self.folder.iterdir()):
+            raise ResultError(f"{self.folder}: is not empty and holds no study: give another --out")
+        if others and not force:
+            raise ResultError(
+                f"{self.folder / PLAN}: is damaged or missing, and {others} of {len(parts)} files "
+                f"in {PARTS} are not known to be of this study: the command that made them mends "
+                "it, another --out keeps them"
+            )
+        if others:
+            _remove(self.folder)
+
+    def _is_own(self, path: Path) -> bool:
+        try:
+            return str(load_arrays(path)["plan"]) == self._digest
+        except (OSError, ValueError, LookupError):
+            return False
 
     def keep(self, part: np.ndarray, rows: np.ndarray, failures: list[str]) -> None:
         """Write finished points; all of them or none.
@@ -59,11 +100,17 @@ class Store:
         part : ndarray of int
             Which points they are.
         """
-        name = f"{int(part[0]):07d}-{len(part)}.npz"
-        draft = self.folder / PARTS / f".{name}.part"
-        with draft.open("wb") as file:
-            np.savez(file, part=part, rows=rows, failures=np.array(json.dumps(failures)))
-        draft.replace(self.folder / PARTS / name)
+        content = io.BytesIO()
+        words = np.array(json.dumps(failures))
+        np.savez(content, part=part, rows=rows, failures=words, plan=np.array(self._digest))
+        path = self.folder / PARTS / f"{int(part[0]):07d}-{len(part)}.npz"
+        try:
+            write_whole(path, content.getvalue())
+        except OSError as error:
+            raise ResultError(
+                f"{path}: cannot be written: {error.strerror or error}; finished points before it "
+                "are kept, the same command continues"
+            ) from None
 
     def read(self, count: int) -> tuple[np.ndarray, list[str], np.ndarray]:
         """Collect what is finished.
@@ -76,19 +123,52 @@ class Store:
         """
         rows, failures = np.zeros(count, ROW), [""] * count
         done = np.zeros(count, bool)
+        damaged = []
         for path in sorted((self.folder / PARTS).glob("*.npz")):
             try:
-                arrays = load_arrays(path)
-                part, found = arrays["part"], arrays["rows"]
-                words = json.loads(str(arrays["failures"]))
-                rows[part], done[part] = found, True
+                part, found, words = _read_part(path, count)
             except (OSError, ValueError, LookupError, RecursionError) as error:
-                raise ResultError(
-                    f"{path}: cannot be read ({reason(error)}): delete it, and its points run again"
-                ) from None
+                why = reason(error).removeprefix(f"{path}: cannot be read: ")
+                damaged.append(f"{path.name}: cannot be read ({why})")
+                continue
+            rows[part], done[part] = found, True
             for k, text in zip(part.tolist(), words, strict=True):
                 failures[k] = text
+        if damaged:
+            raise ResultError(
+                f"{self.folder / PARTS}: {', '.join(damaged)}: delete "
+                f"{'it, and its' if len(damaged) == 1 else 'them, and their'} points run again"
+            )
         return rows, failures, done
+
+
+def _read_part(path: Path, count: int) -> tuple[np.ndarray, np.ndarray, list[str]]:
+    """Points, rows and failures of a part of a study of so many points."""
+    arrays = load_arrays(path)
+    missing = {"part", "rows", "failures"} - arrays.keys()
+    if missing:
+        raise ResultError(f"has no {' and no '.join(sorted(missing))}")
+    part, rows, words = arrays["part"], arrays["rows"], json.loads(str(arrays["failures"]))
+    if part.dtype.kind not in "iu" or part.ndim != 1 or np.any((part < 0) | (part >= count)):
+        raise ResultError(f"names points that are not among the {count}")
+    if rows.dtype != ROW or rows.shape != part.shape:
+        raise ResultError("its rows are not those of its points")
+    if not isinstance(words, list) or [type(one) for one in words] != [str] * len(part):
+        raise ResultError("its failures are not those of its points")
+    return part, rows, words
+
+
+def _read_plan(path: Path) -> dict[str, Any] | None:
+    """Plan that a folder holds; None where there is none, or a damaged one."""
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        return None
+    except OSError as error:
+        raise ResultError(f"{path}: cannot be read: {error.strerror}") from None
+    except (ValueError, RecursionError):
+        return None
+    return found if isinstance(found, dict) and "scene" in found else None
 
 
 def _remove(folder: Path) -> None:
@@ -99,15 +179,9 @@ def _remove(folder: Path) -> None:
         (folder / name).unlink(missing_ok=True)
 
 
-def _difference(path: Path, plan: dict[str, Any]) -> str:
+def _difference(found: dict[str, Any], wanted: dict[str, Any]) -> str:
     """Say in what a plan that was found differs, and what to do."""
-    try:
-        found = json.loads(path.read_text(encoding="utf-8"))
-        wanted = json.loads(to_json(plan))
-        same = all(found.get(key) == wanted[key] for key in wanted if key not in OF_SOURCES)
-    except (ValueError, AttributeError):
-        same = False
-    if not same:
+    if any(found.get(key) != wanted[key] for key in wanted if key not in OF_SOURCES):
         return f"holds another study (see {PLAN} there): {_WAYS_OUT}"
     return (
         "its points were computed by other sources of percussion_model than those of now: "

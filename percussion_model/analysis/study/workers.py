@@ -6,7 +6,7 @@ import os
 import signal
 import sys
 from collections.abc import Callable, Iterator
-from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from multiprocessing import active_children, get_context
@@ -14,6 +14,7 @@ from threading import current_thread, main_thread
 from typing import Any
 
 from percussion_model.scene.inputs import SimulationError
+from percussion_model.simulation.orphans import end_with_parent
 
 # Exit code of a worker that came to start workers itself, since it ran the script again.
 STARTED_AGAIN = 97
@@ -55,17 +56,23 @@ def on_this_machine(
 def _in_a_pool(
     work: Callable[..., Any], tasks: dict[int, Task], processes: int
 ) -> Iterator[tuple[int, Any]]:
-    others = set(active_children())
-    with _one_thread_each(), _interrupts_left_to_this_process():
-        pool = ProcessPoolExecutor(processes, mp_context=get_context("spawn"))
-        try:
-            running = {pool.submit(work, *task): number for number, task in tasks.items()}
-        except RuntimeError as error:
-            if "bootstrapping" not in str(error):
-                raise
-            sys.exit(STARTED_AGAIN)  # multiprocessing starts none while a worker reads its script
-    workers = set(active_children()) - others
+    others, workers = set(active_children()), set()
+    pool = ProcessPoolExecutor(
+        processes, mp_context=get_context("spawn"), initializer=end_with_parent
+    )
+    running: dict[Future[Any], int] = {}
     try:
+        with _one_thread_each(), _interrupts_left_to_this_process():
+            try:
+                for number, task in tasks.items():
+                    running[pool.submit(work, *task)] = number
+            except RuntimeError as error:
+                if "bootstrapping" not in str(error):
+                    raise
+                sys.exit(
+                    STARTED_AGAIN
+                )  # multiprocessing starts none while a worker reads its script
+        workers = set(active_children()) - others
         while running:
             ended, _ = wait(running, return_when=FIRST_COMPLETED)
             for future in ended:
@@ -86,15 +93,25 @@ def _in_a_pool(
 
 @contextmanager
 def _interrupts_left_to_this_process() -> Iterator[None]:
-    """Let processes that are started meanwhile ignore Ctrl-C from their first line on."""
+    """Let processes that are started meanwhile ignore Ctrl-C from their first line on.
+
+    What this process does on SIGTERM waits until they are known, so that it can end them.
+    """
     if current_thread() is not main_thread():  # others may not touch signals
         yield
         return
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    told: list[tuple[Any, ...]] = []
+    before, end = signal.signal(signal.SIGINT, signal.SIG_IGN), signal.getsignal(signal.SIGTERM)
+    if callable(end):
+        signal.signal(signal.SIGTERM, lambda *given: told.append(given))
     try:
         yield
     finally:
         signal.signal(signal.SIGINT, before)
+        if callable(end):
+            signal.signal(signal.SIGTERM, end)
+            for given in told[:1]:
+                end(*given)
 
 
 @contextmanager

@@ -51,6 +51,7 @@ def accuracy(
     )
     from percussion_model.interface.progress import progress
     from percussion_model.scene.scene import Scene
+    from percussion_model.simulation.files import to_json
     from percussion_model.verification.accuracy import study
     from percussion_model.verification.accuracy.ladders import chosen_ladders
     from percussion_model.verification.accuracy.problems import refuse_rigid
@@ -107,11 +108,12 @@ def accuracy(
         if claimed is None:
             continue
         if json_file is None:
-            common.write_json(str(claimed.folder / f"{name}.json"), found[name])
+            texts = {f"{name}.json": to_json(found[name]) + "\n"}
+            common.write_texts(claimed, texts)
         if figures:
             with common.if_drawable():
                 common.list_files(_draw(result, claimed.folder / name))
-        common.list_files([claimed.sign()])
+        common.list_files(common.sign(claimed))
     if len(studies) > 1 and json_file != "-":
         show_contests(studies)
     common.write_json(json_file, found)

@@ -90,15 +90,12 @@ def bench_controller(
             common.print_message(
                 f"{score.trial}: {score.doubt}, so whether it does is not known with this step"
             )
-    try:
+    with common.if_drawable():
         with progress("drawing the figures"):
             # to load what draws takes its time too
             from percussion_model.interface.bench_page import write_bench_page
 
             page = write_bench_page(scores, claimed.folder, controller or system.stem)
-    except ImportError as error:
-        common.print_message(common.needs_plot_extra(error))
-    else:
         common.list_files([page, claimed.sign()])
     if interrupted:
         return common.print_message(

@@ -87,13 +87,17 @@ def calibrate(
     from percussion_model.interface.calibrated_scene import commented_fit
     from percussion_model.interface.measured_files import read_curve, read_drop, read_reading
     from percussion_model.interface.progress import progress
-    from percussion_model.simulation.files import staged_text
+    from percussion_model.scene.writing import is_special
 
     if not curve and not drop and not measured:
         raise common.refusal("nothing to fit: give --curve, --drop or --measured")
     common.check_json(json_file)
+    if figure is not None and not is_special(figure):
+        figure = figure.with_suffix(".png")
     for option, path in (("--out", out), ("--figure", figure)):
-        _check_file(option, path, force)
+        common.check_file(option, path)
+        if path is not None:
+            common.refuse_existing(path, force)
     chosen = common.load_scene(scene, solver, cells, settings, rock=rock)
     slow = [read_curve(path) for path in curve or ()]
     drops = [read_drop(word, gauge) for word in drop or ()]
@@ -111,7 +115,7 @@ def calibrate(
     if out is not None:
         changes = found.changes(write_undetermined)
         calibrated = chosen.replace(**changes).to_toml()
-        staged_text(out, commented_fit(found, changes, scene.name) + calibrated)
+        out = common.write_file(out, commented_fit(found, changes, scene.name) + calibrated)
         written.append(out)
         left = [key for key in found.estimates if key not in changes]
         if left:
@@ -150,18 +154,6 @@ class _Stages:
         of = f" of {self._most}" if self._most else ""
         share = here / self._most if self._most else None
         self._report(f"{self._name}: {here}{of} computations", share)
-
-
-def _check_file(option: str, path: Path | None, force: bool) -> None:
-    """Refuse a file that could not be written, before anything is computed."""
-    from percussion_model.simulation.files import check_writable
-
-    if path is None:
-        return
-    if path.is_dir():
-        raise common.refusal(f"{option} {str(path)!r}: is a folder; give the file to write")
-    check_writable(path.absolute().parent)
-    common.refuse_existing(path, force)
 
 
 def _read_range(word: str) -> tuple[str, tuple[float, float]]:

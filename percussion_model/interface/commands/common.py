@@ -6,12 +6,16 @@ import contextlib
 import gc
 import hashlib
 import os
+import secrets
+import signal
 import sys
+import tempfile
 import tomllib
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn, TypeVar
 
 import typer
 
@@ -19,11 +23,17 @@ from percussion_model.interface.messages import wrapped
 from percussion_model.interface.streams import end_process
 
 if TYPE_CHECKING:
+    from types import FrameType
+
     from percussion_model.scene.scene import Scene
+    from percussion_model.simulation.files import ResultError
     from percussion_model.simulation.origin import Claim
 
+T = TypeVar("T")
 BAD_INPUT = 2
+FAILED = 1
 INTERRUPTED = 130  # what shells report for Ctrl-C
+TERMINATED = 143  # and for SIGTERM
 # Starting makes hundreds of thousands of objects that stay [objects].
 COLLECT_AFTER = 100_000
 # So many files of a folder have a line each.
@@ -329,41 +339,131 @@ def digest(path: Path | None) -> str | None:
 
 def refuse_existing(file: Path, force: bool) -> None:
     """Refuse a file that is there, unless it is to be replaced."""
-    if file.exists() and not force:
+    if file.is_file() and not force:
         raise refusal(f"{file}: exists already; --force overwrites it")
 
 
 def check_json(json_file: str | None) -> None:
     """Refuse a file that could not be written, before anything is computed."""
-    from percussion_model.simulation.files import check_writable
+    if json_file not in (None, "-"):
+        check_file("--json", Path(json_file))
 
-    if json_file in (None, "-"):
+
+def check_file(option: str, path: Path | None) -> None:
+    """Refuse a file of an option that could not be written, before anything is computed."""
+    from percussion_model.simulation.files import ResultError
+    from percussion_model.simulation.files import check_file as check
+
+    if path is None:
         return
-    if Path(json_file).is_dir():
-        raise refusal(f"--json {json_file!r}: is a folder; give the file to write, or - for stdout")
-    check_writable(Path(json_file).absolute().parent)
+    if path.is_dir():
+        raise refusal(f"{option} {str(path)!r}: is a folder; give the file to write")
+    try:
+        check(path)
+    except ResultError as error:
+        raise refusal(f"{option} {error}") from None
 
 
 def write_json(json_file: str | None, values: dict[str, Any]) -> None:
     """Write plain values as JSON to a file, to stdout (-), or nowhere (None)."""
-    from percussion_model.simulation.files import staged_text, to_json
+    from percussion_model.simulation.files import to_json
 
     if json_file == "-":
         typer.echo(to_json(values))
     elif json_file is not None:
         file = Path(json_file)
-        word = "replaced" if file.exists() else "wrote"
-        staged_text(file, to_json(values) + "\n")
+        word = "replaced" if file.is_file() else "wrote"
+        file = write_file(file, to_json(values) + "\n")
         print(f"{word} {file}", file=sys.stderr)
+
+
+# What could not be written where it was asked for, though it is kept elsewhere or only drawn.
+_missed: list[str] = []
+
+
+def write_file(file: Path, text: str) -> Path:
+    """Write what was computed into a file, or elsewhere where that cannot be; return the file."""
+    from percussion_model.simulation.files import ResultError, staged_file
+
+    def write(path: Path) -> None:
+        staged_file(path, text)
+
+    try:
+        write(file)
+    except ResultError as error:
+        return _write_elsewhere(file, write, error)
+    return file
+
+
+def write_folder(claimed: Claim, write: Callable[[Path], T]) -> T:
+    """Write what was computed into the folder of a claim, or elsewhere where that cannot be."""
+    from percussion_model.simulation.files import ResultError
+
+    found: list[T] = []
+    try:
+        found.append(write(claimed.folder))
+    except ResultError as error:
+        claimed.move_to(
+            _write_elsewhere(claimed.folder, lambda folder: found.append(write(folder)), error)
+        )
+    return found[-1]
+
+
+def sign(claimed: Claim) -> list[Path]:
+    """Sign a claimed folder; where that cannot be what is there counts all the same."""
+    from percussion_model.simulation.files import ResultError
+
+    try:
+        return [claimed.sign()]
+    except ResultError as error:
+        print_message(str(error))
+        _missed.append(str(error))
+        return []
+
+
+def write_texts(claimed: Claim, texts: Mapping[str, str]) -> None:
+    """Write texts by their names into the folder of a claim, as `write_folder`, and say so."""
+    from percussion_model.simulation.files import staged_texts
+
+    list_files(write_folder(claimed, partial(staged_texts, texts=texts)))
+
+
+def _write_elsewhere(wanted: Path, write: Callable[[Path], None], error: ResultError) -> Path:
+    """Write into the present folder, else that for temporary files, else home, and say where."""
+    from percussion_model.simulation.files import ResultError
+
+    for place in (Path.cwd, lambda: Path(tempfile.gettempdir()), Path.home):
+        try:
+            path = place() / f"{wanted.stem}-kept-{secrets.token_hex(4)}{wanted.suffix}"
+            write(path)
+        except (ResultError, OSError, RuntimeError):  # no home, and no present folder any more
+            continue
+        print_message(f"{error}: what was computed is kept in {path}")
+        _missed.append(str(error))
+        return path
+    raise error
+
+
+def exit_code(code: Any) -> int:
+    """Code with which a command ends: not 0 where something is not where it was asked for."""
+    found = code if isinstance(code, int) else 0
+    found = found or (FAILED if _missed else 0)
+    _missed.clear()
+    return found
 
 
 @contextmanager
 def if_drawable() -> Iterator[None]:
-    """Draw figures, or say on stderr which package they lack: results count without them."""
+    """Draw figures, or say on stderr what they lack: results count without them."""
+    from percussion_model.simulation.files import ResultError
+
     try:
         yield
     except ImportError as error:
         print_message(needs_plot_extra(error))
+    except ResultError as error:  # as on a disk that is full by now
+        print_message(f"no figures: {error}")
+        _missed.append(str(error))
 
 
 def list_files(paths: Iterable[Path]) -> None:
@@ -410,7 +510,7 @@ def refusal(message: str) -> typer.Exit:
 def end_script(name: str, work: Callable[[], object]) -> NoReturn:
     """Do the work of a script of this project, and end the process.
 
-    What its user can mend and Ctrl-C are a message, as those of `percussion`.
+    What its user can mend, Ctrl-C and SIGTERM are a message, as those of `percussion`.
 
     Parameters
     ----------
@@ -425,7 +525,8 @@ def end_script(name: str, work: Callable[[], object]) -> NoReturn:
         except (KeyboardInterrupt, SystemError) as error:
             if not is_interruption(error):
                 raise
-            return print_message("interrupted before there was a result", INTERRUPTED, name)
+            message = "interrupted before there was a result"
+            return ended_by(print_message(message, INTERRUPTED, name))
         except ValueError as error:
             package = type(error).__module__.partition(".")[0]
             if package not in ("percussion_model", name.partition(".")[0]):
@@ -433,7 +534,29 @@ def end_script(name: str, work: Callable[[], object]) -> NoReturn:
             return print_message(str(error), BAD_INPUT, name)
         return 0
 
+    heed_termination()
     end_process(coded, name)
+
+
+def heed_termination() -> None:
+    """Let SIGTERM do what Ctrl-C does; `ended_by` tells them apart."""
+
+    def interrupt(number: int, frame: FrameType | None) -> None:
+        _terminated.append(number)
+        there = signal.getsignal(signal.SIGINT)
+        if not callable(there):  # of a process in the background, which ignores Ctrl-C
+            raise KeyboardInterrupt
+        there(signal.SIGINT, frame)
+
+    signal.signal(signal.SIGTERM, interrupt)
+
+
+_terminated: list[int] = []
+
+
+def ended_by(code: int) -> int:
+    """Exit code of an interruption: another one where it was SIGTERM."""
+    return TERMINATED if code == INTERRUPTED and _terminated else code
 
 
 def is_interruption(error: BaseException) -> bool:

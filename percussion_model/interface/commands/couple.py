@@ -11,6 +11,7 @@ import typer
 from percussion_model.interface.commands import common
 from percussion_model.interface.messages import wrapped
 from percussion_model.scene.rows import shortened
+from percussion_model.simulation.files import staged
 from percussion_model.simulation.uncertain import (
     NOT_ESTIMATED,
     UNDECIDED,
@@ -20,6 +21,7 @@ from percussion_model.simulation.uncertain import (
 
 if TYPE_CHECKING:
     from percussion_model.coupling import Coupling
+    from percussion_model.coupling.coupled_run import CoupledRun
     from percussion_model.coupling.verdict import Verdict
 
 SystemFile = Annotated[Path, typer.Argument(metavar="SYSTEM.ssp", help="A system (SSP 1.0).")]
@@ -46,7 +48,6 @@ HIDDEN = "its error may be as large"
 DURATION = 6.0
 # Rows of a run without --interval.
 ROWS = 5000
-FAILED = 1
 # Of a number of steps; no run has so many.
 MOST_DIGITS = 9
 
@@ -126,7 +127,6 @@ def couple(
         coupling.free()
         raise
     _tell_of_rest(duration, step)
-    folder = claimed.folder
     wanted = [*known_signals(coupling.outputs), *(signals or ())]
     rows_every = max(step, duration / ROWS) if interval is None else interval
     with progress_bar(duration) as bar:
@@ -134,7 +134,8 @@ def couple(
             duration, step, wanted, rows_every, tolerance, bar, "keep", common.print_message
         )
     found = summary(run)
-    path = run.write_csv(folder / "signals.csv")
+    path = common.write_folder(claimed, lambda folder: _write_signals(run, folder))
+    folder = claimed.folder
     common.write_json(json_file, found)
     if json_file != "-":
         for line in _lines(found):
@@ -148,8 +149,14 @@ def couple(
 
                 figure = save_signals(run, folder / "signals.png", system.stem)
             common.list_files([figure])
-    common.list_files([claimed.sign()])
-    return _tell(run.verdict, common.INTERRUPTED if run.interrupted else FAILED)
+    common.list_files(common.sign(claimed))
+    return _tell(run.verdict, common.INTERRUPTED if run.interrupted else common.FAILED)
+
+
+def _write_signals(run: CoupledRun, folder: Path) -> Path:
+    with staged(folder) as draft:
+        run.write_csv(draft / "signals.csv")
+    return folder / "signals.csv"
 
 
 def _set_time(coupling: Coupling, start: float | None, duration: float | None) -> float:

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from percussion_model.analysis.study import Study
     from percussion_model.interface.plotting.window import Window
     from percussion_model.scene.scene import Scene
+    from percussion_model.simulation.origin import Claim
     from percussion_model.verification.paper.rock_law import Sinking
     from percussion_model.verification.paper.runs import Drop
     from percussion_model.verification.paper.statements import Statement
@@ -32,65 +33,108 @@ def paper(
     force: common.Force = False,
 ) -> None:
     """Reproduce figures 4 and 6 to 9 of the paper, and check what it says one by one."""
-    from percussion_model.interface.progress import progress, progress_bar
-    from percussion_model.interface.terminal import show_statements
-
     common.check_outputs(out, json_file)
     common.load_numba()
     try:
-        from percussion_model.interface.plotting.activation import draw_activation
-        from percussion_model.interface.plotting.compared_blows import draw_comparison
-        from percussion_model.interface.plotting.motion import draw_motion
-        from percussion_model.interface.plotting.paper import draw_drops, draw_scaling, draw_sweeps
-        from percussion_model.interface.plotting.paper_rock_law import draw_force, draw_sinking
-        from percussion_model.interface.plotting.style import save_figures
-        from percussion_model.interface.plotting.window import last_blow_window
+        from percussion_model.interface.plotting import paper as _plotting  # noqa: F401
     except ImportError as error:
         raise common.refusal(common.needs_plot_extra(error)) from None
-    from percussion_model.analysis.comparison import compare
-    from percussion_model.verification.paper.rock_law import run_sinking
-    from percussion_model.verification.paper.runs import SWEEPS, paper_scene, run_drops
+    from percussion_model.interface.terminal import show_statements
+    from percussion_model.verification.paper.runs import paper_scene
     from percussion_model.verification.paper.statements import ERRORS
 
     common.tell_of_compiling("wave", "fem", "rigid")
     scene = paper_scene()
-    claimed = common.claim("paper", out, None, force, scene=scene)
+    written = _Written(common.claim("paper", out, None, force, scene=scene))
+    try:
+        with common.interruptible():
+            statements = _compute(scene, processes, written)
+    except KeyboardInterrupt:
+        if not written.names:
+            raise
+        words = (
+            f"interrupted; complete in {out}: {', '.join(written.names)}; the same command "
+            "continues with the points that are kept there"
+        )
+        raise typer.Exit(common.print_message(words, common.INTERRUPTED)) from None
+    tree = {"errors": ERRORS, "statements": [one.to_dict() for one in statements]}
+    common.write_json(json_file, tree)
+    common.write_json(str(out / "statements.json"), tree)
+    common.list_files([written.claimed.sign()])
+    if json_file != "-":
+        show_statements(statements, ERRORS)
+
+
+class _Written:
+    """Figures and points that are complete: each is written as soon as what it shows is known.
+
+    Parameters
+    ----------
+    claimed : Claim
+    """
+
+    def __init__(self, claimed: Claim) -> None:
+        self.claimed, self.folder = claimed, claimed.folder
+        self.names: list[str] = []
+
+    def draw(self, part: str, figures: dict[str, Callable[[], Figure]]) -> None:
+        """Write figures by their names."""
+        from percussion_model.interface.plotting.style import save_figures
+        from percussion_model.interface.progress import progress
+
+        with progress(f"{part}, drawing") as report:
+            save_figures(
+                lambda: ((name, draw()) for name, draw in figures.items()),
+                self.folder, names=list(figures),
+                report=lambda text, share: report(f"{part}, {text}", share),
+            )  # fmt: skip
+        self.names += figures
+        self.claimed.sign()
+
+
+def _compute(scene: Scene, processes: int | None, written: _Written) -> list[Statement]:
+    """Compute all, draw each figure, and check the statements."""
+    from percussion_model.analysis.comparison import compare
+    from percussion_model.interface.plotting.activation import draw_activation
+    from percussion_model.interface.plotting.compared_blows import draw_comparison
+    from percussion_model.interface.plotting.motion import draw_motion
+    from percussion_model.interface.plotting.paper import draw_drops, draw_scaling, draw_sweeps
+    from percussion_model.interface.plotting.paper_rock_law import draw_force, draw_sinking
+    from percussion_model.interface.plotting.window import last_blow_window
+    from percussion_model.interface.progress import progress, progress_bar
+    from percussion_model.verification.paper.rock_law import run_sinking
+    from percussion_model.verification.paper.runs import SWEEPS, run_drops
+
     part = _parts(4 + len(SWEEPS))
-    with progress(f"{next(part)}, drop tests and sinking, figure 6"):
+    here = next(part)
+    with progress(f"{here}, drop tests and sinking, figure 6"):
         drops, sinking = run_drops(scene), run_sinking(scene)
-    sweeps = _sweeps(out, processes, part)
+    written.draw(
+        here, {"sinking": lambda: draw_sinking(sinking), "figure6": lambda: draw_drops(drops)}
+    )
+    sweeps = _sweeps(written, processes, part)
+    here = next(part)
+    written.draw(
+        here,
+        {
+            "figure9": lambda: draw_sweeps(sweeps),
+            "scaling": lambda: draw_scaling(sweeps["d"]),
+        },
+    )
     with progress_bar(2 * scene.run.duration) as bar:
-        bar.stage(f"{next(part)}, figures 7 and 8", bar.end)
+        bar.stage(f"{here}, figures 7 and 8", bar.end)
         both = compare(scene, ("wave", "fem"), progress=bar)
     windows = {name: last_blow_window(result) for name, result in both.results.items()}
-
     figures: dict[str, Callable[[], Figure]] = {
         "figures4and7": lambda: draw_force(windows["wave"]),
-        "sinking": lambda: draw_sinking(sinking),
-        "figure6": lambda: draw_drops(drops),
         "figures7and8": lambda: draw_comparison(both),
     }
     for name, window in windows.items():
         figures[f"figure7_{name}"] = partial(draw_motion, window)
         figures[f"figure8_{name}"] = partial(draw_activation, window)
-    figures |= {
-        "figure9": lambda: draw_sweeps(sweeps),
-        "scaling": lambda: draw_scaling(sweeps["d"]),
-    }
-    here = next(part)
-    with progress(f"{here}, drawing") as report:
-        save_figures(
-            lambda: ((name, draw()) for name, draw in figures.items()), out, names=list(figures),
-            report=lambda text, share: report(f"{here}, {text}", share),
-        )  # fmt: skip
+    written.draw(next(part), figures)
     with progress(f"{next(part)}, statements of the paper"):
-        statements = list(_statements(scene, drops, sinking, both, windows, sweeps))
-    tree = {"errors": ERRORS, "statements": [one.to_dict() for one in statements]}
-    common.write_json(json_file, tree)
-    common.write_json(str(out / "statements.json"), tree)
-    common.list_files([claimed.sign()])
-    if json_file != "-":
-        show_statements(statements, ERRORS)
+        return list(_statements(scene, drops, sinking, both, windows, sweeps))
 
 
 def _statements(
@@ -124,7 +168,7 @@ def _parts(count: int) -> Iterator[str]:
     return (f"part {k} of {count}" for k in range(1, count + 1))
 
 
-def _sweeps(out: Path, processes: int | None, part: Iterator[str]) -> dict[str, Study]:
+def _sweeps(written: _Written, processes: int | None, part: Iterator[str]) -> dict[str, Study]:
     from percussion_model.interface.progress import count_bar
     from percussion_model.verification.paper.runs import SWEEPS, paper_scene, run_sweep
 
@@ -132,7 +176,8 @@ def _sweeps(out: Path, processes: int | None, part: Iterator[str]) -> dict[str, 
     for sweep in SWEEPS:
         name = sweep.name.replace("_", ", ")
         with count_bar(f"points of figure 9{name}, {next(part)}") as progress:
-            folder = out / f"figure9{sweep.name}"
+            folder = written.folder / f"figure9{sweep.name}"
             found[sweep.name] = run_sweep(paper_scene(), sweep, folder, processes, progress)
             found[sweep.name].save(folder)
+            written.names.append(folder.name)
     return found

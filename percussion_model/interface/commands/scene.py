@@ -77,12 +77,12 @@ def run(
         if result.cut_short:  # part of a run does not replace the whole one
             made_from["until"] = result.duration
             claimed = common.claim("run", None, out, force, **made_from)
-        files += result.save(claimed.folder)
-        files.append(claimed.sign())
+        files += common.write_folder(claimed, result.save)
+        files += common.sign(claimed)
         if figures and not result.cut_short:
             with progress("drawing") as report:
                 files += _draw(result, claimed.folder, report)
-            claimed.sign()
+            common.sign(claimed)
     if json_file != "-":
         terminal.show_summary(result)
     if result.interrupted:
@@ -226,6 +226,7 @@ def new(
     from percussion_model.scene.scene import Scene
 
     common.refuse_existing(file, force)
+    common.check_file("FILE", file)
     if kind == Kind.HOPKINSON:
         if hammer is not None or rods is not None:
             raise common.refusal("--kind hopkinson has no --hammer and no --rods")

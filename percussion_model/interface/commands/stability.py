@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -10,9 +9,8 @@ import typer
 from percussion_model.interface.commands import common
 
 if TYPE_CHECKING:
+    from percussion_model.simulation.origin import Claim
     from percussion_model.verification.hard_cases import Collection
-
-FAILED = 1
 
 
 def stability(
@@ -54,16 +52,15 @@ def stability(
     if json_file != "-":
         show_stability(found)
     if claimed is not None:
-        _write(found, claimed.folder)
-        common.list_files([claimed.sign()])
+        _write(found, claimed)
+        common.list_files(common.sign(claimed))
     if found.failures():
-        raise typer.Exit(FAILED)
+        raise typer.Exit(common.FAILED)
 
 
-def _write(found: Collection, folder: Path) -> None:
-    """Write the page and its figure into a folder."""
+def _write(found: Collection, claimed: Claim) -> None:
+    """Write the page and its figure into a claimed folder."""
     from percussion_model.interface.progress import progress
-    from percussion_model.simulation.files import staged_text
     from percussion_model.verification.hard_cases.stability_page import page
 
     picture = None
@@ -73,8 +70,10 @@ def _write(found: Collection, folder: Path) -> None:
 
         with progress("drawing the figure"):
             save_figures(
-                lambda: [("stability", draw_stability(found))], folder / "images", kinds=("png",)
+                lambda: [("stability", draw_stability(found))],
+                claimed.folder / "images",
+                kinds=("png",),
             )
         picture = "images/stability.png"
-    staged_text(folder / "hard_cases.md", page(found, picture))
-    common.list_files([folder / "hard_cases.md"])
+    texts = {"hard_cases.md": page(found, picture)}
+    common.write_texts(claimed, texts)

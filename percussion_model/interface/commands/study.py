@@ -24,9 +24,6 @@ MANY = 1000
 # Units that a cost is told in [s].
 TIMES = ((86400.0, "days"), (3600.0, "h"), (60.0, "min"), (1.0, "s"))
 
-# Points have failed; what was found of the others is written.
-FAILED = 1
-
 
 def study(
     scene: common.SceneFile,
@@ -124,7 +121,7 @@ def study(
     show_study(found)
     common.list_files(files)
     if any(found.failures):
-        raise typer.Exit(FAILED)
+        raise typer.Exit(common.FAILED)  # what was found of the others is written
 
 
 def _tell_of_cost(

@@ -11,6 +11,7 @@ import typer
 from percussion_model.interface.commands import common
 
 if TYPE_CHECKING:
+    from percussion_model.simulation.origin import Claim
     from percussion_model.verification.measured import Comparison
 
 
@@ -53,20 +54,21 @@ def validate(
     if json_file != "-":
         show_validation(found)
     if claimed is not None:
-        _write(found, claimed.folder, figures)
-        common.list_files([claimed.sign()])
+        _write(found, claimed, figures)
+        common.list_files(common.sign(claimed))
 
 
-def _write(found: Comparison, folder: Path, figures: bool) -> None:
-    """Write the table as CSV and JSON, and the figures, into a folder."""
+def _write(found: Comparison, claimed: Claim, figures: bool) -> None:
+    """Write the table as CSV and JSON, and the figures, into a claimed folder."""
     from percussion_model.interface.progress import progress
-    from percussion_model.simulation.files import staged_text, to_json
+    from percussion_model.simulation.files import to_json
     from percussion_model.verification.measured.table import as_csv
 
-    files = [folder / "validation.csv", folder / "validation.json"]
-    staged_text(files[0], as_csv(found))
-    staged_text(files[1], to_json(found.to_dict()) + "\n")
-    common.list_files(files)
+    texts = {
+        "validation.csv": as_csv(found),
+        "validation.json": to_json(found.to_dict()) + "\n",
+    }
+    common.write_texts(claimed, texts)
     if not figures:
         return
     with common.if_drawable():
@@ -75,7 +77,9 @@ def _write(found: Comparison, folder: Path, figures: bool) -> None:
 
         names = [one.name for one in found.experiments]
         with progress("drawing") as report:
-            drawn = save_figures(lambda: draw_all(found), folder, names=names, report=report)
+            drawn = save_figures(
+                lambda: draw_all(found), claimed.folder, names=names, report=report
+            )
         common.list_files(drawn)
 
 

@@ -15,7 +15,6 @@ from percussion_model.analysis.fitting.found import OPEN, OPEN_ABOVE, OPEN_BELOW
 from percussion_model.analysis.fitting.likelihood import EXPONENTS
 from percussion_model.interface.plotting import style
 from percussion_model.interface.plotting.style import KN, MM, MPA, MS
-from percussion_model.simulation.files import staged
 from percussion_model.simulation.uncertain import in_digits
 
 SYMBOLS = {
@@ -43,10 +42,8 @@ DPI = 130
 
 def save_calibration(found: Fit, path: Path) -> Path:
     """Draw a fit into a PNG file."""
-    path = path if path.suffix == ".png" else path.with_suffix(".png")
-    with rc_context(style.STYLE), staged(path.absolute().parent) as draft:
-        style.save_png(draw_calibration(found), draft / path.name, DPI)
-    return path
+    with rc_context(style.STYLE):
+        return style.save_png(draw_calibration(found), path, DPI)
 
 
 def draw_calibration(found: Fit) -> Figure:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,8 @@ from matplotlib.rcsetup import cycler
 
 from percussion_model.interface.progress import Report
 from percussion_model.physics.records import Mode
-from percussion_model.simulation.files import staged
+from percussion_model.scene.writing import is_special
+from percussion_model.simulation.files import staged, staged_file
 
 # Okabe and Ito's colours, told apart with any colour vision and in grey.
 MODE_COLOURS = {
@@ -252,10 +254,15 @@ def save_png(fig: Figure, path: Path, dpi: float) -> Path:
     Raises
     ------
     ResultError
-        If the folder cannot be written.
+        If it cannot be written.
     """
+    if is_special(path):
+        picture = BytesIO()
+        fig.savefig(picture, format="png", dpi=dpi, metadata=_METADATA["png"])
+        staged_file(path, picture.getvalue())
+        return path
     with staged(path.absolute().parent) as draft:
-        fig.savefig(draft / path.name, dpi=dpi, metadata=_METADATA["png"])
+        fig.savefig(draft / path.name, format="png", dpi=dpi, metadata=_METADATA["png"])
     return path
 
 

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from percussion_model.scene.scene import Scene
+from percussion_model.scene.writing import own_prefix, write_whole
 from percussion_model.solvers.blow_map.records import ENTRIES, Axis
 from percussion_model.solvers.blow_map.single_blow import SingleBlow
 from percussion_model.solvers.blow_map.table import (
@@ -66,7 +67,7 @@ def cache_folder() -> Path:
 @functools.cache
 def _folder_of_process(reason: str) -> Path:
     _log.warning("blow maps are not kept after the end of this process: %s", reason)
-    folder = Path(tempfile.mkdtemp(prefix="percussion_model-"))
+    folder = Path(tempfile.mkdtemp(prefix=own_prefix()))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     return folder
 
@@ -115,6 +116,7 @@ def get_table(
     _log.info("making the blow map %s", path)
     table = build_table(scene, parts_folder(scene), progress, compute)
     try:
+        path.parent.mkdir(parents=True, exist_ok=True)
         write_whole(path, table.to_bytes())
     except OSError as error:
         _log.warning("the blow map is not kept: %s: %s", path, error.strerror)
@@ -186,22 +188,10 @@ def _keep_slab(path: Path, slab: np.ndarray) -> None:
     out = io.BytesIO()
     np.save(out, slab, allow_pickle=False)
     try:
+        path.parent.mkdir(parents=True, exist_ok=True)
         write_whole(path, out.getvalue())
     except OSError as error:  # then an interruption costs more
         _log.warning("a part of the blow map is not kept: %s", error)
-
-
-def write_whole(path: Path, data: bytes) -> None:
-    """Write a file whole or not at all, whoever else writes it."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, draft = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(data)
-        os.replace(draft, path)
-    except BaseException:
-        Path(draft).unlink(missing_ok=True)
-        raise
 
 
 __all__ = [

@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from percussion_model.scene.scene import Scene, SceneError
-from percussion_model.simulation.files import staged_text
+from percussion_model.simulation.files import staged_file
 from percussion_model.solvers.base import Solver
 from percussion_model.verification.accuracy.explicit import ExplicitSolver
 from percussion_model.verification.accuracy.ladders import (
@@ -211,7 +211,7 @@ def save_references(path: Path, references: dict[str, Reference]) -> None:
         "format": FORMAT,
         "references": {key: one.to_dict() for key, one in sorted(references.items())},
     }
-    staged_text(path, json.dumps(tree, indent=1, allow_nan=True) + "\n")
+    staged_file(path, json.dumps(tree, indent=1, allow_nan=True) + "\n")
 
 
 def find_reference(
