@@ -317,7 +317,7 @@ def _result(
         if (above := one.deviance - best.deviance) < TOLD + threshold and _outside(one, profiles)
     ]
     explained = [
-        Explained(one.name, one.data, one.data - off, noise, source)
+        Explained(one.name, one.data, one.data - off[: len(one.data)], noise, source)
         for one, off, noise, source in zip(
             like.series, best.residuals, best.noise, sources, strict=True
         )

@@ -183,7 +183,7 @@ def grid_notes(
         np.stack([like.low, like.high], axis=1),
         lambda: None,
     )
-    weights = np.repeat(1.0 / np.array(best.noise), [len(one) for one in best.residuals])
+    weights = like.weights(best.noise)
     off = np.concatenate(best.residuals)
     change = (np.concatenate(finer.at(best.at).residuals) - off) * weights
     steps = np.clip(STEP_SHARE * np.sqrt(np.diag(spread)), LEAST_STEP, MOST_STEP)

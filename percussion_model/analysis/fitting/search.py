@@ -78,9 +78,7 @@ def _one_round(
     """Least squares with fixed weights; the best place met, and the covariance."""
     from scipy.optimize import least_squares
 
-    weights = np.concatenate(
-        [np.full(len(r), 1.0 / s) for r, s in zip(begun.residuals, begun.noise, strict=True)]
-    )
+    weights = like.weights(begun.noise)
     low, high = like.low[free], like.high[free]
     met = [begun]
 
@@ -230,7 +228,7 @@ def _relaxed(
     for _ in range(RELAXATIONS):
         left = np.split(off + matrix @ move, np.cumsum(counts)[:-1])
         deviance, noise = like.deviance_of(left)
-        weights = np.repeat(1.0 / np.array(noise), counts)
+        weights = like.weights(noise)
         information = (matrix * weights[:, None]).T @ (matrix * weights[:, None])
         information += np.eye(len(free)) / MOST_RELAXED**2
         move = -np.linalg.solve(information, (matrix * weights[:, None]).T @ (off * weights))

@@ -1,0 +1,251 @@
+"""What a sensor adds to a signal: its zero, its drift, and the delay of its trigger.
+
+None of them is known, but each has a prior: a normal distribution about 0 of a stated width.
+For any rock they are where data and priors together are likeliest (docs/data/calibration.md).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from percussion_model.analysis.fitting.curve import SlowFit, best_datum_and_peak
+from percussion_model.analysis.fitting.measurements import SIGNALS, Curve, DropTest
+from percussion_model.analysis.fitting.predictions import DropOnRocks, bit_alone
+from percussion_model.scene.scene import Scene
+
+OFFSET, DRIFT, DELAY = "offset", "drift", "delay"
+# No noise is taken to be smaller than this share of the data's spread: data of a model
+# without noise would have an infinite likelihood.
+LEAST_NOISE = 1e-8
+# A trigger is looked for within so many widths of its prior.
+REACH = 3.0
+# Samples of the model between which a delayed signal is read are no farther apart than this, of
+# positions and of all else [s], and no more in number.
+FINE, FINER, MOST_SAMPLES = 5e-5, 2.5e-5, 20_000
+# The delay is first tried at so many values in so many data; the best few are improved.
+TRIED, TRIED_IN, IMPROVED = 121, 100, 2
+# Steps of least squares at most, the size of the last in widths, and halvings of one; and the
+# size of the last for a curve, whose datum and peak are known no better.
+ROUNDS, ARRIVED, HALVINGS, CURVE_ARRIVED = 30, 1e-9, 8, 1e-5
+
+# Signal, and its slope over the pull of the delay.
+Shown = tuple[np.ndarray, np.ndarray]
+
+
+class Unknown(NamedTuple):
+    """Something of a sensor that is not known, SI units; `width`: standard deviation."""
+
+    name: str
+    unit: str
+    width: float
+
+
+class Sensed(NamedTuple):
+    """What a sensor shows of the model, and its unknowns by the widths of their priors."""
+
+    fitted: np.ndarray
+    pulls: np.ndarray
+
+
+class Sensor(Protocol):
+    """A sensor with unknowns."""
+
+    unknowns: tuple[Unknown, ...]
+
+    def sensed(self, scene: Scene) -> Sensed:
+        """What it shows of a rock where its unknowns are likeliest."""
+        ...
+
+
+def least_noise(data: np.ndarray) -> float:
+    """What the estimated noise of data is at least."""
+    return LEAST_NOISE * (float(np.ptp(data)) or float(np.abs(data).max()))
+
+
+class DropSensor:
+    """Sensor of a drop test.
+
+    Parameters
+    ----------
+    drop : DropTest
+        Checked.
+    kept : ndarray
+        Which of its samples count.
+    """
+
+    def __init__(self, drop: DropTest, kept: np.ndarray) -> None:
+        self._drop, self._time, self._data = drop, drop.time[kept], drop.values[kept]
+        unit = SIGNALS[drop.signal][0]
+        given = zip(
+            (OFFSET, DRIFT, DELAY),
+            (unit, unit + "/s", "s"),
+            (drop.offset, drop.drift, drop.delay),
+            strict=True,
+        )
+        self.unknowns = tuple(Unknown(*one) for one in given if one[2] > 0.0)
+        columns = {OFFSET: np.ones(len(self._time)), DRIFT: self._time}
+        steady = [one.width * columns[one.name] for one in self.unknowns if one.name != DELAY]
+        self._steady = np.stack(steady, axis=1) if steady else np.zeros((len(self._time), 0))
+        self._ahead = 0
+        if drop.delay > 0.0:
+            self._step = _step_of(drop)
+            self._ahead = math.ceil(REACH * drop.delay / self._step) + 2
+            count = math.ceil(drop.time[-1] / self._step) + self._ahead + 2
+            self._model = DropOnRocks(drop, self._step * np.arange(count))
+        else:
+            self._model = DropOnRocks(drop, self._time)
+
+    def sensed(self, scene: Scene) -> Sensed:
+        """What it shows of a rock where its unknowns are likeliest."""
+        signal = self._model(scene)
+        if not np.isfinite(signal).all():
+            return Sensed(np.full(len(self._data), math.nan), np.zeros(len(self.unknowns)))
+        if not self._ahead:
+            return self._best(lambda _: (signal, np.zeros((len(signal), 0))), 0)
+        early = -self._step * np.arange(self._ahead, 0, -1)
+        signal = np.concatenate([_before(self._drop, scene, early, signal[0]), signal])
+
+        def delayed(pull: np.ndarray) -> Shown:
+            return self._read(signal, float(pull[0]))
+
+        found = [self._best(delayed, 1, one) for one in self._first_delays(signal)]
+        return min(found, key=self._deviance)
+
+    def _read(self, signal: np.ndarray, pull: float) -> Shown:
+        """Signal at the times of the data with a delay, by cubics, and its slope over the pull."""
+        place = (self._time + pull * self._drop.delay) / self._step + self._ahead
+        k = np.clip(place.astype(int), 1, len(signal) - 3)
+        x = place - k
+        before, here, there, after = signal[k - 1], signal[k], signal[k + 1], signal[k + 2]
+        a, b = 0.5 * (there - before), before - 2.5 * here + 2.0 * there - 0.5 * after
+        c = 0.5 * (after - before) + 1.5 * (here - there)
+        slope = (a + x * (2.0 * b + 3.0 * c * x)) * (self._drop.delay / self._step)
+        return here + x * (a + x * (b + x * c)), slope[:, None]
+
+    def _first_delays(self, signal: np.ndarray) -> list[float]:
+        """Delays, in widths, near which data are best explained in a few samples."""
+        every = np.arange(0, len(self._time), math.ceil(len(self._time) / TRIED_IN))
+        pulls = np.linspace(-REACH, REACH, TRIED)
+        place = self._time[every] + (pulls * self._drop.delay)[:, None]
+        k, x = np.divmod(place / self._step + self._ahead, 1.0)
+        k = np.clip(k.astype(int), 0, len(signal) - 2)
+        off = self._data[every] - (signal[k] + x * (signal[k + 1] - signal[k]))
+        if self._steady.shape[1]:
+            base = np.linalg.qr(self._steady[every])[0]
+            off = off - (off @ base) @ base.T
+        floor = least_noise(self._data) ** 2
+        above = len(every) * np.log(np.maximum((off**2).mean(axis=1), floor)) + pulls**2
+        padded = np.pad(above, 1, constant_values=math.inf)
+        dips = np.flatnonzero((above <= padded[:-2]) & (above <= padded[2:]))
+        return [float(pulls[dip]) for dip in dips[np.argsort(above[dips])][:IMPROVED]]
+
+    def _deviance(self, found: Sensed) -> float:
+        return _deviance_of(self._data - found.fitted, found.pulls, self._data)
+
+    def _best(
+        self, model: Callable[[np.ndarray], Shown], free: int, first: float = 0.0
+    ) -> Sensed:
+        """Least squares over all unknowns from a delay; the noise is estimated along."""
+        steady, data = self._steady, self._data
+        split = steady.shape[1]
+        pulls = np.append(np.zeros(split), np.full(free, first))
+
+        def at(pulls: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+            signal, slope = model(pulls[split:])
+            off = data - signal - steady @ pulls[:split]
+            return off, slope, _deviance_of(off, pulls, data)
+
+        off, slope, deviance = at(pulls)
+        for _ in range(ROUNDS):
+            columns = np.concatenate([steady, slope], axis=1)
+            variance = max(float(off @ off) / len(off), least_noise(data) ** 2)
+            curved = columns.T @ columns / variance + np.eye(len(pulls))
+            step = np.linalg.solve(curved, columns.T @ off / variance - pulls)
+            for _ in range(HALVINGS):
+                there = pulls + step
+                there[split:] = np.clip(there[split:], -REACH, REACH)
+                tried = at(there)
+                if tried[2] <= deviance:
+                    break
+                step = 0.5 * step
+            else:
+                break
+            moved = float(np.abs(there - pulls).max(initial=0.0))
+            pulls, (off, slope, deviance) = there, tried
+            if moved < ARRIVED:
+                break
+        return Sensed(data - off, pulls)
+
+
+def _deviance_of(off: np.ndarray, pulls: np.ndarray, data: np.ndarray) -> float:
+    variance = max(float(off @ off) / len(off), least_noise(data) ** 2)
+    return len(off) * math.log(variance) + float(pulls @ pulls)
+
+
+def _step_of(drop: DropTest) -> float:
+    """Time between samples of the model: a whole part of that between the data."""
+    between = float(np.median(np.diff(drop.time)))
+    fine = FINE if drop.signal.endswith("position") else FINER
+    fine = max(fine, float(drop.time[-1]) / MOST_SAMPLES)
+    return between / math.ceil(between / fine)
+
+
+def _before(drop: DropTest, scene: Scene, times: np.ndarray, first: float) -> np.ndarray:
+    """Signal before time zero, while the bit falls freely."""
+    scene = bit_alone(scene)
+    weight = scene["gravity.acceleration"] if scene.effects.gravity else 0.0
+    acceleration = weight + scene.feed.force / scene.bit.mass
+    if drop.signal.endswith("position"):
+        return first + times * (drop.speed + 0.5 * acceleration * times)
+    if drop.signal.endswith("velocity"):
+        return first + acceleration * times
+    return np.full(len(times), first)
+
+
+class CurveSensor:
+    """Sensors of a slow test: the force has an unknown zero; that of the penetration is free.
+
+    Parameters
+    ----------
+    curve : Curve
+        Checked.
+    guess : (float, float)
+        Datum and peak [m].
+    """
+
+    def __init__(self, curve: Curve, guess: tuple[float, float]) -> None:
+        self._curve, self._guess = curve, guess
+        self.unknowns = (Unknown(OFFSET, "N", curve.offset),) if curve.offset > 0.0 else ()
+
+    def sensed(self, scene: Scene) -> Sensed:
+        """What it shows of a rock where its unknowns are likeliest."""
+        force, width = self._curve.force, self._curve.offset
+        if not self.unknowns:
+            return Sensed(self._fit(scene, 0.0).force, np.zeros(0))
+
+        def best(pull: float) -> tuple[float, np.ndarray, float]:
+            """Slope of half the deviance over the pull, residuals, and the variance."""
+            off = force - width * pull - self._fit(scene, width * pull).force
+            variance = max(float(off @ off) / len(off), least_noise(force) ** 2)
+            return pull - width * float(off.sum()) / variance, off, variance
+
+        pull, (slope, off, variance) = 0.0, best(0.0)
+        # as if nothing else followed, which goes too far at most
+        step = -slope / (1.0 + len(off) * width**2 / variance)
+        for _ in range(ROUNDS):
+            there = pull + step
+            found = best(there)
+            if abs(step) < CURVE_ARRIVED or found[0] == slope:
+                break
+            step = -found[0] * step / (found[0] - slope)
+            pull, (slope, off, _) = there, found
+        return Sensed(force - off, np.array([pull]))
+
+    def _fit(self, scene: Scene, offset: float) -> SlowFit:
+        curve = self._curve
+        shifted = Curve(curve.penetration, curve.force - offset, curve.name)
+        return best_datum_and_peak(shifted, scene, self._guess)
