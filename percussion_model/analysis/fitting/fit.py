@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import NamedTuple
 
 import numpy as np
 
@@ -60,6 +59,7 @@ from percussion_model.analysis.fitting.notes import (
     rough_notes,
 )
 from percussion_model.analysis.fitting.sampling import (
+    Explored,
     Profile,
     Walk,
     profiles_of,
@@ -72,7 +72,9 @@ from percussion_model.analysis.fitting.search import (
     polish,
     roughness,
 )
+from percussion_model.analysis.fitting.single import solved
 from percussion_model.analysis.fitting.survey import Counter, minima_of, series_of
+from percussion_model.analysis.fitting.trust import distrusted, sensor_notes, sensors_of
 from percussion_model.scene.scene import Scene
 
 # What can be fitted, and where it is searched; SI units.
@@ -170,11 +172,16 @@ def fit_rock(
     box = _box(scene, names, ranges or {})
     counter = Counter(progress, stage)
     whole = Likelihood(scene, series_of(sources, sight), names, box, counter.tick)
-    minima = minima_of(whole, sources, sight, counter)
     quantile = _quantile(confidence, len(names))
-    found = _explored(whole, minima, quantile, counter)
+    notes: list[str] = []
+    if len(names) == 1 and len(sources) == 1 and isinstance(sources[0], Reading):
+        counter.begin("bisection")
+        found, notes = solved(whole, sources[0], quantile)
+    else:
+        minima = minima_of(whole, sources, sight, counter)
+        found = _explored(whole, minima, quantile, counter)
     counter.begin("check with finer cells")
-    return _result(whole, sources, found, confidence, quantile, counter.done, untold)
+    return _result(whole, sources, found, confidence, quantile, counter.done, untold, notes)
 
 
 def _quantile(confidence: float, free: int) -> float:
@@ -211,6 +218,11 @@ def _chosen(
     hammer = [one for one in sources if isinstance(one, Reading) and one.speed is None]
     if hammer and scene.piston.model == "absent":
         raise FitError(f"{hammer[0].name}: the scene has no piston")
+    if len(names) > len(hammer) == len(sources):
+        raise FitError(
+            f"{', '.join(one.name for one in hammer)}: no more unknowns than numbers of the hammer "
+            f"can be told, not {', '.join(names)}; name what to fit (--only), or add tests of rock"
+        )
     return names
 
 
@@ -239,17 +251,6 @@ def _of_one_peak(sources: Sequence[Source]) -> bool:
     """Whether all data are slow tests to about the same force."""
     peaks = [float(one.force.max()) for one in sources if isinstance(one, Curve)]
     return len(peaks) == len(sources) and max(peaks) < ONE_PEAK * min(peaks)
-
-
-class Explored(NamedTuple):
-    """The best place, its covariance, what was found around, and whether no better place was."""
-
-    best: Place
-    spread: np.ndarray
-    profiles: list[Profile]
-    minima: list[Place]
-    threshold: float
-    settled: bool
 
 
 def _explored(like: Likelihood, minima: list[Place], quantile: float, counter: Counter) -> Explored:
@@ -304,6 +305,7 @@ def _result(
     quantile: float,
     runs: int,
     untold: Sequence[str],
+    notes: Sequence[str],
 ) -> Fit:
     """Put a fit together."""
     best, spread, profiles, minima, threshold, settled = explored
@@ -316,17 +318,22 @@ def _result(
         for one in minima[1:]
         if (above := one.deviance - best.deviance) < TOLD + threshold and _outside(one, profiles)
     ]
+    sensors, mixed = sensors_of(like, best, spread)
     explained = [
-        Explained(one.name, one.data, one.data - off[: len(one.data)], noise, source)
-        for one, off, noise, source in zip(
-            like.series, best.residuals, best.noise, sources, strict=True
+        Explained(one.name, one.data, one.data - off[: len(one.data)], noise, source, sensor)
+        for one, off, noise, source, sensor in zip(
+            like.series, best.residuals, best.noise, sources, sensors, strict=True
         )
     ]
+    estimates, distrust = distrusted(estimates, explained, mixed)
     warnings = [
+        *distrust,
+        *notes,
         *interval_notes(estimates, like),
         *kept_notes(like, all(isinstance(one, Curve) for one in sources), untold),
         *([] if settled else [UNSETTLED]),
         *rough_notes((threshold - quantile) / ROUGH_FACTOR),
+        *sensor_notes(explained),
         *gap_notes(like, profiles),
         *rival_notes(rivals),
         *(note for one in explained for note in correlation_note(one)),

@@ -10,14 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from percussion_model.analysis.fitting.measurements import Curve, DropTest, Reading
-from percussion_model.analysis.fitting.predictions import bit_alone, predicted_reading
-from percussion_model.analysis.fitting.sensor import (
-    CurveSensor,
-    DropSensor,
-    Sensor,
+from percussion_model.analysis.fitting.measurements import (
+    Curve,
+    DropTest,
+    Reading,
     least_noise,
 )
+from percussion_model.analysis.fitting.predictions import bit_alone, predicted_reading
+from percussion_model.analysis.fitting.sensor import CurveSensor, DropSensor, Sensor
 from percussion_model.scene.inputs import SimulationError
 from percussion_model.scene.scene import Scene
 
@@ -72,7 +72,7 @@ class Series:
         """Measurements by a sensor."""
 
         def model(scene: Scene) -> np.ndarray:
-            return np.concatenate(sensor.sensed(scene))
+            return np.concatenate(sensor.sensed(scene)[:2])
 
         return cls(name, data, None, model, simulated, sensor)
 

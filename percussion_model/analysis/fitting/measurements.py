@@ -8,6 +8,9 @@ from typing import Any, Literal
 import numpy as np
 
 LEAST_DATA = 10
+# No noise is taken to be smaller than this share of the data's spread: data of a model
+# without noise would have an infinite likelihood.
+LEAST_NOISE = 1e-8
 # Signals that can be measured on a bit that falls: unit, and how large they are at most.
 SIGNALS = {
     "bit_position": ("m", 1.0),
@@ -23,6 +26,7 @@ QUANTITIES = {
     "rebound_velocity": ("m/s", 1e-3, 100.0),
     "penetration": ("m", 1e-6, 0.5),
     "penetration_per_blow": ("m", 1e-6, 0.5),
+    "rate_of_penetration": ("m/s", 1e-7, 1.0),
 }
 # Widths of priors where nothing else is given: of the zero of a sensor by the unit of its signal,
 # of a force or a stress by the share of the greatest; a drift adds as much over the whole record.
@@ -101,17 +105,19 @@ class Reading:
 
     Attributes
     ----------
-    quantity : {"rebound_velocity", "penetration", "penetration_per_blow"}
+    quantity : str
         Greatest upward mean velocity of the bit after a drop [m/s]; what a drop leaves of
         penetration at the end of the scene's duration [m]; mean penetration per blow of the
-        scene's hammer after settling [m].
+        scene's hammer after settling [m], and its rate [m/s].
     value, error : float
         Error: its standard deviation.
     speed : float, optional
         Of the drop [m/s]; None for the hammer.
     """
 
-    quantity: Literal["rebound_velocity", "penetration", "penetration_per_blow"]
+    quantity: Literal[
+        "rebound_velocity", "penetration", "penetration_per_blow", "rate_of_penetration"
+    ]
     value: float
     error: float
     speed: float | None = None
@@ -269,3 +275,8 @@ def checked_columns(columns: dict[str, Any]) -> list[np.ndarray]:
             f"{' and '.join(columns)}: {lengths[0]} data, at least {LEAST_DATA} are needed"
         )
     return found
+
+
+def least_noise(data: np.ndarray) -> float:
+    """What the estimated noise of data is at least."""
+    return LEAST_NOISE * (float(np.ptp(data)) or float(np.abs(data).max()))

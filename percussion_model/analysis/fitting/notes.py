@@ -29,6 +29,7 @@ from percussion_model.analysis.fitting.likelihood import (
 )
 from percussion_model.analysis.fitting.sampling import Profile
 from percussion_model.analysis.fitting.search import LEAST_STEP, MOST_STEP, STEP_SHARE
+from percussion_model.analysis.fitting.trust import neighbours
 from percussion_model.simulation.uncertain import in_digits
 from percussion_model.solvers.base import make_solver
 
@@ -153,12 +154,8 @@ def _odds(rival: Rival) -> str:
 
 def correlation_note(one: Explained) -> list[str]:
     """Say that neighbouring residuals are alike, where they are."""
-    residuals = one.residuals
-    total = float(residuals @ residuals)
-    if len(residuals) < 2 or not total > (len(residuals) * one.noise * 1e-6) ** 2:
-        return []
-    correlation = float(residuals[1:] @ residuals[:-1]) / total
-    if correlation * math.sqrt(len(residuals)) <= MOST_CORRELATION:
+    correlation = neighbours(one)
+    if correlation * math.sqrt(len(one.residuals)) <= MOST_CORRELATION:
         return []
     return [
         f"{one.name}: neighbouring residuals are alike (correlation {correlation:.2f}): the model "

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -89,6 +90,17 @@ class Profile:
     gap: tuple[float, float] | None
     values: np.ndarray = field(repr=False)
     deviance: np.ndarray = field(repr=False)
+
+
+class Explored(NamedTuple):
+    """The best place, its covariance, what was found around, and whether no better place was."""
+
+    best: Place
+    spread: np.ndarray
+    profiles: list[Profile]
+    minima: list[Place]
+    threshold: float
+    settled: bool
 
 
 def steps_wanted(free: int) -> int:

@@ -12,25 +12,27 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from percussion_model.analysis.fitting.curve import SlowFit, best_datum_and_peak
-from percussion_model.analysis.fitting.measurements import SIGNALS, Curve, DropTest
+from percussion_model.analysis.fitting.curve import best_datum_and_peak
+from percussion_model.analysis.fitting.measurements import (
+    SIGNALS,
+    Curve,
+    DropTest,
+    least_noise,
+)
 from percussion_model.analysis.fitting.predictions import DropOnRocks, bit_alone
 from percussion_model.scene.scene import Scene
 
 OFFSET, DRIFT, DELAY = "offset", "drift", "delay"
-# No noise is taken to be smaller than this share of the data's spread: data of a model
-# without noise would have an infinite likelihood.
-LEAST_NOISE = 1e-8
 # A trigger is looked for within so many widths of its prior.
 REACH = 3.0
 # Samples of the model between which a delayed signal is read are no farther apart than this, of
-# positions and of all else [s], and no more in number.
+# positions and of all else [s], twice as far in a search by few data; and no more in number.
 FINE, FINER, MOST_SAMPLES = 5e-5, 2.5e-5, 20_000
-# The delay is first tried at so many values in so many data; the best few are improved.
-TRIED, TRIED_IN, IMPROVED = 121, 100, 2
-# Steps of least squares at most, the size of the last in widths, and halvings of one; and the
-# size of the last for a curve, whose datum and peak are known no better.
-ROUNDS, ARRIVED, HALVINGS, CURVE_ARRIVED = 30, 1e-9, 8, 1e-5
+# The delay is first tried at so many values in so many data; the best is improved, and the second
+# best if it leaves a noise that is no greater by this.
+TRIED, TRIED_IN, NEAR = 61, 60, 2.0
+# Steps of least squares at most, the size of the last in widths, and halvings of one.
+ROUNDS, ARRIVED, HALVINGS = 30, 1e-7, 8
 
 # Signal, and its slope over the pull of the delay.
 Shown = tuple[np.ndarray, np.ndarray]
@@ -45,10 +47,12 @@ class Unknown(NamedTuple):
 
 
 class Sensed(NamedTuple):
-    """What a sensor shows of the model, and its unknowns by the widths of their priors."""
+    """What a sensor shows of the model, its unknowns by the widths of their priors, and their
+    covariance with this rock."""
 
     fitted: np.ndarray
     pulls: np.ndarray
+    spread: np.ndarray
 
 
 class Sensor(Protocol):
@@ -59,11 +63,6 @@ class Sensor(Protocol):
     def sensed(self, scene: Scene) -> Sensed:
         """What it shows of a rock where its unknowns are likeliest."""
         ...
-
-
-def least_noise(data: np.ndarray) -> float:
-    """What the estimated noise of data is at least."""
-    return LEAST_NOISE * (float(np.ptp(data)) or float(np.abs(data).max()))
 
 
 class DropSensor:
@@ -92,7 +91,7 @@ class DropSensor:
         self._steady = np.stack(steady, axis=1) if steady else np.zeros((len(self._time), 0))
         self._ahead = 0
         if drop.delay > 0.0:
-            self._step = _step_of(drop)
+            self._step = _step_of(drop, 1.0 if len(kept) == len(drop.time) else 2.0)
             self._ahead = math.ceil(REACH * drop.delay / self._step) + 2
             count = math.ceil(drop.time[-1] / self._step) + self._ahead + 2
             self._model = DropOnRocks(drop, self._step * np.arange(count))
@@ -103,7 +102,8 @@ class DropSensor:
         """What it shows of a rock where its unknowns are likeliest."""
         signal = self._model(scene)
         if not np.isfinite(signal).all():
-            return Sensed(np.full(len(self._data), math.nan), np.zeros(len(self.unknowns)))
+            count = len(self.unknowns)
+            return Sensed(np.full(len(self._data), math.nan), np.zeros(count), np.eye(count))
         if not self._ahead:
             return self._best(lambda _: (signal, np.zeros((len(signal), 0))), 0)
         early = -self._step * np.arange(self._ahead, 0, -1)
@@ -141,14 +141,14 @@ class DropSensor:
         above = len(every) * np.log(np.maximum((off**2).mean(axis=1), floor)) + pulls**2
         padded = np.pad(above, 1, constant_values=math.inf)
         dips = np.flatnonzero((above <= padded[:-2]) & (above <= padded[2:]))
-        return [float(pulls[dip]) for dip in dips[np.argsort(above[dips])][:IMPROVED]]
+        dips = dips[np.argsort(above[dips])]
+        near = above[dips] <= above[dips[0]] + 2.0 * len(every) * math.log(NEAR)
+        return [float(pulls[dip]) for dip in dips[near][:2]]
 
     def _deviance(self, found: Sensed) -> float:
         return _deviance_of(self._data - found.fitted, found.pulls, self._data)
 
-    def _best(
-        self, model: Callable[[np.ndarray], Shown], free: int, first: float = 0.0
-    ) -> Sensed:
+    def _best(self, model: Callable[[np.ndarray], Shown], free: int, first: float = 0.0) -> Sensed:
         """Least squares over all unknowns from a delay; the noise is estimated along."""
         steady, data = self._steady, self._data
         split = steady.shape[1]
@@ -163,8 +163,8 @@ class DropSensor:
         for _ in range(ROUNDS):
             columns = np.concatenate([steady, slope], axis=1)
             variance = max(float(off @ off) / len(off), least_noise(data) ** 2)
-            curved = columns.T @ columns / variance + np.eye(len(pulls))
-            step = np.linalg.solve(curved, columns.T @ off / variance - pulls)
+            spread = np.linalg.inv(columns.T @ columns / variance + np.eye(len(pulls)))
+            step = spread @ (columns.T @ off / variance - pulls)
             for _ in range(HALVINGS):
                 there = pulls + step
                 there[split:] = np.clip(there[split:], -REACH, REACH)
@@ -178,7 +178,7 @@ class DropSensor:
             pulls, (off, slope, deviance) = there, tried
             if moved < ARRIVED:
                 break
-        return Sensed(data - off, pulls)
+        return Sensed(data - off, pulls, spread)
 
 
 def _deviance_of(off: np.ndarray, pulls: np.ndarray, data: np.ndarray) -> float:
@@ -186,10 +186,10 @@ def _deviance_of(off: np.ndarray, pulls: np.ndarray, data: np.ndarray) -> float:
     return len(off) * math.log(variance) + float(pulls @ pulls)
 
 
-def _step_of(drop: DropTest) -> float:
+def _step_of(drop: DropTest, share: float) -> float:
     """Time between samples of the model: a whole part of that between the data."""
     between = float(np.median(np.diff(drop.time)))
-    fine = FINE if drop.signal.endswith("position") else FINER
+    fine = share * (FINE if drop.signal.endswith("position") else FINER)
     fine = max(fine, float(drop.time[-1]) / MOST_SAMPLES)
     return between / math.ceil(between / fine)
 
@@ -223,29 +223,6 @@ class CurveSensor:
 
     def sensed(self, scene: Scene) -> Sensed:
         """What it shows of a rock where its unknowns are likeliest."""
-        force, width = self._curve.force, self._curve.offset
-        if not self.unknowns:
-            return Sensed(self._fit(scene, 0.0).force, np.zeros(0))
-
-        def best(pull: float) -> tuple[float, np.ndarray, float]:
-            """Slope of half the deviance over the pull, residuals, and the variance."""
-            off = force - width * pull - self._fit(scene, width * pull).force
-            variance = max(float(off @ off) / len(off), least_noise(force) ** 2)
-            return pull - width * float(off.sum()) / variance, off, variance
-
-        pull, (slope, off, variance) = 0.0, best(0.0)
-        # as if nothing else followed, which goes too far at most
-        step = -slope / (1.0 + len(off) * width**2 / variance)
-        for _ in range(ROUNDS):
-            there = pull + step
-            found = best(there)
-            if abs(step) < CURVE_ARRIVED or found[0] == slope:
-                break
-            step = -found[0] * step / (found[0] - slope)
-            pull, (slope, off, _) = there, found
-        return Sensed(force - off, np.array([pull]))
-
-    def _fit(self, scene: Scene, offset: float) -> SlowFit:
-        curve = self._curve
-        shifted = Curve(curve.penetration, curve.force - offset, curve.name)
-        return best_datum_and_peak(shifted, scene, self._guess)
+        found = best_datum_and_peak(self._curve, scene, self._guess)
+        count = len(self.unknowns)
+        return Sensed(found.force, np.full(count, found.pull), found.variance * np.eye(count))
