@@ -25,7 +25,7 @@ UNITS = {
     "s": ("s", "ms", "us"),
     "N": ("N", "kN", "MN", "lbf"),
     "Pa": ("Pa", "kPa", "MPa", "GPa", "psi"),
-    "m/s": ("m/s", "mm/s", "km/h"),
+    "m/s": ("m/s", "mm/s", "km/h", "m/h", "m/min", "mm/min", "ft/h"),
 }
 CURVE_COLUMNS = {"penetration": "m", "force": "N"}
 DROP_COLUMNS = {"time": "s"} | {name: unit for name, (unit, _) in SIGNALS.items()}

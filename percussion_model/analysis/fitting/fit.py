@@ -68,6 +68,8 @@ from percussion_model.analysis.fitting.sampling import (
     walk,
 )
 from percussion_model.analysis.fitting.search import (
+    APART,
+    beside,
     descend,
     polish,
     roughness,
@@ -89,6 +91,8 @@ RANGES = {
 # Walks in turn, each from the best so far: shares of all steps. The search met all there is
 # where the last one finds nothing better by this share of the threshold.
 ROUNDS, BETTER = (0.4, 0.6), 0.25
+# Share of all steps for each other minimum that explains the data as well.
+RIVAL_SHARE = 0.2
 # Peaks of slow tests within this factor are one: they tell gamma there, and q not at all.
 ONE_PEAK = 1.02
 # A parameter whose interval is wider than a factor of ten is not called determined; an exponent,
@@ -174,14 +178,19 @@ def fit_rock(
     whole = Likelihood(scene, series_of(sources, sight), names, box, counter.tick)
     quantile = _quantile(confidence, len(names))
     notes: list[str] = []
+    unreached: list[str] = []
     if len(names) == 1 and len(sources) == 1 and isinstance(sources[0], Reading):
         counter.begin("bisection")
-        found, notes = solved(whole, sources[0], quantile)
+        found, notes, unreached = solved(whole, sources[0], quantile)
     else:
         minima = minima_of(whole, sources, sight, counter)
-        found = _explored(whole, minima, quantile, counter)
+        unknowns = sum(one.unknowns for one in whole.series if one.simulated)
+        alike = _quantile(confidence, len(names) + unknowns)
+        found = _explored(whole, minima, quantile, alike, counter)
     counter.begin("check with finer cells")
-    return _result(whole, sources, found, confidence, quantile, counter.done, untold, notes)
+    return _result(
+        whole, sources, found, confidence, quantile, counter.done, untold, notes, unreached
+    )
 
 
 def _quantile(confidence: float, free: int) -> float:
@@ -253,9 +262,19 @@ def _of_one_peak(sources: Sequence[Source]) -> bool:
     return len(peaks) == len(sources) and max(peaks) < ONE_PEAK * min(peaks)
 
 
-def _explored(like: Likelihood, minima: list[Place], quantile: float, counter: Counter) -> Explored:
-    """Walk from the best of all minima, twice: the second knows how wide the first went."""
+def _explored(
+    like: Likelihood, minima: list[Place], quantile: float, alike: float, counter: Counter
+) -> Explored:
+    """Walk from the best of all minima, twice: the second knows how wide the first went.
+
+    Minima apart that are less than `alike` above the best explain the data as well: unknowns of
+    sensors make one of them the best by luck.
+    """
     every, rng = range(len(like.names)), np.random.default_rng(0)
+    if alike > quantile:
+        counter.begin("minima beside the best")
+        minima = beside(like, minima[0], SLOW, TOLD) + minima[1:]
+        minima.sort(key=lambda one: one.deviance)
     walked = Walk.of(minima)
     wide: np.ndarray | None = None
     for turn, share in enumerate(ROUNDS, 1):
@@ -275,6 +294,13 @@ def _explored(like: Likelihood, minima: list[Place], quantile: float, counter: C
             minima = [place, *minima]
     best, spread = descend(like, minima[0].at, every)
     walked = walked.joined(Walk.of([best]))
+    for other in minima[1:]:
+        # a dip of its own, unless it is one of what was met
+        if other.deviance < best.deviance + alike and _is_apart(other, walked, best, threshold):
+            there, wide_there = descend(like, other.at, every)
+            steps = round(RIVAL_SHARE * steps_wanted(len(every)))
+            met = walk(like, there, wide_there, threshold, steps, rng)
+            walked = walked.joined(met.lifted(there.deviance, float(walked.deviance.min())))
     counter.begin("ends of the intervals")
     beyond = pushed_out(
         like,
@@ -292,6 +318,13 @@ def _explored(like: Likelihood, minima: list[Place], quantile: float, counter: C
     return Explored(best, spread, profiles, minima, threshold, settled)
 
 
+def _is_apart(place: Place, walked: Walk, best: Place, threshold: float) -> bool:
+    """Whether a minimum lies outside of what a walk met below a threshold, in one parameter."""
+    inside = walked.at[walked.deviance < best.deviance + threshold]
+    low, high = inside.min(axis=0) + APART, inside.max(axis=0) - APART
+    return bool(np.any((place.at < low) | (place.at > high)))
+
+
 def _outside(place: Place, profiles: Sequence[Profile]) -> bool:
     """Whether a place lies outside of an interval, in one parameter at least."""
     return any(not one.low <= at <= one.high for at, one in zip(place.at, profiles, strict=True))
@@ -306,6 +339,7 @@ def _result(
     runs: int,
     untold: Sequence[str],
     notes: Sequence[str],
+    unreached: Sequence[str],
 ) -> Fit:
     """Put a fit together."""
     best, spread, profiles, minima, threshold, settled = explored
@@ -325,7 +359,7 @@ def _result(
             like.series, best.residuals, best.noise, sources, sensors, strict=True
         )
     ]
-    estimates, distrust = distrusted(estimates, explained, mixed)
+    estimates, distrust = distrusted(estimates, explained, mixed, unreached)
     warnings = [
         *distrust,
         *notes,

@@ -103,10 +103,12 @@ class SensorEstimate(NamedTuple):
     error: float
     width: float
 
-    def text(self) -> str:
-        """Value, error and prior in words."""
-        value, error, width = (in_digits(one, 2) for one in (self.value, self.error, self.width))
-        return f"{self.name} {value} ± {error} {self.unit} (prior ± {width})"
+    def texts(self) -> tuple[str, str, str]:
+        """Value, error and width with their unit."""
+        value, error, width = (
+            f"{in_digits(one, 2)} {self.unit}" for one in (self.value, self.error, self.width)
+        )
+        return value, error, width
 
 
 @dataclass(frozen=True)

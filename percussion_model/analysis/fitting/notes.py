@@ -64,7 +64,7 @@ def interval_notes(estimates: Mapping[str, Estimate], like: Likelihood) -> list[
             f"{low} to {high}",
             WIDE: f"is not determined: {width}, {low} to {high}, explains the data",
         }.get(one.verdict)
-        if told is None and apart > math.log10(ROUGHLY):
+        if told is None and one.determined and apart > math.log10(ROUGHLY):
             told = f"is determined only to {roughly}: {low} to {high}"
         if told is not None:
             notes.append(f"{NAMES[name]} ({name}) {told}")

@@ -59,6 +59,12 @@ class Walk:
         """Places that are known already."""
         return cls(np.array([one.at for one in places]), np.array([one.deviance for one in places]))
 
+    def lifted(self, dip: float, floor: float) -> Walk:
+        """What lies above the bottom of a dip, as if that were as low as a floor."""
+        return Walk(
+            self.at, np.where(self.deviance < dip, self.deviance, self.deviance - dip + floor)
+        )
+
     @property
     def best(self) -> np.ndarray:
         """The likeliest place."""

@@ -14,7 +14,8 @@ from percussion_model.analysis.fitting.sampling import Explored, Profile
 from percussion_model.simulation.uncertain import in_digits
 
 # The whole range is looked at in so many places: between two of them a number may be met once.
-PLACES = 13
+# Then around what explains it in so many.
+PLACES, FINER = 13, 13
 # Where it is met, to this in the coordinate; where nothing meets it the nearest is sought by so
 # many runs.
 EXACT, NEAREST = 1e-4, 12
@@ -70,8 +71,10 @@ class Response:
             )  # fmt: skip
 
 
-def solved(like: Likelihood, reading: Reading, threshold: float) -> tuple[Explored, list[str]]:
-    """Find the values of one unknown that give a number, and what should be known of them.
+def solved(
+    like: Likelihood, reading: Reading, threshold: float
+) -> tuple[Explored, list[str], list[str]]:
+    """Find the values of one unknown that give a number, what to know of them, and why none does.
 
     Parameters
     ----------
@@ -95,13 +98,24 @@ def solved(like: Likelihood, reading: Reading, threshold: float) -> tuple[Explor
     limit = math.sqrt(threshold)
     for level in (-limit, limit):
         response.crossings(level)
+    near = [at for at in response.met if abs(response(at)) <= limit]
+    if near:
+        # the response may rise and fall within the errors, and beside them
+        width = max(max(near) - min(near), EXACT)
+        for at in np.linspace(min(near) - width, max(near) + width, FINER):
+            response(float(np.clip(at, low, high)))
+        for level in (-limit, limit):
+            response.crossings(level)
+        roots = [at for at in response.crossings(0.0) if abs(response(at)) < MET]
+        best = min(response.met.values(), key=lambda one: one.deviance)
     at = np.array(sorted(response.met))
     above = np.array([response(one) ** 2 for one in at])
     inside = np.flatnonzero(above <= threshold * (1.0 + EXACT))
+    unreached: list[str] = []
     notes = [] if math.isnan(own) else [_run_note(reading, best, own)]
     if not len(inside):
         profile = Profile(-math.inf, math.inf, None, at, above)
-        notes.append(_reach(like, reading, response))
+        unreached = [_reach(like, reading, response)]
     else:
         parts = np.split(at[inside], np.flatnonzero(np.diff(inside) > 1) + 1)
         gaps = [(float(a[-1]), float(b[0])) for a, b in pairwise(parts)]
@@ -117,7 +131,8 @@ def solved(like: Likelihood, reading: Reading, threshold: float) -> tuple[Explor
         values = ", ".join(in_digits(float(values_at(like.names[0], one))) for one in roots)
         notes.append(f"{reading.name}: {len(roots)} values give it alike: {values}")
     spread = np.array([[_variance(response, float(best.at[0]), high)]])
-    return Explored(best, spread, [profile], [best, *others], threshold, True), notes
+    found = Explored(best, spread, [profile], [best, *others], threshold, True)
+    return found, notes, unreached
 
 
 def _variance(response: Response, at: float, high: float) -> float:

@@ -91,9 +91,15 @@ def sensors_of(
 
 
 def distrusted(
-    estimates: Mapping[str, Estimate], explained: Sequence[Explained], mixed: Mapping[str, str]
+    estimates: Mapping[str, Estimate],
+    explained: Sequence[Explained],
+    mixed: Mapping[str, str],
+    known: Sequence[str] = (),
 ) -> tuple[dict[str, Estimate], list[str]]:
-    """Estimates without the word "determined" where it is not earned, and why it is not."""
+    """Estimates without the word "determined" where it is not earned, and why it is not.
+
+    `known` are reasons that are known already.
+    """
     off = [one for one in explained if not is_explained(one)]
     ends = [
         f"the {it.name} of {one.name} is at the end of what was searched, {REACH:g} widths"
@@ -101,11 +107,11 @@ def distrusted(
         for it in one.sensor
         if it.name == DELAY and abs(it.value) > (REACH - AT_END) * it.width
     ]
-    why = [_misfit(one) for one in off] + ends
+    why = [*known, *(ends if known else [_misfit(one) for one in off] + ends)]
     kept, notes = {}, []
     for name, one in estimates.items():
         kept[name] = one
-        if one.determined and why:
+        if why:
             kept[name] = one._replace(verdict=MISFIT)
             notes.append(f"{NAMES[name]} ({name}) is not determined: {'; '.join(why)}")
         elif one.determined and name in mixed:
