@@ -22,6 +22,7 @@ from percussion_model.analysis.fitting.found import (
     Explained,
     Fit,
     Rival,
+    SensorEstimate,
     Source,
 )
 from percussion_model.analysis.fitting.likelihood import (
@@ -177,19 +178,18 @@ def fit_rock(
     counter = Counter(progress, stage)
     whole = Likelihood(scene, series_of(sources, sight), names, box, counter.tick)
     quantile = _quantile(confidence, len(names))
-    notes: list[str] = []
-    unreached: list[str] = []
     if len(names) == 1 and len(sources) == 1 and isinstance(sources[0], Reading):
         counter.begin("bisection")
-        found, notes, unreached = solved(whole, sources[0], quantile)
+        found = solved(whole, sources[0], quantile)
     else:
         minima = minima_of(whole, sources, sight, counter)
         unknowns = sum(one.unknowns for one in whole.series if one.simulated)
         alike = _quantile(confidence, len(names) + unknowns)
         found = _explored(whole, minima, quantile, alike, counter)
+    sensors, mixed = sensors_of(whole, found.best, found.spread)
     counter.begin("check with finer cells")
     return _result(
-        whole, sources, found, confidence, quantile, counter.done, untold, notes, unreached
+        whole, sources, found, confidence, quantile, counter.done, untold, sensors, mixed
     )
 
 
@@ -338,11 +338,11 @@ def _result(
     quantile: float,
     runs: int,
     untold: Sequence[str],
-    notes: Sequence[str],
-    unreached: Sequence[str],
+    sensors: Sequence[tuple[SensorEstimate, ...]],
+    mixed: Mapping[str, str],
 ) -> Fit:
     """Put a fit together."""
-    best, spread, profiles, minima, threshold, settled = explored
+    best, spread, profiles, minima, threshold, settled, notes, unreached = explored
     estimates, curves = {}, {}
     for k, (name, found) in enumerate(zip(like.names, profiles, strict=True)):
         estimates[name] = _estimate(name, best.at[k], found, like.low[k], like.high[k])
@@ -352,7 +352,6 @@ def _result(
         for one in minima[1:]
         if (above := one.deviance - best.deviance) < TOLD + threshold and _outside(one, profiles)
     ]
-    sensors, mixed = sensors_of(like, best, spread)
     explained = [
         Explained(one.name, one.data, one.data - off[: len(one.data)], noise, source, sensor)
         for one, off, noise, source, sensor in zip(

@@ -206,13 +206,14 @@ def checked_drop(drop: DropTest) -> DropTest:
     check_speed(f"speed of {name}", drop.speed)
     offset = OFFSETS.get(unit, OFFSET_SHARE * float(np.abs(values).max()))
     offset = offset if drop.offset is None else drop.offset
-    widths = {
-        "offset": offset,
-        "drift": offset / float(time[-1]) if drop.drift is None else drop.drift,
-        "delay": min(DELAY, DELAY_SHARE * float(time[-1])) if drop.delay is None else drop.delay,
-    }
-    widths = {key: _checked_width(f"{key} of {name}", width) for key, width in widths.items()}
-    return replace(drop, time=time, values=values, speed=float(drop.speed), **widths)
+    drift = offset / float(time[-1]) if drop.drift is None else drop.drift
+    delay = min(DELAY, DELAY_SHARE * float(time[-1])) if drop.delay is None else drop.delay
+    return replace(
+        drop, time=time, values=values, speed=float(drop.speed),
+        offset=_checked_width(f"offset of {name}", offset),
+        drift=_checked_width(f"drift of {name}", drift),
+        delay=_checked_width(f"delay of {name}", delay),
+    )  # fmt: skip
 
 
 def check_reading(reading: Reading) -> None:

@@ -99,7 +99,8 @@ class Profile:
 
 
 class Explored(NamedTuple):
-    """The best place, its covariance, what was found around, and whether no better place was."""
+    """The best place, its covariance, what was found around, whether no better place was, what to
+    know of it, and why nothing explains the data if that is so."""
 
     best: Place
     spread: np.ndarray
@@ -107,6 +108,8 @@ class Explored(NamedTuple):
     minima: list[Place]
     threshold: float
     settled: bool
+    notes: Sequence[str] = ()
+    unreached: Sequence[str] = ()
 
 
 def steps_wanted(free: int) -> int:

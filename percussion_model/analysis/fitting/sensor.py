@@ -55,6 +55,17 @@ class Sensed(NamedTuple):
     spread: np.ndarray
 
 
+class Tried(NamedTuple):
+    """Delays that are tried first: their pulls, samples of the model and places between them, the
+    data, and directions of the other unknowns."""
+
+    pulls: np.ndarray
+    samples: np.ndarray
+    between: np.ndarray
+    data: np.ndarray
+    base: np.ndarray
+
+
 class Sensor(Protocol):
     """A sensor with unknowns."""
 
@@ -90,11 +101,13 @@ class DropSensor:
         steady = [one.width * columns[one.name] for one in self.unknowns if one.name != DELAY]
         self._steady = np.stack(steady, axis=1) if steady else np.zeros((len(self._time), 0))
         self._ahead = 0
+        self._early: np.ndarray | None = None
         if drop.delay > 0.0:
             self._step = _step_of(drop, 1.0 if len(kept) == len(drop.time) else 2.0)
             self._ahead = math.ceil(REACH * drop.delay / self._step) + 2
             count = math.ceil(drop.time[-1] / self._step) + self._ahead + 2
             self._model = DropOnRocks(drop, self._step * np.arange(count))
+            self._tried = self._places_tried(count + self._ahead)
         else:
             self._model = DropOnRocks(drop, self._time)
 
@@ -106,8 +119,10 @@ class DropSensor:
             return Sensed(np.full(len(self._data), math.nan), np.zeros(count), np.eye(count))
         if not self._ahead:
             return self._best(lambda _: (signal, np.zeros((len(signal), 0))), 0)
-        early = -self._step * np.arange(self._ahead, 0, -1)
-        signal = np.concatenate([_before(self._drop, scene, early, signal[0]), signal])
+        if self._early is None:  # it does not depend on the rock
+            early = -self._step * np.arange(self._ahead, 0, -1)
+            self._early = _before(self._drop, scene, early)
+        signal = np.concatenate([self._early + signal[0], signal])
 
         def delayed(pull: np.ndarray) -> Shown:
             return self._read(signal, float(pull[0]))
@@ -126,23 +141,28 @@ class DropSensor:
         slope = (a + x * (2.0 * b + 3.0 * c * x)) * (self._drop.delay / self._step)
         return here + x * (a + x * (b + x * c)), slope[:, None]
 
-    def _first_delays(self, signal: np.ndarray) -> list[float]:
-        """Delays, in widths, near which data are best explained in a few samples."""
+    def _places_tried(self, count: int) -> Tried:
+        """Where among so many samples of the model the delays that are tried first are read."""
         every = np.arange(0, len(self._time), math.ceil(len(self._time) / TRIED_IN))
         pulls = np.linspace(-REACH, REACH, TRIED)
         place = self._time[every] + (pulls * self._drop.delay)[:, None]
         k, x = np.divmod(place / self._step + self._ahead, 1.0)
-        k = np.clip(k.astype(int), 0, len(signal) - 2)
-        off = self._data[every] - (signal[k] + x * (signal[k + 1] - signal[k]))
-        if self._steady.shape[1]:
-            base = np.linalg.qr(self._steady[every])[0]
-            off = off - (off @ base) @ base.T
+        k = np.clip(k.astype(int), 0, count - 2)
+        return Tried(pulls, k, x, self._data[every], np.linalg.qr(self._steady[every])[0])
+
+    def _first_delays(self, signal: np.ndarray) -> list[float]:
+        """Delays, in widths, near which data are best explained in a few samples."""
+        pulls, k, x, data, base = self._tried
+        here = signal[k]
+        off = data - (here + x * (signal[k + 1] - here))
+        off -= (off @ base) @ base.T
         floor = least_noise(self._data) ** 2
-        above = len(every) * np.log(np.maximum((off**2).mean(axis=1), floor)) + pulls**2
+        square = np.einsum("ij,ij->i", off, off) / len(data)
+        above = len(data) * np.log(np.maximum(square, floor)) + pulls**2
         padded = np.pad(above, 1, constant_values=math.inf)
         dips = np.flatnonzero((above <= padded[:-2]) & (above <= padded[2:]))
         dips = dips[np.argsort(above[dips])]
-        near = above[dips] <= above[dips[0]] + 2.0 * len(every) * math.log(NEAR)
+        near = above[dips] <= above[dips[0]] + 2.0 * len(data) * math.log(NEAR)
         return [float(pulls[dip]) for dip in dips[near][:2]]
 
     def _deviance(self, found: Sensed) -> float:
@@ -194,16 +214,16 @@ def _step_of(drop: DropTest, share: float) -> float:
     return between / math.ceil(between / fine)
 
 
-def _before(drop: DropTest, scene: Scene, times: np.ndarray, first: float) -> np.ndarray:
-    """Signal before time zero, while the bit falls freely."""
+def _before(drop: DropTest, scene: Scene, times: np.ndarray) -> np.ndarray:
+    """Signal before time zero, less that at zero, while the bit falls freely."""
     scene = bit_alone(scene)
     weight = scene["gravity.acceleration"] if scene.effects.gravity else 0.0
     acceleration = weight + scene.feed.force / scene.bit.mass
     if drop.signal.endswith("position"):
-        return first + times * (drop.speed + 0.5 * acceleration * times)
+        return times * (drop.speed + 0.5 * acceleration * times)
     if drop.signal.endswith("velocity"):
-        return first + acceleration * times
-    return np.full(len(times), first)
+        return acceleration * times
+    return np.zeros(len(times))
 
 
 class CurveSensor:

@@ -71,9 +71,7 @@ class Response:
             )  # fmt: skip
 
 
-def solved(
-    like: Likelihood, reading: Reading, threshold: float
-) -> tuple[Explored, list[str], list[str]]:
+def solved(like: Likelihood, reading: Reading, threshold: float) -> Explored:
     """Find the values of one unknown that give a number, what to know of them, and why none does.
 
     Parameters
@@ -131,8 +129,8 @@ def solved(
         values = ", ".join(in_digits(float(values_at(like.names[0], one))) for one in roots)
         notes.append(f"{reading.name}: {len(roots)} values give it alike: {values}")
     spread = np.array([[_variance(response, float(best.at[0]), high)]])
-    found = Explored(best, spread, [profile], [best, *others], threshold, True)
-    return found, notes, unreached
+    minima = [best, *others]
+    return Explored(best, spread, [profile], minima, threshold, True, notes, unreached)
 
 
 def _variance(response: Response, at: float, high: float) -> float:

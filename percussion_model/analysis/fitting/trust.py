@@ -23,6 +23,8 @@ from percussion_model.simulation.uncertain import in_digits
 # Neighbouring residuals so alike are twice what independent noise would leave between them; and
 # where residuals are this share of how far the data vary, the model says little of them.
 ALIKE, LITTLE = 0.75, 0.5
+# Residuals below this share of how far the data vary are of data without noise.
+ROUNDING = 1e-5
 # A single number is not explained that is off by so many of its errors.
 OFF = 4.0
 # An unknown of a sensor whose error is this share of its prior is known by that alone, and one
@@ -46,7 +48,8 @@ def is_explained(one: Explained) -> bool:
     """Whether residuals of a series are what its noise may leave."""
     if isinstance(one.source, Reading):
         return bool(np.abs(one.residuals).max() <= OFF * one.noise)
-    return neighbours(one) <= ALIKE and one.noise <= LITTLE * float(np.std(one.data))
+    share = one.noise / (float(np.std(one.data)) or 1.0)
+    return share <= ROUNDING or (neighbours(one) <= ALIKE and share <= LITTLE)
 
 
 def sensors_of(
