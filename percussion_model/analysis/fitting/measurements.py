@@ -203,6 +203,8 @@ def checked_drop(drop: DropTest) -> DropTest:
             f"{name}: {drop.signal} spans {np.ptp(values):.3g} {unit}, more than {most:g} {unit} "
             f'cannot be: write its unit into the heading, as in "{drop.signal} [m{unit}]"'
         )
+    if not np.ptp(values) > 0.0:
+        raise FitError(f"{name}: {drop.signal} does not change")
     check_speed(f"speed of {name}", drop.speed)
     offset = OFFSETS.get(unit, OFFSET_SHARE * float(np.abs(values).max()))
     offset = offset if drop.offset is None else drop.offset
