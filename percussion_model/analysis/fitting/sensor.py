@@ -90,21 +90,21 @@ class DropSensor:
     def __init__(self, drop: DropTest, kept: np.ndarray) -> None:
         self._drop, self._time, self._data = drop, drop.time[kept], drop.values[kept]
         unit = SIGNALS[drop.signal][0]
-        given = zip(
-            (OFFSET, DRIFT, DELAY),
-            (unit, unit + "/s", "s"),
-            (drop.offset, drop.drift, drop.delay),
-            strict=True,
+        offset, drift, self._delay = (one or 0.0 for one in (drop.offset, drop.drift, drop.delay))
+        given = (
+            Unknown(OFFSET, unit, offset),
+            Unknown(DRIFT, unit + "/s", drift),
+            Unknown(DELAY, "s", self._delay),
         )
-        self.unknowns = tuple(Unknown(*one) for one in given if one[2] > 0.0)
+        self.unknowns = tuple(one for one in given if one.width > 0.0)
         columns = {OFFSET: np.ones(len(self._time)), DRIFT: self._time}
         steady = [one.width * columns[one.name] for one in self.unknowns if one.name != DELAY]
         self._steady = np.stack(steady, axis=1) if steady else np.zeros((len(self._time), 0))
         self._ahead = 0
         self._early: np.ndarray | None = None
-        if drop.delay > 0.0:
+        if self._delay > 0.0:
             self._step = _step_of(drop, 1.0 if len(kept) == len(drop.time) else 2.0)
-            self._ahead = math.ceil(REACH * drop.delay / self._step) + 2
+            self._ahead = math.ceil(REACH * self._delay / self._step) + 2
             count = math.ceil(drop.time[-1] / self._step) + self._ahead + 2
             self._model = DropOnRocks(drop, self._step * np.arange(count))
             self._tried = self._places_tried(count + self._ahead)
@@ -132,20 +132,20 @@ class DropSensor:
 
     def _read(self, signal: np.ndarray, pull: float) -> Shown:
         """Signal at the times of the data with a delay, by cubics, and its slope over the pull."""
-        place = (self._time + pull * self._drop.delay) / self._step + self._ahead
+        place = (self._time + pull * self._delay) / self._step + self._ahead
         k = np.clip(place.astype(int), 1, len(signal) - 3)
         x = place - k
         before, here, there, after = signal[k - 1], signal[k], signal[k + 1], signal[k + 2]
         a, b = 0.5 * (there - before), before - 2.5 * here + 2.0 * there - 0.5 * after
         c = 0.5 * (after - before) + 1.5 * (here - there)
-        slope = (a + x * (2.0 * b + 3.0 * c * x)) * (self._drop.delay / self._step)
+        slope = (a + x * (2.0 * b + 3.0 * c * x)) * (self._delay / self._step)
         return here + x * (a + x * (b + x * c)), slope[:, None]
 
     def _places_tried(self, count: int) -> Tried:
         """Where among so many samples of the model the delays that are tried first are read."""
         every = np.arange(0, len(self._time), math.ceil(len(self._time) / TRIED_IN))
         pulls = np.linspace(-REACH, REACH, TRIED)
-        place = self._time[every] + (pulls * self._drop.delay)[:, None]
+        place = self._time[every] + (pulls * self._delay)[:, None]
         k, x = np.divmod(place / self._step + self._ahead, 1.0)
         k = np.clip(k.astype(int), 0, count - 2)
         return Tried(pulls, k, x, self._data[every], np.linalg.qr(self._steady[every])[0])
@@ -239,7 +239,8 @@ class CurveSensor:
 
     def __init__(self, curve: Curve, guess: tuple[float, float]) -> None:
         self._curve, self._guess = curve, guess
-        self.unknowns = (Unknown(OFFSET, "N", curve.offset),) if curve.offset > 0.0 else ()
+        width = curve.offset or 0.0
+        self.unknowns: tuple[Unknown, ...] = (Unknown(OFFSET, "N", width),) if width > 0.0 else ()
 
     def sensed(self, scene: Scene) -> Sensed:
         """What it shows of a rock where its unknowns are likeliest."""

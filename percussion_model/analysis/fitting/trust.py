@@ -67,7 +67,8 @@ def sensors_of(
     steps = np.clip(STEP_SHARE * np.sqrt(np.diag(spread)), LEAST_STEP, MOST_STEP)
     steps = np.where(best.at + steps > like.high, -steps, steps)
     beside = [like.at(best.at + row) for row in np.diag(steps)]
-    found, mixed = [], {}
+    found: list[tuple[SensorEstimate, ...]] = []
+    mixed: dict[str, str] = {}
     for k, one in enumerate(like.series):
         if one.sensor is None or not one.unknowns:
             found.append(())

@@ -211,8 +211,8 @@ def _show(found: Fit, scene: Scene) -> None:
         noise = f"{source.noise_text()} {source.unit}"
         word = "given" if source.noise_is_given else "estimated"
         noises.add_row(source.name, str(len(source.data)), noise, word)
-        for one in source.sensor:
-            sensors.add_row(source.name, one.name, *one.texts())
+        for it in source.sensor:
+            sensors.add_row(source.name, it.name, *it.texts())
     print_table(noises, console)
     if sensors.rows:
         print_table(sensors, console)
