@@ -147,10 +147,13 @@ def best_datum_and_peak(curve: Curve, scene: Scene, guess: tuple[float, float]) 
                 found, others = at(there)
                 penalty = variance * there[2] ** 2
                 if others[6] >= LEAST_BRANCH and others[0] + penalty <= limit:
+                    gain = limit - others[0] - penalty
                     best, model, sums = there, found, others
                     break
             step = 0.5 * step
         else:
+            break
+        if gain <= LEAST_GAIN * sums[0]:  # at a datum where other data begin to carry load
             break
     datum, peak, pull = best.tolist()
     return SlowFit(datum, peak, model + width * pull, pull, min(own, 1.0))
