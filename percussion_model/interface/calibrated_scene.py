@@ -38,6 +38,9 @@ def commented_fit(found: Fit, written: Mapping[str, float], scene: str) -> str:
         kind = "given" if one.noise_is_given else "estimated"
         data = "1 number" if len(one.data) == 1 else f"{len(one.data)} data"
         lines.append(f"  {one.name}: {data}, noise {one.noise_text()} {one.unit} ({kind})")
+        for it in one.sensor:
+            value, error, width = it.texts()
+            lines.append(f"    {it.name} of the sensor {value} ± {error}, prior ± {width}")
     kind = "widened" if found.is_widened else f"{100 * found.confidence:g} %"
     lines += ["", f"Parameters and their {kind} intervals, all together:"]
     for key in LAWS[found.law]:

@@ -27,7 +27,7 @@ UNITS = {
     "s": ("s", "ms", "us"),
     "N": ("N", "kN", "MN", "lbf"),
     "Pa": ("Pa", "kPa", "MPa", "GPa", "psi"),
-    "m/s": ("m/s", "mm/s", "km/h"),
+    "m/s": ("m/s", "mm/s", "km/h", "m/h", "m/min", "mm/min", "ft/h"),
 }
 SEPARATORS = (";", "\t", ",")
 COMMENTS = ("#", "%", "//", "!")

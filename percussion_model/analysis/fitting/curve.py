@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from percussion_model.analysis.fitting.measurements import Curve, FitError
+from percussion_model.analysis.fitting.measurements import Curve, FitError, least_noise
 from percussion_model.analysis.fitting.slow_test import SlowRock
 from percussion_model.scene.scene import Scene
 
@@ -87,19 +87,22 @@ def bilinear_force(
 
 
 class SlowFit(NamedTuple):
-    """Where a curve fits a rock best [m], and the force there [N]."""
+    """Where a curve fits a rock best [m], the force that is shown there [N], and the unknown
+    zero of the force by the width of its prior, with its variance for this rock."""
 
     datum: float
     peak: float
     force: np.ndarray
+    pull: float
+    variance: float
 
 
 def best_datum_and_peak(curve: Curve, scene: Scene, guess: tuple[float, float]) -> SlowFit:
     """Find where the rock is touched and where unloading begins, for a given rock.
 
     The zero of the gauge is rarely that of the rock, and the greatest reading rarely the
-    peak. Gauss and Newton's steps; by the bilinear law force is linear in both as long as the
-    same data carry load.
+    peak; the zero of the force has a prior. Gauss and Newton's steps; by the bilinear law force
+    is linear in all as long as the same data carry load.
 
     Parameters
     ----------
@@ -116,37 +119,73 @@ def best_datum_and_peak(curve: Curve, scene: Scene, guess: tuple[float, float]) 
         At the guess where too few data carry load there.
     """
     rock, first = SlowRock(scene), int(np.argmax(curve.penetration)) + 1
+    width, count = curve.offset or 0.0, len(curve.force)
+    floor = least_noise(curve.force) ** 2
 
-    def at(place: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
-        return rock.weigh(curve.penetration, curve.force, first, *place)
+    def at(place: np.ndarray, more: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+        force = curve.force - width * (place[2] - more)
+        return rock.weigh(curve.penetration, force, first, *place[:2])
 
-    best = guess
+    best = np.array([*guess, 0.0])
     model, sums = at(best)
+    own = 1.0
     for _ in range(MOST_ROUNDS):
-        datum, peak, gain = _step(sums)
+        step, gain = _step(sums)
+        variance = max(sums[0] / count, floor)
+        if width > 0.0:
+            ones = at(best, 1.0)[1]
+            off = width * float((curve.force - width * best[2] - model).sum())
+            step, gain, own = _step_of_three(sums, ones, count * width**2 + variance,
+                                             off - variance * best[2], step, gain)  # fmt: skip
+            own *= variance
         if gain <= LEAST_GAIN * sums[0]:
             break
+        limit = sums[0] + variance * best[2] ** 2
         for _ in range(MOST_HALVINGS):
-            there = best[0] + datum, best[1] + peak
+            there = best + step
             if there[1] > there[0]:
                 found, others = at(there)
-                if others[6] >= LEAST_BRANCH and others[0] <= sums[0]:
+                penalty = variance * there[2] ** 2
+                if others[6] >= LEAST_BRANCH and others[0] + penalty <= limit:
+                    gain = limit - others[0] - penalty
                     best, model, sums = there, found, others
                     break
-            datum, peak = 0.5 * datum, 0.5 * peak
+            step = 0.5 * step
         else:
             break
-    return SlowFit(*best, model)
+        if gain <= LEAST_GAIN * sums[0]:  # at a datum where other data begin to carry load
+            break
+    datum, peak, pull = best.tolist()
+    return SlowFit(datum, peak, model + width * pull, pull, min(own, 1.0))
 
 
-def _step(sums: np.ndarray) -> tuple[float, float, float]:
+def _step(sums: np.ndarray) -> tuple[np.ndarray, float]:
     """Step of least squares of datum and peak, and what it gains; none if the data tell none."""
     _, a, b, c, x, y, least = sums.tolist()
     determinant = a * c - b * b
     if least < LEAST_BRANCH or not determinant > LEAST_DETERMINANT * a * c:
-        return 0.0, 0.0, 0.0
+        return np.zeros(3), 0.0
     datum, peak = (c * x - b * y) / determinant, (a * y - b * x) / determinant
-    return datum, peak, x * datum + y * peak
+    return np.array([datum, peak, 0.0]), x * datum + y * peak
+
+
+def _step_of_three(
+    sums: np.ndarray, more: np.ndarray, own: float, off: float, step: np.ndarray, gain: float
+) -> tuple[np.ndarray, float, float]:
+    """The same with the zero of the force, and the variance of that by the variance of noise.
+
+    `more` are the sums with all forces a width greater.
+    """
+    if not gain > 0.0:
+        return step, gain, 1.0 / own
+    _, a, b, c, x, y, _ = sums.tolist()
+    with_datum, with_peak = float(more[4]) - x, float(more[5]) - y
+    matrix = np.array([[a, b, with_datum], [b, c, with_peak], [with_datum, with_peak, own]])
+    scale = 1.0 / np.sqrt(np.diag(matrix))
+    right = np.array([x, y, off])
+    inverse = np.linalg.inv(matrix * scale[:, None] * scale) * scale[:, None] * scale
+    step = inverse @ right
+    return step, float(right @ step), float(inverse[2, 2])
 
 
 class Sight(NamedTuple):

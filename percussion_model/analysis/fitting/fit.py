@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import NamedTuple
 
 import numpy as np
 
@@ -23,6 +22,7 @@ from percussion_model.analysis.fitting.found import (
     Explained,
     Fit,
     Rival,
+    SensorEstimate,
     Source,
 )
 from percussion_model.analysis.fitting.likelihood import (
@@ -60,6 +60,7 @@ from percussion_model.analysis.fitting.notes import (
     rough_notes,
 )
 from percussion_model.analysis.fitting.sampling import (
+    Explored,
     Profile,
     Walk,
     profiles_of,
@@ -68,11 +69,15 @@ from percussion_model.analysis.fitting.sampling import (
     walk,
 )
 from percussion_model.analysis.fitting.search import (
+    APART,
+    beside,
     descend,
     polish,
     roughness,
 )
+from percussion_model.analysis.fitting.single import solved
 from percussion_model.analysis.fitting.survey import Counter, minima_of, series_of
+from percussion_model.analysis.fitting.trust import distrusted, sensor_notes, sensors_of
 from percussion_model.scene.scene import Scene
 
 # What can be fitted, and where it is searched; SI units.
@@ -87,6 +92,8 @@ RANGES = {
 # Walks in turn, each from the best so far: shares of all steps. The search met all there is
 # where the last one finds nothing better by this share of the threshold.
 ROUNDS, BETTER = (0.4, 0.6), 0.25
+# Share of all steps for each other minimum that explains the data as well.
+RIVAL_SHARE = 0.2
 # Peaks of slow tests within this factor are one: they tell gamma there, and q not at all.
 ONE_PEAK = 1.02
 # A parameter whose interval is wider than a factor of ten is not called determined; an exponent,
@@ -170,11 +177,20 @@ def fit_rock(
     box = _box(scene, names, ranges or {})
     counter = Counter(progress, stage)
     whole = Likelihood(scene, series_of(sources, sight), names, box, counter.tick)
-    minima = minima_of(whole, sources, sight, counter)
     quantile = _quantile(confidence, len(names))
-    found = _explored(whole, minima, quantile, counter)
+    if len(names) == 1 and len(sources) == 1 and isinstance(sources[0], Reading):
+        counter.begin("bisection")
+        found = solved(whole, sources[0], quantile)
+    else:
+        minima = minima_of(whole, sources, sight, counter)
+        unknowns = sum(one.unknowns for one in whole.series if one.simulated)
+        alike = _quantile(confidence, len(names) + unknowns)
+        found = _explored(whole, minima, quantile, alike, counter)
+    sensors, mixed = sensors_of(whole, found.best, found.spread)
     counter.begin("check with finer cells")
-    return _result(whole, sources, found, confidence, quantile, counter.done, untold)
+    return _result(
+        whole, sources, found, confidence, quantile, counter.done, untold, sensors, mixed
+    )
 
 
 def _quantile(confidence: float, free: int) -> float:
@@ -211,6 +227,11 @@ def _chosen(
     hammer = [one for one in sources if isinstance(one, Reading) and one.speed is None]
     if hammer and scene.piston.model == "absent":
         raise FitError(f"{hammer[0].name}: the scene has no piston")
+    if len(names) > len(hammer) == len(sources):
+        raise FitError(
+            f"{', '.join(one.name for one in hammer)}: no more unknowns than numbers of the hammer "
+            f"can be told, not {', '.join(names)}; name what to fit (--only), or add tests of rock"
+        )
     return names
 
 
@@ -241,20 +262,19 @@ def _of_one_peak(sources: Sequence[Source]) -> bool:
     return len(peaks) == len(sources) and max(peaks) < ONE_PEAK * min(peaks)
 
 
-class Explored(NamedTuple):
-    """The best place, its covariance, what was found around, and whether no better place was."""
+def _explored(
+    like: Likelihood, minima: list[Place], quantile: float, alike: float, counter: Counter
+) -> Explored:
+    """Walk from the best of all minima, twice: the second knows how wide the first went.
 
-    best: Place
-    spread: np.ndarray
-    profiles: list[Profile]
-    minima: list[Place]
-    threshold: float
-    settled: bool
-
-
-def _explored(like: Likelihood, minima: list[Place], quantile: float, counter: Counter) -> Explored:
-    """Walk from the best of all minima, twice: the second knows how wide the first went."""
+    Minima apart that are less than `alike` above the best explain the data as well: unknowns of
+    sensors make one of them the best by luck.
+    """
     every, rng = range(len(like.names)), np.random.default_rng(0)
+    if alike > quantile:
+        counter.begin("minima beside the best")
+        minima = beside(like, minima[0], SLOW, TOLD) + minima[1:]
+        minima.sort(key=lambda one: one.deviance)
     walked = Walk.of(minima)
     wide: np.ndarray | None = None
     for turn, share in enumerate(ROUNDS, 1):
@@ -274,6 +294,13 @@ def _explored(like: Likelihood, minima: list[Place], quantile: float, counter: C
             minima = [place, *minima]
     best, spread = descend(like, minima[0].at, every)
     walked = walked.joined(Walk.of([best]))
+    for other in minima[1:]:
+        # a dip of its own, unless it is one of what was met
+        if other.deviance < best.deviance + alike and _is_apart(other, walked, best, threshold):
+            there, wide_there = descend(like, other.at, every)
+            steps = round(RIVAL_SHARE * steps_wanted(len(every)))
+            met = walk(like, there, wide_there, threshold, steps, rng)
+            walked = walked.joined(met.lifted(there.deviance, float(walked.deviance.min())))
     counter.begin("ends of the intervals")
     beyond = pushed_out(
         like,
@@ -291,6 +318,13 @@ def _explored(like: Likelihood, minima: list[Place], quantile: float, counter: C
     return Explored(best, spread, profiles, minima, threshold, settled)
 
 
+def _is_apart(place: Place, walked: Walk, best: Place, threshold: float) -> bool:
+    """Whether a minimum lies outside of what a walk met below a threshold, in one parameter."""
+    inside = walked.at[walked.deviance < best.deviance + threshold]
+    low, high = inside.min(axis=0) + APART, inside.max(axis=0) - APART
+    return bool(np.any((place.at < low) | (place.at > high)))
+
+
 def _outside(place: Place, profiles: Sequence[Profile]) -> bool:
     """Whether a place lies outside of an interval, in one parameter at least."""
     return any(not one.low <= at <= one.high for at, one in zip(place.at, profiles, strict=True))
@@ -304,9 +338,11 @@ def _result(
     quantile: float,
     runs: int,
     untold: Sequence[str],
+    sensors: Sequence[tuple[SensorEstimate, ...]],
+    mixed: Mapping[str, str],
 ) -> Fit:
     """Put a fit together."""
-    best, spread, profiles, minima, threshold, settled = explored
+    best, spread, profiles, minima, threshold, settled, notes, unreached = explored
     estimates, curves = {}, {}
     for k, (name, found) in enumerate(zip(like.names, profiles, strict=True)):
         estimates[name] = _estimate(name, best.at[k], found, like.low[k], like.high[k])
@@ -317,16 +353,20 @@ def _result(
         if (above := one.deviance - best.deviance) < TOLD + threshold and _outside(one, profiles)
     ]
     explained = [
-        Explained(one.name, one.data, one.data - off, noise, source)
-        for one, off, noise, source in zip(
-            like.series, best.residuals, best.noise, sources, strict=True
+        Explained(one.name, one.data, one.data - off[: len(one.data)], noise, source, sensor)
+        for one, off, noise, source, sensor in zip(
+            like.series, best.residuals, best.noise, sources, sensors, strict=True
         )
     ]
+    estimates, distrust = distrusted(estimates, explained, mixed, unreached)
     warnings = [
+        *distrust,
+        *notes,
         *interval_notes(estimates, like),
         *kept_notes(like, all(isinstance(one, Curve) for one in sources), untold),
         *([] if settled else [UNSETTLED]),
         *rough_notes((threshold - quantile) / ROUGH_FACTOR),
+        *sensor_notes(explained),
         *gap_notes(like, profiles),
         *rival_notes(rivals),
         *(note for one in explained for note in correlation_note(one)),

@@ -44,6 +44,8 @@ Source = Curve | DropTest | Reading
 DETERMINED, RIVALLED = "determined", "rival"
 OPEN_ABOVE, OPEN_BELOW, OPEN = "open above", "open below", "open"
 WIDE = "not determined"
+# The model does not explain the data; a parameter that is not told from an unknown of a sensor.
+MISFIT, UNTOLD = "not explained", "not told apart"
 # Minima are told up to this deviance above the best: less likely by exp(-10).
 TOLD = 20.0
 # Digits of a parameter that is not determined.
@@ -92,6 +94,23 @@ def _shown(numbers: Sequence[float], digits: Sequence[int]) -> tuple[str, str, s
     return value, low, high
 
 
+class SensorEstimate(NamedTuple):
+    """An unknown of a sensor, SI units; `width` is the standard deviation of its prior, about 0."""
+
+    name: str
+    unit: str
+    value: float
+    error: float
+    width: float
+
+    def texts(self) -> tuple[str, str, str]:
+        """Value, error and width with their unit."""
+        value, error, width = (
+            f"{in_digits(one, 2)} {self.unit}" for one in (self.value, self.error, self.width)
+        )
+        return value, error, width
+
+
 @dataclass(frozen=True)
 class Explained:
     """One series of measurements and what the best fit says of it, SI units."""
@@ -101,6 +120,7 @@ class Explained:
     fitted: np.ndarray = field(repr=False)
     noise: float
     source: Source = field(repr=False)
+    sensor: tuple[SensorEstimate, ...] = ()
 
     @property
     def noise_is_given(self) -> bool:
@@ -213,7 +233,12 @@ class Fit:
             "threshold": self.threshold,
             "widened": self.is_widened,
             "measurements": {
-                one.name: {"data": len(one.data), "noise": one.noise} for one in self.explained
+                one.name: {
+                    "data": len(one.data),
+                    "noise": one.noise,
+                    "sensor": {it.name: it._asdict() for it in one.sensor},
+                }
+                for one in self.explained
             },
             "rivals": [
                 {"values": one.values, "deviance": one.deviance, "odds": one.odds}

@@ -10,13 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from percussion_model.analysis.fitting.curve import best_datum_and_peak
-from percussion_model.analysis.fitting.measurements import Curve, DropTest, Reading
-from percussion_model.analysis.fitting.predictions import (
-    DropOnRocks,
-    bit_alone,
-    predicted_reading,
+from percussion_model.analysis.fitting.measurements import (
+    Curve,
+    DropTest,
+    Reading,
+    least_noise,
 )
+from percussion_model.analysis.fitting.predictions import bit_alone, predicted_reading
+from percussion_model.analysis.fitting.sensor import CurveSensor, DropSensor, Sensor
 from percussion_model.scene.inputs import SimulationError
 from percussion_model.scene.scene import Scene
 
@@ -28,9 +29,6 @@ SLOW = (STIFFNESS, EXPONENT, RATIO, UNLOADING)
 # Coordinates of the search are logarithms, but of exponents, which are so already: those of
 # powers, and so logarithms of what they do to a force.
 EXPONENTS = (EXPONENT, UNLOADING)
-# No noise is taken to be smaller than this share of the data's spread: data of a model
-# without noise would have an infinite likelihood.
-LEAST_NOISE = 1e-8
 # Points that are not computed again.
 KEPT = 256
 
@@ -57,19 +55,36 @@ def decades(name: str, low: float, high: float) -> float:
 
 @dataclass(frozen=True)
 class Series:
-    """Measurements whose common noise is unknown (`error` None), or one with a known error."""
+    """Measurements whose common noise is unknown (`error` None), or one with a known error.
+
+    The unknowns of a sensor follow its data in what the model says, by the widths of priors.
+    """
 
     name: str
     data: np.ndarray
     error: float | None
     model: Callable[[Scene], np.ndarray] = field(repr=False)
     simulated: bool = True
+    sensor: Sensor | None = None
+
+    @classmethod
+    def sensed(cls, name: str, data: np.ndarray, sensor: Sensor, simulated: bool) -> Series:
+        """Measurements by a sensor."""
+
+        def model(scene: Scene) -> np.ndarray:
+            return np.concatenate(sensor.sensed(scene)[:2])
+
+        return cls(name, data, None, model, simulated, sensor)
 
     @property
-    def least_noise(self) -> float:
-        """What the estimated noise is at least."""
-        size = float(np.ptp(self.data)) or float(np.abs(self.data).max())
-        return LEAST_NOISE * size
+    def unknowns(self) -> int:
+        """How many the sensor has."""
+        return 0 if self.sensor is None else len(self.sensor.unknowns)
+
+    @property
+    def wanted(self) -> np.ndarray:
+        """What the model is to say: the data, and 0 of each unknown."""
+        return np.append(self.data, np.zeros(self.unknowns))
 
 
 @dataclass(frozen=True)
@@ -83,7 +98,7 @@ class Place:
     deviance : float
         Twice the negative logarithm of the likelihood, noise at its best, but for a constant.
     residuals : list of ndarray
-        Data less model of each series.
+        Data less model of each series, then its unknowns with a minus.
     noise : list of float
         Standard deviation of each series.
     """
@@ -172,7 +187,7 @@ class Likelihood:
         """Data less model of each series; None where `below` gives up."""
         residuals, seen = [], []
         for one in self.series:
-            residuals.append(one.data - _finite(one, scene))
+            residuals.append(one.wanted - _finite(one, scene))
             seen.append(_deviance(one, residuals[-1])[0])
             rest = self._least[len(seen) :]
             if limit < sum(seen) + sum(rest) - slack * len(rest) < math.inf:
@@ -185,12 +200,21 @@ class Likelihood:
         parts = [_deviance(*pair) for pair in zip(self.series, residuals, strict=True)]
         return sum(deviance for deviance, _ in parts), [noise for _, noise in parts]
 
+    def weights(self, noise: Sequence[float]) -> np.ndarray:
+        """Weights of all residuals, one after the other."""
+        rows = [
+            np.append(np.full(len(one.data), 1.0 / sigma), np.ones(one.unknowns))
+            for one, sigma in zip(self.series, noise, strict=True)
+        ]
+        return np.concatenate(rows)
+
 
 def _deviance(one: Series, off: np.ndarray) -> tuple[float, float]:
     """Deviance of the residuals of a series, and its noise."""
     if one.error is None:
-        sigma = max(math.sqrt(float(off @ off) / len(off)), one.least_noise)
-        return len(off) * 2.0 * math.log(sigma), sigma
+        off, pulls = np.split(off, [len(one.data)])
+        sigma = max(math.sqrt(float(off @ off) / len(off)), least_noise(one.data))
+        return len(off) * 2.0 * math.log(sigma) + float(pulls @ pulls), sigma
     return float(off @ off) / one.error**2, one.error
 
 
@@ -202,16 +226,12 @@ def _finite(one: Series, scene: Scene) -> np.ndarray:
         found = np.array([math.nan])
     if np.isfinite(found).all():
         return found
-    return one.data + 10.0 * (float(np.ptp(one.data)) or float(np.abs(one.data).max()))
+    return one.wanted + 10.0 * (float(np.ptp(one.data)) or float(np.abs(one.data).max()))
 
 
 def curve_series(curve: Curve, guess: tuple[float, float]) -> Series:
     """Series of a slow curve; its datum and peak, guessed, are at their best for any rock."""
-
-    def model(scene: Scene) -> np.ndarray:
-        return best_datum_and_peak(curve, scene, guess).force
-
-    return Series(curve.name, curve.force, None, model, simulated=False)
+    return Series.sensed(curve.name, curve.force, CurveSensor(curve, guess), simulated=False)
 
 
 def drop_series(drop: DropTest, most: int | None = None) -> Series:
@@ -220,7 +240,7 @@ def drop_series(drop: DropTest, most: int | None = None) -> Series:
     kept = np.arange(count)
     if most is not None and count > most:
         kept = np.unique(np.linspace(0, count - 1, most).round().astype(int))
-    return Series(drop.name, drop.values[kept], None, DropOnRocks(drop, drop.time[kept]))
+    return Series.sensed(drop.name, drop.values[kept], DropSensor(drop, kept), simulated=True)
 
 
 def reading_series(reading: Reading) -> Series:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
 
 LEAST_DATA = 10
+# No noise is taken to be smaller than this share of the data's spread: data of a model
+# without noise would have an infinite likelihood.
+LEAST_NOISE = 1e-8
 # Signals that can be measured on a bit that falls: unit, and how large they are at most.
 SIGNALS = {
     "bit_position": ("m", 1.0),
@@ -23,7 +26,13 @@ QUANTITIES = {
     "rebound_velocity": ("m/s", 1e-3, 100.0),
     "penetration": ("m", 1e-6, 0.5),
     "penetration_per_blow": ("m", 1e-6, 0.5),
+    "rate_of_penetration": ("m/s", 1e-7, 1.0),
 }
+# Widths of priors where nothing else is given: of the zero of a sensor by the unit of its signal,
+# of a force or a stress by the share of the greatest; a drift adds as much over the whole record.
+# Of the delay of a trigger [s], and at most as a share of the record.
+OFFSETS, OFFSET_SHARE = {"m": 1e-4, "m/s": 0.05}, 0.02
+DELAY, DELAY_SHARE = 1e-3, 0.1
 OF_A_DROP = ("rebound_velocity", "penetration")
 # What is possible in a slow test [m], in a drop [s], [m/s].
 PENETRATIONS = (5e-6, 0.05)
@@ -47,11 +56,14 @@ class Curve:
         In the order of time: rising, then falling; any zero [m].
     force : array_like
         On the rock, compression positive [N].
+    offset : float, optional
+        Standard deviation of the zero of the force, 0: known [N]; default 2 % of the greatest.
     """
 
     penetration: Any
     force: Any
     name: str = "curve"
+    offset: float | None = None
 
 
 @dataclass(frozen=True)
@@ -70,6 +82,10 @@ class DropTest:
         What it is, one of `SIGNALS`.
     gauge : float, optional
         Distance of the gauge from the top of the bit [m]; default its middle.
+    offset, drift, delay : float, optional
+        Standard deviations of the zero of the sensor, of its drift [1/s] and of how late the
+        record begins [s]; 0: known. Default: `OFFSETS` or 2 % of the greatest, as much over the
+        record, and 1 ms or a tenth of the record.
     """
 
     time: Any
@@ -78,6 +94,9 @@ class DropTest:
     signal: str = "bit_position"
     gauge: float | None = None
     name: str = "drop"
+    offset: float | None = None
+    drift: float | None = None
+    delay: float | None = None
 
 
 @dataclass(frozen=True)
@@ -86,17 +105,19 @@ class Reading:
 
     Attributes
     ----------
-    quantity : {"rebound_velocity", "penetration", "penetration_per_blow"}
+    quantity : str
         Greatest upward mean velocity of the bit after a drop [m/s]; what a drop leaves of
         penetration at the end of the scene's duration [m]; mean penetration per blow of the
-        scene's hammer after settling [m].
+        scene's hammer after settling [m], and its rate [m/s].
     value, error : float
         Error: its standard deviation.
     speed : float, optional
         Of the drop [m/s]; None for the hammer.
     """
 
-    quantity: Literal["rebound_velocity", "penetration", "penetration_per_blow"]
+    quantity: Literal[
+        "rebound_velocity", "penetration", "penetration_per_blow", "rate_of_penetration"
+    ]
     value: float
     error: float
     speed: float | None = None
@@ -135,7 +156,14 @@ def checked_curve(curve: Curve) -> Curve:
             f"{curve.name}: {words}. A heading without a unit is in SI: is it perhaps "
             f"{_likely_units(span, float(force.max()))}?"
         )
-    return Curve(p, force, curve.name)
+    width = OFFSET_SHARE * float(force.max()) if curve.offset is None else curve.offset
+    return Curve(p, force, curve.name, _checked_width(f"offset of {curve.name}", width))
+
+
+def _checked_width(name: str, width: float) -> float:
+    if not (np.isfinite(width) and width >= 0.0):
+        raise FitError(f"{name} = {width!r}: must be a number, 0 or above")
+    return float(width)
 
 
 def _likely_units(span: float, force: float) -> str:
@@ -175,8 +203,19 @@ def checked_drop(drop: DropTest) -> DropTest:
             f"{name}: {drop.signal} spans {np.ptp(values):.3g} {unit}, more than {most:g} {unit} "
             f'cannot be: write its unit into the heading, as in "{drop.signal} [m{unit}]"'
         )
+    if not np.ptp(values) > 0.0:
+        raise FitError(f"{name}: {drop.signal} does not change")
     check_speed(f"speed of {name}", drop.speed)
-    return DropTest(time, values, float(drop.speed), drop.signal, drop.gauge, name)
+    offset = OFFSETS.get(unit, OFFSET_SHARE * float(np.abs(values).max()))
+    offset = offset if drop.offset is None else drop.offset
+    drift = offset / float(time[-1]) if drop.drift is None else drop.drift
+    delay = min(DELAY, DELAY_SHARE * float(time[-1])) if drop.delay is None else drop.delay
+    return replace(
+        drop, time=time, values=values, speed=float(drop.speed),
+        offset=_checked_width(f"offset of {name}", offset),
+        drift=_checked_width(f"drift of {name}", drift),
+        delay=_checked_width(f"delay of {name}", delay),
+    )  # fmt: skip
 
 
 def check_reading(reading: Reading) -> None:
@@ -239,3 +278,8 @@ def checked_columns(columns: dict[str, Any]) -> list[np.ndarray]:
             f"{' and '.join(columns)}: {lengths[0]} data, at least {LEAST_DATA} are needed"
         )
     return found
+
+
+def least_noise(data: np.ndarray) -> float:
+    """What the estimated noise of data is at least."""
+    return LEAST_NOISE * (float(np.ptp(data)) or float(np.abs(data).max()))

@@ -29,6 +29,7 @@ from percussion_model.analysis.fitting.likelihood import (
 )
 from percussion_model.analysis.fitting.sampling import Profile
 from percussion_model.analysis.fitting.search import LEAST_STEP, MOST_STEP, STEP_SHARE
+from percussion_model.analysis.fitting.trust import neighbours
 from percussion_model.simulation.uncertain import in_digits
 from percussion_model.solvers.base import make_solver
 
@@ -63,7 +64,7 @@ def interval_notes(estimates: Mapping[str, Estimate], like: Likelihood) -> list[
             f"{low} to {high}",
             WIDE: f"is not determined: {width}, {low} to {high}, explains the data",
         }.get(one.verdict)
-        if told is None and apart > math.log10(ROUGHLY):
+        if told is None and one.determined and apart > math.log10(ROUGHLY):
             told = f"is determined only to {roughly}: {low} to {high}"
         if told is not None:
             notes.append(f"{NAMES[name]} ({name}) {told}")
@@ -153,12 +154,8 @@ def _odds(rival: Rival) -> str:
 
 def correlation_note(one: Explained) -> list[str]:
     """Say that neighbouring residuals are alike, where they are."""
-    residuals = one.residuals
-    total = float(residuals @ residuals)
-    if len(residuals) < 2 or not total > (len(residuals) * one.noise * 1e-6) ** 2:
-        return []
-    correlation = float(residuals[1:] @ residuals[:-1]) / total
-    if correlation * math.sqrt(len(residuals)) <= MOST_CORRELATION:
+    correlation = neighbours(one)
+    if correlation * math.sqrt(len(one.residuals)) <= MOST_CORRELATION:
         return []
     return [
         f"{one.name}: neighbouring residuals are alike (correlation {correlation:.2f}): the model "
@@ -183,7 +180,7 @@ def grid_notes(
         np.stack([like.low, like.high], axis=1),
         lambda: None,
     )
-    weights = np.repeat(1.0 / np.array(best.noise), [len(one) for one in best.residuals])
+    weights = like.weights(best.noise)
     off = np.concatenate(best.residuals)
     change = (np.concatenate(finer.at(best.at).residuals) - off) * weights
     steps = np.clip(STEP_SHARE * np.sqrt(np.diag(spread)), LEAST_STEP, MOST_STEP)

@@ -137,12 +137,23 @@ def predicted_reading(scene: Scene, reading: Reading) -> float:
     """
     if reading.speed is None:
         result = simulate(scene, record_events=False, error_estimate=False)
-        value: Any = result.summary()["penetration_per_blow"]
+        value: Any = result.summary()[reading.quantity]
         return math.nan if value is None else float(value)
     if reading.quantity == "penetration":
         ended = _falling(scene, reading.speed).sample(np.array([scene.run.duration]))
         return float(ended["bit_end_position"][0]) - scene.start.rock_gap
     return _rebound_velocity(scene, reading.speed)
+
+
+def run_error(scene: Scene, reading: Reading) -> float:
+    """Estimated error of a number of the hammer, by cells and scatter of the blows; NaN: unknown.
+
+    Parameters and unit as of `predicted_reading`.
+    """
+    summary = simulate(scene, record_events=False).summary()
+    known = summary["errors"] | {"rate_of_penetration": summary["rate_of_penetration_error"]}
+    value = known.get(reading.quantity)
+    return math.nan if value is None else float(value)
 
 
 def _rebound_velocity(scene: Scene, speed: float) -> float:

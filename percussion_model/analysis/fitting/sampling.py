@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -58,6 +59,12 @@ class Walk:
         """Places that are known already."""
         return cls(np.array([one.at for one in places]), np.array([one.deviance for one in places]))
 
+    def lifted(self, dip: float, floor: float) -> Walk:
+        """What lies above the bottom of a dip, as if that were as low as a floor."""
+        return Walk(
+            self.at, np.where(self.deviance < dip, self.deviance, self.deviance - dip + floor)
+        )
+
     @property
     def best(self) -> np.ndarray:
         """The likeliest place."""
@@ -89,6 +96,20 @@ class Profile:
     gap: tuple[float, float] | None
     values: np.ndarray = field(repr=False)
     deviance: np.ndarray = field(repr=False)
+
+
+class Explored(NamedTuple):
+    """The best place, its covariance, what was found around, whether no better place was, what to
+    know of it, and why nothing explains the data if that is so."""
+
+    best: Place
+    spread: np.ndarray
+    profiles: list[Profile]
+    minima: list[Place]
+    threshold: float
+    settled: bool
+    notes: Sequence[str] = ()
+    unreached: Sequence[str] = ()
 
 
 def steps_wanted(free: int) -> int:

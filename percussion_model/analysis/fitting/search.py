@@ -22,6 +22,9 @@ ARRIVED = 0.1
 # The search without derivatives: its longest first step, in the logarithm, which is the longest
 # that tells how rough the deviance is too, and how long it is.
 MOST_POLISH, POLISH_TRIALS = 0.3, 12  # trials a parameter
+# Minima beside the best are looked for this far along a parameter, at so many places, of which the
+# lowest are followed down; nearer to each other than this they are one.
+BESIDE, BESIDE_POINTS, BESIDE_TRIED, APART = 0.25, 41, 5, 5e-3
 # On a grid, parameters that a curve tells are moved by so many steps at most; the weights
 # follow the residuals so often.
 MOST_RELAXED, RELAXATIONS = 4.0, 6
@@ -78,9 +81,7 @@ def _one_round(
     """Least squares with fixed weights; the best place met, and the covariance."""
     from scipy.optimize import least_squares
 
-    weights = np.concatenate(
-        [np.full(len(r), 1.0 / s) for r, s in zip(begun.residuals, begun.noise, strict=True)]
-    )
+    weights = like.weights(begun.noise)
     low, high = like.low[free], like.high[free]
     met = [begun]
 
@@ -171,6 +172,26 @@ def distinct(places: Sequence[Place], sizes: np.ndarray, most: int) -> list[Plac
     return kept
 
 
+def beside(like: Likelihood, best: Place, names: Sequence[str], limit: float) -> list[Place]:
+    """Minima beside the best along single parameters, less than a limit above it.
+
+    Where a sensor's zero and trigger are free, a rock with other bounces may do as well; its dip
+    is too narrow and too near for a search of the whole range.
+    """
+    found = [best]
+    for k in (like.names.index(name) for name in names if name in like.names):
+        shifts = np.linspace(-BESIDE, BESIDE, BESIDE_POINTS)
+        row = [like.at(best.at + shift * np.eye(len(best.at))[k]) for shift in shifts]
+        heights = np.pad([one.deviance for one in row], 1, constant_values=np.inf)
+        inner = heights[1:-1]
+        dips = np.flatnonzero((inner <= heights[:-2]) & (inner <= heights[2:]))
+        for dip in dips[np.argsort(inner[dips])][:BESIDE_TRIED]:
+            found.append(descend(like, row[dip].at, range(len(best.at)), rounds=2)[0])
+    lowest = min(one.deviance for one in found)
+    near = [one for one in found if one.deviance < lowest + limit]
+    return distinct(near, np.full(len(best.at), APART), len(near))
+
+
 def grid(
     like: Likelihood,
     base: np.ndarray,
@@ -230,7 +251,7 @@ def _relaxed(
     for _ in range(RELAXATIONS):
         left = np.split(off + matrix @ move, np.cumsum(counts)[:-1])
         deviance, noise = like.deviance_of(left)
-        weights = np.repeat(1.0 / np.array(noise), counts)
+        weights = like.weights(noise)
         information = (matrix * weights[:, None]).T @ (matrix * weights[:, None])
         information += np.eye(len(free)) / MOST_RELAXED**2
         move = -np.linalg.solve(information, (matrix * weights[:, None]).T @ (off * weights))

@@ -29,6 +29,7 @@ from percussion_model.analysis.fitting.likelihood import (
 )
 from percussion_model.analysis.fitting.measurements import LEAST_DATA, Curve, DropTest
 from percussion_model.analysis.fitting.search import LEAST_STEP, descend, design, distinct, grid
+from percussion_model.analysis.fitting.signs import check_signs
 
 # With a curve, a grid of C_R and W_R is computed for its K_R and gamma and for those this share
 # of their standard errors beside, or this much, and so many of the best places with K_R and gamma
@@ -118,10 +119,7 @@ def minima_of(
     sizes = np.array([ZOOM[name] for name in whole.names])
     most = 0 if lengthens(whole.names, sources) else _most_surveyed(whole.names, sources)
     counter.begin("search of the whole range", most)
-    starts = distinct(_survey(thin, sources, sight), ZOOMS[-1] * sizes, STARTS)
-    counter.begin("descent from the best places")
-    lower = [descend(thin, one.at, every, rounds=2)[0] for one in starts]
-    found = distinct(lower, 0.25 * sizes, STARTS)
+    found = _searched(thin, sources, sight, counter)
     # few samples tell less: what is far above the best in them is so in all
     near = [one for one in found if one.deviance - found[0].deviance < TOLD]
     places = distinct([whole.at(one.at) for one in near], 0.0 * sizes, FINALISTS)
@@ -131,7 +129,27 @@ def minima_of(
         steps = np.array([0.0 if name in ZOOM_VALUES else LAST_STEP for name in whole.names])
         closer = _zoom(whole, best.at, LAST_ZOOM * sizes, steps)
         deep += [descend(whole, one.at, every, rounds=2)[0] for one in closer[:1]]
-    return distinct(deep, 0.1 * sizes, FINALISTS)
+    found = distinct(deep, 0.1 * sizes, FINALISTS)
+
+    def searched(others: Sequence[Source]) -> tuple[Likelihood, Place]:
+        like = thin.with_series(series_of(others, sight, SEARCH_SAMPLES))
+        counter.begin("search with the sign reversed")
+        return like, _searched(like, others, sight, counter)[0]
+
+    check_signs(thin, found, sources, searched)
+    return found
+
+
+def _searched(
+    thin: Likelihood, sources: Sequence[Source], sight: Sight | None, counter: Counter
+) -> list[Place]:
+    """Minima of few samples, the best first."""
+    sizes = np.array([ZOOM[name] for name in thin.names])
+    starts = distinct(_survey(thin, sources, sight), ZOOMS[-1] * sizes, STARTS)
+    counter.begin("descent from the best places")
+    every = range(len(thin.names))
+    lower = [descend(thin, one.at, every, rounds=2)[0] for one in starts]
+    return distinct(lower, 0.25 * sizes, STARTS)
 
 
 def _survey(thin: Likelihood, sources: Sequence[Source], sight: Sight | None) -> list[Place]:

@@ -41,7 +41,7 @@ def calibrate(
             "--measured",
             metavar="QUANTITY=VALUE+-ERROR UNIT @SPEED",
             help="A single number: rebound_velocity or penetration of a drop at a speed in m/s, "
-            "penetration_per_blow of the hammer. May be repeated.",
+            "penetration_per_blow or rate_of_penetration (m/h) of the hammer. May be repeated.",
         ),
     ] = None,
     gauge: Annotated[
@@ -198,9 +198,14 @@ def _show(found: Fit, scene: Scene) -> None:
     console = Console()
     print_table(table, console)
     noises = Table("measurement", "data", "noise", "", box=None)
+    sensors = Table("sensor of", "has", "found", "±", "prior ±", box=None)
     for source in found.explained:
         noise = f"{source.noise_text()} {source.unit}"
         word = "given" if source.noise_is_given else "estimated"
         noises.add_row(source.name, str(len(source.data)), noise, word)
+        for it in source.sensor:
+            sensors.add_row(source.name, it.name, *it.texts())
     print_table(noises, console)
+    if sensors.rows:
+        print_table(sensors, console)
     show_warnings(console, found.warnings)
