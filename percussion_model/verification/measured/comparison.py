@@ -53,7 +53,7 @@ BOTH_LAWS = ("rock.loading_stiffness", "rock.unloading_ratio")
 HIT = 0.1
 
 # What is computed of two other numbers.
-QUOTIENT, SPEEDS = "restitution", ("rebound speed", "indentation speed")
+QUOTIENT, SPEEDS = "restitution", ("rebound_velocity", "indentation_velocity")
 
 FITTED, PREDICTED = "fitted", "predicted"
 MET, MISSED, UNDECIDED, NO_CRITERION = "met", "missed", "undecided", "no criterion"
