@@ -100,6 +100,13 @@ class Bar:
         return cls(tree["value"], tree["error"], limits, tree["agreed"])
 
     @property
+    def doubt(self) -> str:
+        """Why it is no reference; empty where it is one."""
+        if self.agreed:
+            return ""
+        return "the limits disagree" if len(self.limits) > 1 else "one method alone tells it"
+
+    @property
     def apart(self) -> float:
         """Distance of the two surest limits, relative; NaN where there is one."""
         first, *others = self.surest
