@@ -373,7 +373,7 @@ def bars(study: Study) -> str:
         one = QUANTITIES[key]
         label = f"{one.label}, {one.unit}" if one.unit else one.label
         value = "–" if key in HISTORIES else within_bar(one.factor, bar)
-        verdict = "yes" if bar.agreed else "no: the limits disagree"
+        verdict = f"no: {bar.doubt}" if bar.doubt else "yes"
         rows.append([label, value, power(abs(bar.error / bar.value)), power(bar.apart), verdict])
     return table(
         ["quantity", "value", "bar, relative", "solvers differ by, relative", "a reference?"], rows

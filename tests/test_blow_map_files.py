@@ -30,6 +30,7 @@ from percussion_model.analysis.blow_maps import (
 )
 from percussion_model.analysis.effect_study import study_effects
 from percussion_model.interface.cli import INTERRUPTED, _guarded, app
+from percussion_model.physics import user_cache
 from percussion_model.solvers.blow_map import builder
 from percussion_model.solvers.blow_map.builder import build_table, get_table
 from percussion_model.solvers.blow_map.records import Axis
@@ -45,21 +46,22 @@ def cache(tmp_path, monkeypatch):
     return tmp_path
 
 
-def test_without_a_home_tables_are_kept_for_the_process(monkeypatch, tmp_path, caplog):
+def test_without_a_home_tables_are_kept_with_temporary_files(monkeypatch, tmp_path, caplog):
     def no_home():
         raise RuntimeError("Could not determine home directory.")
 
     for name in ("PERCUSSION_CACHE", "XDG_CACHE_HOME", "LOCALAPPDATA"):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setattr(Path, "home", no_home)
-    builder._folder_of_process.cache_clear()
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    user_cache._temporary.cache_clear()
     scene = mapped(**TINY)
     made = make_map(scene, workers=1)
     assert map_file(scene).is_file()
     assert map_file(scene).parent.parent.stat().st_mode & 0o077 == 0
     assert kept_map(scene).to_bytes() == made.to_bytes()
     assert "home directory" in caplog.text
-    builder._folder_of_process.cache_clear()
+    user_cache._temporary.cache_clear()
 
 
 def test_a_damaged_file_is_made_again(cache):

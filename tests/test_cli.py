@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -16,6 +17,7 @@ from percussion_model.interface import progress
 from percussion_model.interface.cli import BAD_INPUT, INTERRUPTED, _guarded, app
 from percussion_model.interface.commands import common
 from percussion_model.interface.commands.common import print_message
+from percussion_model.scene.solver_names import SOLVER_NAMES
 from percussion_model.solvers import base
 
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
@@ -228,9 +230,21 @@ def test_kernels_are_looked_for_where_numba_keeps_them(tmp_path):
     assert shown[1:] == ["None"] * 3
 
 
-def test_kernels_of_every_solver_are_looked_for():
-    for name in ("wave", "fem", "rigid", "blow-map"):
-        base.place_of_kernels(name)  # finds the kernel by its name
+@pytest.mark.parametrize("name", ["wave", "modal", "chain", "fem", "rigid", "blow-map"])
+def test_the_kernel_of_every_solver_is_looked_for_where_numba_keeps_it(name, monkeypatch, tmp_path):
+    assert {*SOLVER_NAMES, "blow-map"} - {"auto"} <= set(base._REGISTRY)
+    entry = base._REGISTRY[name]
+    kernels = importlib.import_module(f"{entry.module.rpartition('.')[0]}.advance")
+    kernel = getattr(kernels, entry.kernel)
+    numbas_name = kernel._cache._impl.filename_base
+    empty = SimpleNamespace(
+        stats=SimpleNamespace(cache_path=str(tmp_path)), overloads={}, __code__=kernel.__code__,
+        __module__=kernel.__module__, __qualname__=kernel.__qualname__,
+    )  # fmt: skip
+    monkeypatch.setattr(kernels, entry.kernel, empty)
+    assert base.place_of_kernels(name) == tmp_path
+    (tmp_path / f"{numbas_name}.nbi").touch()
+    assert base.place_of_kernels(name) is None
 
 
 def test_new_writes_a_scene_that_runs_and_keeps_existing_files(percussion, tmp_path):

@@ -22,10 +22,10 @@ from typing import NamedTuple
 
 from fmu_src.archive import ROOT
 from fmu_src.slave.native import this_platform
+from percussion_model.physics.user_cache import cache_folder, can_write
 from percussion_model.scene.presets import is_clone
 from percussion_model.scene.scene import SceneError
 from percussion_model.scene.writing import own_prefix
-from percussion_model.solvers.blow_map.builder import cache_folder
 
 HERE = Path(__file__).resolve().parent
 # So many libraries are kept, the newest: installations of other versions share a user's cache.
@@ -38,7 +38,7 @@ SOURCES = (
 COMPILERS = ("numba", "llvmlite", "numpy")
 FLAGS = ("-std=c11", "-O2", "-D_POSIX_C_SOURCE=200809L", "-fvisibility=hidden", "-shared")
 # What a command says meanwhile.
-COMPILING = "compiling the library of FMUs, which takes a few minutes the first time"
+COMPILING = "compiling the library of FMUs, once for these sources: ten minutes on one core"
 # Names of platforms that FMI 2.0 has.
 ALIASES = {"linux64": "x86_64-linux", "win64": "x86_64-windows", "darwin64": "x86_64-darwin"}
 
@@ -135,8 +135,11 @@ def compiler_for(name: str, word: str = "") -> list[str]:
 
 
 def kept_folder() -> Path:
-    """Folder that libraries are kept in."""
-    return ROOT / "dist" / "native" if is_clone() else cache_folder() / "native"
+    """Folder that libraries are kept in; of a clone that cannot be written where it has one."""
+    own = ROOT / "dist" / "native"
+    if is_clone() and (can_write(own) or (own / stamp()).is_dir()):
+        return own
+    return cache_folder() / "native"
 
 
 def libraries(

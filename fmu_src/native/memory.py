@@ -10,16 +10,16 @@ from typing import Any
 
 import numpy as np
 from llvmlite import ir
-from numba import carray, from_dtype, literal_unroll, njit, types
+from numba import carray, from_dtype, literal_unroll, types
 from numba.extending import intrinsic
 
-from percussion_model.physics.kernel import preparing
+from percussion_model.physics.kernel import compiled, preparing
 
 # As `preparing`, but part of the caller: views of memory are cheap only there.
-viewing = njit(cache=True, error_model="numpy", forceinline=True)
+viewing = compiled(error_model="numpy", forceinline=True)
 
 # For what returns records within tuples, which no compiled function can.
-merging = njit(cache=True, error_model="numpy", inline="always")
+merging = compiled(error_model="numpy", inline="always")
 
 
 @preparing

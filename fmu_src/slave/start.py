@@ -72,10 +72,12 @@ def native_class(resources: Path) -> Any:
     reason = native.reason_against(str(resources))
     if not reason:
         return class_of(NATIVE, "NativeSlave")
-    note = f"runs by numba, and starts more slowly: {reason}"
+    note = f"runs by numba, whose kernels are compiled for minutes unless they are kept: {reason}"
     if note not in told:
         told.add(note)
         notes.append(note)
+        if sys.stderr is not None:  # hosts see a log later, when a call has ended
+            print(f"{PACKAGE}: {note}", file=sys.stderr, flush=True)
     return None
 
 

@@ -1,46 +1,62 @@
-"""Decorators of every kernel, and the check that no stale compiled code is loaded."""
+"""Decorators of every kernel."""
 
 from __future__ import annotations
 
-import hashlib
-import os
+import functools
+import inspect
+import logging
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from numba import njit, types
+from numba import config, njit, types
 from numba.extending import register_jitable
 
-STAMP = "kernels.sha256"
+from percussion_model.physics import kept_kernels
+
 # Folders with functions that kernels of other files call.
 CALLEES = ("physics", "scene", "solvers", "verification/accuracy")
+PACKAGE = Path(__file__).parents[1]
+# None: beside the sources, or where NUMBA_CACHE_DIR says.
+FOLDER = kept_kernels.prepare(PACKAGE, CALLEES)
+_log = logging.getLogger("percussion_model")
 
 
-def drop_stale_kernels(folder: Path) -> None:
-    """Delete compiled kernels below `folder` where a source in `CALLEES` has changed.
+def compiled(**options: Any) -> Callable[[Callable], Any]:
+    """Decorator that compiles a kernel where it is first called, and keeps it in `FOLDER`.
 
-    Numba's cache looks at the file of a function alone, not at those of the
-    functions that it calls; after an edit or an update it would go on with
-    old code. A cache that the user keeps elsewhere is left alone.
+    Where numba finds no place for it, each process compiles it, which is told once.
     """
-    if os.environ.get("NUMBA_CACHE_DIR"):
-        return
-    digest = hashlib.sha256()
-    for source in sorted(path for name in CALLEES for path in (folder / name).rglob("*.py")):
-        digest.update(source.read_bytes())
-    stamp = Path(__file__).parent / "__pycache__" / STAMP
-    try:
-        if stamp.is_file() and stamp.read_text() == digest.hexdigest():
-            return
-        for compiled in [*folder.rglob("*.nbi"), *folder.rglob("*.nbc")]:
-            compiled.unlink(missing_ok=True)
-        stamp.parent.mkdir(exist_ok=True)
-        stamp.write_text(digest.hexdigest())
-    except OSError:
-        return  # a folder that cannot be written holds no cache of ours
+
+    def decorate(function: Callable) -> Any:
+        before = config.CACHE_DIR
+        config.CACHE_DIR = before if FOLDER is None else str(FOLDER)
+        try:
+            made = njit(cache=True, **options)(function)
+        except RuntimeError:
+            _tell_of_no_place()
+            return njit(**options)(function)
+        finally:
+            config.CACHE_DIR = before
+        if FOLDER is not None and hasattr(made, "stats"):
+            take_along(Path(made.stats.cache_path), Path(inspect.getfile(function)).parent)
+        return made
+
+    return decorate
 
 
-drop_stale_kernels(Path(__file__).parents[1])
+@functools.cache
+def _tell_of_no_place() -> None:
+    _log.warning(
+        "no folder can be written in which compiled kernels would be kept, so each start compiles "
+        "for about a minute: NUMBA_CACHE_DIR names one"
+    )
+
+
+@functools.cache
+def take_along(place: Path, sources: Path) -> None:
+    """Take kernels along that lie beside sources which cannot be written."""
+    kept_kernels.take_along(place, sources / "__pycache__")
 
 
 def place_to_compile(function: Callable) -> Path | None:
@@ -80,7 +96,7 @@ def entry_of(function: Callable) -> Callable:
 # `_nrt=False` leaves out numba's runtime: arrays are passed without reference
 # counting (which took most of a step's time), and a kernel that allocates does
 # not compile, so that it can always be built ahead of time.
-kernel = njit(cache=True, error_model="numpy", _nrt=False)
+kernel = compiled(error_model="numpy", _nrt=False)
 
 
 def plain(function: Callable) -> Callable:
@@ -99,30 +115,30 @@ def preparing(function: Callable) -> Callable:
     Ahead of time, the library brings the memory. Numba would compile a function anew for each
     constant that it is called with; here that takes longer than it spares.
     """
-    compiled = njit(cache=True, error_model="numpy")(function)
-    find: Any = getattr(compiled, "get_call_template", None)  # none where nothing is compiled
+    made = compiled(error_model="numpy")(function)
+    find: Any = getattr(made, "get_call_template", None)  # none where nothing is compiled
 
     def find_plain(arguments: Any, named: Any) -> Any:
         named = {name: types.unliteral(kind) for name, kind in named.items()}
         return find([types.unliteral(kind) for kind in arguments], named)
 
     if find is not None:
-        compiled.get_call_template = find_plain
-    return compiled
+        made.get_call_template = find_plain
+    return made
 
 
 # For calls of other libraries, which may wait for threads that want to run Python.
-nogil = njit(cache=True, error_model="numpy", _nrt=False, nogil=True)
+nogil = compiled(error_model="numpy", _nrt=False, nogil=True)
 
 # For what runs in every step: arrays cost nine words an argument to pass.
-inlined = njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+inlined = compiled(error_model="numpy", _nrt=False, forceinline=True)
 
 # For long recursions, whose latency counts: a product and a sum may be one operation
 # with one rounding. The bits are the same in every run of one build.
-fused = njit(cache=True, error_model="numpy", _nrt=False, forceinline=True, fastmath={"contract"})
+fused = compiled(error_model="numpy", _nrt=False, forceinline=True, fastmath={"contract"})
 
 # For what is called from one place: compiled as part of its caller alone.
-merged = njit(cache=True, error_model="numpy", _nrt=False, inline="always")
+merged = compiled(error_model="numpy", _nrt=False, inline="always")
 
 # For kernels put together at import, which a cache could not tell apart: part of their callers.
 composed = njit(error_model="numpy", _nrt=False, forceinline=True)

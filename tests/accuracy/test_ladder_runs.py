@@ -34,8 +34,10 @@ from percussion_model.verification.accuracy.problems import (
     APERIODIC,
     HISTORIES,
     HISTORY,
+    PERIODIC,
     RATE,
     STRESS_HISTORY,
+    Problem,
     Run,
     pose,
     relative_error,
@@ -309,6 +311,32 @@ def test_rigid_scenes_are_refused_before_anything_is_compiled(bar, tmp_path, mon
     assert "solver.name" not in str(done.exception)
     assert done.output == ""
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("method", ["explicit", "exact-flow", "cvode", "lsoda"])
+@pytest.mark.parametrize("change", ["effects.rock=power", "effects.cuttings=true"])
+def test_a_method_that_has_no_such_law_is_refused_before_anything_is_compiled(
+    method, change, tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(common, "tell_of_compiling", lambda *names: pytest.fail("compiles"))
+    given = "--methods", f"wave,{method}", "--set", change
+    assert change.partition("=")[0] in refused(str(SCENARIOS / "reference.toml"), *given)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_method_that_has_no_such_law_leaves_a_note_where_none_was_named():
+    scene = Scene().replace(**{"effects.rock": "power"})
+    rungs = [rung for rung in ladders(Problem(scene, PERIODIC, 0.1, 0.05)) if rung.peer]
+    assert [rung.ladder for rung in rungs] == ["explicit", "exact-flow", "cvode"]
+    for rung in rungs:
+        with pytest.raises(SceneError, match=r"effects\.rock must not be 'power'"):
+            rung.peer(rung.scene)
+
+
+def test_a_loss_of_elements_alone_is_refused():
+    with pytest.raises(SceneError, match=r"fem\.damping_ratio = 0\.3 .* set loss\.time"):
+        pose(Scene().replace(**{"fem.damping_ratio": 0.3}))
 
 
 def test_what_is_compiled_is_told_by_name(monkeypatch):

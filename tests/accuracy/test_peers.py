@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import math
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from percussion_model import Scene, SceneError, Simulation
+from percussion_model.scene.inputs import SimulationError
+from percussion_model.scene.parameters import parameter_table
 from percussion_model.verification.accuracy.cvode import CvodeSolver, missing
 from percussion_model.verification.accuracy.exact_flow import ExactFlowSolver
 from percussion_model.verification.accuracy.explicit import ExplicitSolver, explicit_rate
+from percussion_model.verification.accuracy.explicit_chain import ExplicitChainSolver
 from percussion_model.verification.accuracy.ladders import fem_scene, stiffness_of
 from percussion_model.verification.accuracy.problems import (
     CONTACT_HISTORY,
@@ -24,6 +27,7 @@ from percussion_model.verification.accuracy.problems import (
     relative_error,
 )
 from percussion_model.verification.accuracy.references import find_reference
+from percussion_model.verification.accuracy.semidiscrete import Drill
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 BARE = {
@@ -192,6 +196,87 @@ def test_what_peers_cannot_do_is_refused(peer):
         peer(Scene.from_toml(SCENARIOS / "rigid.toml"), 10)
     with pytest.raises(SceneError, match="wall"):
         peer(Scene().replace(**{"effects.rock": "wall"}), 10)
+
+
+STRING = {
+    "effects.string": True, "string.rods": [{"sections": [{"length": 1.0, "area": 8e-4}]}],
+}  # fmt: skip
+# What goes with a switch, so that it does something.
+WITH = {
+    "effects.cuttings": {"rock.removed_share": 0.3},
+    "effects.drive": {"drive.external_force": 2000.0},
+    **dict.fromkeys(("effects.string", "effects.joints", "effects.damper"), STRING),
+}
+SWITCHES = [
+    (row.key, value)
+    for row in parameter_table()
+    if row.key.startswith("effects.")
+    for value in (row.choices or (True, False))
+    if value != row.default
+]
+SEEN = ("piston_velocity", "bit_position", "bit_end_position")
+
+
+def with_switch(key, value):
+    return Scene().replace(**{**WITH.get(key, {}), key: value})
+
+
+@cache
+def seen(peer, key, value):
+    """What a peer, or waves, see 1.5 ms after the start; None where the scene is refused."""
+    scene = with_switch(key, value)
+    try:
+        solver = None if peer is None else peer(scene, 10 if peer is ExactFlowSolver else 30)
+        simulation = Simulation(scene if solver else scene.computed_by("wave"), solver=solver)
+    except SceneError:
+        return None
+    simulation.advance(1.5e-3)
+    found = simulation.observe()
+    return np.array([found[name] for name in SEEN])
+
+
+@pytest.mark.parametrize("peer", [*PEERS, ExplicitChainSolver])
+@pytest.mark.parametrize(("key", "value"), SWITCHES)
+def test_a_peer_carries_an_effect_or_refuses_it(peer, key, value):
+    """What it carries changes as much as by waves."""
+    found = seen(peer, key, value)
+    if found is None:
+        assert (key, value) not in [("effects.gravity", False), ("effects.feed", False)]
+        return
+    if key in ("effects.string", "effects.joints", "effects.damper"):
+        assert peer is ExplicitChainSolver  # which test_chain_elements compares
+        return
+    usual = [seen(one, "effects.gravity", True) for one in (peer, None)]
+    change, wanted = found - usual[0], seen(None, key, value) - usual[1]
+    if key == "effects.loss":  # fronts stay as steep as each mesh lets them
+        assert np.all(change * wanted > 0.0)
+    else:  # the barrier takes so little that a sixth of it depends on the mesh
+        assert change == pytest.approx(wanted, rel=0.25, abs=1e-12)
+
+
+@pytest.mark.parametrize(("key", "value"), SWITCHES)
+def test_general_integrators_refuse_what_they_have_no_equation_for(key, value):
+    carried = [(f"effects.{one}", False) for one in ("gravity", "feed", "loss")]
+    if (key, value) in [*carried, ("effects.drive", "none")]:
+        Drill(with_switch(key, value))
+    else:
+        with pytest.raises(SceneError, match="general integrators: "):
+            Drill(with_switch(key, value))
+
+
+@pytest.mark.parametrize("peer", [*PEERS, ExplicitChainSolver])
+def test_a_rock_that_is_curved_chips_or_keeps_cuttings_is_refused_in_one_sentence(peer):
+    for law in ({}, {"rock.loading_exponent": 1.0, "rock.chipping_penetration": 1e-4}):
+        with pytest.raises(SceneError, match=r"must not be 'power'$"):
+            peer(Scene().replace(**{"effects.rock": "power"}, **law), 10)
+    with pytest.raises(SceneError, match=r"effects\.cuttings must be false$"):
+        peer(with_switch("effects.cuttings", True), 10)
+
+
+def test_the_exact_flow_refuses_other_inputs():
+    simulation = Simulation(Scene(), solver=ExactFlowSolver(Scene(), 5))
+    with pytest.raises(SimulationError, match="exact flow: feed_force cannot change"):
+        simulation.set_inputs(feed_force=1e3)
 
 
 def test_a_rate_needs_blows():

@@ -26,6 +26,7 @@ from percussion_model.verification.accuracy.problems import (
 from percussion_model.verification.accuracy.references import (
     CLOSE,
     Reference,
+    _agree,
     fingerprint,
     load_references,
     package_store,
@@ -124,3 +125,14 @@ def test_elements_come_closer_to_closed_forms_with_the_mesh(name):
     errors = [solver_error(CLOSED[name], "fem", count) for count in (20, 80)]
     assert errors[1] < 0.75 * errors[0]
     assert errors[1] < 1e-2
+
+
+def test_one_witness_makes_no_reference():
+    """As the peak of the contact force where explicit elements refuse a rock law."""
+    bar = _agree({"wave": (2.0, 0.1)})
+    assert (bar.value, bar.error, bar.agreed, bar.doubt) == (
+        2.0, 0.1, False, "one method alone tells it",
+    )  # fmt: skip
+    assert math.isnan(bar.apart)
+    assert _agree({"wave": (2.0, 0.1), "fem": (4.0, 0.1)}).doubt == "the limits disagree"
+    assert _agree({"wave": (2.0, 0.1), "fem": (2.1, 0.1)}).doubt == ""

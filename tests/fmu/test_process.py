@@ -146,6 +146,8 @@ def test_the_log_says_once_that_kernels_are_compiled(fmus, tmp_path):
                  "PERCUSSION_FMU_CACHE": str(tmp_path / "kept")},
         )  # fmt: skip
         told.append(done.stdout.splitlines())
+        # hosts see the log when a call has ended
+        assert "runs by numba, whose kernels are compiled for minutes" in done.stderr
     first, again = told
     because = first.pop(0)
     assert because.startswith("1 NumbaRigidHammer: runs by numba")

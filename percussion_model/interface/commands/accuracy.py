@@ -53,8 +53,8 @@ def accuracy(
     from percussion_model.scene.scene import Scene
     from percussion_model.simulation.files import to_json
     from percussion_model.verification.accuracy import study
-    from percussion_model.verification.accuracy.ladders import chosen_ladders
-    from percussion_model.verification.accuracy.problems import refuse_rigid
+    from percussion_model.verification.accuracy.ladders import chosen_ladders, refuse_asked
+    from percussion_model.verification.accuracy.problems import refuse_unfit
     from percussion_model.verification.accuracy.study import solvers_of
 
     chosen = [
@@ -80,7 +80,9 @@ def accuracy(
     words = None if methods is None else [word.strip() for word in methods.split(",")]
     ladders = chosen_ladders(words)  # refuses before anything is computed
     for _, scene in chosen:
-        refuse_rigid(scene)
+        refuse_unfit(scene)
+        if words is not None:
+            refuse_asked(scene, ladders)
         scene.computed_by("wave")
     common.check_json(json_file)
     if make_references:

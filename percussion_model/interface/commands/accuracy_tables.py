@@ -94,7 +94,7 @@ def show_bars(reference: Reference, console: Console | None = None) -> None:
             "" if key in HISTORIES else within_bar(quantity.factor, bar),
             _number(abs(bar.error / bar.value)),
             _number(bar.apart),
-            "" if bar.agreed else "no reference: the limits disagree",
+            f"no reference: {bar.doubt}" if bar.doubt else "",
         )
     _print(f"Reference: {reference.title}", table, console)
     promise = (

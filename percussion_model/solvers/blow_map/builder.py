@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import atexit
-import functools
 import io
 import logging
 import os
 import shutil
-import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -16,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from percussion_model.physics.user_cache import cache_folder
 from percussion_model.scene.scene import Scene
 from percussion_model.scene.writing import own_prefix, write_whole
 from percussion_model.solvers.blow_map.records import ENTRIES, Axis
@@ -28,7 +26,6 @@ from percussion_model.solvers.blow_map.table import (
     table_key,
 )
 
-VARIABLE = "PERCUSSION_CACHE"
 _log = logging.getLogger("percussion_model")
 
 Progress = Callable[[int, int], None]
@@ -40,36 +37,6 @@ def one_by_one(work: Callable[..., Any], tasks: list[tuple[Any, ...]]) -> Iterat
     """Do the tasks in this process, one after the other; as in `Compute`."""
     for number, task in enumerate(tasks):
         yield number, work(*task)
-
-
-# fmu_src/slave/start.py finds its folder in the same way: it runs before anything that an
-# FMU brings along can be imported.
-def cache_folder() -> Path:
-    """Folder for tables: that of the environment variable PERCUSSION_CACHE, or the user's.
-
-    A user without a home has one for as long as the process lasts.
-    """
-    given = os.environ.get(VARIABLE)
-    if given:
-        return Path(given)
-    try:
-        if sys.platform == "win32":
-            base = Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
-        elif sys.platform == "darwin":
-            base = Path.home() / "Library" / "Caches"
-        else:
-            base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    except RuntimeError as error:
-        base = _folder_of_process(str(error))
-    return base / "percussion_model"
-
-
-@functools.cache
-def _folder_of_process(reason: str) -> Path:
-    _log.warning("blow maps are not kept after the end of this process: %s", reason)
-    folder = Path(tempfile.mkdtemp(prefix=own_prefix()))
-    atexit.register(shutil.rmtree, folder, ignore_errors=True)
-    return folder
 
 
 def table_file(scene: Scene) -> Path:

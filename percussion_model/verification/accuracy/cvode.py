@@ -75,7 +75,7 @@ class CvodeSolver(ExactFlowSolver):
         Of a step, by `ABSOLUTE`.
     """
 
-    name = "cvode"
+    name, title = "cvode", "CVODE"
     COUNTS: ClassVar = ("events", "blows")
     levels = 1
 

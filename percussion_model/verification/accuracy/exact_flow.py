@@ -10,12 +10,18 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from percussion_model.physics.records import DriveKind, Mode, RockKind
+from percussion_model.physics.records import DriveKind, Mode
+from percussion_model.scene.inputs import SimulationError
 from percussion_model.scene.numbers import numbers_of
-from percussion_model.scene.scene import Scene, SceneError
+from percussion_model.scene.scene import Scene
 from percussion_model.solvers.fem.mesh import BarMesh, assemble, cut_bar
 from percussion_model.solvers.fem.records import Mesh
-from percussion_model.solvers.setup import fill_parameters, fill_start, kelvin_voigt_time
+from percussion_model.solvers.setup import (
+    fill_parameters,
+    fill_start,
+    kelvin_voigt_time,
+    rock_numbers,
+)
 from percussion_model.solvers.state import State
 from percussion_model.verification.accuracy.exact_flow_step import (
     FINE,
@@ -25,13 +31,15 @@ from percussion_model.verification.accuracy.exact_flow_step import (
     Flow,
     run,
 )
-from percussion_model.verification.accuracy.peer import PeerSolver
+from percussion_model.verification.accuracy.peer import PeerSolver, refuse_uncarried
 
 __all__ = ["ExactFlowSolver"]
 
 # Steps in the bit's transit in which events are looked for: half as many miss short bounces
 # on rock that springs back stiffly, twice as many change nothing that a finer mesh does not.
 WATCH = 8
+# Of what not all peers carry.
+CARRIED = frozenset({"absent", "spring", "none", "no barrier", "paper"})
 
 
 class ExactFlowSolver(PeerSolver):
@@ -47,22 +55,19 @@ class ExactFlowSolver(PeerSolver):
         Steps in the bit's transit time in which events are looked for.
     """
 
-    name = "exact-flow"
+    name, title = "exact-flow", "exact flow"
     time_step: float
     consistent = 0.5  # of the mass; the rest is lumped
     levels = LEVELS
     COUNTS: ClassVar[tuple[str, ...]] = ("steps", "events", "blows")
 
     def __init__(self, scene: Scene, elements: int, watch: int = WATCH) -> None:
+        refuse_uncarried(self.title, scene, CARRIED)
         super().__init__(scene)
         self._numbers = numbers = numbers_of(scene)
         par = np.zeros(1, FLOW_PAR)
         p: Any = par[0]
         fill_parameters(p, numbers, True)
-        if scene.bit.model == "rigid" or scene.piston.model == "rigid":
-            raise SceneError("exact flow: bit.model and piston.model must not be 'rigid'")
-        if p["rock"] == RockKind.WALL or p["effects"] == 1 or p["drive"] == DriveKind.EXTERNAL:
-            raise SceneError("exact flow: no effects.rock = 'wall', held forces or external drive")
         p["step"] = self.time_step = scene.bit.transit_time / watch
         first = scene.bit if scene.piston.model == "absent" else scene.piston
         bars = [cut_bar(numbers.bit, first.length / elements)]
@@ -96,8 +101,7 @@ class ExactFlowSolver(PeerSolver):
         if n_p:
             apart[n_p - 1], apart[n_p] = 1.0, -1.0
             p["soft"] = apart @ inverse @ apart
-        rock = scene.rock
-        spring, dashpot, ratio = rock.loading_stiffness, rock.barrier_damping, rock.unloading_ratio
+        spring, ratio, dashpot, _ = rock_numbers(self._numbers)
         of_mode = {
             Mode.FF: (0.0, 0.0),
             Mode.DFC: (spring, dashpot),
@@ -167,6 +171,10 @@ class ExactFlowSolver(PeerSolver):
         x[2 * n_p + n_b : -2] = start.bit_velocity
         x[-2], x[-1] = 1.0, s["alpha"]
         return state
+
+    def set_inputs(self, state: State, **inputs: float) -> None:
+        """Refuse: the exponentials hold for the inputs of the scene."""
+        raise SimulationError(f"{self.title}: {', '.join(inputs)} cannot change during a run")
 
     def _run(
         self, reads: int, state: State, t: float, blows: np.ndarray, events: np.ndarray,

@@ -11,11 +11,10 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from percussion_model.physics.blows import close_gap, open_gap, push_event, start_blow, starts_blow
 from percussion_model.physics.drive import switch_drive
-from percussion_model.physics.kernel import fused, inlined, kernel, merged
+from percussion_model.physics.kernel import compiled, fused, inlined, kernel, merged
 from percussion_model.physics.readings import fill_ledger, fill_motion
 from percussion_model.physics.records import DriveKind, Mode, RockKind, Status
 from percussion_model.physics.rock import (
@@ -118,7 +117,7 @@ def multiply(m, x, y, first, n, last):
             y[at + np.uint64(i)] += m[j, i] * a + m[j + 1, i] * b
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, fastmath={"reassoc", "contract"})
+@compiled(error_model="numpy", _nrt=False, fastmath={"reassoc", "contract"})
 def weigh(weights, x, first, n, by):
     """Sum of weights times entries of `x`."""
     total = 0.0

@@ -10,7 +10,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from percussion_model.physics.records import Piston, RockKind
+from percussion_model.physics.records import Piston
 from percussion_model.scene.bars import (
     AREA,
     LENGTH,
@@ -37,12 +37,14 @@ from percussion_model.verification.accuracy.explicit_step import (
     prepare_mode,
     run,
 )
-from percussion_model.verification.accuracy.peer import PeerSolver
+from percussion_model.verification.accuracy.peer import PeerSolver, refuse_uncarried
 
 __all__ = ["ExplicitSolver", "explicit_rate"]
 
 # Time step by the longest stable one: there the highest mode would ring on for ever.
 COURANT = 0.9
+# Of what not all peers carry.
+CARRIED = frozenset({"external", "spring", "none", "no barrier", "paper"})
 
 
 def stable_step(transit_time: float, loss_time: float) -> float:
@@ -77,7 +79,7 @@ class ExplicitSolver(PeerSolver):
     Parameters
     ----------
     scene : Scene
-        With elastic bars, whose rock is no wall.
+        With elastic bars on bilinear rock, a spring or none.
     elements : int
         In the piston, or in the bit without one; the bit's have about the same transit time.
     courant : float
@@ -89,16 +91,13 @@ class ExplicitSolver(PeerSolver):
     COUNTS: ClassVar = ("steps", "events", "blows", "locked")
 
     def __init__(self, scene: Scene, elements: int, courant: float = COURANT) -> None:
+        refuse_uncarried("explicit elements", scene, CARRIED | {"absent"})
         super().__init__(scene)
         self._numbers = numbers = numbers_of(scene)
         par = np.zeros(1, EXPLICIT_PAR)
         p: Any = par[0]
         fill_parameters(p, numbers, True)
         kind = Piston(int(p["piston"]))
-        if scene.bit.model == "rigid" or kind == Piston.RIGID:
-            raise SceneError("explicit elements: bit.model and piston.model must not be 'rigid'")
-        if p["rock"] == RockKind.WALL or p["effects"] == 1:
-            raise SceneError("explicit elements: neither effects.rock = 'wall' nor held forces")
         bars = [numbers.bit] if kind == Piston.ABSENT else [numbers.piston, numbers.bit]
         element = bar_transit_time(bars[0]) / elements
         p["eta"], p["start_gap"] = kelvin_voigt_time(numbers), scene.start.gap

@@ -10,7 +10,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from percussion_model.physics.records import Piston, RockKind
 from percussion_model.scene.bars import (
     AREA,
     LENGTH,
@@ -22,7 +21,7 @@ from percussion_model.scene.bars import (
     section_transit_time,
 )
 from percussion_model.scene.numbers import JOINT_KINDS, numbers_of
-from percussion_model.scene.scene import Scene, SceneError
+from percussion_model.scene.scene import Scene
 from percussion_model.solvers.setup import (
     MOST_CHANGES,
     fill_parameters,
@@ -30,7 +29,7 @@ from percussion_model.solvers.setup import (
     kelvin_voigt_time,
 )
 from percussion_model.solvers.state import State
-from percussion_model.verification.accuracy.explicit import COURANT, Elements, stable_step
+from percussion_model.verification.accuracy.explicit import CARRIED, COURANT, Elements, stable_step
 from percussion_model.verification.accuracy.explicit_chain_step import (
     BAR_ROWS,
     CHAIN_PAR,
@@ -51,7 +50,7 @@ from percussion_model.verification.accuracy.explicit_chain_step import (
     run,
 )
 from percussion_model.verification.accuracy.explicit_step import Joint
-from percussion_model.verification.accuracy.peer import PeerSolver
+from percussion_model.verification.accuracy.peer import PeerSolver, refuse_uncarried
 
 __all__ = ["ExplicitChainSolver"]
 
@@ -76,16 +75,13 @@ class ExplicitChainSolver(PeerSolver):
     COUNTS: ClassVar = ("steps", "events", "blows", "locked")
 
     def __init__(self, scene: Scene, elements: int, courant: float = COURANT) -> None:
+        refuse_uncarried("explicit elements of a chain", scene, CARRIED | {"string"})
         super().__init__(scene)
         self._numbers = numbers = numbers_of(scene)
         values = numbers.values
         self._par = par = np.zeros(1, CHAIN_PAR)
         p: Any = par[0]
         fill_parameters(p, numbers, True)
-        if scene.bit.model == "rigid" or p["piston"] != Piston.ELASTIC:
-            raise SceneError("explicit elements: bit.model and piston.model must be 'elastic'")
-        if p["rock"] == RockKind.WALL or p["effects"] == 1 or values.string_bottom:
-            raise SceneError("explicit elements: no wall, no held forces, no open end")
         bars = [numbers.piston, *numbers.rods, numbers.bit]
         self._names = ["piston", *(f"rod {k + 1}" for k in range(len(numbers.rods))), "bit"]
         element = bar_transit_time(numbers.piston) / elements

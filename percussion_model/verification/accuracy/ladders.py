@@ -20,7 +20,7 @@ from percussion_model.verification.accuracy.cvode import CvodeSolver
 from percussion_model.verification.accuracy.exact_flow import ExactFlowSolver
 from percussion_model.verification.accuracy.explicit import ExplicitSolver
 from percussion_model.verification.accuracy.problems import APERIODIC, Problem
-from percussion_model.verification.accuracy.semidiscrete import refusal
+from percussion_model.verification.accuracy.semidiscrete import refuse_general
 
 __all__ = [
     "FITS",
@@ -32,6 +32,7 @@ __all__ = [
     "fem_scene",
     "ladders",
     "misfit_of",
+    "refuse_asked",
 ]
 
 # K_C that goes with ten elements in the piston [N/m]; it rises with the square of their
@@ -221,6 +222,16 @@ def chosen_ladders(words: Sequence[str] | None) -> tuple[str, ...]:
     return tuple(chosen)
 
 
+def refuse_asked(scene: Scene, names: Sequence[str]) -> None:
+    """Raise `SceneError`, before anything is computed, where one of the methods refuses a scene."""
+    for name in names:
+        if name in COMPILED:
+            make, meshes, _ = COMPILED[name]
+            make(scene, meshes[0])
+        elif name in _GENERAL:
+            refuse_general(scene)
+
+
 def fem_scene(
     scene: Scene, elements: int, courant: float, stiffness: float, radius: float = 0.0
 ) -> Scene:
@@ -253,9 +264,7 @@ def ladders(problem: Problem, full: bool = False) -> list[Rung]:
         return list(_rising_durations(problem, full))
     rungs = [*_waves(problem, full), *_compiled(problem, full), *_elements(problem, full)]
     rungs.append(Rung("rigid", "", 1.0, problem.scene.computed_by("rigid")))
-    if not refusal(problem.scene):
-        rungs += _general(problem)
-    return rungs
+    return [*rungs, *_general(problem)]
 
 
 def total_length(scene: Scene) -> float:
@@ -348,6 +357,10 @@ def _compiled(problem: Problem, full: bool) -> Iterator[Rung]:
 def _general(problem: Problem) -> Iterator[Rung]:
     scene = problem.scene
     for name, (method, tolerance, meshes) in _GENERAL.items():
+        try:
+            refuse_general(scene)
+        except SceneError:
+            meshes = meshes[:1]  # its note will tell why
         for count in meshes:
             if count * total_length(scene) <= MOST_ELEMENTS / 3:
                 chosen = fem_scene(scene, count, COURANT, stiffness_of(count))

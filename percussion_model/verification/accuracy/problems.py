@@ -162,8 +162,13 @@ def quantities(kind: str) -> tuple[str, ...]:
     return (*means, *peaks, HISTORY, CONTACT_HISTORY, STRESS_HISTORY)
 
 
-def refuse_rigid(scene: Scene) -> None:
-    """Raise `SceneError` for a scene of rigid bodies."""
+def refuse_unfit(scene: Scene) -> None:
+    """Raise `SceneError` for rigid bodies, and for a loss that finite elements alone have."""
+    if scene.fem.damping_ratio is not None and scene.effects.loss:
+        raise SceneError(
+            f"accuracy: fem.damping_ratio = {scene.fem.damping_ratio!r} is a loss that finite "
+            "elements alone have, another one on each mesh: leave it out and set loss.time"
+        )
     rigid = [bar for bar in ("piston", "bit") if getattr(scene, bar).model == "rigid"]
     if rigid:
         given = ", ".join(f'{bar}.model = "rigid"' for bar in rigid)
@@ -182,7 +187,7 @@ def pose(scene: Scene) -> Problem:
     SceneError
         If there is nothing to refine, or too few blows.
     """
-    refuse_rigid(scene)
+    refuse_unfit(scene)
     if scene.piston.model == "absent":
         return Problem(scene, DROP, scene.run.duration, scene.run.duration)
     pilot = Simulation(scene.computed_by("wave"), record_events=False)

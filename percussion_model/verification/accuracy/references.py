@@ -100,10 +100,17 @@ class Bar:
         return cls(tree["value"], tree["error"], limits, tree["agreed"])
 
     @property
+    def doubt(self) -> str:
+        """Why it is no reference; empty where it is one."""
+        if self.agreed:
+            return ""
+        return "the limits disagree" if len(self.limits) > 1 else "one method alone tells it"
+
+    @property
     def apart(self) -> float:
-        """Distance of the two surest limits, relative."""
-        first, second = self.surest
-        return abs(first[0] - second[0]) / abs(self.value)
+        """Distance of the two surest limits, relative; NaN where there is one."""
+        first, *others = self.surest
+        return abs(first[0] - others[0][0]) / abs(self.value) if others else math.nan
 
     @property
     def surest(self) -> list[tuple[float, float]]:
@@ -386,9 +393,12 @@ def _agree(limits: dict[str, tuple[float, float]]) -> Bar:
     """Take the surest limit; the bar is its own, or the distance of the next one to it.
 
     They agree where they lie within the sum of their bars, or so closely that the distance
-    tells enough.
+    tells enough. One alone is no reference.
     """
-    (value, error), (other, error_of_other) = Bar(1.0, 0.0, limits, True).surest
+    (value, error), *others = Bar(1.0, 0.0, limits, True).surest
+    if not others:
+        return Bar(value, error, limits, False)
+    other, error_of_other = others[0]
     off = abs(value - other)
     agreed = off <= error + error_of_other or off <= CLOSE * abs(value)
     return Bar(value, max(error, off), limits, agreed)

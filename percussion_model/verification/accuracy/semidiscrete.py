@@ -13,11 +13,12 @@ import numpy as np
 
 from percussion_model.physics.records import Mode
 from percussion_model.scene.numbers import section_numbers
-from percussion_model.scene.scene import Scene, SceneError
+from percussion_model.scene.scene import Scene
 from percussion_model.solvers.fem.mesh import assemble, cut_bar
 from percussion_model.solvers.fem.records import Mesh
+from percussion_model.verification.accuracy.peer import refuse_uncarried
 
-__all__ = ["Drill", "OutOfTime", "refusal"]
+__all__ = ["Drill", "OutOfTime", "refuse_general"]
 
 # Dead band of the velocity of the bit's end [m/s]; docs/model.md, section 6.
 REST = 1e-9
@@ -31,17 +32,9 @@ class OutOfTime(Exception):
     """A method that takes too long."""
 
 
-def refusal(scene: Scene) -> str:
-    """Return why these equations cannot do a scene; empty where they can."""
-    if scene.piston.model == "rigid" or scene.bit.model == "rigid":
-        return "a bar is rigid"
-    if scene.effects.drive == "external":
-        return "the drive force comes from outside"
-    if scene.effects.rock != "bilinear" or not scene.barrier_on:
-        return "the rock is not bilinear with a barrier"
-    if scene.effects.standstill_tension != "release":
-        return "standstill may pull"
-    return ""
+def refuse_general(scene: Scene) -> None:
+    """Raise `SceneError` for a scene whose equations these are not."""
+    refuse_uncarried("general integrators", scene, {"absent"})
 
 
 class Drill:
@@ -68,9 +61,7 @@ class Drill:
     """
 
     def __init__(self, scene: Scene) -> None:
-        reason = refusal(scene)
-        if reason:
-            raise SceneError(f"general integrators cannot do this scene: {reason}")
+        refuse_general(scene)
         self.scene, rock = scene, scene.rock
         first = scene.bit if scene.piston.model == "absent" else scene.piston
         element = first.length / scene.fem.elements

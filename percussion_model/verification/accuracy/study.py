@@ -20,6 +20,7 @@ from percussion_model.verification.accuracy.ladders import (
     Rung,
     chosen_ladders,
     ladders,
+    refuse_asked,
 )
 from percussion_model.verification.accuracy.orders import Cost, Order, cost_range, fitted_order
 from percussion_model.verification.accuracy.problems import (
@@ -30,7 +31,7 @@ from percussion_model.verification.accuracy.problems import (
     Run,
     pose,
     quantities,
-    refuse_rigid,
+    refuse_unfit,
     relative_error,
 )
 from percussion_model.verification.accuracy.references import Bar, Reference, find_reference
@@ -373,7 +374,9 @@ def study(
         If the scene has nothing to refine, or a method is not known.
     """
     names = chosen_ladders(methods)
-    refuse_rigid(scene)
+    refuse_unfit(scene)
+    if methods is not None:
+        refuse_asked(scene, names)
     compilation = {}
     # make each solver once: compile, or load what was compiled before
     for name in solvers_of(names):

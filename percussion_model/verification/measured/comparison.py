@@ -52,8 +52,12 @@ BOTH_LAWS = ("rock.loading_stiffness", "rock.unloading_ratio")
 # Share of its error within which a number counts as reached by the fit to it.
 HIT = 0.1
 
+# What is computed of two other numbers.
+QUOTIENT, SPEEDS = "restitution", ("rebound_velocity", "indentation_velocity")
+
 FITTED, PREDICTED = "fitted", "predicted"
 MET, MISSED, UNDECIDED, NO_CRITERION = "met", "missed", "undecided", "no criterion"
+MIXED = "met by some fits"
 
 
 @dataclass(frozen=True)
@@ -184,22 +188,28 @@ class Comparison:
         return tuple(dict.fromkeys(f.law for f in self.fits))
 
     def counts(self, law: str | None = None, anew: bool = False) -> dict[str, int]:
-        """How many predictions met and missed their criteria, were undecided or have none.
+        """How many measured numbers are predicted within their criteria, missed, or have none.
 
-        Those of whole fits by a law, or by all; `anew`: those of fits that move some parameters
-        of another one.
+        Each counts once, whatever the number of fits: those by a law, or by all, that are whole;
+        `anew`: those that move some parameters of another one. A restitution, the quotient of
+        two speeds, does not count beside them.
         """
         chosen = {
             (f.experiment, f.name)
             for f in self.fits
             if bool(f.start) == anew and law in (None, f.law)
         }
-        of = [
-            row.verdict
-            for row in self.rows
-            if row.role == PREDICTED and (row.experiment, row.fit) in chosen
-        ]
-        return {name: of.count(name) for name in (MET, MISSED, UNDECIDED, NO_CRITERION)}
+        rows = [row for row in self.rows if (row.experiment, row.fit) in chosen]
+        known = {_place(row, row.quantity) for row in rows}
+        found: dict[tuple[str, str], set[str]] = {}
+        for row in rows:
+            speeds = {_place(row, one) for one in SPEEDS}
+            if row.role == PREDICTED and not (row.quantity == QUOTIENT and speeds <= known):
+                found.setdefault((row.experiment, row.id), set()).add(row.verdict)
+        verdicts = [one.pop() if len(one) == 1 else MIXED for one in found.values()]
+        return {
+            name: verdicts.count(name) for name in (MET, MISSED, MIXED, UNDECIDED, NO_CRITERION)
+        }
 
     def of(self, experiment: str, fit: str | None = None) -> list[Row]:
         """Rows of an experiment, or of one fit of it."""
@@ -223,6 +233,11 @@ class Comparison:
                 for one in self.experiments
             },
         }
+
+
+def _place(row: Row, quantity: str) -> tuple[Any, ...]:
+    """What a quantity beside that of a row is known by."""
+    return row.experiment, row.fit, row.source, row.speed, quantity
 
 
 def compare(

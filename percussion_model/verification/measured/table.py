@@ -13,6 +13,7 @@ from percussion_model.verification.measured.comparison import (
     FITTED,
     MET,
     MISSED,
+    MIXED,
     NO_CRITERION,
     PREDICTED,
     UNDECIDED,
@@ -130,26 +131,24 @@ def parameters_text(found: FoundFit) -> str:
 
 
 def count_text(found: Comparison) -> str:
-    """How many predictions met their criteria."""
-    texts = []
-    for law in found.laws:
-        counts = found.counts(law)
-        decided = sum(counts.values()) - counts[NO_CRITERION]
-        text = (
-            f"Law {law}: {decided} predictions with a criterion, of which {counts[MET]} meet it "
-            f"and {counts[MISSED]} miss it"
-        )
-        if counts[UNDECIDED]:
-            text += f"; {counts[UNDECIDED]} are undecided"
-        texts.append(f"{text}; {counts[NO_CRITERION]} without.")
+    """How many predicted numbers met their criteria."""
+    texts = [
+        "Each number counts once for a law, however many fits predict it; a restitution does not "
+        "count beside the two speeds that it is the quotient of."
+    ]
+    texts += [f"Law {law}: {_counted(found.counts(law))}" for law in found.laws]
     again = found.counts(anew=True)
-    more = sum(again.values()) - again[NO_CRITERION]
-    if more:
-        texts.append(
-            f"With one parameter fitted anew at another speed: {more}, of which {again[MET]} "
-            f"meet it and {again[MISSED]} miss it."
-        )
+    if sum(again.values()) > again[NO_CRITERION]:
+        texts.append(f"With one parameter fitted anew at another speed: {_counted(again)}")
     return " ".join(texts)
+
+
+def _counted(counts: dict[str, int]) -> str:
+    decided = sum(counts.values()) - counts[NO_CRITERION]
+    parts = [f"{counts[MET]} are met", f"{counts[MISSED]} missed"]
+    parts += [f"{counts[one]} {one}" for one in (MIXED, UNDECIDED) if counts[one]]
+    text = f"{decided} predicted numbers with a criterion, of which {', '.join(parts)}"
+    return f"{text}; {counts[NO_CRITERION]} without." if counts[NO_CRITERION] else f"{text}."
 
 
 def laws_side_by_side(found: Comparison, name: str) -> tuple[list[str], list[list[str]]]:
