@@ -23,7 +23,11 @@ from percussion_model.analysis.study.points import (
 )
 from percussion_model.analysis.study.response import COMPUTING, FOUND, KINDS, run_points
 from percussion_model.analysis.study.store import Store
-from percussion_model.analysis.study.workers import on_a_cluster, on_this_machine
+from percussion_model.analysis.study.workers import (
+    end_if_started_again,
+    on_a_cluster,
+    on_this_machine,
+)
 from percussion_model.scene.rows import unit_suffix
 from percussion_model.scene.scene import Scene
 from percussion_model.simulation.driller_numbers import DRILLER_NUMBERS
@@ -286,6 +290,7 @@ def study(
     """
     refuse_unknown(scene, points)
     check_request(scene, tolerance, most_blows, scatter)
+    end_if_started_again()  # before the folder, which the first process holds
     store = Store(Path(folder), _plan(scene, points, tolerance, most_blows, scatter), force)
     _rows, _failures, done = store.read(len(points))
     order = points.in_cheap_order()

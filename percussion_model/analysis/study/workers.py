@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from multiprocessing import active_children, get_context
+from multiprocessing import active_children, current_process, get_context
 from threading import current_thread, main_thread
 from typing import Any
 
@@ -53,9 +53,16 @@ def on_this_machine(
     )
 
 
+def end_if_started_again() -> None:
+    """End a worker that reads the script again, and would start workers itself."""
+    if getattr(current_process(), "_inheriting", False):  # as multiprocessing asks, which refuses
+        sys.exit(STARTED_AGAIN)
+
+
 def _in_a_pool(
     work: Callable[..., Any], tasks: dict[int, Task], processes: int
 ) -> Iterator[tuple[int, Any]]:
+    end_if_started_again()
     others, workers = set(active_children()), set()
     pool = ProcessPoolExecutor(
         processes, mp_context=get_context("spawn"), initializer=end_with_parent
@@ -63,15 +70,8 @@ def _in_a_pool(
     running: dict[Future[Any], int] = {}
     try:
         with _one_thread_each(), _interrupts_left_to_this_process():
-            try:
-                for number, task in tasks.items():
-                    running[pool.submit(work, *task)] = number
-            except RuntimeError as error:
-                if "bootstrapping" not in str(error):
-                    raise
-                sys.exit(
-                    STARTED_AGAIN
-                )  # multiprocessing starts none while a worker reads its script
+            for number, task in tasks.items():
+                running[pool.submit(work, *task)] = number
         workers = set(active_children()) - others
         while running:
             ended, _ = wait(running, return_when=FIRST_COMPLETED)

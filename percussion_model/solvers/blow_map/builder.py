@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import io
 import logging
-import os
 import shutil
-import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -15,7 +13,7 @@ import numpy as np
 
 from percussion_model.physics.user_cache import cache_folder
 from percussion_model.scene.scene import Scene
-from percussion_model.scene.writing import own_prefix, write_whole
+from percussion_model.scene.writing import write_whole
 from percussion_model.solvers.blow_map.records import ENTRIES, Axis
 from percussion_model.solvers.blow_map.single_blow import SingleBlow
 from percussion_model.solvers.blow_map.table import (
