@@ -57,7 +57,7 @@ def test_words_are_read_or_refused_in_one_line(case, tmp_path, monkeypatch, caps
 
 
 def test_a_byte_order_mark_is_no_part_of_a_scene():
-    """Editors of Windows write it: issue 45, item 11."""
+    """Editors of Windows write it: a report."""
     assert Scene.from_toml(HERE / "byte_order_mark.toml").feed.force == 4000.0
 
 
