@@ -81,7 +81,7 @@ def test_samples_fill_every_slice_and_repeat_with_their_seed():
         (lambda: read_axis("feed.force=1=2"), "must be"),
         (lambda: read_axis("feed.force=1kN,2"), "--over feed.force=1kN,2: give each value its"),
         (lambda: read_axis("feed.force=1kN:2:3"), "--over feed.force=1kN:2:3: give each value"),
-        (lambda: refuse_unknown(Scene(), grid({"effects.feed": [0, 1]})), "this is a flag"),
+        (lambda: refuse_unknown(Scene(), grid({"effects.feed": [0, 1]})), "a study varies numbers"),
     ],
 )
 def test_senseless_points_are_refused(make, words):
