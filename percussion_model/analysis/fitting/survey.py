@@ -28,7 +28,14 @@ from percussion_model.analysis.fitting.likelihood import (
     reading_series,
 )
 from percussion_model.analysis.fitting.measurements import LEAST_DATA, Curve, DropTest
-from percussion_model.analysis.fitting.search import LEAST_STEP, descend, design, distinct, grid
+from percussion_model.analysis.fitting.search import (
+    APART,
+    LEAST_STEP,
+    descend,
+    design,
+    distinct,
+    grid,
+)
 from percussion_model.analysis.fitting.signs import check_signs
 
 # With a curve, a grid of C_R and W_R is computed for its K_R and gamma and for those this share
@@ -52,6 +59,10 @@ STARTS, FINALISTS = 8, 4
 ZOOM = {STIFFNESS: 0.5, EXPONENT: 0.3, RATIO: 0.3, UNLOADING: 0.3, DAMPING: 1.0, ENERGY: 0.6}
 # The last of these grids is of all samples.
 LAST_ZOOM, LAST_STEP = 0.12, 2e-4
+# Of one unknown of a drop that a curve would tell, dips are some thousandths wide, and others
+# beside them are nearly as deep: all of its range is scanned by the first step, in the logarithm,
+# what is beside so many of the lowest places by the second, and so many dips are followed.
+SCAN_STEP, SCAN_FINE, SCANNED, DIPS_FOLLOWED = 5e-3, 5e-4, 24, 12
 # Later bounces tell the exponents of the power law so well that nothing nearby fits them: the
 # search begins with these shares of each drop, and so many of the best places of each go on. From
 # each of these, and from so many of a grid with so many values, it goes down.
@@ -130,6 +141,8 @@ def minima_of(
         closer = _zoom(whole, best.at, LAST_ZOOM * sizes, steps)
         deep += [descend(whole, one.at, every, rounds=2)[0] for one in closer[:1]]
     found = distinct(deep, 0.1 * sizes, FINALISTS)
+    if not simple and len(whole.names) == 1 and whole.names[0] in (STIFFNESS, RATIO):
+        found = distinct([*deep, *_scanned(whole, counter)], np.array([APART]), DIPS_FOLLOWED)
 
     def searched(others: Sequence[Source]) -> tuple[Likelihood, Place]:
         like = thin.with_series(series_of(others, sight, SEARCH_SAMPLES))
@@ -138,6 +151,32 @@ def minima_of(
 
     check_signs(thin, found, sources, searched)
     return found
+
+
+def _scanned(whole: Likelihood, counter: Counter) -> list[Place]:
+    """Dips of one unknown that explain the data nearly as well as the deepest."""
+    (name,), rest = whole.names, math.log(FACTOR)
+    guess = float(coordinates([name], [whole.scene[name]])[0])
+    low, high = max(whole.low[0], guess - rest), min(whole.high[0], guess + rest)
+    row = np.arange(low, high, SCAN_STEP)
+    beside = SCAN_FINE * np.arange(-9, 10)
+    counter.begin("scan of the whole range", len(row) + SCANNED * len(beside))
+    places = [whole.at(np.array([at])) for at in row]
+    for one in sorted(places, key=lambda place: place.deviance)[:SCANNED]:
+        places += [whole.at(one.at + step) for step in beside]
+    places.sort(key=lambda place: float(place.at[0]))
+    dips = [
+        here
+        for before, here, after in zip(places, places[1:], places[2:], strict=False)
+        if here.deviance <= min(before.deviance, after.deviance)
+    ]
+    dips.sort(key=lambda place: place.deviance)
+    steps = np.array([LAST_STEP])
+    return [
+        descend(whole, one.at, [0], steps, rounds=2)[0]
+        for one in distinct(dips, np.array([APART]), DIPS_FOLLOWED)
+        if one.deviance - dips[0].deviance < TOLD
+    ]
 
 
 def _searched(
