@@ -314,6 +314,8 @@ P, F = CURVE.penetration, CURVE.force
         (P[60:], F[60:], "data of loading under force, at least 3"),
         (np.full(100, 1e-3), F, "penetration: does not change"),
         (P, -np.abs(F), "force: never positive"),
+        (P, -F + 1.0, "curve: force: the sign is reversed: multiply the column by -1"),
+        (-P, F, "curve: penetration: the sign is reversed: multiply the column by -1"),
         (P[::-1], F[::-1], "the rows must be in the order of time"),
         (1e3 * P, F / 1e3, r'perhaps "penetration \[mm\]", "force \[kN\]"'),
         (P, F / 1e3, r'perhaps "penetration \[m\]", "force \[kN\]"'),

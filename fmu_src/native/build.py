@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import tempfile
 from pathlib import Path
 
 from fmu_src.flat_names import flat_name
@@ -14,6 +15,7 @@ from fmu_src.native.tables import model_tables
 from fmu_src.run import run_fmu
 from fmu_src.slave.native import this_platform
 from percussion_model.scene.scene import Scene
+from percussion_model.scene.writing import move_whole, own_prefix
 from percussion_model.solvers.blow_map.table import BlowTable
 
 # Files by version of FMI: what follows the name of the scene's FMU.
@@ -49,11 +51,15 @@ def build_native(
     about = about_hammer(scene, path.with_name(f"{path.stem.partition('-')[0]}.fmu"), flat)
     words = None if blow_map is None else blow_map.to_words()
     tables = functools.partial(model_tables, scene, blow_map=words)
-    guid = write_native_fmu(
-        path, version, about, scene, libraries, tables, with_map=blow_map is not None
-    )
-    if this_platform() in libraries:
-        named = flat_name if flat else str
-        refuse_difference(scene, path, named)
-        add_reference_results(path, scene, functools.partial(run_fmu, path), named)
+    # in a folder beside it, so that an interruption leaves what was there
+    with tempfile.TemporaryDirectory(prefix=own_prefix(), dir=path.parent) as folder:
+        draft = Path(folder) / path.name
+        guid = write_native_fmu(
+            draft, version, about, scene, libraries, tables, with_map=blow_map is not None
+        )
+        if this_platform() in libraries:
+            named = flat_name if flat else str
+            refuse_difference(scene, draft, named)
+            add_reference_results(draft, scene, functools.partial(run_fmu, draft), named)
+        move_whole(draft, path)
     return guid

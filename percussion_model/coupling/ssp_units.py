@@ -113,9 +113,11 @@ def conversion(
         gain, shift = _factor_and_shift(given, wanted)
         if not (math.isfinite(gain) and math.isfinite(shift)):
             raise UnitError
-    except (UnitError, OverflowError):
+    except (UnitError, OverflowError) as error:
         names = f"{shortened(given.name)} to {shortened(wanted.name)}"
-        raise UnitError(f"there is no conversion of {names}") from None
+        # a unit that is not known, and the one that is perhaps meant
+        why = f", since {shortened(str(error))}" if "did you mean" in str(error) else ""
+        raise UnitError(f"there is no conversion of {names}{why}") from None
     found = Linear(gain, 0.0 if is_difference else shift)
     return None if found == Linear() else found
 

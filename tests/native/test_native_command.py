@@ -10,6 +10,7 @@ import pytest
 
 from fmu_src.commands import options
 from fmu_src.hammer.build import about_hammer, refuse_other
+from fmu_src.native import build as building
 from fmu_src.native import library as native
 from fmu_src.native.archive import write_native_fmu
 from fmu_src.native.build import native_files
@@ -34,6 +35,23 @@ def bake(scene, path, with_map=False):
         path, "2.0", about_hammer(scene, Path("A.fmu")), scene, {HOST: b""},
         lambda guid: model_tables(scene, guid), with_map,
     )  # fmt: skip
+
+
+def test_an_interruption_leaves_the_fmu_that_was_there(tmp_path, monkeypatch):
+    """It is built beside it, and compared before it takes its place."""
+    path = tmp_path / "Hammer-native.fmu"
+    path.write_bytes(b"the one before")
+    monkeypatch.setattr(building, "this_platform", lambda: HOST)
+
+    def interrupt(scene, draft, named):
+        assert draft.is_file()
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(building, "refuse_difference", interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        building.build_native(Scene(), path, "2.0", {HOST: b""})
+    assert path.read_bytes() == b"the one before"
+    assert list(tmp_path.iterdir()) == [path]
 
 
 def test_the_fmu_of_another_scene_is_not_replaced(tmp_path, monkeypatch, capsys):

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from percussion_model.analysis.fitting.measurements import Curve, FitError, least_noise
+from percussion_model.analysis.fitting.measurements import Curve, FitError, least_noise, named
 from percussion_model.analysis.fitting.slow_test import SlowRock
 from percussion_model.scene.scene import Scene
 
@@ -207,7 +207,10 @@ def first_sight(curves: Sequence[Curve], scene: Scene) -> Sight:
     FitError
         If the data are no loading and unloading.
     """
-    lines = [_lines(curve) for curve in curves]
+    lines = []
+    for curve in curves:
+        with named(curve.name):
+            lines.append(_lines(curve))
     peaks = [float(curve.penetration.max()) for curve in curves]
     if scene.effects.rock == "power":
         return _first_sight_by_power(curves, peaks, [one[2] for one in lines], scene)

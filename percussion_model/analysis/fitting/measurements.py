@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -128,6 +130,17 @@ class Reading:
         return self.quantity + ("" if self.speed is None else f" at {self.speed:g} m/s")
 
 
+@contextmanager
+def named(name: str) -> Iterator[None]:
+    """Say of whose data an error tells."""
+    try:
+        yield
+    except FitError as error:
+        if name in str(error):
+            raise
+        raise FitError(f"{name}: {error}") from None
+
+
 def checked_curve(curve: Curve) -> Curve:
     """Return a curve as arrays of numbers that can be.
 
@@ -135,12 +148,17 @@ def checked_curve(curve: Curve) -> Curve:
     ------
     FitError
     """
-    p, force = checked_columns({"penetration": curve.penetration, "force": curve.force})
-    span = float(np.ptp(p))
-    if not span > 0:
-        raise FitError("penetration: does not change")
-    if not force.max() > 0:
-        raise FitError("force: never positive; compression counts positive")
+    with named(curve.name):
+        p, force = checked_columns({"penetration": curve.penetration, "force": curve.force})
+        span = float(np.ptp(p))
+        if not span > 0:
+            raise FitError("penetration: does not change")
+        if not force.max() > 0:
+            raise FitError("force: never positive; compression counts positive")
+        pressed = int(np.argmax(np.abs(force)))
+        reversed_ = {"force": force[pressed] < 0.0, "penetration": p[pressed] < p[0] - 0.5 * span}
+        for column in (name for name, is_so in reversed_.items() if is_so):
+            raise FitError(f"{column}: the sign is reversed: multiply the column by -1")
     slope = float(force.max()) / span
     scales = []
     if not PENETRATIONS[0] <= span <= PENETRATIONS[1]:
