@@ -51,6 +51,7 @@ def build_native(
     about = about_hammer(scene, path.with_name(f"{path.stem.partition('-')[0]}.fmu"), flat)
     words = None if blow_map is None else blow_map.to_words()
     tables = functools.partial(model_tables, scene, blow_map=words)
+    path.parent.mkdir(parents=True, exist_ok=True)
     # in a folder beside it, so that an interruption leaves what was there
     with tempfile.TemporaryDirectory(prefix=own_prefix(), dir=path.parent) as folder:
         draft = Path(folder) / path.name

@@ -52,6 +52,8 @@ def test_an_interruption_leaves_the_fmu_that_was_there(tmp_path, monkeypatch):
         building.build_native(Scene(), path, "2.0", {HOST: b""})
     assert path.read_bytes() == b"the one before"
     assert list(tmp_path.iterdir()) == [path]
+    with pytest.raises(KeyboardInterrupt):  # a folder that is not there yet is made
+        building.build_native(Scene(), tmp_path / "new" / "A-native.fmu", "2.0", {HOST: b""})
 
 
 def test_the_fmu_of_another_scene_is_not_replaced(tmp_path, monkeypatch, capsys):
