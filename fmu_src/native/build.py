@@ -53,7 +53,7 @@ def build_native(
     tables = functools.partial(model_tables, scene, blow_map=words)
     path.parent.mkdir(parents=True, exist_ok=True)
     # in a folder beside it, so that an interruption leaves what was there
-    with tempfile.TemporaryDirectory(prefix=own_prefix(), dir=path.parent) as folder:
+    with tempfile.TemporaryDirectory(prefix=own_prefix(path.parent), dir=path.parent) as folder:
         draft = Path(folder) / path.name
         guid = write_native_fmu(
             draft, version, about, scene, libraries, tables, with_map=blow_map is not None

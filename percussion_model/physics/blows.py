@@ -14,6 +14,8 @@ from percussion_model.physics.records import DriveKind, EventKind, Mode, Piston
 from percussion_model.physics.rock import hole_depth
 from percussion_model.physics.state import CHECKPOINTS
 
+# No gap is looked at for a closure that would have to close faster [m/s].
+FASTEST = 100.0
 # The standstill force is the mean over this last share of the standstill.
 LAST_SHARE = 0.1
 
@@ -147,6 +149,12 @@ def end_with_blow(par, s, end):
     if s.closed == 1 or par.piston == Piston.ABSENT or not starts_blow(par, s, end):
         return 0.0
     return end
+
+
+@inlined
+def end_of_step_with_blow(par, s, end):
+    """The same of a step, of a solver that knows the gap at all times."""
+    return 0.0 if s.gap > FASTEST * par.dt else end_with_blow(par, s, end)
 
 
 @merged

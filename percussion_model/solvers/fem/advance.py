@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from percussion_model.physics.blows import end_with_blow, push_checkpoint
+from percussion_model.physics.blows import end_of_step_with_blow, push_checkpoint
 from percussion_model.physics.body import hold_effects
 from percussion_model.physics.kernel import kernel, merged
 from percussion_model.physics.readings import fill_ledger, fill_motion
@@ -33,7 +33,7 @@ def time_of_blow(par_, state):
 
     One that is cut at the closure is over before.
     """
-    return end_with_blow(par_[0], state[0], state[0].time + par_[0].dt)
+    return end_of_step_with_blow(par_[0], state[0], state[0].time + par_[0].dt)
 
 
 @merged

@@ -6,6 +6,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from percussion_model.physics.blows import FASTEST
 from percussion_model.physics.kernel import entry_of
 from percussion_model.scene.bar_groups import Bar
 from percussion_model.scene.numbers import kernel_numbers, section_numbers
@@ -38,7 +39,7 @@ from percussion_model.solvers.fem.records import (
 from percussion_model.solvers.setup import refuse_many
 from percussion_model.solvers.state import State, words_of
 
-CLOSED = words_of(FEM_STATE)["closed"]
+CLOSED, GAP = (words_of(FEM_STATE)[name] for name in ("closed", "gap"))
 # A state is no more than a step, and rounding, behind the present [steps].
 MOST_BEHIND = 2.0
 # Elements and contact stiffness of runs to compare with, by those of this one.
@@ -116,7 +117,8 @@ class FemSolver(Solver):
 
     def time_of_blow(self, state: State) -> float:
         """As in `Solver`: a step may be cut at a closure."""
-        if state.words[CLOSED] == 1:  # as the kernel asks, in a tenth of the time
+        # as the kernel asks, in a tenth of the time
+        if state.words[CLOSED] == 1 or state.numbers[GAP] > FASTEST * self.time_step:
             return 0.0
         return float(time_of_blow(self._par, state.record))
 

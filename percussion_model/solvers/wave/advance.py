@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from percussion_model.physics.blows import end_with_blow
+from percussion_model.physics.blows import end_of_step_with_blow
 from percussion_model.physics.kernel import kernel, merged
 from percussion_model.physics.readings import fill_forces, fill_ledger, fill_motion
 from percussion_model.physics.records import Piston, Status
@@ -71,7 +71,9 @@ def time_of_blow(par_, state):
     One that is cut at the closure is over before.
     """
     par, s = par_[0], state[0]
-    return 0.0 if s.leap_end >= 0 else end_with_blow(par, s, s.t_base + (s.step + 1) * par.dt)
+    if s.leap_end >= 0:
+        return 0.0
+    return end_of_step_with_blow(par, s, s.t_base + (s.step + 1) * par.dt)
 
 
 @merged

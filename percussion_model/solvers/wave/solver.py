@@ -7,6 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from percussion_model.physics.blows import FASTEST
 from percussion_model.physics.kernel import entry_of
 from percussion_model.physics.records import Status
 from percussion_model.scene.bar_groups import Bar
@@ -45,7 +46,8 @@ from percussion_model.solvers.wave.totals import resync
 _WORD = words_of(WAVE_STATE)
 LEAP_END, STEP, T_BASE = _WORD["leap_end"], _WORD["step"], _WORD["t_base"]
 EVENTS_ON, N_BLOWS, N_EVENTS = _WORD["events_on"], _WORD["n_blows"], _WORD["n_events"]
-PARITY, PEAK_FROM, CLOSED = _WORD["parity"], _WORD["peak_from"], _WORD["closed"]
+PARITY, PEAK_FROM = _WORD["parity"], _WORD["peak_from"]
+CLOSED, GAP = _WORD["closed"], _WORD["gap"]
 LEAP_WORDS = [
     _WORD[name] for name in ("step", "leap_end", "leap_kind", "dormant", "piston_step", "wake")
 ]
@@ -220,7 +222,8 @@ class WaveSolver(Solver):
 
     def time_of_blow(self, state: State) -> float:
         """As in `Solver`: a step may be cut at a closure."""
-        if state.words[CLOSED] == 1:  # as the kernel asks, in a tenth of the time
+        # as the kernel asks, in a tenth of the time
+        if state.words[CLOSED] == 1 or state.numbers[GAP] > FASTEST * self.time_step:
             return 0.0
         return float(time_of_blow(self._par, state.record))
 
