@@ -12,7 +12,7 @@ import difflib
 import functools
 import re
 import struct
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -43,6 +43,15 @@ _STATUS = {2: "discard", 3: "error", 4: "fatal", 5: "pending"}
 
 class CouplingError(ValueError):
     """A system that cannot be set up or cannot go on; says which part, when and why."""
+
+
+@contextlib.contextmanager
+def naming(place: object) -> Iterator[None]:
+    """Put a place, as a component or a connection, before what is said of it."""
+    try:
+        yield
+    except CouplingError as error:
+        raise type(error)(f"{place}: {error}") from error
 
 
 def read_description(name: str, folder: str) -> Any:

@@ -20,7 +20,7 @@ from typing import Any, Literal
 import numpy as np
 
 from percussion_model.coupling.compiled import CompiledStep, can_compile
-from percussion_model.coupling.component import Component, CouplingError, read_description
+from percussion_model.coupling.component import Component, CouplingError, naming, read_description
 from percussion_model.coupling.coupled_run import JUDGED, CoupledRun, known_signals
 from percussion_model.coupling.port import (
     OnWay,
@@ -117,12 +117,12 @@ class Coupling:
             chosen = replaced.get(name, source)
             fmu = source if callable(chosen) else Path(chosen)
             folders[name] = tempfile.mkdtemp(prefix="fmu-", dir=self._folder)
-            with _named(name):
+            with naming(name):
                 unpack_zip(fmu, Path(folders[name]), allowance)
                 check_xml(Path(folders[name]) / DESCRIPTION, DESCRIPTION, allowance)
             descriptions[name] = read_description(name, folders[name])
         others = {name for name, chosen in replaced.items() if not callable(chosen)}
-        with _named(str(self.path)):
+        with naming(self.path):
             wiring = Wiring(archive, descriptions, others)
             self._links, values = wiring.links(), wiring.values()
         self.start, self.stop = archive.start or 0.0, archive.stop
@@ -358,15 +358,6 @@ class Coupling:
             if isinstance(part, Component):
                 part.free()
         shutil.rmtree(self._folder, ignore_errors=True)
-
-
-@contextmanager
-def _named(component: str) -> Iterator[None]:
-    """Put the component before what is said of its FMU."""
-    try:
-        yield
-    except CouplingError as error:
-        raise CouplingError(f"{component}: {error}") from error
 
 
 @contextmanager

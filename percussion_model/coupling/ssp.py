@@ -6,15 +6,13 @@ Whatever SSP 1.0 can say is applied, changes no number, or is refused here (docs
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 from urllib.parse import unquote, urlsplit
 from urllib.request import url2pathname
 
-from percussion_model.coupling.component import CouplingError
+from percussion_model.coupling.component import CouplingError, naming
 from percussion_model.coupling.ssp_units import Unit, unit_named, units_of
 from percussion_model.coupling.ssp_values import Value, bound_values
 from percussion_model.coupling.ssp_xml import (
@@ -111,7 +109,7 @@ def unpack(path: Path, folder: str, allowance: Allowance) -> Archive:
             f"{path}: no such file; `percussion system {path.stem}` makes it in dist, if it ships"
         )
     reader = Reader(Path(folder), allowance)
-    with _named(f"{path}: no SSP archive"):
+    with naming(f"{path}: no SSP archive"):
         unpack_zip(path, Path(folder), allowance)
     try:
         return _read(path, reader)
@@ -134,15 +132,6 @@ def _read(path: Path, reader: Reader) -> Archive:
         _connectors(named, units),
         *_experiment(root),
     )
-
-
-@contextmanager
-def _named(where: str) -> Iterator[None]:
-    """Put the place before what is said of it."""
-    try:
-        yield
-    except CouplingError as error:
-        raise type(error)(f"{where}: {error}") from error
 
 
 def _components(system: Any) -> dict[str, Any]:
@@ -196,7 +185,7 @@ def _source_of(component: Any, reader: Reader, path: Path) -> Path:
 
 
 def _values_of(name: str, node: Any, reader: Reader, units: dict[str, Unit]) -> dict[str, Value]:
-    with _named(f"component {name}" if name else "system"):
+    with naming(f"component {name}" if name else "system"):
         return bound_values(node, reader, units)
 
 
@@ -220,7 +209,7 @@ def _connection(node: Any) -> Connection:
         (node.get(f"{end}Element", SYSTEM), node.get(f"{end}Connector")) for end in ("start", "end")
     )
     found = Connection(ends, None, is_true(node.get("suppressUnitConversion")))  # type: ignore[arg-type]
-    with _named(str(found)):
+    with naming(found):
         return found._replace(transformation=transformation_of(node))
 
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 from percussion_model.coupling.component import (
     FAMILIES,
     CouplingError,
     find_variable,
+    naming,
     number_of_word,
     numbers_of_words,
 )
@@ -98,7 +98,7 @@ class Wiring:
         found: dict[str, list[Link]] = {name: [] for name in self._variables}
         fed: set[tuple[str, str]] = set()
         for one in self.archive.connections:
-            with _at(one):
+            with naming(one):
                 ends = [self._end(*end) for end in one.ends if self._is_inside(*end)]
                 sinks = [end for end in ends if end.variable.causality == "input"]
                 if len(ends) == 2:
@@ -155,7 +155,7 @@ class Wiring:
                     other = one.ends[one.ends[0] == (SYSTEM, name)]
                     if other[0] == SYSTEM:
                         continue
-                    with _at(one):
+                    with naming(one):
                         end = self._end(*other)
                         ends.append((end, self._passed(value, connector, end, one)))
         for component, variables in self._variables.items():
@@ -190,20 +190,11 @@ class Wiring:
 
     def _fitted(self, value: Value, end: End) -> Any:
         """A value as a variable takes it."""
-        with _at(signal_name(end.component, end.name)):
+        with naming(shortened(signal_name(end.component, end.name))):
             found = _changed(value, end.unit, end.is_difference)
         if isinstance(found, str) and end.variable.type in FAMILIES:
             return number_of_word(end.component, end.variable, found)
         return found
-
-
-@contextmanager
-def _at(place: object) -> Iterator[None]:
-    """Put a connection, or a variable, before what is said of it."""
-    try:
-        yield
-    except CouplingError as error:
-        raise CouplingError(f"{shortened(str(place))}: {error}") from error
 
 
 def _check_connector(name: str, said: Connector, variable: Any, unit: Unit | None) -> None:
@@ -232,7 +223,7 @@ def _changed(value: Value, unit: Unit | None, is_difference: bool) -> Any:
     """A value in another unit and after its transformation."""
     found = value.value
     if value.unit is not None and not value.keeps_unit:
-        with _at(f"{found} {value.unit.name}"):
+        with naming(shortened(f"{found} {value.unit.name}")):
             change = _conversion(value.unit, unit, is_difference)
         found = found if change is None else change(found)
     if value.transformation is not None:
@@ -302,8 +293,10 @@ def _by_table(
             f"its {transformation.kind}MappingTransformation lacks {shortened(', '.join(lacking))}"
         )
 
+    known_table = transformation._replace(table=table)
+
     def look_up(value: Any) -> Any:
-        with _at(connection):  # numbers are known in the run alone
-            return transformation._replace(table=table).change(value)
+        with naming(connection):  # numbers are known in the run alone
+            return known_table.change(value)
 
     return look_up
