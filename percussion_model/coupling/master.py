@@ -188,6 +188,11 @@ class Coupling:
         """
         try:
             count, every = whole_steps(duration, step, interval)
+            if not self.start < self.start + step < math.inf:
+                raise CouplingError(
+                    f"start = {self.start!r} s: must be a finite time that a step of {step:g} s "
+                    "changes"
+                )
             self._refuse_contradictions(count, tolerance)
             self._connect([*signals, *known_signals(self.outputs, JUDGED)])
             self._initialise(tell)

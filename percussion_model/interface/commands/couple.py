@@ -100,7 +100,6 @@ def couple(
     out/SYSTEM.
     """
     from percussion_model.interface.progress import progress, progress_bar
-    from percussion_model.simulation.files import ResultError
 
     try:
         from percussion_model.coupling import Coupling
@@ -123,16 +122,15 @@ def couple(
             tolerance=tolerance,
             every=common.by_name(every), set=common.by_name(settings), signals=signals,
         )  # fmt: skip
-    except ResultError:
+        _tell_of_rest(duration, step)
+        wanted = [*known_signals(coupling.outputs), *(signals or ())]
+        rows_every = max(step, duration / ROWS) if interval is None else interval
+        with progress_bar(duration) as bar:
+            run = coupling.run(
+                duration, step, wanted, rows_every, tolerance, bar, "keep", common.print_message
+            )
+    finally:
         coupling.free()
-        raise
-    _tell_of_rest(duration, step)
-    wanted = [*known_signals(coupling.outputs), *(signals or ())]
-    rows_every = max(step, duration / ROWS) if interval is None else interval
-    with progress_bar(duration) as bar:
-        run = coupling.run(
-            duration, step, wanted, rows_every, tolerance, bar, "keep", common.print_message
-        )
     found = summary(run)
     path = common.write_folder(claimed, lambda folder: _write_signals(run, folder))
     folder = claimed.folder
@@ -165,8 +163,7 @@ def _set_time(coupling: Coupling, start: float | None, duration: float | None) -
         coupling.start = start
     if duration is not None or coupling.stop is None:
         return DURATION if duration is None else duration
-    if coupling.stop <= coupling.start:
-        coupling.free()
+    if not coupling.stop > coupling.start:
         raise common.refusal(
             f"{coupling.path}: stopTime = {coupling.stop:g}: is not after the start at "
             f"{coupling.start:g} s: give --duration"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import subprocess
+import tempfile
 import tomllib
 from pathlib import Path
 
@@ -166,9 +167,21 @@ def test_options_go_before_the_default_experiment(words, first, last, timed):
     assert rows[-1] == pytest.approx([last, last])
 
 
-def test_a_start_after_the_stop_wants_a_duration(timed, capsys):
-    assert percussion("couple", "case.ssp", "--start", "2") == 2
-    assert "stopTime = 1.25: is not after the start at 2 s: give --duration" in " ".join(
-        capsys.readouterr().err.split()
-    )
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--start", "2"), "stopTime = 1.25: is not after the start at 2 s: give --duration"),
+        (("--start", "nan"), "stopTime = 1.25: is not after the start at nan s: give --duration"),
+        (("--start", "inf", "--duration", "1"), "start = inf s: must be a finite time that a step"),
+        (("--start", "-1e300", "--duration", "1"), "start = -1e+300 s: must be a finite time"),
+        (("--duration", "-1"), "duration = -1.0 s: must be above 0 s"),
+    ],
+)
+def test_times_that_cannot_be_are_refused_and_leave_nothing(words, said, timed, capsys):
+    (folder := Path("temporary")).mkdir()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(tempfile, "tempdir", str(folder.absolute()))
+        assert percussion("couple", "case.ssp", *words) == 2
+    assert said in " ".join(capsys.readouterr().err.split())
     assert not Path("out").exists()
+    assert not list(folder.iterdir())
