@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
-import difflib
 import functools
 import re
 import struct
@@ -21,7 +20,7 @@ from fmpy import platform, read_model_description, sharedLibraryExtension
 from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
 from lxml import etree
 
-from percussion_model.scene.rows import shortened, unit_suffix
+from percussion_model.scene.rows import nearest, shortened, unit_suffix
 
 # Number of a bar or a section within a key of a scene, and one in either way of writing.
 _PLACE = re.compile(r"\.([0-9]{1,4})(?=\.|$)")
@@ -92,8 +91,8 @@ def find_variable(component: str, variables: Mapping[str, Any], name: str) -> An
         name = shortened(name)
         # as a scene writes it, which counts from 0
         bracketed = _PLACE.sub(lambda place: f"[{int(place[1]) + 1}]", name)
-        near = difflib.get_close_matches(bracketed, variables, 1)
-        hint = f"; did you mean {near[0]}?" if near else ""
+        near = nearest(bracketed, variables)
+        hint = f"; did you mean {near}?" if near else ""
         if near and _COUNTED.search(name):
             hint += " Bars and sections count from 1 in FMUs, from 0 in scenes"
         raise CouplingError(f"{component} has no variable {name}{hint}")

@@ -9,7 +9,7 @@ from typing import Any
 
 from percussion_model.coupling.component import Component, CouplingError
 from percussion_model.coupling.wiring import Link
-from percussion_model.scene.rows import nearest
+from percussion_model.scene.rows import said_among
 
 OnWay = Callable[[str, float, Any], Any]
 
@@ -153,10 +153,9 @@ def check_pace(every: Mapping[str, int], components: Sequence[str]) -> dict[str,
     """Those parts that are slower than the loop; `CouplingError` if one is not known."""
     for name, steps in every.items():
         if name not in components:
-            near = nearest(name, components)
             raise CouplingError(
-                f"every {name}={steps}: there is no component {name}, only {', '.join(components)}"
-                + (f"; did you mean {near}?" if near else "")
+                f"every {name}={steps}: there is no component {name}: "
+                f"{said_among(name, components)}"
             )
         if isinstance(steps, bool) or not isinstance(steps, int) or steps < 1:
             raise CouplingError(f"every {name}={steps!r}: must be a whole number from 1")

@@ -9,7 +9,8 @@ from typing import Any
 
 from percussion_model.coupling.component import CouplingError
 from percussion_model.coupling.fresh import fresh
-from percussion_model.scene.rows import nearest
+from percussion_model.coupling.ssp_xml import is_true
+from percussion_model.scene.rows import nearest, said_among
 
 Work = Callable[[dict[str, Any], float, float], Mapping[str, Any]]
 # What a user gives: a `Work`, or what makes one (see `fresh`).
@@ -20,9 +21,7 @@ class Inputs(dict[str, Any]):
     """Inputs by name; the error of a missing one names those that are there."""
 
     def __missing__(self, name: str) -> Any:
-        near = nearest(name, self)
-        meant = f"; did you mean {near}?" if near else ""
-        raise CouplingError(f"there is no input {name!r}, only {', '.join(self)}{meant}")
+        raise CouplingError(f"there is no input {name!r}: {said_among(name, self)}")
 
 
 class PythonPart:
@@ -106,14 +105,13 @@ def input_starts(name: str, description: Any, values: Mapping[str, Any]) -> dict
     values : mapping
         Of the archive, by variable.
     """
-    kinds: dict[str, Callable[[str], Any]] = {
-        "Real": float, "Boolean": lambda text: text in ("true", "1")
-    }  # fmt: skip
+    kinds: dict[str, Callable[[str], Any]] = {"Real": float, "Boolean": is_true}
     found = {}
     for one in description.modelVariables:
         if one.causality == "input":
             try:
-                found[one.name] = values.get(one.name, kinds.get(one.type, int)(one.start))
+                own = values.get(one.name)
+                found[one.name] = kinds.get(one.type, int)(one.start) if own is None else own
             except (TypeError, ValueError):
                 raise CouplingError(f"{name}: {one.name} has no start value") from None
     return found

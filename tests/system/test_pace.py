@@ -73,7 +73,7 @@ def test_all_parts_end_at_the_end(feed_control):
 @pytest.mark.parametrize(
     ("every", "words"),
     [
-        ({"rok": 2}, "no component rok, only rock, supply"),
+        ({"rok": 2}, r"no component rok: did you mean rock\? Known are rock, supply"),
         ({"rock": 0}, "rock=0: must be a whole number from 1"),
         ({"rock": 2.0}, "must be a whole number"),
         ({"rock": True}, "must be a whole number"),

@@ -6,6 +6,7 @@ import subprocess
 import tempfile
 import tomllib
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from fmpy import platform, sharedLibraryExtension
@@ -13,6 +14,7 @@ from fmpy import platform, sharedLibraryExtension
 from fmu_src.native.library import NoCompilerError, compiler_for
 from fmu_src.slave.native import this_platform
 from percussion_model.coupling import Coupling, CouplingError
+from percussion_model.coupling.python_part import input_starts
 from tests.commands import percussion
 from tests.properties.hostile import pack
 
@@ -133,6 +135,14 @@ def test_another_fmu_and_a_python_part_have_their_units(echoes, tmp_path):
         2e-3, 1e-3
     )
     assert seen["mode"] == 3
+
+
+def test_an_input_without_a_start_takes_the_value_of_the_archive():
+    one = SimpleNamespace(name="force", type="Real", causality="input", start=None)
+    description = SimpleNamespace(modelVariables=[one])
+    assert input_starts("a", description, {"force": 2.0}) == {"force": 2.0}
+    with pytest.raises(CouplingError, match="a: force has no start value"):
+        input_starts("a", description, {})
 
 
 def test_options_set_what_the_archive_does_too(echoes, tmp_path):
