@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -65,6 +65,13 @@ def table_for(scene: Scene, wanted: bool) -> BlowTable | None:
     from percussion_model.interface.commands.blow_map import ready_map
 
     return ready_map(scene)
+
+
+def list_choices(about: Mapping[str, str]) -> None:
+    """Print a line for each thing that can be chosen: its name, and what it is."""
+    width = max(map(len, about))
+    for name, text in about.items():
+        typer.echo(f"{name:{width}s}  {text}")
 
 
 @contextmanager

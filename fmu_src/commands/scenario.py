@@ -10,6 +10,7 @@ from typing import Annotated
 
 import typer
 
+from fmu_src.commands import options
 from percussion_model.interface.commands import common
 
 # What follows the name is the script's own.
@@ -32,9 +33,7 @@ def scenario(
     folder = scenario_folder()
     about = _scripts(folder)
     if name is None:
-        width = max(map(len, about))
-        for one, text in about.items():
-            typer.echo(f"{one:{width}s}  {text}")
+        options.list_choices(about)
         return
     if name not in about:
         raise common.refusal(

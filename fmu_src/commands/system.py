@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from fmu_src.commands import options
 from percussion_model.interface.commands import common
-
-if TYPE_CHECKING:
-    from fmu_src.system.archive import SystemPlan
 
 INVALID = 1
 # The word for all that ship.
@@ -43,7 +39,7 @@ def system(
         from percussion_model.interface.progress import progress
 
         if not systems:
-            _list(plans())
+            options.list_choices({plan.name: plan.description for plan in plans()})
             return 0
         common.load_numba()
         problems = 0
@@ -71,10 +67,3 @@ def system(
             path = write_system(plan, fmus, output / f"{plan.name}.ssp")
             typer.echo(f"{path}: {state_of(path, before.get(path))}")
         return INVALID if problems else 0
-
-
-def _list(found: Sequence[SystemPlan]) -> None:
-    """Print a line for each system."""
-    width = max(len(plan.name) for plan in found)
-    for plan in found:
-        typer.echo(f"{plan.name:{width}s}  {plan.description}")
