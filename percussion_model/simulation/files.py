@@ -59,14 +59,14 @@ def check_file(path: str | Path) -> None:
     except OSError as error:
         raise ResultError(f"{path}: cannot be written: {error.strerror}") from None
     if target.is_dir():
-        raise ResultError(f"{path}: cannot be written: it is a folder")
+        raise ResultError(f"{path}: is a folder; give the file to write")
     check_writable(target.parent)
     if not target.parent.is_dir():
         raise ResultError(f"{path}: cannot be written: there is no folder {target.parent}")
 
 
 @contextmanager
-def staged(folder: Path, but: Iterable[str] = ()) -> Iterator[Path]:
+def staged(folder: Path, outdated: Iterable[str] = ()) -> Iterator[Path]:
     """Give a draft folder whose files all move to `folder` at the end, or none.
 
     Of several processes that do so at once one is after the other.
@@ -75,8 +75,8 @@ def staged(folder: Path, but: Iterable[str] = ()) -> Iterator[Path]:
     ----------
     folder : Path
         Made if it is not there.
-    but : iterable of str
-        Files that are removed from it unless they are in the draft.
+    outdated : iterable of str
+        Names of files that are removed from it unless they are in the draft.
 
     Yields
     ------
@@ -92,7 +92,7 @@ def staged(folder: Path, but: Iterable[str] = ()) -> Iterator[Path]:
         try:
             yield draft
             one = hold(folder / "moving", waits=True)
-            _move(draft, folder, but)
+            _move(draft, folder, outdated)
             del one
         finally:
             shutil.rmtree(draft, ignore_errors=True)
@@ -100,18 +100,18 @@ def staged(folder: Path, but: Iterable[str] = ()) -> Iterator[Path]:
         raise ResultError(f"{folder}: cannot be written: {error.strerror or error}") from None
 
 
-def _move(draft: Path, folder: Path, but: Iterable[str]) -> None:
+def _move(draft: Path, folder: Path, outdated: Iterable[str]) -> None:
     if not folder.exists():
         draft.rename(folder)
         return
-    for source in sorted(draft.rglob("*")):
+    sources = sorted(draft.rglob("*"))
+    for source in sources:
         target = folder / source.relative_to(draft)
         if source.is_dir():
             target.mkdir(exist_ok=True)
         else:
             move_whole(source, target)
-            but = set(but) - {source.name}
-    for name in but:
+    for name in set(outdated) - {source.name for source in sources}:
         (folder / name).unlink(missing_ok=True)
 
 

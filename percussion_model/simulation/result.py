@@ -363,7 +363,7 @@ def _write_result(result: Result, folder: Path) -> list[Path]:
     """
     was_result = all((folder / name).is_file() for name in _MARKS)
     left = (*_TRACES, ORIGIN, *_DERIVED) if was_result else (*_TRACES, ORIGIN)
-    with staged(folder, but=left) as draft:
+    with staged(folder, outdated=left) as draft:
         (draft / "summary.json").write_text(to_json(result.summary()) + "\n", encoding="utf-8")
         (draft / "scene.toml").write_text(result.scene.to_toml(), encoding="utf-8")
         blows = result.blows

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import gc
 import hashlib
 import os
@@ -12,7 +11,7 @@ import sys
 import tempfile
 import tomllib
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn, TypeVar
@@ -354,12 +353,9 @@ def check_file(option: str, path: Path | None) -> None:
     from percussion_model.simulation.files import ResultError
     from percussion_model.simulation.files import check_file as check
 
-    if path is None:
-        return
-    if path.is_dir():
-        raise refusal(f"{option} {str(path)!r}: is a folder; give the file to write")
     try:
-        check(path)
+        if path is not None:
+            check(path)
     except ResultError as error:
         raise refusal(f"{option} {error}") from None
 
@@ -373,8 +369,8 @@ def write_json(json_file: str | None, values: dict[str, Any]) -> None:
     elif json_file is not None:
         file = Path(json_file)
         word = "replaced" if file.is_file() else "wrote"
-        file = write_file(file, to_json(values) + "\n")
-        print(f"{word} {file}", file=sys.stderr)
+        if write_file(file, to_json(values) + "\n") == file:
+            print(f"{word} {file}", file=sys.stderr)
 
 
 # What could not be written where it was asked for, though it is kept elsewhere or only drawn.
@@ -385,13 +381,10 @@ def write_file(file: Path, text: str) -> Path:
     """Write what was computed into a file, or elsewhere where that cannot be; return the file."""
     from percussion_model.simulation.files import ResultError, staged_file
 
-    def write(path: Path) -> None:
-        staged_file(path, text)
-
     try:
-        write(file)
+        staged_file(file, text)
     except ResultError as error:
-        return _write_elsewhere(file, write, error)
+        return _write_elsewhere(file, partial(staged_file, content=text), error)[0]
     return file
 
 
@@ -399,14 +392,12 @@ def write_folder(claimed: Claim, write: Callable[[Path], T]) -> T:
     """Write what was computed into the folder of a claim, or elsewhere where that cannot be."""
     from percussion_model.simulation.files import ResultError
 
-    found: list[T] = []
     try:
-        found.append(write(claimed.folder))
+        return write(claimed.folder)
     except ResultError as error:
-        claimed.move_to(
-            _write_elsewhere(claimed.folder, lambda folder: found.append(write(folder)), error)
-        )
-    return found[-1]
+        folder, found = _write_elsewhere(claimed.folder, write, error)
+    claimed.move_to(folder)
+    return found
 
 
 def sign(claimed: Claim) -> list[Path]:
@@ -428,19 +419,21 @@ def write_texts(claimed: Claim, texts: Mapping[str, str]) -> None:
     list_files(write_folder(claimed, partial(staged_texts, texts=texts)))
 
 
-def _write_elsewhere(wanted: Path, write: Callable[[Path], None], error: ResultError) -> Path:
+def _write_elsewhere(
+    wanted: Path, write: Callable[[Path], T], error: ResultError
+) -> tuple[Path, T]:
     """Write into the present folder, else that for temporary files, else home, and say where."""
     from percussion_model.simulation.files import ResultError
 
     for place in (Path.cwd, lambda: Path(tempfile.gettempdir()), Path.home):
         try:
             path = place() / f"{wanted.stem}-kept-{secrets.token_hex(4)}{wanted.suffix}"
-            write(path)
+            found = write(path)
         except (ResultError, OSError, RuntimeError):  # no home, and no present folder any more
             continue
         print_message(f"{error}: what was computed is kept in {path}")
         _missed.append(str(error))
-        return path
+        return path, found
     raise error
 
 
@@ -596,6 +589,6 @@ def print_message(message: str, code: int = 0, program: str = "percussion") -> i
     What refuses bad input is one line, for scripts; others are broken to fit.
     """
     text = f"{program}: {message}"
-    with contextlib.suppress(OSError):  # the exit code tells it as well
+    with suppress(OSError):  # the exit code tells it as well
         print(text if code == BAD_INPUT else wrapped(text), file=sys.stderr)
     return code
