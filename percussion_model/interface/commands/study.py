@@ -70,6 +70,7 @@ def study(
     """Map the stationary response over parameters: points.parquet and points.nc."""
     from percussion_model.analysis.study import grid, latin_hypercube, read_axis
     from percussion_model.analysis.study import study as run_study
+    from percussion_model.analysis.study.store import PLAN
     from percussion_model.interface.progress import count_bar, progress
     from percussion_model.interface.terminal import show_study
     from percussion_model.scene.typical import hint_of
@@ -97,7 +98,8 @@ def study(
         common.hint(key, hint_of(key, column.tolist()))
     try:
         with common.interruptible():
-            if len(points) >= MANY and cluster is None:
+            # one that goes on has told it, and its bar tells what is left
+            if len(points) >= MANY and cluster is None and not (out / PLAN).exists():
                 _tell_of_cost(chosen, points, tolerance, scatter, processes)
             with count_bar("points") as report_count:
                 found = run_study(

@@ -167,6 +167,17 @@ def test_a_large_study_tells_its_cost_before(capsys):
         _tell_of_cost(scene, grid({"feed.froce": [4000.0]}), 1e-4, 1e-3, 1)
 
 
+def test_a_folder_that_holds_a_study_is_looked_at_before_the_cost(tmp_path, capsys):
+    """One that goes on has told its cost; another one is refused before a point is tried."""
+    pytest.importorskip("xarray")
+    (tmp_path / "study.json").write_text('{"scene": ""}', encoding="utf-8")
+    words = ["study", "rigid", "--over", "feed.force=4kN:5kN:2000", "--out", tmp_path]
+    assert percussion(*words) == 2
+    said = capsys.readouterr().err
+    assert "holds another study" in said
+    assert "take about" not in said
+
+
 def test_a_misspelt_output_of_a_controller_is_guessed():
     part = PythonPart("controller", lambda *_: {"force_comand": 1.0, "pressure": 2.0}, {})
     part.begin()
