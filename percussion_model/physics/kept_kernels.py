@@ -9,6 +9,7 @@ kernels in the user's cache.
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import logging
 import os
@@ -152,8 +153,9 @@ def _alone(lock: Path) -> Iterator[None]:
         lock.unlink(missing_ok=True)
 
 
+@functools.cache  # a folder has many kernels
 def take_along(place: Path, beside: Path) -> None:
-    """Copy kernels that lie beside sources which cannot be written to where they are kept."""
+    """Copy kernels that lie beside sources which cannot be written to where they are kept; once."""
     if any(place.glob("*.nbi")):
         return
     # those that say which kernels there are come last

@@ -39,7 +39,8 @@ def compiled(**options: Any) -> Callable[[Callable], Any]:
         finally:
             config.CACHE_DIR = before
         if FOLDER is not None and hasattr(made, "stats"):
-            take_along(Path(made.stats.cache_path), Path(inspect.getfile(function)).parent)
+            beside = Path(inspect.getfile(function)).with_name("__pycache__")
+            kept_kernels.take_along(Path(made.stats.cache_path), beside)
         return made
 
     return decorate
@@ -51,12 +52,6 @@ def _tell_of_no_place() -> None:
         "no folder can be written in which compiled kernels would be kept, so each start compiles "
         "for about a minute: NUMBA_CACHE_DIR names one"
     )
-
-
-@functools.cache
-def take_along(place: Path, sources: Path) -> None:
-    """Take kernels along that lie beside sources which cannot be written."""
-    kept_kernels.take_along(place, sources / "__pycache__")
 
 
 def place_to_compile(function: Callable) -> Path | None:

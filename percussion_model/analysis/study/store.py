@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 
 from percussion_model.analysis.study.response import ROW
-from percussion_model.scene.writing import write_whole
 from percussion_model.simulation.files import (
     LARGEST_TEXT,
     ResultError,
     load_arrays,
     reason,
     refuse_large,
+    staged_file,
     staged_texts,
     to_json,
 )
@@ -54,14 +54,14 @@ class Store:
             raise ResultError(f"{folder} {IS_HELD}: wait until it has ended, or give another --out")
         text = to_json(plan) + "\n"
         self._digest = hashlib.sha256(text.encode()).hexdigest()[:32]
-        path = folder / PLAN
+        path, wanted = folder / PLAN, json.loads(text)
         refuse_large(path, LARGEST_TEXT)
         found = _read_plan(path)
         if found is None:
             self._refuse_others(force)
-        elif found != json.loads(text):
+        elif found != wanted:
             if not force:
-                raise ResultError(f"{folder}: {_difference(found, json.loads(text))}")
+                raise ResultError(f"{folder}: {_difference(found, wanted)}")
             _remove(folder)
         if found is None or not path.exists():
             staged_texts(folder, {PLAN: text})
@@ -105,11 +105,10 @@ class Store:
         np.savez(content, part=part, rows=rows, failures=words, plan=np.array(self._digest))
         path = self.folder / PARTS / f"{int(part[0]):07d}-{len(part)}.npz"
         try:
-            write_whole(path, content.getvalue())
-        except OSError as error:
+            staged_file(path, content.getvalue())
+        except ResultError as error:
             raise ResultError(
-                f"{path}: cannot be written: {error.strerror or error}; finished points before it "
-                "are kept, the same command continues"
+                f"{error}; finished points before it are kept, the same command continues"
             ) from None
 
     def read(self, count: int) -> tuple[np.ndarray, list[str], np.ndarray]:

@@ -60,7 +60,7 @@ def paper(
     tree = {"errors": ERRORS, "statements": [one.to_dict() for one in statements]}
     common.write_json(json_file, tree)
     common.write_json(str(out / "statements.json"), tree)
-    common.list_files([written.claimed.sign()])
+    common.list_files(common.sign(written.claimed))
     if json_file != "-":
         show_statements(statements, ERRORS)
 

@@ -124,7 +124,7 @@ def test_a_study_on_a_full_disk_says_what_is_kept(tmp_path, monkeypatch):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     with monkeypatch.context() as patched:
-        patched.setattr("percussion_model.analysis.study.store.write_whole", full)
+        patched.setattr("percussion_model.simulation.files.write_whole", full)
         with pytest.raises(ResultError, match=r"No space left.*are kept, the same command"):
             study(RIGID, grid(FORCES), tmp_path / "out", processes=1)
     assert len(study(RIGID, grid(FORCES), tmp_path / "out", processes=1).rows) == 3
