@@ -106,7 +106,8 @@ def test_numbers_are_printed_with_words_and_units(
 
 
 def test_a_scenario_says_on_a_pipe_how_far_it_is(feed_control, monkeypatch, tmp_path, capsys):
-    monkeypatch.setattr(progress, "EVERY", 1e-2)
+    monkeypatch.setattr(progress, "EVERY", 1e-3)
+    monkeypatch.setattr(progress, "RARER", 1.0)
     rod_addition.run(feed_control, 0.5)
     assert "s of 0.5 s simulated" in capsys.readouterr().err
 
