@@ -130,7 +130,8 @@ def _read(path: Path, reader: Reader) -> Archive:
         {name: _values_of(name, node, reader, units) for name, node in named.items()},
         [_connection(one) for one in elements(system, "ssd:Connections/ssd:Connection")],
         _connectors(named, units),
-        *_experiment(root),
+        _time_of(root, "startTime"),
+        _time_of(root, "stopTime"),
     )
 
 
@@ -213,13 +214,12 @@ def _connection(node: Any) -> Connection:
         return found._replace(transformation=transformation_of(node))
 
 
-def _experiment(root: Any) -> tuple[float | None, float | None]:
-    """Start and stop of the default experiment [s]."""
-    found: list[float | None] = []
-    for key in ("startTime", "stopTime"):
-        given = [one.get(key) for one in elements(root, "ssd:DefaultExperiment")]
-        found.append(float(given[0]) if given and given[0] else None)
-        if found[-1] is not None and not math.isfinite(found[-1]):
-            raise CouplingError(f"DefaultExperiment: {key} = {found[-1]}: must be finite")
-    start, stop = found
-    return start, stop
+def _time_of(root: Any, key: str) -> float | None:
+    """Start or stop of the default experiment [s], None where it does not say."""
+    for one in elements(root, "ssd:DefaultExperiment"):
+        if key in one.attrib:
+            time = float(one.get(key))
+            if not math.isfinite(time):
+                raise CouplingError(f"DefaultExperiment: {key} = {time}: must be finite")
+            return time
+    return None
