@@ -10,6 +10,7 @@ import pytest
 import percussion_model
 from percussion_model.interface.cli import main
 from percussion_model.simulation.files import ResultError
+from percussion_model.simulation.one_writer import hold
 from percussion_model.simulation.origin import ORIGIN, Claim
 
 SCENE = str(Path(__file__).parents[1] / "scenarios" / "rigid.toml")
@@ -232,3 +233,20 @@ def test_a_summary_that_is_replaced_is_said_to_be(percussion):
     words = (*RUN, "--json", "numbers.json")
     assert "wrote numbers.json" in percussion(*words)[1]
     assert "replaced numbers.json" in percussion(*words)[1]
+
+
+def test_force_removes_nothing_from_the_folder_beside_one_that_is_held(tmp_path, monkeypatch):
+    """Another process writes to the wanted folder: the one beside it has this origin, and stays."""
+    beside = tmp_path / "run-2"
+    beside.mkdir()
+    claimed = Claim(beside, {"command": "run"})
+    (beside / "figure.png").touch()
+    claimed.sign()
+    monkeypatch.setattr(
+        "percussion_model.simulation.origin.hold",
+        lambda folder: None if folder.name == "run" else hold(folder),
+    )
+    again = Claim(tmp_path / "run", {"command": "run"}, force=True, numbered=True)
+    assert again.folder == beside
+    again.sign()
+    assert (beside / "figure.png").exists()

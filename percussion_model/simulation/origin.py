@@ -70,7 +70,7 @@ class Claim:
             self.moved = f"{folder} {other}: this one goes to {self.folder}"
             self.moved += f" ({can_replace})" if can_replace else ""
         check_writable(self.folder)
-        self._note(bool(other and force))
+        self._note(bool(other) and not self.moved)
 
     def _note(self, replaces: bool) -> None:
         """Take what the folder holds before anything is written."""
