@@ -17,8 +17,9 @@ LEAST_BRANCH = 3
 # Force below this share of the greatest does not count for the first guess of a slope.
 CLEAR_FORCE = 0.1
 # Datum and peak are found when a step would gain less than this share of the sum of squares, or
-# after so many rounds; a step that does not lead down is halved so often.
-LEAST_GAIN, MOST_ROUNDS, MOST_HALVINGS = 1e-7, 30, 12
+# after so many rounds. A step that does not lead down is cut to where a parabola has its lowest
+# point, at least to this share, so often.
+LEAST_GAIN, MOST_ROUNDS, LEAST_CUT, MOST_CUTS = 1e-7, 30, 0.1, 12
 # The data tell datum and peak apart if the determinant is above this share of its greatest.
 LEAST_DETERMINANT = 1e-12
 # Exponents that the first sight of a loading branch tries.
@@ -130,27 +131,24 @@ def best_datum_and_peak(curve: Curve, scene: Scene, guess: tuple[float, float]) 
     model, sums = at(best)
     own = 1.0
     for _ in range(MOST_ROUNDS):
-        step, gain = _step(sums)
         variance = max(sums[0] / count, floor)
-        if width > 0.0:
-            ones = at(best, 1.0)[1]
-            off = width * float((curve.force - width * best[2] - model).sum())
-            step, gain, own = _step_of_three(sums, ones, count * width**2 + variance,
-                                             off - variance * best[2], step, gain)  # fmt: skip
-            own *= variance
+        across = at(best, 1.0)[1] - sums if width > 0.0 else np.zeros_like(sums)
+        off = width * float((curve.force - width * best[2] - model).sum()) - variance * best[2]
+        step, gain, own = _step(sums, across, count * width**2, off, variance)
         if gain <= LEAST_GAIN * sums[0]:
             break
-        limit = sums[0] + variance * best[2] ** 2
-        for _ in range(MOST_HALVINGS):
-            there = best + step
+        limit, slope = sums[0] + variance * best[2] ** 2, gain
+        for _ in range(MOST_CUTS):
+            there, share = best + step, 0.5
             if there[1] > there[0]:
                 found, others = at(there)
-                penalty = variance * there[2] ** 2
-                if others[6] >= LEAST_BRANCH and others[0] + penalty <= limit:
-                    gain = limit - others[0] - penalty
-                    best, model, sums = there, found, others
-                    break
-            step = 0.5 * step
+                above = others[0] + variance * there[2] ** 2 - limit
+                if others[6] >= LEAST_BRANCH:
+                    if above <= 0.0:
+                        gain, best, model, sums = -above, there, found, others
+                        break
+                    share = max(slope / (above + 2.0 * slope), LEAST_CUT)
+            step, slope = share * step, share * slope
         else:
             break
         if gain <= LEAST_GAIN * sums[0]:  # at a datum where other data begin to carry load
@@ -159,33 +157,28 @@ def best_datum_and_peak(curve: Curve, scene: Scene, guess: tuple[float, float]) 
     return SlowFit(datum, peak, model + width * pull, pull, min(own, 1.0))
 
 
-def _step(sums: np.ndarray) -> tuple[np.ndarray, float]:
-    """Step of least squares of datum and peak, and what it gains; none if the data tell none."""
+def _step(
+    sums: np.ndarray, across: np.ndarray, own: float, off: float, variance: float
+) -> tuple[np.ndarray, float, float]:
+    """Step of least squares of datum, peak and the zero of the force, and what it gains.
+
+    None if the data tell no datum and peak. `across`: what the sums have more with all forces a
+    width greater; `own`, `off`: matrix and right-hand side of the zero; `variance`: of noise.
+    The last result is the variance of the zero.
+    """
     _, a, b, c, x, y, least = sums.tolist()
     determinant = a * c - b * b
     if least < LEAST_BRANCH or not determinant > LEAST_DETERMINANT * a * c:
-        return np.zeros(3), 0.0
+        return np.zeros(3), 0.0, variance / (own + variance)
+    with_datum, with_peak = across[4:6].tolist()
     datum, peak = (c * x - b * y) / determinant, (a * y - b * x) / determinant
-    return np.array([datum, peak, 0.0]), x * datum + y * peak
-
-
-def _step_of_three(
-    sums: np.ndarray, more: np.ndarray, own: float, off: float, step: np.ndarray, gain: float
-) -> tuple[np.ndarray, float, float]:
-    """The same with the zero of the force, and the variance of that by the variance of noise.
-
-    `more` are the sums with all forces a width greater.
-    """
-    if not gain > 0.0:
-        return step, gain, 1.0 / own
-    _, a, b, c, x, y, _ = sums.tolist()
-    with_datum, with_peak = float(more[4]) - x, float(more[5]) - y
-    matrix = np.array([[a, b, with_datum], [b, c, with_peak], [with_datum, with_peak, own]])
-    scale = 1.0 / np.sqrt(np.diag(matrix))
-    right = np.array([x, y, off])
-    inverse = np.linalg.inv(matrix * scale[:, None] * scale) * scale[:, None] * scale
-    step = inverse @ right
-    return step, float(right @ step), float(inverse[2, 2])
+    # what a pull of the zero takes from both
+    of_datum = (c * with_datum - b * with_peak) / determinant
+    of_peak = (a * with_peak - b * with_datum) / determinant
+    own = max(own - with_datum * of_datum - with_peak * of_peak, 0.0) + variance
+    pull = (off - with_datum * datum - with_peak * peak) / own
+    step = np.array([datum - of_datum * pull, peak - of_peak * pull, pull])
+    return step, float(np.dot((x, y, off), step)), variance / own
 
 
 class Sight(NamedTuple):

@@ -6,6 +6,7 @@ import math
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -81,7 +82,12 @@ class Series:
         """How many the sensor has."""
         return 0 if self.sensor is None else len(self.sensor.unknowns)
 
-    @property
+    @cached_property
+    def floor(self) -> float:
+        """What their noise is at least."""
+        return least_noise(self.data)
+
+    @cached_property
     def wanted(self) -> np.ndarray:
         """What the model is to say: the data, and 0 of each unknown."""
         return np.append(self.data, np.zeros(self.unknowns))
@@ -212,8 +218,8 @@ class Likelihood:
 def _deviance(one: Series, off: np.ndarray) -> tuple[float, float]:
     """Deviance of the residuals of a series, and its noise."""
     if one.error is None:
-        off, pulls = np.split(off, [len(one.data)])
-        sigma = max(math.sqrt(float(off @ off) / len(off)), least_noise(one.data))
+        off, pulls = off[: len(one.data)], off[len(one.data) :]
+        sigma = max(math.sqrt(float(off @ off) / len(off)), one.floor)
         return len(off) * 2.0 * math.log(sigma) + float(pulls @ pulls), sigma
     return float(off @ off) / one.error**2, one.error
 

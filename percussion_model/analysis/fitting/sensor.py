@@ -89,6 +89,7 @@ class DropSensor:
 
     def __init__(self, drop: DropTest, kept: np.ndarray) -> None:
         self._drop, self._time, self._data = drop, drop.time[kept], drop.values[kept]
+        self._floor = least_noise(self._data) ** 2  # variance of the noise at least
         unit = SIGNALS[drop.signal][0]
         offset, drift, self._delay = (one or 0.0 for one in (drop.offset, drop.drift, drop.delay))
         given = (
@@ -156,9 +157,8 @@ class DropSensor:
         here = signal[k]
         off = data - (here + x * (signal[k + 1] - here))
         off -= (off @ base) @ base.T
-        floor = least_noise(self._data) ** 2
         square = np.einsum("ij,ij->i", off, off) / len(data)
-        above = len(data) * np.log(np.maximum(square, floor)) + pulls**2
+        above = len(data) * np.log(np.maximum(square, self._floor)) + pulls**2
         padded = np.pad(above, 1, constant_values=math.inf)
         dips = np.flatnonzero((above <= padded[:-2]) & (above <= padded[2:]))
         dips = dips[np.argsort(above[dips])]
@@ -166,7 +166,13 @@ class DropSensor:
         return [float(pulls[dip]) for dip in dips[near][:2]]
 
     def _deviance(self, found: Sensed) -> float:
-        return _deviance_of(self._data - found.fitted, found.pulls, self._data)
+        return self._deviance_of(self._data - found.fitted, found.pulls)
+
+    def _variance_of(self, off: np.ndarray) -> float:
+        return max(float(off @ off) / len(off), self._floor)
+
+    def _deviance_of(self, off: np.ndarray, pulls: np.ndarray) -> float:
+        return len(off) * math.log(self._variance_of(off)) + float(pulls @ pulls)
 
     def _best(self, model: Callable[[np.ndarray], Shown], free: int, first: float = 0.0) -> Sensed:
         """Least squares over all unknowns from a delay; the noise is estimated along."""
@@ -177,12 +183,12 @@ class DropSensor:
         def at(pulls: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
             signal, slope = model(pulls[split:])
             off = data - signal - steady @ pulls[:split]
-            return off, slope, _deviance_of(off, pulls, data)
+            return off, slope, self._deviance_of(off, pulls)
 
         off, slope, deviance = at(pulls)
         for _ in range(ROUNDS):
             columns = np.concatenate([steady, slope], axis=1)
-            variance = max(float(off @ off) / len(off), least_noise(data) ** 2)
+            variance = self._variance_of(off)
             spread = np.linalg.inv(columns.T @ columns / variance + np.eye(len(pulls)))
             step = spread @ (columns.T @ off / variance - pulls)
             for _ in range(HALVINGS):
@@ -199,11 +205,6 @@ class DropSensor:
             if moved < ARRIVED:
                 break
         return Sensed(data - off, pulls, spread)
-
-
-def _deviance_of(off: np.ndarray, pulls: np.ndarray, data: np.ndarray) -> float:
-    variance = max(float(off @ off) / len(off), least_noise(data) ** 2)
-    return len(off) * math.log(variance) + float(pulls @ pulls)
 
 
 def _step_of(drop: DropTest, share: float) -> float:
