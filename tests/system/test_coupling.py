@@ -110,7 +110,9 @@ def test_a_fault_of_a_callable_is_told_with_its_place(feed_control):
         assert inputs["feed_setpoint"] == 3000.0  # of the archive; the table has 2500
         return {**steady(inputs, time, step), "force_command": inputs["feed"]}
 
-    with pytest.raises(CouplingError, match=r"no input 'feed': did you mean feed_setpoint.*test_coupling.py, line"):
+    with pytest.raises(
+        CouplingError, match=r"no input 'feed': did you mean feed_setpoint.*test_coupling.py, line"
+    ):
         Coupling(feed_control, replaced={"controller": careless}).run(SHORT, 1e-3)
 
 
