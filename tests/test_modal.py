@@ -15,6 +15,7 @@ from percussion_model.physics.records import EventKind
 from percussion_model.scene.bars import bar_mass, bar_transit_time
 from percussion_model.solvers.modal.bar import carry, try_move
 from percussion_model.solvers.modal.between import falls_below, least_at, parabola
+from percussion_model.solvers.modal.laws import MOST_PAIRS
 from percussion_model.solvers.modal.modes import (
     bar_modes,
     fill_quadrature,
@@ -260,6 +261,19 @@ def test_grids_that_agree_by_luck_do_not_make_an_error_small():
     # explicit elements of 100, 200, 300: 82.23356, 82.23436, 82.23438 mm/s
     off = abs(result.rate_of_penetration / 82.2344e-3 - 1.0)
     assert off < 1e-4 < result.rate_of_penetration_relative_error
+
+
+@pytest.mark.parametrize(
+    "modes", [80, pytest.param(112, marks=pytest.mark.skipif(not LONG, reason="12 s"))]
+)
+def test_a_bit_of_too_many_modes_for_pairs_drills_as_well(modes):
+    """Stepped, with modes that have died left out: what goes must not show."""
+    scene = Scene.from_toml(ROOT / "scenarios" / "top_hammer.toml")
+    scene = modal(scene, modes, **{"run.duration": 1.5})
+    run = simulate(scene, error_estimate=False, record_events=False)
+    assert run.cells["bit"] > MOST_PAIRS
+    # explicit elements of 200 and 300, as above; with fewer modes 82.2350, 82.2348 (40, 56)
+    assert run.rate_of_penetration == pytest.approx(82.2344e-3, rel=1e-5)
 
 
 SCENES = {

@@ -10,12 +10,7 @@ from percussion_model.physics.kernel import inlined, kernel, merged
 from percussion_model.physics.records import Mode, RockKind
 from percussion_model.physics.rock import book_dashpot, damping
 from percussion_model.solvers.modal.bar import LOAD, SOFT, STIFF, TINY, Q, V, row_sum
-from percussion_model.solvers.modal.forms import (
-    LEAST_FORCE,
-    LEAST_SHARE,
-    form_wanted,
-    refresh_loads,
-)
+from percussion_model.solvers.modal.forms import form_wanted, refresh_loads
 from percussion_model.solvers.modal.lanes import WIDTH, load, spread, store, total
 from percussion_model.solvers.modal.records import JOINED, End, Go, Shape
 
@@ -31,8 +26,9 @@ SHAPE_LOW, SHAPE_TOP, SHAPE_BIT, SHAPE_PISTON = (
 )
 
 
-# Modes that have less than this share of the energy of vibration make no pairs.
-NO_SHARE = 1e-12
+# Modes that have less than this share of the energy of vibration make no pairs, and pairs are left
+# out that have less than the second together, or could hold less than such a share of the load.
+NO_SHARE, LEAST_SHARE, LEAST_FORCE = 1e-12, 1e-10, 1e-5
 # Steps between two looks at which pairs are needed: the highest die soon.
 FIRST_STRIDE = 4
 
