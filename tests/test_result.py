@@ -4,6 +4,7 @@ import json
 import math
 import os
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from percussion_model.simulation.files import check_writable, staged
 from percussion_model.simulation.rate import LEAST_BLOWS
 from percussion_model.simulation.result import FIGURES, REPORT
 from percussion_model.simulation.validity import numerical_note
+from percussion_model.simulation.warnings import find_warnings
 
 RIGID = Scene().replace(**{"piston.model": "rigid", "bit.model": "rigid"})
 WAVES = {"solver.name": "wave"}
@@ -194,13 +196,20 @@ def test_warnings_about_the_scene(changes, warning):
 
 def test_what_the_discretisation_takes_is_told_beyond_its_limits():
     assert not list(numerical_note(0.01, "wave"))
-    assert not list(numerical_note(-1e-10, "wave"))
+    assert "1 % of the energy" in "".join(numerical_note(0.0101, "wave"))
     assert not list(numerical_note(-1e-3, "blow-map"))  # interpolated
-    assert not list(numerical_note(-1e-5, "rigid", by_lines=True))
-    for share, by_lines in ((-1e-5, False), (-1e-3, True)):
-        assert "gives energy" in "".join(numerical_note(share, "rigid", by_lines))
-    for share, words in ((0.0101, "1 % of the energy"), (-1.1e-9, "error of the solver")):
-        assert words in "".join(numerical_note(share, "wave"))
+    assert "gives energy" in "".join(numerical_note(-0.011, "blow-map"))
+
+
+@pytest.mark.parametrize("solver", ["wave", "modal", "chain", "fem", "rigid"])
+@pytest.mark.parametrize("law", ["bilinear", "power"])
+def test_a_solver_that_makes_energy_is_told(rigid, solver, law):
+    """Bounds of docs/model.md, section 8, on any rock."""
+    scene = rigid.scene.replace(**{"effects.rock": law})
+    for share, told in ((-1.1e-9, True), (-0.9e-9, False)):
+        energy = rigid.energy | {"numerical_relative": share}
+        made = replace(rigid, scene=scene, solver=solver, energy=energy)
+        assert any("error of the solver" in text for text in find_warnings(made)) == told
 
 
 # -------------------------------------------------------------------------- files

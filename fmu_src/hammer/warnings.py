@@ -12,7 +12,6 @@ from percussion_model.simulation.validity import (
     button_note,
     flight_note,
     guard_notes,
-    is_curved,
     ledger_note,
     numerical_note,
     rate_note,
@@ -82,8 +81,7 @@ class Warnings:
                 yield "barrier", text
         for text in ledger_note(motion.residual(), motion.solver.name):
             yield "ledger", text
-        by_lines = is_curved(motion.scene)
-        for text in numerical_note(motion.numerical(), motion.solver.name, by_lines):
+        for text in numerical_note(motion.numerical(), motion.solver.name):
             yield "numerical", text
         for text in guard_notes(motion.solver.statistics(motion._state)):
             yield "guards", text

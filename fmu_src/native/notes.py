@@ -12,7 +12,6 @@ from percussion_model.physics.power_law import secant_stiffness
 from percussion_model.physics.records import Mode, RockKind
 from percussion_model.simulation.validity import (
     BUTTON_LENGTH,
-    LEAST_BY_LINES,
     LEAST_NUMERICAL,
     LONGEST_FLIGHT,
     MOST_BARRIER,
@@ -90,9 +89,7 @@ def _of_state(base, notes):
     if not abs(share) <= (MOST_MAP_RESIDUAL if is_map else MOST_RESIDUAL):
         _tell(base, notes, Note.MAP_LEDGER if is_map else Note.LEDGER, share, 0.0)
     taken = numerical(reading)
-    by_lines = head.kind == Kind.RIGID and head.exponent > 1.0
-    least = LEAST_BY_LINES if by_lines else LEAST_NUMERICAL
-    if not taken >= (-MOST_MAP_RESIDUAL if is_map else least):
+    if not taken >= (-MOST_MAP_RESIDUAL if is_map else LEAST_NUMERICAL):
         _tell(base, notes, Note.GIVES_ENERGY, taken, 0.0)
     elif taken > MOST_NUMERICAL:
         _tell(base, notes, Note.TAKES_ENERGY + head.kind - 1, 100.0 * taken, 0.0)

@@ -16,8 +16,6 @@ MOST_RESIDUAL = 1e-6
 LEAST_NUMERICAL = -1e-9
 # ... and above this share of the energy put in it shows in peaks and rates.
 MOST_NUMERICAL = 1e-2
-# Lines of the power law by rigid bodies take or give a little, which means nothing.
-LEAST_BY_LINES = -1e-4
 # Between the nodes of a blow map energy is kept as well as the map is interpolated.
 MOST_MAP_RESIDUAL = 1e-2
 # Buttons of a percussive bit stand out by 5 to 15 mm; deeper in, its face meets the rock,
@@ -43,14 +41,9 @@ def ledger_note(residual: float, solver: str) -> Iterator[str]:
         )
 
 
-def numerical_note(share: float, solver: str, by_lines: bool = False) -> Iterator[str]:
-    """Say that the discretisation took too much of the energy put in, or gave some.
-
-    `by_lines`: whether the force of the rock is curved, which rigid bodies follow by lines.
-    """
+def numerical_note(share: float, solver: str) -> Iterator[str]:
+    """Say that the discretisation took too much of the energy put in, or gave some."""
     least = -MOST_MAP_RESIDUAL if solver == "blow-map" else LEAST_NUMERICAL
-    if solver == "rigid" and by_lines:
-        least = LEAST_BY_LINES
     if not share >= least:
         yield (
             f"numerical is {share:.2g} of the energy put in: the discretisation gives energy, "
@@ -82,11 +75,6 @@ def guard_notes(statistics: Mapping[str, int]) -> Iterator[str]:
             f"{storms} storm{'s' if storms != 1 else ''} of events: more within a moment than can "
             "mean anything; rebounds were left out or events postponed: bounded but not exact"
         )
-
-
-def is_curved(scene: Scene) -> bool:
-    """Whether the force of the rock is no straight line of the penetration."""
-    return scene.effects.rock == "power" and scene.rock.loading_exponent > 1.0
 
 
 def stiffness_at(scene: Scene, force: float, loading_stiffness: float) -> float:

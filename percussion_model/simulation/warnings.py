@@ -17,7 +17,6 @@ from percussion_model.simulation.validity import (
     button_note,
     flight_note,
     guard_notes,
-    is_curved,
     ledger_note,
     numerical_note,
     rate_note,
@@ -161,8 +160,7 @@ def _about_flight(result: Result) -> Iterator[str]:
 def _about_validity(result: Result) -> Iterator[str]:
     if any(result.energy[name] for name in _FLOWS):
         yield from ledger_note(result.energy["residual_relative"], result.solver)
-        share = result.energy["numerical_relative"]
-        yield from numerical_note(share, result.solver, is_curved(result.scene))
+        yield from numerical_note(result.energy["numerical_relative"], result.solver)
     yield from guard_notes(result.statistics)
     scene = result.scene
     if scene.effects.rock == "none":

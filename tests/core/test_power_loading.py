@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from percussion_model import Scene, simulate
 from percussion_model.physics.power_law import loading_force, loading_work
 from percussion_model.physics.records import Mode, RockKind
 from percussion_model.physics.rock import (
@@ -149,3 +150,19 @@ def test_the_part_that_is_given_back_falls_with_the_peak():
     assert shares[1] == pytest.approx(1.0 / GAMMA, rel=1e-12)
     assert shares[2] == pytest.approx(2.0 ** (-1.5 * 0.5) / GAMMA, rel=1e-12)
     assert shares[0] > shares[1] > shares[2]
+
+
+@pytest.mark.parametrize("exponent", [1.5, 3.0])
+def test_rigid_bodies_crush_what_the_law_does_not_give_back(exponent):
+    """Of a drop W all but (n + 1)/(2 gamma) W; following lines takes nothing and gives nothing."""
+    scene = Scene().replace(**{
+        "piston.model": "absent", "bit.model": "rigid", "effects.drive": "none",
+        "effects.gravity": False, "effects.feed": False, "effects.barrier": False,
+        "effects.rock": "power", "rock.loading_exponent": exponent, "start.bit_velocity": 8.0,
+    })  # fmt: skip
+    result = simulate(scene, 0.01, settle=0.0, error_estimate=False)
+    drop = 32.0 * scene.bit.mass
+    left = 1.0 - (exponent + 1.0) / (2.0 * scene.rock.unloading_ratio)
+    assert result.energy["crushing"] == pytest.approx(left * drop, rel=1e-5)
+    assert result.energy["numerical"] == 0.0
+    assert abs(result.energy["residual_relative"]) < 1e-12

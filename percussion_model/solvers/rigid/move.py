@@ -201,8 +201,10 @@ def book_rock(par, s, p_before, taken):
     book_dashpot(s, taken)
     given = change + crush(par, s, p_before)
     if par.power == 1 and is_loading(s):
+        # what rock that yields by lines does not give back is crushed: more than by its law
+        # within a line, or less, and as much over a whole one
         work = line_work(s, p_before)
-        s.e_numerical += work - given
+        s.e_crushing += work - given
         given = work
     s.rock_work += given + taken
 
