@@ -68,6 +68,8 @@ def test_datum_and_peak_of_a_curve_without_noise_are_found():
 def test_a_curve_without_noise_gives_its_parameters_back():
     fit = fit_rock(Scene(), noisy_curve(0, noise=0.0))
     assert fit.changes() == pytest.approx({key: TRUTH[key] for key in (STIFFNESS, RATIO)}, rel=1e-6)
+    assert not [text for text in fit.warnings if "rough" in text or "neighbouring" in text]
+    assert not fit.is_widened
 
 
 def test_an_interval_that_roughness_widens_is_not_called_by_its_confidence():
@@ -289,6 +291,17 @@ def test_a_deviance_that_jumps_everywhere_is_called_rough():
         Scene(), [Series("x", data, 0.01, jumpy)], [STIFFNESS], np.log([[1e8, 1e9]]), lambda: None
     )
     assert roughness(like, like.at(np.log([7e8])), np.array([[1e-6]]))[0] > 10.0
+
+
+@pytest.mark.parametrize("curves", [0, 1])
+def test_a_drop_without_noise_that_is_explained_to_all_digits_is_not_rough(curves):
+    """Alone; beside a noisy series only that one tells of dips."""
+    series = [drop_series(one) for one in drops(bit(), 0, samples=40, end=8e-3, noise=0.0)]
+    series += curves * [curve_series(CURVE, (DATUM, DATUM + DEPTH))]
+    like = Likelihood(bit(**TRUTH), series, [ENERGY], np.log([[1e-3, 1.0]]), lambda: None)
+    best, spread = descend(like, np.log([TRUTH[ENERGY]]), [0])
+    assert like.at(best.at + 1e-5).deviance - best.deviance > 10.0
+    assert max(roughness(like, best, spread)) < 1e-6
 
 
 def test_residuals_that_follow_from_each_other_are_warned_of():

@@ -201,9 +201,12 @@ class Likelihood:
         self._least = [min(pair) for pair in zip(self._least, seen, strict=True)]
         return residuals
 
-    def deviance_of(self, residuals: Sequence[np.ndarray]) -> tuple[float, list[float]]:
-        """Deviance of residuals, and the noise of each series."""
-        parts = [_deviance(*pair) for pair in zip(self.series, residuals, strict=True)]
+    def deviance_of(
+        self, residuals: Sequence[np.ndarray], of: Sequence[int] | None = None
+    ) -> tuple[float, list[float]]:
+        """Deviance of residuals, and the noise of each series; of some of them, by their places."""
+        some = range(len(residuals)) if of is None else of
+        parts = [_deviance(self.series[k], residuals[k]) for k in some]
         return sum(deviance for deviance, _ in parts), [noise for _, noise in parts]
 
     def weights(self, noise: Sequence[float]) -> np.ndarray:

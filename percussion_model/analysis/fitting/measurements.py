@@ -13,6 +13,8 @@ LEAST_DATA = 10
 # No noise is taken to be smaller than this share of the data's spread: data of a model
 # without noise would have an infinite likelihood.
 LEAST_NOISE = 1e-8
+# Residuals below this share of how far the data vary are of data without noise.
+ROUNDING = 1e-5
 # Signals that can be measured on a bit that falls: unit, and how large they are at most.
 SIGNALS = {
     "bit_position": ("m", 1.0),
@@ -296,6 +298,11 @@ def checked_columns(columns: dict[str, Any]) -> list[np.ndarray]:
             f"{' and '.join(columns)}: {lengths[0]} data, at least {LEAST_DATA} are needed"
         )
     return found
+
+
+def is_rounding(noise: float, data: np.ndarray) -> bool:
+    """Whether what is left of data is so small that they have no noise."""
+    return noise <= ROUNDING * (float(np.std(data)) or 1.0)
 
 
 def least_noise(data: np.ndarray) -> float:

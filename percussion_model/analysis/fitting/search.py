@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from percussion_model.analysis.fitting.likelihood import Likelihood, Place
+from percussion_model.analysis.fitting.measurements import is_rounding
 
 # First and last steps of slopes, in the logarithm. Events move from cell to cell: far below a
 # standard error there is noise, far above it the number of drilling cycles changes.
@@ -129,7 +130,8 @@ def roughness(like: Likelihood, best: Place, spread: np.ndarray) -> tuple[float,
     """How rough the deviance is: over next to nothing, and over the size of the errors.
 
     Where bounces amplify rounding, places that nobody can tell apart differ in their deviance;
-    and where it has many dips, the deepest of them is deeper by luck.
+    and where it has many dips, the deepest of them is deeper by luck. Data without noise, which
+    the best place explains to all digits, tell everything apart and say nothing of that.
 
     Returns
     -------
@@ -138,20 +140,31 @@ def roughness(like: Likelihood, best: Place, spread: np.ndarray) -> tuple[float,
     dips : float
         Median departure from a parabola at about `DIPS` standard errors.
     """
+    noisy = [
+        k
+        for k, (one, noise) in enumerate(zip(like.series, best.noise, strict=True))
+        if one.error is not None or not is_rounding(noise, one.data)
+    ]
+    if not noisy:
+        return 0.0, 0.0
+    least = like.deviance_of(best.residuals, noisy)[0]
+
+    def above(shift: np.ndarray) -> float:
+        return like.deviance_of(like.at(best.at + shift).residuals, noisy)[0] - least
+
     normal = np.random.default_rng(0).normal(0.0, 1.0, (CHANGES, len(best.at)))
-    seen = [best.deviance, *(like.at(best.at + TINY * one).deviance for one in normal)]
+    seen = [0.0, *(above(TINY * one) for one in normal)]
     variances, directions = np.linalg.eigh(spread)
     errors = np.sqrt(variances)
     # far along a direction that is not told the deviance is no parabola, whether rough or not
     shares = np.minimum(DIPS, MOST_POLISH / errors)
-    off = [
-        abs(
-            like.at(best.at + directions @ (shares * errors * one)).deviance
-            - best.deviance
-            - float((shares * one) @ (shares * one))
-        )
-        for one in normal
-    ]
+    off = []
+    for one in normal:
+        change = above(directions @ (shares * errors * one))
+        parabola = float((shares * one) @ (shares * one))
+        # how much of it is that of data without noise is not known
+        least_change = parabola if len(noisy) == len(like.series) else 0.0
+        off.append(max(change - parabola, least_change - change, 0.0))
     return max(seen) - min(seen), float(np.median(off))
 
 

@@ -15,7 +15,7 @@ from percussion_model.analysis.fitting.found import (
     SensorEstimate,
 )
 from percussion_model.analysis.fitting.likelihood import Likelihood, Place
-from percussion_model.analysis.fitting.measurements import Reading
+from percussion_model.analysis.fitting.measurements import Reading, is_rounding
 from percussion_model.analysis.fitting.search import LEAST_STEP, MOST_STEP, STEP_SHARE
 from percussion_model.analysis.fitting.sensor import DELAY, REACH
 from percussion_model.simulation.uncertain import in_digits
@@ -23,8 +23,6 @@ from percussion_model.simulation.uncertain import in_digits
 # Neighbouring residuals so alike are twice what independent noise would leave between them; and
 # where residuals are this share of how far the data vary, the model says little of them.
 ALIKE, LITTLE = 0.75, 0.5
-# Residuals below this share of how far the data vary are of data without noise.
-ROUNDING = 1e-5
 # A single number is not explained that is off by so many of its errors.
 OFF = 4.0
 # An unknown of a sensor whose error is this share of its prior is known by that alone, and one
@@ -38,18 +36,19 @@ FAR, AT_END = 2.0, 0.05
 def neighbours(one: Explained) -> float:
     """Correlation of neighbouring residuals; 0 of a single number or of rounding alone."""
     residuals = one.residuals
-    total = float(residuals @ residuals)
-    if len(residuals) < 2 or not total > (len(residuals) * one.noise * 1e-6) ** 2:
+    if len(residuals) < 2 or is_rounding(one.noise, one.data):
         return 0.0
-    return float(residuals[1:] @ residuals[:-1]) / total
+    return float(residuals[1:] @ residuals[:-1]) / float(residuals @ residuals)
 
 
 def is_explained(one: Explained) -> bool:
     """Whether residuals of a series are what its noise may leave."""
     if isinstance(one.source, Reading):
         return bool(np.abs(one.residuals).max() <= OFF * one.noise)
+    if is_rounding(one.noise, one.data):
+        return True
     share = one.noise / (float(np.std(one.data)) or 1.0)
-    return share <= ROUNDING or (neighbours(one) <= ALIKE and share <= LITTLE)
+    return neighbours(one) <= ALIKE and share <= LITTLE
 
 
 def sensors_of(
