@@ -11,6 +11,7 @@ import pytest
 
 from percussion_model import Scene, Simulation
 from percussion_model.physics.records import BLOW
+from percussion_model.scene.hammers import hammer
 from percussion_model.simulation.means import numbers_over, scatter_over
 from percussion_model.simulation.rate import FEWEST_DEPENDENT, rate_of_blows, ratio_of_sums
 
@@ -129,14 +130,18 @@ def blows_of(scene, duration):
     return simulation.blows[simulation.blows["time"] >= SETTLE]
 
 
+def started(scene, count):
+    """Blows of so many short runs that start a little differently."""
+    found = []
+    for k in range(count):
+        start = {"start.gap": 1e-5 * (1.0 + 0.013 * k), "start.piston_velocity": 10.0 + 0.01 * k}
+        found.append(blows_of(scene.replace(**start), SHORT))
+    return found
+
+
 @cache
 def runs_of(items):
-    """Blows of short runs that start a little differently."""
-    found = []
-    for k in range(RUNS):
-        start = {"start.gap": 1e-5 * (1.0 + 0.013 * k), "start.piston_velocity": 10.0 + 0.01 * k}
-        found.append(blows_of(Scene().replace(**dict(items), **start), SHORT))
-    return found
+    return started(Scene().replace(**dict(items)), RUNS)
 
 
 @pytest.mark.parametrize("changes", CASES, ids=str)
@@ -145,6 +150,14 @@ def test_rates_scatter_as_their_standard_errors_say(changes):
     spread = np.std(rates, ddof=1)
     assert spread > 1e-4 * np.mean(rates)  # else the motion would not be aperiodic
     assert 0.6 < math.sqrt(np.mean(errors**2)) / spread < 1.7
+
+
+@pytest.mark.skipif(not LONG, reason="set PERCUSSION_LONG=1")
+@pytest.mark.parametrize("name", ["hc25", "t38", "t45"])
+def test_rates_of_top_hammers_scatter_as_their_standard_errors_say(name):
+    found = [rate_of_blows(rows) for rows in started(hammer(name), 40)]
+    rates, errors = np.array(found).T
+    assert 0.8 < math.sqrt(np.mean(errors**2)) / np.std(rates, ddof=1) < 1.5
 
 
 # Of a number of drilling cycles a single rare blow may be most, which few runs have.

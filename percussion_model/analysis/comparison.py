@@ -46,7 +46,10 @@ COMPARED = (
 USUAL = ("modal", "wave", "fem", "rigid")
 
 # Numbers of the fall of a bit that nothing strikes, of a `Result.fall`.
-OF_FALL = ("depth", "first_contact", "rebound_velocity", "rest_time", "crushed")
+OF_FALL = (
+    *("depth", "first_contact", "rebound_velocity", "rest_time"),
+    *("peak_bit_force", "crushed", "transfer_efficiency"),
+)
 
 
 @dataclass(frozen=True)

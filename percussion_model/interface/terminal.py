@@ -70,7 +70,9 @@ WITHOUT_BLOWS = (
     ("First contact with the rock", "first_contact", 1e3, "ms"),
     ("First rebound velocity of the bit", "rebound_velocity", 1.0, "m/s"),
     ("Stands still from", "rest_time", 1e3, "ms"),
+    ("Peak bit force", "peak_bit_force", 1e-3, "kN"),
     ("Energy to crush rock", "crushed", 1.0, "J"),
+    ("Energy transfer efficiency", "transfer_efficiency", 100.0, "%"),
 )
 
 

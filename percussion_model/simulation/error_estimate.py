@@ -24,7 +24,7 @@ from percussion_model.simulation.rate import LARGE_ERROR, LEAST_BLOWS, rate_of_b
 from percussion_model.simulation.result import Result
 from percussion_model.simulation.uncertain import in_digits
 from percussion_model.simulation.warnings import least_loss_time
-from percussion_model.solvers.chain.resolution import error_by_steps
+from percussion_model.solvers.chain.resolution import error_by_pulse, error_by_steps
 from percussion_model.solvers.setup import kelvin_voigt_time
 from percussion_model.solvers.wave.grid import elastic_bars
 from percussion_model.solvers.wave.resolution import FITS, largest_misfit, misfits, promised_error
@@ -437,7 +437,16 @@ def _estimate(part: GridRun, others: Sequence[GridRun]) -> Estimate:
     same = all(_same_motion(part, other) for other in known)
     share = NUMERICAL_SHARE if same else NUMERICAL_SHARE_OF_MOTIONS
     floor = share * abs(part.result.energy["numerical_relative"])
-    return Estimate(off, 0.0, scatter, max(floor, FLOOR_SHARE * part.promised))
+    # the ledger has no share where only a wave from outside gave energy
+    return Estimate(off, 0.0, scatter, max(FLOOR_SHARE * part.promised, _by_pulse(part), floor))
+
+
+def _by_pulse(run: GridRun) -> float:
+    """Error of what a wave from outside does, whose front and end steps spread; 0 without one."""
+    string, step = run.result.scene.string, run.result.time_step
+    if run.result.solver != "chain" or len(run.result.blows) or not string.pulse_force or not step:
+        return 0.0
+    return error_by_pulse(string.pulse_duration / step)
 
 
 def _of_whole(estimate: Estimate, whole: GridRun) -> Estimate:

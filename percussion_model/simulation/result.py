@@ -105,7 +105,8 @@ class Result:
         run by that time, wherever in a blow they lie (eq. 58 of the paper) [m/s];
         NaN where the run was not read at its settling time.
     end : dict of float
-        Sample at the end of the run, by SAMPLE_FIELDS; empty where that is not known.
+        Sample at the end of the run, by SAMPLE_FIELDS, and `peak_bit_force` since the last
+        blow began [N]; empty where that is not known.
     interrupted : bool
         Whether Ctrl-C ended this run, or another one that was to tell its error.
     """
@@ -221,7 +222,9 @@ class Result:
             the end of the run [m]; `first_contact` with the
             rock [s]; `rebound_velocity` with which the mean bit leaves it for the first
             time, upwards, where no piston can strike it [m/s]; `rest_time`, from which it
-            stands still [s]; `crushed` energy [J]. Only what is known.
+            stands still [s]; `peak_bit_force` [N]; `crushed` energy [J];
+            `transfer_efficiency`, what the rock keeps by the energy of the wave that came
+            from outside. Only what is known.
         """
         return {} if len(self.blows) else _fall(self)
 
@@ -331,9 +334,25 @@ def _fall(result: Result) -> dict[str, float]:
             found["rebound_velocity"] = _leaving_velocity(result, modes, int(left[0]))
         if modes["kind"][-1] == Mode.SS:
             found["rest_time"] = float(modes["time"][-1])
+        found["peak_bit_force"] = result.end.get("peak_bit_force", math.nan)
     if "crushing" in result.energy:
         found["crushed"] = result.energy["crushing"]
+        if len(touching) and (given := _energy_of_pulse(scene)):
+            kept = sum(result.energy[name] for name in _KEPT_BY_ROCK)
+            found["transfer_efficiency"] = kept / given
     return {name: value for name, value in found.items() if math.isfinite(value)}
+
+
+# Entries of the ledger that are in the rock.
+_KEPT_BY_ROCK = ("crushing", "barrier", "standstill", "recoverable")
+
+
+def _energy_of_pulse(scene: Scene) -> float:
+    """Energy of the wave that comes down the topmost bar from outside [J]; 0 without one."""
+    if scene.piston.model != "absent" or not scene.effects.string:
+        return 0.0
+    top = next(iter(scene.bars.values())).sections[0]
+    return scene.string.pulse_force**2 * scene.string.pulse_duration / top.impedance
 
 
 def _leaving_velocity(result: Result, modes: np.ndarray, k: int) -> float:

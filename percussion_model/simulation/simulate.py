@@ -251,7 +251,7 @@ class Simulation(Runner):
             setup_time=self.setup_time,
             warnings=[],
             rate_of_penetration_fixed_window=self._fixed_window_rate(settle),
-            end=self.observe(),
+            end=self.observe() | {"peak_bit_force": float(self._state.record[0]["b_peak_bit"])},
         )
 
     def _fixed_window_rate(self, settle: float | None) -> float:

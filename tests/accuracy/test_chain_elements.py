@@ -198,6 +198,22 @@ def test_ledger_of_elements_closes(name):
         assert 0.0 < numerical[1] < 0.5 * numerical[0]
 
 
+@pytest.mark.parametrize(("stiffness", "damping"), [(2e6, 1e4), (1e8, 2e5)])
+def test_ledger_of_waves_is_that_of_elements(stiffness, damping):
+    """Where the damper parts and closes some times: entry by entry."""
+    damper = DAMPER | {"stiffness": stiffness, "damping": damping, "casing_mass": 100.0}
+    scene = chain_of(JOINTS["lossy"], damper=damper, effects={"damper": True})
+    (elements,) = seen_by_elements(scene, 2 * MESHES[1], (8e-3,))
+    (waves,) = seen_by_waves(scene, (8e-3,))
+    wanted, ledger = (complete_ledger(energies(one.reading)) for one in (elements, waves))
+    given = wanted["initial"] + wanted["input"]
+    for name in ("input", "crushing", "joints", "stored"):
+        assert ledger[name] == pytest.approx(wanted[name], abs=2e-3 * given), name
+        assert abs(ledger["numerical"]) < 1e-3 * given
+    joints = ledger["joints"] / wanted["joints"]
+    assert joints == pytest.approx(1.0, rel=1e-2)
+
+
 def test_perfect_joint_is_a_bar_that_goes_on():
     """A rod cut in two is the same elements: the same motion to rounding."""
     off = {"feed": False, "gravity": False}

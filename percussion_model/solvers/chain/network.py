@@ -18,7 +18,7 @@ from percussion_model.scene.bars import (
 )
 from percussion_model.solvers import plain_code  # noqa: F401  # kernels call functions of scenes
 from percussion_model.solvers.chain.records import Body, Chain, Fit, Joint, Place, Steel
-from percussion_model.solvers.chain.resolution import DEFAULT_STEPS, steps_for
+from percussion_model.solvers.chain.resolution import DEFAULT_STEPS, PULSE_STEPS, steps_for
 from percussion_model.solvers.chain.taps import WHOLE, turning, weights_of
 from percussion_model.solvers.modal.lanes import WIDTH
 from percussion_model.solvers.setup import PISTONS, kelvin_voigt_time
@@ -27,6 +27,8 @@ from percussion_model.solvers.setup import PISTONS, kelvin_voigt_time
 LEAST_SPREAD = 0.99
 # Steps in which a wave crosses any bar at least, where a scene asks for none.
 FEWEST_STEPS = 4
+# Cells in which all bars are cut at most for the sake of a short wave from outside.
+MOST_FOR_PULSE = 1 << 14
 TOO_FINE = (
     "loss.time = {eta} s: too long for a section of {length} m in steps of {step} s: take a "
     "shorter loss.time, or fewer solver.cells"
@@ -137,6 +139,15 @@ def _elastic_chain(numbers):
 
 
 @preparing
+def _step_of_pulse(values, sections):
+    """Longest step for a wave that comes down from outside [s]; infinite where there is none."""
+    if PISTONS[values.piston_model] != Piston.ABSENT or values.string_pulse_force == 0.0:
+        return math.inf
+    finest = bar_transit_time(sections) / MOST_FOR_PULSE
+    return max(values.string_pulse_duration / PULSE_STEPS, finest)
+
+
+@preparing
 def _time_step(numbers, sections, counts):
     """Time step of a scene [s]: the transit time of the first elastic bar by its cells."""
     values = numbers.values
@@ -150,6 +161,7 @@ def _time_step(numbers, sections, counts):
     for i in range(1, len(counts)):
         begin, end = end, end + counts[i]
         longest = min(longest, bar_transit_time(sections[begin:end]) / FEWEST_STEPS)
+    longest = min(longest, _step_of_pulse(values, sections))
     # a section shorter than a step would be longer than it is
     for k in range(len(sections)):
         longest = min(longest, section_transit_time(sections[k]))

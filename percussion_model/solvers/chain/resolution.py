@@ -11,6 +11,9 @@ import math
 
 # Steps in the piston, where a scene asks for none, and the relative error of a rate by them.
 DEFAULT_STEPS, DEFAULT_ERROR = 16, 5e-3
+# Steps of a wave from outside, and the relative error of what it does, times them: its front and
+# end are spread over one or two. Without loss up to 0.3 was seen of peaks, 0.6 of work on rock.
+PULSE_STEPS, ERROR_OF_A_STEP = 192, 0.7
 # A run is compared with one whose steps are so many times as long.
 COARSER = 1.5
 
@@ -23,6 +26,11 @@ def steps_for(accuracy: float) -> int:
 def error_by_steps(steps: int) -> float:
     """Relative error of the rate of penetration that so many steps promise."""
     return DEFAULT_ERROR * DEFAULT_STEPS / steps
+
+
+def error_by_pulse(steps: float) -> float:
+    """Relative error of what a wave from outside does that lasts for so many steps."""
+    return ERROR_OF_A_STEP / steps
 
 
 def coarser_steps(steps: int) -> int:

@@ -71,7 +71,8 @@ def stored_in_joint(fits, joints, j):
 def damper_force(par, shortened, speed, inv_mass):
     """Mean force over a step of the damper between casing and bar, which only pushes [N].
 
-    By the trapezoidal rule, which is stable at any stiffness and damping.
+    By the trapezoidal rule, which is stable at any stiffness and damping; `speed` is that in the
+    middle of the step without it.
     """
     k, c, half = par.damper_stiffness, par.damper_damping, 0.5 * par.dt
     gives = half * (1.0 / par.casing_mass + inv_mass)
@@ -89,6 +90,18 @@ def stored_in_damper(par, shortened):
 
 
 @inlined
+def taken_by_damper(par, shortened, way, tau):
+    """What its dashpot took on a way that ends at `shortened`, by its middle; never negative [J].
+
+    Its force less that of its spring, which both only push, has the sign of the way: so it takes
+    all where the spring lets go more slowly than the bar, or where the dashpot alone pushes.
+    """
+    spring = par.damper_preload + par.damper_stiffness * (shortened - 0.5 * way)
+    force = max(spring + par.damper_damping * way / tau, 0.0)
+    return way * (force - max(spring, 0.0))
+
+
+@inlined
 def accelerations(par, s, chain, waves, push):
     """Acceleration that its body forces give each bar; the force of the damper [N]."""
     came, bodies, g = waves.came, chain.bodies, par.gravity
@@ -96,7 +109,10 @@ def accelerations(par, s, chain, waves, push):
         came[ACCELERATION, i] = g
     struck, bit, damper = par.struck, par.bars - 1, 0.0
     if par.damper == 1:
-        speed = s.v_c - waves.bars[VELOCITY, struck]
+        # in the middle of the step but for the damper; impulses are those of the step before
+        given = (came[FROM_ABOVE, struck] - came[FROM_BELOW, struck]) * bodies[struck, INV_MASS]
+        others = ((s.feed - push) / par.casing_mass - g) * par.dt - given
+        speed = s.v_c - waves.bars[VELOCITY, struck] + 0.5 * others
         damper = damper_force(par, s.x_c, speed, bodies[struck, INV_MASS])
         came[ACCELERATION, struck] += damper * bodies[struck, INV_MASS]
     else:
@@ -305,8 +321,10 @@ def move_bars(par, s, chain, waves, damper, tau):
     before = stored_in_damper(par, s.x_c)
     s.x_c += path - held
     stored = stored_in_damper(par, s.x_c) - before
+    taken = taken_by_damper(par, s.x_c, path - held, tau)
     s.e_stored += stored
-    s.e_joints += damper * (path - held) - stored
+    s.e_joints += taken
+    s.e_numerical += damper * (path - held) - stored - taken
     s.e_feed += s.feed * path
     s.e_drive -= recoil * path
     s.v_c = v1
