@@ -5,57 +5,18 @@ Lengths, rock, feed and stroke are drawn by seed over the ranges of the paper's 
 
 from __future__ import annotations
 
-import math
 import os
 
-import numpy as np
 import pytest
 
+from benchmarks.coverage import drawn, truth
 from percussion_model import Scene, simulate
-from percussion_model.verification.accuracy.explicit import explicit_rate
 
 LONG = os.environ.get("PERCUSSION_LONG") == "1"
-DURATION, SETTLE = 2.0, 1.0
-# Elements in the piston and share of the stable step of the runs to compare with, the best last.
-MESHES = ((60, 0.9), (60, 0.6), (90, 0.6))
 # Six that are not dear; the long mode has all twenty.
 QUICK = (2, 3, 4, 7, 10, 11)
 # An estimate may miss the true error by this factor, not more.
 SHARE = 0.1
-
-
-def drawn(seed):
-    """A scene of two plain bars; the drive's power is that of the reference."""
-    rng = np.random.default_rng(seed)
-
-    def between(low, high):
-        return float(math.exp(rng.uniform(math.log(low), math.log(high))))
-
-    piston, ratio = float(rng.uniform(0.15, 0.35)), between(0.7, 2.5)
-    reversal = between(4e-3, 0.1)
-    return Scene().replace(
-        **{
-            "piston.sections.0.length": piston,
-            "bit.sections.0.length": piston * ratio,
-            "rock.loading_stiffness": between(1e8, 3e9),
-            "rock.unloading_ratio": between(2.0, 40.0),
-            "feed.force": between(500.0, 3e4),
-            "drive.reversal_distance": reversal,
-            "drive.force": 3000.0 * (0.04 / reversal) ** (1.0 / 3.0),
-            "run.duration": DURATION,
-            "run.settle": SETTLE,
-        }
-    )
-
-
-def truth(scene):
-    """Rate by explicit elements, and how far it may be off, relative to it.
-
-    In chatter they answer to the step most, about in proportion: what is left at 0.6 is twice
-    what 0.9 was off by from there. Of the same scene exact flow knows no step, and agrees.
-    """
-    rates = [explicit_rate(scene, count, DURATION, SETTLE, step) for count, step in MESHES]
-    return rates[-1], 2.0 * (max(rates) - min(rates)) / abs(rates[-1])
 
 
 def judge(scene, rate, unsure, **request):

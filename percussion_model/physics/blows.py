@@ -97,6 +97,9 @@ def finish_blow(par, s, blows, time, bit_position):
     row.drive_impulse = s.i_drive - s.b_drive0
     row.contacts = s.b_contacts
     row.drilling_cycles = s.b_cycles
+    row.barrier_margin = s.b_barrier
+    row.counting_margin = s.b_counting
+    row.closing_speed = s.b_closing
     s.n_blows += 1
 
 
@@ -133,6 +136,9 @@ def start_blow(par, s, blows, time, piston_velocity, bit_position, standstill):
     s.b_drive0 = s.i_drive
     s.b_contacts = 0
     s.b_cycles = 0
+    s.b_barrier = math.nan
+    s.b_counting = math.nan
+    s.b_closing = math.nan
 
 
 @inlined
@@ -161,6 +167,8 @@ def end_of_step_with_blow(par, s, end):
 def close_gap(s, events, time, approach):
     """Note that the gap closes at `time` with a closing speed [m/s]."""
     s.b_contacts += 1
+    if not s.b_closing <= approach:
+        s.b_closing = approach
     s.count_contacts += 1
     push_event(s, events, time, EventKind.CONTACT_CLOSED, approach)
 

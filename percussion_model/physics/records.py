@@ -119,6 +119,17 @@ BLOW_COLUMNS = (
     Column("drive_impulse", "N s", "impulse of the drive on the piston over the blow"),
     Column("contacts", "", "how often the gap of piston and bit closed", "i8"),
     Column("drilling_cycles", "", "cycles of the rock law that crushed more than W_R/100", "i8"),
+    Column(
+        "barrier_margin",
+        "",
+        "energy of the bit divided by the barrier, less 1, where it came closest to 0",
+    ),
+    Column(
+        "counting_margin",
+        "",
+        "energy crushed by a cycle divided by W_R/100, less 1, where it came closest to 0",
+    ),
+    Column("closing_speed", "m/s", "least speed at which the gap of piston and bit closed"),
 )
 BLOW = np.dtype([(column.name, column.kind) for column in BLOW_COLUMNS], align=True)
 

@@ -112,9 +112,15 @@ def barrier_off(par, s):
 
 
 @inlined
+def barrier_level(par, s):
+    """Energy above which a bit starts a drilling cycle, W_R unless a scene asks otherwise [J]."""
+    return par.threshold * s.w_r
+
+
+@inlined
 def overcomes_barrier(par, s, energy):
     """Whether a bit of that kinetic energy [J] starts a drilling cycle."""
-    return barrier_off(par, s) or energy > s.w_r
+    return barrier_off(par, s) or energy > barrier_level(par, s)
 
 
 @kernel
@@ -164,6 +170,10 @@ def end_loading(par, s):
 
     By the power law K_R becomes that of the straight line on which this cycle unloads.
     """
+    if s.w_r > 0.0:
+        margin = s.crushed / (COUNTED_CYCLE * s.w_r) - 1.0
+        if not abs(s.b_counting) <= abs(margin):
+            s.b_counting = margin
     if par.power == 1:
         force = loading_force(par, s, s.p)
         given_back = recovery(par, s, s.p, force)
@@ -175,10 +185,21 @@ def end_loading(par, s):
     s.mode = Mode.BC
 
 
+@inlined
+def decide_barrier(par, s, energy):
+    """Decide as `overcomes_barrier`, and keep the closest of a blow's decisions."""
+    if barrier_off(par, s):
+        return True
+    margin = energy / barrier_level(par, s) - 1.0
+    if not abs(s.b_barrier) <= abs(margin):  # of the first one it is NaN
+        s.b_barrier = margin
+    return overcomes_barrier(par, s, energy)
+
+
 @merged
 def end_unloading(par, s, energy):
     """The bit turns downward while unloading: a new cycle, or standstill."""
-    if overcomes_barrier(par, s, energy):
+    if decide_barrier(par, s, energy):
         resume_cycle(par, s)
     else:
         s.mode = Mode.SS
@@ -220,7 +241,7 @@ def close_interface(par, s, energy):
         s.mode = Mode.FC
     elif par.rock == RockKind.WALL:
         s.mode = Mode.SS
-    elif overcomes_barrier(par, s, energy):
+    elif decide_barrier(par, s, energy):
         s.e_standstill += recoverable(par, s)
         start_cycle(par, s, 0.0)
     else:

@@ -23,6 +23,7 @@ COMMON_PARAMETERS = [
     ("drive", "i8"),  # DriveKind
     ("rock", "i8"),  # RockKind
     ("barrier", "i8"),  # 1: the energy barrier is on
+    ("threshold", "f8"),  # energy above which a cycle begins, by W_R
     ("power", "i8"),  # 1: the rock is loaded by a power law
     ("exponent", "f8"),  # n and q of the power law
     ("unloading_exponent", "f8"),
@@ -116,6 +117,9 @@ _BLOW = [  # the blow under way: what it began with, and what it has come to
     ("b_peak_contact", "f8"),
     ("b_peak_bit", "f8"),
     ("b_standstill", "f8"),
+    ("b_barrier", "f8"),  # closest decisions, NaN before the first: see BLOW_COLUMNS
+    ("b_counting", "f8"),
+    ("b_closing", "f8"),
     ("b_position", "f8"),
     ("b_hole", "f8"),
     ("b_rock0", "f8"),
@@ -169,4 +173,6 @@ COMMON_LIMITS: dict[str, tuple[float, float]] = {
     "armed": FLAG,
 }
 # Numbers that may be undefined.
-COMMON_UNDEFINED = ("b_rebound", "b_standstill", "b_peak_contact")
+COMMON_UNDEFINED = (
+    *("b_rebound", "b_standstill", "b_peak_contact", "b_barrier", "b_counting", "b_closing"),
+)

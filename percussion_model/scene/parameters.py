@@ -240,6 +240,14 @@ class RockLaw(Parameters):
         1e4, "N s/m", "damping C_R of the energy barrier", BARRIER_ON, ge=0, le=1e9
     )
     barrier_energy: float = quantity(0.05, "J", "energy barrier W_R", BARRIER_ON, ge=0, le=1e6)
+    barrier_threshold: float = quantity(
+        1.0,
+        "-",
+        "energy above which a bit begins a drilling cycle, divided by W_R: 1 in the paper",
+        BARRIER_ON,
+        gt=0,
+        le=1e6,
+    )
 
 
 class Contact(Parameters):

@@ -15,9 +15,12 @@ from percussion_model.scene.solver_names import counted
 from percussion_model.simulation.error_estimate import (
     Estimate,
     GridRun,
+    error_by_decisions,
     errors_of_numbers,
     estimate_error,
     grid_run,
+    otherwise_decided,
+    warnings_of_decisions,
 )
 from percussion_model.simulation.rate import FEWEST_DEPENDENT, LEAST_BLOWS
 from percussion_model.simulation.result import Result
@@ -72,6 +75,8 @@ class Step:
     doubt : float
         Relative error that the run before was thought to have by its cells: there was
         reason not to trust that one, and two runs that agree by chance are not rare then.
+    decided : tuple of GridRun
+        On the same grid, with close decisions taken otherwise.
     interrupted : bool
         Whether the run after this one was.
     """
@@ -80,12 +85,18 @@ class Step:
     run: GridRun
     estimate: Estimate
     doubt: float = 0.0
+    decided: tuple[GridRun, ...] = ()
     interrupted: bool = False
 
     @property
     def error(self) -> float:
         """Estimated error of the rate, relative to it."""
-        return max(self.estimate.total, self.doubt)
+        return max(self.estimate.total, self.doubt, self.by_decisions)
+
+    @property
+    def by_decisions(self) -> float:
+        """What close decisions make of it."""
+        return error_by_decisions(self.run, self.run, self.decided)
 
 
 def time_needed(result: Result, accuracy: float) -> float:
@@ -136,6 +147,7 @@ def run_to_accuracy(scene: Scene, run_once: RunOnce) -> Result:
     if not runs[-1].useful:
         return _finished(scene, runs, None)
     step = Step(cells, runs[-1], estimate_error(runs[-1], runs[:-1]))
+    step = _decided(step, runs[:-1], wanted, run_once)
     if not scene.run.check and _trusted(step, wanted):
         return _finished(scene, runs, step)
     while (finer := _finer(scene, step, wanted)) is not None:
@@ -146,6 +158,7 @@ def run_to_accuracy(scene: Scene, run_once: RunOnce) -> Result:
         if not runs[-1].useful:
             return _finished(scene, runs, None)
         step = Step(finer, runs[-1], estimate_error(runs[-1], runs[:-1]), doubt=step.estimate.cells)
+        step = _decided(step, runs[:-1], wanted, run_once)
         if step.error <= wanted:
             break
     return _finished(scene, runs, step)
@@ -201,6 +214,14 @@ def _run(scene: Scene, cells: int, run_once: RunOnce, extend: bool = True) -> Gr
     return grid_run(run_once(with_cells(scene, cells), extend))
 
 
+def _decided(step: Step, others: list[GridRun], wanted: float, run_once: RunOnce) -> Step:
+    """A step that would do, with runs of the other motions where decisions are close."""
+    if step.error > wanted:
+        return step
+    scenes = otherwise_decided(step.run, others)
+    return replace(step, decided=tuple(grid_run(run_once(one, False)) for one in scenes))
+
+
 def _trusted(step: Step, wanted: float) -> bool:
     """Whether coarser runs give no reason to doubt the one that the rule chose."""
     cycles = step.run.result.summary()["drilling_cycles_per_blow"]
@@ -212,7 +233,7 @@ def _trusted(step: Step, wanted: float) -> bool:
 def _finer(scene: Scene, step: Step, wanted: float) -> int | None:
     """Cells of the next run; None where a finer one is not tried or would not help."""
     estimate = step.estimate
-    by_grid = max(estimate.cells + estimate.fit, estimate.floor, step.doubt)
+    by_grid = max(estimate.cells + estimate.fit, estimate.floor, step.doubt, step.by_decisions)
     if step.error > wanted and by_grid <= CHATTER_SHARE * wanted:
         return None  # scatter is all that is left
     fit = FIT_SHARE * wanted
@@ -235,15 +256,17 @@ def _finished(scene: Scene, runs: list[GridRun], step: Step | None) -> Result:
         error = runs[0].scatter / abs(runs[0].value)
     # by place: runs compare by arrays
     before = runs[: next(k for k, run in enumerate(runs) if run is judged)]
-    known = math.isfinite(error)
+    known, decided = math.isfinite(error), step.decided if step else ()
     result = replace(
         last,
         scene=scene,
-        errors=errors_of_numbers(judged, judged, before) if known else {},
+        errors=errors_of_numbers(judged, judged, before, decided) if known else {},
         rate_of_penetration_relative_error=error,
         wall_time=sum(run.result.wall_time for run in runs),
         setup_time=sum(run.result.setup_time for run in runs),
     )
+    if known and error > wanted:
+        result.warnings.extend(warnings_of_decisions(judged, judged, before, decided, error))
     if not error <= wanted and not last.cut_short:
         result.warnings.append(_missed(result, step, wanted, error))
     elif step is not None and step.interrupted:
@@ -265,6 +288,8 @@ def _missed(result: Result, step: Step | None, wanted: float, error: float) -> s
             f"{head}, since the motion is aperiodic and {result.duration:.4g} s average "
             "out no more; a longer run.duration allows a longer run"
         )
+    if step.by_decisions > wanted:
+        return f"{head}, since a bounce comes close to the barrier"
     if step.estimate.fit > wanted:
         return f"{head}, since the lengths fit no common cell"
     return (

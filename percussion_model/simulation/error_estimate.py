@@ -19,6 +19,12 @@ from percussion_model.scene.bars import bar_transit_time
 from percussion_model.scene.inputs import SimulationError
 from percussion_model.scene.numbers import Numbers, numbers_of
 from percussion_model.scene.scene import Scene, SceneError
+from percussion_model.simulation.decisions import (
+    near_barrier,
+    other_barriers,
+    unsure_counts,
+    unsure_margin,
+)
 from percussion_model.simulation.means import COUNTS, numbers_over, scatter_over
 from percussion_model.simulation.rate import LARGE_ERROR, LEAST_BLOWS, rate_of_blows
 from percussion_model.simulation.result import Result
@@ -75,6 +81,8 @@ OF_VIBRATION = ("standstill_bit_force", "rebound_velocity")
 # Runs whose drilling cycles a blow differ by more, or by more than this share of them, are
 # of different motions; where there are dozens, one more or less is a smooth change.
 SAME_MOTION, SAME_SHARE = 0.5, 0.05
+# Blows are alike whose advances differ by less than this share.
+REPEATED = 1e-3
 
 
 @dataclass(frozen=True)
@@ -126,6 +134,16 @@ class GridRun:
         return float(np.mean(counted)) if len(counted) else 0.0
 
     @cached_property
+    def repeats(self) -> int:
+        """Blows after which the motion repeats; 0 where it was not seen to."""
+        advance = self.result.counted["hole_advance"]
+        for order in range(1, len(advance) // 2 + 1):
+            off = np.abs(advance[order:] - advance[:-order])
+            if np.max(off) <= REPEATED * abs(float(np.mean(advance))):
+                return order
+        return 0
+
+    @cached_property
     def largest(self) -> float:
         """Largest misfit of a section."""
         return largest_misfit(self.misfit)
@@ -158,7 +176,7 @@ class GridRun:
         blows = self.result.counted
         scatter, found = scatter_over(blows), {}
         # what is the same for all numbers is found once
-        shared = {name: getattr(self, name) for name in ("cycles", "largest", "signed")}
+        shared = {name: getattr(self, name) for name in ("cycles", "repeats", "largest", "signed")}
         of_kinds = [numbers_over(kind) for kind in _two_kinds(blows)]
         for name, value in numbers_over(blows).items():
             number = value, scatter.get(name, math.nan)
@@ -224,6 +242,23 @@ def _by_slight_loss(numbers: Numbers, modes: int) -> float:
     """Relative error of the rate that is expected of modes that ring for long."""
     steps = kelvin_voigt_time(numbers) * modes / bar_transit_time(elastic_bars(numbers)[0])
     return SLIGHT_LOSS / steps if steps > 0.0 else math.inf
+
+
+def error_by_decisions(part: GridRun, whole: GridRun, decided: Sequence[GridRun]) -> float:
+    """Relative error that covers runs whose close decisions were taken otherwise.
+
+    Parameters
+    ----------
+    part, whole : GridRun
+        Over the time of those runs, and over all of it, which counts where the part is too short
+        to tell its blows of two kinds from it.
+    decided : sequence of GridRun
+        On the same grid, with another barrier.
+    """
+    settles = abs(whole.value - part.value) > CONFIDENCE * part.scatter
+    run = replace(whole, number=(part.value if settles else whole.value, whole.scatter))
+    off = (_difference(other, run) for other in decided if other.useful)
+    return SPREAD_MARGIN * max(off, default=0.0)
 
 
 def estimate_error(run: GridRun, others: Sequence[GridRun]) -> Estimate:
@@ -292,7 +327,9 @@ def _difference(other: GridRun, run: GridRun) -> float:
 
 
 def _same_motion(run: GridRun, other: GridRun) -> bool:
-    """Whether two runs have the same number of drilling cycles a blow."""
+    """Whether two runs have the same number of drilling cycles a blow, and repeat as soon."""
+    if 0 < run.repeats != other.repeats > 0:
+        return False
     off = abs(run.cycles - other.cycles)
     return off <= max(SAME_MOTION, SAME_SHARE * run.cycles)
 
@@ -370,24 +407,46 @@ def with_error_estimate(
         return result
     whole = grid_run(result)
     if not coarser:
-        return _judged(whole, whole, [])
+        return _judged(whole, whole, [], [])
     end = result.duration if whole_time else _comparison_time(result, coarser)
     settle = min(result.settle, 0.5 * end)
     short = {"run.duration": end, "run.settle": settle}
+    early = result.blows["time"] + result.blows["period"] <= end
+    part = grid_run(replace(result, settle=settle, blows=result.blows[early]))
     try:
         others = [grid_run(run(scene.replace(**short))) for scene in coarser]
+        decided = [
+            grid_run(run(scene.replace(**short))) for scene in otherwise_decided(part, others)
+        ]
     except (SceneError, SimulationError) as error:
         result.warnings.append(f"the errors of the means could not be estimated: {error}")
         return result
-    if any(other.result.cut_short for other in others):
+    if any(other.result.cut_short for other in (*others, *decided)):
         result.warnings.append("interrupted while the errors of the means were estimated")
         return result
-    early = result.blows["time"] + result.blows["period"] <= end
-    part = grid_run(replace(result, settle=settle, blows=result.blows[early]))
-    return _judged(whole, part, others)
+    return _judged(whole, part, others, decided)
 
 
-def errors_of_numbers(whole: GridRun, part: GridRun, others: Sequence[GridRun]) -> dict[str, float]:
+def otherwise_decided(run: GridRun, others: Sequence[GridRun]) -> list[Scene]:
+    """Return the scene of a run with the barrier moved past the energies of close decisions."""
+    scene, margins = run.result.scene, run.result.counted["barrier_margin"]
+    return [
+        scene.replace(**{"rock.barrier_threshold": factor * scene.rock.barrier_threshold})
+        for factor in other_barriers(margins, _unsure_margin(run, others))
+    ]
+
+
+def _unsure_margin(run: GridRun, others: Sequence[GridRun]) -> float:
+    compared = [other.result.counted for other in others]
+    return unsure_margin("barrier_margin", run.result.counted, compared)
+
+
+def errors_of_numbers(
+    whole: GridRun,
+    part: GridRun,
+    others: Sequence[GridRun],
+    decided: Sequence[GridRun] = (),
+) -> dict[str, float]:
     """Estimate the errors of the numbers over blows of a run, or of its fall.
 
     Parameters
@@ -396,6 +455,8 @@ def errors_of_numbers(whole: GridRun, part: GridRun, others: Sequence[GridRun]) 
         The run, and the stretch of it that others are compared with.
     others : sequence of GridRun
         On coarser grids, the best last; none where there is no grid.
+    decided : sequence of GridRun
+        See `estimate_error`.
 
     Returns
     -------
@@ -404,19 +465,23 @@ def errors_of_numbers(whole: GridRun, part: GridRun, others: Sequence[GridRun]) 
         vibrates when the next blow comes, grids that agree do so by chance on `OF_VIBRATION`.
     """
     vibrates = others and whole.result.scene.loss.time < least_loss_time(whole.result)
-    compared = [other.numbers() for other in others]
+    compared, otherwise = ([other.numbers() for other in runs] for runs in (others, decided))
+    counts = unsure_counts(part.result.counted, [other.result.counted for other in others])
     of_part, found = part.numbers(), {}
     for name, number in whole.numbers().items():
         if vibrates and name in OF_VIBRATION:
             continue
         if number.useful and of_part[name].useful:
-            known = [numbers[name] for numbers in compared if name in numbers]
+            known, moved = (
+                [numbers[name] for numbers in runs if name in numbers]
+                for runs in (compared, otherwise)
+            )
             if others and not known:
                 continue
-            estimate = _of_whole(_estimate(of_part[name], known), number)
+            estimate = _of_whole(_estimate(of_part[name], known), of_part[name], number, moved)
             if name in COUNTS:  # grids that agree do so exactly
                 estimate = replace(estimate, floor=0.0)
-            error = abs(number.value) * estimate.total
+            error = max(abs(number.value) * estimate.total, counts.get(name, 0.0))
             if math.isfinite(error):
                 found[name] = error
     return found
@@ -449,24 +514,54 @@ def _by_pulse(run: GridRun) -> float:
     return error_by_pulse(string.pulse_duration / step)
 
 
-def _of_whole(estimate: Estimate, whole: GridRun) -> Estimate:
+def _of_whole(
+    estimate: Estimate, part: GridRun, whole: GridRun, decided: Sequence[GridRun]
+) -> Estimate:
     """An estimate by a part of a run, with the scatter and the kinds of blows of all of it."""
     scatter = whole.scatter / abs(whole.value)
     scatter = scatter if math.isfinite(scatter) else math.inf
-    cells = max(estimate.cells, SPREAD_MARGIN * whole.apart) if whole.result.cells else 0.0
+    cells = 0.0
+    if whole.result.cells:
+        by_decisions = error_by_decisions(part, whole, decided)
+        cells = max(estimate.cells, SPREAD_MARGIN * whole.apart, by_decisions)
     return Estimate(cells, estimate.fit, scatter, estimate.floor)
 
 
-def _judged(whole: GridRun, part: GridRun, others: Sequence[GridRun]) -> Result:
+def _judged(
+    whole: GridRun, part: GridRun, others: Sequence[GridRun], decided: Sequence[GridRun]
+) -> Result:
     """The result with its errors and what to warn of."""
-    result = replace(whole.result, errors=errors_of_numbers(whole, part, others))
+    result = replace(whole.result, errors=errors_of_numbers(whole, part, others, decided))
     if not whole.useful or not part.useful:
         return result
-    estimate = _of_whole(_estimate(part, others), whole)
+    estimate = _of_whole(_estimate(part, others), part, whole, decided)
     if not math.isfinite(estimate.total):
         return result
-    result.warnings.extend(_large_error(estimate, result.solver))
+    if estimate.total > LARGE_ERROR:
+        close = list(warnings_of_decisions(part, whole, others, decided, estimate.total))
+        result.warnings.extend(close or _large_error(estimate, result.solver))
     return replace(result, rate_of_penetration_relative_error=estimate.total)
+
+
+def warnings_of_decisions(
+    part: GridRun,
+    whole: GridRun,
+    others: Sequence[GridRun],
+    decided: Sequence[GridRun],
+    error: float,
+) -> Iterator[str]:
+    """Name the close decision that makes most of an error, relative, and the other rates."""
+    if not decided or error_by_decisions(part, whole, decided) < error:
+        return
+    margins = part.result.counted["barrier_margin"]
+    near = near_barrier(margins, _unsure_margin(part, others))
+    rates = " or ".join(in_digits(1e3 * other.value, 4) for other in decided if other.useful)
+    yield (
+        f"the rate of penetration {LARGE} {in_digits(100.0 * error, 2)} %: at a bounce the bit's "
+        f"energy is within {in_digits(100.0 * float(np.max(np.abs(near))), 2)} % of the barrier "
+        f"(rock.barrier_energy) in {len(near)} of {len(margins)} blows, and another resolution "
+        f"may decide otherwise; the rate is {rates} mm/s then"
+    )
 
 
 def _large_error(estimate: Estimate, solver: str) -> Iterator[str]:

@@ -137,6 +137,7 @@ def fill_parameters(p: Any, numbers: Numbers, with_piston: bool) -> None:
     p["drive"] = DRIVES[values.effects_drive]
     p["rock"] = ROCKS[values.effects_rock]
     p["barrier"] = barrier_on(numbers)
+    p["threshold"] = values.rock_barrier_threshold
     fill_power(p, values)
     p["release"] = values.effects_standstill_tension == StandstillTension.RELEASE
     fill_effects(p, values)
@@ -216,5 +217,5 @@ def fill_start(s: Any, numbers: Numbers) -> None:
     s["gap"] = values.start_gap if has_piston else math.inf
     s["t_open"] = -math.inf
     s["peak_from"] = math.inf
-    s["b_rebound"] = math.nan
-    s["b_standstill"] = math.nan
+    s["b_rebound"] = s["b_standstill"] = math.nan
+    s["b_barrier"] = s["b_counting"] = s["b_closing"] = math.nan

@@ -10,7 +10,14 @@ from __future__ import annotations
 
 from percussion_model.physics.kernel import inlined, kernel, merged
 from percussion_model.physics.records import DriveKind, Mode, RockKind
-from percussion_model.physics.rock import REST_VELOCITY, damping, is_loading, origin, stiffness
+from percussion_model.physics.rock import (
+    REST_VELOCITY,
+    barrier_level,
+    damping,
+    is_loading,
+    origin,
+    stiffness,
+)
 from percussion_model.solvers.fem.bars import relative_motion
 from percussion_model.solvers.fem.records import Column, Mesh, Node, Probe
 from percussion_model.solvers.fem.scheme import acceleration, try_step
@@ -66,7 +73,7 @@ def turn_value(par, s, v, energy):
     if s.mode == Mode.FF or par.rock == RockKind.SPRING:
         return NEVER
     if s.mode == Mode.SS:
-        return s.w_r - energy
+        return barrier_level(par, s) - energy
     if s.mode == Mode.BC:
         return REST_VELOCITY - v
     return v + REST_VELOCITY

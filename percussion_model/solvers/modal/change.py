@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from percussion_model.physics.kernel import inlined, kernel
 from percussion_model.physics.records import Mode
-from percussion_model.physics.rock import origin
+from percussion_model.physics.rock import barrier_level, origin
 from percussion_model.solvers.modal.bar import BIT
 from percussion_model.solvers.modal.forms import change_spring, form_wanted
 from percussion_model.solvers.modal.lanes import WIDTH, load, spread, store, total
@@ -115,6 +115,7 @@ def end_mode(par, s, bars, events):
         take_modes(par, s, bars, n)
         change_spring(par, s, bars)
     s.alert = 1
-    if s.mode == Mode.SS and over >= 0 and s.vibrates <= QUIET_SHARE * s.w_r:
+    quiet = QUIET_SHARE * barrier_level(par, s)
+    if s.mode == Mode.SS and over >= 0 and s.vibrates <= quiet:
         s.alert = 0
     note_mode(par, s, events)

@@ -18,6 +18,7 @@ from percussion_model.physics.drive import drive_force, switch_drive
 from percussion_model.physics.kernel import inlined, kernel, merged
 from percussion_model.physics.records import Mode, Piston
 from percussion_model.physics.rock import (
+    barrier_level,
     crush,
     damping,
     origin,
@@ -269,7 +270,7 @@ def watch_barrier(par, s, bars, most, events):
         up to the tick in which the barrier is passed.
     """
     energy = energy_about_rest(s, bars, spell_out(s, bars, bars.w, PQ))
-    s.alert = 1 if energy > QUIET_SHARE * s.w_r else 0
+    s.alert = 1 if energy > QUIET_SHARE * barrier_level(par, s) else 0
     if s.alert == 0:
         return most
     most = min(most, WHOLE)

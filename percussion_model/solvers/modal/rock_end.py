@@ -7,6 +7,7 @@ from percussion_model.physics.kernel import inlined, kernel
 from percussion_model.physics.records import Mode, RockKind
 from percussion_model.physics.rock import (
     REST_VELOCITY,
+    barrier_level,
     close_interface,
     enter_standstill,
     leave_by_velocity,
@@ -29,7 +30,7 @@ def watch_energy(par, s, bars):
     """Note whether a standstill may end by the energy that the bit has now."""
     s.alert = 1
     if s.mode == Mode.SS and s.form == 2:
-        s.alert = 1 if standing_energy(s, bars) > QUIET_SHARE * s.w_r else 0
+        s.alert = 1 if standing_energy(s, bars) > QUIET_SHARE * barrier_level(par, s) else 0
 
 
 @kernel

@@ -8,7 +8,7 @@ from percussion_model.physics.body import hold_effects, piston_acceleration
 from percussion_model.physics.drive import drive_force
 from percussion_model.physics.kernel import kernel
 from percussion_model.physics.records import DriveKind, Mode, Piston, RockKind
-from percussion_model.physics.rock import REST_VELOCITY, barrier_off
+from percussion_model.physics.rock import REST_VELOCITY, barrier_level, barrier_off
 from percussion_model.solvers.rigid.forces import (
     ROUNDING,
     acceleration,
@@ -90,7 +90,7 @@ def standstill_event(par, s, y, acc, beta, k, F, M):
     tau = NEVER
     kind = Next.NOTHING
     if not barrier_off(par, s):
-        limit = math.sqrt(2.0 * s.w_r / par.mass_b)
+        limit = math.sqrt(2.0 * barrier_level(par, s) / par.mass_b)
         if abs(v) > limit:
             return 0.0, Next.LEAVE_DOWN if v > -REST_VELOCITY else Next.LEAVE_UP
         if math.sqrt(v * v + acc * acc / k) > limit:

@@ -11,6 +11,7 @@ from percussion_model.physics.kernel import kernel
 from percussion_model.physics.records import DriveKind, Mode, RockKind
 from percussion_model.physics.rock import (
     REST_VELOCITY,
+    barrier_level,
     book_dashpot,
     damping,
     origin,
@@ -124,7 +125,7 @@ def fill_events(par, s, f, x, work, out):
         if par.release == 1:
             out[2] = stiffness(s) * x[end] + damping(s) * v
         if par.barrier == 1:
-            out[3] = s.w_r - kinetic_energy(par, f, x)
+            out[3] = barrier_level(par, s) - kinetic_energy(par, f, x)
 
 
 @kernel

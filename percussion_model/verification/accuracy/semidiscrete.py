@@ -80,6 +80,7 @@ class Drill:
         self.share = mesh[Mesh.SHARE].copy()
         self.k_r, self.gamma = rock.loading_stiffness, rock.unloading_ratio
         self.c_r, self.w_r = rock.barrier_damping, rock.barrier_energy
+        self.level = rock.barrier_threshold * self.w_r
         self.k_c = scene.fem.contact_stiffness
         self.weight = scene.gravity.acceleration if scene.effects.gravity else 0.0
         feed = scene.feed.force if scene.effects.feed else 0.0
@@ -200,7 +201,7 @@ class Drill:
             found.append((ROCK + " free", lambda t, y: y[n - 1] - end))
             found.append((ROCK, lambda t, y: REST - y[2 * n - 1]))
         else:
-            found.append((ROCK, lambda t, y: self.w_r - self.kinetic(y)))
+            found.append((ROCK, lambda t, y: self.level - self.kinetic(y)))
             found.append((ROCK + " free", lambda t, y: float(self.bit_force(y))))
         for _, function in found:
             function.terminal, function.direction = True, -1.0  # type: ignore[attr-defined]
@@ -242,7 +243,7 @@ class Drill:
             self.mode = Mode.FF
         elif self.mode in (Mode.DFC, Mode.FC):
             self.p_u, self.mode = p * (self.gamma - 1.0) / self.gamma, Mode.BC
-        elif self.mode in (Mode.FF, Mode.BC) and self.kinetic(y) <= self.w_r:
+        elif self.mode in (Mode.FF, Mode.BC) and self.kinetic(y) <= self.level:
             self.mode = Mode.SS
         elif self.mode == Mode.SS and y[2 * self.n - 1] < -REST:
             self.mode = Mode.BC

@@ -20,6 +20,7 @@ from percussion_model.physics.body import (
 from percussion_model.physics.kernel import kernel, merged
 from percussion_model.physics.records import Mode, RockKind
 from percussion_model.physics.rock import (
+    barrier_level,
     barrier_off,
     book_dashpot,
     crush,
@@ -87,7 +88,7 @@ def stays_below_barrier(par, s, energy):
     """Whether a standstill of that energy stays below the barrier."""
     if barrier_off(par, s):
         return False
-    return energy <= QUIET_SHARE * s.w_r
+    return energy <= QUIET_SHARE * barrier_level(par, s)
 
 
 @merged
