@@ -456,7 +456,7 @@ def errors_of_numbers(
     others : sequence of GridRun
         On coarser grids, the best last; none where there is no grid.
     decided : sequence of GridRun
-        See `estimate_error`.
+        See `error_by_decisions`.
 
     Returns
     -------
