@@ -22,7 +22,6 @@ from percussion_model.physics.readings import fill_ledger, fill_motion
 from percussion_model.physics.records import Mode, RockKind, Status
 from percussion_model.physics.rock import (
     REST_VELOCITY,
-    barrier_level,
     book_dashpot,
     close_interface,
     crush,
@@ -518,7 +517,7 @@ def look(par, s, runs, w, v, events):
     if s.mode == Mode.SS and s.closed == 0 and s.quiet_b == 0:
         # the energy of what is left to itself does not rise
         energy = standing_energy(par, s, runs, w, v)
-        s.alert = 1 if energy > SURELY * barrier_level(par, s) else 0
+        s.alert = 1 if overcomes_barrier(par, s, energy / SURELY) else 0
         if s.quiet_p == 1 and energy < QUIET:
             s.quiet_b = 1
             for i in range(runs[par.uppers].first, v.shape[0]):
