@@ -387,8 +387,8 @@ def usual() -> str:
     study = load_studies(("reference",))["reference"]
     point = next(p for p in study.ladder("wave") if p.label == "20 cells")
     return (
-        f"Twenty cells, the default, are off by {power(point.errors[RATE])} in the reference "
-        f"scene. That is luck: over the {row['points']} points of the map of section 7, whose "
+        f"Twenty cells, the default of the waves, are off by {power(point.errors[RATE])} in the "
+        f"reference scene. That is luck: over the {row['points']} points of the map of section 7, whose "
         f"lengths fit as well, the median is {power(row['median'])}, "
         f"the greatest {power(row['greatest'])}."
     )

@@ -24,7 +24,7 @@ from percussion_model.interface.plotting.error_against_time import (
 IMAGES = DOCS / "images"
 # The methods of each scene; the reference scene gets all of them.
 PEERS = (
-    *("modal", "wave", "wave-steps", "wave-misfit"),
+    *("modal", "wave", "wave-misfit"),
     *("explicit", "exact-flow", "fem", "rigid"),
 )
 METHODS: dict[str, tuple[str, ...] | None] = {

@@ -26,7 +26,11 @@ def accuracy(
     ] = False,
     methods: Annotated[
         str | None,
-        typer.Option("--methods", metavar="A,B", help="As modal,explicit,scipy; all if left out."),
+        typer.Option(
+            "--methods",
+            metavar="A,B",
+            help="As modal,fem,scipy; left out: all, of several scenes the quick ones.",
+        ),
     ] = None,
     make_references: Annotated[
         bool,
@@ -53,7 +57,11 @@ def accuracy(
     from percussion_model.scene.scene import Scene
     from percussion_model.simulation.files import to_json
     from percussion_model.verification.accuracy import study
-    from percussion_model.verification.accuracy.ladders import chosen_ladders, refuse_asked
+    from percussion_model.verification.accuracy.ladders import (
+        COMPARED,
+        chosen_ladders,
+        refuse_asked,
+    )
     from percussion_model.verification.accuracy.problems import default_solver, refuse_unfit
     from percussion_model.verification.accuracy.study import solvers_of
 
@@ -78,11 +86,13 @@ def accuracy(
             "methods always"
         )
     words = None if methods is None else [word.strip() for word in methods.split(",")]
+    if words is None and len(chosen) > 1:
+        words = [COMPARED]
     ladders = chosen_ladders(words)  # refuses before anything is computed
     for _, scene in chosen:
         refuse_unfit(scene)
         if words is not None:
-            refuse_asked(scene, ladders)
+            refuse_asked(scene, chosen_ladders([word for word in words if word != COMPARED]))
         default_solver(scene)
     common.check_json(json_file)
     if make_references:

@@ -33,6 +33,7 @@ from percussion_model.verification.accuracy.problems import (
 from percussion_model.verification.accuracy.semidiscrete import refuse_general
 
 __all__ = [
+    "COMPARED",
     "FITS",
     "LADDERS",
     "Ladder",
@@ -192,6 +193,13 @@ LADDERS = {
     )
 }
 
+# What several scenes are compared by, where no methods are asked for.
+COMPARED = "compared"
+QUICK = (
+    *("modal", "chain", "wave"),
+    *("explicit", "exact-flow", "cvode", "fem", "rigid"),
+)
+
 # Integrator, tolerance and meshes of the general methods. CVODE is the compiled one.
 _GENERAL = {"lsoda": ("LSODA", 1e-4, (5, 10, 20, 30)), "radau": ("Radau", 1e-3, (5, 10, 20))}
 
@@ -232,7 +240,9 @@ class Rung:
 
 
 def chosen_ladders(words: Sequence[str] | None) -> tuple[str, ...]:
-    """Names of ladders from words; "scipy" stands for all general integrators.
+    """Names of ladders from words.
+
+    "scipy" stands for all general integrators, "compared" for own solvers and their quick peers.
 
     Raises
     ------
@@ -242,25 +252,31 @@ def chosen_ladders(words: Sequence[str] | None) -> tuple[str, ...]:
     if words is None:
         return tuple(LADDERS)
     general = tuple(name for name in LADDERS if LADDERS[name].family == "scipy")
+    groups = {"scipy": general, COMPARED: QUICK}
     chosen: list[str] = []
     for word in words:
-        if word != "scipy" and word not in LADDERS:
-            known = ", ".join([*LADDERS, "scipy"])
+        if word not in groups and word not in LADDERS:
+            known = ", ".join([*LADDERS, *groups])
             raise SceneError(f"--methods: {word!r} is no method: {known}")
-        chosen += general if word == "scipy" else [word]
-    return tuple(chosen)
+        chosen += groups.get(word, (word,))
+    return tuple(dict.fromkeys(chosen))
 
 
 def refuse_asked(scene: Scene, names: Sequence[str]) -> None:
     """Raise `SceneError`, before anything is computed, where one of the methods refuses a scene."""
     for name in names:
-        if name in COMPILED:
+        if scene.effects.string and name == "explicit":
+            ExplicitChainSolver(scene, CHAIN_MESHES[0])
+        elif name in COMPILED:
             make, meshes, _ = COMPILED[name]
             make(scene, meshes[0])
-        elif name in ("modal", "chain") and scene.effects.string == (name == "modal"):
-            scene.computed_by(name)  # refuses
+        elif LADDERS[name].family in ("wave", "fem"):
+            scene.computed_by(LADDERS[name].family)
+        elif name == "modal":
+            by_modes(scene, PILOT_MODES)
+        elif name == "chain" and not scene.effects.string:
             raise SceneError(
-                f"--methods: {name!r} computes bars between piston and bit, and there are none"
+                "--methods: 'chain' computes bars between piston and bit, and there are none"
             )
         elif name in _GENERAL:
             refuse_general(scene)

@@ -66,8 +66,8 @@ QUANTITIES = {
         Quantity("peak_contact_force", "peak contact force (10 µs means)", 1e-3, "kN"),
         Quantity("peak_stress", "peak stress, mid-bit", 1e-6, "MPa"),
         Quantity("rock_energy", "energy into rock, a blow", 1.0, "J"),
-        Quantity("rock_share", "share of the blow energy that the rock takes", 1.0, ""),
-        Quantity("loss_share", "share of the blow energy lost in the bars", 1.0, ""),
+        Quantity("rock_share", "rock's share of the blow energy", 1.0, ""),
+        Quantity("loss_share", "share of the blow energy lost", 1.0, ""),
         Quantity("resting_place", "resting place of the bit's end, from its start", 1e3, "mm"),
         Quantity(HISTORY, "bit force through a blow", 1.0, ""),
         Quantity(CONTACT_HISTORY, "contact force through a blow", 1.0, ""),
@@ -246,17 +246,17 @@ class Run:
     Attributes
     ----------
     setup_time : float
-        Time to make the solver [s]; of the first of a kind compilation included.
+        Processor time to make the solver [s]; of the first of a kind compilation included.
     """
 
     def __init__(
         self, problem: Problem, scene: Scene, peer: Callable[[Scene], Solver] | None = None
     ) -> None:
         self.problem = problem
-        began = time.perf_counter()
+        began = time.process_time()
         solver = None if peer is None else peer(scene)
         self.simulation = Simulation(scene, record_events=False, solver=solver)
-        self.setup_time = time.perf_counter() - began
+        self.setup_time = time.process_time() - began
         self._start = self.simulation.save()
 
     def cost(self, duration: float | None = None) -> float:

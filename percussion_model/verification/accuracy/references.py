@@ -84,6 +84,8 @@ MOST_CELLS = 900
 LONG = 20.0
 LONG_CELLS = 40
 LONG_MODES = 24
+# Elements in the piston of a string, which is long.
+LONG_MESH = 24
 # Limits that are relatively closer than this make a reference whatever their bars say.
 CLOSE = 2e-3
 
@@ -386,7 +388,7 @@ def _string_levels(problem: Problem, quick: bool) -> dict[str, list[Level]]:
             1.0 / count,
             peer=partial(ExplicitChainSolver, elements=count),
         )
-        for count in counts
+        for count in ([LONG_MESH] if problem.kind == APERIODIC else counts)
     ]
     return found
 

@@ -16,6 +16,7 @@ from percussion_model.simulation.uncertain import in_digits
 from percussion_model.solvers.base import place_of_kernels
 from percussion_model.verification.accuracy.integrators import GeneralRun
 from percussion_model.verification.accuracy.ladders import (
+    COMPARED,
     FITS,
     LADDERS,
     Rung,
@@ -389,7 +390,8 @@ def study(
     full : bool
         Whether to take the costly rungs as well.
     methods : sequence of str, optional
-        Names of `LADDERS`, or "scipy" for all general integrators.
+        Names of `LADDERS`, or "scipy" for all general integrators, or "compared" for those of
+        the quick methods that carry the scene.
     progress : callable
         Called with what comes next, and the share of the work that is done; None while
         kernels may have to be compiled, which takes minutes or nothing.
@@ -402,7 +404,7 @@ def study(
     names = chosen_ladders(methods)
     refuse_unfit(scene)
     if methods is not None:
-        refuse_asked(scene, names)
+        refuse_asked(scene, chosen_ladders([word for word in methods if word != COMPARED]))
     compilation = {}
     default = default_solver(scene)
     # make each solver once: compile, or load what was compiled before
