@@ -388,8 +388,8 @@ def usual() -> str:
     point = next(p for p in study.ladder("wave") if p.label == "20 cells")
     return (
         f"Twenty cells, the default of the waves, are off by {power(point.errors[RATE])} in the "
-        f"reference scene. That is luck: over the {row['points']} points of the map of section 7, whose "
-        f"lengths fit as well, the median is {power(row['median'])}, "
+        f"reference scene. That is luck: over the {row['points']} points of the map of section 7, "
+        f"whose lengths fit as well, the median is {power(row['median'])}, "
         f"the greatest {power(row['greatest'])}."
     )
 

@@ -132,6 +132,11 @@ def test_set_up_counts_where_it_is_asked_for():
     assert contest(found, 1e-3).ratio == pytest.approx(10.0)
     assert contest(found, 1e-3, duration=2.0).ratio == pytest.approx(10.5 / 2.5)
     assert found.setup(contest(found, 1e-3).own) == 3.0
+    slow = replace(found, points=[replace(p, setup=9.0) if p.ladder == "fem" else p
+                                  for p in made({"modal": peer(1.0), "fem": peer(8.0),
+                                                 "explicit": peer(10.0)}).points])  # fmt: skip
+    winners = [contest(slow, 1e-3, duration=time).peer for time in (math.inf, 2.0)]
+    assert [one.ladder for one in winners] == ["fem", "explicit"]
 
 
 def test_a_row_says_why_a_peer_wins_or_nobody_does():

@@ -132,9 +132,10 @@ def test_modes_and_chains_take_the_ladders_of_their_scenes():
     """Modes in eights from eight on; in a string steps of the chain and its explicit elements."""
     problem = pose(Scene())
     counts = [r.label for r in ladders(problem) if r.ladder == "modal"]
-    assert counts[:3] == ["8 modes", "14 modes", "20 modes"]
+    # the bit has 1.15 times as many: with eight sixteen are computed, with fewer eight
+    assert counts[:3] == ["6 modes", "8 modes", "14 modes"]
     long = Scene.from_toml(SCENARIOS / "top_hammer.toml")
-    assert affordable_modes(long, (8, 20, 56, 80)) == [8, 20, 56]
+    assert affordable_modes(long, (2, 4, 8, 20, 56, 80)) == [2, 4, 8, 20, 56]
     string = Problem(hammer("t38"), PERIODIC, 0.1, 0.05)
     assert {rung.ladder for rung in ladders(string)} == {"chain", "explicit"}
     for rung in ladders(replace(string, kind=APERIODIC)):

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from statistics import median
 from typing import NamedTuple
 
 from percussion_model.verification.accuracy.orders import Cost
-from percussion_model.verification.accuracy.problems import APERIODIC
 from percussion_model.verification.accuracy.study import PEERS, Study
 
 __all__ = [
@@ -93,10 +92,8 @@ def contest(
         Of a run whose set-up counts as well [s]; without set-up if left out.
     """
     key = key or found.main
-    own, peer = found.cost(ladder or found.own, key, wanted), found.best(PEERS, key, wanted)
-    if math.isfinite(duration):
-        own = _with_setup(found, own, duration)
-        peer = None if peer is None else _with_setup(found, peer, duration)
+    own = found.cost(ladder or found.own, key, wanted, duration)
+    peer = found.best(PEERS, key, wanted, duration)
     why = ""
 
     def ended(outcome: str, ratio: float, low: float, high: float) -> Contest:
@@ -117,7 +114,7 @@ def contest(
         why = _why_slower(found, own, peer) if ratio < 1.0 else ""
         return ended(MET, ratio, low, math.inf if own.is_bound else peer.high / own.low)
     if is_met:
-        tried = [found.cost(name, key, wanted) for name in found.peers]
+        tried = [found.cost(name, key, wanted, duration) for name in found.peers]
         if not tried or not all(cost.decided for cost in tried):
             return ended(UNDECIDED, math.nan, math.nan, math.nan)
         least = min(cost.dearest for cost in tried) / own.value
@@ -127,14 +124,6 @@ def contest(
         most = peer.value / own.dearest
         return ended(MISSED, most, 0.0, most)
     return ended(UNDECIDED, math.nan, math.nan, math.nan)
-
-
-def _with_setup(found: Study, cost: Cost, duration: float) -> Cost:
-    """Time of a run so long, set-up included, by its duration."""
-    setup = found.setup(cost)
-    more = setup / (1.0 if found.kind == APERIODIC else duration) if math.isfinite(setup) else 0.0
-    value, low, high = (time + more for time in (cost.value, cost.low, cost.high))
-    return replace(cost, value=value, low=low, high=high, dearest=cost.dearest + more)
 
 
 def _why_slower(found: Study, own: Cost, peer: Cost) -> str:

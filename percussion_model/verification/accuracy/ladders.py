@@ -59,8 +59,10 @@ NEAR = 1.25
 MISFIT_CELLS, MISFIT_NEAR, MISFIT_RUNGS = 40, 1.25, 6
 WAVE_CELLS = (3, 5, 7, 10, 14, 20, 30, 44, 66, 100)
 WAVE_CELLS_FULL = (*WAVE_CELLS, 150, 200)
-# Modes in the bar of the shortest transit time: they come in eights, and fewer are as many.
-MODES, MODES_FULL = (8, 14, 20, 28, 40, 56), (8, 14, 20, 28, 40, 56, 80)
+# Modes in the bar of the shortest transit time. They are computed in eights: of numbers that
+# fill as many eights the largest is taken.
+MODES, MODES_FULL = (2, 4, 6, 8, 14, 20, 28, 40, 56), (2, 4, 6, 8, 14, 20, 28, 40, 56, 80)
+EIGHT = 8
 # Modes of the longer bar: with more, each rung takes half a minute to be prepared.
 MOST_MODES = 400
 # Steps in the piston of a chain of bars, and elements of its peer.
@@ -361,7 +363,12 @@ def affordable_modes(scene: Scene, wished: Sequence[int]) -> list[int]:
     first, shortest = elastic_times(numbers)
     longest = max(first, scene.bit.transit_time)
     most = min(MOST_MODES * shortest / longest, most_modes(numbers) * shortest / first)
-    return [count for count in wished if count <= most] or [wished[0]]
+    by_eights = {
+        (math.ceil(count / EIGHT), math.ceil(count * longest / shortest / EIGHT)): count
+        for count in wished
+        if count <= most
+    }
+    return list(by_eights.values()) or [wished[0]]
 
 
 def _modes(problem: Problem, full: bool) -> Iterator[Rung]:

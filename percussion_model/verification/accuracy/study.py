@@ -191,10 +191,13 @@ class Study:
         """What costs are the times of."""
         return "the run" if self.kind == APERIODIC else "a simulated second"
 
-    def cost(self, name: str, key: str, wanted: float) -> Cost:
-        """Time at which a ladder meets an error for good [s]; see `seconds`."""
+    def cost(self, name: str, key: str, wanted: float, duration: float = math.inf) -> Cost:
+        """Time at which a ladder meets an error for good [s]; see `seconds`.
+
+        Of runs so long with their set-up [s], if a duration is given.
+        """
         points = self.ladder(name)
-        return cost_range(
+        found = cost_range(
             name,
             [
                 (self.seconds(point), point.spread, point.errors.get(key, math.nan))
@@ -203,6 +206,11 @@ class Study:
             wanted,
             self.floor(key),
         )
+        if math.isinf(duration) or not math.isfinite(found.value):
+            return found
+        more = self.setup(found) / (1.0 if self.kind == APERIODIC else duration)
+        value, low, high = (time + more for time in (found.value, found.low, found.high))
+        return replace(found, value=value, low=low, high=high, dearest=found.dearest + more)
 
     def meets(self, cost: Cost) -> Point:
         """Rung at which an error is met for good."""
@@ -213,7 +221,9 @@ class Study:
         """Set-up of the rung at which an error is met for good [s]; NaN where none meets it."""
         return self.meets(cost).setup if math.isfinite(cost.value) else math.nan
 
-    def best(self, families: Sequence[str], key: str, wanted: float) -> Cost | None:
+    def best(
+        self, families: Sequence[str], key: str, wanted: float, duration: float = math.inf
+    ) -> Cost | None:
         """Least cost of an error among the ladders of families; None where none is known to.
 
         Its range is that of the best in either case: another ladder may be the cheaper one. It
@@ -221,7 +231,7 @@ class Study:
         rungs is left out.
         """
         names = [name for name in self.names if LADDERS[name].family in families]
-        found = [self.cost(name, key, wanted) for name in names]
+        found = [self.cost(name, key, wanted, duration) for name in names]
         known = [cost for cost in found if math.isfinite(cost.value)]
         if not known:
             return None
