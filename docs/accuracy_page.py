@@ -143,15 +143,13 @@ def setup_cell(study: Study, one: Contest) -> str:
 
 def reasons(names: Sequence[str], found: dict[float, list[Contest]]) -> str:
     """Where a peer wins, and what is undecided, each with its reason."""
-    told: dict[str, list[str]] = {}
-    for wanted, column in found.items():
-        for name, one in zip(names, column, strict=True):
-            if one.why:
-                told.setdefault(f"{name}: {why_text(one)}", []).append(percent(wanted))
-    rows = [
-        f"- {what.replace(':', f', {chr(44).join(errors)}:', 1)}." for what, errors in told.items()
-    ]
-    return "\n".join(row.replace(",0", ", 0") for row in rows)
+    told: dict[tuple[str, str], list[str]] = {}
+    for k, name in enumerate(names):
+        for wanted, column in found.items():
+            if (one := column[k]).why:
+                told.setdefault((name, why_text(one)), []).append(percent(wanted))
+    rows = (f"- {name}, {', '.join(errors)}: {why}." for (name, why), errors in told.items())
+    return "\n".join(rows)
 
 
 def milliseconds(cost: Cost) -> str:
@@ -259,8 +257,15 @@ def advantage() -> str:
 
 def modes_table() -> str:
     """Errors of the rate by modes, scene by scene."""
-    studies = {name: one for name, one in load_studies().items() if one.kind == PERIODIC}
-    labels = list(dict.fromkeys(p.label for one in studies.values() for p in one.ladder("modal")))
+    studies = {
+        name: one
+        for name, one in load_studies().items()
+        if one.kind == PERIODIC and one.ladder("modal")
+    }
+    labels = sorted(
+        {point.label for one in studies.values() for point in one.ladder("modal")},
+        key=lambda label: int(label.split()[0]),
+    )
     rows = []
     for name, one in studies.items():
         by: dict[str, Point] = {point.label: point for point in one.ladder("modal")}

@@ -32,7 +32,7 @@ METHODS: dict[str, tuple[str, ...] | None] = {
     "reference": None,
     "t38_rods": ("chain", "explicit"),
 }
-DPI, DPI_OF_MANY = 110, 75
+DPI, DPI_OF_MANY = 110, 60
 CLOSED_WAVE, CLOSED_FEM = (5, 20, 40), (20, 40, 80)
 
 

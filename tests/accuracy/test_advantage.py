@@ -142,14 +142,14 @@ def test_set_up_counts_where_it_is_asked_for():
 def test_a_row_says_why_a_peer_wins_or_nobody_does():
     lost = contest(made({"wave": WAVE, "explicit": peer(1.0)}), 1e-3)
     assert why_text(lost) == (
-        "explicit elements faster: it meets the error for good with rung 1, the solver with rung 1"
+        "explicit elements win, rung 1 meet the error for good, of the solver rung 1"
     )
     near = contest(made({"wave": WAVE, "explicit": peer(9.0)}, bar=6e-3, threshold=True), 1e-3)
     assert why_text(near) == "undecided, the motion is near a threshold"
     blurred = contest(made({"wave": WAVE, "explicit": peer(9.0)}, bar=6e-3), 1e-3)
     assert why_text(blurred) == "undecided, by the bar of the reference"
     missed = contest(made({"wave": [(2.0, MISS)], "explicit": peer(10.0)}), 1e-3)
-    assert why_text(missed) == "explicit elements faster: the solver misses it"
+    assert why_text(missed) == "explicit elements win, the solver misses it"
     assert contest(made({"wave": WAVE, "explicit": peer(9.0)}), 1e-3).why == ""
 
 

@@ -286,7 +286,7 @@ def why_text(one: Contest) -> str:
         return f"{UNDECIDED}, {one.why}"
     if one.peer is None:
         return one.why
-    return f"{LADDERS[one.peer.ladder].title} faster: {one.why}"
+    return f"{LADDERS[one.peer.ladder].title} win, {one.why}"
 
 
 def ratio_text(one: Contest, strong: str = "") -> str:

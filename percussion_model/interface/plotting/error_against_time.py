@@ -50,6 +50,8 @@ OWN_SIZE, SIZE = 9.0, 5.0
 # Time at which a run takes as long as what it simulates [s].
 REAL_TIME = 1.0
 IN_A_ROW = 4
+# Axes that span less than this ratio have ticks between the powers of ten.
+FEW_DECADES = 100.0
 
 
 def draw_accuracy(found: Study) -> Figure:
@@ -90,6 +92,7 @@ def draw_misfits(studies: Sequence[Study]) -> Figure:
         "#56B4E9",
         "#595959",
         "#222222",
+        "#8C564B",
     )
     scale, drawn = [math.inf, 0.0], 0
     for found in studies:
@@ -101,7 +104,7 @@ def draw_misfits(studies: Sequence[Study]) -> Figure:
         x, y = np.array(pairs).T
         scale = [min(scale[0], x.min()), max(scale[1], x.max())]
         ax.plot(
-            x, y, color=colours[drawn % 8], marker="os^DvPX*"[drawn % 8], markersize=5.0,
+            x, y, color=colours[drawn % 9], marker="os^DvPX*h"[drawn % 9], markersize=5.0,
             linestyle="", label=found.title,
         )  # fmt: skip
         drawn += 1
@@ -153,6 +156,8 @@ def _panel(ax: Axes, found: Study, key: str) -> None:
     else:
         ax.text(0.5, 0.5, "no reference: see the table", ha="center", transform=ax.transAxes)
     _log_axes(ax)
+    if errors and 4.0 * max(errors) < FEW_DECADES * min(errors):
+        ax.yaxis.set_major_locator(LogLocator(10.0, subs=(1.0, 2.0, 5.0), numticks=12))
     quantity = QUANTITIES[key]
     unit = {DROP: "the whole drop", APERIODIC: "the run"}.get(found.kind, "one simulated second")
     kind = "mean difference, by the mean force" if key == HISTORY else "error"

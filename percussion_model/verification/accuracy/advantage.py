@@ -131,7 +131,7 @@ def _why_slower(found: Study, own: Cost, peer: Cost) -> str:
     if peer.is_bound:
         return "the peer meets it with its coarsest setting"
     mine, other = (found.meets(one).label for one in (own, peer))
-    return f"it meets the error for good with {other}, the solver with {mine}"
+    return f"{other} meet the error for good, of the solver {mine}"
 
 
 class Bounds(NamedTuple):

@@ -492,7 +492,7 @@ def _agree(limits: dict[str, tuple[float, float]], seen: Sequence[float] = ()) -
     ends = min((value, *seen)), max((value, *seen))
     if seen and max(seen) - min(seen) > NEAR_THRESHOLD * abs(value):
         half = 0.5 * (ends[1] - ends[0])
-        return Bar(ends[0] + half, max(error, half), limits, True, True)
+        return Bar(ends[0] + half, max(error, off, half), limits, True, True)
     spread = max(ends[1] - value, value - ends[0])
     return Bar(value, max(error, off, spread), limits, agreed)
 
