@@ -22,24 +22,27 @@ from percussion_model.interface.plotting.error_against_time import (
 )
 
 IMAGES = DOCS / "images"
-SCENARIOS = DOCS.parent / "scenarios"
 # The methods of each scene; the reference scene gets all of them.
-PEERS = ("wave", "wave-steps", "wave-misfit", "explicit", "exact-flow", "fem", "rigid")
+PEERS = (
+    *("modal", "wave", "wave-misfit"),
+    *("explicit", "exact-flow", "fem", "rigid"),
+)
 METHODS: dict[str, tuple[str, ...] | None] = {
     **dict.fromkeys((*COMPARED, *OTHERS), PEERS),
     "reference": None,
+    "t38_rods": ("chain", "explicit"),
 }
-DPI, DPI_OF_MANY = 110, 75
+DPI, DPI_OF_MANY = 110, 60
 CLOSED_WAVE, CLOSED_FEM = (5, 20, 40), (20, 40, 80)
 
 
 def measure(name: str) -> None:
     """Study a scene and keep its numbers."""
     from percussion_model import Scene
+    from percussion_model.scene.presets import scene_presets
     from percussion_model.verification.accuracy import study
 
-    folder = SCENARIOS / "drawn" if name.startswith("drawn") else SCENARIOS
-    scene = Scene.from_toml(folder / f"{name}.toml")
+    scene = Scene.from_toml(scene_presets()[name])
     found = study(scene, False, METHODS[name], lambda text, share: say(f"{name}: {text}"))
     keep(name, found.to_dict())
 

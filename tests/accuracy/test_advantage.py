@@ -1,8 +1,9 @@
-"""Waves against peers, on studies whose answer is known."""
+"""The default solver against peers, on studies whose answer is known."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -14,6 +15,7 @@ from percussion_model.interface.commands.accuracy_tables import (
     show_bars,
     show_contests,
     show_study,
+    why_text,
 )
 from percussion_model.verification.accuracy import Point, Reference, Study
 from percussion_model.verification.accuracy.advantage import (
@@ -32,7 +34,7 @@ from percussion_model.verification.accuracy.references import (
 )
 
 
-def made(ladders, bar=0.0, agreed=True, title="", kind=PERIODIC, sizes=None):
+def made(ladders, bar=0.0, agreed=True, title="", kind=PERIODIC, sizes=None, threshold=False):
     """A study of ladders: pairs of time and error, by name; each rung half the size of the last."""
     key = quantities(kind)[0]
     points = [
@@ -41,7 +43,7 @@ def made(ladders, bar=0.0, agreed=True, title="", kind=PERIODIC, sizes=None):
         for name, rungs in ladders.items()
         for k, (time, error) in enumerate(rungs)
     ]  # fmt: skip
-    bars = {key: Bar(1.0, bar, {"wave": (1.0, bar), "explicit": (1.0, bar)}, agreed)}
+    bars = {key: Bar(1.0, bar, {"wave": (1.0, bar), "explicit": (1.0, bar)}, agreed, threshold)}
     here = {"processor": "one", "cores": 1, "load": None, "python": "3"}
     return Study(title, kind, 1.0, 1.0, Reference(title, kind, bars, {}), points, {}, here)
 
@@ -80,7 +82,7 @@ def test_what_one_side_misses_gives_a_bound():
 def test_a_coarsest_rung_that_meets_the_error_gives_a_bound():
     """What a coarser one would cost nobody knows: at most that."""
     waves = contest(made({"wave": [(2.0, 5e-4)], "explicit": peer(10.0)}), 1e-3)
-    assert waves.wave.is_bound
+    assert waves.own.is_bound
     assert (waves.least, waves.most) == (pytest.approx(5.0), math.inf)
     assert ratio_text(waves) == "≥ 5.0"
     peers = contest(made({"wave": WAVE, "explicit": [(10.0, 5e-4)]}), 1e-3)
@@ -108,6 +110,47 @@ def test_what_the_reference_does_not_resolve_is_undecided():
     assert contest(made(ladders, bar=6e-4), 1e-3).outcome == UNDECIDED
     assert contest(made(ladders, agreed=False), 1e-3).outcome == UNDECIDED
     assert contest(made(ladders), 1e-3).outcome == MET
+
+
+def test_the_default_solver_counts_and_another_own_one_where_it_was_not_run():
+    ladders = {"modal": peer(1.0), "wave": peer(2.0), "explicit": peer(10.0)}
+    found = made(ladders)
+    assert found.own == "modal"
+    assert contest(found, 1e-3).ratio == pytest.approx(10.0)
+    assert contest(found, 1e-3, ladder="wave").ratio == pytest.approx(5.0)
+    assert replace(found, solver="wave").own == "wave"  # as of a power law
+    del ladders["modal"]
+    assert replace(made(ladders), solver="modal").own == "wave"
+    assert made({"chain": WAVE, "explicit": peer(9.0)}).own == "chain"
+
+
+def test_set_up_counts_where_it_is_asked_for():
+    found = made({"modal": peer(1.0), "explicit": peer(10.0)})
+    setups = {"modal": 3.0, "explicit": 1.0}
+    points = [replace(point, setup=setups[point.ladder]) for point in found.points]
+    found = replace(found, points=points)
+    assert contest(found, 1e-3).ratio == pytest.approx(10.0)
+    assert contest(found, 1e-3, duration=2.0).ratio == pytest.approx(10.5 / 2.5)
+    assert found.setup(contest(found, 1e-3).own) == 3.0
+    slow = replace(found, points=[replace(p, setup=9.0) if p.ladder == "fem" else p
+                                  for p in made({"modal": peer(1.0), "fem": peer(8.0),
+                                                 "explicit": peer(10.0)}).points])  # fmt: skip
+    winners = [contest(slow, 1e-3, duration=time).peer for time in (math.inf, 2.0)]
+    assert [one.ladder for one in winners] == ["fem", "explicit"]
+
+
+def test_a_row_says_why_a_peer_wins_or_nobody_does():
+    lost = contest(made({"wave": WAVE, "explicit": peer(1.0)}), 1e-3)
+    assert why_text(lost) == (
+        "explicit elements win, rung 1 meet the error for good, of the solver rung 1"
+    )
+    near = contest(made({"wave": WAVE, "explicit": peer(9.0)}, bar=6e-3, threshold=True), 1e-3)
+    assert why_text(near) == "undecided, the motion is near a threshold"
+    blurred = contest(made({"wave": WAVE, "explicit": peer(9.0)}, bar=6e-3), 1e-3)
+    assert why_text(blurred) == "undecided, by the bar of the reference"
+    missed = contest(made({"wave": [(2.0, MISS)], "explicit": peer(10.0)}), 1e-3)
+    assert why_text(missed) == "explicit elements win, the solver misses it"
+    assert contest(made({"wave": WAVE, "explicit": peer(9.0)}), 1e-3).why == ""
 
 
 def test_the_summary_has_the_worst_scene_and_not_the_luckiest_alone():

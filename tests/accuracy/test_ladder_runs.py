@@ -20,14 +20,19 @@ from percussion_model.interface.commands.accuracy_tables import (
     show_study,
     within_bar,
 )
+from percussion_model.scene.hammers import hammer
 from percussion_model.verification.accuracy import Study, study
+from percussion_model.verification.accuracy.explicit import ExplicitSolver
 from percussion_model.verification.accuracy.integrators import GeneralRun
 from percussion_model.verification.accuracy.ladders import (
     LADDERS,
+    affordable_modes,
     best_fitting,
+    even_mesh,
     fem_scene,
     ladders,
     misfit_of,
+    refuse_asked,
 )
 from percussion_model.verification.accuracy.orders import Order
 from percussion_model.verification.accuracy.problems import (
@@ -57,15 +62,16 @@ POINT_KEYS = {
 
 @pytest.fixture(scope="module")
 def found():
-    """The reference scene by coarse waves and rigid bars."""
+    """The reference scene by modes, coarse waves and rigid bars."""
     patch = pytest.MonkeyPatch()
 
     def few(problem, full):
         rungs = ladders(problem, full)
         chosen = {
+            "modal": ("8 modes",),
             "wave": ("6 cells", "20 cells", "40 cells", "60 cells"),
             "wave-steps": ("20 cells",),
-            "explicit": ("10 elements", "20 elements", "40 elements"),
+            "explicit": ("11 elements", "20 elements", "40 elements"),
             "rigid": ("",),
         }
         return [rung for rung in rungs if rung.label in chosen.get(rung.ladder, ())]
@@ -83,7 +89,8 @@ def found():
     before = [text for text, share in said if share is None]
     assert before == [text for text, _ in said[: len(before)]]
     assert [text for text in before if text.startswith("compiling or loading ")] == [
-        "compiling or loading wave", "compiling or loading wave, without leaps",
+        "compiling or loading modal", "compiling or loading wave",
+        "compiling or loading wave, without leaps",
         "compiling or loading explicit elements", "compiling or loading rigid",
     ]  # fmt: skip
     after = [text for text, _ in said[len(before) :]]
@@ -103,6 +110,57 @@ def test_finer_waves_are_better_and_dearer(found):
     order = found.order("wave", HISTORY)
     assert order is not None
     assert order.value > 1.0
+
+
+def test_modes_are_the_default_solver(found):
+    """Eight modes meet a thousandth; what no ledger of explicit elements tells is left out."""
+    assert found.own == found.solver == "modal"
+    (modes,) = found.ladder("modal")
+    assert modes.errors[RATE] < 1e-3
+    assert modes.setup > 0.0
+    waves = found.ladder("wave")[-1]
+    for share in ("rock_share", "loss_share"):
+        assert modes.values[share] == pytest.approx(waves.values[share], rel=2e-3)
+        assert modes.errors[share] < 2e-3
+    mass, speed = Scene().piston.mass, waves.values["impact_velocity"]
+    into_rock = waves.values["rock_share"] * 0.5 * mass * speed**2
+    assert into_rock == pytest.approx(waves.values["rock_energy"], rel=1e-3)
+    assert "loss_share" not in found.ladder("explicit")[0].values
+
+
+def test_modes_and_chains_take_the_ladders_of_their_scenes():
+    """Modes in eights from eight on; in a string steps of the chain and its explicit elements."""
+    problem = pose(Scene())
+    counts = [r.label for r in ladders(problem) if r.ladder == "modal"]
+    # the bit has 1.15 times as many: with eight sixteen are computed, with fewer eight
+    assert counts[:3] == ["6 modes", "8 modes", "14 modes"]
+    long = Scene.from_toml(SCENARIOS / "top_hammer.toml")
+    assert affordable_modes(long, (2, 4, 8, 20, 56, 80)) == [2, 4, 8, 20, 56]
+    string = Problem(hammer("t38"), PERIODIC, 0.1, 0.05)
+    assert {rung.ladder for rung in ladders(string)} == {"chain", "explicit"}
+    for rung in ladders(replace(string, kind=APERIODIC)):
+        assert rung.ladder in ("chain", "explicit")
+    refuse_asked(hammer("t38"), ["chain", "explicit"])
+    for name in ("modal", "wave", "wave-steps", "fem-gauss"):
+        with pytest.raises(SceneError, match="piston and bit alone, but the scene has rods"):
+            refuse_asked(hammer("t38"), [name])
+    with pytest.raises(SceneError, match="there are none"):
+        refuse_asked(Scene(), ["chain"])
+
+
+def test_explicit_elements_are_as_even_as_the_lengths_allow():
+    scene = Scene.from_toml("dth5_st_anne")
+
+    def step_by_mean(count):
+        made = ExplicitSolver(scene, count)
+        return made.time_step * sum(made.cells.values())
+
+    tuned = [even_mesh(scene, about) for about in (10, 20, 40)]
+    assert all(
+        abs(count - about) <= 0.15 * about for count, about in zip(tuned, (10, 20, 40), strict=True)
+    )
+    for count, about in zip(tuned, (10, 20, 40), strict=True):
+        assert step_by_mean(count) >= 0.999 * step_by_mean(about)
 
 
 def test_lengths_that_do_not_fit_are_not_in_the_order(found):
@@ -146,9 +204,9 @@ def test_a_rigid_hammer_has_an_error_and_no_order(found):
 
 
 def test_advice_names_a_method_that_keeps_the_word(found):
-    text = found.advice(1e-3)
+    text = replace(found, points=[p for p in found.points if p.ladder != "modal"]).advice(1e-3)
     assert text.startswith("For 0.1 % take wave, 20 cells")
-    assert "no method" in found.advice(1e-9)
+    assert "no method" in replace(found, points=found.ladder("rigid")).advice(1e-9)
 
 
 def test_json_has_what_it_promises(found):
@@ -215,7 +273,7 @@ def test_every_ladder_is_described_and_full_runs_have_more_rungs():
     problem = pose(Scene())
     usual, full = (ladders(problem, wish) for wish in (False, True))
     for rungs in (usual, full):
-        assert {rung.ladder for rung in rungs} == set(LADDERS)
+        assert {rung.ladder for rung in rungs} == {*LADDERS} - {"chain"}
     labels = [{(rung.ladder, rung.label) for rung in rungs} for rungs in (usual, full)]
     assert labels[0] < labels[1]
 
@@ -227,7 +285,7 @@ def test_short_strokes_are_told_by_statistics():
     assert not answer.histories
     assert answer.errors[RATE] > 0
     rungs = ladders(problem)
-    assert {rung.ladder for rung in rungs} == {"wave", "explicit", "fem", "rigid"}
+    assert {rung.ladder for rung in rungs} == {"modal", "wave", "explicit", "fem", "rigid"}
 
 
 def test_a_general_integrator_agrees_with_the_elements_on_the_same_mesh():
@@ -313,13 +371,15 @@ def test_rigid_scenes_are_refused_before_anything_is_compiled(bar, tmp_path, mon
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("method", ["explicit", "exact-flow", "cvode", "lsoda"])
+@pytest.mark.parametrize("method", ["modal", "explicit", "exact-flow", "cvode", "lsoda"])
 @pytest.mark.parametrize("change", ["effects.rock=power", "effects.cuttings=true"])
 def test_a_method_that_has_no_such_law_is_refused_before_anything_is_compiled(
     method, change, tmp_path, monkeypatch
 ):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(common, "tell_of_compiling", lambda *names: pytest.fail("compiles"))
+    if method == "modal" and "cuttings" in change:
+        return  # modes carry them
     given = "--methods", f"wave,{method}", "--set", change
     assert change.partition("=")[0] in refused(str(SCENARIOS / "reference.toml"), *given)
     assert not list(tmp_path.iterdir())
@@ -327,7 +387,10 @@ def test_a_method_that_has_no_such_law_is_refused_before_anything_is_compiled(
 
 def test_a_method_that_has_no_such_law_leaves_a_note_where_none_was_named():
     scene = Scene().replace(**{"effects.rock": "power"})
-    rungs = [rung for rung in ladders(Problem(scene, PERIODIC, 0.1, 0.05)) if rung.peer]
+    modes, *rungs = [r for r in ladders(Problem(scene, PERIODIC, 0.1, 0.05)) if r.peer]
+    assert modes.ladder == "modal"
+    with pytest.raises(SceneError, match="bars have modes on a rock of one stiffness"):
+        modes.peer(modes.scene)
     assert [rung.ladder for rung in rungs] == ["explicit", "exact-flow", "cvode"]
     for rung in rungs:
         with pytest.raises(SceneError, match=r"effects\.rock must not be 'power'"):
@@ -354,7 +417,10 @@ def test_what_is_compiled_is_told_by_name(monkeypatch):
     monkeypatch.setattr(study_module, "pose", held_up)
     with pytest.raises(InterruptedError):
         study(Scene(), methods=["wave", "fem"], progress=lambda text, share: said.append(text))
-    assert said == ["compiling the solver wave", "loading the solver fem", "pilot run"]
+    assert said == [
+        *("loading the solver modal", "compiling the solver wave", "loading the solver fem"),
+        "pilot run",
+    ]
 
 
 def test_too_few_blows_are_refused():
@@ -364,7 +430,7 @@ def test_too_few_blows_are_refused():
 
 def test_unknown_methods_and_missing_files_are_refused():
     scene = str(SCENARIOS / "reference.toml")
-    assert "'waves' is no method: wave, wave-steps" in refused(scene, "--methods", "waves,fem")
+    assert "'waves' is no method: modal, chain, wave" in refused(scene, "--methods", "waves,fem")
     assert "none.toml" in refused("none.toml")
 
 
@@ -384,9 +450,12 @@ def test_a_value_of_the_reference_has_the_digits_of_its_bar():
 
 
 def test_only_methods_that_were_asked_are_set_up():
-    assert solvers_of(("wave", "rigid")) == ["wave", "rigid"]
-    assert solvers_of(("fem-time", "explicit")) == ["wave", "fem"]
-    assert solvers_of(LADDERS) == ["wave", "fem", "rigid"]
+    assert solvers_of(("wave", "rigid"), Scene()) == ["modal", "wave", "rigid"]
+    assert solvers_of(("fem-time", "explicit"), Scene()) == ["modal", "fem"]
+    assert solvers_of(LADDERS, Scene()) == ["modal", "wave", "fem", "rigid"]
+    power = Scene().replace(**{"effects.rock": "power"})
+    assert solvers_of(LADDERS, power) == ["wave", "fem", "rigid"]
+    assert solvers_of(LADDERS, hammer("t38")) == ["chain"]
 
 
 def test_methods_of_a_reference_are_refused(monkeypatch, capsys):

@@ -26,7 +26,11 @@ def accuracy(
     ] = False,
     methods: Annotated[
         str | None,
-        typer.Option("--methods", metavar="A,B", help="As wave,fem,rigid,scipy; all if left out."),
+        typer.Option(
+            "--methods",
+            metavar="A,B",
+            help="As modal,fem,scipy; left out: all, of several scenes the quick ones.",
+        ),
     ] = None,
     make_references: Annotated[
         bool,
@@ -39,10 +43,10 @@ def accuracy(
     force: common.Force = False,
     figures: Annotated[bool, typer.Option(help="Draw error against time.")] = True,
 ) -> None:
-    """Measure error against time: waves, their peers, rigid bars.
+    """Measure error against time: the default solver, its peers, rigid bars.
 
-    Prints tables, of several scenes one of waves against the best of their peers as well;
-    figures, and the numbers as JSON unless --json is given, go to out/accuracy.
+    Prints tables, of several scenes one of the default solver against the best of its peers as
+    well; figures, and the numbers as JSON unless --json is given, go to out/accuracy.
     """
     from percussion_model.interface.commands.accuracy_tables import (
         show_bars,
@@ -53,8 +57,12 @@ def accuracy(
     from percussion_model.scene.scene import Scene
     from percussion_model.simulation.files import to_json
     from percussion_model.verification.accuracy import study
-    from percussion_model.verification.accuracy.ladders import chosen_ladders, refuse_asked
-    from percussion_model.verification.accuracy.problems import refuse_unfit
+    from percussion_model.verification.accuracy.ladders import (
+        COMPARED,
+        chosen_ladders,
+        refuse_asked,
+    )
+    from percussion_model.verification.accuracy.problems import default_solver, refuse_unfit
     from percussion_model.verification.accuracy.study import solvers_of
 
     chosen = [
@@ -78,19 +86,23 @@ def accuracy(
             "methods always"
         )
     words = None if methods is None else [word.strip() for word in methods.split(",")]
+    if words is None and len(chosen) > 1:
+        words = [COMPARED]
     ladders = chosen_ladders(words)  # refuses before anything is computed
     for _, scene in chosen:
         refuse_unfit(scene)
         if words is not None:
-            refuse_asked(scene, ladders)
-        scene.computed_by("wave")
+            refuse_asked(scene, chosen_ladders([word for word in words if word != COMPARED]))
+        default_solver(scene)
     common.check_json(json_file)
     if make_references:
-        common.tell_of_compiling("wave", "fem")
+        common.tell_of_compiling("modal", "wave", "fem")
         for _, scene in chosen:
             show_bars(_make_reference(scene))
         return
-    common.tell_of_compiling(*solvers_of(ladders))
+    common.tell_of_compiling(
+        *dict.fromkeys(name for _, scene in chosen for name in solvers_of(ladders, scene))
+    )
     claimed = None
     if figures or json_file is None:
         claimed = common.claim(

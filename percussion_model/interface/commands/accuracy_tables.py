@@ -38,6 +38,8 @@ SHORT = {
     "impact_velocity": "impact",
     "rebound_velocity": "rebound",
     "rock_energy": "energy",
+    "rock_share": "rock share",
+    "loss_share": "loss share",
     "peak_bit_force": "bit peak",
     "peak_contact_force": "contact peak",
     "peak_stress": "stress peak",
@@ -190,8 +192,9 @@ def _show_orders(found: Study, console: Console) -> None:
 
 
 def _show_costs(found: Study, console: Console) -> None:
-    """Print what errors of the first quantity cost the waves, and the best of each family."""
-    ladders = [name for name in ("wave", "wave-steps") if name in found.names]
+    """Print what errors of the first quantity cost own solvers, and the best of each family."""
+    own = dict.fromkeys((found.own, "wave", "wave-steps"))
+    ladders = [name for name in own if name in found.names]
     here = {LADDERS[name].family for name in found.names}
     families = {family: title for family, title in FAMILIES.items() if family in here}
     if not ladders and not families:
@@ -227,20 +230,24 @@ def _compared(found: Study) -> str:
 
 
 def show_contests(studies: dict[str, Study]) -> None:
-    """Print waves against the best of their peers, all scenes in one table, and the ratios."""
+    """Print default solvers against the best of their peers: a table of all scenes, and ratios."""
     console = Console()
     table = _table("scene")
-    for heading in ("error", "wave", "best peer", "ratio"):
+    for heading in ("error", "solver", "set-up", "best peer", "set-up", "ratio"):
         table.add_column(heading, justify="right", no_wrap=True)
     table.add_column("the peer")
     found = [[contest(one, wanted) for wanted in WANTED] for one in studies.values()]
-    for name, contests in zip(studies, found, strict=True):
+    whys = []
+    for (name, study), contests in zip(studies.items(), found, strict=True):
         for k, one in enumerate(contests):
-            table.add_row(
-                escape(name) if k == 0 else "", f"{100 * one.wanted:g} %", *_contest_cells(one)
-            )
+            heads = (name, LADDERS[study.own].title)
+            first = escape(heads[k]) if k < len(heads) else ""
+            table.add_row(first, f"{100 * one.wanted:g} %", *_contest_cells(study, one))
         table.add_section()
-    _print("The same error by waves and peers: ms to compute", table, console, keys=2)
+        whys += [(name, one) for one in contests if one.why]
+    _print("The same error by the default solver and peers: ms to compute", table, console, keys=2)
+    for name, one in whys:
+        console.print(escape(f"{name}, {100 * one.wanted:g} %: {why_text(one)}."), highlight=False)
     for what in dict.fromkeys((_compared(one), one.timed) for one in studies.values()):
         names = [name for name, one in studies.items() if (_compared(one), one.timed) == what]
         text = f"{', '.join(names)}: error in the {what[0]}, ms to compute {what[1]}."
@@ -258,12 +265,28 @@ def show_contests(studies: dict[str, Study]) -> None:
         console.print(text, highlight=False)
 
 
-def _contest_cells(one: Contest) -> tuple[str, str, str, str]:
-    """Times of the waves and of the best peer, the ratio, each with its range; the peer's name."""
-    peer, name = "-", ""
+def _contest_cells(found: Study, one: Contest) -> tuple[str, ...]:
+    """Times and set-ups of the solver and of the best peer, the ratio; the peer's name."""
+    peer, name, before = "-", "", "-"
     if one.peer is not None:
         peer, name = _cost_text(one.peer), LADDERS[one.peer.ladder].title
-    return _cost_text(one.wave), peer, ratio_text(one), name
+        before = _setup_text(found, one.peer)
+    own = _setup_text(found, one.own)
+    return _cost_text(one.own), own, peer, before, ratio_text(one), name
+
+
+def _setup_text(found: Study, cost: Cost) -> str:
+    setup = found.setup(cost)
+    return two(1e3 * setup) if isfinite(setup) else "-"
+
+
+def why_text(one: Contest) -> str:
+    """Why a contest is undecided, or which peer is faster and why."""
+    if one.outcome == UNDECIDED:
+        return f"{UNDECIDED}, {one.why}"
+    if one.peer is None:
+        return one.why
+    return f"{LADDERS[one.peer.ladder].title} win, {one.why}"
 
 
 def ratio_text(one: Contest, strong: str = "") -> str:

@@ -25,8 +25,11 @@ from percussion_model.verification.accuracy.study import Point, Study
 
 # Colour, dashes and marker of each ladder that is drawn; families share a colour. Ladders
 # that refine something else than cells or elements stand in the tables alone.
+_MODAL = "#222222"
 _WAVE, _FEM, _SCIPY, _RIGID, _PEER = "#0072B2", "#D55E00", "#009E73", "#595959", "#CC79A7"
 LINES: dict[str, tuple[str, Any, str]] = {
+    "modal": (_MODAL, "-", "*"),
+    "chain": (_MODAL, "-", "*"),
     "wave": (_WAVE, "-", "o"),
     "wave-steps": (_WAVE, (0, (4, 1.5)), "o"),
     "explicit": (_PEER, "-", "v"),
@@ -41,12 +44,14 @@ LINES: dict[str, tuple[str, Any, str]] = {
 }
 # Errors below this are drawn at it: they are zero within the bar of the reference.
 LEAST = 1e-7
-# Width of the lines of this program's own solver, and of its peers.
-OWN_WIDTH, WIDTH = 2.0, 1.0
-OWN = "wave"
+# Width of the line of the default solver, and of others; size of its markers, and of theirs.
+OWN_WIDTH, WIDTH = 2.4, 1.0
+OWN_SIZE, SIZE = 9.0, 5.0
 # Time at which a run takes as long as what it simulates [s].
 REAL_TIME = 1.0
 IN_A_ROW = 4
+# Axes that span less than this ratio have ticks between the powers of ten.
+FEW_DECADES = 100.0
 
 
 def draw_accuracy(found: Study) -> Figure:
@@ -87,6 +92,7 @@ def draw_misfits(studies: Sequence[Study]) -> Figure:
         "#56B4E9",
         "#595959",
         "#222222",
+        "#8C564B",
     )
     scale, drawn = [math.inf, 0.0], 0
     for found in studies:
@@ -98,7 +104,7 @@ def draw_misfits(studies: Sequence[Study]) -> Figure:
         x, y = np.array(pairs).T
         scale = [min(scale[0], x.min()), max(scale[1], x.max())]
         ax.plot(
-            x, y, color=colours[drawn % 8], marker="os^DvPX*"[drawn % 8], markersize=5.0,
+            x, y, color=colours[drawn % 9], marker="os^DvPX*h"[drawn % 9], markersize=5.0,
             linestyle="", label=found.title,
         )  # fmt: skip
         drawn += 1
@@ -150,6 +156,8 @@ def _panel(ax: Axes, found: Study, key: str) -> None:
     else:
         ax.text(0.5, 0.5, "no reference: see the table", ha="center", transform=ax.transAxes)
     _log_axes(ax)
+    if errors and 4.0 * max(errors) < FEW_DECADES * min(errors):
+        ax.yaxis.set_major_locator(LogLocator(10.0, subs=(1.0, 2.0, 5.0), numticks=12))
     quantity = QUANTITIES[key]
     unit = {DROP: "the whole drop", APERIODIC: "the run"}.get(found.kind, "one simulated second")
     kind = "mean difference, by the mean force" if key == HISTORY else "error"
@@ -198,8 +206,9 @@ def _ladder(ax: Axes, found: Study, name: str, key: str) -> None:
     """Line through all points; hollow markers where they are not in the order."""
     colour, dashes, marker = LINES[name]
     x, y = np.array(_points(found, name, key)).T
-    width = OWN_WIDTH if name == OWN else WIDTH
-    ax.plot(x, y, color=colour, linestyle=dashes, linewidth=width, zorder=2)
+    is_own = name == found.own
+    width, size = (OWN_WIDTH, OWN_SIZE) if is_own else (WIDTH, SIZE)
+    ax.plot(x, y, color=colour, linestyle=dashes, linewidth=width, zorder=4 if is_own else 2)
     fitted = {point.label for point in found.fitted(name, key)}
     full = [point for point in found.ladder(name) if point.label in fitted]
     rest = [point for point in found.ladder(name) if point.label not in fitted]
@@ -208,8 +217,8 @@ def _ladder(ax: Axes, found: Study, name: str, key: str) -> None:
         if pairs:
             x, y = np.array(pairs).T
             ax.plot(
-                x, y, color=colour, linestyle="", marker=marker, markersize=5.0,
-                markerfacecolor=face, zorder=3,
+                x, y, color=colour, linestyle="", marker=marker, markersize=size,
+                markerfacecolor=face, zorder=5 if is_own else 3,
             )  # fmt: skip
 
 
@@ -219,9 +228,12 @@ def _handles(found: Study) -> list[Any]:
     for name in _drawn(found):
         colour, dashes, marker = LINES[name]
         text = LADDERS[name].title.replace("K_C", "$K_C$")
+        width, size = WIDTH, SIZE
+        if name == found.own:
+            text, width, size = f"{text}, the default", OWN_WIDTH, OWN_SIZE
         handles.append(
-            Line2D([], [], color=colour, linestyle=dashes, marker=marker, markersize=5, label=text,
-                   linewidth=OWN_WIDTH if name == OWN else WIDTH)
+            Line2D([], [], color=colour, linestyle=dashes, marker=marker, markersize=size,
+                   label=text, linewidth=width)
         )  # fmt: skip
     if found.kind != APERIODIC:
         hollow = Line2D(

@@ -35,7 +35,9 @@ def is_clone() -> bool:
 def scene_presets() -> dict[str, Path]:
     """Scenes that ship, by name."""
     folder = scenario_folder()
-    return _by_name([*folder.glob("*.toml"), *folder.glob("drawn/*.toml")])
+    return _by_name(
+        [*folder.glob("*.toml"), *folder.glob("drawn/*.toml"), *folder.glob("hammers/*.toml")]
+    )
 
 
 def system_presets() -> dict[str, Path]:

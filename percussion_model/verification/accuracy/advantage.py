@@ -1,4 +1,4 @@
-"""Waves against the best of their peers: times for the same error, over several scenes."""
+"""The default solver against the best of its peers: times for the same error, over scenes."""
 
 from __future__ import annotations
 
@@ -25,12 +25,13 @@ __all__ = [
 
 # How a contest ends: both meet the error; one of them does not; the reference cannot tell, or
 # both meet it with their coarsest rungs.
-MET, PEER_MISSES, MISSED, UNDECIDED = "met", "no peer meets it", "waves miss it", "undecided"
+MET, PEER_MISSES, MISSED, UNDECIDED = "met", "no peer meets it", "the solver misses it", "undecided"
+THRESHOLD = "the motion is near a threshold"
 
 
 @dataclass(frozen=True)
 class Contest:
-    """Waves and the best peer, at one error of one scene.
+    """The default solver and the best peer, at one error of one scene.
 
     Attributes
     ----------
@@ -38,24 +39,28 @@ class Contest:
         Of the scene.
     wanted : float
         Relative error that both have to meet for good.
-    wave : Cost
+    own : Cost
+        Of the default solver.
     peer : Cost or None
         The cheapest of the peers, None where none meets the error.
     outcome : str
         `MET`, `PEER_MISSES`, `MISSED` or `UNDECIDED`.
     ratio, low, high : float
-        Time of the peer by that of the waves, and its range. Where one of the two misses the
+        Time of the peer by that of the solver, and its range. Where one of the two misses the
         error, or meets it with its coarsest rung, a bound, from the dearest rung or from that.
+    why : str
+        Why it is undecided, or the peer faster; empty where neither is so.
     """
 
     title: str
     wanted: float
-    wave: Cost
+    own: Cost
     peer: Cost | None
     outcome: str
     ratio: float
     low: float
     high: float
+    why: str = ""
 
     @property
     def least(self) -> float:
@@ -66,11 +71,13 @@ class Contest:
     @property
     def most(self) -> float:
         """What the ratio is at most: infinite where it is bounded from below alone."""
-        return math.inf if self.outcome == PEER_MISSES or self.wave.is_bound else self.ratio
+        return math.inf if self.outcome == PEER_MISSES or self.own.is_bound else self.ratio
 
 
-def contest(found: Study, wanted: float, key: str = "", waves: str = "wave") -> Contest:
-    """Compare the waves with the best of their peers.
+def contest(
+    found: Study, wanted: float, key: str = "", ladder: str = "", duration: float = math.inf
+) -> Contest:
+    """Compare the default solver with the best of its peers.
 
     Parameters
     ----------
@@ -79,35 +86,52 @@ def contest(found: Study, wanted: float, key: str = "", waves: str = "wave") -> 
         Relative error.
     key : str
         Quantity; the main one if left out.
-    waves : str
-        Ladder of the waves.
+    ladder : str
+        The one to be compared; that of the default solver if left out.
+    duration : float
+        Of a run whose set-up counts as well [s]; without set-up if left out.
     """
     key = key or found.main
-    wave, peer = found.cost(waves, key, wanted), found.best(PEERS, key, wanted)
+    own = found.cost(ladder or found.own, key, wanted, duration)
+    peer = found.best(PEERS, key, wanted, duration)
+    why = ""
 
     def ended(outcome: str, ratio: float, low: float, high: float) -> Contest:
-        return Contest(found.title, wanted, wave, peer, outcome, ratio, low, high)
+        return Contest(found.title, wanted, own, peer, outcome, ratio, low, high, why)
 
     floor = found.reference.floor(key)
-    if math.isnan(floor) or not wave.decided or (peer is not None and not peer.decided):
+    if math.isnan(floor) or not own.decided or (peer is not None and not peer.decided):
+        bar = found.reference.bars.get(key)
+        why = THRESHOLD if bar is not None and bar.threshold else "by the bar of the reference"
         return ended(UNDECIDED, math.nan, math.nan, math.nan)
-    wave_met = math.isfinite(wave.value)
-    if peer is not None and wave_met:
-        if wave.is_bound and peer.is_bound:
+    is_met = math.isfinite(own.value)
+    if peer is not None and is_met:
+        if own.is_bound and peer.is_bound:
+            why = "both meet it with their coarsest settings"
             return ended(UNDECIDED, math.nan, math.nan, math.nan)
-        ratio = peer.value / wave.value
-        low = 0.0 if peer.is_bound else peer.low / wave.high
-        return ended(MET, ratio, low, math.inf if wave.is_bound else peer.high / wave.low)
-    if wave_met:
-        tried = [found.cost(name, key, wanted) for name in found.peers]
+        ratio = peer.value / own.value
+        low = 0.0 if peer.is_bound else peer.low / own.high
+        why = _why_slower(found, own, peer) if ratio < 1.0 else ""
+        return ended(MET, ratio, low, math.inf if own.is_bound else peer.high / own.low)
+    if is_met:
+        tried = [found.cost(name, key, wanted, duration) for name in found.peers]
         if not tried or not all(cost.decided for cost in tried):
             return ended(UNDECIDED, math.nan, math.nan, math.nan)
-        least = min(cost.dearest for cost in tried) / wave.value
+        least = min(cost.dearest for cost in tried) / own.value
         return ended(PEER_MISSES, least, least, math.inf)
     if peer is not None:
-        most = peer.value / wave.dearest
+        why = MISSED
+        most = peer.value / own.dearest
         return ended(MISSED, most, 0.0, most)
     return ended(UNDECIDED, math.nan, math.nan, math.nan)
+
+
+def _why_slower(found: Study, own: Cost, peer: Cost) -> str:
+    """Why a peer is faster: by luck, by its coarse mesh, or by what the solver needs."""
+    if peer.is_bound:
+        return "the peer meets it with its coarsest setting"
+    mine, other = (found.meets(one).label for one in (own, peer))
+    return f"{other} meet the error for good, of the solver {mine}"
 
 
 class Bounds(NamedTuple):

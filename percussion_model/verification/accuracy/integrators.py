@@ -240,12 +240,17 @@ class GeneralRun:
             return Answer(values, histories={HISTORY: course.samples})
         period = course.time - course.started
         advance = drill.mean(drill.y[:n], True) - course.start_position
+        impact, into_rock = (
+            drill.mean(drill.y[n : 2 * n], False),
+            float(drill.y[-1]) - course.start_energy,
+        )
         values = {
             RATE: advance / period,
             "blow_period": period,
-            "impact_velocity": drill.mean(drill.y[n : 2 * n], False),
+            "impact_velocity": impact,
             "rebound_velocity": course.rebound_velocity,
-            "rock_energy": float(drill.y[-1]) - course.start_energy,
+            "rock_energy": into_rock,
+            "rock_share": into_rock / (0.5 * drill.scene.piston.mass * impact**2),
             "peak_bit_force": peak,
         }
         return Answer(values, histories={HISTORY: course.samples}, blows=1.0)

@@ -15,18 +15,30 @@ from typing import Any
 from percussion_model.scene.numbers import numbers_of
 from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.solvers.base import Solver
+from percussion_model.solvers.modal.resolution import most_modes
+from percussion_model.solvers.modal.solver import ModalSolver
+from percussion_model.solvers.setup import elastic_times, kelvin_voigt_time
 from percussion_model.solvers.wave.grid import fitting_cells
 from percussion_model.verification.accuracy.cvode import CvodeSolver
 from percussion_model.verification.accuracy.exact_flow import ExactFlowSolver
-from percussion_model.verification.accuracy.explicit import ExplicitSolver
-from percussion_model.verification.accuracy.problems import APERIODIC, Problem
+from percussion_model.verification.accuracy.explicit import COURANT as COURANT_OF_PEER
+from percussion_model.verification.accuracy.explicit import ExplicitSolver, stable_step
+from percussion_model.verification.accuracy.explicit_chain import ExplicitChainSolver
+from percussion_model.verification.accuracy.problems import (
+    APERIODIC,
+    PILOT_MODES,
+    Problem,
+    by_modes,
+)
 from percussion_model.verification.accuracy.semidiscrete import refuse_general
 
 __all__ = [
+    "COMPARED",
     "FITS",
     "LADDERS",
     "Ladder",
     "Rung",
+    "affordable_modes",
     "best_fitting",
     "chosen_ladders",
     "fem_scene",
@@ -47,6 +59,15 @@ NEAR = 1.25
 MISFIT_CELLS, MISFIT_NEAR, MISFIT_RUNGS = 40, 1.25, 6
 WAVE_CELLS = (3, 5, 7, 10, 14, 20, 30, 44, 66, 100)
 WAVE_CELLS_FULL = (*WAVE_CELLS, 150, 200)
+# Modes in the bar of the shortest transit time. They are computed in eights: of numbers that
+# fill as many eights the largest is taken.
+MODES, MODES_FULL = (2, 4, 6, 8, 14, 20, 28, 40, 56), (2, 4, 6, 8, 14, 20, 28, 40, 56, 80)
+EIGHT = 8
+# Modes of the longer bar: with more, each rung takes half a minute to be prepared.
+MOST_MODES = 400
+# Steps in the piston of a chain of bars, and elements of its peer.
+CHAIN_STEPS, CHAIN_MESHES = (6, 10, 16, 24, 40, 60), (5, 7, 10, 15, 20, 30)
+CHAIN_STEPS_LONG, CHAIN_MESH_LONG = 16, 20
 MESHES, MESHES_FULL = (10, 20, 30, 50, 70), (10, 20, 30, 50, 70, 100)
 # Tolerance that goes with ten elements in the piston; it falls with the square of their number.
 TOLERANCE_OF_TEN = 1e-4
@@ -59,13 +80,15 @@ def _cvode(scene: Scene, elements: int) -> CvodeSolver:
 # Compiled peers, their meshes, and the most elements in all bars: those of the exact flow
 # have dense matrices.
 COMPILED: dict[str, tuple[Callable[..., Solver], tuple[int, ...], float]] = {
-    "explicit": (ExplicitSolver, (5, 7, 10, 15, 20, 25, 30, 40, 60, 80, 120), 260.0),
-    "exact-flow": (ExactFlowSolver, (5, 7, 10, 15, 20, 30), 100.0),
+    "explicit": (ExplicitSolver, (2, 3, 4, 5, 7, 10, 15, 20, 25, 30, 40, 60, 80, 120), 260.0),
+    "exact-flow": (ExactFlowSolver, (2, 3, 5, 7, 10, 15, 20, 30), 100.0),
     "cvode": (_cvode, (5, 7, 10, 15), 50.0),
 }
 FEW = (3, 5, 10, 20)  # of a bar so long that no four of the others are affordable
 STEPS = (20.0, 10.0, 5.0, 3.0, 2.0, 1.0)
 COURANT = 2.0
+# Near a number of explicit elements, up to this factor off it, the most even mesh is taken.
+EVEN_NEAR = 1.15
 # A bar has at most so many elements in a ladder; a long rod gets coarser ones.
 MOST_ELEMENTS = 400
 DURATIONS = (4.0, 16.0, 64.0, 256.0)  # of aperiodic runs, in sixteenths of the scene's
@@ -84,7 +107,7 @@ class Ladder:
         What is refined, and what the order is measured against.
     note : str
         What else there is to know.
-    family : {"wave", "fem", "peer", "scipy", "rigid"}
+    family : {"modal", "chain", "wave", "fem", "peer", "scipy", "rigid"}
         Methods of a family share a colour; the last has another model.
     """
 
@@ -98,6 +121,14 @@ class Ladder:
 LADDERS = {
     one.name: one
     for one in (
+        Ladder(
+            "modal",
+            "modal",
+            "number of modes",
+            "modes in the bar of the shorter transit time, the longer has more",
+            "modal",
+        ),
+        Ladder("chain", "chain", "step", "steps in the piston of a drill string", "chain"),
         Ladder(
             "wave",
             "wave",
@@ -117,7 +148,8 @@ LADDERS = {
             "explicit",
             "explicit elements",
             "element size",
-            "lumped masses, hard contact, leapfrog at 0.9 of the longest stable step",
+            "lumped masses, hard contact, leapfrog at 0.9 of the longest stable step; near each "
+            "number of elements that whose lengths fit the sections best",
         ),
         Ladder(
             "exact-flow",
@@ -163,6 +195,13 @@ LADDERS = {
     )
 }
 
+# What several scenes are compared by, where no methods are asked for.
+COMPARED = "compared"
+QUICK = (
+    *("modal", "chain", "wave"),
+    *("explicit", "exact-flow", "cvode", "fem", "rigid"),
+)
+
 # Integrator, tolerance and meshes of the general methods. CVODE is the compiled one.
 _GENERAL = {"lsoda": ("LSODA", 1e-4, (5, 10, 20, 30)), "radau": ("Radau", 1e-3, (5, 10, 20))}
 
@@ -203,7 +242,9 @@ class Rung:
 
 
 def chosen_ladders(words: Sequence[str] | None) -> tuple[str, ...]:
-    """Names of ladders from words; "scipy" stands for all general integrators.
+    """Names of ladders from words.
+
+    "scipy" stands for all general integrators, "compared" for own solvers and their quick peers.
 
     Raises
     ------
@@ -213,21 +254,32 @@ def chosen_ladders(words: Sequence[str] | None) -> tuple[str, ...]:
     if words is None:
         return tuple(LADDERS)
     general = tuple(name for name in LADDERS if LADDERS[name].family == "scipy")
+    groups = {"scipy": general, COMPARED: QUICK}
     chosen: list[str] = []
     for word in words:
-        if word != "scipy" and word not in LADDERS:
-            known = ", ".join([*LADDERS, "scipy"])
+        if word not in groups and word not in LADDERS:
+            known = ", ".join([*LADDERS, *groups])
             raise SceneError(f"--methods: {word!r} is no method: {known}")
-        chosen += general if word == "scipy" else [word]
-    return tuple(chosen)
+        chosen += groups.get(word, (word,))
+    return tuple(dict.fromkeys(chosen))
 
 
 def refuse_asked(scene: Scene, names: Sequence[str]) -> None:
     """Raise `SceneError`, before anything is computed, where one of the methods refuses a scene."""
     for name in names:
-        if name in COMPILED:
+        if scene.effects.string and name == "explicit":
+            ExplicitChainSolver(scene, CHAIN_MESHES[0])
+        elif name in COMPILED:
             make, meshes, _ = COMPILED[name]
             make(scene, meshes[0])
+        elif LADDERS[name].family in ("wave", "fem"):
+            scene.computed_by(LADDERS[name].family)
+        elif name == "modal":
+            by_modes(scene, PILOT_MODES)
+        elif name == "chain" and not scene.effects.string:
+            raise SceneError(
+                "--methods: 'chain' computes bars between piston and bit, and there are none"
+            )
         elif name in _GENERAL:
             refuse_general(scene)
 
@@ -262,7 +314,14 @@ def ladders(problem: Problem, full: bool = False) -> list[Rung]:
     """
     if problem.kind == APERIODIC:
         return list(_rising_durations(problem, full))
-    rungs = [*_waves(problem, full), *_compiled(problem, full), *_elements(problem, full)]
+    if problem.scene.effects.string:
+        return list(_chains(problem, full))
+    rungs = [
+        *_modes(problem, full),
+        *_waves(problem, full),
+        *_compiled(problem, full),
+        *_elements(problem, full),
+    ]
     rungs.append(Rung("rigid", "", 1.0, problem.scene.computed_by("rigid")))
     return [*rungs, *_general(problem)]
 
@@ -292,6 +351,64 @@ def best_fitting(scene: Scene, about: float) -> int:
         counts or [round(about)],
         key=lambda count: (max(misfit_of(scene, count), FITS), abs(count - about)),
     )
+
+
+def _modal(scene: Scene, modes: int) -> Solver:
+    return ModalSolver(by_modes(scene, modes))
+
+
+def affordable_modes(scene: Scene, wished: Sequence[int]) -> list[int]:
+    """Numbers of modes in the bar of the shortest transit time that are soon prepared."""
+    numbers = numbers_of(scene)
+    first, shortest = elastic_times(numbers)
+    longest = max(first, scene.bit.transit_time)
+    most = min(MOST_MODES * shortest / longest, most_modes(numbers) * shortest / first)
+    by_eights = {
+        (math.ceil(count / EIGHT), math.ceil(count * longest / shortest / EIGHT)): count
+        for count in wished
+        if count <= most
+    }
+    return list(by_eights.values()) or [wished[0]]
+
+
+def _modes(problem: Problem, full: bool) -> Iterator[Rung]:
+    scene = problem.scene
+    counts = affordable_modes(scene, MODES_FULL if full else MODES)
+    try:
+        _modal(scene, PILOT_MODES)
+    except SceneError:  # its note will tell why
+        yield Rung("modal", "", 1.0, scene, peer=partial(_modal, modes=PILOT_MODES))
+        return
+    for count in counts:
+        yield Rung("modal", f"{count} modes", 1.0 / count, by_modes(scene, count))
+
+
+def _chains(problem: Problem, full: bool) -> Iterator[Rung]:
+    """Where bars lie between piston and bit: steps of the chain, and explicit elements."""
+    scene = problem.scene
+    for steps in CHAIN_STEPS:
+        chosen = scene.computed_by("chain", **{"solver.cells": steps})
+        yield Rung("chain", f"{steps} steps", 1.0 / steps, chosen)
+    for count in CHAIN_MESHES if not full else (*CHAIN_MESHES, 45):
+        peer = partial(ExplicitChainSolver, elements=count)
+        yield Rung("explicit", f"{count} elements", 1.0 / count, scene, peer=peer)
+
+
+def even_mesh(scene: Scene, about: int) -> int:
+    """Number of explicit elements near `about` whose smallest, which sets the step, is not small.
+
+    All elements would be alike at the step that the mean of their transit times allows.
+    """
+    loss = kelvin_voigt_time(numbers_of(scene))
+    bars = [bar.transit_time for bar in scene.bars.values()]
+
+    def unevenness(count: int) -> tuple[float, int]:
+        made = ExplicitSolver(scene, count)
+        longest = COURANT_OF_PEER * stable_step(sum(bars) / sum(made.cells.values()), loss)
+        return round(longest / made.time_step, 2), abs(count - about)
+
+    counts = range(math.ceil(about / EVEN_NEAR), math.floor(about * EVEN_NEAR) + 1)
+    return min(counts or [about], key=unevenness)
 
 
 def _waves(problem: Problem, full: bool) -> Iterator[Rung]:
@@ -349,6 +466,8 @@ def _compiled(problem: Problem, full: bool) -> Iterator[Rung]:
             counts = _affordable(scene, meshes, most * (2.0 if full else 1.0))
         except SceneError:
             counts = [meshes[0]]  # its note will tell why
+        if name == "explicit" and len(counts) > 1:
+            counts = sorted({even_mesh(scene, count) for count in counts})
         for count in counts:
             peer = partial(make, elements=count)
             yield Rung(name, f"{count} elements", 1.0 / count, scene, peer=peer)
@@ -370,14 +489,21 @@ def _general(problem: Problem) -> Iterator[Rung]:
 def _rising_durations(problem: Problem, full: bool) -> Iterator[Rung]:
     """Aperiodic motion: what costs is the length of the run."""
     scene = problem.scene
-    solvers = {
-        "wave": (scene.computed_by("wave", **{"solver.cells": 20}), 1.0),
-        "fem": (fem_scene(scene, 20, COURANT, stiffness_of(20)), 0.25),
-        "rigid": (scene.computed_by("rigid"), 1.0),
-        "explicit": (scene, 1.0),
-    }
+    peers: Callable[..., Solver] = ExplicitSolver
+    if scene.effects.string:
+        chain = scene.computed_by("chain", **{"solver.cells": CHAIN_STEPS_LONG})
+        solvers = {"chain": (chain, 1.0), "explicit": (scene, 1.0)}
+        peers = ExplicitChainSolver
+    else:
+        solvers = {
+            "modal": (by_modes(scene, 20), 1.0),
+            "wave": (scene.computed_by("wave", **{"solver.cells": 20}), 1.0),
+            "fem": (fem_scene(scene, 20, COURANT, stiffness_of(20)), 0.25),
+            "rigid": (scene.computed_by("rigid"), 1.0),
+            "explicit": (scene, 1.0),
+        }
     for name, (chosen, share) in solvers.items():
-        peer = partial(ExplicitSolver, elements=20) if name == "explicit" else None
+        peer = partial(peers, elements=CHAIN_MESH_LONG) if name == "explicit" else None
         for factor in DURATIONS:
             duration = share * factor / 16.0 * problem.duration * (4.0 if full else 1.0)
             yield Rung(name, f"{duration:g} s", duration, chosen, duration=duration, peer=peer)

@@ -1,8 +1,10 @@
 """References with error bars, made by solvers that share no motion, stored as JSON.
 
-Waves, explicit and implicit elements are each refined three times and extrapolated
-(Richardson). A number is called a reference where the two surest limits agree within their
-bars or nearly so; its bar covers the distance of the two.
+Waves (in strings steps of the chain), explicit and implicit elements are each refined three
+times and extrapolated (Richardson); modes are refined as well. A number is called a reference
+where the two surest limits agree within their bars or nearly so. Its bar covers the distance
+of the two and, since a motion near a threshold is another one on other meshes, all that the
+modes found.
 """
 
 from __future__ import annotations
@@ -25,8 +27,10 @@ from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.simulation.files import staged_file
 from percussion_model.solvers.base import Solver
 from percussion_model.verification.accuracy.explicit import ExplicitSolver
+from percussion_model.verification.accuracy.explicit_chain import ExplicitChainSolver
 from percussion_model.verification.accuracy.ladders import (
     FITS,
+    affordable_modes,
     best_fitting,
     fem_scene,
     misfit_of,
@@ -39,6 +43,8 @@ from percussion_model.verification.accuracy.problems import (
     Answer,
     Problem,
     Run,
+    by_modes,
+    default_solver,
 )
 
 __all__ = [
@@ -58,11 +64,18 @@ FORMAT = 2
 DIGITS = 6
 # Orders that extrapolation assumes: about the least that was measured; the mesh of the
 # implicit elements, with a penalty that goes along, is of second order.
-ORDERS = {"wave": 1.0, "explicit": 1.0, "fem": 2.0}
+ORDERS = {"wave": 1.0, "chain": 1.0, "explicit": 1.0, "fem": 2.0}
 # Cells in all bars together, coarse to fine; elements likewise.
 WAVE_LEVELS, WAVE_LEVELS_QUICK = (172.0, 258.0, 430.0), (86.0, 129.0, 172.0)
-EXPLICIT_LEVELS, EXPLICIT_LEVELS_QUICK = (215.0, 301.0, 430.0), (108.0, 151.0, 215.0)
+EXPLICIT_LEVELS, EXPLICIT_LEVELS_QUICK = (602.0, 860.0, 1204.0), (108.0, 151.0, 215.0)
 FEM_LEVELS, FEM_LEVELS_QUICK = (108.0, 151.0, 215.0), (65.0, 86.0, 108.0)
+# Modes in the bar of the shortest transit time. They come near their limit first, so that what
+# they find on the way is no error of theirs but another motion: the bar covers it.
+MODES, MODES_QUICK = (20, 28, 40, 56, 80), (20, 28, 40)
+# Modes whose rates differ by more than this [relative] find more than one motion.
+NEAR_THRESHOLD = 1e-3
+# Levels that come closer to their limit change less, or not much more: else there is no order.
+GROWTH = 3.0
 # A penalty rings: its contact force is no witness.
 RINGING = {"fem": ("peak_contact_force", CONTACT_HISTORY)}
 # Where these do not fit the lengths, cells that do, up to so many in all bars.
@@ -70,6 +83,9 @@ MOST_CELLS = 900
 # Simulated time of aperiodic references, by the scene's duration.
 LONG = 20.0
 LONG_CELLS = 40
+LONG_MODES = 24
+# Elements in the piston of a string, which is long.
+LONG_MESH = 24
 # Limits that are relatively closer than this make a reference whatever their bars say.
 CLOSE = 2e-3
 
@@ -86,18 +102,24 @@ class Bar:
         Limit of each solver and its own bar; of a history by L1 distance to the waves.
     agreed : bool
         Whether it is a reference.
+    threshold : bool
+        Whether modes that are refined find another motion: then the value is the middle of all
+        that they and the surest limit found, and the bar covers it.
     """
 
     value: float
     error: float
     limits: dict[str, tuple[float, float]]
     agreed: bool
+    threshold: bool = False
 
     @classmethod
     def from_dict(cls, tree: dict[str, Any]) -> Bar:
         """Read plain values."""
         limits = {name: (limit[0], limit[1]) for name, limit in tree["limits"].items()}
-        return cls(tree["value"], tree["error"], limits, tree["agreed"])
+        return cls(
+            tree["value"], tree["error"], limits, tree["agreed"], tree.get("threshold", False)
+        )
 
     @property
     def doubt(self) -> str:
@@ -259,14 +281,23 @@ def make_reference(
             answers[solver].append(_answer(problem, level))
     bars = {}
     for key in problem.quantities:
-        heard = [name for name in levels if key not in RINGING.get(name, ())]
+        heard = [
+            name
+            for name in levels
+            if key not in RINGING.get(name, ())
+            and all(key in HISTORIES or key in answer.values for answer in answers[name])
+        ]
         if key in HISTORIES:
             bars[key] = _history_bar(levels, answers, key)
         elif problem.kind == APERIODIC:
             last = {name: answers[name][-1] for name in heard}
             bars[key] = _agree({n: (one.values[key], one.errors[key]) for n, one in last.items()})
         else:
-            bars[key] = _agree({n: _limit(answers[n], levels[n], key, ORDERS[n]) for n in heard})
+            limits = {n: _limit(answers[n], levels[n], key, ORDERS.get(n)) for n in heard}
+            # peaks converge too slowly to tell another motion
+            told = () if key.startswith("peak") else answers.get("modal", ())
+            seen = [answer.values[key] for answer in told]
+            bars[key] = _agree(limits, seen)
     made = {
         **{name: [level.name for level in chosen] for name, chosen in levels.items()},
         "date": time.strftime("%Y-%m-%d"),
@@ -275,7 +306,8 @@ def make_reference(
         "numba": version("numba"),
         "quick": quick,
     }
-    return Reference(scene.title, problem.kind, bars, answers["wave"][-1].histories, made)
+    base = next(iter(levels))
+    return Reference(scene.title, problem.kind, bars, answers[base][-1].histories, made)
 
 
 class Level(NamedTuple):
@@ -306,12 +338,16 @@ def _levels(problem: Problem, quick: bool) -> dict[str, list[Level]]:
     waves = WAVE_LEVELS_QUICK if quick else WAVE_LEVELS
     explicit = EXPLICIT_LEVELS_QUICK if quick else EXPLICIT_LEVELS
     fem = FEM_LEVELS_QUICK if quick else FEM_LEVELS
+    if scene.effects.string:
+        return _string_levels(problem, quick)
     if problem.kind == APERIODIC:
         counts, meshes = [LONG_CELLS], [LONG_CELLS]
     else:
         counts = wave_levels(scene, waves, 0 if quick else MOST_CELLS)
         meshes = [max(3, round(target / lengths)) for target in explicit]
     found = {"wave": [_wave_level(scene, count) for count in counts]}
+    if default_solver(scene) == "modal":
+        found["modal"] = _modal_levels(problem, quick)
     try:
         ExplicitSolver(scene, meshes[0])
         found["explicit"] = [_explicit_level(scene, count) for count in meshes]
@@ -325,6 +361,48 @@ def _levels(problem: Problem, quick: bool) -> dict[str, list[Level]]:
         for count in (max(3, round(target / lengths)) for target in fem)
     ]
     return found
+
+
+def _string_levels(problem: Problem, quick: bool) -> dict[str, list[Level]]:
+    """Levels where bars lie between piston and bit: of the chain, and of explicit elements."""
+    scene = problem.scene
+    counts = [LONG_CELLS] if problem.kind == APERIODIC else [30, 45, 70][: 2 if quick else 3]
+    found = {
+        "chain": [
+            Level(
+                f"chain, {count} steps",
+                scene.computed_by("chain", **{"solver.cells": count}),
+                1.0 / count,
+            )
+            for count in counts
+        ],
+    }
+    try:
+        ExplicitChainSolver(scene, counts[0])
+    except SceneError:
+        return found
+    found["explicit"] = [
+        Level(
+            f"explicit, {count} elements",
+            scene,
+            1.0 / count,
+            peer=partial(ExplicitChainSolver, elements=count),
+        )
+        for count in ([LONG_MESH] if problem.kind == APERIODIC else counts)
+    ]
+    return found
+
+
+def _modal_levels(problem: Problem, quick: bool) -> list[Level]:
+    scene = problem.scene
+    if problem.kind == APERIODIC:
+        wished: tuple[int, ...] = (LONG_MODES,)
+    else:
+        wished = MODES_QUICK if quick else MODES
+    return [
+        Level(f"modal, {n} modes", by_modes(scene, n), 1.0 / n)
+        for n in affordable_modes(scene, wished)
+    ]
 
 
 def _wave_level(scene: Scene, count: int) -> Level:
@@ -365,18 +443,25 @@ def _answer(problem: Problem, level: Level) -> Answer:
 
 
 def _limit(
-    answers: Sequence[Answer], levels: Sequence[Level], key: str, order: float
+    answers: Sequence[Answer], levels: Sequence[Level], key: str, order: float | None
 ) -> tuple[float, float]:
     """Extrapolate the last two levels; the bar is what the last two steps of it changed.
 
     Half the change from the level before to the finest is a bound as well: where answers
     jump from level to level, extrapolation would promise too much. Levels that do not fit
-    the lengths do not fall in order: then the finest is taken, and its change is the bar.
+    the lengths do not fall in order: then the finest is taken, and its change is the bar. So
+    it is where changes do not fall, and of modes, which have no order, by their finer half.
     """
     values = [answer.values[key] for answer in answers]
+    if order is None:
+        finer = values[len(values) // 2 :]
+        return values[-1], max(max(finer) - min(finer), abs(values[-1] - values[-2]))
     change = abs(values[-1] - values[-2])
     if not all(level.fits for level in levels):
         return values[-1], change
+    before = abs(values[-2] - values[-3]) if len(values) > 2 else math.inf
+    if change > GROWTH * before:
+        return values[-1], max(change, before)
     limits = [
         values[k + 1] + _remains(levels[k : k + 2], order) * (values[k + 1] - values[k])
         for k in range(len(values) - 1)
@@ -389,8 +474,11 @@ def _remains(levels: Sequence[Level], order: float) -> float:
     return 1.0 / ((levels[0].size / levels[1].size) ** order - 1.0)
 
 
-def _agree(limits: dict[str, tuple[float, float]]) -> Bar:
+def _agree(limits: dict[str, tuple[float, float]], seen: Sequence[float] = ()) -> Bar:
     """Take the surest limit; the bar is its own, or the distance of the next one to it.
+
+    It covers what else was seen too: all that modes found on the way to their limit. Where
+    that is more than one motion, no solver can be called right.
 
     They agree where they lie within the sum of their bars, or so closely that the distance
     tells enough. One alone is no reference.
@@ -401,26 +489,36 @@ def _agree(limits: dict[str, tuple[float, float]]) -> Bar:
     other, error_of_other = others[0]
     off = abs(value - other)
     agreed = off <= error + error_of_other or off <= CLOSE * abs(value)
-    return Bar(value, max(error, off), limits, agreed)
+    ends = min((value, *seen)), max((value, *seen))
+    if seen and max(seen) - min(seen) > NEAR_THRESHOLD * abs(value):
+        half = 0.5 * (ends[1] - ends[0])
+        return Bar(ends[0] + half, max(error, off, half), limits, True, True)
+    spread = max(ends[1] - value, value - ends[0])
+    return Bar(value, max(error, off, spread), limits, agreed)
 
 
 def _history_bar(levels: dict[str, list[Level]], answers: dict[str, list[Answer]], key: str) -> Bar:
-    """L1 distance of the finest waves to the second solver, or to the waves before.
+    """L1 distance of the finest waves to the second solver, the modes, or the waves before.
 
     The limits carry what is left of their error, which decides whether they agree.
     """
+    base = next(iter(levels))
     finest = {name: found[-1].histories[key] for name, found in answers.items()}
-    whole = float(np.sum(np.abs(finest["wave"])))
+    whole = float(np.sum(np.abs(finest[base])))
 
     def apart(a: np.ndarray, b: np.ndarray) -> float:
         return float(np.sum(np.abs(a - b))) / whole
 
-    second = next(name for name in levels if name != "wave")
+    second = next((name for name in levels if name not in (base, "modal")), "")
+    if not second:
+        moved = apart(finest[base], answers[base][-2].histories[key])
+        return Bar(1.0, moved, {base: (1.0, moved)}, False)
     change = {
-        name: apart(finest[name], answers[name][-2].histories[key]) for name in ("wave", second)
+        name: apart(finest[name], answers[name][-2].histories[key]) for name in (base, second)
     }
     left = {n: _remains(levels[n][-2:], ORDERS[n]) * moved for n, moved in change.items()}
-    off = apart(finest["wave"], finest[second])
-    limits = {"wave": (1.0, left["wave"]), second: (1.0 + off, left[second])}
+    off = apart(finest[base], finest[second])
+    limits = {base: (1.0, left[base]), second: (1.0 + off, left[second])}
     agreed = off <= max(sum(left.values()), CLOSE)
-    return Bar(1.0, max(change["wave"], off), limits, agreed)
+    modes = apart(finest[base], finest["modal"]) if "modal" in finest else 0.0
+    return Bar(1.0, max(change[base], off, modes), limits, agreed)

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field, fields, replace
 from itertools import takewhile
 from typing import Any
 
-from percussion_model.scene.scene import Scene
+from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.simulation.files import plain
 from percussion_model.simulation.simulate import Simulation
 from percussion_model.simulation.uncertain import in_digits
 from percussion_model.solvers.base import place_of_kernels
 from percussion_model.verification.accuracy.integrators import GeneralRun
 from percussion_model.verification.accuracy.ladders import (
+    COMPARED,
     FITS,
     LADDERS,
     Rung,
@@ -25,10 +27,13 @@ from percussion_model.verification.accuracy.ladders import (
 from percussion_model.verification.accuracy.orders import Cost, Order, cost_range, fitted_order
 from percussion_model.verification.accuracy.problems import (
     APERIODIC,
+    PILOT_MODES,
     QUANTITIES,
     Answer,
     Problem,
     Run,
+    by_modes,
+    default_solver,
     pose,
     quantities,
     refuse_unfit,
@@ -42,8 +47,10 @@ __all__ = ["WANTED", "Point", "Study", "study"]
 
 # Errors whose cost is told.
 WANTED = (1e-2, 3e-3, 1e-3, 5e-4)
-# Families of ladders that the waves are compared with: the best of them counts.
+# Families of ladders that the default solver is compared with: the best of them counts.
 PEERS = ("peer", "fem", "scipy")
+# Ladders of own solvers, and which stands in where the one that "auto" takes was not run.
+OWN = ("modal", "chain", "wave")
 # A general integrator gets so long for a blow [s].
 PATIENCE, PATIENCE_FULL = 25.0, 120.0
 # Errors below this multiple of the reference's bar are not resolved.
@@ -108,6 +115,8 @@ class Study:
     compilation : dict of float
         Time of the first set-up of each solver, compilation or its cache included [s].
     machine : dict
+    solver : str
+        The one that `solver.name = "auto"` takes.
     """
 
     title: str
@@ -118,6 +127,7 @@ class Study:
     points: list[Point] = field(repr=False)
     compilation: dict[str, float] = field(repr=False)
     machine: dict[str, Any] = field(repr=False)
+    solver: str = ""
 
     @property
     def quantities(self) -> tuple[str, ...]:
@@ -139,8 +149,14 @@ class Study:
         return [name for name in LADDERS if self.ladder(name)]
 
     @property
+    def own(self) -> str:
+        """Ladder of the default solver; where it was not run, of another own one."""
+        chosen = (name for name in (self.solver, *OWN) if name and self.ladder(name))
+        return next(chosen, self.solver or OWN[0])
+
+    @property
     def peers(self) -> list[str]:
-        """Ladders that the waves are compared with."""
+        """Ladders that the default solver is compared with."""
         return [name for name in self.names if LADDERS[name].family in PEERS]
 
     def floor(self, key: str) -> float:
@@ -175,10 +191,13 @@ class Study:
         """What costs are the times of."""
         return "the run" if self.kind == APERIODIC else "a simulated second"
 
-    def cost(self, name: str, key: str, wanted: float) -> Cost:
-        """Time at which a ladder meets an error for good [s]; see `seconds`."""
+    def cost(self, name: str, key: str, wanted: float, duration: float = math.inf) -> Cost:
+        """Time at which a ladder meets an error for good [s]; see `seconds`.
+
+        Of runs so long with their set-up [s], if a duration is given.
+        """
         points = self.ladder(name)
-        return cost_range(
+        found = cost_range(
             name,
             [
                 (self.seconds(point), point.spread, point.errors.get(key, math.nan))
@@ -187,8 +206,24 @@ class Study:
             wanted,
             self.floor(key),
         )
+        if math.isinf(duration) or not math.isfinite(found.value):
+            return found
+        more = self.setup(found) / (1.0 if self.kind == APERIODIC else duration)
+        value, low, high = (time + more for time in (found.value, found.low, found.high))
+        return replace(found, value=value, low=low, high=high, dearest=found.dearest + more)
 
-    def best(self, families: Sequence[str], key: str, wanted: float) -> Cost | None:
+    def meets(self, cost: Cost) -> Point:
+        """Rung at which an error is met for good."""
+        points = sorted(self.ladder(cost.ladder), key=self.seconds)
+        return next((one for one in points if self.seconds(one) >= cost.value), points[-1])
+
+    def setup(self, cost: Cost) -> float:
+        """Set-up of the rung at which an error is met for good [s]; NaN where none meets it."""
+        return self.meets(cost).setup if math.isfinite(cost.value) else math.nan
+
+    def best(
+        self, families: Sequence[str], key: str, wanted: float, duration: float = math.inf
+    ) -> Cost | None:
         """Least cost of an error among the ladders of families; None where none is known to.
 
         Its range is that of the best in either case: another ladder may be the cheaper one. It
@@ -196,7 +231,7 @@ class Study:
         rungs is left out.
         """
         names = [name for name in self.names if LADDERS[name].family in families]
-        found = [self.cost(name, key, wanted) for name in names]
+        found = [self.cost(name, key, wanted, duration) for name in names]
         known = [cost for cost in found if math.isfinite(cost.value)]
         if not known:
             return None
@@ -299,6 +334,7 @@ class Study:
                 "kind": self.kind,
                 "duration": self.duration,
                 "period": self.period,
+                "solver": self.solver,
                 "machine": self.machine,
                 "compilation": self.compilation,
                 "reference": {
@@ -332,6 +368,7 @@ class Study:
             points,
             tree["compilation"],
             tree["machine"],
+            tree.get("solver", ""),
         )
 
 
@@ -363,7 +400,8 @@ def study(
     full : bool
         Whether to take the costly rungs as well.
     methods : sequence of str, optional
-        Names of `LADDERS`, or "scipy" for all general integrators.
+        Names of `LADDERS`, or "scipy" for all general integrators, or "compared" for those of
+        the quick methods that carry the scene.
     progress : callable
         Called with what comes next, and the share of the work that is done; None while
         kernels may have to be compiled, which takes minutes or nothing.
@@ -376,13 +414,15 @@ def study(
     names = chosen_ladders(methods)
     refuse_unfit(scene)
     if methods is not None:
-        refuse_asked(scene, names)
+        refuse_asked(scene, chosen_ladders([word for word in methods if word != COMPARED]))
     compilation = {}
+    default = default_solver(scene)
     # make each solver once: compile, or load what was compiled before
-    for name in solvers_of(names):
+    for name in solvers_of(names, scene):
         word = "loading" if place_of_kernels(name) is None else "compiling"
         progress(f"{word} the solver {name}", None)
-        compilation[name] = Simulation(scene.computed_by(name)).setup_time
+        chosen = by_modes(scene, PILOT_MODES) if name == "modal" else scene.computed_by(name)
+        compilation[name] = Simulation(chosen).setup_time
     progress("pilot run", None)
     problem = pose(scene)
     reference = find_reference(problem, scene, lambda text: progress(text, None))
@@ -394,6 +434,9 @@ def study(
         rung, title = rungs[k], LADDERS[rungs[k].ladder].title
         if done < 0:
             progress(f"compiling or loading {title}", None)
+            if rung.peer is not None:  # once, so that its set-up has no loading in it
+                with suppress(SceneError):
+                    Run(problem, rung.scene, rung.peer)
         else:
             progress(f"{title}, {rung.label}".rstrip(", "), ANSWERS * done / len(others))
         points[k], run = _measured(rung, problem, reference, full)
@@ -421,6 +464,7 @@ def study(
         [points[k] for k in range(len(rungs))],
         compilation,
         machine(),
+        default,
     )
 
 
@@ -434,10 +478,14 @@ def in_turn(rungs: Sequence[Rung]) -> tuple[list[int], list[int]]:
     return compiling, [k for k in range(len(rungs)) if k not in compiling]
 
 
-def solvers_of(names: Iterable[str]) -> list[str]:
-    """Solvers of the package that are run for ladders, and by the pilot run, waves."""
-    needed = {"wave", *(LADDERS[name].family for name in names)}
-    return [name for name in ("wave", "fem", "rigid") if name in needed]
+def solvers_of(names: Iterable[str], scene: Scene) -> list[str]:
+    """Solvers of the package that are run for ladders that carry a scene, and by the pilot run."""
+    default = default_solver(scene)
+    needed = {default, *(LADDERS[name].family for name in names)}
+    if scene.effects.string:
+        return ["chain"]
+    known = ("wave", "fem", "rigid") if default != "modal" else ("modal", "wave", "fem", "rigid")
+    return [name for name in known if name in needed]
 
 
 def _measured(
