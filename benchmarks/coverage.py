@@ -1,9 +1,8 @@
 """How often the stated error of a rate holds, over drawn scenes.
 
 `python -m benchmarks.coverage` runs them and prints the tables of docs/data/stated_errors.md,
-section 6; `--scenes 20` the first so many. `--truths FILE` keeps a line of JSON for each scene with
-the rates that may be right, which take most of the half an hour of one core, and takes what is
-there already.
+section 6. The rates that may be right are kept in coverage_truths.jsonl; without that file they
+are made anew, which takes half an hour of one core. `--scenes 20` takes the first so many.
 """
 
 from __future__ import annotations
@@ -33,6 +32,7 @@ MESHES = ((60, 0.9), (60, 0.6), (90, 0.6))
 FINE = 112
 # An error is unsound that is so many times what was stated.
 UNSOUND = 3.0
+TRUTHS = Path(__file__).with_name("coverage_truths.jsonl")
 
 
 def drawn(seed: int) -> Scene:
@@ -85,6 +85,13 @@ def rates_that_may_be_right(seed: int) -> dict[str, float]:
         "many_modes": many.rate_of_penetration,
         "many_unsure": many.rate_of_penetration_standard_error,
     }
+
+
+def truths() -> list[dict[str, Any]]:
+    """Rates that are kept, by seed."""
+    if not TRUTHS.exists():
+        return []
+    return [json.loads(line) for line in TRUTHS.read_text(encoding="utf-8").splitlines()]
 
 
 def stated(seed: int) -> dict[str, Any]:
@@ -145,21 +152,15 @@ def main() -> None:
     """Run what is missing, and print the tables."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--scenes", type=int, default=SCENES)
-    parser.add_argument("--truths", type=Path)
     words = parser.parse_args()
-    known: list[dict[str, Any]] = []
-    if words.truths is not None and words.truths.exists():
-        known = [json.loads(line) for line in words.truths.read_text(encoding="utf-8").splitlines()]
     rows = []
+    known = truths()
     for seed in range(words.scenes):
-        if seed < len(known):
-            right = known[seed]
-        else:
-            right = rates_that_may_be_right(seed)
-            if words.truths is not None:
-                with words.truths.open("a", encoding="utf-8") as out:
-                    out.write(json.dumps(right) + "\n")
-        row = right | stated(seed)
+        if seed == len(known):
+            known.append(rates_that_may_be_right(seed))
+            with TRUTHS.open("a", encoding="utf-8") as out:
+                out.write(json.dumps(known[seed]) + "\n")
+        row = known[seed] | stated(seed)
         rows.append(row)
         print(
             f"{seed}: off by {off(row):.2g} of the stated {row['stated'] / row['rate']:.1e}",

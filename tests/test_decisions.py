@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import math
+import os
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from benchmarks.coverage import drawn
+from benchmarks.coverage import UNSOUND, drawn, off, stated, truths
 from percussion_model import Scene, Simulation, simulate
 from percussion_model.physics.records import BLOW
 from percussion_model.simulation.decisions import other_barriers, unsure_counts, unsure_margin
 
+LONG = pytest.mark.skipif(
+    os.environ.get("PERCUSSION_LONG") != "1", reason="half a minute; set PERCUSSION_LONG=1"
+)
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
 # Rates of the two motions on stiff rock, six cycles a blow, and five in most blows: docs/data/
 # stated_errors.md, section 6 [m/s].
@@ -72,6 +76,16 @@ def test_the_margin_is_that_of_the_decision(solver):
     assert kinds[0] == kinds[1] != kinds[2] == kinds[3]
 
 
+@pytest.mark.parametrize("count", [60, pytest.param(200, marks=LONG)])
+def test_stated_errors_hold_in_drawn_scenes(count):
+    """95 of 100 do. In scene 121 a cycle more begins where the rock end comes just to rest."""
+    rows = [right | stated(right["seed"]) for right in truths()[-count:]]
+    assert len(rows) == count
+    assert sum(off(row) <= 1.0 for row in rows) >= 0.95 * count
+    silent = [row["seed"] for row in rows if off(row) > UNSOUND and not row["warned"]]
+    assert set(silent) <= {121}
+
+
 def test_barriers_lie_beyond_what_is_near():
     margins = np.array([0.02, 0.05, math.nan, 0.4])
     assert list(other_barriers(margins, 0.01)) == []
@@ -79,7 +93,7 @@ def test_barriers_lie_beyond_what_is_near():
     assert list(other_barriers(-margins, 0.02)) == pytest.approx([1.0 - 1.2 * 0.05])
     both = np.array([0.01, -0.01])
     assert list(other_barriers(both, 0.03)) == pytest.approx([1.0 + 1.2 * 0.03, 1.0 - 1.2 * 0.03])
-    assert list(other_barriers(np.array([-1e-3]), 10.0)) == pytest.approx([1.0 - 1.2 * 0.5])
+    assert list(other_barriers(np.array([-1e-3]), 10.0)) == pytest.approx([1.0 - 1.2 * 0.1])
     assert list(other_barriers(margins[:0], 0.02)) == []
 
 

@@ -25,6 +25,9 @@ REST_VELOCITY = 1e-9
 # A drilling cycle counts when it crushed more than this share of W_R.
 COUNTED_CYCLE = 0.01
 
+# Energies are divided by no less than this, as hosts may trap an overflow [J].
+LEAST_ENERGY = 1e-30
+
 
 @inlined
 def stiffness(s):
@@ -171,7 +174,7 @@ def end_loading(par, s):
     By the power law K_R becomes that of the straight line on which this cycle unloads.
     """
     if s.w_r > 0.0:
-        margin = s.crushed / (COUNTED_CYCLE * s.w_r) - 1.0
+        margin = s.crushed / max(COUNTED_CYCLE * s.w_r, LEAST_ENERGY) - 1.0
         if not abs(s.b_counting) <= abs(margin):
             s.b_counting = margin
     if par.power == 1:
@@ -190,7 +193,7 @@ def decide_barrier(par, s, energy):
     """Decide as `overcomes_barrier`, and keep the closest of a blow's decisions."""
     if barrier_off(par, s):
         return True
-    margin = energy / barrier_level(par, s) - 1.0
+    margin = energy / max(barrier_level(par, s), LEAST_ENERGY) - 1.0
     if not abs(s.b_barrier) <= abs(margin):  # of the first one it is NaN
         s.b_barrier = margin
     return overcomes_barrier(par, s, energy)

@@ -245,8 +245,8 @@ class RockLaw(Parameters):
         "-",
         "energy above which a bit begins a drilling cycle, divided by W_R: 1 in the paper",
         BARRIER_ON,
-        gt=0,
-        le=1e6,
+        ge=1e-3,
+        le=1e3,
     )
 
 

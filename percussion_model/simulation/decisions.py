@@ -17,8 +17,8 @@ UNSURE = 6.0
 # The other barrier lies beyond the energies of all blows that are near, and what is doubtful, by
 # this factor: the other motion has other energies. Those so many times as far are not near.
 BEYOND, NEAR = 1.2, 3.0
-# A decision that is farther from the barrier is not near [1].
-FAR = 0.5
+# A decision that is farther from the barrier is not near, however unsure [1].
+FAR = 0.1
 # Counts a blow, and what tells how close the decisions behind them were.
 _COUNTED = {
     "drilling_cycles_per_blow": "counting_margin",
@@ -48,7 +48,7 @@ def _middle(values: np.ndarray) -> float:
 
 def near_barrier(margins: np.ndarray, unsure: float) -> np.ndarray:
     """Those of the margins whose decision may fall the other way, and others nearly as close."""
-    if not np.any(np.abs(margins) <= unsure):
+    if not np.any(np.abs(margins) <= min(unsure, FAR)):
         return margins[:0]
     return margins[np.abs(margins) <= min(NEAR * unsure, FAR)]
 

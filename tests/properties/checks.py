@@ -40,7 +40,10 @@ PIECES, AHEAD = STEP + 1, LONGEST >> STEP
 RIGID_EVENTS_A_TRANSIT = 2000 + 4 * 200
 # What may be undefined, and where.
 WITHOUT_PISTON = ("piston_position", "piston_velocity", "gap", "relative_displacement")
-UNDEFINED_IN_BLOWS = ("standstill_force", "rebound_velocity")
+UNDEFINED_IN_BLOWS = (
+    *("standstill_force", "rebound_velocity"),
+    *("barrier_margin", "counting_margin"),  # of a blow in which nothing was decided
+)
 
 
 class Watch:
