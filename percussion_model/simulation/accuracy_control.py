@@ -151,6 +151,7 @@ def run_to_accuracy(scene: Scene, run_once: RunOnce) -> Result:
     if not scene.run.check and _trusted(step, wanted):
         return _finished(scene, runs, step)
     while (finer := _finer(scene, step, wanted)) is not None:
+        close = step.by_decisions > wanted
         runs.append(_run(scene, finer, run_once))
         if runs[-1].result.cut_short:
             step = replace(step, interrupted=True)
@@ -159,7 +160,8 @@ def run_to_accuracy(scene: Scene, run_once: RunOnce) -> Result:
             return _finished(scene, runs, None)
         step = Step(finer, runs[-1], estimate_error(runs[-1], runs[:-1]), doubt=step.estimate.cells)
         step = _decided(step, runs[:-1], wanted, run_once)
-        if step.error <= wanted:
+        # a decision that is close on two grids is so on many
+        if step.error <= wanted or (close and step.by_decisions > wanted):
             break
     return _finished(scene, runs, step)
 
