@@ -14,6 +14,8 @@ import numpy as np
 # A margin may be off by so many times what coarser runs are: energies that decide converge late,
 # and not from one side (docs/data/stated_errors.md, section 6).
 UNSURE = 6.0
+# So it may where coarser runs have other decisions, which tell nothing of this one.
+UNSURE_OTHERWISE = 0.02
 # The other barrier lies beyond the energies of all blows that are near, and what is doubtful, by
 # this factor: the other motion has other energies. Those so many times as far are not near.
 BEYOND, NEAR = 1.2, 3.0

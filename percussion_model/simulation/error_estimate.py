@@ -20,6 +20,7 @@ from percussion_model.scene.inputs import SimulationError
 from percussion_model.scene.numbers import Numbers, numbers_of
 from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.simulation.decisions import (
+    UNSURE_OTHERWISE,
     near_barrier,
     other_barriers,
     unsure_counts,
@@ -50,9 +51,8 @@ SPREAD_MARGIN = 1.5
 NUMERICAL_SHARE = 0.4
 # The same where coarser elements have another motion; 2.6 was seen (scenarios/chatter.toml).
 NUMERICAL_SHARE_OF_MOTIONS = 3.0
-# The error is not below this share of what the rule of cells promises.
+# The error is not below this share of what the rule of cells promises; as many modes are surer.
 FLOOR_SHARE = 0.1
-# As many modes are surer: the median error of 200 drawn scenes is a hundredth of what is stated.
 FLOOR_SHARE_OF_MODES = 0.08
 # With modes whose loss time is so many times their time step nothing is expected to be right: at
 # 0.01 steps 0.0075 was seen where fewer modes agreed to 0.0014, and 0.006 in most of 20 scenes.
@@ -439,8 +439,11 @@ def otherwise_decided(run: GridRun, others: Sequence[GridRun]) -> list[Scene]:
 def _unsure_margin(run: GridRun, others: Sequence[GridRun]) -> float:
     """By how much the margin of the barrier may be off, as runs tell that fit as well."""
     fitting = [other for other in others if other.largest <= max(run.largest, FITS)]
-    compared = [other.result.counted for other in fitting]
-    return unsure_margin("barrier_margin", run.result.counted, compared)
+    alike = [other for other in fitting if abs(run.cycles - other.cycles) <= SAME_MOTION]
+    if len(alike) < len(fitting):  # their closest decision is another one
+        return UNSURE_OTHERWISE
+    blows = (run.result.counted, [other.result.counted for other in alike])
+    return unsure_margin("barrier_margin", *blows)
 
 
 def errors_of_numbers(
