@@ -140,7 +140,7 @@ def table(rows: list[dict[str, Any]]) -> str:
             f"{statistics.median(ratios):.2g}, {max(ratios):.2g}",
         ),
         (
-            "elements surer than the stated error: within it of their rate",
+            "of scenes where elements are surer than that: within it of their rate",
             f"{sum(one <= 1.0 for one in from_truth)} of {len(known)}",
         ),
         ("median stated error, relative", f"{stated:.1e}"),

@@ -7,6 +7,7 @@ import pytest
 
 from percussion_model.physics.records import Status
 from percussion_model.scene.numbers import kernel_numbers
+from percussion_model.scene.parameters import parameter_table
 from percussion_model.solvers.blow_map.prepare import (
     first_value,
     made_for,
@@ -69,6 +70,18 @@ def test_axes_that_no_table_has_are_refused(words, value):
     damaged = words.copy()
     damaged[Word.LOWEST + 2] = -WEIGHT  # the logarithm of nothing
     assert words_fault(damaged, WEIGHT) == WordFault.NODES
+
+
+def test_all_numbers_of_the_rock_are_on_an_axis_or_fixed():
+    """A new one that changes blows must not be read past."""
+    rock = {
+        row.key
+        for row in parameter_table()
+        if row.key.startswith("rock.")
+        and "bilinear" in row.needs.get("effects.rock", ())
+        and "effects.cuttings" not in row.needs
+    }
+    assert rock - set(FIXED) == {"rock.loading_stiffness"}
 
 
 @pytest.mark.parametrize("k", range(len(FIXED)))

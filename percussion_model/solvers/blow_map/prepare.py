@@ -77,6 +77,7 @@ def made_for(values):
         float(values.rock_unloading_ratio),
         float(values.rock_barrier_damping),
         float(values.rock_barrier_energy),
+        float(values.rock_barrier_threshold),
         float(values.solver_cells),
     )
 

@@ -19,7 +19,7 @@ from percussion_model.solvers.blow_map.records import ENTRIES, Axis, Entry
 from percussion_model.solvers.blow_map.words import FIXED, SECTION, head_of
 from percussion_model.solvers.sources import sources_digest
 
-FORMAT = 1
+FORMAT = 2
 # Greatest ratio of neighbouring nodes at density 1, axis by axis: rebound and penetration
 # wave up and down along the stiffness with the bit's vibration, and are smooth along the
 # rest (docs/fidelity.md).

@@ -30,6 +30,7 @@ FIXED = (
     "rock.unloading_ratio",
     "rock.barrier_damping",
     "rock.barrier_energy",
+    "rock.barrier_threshold",
     "solver.cells",
 )
 _ROWS = {row.key: row for row in parameter_table() if row.key in FIXED}
@@ -42,7 +43,7 @@ FIXED_INPUTS = {
     "barrier_energy": "rock.barrier_energy",
 }
 # Of these rows of numbers.
-FORMAT = 1
+FORMAT = 2
 
 
 class Word(IntEnum):
