@@ -11,7 +11,7 @@ import pytest
 
 from benchmarks.coverage import UNSOUND, drawn, off, stated, truths
 from percussion_model import Scene, Simulation, simulate
-from percussion_model.physics.records import BLOW
+from percussion_model.physics.records import BLOW, Mode
 from percussion_model.simulation.decisions import other_barriers, unsure_counts, unsure_margin
 
 LONG = pytest.mark.skipif(
@@ -78,12 +78,35 @@ def test_the_margin_is_that_of_the_decision(solver):
 
 @pytest.mark.parametrize("count", [60, pytest.param(200, marks=LONG)])
 def test_stated_errors_hold_in_drawn_scenes(count):
-    """95 of 100 do. In scene 121 a cycle more begins where the rock end comes just to rest."""
+    """95 of 100 do."""
     rows = [right | stated(right["seed"]) for right in truths()[-count:]]
     assert len(rows) == count
     assert sum(off(row) <= 1.0 for row in rows) >= 0.95 * count
     silent = [row["seed"] for row in rows if off(row) > UNSOUND and not row["warned"]]
-    assert set(silent) <= {121}
+    assert not silent
+
+
+@pytest.mark.parametrize("modes", [16, 24, 40])
+def test_a_standstill_that_hardly_ends_is_a_close_decision(modes):
+    """Of 28 modes and fewer its energy stays 0.1 % below the barrier, of 34 and more it passes."""
+    result = simulate(drawn(121).replace(**{"solver.cells": modes}), record_events=False)
+    rate, error = result.rate_of_penetration, result.rate_of_penetration_error
+    assert rate - error <= 15.2274e-3
+    assert rate + error >= 15.37e-3
+    assert np.all(np.abs(result.counted["barrier_margin"]) < 0.02)
+
+
+def test_the_margin_of_a_standstill_is_that_of_its_highest_energy():
+    scene = drawn(121).replace(**{"run.duration": 1.2})
+    blow = simulate(scene, error_estimate=False).counted[-1]
+    simulation = Simulation(scene)
+    simulation.advance(blow["time"])
+    sampled = simulation.sample(np.arange(blow["time"], blow["time"] + 5e-3, 0.5e-6))
+    stands = sampled["drilling_mode"] == Mode.SS
+    margins = sampled["bit_kinetic_energy"][stands] / scene.rock.barrier_energy - 1.0
+    margin = np.max(margins[margins < 0.0])  # a blow of the piston ends it by far more
+    assert margin > -0.02
+    assert blow["barrier_margin"] == pytest.approx(margin, abs=2e-3)
 
 
 def test_barriers_lie_beyond_what_is_near():
@@ -93,7 +116,7 @@ def test_barriers_lie_beyond_what_is_near():
     assert list(other_barriers(-margins, 0.02)) == pytest.approx([1.0 - 1.2 * 0.05])
     both = np.array([0.01, -0.01])
     assert list(other_barriers(both, 0.03)) == pytest.approx([1.0 + 1.2 * 0.03, 1.0 - 1.2 * 0.03])
-    assert list(other_barriers(np.array([-1e-3]), 10.0)) == pytest.approx([1.0 - 1.2 * 0.1])
+    assert list(other_barriers(np.array([-1e-3]), 10.0)) == pytest.approx([1.0 - 1.2 * 0.07])
     assert list(other_barriers(margins[:0], 0.02)) == []
 
 

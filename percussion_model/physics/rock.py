@@ -189,14 +189,31 @@ def end_loading(par, s):
 
 
 @inlined
+def keep_margin(par, s, energy):
+    """Keep how far from the barrier an energy is, where it is the closest of a blow's decisions."""
+    margin = energy / max(barrier_level(par, s), LEAST_ENERGY) - 1.0
+    if not abs(s.b_barrier) <= abs(margin):  # of the first one it is NaN
+        s.b_barrier = margin
+
+
+@inlined
 def decide_barrier(par, s, energy):
     """Decide as `overcomes_barrier`, and keep the closest of a blow's decisions."""
     if barrier_off(par, s):
         return True
-    margin = energy / max(barrier_level(par, s), LEAST_ENERGY) - 1.0
-    if not abs(s.b_barrier) <= abs(margin):  # of the first one it is NaN
-        s.b_barrier = margin
+    keep_margin(par, s, energy)
     return overcomes_barrier(par, s, energy)
+
+
+@inlined
+def ends_standstill(par, s, energy):
+    """Decide as `overcomes_barrier` in standstill, and keep how near its energy came at a top."""
+    if overcomes_barrier(par, s, energy):
+        return True
+    if energy < s.watched_energy:
+        keep_margin(par, s, s.watched_energy)
+    s.watched_energy = energy
+    return False
 
 
 @merged
@@ -267,6 +284,7 @@ def leave_standstill(par, s, v):
 def enter_standstill(s, time):
     """Start the record of the bit force in standstill."""
     s.t_standstill = time
+    s.watched_energy = 0.0
     s.n_check = 0
 
 

@@ -92,6 +92,7 @@ _MOTION = [
     ("u_r", "f8"),  # relative mean displacement of the pressure law [m]
     ("t_open", "f8"),  # when the gap opened last [s]
     ("t_standstill", "f8"),  # when standstill began [s]
+    ("watched_energy", "f8"),  # of the bit's motion, when that was last compared with W_R [J]
     ("n_check", "i8"),
     ("check_time", "f8", (CHECKPOINTS,)),
     ("check_impulse", "f8", (CHECKPOINTS,)),

@@ -1,8 +1,8 @@
 """Decisions of a motion that another resolution may take otherwise.
 
-Each blow keeps how close its closest decisions were: a cycle begins or not (`barrier_margin`),
-counts or not (`counting_margin`), the gap closes or not (`closing_speed`). What coarser runs have
-instead tells by how much these numbers may be off.
+Each blow keeps how close its closest decisions were: a cycle begins or not, a standstill ends
+or not (`barrier_margin`), a cycle counts or not (`counting_margin`), the gap closes or not
+(`closing_speed`). What coarser runs have instead tells by how much these numbers may be off.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ UNSURE_OTHERWISE = 0.02
 # this factor: the other motion has other energies. Those so many times as far are not near.
 BEYOND, NEAR = 1.2, 3.0
 # A decision that is farther from the barrier is not near, however unsure [1].
-FAR = 0.1
+FAR = 0.07
 # Counts a blow, and what tells how close the decisions behind them were.
 _COUNTED = {
     "drilling_cycles_per_blow": "counting_margin",

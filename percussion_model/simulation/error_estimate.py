@@ -561,11 +561,12 @@ def warnings_of_decisions(
     margins = part.result.counted["barrier_margin"]
     near = near_barrier(margins, _unsure_margin(part, others))
     rates = " or ".join(in_digits(1e3 * other.value, 4) for other in decided if other.useful)
+    within = in_digits(100.0 * float(np.max(np.abs(near))), 2)
     yield (
-        f"the rate of penetration {LARGE} {in_digits(100.0 * error, 2)} %: at a bounce the bit's "
-        f"energy is within {in_digits(100.0 * float(np.max(np.abs(near))), 2)} % of the barrier "
-        f"(rock.barrier_energy) in {len(near)} of {len(margins)} blows, and another resolution "
-        f"may decide otherwise; the rate is {rates} mm/s then"
+        f"the rate of penetration {LARGE} {in_digits(100.0 * error, 2)} %: at a bounce or in a "
+        f"standstill the bit's energy is within {within} % of the barrier (rock.barrier_energy) "
+        f"in {len(near)} of {len(margins)} blows, and another resolution may decide otherwise; "
+        f"the rate is {rates} mm/s then"
     )
 
 

@@ -21,6 +21,8 @@ from percussion_model.physics.rock import (
     barrier_level,
     crush,
     damping,
+    ends_standstill,
+    keep_margin,
     origin,
     overcomes_barrier,
     recoverable,
@@ -83,6 +85,9 @@ from percussion_model.solvers.modal.search import UNSURE, moving
 
 # Steps after which the running force of a standstill is noted.
 CHECKPOINT = 64
+
+# Steps after which kinetic energy that still rises is high enough.
+LONGEST_RISE = 64
 
 # What a look may pass: piston and bit meet or part, the drive turns, the mode of the rock ends, so
 # also by the work of its dashpot; or nothing at the look, but the rock end turned back before.
@@ -260,6 +265,20 @@ def kinetic_at(s, bars, x, first):
 
 
 @kernel
+def highest_kinetic(s, bars):
+    """Kinetic energy of a bit at the end of its present rise, if its mode went on [J]."""
+    keep(bars.w, PQ, bars.w, AT, s.pairs)
+    highest = 0.0
+    for _ in range(LONGEST_RISE):
+        move_pairs(s, bars, bars.w, AT, STEP)
+        energy = kinetic_at(s, bars, bars.w, AT)
+        if energy <= highest:
+            break
+        highest = energy
+    return highest
+
+
+@kernel
 def watch_barrier(par, s, bars, most, events):
     """Leave standstill where the kinetic energy of the bit passes the barrier.
 
@@ -274,13 +293,14 @@ def watch_barrier(par, s, bars, most, events):
     if s.alert == 0:
         return most
     most = min(most, WHOLE)
-    if not overcomes_barrier(par, s, energy):
-        return most
-    if overcomes_barrier(par, s, kinetic_of(bars.rows, bars.laws.sizes[s.law])):
+    now = kinetic_of(bars.rows, bars.laws.sizes[s.law])
+    if ends_standstill(par, s, now):
         drop_pairs(par, s, bars)
         end_standstill(par, s, bars, events)
         return most
-    ticks, level = 0, level_below(most)
+    if not overcomes_barrier(par, s, energy):
+        return most
+    ticks, level, passes = 0, level_below(most), False
     keep(bars.w, PQ, bars.w, AT, s.pairs)
     while level >= 0:
         go = 1 << level
@@ -288,13 +308,15 @@ def watch_barrier(par, s, bars, most, events):
             keep(bars.w, AT, bars.rows, KEPT, s.pairs)
             move_pairs(s, bars, bars.w, AT, level)
             if overcomes_barrier(par, s, kinetic_at(s, bars, bars.w, AT)):
-                most = ticks + go
+                most, passes = ticks + go, True
                 keep(bars.rows, KEPT, bars.w, AT, s.pairs)
             else:
                 ticks += go
                 if ticks == most:
                     break
         level -= 1
+    if passes:
+        keep_margin(par, s, highest_kinetic(s, bars))
     return most
 
 

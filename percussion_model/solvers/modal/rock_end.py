@@ -9,10 +9,10 @@ from percussion_model.physics.rock import (
     REST_VELOCITY,
     barrier_level,
     close_interface,
+    ends_standstill,
     enter_standstill,
     leave_by_velocity,
     leave_standstill,
-    overcomes_barrier,
     recoverable,
     spring_force,
 )
@@ -44,7 +44,7 @@ def look(par, s, bars):
 @kernel
 def end_standstill(par, s, bars, events):
     """Leave standstill where the bit's energy passes the barrier."""
-    if overcomes_barrier(par, s, bit_kinetic(s, bars, bars.w)):
+    if ends_standstill(par, s, bit_kinetic(s, bars, bars.w)):
         # before a front can be there, modes ring
         leave_standstill(par, s, s.v_low if s.time >= s.rest_until else 0.0)
         change_spring(par, s, bars)
