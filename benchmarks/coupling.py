@@ -21,9 +21,9 @@ ROOT = Path(__file__).resolve().parents[1]
 STEP = 1e-3  # [s]
 ROWS_EVERY = 1.0  # [s]
 DURATION, CLOCKED = 20.0, 5.0  # simulated [s]
-SYSTEMS = ("FeedControl", "FeedControlRigid", "FeedControlMap")
+SYSTEMS = ("FeedControl", "FeedControlRigid")
 HOUR = 3600.0  # [s]
-# An hour drills some 70 m: one kind of rock with a variation that a blow map covers.
+# An hour drills some 70 m: one kind of rock with a variation.
 LONG_HOLE = {
     "rock.layers[1].loading_stiffness": 7.5e8,
     "rock.layers[2].top": 20.0, "rock.layers[2].loading_stiffness": 1.2e9,
@@ -119,11 +119,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.coupling", description=__doc__)
     parser.add_argument("systems", nargs="*", type=Path, help="archives; left out: those of dist")
     parser.add_argument("--duration", type=float, default=DURATION, help="simulated time [s]")
-    parser.add_argument("--hour", action="store_true", help="one hour of the blow map alone")
+    parser.add_argument("--hour", action="store_true", help="one hour of one system alone")
     choice = parser.parse_args()
     dist = [ROOT / "dist" / f"{name}.ssp" for name in SYSTEMS]
     if choice.hour:
-        system = choice.systems[0] if choice.systems else dist[-1]
+        system = choice.systems[0] if choice.systems else dist[0]
         print(line(system, measure(system, HOUR, LONG_HOLE | LUMPED, SLOW, minutes())))
         return
     for system in choice.systems or dist:

@@ -103,7 +103,7 @@ def main() -> int:
     """Compare on the reference scene."""
     scene = Scene.from_toml(scene_presets()["reference"])
     try:
-        refuse_other(DEFAULT, scene, with_map=False)
+        refuse_other(DEFAULT, scene)
     except SceneError as error:
         print(f"error: {error}", file=sys.stderr)
         return 1

@@ -79,9 +79,7 @@ def write_page(
 def _errors(scene: Scene) -> str:
     """What is known of the errors of the outputs."""
     name = scene.solver_name
-    if name == "blow-map":
-        grid = "Blows come from a table, whose error comes on top of that of the cells behind it."
-    elif scene.has_waves or name == "fem":
+    if scene.has_waves or name == "fem":
         what = "elements" if name == "fem" else "cells"
         count = scene.fem.elements if name == "fem" else scene.solver.cells
         grid = (

@@ -12,7 +12,7 @@ from typing import Any
 from fmu_src.native.library import library_here
 from percussion_model.interface.progress import lines
 from percussion_model.simulation.orphans import end_with_parent
-from percussion_model.simulation.warm_up import SOLVERS, compile_blow_map, compile_kernels
+from percussion_model.simulation.warm_up import SOLVERS, compile_kernels
 
 
 def main() -> None:
@@ -20,7 +20,6 @@ def main() -> None:
     with ProcessPoolExecutor(max_workers=2, initializer=end_with_parent) as pool:
         jobs: list[Future[Any]] = [pool.submit(library_here)]
         jobs += [pool.submit(compile_kernels, solver) for solver in SOLVERS]
-        jobs.append(pool.submit(compile_blow_map))
         # processes are forked by now: none inherits the thread that prints
         with lines("compiling") as report:
             for done, job in enumerate(as_completed(jobs), 1):

@@ -18,7 +18,6 @@ RIGID = {"piston.model": "rigid", "bit.model": "rigid"}
 WAVES = Scene().computed_by("wave")
 LONG_BIT = {"bit": {"sections": [{"length": 1000.0, "area": 5e-3}]}}
 SHORT_PISTON = {"piston": {"sections": [{"length": 1e-9, "area": 5e-3}]}}
-WIDE_MAP = {"density": 10.0, "force_from": 1e-9, "force_to": 1e13}
 
 TOO_LARGE = {
     "long bit": (
@@ -44,9 +43,6 @@ TOO_LARGE = {
     "modes of a long bit": (
         LONG_BIT | SHORT_PISTON | {"solver": {"name": "modal", "cells": 100_000}},
         "modes, more than 1000",
-    ),
-    "blow map": (
-        {"solver": {"fidelity": "blow-map"}, "blow_map": WIDE_MAP}, "nodes, more than 1000000"
     ),
 }  # fmt: skip
 

@@ -230,9 +230,9 @@ def test_kernels_are_looked_for_where_numba_keeps_them(tmp_path):
     assert shown[1:] == ["None"] * 3
 
 
-@pytest.mark.parametrize("name", ["wave", "modal", "chain", "fem", "rigid", "blow-map"])
+@pytest.mark.parametrize("name", ["wave", "modal", "chain", "fem", "rigid"])
 def test_the_kernel_of_every_solver_is_looked_for_where_numba_keeps_it(name, monkeypatch, tmp_path):
-    assert {*SOLVER_NAMES, "blow-map"} - {"auto"} <= set(base._REGISTRY)
+    assert {*SOLVER_NAMES} - {"auto"} <= set(base._REGISTRY)
     entry = base._REGISTRY[name]
     kernels = importlib.import_module(f"{entry.module.rpartition('.')[0]}.advance")
     kernel = getattr(kernels, entry.kernel)

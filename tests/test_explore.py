@@ -117,16 +117,9 @@ def test_a_response_gives_way_to_a_newer_one(monkeypatch):
         respond(Scene(), is_overtaken=lambda: True)
 
 
-@pytest.mark.parametrize(
-    ("values", "named"),
-    [
-        ({"piston": {"model": "absent"}, "effects": {"drive": "none"}}, "piston.model"),
-        ({"solver": {"fidelity": "blow-map"}}, "solver.fidelity"),
-    ],
-)
-def test_scenes_that_cannot_follow_a_slider_are_refused(values, named):
-    with pytest.raises(SceneError, match=named):
-        refuse_scene(Scene(**values))
+def test_scenes_that_cannot_follow_a_slider_are_refused():
+    with pytest.raises(SceneError, match=r"piston\.model"):
+        refuse_scene(Scene(piston={"model": "absent"}, effects={"drive": "none"}))
 
 
 def test_sliders_lie_in_the_bounds_of_the_table_and_reach_every_default():

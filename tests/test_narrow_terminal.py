@@ -91,7 +91,7 @@ def test_rows_of_a_run_that_have_long_numbers_keep_to_a_line(shown, name):
 
 
 def test_help_fits(shown):
-    assert "blow-map" in shown("--help")[1]
+    assert "stability" in shown("--help")[1]
     for command in app.registered_commands:
         name = command.name or command.callback.__name__.replace("_", "-")
         text = shown(name, "--help")[1]
@@ -168,11 +168,6 @@ def test_statements_of_the_paper_fit(shown, monkeypatch):
     # three lines of a long text, not a column of words
     found = text[text.index("found here: K_R^-0.5432") :]
     assert found[: found.index("why: ")].count("\n") <= 2
-
-
-def test_a_blow_map_that_is_not_made_is_told_of(shown, monkeypatch):
-    monkeypatch.setenv("PERCUSSION_CACHE", "maps")
-    assert "not made yet" in shown("blow-map", REFERENCE, "show")[1]
 
 
 def test_a_calibration_fits(shown, tmp_path):

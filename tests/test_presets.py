@@ -73,7 +73,7 @@ def test_a_name_that_no_file_can_have_is_refused():
     "words",
     [
         *(["run", "nosuch"], ["explain", "nosuch"], ["settled", "nosuch"], ["effects", "nosuch"]),
-        *(["compare", "nosuch"], ["accuracy", "nosuch"], ["blow-map", "nosuch"], ["fmu", "nosuch"]),
+        *(["compare", "nosuch"], ["accuracy", "nosuch"], ["fmu", "nosuch"]),
         *(["plot", "nosuch"], ["native", "nosuch"], ["fmu", "--scene", "nosuch"]),
         ["study", "nosuch", "--over", "feed.force=1,2", "--out", "a"],
         ["calibrate", "nosuch", "--measured", "penetration=1+-0.1 mm @5"],

@@ -102,7 +102,6 @@ def test_lines_after_the_first_are_rare(heard, monkeypatch):
         ["effects", RIGID, "--no-figures"],
         ["paper", "--out", "out", "--processes", "1"],
         ["stability", "gamma_40", "--workers", "1"],
-        ["blow-map", REFERENCE, "--workers", "1"],
     ],
     ids=lambda words: " ".join([words[0], *words[2:3]]),
 )
@@ -112,7 +111,6 @@ def test_every_command_says_on_a_pipe_that_it_runs(arguments, heard, tmp_path, m
         pytest.importorskip("matplotlib")
         pytest.importorskip("xarray")
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("PERCUSSION_CACHE", str(tmp_path))
     monkeypatch.setattr(Solver, "__init__", slow(heard))
     code = _guarded(lambda: app(arguments, standalone_mode=False))
     assert code == INTERRUPTED, heard.getvalue()

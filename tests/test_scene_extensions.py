@@ -52,7 +52,7 @@ def test_a_registered_solver_of_rigid_bodies_makes_them_so(names):
 
 
 def test_a_name_is_registered_once(names):
-    for name in ("wave", "auto", "blow-map"):
+    for name in ("wave", "auto"):
         with pytest.raises(ValueError, match="there is a solver of this name"):
             names.register_name(name)
 

@@ -32,7 +32,6 @@ def fmu(
             help="Bring native libraries for linux64,win64 along; left out: for this one.",
         ),
     ] = None,
-    blow_map: options.BlowMap = False,
     pneumatics: Annotated[
         bool, typer.Option("--pneumatics", help="Write the simple pneumatic drive instead.")
     ] = False,
@@ -52,9 +51,7 @@ def fmu(
         if pneumatics:
             write_drive(output, flat_names)
             return
-        path = write_hammer(
-            scene, output, platforms, blow_map, force, scene_option, rock, flat_names
-        )
+        path = write_hammer(scene, output, platforms, force, scene_option, rock, flat_names)
         if not no_reference:
             _write_reference(path)
 
@@ -63,7 +60,6 @@ def write_hammer(
     scene: Path | None = None,
     output: Path | None = None,
     platforms: str | None = None,
-    blow_map: bool = False,
     force: bool = False,
     scene_option: Path | None = None,
     rock: str | None = None,
@@ -76,15 +72,14 @@ def write_hammer(
 
     file, chosen = options.baked_scene(scene, scene_option, rock)
     names = None if platforms is None else _export_platforms(platforms)
-    path = output or options.DIST / hammer_name(file, "Ladder" if blow_map else "")
+    path = output or options.DIST / hammer_name(file)
     about_hammer(chosen, path)  # refuses a name, before anything is compiled or --force offered
-    refuse_other(path, chosen, blow_map or chosen.solver_name == "blow-map", force)
+    refuse_other(path, chosen, force)
     check_fmu(output, path)
     libraries = _libraries(names)
-    table = options.table_for(chosen, blow_map)
     before = content(path)
     with progress("building the FMU"):
-        guid = build_hammer(chosen, path, table, libraries, flat_names)
+        guid = build_hammer(chosen, path, libraries, flat_names)
     source = options.baked_from(scene, scene_option, rock)
     typer.echo(f"{path} {{{guid}}}: {state_of(path, before)}, {source}")
     return path

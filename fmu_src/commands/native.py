@@ -24,7 +24,6 @@ def native(
             help="Processors and systems, as linux64,win64,aarch64-linux; left out: this one.",
         ),
     ] = None,
-    blow_map: options.BlowMap = False,
     flat_names: options.FlatNames = False,
     force: options.Force = False,
     rock: common.RockName = None,
@@ -48,17 +47,15 @@ def native(
             )
         file, chosen = options.baked_scene(scene, scene_option, rock)
         names = platform_names((platforms or this_platform()).split(","))
-        files = native_files(file, output, blow_map)
-        with_map = blow_map or chosen.solver_name == "blow-map"
+        files = native_files(file, output)
         for path in files.values():
-            refuse_other(path, chosen, with_map, force)
+            refuse_other(path, chosen, force)
         common.check_outputs(output, None)
         with progress(COMPILING):
             made = libraries(names)
-        table = options.table_for(chosen, blow_map)
         source = options.baked_from(scene, scene_option, rock)
         for version, path in files.items():
             before = content(path)
             with progress(f"building the FMU of FMI {version}"):
-                guid = build_native(chosen, path, version, made, table, flat_names)
+                guid = build_native(chosen, path, version, made, flat_names)
             typer.echo(f"{path} {{{guid}}}: {state_of(path, before)}, {source}")

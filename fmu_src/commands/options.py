@@ -13,7 +13,6 @@ from percussion_model.interface.commands import common
 
 if TYPE_CHECKING:
     from percussion_model.scene.scene import Scene
-    from percussion_model.solvers.blow_map.table import BlowTable
 
 DIST = Path("dist")
 REFERENCE = Path("reference")
@@ -24,9 +23,6 @@ Baked = Annotated[
 ]
 # How `build.py fmu` and `build.py native` have named it from the first.
 BakedToo = Annotated[Path | None, typer.Option("--scene", hidden=True)]
-BlowMap = Annotated[
-    bool, typer.Option("--blow-map", help="Bring the table that solver.fidelity needs along.")
-]
 FlatNames = Annotated[
     bool,
     typer.Option(
@@ -56,15 +52,6 @@ def baked_from(named: Path | None, option: Path | None, rock: str | None = None)
     chosen = named or option
     told = f"from the scene {chosen or REFERENCE}{'' if chosen else ', since none was named'}"
     return told if rock is None else f"{told}, with the rock {rock}"
-
-
-def table_for(scene: Scene, wanted: bool) -> BlowTable | None:
-    """Blow map that the FMU of a scene brings along, if it does."""
-    if not wanted and scene.solver_name != "blow-map":
-        return None
-    from percussion_model.interface.commands.blow_map import ready_map
-
-    return ready_map(scene)
 
 
 def list_choices(about: Mapping[str, str]) -> None:

@@ -11,8 +11,6 @@ from collections.abc import Mapping
 from importlib.metadata import version
 from pathlib import Path
 
-import numpy as np
-
 from fmu_src.archive import SCENE, write_fmu
 from fmu_src.description import About
 from fmu_src.hammer.slave import PercussiveHammer
@@ -26,16 +24,13 @@ from fmu_src.variables import FILE, Variable, to_json, write_variables
 from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.scene.writing import is_special
 from percussion_model.solvers.base import added_solvers
-from percussion_model.solvers.blow_map.table import BlowTable, fixed_values
 
 STEP_SIZE = 1e-3  # of the default experiment [s]
-BLOW_MAP = "resources/blow_map.npz"  # of an FMU that runs Python
 
 
 def build_hammer(
     scene: Scene,
     path: Path,
-    blow_map: BlowTable | None = None,
     libraries: Mapping[str, bytes] | None = None,
     flat: bool = False,
 ) -> str:
@@ -45,8 +40,6 @@ def build_hammer(
 
     Parameters
     ----------
-    blow_map : BlowTable, optional
-        What `solver.fidelity = "blow-map"` needs; the FMU runs without it otherwise.
     path : Path
         Ends with `.fmu`; the rest of its name is the model identifier.
     libraries : dict of str, optional
@@ -66,26 +59,20 @@ def build_hammer(
         FILE: write_variables(variables),
         "scene.json": to_json(_scene(scene, variables, bundle.name)),
     }
-    if blow_map is not None:
-        blow_map.refuse_other(fixed_values(scene))
-        resources["blow_map.npz"] = blow_map.to_bytes()
     model = None
     if not added_solvers():  # the library has the solvers of the package alone
         for name, library in (library_here() if libraries is None else libraries).items():
             resources[library_name(name)] = library
-        words = np.zeros(0) if blow_map is None else blow_map.to_words()
-        model = functools.partial(model_tables, scene, blow_map=words)
+        model = functools.partial(model_tables, scene)
     page = write_page(about, variables, scene)
     return write_fmu(path, about, variables, bundle, PercussiveHammer, resources, page, model)
 
 
-def refuse_other(path: Path, scene: Scene, with_map: bool, force: bool = False) -> None:
+def refuse_other(path: Path, scene: Scene, force: bool = False) -> None:
     """Raise `SceneError` where a file holds the FMU of another scene, or no FMU of a scene.
 
     Parameters
     ----------
-    with_map : bool
-        Whether the new one brings a blow map along.
     force : bool
         Let it be replaced.
     """
@@ -98,9 +85,7 @@ def refuse_other(path: Path, scene: Scene, with_map: bool, force: bool = False) 
     try:
         with zipfile.ZipFile(path) as archive:
             found = json.loads(archive.read(SCENE))
-            has_map = BLOW_MAP in archive.namelist() or found.get("blow_map") is True
-            given = json.loads(to_json(given_values(scene)))
-            same = (found["given"], has_map) == (given, with_map)
+            same = found["given"] == json.loads(to_json(given_values(scene)))
     except (
         OSError,
         ValueError,
@@ -124,9 +109,9 @@ def given_values(scene: Scene) -> dict[str, object]:
     return scene.replace(hole_diameter=None).given_values()
 
 
-def hammer_name(scene: Path, suffix: str = "") -> str:
+def hammer_name(scene: Path) -> str:
     """Name of the file for the FMU of a scene's file: that of the reference, or of its own."""
-    stem = re.sub(r"\W", "", scene.stem.title().replace("_", "")) + suffix
+    stem = re.sub(r"\W", "", scene.stem.title().replace("_", ""))
     if not stem[:1].isalpha():
         stem = f"Scene{stem}"  # the name is an identifier
     return "PercussiveHammer.fmu" if stem == "Reference" else f"{stem}Hammer.fmu"

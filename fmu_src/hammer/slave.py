@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 from weakref import WeakValueDictionary
 
-from fmu_src.hammer.blow_map import read_blow_map
 from fmu_src.hammer.inputs import DRIVE_INPUTS, NAMES_OUTSIDE, PLAIN_INPUTS
 from fmu_src.hammer.motion import Gauge, Motion
 from fmu_src.hammer.outputs import OUTPUTS
@@ -137,7 +136,7 @@ class PercussiveHammer(Slave):
         """Motion from time zero under these inputs and the parameters."""
         scene = self.make_scene(values)
         key = fingerprint(self.fingerprint().hex(), [values[one.name] for one in self.inputs])
-        motion = Motion(scene, _SOLVERS.get(key) or self._map_solver(scene))
+        motion = Motion(scene, _SOLVERS.get(key))
         _SOLVERS[key] = motion.solver
         motion.gauge = self._find_gauge(scene, motion.solver)
         return motion
@@ -146,15 +145,6 @@ class PercussiveHammer(Slave):
         self.motion = motion
         self.given_inputs = [inputs[one.name] for one in self.inputs]
         self._acts: dict[str, bool] = {}
-
-    def _map_solver(self, scene: Scene) -> Solver | None:
-        """Solver on the table that the FMU brings along, if the scene wants that."""
-        if scene.solver_name != "blow-map":
-            return None
-        # its kernels are loaded where they are needed only
-        from percussion_model.solvers.blow_map.solver import BlowMapSolver
-
-        return BlowMapSolver(scene, read_blow_map(self.folder))
 
     def _find_gauge(self, scene: Scene, solver: Solver) -> Gauge | None:
         """Cell at the place of the gauge, None in a bar without cells."""

@@ -166,7 +166,7 @@ def _parameters(scene: Scene) -> Iterator[Variable]:
             yield from _sections(scene, group, FIRST_SECTION[group])
         if row.kind == "rods" and scene.effects.string:
             yield from _rods(scene, row.key)
-        if row.kind in ("sections", "rods") or "*" in row.key or group in ("blow_map", "run"):
+        if row.kind in ("sections", "rods") or "*" in row.key or group == "run":
             continue
         if row.key not in replaced:
             yield _parameter(row.key, row, scene[row.key])

@@ -79,7 +79,7 @@ class Warnings:
             self._scene_seen = True
             for text in barrier_note(*barrier_shares(motion.scene)):
                 yield "barrier", text
-        for text in ledger_note(motion.residual(), motion.solver.name):
+        for text in ledger_note(motion.residual()):
             yield "ledger", text
         for text in numerical_note(motion.numerical(), motion.solver.name):
             yield "numerical", text

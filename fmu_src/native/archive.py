@@ -36,7 +36,6 @@ def write_native_fmu(
     scene: Scene,
     libraries: Mapping[str, bytes],
     model: Callable[[str], bytes],
-    with_map: bool = False,
 ) -> str:
     """Write an FMU and return its GUID or instantiation token, without the braces.
 
@@ -49,8 +48,6 @@ def write_native_fmu(
     model : callable
         Gives the tables of the scene for a GUID as hosts pass it, with its braces; it is asked
         for an empty one as well, whose tables are part of what the GUID is a hash of.
-    with_map : bool
-        Whether they have a blow map.
     """
     variables = hammer_variables(scene)
     page = write_native_page(about, variables, scene, libraries)
@@ -59,7 +56,7 @@ def write_native_fmu(
         "documentation/licenses/license.txt": licence(),
         MODEL: model(""),
         # what nothing that runs reads: whose FMU this is
-        SCENE: to_json({"given": given_values(scene), "blow_map": with_map}).encode(),
+        SCENE: to_json({"given": given_values(scene)}).encode(),
         **_pictures(version, about.flat),
     }
     for platform, library in libraries.items():

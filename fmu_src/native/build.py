@@ -16,15 +16,14 @@ from fmu_src.run import run_fmu
 from fmu_src.slave.native import this_platform
 from percussion_model.scene.scene import Scene
 from percussion_model.scene.writing import move_whole, own_prefix
-from percussion_model.solvers.blow_map.table import BlowTable
 
 # Files by version of FMI: what follows the name of the scene's FMU.
 SUFFIXES: dict[Version, str] = {"2.0": "-native", "3.0": "-fmi3"}
 
 
-def native_files(scene: Path, folder: Path, blow_map: bool = False) -> dict[Version, Path]:
-    """Native FMUs of a scene's file by version of FMI; those with a map have another name."""
-    stem = hammer_name(scene, "Ladder" if blow_map else "").removesuffix(".fmu")
+def native_files(scene: Path, folder: Path) -> dict[Version, Path]:
+    """Native FMUs of a scene's file by version of FMI."""
+    stem = hammer_name(scene).removesuffix(".fmu")
     return {version: folder / f"{stem}{suffix}.fmu" for version, suffix in SUFFIXES.items()}
 
 
@@ -33,7 +32,6 @@ def build_native(
     path: Path,
     version: Version,
     libraries: dict[str, bytes],
-    blow_map: BlowTable | None = None,
     flat: bool = False,
 ) -> str:
     """Write the native FMU of a scene, with reference results; return its GUID.
@@ -42,22 +40,17 @@ def build_native(
     ----------
     libraries : dict of bytes
         By platform.
-    blow_map : BlowTable, optional
-        What `solver.fidelity = "blow-map"` needs.
     flat : bool
         Whether names of variables have no dots.
     """
     # the name of the file is no identifier, that of the model is
     about = about_hammer(scene, path.with_name(f"{path.stem.partition('-')[0]}.fmu"), flat)
-    words = None if blow_map is None else blow_map.to_words()
-    tables = functools.partial(model_tables, scene, blow_map=words)
+    tables = functools.partial(model_tables, scene)
     path.parent.mkdir(parents=True, exist_ok=True)
     # in a folder beside it, so that an interruption leaves what was there
     with tempfile.TemporaryDirectory(prefix=own_prefix(path.parent), dir=path.parent) as folder:
         draft = Path(folder) / path.name
-        guid = write_native_fmu(
-            draft, version, about, scene, libraries, tables, with_map=blow_map is not None
-        )
+        guid = write_native_fmu(draft, version, about, scene, libraries, tables)
         if this_platform() in libraries:
             named = flat_name if flat else str
             refuse_difference(scene, draft, named)

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fmu_src.native import blow_map, kinds
+from fmu_src.native import kinds
 from fmu_src.native.image import (
     AT,
     Own,
@@ -54,7 +54,6 @@ from percussion_model.scene.solver_names import BODIES
 from percussion_model.scene.values import SCENE_NUMBERS
 from percussion_model.solvers import plain_code  # noqa: F401  # kernels call functions of scenes
 from percussion_model.solvers.base import MOST_AHEAD
-from percussion_model.solvers.blow_map.records import MAP_STATE
 from percussion_model.solvers.chain.records import CHAIN_STATE
 from percussion_model.solvers.fem.records import FEM_STATE
 from percussion_model.solvers.modal.records import MODAL_STATE
@@ -64,7 +63,6 @@ from percussion_model.solvers.setup import (
     PISTONS,
     POWER,
     ROCKS,
-    any_effect,
     barrier_on,
     rock_numbers,
 )
@@ -98,7 +96,7 @@ CLOCK_ROUNDING = 1e-12
 # Records of the solvers by `Kind`, of which the first is none.
 RECORDS = {
     Kind.MODAL: MODAL_STATE, Kind.WAVE: WAVE_STATE, Kind.CHAIN: CHAIN_STATE, Kind.FEM: FEM_STATE,
-    Kind.RIGID: RIGID_STATE, Kind.MAP: MAP_STATE,
+    Kind.RIGID: RIGID_STATE,
 }  # fmt: skip
 
 
@@ -197,8 +195,7 @@ def _refuse_contradiction(values, has_rods, is_barrier_given, notes):
     """Refuse parameters that contradict each other."""
     v = values[0]
     bodies = BODIES_OF_SOLVERS[v.solver_name]
-    has_effects = any_effect(v)
-    found = find_contradiction(v, bodies, has_rods, has_effects, is_barrier_given)
+    found = find_contradiction(v, bodies, has_rods, is_barrier_given)
     rule = found.value
     if rule == Rule.NOTHING.value:
         return 0
@@ -240,7 +237,7 @@ def _check_values(image, values, notes):
 
 
 @preparing
-def create(image, table, table_size, motion, notes):
+def create(image, motion, notes):
     """Make the memory of a motion at time zero; its address goes to the address `motion`."""
     fault = check(image, notes)
     if fault != 0:
@@ -257,13 +254,9 @@ def create(image, table, table_size, motion, notes):
     if bar - GaugeBar.ROD >= len(numbers.rod_counts):
         bar = GaugeBar.NONE.value
     kind, facts = kind_of(numbers), np.zeros(4)
-    if kind == Kind.MAP:
-        fault = blow_map.refuse_map(numbers, table, table_size, facts)
-        if fault > 0:
-            return set_fault(notes, fault, facts)
-    if kind == Kind.MAP or kind == Kind.RIGID:
+    if kind == Kind.RIGID:
         bar = GaugeBar.NONE.value
-    base = kinds.create(kind, numbers, table, bar, place)
+    base = kinds.create(kind, numbers, bar, place)
     if base == 0:
         return set_fault(notes, Fault.MEMORY.value, facts)
     head = head_records(base, 1)[0]
@@ -288,9 +281,6 @@ def _end(base, status, notes):
         return 0
     head, facts = head_records(base, 1)[0], np.zeros(4)
     number = Fault.STOPPED.value
-    if status == Status.REFUSED and head.kind == Kind.MAP:
-        number = blow_map.explain(base, facts)
-        return set_fault(notes, number, facts)
     if status == Status.NOT_FINITE:
         number = Fault.NOT_FINITE.value
     facts[0] = kinds.state_time(base, base + head.state_at)
@@ -309,11 +299,7 @@ def take_step(motion, image, flags, t, size, reached, notes):
     if flags & NEW_INPUTS:
         values = np.zeros(1, SCENE_NUMBERS)
         fill_values(image, values)
-        wanted, facts = _wanted(values), np.zeros(4)
-        fault = kinds.refuse_inputs(motion, wanted, facts)
-        if fault > 0:
-            return set_fault(notes, fault, facts)
-        status, in_vain = set_inputs(motion, wanted)
+        status, in_vain = set_inputs(motion, _wanted(values))
         for k in range(COUNT):
             if in_vain & (1 << k):
                 add_note(notes, Note.IN_VAIN + k, 0.0, 0.0, t)

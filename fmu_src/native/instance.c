@@ -308,7 +308,7 @@ static bool is_motion_good(const int64_t *motion) {
            motion[SHARED_BEGIN] <= all;
 }
 
-/* Hash of all that a motion is made of. A blow map is no part of it: each has its own. */
+/* Hash of all that a motion is made of. */
 static void hash_image(const Tables *tables, const int64_t *image, uint8_t digest[DIGEST]) {
     Hash hash;
     hash_begin(&hash);
@@ -325,11 +325,10 @@ Status make_motion(Instance *one, const double *values, const int64_t *image, in
         return status;
     }
     hash_image(tables, image, digest);
-    if (tables->map_count == 0 && (*motion = equal_motion(digest)) != NULL) {
+    if ((*motion = equal_motion(digest)) != NULL) {
         return DONE;
     }
-    int64_t fault = one->kernels.create(image, tables->map, (int64_t)tables->map_count, motion,
-                                        one->notes);
+    int64_t fault = one->kernels.create(image, motion, one->notes);
     if (fault != 0) {
         free_motion(*motion);
         *motion = NULL;
@@ -343,7 +342,7 @@ Status make_motion(Instance *one, const double *values, const int64_t *image, in
         *motion = NULL;
         return refuse(one, "the model has no good place for its state");
     }
-    if (tables->map_count == 0 && (*motion = share_motion(*motion, digest)) == NULL) {
+    if ((*motion = share_motion(*motion, digest)) == NULL) {
         return out_of_memory(one);
     }
     tell_notes(one);

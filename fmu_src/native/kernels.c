@@ -9,8 +9,7 @@
 
 #define DECLARE(suffix)                                                                        \
     int64_t kernel_check##suffix(const int64_t *image, int64_t *notes);                        \
-    int64_t kernel_create##suffix(const int64_t *image, const double *map, int64_t map_size,   \
-                                  int64_t **motion, int64_t *notes);                           \
+    int64_t kernel_create##suffix(const int64_t *image, int64_t **motion, int64_t *notes);     \
     int64_t kernel_step##suffix(int64_t *motion, const int64_t *image, int64_t flags, double t, \
                                 double h, double *reached, int64_t *notes);                    \
     int64_t kernel_read##suffix(int64_t *motion, int64_t flags, double *outputs);              \

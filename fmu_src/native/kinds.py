@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from fmu_src.native import blow_map, chain, fem, modal, rigid, wave
-from fmu_src.native.layout import GaugeBar, Kind, head_records, motion_of
+from fmu_src.native import chain, fem, modal, rigid, wave
+from fmu_src.native.layout import GaugeBar, Kind, head_records
 from percussion_model.physics.kernel import preparing
 
 
@@ -27,13 +27,11 @@ def refuse(kind, numbers, facts):
         return chain.refuse(numbers, facts)
     if kind == Kind.FEM:
         return fem.refuse(numbers, facts)
-    if kind == Kind.MAP:
-        return blow_map.refuse(numbers, facts)
     return 0
 
 
 @preparing
-def create(kind, numbers, table, bar, place):
+def create(kind, numbers, bar, place):
     """Make the memory of a motion at time zero; its address, 0 where there is no memory left.
 
     Parameters
@@ -41,8 +39,6 @@ def create(kind, numbers, table, bar, place):
     kind : int
         `Kind`.
     numbers : Numbers
-    table : int
-        Address of a blow map.
     bar : int
         `GaugeBar`.
     place : float
@@ -56,9 +52,7 @@ def create(kind, numbers, table, bar, place):
         return chain.create(numbers, bar, place)
     if kind == Kind.FEM:
         return fem.create(numbers, bar, place)
-    if kind == Kind.RIGID:
-        return rigid.create(numbers)
-    return blow_map.create(numbers, table)
+    return rigid.create(numbers)
 
 
 @preparing
@@ -73,9 +67,7 @@ def state_time(base, moving):
         return chain.state_time(base, moving)
     if kind == Kind.FEM:
         return fem.state_time(moving)
-    if kind == Kind.RIGID:
-        return rigid.state_time(moving)
-    return blow_map.state_time(moving)
+    return rigid.state_time(moving)
 
 
 @preparing
@@ -88,8 +80,6 @@ def grid_point_after(base, t):
         return wave.grid_point_after(base, t)
     if head.kind == Kind.CHAIN:
         return chain.grid_point_after(base, t)
-    if head.kind == Kind.MAP:
-        return t
     return max(t, state_time(base, base + head.state_at))
 
 
@@ -105,8 +95,6 @@ def is_quiet(base, t):
         return chain.is_quiet(base, t)
     if kind == Kind.RIGID:
         return rigid.is_quiet(base, t)
-    if kind == Kind.MAP:
-        return blow_map.is_quiet(base, t)
     return False
 
 
@@ -135,27 +123,14 @@ def go(base, task, t, room):
         return chain.go(base, t, room)
     if kind == Kind.FEM:
         return fem.go(base, task, t, room)
-    if kind == Kind.RIGID:
-        return rigid.go(base, task, t, room)
-    return blow_map.go(base, task, t, room)
+    return rigid.go(base, task, t, room)
 
 
 @preparing
-def refuse_inputs(base, wanted, facts):
-    """Number of why inputs cannot have new values, 0 for none."""
-    if head_records(base, 1)[0].kind == Kind.MAP:
-        return blow_map.refuse_inputs(motion_of(base).acting, wanted, facts)
-    return 0
-
-
-@preparing
-def take_inputs(base, changed):
-    """Let the solver follow inputs that have changed, by their bits."""
-    kind = head_records(base, 1)[0].kind
-    if kind == Kind.FEM:
+def take_inputs(base):
+    """Let the solver follow inputs that have changed."""
+    if head_records(base, 1)[0].kind == Kind.FEM:
         fem.take_inputs(base)
-    elif kind == Kind.MAP:
-        blow_map.take_inputs(base, changed)
 
 
 @preparing
@@ -170,10 +145,8 @@ def read(base, moving, t, reading, peaks):
         chain.read(base, moving, t, reading, peaks)
     elif kind == Kind.FEM:
         fem.read(base, moving, t, reading)
-    elif kind == Kind.RIGID:
-        rigid.read(base, moving, t, reading)
     else:
-        blow_map.read(base, moving, t, reading)
+        rigid.read(base, moving, t, reading)
 
 
 @preparing
@@ -203,6 +176,4 @@ def find_fault(base, moving, t, facts):
         return chain.find_fault(base, moving, facts)
     if kind == Kind.FEM:
         return fem.find_fault(base, moving, t, facts)
-    if kind == Kind.RIGID:
-        return rigid.find_fault(moving, t, facts)
-    return blow_map.find_fault(moving, t, facts)
+    return rigid.find_fault(moving, t, facts)

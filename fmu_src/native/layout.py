@@ -41,13 +41,12 @@ class Kind(IntEnum):
     CHAIN = 3
     FEM = 4
     RIGID = 5
-    MAP = 6
 
 
 # By the names of solvers.
 KINDS = {
     "modal": Kind.MODAL, "wave": Kind.WAVE, "chain": Kind.CHAIN, "fem": Kind.FEM,
-    "rigid": Kind.RIGID, "blow-map": Kind.MAP,
+    "rigid": Kind.RIGID,
 }  # fmt: skip
 
 
@@ -86,7 +85,6 @@ HEAD = np.dtype(
         ("here_at", "i8"),  # at the present time,
         ("trial_at", "i8"),  # and for what is read beside them
         ("blows_at", "i8"),
-        ("table_address", "i8"),  # of a blow map, which is not copied
         ("acts", "i8", (len(INPUTS),)),  # 1: an input has an effect
         ("inputs_at", "i8", (len(INPUTS),)),  # words of the record that hold the inputs
         ("peak_from_at", "i8"),  # and when peaks began, the peaks, counts of guards

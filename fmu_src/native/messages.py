@@ -11,7 +11,6 @@ import re
 from collections.abc import Callable, Iterator, Sequence
 from enum import IntEnum
 
-from fmu_src.hammer.blow_map import NO_MAP
 from fmu_src.hammer.inputs import NAMES_OUTSIDE
 from fmu_src.native.layout import KINDS
 from percussion_model.scene.contradictions import TEXTS
@@ -19,10 +18,6 @@ from percussion_model.scene.inputs import INPUTS
 from percussion_model.scene.parameters import find_row
 from percussion_model.scene.scene import SceneError
 from percussion_model.simulation import validity
-from percussion_model.solvers.blow_map.prepare import NO_STAND
-from percussion_model.solvers.blow_map.records import MAP_LIMITS, Refusal
-from percussion_model.solvers.blow_map.refusals import FALLEN, MOVING, RANGE, TURNED
-from percussion_model.solvers.blow_map.words import FIXED, FIXED_INPUTS
 from percussion_model.solvers.chain.network import TOO_FINE
 from percussion_model.solvers.chain.records import CHAIN_LIMITS
 from percussion_model.solvers.fem.records import FEM_LIMITS
@@ -46,30 +41,20 @@ class Fault(IntEnum):
     ELEMENTS = 6
     WORK = 7  # cells, sub-steps
     TOO_FINE = 8  # loss time, length of a section, time step
-    NO_STAND = 9  # gap to the rock, velocity
-    NO_MAP = 10
-    BAD_MAP = 11
-    MAP_SECTIONS = 12  # which bar, counted from 0
-    MAP_FIXED = 13  # place in `FIXED`
-    MAP_SECTION = 14
-    MAP_INPUT = 15  # value, that of the map, input counted from 1
-    NOT_FINITE = 16  # time
-    STOPPED = 17  # time
-    MAP_NEVER_RESTS = 18  # time of flight [ms], feed force
-    MAP_REFUSAL = 19  # and the following: as `Refusal` from 1 on
-    MOTION = 26  # what a communication step keeps
-    WORKSPACE = 27
-    BEHIND = 28  # time of the state, present
-    NEXT_EVENT = 29  # time of the next event, present
-    WAVE_LEAP = 30  # end, step, most steps
-    WAVE_WAKE = 31  # when, step, since when
-    MODAL_FIELD = 32  # word, value, its limits
-    WAVE_FIELD = 33
-    CHAIN_FIELD = 34
-    FEM_FIELD = 35
-    RIGID_FIELD = 36
-    MAP_FIELD = 37
-    MODAL_STATE = 38  # and the following: as `solvers.modal.faults.FAULTS`
+    NOT_FINITE = 9  # time
+    STOPPED = 10  # time
+    MOTION = 11  # what a communication step keeps
+    WORKSPACE = 12
+    BEHIND = 13  # time of the state, present
+    NEXT_EVENT = 14  # time of the next event, present
+    WAVE_LEAP = 15  # end, step, most steps
+    WAVE_WAKE = 16  # when, step, since when
+    MODAL_FIELD = 17  # word, value, its limits
+    WAVE_FIELD = 18
+    CHAIN_FIELD = 19
+    FEM_FIELD = 20
+    RIGID_FIELD = 21
+    MODAL_STATE = 22  # and the following: as `solvers.modal.faults.FAULTS`
 
 
 class Note(IntEnum):
@@ -77,15 +62,14 @@ class Note(IntEnum):
 
     BARRIER = 1
     LEDGER = 2
-    MAP_LEDGER = 3
-    GIVES_ENERGY = 4
-    TAKES_ENERGY = 5  # and the following: one for each `Kind`
-    LOCKED = 11
-    STORM = 12
-    FLIGHT = 13
-    BUTTON = 14
-    RATE = 15
-    IN_VAIN = 16  # and the following: one for each input
+    GIVES_ENERGY = 3
+    TAKES_ENERGY = 4  # and the following: one for each `Kind`
+    LOCKED = 9
+    STORM = 10
+    FLIGHT = 11
+    BUTTON = 12
+    RATE = 13
+    IN_VAIN = 14  # and the following: one for each input
 
 
 class Fact(float):
@@ -127,29 +111,6 @@ def refused(work: Callable[[], object]) -> str:
     raise ValueError("nothing was refused")
 
 
-def _map_texts() -> dict[int, str]:
-    """Templates of a map that does not answer."""
-    ranges = {
-        Refusal.STIFFNESS: ("rock.loading_stiffness", "N/m", "stiffness"),
-        Refusal.VELOCITY: ("the impact velocity", "m/s", "velocity"),
-        Refusal.FEED: ("feed.force", "N", "feed"),
-        Refusal.DRIVE: ("drive.force", "N", "force"),
-    }
-    texts = {
-        reason: RANGE.format(
-            name=name, value="{0:.6g}", unit=unit, low="{1:.6g}", high="{2:.6g}",
-            key=f"blow_map.{key}_{{3:|from|to|}}",
-        )
-        for reason, (name, unit, key) in ranges.items()
-    }  # fmt: skip
-    texts[Refusal.MOVING] = MOVING.format(
-        flight="{0:.3g}", feed="{1:.6g}", until="after {2:.3g} ms"
-    )
-    texts[Refusal.TURNED] = TURNED.format(reversal="{0:.6g}")
-    texts[Refusal.FALLEN] = FALLEN.format(force="{0:.6g}")
-    return {int(reason): texts[reason] for reason in Refusal if reason != Refusal.NONE}
-
-
 def faults(bars: Sequence[str] = ("piston", "bit")) -> tuple[str, ...]:
     """Templates of the faults, by `Fault`.
 
@@ -158,7 +119,6 @@ def faults(bars: Sequence[str] = ("piston", "bit")) -> tuple[str, ...]:
     bars : sequence of str
         That may carry the gauge.
     """
-    fixed, inputs = "|".join(FIXED), "|".join(FIXED_INPUTS.get(name, name) for name in INPUTS)
     texts: dict[int, str] = {
         Fault.MEMORY: "memory is exhausted",
         Fault.SOLVER: (
@@ -174,26 +134,8 @@ def faults(bars: Sequence[str] = ("piston", "bit")) -> tuple[str, ...]:
         Fault.ELEMENTS: _too_many("elements"),
         Fault.WORK: WORK.format(cells="{0:.3g}", parts="{1:.3g}"),
         Fault.TOO_FINE: TOO_FINE.format(eta="{0:.3g}", length="{1:g}", step="{2:.2g}"),
-        Fault.NO_STAND: NO_STAND.format(gap="{0:r}", velocity="{1:r}"),
-        Fault.NO_MAP: NO_MAP,
-        Fault.BAD_MAP: "the blow map of this FMU is damaged, or of another format",
-        Fault.MAP_SECTIONS: (
-            "the blow map was made for another number of sections of the {0:|piston|bit|} and "
-            "holds for that alone"
-        ),
-        Fault.MAP_FIXED: (
-            f"the blow map was made for another {{0:|{fixed}|}} and holds for that alone"
-        ),
-        Fault.MAP_SECTION: "the blow map was made for other sections and holds for those alone",
-        Fault.MAP_INPUT: (
-            f"{{2:|{inputs}|}} = {{0:r}}: the blow map was made for {{1:r}} "
-            "and holds for that alone"
-        ),
         Fault.NOT_FINITE: "at t = {0:r} s the state is no longer finite: check the scene",
         Fault.STOPPED: "at t = {0:r} s the solver could not continue",
-        Fault.MAP_NEVER_RESTS: MOVING.format(
-            flight="{0:.3g}", feed="{1:.6g}", until="in no time of the table"
-        ),
         Fault.MOTION: "the saved motion has a number that is not finite, or a count below 0",
         Fault.WORKSPACE: f"the saved state has {WORKSPACE}",
         Fault.BEHIND: "the saved state has its time of {0:r} s, far before {1:r} s",
@@ -211,9 +153,7 @@ def faults(bars: Sequence[str] = ("piston", "bit")) -> tuple[str, ...]:
         Fault.CHAIN_FIELD: _of_field(CHAIN_LIMITS.names),
         Fault.FEM_FIELD: _of_field(FEM_LIMITS.names),
         Fault.RIGID_FIELD: _of_field(RIGID_LIMITS.names),
-        Fault.MAP_FIELD: _of_field(MAP_LIMITS.names),
     }
-    texts |= {Fault.MAP_REFUSAL + k - 1: text for k, text in _map_texts().items()}
     more = [*(_of_state(text) for text in MODAL_FAULTS[1:]), *map(_of_rule, TEXTS.values())]
     texts |= {Fault.MODAL_STATE + k: text for k, text in enumerate(more)}
     return ("", *(texts[k] for k in range(1, 1 + len(texts))))
@@ -271,8 +211,7 @@ def notes() -> tuple[str, ...]:
     one = Fact(0, 1.0)
     texts: dict[int, str] = {
         Note.BARRIER: _only(validity.barrier_note(one, Fact(1, 1.0))),
-        Note.LEDGER: _only(validity.ledger_note(one, "modal")),
-        Note.MAP_LEDGER: _only(validity.ledger_note(one, "blow-map")),
+        Note.LEDGER: _only(validity.ledger_note(one)),
         Note.GIVES_ENERGY: _only(validity.numerical_note(Fact(0, -1.0), "modal")),
         Note.LOCKED: _counted("locked", "2 time steps", "{0:d} time step{1:||s|}"),
         Note.STORM: _counted("storms", "2 storms", "{0:d} storm{1:||s|}"),

@@ -200,12 +200,11 @@ def set_inputs(base, wanted):
     if status == Status.DONE:
         status = _run(base, COMMIT, t, NO_LIMIT)
     if status == Status.DONE:
-        numbers, changed = numbers_of_record(base), 0
+        numbers = numbers_of_record(base)
         for k in range(COUNT):
             if wanted[k] != motion.acting[k]:
                 numbers[head.inputs_at[k]] = motion.acting[k] = wanted[k]
-                changed |= 1 << k
-        kinds.take_inputs(base, changed)
+        kinds.take_inputs(base)
     return status, in_vain
 
 

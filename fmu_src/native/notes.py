@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fmu_src.native.layout import Kind, head_records, last_blow, motion_of
+from fmu_src.native.layout import head_records, last_blow, motion_of
 from fmu_src.native.memory import floats_at, words_at
 from fmu_src.native.messages import Note
 from fmu_src.native.motion import count_of, read
@@ -15,7 +15,6 @@ from percussion_model.simulation.validity import (
     LEAST_NUMERICAL,
     LONGEST_FLIGHT,
     MOST_BARRIER,
-    MOST_MAP_RESIDUAL,
     MOST_NUMERICAL,
     MOST_RATE,
     MOST_RESIDUAL,
@@ -85,11 +84,10 @@ def _of_state(base, notes):
             _tell(base, notes, Note.BARRIER, head.time_share, head.energy_share)
     reading = read(base, False)
     row, share = reading[0], residual(reading)
-    is_map = head.kind == Kind.MAP
-    if not abs(share) <= (MOST_MAP_RESIDUAL if is_map else MOST_RESIDUAL):
-        _tell(base, notes, Note.MAP_LEDGER if is_map else Note.LEDGER, share, 0.0)
+    if not abs(share) <= MOST_RESIDUAL:
+        _tell(base, notes, Note.LEDGER, share, 0.0)
     taken = numerical(reading)
-    if not taken >= (-MOST_MAP_RESIDUAL if is_map else LEAST_NUMERICAL):
+    if not taken >= LEAST_NUMERICAL:
         _tell(base, notes, Note.GIVES_ENERGY, taken, 0.0)
     elif taken > MOST_NUMERICAL:
         _tell(base, notes, Note.TAKES_ENERGY + head.kind - 1, 100.0 * taken, 0.0)

@@ -30,7 +30,7 @@ _WORD, _NUMBER = types.int64, types.float64
 # Entries by their names in C, with the types of their arguments: pointers are addresses.
 ENTRIES: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "kernel_check": (entries.check, (_WORD,) * 2),
-    "kernel_create": (entries.create, (_WORD,) * 5),
+    "kernel_create": (entries.create, (_WORD,) * 3),
     "kernel_step": (entries.take_step, (*(_WORD,) * 3, _NUMBER, _NUMBER, _WORD, _WORD)),
     "kernel_read": (entries.read_outputs, (_WORD,) * 3),
     "kernel_fault": (entries.find_fault, (_WORD, _WORD, _NUMBER, _WORD)),

@@ -96,8 +96,7 @@ enum {
  * blows have ended. */
 typedef struct {
     int64_t (*check)(const int64_t *image, int64_t *notes);
-    int64_t (*create)(const int64_t *image, const double *map, int64_t map_size,
-                      int64_t **motion, int64_t *notes);
+    int64_t (*create)(const int64_t *image, int64_t **motion, int64_t *notes);
     int64_t (*step)(int64_t *motion, const int64_t *image, int64_t flags, double t, double h,
                     double *reached, int64_t *notes);
     int64_t (*read)(int64_t *motion, int64_t flags, double *outputs);
@@ -180,8 +179,6 @@ typedef struct {
     const Entry *entries; /* of the version of FMI that is spoken */
     size_t entry_count;
     const uint32_t *members, *known;
-    const double *map; /* of blows */
-    size_t map_count;
     Slot *slots;
     uint32_t slot_shift, slot_mask;
     void *own; /* entries and members of FMI 2.0, which are not in the file */

@@ -10,10 +10,10 @@
 #include <string.h>
 
 static const char MAGIC[8] = "PHTABLE";
-enum { FILE_VERSION = 1 };
+enum { FILE_VERSION = 2 };
 
 enum {
-    TEXT, HEAD, VARIABLES, CHOICES, IMAGE, DRIVE, NOTES, FAULTS, ENTRIES, MEMBERS, KNOWN, MAP,
+    TEXT, HEAD, VARIABLES, CHOICES, IMAGE, DRIVE, NOTES, FAULTS, ENTRIES, MEMBERS, KNOWN,
     SECTIONS
 };
 
@@ -40,7 +40,7 @@ static const size_t SIZES[SECTIONS] = {
     [TEXT] = 1, [HEAD] = sizeof(uint32_t), [VARIABLES] = sizeof(Variable),
     [CHOICES] = sizeof(int64_t), [IMAGE] = sizeof(int64_t), [DRIVE] = sizeof(Drive),
     [NOTES] = sizeof(uint32_t), [FAULTS] = sizeof(uint32_t), [ENTRIES] = sizeof(Entry),
-    [MEMBERS] = sizeof(uint32_t), [KNOWN] = sizeof(uint32_t), [MAP] = sizeof(double),
+    [MEMBERS] = sizeof(uint32_t), [KNOWN] = sizeof(uint32_t),
 };
 
 _Static_assert(sizeof(Head) == 56 + 16 * SECTIONS, "the head has no gaps");
@@ -104,8 +104,6 @@ static void take_sections(Tables *tables, const Head *head) {
     tables->note_count = (size_t)section[NOTES].count;
     tables->faults = begin_of(tables, head, FAULTS);
     tables->fault_count = (size_t)section[FAULTS].count;
-    tables->map = begin_of(tables, head, MAP);
-    tables->map_count = (size_t)section[MAP].count;
 }
 
 /* Whether a place in the text is one; the text ends with a zero. */

@@ -12,8 +12,6 @@ import struct
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
-import numpy as np
-
 from fmu_src.description import depends_at_start
 from fmu_src.hammer.inputs import DRIVE_INPUTS
 from fmu_src.hammer.variables import TABLE_INPUTS, gauge_bars, hammer_variables
@@ -25,16 +23,16 @@ from percussion_model.scene.numbers import (
     scene_numbers,
     section_numbers,
 )
+from percussion_model.scene.retired import remark
 from percussion_model.scene.rows import unit_suffix
 from percussion_model.scene.scene import Scene
 from percussion_model.scene.values import SCENE_NUMBERS
-from percussion_model.solvers.blow_map.builder import get_table
 
 FILE = "model.bin"
-MAGIC, VERSION = b"PHTABLE\0", 1
+MAGIC, VERSION = b"PHTABLE\0", 2
 # In this order in the file, as in `tables.c`.
 SECTIONS = ("text", "head", "variables", "choices", "image", "drive", "notes", "faults",
-            "entries", "members", "known", "map")  # fmt: skip
+            "entries", "members", "known")  # fmt: skip
 SECTIONS_AT = 56
 VARIABLE = struct.Struct("<6I4d6I")
 ENTRY = struct.Struct("<8I")
@@ -127,7 +125,6 @@ def scene_image(scene: Scene) -> Image:
 def model_tables(
     scene: Scene,
     guid: str,
-    blow_map: np.ndarray | None = None,
     faults: Sequence[str] | None = None,
     notes: Sequence[str] | None = None,
 ) -> bytes:
@@ -138,17 +135,12 @@ def model_tables(
     scene : Scene
     guid : str
         Of the model description, FMI 2.0 or 3.0; saved states belong to it too.
-    blow_map : float array, optional
-        Numbers of the blow map, as `kernel_create` takes them; if left out those of the map that
-        the scene asks for, if it does.
     faults, notes : sequence of str, optional
         Templates of messages, the first unused; those of `fmu_src.native.messages` if left out.
     """
-    if blow_map is None and scene.solver_name == "blow-map":
-        blow_map = get_table(scene).to_words()
     if faults is None or notes is None:
         faults, notes = messages.faults(gauge_bars(scene)), messages.notes()
-    return _Writer(scene).write(guid, blow_map, faults, notes)
+    return _Writer(scene).write(guid, faults, notes)
 
 
 class _Writer:
@@ -166,13 +158,7 @@ class _Writer:
         self.places: dict[str, int] = {"": 0}
         self.choices: list[int] = []
 
-    def write(
-        self,
-        guid: str,
-        blow_map: np.ndarray | None,
-        faults: Sequence[str],
-        notes: Sequence[str],
-    ) -> bytes:
+    def write(self, guid: str, faults: Sequence[str], notes: Sequence[str]) -> bytes:
         """All sections behind their head."""
         counts = [
             sum(one.causality == kind for one in self.variables) for kind in ("input", "output")
@@ -180,7 +166,6 @@ class _Writer:
         outputs = iter(range(counts[1]))
         records = [self._variable(one, outputs) for one in self.variables]
         entries, members, known = self._entries()
-        numbers = np.zeros(0) if blow_map is None else np.ascontiguousarray(blow_map, "<f8")
         sections = {
             "head": _whole([self._place(guid), *counts, self.image.plain_words]),
             "variables": (b"".join(records), len(records)),
@@ -192,7 +177,6 @@ class _Writer:
             "entries": (b"".join(entries), len(entries)),
             "members": _whole(members),
             "known": _whole(known),
-            "map": (numbers.tobytes(), numbers.size),
         }
         sections["text"] = bytes(self.text), len(self.text)  # when all have their places
         return _file(sections)
@@ -223,7 +207,7 @@ class _Writer:
             0.0 if is_output else float(one.start), lower, upper,
             math.nan if one.left_out is None else float(one.left_out),
             one.left_out is not None, NEEDS.get(one.name, 0),
-            self._place("" if row is None else row.allowed),
+            self._place("" if row is None else row.allowed + remark(row.key)),
             self._place("" if row is None else unit_suffix(row.unit)),
             first, len(choices),
         )  # fmt: skip

@@ -14,8 +14,8 @@ from fmu_src.archive import write_archive
 from fmu_src.hammer.build import build_hammer, hammer_name, refuse_other
 from fmu_src.parts.build import PARTS, build_part
 from fmu_src.units import UNITS
-from percussion_model.interface.commands.blow_map import ready_map
 from percussion_model.scene.presets import scenario_folder, scene_file, system_file
+from percussion_model.scene.retired import remark
 from percussion_model.scene.rows import said_among, shortened, show_value, unprintable
 from percussion_model.scene.scene import Scene
 from percussion_model.scene.text import read_toml
@@ -55,9 +55,6 @@ class SystemPlan:
     ----------
     components : dict of str
         Name of the FMU by name of the component.
-    fidelity : str
-        Rung of docs/fidelity.md by which the hammer is computed; a scene of rigid bodies
-        keeps "wave".
     connections : dict of str
         Output by input, each `component.variable`.
     parameters : dict of dict
@@ -67,7 +64,6 @@ class SystemPlan:
     name: str
     description: str
     hammer: Path
-    fidelity: str
     duration: float
     step: float
     components: dict[str, str]
@@ -93,7 +89,6 @@ def read_plan(path: Path, **changes: Any) -> SystemPlan:
         name=found["name"],
         description=found["description"],
         hammer=_beside(path, found["hammer"]) or scene_file(Path(found["hammer"])),
-        fidelity=found.get("fidelity", "wave"),
         duration=float(found["duration"]),
         step=float(found["step"]),
         components=found["components"],
@@ -122,6 +117,9 @@ def _check_entries(path: Path, found: dict[str, Any]) -> None:
                 f"{path}: {show_value(name)}: a name must begin with a letter and go on with "
                 "letters, digits and underlines, 100 in all"
             )
+    if (word := found.get("fidelity", "wave")) != "wave":
+        said = f'{path}: fidelity = {show_value(word)}: must be "wave", or be left out'
+        raise SystemPlanError(said + remark("solver.fidelity"))
     if unprintable(found["description"]):
         raise SystemPlanError(f"{path}: description has a control character")
 
@@ -179,16 +177,11 @@ def build_fmus(plan: SystemPlan, folder: Path, force: bool = False) -> dict[str,
 
 
 def _hammer(plan: SystemPlan, folder: Path, force: bool) -> Path:
-    """Write the FMU of the hammer; one of another scene or rung has another name."""
-    scene, table, suffix = Scene.from_toml(plan.hammer), None, ""
-    if plan.fidelity == "blow-map":
-        scene, suffix = scene.computed_by("blow-map"), "Map"
-        table = ready_map(scene)
-    elif plan.fidelity != "wave":
-        raise SystemPlanError(f'fidelity = {plan.fidelity!r}: must be "wave" or "blow-map"')
-    path = folder / hammer_name(plan.hammer, suffix)
-    refuse_other(path, scene, table is not None, force)
-    build_hammer(scene, path, table)
+    """Write the FMU of the hammer; one of another scene has another name."""
+    scene = Scene.from_toml(plan.hammer)
+    path = folder / hammer_name(plan.hammer)
+    refuse_other(path, scene, force)
+    build_hammer(scene, path)
     return path
 
 
@@ -338,16 +331,16 @@ def find_plan(named: Path) -> SystemPlan:
         raise SystemPlanError(
             f"{shortened(str(named))}: there is no such file of a system, and no preset of that "
             f"name: {said_among(named.name, found)}"
+            f"{remark('', 'blow-map') if named.name.endswith('Map') else ''}"
         )
     return found[named.name]
 
 
 def plans() -> list[SystemPlan]:
-    """All systems of `scenarios/systems`, each with the three hammers of docs/fidelity.md."""
+    """All systems of `scenarios/systems`, each with both hammers of docs/fidelity.md."""
     found = []
     for path in sorted(SYSTEMS.glob("*.toml")):
         plan = read_plan(path)
         found.append(plan)
         found.append(read_plan(path, name=f"{plan.name}Rigid", hammer="rigid"))
-        found.append(read_plan(path, name=f"{plan.name}Map", fidelity="blow-map"))
     return found

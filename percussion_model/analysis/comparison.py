@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from percussion_model.analysis.change import Change, change_of
+from percussion_model.scene.retired import remark
 from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.scene.solver_names import SOLVER_NAMES
 from percussion_model.simulation.result import Result
@@ -216,7 +217,7 @@ def compare(
 
 def solver_names() -> tuple[str, ...]:
     """Names of all solvers, as a scene is computed by them."""
-    return (*(name for name in SOLVER_NAMES if name != "auto"), "blow-map")
+    return tuple(name for name in SOLVER_NAMES if name != "auto")
 
 
 def usual_solvers(scene: Scene) -> tuple[str, ...]:
@@ -249,7 +250,9 @@ def read_solvers(text: str) -> tuple[str, ...]:
     known = solver_names()
     for name in names:
         if name not in known:
-            raise SceneError(f"--solvers {text}: {name!r} is no solver: {', '.join(known)}")
+            raise SceneError(
+                f"--solvers {text}: {name!r} is no solver: {', '.join(known)}{remark('', name)}"
+            )
         if names.count(name) > 1:
             raise SceneError(f"--solvers {text}: {name} is given twice")
     return names

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import os
-import time
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
-from percussion_model.analysis.blow_maps import MapCost, kept_map, map_cost
 from percussion_model.analysis.stationary import MOST_BLOWS
 from percussion_model.scene.rocks import rock_of
 from percussion_model.scene.scales import scales
@@ -57,17 +54,15 @@ class Forecast:
 
     Attributes
     ----------
-    solver : Solver or None
-        None where its blow map has not been made.
+    solver : Solver
     setup_time : float
-        Time to make the solver, compilation included, and that of its blow map where
-        this has not been made [s].
-    wall_time : float or None
-        Predicted time of the whole run without set-up [s]; None without a solver.
+        Time to make the solver, compilation included [s].
+    wall_time : float
+        Predicted time of the whole run without set-up [s].
     duration : float
         Simulated time of that run [s].
-    per_second : float or None
-        Time for a simulated second, once blows follow each other [s]; None without a solver.
+    per_second : float
+        Time for a simulated second, once blows follow each other [s].
     per_blow : float or None
         Time for a blow [s]; None where there were fewer than two.
     counts : dict of float
@@ -76,22 +71,19 @@ class Forecast:
         Simulated time that it rests on [s].
     runs : int
         Runs that `setup_time` and `wall_time` are the sum of.
-    blow_map : MapCost or None
-        Of the blow map that has not been made.
     row_bytes : float
         Rows of blows and events of the whole run, as the probe goes on [bytes].
     """
 
-    solver: Solver | None
+    solver: Solver
     setup_time: float
-    wall_time: float | None
+    wall_time: float
     duration: float
-    per_second: float | None
+    per_second: float
     per_blow: float | None
     counts: dict[str, float]
     probed: float
     runs: int = 1
-    blow_map: MapCost | None = None
     row_bytes: float = 0.0
 
     @property
@@ -115,10 +107,7 @@ def forecast(scene: Scene) -> Forecast:
 
     A wanted accuracy takes several runs: times are those of all, the rest is
     that of the finest. What aperiodic motion or a doubt adds is not foreseen.
-    A blow map that is missing is not made here: its cost is estimated instead.
     """
-    if scene.solver_name == "blow-map" and kept_map(scene) is None:
-        return _without_map(scene)
     scenes = [scene]
     if scene.solver.accuracy is not None and has_grid(scene):
         scenes = [with_cells(scene, cells) for cells in planned_cells(scene)]
@@ -132,18 +121,9 @@ def forecast(scene: Scene) -> Forecast:
     return replace(
         found[-1],
         setup_time=sum(one.setup_time for one in found),
-        wall_time=sum(one.wall_time or 0.0 for one in found),
+        wall_time=sum(one.wall_time for one in found),
         runs=len(found),
     )
-
-
-def _without_map(scene: Scene) -> Forecast:
-    """What the blow map costs; the run cannot be probed before it is there."""
-    begin = time.perf_counter()
-    cost = map_cost(scene)
-    setup = time.perf_counter() - begin + cost.processor_time / (os.cpu_count() or 1)
-    duration = scene.run.duration
-    return Forecast(None, setup, None, duration, None, None, {}, 0.0, blow_map=cost)
 
 
 def probe(simulation: Simulation, duration: float) -> list[Mark]:
@@ -221,15 +201,15 @@ def explained(scene: Scene, found: Forecast) -> dict[str, Any]:
         "without_effect": list(scene.unused),
         "rock": rock_of(scene) or None,
         "scales": {name: scale.value for name, scale in scales(scene).items()},
-        "solver": solver.name if solver else scene.solver_name,
-        "cells": (solver.cells or None) if solver else None,
-        "time_step": solver.time_step if solver else None,
-        "wave_speed_error": solver.wave_speed_error if solver else None,
+        "solver": solver.name,
+        "cells": solver.cells or None,
+        "time_step": solver.time_step,
+        "wave_speed_error": solver.wave_speed_error,
         "accuracy": scene.solver.accuracy,
         "setup_time": found.setup_time,
-        "operator_bytes": solver.operator_bytes if solver else None,
+        "operator_bytes": solver.operator_bytes,
         "predicted_wall_time": found.wall_time,
-        "predicted_within_factor": None if found.wall_time is None else FACTOR,
+        "predicted_within_factor": FACTOR,
         "duration": found.duration,
         "wall_time_per_second": found.per_second,
         "wall_time_per_blow": found.per_blow,
@@ -239,5 +219,4 @@ def explained(scene: Scene, found: Forecast) -> dict[str, Any]:
         "row_bytes": found.row_bytes,
         "refused": found.refused or None,
         "longest_settled_time": found.settled_time,
-        "blow_map_to_make": found.blow_map._asdict() if found.blow_map else None,
     }

@@ -454,13 +454,8 @@ def study_effects(
     Raises
     ------
     SceneError, SimulationError
-        If the scene itself cannot be computed, or would need a blow map for each effect.
+        If the scene itself cannot be computed.
     """
-    if scene.solver_name == "blow-map":
-        raise SceneError(
-            "a study of effects would make a blow map for each effect, minutes each: compute the "
-            "scene by wave, fem or rigid (--solver)"
-        )
     scene = by_one_solver(scene)
     base, *rest = effect_variants(scene)
     cases = [(base, scene)]

@@ -20,6 +20,7 @@ from fmpy import platform, read_model_description, sharedLibraryExtension
 from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
 from lxml import etree
 
+from percussion_model.scene.retired import remark
 from percussion_model.scene.rows import nearest, shortened, unit_suffix
 
 # Number of a bar or a section within a key of a scene, and one in either way of writing.
@@ -113,7 +114,8 @@ def number_of_word(component: str, variable: Any, word: str) -> int:
         number = f"a number{unit}, with a decimal point and no unit"
         kind = {"Boolean": "true or false"}.get(variable.type, number)
         raise CouplingError(
-            f"{component}.{variable.name} = {shortened(word)}: must be {', '.join(found) or kind}"
+            f"{component}.{variable.name} = {shortened(word)}: must be "
+            f"{', '.join(found) or kind}{remark(variable.name, word)}"
         )
     return found[word]
 

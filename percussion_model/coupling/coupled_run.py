@@ -37,7 +37,7 @@ ESTIMATES = ("depth", "rate_second_half", "shoulder_energy", "feed_work", "shoul
 # (docs/system.md, section 4).
 MISSED_BY_SHOULDER, UNSEEING_STEP = 0.012, 1e-4
 # What the error of the rate is of, and what is in none of the errors.
-SCATTER, STEP, CELLS, BLOW_MAP = "scatter", "communication step", "cells", "blow map"
+SCATTER, STEP, CELLS = "scatter", "communication step", "cells"
 
 
 @dataclass
@@ -63,8 +63,6 @@ class CoupledRun:
     jumps : dict of float
         Root mean square of the change of what parts exchange in a step, by signal: forces by
         the greatest force [1].
-    by_map : bool
-        Whether the hammer takes its blows out of a blow map.
     """
 
     columns: dict[str, np.ndarray] = field(repr=False)
@@ -77,7 +75,6 @@ class CoupledRun:
     processor_time: float = field(default=0.0, compare=False)
     interrupted: bool = False
     jumps: dict[str, float] = field(default_factory=dict, compare=False)
-    by_map: bool = False
 
     def __getitem__(self, signal: str) -> np.ndarray:
         return self.columns[signal]
@@ -87,7 +84,7 @@ class CoupledRun:
         """Whether energies balance, or the step is too long and which one would do."""
         return judge_run(
             self.columns, _balances(self.columns), self.jumps, self.step, self.steps, self.error,
-            controlled=self.tried > 0, by_map=self.by_map,
+            controlled=self.tried > 0,
         )  # fmt: skip
 
     def write_csv(self, path: Path) -> Path:
@@ -140,9 +137,8 @@ def summary(run: CoupledRun) -> dict[str, Any]:
     found |= _balances(columns)
     found |= _undecided_losses(found, columns, run.step)
     unknown = [key for key in ESTIMATES if key in found and found.get(f"{key}_error") is None]
-    missing = [STEP, CELLS, *([BLOW_MAP] if run.by_map else [])]
     return found | {
-        "without_error": unknown, "not_in_errors": missing, "verdict": run.verdict.to_dict(),
+        "without_error": unknown, "not_in_errors": [STEP, CELLS], "verdict": run.verdict.to_dict(),
     }  # fmt: skip
 
 

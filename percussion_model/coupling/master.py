@@ -43,7 +43,6 @@ INITIAL_PASSES = 4
 # New objects that may be there before garbage is looked for.
 YOUNG = 50_000
 DESCRIPTION = "modelDescription.xml"
-FIDELITY = "solver.fidelity"
 # A number of steps is whole if it misses by no more than this.
 ROUNDING = 1e-9
 
@@ -253,21 +252,9 @@ class Coupling:
         table = np.array(rows, dtype=float)
         columns = {name: table[:, k] for k, name in enumerate(["time", *names])}
         run = CoupledRun(columns, step, done, error, 0, 0, *times, interrupted, jumps.by_size())
-        run.by_map = self._by_map()
         if control is not None:
             run.steps, run.tried, run.rejected = control.done, control.tried, control.rejected
         return run
-
-    def _by_map(self) -> bool:
-        """Whether the hammer takes its blows out of a blow map."""
-        known = getattr(self.parts.get("hammer"), "variables", {})
-        if FIDELITY not in known:
-            return False
-        one = known[FIDELITY]
-        value = self._parameters.get("hammer", {}).get(FIDELITY, one.start)
-        words = {str(item.value): item.name for item in one.declaredType.items}
-        key = value if isinstance(value, str) else str(int(value))
-        return words.get(key, key) == "blow-map"  # values are words or their numbers
 
     def _stepping(self, count: int, control: StepControl | None) -> Callable[[float, float], None]:
         """Return what does a step: compiled code where that is possible, else Python."""

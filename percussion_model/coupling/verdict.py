@@ -18,9 +18,8 @@ LARGEST_JUMP = 0.05
 # Greatest residual of the string by the energy put in: up to 0.9 % in the shipped systems at any
 # step that is short enough, for the cells of the string.
 LARGEST_STRING_RESIDUAL = 0.02
-# Of a hammer's own ledger, which closes to rounding; that of a blow map to 0.03 %, since energies
-# between the blows of its table are interpolated.
-LARGEST_HAMMER_RESIDUAL, LARGEST_MAP_RESIDUAL = 1e-9, 2e-3
+# Of a hammer's own ledger, which closes to rounding.
+LARGEST_HAMMER_RESIDUAL = 1e-9
 # Energy that the shoulder may make, and take, by that of the blows: right is 1 %, and the
 # sampled one has -0.2 to 1 % (docs/system.md, section 4).
 MADE_BY_SHOULDER, TAKEN_BY_SHOULDER = 0.01, 0.1
@@ -167,7 +166,6 @@ def judge_run(
     steps: int,
     error: str,
     controlled: bool,
-    by_map: bool = False,
 ) -> Verdict:
     """Verdict on a run.
 
@@ -185,8 +183,6 @@ def judge_run(
         Why the run ended early.
     controlled : bool
         Whether steps were shortened by their error.
-    by_map : bool
-        Whether the hammer takes its blows out of a blow map.
     """
     numbers = {key: float(balances[key]) for key in _BALANCES if key in balances}
     findings = [*_not_numbers(columns), *_softening(columns, step)]
@@ -194,8 +190,7 @@ def judge_run(
         signal, value = max(jumps.items(), key=lambda one: one[1])
         numbers["largest_jump"] = value
         findings += _jump(signal, value, step)
-    own = LARGEST_MAP_RESIDUAL if by_map else LARGEST_HAMMER_RESIDUAL
-    findings += _imbalance(numbers, findings, step, own)
+    findings += _imbalance(numbers, findings, step)
     remarks = _limits(columns)
     steps_that_do = [one.step for one in findings if one.step is not None]
     shorter = _round_down(min(steps_that_do)) if steps_that_do else None
@@ -263,7 +258,7 @@ def _jump(signal: str, value: float, step: float) -> list[Finding]:
 
 
 def _imbalance(
-    numbers: Mapping[str, float], known: Sequence[Finding], step: float, largest_own: float
+    numbers: Mapping[str, float], known: Sequence[Finding], step: float
 ) -> list[Finding]:
     """Balances that do not close; what is known already says from where, and which step."""
     by_step = [one for one in known if one.step is not None]
@@ -289,9 +284,9 @@ def _imbalance(
         mended = shorter or step * max(MUCH_SHORTER, limit / shoulder)
         found.append(Finding("string.energy.shoulder", text, shoulder, limit, mended))
     own = numbers.get("hammer_energy_residual", 0.0)
-    if not own <= largest_own:
+    if not own <= LARGEST_HAMMER_RESIDUAL:
         text = f"the hammer's own ledger misses {own:.2g} of its energy, whatever the step"
-        found.append(Finding("hammer.energy_residual", text, own, largest_own))
+        found.append(Finding("hammer.energy_residual", text, own, LARGEST_HAMMER_RESIDUAL))
     return found
 
 

@@ -18,7 +18,6 @@ import typer
 
 from percussion_model.interface.commands.accuracy import accuracy
 from percussion_model.interface.commands.bench_controller import bench_controller
-from percussion_model.interface.commands.blow_map import blow_map
 from percussion_model.interface.commands.calibrate import calibrate
 from percussion_model.interface.commands.common import (
     BAD_INPUT,
@@ -170,7 +169,6 @@ for _command in (
     rocks,
 ):
     add(_command)
-add(blow_map, "blow-map")
 add(explore, waits=True)
 
 

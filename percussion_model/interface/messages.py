@@ -6,6 +6,8 @@ import shutil
 import textwrap
 from typing import Any
 
+from percussion_model.scene.retired import remark
+
 # What pydantic, which reads the options for typer, calls a fault; and what is allowed then.
 _ALLOWED = {
     "int_parsing": "must be a whole number",
@@ -43,6 +45,8 @@ def usage_text(error: Any) -> str:
         fault = faults()[0]
         option = max([*error.param.opts, error.param.name], key=len)
         told = f"{option} {fault['input']!r}: {_allowed(fault)}"
+    retired = (word for word in told.split() if word.strip("'\".,;:-") == "blow-map")
+    told += remark("", "blow-map") if any(retired) else ""
     if error.ctx is not None:
         told += f"{'' if told.endswith('?') else ';'} see {error.ctx.command_path} --help"
     return told

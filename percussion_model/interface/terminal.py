@@ -250,12 +250,10 @@ def show_explanation(scene: Scene, found: Forecast) -> None:
     for name, text in _scale_rows(scene):
         table.add_row(name, text)
     why = f" (auto: {scene.why_solver})" if scene.why_solver else ""
-    table.add_row("Solver", f"{solver.name if solver else scene.solver_name}{why}")
+    table.add_row("Solver", f"{solver.name}{why}")
     if scene.solver.accuracy is not None:
         table.add_row("Wanted accuracy of the rate", f"{scene.solver.accuracy:g}")
-    if solver is None or scene.solver_name == "blow-map":
-        table.add_row("Steps", "from blow to blow, out of a table")
-    elif solver.time_step is not None:
+    if solver.time_step is not None:
         cells = ", ".join(f"{count} in the {bar}" for bar, count in solver.cells.items())
         table.add_row(counted(solver.name).capitalize(), cells)
         table.add_row("Time step", f"{solver.time_step:.6g} s")
@@ -269,29 +267,16 @@ def show_explanation(scene: Scene, found: Forecast) -> None:
         counts = ", ".join(f"{in_digits(value)} {name}" for name, value in found.counts.items())
         cost = in_digits(1e3 * found.per_blow, TIMED)
         table.add_row("A blow", f"{cost} ms to compute; {counts}")
-    if found.per_second is not None:
-        table.add_row("A simulated second", f"{in_digits(found.per_second, TIMED)} s to compute")
-    if found.wall_time is not None:
-        runs = f", {found.runs} runs to compare" if found.runs > 1 else ""
-        within = f"within a factor of {FACTOR:g}"
-        if scene.solver.accuracy is not None:
-            within += " if the motion is periodic"
-        time = in_digits(found.wall_time, TIMED)
-        whole = f"about {time} s ({within}) for {found.duration:g} s simulated{runs}"
-        table.add_row("Predicted cost of the run", f"{whole}{_cost_of_errors(scene, solver)}")
-    if found.blow_map is not None:
-        blows, seconds = found.blow_map
-        words = (
-            f"not made yet: {blows:,} blows, about {in_digits(seconds, TIMED)} s of one processor"
-        )
-        table.add_row("Blow map", words)
-        table.add_row(
-            "", "the first run makes it, or percussion blow-map; then a run can be predicted"
-        )
+    table.add_row("A simulated second", f"{in_digits(found.per_second, TIMED)} s to compute")
+    runs = f", {found.runs} runs to compare" if found.runs > 1 else ""
+    within = f"within a factor of {FACTOR:g}"
+    if scene.solver.accuracy is not None:
+        within += " if the motion is periodic"
+    time = in_digits(found.wall_time, TIMED)
+    whole = f"about {time} s ({within}) for {found.duration:g} s simulated{runs}"
+    table.add_row("Predicted cost of the run", f"{whole}{_cost_of_errors(scene, solver)}")
     memory = (
-        f"; {in_digits(solver.operator_bytes / 1e6, TIMED)} MB"
-        if solver and solver.operator_bytes
-        else ""
+        f"; {in_digits(solver.operator_bytes / 1e6, TIMED)} MB" if solver.operator_bytes else ""
     )
     table.add_row("To prepare", f"{in_digits(found.setup_time, TIMED)} s{memory}")
     if found.settled_time is not None and found.settled_time > MOST_TIME:
@@ -305,16 +290,16 @@ def show_explanation(scene: Scene, found: Forecast) -> None:
     print_table(table)
 
 
-def _cost_of_errors(scene: Scene, solver: Solver | None) -> str:
+def _cost_of_errors(scene: Scene, solver: Solver) -> str:
     """Say what the errors of the numbers of a run add to its cost; nothing if they are not asked.
 
     Parameters
     ----------
     scene : Scene
-    solver : Solver or None
-        Of the scene; None where it has not been made.
+    solver : Solver
+        Of the scene.
     """
-    if solver is None or scene.solver.accuracy is not None or not scene.run.error_estimate:
+    if scene.solver.accuracy is not None or not scene.run.error_estimate:
         return ""
     coarser = solver.coarser_scenes()
     if scene.is_undamped:

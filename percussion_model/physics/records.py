@@ -45,7 +45,6 @@ class Status(IntEnum):
     EVENTS_FULL = 2  # room for events used up: read them out, call again
     NOT_FINITE = 3  # the state is no longer finite
     LOCKED = 4  # more crossings inside one step than the law can make
-    REFUSED = 5  # the blow map does not answer; the solver says why
 
 
 class Piston(IntEnum):

@@ -1,4 +1,4 @@
-"""The folder that keeps for a user what takes long to make: kernels, tables, libraries."""
+"""The folder that keeps for a user what takes long to make: kernels and libraries."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def _temporary(reason: str) -> Path:
     if not _is_private(folder):
         folder = Path(tempfile.mkdtemp(prefix=f"{NAME}-"))
         atexit.register(shutil.rmtree, folder, ignore_errors=True)
-    _log.warning("%s: kernels and tables are kept in %s; %s changes that", reason, folder, VARIABLE)
+    _log.warning("%s: kernels are kept in %s; %s changes that", reason, folder, VARIABLE)
     return folder
 
 

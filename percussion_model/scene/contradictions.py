@@ -9,7 +9,6 @@ import math
 from enum import IntEnum
 from typing import Any
 
-from percussion_model.physics.effects import EFFECTS
 from percussion_model.scene.parameters import find_row
 
 
@@ -27,25 +26,15 @@ class Rule(IntEnum):
     SOLVER_OF_STRING = 8
     FIDELITY_OF_STRING = 9
     FIDELITY_AND_NAME = 10
-    MAPPED_DRIVE = 11
-    MAPPED_ROCK = 12
-    MAPPED_BIT = 13
-    MAPPED_EFFECT = 14
-    RANGE_OF_VELOCITY = 15
-    RANGE_OF_FEED = 16
-    RANGE_OF_FORCE = 17
-    RANGE_OF_STIFFNESS = 18
-    ACCURACY_AND_CELLS = 19
-    ACCURACY_OF_ELEMENTS = 20
-    ACCURACY_OF_MAP = 21
-    ACCURACY_WITHOUT_PISTON = 22
-    ACCURACY_WITHOUT_LOSS = 23
-    ACCURACY_WITHOUT_LOSS_TIME = 24
-    BARRIER = 25
-    SETTLE = 26
-    MODES_OF_POWER = 27
-    MODES_OF_CUTTINGS = 28
-    MAPPED_CUTTINGS = 29
+    ACCURACY_AND_CELLS = 11
+    ACCURACY_OF_ELEMENTS = 12
+    ACCURACY_WITHOUT_PISTON = 13
+    ACCURACY_WITHOUT_LOSS = 14
+    ACCURACY_WITHOUT_LOSS_TIME = 15
+    BARRIER = 16
+    SETTLE = 17
+    MODES_OF_POWER = 18
+    MODES_OF_CUTTINGS = 19
 
 
 _OF_STRING = (
@@ -57,13 +46,6 @@ _FINER = (
     "(docs/undamped.md): leave it out and set solver.cells, or set effects.loss = true with "
     "loss.time above 0 s"
 )
-
-
-def _range(name: str) -> str:
-    return (
-        f"blow_map.{name}_from = {{blow_map.{name}_from!r}}: must be below blow_map.{name}_to = "
-        f"{{blow_map.{name}_to!r}}"
-    )
 
 
 # Places stand for values of the scene.
@@ -98,23 +80,6 @@ TEXTS = {
         'solver.fidelity = "{solver.fidelity}" and solver.name = "{solver.name}": a name '
         'says how elastic waves are computed; leave it "auto"'
     ),
-    Rule.MAPPED_DRIVE: (
-        'solver.fidelity = "blow-map" needs effects.drive = "pressure", not "{effects.drive}"'
-    ),
-    Rule.MAPPED_ROCK: (
-        'solver.fidelity = "blow-map" needs effects.rock = "bilinear", not "{effects.rock}"'
-    ),
-    Rule.MAPPED_BIT: (
-        'solver.fidelity = "blow-map" needs bit.model = "elastic", not "{bit.model}"'
-    ),
-    Rule.MAPPED_EFFECT: (
-        'solver.fidelity = "blow-map" knows none of the effects '
-        f"{', '.join(f'effects.{effect.name}' for effect in EFFECTS)}: set them to false"
-    ),
-    Rule.RANGE_OF_VELOCITY: _range("velocity"),
-    Rule.RANGE_OF_FEED: _range("feed"),
-    Rule.RANGE_OF_FORCE: _range("force"),
-    Rule.RANGE_OF_STIFFNESS: _range("stiffness"),
     Rule.ACCURACY_AND_CELLS: (
         "solver.accuracy = {solver.accuracy!r} and solver.cells = {solver.cells!r} both choose "
         "the resolution: give one of them"
@@ -123,10 +88,6 @@ TEXTS = {
         "solver.accuracy = {solver.accuracy!r} picks the cells of waves, no finite elements: set "
         "fem.elements, fem.courant and fem.contact_stiffness, or solver.name = "
         '"wave" or "auto"'
-    ),
-    Rule.ACCURACY_OF_MAP: (
-        "solver.accuracy = {solver.accuracy!r}: a blow map is as accurate as its table "
-        '(docs/fidelity.md); set blow_map.density, or solver.fidelity = "wave"'
     ),
     Rule.ACCURACY_WITHOUT_PISTON: _OF_RATE
     + (
@@ -149,9 +110,6 @@ TEXTS = {
         'solver.name = "modal" with effects.cuttings = true: set solver.name = "wave" or "auto", '
         "which follow them"
     ),
-    Rule.MAPPED_CUTTINGS: (
-        'solver.fidelity = "blow-map" knows no cuttings in the crater: set effects.cuttings = false'
-    ),
     Rule.SETTLE: ("run.settle = {run.settle!r} s: must be below run.duration = {run.duration!r} s"),
 }
 
@@ -172,17 +130,15 @@ def _place(key: str, word: str) -> int:
 
 ELASTIC, RIGID = _place("bit.model", "elastic"), _place("bit.model", "rigid")
 PISTON_ELASTIC, PISTON_ABSENT = (_place("piston.model", word) for word in ("elastic", "absent"))
-NO_DRIVE, PRESSURE = (_place("effects.drive", word) for word in ("none", "pressure"))
+NO_DRIVE = _place("effects.drive", "none")
 BILINEAR, POWER = (_place("effects.rock", word) for word in ("bilinear", "power"))
 AUTO, FEM, CHAIN, MODAL = (
     _place("solver.name", word) for word in ("auto", "fem", "chain", "modal")
 )
-WAVE, BLOW_MAP = (_place("solver.fidelity", word) for word in ("wave", "blow-map"))
+WAVE = _place("solver.fidelity", "wave")
 
 
-def find_contradiction(
-    v: Any, bodies: int, has_rods: bool, has_effects: bool, is_barrier_given: bool
-) -> Rule:
+def find_contradiction(v: Any, bodies: int, has_rods: bool, is_barrier_given: bool) -> Rule:
     """Find the first contradiction of a scene.
 
     Parameters
@@ -190,8 +146,8 @@ def find_contradiction(
     v : Values, or SCENE_NUMBERS record
     bodies : int
         `Bodies` of the solver that is named.
-    has_rods, has_effects : bool
-        Whether there are rods, and effects that hold a force.
+    has_rods : bool
+        Whether there are rods.
     is_barrier_given : bool
         Whether it was asked for, not left to its default.
     """
@@ -204,8 +160,8 @@ def find_contradiction(
     if bodies == Bodies.RIGID and v.bit_model == ELASTIC:
         return Rule.NEEDS_RIGID
     found = _in_string(v, has_rods)
-    if found == Rule.NOTHING:
-        found = _in_fidelity(v, has_effects)
+    if found == Rule.NOTHING and v.solver_fidelity != WAVE and v.solver_name != AUTO:
+        found = Rule.FIDELITY_AND_NAME
     if found == Rule.NOTHING:
         found = _in_accuracy(v)
     if found != Rule.NOTHING:
@@ -235,35 +191,6 @@ def _in_string(v: Any, has_rods: bool) -> Rule:
     return Rule.NOTHING
 
 
-def _in_fidelity(v: Any, has_effects: bool) -> Rule:
-    """A fidelity that a scene cannot have, or ranges of the blow map that do not rise."""
-    if v.solver_fidelity == WAVE:
-        return Rule.NOTHING
-    if v.solver_name != AUTO:
-        return Rule.FIDELITY_AND_NAME
-    if v.solver_fidelity != BLOW_MAP:
-        return Rule.NOTHING
-    if v.effects_drive != PRESSURE:
-        return Rule.MAPPED_DRIVE
-    if v.effects_rock != BILINEAR:
-        return Rule.MAPPED_ROCK
-    if v.effects_cuttings:
-        return Rule.MAPPED_CUTTINGS
-    if v.bit_model != ELASTIC:
-        return Rule.MAPPED_BIT
-    if has_effects:
-        return Rule.MAPPED_EFFECT
-    if not v.blow_map_velocity_from < v.blow_map_velocity_to:
-        return Rule.RANGE_OF_VELOCITY
-    if not v.blow_map_feed_from < v.blow_map_feed_to:
-        return Rule.RANGE_OF_FEED
-    if not v.blow_map_force_from < v.blow_map_force_to:
-        return Rule.RANGE_OF_FORCE
-    if not v.blow_map_stiffness_from < v.blow_map_stiffness_to:
-        return Rule.RANGE_OF_STIFFNESS
-    return Rule.NOTHING
-
-
 def _in_accuracy(v: Any) -> Rule:
     """An accuracy that is said in two ways, that no rule picks a mesh for, or of no rate."""
     if math.isnan(v.solver_accuracy):
@@ -272,8 +199,6 @@ def _in_accuracy(v: Any) -> Rule:
         return Rule.ACCURACY_AND_CELLS
     if v.solver_name == FEM:
         return Rule.ACCURACY_OF_ELEMENTS
-    if v.solver_fidelity == BLOW_MAP and v.bit_model == ELASTIC:
-        return Rule.ACCURACY_OF_MAP
     if v.piston_model == PISTON_ABSENT:
         return Rule.ACCURACY_WITHOUT_PISTON
     # rigid bodies have no waves, that lose or lose not

@@ -22,7 +22,6 @@ HAS_PISTON: Needs = {"piston.model": ("elastic", "rigid")}
 HAS_WAVES: Needs = {"bit.model": ("elastic",)}
 SOLVER_WAVE: Needs = {"solver.name": ("auto", "wave", "modal", "chain"), **HAS_WAVES}
 SOLVER_FEM: Needs = {"solver.name": ("fem",)}
-BLOW_MAP: Needs = {"solver.fidelity": ("blow-map",), **HAS_WAVES}
 ALL_RIGID: Needs = {"piston.model": ("rigid",), "bit.model": ("rigid",)}
 GRAVITY_ON: Needs = {"effects.gravity": (True,)}
 FEED_ON: Needs = {"effects.feed": (True,)}

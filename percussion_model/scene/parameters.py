@@ -28,7 +28,6 @@ from percussion_model.scene.bar_groups import (
 from percussion_model.scene.group import (
     ALL_RIGID,
     BARRIER_ON,
-    BLOW_MAP,
     CUTTINGS_ON,
     DRIVE_EXTERNAL,
     DRIVE_PRESSURE,
@@ -47,6 +46,7 @@ from percussion_model.scene.group import (
     STRING_ON,
     Parameters,
 )
+from percussion_model.scene.retired import BLOW_MAP, BLOW_MAP_TABLE
 from percussion_model.scene.rows import (
     SIMILAR_ENOUGH,
     Needs,
@@ -310,8 +310,8 @@ class SolverOptions(Parameters):
     )
     fidelity: str = choice(
         "wave",
-        ("wave", "rigid", "blow-map"),
-        "elastic waves, rigid bodies in place of elastic ones, or a table of blows",
+        ("wave", "rigid"),
+        "elastic waves, or rigid bodies in place of elastic ones",
         HAS_WAVES,
     )
     cells: int | None = count(
@@ -395,28 +395,6 @@ class FemOptions(Parameters):
     )
 
 
-def _edge(default: float, unit: str, description: str) -> float:
-    """Declare an edge of the blow map."""
-    found: float = quantity(default, unit, description, BLOW_MAP, gt=0, le=1e13)
-    return found
-
-
-class BlowMapOptions(Parameters):
-    """What the table of blows covers."""
-
-    velocity_from: float = _edge(4.0, "m/s", "least impact velocity")
-    velocity_to: float = _edge(12.0, "m/s", "greatest impact velocity")
-    feed_from: float = _edge(1000.0, "N", "least feed force")
-    feed_to: float = _edge(8000.0, "N", "greatest feed force")
-    force_from: float = _edge(1500.0, "N", "least drive force")
-    force_to: float = _edge(5000.0, "N", "greatest drive force")
-    stiffness_from: float = _edge(3e8, "N/m", "least loading stiffness of the rock")
-    stiffness_to: float = _edge(2e9, "N/m", "greatest loading stiffness of the rock")
-    density: float = quantity(
-        1.0, "-", "nodes along each axis, by the usual number", BLOW_MAP, gt=0, le=10
-    )
-
-
 class RunOptions(Parameters):
     """How long the scene runs."""
 
@@ -447,7 +425,6 @@ _BUILT_IN: dict[str, type[Parameters]] = {
     "start": Start,
     "solver": SolverOptions,
     "fem": FemOptions,
-    "blow_map": BlowMapOptions,
     "run": RunOptions,
 }
 
@@ -562,7 +539,10 @@ def unknown_key(key: str) -> str:
     counted = re.sub(r"\[([1-9][0-9]{0,3})\]", lambda place: f".{int(place[1]) - 1}", key)
     is_counted = counted != key and find_row(counted) is not None
     parent, _, name = key.rpartition(".")
+    is_retired = key.partition(".")[0] == BLOW_MAP_TABLE
     key = shortened(key, LONGEST_KEY)
+    if is_retired:
+        return f"{key}: {BLOW_MAP}"
     if is_counted:
         return f"unknown key {key}: did you mean {counted}? Scenes count from 0, FMUs from 1"
     prefix = generic_key(parent) + "." if parent else ""

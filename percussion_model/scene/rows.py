@@ -17,6 +17,8 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, Literal
 
+from percussion_model.scene.retired import remark
+
 Kind = Literal["number", "whole number", "flag", "choice", "sections", "rods"]
 
 # Of a key or of a parser's words, no more than this is repeated in a message.
@@ -275,7 +277,7 @@ def refuse_value(row: Row, key: str, value: Any) -> str:
     """Say that a value is not allowed, and what is."""
     number = isinstance(value, (int, float)) and not isinstance(value, bool)
     unit = unit_suffix(row.unit) if number else ""
-    return f"{key} = {show_value(value)}{unit}: must be {row.allowed}"
+    return f"{key} = {show_value(value)}{unit}: must be {row.allowed}{remark(key, value)}"
 
 
 def show_value(value: Any) -> str:

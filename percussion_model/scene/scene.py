@@ -16,7 +16,6 @@ from percussion_model.scene.group import Parameters
 from percussion_model.scene.parameters import (
     GROUPS,
     HOLE_DIAMETER,
-    BlowMapOptions,
     Contact,
     Drive,
     Effects,
@@ -32,6 +31,7 @@ from percussion_model.scene.parameters import (
     parameter_table,
     unknown_key,
 )
+from percussion_model.scene.retired import BLOW_MAP_TABLE
 from percussion_model.scene.rows import (
     REFUSED,
     Faults,
@@ -86,7 +86,6 @@ class Scene:
     start: Start
     solver: SolverOptions
     fem: FemOptions
-    blow_map: BlowMapOptions
     run: RunOptions
     # fields of the dataclass: those above, and groups that effects have added
     __annotations__ = (
@@ -111,8 +110,8 @@ class Scene:
                 kept[name] = group.read(values[name], name, faults)
             else:
                 kept[name] = _DEFAULTS[name]
-        for name in values:
-            if name not in kept:
+        for name, value in values.items():
+            if name not in kept and (name, value) != (BLOW_MAP_TABLE, {}):
                 faults.add(unknown_key, name)
         faults.refuse()
         refuse_contradictions(self)
@@ -240,8 +239,7 @@ class Scene:
 
         `SceneError` if the solver needs elastic bars and the scene has none.
         """
-        changes["solver.fidelity"] = "blow-map" if solver == "blow-map" else None
-        changes["solver.name"] = "auto" if solver == "blow-map" else solver
+        changes |= {"solver.fidelity": None, "solver.name": solver}
         if BODIES.get(solver) == "rigid":
             changes["bit.model"] = "rigid"
             if changes.get("piston.model", self.piston.model) == "elastic":
@@ -314,7 +312,7 @@ class Scene:
 
     @property
     def solver_name(self) -> str:
-        """Solver that computes the scene: "wave", "modal", "chain", "fem", "rigid", "blow-map"."""
+        """Solver that computes the scene: "wave", "modal", "chain", "fem" or "rigid"."""
         if self.bit.model == "elastic" and self.solver.fidelity != "wave":
             return str(self.solver.fidelity)
         if self.effects.string and self.solver.name == "auto":
@@ -461,7 +459,6 @@ def refuse_contradictions(scene: Scene) -> None:
         values_of(scene),
         bodies,
         has_rods=bool(scene.string.rods),
-        has_effects=any(scene[f"effects.{effect.name}"] for effect in EFFECTS),
         is_barrier_given="barrier" in scene.effects._given,
     )
     if found != Rule.NOTHING:

@@ -27,7 +27,7 @@ def register_name(name: str, bodies: Literal["elastic", "rigid"] | None = None) 
     bodies : {"elastic", "rigid"}, optional
         What `bit.model` must be for this solver; either if left out.
     """
-    if name in SOLVER_NAMES or name == "blow-map":
+    if name in SOLVER_NAMES:
         raise ValueError(f"solver.name = {name!r}: there is a solver of this name")
     SOLVER_NAMES.append(name)
     if bodies is not None:

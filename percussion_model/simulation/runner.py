@@ -177,8 +177,6 @@ class Runner:
         if status == _DONE or (status in _FULL and (n_blows or n_events)):
             return status, n_blows
         where = f"at t = {self.solver.time(self._state)!r} s"
-        if status == Status.REFUSED:
-            raise SimulationError(f"after t = {self._time!r} s {self.solver.refusal(self._state)}")
         if status == Status.NOT_FINITE:
             raise SimulationError(f"{where} the state is no longer finite: check the scene")
         reason = Status(status).name.lower()

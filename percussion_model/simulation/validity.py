@@ -16,8 +16,6 @@ MOST_RESIDUAL = 1e-6
 LEAST_NUMERICAL = -1e-9
 # ... and above this share of the energy put in it shows in peaks and rates.
 MOST_NUMERICAL = 1e-2
-# Between the nodes of a blow map energy is kept as well as the map is interpolated.
-MOST_MAP_RESIDUAL = 1e-2
 # Buttons of a percussive bit stand out by 5 to 15 mm; deeper in, its face meets the rock,
 # which the model does not have [m].
 BUTTON_LENGTH = 0.010
@@ -30,21 +28,18 @@ MOST_BARRIER = 0.1
 LONGEST_FLIGHT = 0.25
 
 
-def ledger_note(residual: float, solver: str) -> Iterator[str]:
+def ledger_note(residual: float) -> Iterator[str]:
     """Say that a share of the energy put in is unexplained, where it is."""
-    mapped = solver == "blow-map"
-    if not abs(residual) <= (MOST_MAP_RESIDUAL if mapped else MOST_RESIDUAL):
+    if not abs(residual) <= MOST_RESIDUAL:
         yield (
             f"the energy ledger does not close: {residual:.2g} of the energy put in is "
-            "unexplained; "
-            + ("raise blow_map.density" if mapped else "this is an error of the solver")
+            "unexplained; this is an error of the solver"
         )
 
 
 def numerical_note(share: float, solver: str) -> Iterator[str]:
     """Say that the discretisation took too much of the energy put in, or gave some."""
-    least = -MOST_MAP_RESIDUAL if solver == "blow-map" else LEAST_NUMERICAL
-    if not share >= least:
+    if not share >= LEAST_NUMERICAL:
         yield (
             f"numerical is {share:.2g} of the energy put in: the discretisation gives energy, "
             "which it cannot; this is an error of the solver"

@@ -7,18 +7,12 @@ from __future__ import annotations
 
 from concurrent.futures import ProcessPoolExecutor
 
-import numpy as np
-
 from percussion_model.scene.scene import Scene
 from percussion_model.simulation.orphans import end_with_parent
 from percussion_model.simulation.simulate import Simulation
-from percussion_model.solvers.blow_map.records import ENTRIES
-from percussion_model.solvers.blow_map.solver import BlowMapSolver
-from percussion_model.solvers.blow_map.table import BlowTable, Nodes, fixed_values
 
 # Long enough for a contact, a change of mode and a reading [s].
 SHORT = 1e-4
-COARSE = {"blow_map.density": 0.1}
 SOLVERS = ("wave", "modal", "fem", "rigid")
 
 
@@ -34,19 +28,11 @@ def compile_kernels(solver: str) -> str:
     return solver
 
 
-def compile_blow_map() -> str:
-    """Make the solver of the blow map, which compiles its kernels, on a table of no blows."""
-    scene = Scene().computed_by("blow-map", **COARSE)
-    nodes = Nodes.of(scene)
-    table = BlowTable(nodes, np.zeros((*nodes.counts, ENTRIES)), fixed_values(scene), {}, 0.0)
-    return BlowMapSolver(scene, table).name
-
-
 def main() -> None:
     """Compile the kernels of all solvers, two at a time."""
     with ProcessPoolExecutor(max_workers=2, initializer=end_with_parent) as pool:
         jobs = [pool.submit(compile_kernels, solver) for solver in SOLVERS]
-        for job in [*jobs, pool.submit(compile_blow_map)]:
+        for job in jobs:
             job.result()
 
 

@@ -159,7 +159,7 @@ def _about_flight(result: Result) -> Iterator[str]:
 
 def _about_validity(result: Result) -> Iterator[str]:
     if any(result.energy[name] for name in _FLOWS):
-        yield from ledger_note(result.energy["residual_relative"], result.solver)
+        yield from ledger_note(result.energy["residual_relative"])
         yield from numerical_note(result.energy["numerical_relative"], result.solver)
     yield from guard_notes(result.statistics)
     scene = result.scene
@@ -168,8 +168,7 @@ def _about_validity(result: Result) -> Iterator[str]:
     if scene.effects.rock != "wall" and len(result.blows):
         peak = float(result.blows["peak_bit_force"].max())
         yield from button_note(peak, stiffness_at(scene, peak, scene.rock.loading_stiffness))
-    if result.solver != "blow-map":  # there the bit stands on the rock between blows
-        yield from flight_note(longest_flight(result))
+    yield from flight_note(longest_flight(result))
     yield from rate_note(result.rate_of_penetration)
     if scene.loss_on and scene.loss.time > scene.bit.transit_time:
         yield (

@@ -232,10 +232,6 @@ class Solver(ABC):
         """Cells or elements in each section of an elastic bar."""
         return []
 
-    def refusal(self, state: State) -> str:
-        """Why the solver ended with `Status.REFUSED`."""
-        return ""
-
     def statistics(self, state: State) -> dict[str, int]:
         """Counts of what the solver did."""
         s = state.record[0]
@@ -267,7 +263,6 @@ _REGISTRY = {
     "chain": Entry(f"{_HERE}.chain.solver", "ChainSolver", "run"),
     "fem": Entry(f"{_HERE}.fem.solver", "FemSolver", "run"),
     "rigid": Entry(f"{_HERE}.rigid.solver", "RigidSolver", "advance"),
-    "blow-map": Entry(f"{_HERE}.blow_map.solver", "make_map_solver", "advance"),
 }
 
 

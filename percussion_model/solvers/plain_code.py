@@ -35,7 +35,6 @@ for _function in (
     solver_choice.why_waves,
     contradictions.find_contradiction,
     contradictions._in_string,
-    contradictions._in_fidelity,
     contradictions._in_accuracy,
     setup.barrier_on,
     setup.kelvin_voigt_time,
@@ -111,26 +110,3 @@ def _effects(p, values):
             numbers = _and_number(numbers, f"{effect.name}_{name}")
         fill = _and_effect(fill, effect.name, numbers)
     return lambda p, values: fill(p, values)
-
-
-def _or_effect(before: Callable, name: str) -> Callable:
-    switch = f"effects_{name}"
-
-    @composed
-    def either(values: Any) -> bool:
-        return before(values) or values[switch] != 0
-
-    return either
-
-
-@composed
-def _none(values: Any) -> bool:
-    return False
-
-
-@overload(setup.any_effect)
-def _any(values):
-    either = _none
-    for effect in EFFECTS:
-        either = _or_effect(either, effect.name)
-    return lambda values: either(values)

@@ -170,11 +170,6 @@ def fill_cuttings(p: Any, values: Any) -> None:
         p["power"] = 1
 
 
-def any_effect(values: Any) -> bool:
-    """Whether an effect is on that holds a force."""
-    return any(getattr(values, f"effects_{effect.name}") for effect in EFFECTS)
-
-
 def fill_effects(p: Any, values: Any) -> None:
     """Fill the parameters of effects that hold a force."""
     for effect in EFFECTS:

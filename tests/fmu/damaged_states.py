@@ -31,9 +31,7 @@ from fmu_src.parts import pneumatic_drive
 from fmu_src.parts.build import PARTS, build_part
 from fmu_src.slave.states import HEADER, PLACE, START, pack
 from percussion_model import Scene
-from percussion_model.analysis.blow_maps import make_map
 from scenarios.harness import Instance
-from tests.blow_map_scenes import mapped
 
 STEP = 1.9e-3
 STEPS = 3  # after a state that was taken
@@ -56,7 +54,6 @@ KINDS: dict[str, dict[str, Any]] = {
     "PercussiveHammer": {},
     "RigidHammer": {},
     "FemHammer": {},
-    "MapHammer": {},
     "NumbaHammer": {},
     "NumbaRigidHammer": {},
     **{name: {} for name in PARTS},
@@ -76,8 +73,6 @@ def build(names: Sequence[str], folder: Path) -> dict[str, str]:
                 build_part(PARTS[base], path)
             elif base == "PneumaticDrive":
                 build_part(pneumatic_drive.TABLE, path)
-            elif base == "MapHammer":
-                build_hammer(mapped(), path, make_map(mapped(), workers=1))
             else:
                 changes = {
                     "PercussiveHammer": {},

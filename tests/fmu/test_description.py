@@ -110,7 +110,7 @@ def test_the_interface_keeps_its_names_and_references():
 def test_every_parameter_of_the_table_can_be_set():
     names = {one.key or one.row.key for one in hammer_variables(Scene()) if one.row is not None}
     for row in parameter_table():
-        if row.kind in ("sections", "rods") or row.key.startswith(("run.", "blow_map.")):
+        if row.kind in ("sections", "rods") or row.key.startswith("run."):
             continue
         if row.key.startswith("string.rods."):
             continue  # this scene has none: tests/fmu/test_top_hammer_fmu.py

@@ -11,7 +11,7 @@ from fmu_src.commands import options
 from fmu_src.hammer.build import hammer_name
 from fmu_src.system.archive import SYSTEMS, build_fmus, read_plan
 from percussion_model.scene.presets import scene_presets
-from percussion_model.scene.scene import Scene, SceneError
+from percussion_model.scene.scene import SceneError
 from tests.commands import percussion
 
 RIGID = scene_presets()["rigid"]
@@ -99,17 +99,6 @@ def test_a_file_that_is_no_fmu_is_not_replaced(dist, tmp_path):
 def test_names_are_identifiers(scene, name):
     assert hammer_name(Path(scene)) == name
     assert name.removesuffix(".fmu").isidentifier()
-
-
-def test_a_table_makes_another_fmu(tmp_path):
-    """With and without a blow map are two, though the scene is one."""
-    from fmu_src.hammer.build import build_hammer, refuse_other
-
-    path = tmp_path / "A.fmu"
-    build_hammer(Scene(), path)
-    refuse_other(path, Scene(), with_map=False)
-    with pytest.raises(SceneError, match="holds another FMU"):
-        refuse_other(path, Scene(), with_map=True)
 
 
 def test_a_folder_is_no_fmu(tmp_path, capsys):

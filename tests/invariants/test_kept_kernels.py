@@ -155,3 +155,19 @@ def test_a_folder_for_temporary_files_that_others_can_write_is_not_used(tmp_path
     user_cache._temporary.cache_clear()
     assert found != planted
     assert found.stat().st_mode & 0o077 == 0
+
+
+def test_without_a_home_the_folder_for_temporary_files_serves(tmp_path, monkeypatch, caplog):
+    def no_home():
+        raise RuntimeError("Could not determine home directory.")
+
+    for name in ("PERCUSSION_CACHE", "XDG_CACHE_HOME", "LOCALAPPDATA"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(Path, "home", no_home)
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    user_cache._temporary.cache_clear()
+    found = user_cache.cache_folder()
+    assert found.is_relative_to(tmp_path)
+    assert found.parent.stat().st_mode & 0o077 == 0
+    assert "home directory" in caplog.text
+    user_cache._temporary.cache_clear()

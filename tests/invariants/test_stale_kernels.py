@@ -16,8 +16,6 @@ FORCES = """
 import json
 import numpy as np
 from percussion_model.physics.records import DriveKind, Piston
-from percussion_model.solvers.blow_map.flight import move
-from percussion_model.solvers.blow_map.records import MAP_PAR, MAP_STATE
 from percussion_model.solvers.fem.records import FEM_PAR, FEM_STATE, Mesh, Node, Trial
 from percussion_model.solvers.fem.scheme import load
 from percussion_model.solvers.rigid.forces import contact_force
@@ -43,9 +41,6 @@ load(par[0], state[0], nodes, mesh, x, 1.0)
 found["fem"] = x[Trial.RE, 0]
 par, state = records(RIGID_PAR, RIGID_STATE)
 found["rigid"] = contact_force(par[0], state[0], 0.0)
-par, state = records(MAP_PAR, MAP_STATE)
-move(par[0], state[0], 1.0)
-found["blow-map"] = state["i_drive"][0]
 print(json.dumps(found))
 """
 
@@ -67,16 +62,16 @@ def test_every_solver_sees_an_edit_of_a_function_that_its_kernels_call(tmp_path)
         found = [path for path in package.rglob("*.nb[ci]") if path.parent.name == "__pycache__"]
         return {path: path.stat().st_mtime_ns for path in found}
 
-    assert forces() == dict.fromkeys(("wave", "fem", "rigid", "blow-map"), 7.0)
+    assert forces() == dict.fromkeys(("wave", "fem", "rigid"), 7.0)
     compiled = kernels()
     # kept, so that they could be stale
-    assert {"leaps", "fem", "rigid", "blow_map"} <= {path.parent.parent.name for path in compiled}
+    assert {"leaps", "fem", "rigid"} <= {path.parent.parent.name for path in compiled}
     callee = package / "physics" / "drive.py"
     text = callee.read_text(encoding="utf-8")
     assert "return s.external\n" in text
     callee.write_text(text.replace("return s.external\n", "return s.external + 1000.0\n"))
-    assert forces() == dict.fromkeys(("wave", "fem", "rigid", "blow-map"), 1007.0)
+    assert forces() == dict.fromkeys(("wave", "fem", "rigid"), 1007.0)
     assert kernels() != compiled
     callee.write_text(text, encoding="utf-8")
-    assert forces() == dict.fromkeys(("wave", "fem", "rigid", "blow-map"), 7.0)
+    assert forces() == dict.fromkeys(("wave", "fem", "rigid"), 7.0)
     assert kernels() == compiled  # back with their sources, and not compiled again

@@ -61,8 +61,7 @@ int64_t kernel_check_base(const int64_t *image, int64_t *notes) {
     return gap > 50.0 ? fault(notes, 5, gap, 2.0) : 0;
 }
 
-int64_t kernel_create_base(const int64_t *image, const double *map, int64_t map_size,
-                           int64_t **motion, int64_t *notes) {
+int64_t kernel_create_base(const int64_t *image, int64_t **motion, int64_t *notes) {
     double place = own(image, 4);
     Motion *made = (Motion *)(intptr_t)native_allocate(sizeof *made);
     *motion = (int64_t *)made;
@@ -78,9 +77,6 @@ int64_t kernel_create_base(const int64_t *image, const double *map, int64_t map_
     made->shared_at = sizeof *made; /* nothing is shared */
     made->rock_at_start = value(image, STIFFNESS);
     made->moving.force = value(image, FEED_FORCE);
-    for (int64_t k = 0; k < map_size; k++) {
-        made->rock_at_start += map[k];
-    }
     return 0;
 }
 

@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import fmpy
-import numpy as np
 
 from fmu_src.hammer.variables import hammer_variables
 from fmu_src.native.tables import FILE, model_tables
@@ -92,9 +91,9 @@ def build_host(folder: Path, flags: Sequence[str] = ()) -> Path:
     )
 
 
-def write_resources(folder: Path, blow_map: np.ndarray | None = None) -> Path:
+def write_resources(folder: Path) -> Path:
     """Folder with the toy's tables."""
     folder.mkdir(parents=True, exist_ok=True)
-    tables = model_tables(toy_scene(), GUID, blow_map, FAULTS, NOTES)
+    tables = model_tables(toy_scene(), GUID, FAULTS, NOTES)
     (folder / FILE).write_bytes(tables)
     return folder

@@ -29,11 +29,11 @@ def without_compilers(monkeypatch):
     monkeypatch.setattr(native.importlib.util, "find_spec", lambda name: None)
 
 
-def bake(scene, path, with_map=False):
+def bake(scene, path):
     """A native FMU with a library that is none."""
     write_native_fmu(
         path, "2.0", about_hammer(scene, Path("A.fmu")), scene, {HOST: b""},
-        lambda guid: model_tables(scene, guid), with_map,
+        lambda guid: model_tables(scene, guid),
     )  # fmt: skip
 
 
@@ -69,12 +69,10 @@ def test_the_fmu_of_another_scene_is_not_replaced(tmp_path, monkeypatch, capsys)
     assert f"{path}: holds another FMU than that of this scene" in said
     assert path.read_bytes() == before
     assert list(tmp_path.iterdir()) == [path]
-    refuse_other(path, rigid, with_map=False)
+    refuse_other(path, rigid)
     with pytest.raises(SceneError, match="holds another FMU"):
-        refuse_other(path, rigid, with_map=True)
-    bake(rigid, path, with_map=True)
-    refuse_other(path, rigid, with_map=True)
-    refuse_other(path, Scene(), with_map=False, force=True)
+        refuse_other(path, Scene())
+    refuse_other(path, Scene(), force=True)
 
 
 def test_two_files_go_to_a_folder(tmp_path, capsys):

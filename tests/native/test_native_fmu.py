@@ -23,7 +23,6 @@ from fmu_src.native.compare import fmu_outputs, package_outputs
 from percussion_model import Scene
 from percussion_model.scene.numbers import section_numbers
 from percussion_model.solvers.cells import find_cell
-from tests.blow_map_scenes import mapped
 
 VERSIONS = ("2.0", "3.0")
 STEP = 2.0**-10
@@ -95,20 +94,9 @@ def test_outputs_are_those_of_the_package_to_the_last_bit(write, name, version):
         assert there[-1, list(OUTPUTS).index("blow_count")] >= 3
 
 
-def test_a_blow_map_comes_along(write, tmp_path, monkeypatch, capfd):
-    """And says, as the package does, why it does not answer, or why it is none for a scene."""
-    monkeypatch.setenv("PERCUSSION_CACHE", str(tmp_path / "cache"))
-    scene = mapped(blow_map__density=0.1)
-    path = write(scene, "2.0")
-    there, here = fmu_outputs(path), package_outputs(scene)
-    assert same(there, here) == []
-    assert there[-1, list(OUTPUTS).index("blow_count")] >= 3
-    assert "feed.force = 9000 N: the blow map covers 2000 to 3500 N" in told(
-        path, capfd, feed_force=9000.0
-    )
-    assert "made for other sections" in told(path, capfd, **{"bit.sections[1].length": 0.4})
-    plain = write(Scene(), "2.0")
-    assert "this FMU brings no blow map" in told(plain, capfd, **{"solver.fidelity": 3})
+def test_the_blow_map_is_retired(write, capfd):
+    said = told(write(Scene(), "2.0"), capfd, **{"solver.fidelity": 3})
+    assert 'solver.fidelity = 3: must be one of "wave", "rigid"; the blow map is retired' in said
 
 
 def told(path, capfd, **start_values):
@@ -191,7 +179,6 @@ INSIDE = {
 SOLVERS = {
     "modal": {}, "wave": SCENES["waves"], "fem": SCENES["elements"],
     "rigid": SCENES["rigid bodies"], "chain": SCENES["string"],
-    "blow-map": mapped(blow_map__density=0.1).given_values(),
 }  # fmt: skip
 
 

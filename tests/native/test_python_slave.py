@@ -25,7 +25,6 @@ from fmu_src.native.compare import STEP, STEPS, fmu_outputs, package_outputs
 from fmu_src.slave.native import library_name, this_platform
 from percussion_model import Scene
 from scenarios.harness import Instance
-from tests.blow_map_scenes import mapped
 
 ROOT = Path(__file__).parents[2]
 # Real outputs that a host of plain Python reads.
@@ -45,9 +44,9 @@ SCENES = {
 def write(library, tmp_path):
     """Writes the FMU of a scene with the library of this machine."""
 
-    def one(scene, name="Hammer", blow_map=None):
+    def one(scene, name="Hammer"):
         path = tmp_path / f"{name}.fmu"
-        build_hammer(scene, path, blow_map, library)
+        build_hammer(scene, path, library)
         return path
 
     return one
@@ -66,14 +65,6 @@ def test_outputs_are_those_of_the_package_to_the_last_bit(write, name):
     there = fmu_outputs(path)
     assert differing(there, package_outputs(scene)) == []
     assert there[-1, list(OUTPUTS).index("blow_count")] >= 3
-
-
-def test_a_blow_map_comes_along(write):
-    from percussion_model.solvers.blow_map.builder import get_table
-
-    scene = mapped(blow_map__density=0.1)
-    path = write(scene, blow_map=get_table(scene))
-    assert differing(fmu_outputs(path), package_outputs(scene)) == []
 
 
 def test_other_scenes_have_tables_of_their_own(write):

@@ -21,7 +21,7 @@ from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
 from fmpy.fmi3 import FMU3Slave
 
 from fmu_src.hammer.variables import LEFT_OUT, hammer_variables
-from fmu_src.native.tables import FILE, LAST, model_tables, scene_image
+from fmu_src.native.tables import LAST, model_tables, scene_image
 from fmu_src.native.variables3 import TIME, array_name, fmi3_variables
 from percussion_model import Scene
 from percussion_model.scene.numbers import numbers_of, scene_numbers
@@ -372,13 +372,3 @@ def test_the_library_gives_only_fmi(toy):
     assert hasattr(library, "fmi3GetVersion")
     for name in ("refuse", "get_values", "free_motion", "kernel_step_base"):
         assert not hasattr(library, name)
-
-
-def test_a_map_reaches_the_kernel(toy, tmp_path):
-    folder = build.write_resources(tmp_path / "resources", np.array([1.0, 2.5]))
-    one = FMU2Toy(toy["plain"][0], folder)
-    one.setupExperiment(startTime=0.0)
-    one.enterInitializationMode()
-    assert one.getReal([223]) == [7.5e8 + 3.5]
-    one.fmi2FreeInstance(one.component)
-    assert (folder / FILE).stat().st_size < 30_000

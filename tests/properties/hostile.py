@@ -81,7 +81,7 @@ def _large_scene(chance: random.Random) -> bytes:
         b"[solver]\ncells = %d\n" % count,
         b'[solver]\nname = "fem"\n[fem]\nelements = %d\n' % count,
         b"[solver]\naccuracy = 1e-4\n" + section % b"1000",
-        b'[solver]\nfidelity = "blow-map"\n[blow_map]\ndensity = 10\nforce_to = 1e13\n',
+        b'[solver]\nfidelity = "blow-map"\n[blow_map]\ndensity = 10\nforce_to = 1e13\n',  # retired
         b'title = "%s"' % (b"t" * count),
         b'title = "a%sb"' % chance.choice([b"\\u0000", b"\\u001b[31m", b"\\uffff", b"\\n"]),
         b'"%s" = 1' % (b"k" * count),
@@ -106,12 +106,8 @@ def draw_scene(chance: random.Random) -> bytes:
 def check_scene(path: Path) -> str:
     """Read a scene and run it for a little while; what became of it."""
     from percussion_model import Scene, Simulation
-    from percussion_model.solvers.blow_map.table import Nodes
 
     scene = Scene.from_toml(path)
-    if scene.solver_name == "blow-map":
-        Nodes.of(scene)
-        return "read"
     bars = [bar for bar in (scene.piston, scene.bit) if bar.model == "elastic"]
     if bars:
         first = bars[0].transit_time

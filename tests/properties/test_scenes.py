@@ -98,8 +98,7 @@ def test_cases_cover_solvers_effects_and_parameters():
         ):
             found = {scene[key] for scene in scenes}
             allowed = set(row.choices) if row.kind == "choice" else {True, False}
-            # a blow map takes a minute to make: tests/test_blow_map.py has its random points
-            assert found == allowed - {"blow-map"}, key
+            assert found == allowed, key
     for key, (low, high, *more) in WIDE.items():
         values = np.array([scene[key] for scene in scenes if scene[key] is not None])
         sizes = np.abs(values[values != 0.0])

@@ -117,13 +117,6 @@ def test_a_ledger_that_is_open_at_any_step():
     assert "whatever the step" in verdict.text
 
 
-def test_a_ledger_of_a_blow_map_is_interpolated():
-    run = made_up(hammer__energy_residual=late(3e-4))
-    assert run.verdict.word == "not balanced"
-    run.by_map = True
-    assert run.verdict.word == "balanced"
-
-
 def test_a_balance_of_nan_is_no_balance():
     assert made_up(hammer__energy_residual=late(np.nan)).verdict.is_bad
 

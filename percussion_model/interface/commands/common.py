@@ -67,7 +67,7 @@ SceneFile = Annotated[
     Path, typer.Argument(metavar="SCENE", help="A scene file (TOML), or a preset, as reference.")
 ]
 SolverName = Annotated[
-    Literal["wave", "modal", "chain", "fem", "rigid", "blow-map"] | None,
+    Literal["wave", "modal", "chain", "fem", "rigid"] | None,
     typer.Option("--solver", help="Solver; rigid makes piston and bit rigid."),
 ]
 Cells = Annotated[

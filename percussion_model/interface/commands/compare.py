@@ -8,7 +8,6 @@ from typing import Annotated
 import typer
 
 from percussion_model.interface.commands import common
-from percussion_model.interface.commands.blow_map import prepare_map
 
 
 def compare(
@@ -48,8 +47,6 @@ def compare(
             "compare", out, Path("out") / f"{scene.stem}-compared", force,
             scene=chosen, solvers=names, duration=duration, settle=settle,
         )  # fmt: skip
-    if "blow-map" in names:
-        prepare_map(chosen.computed_by("blow-map"), duration)
     common.tell_of_compiling(*names)
     end = chosen.run.duration if duration is None else duration
     with progress_bar(end * len(names)) as bar:

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from percussion_model.interface.commands import common
-from percussion_model.interface.commands.blow_map import prepare_map, warn_of_outside
 from percussion_model.scene.hammers import hammers
 
 if TYPE_CHECKING:
@@ -60,7 +59,6 @@ def run(
     made_from |= {"trace": trace, "error_estimate": error_estimate}
     claimed = None if out is None else common.claim("run", out, None, force, **made_from)
     end = chosen.run.duration if duration is None else duration
-    prepare_map(chosen, duration)
     with progress_bar(end) as bar:
         result = simulate(
             chosen,
@@ -114,7 +112,6 @@ def settled(
 
     common.check_json(json_file)
     chosen = common.load_scene(scene, solver, cells, settings, rock=rock)
-    prepare_map(chosen)
     with progress("preparing") as report:
         found = run_until_settled(
             chosen,
@@ -138,15 +135,13 @@ def explain(
     rock: common.RockName = None,
     json_file: common.JsonFile = None,
 ) -> None:
-    """Tell what a scene computes, how, and what the run will cost; makes no blow map."""
+    """Tell what a scene computes, how, and what the run will cost."""
     from percussion_model.analysis.cost import explained, forecast
     from percussion_model.interface.progress import progress
     from percussion_model.interface.terminal import show_explanation
 
     chosen = common.load_scene(scene, solver, cells, settings, accuracy, check, rock=rock)
     common.check_json(json_file)
-    if chosen.solver_name == "blow-map":
-        warn_of_outside(chosen)
     with progress("trying the first blows"):
         found = forecast(chosen)
     common.write_json(json_file, explained(chosen, found))
@@ -193,7 +188,6 @@ def plot(
         made_from = _made_from(scene, duration, settle)
         # its figures belong to the result of that run, and may stand beside it
         claimed = common.claim("run", out, Path("out") / source.stem, force, **made_from)
-        prepare_map(scene, duration)
         with progress_bar(scene.run.duration if duration is None else duration) as bar:
             result = simulate(scene, duration, settle, progress=bar, stage=bar.stage)
     with progress("drawing") as report:

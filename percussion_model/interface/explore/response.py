@@ -72,11 +72,6 @@ def refuse_scene(scene: Scene) -> None:
             "effects.string = true: blows of a drill string settle too slowly to follow a slider; "
             "take `percussion run`"
         )
-    if scene.solver_name == "blow-map":
-        raise SceneError(
-            'solver.fidelity = "blow-map": a new table for each length takes minutes; set '
-            'solver.fidelity = "wave" or "rigid"'
-        )
 
 
 def respond(

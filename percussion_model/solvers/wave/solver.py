@@ -32,7 +32,6 @@ from percussion_model.solvers.wave.records import (
     WAVE_PAR,
     WAVE_STATE,
     Bars,
-    Coef,
     LeapKind,
     Row,
     Scratch,
@@ -41,7 +40,6 @@ from percussion_model.solvers.wave.records import (
 )
 from percussion_model.solvers.wave.resolution import coarser_cells
 from percussion_model.solvers.wave.shared import cut_bars, leap_operators
-from percussion_model.solvers.wave.totals import resync
 
 _WORD = words_of(WAVE_STATE)
 LEAP_END, STEP, T_BASE = _WORD["leap_end"], _WORD["step"], _WORD["t_base"]
@@ -118,19 +116,10 @@ class WaveSolver(Solver):
         entry_of(fill_wave_start)(self._par, state.record, self._bars(state), self._numbers)
         return state
 
-    def derive(self, state: State) -> None:
-        """Derive the mean velocities and u_r of a state whose gap and waves were set."""
-        resync(self._par[0], state.record[0], self._bars(state))
-
     @property
     def place_of_closure(self) -> float:
         """Share of a step after which a closure comes best (docs/numerics.md, eq. 14b)."""
         return float(self._par[0]["front"])
-
-    @property
-    def static_wave(self) -> np.ndarray:
-        """Down-going wave of a bit at rest under unit body acceleration, by cell [s]."""
-        return self._cb[Coef.STATIC, : self.cells["bit"]]
 
     def _run(
         self, task: Task, state: State, time: float, blows: np.ndarray, events: np.ndarray,

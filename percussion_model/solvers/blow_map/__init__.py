@@ -1,1 +1,0 @@
-"""A table of blows, and closed-form flight between them."""
