@@ -34,6 +34,8 @@ MODEL_FILES = (
     "simulation/validity.py",
     "solvers/**/*.py",
 )
+# What parts take of it.
+PART_FILES = ("__init__.py", "scene/__init__.py", "scene/rows.py", "scene/retired.py")
 LIBRARY_FILES = (
     "_version.py",
     "default_experiment.py",
@@ -91,7 +93,7 @@ def stage(prefix: str, folder: str, with_model: bool) -> Bundle:
             path = source.relative_to(ADAPTERS).as_posix()
             if path != START and not (pattern.startswith(folder) and source.name in BUILD_FILES):
                 inner[f"fmu_src/{path}"] = _read(source)
-    patterns = MODEL_FILES if with_model else ("__init__.py", "scene/__init__.py", "scene/rows.py")
+    patterns = MODEL_FILES if with_model else PART_FILES
     for pattern in patterns:
         for source in sorted(MODEL.glob(pattern)):
             inner[f"percussion_model/{source.relative_to(MODEL).as_posix()}"] = _read(source)

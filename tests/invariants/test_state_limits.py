@@ -79,7 +79,7 @@ OF_MODES = (
 @pytest.mark.parametrize(
     ("field", "value"),
     [("mode", 5), ("mode", -1), ("alpha", 2), ("closed", 2), ("live", 0), ("armed", -1),
-     ("parity", 1000), ("piston_parity", -1), ("leap_kind", 3), ("next_kind", 14), ("next", 4)],
+     ("parity", 1000), ("piston_parity", -1), ("leap_kind", 3), ("next_kind", 14)],
 )  # fmt: skip
 def test_no_index_leads_out_of_an_array(runs, field, value):
     having = [one for one in runs.values() if field in one[1].state.dtype.names]
@@ -92,9 +92,16 @@ def test_no_index_leads_out_of_an_array(runs, field, value):
 def test_numbers_are_finite(runs, name):
     run, good = runs[name]
     dtype = good.state.dtype
-    may_be_infinite = {"gap", "t_open", "peak_from", "next_time", "next_tau", "t_next", "rest"}
-    may_be_infinite |= {"refused_value", "late_from", "line_end"}
-    undefined = {*COMMON_UNDEFINED, "ss_force", "refused_value"}
+    may_be_infinite = {
+        "gap",
+        "t_open",
+        "peak_from",
+        "next_time",
+        "next_tau",
+        "late_from",
+        "line_end",
+    }
+    undefined = {*COMMON_UNDEFINED, "ss_force"}
     if name == "rigid":
         undefined |= {"peak_contact_force"}
     for field in dtype.names:

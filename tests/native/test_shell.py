@@ -230,13 +230,13 @@ def test_the_image_has_the_numbers_of_the_scene():
         rest += [numbers.joints.ravel(), [float(starts[name]) for name in LAST]]
         wanted = np.array(counts, "<i8").tobytes() + scene_numbers(scene).tobytes()
         wanted += np.concatenate(rest).astype("<f8").tobytes()
-        tables = model_tables(scene, build.GUID, None, build.FAULTS, build.NOTES)
+        tables = model_tables(scene, build.GUID, build.FAULTS, build.NOTES)
         assert wanted in tables
         assert len(scene_image(scene).words) == len(wanted) // 8 + 1
 
 
 def test_tables_are_the_same_each_time():
-    assert len({model_tables(build.toy_scene(), build.GUID, None, build.FAULTS, build.NOTES)
+    assert len({model_tables(build.toy_scene(), build.GUID, build.FAULTS, build.NOTES)
                 for _ in range(2)}) == 1  # fmt: skip
 
 

@@ -16,7 +16,7 @@ from fmu_src.system.archive import (
 )
 from percussion_model import Scene
 from percussion_model.coupling import Coupling, CouplingError
-from percussion_model.coupling.coupled_run import summary
+from percussion_model.coupling.coupled_run import known_signals, summary
 
 DURATION = 1.5  # [s]: some thirty blows
 ONE_ROCK = {
@@ -39,7 +39,8 @@ def system(tmp_path_factory):
 
 
 def test_energy_and_momentum_balance(system):
-    run = Coupling(system, ONE_ROCK | {FIDELITY: "wave"}).run(DURATION, 1e-3)
+    coupling = Coupling(system, ONE_ROCK | {FIDELITY: "wave"})
+    run = coupling.run(DURATION, 1e-3, known_signals(coupling.outputs))
     assert run.error == ""
     found = summary(run)
     assert run.verdict.word == "balanced"
