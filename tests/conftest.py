@@ -25,10 +25,10 @@ os.environ.setdefault(
     "PERCUSSION_FMU_CACHE",
     str(Path(os.environ.get("NUMBA_CACHE_DIR") or tempfile.gettempdir()) / "percussion_fmu"),
 )
-# Tables of blows are shared like compiled kernels, and never the user's own.
+# The cache is shared like compiled kernels, and never the user's own.
 os.environ.setdefault(
     "PERCUSSION_CACHE",
-    str(Path(os.environ.get("NUMBA_CACHE_DIR") or tempfile.gettempdir()) / "percussion_maps"),
+    str(Path(os.environ.get("NUMBA_CACHE_DIR") or tempfile.gettempdir()) / "percussion_cache"),
 )
 
 

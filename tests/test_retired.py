@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pickle
+
 import pytest
 
 from percussion_model import Scene, SceneError, simulate
@@ -64,6 +66,12 @@ def test_its_fidelity_is_refused_with_those_there_are(tmp_path):
     for work in (lambda: Scene().computed_by("blow-map"), lambda: read_solvers("blow-map")):
         with pytest.raises(SceneError, match="the blow map is retired"):
             work()
+
+
+def test_pickles_of_scenes_that_had_its_table_are_refused():
+    """As pickle makes the group again."""
+    with pytest.raises(SceneError, match="pickled by an earlier version"):
+        pickle.loads(b"cpercussion_model.scene.parameters\nBlowMapOptions\n)\x81.")
 
 
 def test_files_of_percussion_new_are_read_still(tmp_path):

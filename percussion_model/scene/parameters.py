@@ -13,7 +13,7 @@ import math
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
-from typing import Any
+from typing import Any, Self
 
 from percussion_model.physics.effects import EFFECTS, Effect
 from percussion_model.scene.bar_groups import (
@@ -406,6 +406,14 @@ class RunOptions(Parameters):
     error_estimate: bool = flag(
         True, "estimate the error of the rate of penetration by short runs on coarser cells"
     )
+
+
+class BlowMapOptions:
+    """A group of earlier versions, which their pickles name: these are refused."""
+
+    def __new__(cls) -> Self:
+        """Refuse."""
+        raise SceneError("a scene or a state pickled by an earlier version: compute it anew")
 
 
 # --------------------------------------------------------------------- the whole table
