@@ -371,7 +371,7 @@ def test_rigid_scenes_are_refused_before_anything_is_compiled(bar, tmp_path, mon
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("method", ["modal", "explicit", "exact-flow", "cvode", "lsoda"])
+@pytest.mark.parametrize("method", ["modal", "explicit", "exact-flow", "lsoda"])
 @pytest.mark.parametrize("change", ["effects.rock=power", "effects.cuttings=true"])
 def test_a_method_that_has_no_such_law_is_refused_before_anything_is_compiled(
     method, change, tmp_path, monkeypatch
@@ -391,7 +391,7 @@ def test_a_method_that_has_no_such_law_leaves_a_note_where_none_was_named():
     assert modes.ladder == "modal"
     with pytest.raises(SceneError, match="bars have modes on a rock of one stiffness"):
         modes.peer(modes.scene)
-    assert [rung.ladder for rung in rungs] == ["explicit", "exact-flow", "cvode"]
+    assert [rung.ladder for rung in rungs] == ["explicit", "exact-flow"]
     for rung in rungs:
         with pytest.raises(SceneError, match=r"effects\.rock must not be 'power'"):
             rung.peer(rung.scene)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +12,6 @@ import pytest
 from percussion_model import Scene, SceneError, Simulation
 from percussion_model.scene.inputs import SimulationError
 from percussion_model.scene.parameters import parameter_table
-from percussion_model.verification.accuracy.cvode import CvodeSolver, missing
 from percussion_model.verification.accuracy.exact_flow import ExactFlowSolver
 from percussion_model.verification.accuracy.explicit import ExplicitSolver, explicit_rate
 from percussion_model.verification.accuracy.explicit_chain import ExplicitChainSolver
@@ -150,26 +149,6 @@ def test_the_exact_flow_converges_with_the_square_of_its_elements():
     )
     assert 3.0 < coarse / fine < 7.0
     assert fine < 2e-4
-
-
-def test_cvode_and_the_exact_flow_agree_on_one_mesh():
-    """The same equations, two ways through time."""
-    pytest.importorskip("sksundae", reason="the package scikit-sundae is not installed")
-    scene = Scene.from_toml(SCENARIOS / "drop_test.toml").replace(**{"run.duration": 4e-3})
-    problem = pose(scene)
-    exact = Run(problem, scene, partial(ExactFlowSolver, elements=5, watch=32)).answer()
-    found = Run(problem, scene, partial(CvodeSolver, elements=5, tolerance=1e-5)).answer()
-    for key in ("resting_place", "rock_energy", "peak_bit_force"):
-        assert found.values[key] == pytest.approx(exact.values[key], rel=5e-4), key
-    assert relative_error(found, exact.values, exact.histories, HISTORY) < 1e-3
-
-
-def test_cvode_tells_what_it_needs():
-    if missing():
-        with pytest.raises(SceneError, match=r"scikit-sundae .* pip install"):
-            CvodeSolver(Scene(), 5)
-    else:
-        assert CvodeSolver(Scene(), 5).cells["piston"] == 5
 
 
 def test_lengths_that_share_no_cell():

@@ -34,7 +34,6 @@ LINES: dict[str, tuple[str, Any, str]] = {
     "wave-steps": (_WAVE, (0, (4, 1.5)), "o"),
     "explicit": (_PEER, "-", "v"),
     "exact-flow": (_PEER, (0, (4, 1.5)), "d"),
-    "cvode": (_PEER, (0, (1.2, 1.2)), "h"),
     "fem": (_FEM, "-", "s"),
     "fem-paper": ("#E69F00", (0, (4, 1.5)), "s"),
     "fem-gauss": (_FEM, (0, (1.2, 1.2)), "D"),

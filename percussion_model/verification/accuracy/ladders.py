@@ -19,7 +19,6 @@ from percussion_model.solvers.modal.resolution import most_modes
 from percussion_model.solvers.modal.solver import ModalSolver
 from percussion_model.solvers.setup import elastic_times, kelvin_voigt_time
 from percussion_model.solvers.wave.grid import fitting_cells
-from percussion_model.verification.accuracy.cvode import CvodeSolver
 from percussion_model.verification.accuracy.exact_flow import ExactFlowSolver
 from percussion_model.verification.accuracy.explicit import COURANT as COURANT_OF_PEER
 from percussion_model.verification.accuracy.explicit import ExplicitSolver, stable_step
@@ -69,20 +68,12 @@ MOST_MODES = 400
 CHAIN_STEPS, CHAIN_MESHES = (6, 10, 16, 24, 40, 60), (5, 7, 10, 15, 20, 30)
 CHAIN_STEPS_LONG, CHAIN_MESH_LONG = 16, 20
 MESHES, MESHES_FULL = (10, 20, 30, 50, 70), (10, 20, 30, 50, 70, 100)
-# Tolerance that goes with ten elements in the piston; it falls with the square of their number.
-TOLERANCE_OF_TEN = 1e-4
-
-
-def _cvode(scene: Scene, elements: int) -> CvodeSolver:
-    return CvodeSolver(scene, elements, TOLERANCE_OF_TEN * (10.0 / elements) ** 2)
-
 
 # Compiled peers, their meshes, and the most elements in all bars: those of the exact flow
 # have dense matrices.
 COMPILED: dict[str, tuple[Callable[..., Solver], tuple[int, ...], float]] = {
     "explicit": (ExplicitSolver, (2, 3, 4, 5, 7, 10, 15, 20, 25, 30, 40, 60, 80, 120), 260.0),
     "exact-flow": (ExactFlowSolver, (2, 3, 5, 7, 10, 15, 20, 30), 100.0),
-    "cvode": (_cvode, (5, 7, 10, 15), 50.0),
 }
 FEW = (3, 5, 10, 20)  # of a bar so long that no four of the others are affordable
 STEPS = (20.0, 10.0, 5.0, 3.0, 2.0, 1.0)
@@ -158,12 +149,6 @@ LADDERS = {
             "elements of mixed mass, hard contact, matrix exponentials between events",
         ),
         Ladder(
-            "cvode",
-            "CVODE",
-            "element size",
-            "as exact flow; tolerance 1e-4 at 10 elements, falling with the square of the mesh",
-        ),
-        Ladder(
             "fem",
             "fem",
             "element size",
@@ -199,10 +184,10 @@ LADDERS = {
 COMPARED = "compared"
 QUICK = (
     *("modal", "chain", "wave"),
-    *("explicit", "exact-flow", "cvode", "fem", "rigid"),
+    *("explicit", "exact-flow", "fem", "rigid"),
 )
 
-# Integrator, tolerance and meshes of the general methods. CVODE is the compiled one.
+# Integrator, tolerance and meshes of the general methods.
 _GENERAL = {"lsoda": ("LSODA", 1e-4, (5, 10, 20, 30)), "radau": ("Radau", 1e-3, (5, 10, 20))}
 
 
