@@ -1,4 +1,4 @@
-"""What may be added to the table of parameters: solvers by name, effects with parameters."""
+"""What may be added to the table of parameters: solvers by name, components with parameters."""
 
 import subprocess
 import sys
@@ -8,7 +8,7 @@ import pytest
 from percussion_model.scene import solver_names
 from percussion_model.scene.parameters import (
     GROUPS,
-    Effect,
+    Component,
     Effects,
     find_row,
     groups_with,
@@ -17,7 +17,9 @@ from percussion_model.scene.parameters import (
 from percussion_model.scene.rows import SceneError
 from percussion_model.scene.scene import Scene
 
-FRICTION = Effect("friction", "friction", {"force": (50.0, "N", "friction force", 0.0, 1e6)}, max)
+FRICTION = Component(
+    "friction", "friction", {"force": (50.0, "N", "friction force", 0.0, 1e6)}, max
+)
 
 
 @pytest.fixture
@@ -78,20 +80,20 @@ def test_the_table_is_as_it_was_without_additions():
 
 
 @pytest.mark.parametrize("name", ["gravity", "rock", "friction"])
-def test_the_name_of_an_effect_must_be_new(name):
+def test_the_name_of_a_component_must_be_new(name):
     with pytest.raises(ValueError, match="there is a group or a switch of this name"):
-        groups_with([FRICTION, Effect(name, "again", {}, max)])
+        groups_with([FRICTION, Component(name, "again", {}, max)])
 
 
-def test_a_scene_has_the_groups_that_effects_bring(tmp_path):
+def test_a_scene_has_the_groups_that_components_bring(tmp_path):
     code = """
 import pickle
 import sys
-from percussion_model.physics import effects
+from percussion_model import components
 from percussion_model.scene import parameters
 friction = {"force": (50.0, "N", "F", 0.0, 1e6)}
-effects.EFFECTS = (effects.Effect("friction", "rub", friction, max),)
-parameters.GROUPS.update(parameters.groups_with(effects.EFFECTS))
+components.COMPONENTS = (components.Component("friction", "rub", friction, max),)
+parameters.GROUPS.update(parameters.groups_with(components.COMPONENTS))
 from percussion_model.scene.scene import Scene
 scene = Scene().replace(**{"friction.force": 60.0})
 assert scene.unused == ("friction.force",) and "friction" in scene.effects_off

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 import textwrap
 import tomllib
 from itertools import pairwise
@@ -28,12 +29,12 @@ WAY = (
 )
 WIDTH, ROW, GAP = 17.0, 1.4, 0.2
 LEFT, WAY_AT, WAY_WIDTH, SIDE = 0.3, 8.9, 3.4, 13.0
-BETWEEN = " | "
+BETWEEN = re.compile(" [|:] ")
 RUN = "#0072B2"
 COLOURS = {
     "interface": "#FBE5D6", "verification": "#F7EBC8", "coupling": "#F7EBC8",
     "analysis": "#E4EFD9", "simulation": "#D5ECE4", "solvers": "#D6E8F3", "scene": "#DCE6EE",
-    "physics": "#E8E3F0",
+    "physics": "#E8E3F0", "components": "#E8E3F0",
 }  # fmt: skip
 
 
@@ -42,7 +43,7 @@ def layers() -> list[list[str]]:
     with (ROOT / "pyproject.toml").open("rb") as file:
         contracts = tomllib.load(file)["tool"]["importlinter"]["contracts"]
     (found,) = (one["layers"] for one in contracts if one["type"] == "layers")
-    return [row.split(BETWEEN) for row in found]
+    return [BETWEEN.split(row) for row in found]
 
 
 def line_on(folder: str) -> str:

@@ -8,6 +8,8 @@ from typing import Any, Literal
 
 from fmu_src.hammer.inputs import DRIVE_INPUTS, PLAIN_INPUTS
 from fmu_src.hammer.motion import AT, Motion
+from fmu_src.units import fmi_unit
+from percussion_model.components import COMPONENTS
 from percussion_model.physics.records import Mode
 
 MODES = {
@@ -99,3 +101,15 @@ OUTPUTS: dict[str, Output] = {
     "drilling_mode": Output(None, int(min(Mode)), int(max(Mode)), None, "mode of the rock law", lambda motion: int(motion.read()[AT["drilling_mode"]]), "Enumeration", at_start=ALL),
     "off_bottom": Output(None, None, None, None, "whether the bit met no rock in the last communication step", lambda motion: motion.off_bottom(), "Boolean", at_start=ALL),
 }  # fmt: skip
+# Columns of the states of components, by the names of their outputs.
+OF_COMPONENTS = {
+    f"{one.name}.{name}": field
+    for one in COMPONENTS
+    for name, field in zip(one.state, one.fields, strict=True)
+}
+for _one in COMPONENTS:
+    for _name, (_unit, _text, _) in _one.state.items():
+        _output = f"{_one.name}.{_name}"
+        OUTPUTS[_output] = Output(
+            fmi_unit(_unit), None, None, None, _text, _sample(OF_COMPONENTS[_output])
+        )

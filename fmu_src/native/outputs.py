@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fmu_src.hammer.motion import INSTANT, NO_CONTACT
-from fmu_src.hammer.outputs import OUTPUTS
+from fmu_src.hammer.outputs import OF_COMPONENTS, OUTPUTS
 from fmu_src.native.layout import last_blow, motion_of
 from fmu_src.native.motion import (
     rate_decay,
@@ -45,6 +45,7 @@ READ = (
     ("piston.position", "piston_position"),
     ("piston.velocity", "piston_velocity"),
     ("drilling_mode", "drilling_mode"),
+    *OF_COMPONENTS.items(),
 )
 OF_BLOW = (
     ("piston.stroke", "stroke"),

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from percussion_model.analysis.change import Change, change_of
-from percussion_model.physics.effects import EFFECTS
+from percussion_model.components import COMPONENTS
 from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.simulation.error_estimate import LARGE
 from percussion_model.simulation.rate import LEAST_BLOWS
@@ -126,7 +126,7 @@ def effect_variants(scene: Scene) -> Iterator[Variant]:
     """Go through the scene as it is, then one effect after the other."""
     effects = scene.effects
     yield Variant("", "as it is", no_penetration=_NO_CRUSHING if effects.rock == "spring" else "")
-    for name in ("gravity", "feed", *(effect.name for effect in EFFECTS)):
+    for name in ("gravity", "feed", *(one.name for one in COMPONENTS)):
         is_on = getattr(effects, name)
         yield Variant(name, "off" if is_on else "on", {f"effects.{name}": not is_on}, off=is_on)
     yield from _drive(scene)

@@ -1,65 +1,107 @@
-"""Forces on the bodies from outside: weight, feed, drive, and effects that hold a force."""
+"""Forces on the bodies from outside: weight, feed, drive, and those of components."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
-from percussion_model.physics.effects import EFFECTS, Effect
+from percussion_model.components import COMPONENTS, Component
 from percussion_model.physics.kernel import composed, inlined, merged
 
 
 @composed
-def _no_force(par: Any, s: Any) -> float:
+def _no_force(par: Any, s: Any, h: float) -> float:
     return 0.0
 
 
 @composed
-def _no_work(s: Any, path: float) -> None:
+def _nothing(par: Any, s: Any, amount: float) -> None:
     pass
 
 
-def _and_force(before: Callable, effect: Effect) -> Callable:
-    force, held = effect.force, f"f_{effect.name}"
+def _and_force(before: Callable, one: Component) -> Callable:
+    force, present, held = one.force, f"with_{one.name}", f"f_{one.name}"
 
     @composed
-    def hold(par: Any, s: Any) -> float:
-        total = before(par, s)
-        s[held] = force(par, s)
-        return total + s[held]
+    def hold(par: Any, s: Any, h: float) -> float:
+        total = before(par, s, h)
+        if par[present] == 1:
+            s[held] = force(par, s, h)
+            total += s[held]
+        return total
 
     return hold
 
 
-def _and_work(before: Callable, effect: Effect) -> Callable:
-    held, entry = f"f_{effect.name}", f"e_{effect.name}"
+def _and_work(before: Callable, one: Component) -> Callable:
+    held, entry = f"f_{one.name}", f"e_{one.name}"
 
     @composed
-    def book(s: Any, path: float) -> None:
-        before(s, path)
+    def book(par: Any, s: Any, path: float) -> None:
+        before(par, s, path)
         s[entry] -= s[held] * path
 
     return book
 
 
-# hold_forces(par, s): take the force of each effect now; their sum [N].
-# book_forces(s, path): enter what the held forces take from the bit over a path [m].
-hold_forces, book_forces = _no_force, _no_work
-for _effect in EFFECTS:
-    hold_forces, book_forces = _and_force(hold_forces, _effect), _and_work(book_forces, _effect)
+def _and_time(before: Callable, one: Component) -> Callable:
+    take_on, present = one.pass_time, f"with_{one.name}"
+    if take_on is None:
+        return before
+
+    @composed
+    def pass_on(par: Any, s: Any, h: float) -> None:
+        before(par, s, h)
+        if par[present] == 1:
+            take_on(par, s, h)
+
+    return pass_on
+
+
+def _joined(start: Callable, add: Callable, components: Iterable[Component]) -> Callable:
+    for one in components:
+        start = add(start, one)
+    return start
+
+
+_ON_BIT = [one for one in COMPONENTS if one.body == "bit"]
+_ON_PISTON = [one for one in COMPONENTS if one.body == "piston"]
+# hold_...(par, s, h): take the mean force of each component over the next h; their sum [N].
+hold_on_bit = _joined(_no_force, _and_force, _ON_BIT)
+hold_on_piston = _joined(_no_force, _and_force, _ON_PISTON)
+# book_...(par, s, path): enter what the held forces take from a body over a path [m].
+book_on_bit = _joined(_nothing, _and_work, _ON_BIT)
+book_on_piston = _joined(_nothing, _and_work, _ON_PISTON)
+# pass_own_time(par, s, h): take the states of components on by h [s].
+pass_own_time = _joined(_nothing, _and_time, COMPONENTS)
+
+
+@merged
+def hold_components(par, s, h):
+    """Take the mean forces of components over the next time h; they hold until the next call."""
+    if par.effects == 1:
+        s.f_on_bit = hold_on_bit(par, s, h)
+        s.f_on_piston = hold_on_piston(par, s, h)
+
+
+@merged
+def pass_time(par, s, h):
+    """Take the states of components on by a time h, at whose end the bodies are."""
+    if par.effects == 1:
+        pass_own_time(par, s, h)
 
 
 @inlined
 def bit_load(par, s):
-    """Constant force on the bit: weight, feed and held forces [N]."""
-    return par.mass_b * par.gravity + (s.feed + s.f_held)
+    """Constant force on the bit: weight, feed and forces of components [N]."""
+    return par.mass_b * par.gravity + (s.feed + s.f_on_bit)
 
 
 @inlined
 def bit_acceleration(par, s):
     """Acceleration that its body forces give the bit [m/s^2], docs/model.md, eq. 3."""
-    return par.gravity + (s.feed + s.f_held) / par.mass_b
+    return par.gravity + (s.feed + s.f_on_bit) / par.mass_b
 
 
 @inlined
@@ -68,20 +110,13 @@ def piston_acceleration(par, push):
     return par.gravity + push / par.mass_p
 
 
-@merged
-def hold_effects(par, s):
-    """Take the forces of the effects in the present state; they hold until the next call."""
-    if par.effects == 1:
-        s.f_held = hold_forces(par, s)
-
-
 @inlined
 def book_bit_load(par, s, path):
     """Enter the work of the bit's body forces over a path of its mean motion [m]."""
     s.e_feed += s.feed * path
     s.e_gravity += par.mass_b * par.gravity * path
     if par.effects == 1:
-        book_forces(s, path)
+        book_on_bit(par, s, path)
 
 
 @inlined
@@ -91,11 +126,20 @@ def book_piston_load(par, s, push, path, impulse):
     Parameters
     ----------
     push, impulse : float
-        Force [N] and impulse [N s] of the drive.
+        Force [N] and impulse [N s] of drive and components.
     """
     s.e_drive += push * path
     s.e_gravity += par.mass_p * par.gravity * path
     s.i_drive += impulse
+    move_to_components(par, s, path)
+
+
+@inlined
+def move_to_components(par, s, path):
+    """Enter what components do over a path of the piston [m] as theirs, not as the drive's."""
+    if par.effects == 1:
+        s.e_drive -= s.f_on_piston * path
+        book_on_piston(par, s, path)
 
 
 @inlined

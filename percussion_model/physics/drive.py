@@ -9,12 +9,12 @@ from percussion_model.physics.records import DriveKind, EventKind
 
 @inlined
 def drive_force(par, s):
-    """Force of the drive on the piston, down positive [N]."""
+    """Force of drive and components on the piston, down positive [N]."""
     if par.drive == DriveKind.PRESSURE:
-        return s.alpha * s.drive_force
+        return s.alpha * s.drive_force + s.f_on_piston
     if par.drive == DriveKind.EXTERNAL:
-        return s.external
-    return 0.0
+        return s.external + s.f_on_piston
+    return s.f_on_piston
 
 
 @inlined

@@ -1,7 +1,7 @@
 """Where compiled kernels are kept: a set of them for each state of the sources.
 
 Numba's cache looks at the file of a function alone, not at those of the functions that it
-calls; after an edit, an update or one more effect it would go on with old code. So sets are
+calls; after an edit, an update or one more component it would go on with old code. So sets are
 told apart by a hash of the sources. That of the present sources lies beside them, the last
 ones are set aside, and come back with their sources. Sources that cannot be written have their
 kernels in the user's cache.
@@ -90,7 +90,7 @@ def exchange(package: Path, beside: Path, digest: str) -> None:
             else:
                 kernels.unlink(missing_ok=True)
         present = aside / digest[:16]
-        now = sorted(path.stem for path in (package / "physics" / "effects").glob("[!_]*.py"))
+        now = sorted(path.stem for path in (package / "components").glob("[!_]*.py"))
         if present.is_dir():
             for kernels in [path for path in present.rglob("*") if path.is_file()]:
                 folder = package / kernels.parent.relative_to(present)
@@ -102,9 +102,9 @@ def exchange(package: Path, beside: Path, digest: str) -> None:
         stamp.write_text(" ".join([digest, *now]))
 
 
-def _tell(effects: list[str]) -> None:
-    """Say why all kernels are compiled anew: effects that came or went, or other sources."""
-    why = f"effects ({', '.join(effects)})" if effects else "sources of the package"
+def _tell(components: list[str]) -> None:
+    """Say why all kernels are compiled anew: components that came or went, or other sources."""
+    why = f"components ({', '.join(components)})" if components else "sources of the package"
     _log.warning(
         "%s have changed: a solver's kernels are compiled anew when it is first used, for about "
         "a minute, and an FMU's library for some ten; those of before are kept",
@@ -113,7 +113,7 @@ def _tell(effects: list[str]) -> None:
 
 
 def _words(stamp: Path) -> list[str]:
-    """Hash of the sources whose kernels lie beside them, and names of their effects."""
+    """Hash of the sources whose kernels lie beside them, and names of their components."""
     try:
         return stamp.read_text().split()
     except OSError:

@@ -15,7 +15,7 @@ from numba.extending import register_jitable
 from percussion_model.physics import kept_kernels
 
 # Folders with functions that kernels of other files call.
-CALLEES = ("physics", "scene", "solvers", "verification/accuracy")
+CALLEES = ("physics", "components", "scene", "solvers", "verification/accuracy")
 PACKAGE = Path(__file__).parents[1]
 # None: beside the sources, or where NUMBA_CACHE_DIR says.
 FOLDER = kept_kernels.prepare(PACKAGE, CALLEES)

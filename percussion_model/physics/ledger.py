@@ -6,13 +6,13 @@ import math
 
 import numpy as np
 
-from percussion_model.physics.effects import EFFECTS
+from percussion_model.components import COMPONENTS
 from percussion_model.physics.records import LEDGER_FIELDS, STORED_FIELDS
 
 WORKS = ("drive", "feed", "gravity")
 DISSIPATED = (
     *("crushing", "barrier", "standstill", "loss", "contact", "joints", "ends"),
-    *(effect.name for effect in EFFECTS),
+    *(one.name for one in COMPONENTS),
 )
 NUMERICAL = ("numerical", "overshoot")
 STORED = ("kinetic", "elastic", "recoverable")

@@ -3,16 +3,39 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from typing import Any
 
 from numba import literal_unroll
 
+from percussion_model.components import COMPONENTS
 from percussion_model.physics.drive import drive_force
-from percussion_model.physics.kernel import merged
+from percussion_model.physics.kernel import composed, merged
 from percussion_model.physics.records import LEDGER_ENTRIES, PEAK_FIELDS, Piston
 from percussion_model.physics.rock import hole_depth
 
 # What a reading takes over from a state as it is.
 _KEPT = (*LEDGER_ENTRIES, *PEAK_FIELDS)
+
+
+@composed
+def _nothing(s: Any, reading: Any) -> None:
+    pass
+
+
+def _and_field(before: Callable, field: str) -> Callable:
+    @composed
+    def copy(s: Any, reading: Any) -> None:
+        before(s, reading)
+        reading[field] = s[field]
+
+    return copy
+
+
+# fill_components(s, reading): write the states of components.
+fill_components = _nothing
+for _field in (field for one in COMPONENTS for field in one.fields):
+    fill_components = _and_field(fill_components, _field)
 
 
 @merged
@@ -44,6 +67,7 @@ def fill_motion(par, s, reading, time, piston_position, bit_position):
     reading.bit_impulse = s.i_bit
     reading.contact_impulse = s.i_contact
     reading.drive_impulse = s.i_drive
+    fill_components(s, reading)
     if par.piston == Piston.ABSENT:
         reading.piston_position = math.nan
         reading.piston_velocity = math.nan

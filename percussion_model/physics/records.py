@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from percussion_model.physics.effects import EFFECTS
+from percussion_model.components import COMPONENTS
 
 
 class Mode(IntEnum):
@@ -166,6 +166,11 @@ SAMPLE_COLUMNS = (
     Column("bit_impulse", "N s", "integral of the bit force since the run began"),
     Column("contact_impulse", "N s", "integral of the contact force since the run began"),
     Column("drive_impulse", "N s", "integral of the drive force since the run began"),
+    *(
+        Column(field, unit, text)
+        for one in COMPONENTS
+        for field, (unit, text, _) in zip(one.fields, one.state.values(), strict=True)
+    ),
 )
 SAMPLE_FIELDS = tuple(column.name for column in SAMPLE_COLUMNS)
 
@@ -183,7 +188,7 @@ LEDGER_COLUMNS = (
     Column("joints", "J", "taken by joints and the damper"),
     Column("ends", "J", "leaves by ends without reflection, less what comes in there"),
     Column("overshoot", "J", "lost by springs where an event is found just past its place"),
-    *(Column(one.name, "J", "taken from the bit by this effect's force") for one in EFFECTS),
+    *(Column(one.name, "J", f"taken from the {one.body} by this force") for one in COMPONENTS),
 )
 LEDGER_FIELDS = tuple(column.name for column in LEDGER_COLUMNS)
 

@@ -7,7 +7,7 @@ puts its own fields first: numba takes a record that only has more at its end fo
 
 from __future__ import annotations
 
-from percussion_model.physics.effects import EFFECTS
+from percussion_model.components import COMPONENTS
 from percussion_model.physics.records import LEDGER_ENTRIES, Mode
 
 # Checkpoints of the running bit impulse during standstill.
@@ -35,8 +35,9 @@ COMMON_PARAMETERS = [
     ("removed_share", "f8"),  # of a crater of 1 mm
     ("removal_exponent", "f8"),
     ("release", "i8"),  # 1: standstill leaves to free flight when F_R reaches 0
-    ("effects", "i8"),  # 1: there are effects that hold a force
-    *[(f"{effect.name}_{name}", "f8") for effect in EFFECTS for name in effect.parameters],
+    ("effects", "i8"),  # 1: there are components
+    *[(f"with_{one.name}", "i8") for one in COMPONENTS],
+    *[(f"{one.name}_{name}", "f8") for one in COMPONENTS for name in one.parameters],
 ]
 
 _SWITCHES = [
@@ -69,8 +70,10 @@ _INPUTS = [  # changed from outside at grid points
     ("next_gamma", "f8"),
     ("next_c_r", "f8"),
     ("next_w_r", "f8"),
-    ("f_held", "f8"),  # sum of the forces that effects hold on the bit [N]
-    *[(f"f_{effect.name}", "f8") for effect in EFFECTS],
+    ("f_on_bit", "f8"),  # sums of the forces of components [N]
+    ("f_on_piston", "f8"),
+    *[(f"f_{one.name}", "f8") for one in COMPONENTS],
+    *[(field, "f8") for one in COMPONENTS for field in one.fields],
 ]
 
 _MOTION = [

@@ -15,7 +15,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
 from typing import Any, Self
 
-from percussion_model.physics.effects import EFFECTS, Effect
+from percussion_model.components import COMPONENTS, Component
 from percussion_model.scene.bar_groups import (
     REFERENCE_BIT_LENGTH,
     STEEL_DENSITY,
@@ -437,28 +437,28 @@ _BUILT_IN: dict[str, type[Parameters]] = {
 }
 
 
-def groups_with(effects: Iterable[Effect]) -> dict[str, type[Parameters]]:
-    """Return the groups of a scene, the built-in ones and those that effects add.
+def groups_with(components: Iterable[Component]) -> dict[str, type[Parameters]]:
+    """Return the groups of a scene, the built-in ones and those that components add.
 
     Parameters
     ----------
-    effects : iterable of Effect
+    components : iterable of Component
         Each gets a switch in `effects` and, for its parameters, a group of its own.
     """
     groups = dict(_BUILT_IN)
     switches: dict[str, Any] = {}
-    for effect in effects:
-        if effect.name in groups or effect.name in switches or effect.name in Effects.rows:
-            raise ValueError(f"effect {effect.name}: there is a group or a switch of this name")
-        switches[effect.name] = flag(False, effect.description)
-        needs: Needs = {f"effects.{effect.name}": (True,)}
+    for one in components:
+        if one.name in groups or one.name in switches or one.name in Effects.rows:
+            raise ValueError(f"component {one.name}: there is a group or a switch of this name")
+        switches[one.name] = flag(False, one.description)
+        needs: Needs = {f"effects.{one.name}": (True,)}
         fields = {
             name: quantity(default, unit, description, needs, ge=lower, le=upper)
-            for name, (default, unit, description, lower, upper) in effect.parameters.items()
+            for name, (default, unit, description, lower, upper) in one.parameters.items()
         }
         if fields:
-            name_of_class = effect.name.title().replace("_", "") + "Group"
-            groups[effect.name] = _group(name_of_class, Parameters, effect.description, fields)
+            name_of_class = one.name.title().replace("_", "") + "Group"
+            groups[one.name] = _group(name_of_class, Parameters, one.description, fields)
     if switches:
         groups["effects"] = _group("Effects", Effects, Effects.__doc__, switches)
     for key, group in groups.items():
@@ -474,7 +474,7 @@ def _group(
 
 
 # The groups of a scene, in the order in which they are written.
-GROUPS = groups_with(EFFECTS)
+GROUPS = groups_with(COMPONENTS)
 # Objects of the added ones are found here by name, when they come from another process.
 globals().update({group.__name__: group for group in GROUPS.values()})
 

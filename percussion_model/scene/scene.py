@@ -8,7 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, Self
 
-from percussion_model.physics.effects import EFFECTS
+from percussion_model.components import COMPONENTS
 from percussion_model.scene.bar_groups import Bar, BitBar, Damper, DrillString, PistonBar
 from percussion_model.scene.chain import chain_as_groups, refuse_joints
 from percussion_model.scene.contradictions import TEXTS, Bodies, Rule, find_contradiction
@@ -409,7 +409,7 @@ class Scene:
             "barrier": self.barrier_on,
             "cuttings": self.cuttings_on,
             "rock": self.effects.rock != "none",
-            **{effect.name: getattr(self.effects, effect.name) for effect in EFFECTS},
+            **{one.name: getattr(self.effects, one.name) for one in COMPONENTS},
         }
 
     def _string_switches(self) -> dict[str, bool]:

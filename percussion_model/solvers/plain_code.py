@@ -12,7 +12,7 @@ from typing import Any
 
 from numba.extending import overload, register_jitable
 
-from percussion_model.physics.effects import EFFECTS
+from percussion_model.components import COMPONENTS
 from percussion_model.physics.kernel import composed
 from percussion_model.scene import bars, contradictions, solver_choice
 from percussion_model.solvers import setup
@@ -75,38 +75,59 @@ def _rows(sections):
 
 
 @composed
-def _nothing(p: Any, values: Any) -> None:
+def _nothing(record: Any, values: Any) -> None:
     pass
 
 
-def _and_number(before: Callable, field: str) -> Callable:
+def _and_number(before: Callable, field: str, value: str) -> Callable:
     @composed
-    def fill(p: Any, values: Any) -> None:
-        before(p, values)
-        p[field] = values[field]
+    def fill(record: Any, values: Any) -> None:
+        before(record, values)
+        record[field] = values[value]
 
     return fill
 
 
-def _and_effect(before: Callable, name: str, numbers: Callable) -> Callable:
-    switch = f"effects_{name}"
+def _and_constant(before: Callable, field: str, value: float) -> Callable:
+    @composed
+    def fill(record: Any, values: Any) -> None:
+        before(record, values)
+        record[field] = value
+
+    return fill
+
+
+def _and_component(before: Callable, name: str, numbers: Callable) -> Callable:
+    switch, present = f"effects_{name}", f"with_{name}"
 
     @composed
     def fill(p: Any, values: Any) -> None:
         before(p, values)
         if values[switch]:
-            p["effects"] = 1
+            p["effects"] = p[present] = 1
             numbers(p, values)
 
     return fill
 
 
-@overload(setup.fill_effects)
-def _effects(p, values):
+@overload(setup.fill_components)
+def _parameters(p, values):
     fill = _nothing
-    for effect in EFFECTS:
+    for one in COMPONENTS:
         numbers = _nothing
-        for name in effect.parameters:
-            numbers = _and_number(numbers, f"{effect.name}_{name}")
-        fill = _and_effect(fill, effect.name, numbers)
+        for name in one.parameters:
+            numbers = _and_number(numbers, f"{one.name}_{name}", f"{one.name}_{name}")
+        fill = _and_component(fill, one.name, numbers)
     return lambda p, values: fill(p, values)
+
+
+@overload(setup.start_components)
+def _states(s, values):
+    fill = _nothing
+    for one in COMPONENTS:
+        for field, (_, _, start) in zip(one.fields, one.state.values(), strict=True):
+            if isinstance(start, str):
+                fill = _and_number(fill, field, f"{one.name}_{start}")
+            else:
+                fill = _and_constant(fill, field, float(start))
+    return lambda s, values: fill(s, values)

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from percussion_model.physics.effects import EFFECTS
+from percussion_model.components import COMPONENTS
 from percussion_model.physics.records import DriveKind, Mode, Piston, RockKind
 from percussion_model.scene.bars import bar_mass, bar_transit_time
 from percussion_model.scene.numbers import Numbers
@@ -140,7 +140,7 @@ def fill_parameters(p: Any, numbers: Numbers, with_piston: bool) -> None:
     p["threshold"] = values.rock_barrier_threshold
     fill_power(p, values)
     p["release"] = values.effects_standstill_tension == StandstillTension.RELEASE
-    fill_effects(p, values)
+    fill_components(p, values)
 
 
 def fill_power(p: Any, values: Any) -> None:
@@ -170,13 +170,22 @@ def fill_cuttings(p: Any, values: Any) -> None:
         p["power"] = 1
 
 
-def fill_effects(p: Any, values: Any) -> None:
-    """Fill the parameters of effects that hold a force."""
-    for effect in EFFECTS:
-        if getattr(values, f"effects_{effect.name}"):
-            p["effects"] = 1
-            for name in effect.parameters:
-                p[f"{effect.name}_{name}"] = getattr(values, f"{effect.name}_{name}")
+def fill_components(p: Any, values: Any) -> None:
+    """Fill the parameters of the components that are on."""
+    for one in COMPONENTS:
+        if getattr(values, f"effects_{one.name}"):
+            p["effects"] = p[f"with_{one.name}"] = 1
+            for name in one.parameters:
+                p[f"{one.name}_{name}"] = getattr(values, f"{one.name}_{name}")
+
+
+def start_components(s: Any, values: Any) -> None:
+    """Fill the states of components at time zero, whether they are on or not."""
+    for one in COMPONENTS:
+        for field, (_, _, start) in one.state.items():
+            is_name = isinstance(start, str)
+            value = getattr(values, f"{one.name}_{start}") if is_name else start
+            s[f"{one.name}_{field}"] = value
 
 
 def fill_start(s: Any, numbers: Numbers) -> None:
@@ -214,3 +223,4 @@ def fill_start(s: Any, numbers: Numbers) -> None:
     s["peak_from"] = math.inf
     s["b_rebound"] = s["b_standstill"] = math.nan
     s["b_barrier"] = s["b_counting"] = s["b_closing"] = math.nan
+    start_components(s, values)

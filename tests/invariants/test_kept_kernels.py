@@ -21,7 +21,7 @@ RUN = "from percussion_model.physics.elementary import exp; print(exp(1.0))"
 @pytest.fixture
 def package(tmp_path):
     """Folders of a package, without a kernel."""
-    for folder in ("physics/effects", "physics/__pycache__", "solvers/__pycache__"):
+    for folder in ("components", "physics/__pycache__", "solvers/__pycache__"):
         (tmp_path / folder).mkdir(parents=True, exist_ok=True)
     return tmp_path
 
@@ -38,11 +38,11 @@ def change(package, digest):
 def test_a_set_comes_back_with_its_sources(package, caplog):
     assert change(package, "a" * 64) == "a" * 64
     assert not caplog.text  # nothing was compiled before
-    (package / "physics/effects/drag.py").touch()
+    (package / "components/drag.py").touch()
     assert change(package, "b" * 64) == "b" * 64
-    assert "effects (drag) have changed: a solver's kernels are compiled anew" in caplog.text
+    assert "components (drag) have changed: a solver's kernels are compiled anew" in caplog.text
     caplog.clear()
-    (package / "physics/effects/drag.py").unlink()
+    (package / "components/drag.py").unlink()
     assert change(package, "a" * 64) == "a" * 64
     assert not caplog.text
     (package / "solvers/__pycache__/step.run-1.py311.nbi").write_text("own")

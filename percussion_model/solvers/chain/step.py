@@ -10,7 +10,12 @@ from percussion_model.physics.blows import (
     start_blow,
     starts_blow,
 )
-from percussion_model.physics.body import book_forces, hold_effects, piston_acceleration
+from percussion_model.physics.body import (
+    book_on_bit,
+    hold_components,
+    pass_time,
+    piston_acceleration,
+)
 from percussion_model.physics.drive import drive_force
 from percussion_model.physics.kernel import inlined, kernel, merged
 from percussion_model.physics.records import Mode, Piston
@@ -118,7 +123,7 @@ def accelerations(par, s, chain, waves, push):
     else:
         came[ACCELERATION, struck] += s.feed * bodies[struck, INV_MASS]
     if par.effects == 1:
-        came[ACCELERATION, bit] += s.f_held * bodies[bit, INV_MASS]
+        came[ACCELERATION, bit] += s.f_on_bit * bodies[bit, INV_MASS]
     if par.piston == Piston.ELASTIC:
         came[ACCELERATION, 0] = piston_acceleration(par, push)
     return damper
@@ -310,7 +315,7 @@ def move_bars(par, s, chain, waves, damper, tau):
             held = path
     s.e_gravity += g * lifted
     if par.effects == 1:
-        book_forces(s, path)
+        book_on_bit(par, s, path)
     s.v_b = waves.bars[VELOCITY, bit]
     if par.damper == 0:
         s.e_feed += s.feed * held
@@ -344,12 +349,12 @@ def meet(par, s, chain, waves, tau, blows, events):
         Velocity that the piston is still to get, where the drive turned [m/s].
     """
     time = time_of(par, s)
-    hold_effects(par, s)
+    hold_components(par, s, tau)
     push = drive_force(par, s)
     damper = accelerations(par, s, chain, waves, push)
     pass_on(par, s, chain, waves)
     meet_joints(par, s, chain, waves, tau)
-    impulse = 0.0
+    impulse = due = 0.0
     if par.piston == Piston.ABSENT:
         meet_top(par, s, chain, waves, tau, time)
     else:
@@ -373,8 +378,9 @@ def meet(par, s, chain, waves, tau, blows, events):
         if par.piston == Piston.ELASTIC:
             waves.bars[VELOCITY, 0] = s.v_p
             # what its waves get is the force at the start over the whole step
-            return s.v_p - v_p + impulse / par.mass_p - a_p * tau
-    return 0.0
+            due = s.v_p - v_p + impulse / par.mass_p - a_p * tau
+    pass_time(par, s, tau)
+    return due
 
 
 @kernel

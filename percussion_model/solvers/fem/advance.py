@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from percussion_model.physics.blows import end_of_step_with_blow, push_checkpoint
-from percussion_model.physics.body import hold_effects
+from percussion_model.physics.body import hold_components
 from percussion_model.physics.kernel import kernel, merged
 from percussion_model.physics.readings import fill_ledger, fill_motion
 from percussion_model.physics.records import Mode, Status
@@ -76,7 +76,7 @@ def advance_to(par, s, elements, time, whole, blows, events):
             return Status.NOT_FINITE
         if par.effects == 1:
             read_means(par, s, w, c)
-            hold_effects(par, s)
+            hold_components(par, s, h)
         tried = h
         h = end_of_step(par, s, elements, h)
         take_step(par, s, w, c, x, h)

@@ -6,7 +6,7 @@ is one of a mean and a bend (docs/numerics.md, section 10).
 
 from __future__ import annotations
 
-from percussion_model.physics.body import book_bit_load, book_piston_load
+from percussion_model.physics.body import book_bit_load, book_piston_load, pass_time
 from percussion_model.physics.drive import drive_force
 from percussion_model.physics.kernel import inlined, kernel, merged
 from percussion_model.physics.records import Mode
@@ -156,4 +156,5 @@ def take_step(par, s, w, c, x, h):
         s.b_stroke = -s.u_r
     s.time += h
     s.count_steps += 1
+    pass_time(par, s, h)
     note_forces(par, s)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from percussion_model.physics.blows import end_with_blow
+from percussion_model.physics.body import pass_time
 from percussion_model.physics.kernel import inlined, kernel, merged
 from percussion_model.physics.readings import fill_ledger, fill_motion
 from percussion_model.physics.records import Mode, Piston, Status
@@ -144,12 +145,13 @@ def read_at(par, s, bars, time, row):
             own = kinetic_of(bars.wp, bars.wp.shape[1])
             kinetic += own
             elastic += piston_vibration(bars) - own
+    # within a tick forces stay, so that impulses and velocities agree
+    rest = max(0.0, time - time_of(par, s))
+    pass_time(par, s, rest)
     fill_ledger(s, row, kinetic, elastic, recoverable(par, s))
     fill_motion(par, s, row, time, s.u_p + par.start_gap, s.u_b)
     row.bit_end_velocity = s.v_low
     row.bit_force = s.f_rock
-    # within a tick forces stay, so that impulses and velocities agree
-    rest = max(0.0, time - time_of(par, s))
     row.bit_position += rest * s.v_b
     row.bit_end_position += rest * s.v_low
     row.bit_velocity += rest * (s.a_b + (s.f_contact - s.f_rock) / par.mass_b)

@@ -13,7 +13,8 @@ from percussion_model.physics.body import (
     bit_acceleration,
     book_bit_load,
     book_piston_load,
-    hold_effects,
+    hold_components,
+    pass_time,
     piston_acceleration,
 )
 from percussion_model.physics.drive import drive_force, switch_drive
@@ -198,6 +199,17 @@ def make(par, s, bars, level, trial, push, events):
         s.u_r = s.u_p - s.u_b
         s.b_stroke = max(s.b_stroke, -s.u_r)
         switch_drive(par, s, u_before, begin, h, events)
+    pass_time(par, s, h)
+
+
+@inlined
+def load_bodies(par, s, bars, level):
+    """Take the forces on the bodies over the next 2^level ticks."""
+    hold_components(par, s, par.tick * (1 << level))
+    a_p = piston_acceleration(par, drive_force(par, s)) if has_piston(par) else 0.0
+    a_b = bit_acceleration(par, s)
+    if a_p != s.a_p or a_b != s.a_b:
+        refresh_loads(s, bars, a_b, a_p)
 
 
 @kernel
@@ -225,18 +237,13 @@ def go_on(par, s, bars, most, near, blows, events):
     """
     if s.time >= s.look:
         look(par, s, bars)
-    hold_effects(par, s)
     piston = has_piston(par)
     if piston and s.parked == 0 and s.closed == 0 and s.time >= s.no_park:
         park(par, s, bars)
     if s.mode == Mode.SS and s.alert == 1 and par.rock == RockKind.BILINEAR:
         end_standstill(par, s, bars, events)
-    push = drive_force(par, s)
-    a_p = piston_acceleration(par, push) if piston else 0.0
-    a_b = bit_acceleration(par, s)
-    if a_p != s.a_p or a_b != s.a_b:
-        refresh_loads(s, bars, a_b, a_p)
     level, flips = most, 0
+    load_bodies(par, s, bars, level)
     while True:
         stands = s.mode == Mode.SS and s.alert == 1 and par.rock == RockKind.BILINEAR
         trial = try_step(par, s, bars, level)
@@ -254,14 +261,17 @@ def go_on(par, s, bars, most, near, blows, events):
         turns = piston and switches(par, s, s.u_r + trial.way_p - trial.way_b)
         if level > 0 and (flip or ends or turns or bursts):
             level -= 1
+            if par.effects == 1:
+                load_bodies(par, s, bars, level)
         elif flip and flips < MOST_FLIPS:
             flip_contact(par, s, bars, s.v_p - s.v_b, blows, events)
             level, flips = most, flips + 1
+            load_bodies(par, s, bars, level)
         elif ends and s.mode != Mode.FF and par.rock == RockKind.WALL:
             change_mode(par, s, bars, events)
         else:
             break
-    make(par, s, bars, level, trial, push, events)
+    make(par, s, bars, level, trial, drive_force(par, s), events)
     if ends:
         change_mode(par, s, bars, events)
     elif s.mode == Mode.SS and (s.n_check == 0 or s.count_steps % CHECKPOINT == 0):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from percussion_model.physics.body import hold_components
 from percussion_model.physics.kernel import kernel
 from percussion_model.physics.readings import fill_ledger, fill_motion
 from percussion_model.physics.records import Status
@@ -88,6 +89,7 @@ def commit(par_, state, t):
     par = par_[0]
     s = state[0]
     if t > s.time:
+        hold_components(par, s, t - s.time)
         move(par, s, t - s.time)
         s.time = t
         s.standing_events = 0
@@ -116,6 +118,7 @@ def read(par_, state, t, blows, events, reading):
     s.live = 0
     status = advance(par_, state, t, blows, events)
     if t > s.time:
+        hold_components(par, s, t - s.time)
         move(par, s, t - s.time)
         s.time = t
     s.u_r = -s.gap

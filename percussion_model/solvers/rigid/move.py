@@ -4,7 +4,12 @@ from __future__ import annotations
 
 import math
 
-from percussion_model.physics.body import book_bit_load, book_piston_load, piston_acceleration
+from percussion_model.physics.body import (
+    book_bit_load,
+    book_piston_load,
+    pass_time,
+    piston_acceleration,
+)
 from percussion_model.physics.drive import drive_force
 from percussion_model.physics.kernel import kernel
 from percussion_model.physics.records import Mode, Piston, RockKind
@@ -235,3 +240,4 @@ def move(par, s, tau):
     s.v_p = v_p
     s.gap = gap
     book_rock(par, s, p_before, taken)
+    pass_time(par, s, tau)

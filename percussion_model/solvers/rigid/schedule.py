@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from percussion_model.physics.body import hold_effects, piston_acceleration
+from percussion_model.physics.body import hold_components, piston_acceleration
 from percussion_model.physics.drive import drive_force
 from percussion_model.physics.kernel import kernel
 from percussion_model.physics.records import DriveKind, Mode, Piston, RockKind
@@ -204,7 +204,16 @@ def piston_event(par, s, y, acc, beta, k, tau, kind):
 @kernel
 def schedule(par, s):
     """Find the next event and note it in the state. Depends on the state alone."""
-    hold_effects(par, s)
+    hold_components(par, s, par.window)
+    find_next(par, s)
+    if par.effects == 1 and 0.0 < s.next_tau < par.window:
+        hold_components(par, s, s.next_tau)
+        find_next(par, s)
+
+
+@kernel
+def find_next(par, s):
+    """Find the next event under the forces that are held."""
     F, M = loads(par, s)
     K, C, P = rock_terms(par, s)
     acc = acceleration(par, s)

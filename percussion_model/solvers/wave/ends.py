@@ -16,7 +16,8 @@ from percussion_model.physics.blows import (
 from percussion_model.physics.body import (
     bit_acceleration,
     book_bit_load,
-    hold_effects,
+    move_to_components,
+    pass_time,
     piston_acceleration,
 )
 from percussion_model.physics.drive import drive_force, switch_drive
@@ -212,7 +213,6 @@ def meet(par, s, bars, tau, blows, events):
     """
     r = 2 * s.parity
     time = time_of(par, s)
-    hold_effects(par, s)
     a_b = bit_acceleration(par, s)
     top, bottom = inner_waves(par, bars.wb, bars.cb, par.n_b, r, a_b * 0.5 * par.dt)
     kick = a_b * 0.5 * par.dt
@@ -282,6 +282,7 @@ def meet(par, s, bars, tau, blows, events):
             d_p = half * (2.0 * (s.v_p + a_p * half) - impulse / par.mass_p)
         s.u_r += d_p - half * (v_b + s.v_b)
         move_piston(par, s, push, impulse, u_before, time, tau, events)
+    pass_time(par, s, tau)
     return top, bottom, top_p, bottom_p, tau
 
 
@@ -317,5 +318,6 @@ def move_piston(par, s, push, impulse, u_before, time, tau, events):
     s.e_drive += push * first + later * second
     s.e_gravity += par.mass_p * par.gravity * (first + second)
     s.i_drive += (push + later) * half
+    move_to_components(par, s, first + second)
     if -s.u_r > s.b_stroke:
         s.b_stroke = -s.u_r

@@ -11,6 +11,7 @@ from percussion_model.physics.blows import push_checkpoint
 from percussion_model.physics.body import (
     book_bit_load,
     book_piston_load,
+    hold_components,
     piston_acceleration,
 )
 from percussion_model.physics.drive import drive_force
@@ -87,6 +88,7 @@ def step(par, s, bars, dt, blows, events):
     alpha = s.alpha
     v_p, v_b = s.v_p, s.v_b
     contact_before = s.i_contact
+    hold_components(par, s, dt)
     push = drive_force(par, s)
     top, bottom, top_p, bottom_p, tau = meet(par, s, bars, dt, blows, events)
     if s.live == 0 and tau == dt:

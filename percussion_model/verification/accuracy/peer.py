@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from percussion_model.physics.effects import EFFECTS
+from percussion_model.components import COMPONENTS
 from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.solvers.base import Solver
 from percussion_model.solvers.state import State
@@ -35,7 +35,7 @@ def _demands(scene: Any) -> Iterator[tuple[str, str, bool]]:
     yield "paper", "effects.standstill_tension must not be 'paper'", pulls
     left = effects.cuttings and scene.matters("effects.cuttings")
     yield "cuttings", "effects.cuttings must be false", left
-    for one in EFFECTS:
+    for one in COMPONENTS:
         yield one.name, f"effects.{one.name} must be false", getattr(effects, one.name)
 
 
