@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from xml.etree.ElementTree import Element, SubElement
 
@@ -35,6 +36,8 @@ UNITS: dict[str, Unit] = {
     "kg": Unit({"kg": 1}, {}),
     "m.s": Unit({"m": 1, "s": 1}, {}),
     "K": Unit({"K": 1}, {}),
+    "rad": Unit({"rad": 1}, {}),
+    "W": Unit({"kg": 1, "m": 2, "s": -3}, {}),
     "N.m": Unit({"kg": 1, "m": 2, "s": -2}, {}),
     "N/s": Unit({"kg": 1, "m": 1, "s": -3}, {}),
     "N.s/m2": Unit({"kg": 1, "m": -1, "s": -1}, {}),
@@ -46,31 +49,38 @@ UNITS: dict[str, Unit] = {
     "m3/(s.Pa)": Unit({"kg": -1, "m": 4, "s": 1}, {}),
 }
 
-# The parameter table writes units as people do.
-FROM_TABLE = {
-    "-": "1",
-    "": "1",
-    "m^2": "m2",
-    "m/s^2": "m/s2",
-    "kg/m^3": "kg/m3",
-    "N s/m": "N.s/m",
-    "m s": "m.s",
-    "N s": "N.s",
-    "N m": "N.m",
-    "N s/m^2": "N.s/m2",
-    "m^3": "m3",
-    "m^3/s": "m3/s",
-    "Pa s/m^3": "Pa.s/m3",
-    "m^3/(s Pa)": "m3/(s.Pa)",
-}
+# A symbol and its exponent, as in m3.
+_FACTOR = re.compile(r"([A-Za-z]+)(\d*)")
 
 
 def fmi_unit(unit: str) -> str:
-    """Name of a unit of the parameter table in the interface."""
-    name = FROM_TABLE.get(unit, unit)
+    """Name of a unit of the parameter table in the interface: `N s/m^2` there is `N.s/m2` here.
+
+    What is not among `UNITS` yet is added to them, where it is a product of such.
+
+    Raises
+    ------
+    ValueError
+        Where it is not.
+    """
+    name = unit.replace("^", "").replace(" ", ".") if unit not in ("", "-") else "1"
     if name not in UNITS:
-        raise KeyError(f"the unit {unit!r} is not in fmu_src/units.py")
+        UNITS[name] = Unit(_exponents(name), {})
     return name
+
+
+def _exponents(name: str) -> dict[str, int]:
+    found: dict[str, int] = {}
+    above, _, below = name.partition("/")
+    for product, sign in ((above, 1), (below.strip("()"), -1)):
+        for factor in filter(None, product.split(".")):
+            read = _FACTOR.fullmatch(factor)
+            if factor != "1" and (read is None or read[1] not in UNITS):
+                raise ValueError(f"unit {name!r}: {factor!r} must be one of {', '.join(UNITS)}")
+            if read:
+                for base, power in UNITS[read[1]].base.items():
+                    found[base] = found.get(base, 0) + sign * power * int(read[2] or 1)
+    return {base: power for base, power in found.items() if power}
 
 
 def write_units(names: set[str]) -> Element:
