@@ -1,1 +1,1 @@
-"""Accuracy against time, hard cases, published measurements and the paper's statements."""
+"""Accuracy against time, hard cases, measurements, the paper's statements."""
