@@ -45,7 +45,7 @@ from fmu_src.native.notes import add_note, look, set_fault
 from fmu_src.native.outputs import OUTPUT_COUNT, fill_outputs
 from fmu_src.native.solvers import kind_of
 from percussion_model.physics.kernel import preparing
-from percussion_model.physics.records import BLOW, DriveKind, Piston, Status
+from percussion_model.physics.records import BLOW, TURNS, Piston, Status
 from percussion_model.physics.state import LARGEST, MOST
 from percussion_model.scene.bars import bar_length, bar_mass
 from percussion_model.scene.contradictions import TEXTS, Bodies, Rule, find_contradiction
@@ -59,7 +59,6 @@ from percussion_model.solvers.fem.records import FEM_STATE
 from percussion_model.solvers.modal.records import MODAL_STATE
 from percussion_model.solvers.rigid.records import RIGID_STATE
 from percussion_model.solvers.setup import (
-    DRIVES,
     PISTONS,
     POWER,
     ROCKS,
@@ -149,8 +148,7 @@ def _fill_barrier(head, numbers):
     """Enter shares of the barrier: of a drilling cycle's time and of a blow's energy (eq. 30)."""
     values = numbers.values
     energy = values.drive_force * values.drive_reversal_distance
-    is_pressure = DRIVES[values.effects_drive] == DriveKind.PRESSURE
-    if not (is_pressure and energy > 0.0 and barrier_on(numbers)):
+    if not (TURNS[values.effects_drive] and energy > 0.0 and barrier_on(numbers)):
         return
     share = values.rock_barrier_energy / energy
     took = share * bar_mass(numbers.piston) / values.rock_barrier_damping

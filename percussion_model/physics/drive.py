@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from percussion_model.physics.blows import push_event
 from percussion_model.physics.kernel import inlined
 from percussion_model.physics.records import DriveKind, EventKind
@@ -18,6 +20,18 @@ def drive_force(par, s):
 
 
 @inlined
+def room_to_turn(par, s, u_r):
+    """How far a relative displacement is before that at which the drive turns [m].
+
+    Infinite where it does not turn by itself. The pressure law turns at u_r = 0 while it pushes
+    down, at u_r = -D_1 while it lifts; only one of them is watched at a time.
+    """
+    if par.drive != DriveKind.PRESSURE:
+        return math.inf
+    return -u_r if s.alpha > 0 else u_r + s.reversal
+
+
+@inlined
 def turn_drive(s, events, time, u_r):
     """Turn the pressure at `time`, where the relative displacement is `u_r` [m]."""
     s.alpha = -s.alpha
@@ -30,10 +44,7 @@ def turn_drive(s, events, time, u_r):
 
 @inlined
 def switch_drive(par, s, u_before, time, tau, events):
-    """Turn the pressure where the relative motion reaches its threshold.
-
-    Only one threshold is watched at a time: u_r = 0 while the pressure pushes
-    down, u_r = -D_1 while it lifts.
+    """Turn the pressure where the relative motion reaches its threshold, see `room_to_turn`.
 
     Parameters
     ----------
@@ -47,16 +58,9 @@ def switch_drive(par, s, u_before, time, tau, events):
     float
         Share of the step before the switch, or -1 where there is none.
     """
-    if par.drive != DriveKind.PRESSURE:
+    if room_to_turn(par, s, s.u_r) > 0.0:
         return -1.0
-    if s.alpha > 0:
-        level = 0.0
-        passed = s.u_r >= level
-    else:
-        level = -s.reversal
-        passed = s.u_r <= level
-    if not passed:
-        return -1.0
+    level = 0.0 if s.alpha > 0 else -s.reversal
     share = 0.0
     if u_before != s.u_r:
         share = min(max((level - u_before) / (s.u_r - u_before), 0.0), 1.0)

@@ -63,6 +63,11 @@ class DriveKind(IntEnum):
     EXTERNAL = 2  # a force from outside
 
 
+# Drives by the choice of `effects.drive`, and which of them turn by themselves.
+DRIVES = (DriveKind.PRESSURE, DriveKind.EXTERNAL, DriveKind.NONE)
+TURNS = (True, False, False)
+
+
 class RockKind(IntEnum):
     """What the bit meets."""
 

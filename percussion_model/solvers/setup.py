@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from percussion_model.components import COMPONENTS
-from percussion_model.physics.records import DriveKind, Mode, Piston, RockKind
+from percussion_model.physics.records import DRIVES, TURNS, Mode, Piston, RockKind
 from percussion_model.scene.bars import bar_mass, bar_transit_time
 from percussion_model.scene.numbers import Numbers
 from percussion_model.scene.rows import SceneError
@@ -26,7 +26,6 @@ MOST_CELLS = 1_000_000
 
 # What the choices of the parameter table mean, in their order.
 PISTONS = (Piston.ELASTIC, Piston.RIGID, Piston.ABSENT)
-DRIVES = (DriveKind.PRESSURE, DriveKind.EXTERNAL, DriveKind.NONE)
 ROCKS = (
     RockKind.BILINEAR, RockKind.SPRING, RockKind.WALL, RockKind.NONE, RockKind.BILINEAR,
 )  # fmt: skip
@@ -203,7 +202,7 @@ def fill_start(s: Any, numbers: Numbers) -> None:
     s["live"] = 1
     s["mode"] = Mode.FF
     s["alpha"] = direction
-    s["armed"] = DRIVES[values.effects_drive] != DriveKind.PRESSURE or direction > 0
+    s["armed"] = not TURNS[values.effects_drive] or direction > 0
     s["feed"] = values.feed_force if values.effects_feed else 0.0
     s["drive_force"] = values.drive_force
     s["reversal"] = values.drive_reversal_distance

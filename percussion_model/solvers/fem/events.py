@@ -8,8 +8,11 @@ Cubics are lowered by half the tolerance, so the new mode never sees its own thr
 
 from __future__ import annotations
 
+import math
+
+from percussion_model.physics.drive import room_to_turn
 from percussion_model.physics.kernel import inlined, kernel, merged
-from percussion_model.physics.records import DriveKind, Mode, RockKind
+from percussion_model.physics.records import Mode, RockKind
 from percussion_model.physics.rock import (
     REST_VELOCITY,
     barrier_level,
@@ -44,9 +47,8 @@ def contact_value(par, s, a):
 @inlined
 def drive_value(par, s, u_r):
     """Distance of u_r to the threshold that is watched [m]."""
-    if par.drive != DriveKind.PRESSURE:
-        return NEVER
-    return -u_r if s.alpha > 0 else u_r + s.reversal
+    room = room_to_turn(par, s, u_r)
+    return room if room < math.inf else NEVER
 
 
 @inlined
@@ -136,7 +138,7 @@ def fill_slopes(par, s, c, a, x, end, h, q, column):
         rate = a[Node.V, n_p] - a[Node.V, n_p - 1]
         q[Probe.CONTACT, column] = h * (-rate if s.closed == 1 else rate)
         rate = relative_motion(par, c, a, Node.V)
-        q[Probe.DRIVE, column] = h * (-rate if s.alpha > 0 else rate)
+        q[Probe.DRIVE, column] = -h * (s.alpha * rate)
     turn = acceleration(par, x, last, end)
     if s.mode == Mode.FF:
         q[Probe.ROCK, column] = -h * (turn if s.rebounding == 1 else v)

@@ -6,8 +6,9 @@ import math
 from typing import NamedTuple
 
 from percussion_model.physics.blows import push_checkpoint
+from percussion_model.physics.drive import room_to_turn
 from percussion_model.physics.kernel import kernel, merged
-from percussion_model.physics.records import DriveKind, Mode, RockKind
+from percussion_model.physics.records import Mode, RockKind
 from percussion_model.solvers.modal.change import end_mode
 from percussion_model.solvers.modal.near import book_way, present_look, ready, watch_barrier
 from percussion_model.solvers.modal.pairs import AT, PQ, drop_tiny, keep
@@ -44,11 +45,9 @@ def far_touching(par, s):
     age = s.time - s.closed_at
     if age < par.ringing or age * par.tick < RINGING * par.window:
         return Far(0, 0)
-    if par.drive != DriveKind.PRESSURE:
-        return Far(0, LONGEST)
     speed = 1.0 / math.sqrt(par.mass_p) + 1.0 / math.sqrt(par.mass_b)
     speed *= math.sqrt(max(0.0, 2.0 * s.vibrates))
-    room = -s.u_r if s.alpha > 0 else s.reversal + s.u_r
+    room = room_to_turn(par, s, s.u_r)
     return Far(0, int(min(max(room, 0.0) / (speed * par.tick + 1e-300), LONGEST)))
 
 

@@ -14,7 +14,7 @@ from percussion_model.physics.body import (
     book_piston_load,
     piston_acceleration,
 )
-from percussion_model.physics.drive import drive_force, switch_drive
+from percussion_model.physics.drive import drive_force, room_to_turn, switch_drive
 from percussion_model.physics.kernel import inlined, kernel, merged
 from percussion_model.physics.records import Mode, Piston
 from percussion_model.physics.rock import (
@@ -347,12 +347,12 @@ def kind_of(s, meets, turns, ends, work):
 
 
 @inlined
-def room_at(s, kind, look, work):
+def room_at(par, s, kind, look, work):
     """How far a look is before what is passed, in any unit; 0 where that is not known."""
     if kind == MEETS:
         return look.gap
     if kind == TURNS:
-        return -look.u_r if s.alpha > 0 else look.u_r + s.reversal
+        return room_to_turn(par, s, look.u_r)
     if kind == ENDS:
         return -beyond(s, end_of(look))
     return s.w_r - s.w - work if kind == WORK else 0.0
@@ -368,9 +368,9 @@ class Aim(NamedTuple):
 
 
 @inlined
-def aim_at(s, aim, last, work, ticks, halve):
+def aim_at(par, s, aim, last, work, ticks, halve):
     """Foretell by a straight line when that is passed, from a later look before it."""
-    low, share = room_at(s, aim.kind, last, work), 0.5
+    low, share = room_at(par, s, aim.kind, last, work), 0.5
     if low > 0.0 > aim.high and not halve:
         share = low / (low - aim.high)
     return Aim(aim.kind, aim.known, aim.high, ticks + share * (aim.known - ticks))
@@ -413,9 +413,9 @@ def go_near(par, s, bars, most, blows, events):
             back = turns_between(s, end_of(last), end_of(look), par.tick * (1 << level))
         if level > 0 and (meets or ends or turns or back > 0.0):
             kind, known, same = kind_of(s, meets, turns, ends, work), ticks + (1 << level), 0
-            aim = Aim(kind, known, room_at(s, kind, look, work), ticks + back * (1 << level))
+            aim = Aim(kind, known, room_at(par, s, kind, look, work), ticks + back * (1 << level))
             if kind != BACK:
-                aim = aim_at(s, aim, last, taken + sampled, ticks, False)
+                aim = aim_at(par, s, aim, last, taken + sampled, ticks, False)
             level = min(level - 1, level_below(max(aim.goal - ticks, 1.0)))
             continue
         if meets:
@@ -433,7 +433,7 @@ def go_near(par, s, bars, most, blows, events):
             continue
         same += 1
         if aim.kind != BACK:
-            aim = aim_at(s, aim, last, taken + sampled, ticks, same >= SAME_SIDE)
+            aim = aim_at(par, s, aim, last, taken + sampled, ticks, same >= SAME_SIDE)
         rest = max(aim.known - ticks - 1.0, 1.0)
         level = level_below(min(max(aim.goal - ticks, 1.0), rest))
     if ticks > 0:

@@ -12,9 +12,9 @@ from percussion_model.physics.blows import (
     starts_blow,
 )
 from percussion_model.physics.body import piston_acceleration, time_to_cover
-from percussion_model.physics.drive import drive_force
+from percussion_model.physics.drive import drive_force, room_to_turn
 from percussion_model.physics.kernel import inlined, kernel, merged
-from percussion_model.physics.records import DriveKind, Mode, Piston
+from percussion_model.physics.records import Mode, Piston
 from percussion_model.solvers.modal.bar import (
     LOW,
     Q,
@@ -125,19 +125,13 @@ def book_contact(par, s, contact, h, time):
 @merged
 def switches(par, s, u_r):
     """Whether the drive turns at a relative displacement."""
-    if par.drive != DriveKind.PRESSURE:
-        return False
-    return u_r >= 0.0 if s.alpha > 0 else u_r <= -s.reversal
+    return room_to_turn(par, s, u_r) <= 0.0
 
 
 @merged
 def until_drive(par, s, v, a, spread):
     """Time before which the drive cannot turn, for a relative mean motion [s]."""
-    if par.drive != DriveKind.PRESSURE:
-        return math.inf
-    if s.alpha > 0:
-        return time_to_cover(-s.u_r - spread, v, a)
-    return time_to_cover(s.reversal + s.u_r - spread, -v, -a)
+    return time_to_cover(room_to_turn(par, s, s.u_r) - spread, s.alpha * v, s.alpha * a)
 
 
 @kernel

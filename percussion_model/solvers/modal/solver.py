@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from percussion_model.physics.kernel import entry_of
-from percussion_model.physics.records import DriveKind
+from percussion_model.physics.records import TURNS
 from percussion_model.scene.bar_groups import Bar
 from percussion_model.scene.numbers import Numbers, numbers_of
 from percussion_model.scene.scene import Scene
@@ -112,7 +112,7 @@ class ModalSolver(Solver):
         self.cells["bit"] = int(made.forms.sizes[0])
         self.operator_bytes = sum(part.nbytes for part in (*made.forms, *made.laws))
         self._rows = aligned(np.zeros((8, max(made.forms.shape.shape[2], 2 * SCAN))))
-        self._must_arm = int(p["drive"]) == DriveKind.PRESSURE
+        self._must_arm = TURNS[numbers.values.effects_drive]
         self._read_at: dict[str, Places] = {}
         self._entry: Callable[..., int] = entry_of(run)
 

@@ -11,9 +11,9 @@ from percussion_model.physics.blows import (
     start_blow,
     starts_blow,
 )
-from percussion_model.physics.drive import turn_drive
+from percussion_model.physics.drive import room_to_turn, turn_drive
 from percussion_model.physics.kernel import kernel
-from percussion_model.physics.records import DriveKind, EventKind, Mode, RockKind
+from percussion_model.physics.records import EventKind, Mode, RockKind
 from percussion_model.physics.rock import (
     close_interface,
     end_loading,
@@ -72,7 +72,7 @@ def impact(par, s, blows, events):
     s.gap = 0.0
     w = max(s.v_p - s.v_b, 0.0)
     close_gap(s, events, s.time, w)
-    if par.drive == DriveKind.PRESSURE and s.alpha > 0:
+    if room_to_turn(par, s, 0.0) <= 0.0:
         turn_drive(s, events, s.time, 0.0)
     # A bit at the wall stays there, even if its feed pulls and it is about to leave.
     rests = par.rock == RockKind.WALL and s.p >= s.p_u and s.v_b == 0.0

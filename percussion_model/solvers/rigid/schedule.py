@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 from percussion_model.physics.body import hold_components, piston_acceleration
-from percussion_model.physics.drive import drive_force
+from percussion_model.physics.drive import drive_force, room_to_turn
 from percussion_model.physics.kernel import kernel
-from percussion_model.physics.records import DriveKind, Mode, Piston, RockKind
+from percussion_model.physics.records import Mode, Piston, RockKind
 from percussion_model.physics.rock import REST_VELOCITY, barrier_level, barrier_off
 from percussion_model.solvers.rigid.forces import (
     ROUNDING,
@@ -163,7 +163,7 @@ def piston_event(par, s, y, acc, beta, k, tau, kind):
     a_p = piston_acceleration(par, drive_force(par, s))
     jerk = -2.0 * beta * acc - k * s.v_b
     doubt = acceleration_doubt(par, s, acc)
-    if s.held == 1 and par.drive == DriveKind.PRESSURE and s.alpha > 0:
+    if s.held == 1 and room_to_turn(par, s, 0.0) <= 0.0:
         return 0.0, Next.SWITCH  # a start in contact: u_r = 0 is reached
     if s.held == 1:
         t_release = release_time(a_p, acc, jerk, doubt, beta, k)
@@ -171,12 +171,13 @@ def piston_event(par, s, y, acc, beta, k, tau, kind):
         if t_release < tau:
             return t_release, Next.RELEASE
         return tau, kind
-    lift = par.drive == DriveKind.PRESSURE and s.alpha < 0
+    # while it pushes down it turns where they meet
+    lift = s.alpha < 0 and room_to_turn(par, s, -s.gap) < math.inf
     if k > 0.0:
         # No further than this can the gap change before tau.
         reach = abs(acc) + abs(a_p) + abs(jerk) / math.sqrt(k)
         reach = tau * (abs(s.v_b - s.v_p) + 0.5 * tau * reach)
-        if reach < s.gap and not (lift and reach >= s.reversal - s.gap):
+        if reach < s.gap and not (lift and reach >= room_to_turn(par, s, -s.gap)):
             return tau, kind
         close = approach_time(s.gap, 1.0, y, s.v_b, beta, k, s.v_p, a_p, doubt, tau)
     else:
@@ -185,7 +186,7 @@ def piston_event(par, s, y, acc, beta, k, tau, kind):
         tau = close
         kind = Next.CLOSE
     if lift:
-        h = s.reversal - s.gap
+        h = room_to_turn(par, s, -s.gap)
         if h <= 0.0 and postponed(par, s, 0.0, Next.SWITCH) == 0.0:
             return 0.0, Next.SWITCH
         if h <= 0.0:

@@ -15,9 +15,9 @@ from percussion_model.physics.body import (
     piston_acceleration,
     time_to_cover,
 )
-from percussion_model.physics.drive import drive_force
+from percussion_model.physics.drive import drive_force, room_to_turn
 from percussion_model.physics.kernel import kernel, merged
-from percussion_model.physics.records import DriveKind, Mode, Piston
+from percussion_model.physics.records import Mode, Piston
 from percussion_model.physics.rock import recoverable
 from percussion_model.solvers.wave.bar import (
     deviation_energy,
@@ -90,12 +90,8 @@ def quiet_steps(par, s, wb, cb, gap, u_r, v):
     a = piston_acceleration(par, drive_force(par, s))
     margin = 2.0 * (spread + s.spread_p)
     limit = min(limit, time_to_cover(gap - margin, v + speed, a + slack))
-    if par.drive == DriveKind.PRESSURE:
-        if s.alpha > 0:
-            limit = min(limit, time_to_cover(-u_r - margin, v + speed, a + slack))
-        else:
-            room = s.reversal + u_r - margin
-            limit = min(limit, time_to_cover(room, speed - v, slack - a))
+    room = room_to_turn(par, s, u_r) - margin
+    limit = min(limit, time_to_cover(room, speed + s.alpha * v, slack + s.alpha * a))
     if a > 0.0 and v < pace:
         # look at the top, which is the stroke: where the bit moves, all along it
         top = (-pace - v) / (a + slack)

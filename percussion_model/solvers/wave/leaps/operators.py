@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from percussion_model.physics.kernel import kernel, preparing
-from percussion_model.physics.records import DriveKind, Mode, Piston, RockKind
+from percussion_model.physics.records import Mode, Piston, RockKind
 from percussion_model.solvers.wave.leaps.linear import DIGITS, PADDING
 from percussion_model.solvers.wave.leaps.lookahead import LOOKAHEAD, LOOKAHEAD_LEVELS
 from percussion_model.solvers.wave.leaps.products import (
@@ -111,7 +111,7 @@ def alone(par):
     p = of_bit[0]
     p.gravity = p.ss_stiffness = p.ss_loading = p.ss_damping = 0.0
     p.piston, p.n_p = Piston.ABSENT, 0
-    p.drive, p.rock = DriveKind.NONE, RockKind.NONE
+    p.rock = RockKind.NONE
     p.release, p.barrier = 0, 1
     return of_bit
 
