@@ -85,6 +85,12 @@ def test_the_name_of_a_component_must_be_new(name):
         groups_with([FRICTION, Component(name, "again", {}, max)])
 
 
+def test_a_field_of_a_component_is_no_parameter_of_it():
+    twice = Component("seal", "seal", FRICTION.parameters, max, state={"force": ("N", "F", 0.0)})
+    with pytest.raises(ValueError, match="component seal: force is a parameter and a field"):
+        groups_with([twice])
+
+
 def test_a_scene_has_the_groups_that_components_bring(tmp_path):
     code = """
 import pickle

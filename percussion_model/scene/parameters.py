@@ -450,6 +450,8 @@ def groups_with(components: Iterable[Component]) -> dict[str, type[Parameters]]:
     for one in components:
         if one.name in groups or one.name in switches or one.name in Effects.rows:
             raise ValueError(f"component {one.name}: there is a group or a switch of this name")
+        if both := set(one.parameters) & set(one.state):
+            raise ValueError(f"component {one.name}: {both.pop()} is a parameter and a field")
         switches[one.name] = flag(False, one.description)
         needs: Needs = {f"effects.{one.name}": (True,)}
         fields = {
