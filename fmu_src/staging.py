@@ -27,6 +27,7 @@ LIBRARY = Path(pythonfmu.__file__).parent
 # What computes, and nothing that plots, reads files or needs more than numpy and numba.
 MODEL_FILES = (
     "__init__.py",
+    "components/*.py",
     "physics/**/*.py",
     "scene/*.py",
     "simulation/__init__.py",

@@ -8,7 +8,6 @@ from typing import Any, Literal
 
 from fmu_src.hammer.inputs import DRIVE_INPUTS, PLAIN_INPUTS
 from fmu_src.hammer.motion import AT, Motion
-from fmu_src.units import fmi_unit
 from percussion_model.components import COMPONENTS
 from percussion_model.physics.records import Mode
 
@@ -110,6 +109,4 @@ OF_COMPONENTS = {
 for _one in COMPONENTS:
     for _name, (_unit, _text, _) in _one.state.items():
         _output = f"{_one.name}.{_name}"
-        OUTPUTS[_output] = Output(
-            fmi_unit(_unit), None, None, None, _text, _sample(OF_COMPONENTS[_output])
-        )
+        OUTPUTS[_output] = Output(_unit, None, None, None, _text, _sample(OF_COMPONENTS[_output]))

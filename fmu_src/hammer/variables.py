@@ -135,7 +135,7 @@ def _inputs(scene: Scene) -> Iterator[Variable]:
 def _outputs() -> Iterator[Variable]:
     for name, one in OUTPUTS.items():
         real = one.type == "Real"
-        unit = one.unit or ""
+        unit = fmi_unit(one.unit) if one.unit else ""
         display = {"rate_of_penetration": "mm/s", "gauge_stress": "MPa"}.get(name)
         modes: dict[str, Any] = {
             "enumeration": "DrillingMode",
@@ -148,7 +148,7 @@ def _outputs() -> Iterator[Variable]:
             causality="output",
             description=one.description,
             variability="continuous" if real else "discrete",
-            unit=one.unit,
+            unit=unit or None,
             display=display or DISPLAYS.get(unit),
             lower=one.lower,
             upper=one.upper,
