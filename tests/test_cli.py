@@ -52,6 +52,12 @@ def test_json_on_stdout_is_one_object_and_nothing_else(percussion):
     assert summary["rate_of_penetration"] > 0.01
 
 
+def test_what_a_refused_command_was_to_say_is_forgotten(percussion):
+    common._moved.append("out/FeedControl holds another result: this one goes elsewhere")
+    code, _, err = percussion("run", RIGID, *SHORT, "--json", "-")
+    assert (code, err) == (0, "")
+
+
 def test_the_table_names_the_rate(percussion):
     code, out, _ = percussion("run", RIGID, *SHORT)
     assert code == 0

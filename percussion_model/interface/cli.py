@@ -24,6 +24,7 @@ from percussion_model.interface.commands.common import (
     INTERRUPTED,
     ended_by,
     exit_code,
+    forget_moving,
     heed_termination,
     is_interruption,
     own_process,
@@ -184,6 +185,7 @@ def main() -> None:
 def _guarded(work: Callable[[], Any]) -> int:
     """Turn errors that a user can mend into a message."""
     _begun.clear()
+    forget_moving()
     try:
         code = exit_code(work())
         if code == INTERRUPTED and not _begun:

@@ -308,6 +308,11 @@ def claim(
 _moved: list[str] = []
 
 
+def forget_moving() -> None:
+    """Forget what a command before was to say: it was refused."""
+    _moved.clear()
+
+
 def tell_of_moving() -> None:
     """Say once why files that are written now are in another folder than usual."""
     while _moved:
