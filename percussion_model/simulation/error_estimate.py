@@ -556,17 +556,16 @@ def warnings_of_decisions(
     error: float,
 ) -> Iterator[str]:
     """Name the close decision that makes most of an error, relative, and the other rates."""
-    if not decided or error_by_decisions(part, whole, decided) < error:
+    if error_by_decisions(part, whole, decided) < error:
         return
-    margins = part.result.counted["barrier_margin"]
-    near = near_barrier(margins, _unsure_margin(part, others))
+    blows = part.result.counted
+    near = near_barrier(blows["barrier_margin"], _unsure_margin(part, others))
     rates = " or ".join(in_digits(1e3 * other.value, 4) for other in decided if other.useful)
-    within = in_digits(100.0 * float(np.max(np.abs(near))), 2)
+    off, within = (in_digits(100.0 * share, 2) for share in (error, float(np.max(np.abs(near)))))
     yield (
-        f"the rate of penetration {LARGE} {in_digits(100.0 * error, 2)} %: at a bounce or in a "
-        f"standstill the bit's energy is within {within} % of the barrier (rock.barrier_energy) "
-        f"in {len(near)} of {len(margins)} blows, and another resolution may decide otherwise; "
-        f"the rate is {rates} mm/s then"
+        f"the rate of penetration {LARGE} {off} %: at a bounce or in a standstill the bit's energy "
+        f"is within {within} % of the barrier (rock.barrier_energy) in {len(near)} of {len(blows)} "
+        f"blows, and another resolution may decide otherwise; the rate is {rates} mm/s then"
     )
 
 
