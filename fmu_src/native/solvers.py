@@ -9,7 +9,7 @@ from percussion_model.physics.records import Piston, RockKind
 from percussion_model.scene.bars import bar_transit_time
 from percussion_model.scene.solver_choice import WhyWaves, why_waves
 from percussion_model.solvers import plain_code  # noqa: F401  # kernels call functions of scenes
-from percussion_model.solvers.setup import PISTONS, POWER, ROCKS, Bit
+from percussion_model.solvers.setup import PISTONS, ROCKS, Bit
 
 # By the choices of `solver.fidelity` and `solver.name`: 0 for waves, which a name divides, for
 # "auto" and for solvers that others added.
@@ -36,9 +36,6 @@ def kind_of(numbers):
     piston, bit = PISTONS[values.piston_model], bar_transit_time(numbers.bit)
     top = bar_transit_time(numbers.piston) if piston == Piston.ELASTIC else bit
     is_wall = ROCKS[values.effects_rock] == RockKind.WALL
-    is_power, has_loss = values.effects_rock == POWER, values.effects_loss != 0
-    cuttings = ROCKS[values.effects_rock] == RockKind.BILINEAR and values.effects_cuttings != 0
-    why = why_waves(
-        piston == Piston.RIGID, is_wall, is_power, cuttings, has_loss, values.loss_time, top, bit
-    )
+    has_loss = values.effects_loss != 0
+    why = why_waves(piston == Piston.RIGID, is_wall, has_loss, values.loss_time, top, bit)
     return Kind.MODAL.value if why == WhyWaves.NOT else Kind.WAVE.value

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from percussion_model.physics.elementary import exp, log
-from percussion_model.physics.kernel import kernel, merged
+from percussion_model.physics.kernel import inlined, kernel, merged
 
 # Below this share of the reference penetration, or of the force there, the power law goes on as
 # a straight line: nothing that moves a bit is so small.
@@ -26,7 +26,13 @@ MOST_TURNS = 60
 @kernel
 def growth(par, p):
     """Secant stiffness at a penetration that loads, by that at the reference penetration."""
-    return exp((par.exponent - 1.0) * log(max(p / par.reference_penetration, LEAST_SHARE)))
+    share = max(p / par.reference_penetration, LEAST_SHARE)
+    # the usual exponents, which cost no logarithm
+    if par.exponent == 1.0:
+        return 1.0
+    if par.exponent == 1.5:
+        return math.sqrt(share)
+    return share if par.exponent == 2.0 else exp((par.exponent - 1.0) * log(share))
 
 
 @kernel
@@ -103,6 +109,15 @@ def loading_work(par, s, p):
 
 
 @kernel
+def force_and_work(par, s, p):
+    """`loading_force` [N] and `loading_work` [J] at a penetration."""
+    if par.chipping_penetration > 0.0 or is_reloading(s, p):
+        return loading_force(par, s, p), loading_work(par, s, p)
+    force = s.k_r * p * growth(par, p)
+    return force, force * p / (par.exponent + 1.0)
+
+
+@kernel
 def fresh_work(par, s, p):
     """Work from no penetration to `p` on rock that no cuttings cover [J]."""
     part = loading_part(par, s, p)
@@ -130,27 +145,26 @@ def recovered_share(par, s, force):
     return min(share, 1.0 / par.exponent)
 
 
-@kernel
-def fresh_recovery(par, s, p):
+@inlined
+def fresh_recovery(par, s, p, force):
     """Penetration that rock gives back from a peak, in a cycle that began without a force [m]."""
     if is_reloading(s, p):
         return p - s.reload_from
-    return loading_part(par, s, p) * recovered_share(par, s, fresh_force(par, s, p))
+    return loading_part(par, s, p) * recovered_share(par, s, force)
 
 
 @kernel
 def recovery(par, s, p, force):
     """Penetration that rock gives back from a peak and its force (docs/model.md, eq. 20c) [m]."""
-    given_back = fresh_recovery(par, s, p)
+    given_back = fresh_recovery(par, s, p, force)
     if s.resumed_force > 0.0:
         given_back *= 1.0 - (1.0 - s.resumed_share) * s.resumed_force / max(force, s.resumed_force)
     return given_back
 
 
 @kernel
-def recoverable_by_power(par, s, p):
-    """Energy that the rock would give back in a drilling cycle of the power law [J]."""
-    force = loading_force(par, s, p)
+def recoverable_by_power(par, s, p, force):
+    """Energy that the rock would give back at a penetration [m] and its force [N] [J]."""
     return 0.5 * force * recovery(par, s, p, force)
 
 
@@ -186,12 +200,12 @@ def peak_above(par, s, left):
     """Penetration from which the rock would unload to `left` [m]."""
     low, high = left, 2.0 * left
     for _ in range(MOST_TURNS):
-        if high - fresh_recovery(par, s, high) >= left:
+        if high - fresh_recovery(par, s, high, fresh_force(par, s, high)) >= left:
             break
         low, high = high, 2.0 * high
     for _ in range(MOST_TURNS):
         mid = 0.5 * (low + high)
-        if mid - fresh_recovery(par, s, mid) < left:
+        if mid - fresh_recovery(par, s, mid, fresh_force(par, s, mid)) < left:
             low = mid
         else:
             high = mid
@@ -207,7 +221,8 @@ def start_loading(par, s, left):
     s.reload_from = s.reload_to = 0.0
     if left > LEAST_SHARE * par.reference_penetration:
         peak = peak_above(par, s, left)
-        s.reload_stiffness = fresh_force(par, s, peak) / fresh_recovery(par, s, peak)
+        force = fresh_force(par, s, peak)
+        s.reload_stiffness = force / fresh_recovery(par, s, peak, force)
         s.reload_from, s.reload_to = left, peak
 
 
@@ -226,7 +241,8 @@ def resume_loading(par, s, force, given_back):
         Penetration that the rock would give back from it [m].
     """
     if force > 0.0:
-        s.resumed_share = min(given_back / fresh_recovery(par, s, s.p), 1.0)
+        own = fresh_recovery(par, s, s.p, fresh_force(par, s, s.p))
+        s.resumed_share = min(given_back / own, 1.0)
         s.resumed_force = force
 
 

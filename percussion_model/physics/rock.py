@@ -25,6 +25,10 @@ REST_VELOCITY = 1e-9
 # A drilling cycle counts when it crushed more than this share of W_R.
 COUNTED_CYCLE = 0.01
 
+# Rock that would give back less than this share of W_R is unloaded: a bit is found on it within
+# a tick or a step of where it met it.
+UNLOADED = 1e-6
+
 # Energies are divided by no less than this, as hosts may trap an overflow [J].
 LEAST_ENERGY = 1e-30
 
@@ -74,7 +78,7 @@ def recoverable_at(par, s, p):
     """Energy that the rock would give back from `p` in this mode (docs/model.md, eq. 21) [J]."""
     if is_loading(s):
         if par.power == 1:
-            return recoverable_by_power(par, s, p)
+            return recoverable_by_power(par, s, p, loading_force(par, s, p))
         return 0.5 * s.k_r * p * p / s.gamma
     if s.mode == Mode.FF and p <= s.p_u:
         return 0.0
@@ -265,10 +269,12 @@ def close_interface(par, s, energy):
         s.e_standstill += recoverable(par, s)
         start_cycle(par, s, 0.0)
     else:
+        before = recoverable(par, s)
         s.mode = Mode.SS
-        if par.power == 1 and s.p <= s.p_u:
+        if par.power == 1 and before <= UNLOADED * s.w_r:
             # unloaded rock: the stiffness of the last peak's line has no say any more
             s.k_r, s.gamma = par.buttons * s.next_k_r, s.next_gamma
+        s.e_standstill += before - recoverable(par, s)
 
 
 @merged
@@ -308,10 +314,16 @@ def crush(par, s, p_before):
         work -= recoverable(par, s) - recoverable_at(par, s, p_before)
     else:
         work = 0.5 * s.k_r * (s.p - p_before) * (s.p + p_before) * (1.0 - 1.0 / s.gamma)
+    book_crushed(s, work)
+    return work
+
+
+@inlined
+def book_crushed(s, work):
+    """Book what was crushed in a drilling cycle [J]."""
     s.e_crushing += work
     s.crushed += work
     if s.cycle_counted == 0 and s.crushed > COUNTED_CYCLE * s.w_r:
         s.cycle_counted = 1
         s.count_cycles += 1
         s.b_cycles += 1
-    return work

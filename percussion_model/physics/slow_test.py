@@ -30,10 +30,11 @@ def weigh(par, s, p, force, first, datum, peak, model, sums):
     """
     depth = peak - datum
     top = fresh_force(par, s, depth)
-    slope = top / fresh_recovery(par, s, depth)
+    slope = top / fresh_recovery(par, s, depth, top)
     rise = loading_slope(par, s, depth)
     more = depth * (1.0 + TURN)
-    turn = fresh_force(par, s, more) / fresh_recovery(par, s, more) - slope
+    force = fresh_force(par, s, more)
+    turn = force / fresh_recovery(par, s, more, force) - slope
     turn /= TURN * depth
     loaded, unloaded = 0, 0
     for k in range(len(p)):

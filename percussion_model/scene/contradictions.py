@@ -33,8 +33,6 @@ class Rule(IntEnum):
     ACCURACY_WITHOUT_LOSS_TIME = 15
     BARRIER = 16
     SETTLE = 17
-    MODES_OF_POWER = 18
-    MODES_OF_CUTTINGS = 19
 
 
 _OF_STRING = (
@@ -102,14 +100,6 @@ TEXTS = {
         'effects.barrier = true needs effects.rock = "bilinear" or "power", not "{effects.rock}": '
         "set effects.barrier = false"
     ),
-    Rule.MODES_OF_POWER: (
-        'solver.name = "modal" with effects.rock = "power": bars have modes on a rock of one '
-        'stiffness; set solver.name = "wave" or "auto"'
-    ),
-    Rule.MODES_OF_CUTTINGS: (
-        'solver.name = "modal" with effects.cuttings = true: set solver.name = "wave" or "auto", '
-        "which follow them"
-    ),
     Rule.SETTLE: ("run.settle = {run.settle!r} s: must be below run.duration = {run.duration!r} s"),
 }
 
@@ -132,9 +122,7 @@ ELASTIC, RIGID = _place("bit.model", "elastic"), _place("bit.model", "rigid")
 PISTON_ELASTIC, PISTON_ABSENT = (_place("piston.model", word) for word in ("elastic", "absent"))
 NO_DRIVE = _place("effects.drive", "none")
 BILINEAR, POWER = (_place("effects.rock", word) for word in ("bilinear", "power"))
-AUTO, FEM, CHAIN, MODAL = (
-    _place("solver.name", word) for word in ("auto", "fem", "chain", "modal")
-)
+AUTO, FEM, CHAIN = (_place("solver.name", word) for word in ("auto", "fem", "chain"))
 WAVE = _place("solver.fidelity", "wave")
 
 
@@ -169,10 +157,6 @@ def find_contradiction(v: Any, bodies: int, has_rods: bool, is_barrier_given: bo
     is_crushed = v.effects_rock == BILINEAR or v.effects_rock == POWER
     if v.effects_barrier and not is_crushed and is_barrier_given:
         return Rule.BARRIER
-    if v.effects_rock == POWER and v.solver_name == MODAL:
-        return Rule.MODES_OF_POWER
-    if v.effects_cuttings and v.effects_rock == BILINEAR and v.solver_name == MODAL:
-        return Rule.MODES_OF_CUTTINGS
     return Rule.SETTLE if v.run_settle >= v.run_duration else Rule.NOTHING
 
 

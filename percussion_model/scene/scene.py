@@ -348,8 +348,6 @@ class Scene:
         found = why_waves(
             self.piston.model == "rigid",
             self.effects.rock == "wall",
-            self.effects.rock == "power",
-            self.cuttings_on,
             self.effects.loss,
             self.loss.time,
             self.piston.transit_time if self.piston.model == "elastic" else bit,

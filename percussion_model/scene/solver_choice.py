@@ -22,16 +22,12 @@ class WhyWaves(IntEnum):
     UNLIKE = 4
     LITTLE_LOSS = 5
     MUCH_LOSS = 6
-    POWER = 7
-    CUTTINGS = 8
 
 
 REASONS = {
     WhyWaves.NOT: "",
     WhyWaves.RIGID_PISTON: "the piston is rigid",
     WhyWaves.WALL: "the rock is a wall",
-    WhyWaves.POWER: "the rock has a power law",
-    WhyWaves.CUTTINGS: "cuttings stay in the crater",
     WhyWaves.NO_LOSS: "loss is off",
     WhyWaves.UNLIKE: f"one bar is more than {MOST_UNLIKE:g} times as long by transit time",
     WhyWaves.LITTLE_LOSS: f"loss.time is below {LEAST_LOSS:g} of the shorter transit time",
@@ -42,8 +38,6 @@ REASONS = {
 def why_waves(
     is_rigid: bool,
     is_wall: bool,
-    is_power: bool,
-    has_cuttings: bool,
     has_loss: bool,
     loss_time: float,
     piston: float,
@@ -53,9 +47,8 @@ def why_waves(
 
     Parameters
     ----------
-    is_rigid, is_wall, is_power, has_cuttings, has_loss : bool
-        Of the piston, of the rock, which may be a wall, have a power law or leave cuttings, and
-        of the bars.
+    is_rigid, is_wall, has_loss : bool
+        Of the piston, of the rock, which may be a wall, and of the bars.
     loss_time : float
         [s]
     piston, bit : float
@@ -65,10 +58,6 @@ def why_waves(
         return WhyWaves.RIGID_PISTON
     if is_wall:
         return WhyWaves.WALL
-    if is_power:
-        return WhyWaves.POWER
-    if has_cuttings:
-        return WhyWaves.CUTTINGS
     if not has_loss:
         return WhyWaves.NO_LOSS
     if max(piston, bit) > MOST_UNLIKE * min(piston, bit):

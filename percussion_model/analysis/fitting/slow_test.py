@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from percussion_model.physics.kernel import entry_of
-from percussion_model.physics.power_law import fresh_recovery, start_loading
+from percussion_model.physics.power_law import fresh_force, fresh_recovery, start_loading
 from percussion_model.physics.records import RockKind
 from percussion_model.physics.slow_test import weigh
 from percussion_model.physics.state import COMMON_PARAMETERS, COMMON_STATE
@@ -41,7 +41,8 @@ class SlowRock:
 
     def given_back(self, depth: float) -> float:
         """Penetration that the rock gives back from a peak at a depth [m]."""
-        return float(fresh_recovery(*self._records, depth))
+        force = fresh_force(*self._records, depth)
+        return float(fresh_recovery(*self._records, depth, force))
 
     def weigh(
         self, p: np.ndarray, force: np.ndarray, first: int, datum: float, peak: float

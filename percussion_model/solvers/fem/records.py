@@ -148,8 +148,8 @@ FEM_STATE = np.dtype(
         ("next_p", "f8"),
         ("next_b", "f8"),
         ("far", "f8"),  # of these means and of the penetration, what the nodes do not have [m]
-        ("chord_stiffness", "f8"),  # of the power law in the present step [N/m]
-        ("chord_origin", "f8"),  # [m]
+        ("line_stiffness", "f8"),  # of the power law in the present step [N/m]
+        ("line_origin", "f8"),  # [m]
         ("rebounding", "i8"),  # 1: in flight, rock still pressed in
         ("inputs_changed", "i8"),  # 1: inputs were changed, modes may have to follow
         ("skip_events", "i8"),  # modes did not settle: no events in the next step

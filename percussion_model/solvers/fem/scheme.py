@@ -12,8 +12,8 @@ from percussion_model.physics.body import bit_acceleration, piston_acceleration
 from percussion_model.physics.drive import drive_force
 from percussion_model.physics.kernel import inlined, kernel, merged
 from percussion_model.physics.rock import damping
+from percussion_model.physics.rock_line import present_line, take_step_line
 from percussion_model.solvers.fem.bars import read_ahead
-from percussion_model.solvers.fem.power_chord import rock_origin, rock_stiffness, take_chord
 from percussion_model.solvers.fem.records import Mesh, Node, Trial
 from percussion_model.solvers.fem.solve import factors, substitute
 
@@ -62,8 +62,8 @@ def load(par, s, w, c, x, h):
         x[Trial.IM, n_p - 1] -= push_im
         x[Trial.RE, n_p] += push_re
         x[Trial.IM, n_p] += push_im
-    K = rock_stiffness(par, s)
-    x[Trial.RE, n - 1] -= K * (s.p - rock_origin(par, s) + h_re * s.v_end) + damping(s) * s.v_end
+    K, P = present_line(par, s)
+    x[Trial.RE, n - 1] -= K * (s.p - P + h_re * s.v_end) + damping(s) * s.v_end
     x[Trial.IM, n - 1] -= K * h_im * s.v_end
 
 
@@ -86,7 +86,7 @@ def try_step(par, s, w, c, f, x, h):
     h : float
         Length of the step [s].
     """
-    take_chord(par, s, h)
+    take_step_line(par, s, s.v_end * h)
     slot = factors(par, s, c, f, h)
     load(par, s, w, c, x, h)
     substitute(par, s, f, slot, x, h)

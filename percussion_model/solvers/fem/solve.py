@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from percussion_model.physics.kernel import inlined, kernel, merged
 from percussion_model.physics.rock import damping
-from percussion_model.solvers.fem.power_chord import rock_stiffness
+from percussion_model.physics.rock_line import present_line
 from percussion_model.solvers.fem.records import Factor, Key, Mesh, Trial
 
 ROWS = len(Factor)
@@ -86,7 +86,7 @@ def factors(par, s, c, f, h):
     """Slot of the factorisation for a step, made anew where it is not there."""
     slot = WHOLE if h == par.dt else PART
     at = slot * ROWS
-    K = rock_stiffness(par, s)
+    K, _ = present_line(par, s)
     C = damping(s)
     known = f[at + Factor.KEY, Key.STEP] == h
     if not (

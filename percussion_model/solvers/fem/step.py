@@ -17,13 +17,8 @@ from percussion_model.physics.rock import (
     recoverable,
     spring_force,
 )
+from percussion_model.physics.rock_line import is_curved, missing_work, present_line
 from percussion_model.solvers.fem.bars import read_nodes
-from percussion_model.solvers.fem.power_chord import (
-    chord_work,
-    has_chord,
-    rock_origin,
-    rock_stiffness,
-)
 from percussion_model.solvers.fem.records import Mesh, Node, Trial
 from percussion_model.solvers.fem.scheme import rate_bend
 
@@ -84,11 +79,11 @@ def book_contact(par, s, x, w, h):
 def book_rock(par, s, x, w, h):
     """Impulse and works of the rock, by the quadrature of the scheme."""
     i = par.n_p + par.n_b - 1
-    K = rock_stiffness(par, s)
+    K, P = present_line(par, s)
     C = damping(s)
     bend = rate_bend(par, x, i, h)
     path = x[Node.U, i] - w[Node.U, i]
-    y = s.p - rock_origin(par, s)
+    y = s.p - P
     after = y + path
     defect = 0.5 * h * h * par.dissipation * K * bend * bend
     dashpot = dashpot_work(par, s, x, w, h)
@@ -150,8 +145,9 @@ def take_step(par, s, w, c, x, h):
         s.e_standstill += before - recoverable(par, s)
     else:
         crushed = crush(par, s, p_before)
-        if has_chord(par, s):
-            s.e_numerical += chord_work(s, p_before) - (recoverable(par, s) - before) - crushed
+        if is_curved(par, s):
+            line = present_line(par, s)
+            s.e_numerical += missing_work(par, s, line, p_before, before, crushed)
     if -s.u_r > s.b_stroke and n_p > 0:
         s.b_stroke = -s.u_r
     s.time += h

@@ -18,6 +18,7 @@ from percussion_model.solvers.modal.bar import (
     piston_vibration,
     sag,
 )
+from percussion_model.solvers.modal.forms import follows_form
 from percussion_model.solvers.modal.leaps import LONGEST, leap, plan
 from percussion_model.solvers.modal.near import go_near
 from percussion_model.solvers.modal.pairs import FIRST_STRIDE, drop_pairs, law_wanted
@@ -158,7 +159,7 @@ def read_at(par, s, bars, time, row):
     if has_piston(par):
         row.piston_position += rest * s.v_p
         row.piston_velocity += rest * (s.a_p - s.f_contact / par.mass_p)
-    if s.mode == Mode.SS and s.closed == 0 and held > 0.0:
+    if s.mode == Mode.SS and s.closed == 0 and held > 0.0 and follows_form(par, s):
         # what modes that are left out would hold of the load
         row.bit_force += par.mass_b * s.a_b - held * sag(s, bars)
     row.contact_force = s.f_contact

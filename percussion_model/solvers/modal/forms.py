@@ -6,9 +6,10 @@ within a microsecond: it is booked as loss.
 
 from __future__ import annotations
 
-from percussion_model.physics.kernel import inlined, kernel, merged
+from percussion_model.physics.kernel import inlined, kernel
 from percussion_model.physics.records import Mode, Piston, RockKind
-from percussion_model.physics.rock import origin
+from percussion_model.physics.rock import is_loading, origin
+from percussion_model.physics.rock_line import is_curved
 from percussion_model.solvers.modal.bar import (
     BIT,
     LOAD,
@@ -33,19 +34,25 @@ LEAST_SHARE = 1e-16
 LEAST_FORCE = 1e-7
 
 
-@merged
+@inlined
 def form_wanted(par, s):
-    """Form of the present mode; the free one for rock that no form was made for."""
+    """Form of the present mode; the free one where the rock has no spring."""
     form = JOINED if s.closed == 1 else 0
-    if par.rock == RockKind.SPRING and s.mode != Mode.FF and s.k_r == par.k_r:
-        return form + 1
-    if par.rock != RockKind.BILINEAR or s.k_r != par.k_r or s.gamma != par.gamma:
+    if s.mode == Mode.FF or par.rock == RockKind.NONE or par.rock == RockKind.WALL:
         return form
-    if s.mode == Mode.DFC or s.mode == Mode.FC:
-        return form + 1
-    if s.mode == Mode.BC or s.mode == Mode.SS:
-        return form + 2
-    return form
+    return form + (1 if is_loading(s) else 2)
+
+
+@inlined
+def follows_form(par, s):
+    """Whether the rock is the spring of the form that its mode wants; else its rest is stepped."""
+    if s.mode == Mode.FF:
+        return True
+    if par.rock == RockKind.SPRING:
+        return s.k_r == par.k_r
+    if par.rock != RockKind.BILINEAR or s.k_r != par.k_r:
+        return False
+    return s.gamma == par.gamma and not is_curved(par, s)
 
 
 @kernel
@@ -130,7 +137,7 @@ def settle(par, s, bars, low):
     refresh_loads(s, bars, s.a_b, s.a_p)
     refresh_sums(s, bars)
     hold_end(s, bars, low)
-    if bars.laws.sizes[2 * s.form] == 0 or (s.form % JOINED == 0) != (s.mode == Mode.FF):
+    if bars.laws.sizes[2 * s.form] == 0 or not follows_form(par, s):
         trim(par, s, bars)
     refresh_sums(s, bars)
     shift(s, bars, low - s.low)

@@ -10,7 +10,7 @@ from percussion_model.physics.kernel import inlined, kernel, merged
 from percussion_model.physics.records import Mode, RockKind
 from percussion_model.physics.rock import book_dashpot, damping
 from percussion_model.solvers.modal.bar import LOAD, SOFT, STIFF, TINY, Q, V, row_sum
-from percussion_model.solvers.modal.forms import form_wanted, refresh_loads
+from percussion_model.solvers.modal.forms import follows_form, form_wanted, refresh_loads
 from percussion_model.solvers.modal.lanes import WIDTH, load, spread, store, total
 from percussion_model.solvers.modal.records import JOINED, End, Go, Shape
 
@@ -45,7 +45,7 @@ class Sums(NamedTuple):
 @merged
 def law_in(par, s, laws, form):
     """Law by which the present mode moves in a form; -1 where it has to be stepped."""
-    if par.effects == 1 or (form % JOINED == 0) != (s.mode == Mode.FF):
+    if par.effects == 1 or not follows_form(par, s):
         return -1
     if s.closed == 1 and s.mode == Mode.SS and s.alert == 1:
         return -1  # the bit's own energy is known by its modes

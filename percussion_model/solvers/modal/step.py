@@ -21,13 +21,23 @@ from percussion_model.physics.drive import drive_force, switch_drive
 from percussion_model.physics.kernel import inlined, kernel, merged
 from percussion_model.physics.records import Mode, Piston, RockKind
 from percussion_model.physics.rock import (
+    book_crushed,
     book_dashpot,
     crush,
     damping,
     origin,
     overcomes_barrier,
     recoverable,
+    recoverable_at,
     stiffness,
+)
+from percussion_model.physics.rock_line import (
+    Line,
+    Place,
+    crushed_between,
+    is_curved,
+    line_between,
+    place_at,
 )
 from percussion_model.solvers.modal.bar import (
     Ends,
@@ -59,6 +69,8 @@ from percussion_model.solvers.modal.rock_end import (
 
 # Steps after which the running force of a standstill is noted.
 CHECKPOINT = 64
+# Lines that are taken for the way of a step on a curve, until they change it by no more than this.
+MOST_TURNS, SETTLED = 8, 1e-10
 # Openings and closures of one instant; more would be a loop.
 MOST_FLIPS = 2
 
@@ -68,11 +80,11 @@ class Trial(NamedTuple):
 
     h: float  # [s]
     ends: Ends
-    rest: float  # force at the rock end besides the spring of the form [N]
     force: float  # mean force of the rock [N]
     last: float  # force of the rock at the end [N]
     path: float  # of the penetration [m]
     work: float  # of the rock's dashpot [J]
+    rock: Answer
     contact: float  # mean force of piston on bit [N]
     touch: float  # the same at the end [N]
     way_b: float  # of the mean motion of bit and piston [m]
@@ -81,26 +93,69 @@ class Trial(NamedTuple):
     gap: float  # [m]
 
 
+class Answer(NamedTuple):
+    """What the rock does in a step."""
+
+    rest: float  # force at the rock end besides the spring of the form [N]
+    line: Line  # of its spring
+    begin: Place  # of loading along a curve, before the step and after it
+    end: Place
+
+
 @inlined
-def rest_force(par, s, bars, level, h):
-    """Force at the rock end besides the spring of the form, over a step of `h` [N]."""
+def rest_on_line(s, line, held, lag, free, yields):
+    """Mean force over a step besides a spring `held`, of the rock on a line [N].
+
+    Parameters
+    ----------
+    lag : float
+        Force by the path of the rock end, of dashpots [N/m].
+    free, yields : float
+        Path of the rock end without that force [m], and what it goes back by 1 N [m/N].
+    """
+    first, slope = 0.0, lag
+    if line.stiffness != held:
+        first = line.stiffness * (s.p - line.origin) - held * s.low
+        slope += 0.5 * (line.stiffness - held)
+    return (first + slope * free) / (1.0 + slope * yields)
+
+
+@inlined
+def answer_on_curve(par, s, held, lag, free, yields, h):
+    """`Answer` of rock that loads along a curve."""
+    path, begin = s.v_low * h, place_at(par, s, s.p)
+    for _ in range(MOST_TURNS):
+        end = place_at(par, s, s.p + path)
+        line = line_between(par, s, begin, end)
+        rest = rest_on_line(s, line, held, lag, free, yields)
+        before, path = path, free - yields * rest
+        if abs(path - before) <= SETTLED * abs(path):
+            break
+    return Answer(rest, line, begin, end)
+
+
+@inlined
+def answer_of(par, s, bars, level, h):
+    """Make out what the rock does over a step of `h` [s]."""
     shape, n = bars.forms.shape[s.form], s.active
     held, yields = bars.forms.stiff[s.form], bars.forms.yields[s.form, level, n // WIDTH - 1]
     m = bars.forms.move[s.form, level]
+    line, here = Line(stiffness(s), origin(s)), Place(s.p, 0.0, 0.0)
     if par.rock == RockKind.WALL:
         if s.mode == Mode.FF:
-            return 0.0
-        return (low_after(bars.w, shape, m, n) - s.low) / yields
-    first = slope = 0.0
-    if s.mode != Mode.FF:
-        K = stiffness(s) - held if held == 0.0 else 0.0
-        first = K * (s.p - origin(s))
-        # the loss of a form's modes takes its spring for a part of the bar
-        slope = 0.5 * K + (damping(s) - par.eta * held) / h
-    if first == 0.0 and slope == 0.0:
-        return 0.0
+            return Answer(0.0, line, here, here)
+        rest = (low_after(bars.w, shape, m, n) - s.low) / yields
+        return Answer(rest, line, here, here)
+    # the loss of a form's modes takes its spring for a part of the bar
+    lag = (damping(s) - par.eta * held) / h
+    curved = is_curved(par, s)
+    if s.mode == Mode.FF or (lag == 0.0 and line.stiffness == held and not curved):
+        return Answer(0.0, line, here, here)
     free = low_after(bars.w, shape, m, n) - s.low
-    return (first + slope * free) / (1.0 + slope * yields)
+    if curved:
+        return answer_on_curve(par, s, held, lag, free, yields, h)
+    rest = rest_on_line(s, line, held, lag, free, yields)
+    return Answer(rest, line, here, here)
 
 
 @inlined
@@ -109,13 +164,14 @@ def try_step(par, s, bars, level):
     h = par.tick * (1 << level)
     m = bars.forms.move[s.form, level]
     joined = s.closed == 1
-    rest = rest_force(par, s, bars, level, h)
+    rock = answer_of(par, s, bars, level, h)
+    rest, line = rock.rest, rock.line
     shape = bars.forms.shape[s.form]
     ends = try_move(bars.w, bars.rows, shape, m, s.active, rest, par.eta, joined)
     path = ends.low - s.low
-    C, spring = damping(s), stiffness(s) * (s.p - origin(s))
-    force = spring + 0.5 * stiffness(s) * path + C * path / h
-    last = spring + stiffness(s) * path + C * ends.speed
+    C, spring = damping(s), line.stiffness * (s.p - line.origin)
+    force = spring + 0.5 * line.stiffness * path + C * path / h
+    last = spring + line.stiffness * path + C * ends.speed
     if par.rock == RockKind.WALL:
         force = last = rest
     way_b = (ends.bit - s.at_b) / par.mass_b
@@ -136,29 +192,31 @@ def try_step(par, s, bars, level):
                 low_p = end_after(bars.wp, bars.shape_p, bars.move_p[level], bars.wp.shape[1])
         gap = top - (s.u_p + way_p + low_p)
     work = C * path * path / h
-    return Trial(h, ends, rest, force, last, path, work, contact, touch, way_b, way_p, low_p, gap)
+    return Trial(h, ends, force, last, path, work, rock, contact, touch, way_b, way_p, low_p, gap)
 
 
 @merged
-def book_rock(par, s, trial, before, v_low):
+def book_rock(par, s, trial, v_low):
     """Book what the rock takes in a step.
 
     Parameters
     ----------
-    before : float
-        Energy that it would have given back before [J].
     v_low : float
-        Velocity of the rock end then [m/s].
+        Velocity of the rock end before [m/s].
     """
+    p_before, line = s.p - trial.path, trial.rock.line
     if s.mode == Mode.FF:
-        s.e_standstill += before - recoverable(par, s)
+        s.e_standstill += recoverable_at(par, s, p_before) - recoverable(par, s)
         return
     s.rock_work += trial.force * trial.path
     book_dashpot(s, trial.work)
-    crush(par, s, s.p - trial.path)
+    if is_curved(par, s):
+        book_crushed(s, crushed_between(par, s, trial.rock.begin, trial.rock.end))
+    else:
+        crush(par, s, p_before)
     first = trial.last
     if par.rock != RockKind.WALL:
-        first = stiffness(s) * (s.p - trial.path - origin(s)) + damping(s) * v_low
+        first = line.stiffness * (p_before - line.origin) + damping(s) * v_low
     s.b_peak_bit = max(s.b_peak_bit, trial.last)
     late = late_force(s, time_of(par, s), trial.h, first, trial.last)
     s.peak_bit_force = max(s.peak_bit_force, late)
@@ -167,7 +225,7 @@ def book_rock(par, s, trial, before, v_low):
 @kernel
 def make(par, s, bars, level, trial, push, events):
     """Make a step that was tried."""
-    begin, before, h, v_low = time_of(par, s), recoverable(par, s), trial.h, s.v_low
+    begin, h, v_low = time_of(par, s), trial.h, s.v_low
     ends = trial.ends
     s.time += 1 << level
     s.count_steps += 1
@@ -191,7 +249,7 @@ def make(par, s, bars, level, trial, push, events):
     s.low, s.top, s.at_b, s.at_p = ends.low, ends.top, ends.bit, ends.piston
     s.f_contact, s.f_rock = trial.contact, trial.force
     s.p += trial.path
-    book_rock(par, s, trial, before, v_low)
+    book_rock(par, s, trial, v_low)
     if s.closed == 1:
         book_contact(par, s, trial.contact, h, time_of(par, s))
     if has_piston(par):

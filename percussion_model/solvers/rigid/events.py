@@ -20,6 +20,7 @@ from percussion_model.physics.rock import (
     end_unloading,
     resume_cycle,
 )
+from percussion_model.physics.rock_line import is_curved, take_line
 from percussion_model.solvers.rigid.forces import (
     acceleration,
     acceleration_doubt,
@@ -32,7 +33,6 @@ from percussion_model.solvers.rigid.forces import (
     note_standstill_force,
     storm_persists,
 )
-from percussion_model.solvers.rigid.power_lines import begin_loading, take_line
 from percussion_model.solvers.rigid.records import Next
 
 # Pressed together, a rebound slower than this ends the bouncing: what is left of a blow
@@ -150,8 +150,8 @@ def change_mode(par, s, events, kind, moved):
         resume_cycle(par, s)
     else:
         s.mode = Mode.BC
-    if kind != Next.BARRIER:
-        begin_loading(par, s)
+    if kind != Next.BARRIER and is_curved(par, s):
+        take_line(par, s)
     force = bit_force(par, s, s.p, s.v_b)
     s.b_peak_bit = max(s.b_peak_bit, force)
     push_event(s, events, s.time, EventKind.MODE_FF + s.mode, force)

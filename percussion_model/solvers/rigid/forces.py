@@ -14,10 +14,9 @@ from percussion_model.physics.rock import (
     damping,
     enter_standstill,
     is_loading,
-    origin,
     recoverable,
-    stiffness,
 )
+from percussion_model.physics.rock_line import present_line
 from percussion_model.solvers.rigid.motion import oscillate
 
 # Relative rounding of an acceleration, and of a force that is the difference of two lengths.
@@ -48,9 +47,8 @@ def rock_terms(par, s):
     """Stiffness K, damping C and origin P_R of the present mode; K = 0 off the rock."""
     if s.mode == Mode.FF or par.rock == RockKind.WALL:
         return 0.0, 0.0, 0.0
-    if par.power == 1 and is_loading(s):
-        return s.line_stiffness, damping(s), s.line_origin
-    return stiffness(s), damping(s), origin(s)
+    line = present_line(par, s)
+    return line.stiffness, damping(s), line.origin
 
 
 @kernel

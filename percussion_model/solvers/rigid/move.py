@@ -16,10 +16,10 @@ from percussion_model.physics.records import Mode, Piston, RockKind
 from percussion_model.physics.rock import (
     book_dashpot,
     crush,
-    is_loading,
     recoverable,
     recoverable_at,
 )
+from percussion_model.physics.rock_line import is_curved, line_work, present_line
 from percussion_model.solvers.rigid.forces import (
     acceleration,
     bit_force,
@@ -35,7 +35,6 @@ from percussion_model.solvers.rigid.motion import (
     oscillate_with_loss,
     zero_time,
 )
-from percussion_model.solvers.rigid.power_lines import line_work
 
 
 @kernel
@@ -205,10 +204,10 @@ def book_rock(par, s, p_before, taken):
         return
     book_dashpot(s, taken)
     given = change + crush(par, s, p_before)
-    if par.power == 1 and is_loading(s):
+    if is_curved(par, s):
         # what rock that yields by lines does not give back is crushed: more than by its law
         # within a line, or less, and as much over a whole one
-        work = line_work(s, p_before)
+        work = line_work(present_line(par, s), p_before, s.p)
         s.e_crushing += work - given
         given = work
     s.rock_work += given + taken

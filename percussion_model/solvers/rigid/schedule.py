@@ -9,6 +9,7 @@ from percussion_model.physics.drive import drive_force, room_to_turn
 from percussion_model.physics.kernel import kernel
 from percussion_model.physics.records import Mode, Piston, RockKind
 from percussion_model.physics.rock import REST_VELOCITY, barrier_level, barrier_off
+from percussion_model.physics.rock_line import is_curved
 from percussion_model.solvers.rigid.forces import (
     ROUNDING,
     acceleration,
@@ -232,7 +233,7 @@ def find_next(par, s):
             tau, kind = fall_time(y, s.v_b, 0.0, k, -F / K), Next.LIFT
         elif s.mode == Mode.DFC or s.mode == Mode.FC:
             tau, kind = loading_event(s, y, acc, beta, k, M)
-            if par.power == 1 and tau > 0.0:
+            if is_curved(par, s) and tau > 0.0:
                 end = fall_time(-y, -s.v_b, beta, k, P + F / K - s.line_end)
                 if end < tau:
                     tau, kind = end, Next.LINE
