@@ -23,8 +23,8 @@ from percussion_model.solvers.modal.leaps import LONGEST, leap, plan
 from percussion_model.solvers.modal.near import go_near
 from percussion_model.solvers.modal.pairs import FIRST_STRIDE, drop_pairs, law_wanted
 from percussion_model.solvers.modal.piston import WHOLE, has_piston, time_of, unpark
-from percussion_model.solvers.modal.records import STEP, Task
-from percussion_model.solvers.modal.step import step
+from percussion_model.solvers.modal.records import Task
+from percussion_model.solvers.modal.step import level_of_step, step
 
 # Events that one step can make: of the barrier, two of the contact, of the drive, of the rock.
 MOST_EVENTS = 6
@@ -63,8 +63,9 @@ def time_of_blow(par_, state, bars_):
     par, s = par_[0], state[0]
     if s.leap_end >= 0:
         return 0.0
-    law = law_wanted(par, s, refer(bars_).laws)
-    ticks = portion(s, law) if law >= 0 else WHOLE
+    bars = refer(bars_)
+    law = law_wanted(par, s, bars.laws)
+    ticks = portion(s, law) if law >= 0 else 1 << level_of_step(par, s, bars)
     return end_with_blow(par, s, (s.time + ticks) * par.tick)
 
 
@@ -83,9 +84,10 @@ def advance_to(par, s, bars, end, blows, events):
         if law < 0:
             if s.law >= 0:
                 drop_pairs(par, s, bars)
-            if s.time + WHOLE > end:
+            level = level_of_step(par, s, bars)
+            if s.time + (1 << level) > end:
                 return Status.DONE
-            step(par, s, bars, STEP, blows, events)
+            step(par, s, bars, level, blows, events)
             continue
         if s.leap_end < 0:
             most = portion(s, law)
@@ -106,7 +108,6 @@ def commit_to(par, s, bars, end, blows, events):
     s.n_blows = 0
     s.n_events = 0
     s.leap_end = -1
-    level = STEP
     while s.time < end:
         status = full(s, blows, events)
         if status != Status.DONE:
@@ -122,6 +123,7 @@ def commit_to(par, s, bars, end, blows, events):
             continue
         if s.law >= 0:
             drop_pairs(par, s, bars)
+        level = level_of_step(par, s, bars)
         while s.time + (1 << level) > end:
             level -= 1
         step(par, s, bars, level, blows, events)

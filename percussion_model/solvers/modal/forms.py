@@ -36,11 +36,13 @@ LEAST_FORCE = 1e-7
 
 @inlined
 def form_wanted(par, s):
-    """Form of the present mode; the free one where the rock has no spring."""
+    """Form of the present mode: free, or on the spring that comes closest to the rock's."""
     form = JOINED if s.closed == 1 else 0
     if s.mode == Mode.FF or par.rock == RockKind.NONE or par.rock == RockKind.WALL:
         return form
-    return form + (1 if is_loading(s) else 2)
+    if is_loading(s):
+        return form + 1
+    return form + (1 if s.gamma * s.k_r < 0.5 * (1.0 + par.gamma) * par.k_r else 2)
 
 
 @inlined

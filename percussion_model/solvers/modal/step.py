@@ -19,6 +19,7 @@ from percussion_model.physics.body import (
 )
 from percussion_model.physics.drive import drive_force, switch_drive
 from percussion_model.physics.kernel import inlined, kernel, merged
+from percussion_model.physics.power_law import loading_slope
 from percussion_model.physics.records import Mode, Piston, RockKind
 from percussion_model.physics.rock import (
     book_crushed,
@@ -48,7 +49,7 @@ from percussion_model.solvers.modal.bar import (
     take,
     try_move,
 )
-from percussion_model.solvers.modal.between import late_force
+from percussion_model.solvers.modal.between import End, late_force, turns_between
 from percussion_model.solvers.modal.forms import refresh_loads
 from percussion_model.solvers.modal.lanes import WIDTH
 from percussion_model.solvers.modal.piston import (
@@ -60,6 +61,7 @@ from percussion_model.solvers.modal.piston import (
     time_of,
     unpark,
 )
+from percussion_model.solvers.modal.records import STEP
 from percussion_model.solvers.modal.rock_end import (
     change_mode,
     end_standstill,
@@ -71,6 +73,9 @@ from percussion_model.solvers.modal.rock_end import (
 CHECKPOINT = 64
 # Lines that are taken for the way of a step on a curve, until they change it by no more than this.
 MOST_TURNS, SETTLED = 8, 1e-10
+# Steps are longer, 2^LONGER times at most, while by the spring that their form lacks the rock end
+# moves less than this share of what it does by the rest.
+LONGER, MOST_REST = 2, 0.02
 # Openings and closures of one instant; more would be a loop.
 MOST_FLIPS = 2
 
@@ -81,7 +86,8 @@ class Trial(NamedTuple):
     h: float  # [s]
     ends: Ends
     force: float  # mean force of the rock [N]
-    last: float  # force of the rock at the end [N]
+    first: float  # at the begin
+    last: float  # at the end
     path: float  # of the penetration [m]
     work: float  # of the rock's dashpot [J]
     rock: Answer
@@ -171,9 +177,9 @@ def try_step(par, s, bars, level):
     path = ends.low - s.low
     C, spring = damping(s), line.stiffness * (s.p - line.origin)
     force = spring + 0.5 * line.stiffness * path + C * path / h
-    last = spring + line.stiffness * path + C * ends.speed
+    first, last = spring + C * s.v_low, spring + line.stiffness * path + C * ends.speed
     if par.rock == RockKind.WALL:
-        force = last = rest
+        force = first = last = rest
     way_b = (ends.bit - s.at_b) / par.mass_b
     way_p = contact = touch = low_p = gap = 0.0
     if joined:
@@ -192,7 +198,9 @@ def try_step(par, s, bars, level):
                 low_p = end_after(bars.wp, bars.shape_p, bars.move_p[level], bars.wp.shape[1])
         gap = top - (s.u_p + way_p + low_p)
     work = C * path * path / h
-    return Trial(h, ends, force, last, path, work, rock, contact, touch, way_b, way_p, low_p, gap)
+    return Trial(
+        h, ends, force, first, last, path, work, rock, contact, touch, way_b, way_p, low_p, gap
+    )
 
 
 @merged
@@ -204,7 +212,7 @@ def book_rock(par, s, trial, v_low):
     v_low : float
         Velocity of the rock end before [m/s].
     """
-    p_before, line = s.p - trial.path, trial.rock.line
+    p_before = s.p - trial.path
     if s.mode == Mode.FF:
         s.e_standstill += recoverable_at(par, s, p_before) - recoverable(par, s)
         return
@@ -214,11 +222,8 @@ def book_rock(par, s, trial, v_low):
         book_crushed(s, crushed_between(par, s, trial.rock.begin, trial.rock.end))
     else:
         crush(par, s, p_before)
-    first = trial.last
-    if par.rock != RockKind.WALL:
-        first = line.stiffness * (p_before - line.origin) + damping(s) * v_low
     s.b_peak_bit = max(s.b_peak_bit, trial.last)
-    late = late_force(s, time_of(par, s), trial.h, first, trial.last)
+    late = late_force(s, time_of(par, s), trial.h, trial.first, trial.last)
     s.peak_bit_force = max(s.peak_bit_force, late)
 
 
@@ -270,6 +275,20 @@ def load_bodies(par, s, bars, level):
         refresh_loads(s, bars, a_b, a_p)
 
 
+@merged
+def level_of_step(par, s, bars):
+    """Level of the next step of bars that are stepped: longer where they follow their form best."""
+    if par.effects == 1 or s.closed == 1 or s.mode == Mode.FF or par.rock == RockKind.WALL:
+        return STEP
+    K = loading_slope(par, s, s.p) if is_curved(par, s) else stiffness(s)
+    rest, yields = abs(K - bars.forms.stiff[s.form]), bars.forms.yields[s.form]
+    lanes, level = s.active // WIDTH - 1, STEP
+    most = STEP + (1 if damping(s) > 0.0 else LONGER)
+    while level < most and rest * yields[level + 1, lanes] < MOST_REST:
+        level += 1
+    return level
+
+
 @kernel
 def step(par, s, bars, most, blows, events):
     """Go on by a step, of 2^most ticks at most, or to the next event."""
@@ -315,7 +334,11 @@ def go_on(par, s, bars, most, near, blows, events):
                 flip = trial.touch < 0.0 or trial.contact < 0.0
         # the barrier is passed within, and left at the next step
         bursts = stands and overcomes_barrier(par, s, bit_kinetic(s, bars, bars.rows))
-        ends = passed(par, s, s.p + trial.path, trial.ends.speed, trial.work, trial.last)
+        p, speed = s.p + trial.path, trial.ends.speed
+        ends = passed(par, s, p, speed, trial.work, trial.last)
+        if level > STEP:
+            before = End(s.p, s.v_low, trial.first)
+            ends = ends or turns_between(s, before, End(p, speed, trial.last), trial.h) > 0.0
         turns = piston and switches(par, s, s.u_r + trial.way_p - trial.way_b)
         if level > 0 and (flip or ends or turns or bursts):
             level -= 1
