@@ -19,7 +19,6 @@ from percussion_model.physics.body import (
 )
 from percussion_model.physics.drive import drive_force, switch_drive
 from percussion_model.physics.kernel import inlined, kernel, merged
-from percussion_model.physics.power_law import loading_slope
 from percussion_model.physics.records import Mode, Piston, RockKind
 from percussion_model.physics.rock import (
     book_crushed,
@@ -73,9 +72,6 @@ from percussion_model.solvers.modal.rock_end import (
 CHECKPOINT = 64
 # Lines that are taken for the way of a step on a curve, until they change it by no more than this.
 MOST_TURNS, SETTLED = 8, 1e-10
-# Steps are longer, 2^LONGER times at most, while by the spring that their form lacks the rock end
-# moves less than this share of what it does by the rest.
-LONGER, MOST_REST = 2, 0.02
 # Openings and closures of one instant; more would be a loop.
 MOST_FLIPS = 2
 
@@ -276,17 +272,11 @@ def load_bodies(par, s, bars, level):
 
 
 @merged
-def level_of_step(par, s, bars):
-    """Level of the next step of bars that are stepped: longer where they follow their form best."""
+def level_of_step(par, s):
+    """Level of the next step of bars that are stepped."""
     if par.effects == 1 or s.closed == 1 or s.mode == Mode.FF or par.rock == RockKind.WALL:
         return STEP
-    K = loading_slope(par, s, s.p) if is_curved(par, s) else stiffness(s)
-    rest, yields = abs(K - bars.forms.stiff[s.form]), bars.forms.yields[s.form]
-    lanes, level = s.active // WIDTH - 1, STEP
-    most = STEP + (1 if damping(s) > 0.0 else LONGER)
-    while level < most and rest * yields[level + 1, lanes] < MOST_REST:
-        level += 1
-    return level
+    return STEP + 1  # forces on rock change slower than a front passes
 
 
 @kernel
