@@ -101,10 +101,11 @@ def line_work(line, a, b):
 
 
 @inlined
-def crushed_between(par, s, one, other):
-    """What loading crushed from one place to another [J]."""
+def crushed_on_line(par, s, line, one, other):
+    """What loading crushed from one place to another, between which a line was taken [J]."""
     before = recoverable_by_power(par, s, one.p, one.force)
-    return other.work - one.work - (recoverable_by_power(par, s, other.p, other.force) - before)
+    change = recoverable_by_power(par, s, other.p, other.force) - before
+    return line_work(line, one.p, other.p) - change
 
 
 @inlined

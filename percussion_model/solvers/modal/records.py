@@ -293,6 +293,10 @@ MODAL_STATE = np.dtype(
         ("rest_pull", "f8"),  # of bit on piston besides what the pairs tell [N]
         ("vibrates", "f8"),  # energy about rest when the pairs were taken [J]
         ("takes", "f8"),  # that a dashpot of 1 N s/m would take from then on [J]
+        ("has_place", "i8"),  # 1: where loading along a curve is, is known
+        ("place_p", "f8"),  # penetration [m], force [N], work [J]
+        ("place_force", "f8"),
+        ("place_work", "f8"),
         ("v_low", "f8"),  # velocity of the rock end [m/s]
         ("f_contact", "f8"),  # mean forces of the last step [N]
         ("f_rock", "f8"),
@@ -321,6 +325,7 @@ MODAL_LIMITS = Limits(
         "alert": FLAG,
         "form": (0, 5),
         "active": COUNT,
+        "has_place": FLAG,
         "count_leaps": COUNT,
     },
 )

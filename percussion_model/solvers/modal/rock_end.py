@@ -45,6 +45,7 @@ def look(par, s, bars):
 def end_standstill(par, s, bars, events):
     """Leave standstill where the bit's energy passes the barrier."""
     if ends_standstill(par, s, bit_kinetic(s, bars, bars.w)):
+        s.has_place = 0
         # before a front can be there, modes ring
         leave_standstill(par, s, s.v_low if s.time >= s.rest_until else 0.0)
         change_spring(par, s, bars)
@@ -61,6 +62,7 @@ def next_mode(par, s, energy):
         Kinetic energy of the bit [J].
     """
     left, before = s.mode, recoverable(par, s)
+    s.has_place = 0
     if s.mode == Mode.FF:
         if par.rock == RockKind.WALL:
             s.e_standstill += before

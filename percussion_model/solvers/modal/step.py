@@ -34,7 +34,7 @@ from percussion_model.physics.rock import (
 from percussion_model.physics.rock_line import (
     Line,
     Place,
-    crushed_between,
+    crushed_on_line,
     is_curved,
     line_between,
     place_at,
@@ -51,6 +51,7 @@ from percussion_model.solvers.modal.bar import (
 from percussion_model.solvers.modal.between import End, late_force, turns_between
 from percussion_model.solvers.modal.forms import refresh_loads
 from percussion_model.solvers.modal.lanes import WIDTH
+from percussion_model.solvers.modal.narrow import beyond, level_below
 from percussion_model.solvers.modal.piston import (
     book_contact,
     flip_contact,
@@ -71,7 +72,7 @@ from percussion_model.solvers.modal.rock_end import (
 # Steps after which the running force of a standstill is noted.
 CHECKPOINT = 64
 # Lines that are taken for the way of a step on a curve, until they change it by no more than this.
-MOST_TURNS, SETTLED = 8, 1e-10
+MOST_TURNS, SETTLED = 8, 1e-6
 # Openings and closures of one instant; more would be a loop.
 MOST_FLIPS = 2
 
@@ -100,8 +101,7 @@ class Answer(NamedTuple):
 
     rest: float  # force at the rock end besides the spring of the form [N]
     line: Line  # of its spring
-    begin: Place  # of loading along a curve, before the step and after it
-    end: Place
+    begin: Place  # of loading along a curve
 
 
 @inlined
@@ -123,17 +123,24 @@ def rest_on_line(s, line, held, lag, free, yields):
 
 
 @inlined
+def present_place(par, s):
+    """Where loading along a curve is, by the step before or anew."""
+    if s.has_place == 1 and s.place_p == s.p:
+        return Place(s.place_p, s.place_force, s.place_work)
+    return place_at(par, s, s.p)
+
+
+@inlined
 def answer_on_curve(par, s, held, lag, free, yields, h):
     """`Answer` of rock that loads along a curve."""
-    path, begin = s.v_low * h, place_at(par, s, s.p)
+    path, begin = s.v_low * h, present_place(par, s)
     for _ in range(MOST_TURNS):
-        end = place_at(par, s, s.p + path)
-        line = line_between(par, s, begin, end)
+        line = line_between(par, s, begin, place_at(par, s, s.p + path))
         rest = rest_on_line(s, line, held, lag, free, yields)
         before, path = path, free - yields * rest
         if abs(path - before) <= SETTLED * abs(path):
             break
-    return Answer(rest, line, begin, end)
+    return Answer(rest, line, begin)
 
 
 @inlined
@@ -145,19 +152,19 @@ def answer_of(par, s, bars, level, h):
     line, here = Line(stiffness(s), origin(s)), Place(s.p, 0.0, 0.0)
     if par.rock == RockKind.WALL:
         if s.mode == Mode.FF:
-            return Answer(0.0, line, here, here)
+            return Answer(0.0, line, here)
         rest = (low_after(bars.w, shape, m, n) - s.low) / yields
-        return Answer(rest, line, here, here)
+        return Answer(rest, line, here)
     # the loss of a form's modes takes its spring for a part of the bar
     lag = (damping(s) - par.eta * held) / h
     curved = is_curved(par, s)
     if s.mode == Mode.FF or (lag == 0.0 and line.stiffness == held and not curved):
-        return Answer(0.0, line, here, here)
+        return Answer(0.0, line, here)
     free = low_after(bars.w, shape, m, n) - s.low
     if curved:
         return answer_on_curve(par, s, held, lag, free, yields, h)
     rest = rest_on_line(s, line, held, lag, free, yields)
-    return Answer(rest, line, here, here)
+    return Answer(rest, line, here)
 
 
 @inlined
@@ -215,7 +222,9 @@ def book_rock(par, s, trial, v_low):
     s.rock_work += trial.force * trial.path
     book_dashpot(s, trial.work)
     if is_curved(par, s):
-        book_crushed(s, crushed_between(par, s, trial.rock.begin, trial.rock.end))
+        end = place_at(par, s, s.p)
+        s.has_place, s.place_p, s.place_force, s.place_work = 1, end.p, end.force, end.work
+        book_crushed(s, crushed_on_line(par, s, trial.rock.line, trial.rock.begin, end))
     else:
         crush(par, s, p_before)
     s.b_peak_bit = max(s.b_peak_bit, trial.last)
@@ -279,6 +288,25 @@ def level_of_step(par, s):
     return STEP + 1  # forces on rock change slower than a front passes
 
 
+@inlined
+def ends_of(s, trial):
+    """The rock end before a step and after it."""
+    after = End(s.p + trial.path, trial.ends.speed, trial.last)
+    return End(s.p, s.v_low, trial.first), after
+
+
+@merged
+def level_before(s, trial, level):
+    """Level of a step that is likely to end just before the mode does, within one of 2^level."""
+    before, after = ends_of(s, trial)
+    low, high = beyond(s, before), beyond(s, after)
+    if low < 0.0 < high:
+        return level_below(low / (low - high) * (1 << level))
+    if s.mode == Mode.DFC and trial.work > 0.0:
+        return level_below((s.w_r - s.w) / trial.work * (1 << level))
+    return level
+
+
 @kernel
 def step(par, s, bars, most, blows, events):
     """Go on by a step, of 2^most ticks at most, or to the next event."""
@@ -309,7 +337,7 @@ def go_on(par, s, bars, most, near, blows, events):
         park(par, s, bars)
     if s.mode == Mode.SS and s.alert == 1 and par.rock == RockKind.BILINEAR:
         end_standstill(par, s, bars, events)
-    level, flips = most, 0
+    level, flips, longer = most, 0, level_of_step(par, s) > STEP
     load_bodies(par, s, bars, level)
     while True:
         stands = s.mode == Mode.SS and s.alert == 1 and par.rock == RockKind.BILINEAR
@@ -324,14 +352,15 @@ def go_on(par, s, bars, most, near, blows, events):
                 flip = trial.touch < 0.0 or trial.contact < 0.0
         # the barrier is passed within, and left at the next step
         bursts = stands and overcomes_barrier(par, s, bit_kinetic(s, bars, bars.rows))
-        p, speed = s.p + trial.path, trial.ends.speed
-        ends = passed(par, s, p, speed, trial.work, trial.last)
+        before, now = ends_of(s, trial)
+        ends = passed(par, s, now.p, now.speed, trial.work, trial.last)
         if level > STEP:
-            before = End(s.p, s.v_low, trial.first)
-            ends = ends or turns_between(s, before, End(p, speed, trial.last), trial.h) > 0.0
+            ends = ends or turns_between(s, before, now, trial.h) > 0.0
         turns = piston and switches(par, s, s.u_r + trial.way_p - trial.way_b)
         if level > 0 and (flip or ends or turns or bursts):
             level -= 1
+            if longer and not (flip or turns or bursts):
+                level = min(level, level_before(s, trial, level + 1))
             if par.effects == 1:
                 load_bodies(par, s, bars, level)
         elif flip and flips < MOST_FLIPS:
