@@ -285,7 +285,8 @@ def level_of_step(par, s):
     """Level of the next step of bars that are stepped."""
     if par.effects == 1 or s.closed == 1 or s.mode == Mode.FF or par.rock == RockKind.WALL:
         return STEP
-    return STEP + 1  # forces on rock change slower than a front passes
+    # the rock changes slower than a front passes, slowest where it unloads on a line
+    return STEP + (2 if s.mode == Mode.BC else 1)
 
 
 @inlined
