@@ -6,10 +6,9 @@ import pytest
 
 from percussion_model import Scene, simulate
 from percussion_model.physics.records import Mode
-from percussion_model.scene.scene import SceneError
 
 RIGID = {"piston.model": "rigid", "bit.model": "rigid"}
-SOLVERS = [{"solver.name": "wave"}, {"solver.name": "fem"}, RIGID]
+SOLVERS = [{"solver.name": one} for one in ("modal", "wave", "fem")] + [RIGID]
 SHORT = {"run.duration": 0.6, "run.settle": 0.3}
 
 
@@ -45,13 +44,16 @@ def test_plain_exponents_are_the_bilinear_law_to_the_last_bit(solver):
 
 @pytest.mark.parametrize("solver", SOLVERS)
 def test_the_law_goes_over_into_the_bilinear_one(solver):
+    # modes are stepped on a curve, and leap on the bilinear law
+    close = 1e-4 if solver.get("solver.name") == "modal" else 1e-5
     bilinear = drill(**solver)
     power = drill(**solver, **{"effects.rock": "power", "rock.loading_exponent": 1.0 + 1e-7})
-    assert power.rate_of_penetration == pytest.approx(bilinear.rate_of_penetration, rel=1e-5)
+    assert power.rate_of_penetration == pytest.approx(bilinear.rate_of_penetration, rel=close)
 
 
-@pytest.mark.parametrize(("exponent", "unloading"), [(1.5, 0.0), (2.0, 0.3)])
-def test_solvers_agree(exponent, unloading):
+# by the second law no blow is like the one before: means of 21 scatter by half a per cent
+@pytest.mark.parametrize(("exponent", "unloading", "close"), [(1.5, 0.0, 1e-3), (2.0, 0.3, 0.015)])
+def test_solvers_agree(exponent, unloading, close):
     law = {
         "effects.rock": "power", "rock.loading_exponent": exponent,
         "rock.unloading_exponent": unloading,
@@ -59,8 +61,10 @@ def test_solvers_agree(exponent, unloading):
     # blows by the second law repeat to 0.3 % alone
     law |= {"run.duration": 1.6, "run.settle": 0.6}
     waves = drill(**law, **{"solver.name": "wave", "solver.cells": 60})
-    elements = drill(**law, **{"solver.name": "fem", "fem.elements": 60})
+    modes = drill(**law, **{"solver.name": "modal"})
+    elements = drill(**law, **{"solver.name": "fem", "fem.elements": 120})
     rigid = drill(**law, **RIGID)
+    assert modes.rate_of_penetration == pytest.approx(waves.rate_of_penetration, rel=close)
     # as the same elements and bodies do with the bilinear law
     assert elements.rate_of_penetration == pytest.approx(waves.rate_of_penetration, rel=0.01)
     assert rigid.rate_of_penetration == pytest.approx(waves.rate_of_penetration, rel=0.1)
@@ -80,8 +84,3 @@ def test_leaps_change_nothing():
     leaping, stepping = drill(**law), drill(**law, **{"solver.leaps": False})
     found, wanted = leaping.blows["hole_advance"][:8], stepping.blows["hole_advance"][:8]
     assert found == pytest.approx(wanted, rel=1e-9)
-
-
-def test_bars_have_no_modes_on_it():
-    with pytest.raises(SceneError, match="bars have modes on a rock of one stiffness"):
-        Scene().replace(**{"effects.rock": "power", "solver.name": "modal"})

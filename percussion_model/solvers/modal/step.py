@@ -49,7 +49,7 @@ from percussion_model.solvers.modal.bar import (
     try_move,
 )
 from percussion_model.solvers.modal.between import End, late_force, turns_between
-from percussion_model.solvers.modal.forms import refresh_loads
+from percussion_model.solvers.modal.forms import follows_form, refresh_loads
 from percussion_model.solvers.modal.lanes import WIDTH
 from percussion_model.solvers.modal.narrow import beyond, level_below
 from percussion_model.solvers.modal.piston import (
@@ -283,7 +283,7 @@ def load_bodies(par, s, bars, level):
 @merged
 def level_of_step(par, s):
     """Level of the next step of bars that are stepped."""
-    if par.effects == 1 or s.closed == 1 or s.mode == Mode.FF or par.rock == RockKind.WALL:
+    if par.effects == 1 or s.closed == 1 or par.rock == RockKind.WALL or follows_form(par, s):
         return STEP
     # the rock changes slower than a front passes, slowest where it unloads on a line
     return STEP + (2 if s.mode == Mode.BC else 1)

@@ -1,0 +1,66 @@
+"""Modes on rock that loads along a curve, against a general integrator."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from percussion_model import Scene, Simulation
+from percussion_model.physics.records import Mode
+from percussion_model.solvers.modal.records import Shape
+
+ON_ROCK = 1  # form of the bit alone on K_R
+
+
+def dropped(modes: int, **changes) -> Scene:
+    """A bit alone that falls on rock by the power law."""
+    return Scene().replace(
+        **{
+            "piston.model": "absent", "effects.drive": "none", "effects.feed": False,
+            "effects.gravity": False, "effects.barrier": False, "effects.rock": "power",
+            "start.bit_velocity": 8.0, "start.rock_gap": 0.0, "solver.name": "modal",
+            "solver.cells": modes, **changes,
+        }
+    )  # fmt: skip
+
+
+def first_peak(scene: Scene) -> float:
+    """Force where the bit first turns, by the solver [N]."""
+    run = Simulation(scene)
+    run.advance(2e-3)
+    return float(run.events["value"][run.events["kind"] == Mode.BC][0])
+
+
+def integrated_peak(scene: Scene) -> float:
+    """The same by a general integrator, with the modes of the solver [N]."""
+    forms = Simulation(scene).solver._tables.forms
+    n, held = forms.sizes[ON_ROCK], forms.stiff[ON_ROCK]
+    shape = forms.shape[ON_ROCK, :, :n]
+    low, stiff, bit = shape[Shape.LOW], shape[Shape.STIFF], shape[Shape.BIT]
+    rock, eta = scene.rock, scene.loss.time
+
+    def force(p: float) -> float:
+        share = max(p, 0.0) / rock.reference_penetration
+        return rock.loading_stiffness * rock.reference_penetration * share**rock.loading_exponent
+
+    def motion(_, y):
+        q, v = y[:n], y[n:]
+        p, speed = low @ q, low @ v
+        end = force(p) - held * p - eta * held * speed
+        return np.concatenate((v, -stiff * (q + eta * v) - low * end))
+
+    def turns(_, y):
+        return low @ y[n:]
+
+    turns.terminal, turns.direction = True, -1.0
+    start = np.concatenate((np.zeros(n), 8.0 * bit))
+    found = solve_ivp(motion, (0.0, 2e-3), start, "DOP853", events=turns, rtol=1e-11, atol=1e-14)
+    return force(low @ found.y_events[0][0][:n])
+
+
+@pytest.mark.parametrize("modes", [20, 40, 160])
+@pytest.mark.parametrize("exponent", [1.3, 1.5, 2.0])
+def test_the_peak_of_a_drop_is_that_of_a_general_integrator(exponent, modes):
+    scene = dropped(modes, **{"rock.loading_exponent": exponent})
+    assert first_peak(scene) == pytest.approx(integrated_peak(scene), rel=2e-6)
