@@ -33,8 +33,8 @@ def weigh(par, s, p, force, first, datum, peak, model, sums):
     slope = top / fresh_recovery(par, s, depth, top)
     rise = loading_slope(par, s, depth)
     more = depth * (1.0 + TURN)
-    force = fresh_force(par, s, more)
-    turn = force / fresh_recovery(par, s, more, force) - slope
+    beyond = fresh_force(par, s, more)
+    turn = beyond / fresh_recovery(par, s, more, beyond) - slope
     turn /= TURN * depth
     loaded, unloaded = 0, 0
     for k in range(len(p)):
