@@ -303,7 +303,7 @@ def level_before(s, trial, level):
     low, high = beyond(s, before), beyond(s, after)
     if low < 0.0 < high:
         return level_below(low / (low - high) * (1 << level))
-    if s.mode == Mode.DFC and trial.work > 0.0:
+    if s.mode == Mode.DFC and s.w + trial.work >= s.w_r > s.w:
         return level_below((s.w_r - s.w) / trial.work * (1 << level))
     return level
 
