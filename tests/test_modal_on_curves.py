@@ -64,3 +64,21 @@ def integrated_peak(scene: Scene) -> float:
 def test_the_peak_of_a_drop_is_that_of_a_general_integrator(exponent, modes):
     scene = dropped(modes, **{"rock.loading_exponent": exponent})
     assert first_peak(scene) == pytest.approx(integrated_peak(scene), rel=2e-6)
+
+
+def test_a_dissipative_cycle_that_turns_within_a_step_goes_on():
+    """Its end was sought by the work of the barrier, which was next to none: for ever."""
+    scene = Scene().replace(
+        **{
+            "piston.sections.0.length": 0.21539445532111212,
+            "bit.sections.0.length": 0.5298349872372927,
+            "rock.loading_stiffness": 1461444723.1113753,
+            "rock.unloading_ratio": 27.08890502274836, "feed.force": 2479.5789572511712,
+            "drive.reversal_distance": 0.011158315160164165,
+            "drive.force": 4591.363851278547,
+            "effects.cuttings": True, "solver.name": "modal", "solver.cells": 80,
+        }
+    )  # fmt: skip
+    run = Simulation(scene)
+    run.advance(2e-2)
+    assert run.events["time"][-1] > 9e-3
