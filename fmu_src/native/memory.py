@@ -9,7 +9,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from llvmlite import ir
 from numba import carray, from_dtype, literal_unroll, types
 from numba.extending import intrinsic
 
@@ -64,16 +63,6 @@ def pointer_like(typing, address, array):
         return builder.inttoptr(args[0], context.get_value_type(pointer))
 
     return pointer(types.int64, array), generate
-
-
-@intrinsic
-def address_of(typing, pointer):
-    """Address that a pointer holds."""
-
-    def generate(context, builder, signature, args):
-        return builder.ptrtoint(args[0], ir.IntType(64))
-
-    return types.int64(pointer), generate
 
 
 def records_at(dtype: np.dtype) -> Any:

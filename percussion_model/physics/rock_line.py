@@ -23,7 +23,7 @@ from percussion_model.physics.power_law import (
     next_kink,
     recoverable_by_power,
 )
-from percussion_model.physics.rock import is_loading, origin, recoverable, stiffness
+from percussion_model.physics.rock import is_loading, origin, stiffness
 
 # A line is no shorter than this share of the reference penetration: where the bit turns, it is
 # the tangent.
@@ -106,20 +106,6 @@ def crushed_on_line(par, s, line, one, other):
     before = recoverable_by_power(par, s, one.p, one.force)
     change = recoverable_by_power(par, s, other.p, other.force) - before
     return line_work(line, one.p, other.p) - change
-
-
-@inlined
-def missing_work(par, s, line, p_before, before, crushed):
-    """What a line did besides the law on the way from a penetration to now [J].
-
-    Parameters
-    ----------
-    before : float
-        Energy that the rock would have given back there [J].
-    crushed : float
-        What was crushed since by the law [J].
-    """
-    return line_work(line, p_before, s.p) - (recoverable(par, s) - before) - crushed
 
 
 @kernel

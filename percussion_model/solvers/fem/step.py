@@ -17,7 +17,7 @@ from percussion_model.physics.rock import (
     recoverable,
     spring_force,
 )
-from percussion_model.physics.rock_line import is_curved, missing_work, present_line
+from percussion_model.physics.rock_line import is_curved, line_work, present_line
 from percussion_model.solvers.fem.bars import read_nodes
 from percussion_model.solvers.fem.records import Mesh, Node, Trial
 from percussion_model.solvers.fem.scheme import rate_bend
@@ -146,8 +146,8 @@ def take_step(par, s, w, c, x, h):
     else:
         crushed = crush(par, s, p_before)
         if is_curved(par, s):
-            line = present_line(par, s)
-            s.e_numerical += missing_work(par, s, line, p_before, before, crushed)
+            work = line_work(present_line(par, s), p_before, s.p)
+            s.e_numerical += work - (recoverable(par, s) - before) - crushed
     if -s.u_r > s.b_stroke and n_p > 0:
         s.b_stroke = -s.u_r
     s.time += h

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from percussion_model.physics.kernel import inlined, kernel
+from percussion_model.physics.rock import stiffness
 from percussion_model.solvers.modal.lanes import WIDTH, load, spread, store, total
 from percussion_model.solvers.modal.records import JOINED, LEVELS, Move, Shape
 
@@ -196,14 +197,19 @@ def bar_energy(s, bars):
 
 
 @kernel
-def standing_energy(s, bars):
+def standing_energy(par, s, bars):
     """Energy of a standing bit about its rest, with that of the rock's spring [J]."""
     shape, energy = bars.forms.shape[s.form], spread(0.0)
+    held, load_b = bars.forms.stiff[s.form], par.mass_b * s.a_b
+    more = stiffness(s) - held if held > 0.0 else 0.0
+    # what holds the bit at rest besides the spring of the form
+    rest = more * load_b / (held + more) if more != 0.0 else 0.0
     for k in range(0, s.active, WIDTH):
-        off = load(bars.w, Q, k) - load(shape, SOFT, k) * load(bars.w, LOAD, k)
-        v = load(bars.w, V, k)
+        f = load(bars.w, LOAD, k) - load(shape, LOW, k) * rest
+        off, v = load(bars.w, Q, k) - load(shape, SOFT, k) * f, load(bars.w, V, k)
         energy = energy + v * v + load(shape, STIFF, k) * (off * off)
-    return 0.5 * total(energy)
+    off = s.low - load_b / (held + more) if more != 0.0 else 0.0
+    return 0.5 * (total(energy) + more * off * off)
 
 
 @kernel

@@ -18,13 +18,12 @@ from percussion_model.physics.records import Mode, Piston
 from percussion_model.solvers.modal.bar import (
     LOW,
     Q,
-    bit_kinetic,
     carry,
     piston_vibration,
     row_sum,
     standing_energy,
 )
-from percussion_model.solvers.modal.forms import follows_form, gap_of, join, part
+from percussion_model.solvers.modal.forms import gap_of, join, part
 from percussion_model.solvers.modal.records import LOOK, STEP
 
 WHOLE = 1 << STEP
@@ -80,12 +79,6 @@ def park(par, s, bars):
         s.no_park = s.time + PATIENCE * WHOLE
 
 
-@inlined
-def energy_standing(par, s, bars):
-    """Energy of a standing bit about its rest; only that of motion on another spring [J]."""
-    return standing_energy(s, bars) if follows_form(par, s) else bit_kinetic(s, bars, bars.w)
-
-
 @kernel
 def flip_contact(par, s, bars, approach, blows, events):
     """Open or close the contact of piston and bit."""
@@ -103,7 +96,7 @@ def flip_contact(par, s, bars, approach, blows, events):
             start_blow(par, s, blows, time, s.v_p, s.u_b, still)
         s.closed = 1
         s.closed_at = s.time
-        if s.mode == Mode.SS and energy_standing(par, s, bars) < AT_REST * s.w_r:
+        if s.mode == Mode.SS and standing_energy(par, s, bars) < AT_REST * s.w_r:
             s.rest_until = s.time + par.transit
         close_gap(s, events, time, approach)
         join(par, s, bars)

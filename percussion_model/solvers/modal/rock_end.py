@@ -17,9 +17,9 @@ from percussion_model.physics.rock import (
     spring_force,
 )
 from percussion_model.solvers.modal.bar import bit_kinetic, standing_energy
-from percussion_model.solvers.modal.forms import change_spring, follows_form, leave_out
+from percussion_model.solvers.modal.forms import change_spring, leave_out
 from percussion_model.solvers.modal.piston import WHOLE, time_of
-from percussion_model.solvers.modal.records import LOOK
+from percussion_model.solvers.modal.records import JOINED, LOOK
 
 # A standstill with less than this share of W_R stays one if nothing comes from outside.
 QUIET_SHARE = 0.9
@@ -29,8 +29,8 @@ QUIET_SHARE = 0.9
 def watch_energy(par, s, bars):
     """Note whether a standstill may end by the energy that the bit has now."""
     s.alert = 1
-    if s.mode == Mode.SS and s.form == 2 and follows_form(par, s):
-        s.alert = 1 if standing_energy(s, bars) > QUIET_SHARE * barrier_level(par, s) else 0
+    if s.mode == Mode.SS and 0 < s.form < JOINED:
+        s.alert = 1 if standing_energy(par, s, bars) > QUIET_SHARE * barrier_level(par, s) else 0
 
 
 @kernel

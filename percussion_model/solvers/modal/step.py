@@ -72,9 +72,17 @@ from percussion_model.solvers.modal.rock_end import (
 # Steps after which the running force of a standstill is noted.
 CHECKPOINT = 64
 # Lines that are taken for the way of a step on a curve, until they change it by no more than this.
-MOST_TURNS, SETTLED = 8, 1e-6
+MOST_TRIES, SETTLED = 8, 1e-6
 # Openings and closures of one instant; more would be a loop.
 MOST_FLIPS = 2
+
+
+class Answer(NamedTuple):
+    """What the rock does in a step."""
+
+    rest: float  # force at the rock end besides the spring of the form [N]
+    line: Line  # of its spring
+    begin: Place  # of loading along a curve
 
 
 class Trial(NamedTuple):
@@ -83,8 +91,8 @@ class Trial(NamedTuple):
     h: float  # [s]
     ends: Ends
     force: float  # mean force of the rock [N]
-    first: float  # at the begin
-    last: float  # at the end
+    first: float  # the same at the begin
+    last: float  # and at the end
     path: float  # of the penetration [m]
     work: float  # of the rock's dashpot [J]
     rock: Answer
@@ -94,14 +102,6 @@ class Trial(NamedTuple):
     way_p: float
     low_p: float  # offset of the free piston's low end [m]
     gap: float  # [m]
-
-
-class Answer(NamedTuple):
-    """What the rock does in a step."""
-
-    rest: float  # force at the rock end besides the spring of the form [N]
-    line: Line  # of its spring
-    begin: Place  # of loading along a curve
 
 
 @inlined
@@ -134,7 +134,7 @@ def present_place(par, s):
 def answer_on_curve(par, s, held, lag, free, yields, h):
     """`Answer` of rock that loads along a curve."""
     path, begin = s.v_low * h, present_place(par, s)
-    for _ in range(MOST_TURNS):
+    for _ in range(MOST_TRIES):
         line = line_between(par, s, begin, place_at(par, s, s.p + path))
         rest = rest_on_line(s, line, held, lag, free, yields)
         before, path = path, free - yields * rest
@@ -207,14 +207,8 @@ def try_step(par, s, bars, level):
 
 
 @merged
-def book_rock(par, s, trial, v_low):
-    """Book what the rock takes in a step.
-
-    Parameters
-    ----------
-    v_low : float
-        Velocity of the rock end before [m/s].
-    """
+def book_rock(par, s, trial):
+    """Book what the rock takes in a step."""
     p_before = s.p - trial.path
     if s.mode == Mode.FF:
         s.e_standstill += recoverable_at(par, s, p_before) - recoverable(par, s)
@@ -235,7 +229,7 @@ def book_rock(par, s, trial, v_low):
 @kernel
 def make(par, s, bars, level, trial, push, events):
     """Make a step that was tried."""
-    begin, h, v_low = time_of(par, s), trial.h, s.v_low
+    begin, h = time_of(par, s), trial.h
     ends = trial.ends
     s.time += 1 << level
     s.count_steps += 1
@@ -259,7 +253,7 @@ def make(par, s, bars, level, trial, push, events):
     s.low, s.top, s.at_b, s.at_p = ends.low, ends.top, ends.bit, ends.piston
     s.f_contact, s.f_rock = trial.contact, trial.force
     s.p += trial.path
-    book_rock(par, s, trial, v_low)
+    book_rock(par, s, trial)
     if s.closed == 1:
         book_contact(par, s, trial.contact, h, time_of(par, s))
     if has_piston(par):
