@@ -1,8 +1,8 @@
 """Steps in which a wave crosses the first bar of a chain, for a wanted accuracy.
 
-Contacts that begin within a step are averaged over it: the error of a rate is of first order in
-the step. Top hammers of four rods were off by 0.4 to 0.9 % with 20 steps in the piston
-(`benchmarks.top_hammer`, docs/top_hammer.md).
+Where there are rods contacts that begin within a step count from its nearer end: the error of a
+rate is of first order in the step. Top hammers of four rods were off by 0.4 to 0.9 % with 20 steps
+in the piston (`benchmarks.top_hammer`, docs/top_hammer.md).
 """
 
 from __future__ import annotations
