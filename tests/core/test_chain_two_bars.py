@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from percussion_model import Scene, Simulation, simulate
+from percussion_model.solvers.base import make_solver
 from tests.core.chain_scenes import AREA, C0, CELL, DT, F0, Z, bar, driven, struck
 
 
@@ -90,7 +91,7 @@ def test_the_ledger_of_two_bars_closes(changes):
     """Through blows, cut steps, flight and standstill."""
     scene = Scene(run={"duration": 0.15, "settle": 0.0}).computed_by("chain", **changes)
     result = simulate(scene)
-    assert abs(result.energy["residual_relative"]) < 3e-12
+    assert abs(result.energy["residual_relative"]) < 1e-11
     assert len(result.events) > 0
 
 
@@ -110,10 +111,18 @@ def test_the_ledger_closes_where_a_section_turns_waves():
     assert abs(ledger["residual_relative"]) < 1e-13
 
 
+@pytest.mark.parametrize("model", ["elastic", "rigid", "absent"])
+def test_the_first_elastic_bar_of_two_has_24_steps(model):
+    """Those of a rigid piston, or of none, are counted in the bit."""
+    drive = {} if model != "absent" else {"effects.drive": "none"}
+    solver = make_solver(Scene().computed_by("chain", **{"piston.model": model, **drive}))
+    assert next(iter(solver.cells.values())) == 24
+
+
 @pytest.mark.parametrize(
     ("name", "changes", "cells", "error"),
     [
-        ("reference", {}, 32, 2e-4),
+        ("reference", {}, 24, 2e-4),
         ("reference", {"piston.model": "rigid"}, 64, 1e-3),
         ("hammers/dth4_kuru", {}, 32, 5e-3),
         ("hammers/dth5_st_anne", {}, 64, 2e-3),

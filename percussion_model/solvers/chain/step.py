@@ -287,7 +287,7 @@ def meet_piston(par, s, chain, waves, push, tau, time, blows, events):
     if s.closed == 0:
         if approach > 0.0 and s.gap < approach * tau:
             t_close = s.gap / approach
-            s.closed, touches = 1, t_close < 0.5 * par.dt
+            s.closed, touches = 1, t_close < 0.5 * tau
         s.gap = 0.0 if s.closed == 1 else s.gap - approach * tau
     impulse, force, more = 0.0, before + approach / yields, 1.0 + par.viscous
     if touches and elastic:
