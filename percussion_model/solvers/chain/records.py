@@ -73,6 +73,7 @@ class Has(IntEnum):
     PASSED = 5  # that went on downward
     RETURNED = 6  # that was sent back up
     STRAIN = 7  # force by the waves alone in its last step [N]
+    LATE = 8  # impulse that loss has given beside the waves [N s]
 
 
 class Bar(IntEnum):
@@ -156,6 +157,8 @@ CHAIN_STATE = np.dtype(
         ("u_0", "f8"),  # u_r at the start [m]
         ("g_contact", "f8"),  # force by the waves alone below the piston in the last step [N]
         ("g_rock", "f8"),  # and at the rock
+        ("late_contact", "f8"),  # impulse that loss has given there beside the waves [N s]
+        ("late_rock", "f8"),
         ("i_came", "f8"),  # energy that came down to the rock [J]
         ("i_returned", "f8"),  # that it sent back
         *COMMON_STATE,

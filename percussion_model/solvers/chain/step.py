@@ -53,7 +53,7 @@ from percussion_model.solvers.wave.rock_end import asks_for_energy, rock_step
 PERFECT, _, LOSSY, THREADED = (float(kind) for kind in Joint)
 VELOCITY, POSITION = int(Bar.VELOCITY), int(Bar.POSITION)
 KIND, YIELD, PRELOAD, STIFFNESS, DAMPING, SECTION, STIFF, ABOVE, BELOW = (int(row) for row in Fit)
-CLOSED, GAP, FORCE, LEAST, CAME, PASSED, RETURNED, STRAIN = (int(row) for row in Has)
+CLOSED, GAP, FORCE, LEAST, CAME, PASSED, RETURNED, STRAIN, LATE = (int(row) for row in Has)
 # A part of a step shorter than this is not worth a step of its own.
 SHORTEST_PART = 1e-3
 # Mean motion is derived anew from waves and gap so often [steps].
@@ -201,6 +201,7 @@ def meet_joints(par, s, chain, waves, tau):
             force = give_way(s, fits, joints, j, a, y, tau) / tau
         strain = before + force / (1.0 + par.viscous)
         joints[STRAIN, j] = strain
+        joints[LATE, j] += (force - strain) * tau
         v_a, v_b = v_a - strain * fits[j, ABOVE], v_b + strain * fits[j, BELOW]
         s.e_loss += (force - strain) * (v_b - v_a) * tau
         returned, passed = v_a - down, v_b - up
@@ -298,6 +299,7 @@ def meet_piston(par, s, chain, waves, push, tau, time, blows, events):
         s.e_numerical += z_v * (q_t - d_t * d_t / tau)
     strain = before + impulse / (more * tau)
     s.g_contact = strain
+    s.late_contact += impulse - strain * tau
     v_t += strain / z_t
     s.e_loss += (impulse - strain * tau) * v_t
     if elastic:
@@ -325,6 +327,7 @@ def meet_rock(par, s, chain, waves, tau, time, events):
     d, q = rock_step(par, s, energy, v_free, z_v, tau, time, events)
     impulse, up = z_v * (v_free * tau - d), d / tau - down
     s.g_rock = z * (v_whole - d / tau)
+    s.late_rock += impulse - s.g_rock * tau
     s.e_loss += (s.g_rock - impulse / tau) * d
     waves.came[UP_OUT, k], waves.came[FROM_BELOW, bit] = up, s.g_rock * tau
     s.e_numerical += z_v * (q - d * d / tau)
