@@ -136,21 +136,22 @@ def create(numbers, bar, place):
 @preparing
 def state_time(base, moving):
     """Time up to which a state is committed [s]."""
-    return state_in(moving)[0].step * parameters(base)[0].dt
+    s = state_in(moving)[0]
+    return s.t_base + s.step * parameters(base)[0].dt
 
 
 @preparing
 def grid_point_after(base, t):
     """First grid point at or after a time [s]."""
-    dt = parameters(base)[0].dt
-    return math.ceil(t / dt - GRID_ROUNDING) * dt
+    s, dt = state_in(base + head_records(base, 1)[0].state_at)[0], parameters(base)[0].dt
+    return s.t_base + math.ceil((t - s.t_base) / dt - GRID_ROUNDING) * dt
 
 
 @preparing
 def is_quiet(base, t):
     """Whether nothing has to be done to come to a time: a step passes it."""
     s = state_in(base + head_records(base, 1)[0].state_at)[0]
-    return math.floor(t / parameters(base)[0].dt + GRID_ROUNDING) <= s.step
+    return (t - s.t_base) / parameters(base)[0].dt + GRID_ROUNDING < s.step + 1
 
 
 @preparing

@@ -265,6 +265,9 @@ def test_weights_keep_time_and_make_no_energy(transit, variance):
     assert weights @ (times - transit) ** 2 == pytest.approx(spread, abs=1e-9)
     if variance <= 0.25 * transit and transit > 3:
         assert spread == pytest.approx(variance, abs=1e-9)
+    if variance > 0.0 and transit > 20:
+        third = 2.25 * variance**2 / transit
+        assert weights @ (times - transit) ** 3 == pytest.approx(third, abs=1e-9)
     w = np.linspace(0.0, math.pi, 200)
     assert np.abs(np.exp(-1j * np.outer(w, times)) @ weights).max() < 1 + 1e-13
 
@@ -295,7 +298,7 @@ def test_finer_cells_keep_their_loss(cells):
 @pytest.mark.parametrize("eta", [2e-7, 1e-6])
 @pytest.mark.parametrize("length", [0.6, 0.6037])
 def test_loss_dampens_a_sine_as_kelvin_voigt_steel_does(eta, length):
-    """A wave of angular frequency w keeps exp(-eta w^2 L/(2 c)) and takes L/c.
+    """A wave of angular frequency w arrives by exp(-i w T / sqrt(1 + i eta w)) of itself.
 
     The answer to a wave of one step, as a Fourier sum: what a burst of any length comes to.
     """
@@ -310,12 +313,13 @@ def test_loss_dampens_a_sine_as_kelvin_voigt_steel_does(eta, length):
     for wavelength in (200 * CELL, 50 * CELL, 25 * CELL):
         w = 2 * math.pi * C0 / wavelength
         found = came @ np.exp(-1j * w * DT * np.arange(steps))
-        kept = math.exp(-0.5 * eta * w * w * path / C0)
-        # weights on steps differ from a normal distribution by the fourth order
-        assert abs(found) == pytest.approx(kept, rel=0.016 * (w * DT) ** 4 * path / CELL + 1e-12)
-        phase = np.angle(found * np.exp(1j * w * path / C0))
-        # and a part of a step is Lagrange's cubic
-        assert abs(phase) < 3e-3 * (w * DT) ** 5 + 1e-12
+        exact = np.exp(-1j * w * path / C0 / np.sqrt(1 + 1j * eta * w))
+        # weights on steps differ from that distribution by the fourth order
+        fourth = (0.016 + 0.35 * (eta / DT) ** 3) * (w * DT) ** 4 * path / CELL
+        assert abs(found) == pytest.approx(abs(exact), rel=fourth + 1e-12)
+        # and a part of a step is Lagrange's cubic, the third moment of loss one of differences
+        third = 0.1 * (eta / DT) ** 2 * (w * DT) ** 5 * path / CELL
+        assert abs(np.angle(found / exact)) < 3e-3 * (w * DT) ** 5 + third + 1e-12
     ledger = simulation.energy()
     assert ledger["loss"] > 0.0
     assert abs(ledger["residual"]) < 1e-11 * abs(ledger["ends"])

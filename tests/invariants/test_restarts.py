@@ -11,6 +11,7 @@ from tests.state_bits import run_bits
 SOLVERS = {
     "wave": {"solver.name": "wave"},
     "modal": {"solver.name": "modal"},
+    "chain": {"solver.name": "chain"},
     "fem": {"solver.name": "fem"},
     "rigid": {"solver.name": "rigid", "piston.model": "rigid", "bit.model": "rigid"},
 }

@@ -284,9 +284,11 @@ def check_events(events: np.ndarray, scene: Any) -> None:
 
 def cuts_of(simulation: Simulation) -> int:
     """How often steps may be cut: twice before each blow, or each closure (docs/numerics.md, 6)."""
+    closures = np.count_nonzero(simulation.events["kind"] == EventKind.CONTACT_CLOSED)
+    if simulation.scene.solver_name == "chain":
+        return MOST_CUTS * int(closures + 1)
     if getattr(simulation.solver, "place_of_closure", 0.0) < WIDE:
         return MOST_CUTS * len(simulation.blows)
-    closures = np.count_nonzero(simulation.events["kind"] == EventKind.CONTACT_CLOSED)
     return MOST_CUTS * int(closures)
 
 

@@ -275,8 +275,10 @@ class Balance:
         """Momentum of bars, rigid piston and casing [N s]."""
         solver, s = self.simulation.solver, self.simulation._state.record[0]
         total = solver._chain.bodies[:, Body.MASS] @ self.simulation._state.arrays[0][Bar.VELOCITY]
+        # loss adds to the force of waves what they give later
+        total -= s["late_rock"]
         if self.simulation.scene.piston.model == "rigid":
-            total += s["v_p"] * self.simulation.scene.piston.mass
+            total += s["late_contact"] + s["v_p"] * self.simulation.scene.piston.mass
         if self.simulation.scene.effects.damper:
             total += s["v_c"] * self.simulation.scene.damper.casing_mass
         return float(total)

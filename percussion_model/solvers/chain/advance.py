@@ -12,11 +12,12 @@ from percussion_model.physics.rock import recoverable
 from percussion_model.solvers.chain.records import Task
 from percussion_model.solvers.chain.sections import (
     DOWN,
+    INV_MASS,
     UP_OUT,
     energy_of_bar,
     kinetic_of_bar,
 )
-from percussion_model.solvers.chain.step import POSITION, step, time_of
+from percussion_model.solvers.chain.step import LATE, POSITION, step, time_of
 
 # Events that one step can make besides the rock's crossings: contact and drive.
 OTHER_EVENTS = 4
@@ -40,6 +41,19 @@ def stored(par, s, chain, waves):
 
 
 @merged
+def show_motion(par, s, chain, waves, row, time):
+    """Fill in the motion, with the momentum that loss gives beside the waves near contacts."""
+    bit = par.bars - 1
+    here = waves.bars[POSITION, bit]
+    above = s.late_contact if par.struck == bit else waves.joints[LATE, par.joints - 1]
+    s.v_b += (above - s.late_rock) * chain.bodies[bit, INV_MASS]
+    if par.piston == Piston.ELASTIC:
+        s.v_p -= s.late_contact * chain.bodies[0, INV_MASS]
+    casing = s.u_c if par.damper == 1 else waves.bars[POSITION, par.struck]
+    fill_motion(par, s, row, time, s.u_r - s.u_0 + casing, here)
+
+
+@merged
 def read_at(par, s, chain, waves, time, blows, events, row):
     """Read the ledger at the grid point, then let the ends meet up to `time` and read the rest."""
     kinetic, elastic = stored(par, s, chain, waves)
@@ -50,16 +64,13 @@ def read_at(par, s, chain, waves, time, blows, events, row):
     s.i_bit = 0.0
     s.i_contact = 0.0
     at_grid_point = time - time_of(par, s) <= SHORTEST * par.dt
-    casing = s.u_c if par.damper == 1 else waves.bars[POSITION, par.struck]
     if at_grid_point:  # nothing has moved in that instant
-        fill_motion(par, s, row, time, s.u_r - s.u_0 + casing, waves.bars[POSITION, par.bars - 1])
+        show_motion(par, s, chain, waves, row, time)
     step(par, s, chain, waves, tau, blows, events)
     if at_grid_point:
         row.drilling_mode = s.mode
     else:
-        casing = s.u_c if par.damper == 1 else waves.bars[POSITION, par.struck]
-        here = waves.bars[POSITION, par.bars - 1]
-        fill_motion(par, s, row, time, s.u_r - s.u_0 + casing, here)
+        show_motion(par, s, chain, waves, row, time)
     k = par.sections - 1
     row.bit_end_velocity = waves.came[DOWN, k] + waves.came[UP_OUT, k]
     fill_forces(s, row, tau, bit, contact, at_grid_point)
@@ -96,8 +107,7 @@ def run(task, par_, state, chain_, waves_, time, blows, events, reading):
         return Status.DONE
     s.n_blows = 0
     s.n_events = 0
-    last = math.floor(time / par.dt + GRID_ROUNDING)
-    while s.step < last:
+    while (time - s.t_base) / par.dt + GRID_ROUNDING >= s.step + 1:
         if s.n_blows >= blows.shape[0]:
             return Status.BLOWS_FULL
         if s.events_on == 1 and s.n_events + par.most_changes + OTHER_EVENTS > events.shape[0]:

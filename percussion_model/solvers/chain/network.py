@@ -18,7 +18,12 @@ from percussion_model.scene.bars import (
 )
 from percussion_model.solvers import plain_code  # noqa: F401  # kernels call functions of scenes
 from percussion_model.solvers.chain.records import Body, Chain, Fit, Joint, Place, Steel
-from percussion_model.solvers.chain.resolution import DEFAULT_STEPS, PULSE_STEPS, steps_for
+from percussion_model.solvers.chain.resolution import (
+    DEFAULT_STEPS,
+    PULSE_STEPS,
+    STEPS_OF_TWO,
+    steps_for,
+)
 from percussion_model.solvers.chain.taps import WHOLE, turning, weights_of
 from percussion_model.solvers.modal.lanes import WIDTH
 from percussion_model.solvers.setup import PISTONS, kelvin_voigt_time
@@ -156,7 +161,8 @@ def _time_step(numbers, sections, counts):
         return first / values.solver_cells
     if not math.isnan(values.solver_accuracy):
         return first / steps_for(values.solver_accuracy)
-    longest = first / (DEFAULT_STEPS if first_is_piston(numbers) else FEWEST_STEPS)
+    steps = DEFAULT_STEPS if first_is_piston(numbers) else FEWEST_STEPS
+    longest = first / (steps if len(numbers.rod_counts) > 0 else STEPS_OF_TWO)
     end = counts[0]
     for i in range(1, len(counts)):
         begin, end = end, end + counts[i]

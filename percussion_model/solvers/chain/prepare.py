@@ -10,7 +10,10 @@ from percussion_model.solvers.chain.advance import stored
 from percussion_model.solvers.chain.network import first_is_piston
 from percussion_model.solvers.chain.records import Bar, Body, Has
 from percussion_model.solvers.chain.sections import RING, SIZE, kept_of
-from percussion_model.solvers.setup import MOST_CHANGES, fill_parameters, fill_start
+from percussion_model.solvers.setup import MOST_CHANGES, REARM_TRANSITS, fill_parameters, fill_start
+
+# Loss spreads fronts by so many steps^2 in a transit where any step before a closure is cut.
+WIDE = 0.12
 
 
 @preparing
@@ -19,6 +22,10 @@ def fill_chain_parameters(p, numbers, plan, network):
     values, chain = numbers.values, network.chain
     fill_parameters(p, numbers, True)
     p.dt, p.most_changes = plan.time_step, MOST_CHANGES
+    p.viscous = 0.5 * plan.eta / plan.time_step
+    p.lag = p.viscous / (1.0 + p.viscous)
+    spread = plan.eta * p.rearm_time / REARM_TRANSITS
+    p.cuts_all = 1 if spread > WIDE * plan.time_step**2 else 0
     p.mass_b = chain.bodies[-1, Body.MASS]
     if first_is_piston(numbers):
         p.mass_p = chain.bodies[0, Body.MASS]

@@ -72,6 +72,8 @@ class Has(IntEnum):
     CAME = 4  # energy that came down to it [J]
     PASSED = 5  # that went on downward
     RETURNED = 6  # that was sent back up
+    STRAIN = 7  # force by the waves alone in its last step [N]
+    LATE = 8  # impulse that loss has given beside the waves [N s]
 
 
 class Bar(IntEnum):
@@ -120,6 +122,9 @@ class Waves(NamedTuple):
 CHAIN_PAR = np.dtype(
     [
         ("dt", "f8"),  # time step [s]
+        ("viscous", "f8"),  # eta / (2 dt): share of the loss in the force at an end
+        ("lag", "f8"),  # viscous / (1 + viscous)
+        ("cuts_all", "i8"),  # 1: loss spreads fronts, so that any step before a closure is cut
         ("sections", "i8"),
         ("bars", "i8"),
         ("joints", "i8"),  # but for that of the piston
@@ -142,12 +147,18 @@ CHAIN_PAR = np.dtype(
 CHAIN_STATE = np.dtype(
     [
         ("step", "i8"),  # number of steps done
+        ("cuts", "i8"),  # steps cut since the last closure below the piston
+        ("t_base", "f8"),  # time of step 0 if none had been cut [s]
         ("v_c", "f8"),  # velocity of the casing [m/s]
         ("u_c", "f8"),  # its displacement [m]
         ("x_c", "f8"),  # shortening of the damper since the start [m]
         ("e_stored", "f8"),  # in joints and damper [J]
         ("end_start", "f8"),  # position of the bit's lower end at the start [m]
         ("u_0", "f8"),  # u_r at the start [m]
+        ("g_contact", "f8"),  # force by the waves alone below the piston in the last step [N]
+        ("g_rock", "f8"),  # and at the rock
+        ("late_contact", "f8"),  # impulse that loss has given there beside the waves [N s]
+        ("late_rock", "f8"),
         ("i_came", "f8"),  # energy that came down to the rock [J]
         ("i_returned", "f8"),  # that it sent back
         *COMMON_STATE,
@@ -155,4 +166,6 @@ CHAIN_STATE = np.dtype(
     align=True,
 )
 
-CHAIN_LIMITS = Limits(CHAIN_STATE, {"step": COUNT})
+# Steps that are cut at most for a closure to come.
+MOST_CUTS = 2
+CHAIN_LIMITS = Limits(CHAIN_STATE, {"step": COUNT, "cuts": (0, MOST_CUTS)})

@@ -22,9 +22,22 @@ MOST_GIVEN = 1.0
 
 
 @inlined
-def send(places, rings, step, k, down, up):
+def turned(places, weights, rings, step, k, way):
+    """By how much a step changes what a section of one to two steps keeps (`taps.turning`)."""
+    weight, size = places[k, WEIGHTS], places[k, SIZE]
+    x = rings[0, places[k, RING] + 2 * size * way + ((step - places[k, DELAY]) & (size - 1))]
+    q = rings[0, places[k, RING] + 4 * size + way]
+    return weights[0, weight + 1] * x - weights[0, weight] * q - q
+
+
+@inlined
+def send(places, weights, rings, step, k, down, up, share):
     """Send both waves, less what body forces gave the bar, into a section at a step's end."""
     size = places[k, SIZE]
+    if places[k, TAPS] == 1 and places[k, WEIGHTS] >= 0:
+        kept = places[k, RING] + 4 * size
+        for way in range(2):
+            rings[0, kept + way] += share * turned(places, weights, rings, step, k, way)
     place = places[k, RING] + ((step + 1) & (size - 1))
     # twice, so that what is read never wraps
     rings[0, place] = rings[0, place + size] = down
@@ -43,7 +56,6 @@ def pass_on(par, s, chain, waves):
     rings, came, bars = waves.rings, waves.came, waves.bars
     lost = mixed = spread(0.0)
     loss = other = before = 0.0
-    live = s.live == 1
     for k in range(par.sections):
         size, taps, weight = places[k, SIZE], places[k, TAPS], places[k, WEIGHTS]
         first = places[k, RING] + ((step - places[k, DELAY] - taps + 1) & (size - 1))
@@ -52,10 +64,7 @@ def pass_on(par, s, chain, waves):
             down, up = rings[0, first], rings[0, second]
             if weight >= 0:  # of one to two steps (taps.turning)
                 a, b, kept = weights[0, weight], weights[0, weight + 1], places[k, RING] + 4 * size
-                x, y, p, q = down, up, rings[0, kept], rings[0, kept + 1]
-                down, up = a * x + b * p, a * y + b * q
-                if live:
-                    rings[0, kept], rings[0, kept + 1] = b * x - a * p, b * y - a * q
+                down, up = a * down + b * rings[0, kept], a * up + b * rings[0, kept + 1]
         else:
             share = load(weights, 0, weight)
             x, y = load(rings, 0, first), load(rings, 0, second)
@@ -86,9 +95,7 @@ def pass_on(par, s, chain, waves):
         before = down
     last = par.sections - 1
     came[DOWN, last] = before + bars[GIVEN, places[last, BAR]]
-    if live:
-        s.e_loss += total(lost) - loss
-        s.e_numerical += total(mixed) - other
+    return total(lost) - loss, total(mixed) - other
 
 
 @inlined
@@ -98,6 +105,54 @@ def kept_of(chain, k):
     if chain.places[k, TAPS] > 1 or weight < 0:
         return 0.0
     return chain.weights[0, weight + 1] / (1.0 + chain.weights[0, weight])
+
+
+@kernel
+def mixing_in_turns(dt, chain, waves, step, k, share, change):
+    """As `part_of_step` dissipates, in what a section of one to two steps keeps, before it."""
+    if chain.places[k, TAPS] > 1 or chain.places[k, WEIGHTS] < 0:
+        return 0.0
+    change *= kept_of(chain, k)
+    a = turned(chain.places, chain.weights, waves.rings, step, k, 0) + change
+    b = turned(chain.places, chain.weights, waves.rings, step, k, 1) + change
+    return share * (1.0 - share) * chain.steel[k, IMPEDANCE] * dt * (a * a + b * b)
+
+
+@kernel
+def part_of_step(dt, chain, waves, step, bar, share, change):
+    """Move the waves of a bar back to a share of the step just done, into which they were sent.
+
+    Waves of neighbouring steps mix so.
+
+    Parameters
+    ----------
+    change : float
+        Velocity that body forces give each wave in a whole step [m/s].
+
+    Returns
+    -------
+    float
+        Energy that the mixing dissipates [J].
+    """
+    lost, rings = 0.0, waves.rings
+    for k in range(int(chain.bodies[bar, FIRST]), int(chain.bodies[bar, LAST]) + 1):
+        size, taps, weight = chain.places[k, SIZE], chain.places[k, TAPS], chain.places[k, WEIGHTS]
+        one = 0.0
+        for way in range(2):
+            start, left = chain.places[k, RING] + 2 * size * way, 1.0
+            for age in range(size - 1):
+                late = age - chain.places[k, DELAY]
+                if late >= taps:
+                    left = 0.0
+                elif late > 0:
+                    left -= chain.weights[0, weight + taps - late]
+                here = start + ((step - age) & (size - 1))
+                jump = rings[0, here] - rings[0, start + ((step - age - 1) & (size - 1))]
+                one += left * (jump + change) * (jump + change)
+                rings[0, here] -= (1.0 - share) * jump
+                rings[0, here + size] = rings[0, here]
+        lost += chain.steel[k, IMPEDANCE] * dt * one
+    return share * (1.0 - share) * lost
 
 
 @kernel

@@ -36,7 +36,7 @@ from percussion_model.solvers.state import State, words_of
 
 _WORD = words_of(CHAIN_STATE)
 STEP, EVENTS_ON, PEAK_FROM = _WORD["step"], _WORD["events_on"], _WORD["peak_from"]
-N_BLOWS, N_EVENTS = _WORD["n_blows"], _WORD["n_events"]
+T_BASE, N_BLOWS, N_EVENTS = _WORD["t_base"], _WORD["n_blows"], _WORD["n_events"]
 
 
 def _network(numbers: Numbers) -> tuple[Plan, Network]:
@@ -174,15 +174,16 @@ class ChainSolver(Solver):
 
     def time(self, state: State) -> float:
         """Time up to which the state is committed [s]."""
-        return int(state.words[STEP]) * self.time_step
+        return float(state.numbers[T_BASE]) + int(state.words[STEP]) * self.time_step
 
     def readable_until(self, state: State) -> float:
         """Time up to which `read` answers without advancing the state [s]."""
-        return (int(state.words[STEP]) + 1) * self.time_step
+        return float(state.numbers[T_BASE]) + (int(state.words[STEP]) + 1) * self.time_step
 
     def grid_point_after(self, state: State, t: float) -> float:
         """First grid point at or after `t` [s]."""
-        return math.ceil(t / self.time_step - GRID_ROUNDING) * self.time_step
+        base = float(state.numbers[T_BASE])
+        return base + math.ceil((t - base) / self.time_step - GRID_ROUNDING) * self.time_step
 
     def fields(self, state: State) -> dict[str, np.ndarray]:
         """Force [N] and velocity [m/s] of each cell, top to bottom, by bar."""

@@ -12,6 +12,7 @@ from percussion_model.physics.blows import (
 )
 from percussion_model.physics.body import (
     book_on_bit,
+    book_piston_load,
     hold_components,
     pass_time,
     piston_acceleration,
@@ -20,7 +21,7 @@ from percussion_model.physics.drive import drive_force
 from percussion_model.physics.kernel import inlined, kernel, merged
 from percussion_model.physics.records import Mode, Piston
 from percussion_model.solvers.chain.joint import shoulders, yielding
-from percussion_model.solvers.chain.records import Bar, Fit, Has, Joint
+from percussion_model.solvers.chain.records import MOST_CUTS, Bar, Fit, Has, Joint
 from percussion_model.solvers.chain.sections import (
     ACCELERATION,
     BAR,
@@ -38,6 +39,8 @@ from percussion_model.solvers.chain.sections import (
     UP,
     UP_OUT,
     kinetic_of_bar,
+    mixing_in_turns,
+    part_of_step,
     pass_on,
     send,
     shortening,
@@ -50,7 +53,9 @@ from percussion_model.solvers.wave.rock_end import asks_for_energy, rock_step
 PERFECT, _, LOSSY, THREADED = (float(kind) for kind in Joint)
 VELOCITY, POSITION = int(Bar.VELOCITY), int(Bar.POSITION)
 KIND, YIELD, PRELOAD, STIFFNESS, DAMPING, SECTION, STIFF, ABOVE, BELOW = (int(row) for row in Fit)
-CLOSED, GAP, FORCE, LEAST, CAME, PASSED, RETURNED = (int(row) for row in Has)
+CLOSED, GAP, FORCE, LEAST, CAME, PASSED, RETURNED, STRAIN, LATE = (int(row) for row in Has)
+# A part of a step shorter than this is not worth a step of its own.
+SHORTEST_PART = 1e-3
 # Mean motion is derived anew from waves and gap so often [steps].
 RESYNC_STEPS = 256
 # Spacing of the bit force's checkpoints while standing still [steps].
@@ -60,7 +65,7 @@ CHECKPOINT_STEPS = 64
 @merged
 def time_of(par, s):
     """Time of a state [s]."""
-    return s.step * par.dt
+    return s.t_base + s.step * par.dt
 
 
 @inlined
@@ -153,9 +158,9 @@ def meet_top(par, s, chain, waves, tau, time):
 
 
 @inlined
-def give_way(s, fits, joints, j, a, tau):
+def give_way(s, fits, joints, j, a, y, tau):
     """A joint that parts, closes or yields within `tau`; its impulse [N s]."""
-    y, stored = fits[j, YIELD], stored_in_joint(fits, joints, j)
+    stored = stored_in_joint(fits, joints, j)
     if fits[j, KIND] == LOSSY:
         met = yielding(joints[GAP, j], a, y, fits[j, STIFFNESS], fits[j, DAMPING], tau)
     else:
@@ -169,12 +174,12 @@ def give_way(s, fits, joints, j, a, tau):
 
 
 @inlined
-def holds(fits, joints, j, a):
+def holds(fits, joints, j, a, y):
     """Whether a joint stays closed and rigid for the whole step."""
     kind = fits[j, KIND]
     if kind == PERFECT:
         return True
-    return kind != LOSSY and joints[CLOSED, j] == 1.0 and a + fits[j, YIELD] * fits[j, PRELOAD] > 0
+    return kind != LOSSY and joints[CLOSED, j] == 1.0 and a + y * fits[j, PRELOAD] > 0
 
 
 @inlined
@@ -188,13 +193,20 @@ def meet_joints(par, s, chain, waves, tau):
         down, up = came[DOWN, k - 1], came[UP, k]
         v_a = 2.0 * down + half * came[ACCELERATION, above]
         v_b = 2.0 * up + half * came[ACCELERATION, below]
-        if holds(fits, joints, j, v_a - v_b):
-            force = (v_a - v_b) * fits[j, STIFF]
+        before = par.lag * joints[STRAIN, j]
+        a, y = v_a - v_b - fits[j, YIELD] * before, fits[j, YIELD] / (1.0 + par.viscous)
+        if holds(fits, joints, j, a, y):
+            force = a * fits[j, STIFF] * (1.0 + par.viscous)
         else:
-            force = give_way(s, fits, joints, j, v_a - v_b, tau) / tau
-        returned, passed = v_a - force * fits[j, ABOVE] - down, v_b + force * fits[j, BELOW] - up
+            force = give_way(s, fits, joints, j, a, y, tau) / tau
+        strain = before + force / (1.0 + par.viscous)
+        joints[STRAIN, j] = strain
+        joints[LATE, j] += (force - strain) * tau
+        v_a, v_b = v_a - strain * fits[j, ABOVE], v_b + strain * fits[j, BELOW]
+        s.e_loss += (force - strain) * (v_b - v_a) * tau
+        returned, passed = v_a - down, v_b - up
         came[UP_OUT, k - 1], came[DOWN_OUT, k] = returned, passed
-        came[FROM_BELOW, above] = came[FROM_ABOVE, below] = force * tau
+        came[FROM_BELOW, above] = came[FROM_ABOVE, below] = strain * tau
         joints[FORCE, j] = force
         joints[LEAST, j] = min(joints[LEAST, j], force)
         z_a, z_b = steel[k - 1, IMPEDANCE] * tau, steel[k, IMPEDANCE] * tau
@@ -210,6 +222,7 @@ def record_contact(par, s, waves, opened, t_close, approach, force, time, tau, b
         open_gap(s, events, time, approach)
     if t_close >= 0.0:
         closure = time + t_close
+        s.cuts = 0
         if starts_blow(par, s, closure):
             here = waves.bars[POSITION, par.bars - 1] + s.v_b * t_close
             speed = s.v_p + piston_acceleration(par, drive_force(par, s)) * t_close
@@ -223,6 +236,39 @@ def record_contact(par, s, waves, opened, t_close, approach, force, time, tau, b
 
 
 @inlined
+def free_ends(par, s, chain, waves, push):
+    """Velocities of piston and struck bar at the contact without it, and how far they yield."""
+    came, struck = waves.came, par.struck
+    k = int(chain.bodies[struck, FIRST])
+    z_t = chain.steel[k, IMPEDANCE]
+    v_t, yields = 2.0 * came[UP, k] + kick_of(par, waves, struck), 1.0 / z_t
+    if par.piston == Piston.ELASTIC:
+        v_p = 2.0 * came[DOWN, k - 1] + kick_of(par, waves, 0)
+        yields += 1.0 / chain.steel[k - 1, IMPEDANCE]
+    else:
+        v_p = s.v_p + 0.5 * par.dt * piston_acceleration(par, push)
+    return v_p, v_t, yields
+
+
+@merged
+def time_to_cut(par, s, chain, waves, push, tau):
+    """Time at which to end the step, so that a closure comes at the start of the next one [s].
+
+    A cut mixes the waves of neighbouring steps: rods ring from blow to blow, and are not cut.
+    """
+    v_p, v_t, yields = free_ends(par, s, chain, waves, push)
+    approach = v_p - v_t - yields * par.lag * s.g_contact
+    if par.joints > 0 or s.closed == 1 or approach <= 0.0 or s.cuts >= MOST_CUTS:
+        return tau
+    reach = s.gap / approach
+    if reach < SHORTEST_PART * par.dt or reach > (1.0 - SHORTEST_PART) * par.dt:
+        return tau
+    if par.cuts_all == 0 and not starts_blow(par, s, time_of(par, s) + reach):
+        return tau
+    return reach
+
+
+@inlined
 def meet_piston(par, s, chain, waves, push, tau, time, blows, events):
     """The piston and the bar that it strikes; the impulse between them [N s].
 
@@ -233,33 +279,36 @@ def meet_piston(par, s, chain, waves, push, tau, time, blows, events):
     came, struck = waves.came, par.struck
     k = int(chain.bodies[struck, FIRST])
     z_t, elastic = chain.steel[k, IMPEDANCE], par.piston == Piston.ELASTIC
-    v_t, yields = 2.0 * came[UP, k] + kick_of(par, waves, struck), 1.0 / z_t
-    if elastic:
-        v_p = 2.0 * came[DOWN, k - 1] + kick_of(par, waves, 0)
-        yields += 1.0 / chain.steel[k - 1, IMPEDANCE]
-    else:
-        v_p = s.v_p + 0.5 * par.dt * piston_acceleration(par, push)
-    approach, was, opened, t_close = v_p - v_t, s.closed, 0, -1.0
+    v_p, v_t, yields = free_ends(par, s, chain, waves, push)
+    before = par.lag * s.g_contact
+    approach, was, opened, t_close = v_p - v_t - yields * before, s.closed, 0, -1.0
     if was == 1 and approach <= 0.0:
         s.closed, opened = 0, 1
     touches = s.closed == 1
     if s.closed == 0:
         if approach > 0.0 and s.gap < approach * tau:
             t_close = s.gap / approach
-            s.closed, touches = 1, t_close < 0.5 * par.dt
+            s.closed, touches = 1, t_close < 0.5 * tau
         s.gap = 0.0 if s.closed == 1 else s.gap - approach * tau
-    impulse, force = 0.0, approach / yields
+    impulse, force, more = 0.0, before + approach / yields, 1.0 + par.viscous
     if touches and elastic:
-        impulse = force * tau
+        impulse = approach / yields * more * tau
     elif touches:
-        _, _, _, _, d_t, q_t, impulse, _, _ = mass_contact(1, 0.0, v_p, v_t, par.mass_p, z_t, tau)
-        s.e_numerical += z_t * (q_t - d_t * d_t / tau)
+        z_v, v_v = z_t * more, v_t + before / z_t
+        _, _, _, _, d_t, q_t, impulse, _, _ = mass_contact(1, 0.0, v_p, v_v, par.mass_p, z_v, tau)
+        s.e_numerical += z_v * (q_t - d_t * d_t / tau)
+    strain = before + impulse / (more * tau)
+    s.g_contact = strain
+    s.late_contact += impulse - strain * tau
+    v_t += strain / z_t
+    s.e_loss += (impulse - strain * tau) * v_t
     if elastic:
-        z_p = chain.steel[k - 1, IMPEDANCE]
-        came[UP_OUT, k - 1] = v_p - impulse / (z_p * tau) - came[DOWN, k - 1]
+        v_p -= strain / chain.steel[k - 1, IMPEDANCE]
+        s.e_loss -= (impulse - strain * tau) * v_p
+        came[UP_OUT, k - 1] = v_p - came[DOWN, k - 1]
         came[DOWN_OUT, 0] = came[UP, 0] + kick_of(par, waves, 0)
-    came[DOWN_OUT, k] = v_t + impulse / (z_t * tau) - came[UP, k]
-    came[FROM_ABOVE, struck] = impulse
+    came[DOWN_OUT, k] = v_t - came[UP, k]
+    came[FROM_ABOVE, struck] = strain * tau
     if was == 1 or s.closed == 1:
         peak = force if touches else 0.0
         record_contact(par, s, waves, opened, t_close, approach, peak, time, tau, blows, events)
@@ -271,14 +320,18 @@ def meet_rock(par, s, chain, waves, tau, time, events):
     """The bit's lower end on the rock; the impulse on the rock [N s]."""
     k, bit = par.sections - 1, par.bars - 1
     z, down = chain.steel[k, IMPEDANCE], waves.came[DOWN, k]
-    v_free, energy = 2.0 * down + kick_of(par, waves, bit), 0.0
-    if asks_for_energy(par, s, v_free, z, tau):
+    v_whole, energy = 2.0 * down + kick_of(par, waves, bit), 0.0
+    v_free, z_v = v_whole - par.lag * s.g_rock / z, z * (1.0 + par.viscous)
+    if asks_for_energy(par, s, v_free, z_v, tau):
         energy = kinetic_of_bar(chain, waves, s.step, bit)
-    d, q = rock_step(par, s, energy, v_free, z, tau, time, events)
-    impulse, up = z * (v_free * tau - d), d / tau - down
-    waves.came[UP_OUT, k], waves.came[FROM_BELOW, bit] = up, impulse
-    s.e_numerical += z * (q - d * d / tau)
-    s.rock_work += z * (v_free * d - q)
+    d, q = rock_step(par, s, energy, v_free, z_v, tau, time, events)
+    impulse, up = z_v * (v_free * tau - d), d / tau - down
+    s.g_rock = z * (v_whole - d / tau)
+    s.late_rock += impulse - s.g_rock * tau
+    s.e_loss += (s.g_rock - impulse / tau) * d
+    waves.came[UP_OUT, k], waves.came[FROM_BELOW, bit] = up, s.g_rock * tau
+    s.e_numerical += z_v * (q - d * d / tau)
+    s.rock_work += z_v * (v_free * d - q)
     s.i_bit += impulse
     s.i_came += z * down * down * tau
     s.i_returned += z * up * up * tau
@@ -298,7 +351,7 @@ def meet_nothing(par, s, chain, waves, tau):
 
 
 @inlined
-def move_bars(par, s, chain, waves, damper, tau):
+def move_bars(par, s, chain, waves, damper, tau, rest):
     """Mean motion of bars and casing, and the work of body forces; path of what the drive holds."""
     came, bars, bodies, g = waves.came, waves.bars, chain.bodies, par.gravity
     struck, bit, held, lifted = par.struck, par.bars - 1, 0.0, 0.0
@@ -307,7 +360,7 @@ def move_bars(par, s, chain, waves, damper, tau):
         v0 = bars[VELOCITY, i]
         gained = (came[FROM_ABOVE, i] - came[FROM_BELOW, i]) * bodies[i, INV_MASS]
         v1 = v0 + came[ACCELERATION, i] * tau + gained
-        path = 0.5 * tau * (v0 + v1)
+        path = 0.5 * (tau * (v0 + v1) + rest * (v1 - v0))
         bars[VELOCITY, i] = v1
         bars[POSITION, i] += path
         lifted += bodies[i, MASS] * path
@@ -345,14 +398,24 @@ def meet(par, s, chain, waves, tau, blows, events):
 
     Returns
     -------
-    float
+    due : float
         Velocity that the piston is still to get, where the drive turned [m/s].
+    tau : float
+        Time that has passed [s].
     """
     time = time_of(par, s)
     hold_components(par, s, tau)
     push = drive_force(par, s)
     damper = accelerations(par, s, chain, waves, push)
-    pass_on(par, s, chain, waves)
+    lost, mixed = pass_on(par, s, chain, waves)
+    rest = 0.0
+    if s.live == 1:
+        if par.piston != Piston.ABSENT:
+            tau = time_to_cut(par, s, chain, waves, push, tau)
+            rest = par.dt - tau
+        share = tau / par.dt
+        s.e_loss += share * lost
+        s.e_numerical += share * mixed
     meet_joints(par, s, chain, waves, tau)
     impulse = due = 0.0
     if par.piston == Piston.ABSENT:
@@ -364,9 +427,11 @@ def meet(par, s, chain, waves, tau, blows, events):
     else:
         meet_rock(par, s, chain, waves, tau, time, events)
     s.i_contact += impulse
-    held = move_bars(par, s, chain, waves, damper, tau)
+    held = move_bars(par, s, chain, waves, damper, tau, rest)
     if par.piston != Piston.ABSENT:
         half, u_before = 0.5 * tau, s.u_r
+        if par.piston == Piston.ELASTIC:
+            impulse = s.g_contact * tau
         a_p = piston_acceleration(par, push)
         s.u_r += half * (2.0 * (s.v_p + a_p * half) - impulse / par.mass_p) - held
         v_p, given = s.v_p, s.i_drive
@@ -379,8 +444,11 @@ def meet(par, s, chain, waves, tau, blows, events):
             waves.bars[VELOCITY, 0] = s.v_p
             # what its waves get is the force at the start over the whole step
             due = s.v_p - v_p + impulse / par.mass_p - a_p * tau
+            if rest > 0.0:
+                further = 0.5 * rest * (a_p * tau - impulse / par.mass_p)
+                book_piston_load(par, s, push, further, 0.0)
     pass_time(par, s, tau)
-    return due
+    return due, tau
 
 
 @kernel
@@ -405,29 +473,41 @@ def resync(par, s, chain, waves):
 @kernel
 def step(par, s, chain, waves, tau, blows, events):
     """Advance the state by one step; a copy that is only read meets what it meets for `tau`."""
-    due = meet(par, s, chain, waves, tau, blows, events)
+    due, tau = meet(par, s, chain, waves, tau, blows, events)
     if s.live == 0:
         return
+    share = tau / par.dt
     places, rings, came, bodies, bars = (
         chain.places, waves.rings, waves.came, chain.bodies, waves.bars
     )  # fmt: skip
     now, half, rewrite = s.step, 0.5 * par.dt, False
     for i in range(par.bars):
         given = bars[GIVEN, i] + half * came[ACCELERATION, i]
-        bars[GIVEN, i] = given
+        bars[GIVEN, i] += share * half * came[ACCELERATION, i]
         came[DOWN_OUT, int(bodies[i, FIRST])] -= given
         came[UP_OUT, int(bodies[i, LAST])] -= given
         rewrite = rewrite or abs(given) > MOST_GIVEN
+    if share < 1.0:
+        for k in range(par.sections):
+            change = half * came[ACCELERATION, places[k, BAR]]
+            s.e_numerical += mixing_in_turns(par.dt, chain, waves, now, k, share, change)
     for k in range(par.sections):
-        send(places, rings, now, k, came[DOWN_OUT, k], came[UP_OUT, k])
+        down, up = came[DOWN_OUT, k], came[UP_OUT, k]
+        send(places, chain.weights, rings, now, k, down, up, share)
     bars[GIVEN, 0] += 0.5 * due
     s.step = now + 1
     s.count_steps += 1
+    if share < 1.0:
+        s.cuts += 1
+        s.t_base -= par.dt - tau
+        for i in range(par.bars):
+            change = half * came[ACCELERATION, i]
+            s.e_numerical += part_of_step(par.dt, chain, waves, s.step, i, share, change)
     if rewrite:
         for i in range(par.bars):
             if abs(bars[GIVEN, i]) > MOST_GIVEN:
                 write_given(chain, waves, i)
-    if s.step % RESYNC_STEPS == 0:
+    if share < 1.0 or s.step % RESYNC_STEPS == 0:
         resync(par, s, chain, waves)
     if s.mode == Mode.SS and (s.n_check == 0 or s.step % CHECKPOINT_STEPS == 0):
         push_checkpoint(s, time_of(par, s))

@@ -1,7 +1,8 @@
 """Weights by which a wave arrives at the far end of a section.
 
 A wave takes the time T = (n + f) dt from end to end, and structural loss spreads it as a normal
-distribution of the variance eta T does (docs/model.md, eq. 2, for waves far longer than eta c).
+distribution of the variance eta T does, which leans by the third moment 9/4 eta^2 T: exp(-s T /
+sqrt(1 + eta s)) of docs/model.md, eq. 2, to the third order in s.
 So it arrives as a sum of what was sent at some steps before, by weights whose sum is one: a
 lasting force passes as it is. The part f dt of a step is Lagrange's cubic between four steps, in
 its middle interval, where it lets no frequency grow (T. Laakso et al., IEEE Signal Processing
@@ -28,6 +29,8 @@ MOST_SPREAD = 0.25
 UTMOST_SPREAD = 0.5
 # Above this variance samples of a normal distribution have it to rounding [steps^2].
 LEAST_NORMAL = 2.0
+# Third moment eta^2 T of loss: so many times the square of its variance by T.
+THIRD = 2.25
 # They end so many standard deviations from the mean, where they are 4e-5 of the greatest; where a
 # section is too short for that no less than so many, which keeps 0.999 of the variance.
 REACH, LEAST_REACH = 4.5, 4.0
@@ -65,7 +68,9 @@ def weights_of(transit, variance):
     reach = min(room, math.ceil(REACH * math.sqrt(rest)))
     if rest >= LEAST_NORMAL and reach >= LEAST_REACH * math.sqrt(rest):
         weights = _scaled(_convolved(weights, _normal(rest, reach)))
-        return delay - reach, weights, rest
+        if room - reach < 2:
+            return delay - reach, weights, rest
+        return delay - reach - 2, _convolved(weights, _lean(transit, rest)), rest
     rounds = min(math.ceil(0.5 * rest / MOST_SPREAD), room)
     if rounds == 0:
         return delay, weights, 0.0
@@ -73,6 +78,8 @@ def weights_of(transit, variance):
     once = np.array([a, 1.0 - 2.0 * a, a])
     for _ in range(rounds):
         weights = _convolved(weights, once)
+    if room - rounds >= 2:
+        weights, delay = _convolved(weights, _lean(transit, variance)), delay - 2
     first, end = 0, len(weights)
     while abs(weights[first]) <= NOTHING:
         first += 1
@@ -82,6 +89,13 @@ def weights_of(transit, variance):
     for k in range(end - first):
         left[k] = weights[first + k]
     return delay - rounds + first, _scaled(left), 2.0 * a * rounds
+
+
+@preparing
+def _lean(transit, variance):
+    """Weights that give a distribution its third moment, and leave all before as they are."""
+    c = THIRD * variance * variance / transit / 6.0
+    return np.array([-0.5 * c, c, 1.0, -c, 0.5 * c])
 
 
 @preparing

@@ -1,0 +1,36 @@
+"""Random scenes of two bars, in delay lines: what holds for every solver."""
+
+from __future__ import annotations
+
+import pytest
+
+from percussion_model import SceneError
+from percussion_model.solvers.base import make_solver
+from tests.properties import checks
+from tests.properties.scenes import draw_case
+from tests.properties.source import Generator
+
+SEED, COUNT, GROUPS = 47, 75, 4
+# Sections that are shorter than a step have the mass of one.
+FITS = 1e-9
+
+
+def in_delay_lines(index):
+    """A case of waves by delay lines; None where it is another one, or refused in a sentence."""
+    case = draw_case(Generator(SEED, index))
+    if case.scene.solver_name != "wave":
+        return None
+    case.scene = case.scene.computed_by("chain")
+    try:
+        return case if make_solver(case.scene).wave_speed_error < FITS else None
+    except SceneError:  # too much loss for short sections
+        return None
+
+
+@pytest.mark.parametrize("group", range(GROUPS))
+def test_random_scenes_of_two_bars(group):
+    cases = [in_delay_lines(group * COUNT + k) for k in range(COUNT)]
+    found = [case for case in cases if case is not None]
+    assert len(found) > COUNT // 5
+    for case in found:
+        checks.check_case(case)
