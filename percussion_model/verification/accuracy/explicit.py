@@ -193,7 +193,7 @@ class ExplicitSolver(PeerSolver):
     def new_state(self) -> State:
         """State at time zero; velocities are those of half a step before."""
         values, par = self._numbers.values, self._par[0]
-        counts: tuple[tuple[int, ...], ...] = ((3, self._nodes),)
+        counts: tuple[tuple[int, int], ...] = ((3, self._nodes),)
         if self._is_chain:
             counts = (
                 (4, self._nodes), (BAR_ROWS, len(self._bars)), (JOINT_ROWS, len(self._fits))

@@ -13,7 +13,7 @@ import numpy as np
 
 from percussion_model.physics.body import piston_acceleration
 from percussion_model.physics.drive import drive_force
-from percussion_model.physics.kernel import fused, inlined, kernel, merged
+from percussion_model.physics.kernel import compiled, inlined, kernel, merged
 from percussion_model.physics.rock import recoverable
 from percussion_model.scene.numbers import JOINT_KINDS
 from percussion_model.verification.accuracy.explicit_rock import ride, step_rock_end
@@ -28,6 +28,10 @@ BAR_ROWS = 5
 # step, its least and its greatest so far, all positive in compression.
 GAP, STORED, FORCE, LEAST, GREATEST = range(5)
 JOINT_ROWS = 5
+# For long sums of the ledger, in any order: vectors add up several at once.
+summed = compiled(
+    error_model="numpy", _nrt=False, forceinline=True, fastmath={"contract", "reassoc"}
+)
 DAMPER = ("stiffness", "damping", "preload", "casing_mass")
 
 # A joint: its kind, the reduced mass of both ends [kg], the preload of a thread [N], the stiffness
@@ -228,7 +232,7 @@ def kick_means(par, s, chain, kick):
         s.v_c -= recoil
 
 
-@fused
+@summed
 def strain_work(before, v, first, n):
     """Sum over a stretch of rate of strain a step ago times twice its mean [m2/s2]."""
     total = 0.0
