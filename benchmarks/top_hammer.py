@@ -79,12 +79,12 @@ def long_rods() -> None:
 
 def against_elements(simulated: float) -> None:
     """Rates of two presets by waves and by explicit elements."""
-    from percussion_model.verification.accuracy.explicit_chain import ExplicitChainSolver
+    from percussion_model.verification.accuracy.explicit import ExplicitSolver
 
     for name in ("t38", "t45"):
         scene, found = hammer(name, 4), {}
         for kind, solver in (
-            ("waves", None), ("elements", ExplicitChainSolver(scene, ELEMENTS)),
+            ("waves", None), ("elements", ExplicitSolver(scene, ELEMENTS)),
         ):  # fmt: skip
             run = Simulation(scene, record_events=False, solver=solver)
             run.advance(simulated)

@@ -14,7 +14,6 @@ from percussion_model.scene.inputs import SimulationError
 from percussion_model.scene.parameters import parameter_table
 from percussion_model.verification.accuracy.exact_flow import ExactFlowSolver
 from percussion_model.verification.accuracy.explicit import ExplicitSolver, explicit_rate
-from percussion_model.verification.accuracy.explicit_chain import ExplicitChainSolver
 from percussion_model.verification.accuracy.ladders import fem_scene, stiffness_of
 from percussion_model.verification.accuracy.problems import (
     CONTACT_HISTORY,
@@ -218,7 +217,7 @@ def seen(peer, key, value):
     return np.array([found[name] for name in SEEN])
 
 
-@pytest.mark.parametrize("peer", [*PEERS, ExplicitChainSolver])
+@pytest.mark.parametrize("peer", [*PEERS, ExplicitSolver])
 @pytest.mark.parametrize(("key", "value"), SWITCHES)
 def test_a_peer_carries_an_effect_or_refuses_it(peer, key, value):
     """What it carries changes as much as by waves."""
@@ -227,7 +226,7 @@ def test_a_peer_carries_an_effect_or_refuses_it(peer, key, value):
         assert (key, value) not in [("effects.gravity", False), ("effects.feed", False)]
         return
     if key in ("effects.string", "effects.joints", "effects.damper"):
-        assert peer is ExplicitChainSolver  # which test_chain_elements compares
+        assert peer is ExplicitSolver  # which test_chain_elements compares
         return
     usual = [seen(one, "effects.gravity", True) for one in (peer, None)]
     change, wanted = found - usual[0], seen(None, key, value) - usual[1]
@@ -247,7 +246,7 @@ def test_general_integrators_refuse_what_they_have_no_equation_for(key, value):
             Drill(with_switch(key, value))
 
 
-@pytest.mark.parametrize("peer", [*PEERS, ExplicitChainSolver])
+@pytest.mark.parametrize("peer", [*PEERS, ExplicitSolver])
 def test_a_rock_that_is_curved_chips_or_keeps_cuttings_is_refused_in_one_sentence(peer):
     for law in ({}, {"rock.loading_exponent": 1.0, "rock.chipping_penetration": 1e-4}):
         with pytest.raises(SceneError, match=r"must not be 'power'$"):

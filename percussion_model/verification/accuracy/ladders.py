@@ -22,7 +22,6 @@ from percussion_model.solvers.wave.grid import fitting_cells
 from percussion_model.verification.accuracy.exact_flow import ExactFlowSolver
 from percussion_model.verification.accuracy.explicit import COURANT as COURANT_OF_PEER
 from percussion_model.verification.accuracy.explicit import ExplicitSolver, stable_step
-from percussion_model.verification.accuracy.explicit_chain import ExplicitChainSolver
 from percussion_model.verification.accuracy.problems import (
     APERIODIC,
     PILOT_MODES,
@@ -252,9 +251,7 @@ def chosen_ladders(words: Sequence[str] | None) -> tuple[str, ...]:
 def refuse_asked(scene: Scene, names: Sequence[str]) -> None:
     """Raise `SceneError`, before anything is computed, where one of the methods refuses a scene."""
     for name in names:
-        if scene.effects.string and name == "explicit":
-            ExplicitChainSolver(scene, CHAIN_MESHES[0])
-        elif name in COMPILED:
+        if name in COMPILED:
             make, meshes, _ = COMPILED[name]
             make(scene, meshes[0])
         elif LADDERS[name].family in ("wave", "fem"):
@@ -375,7 +372,7 @@ def _chains(problem: Problem, full: bool) -> Iterator[Rung]:
         chosen = scene.computed_by("chain", **{"solver.cells": steps})
         yield Rung("chain", f"{steps} steps", 1.0 / steps, chosen)
     for count in CHAIN_MESHES if not full else (*CHAIN_MESHES, 45):
-        peer = partial(ExplicitChainSolver, elements=count)
+        peer = partial(ExplicitSolver, elements=count)
         yield Rung("explicit", f"{count} elements", 1.0 / count, scene, peer=peer)
 
 
@@ -474,11 +471,9 @@ def _general(problem: Problem) -> Iterator[Rung]:
 def _rising_durations(problem: Problem, full: bool) -> Iterator[Rung]:
     """Aperiodic motion: what costs is the length of the run."""
     scene = problem.scene
-    peers: Callable[..., Solver] = ExplicitSolver
     if scene.effects.string:
         chain = scene.computed_by("chain", **{"solver.cells": CHAIN_STEPS_LONG})
         solvers = {"chain": (chain, 1.0), "explicit": (scene, 1.0)}
-        peers = ExplicitChainSolver
     else:
         solvers = {
             "modal": (by_modes(scene, 20), 1.0),
@@ -488,7 +483,7 @@ def _rising_durations(problem: Problem, full: bool) -> Iterator[Rung]:
             "explicit": (scene, 1.0),
         }
     for name, (chosen, share) in solvers.items():
-        peer = partial(peers, elements=CHAIN_MESH_LONG) if name == "explicit" else None
+        peer = partial(ExplicitSolver, elements=CHAIN_MESH_LONG) if name == "explicit" else None
         for factor in DURATIONS:
             duration = share * factor / 16.0 * problem.duration * (4.0 if full else 1.0)
             yield Rung(name, f"{duration:g} s", duration, chosen, duration=duration, peer=peer)

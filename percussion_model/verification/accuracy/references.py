@@ -27,7 +27,6 @@ from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.simulation.files import staged_file
 from percussion_model.solvers.base import Solver
 from percussion_model.verification.accuracy.explicit import ExplicitSolver
-from percussion_model.verification.accuracy.explicit_chain import ExplicitChainSolver
 from percussion_model.verification.accuracy.ladders import (
     FITS,
     affordable_modes,
@@ -378,7 +377,7 @@ def _string_levels(problem: Problem, quick: bool) -> dict[str, list[Level]]:
         ],
     }
     try:
-        ExplicitChainSolver(scene, counts[0])
+        ExplicitSolver(scene, counts[0])
     except SceneError:
         return found
     found["explicit"] = [
@@ -386,7 +385,7 @@ def _string_levels(problem: Problem, quick: bool) -> dict[str, list[Level]]:
             f"explicit, {count} elements",
             scene,
             1.0 / count,
-            peer=partial(ExplicitChainSolver, elements=count),
+            peer=partial(ExplicitSolver, elements=count),
         )
         for count in ([LONG_MESH] if problem.kind == APERIODIC else counts)
     ]
