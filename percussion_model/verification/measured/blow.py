@@ -169,9 +169,19 @@ def _slope(time: np.ndarray, path: np.ndarray, part: slice) -> float:
 
 
 def _residual(blow: Blow) -> float:
-    after = slice(deepest(blow), None)
-    gone = blow.force[after] <= 0.0
-    return float(blow.end[after][np.argmax(gone)]) if gone.any() else math.nan
+    """Penetration where the line of the last two forces of contact has come to nothing.
+
+    Forces are means of time steps, so the middles of these are their places.
+    """
+    most = deepest(blow)
+    gone = blow.force[most:] <= 0.0
+    if not gone.any():
+        return math.nan
+    first = most + int(np.argmax(gone))
+    one, other = 0.5 * (blow.end[first - 3 : first - 1] + blow.end[first - 2 : first])
+    before, last = blow.force[first - 2 : first]
+    falls = before > last
+    return float(other - last * (one - other) / (before - last) if falls else blow.end[first])
 
 
 def _loading_stiffness(blow: Blow) -> float:
