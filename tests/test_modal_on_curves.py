@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from percussion_model import Scene, Simulation
+from benchmarks.coverage import drawn
+from percussion_model import Scene, Simulation, simulate
 from percussion_model.physics.records import Mode
 from percussion_model.solvers.modal.records import Shape
 
@@ -82,3 +83,19 @@ def test_a_dissipative_cycle_that_turns_within_a_step_goes_on():
     run = Simulation(scene)
     run.advance(2e-2)
     assert run.events["time"][-1] > 9e-3
+
+
+def test_steps_are_cut_where_rock_unloads_on_a_stiff_line():
+    """With steps of one length 20 modes were off by 2 % here."""
+    scene = drawn(148).replace(**{"effects.rock": "power", "rock.loading_exponent": 1.3})
+    few, many = (
+        simulate(scene.replace(**{"solver.cells": modes}), error_estimate=False)
+        for modes in (20, 40)
+    )
+    assert few.rate_of_penetration == pytest.approx(many.rate_of_penetration, rel=1e-3)
+
+
+def test_a_run_with_half_the_modes_takes_longer_steps_on_rock():
+    """So that the comparison behind a stated error sees what steps do to a rate."""
+    longest = [Simulation(dropped(modes)).solver._par["asked"][0] for modes in (10, 20)]
+    assert longest[0] == longest[1] + 1

@@ -65,7 +65,7 @@ def time_of_blow(par_, state, bars_):
         return 0.0
     bars = refer(bars_)
     law = law_wanted(par, s, bars.laws)
-    ticks = portion(s, law) if law >= 0 else 1 << level_of_step(par, s)
+    ticks = portion(s, law) if law >= 0 else 1 << level_of_step(par, s, bars)
     return end_with_blow(par, s, (s.time + ticks) * par.tick)
 
 
@@ -84,7 +84,7 @@ def advance_to(par, s, bars, end, blows, events):
         if law < 0:
             if s.law >= 0:
                 drop_pairs(par, s, bars)
-            level = level_of_step(par, s)
+            level = level_of_step(par, s, bars)
             if s.time + (1 << level) > end:
                 return Status.DONE
             step(par, s, bars, level, blows, events)
@@ -123,7 +123,7 @@ def commit_to(par, s, bars, end, blows, events):
             continue
         if s.law >= 0:
             drop_pairs(par, s, bars)
-        level = level_of_step(par, s)
+        level = level_of_step(par, s, bars)
         while s.time + (1 << level) > end:
             level -= 1
         step(par, s, bars, level, blows, events)

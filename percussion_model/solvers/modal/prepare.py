@@ -34,6 +34,9 @@ from percussion_model.solvers.setup import (
 # Steps in the transit time of the first bar at least: with fewer a search missed that the rock end
 # turned.
 FEWEST_STEPS = 12
+# Where rock unloads on another spring than that of the form, the difference bends the path of a
+# step by no more than this share of it, with as many modes as by default (docs/modal.md).
+MOST_BEND = 0.01
 MOST_TICKS = 2.0**62  # that a number of a record holds
 
 
@@ -94,10 +97,12 @@ def fill_modal_parameters(p, numbers):
     eta, rock = kelvin_voigt_time(numbers), rock_numbers(numbers)
     dt = first / asked_modes(numbers)
     highest = math.pi / dt
-    p["ringing"] = RINGING << STEP
+    p["ringing"], p["asked"] = RINGING << STEP, STEP
+    p["most_bend"] = MOST_BEND * default_modes(numbers) / asked_modes(numbers)
     while dt > first / FEWEST_STEPS:
         dt *= 0.5
         p["ringing"] *= 2
+        p["asked"] += 1
     tick = dt / (1 << STEP)
     p["eta"], p["dt"], p["tick"] = eta, dt, tick
     # a period of the highest of few modes; a rigid piston pushes hardest at once

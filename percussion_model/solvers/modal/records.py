@@ -230,6 +230,8 @@ MODAL_PAR = np.dtype(
     [
         ("tick", "f8"),  # unit of time [s]
         ("dt", "f8"),  # 2^STEP ticks
+        ("asked", "i8"),  # level of the step that goes with the modes asked for
+        ("most_bend", "f8"),  # share of its path by which rock may bend a step where it unloads
         ("ringing", "i8"),  # after a closure only the mean of contact counts so long [ticks]
         ("eta", "f8"),  # Kelvin-Voigt time [s]
         ("transit", "i8"),  # of a wave through the bit [ticks]

@@ -275,12 +275,20 @@ def load_bodies(par, s, bars, level):
 
 
 @merged
-def level_of_step(par, s):
-    """Level of the next step of bars that are stepped."""
+def level_of_step(par, s, bars):
+    """Level of the next step of bars that are stepped.
+
+    Steps on rock go with the modes asked for, so that runs with fewer tell what they do to a rate.
+    """
     if par.effects == 1 or s.closed == 1 or par.rock == RockKind.WALL or follows_form(par, s):
         return STEP
-    # the rock changes slower than a front passes, slowest where it unloads on a line
-    return STEP + (2 if s.mode == Mode.BC else 1)
+    if s.mode != Mode.BC:  # the rock changes slower than a front passes
+        return par.asked + 1
+    level, lane = par.asked + 2, s.active // WIDTH - 1
+    rest = abs(stiffness(s) - bars.forms.stiff[s.form])
+    while level > 0 and rest * bars.forms.yields[s.form, level, lane] > par.most_bend:
+        level -= 1
+    return level
 
 
 @inlined
@@ -332,7 +340,7 @@ def go_on(par, s, bars, most, near, blows, events):
         park(par, s, bars)
     if s.mode == Mode.SS and s.alert == 1 and par.rock == RockKind.BILINEAR:
         end_standstill(par, s, bars, events)
-    level, flips, longer = most, 0, level_of_step(par, s) > STEP
+    level, flips, longer = most, 0, level_of_step(par, s, bars) > STEP
     load_bodies(par, s, bars, level)
     while True:
         stands = s.mode == Mode.SS and s.alert == 1 and par.rock == RockKind.BILINEAR
