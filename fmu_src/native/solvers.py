@@ -37,5 +37,5 @@ def kind_of(numbers):
     top = bar_transit_time(numbers.piston) if piston == Piston.ELASTIC else bit
     is_wall = ROCKS[values.effects_rock] == RockKind.WALL
     has_loss = values.effects_loss != 0
-    why = why_waves(piston == Piston.RIGID, is_wall, has_loss, values.loss_time, top, bit)
+    why = why_waves(is_wall, has_loss, values.loss_time, top, bit)
     return Kind.MODAL.value if why == WhyWaves.NOT else Kind.WAVE.value

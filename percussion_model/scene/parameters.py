@@ -305,8 +305,8 @@ class SolverOptions(Parameters):
     name: str = choice(
         "auto",
         SOLVER_NAMES,
-        "solver; auto: modal for an elastic bit, wave where loss is off, slight or strong, the "
-        "piston rigid, the rock a wall or one bar far longer; rigid for a rigid bit",
+        "solver; auto: modal for an elastic bit, wave where loss is off or slight, the rock "
+        "a wall or one bar far longer; rigid for a rigid bit",
     )
     fidelity: str = choice(
         "wave",

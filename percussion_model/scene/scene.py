@@ -346,7 +346,6 @@ class Scene:
         """Why waves drill better than as many modes; empty where they do not."""
         bit = self.bit.transit_time
         found = why_waves(
-            self.piston.model == "rigid",
             self.effects.rock == "wall",
             self.effects.loss,
             self.loss.time,

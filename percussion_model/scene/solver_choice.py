@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from enum import IntEnum
 
-# Modes are taken where the loss time is such a share of the shorter transit time. Below fronts
-# stay sharp and ring, above many modes are needed (docs/modal.md, section 9).
-LEAST_LOSS, MOST_LOSS = 5e-4, 1.0
+# Modes are taken where the loss time is such a share of the shorter transit time, or more: below
+# fronts stay sharp and ring (docs/modal.md, section 9).
+LEAST_LOSS = 5e-4
 # And where no bar is longer than so many times the other, by its transit time: it takes as
 # many times the modes, whose tables fill a gigabyte.
 MOST_UNLIKE = 16.0
@@ -16,27 +16,22 @@ class WhyWaves(IntEnum):
     """Why waves drill better than as many modes."""
 
     NOT = 0  # they do not
-    RIGID_PISTON = 1  # it pushes hardest in the first instant, as a wall does
-    WALL = 2
-    NO_LOSS = 3
-    UNLIKE = 4
-    LITTLE_LOSS = 5
-    MUCH_LOSS = 6
+    WALL = 1
+    NO_LOSS = 2
+    UNLIKE = 3
+    LITTLE_LOSS = 4
 
 
 REASONS = {
     WhyWaves.NOT: "",
-    WhyWaves.RIGID_PISTON: "the piston is rigid",
     WhyWaves.WALL: "the rock is a wall",
     WhyWaves.NO_LOSS: "loss is off",
     WhyWaves.UNLIKE: f"one bar is more than {MOST_UNLIKE:g} times as long by transit time",
     WhyWaves.LITTLE_LOSS: f"loss.time is below {LEAST_LOSS:g} of the shorter transit time",
-    WhyWaves.MUCH_LOSS: "loss.time is above the shorter transit time",
 }
 
 
 def why_waves(
-    is_rigid: bool,
     is_wall: bool,
     has_loss: bool,
     loss_time: float,
@@ -47,22 +42,17 @@ def why_waves(
 
     Parameters
     ----------
-    is_rigid, is_wall, has_loss : bool
-        Of the piston, of the rock, which may be a wall, and of the bars.
+    is_wall, has_loss : bool
+        Of the rock, and of the bars.
     loss_time : float
         [s]
     piston, bit : float
         Transit times [s]; without an elastic piston that of the bit twice.
     """
-    if is_rigid:
-        return WhyWaves.RIGID_PISTON
     if is_wall:
         return WhyWaves.WALL
     if not has_loss:
         return WhyWaves.NO_LOSS
     if max(piston, bit) > MOST_UNLIKE * min(piston, bit):
         return WhyWaves.UNLIKE
-    share = loss_time / min(piston, bit)
-    if share < LEAST_LOSS:
-        return WhyWaves.LITTLE_LOSS
-    return WhyWaves.MUCH_LOSS if share > MOST_LOSS else WhyWaves.NOT
+    return WhyWaves.LITTLE_LOSS if loss_time < LEAST_LOSS * min(piston, bit) else WhyWaves.NOT
