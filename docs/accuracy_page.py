@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import json
 import math
-import re
 import textwrap
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from statistics import median
 from typing import Any
 
+from docs.blocks import renewed, table
 from percussion_model.interface.commands.accuracy_tables import (
     bounds_text,
     ratio_text,
@@ -91,12 +91,6 @@ def load_studies(names: Sequence[str] = COMPARED) -> dict[str, Study]:
 
 
 # numbers
-
-
-def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Markdown of a table."""
-    lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
-    return "\n".join(lines + ["| " + " | ".join(row) + " |" for row in rows])
 
 
 def power(value: float) -> str:
@@ -551,21 +545,7 @@ FILLED = (
 )
 
 
-def filled(path: Path) -> str:
-    """Text of a page with its blocks made anew, between their marks."""
-
-    def made(found: re.Match[str]) -> str:
-        return f"{found[1]}\n{BLOCKS[found[2]]()}\n{found[3]}"
-
-    return re.sub(
-        r"(<!-- begin (\w+) -->)\n.*?(<!-- end -->)",
-        made,
-        path.read_text(encoding="utf-8"),
-        flags=re.DOTALL,
-    )
-
-
 def pages() -> dict[Path, str]:
     """All pages that follow from the data, by file."""
     scenes = {DATA / f"{name}.md": scene_page(name) for name in (*COMPARED, *OTHERS)}
-    return scenes | {path: filled(path) for path in FILLED}
+    return scenes | {path: renewed(path, BLOCKS) for path in FILLED}

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from docs.blocks import table
 from percussion_model.coupling import Coupling
 from percussion_model.coupling.coupled_run import CoupledRun, known_signals, summary
 from percussion_model.interface.progress import progress
@@ -21,6 +22,10 @@ FOLDER = Path(__file__).parent / "data"
 JUDGED = (1e-5, 1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 2.5e-3, 5e-3, 1e-2, 2e-2, 5e-2, 0.1, 0.2, 0.5)
 DURATION = 1.0
 INTERVAL = 2e-4
+HEADINGS = (
+    *("step [ms]", "shoulder", "string's residual", "shoulder divided by blows"),
+    *("largest change", "rate [mm/s]", "verdict"),
+)
 STEPS_HEAD = """# Error against the communication step
 
 This page has the numbers behind [section 4 and 5 of the drilling
@@ -88,25 +93,21 @@ def steps_page(archive: Path) -> str:
 
 def verdicts(archive: Path) -> str:
     """Table of verdicts by step, Markdown."""
-    lines = [
-        "| step [ms] | shoulder | string's residual | shoulder divided by blows | largest change "
-        "| rate [mm/s] | verdict |",
-        "|---|---|---|---|---|---|---|",
-    ]
+    rows = []
     with progress("verdicts with every step"):
         for step in JUDGED:
             coupling = Coupling(archive)
             signals, interval = known_signals(coupling.outputs), max(step, INTERVAL)
-            lines.append(_verdict(coupling.run(DURATION, step, signals, interval, tell=tell)))
-    return "\n".join(lines)
+            rows.append(_verdict(coupling.run(DURATION, step, signals, interval, tell=tell)))
+    return table(HEADINGS, rows)
 
 
-def _verdict(run: CoupledRun) -> str:
+def _verdict(run: CoupledRun) -> list[str]:
     found, verdict = summary(run), run.verdict
     stiffness = run["string.shoulder_stiffness"]
     rate, error = (found.get(f"rate_second_half{end}") for end in ("", "_error"))
     proposed = "" if verdict.step is None else f": {1e3 * verdict.step:g} ms"
-    cells = [
+    return [
         f"{1e3 * run.step:g}",
         _percent(float(stiffness.min() / stiffness[0])),
         _percent(found["string_energy_residual"]),
@@ -115,7 +116,6 @@ def _verdict(run: CoupledRun) -> str:
         with_error(1e3 * rate, 1e3 * error) if rate is not None and error is not None else "",
         verdict.word + proposed,
     ]
-    return "| " + " | ".join(cells) + " |"
 
 
 def _percent(share: float) -> str:

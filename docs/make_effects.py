@@ -9,6 +9,7 @@ from pathlib import Path
 
 import matplotlib
 
+from docs.blocks import renewed, table
 from percussion_model import Scene
 from percussion_model.analysis.effect_study import EffectsStudy, study_effects
 from percussion_model.interface.commands.effects import table_of
@@ -20,42 +21,27 @@ HERE = Path(__file__).resolve().parent
 PAGE = HERE / "effects.md"
 REFERENCE = HERE.parent / "scenarios" / "reference.toml"
 
-BEGIN, END = "<!-- tables: begin -->", "<!-- tables: end -->"
-
-
-def table(found: EffectsStudy) -> str:
-    """The table in Markdown, and the reasons of its dashes."""
-    headings, rows, reasons = table_of(found)
-    headings = [heading.replace("\n", ", ") for heading in headings]
-    lines = ["| " + " | ".join(headings) + " |", "|---" + "|---:" * (len(headings) - 1) + "|"]
-    lines += ["| " + " | ".join(row) + " |" for row in rows]
-    lines += ["", *(f"- *{name}*: {reason}." for name, reason in reasons.items())]
-    return "\n".join(lines)
-
 
 def block(found: EffectsStudy, computer: dict[str, object]) -> str:
-    """What was run and where, and the table."""
+    """What was run and where, the table, and the reasons of its dashes."""
     result = found.base.result
     cells = " + ".join(str(count) for count in result.cells.values())
+    headings, rows, reasons = table_of(found)
+    shown = table([heading.replace("\n", ", ") for heading in headings], rows, numbers=True)
+    dashes = "\n".join(f"- *{name}*: {reason}." for name, reason in reasons.items())
     return (
         f"Reference scene by waves, {cells} cells, {result.duration:g} s simulated; "
         f"{computer['processor']}, one thread, load {computer['load']:.1f} before.\n\n"
-        f"{table(found)}"
+        f"{shown}\n\n{dashes}"
     )
-
-
-def page(found: EffectsStudy, computer: dict[str, object]) -> str:
-    """Text of the page with its table renewed."""
-    before, _, rest = PAGE.read_text(encoding="utf-8").partition(BEGIN)
-    _, _, after = rest.partition(END)
-    return f"{before}{BEGIN}\n\n{block(found, computer)}\n\n{END}{after}"
 
 
 def main() -> None:
     """Measure, write the page and draw the figure."""
     computer = machine()
     found = study_effects(Scene.from_toml(REFERENCE))
-    PAGE.write_text(page(found, computer), encoding="utf-8")
+    text = renewed(PAGE, {"effects": block(found, computer)})
+    PAGE.write_text(text, encoding="utf-8")
     with matplotlib.rc_context(style.STYLE):
         draw_effects(found).savefig(HERE / "images" / "effects.png", dpi=110)
 

@@ -6,10 +6,10 @@ import math
 import time
 from pathlib import Path
 
+from docs.blocks import renewed, table
 from percussion_model import Scene, Simulation, simulate
 
 PAGE = Path(__file__).with_name("fidelity.md")
-BEGIN, END = "<!-- tables: begin -->", "<!-- tables: end -->"
 
 SCENES: dict[str, dict[str, float]] = {
     "reference": {},
@@ -40,20 +40,19 @@ LONG = 40.0
 
 def errors() -> str:
     """Error of rigid bodies against the waves, Markdown."""
-    lines = ["| scene | " + " | ".join(f"{n}, %" for n in COMPARED.values()) + " |"]
-    lines.append("|---" * (1 + len(COMPARED)) + "|")
+    rows = []
     for name, changes in SCENES.items():
         scene = Scene().replace(**changes)
         wave = simulate(scene.computed_by("wave"), DURATION).summary()
         found = simulate(scene.replace(**{"solver.fidelity": "rigid"}), DURATION).summary()
         cells = [f"{100 * (found[key] / wave[key] - 1):+.2f}" for key in COMPARED]
-        lines.append(f"| {name} | " + " | ".join(cells) + " |")
-    return "\n".join(lines)
+        rows.append([name, *cells])
+    return table(["scene", *(f"{one}, %" for one in COMPARED.values())], rows)
 
 
 def costs() -> str:
     """Processor time of long runs, Markdown."""
-    lines = ["| scene | solver | × real time | µs a blow | an hour, s |", "|---|---|---|---|---|"]
+    rows = []
     for name, scene in TIMED.items():
         best, blows = math.inf, 1
         for _ in range(5):
@@ -61,20 +60,10 @@ def costs() -> str:
             began = time.process_time()
             simulation.advance(LONG)
             best, blows = min(best, time.process_time() - began), len(simulation.blows)
-        lines.append(
-            f"| {name} | {scene.solver_name} | {LONG / best:.0f} | {1e6 * best / blows:.3g} "
-            f"| {HOUR * best / LONG:.2g} |"
-        )
-    return "\n".join(lines)
-
-
-def page() -> str:
-    """Text of the page with its tables renewed."""
-    before, _, rest = PAGE.read_text(encoding="utf-8").partition(BEGIN)
-    _, _, after = rest.partition(END)
-    parts = [errors(), costs()]
-    return f"{before}{BEGIN}\n\n" + "\n\n".join(parts) + f"\n\n{END}{after}"
+        times = (f"{LONG / best:.0f}", f"{1e6 * best / blows:.3g}", f"{HOUR * best / LONG:.2g}")
+        rows.append([name, scene.solver_name, *times])
+    return table(["scene", "solver", "× real time", "µs a blow", "an hour, s"], rows)
 
 
 if __name__ == "__main__":
-    PAGE.write_text(page(), encoding="utf-8")
+    PAGE.write_text(renewed(PAGE, {"errors": errors, "costs": costs}), encoding="utf-8")

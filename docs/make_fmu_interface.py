@@ -11,9 +11,11 @@ from typing import Any
 
 from fmpy import read_model_description
 
+from docs.blocks import table
 from fmu_src.hammer.build import build_hammer
 from percussion_model.scene.scene import Scene
 
+HEADINGS = ("name", "unit", "shown in", "start", "range", "meaning", "reference")
 PAGE = Path(__file__).parent / "data" / "fmu_interface.md"
 HEAD = """# Variables of the hammer's FMU
 
@@ -33,13 +35,8 @@ def tables() -> str:
         variables = read_model_description(str(path)).modelVariables
     parts = []
     for causality, head in HEADS.items():
-        parts.append(f"## {head}\n")
-        parts.append("| name | unit | shown in | start | range | meaning | reference |")
-        parts.append("|---|---|---|---|---|---|---|")
-        for one in variables:
-            if one.causality == causality:
-                parts.append("| " + " | ".join(_cells(one)) + " |")
-        parts.append("")
+        rows = [_cells(one) for one in variables if one.causality == causality]
+        parts.append(f"## {head}\n\n{table(HEADINGS, rows)}\n")
     return "\n".join(parts)
 
 

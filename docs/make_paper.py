@@ -12,8 +12,11 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any
 
+from docs.blocks import table
+
 HERE = Path(__file__).resolve().parent
 PAGE = HERE / "data" / "paper_statements.md"
+HEADINGS = ("place", "the paper", "found", "agrees", "it must be")
 FIGURES = ("figures4and7", "sinking", "figure6", "figures7and8", "figure9", "scaling")
 
 HEAD = """# Statements of the paper
@@ -31,8 +34,7 @@ def page(found: dict[str, Any]) -> str:
     agree = sum(one["agrees"] for one in statements)
     parts = [HEAD.format(agree=agree, all=len(statements), errors=found["errors"])]
     for section, ones in groupby(statements, key=section_of):
-        parts += [f"## {section}\n", "| place | the paper | found | agrees | it must be |"]
-        parts += ["|---|---|---|---|---|", *(row(one) for one in ones), ""]
+        parts += [f"## {section}\n\n{table(HEADINGS, map(cells, ones))}\n"]
     return "\n".join(parts)
 
 
@@ -42,11 +44,11 @@ def section_of(one: dict[str, Any]) -> str:
     return f"Section {number}" if number[0].isdigit() else one["place"]
 
 
-def row(one: dict[str, Any]) -> str:
+def cells(one: dict[str, Any]) -> list[str]:
     """A row of a table, with the reason where a statement differs."""
     agrees = "yes" if one["agrees"] else f"**no**: {one['why']}"
-    cells = (one["place"], one["says"], one["found"], agrees, one["agrees_if"])
-    return f"| {' | '.join(text.replace('|', '/') for text in cells)} |"
+    row = (one["place"], one["says"], one["found"], agrees, one["agrees_if"])
+    return [text.replace("|", "/") for text in row]
 
 
 def main(folder: Path) -> None:

@@ -1,11 +1,11 @@
-"""Write docs/parameters.md from the parameter table: `python docs/make_parameters.py`."""
+"""Write docs/parameters.md from the parameter table: `python -m docs.make_parameters`."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from itertools import groupby
 from pathlib import Path
 
+from docs.blocks import table
 from percussion_model.scene.parameters import HOLE_DIAMETER, parameter_table
 from percussion_model.scene.rows import Row, short_number, toml_value
 
@@ -25,11 +25,13 @@ the bit, and those between them are `string.rods`.
 steel. It is no bound. Commands hint, once for each key, at a value ten times beyond, since that is
 mostly a slip of the unit.
 
-This page is written by `python docs/make_parameters.py`; change
+This page is written by `python -m docs.make_parameters`; change
 `percussion_model/scene/parameters.py` or `bar_groups.py` instead.
 
 One key stands before all tables, beside `title`. No solver takes it, and FMUs do not have it.
 """
+
+HEADINGS = ("key", "meaning", "unit", "default", "allowed", "typical", "matters if")
 
 
 def default(row: Row) -> str:
@@ -62,26 +64,18 @@ def typical(row: Row) -> str:
     return f"{low} to {high}"
 
 
-def table(rows: Iterable[Row]) -> list[str]:
-    """Lines of a table of parameters."""
-    lines = [
-        "| key | meaning | unit | default | allowed | typical | matters if |",
-        "|---|---|---|---|---|---|---|",
-    ]
-    for row in rows:
-        key = row.key.replace("*", "N")
-        needs = f"`{row.effect}`" if row.effect else ""
-        shown = default(row), allowed(row), typical(row), needs
-        lines.append("| " + " | ".join((f"`{key}`", row.description, row.unit, *shown)) + " |")
-    return lines
+def cells(row: Row) -> tuple[str, ...]:
+    """A row of a table of parameters."""
+    key, needs = row.key.replace("*", "N"), f"`{row.effect}`" if row.effect else ""
+    shown = default(row), allowed(row), typical(row), needs
+    return f"`{key}`", row.description, row.unit, *shown
 
 
 def page() -> str:
     """Text of the page."""
-    parts = [HEAD, *table([HOLE_DIAMETER])]
+    parts = [HEAD, table(HEADINGS, [cells(HOLE_DIAMETER)])]
     for group, rows in groupby(parameter_table(), key=lambda row: row.key.split(".")[0]):
-        parts.append(f"\n## {group}\n")
-        parts += table(rows)
+        parts.append(f"\n## {group}\n\n{table(HEADINGS, map(cells, rows))}")
     return "\n".join(parts) + "\n"
 
 

@@ -7,6 +7,7 @@ import sys
 from collections.abc import Iterable
 from pathlib import Path
 
+from docs.blocks import table
 from percussion_model.analysis.study.response import FOUND, KINDS
 from percussion_model.physics.records import (
     BLOW_COLUMNS,
@@ -45,10 +46,10 @@ def study_columns() -> tuple[Column, ...]:
     return tuple(Column(name, units[name], known[name]) for name in FOUND) + STUDY_ONLY
 
 
-def table(columns: Iterable[Column]) -> str:
+def listed(columns: Iterable[Column]) -> str:
     """Columns as a table in Markdown."""
-    rows = [f"| `{one.name}` | {one.unit} | {one.meaning} |" for one in columns]
-    return "\n".join(["| name | unit | meaning |", "|---|---|---|", *rows])
+    rows = [(f"`{one.name}`", one.unit, one.meaning) for one in columns]
+    return table(("name", "unit", "meaning"), rows)
 
 
 def numbers(kinds: Iterable[Mode | EventKind]) -> str:
@@ -60,18 +61,18 @@ def outputs() -> str:
     """Text of the page of outputs."""
     parts = {
         "Summary": "`summary.json`, `--json`, `Result.summary()`. Means are over the counted "
-        "blows.\n\n" + table(SUMMARY_COLUMNS),
+        "blows.\n\n" + listed(SUMMARY_COLUMNS),
         "Blows": "`blows.csv`, `Result.blows`: a row for each whole blow.\n\n"
-        + table(BLOW_COLUMNS),
+        + listed(BLOW_COLUMNS),
         "Events": "`events.csv`, `Result.events`. In the file the kind is a word, in Python a "
-        f"number: {numbers(EventKind)}.\n\n" + table(EVENT_COLUMNS),
+        f"number: {numbers(EventKind)}.\n\n" + listed(EVENT_COLUMNS),
         "Samples": "`trace.csv` or `trace.npz` (`--trace`), `Result.trace`, "
         f"`Simulation.observe()`. Modes of the rock law: {numbers(Mode)}.\n\n"
-        + table(SAMPLE_COLUMNS),
+        + listed(SAMPLE_COLUMNS),
         "Energy ledger": "`energy` in a summary. [The model, section 8](../model.md) tells how "
-        "the entries add up.\n\n" + table(ENERGY_COLUMNS),
+        "the entries add up.\n\n" + listed(ENERGY_COLUMNS),
         "Points of a study": "`points.parquet` and `points.nc` of `percussion study`, beside the "
-        "parameters that vary.\n\n" + table(study_columns()),
+        "parameters that vary.\n\n" + listed(study_columns()),
     }
     return OUTPUTS + "".join(f"\n## {head}\n\n{text}\n" for head, text in parts.items())
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from pathlib import Path
 from textwrap import fill
 
+from docs.blocks import table
 from percussion_model.interface.commands.rocks import (
     HEADINGS,
     NOTES,
@@ -42,12 +43,6 @@ al. 1992, as quoted by S. Okubo, K. Fukui, A. Ota, J. of MMIJ 115 (1999) 661).
 """
 
 
-def table(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
-    """Lines of a table, with a blank line before it."""
-    lines = [f"| {' | '.join(row)} |" for row in rows]
-    return ["", f"| {' | '.join(headings)} |", "|" + "---|" * len(headings), *lines]
-
-
 def numbers(chosen: Iterable[Rock]) -> list[str]:
     """Lines of what the command prints, in two tables that fit a page."""
     rows = [(f"`{name}`", *rest) for name, *rest in map(cells, chosen)]
@@ -56,9 +51,9 @@ def numbers(chosen: Iterable[Rock]) -> list[str]:
         for name, _, buttons, stiffness, kind, ratio, other, _, _ in rows
     ]
     rock_, law, buttons, stiffness, _, ratio, _, source, fitted = HEADINGS
-    lines = table((rock_, buttons, stiffness, ratio), values)
     others = [(row[0], row[1], row[-1], row[-2]) for row in rows]
-    return lines + table((rock_, law, fitted, source), others)
+    first = table((rock_, buttons, stiffness, ratio), values)
+    return ["", first, "", table((rock_, law, fitted, source), others)]
 
 
 def sources(chosen: Iterable[Rock]) -> list[str]:
@@ -66,13 +61,16 @@ def sources(chosen: Iterable[Rock]) -> list[str]:
     lines = []
     for one in chosen:
         known = (*one.numbers, *([one.strength] if one.strength else []))
-        lines += [f"\n## {one.title}", "", f"`{one.name}`: {one.rock} ({one.origin}).", ""]
-        lines += ["| | |", "|---|---|"]
-        lines += [f"| bit | {one.indenter} |", f"| fitted to | {one.fitted_to} |"]
-        lines += [f"| holds for | {one.holds_for} |"]
-        lines += [f"| {of(number.key)} | {told(number)} |" for number in known]
-        lines += [f"| source | {one.source['published']}; doi: {one.source['doi']} |"]
-        lines += [f"| read in | {one.source['read_in']} |"]
+        rows = [
+            ("bit", one.indenter),
+            ("fitted to", one.fitted_to),
+            ("holds for", one.holds_for),
+            *((of(number.key), told(number)) for number in known),
+            ("source", f"{one.source['published']}; doi: {one.source['doi']}"),
+            ("read in", one.source["read_in"]),
+        ]
+        lines += [f"\n## {one.title}\n\n`{one.name}`: {one.rock} ({one.origin}).\n"]
+        lines.append(table(("", ""), rows))
     return lines
 
 
@@ -93,7 +91,7 @@ def check(factors: dict[str, float]) -> list[str]:
     headings = (
         "rock", "R, mm", "σ, MPa", "C", "slope of one button, kN/mm", "by strength, kN/mm", "off",
     )  # fmt: skip
-    return table(headings, rows)
+    return ["", table(headings, rows)]
 
 
 def of(key: str) -> str:

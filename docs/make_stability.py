@@ -10,6 +10,7 @@ import json
 import sys
 from pathlib import Path
 
+from docs.blocks import renewed
 from percussion_model.interface.plotting.stability_dots import draw_stability
 from percussion_model.interface.plotting.style import save_figures
 from percussion_model.interface.progress import count_bar
@@ -18,7 +19,6 @@ from percussion_model.verification.hard_cases.stability_page import page, verdic
 
 HERE = Path(__file__).resolve().parent
 GUIDE, DATA = HERE / "stability.md", HERE / "data" / "hard_cases.md"
-BEGIN, END = "<!-- tables: begin -->", "<!-- tables: end -->"
 
 
 def collection(file: str | None) -> Collection:
@@ -30,20 +30,13 @@ def collection(file: str | None) -> Collection:
     return Collection(found["rows"], found["share"], found["left_out"])
 
 
-def guide(found: Collection) -> str:
-    """Text of the guide with the verdict renewed."""
-    before, _, rest = GUIDE.read_text(encoding="utf-8").partition(BEGIN)
-    _, _, after = rest.partition(END)
-    return f"{before}{BEGIN}\n\n{verdict(found)}\n{END}{after}"
-
-
 def main(file: str | None = None) -> None:
     """Write both pages and draw the figure."""
     found = collection(file)
     save_figures(lambda: [("stability", draw_stability(found))], HERE / "images", kinds=("png",))
     text = page(found, "../images/stability.png", "the [guide to hard cases](../stability.md)")
     DATA.write_text(text, encoding="utf-8")
-    GUIDE.write_text(guide(found), encoding="utf-8")
+    GUIDE.write_text(renewed(GUIDE, {"verdict": verdict(found)}), encoding="utf-8")
 
 
 if __name__ == "__main__":

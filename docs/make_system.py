@@ -8,13 +8,14 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from docs.blocks import renewed, table
 from fmu_src.parts.build import PARTS, part_variables
 from fmu_src.system.archive import SYSTEMS, read_plan
 from fmu_src.variables import Variable
 
 PAGE = Path(__file__).with_name("system.md")
 VARIABLES = Path(__file__).parent / "data" / "system_variables.md"
-BEGIN, END = "<!-- tables: begin -->", "<!-- tables: end -->"
+HEADINGS = ("name", "kind", "unit", "start", "range", "meaning")
 SYSTEM = SYSTEMS / "feed_control.toml"
 HEAD = """# Variables of the drilling system
 
@@ -30,22 +31,20 @@ def signals() -> str:
     """Table of the signals of the feed-controlled system, Markdown."""
     plan = read_plan(SYSTEM)
     variables = {name: {v.name: v for v in part_variables(part)} for name, part in PARTS.items()}
-    lines = ["| from | to | unit | meaning |", "|---|---|---|---|"]
+    rows = []
     for sink, source in plan.connections.items():
         one = _find(plan.components, variables, source) or _find(plan.components, variables, sink)
         unit = (one.unit or "") if one else ""
-        lines.append(f"| `{source}` | `{sink}` | {unit} | {one.description if one else ''} |")
-    return "\n".join(lines) + "\n"
+        rows.append((f"`{source}`", f"`{sink}`", unit, one.description if one else ""))
+    return table(("from", "to", "unit", "meaning"), rows)
 
 
 def variables_page() -> str:
     """Text of the page of the variables of all parts."""
     lines = [HEAD.rstrip()]
     for name, part in PARTS.items():
-        lines.append(f"\n## {name}\n")
-        lines.append("| name | kind | unit | start | range | meaning |")
-        lines.append("|---|---|---|---|---|---|")
-        lines += [_line(one) for one in part_variables(part) if not _repeated(one.name)]
+        rows = [_cells(one) for one in part_variables(part) if not _repeated(one.name)]
+        lines.append(f"\n## {name}\n\n{table(HEADINGS, rows)}")
     return "\n".join(lines) + "\n"
 
 
@@ -61,7 +60,7 @@ def _repeated(name: str) -> bool:
     return name.startswith("layers[") and not name.startswith("layers[1]")
 
 
-def _line(one: Variable) -> str:
+def _cells(one: Variable) -> tuple[str, ...]:
     start: Any = "" if one.start is None else one.start
     span = ""
     if one.items:
@@ -70,20 +69,10 @@ def _line(one: Variable) -> str:
         start = str(one.start).lower()
     elif one.lower is not None:
         start, span = f"{one.start:g}", f"{one.lower:g} … {one.upper:g}"
-    return (
-        f"| `{one.name}` | {one.causality} | {one.unit or ''} | {start} | {span} "
-        f"| {one.description} |"
-    )
-
-
-def page() -> str:
-    """Text of docs/system.md with its table renewed."""
-    before, _, rest = PAGE.read_text(encoding="utf-8").partition(BEGIN)
-    _, _, after = rest.partition(END)
-    return f"{before}{BEGIN}\n\n{signals()}\n{END}{after}"
+    return f"`{one.name}`", one.causality, one.unit or "", str(start), span, one.description
 
 
 if __name__ == "__main__":
     VARIABLES.parent.mkdir(exist_ok=True)
     VARIABLES.write_text(variables_page(), encoding="utf-8")
-    PAGE.write_text(page(), encoding="utf-8")
+    PAGE.write_text(renewed(PAGE, {"signals": signals}), encoding="utf-8")

@@ -5,7 +5,6 @@ Writes docs/images/undamped.png and the table of docs/data/undamped.md. Takes so
 
 from __future__ import annotations
 
-import re
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,6 +13,7 @@ from typing import Any
 import matplotlib
 from matplotlib.figure import Figure
 
+from docs.blocks import renewed, table
 from percussion_model import Scene, simulate
 from percussion_model.interface.plotting import style
 from percussion_model.scene.text import write_text
@@ -111,17 +111,17 @@ def draw(rows: list[dict[str, Any]]) -> Figure:
     return fig
 
 
-def table(rows: list[dict[str, Any]]) -> str:
-    """Rows of the page's table."""
+def block(rows: list[dict[str, Any]]) -> str:
+    """The page's table."""
     head = ["loss time, s", *(f"{cells} cells" for cells in CELLS), "differ by", "cycles", "warns"]
-    lines = ["| " + " | ".join(head) + " |", "|---" * len(head) + "|"]
+    lines = []
     for loss, mine in by_loss(rows).items():
         off, error = spread(mine)
         cells = [f"{loss:.4g}", *(_rate(row) for row in mine)]
         cells += [f"{100 * off:.1f} ± {100 * error:.1f} %", f"{mine[-1]['cycles']:.0f}"]
         cells.append("yes" if all(row["warned"] for row in mine) else "no")
-        lines.append("| " + " | ".join(cells) + " |")
-    return "\n".join(lines)
+        lines.append(cells)
+    return table(head, lines)
 
 
 def _rate(row: dict[str, Any]) -> str:
@@ -138,11 +138,7 @@ def main() -> None:
     with matplotlib.rc_context(style.STYLE):
         draw(rows).savefig(HERE / "images" / "undamped.png", metadata={"Software": None}, dpi=110)
     page = HERE / "data" / "undamped.md"
-    text = page.read_text(encoding="utf-8")
-    marks = "<!-- table -->\n", "\n<!-- end of table -->"
-    pattern = f"{re.escape(marks[0])}.*{re.escape(marks[1])}"
-    filled = marks[0] + table(rows) + marks[1]
-    write_text(page, re.sub(pattern, lambda _: filled, text, flags=re.DOTALL))
+    write_text(page, renewed(page, {"rates": block(rows)}))
 
 
 if __name__ == "__main__":

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from docs.blocks import renewed
 from percussion_model.interface.plotting.style import save_figures
 from percussion_model.interface.plotting.validation import draw_all
 from percussion_model.interface.progress import count_bar
@@ -17,8 +18,6 @@ HERE = Path(__file__).resolve().parent
 PAGE = HERE / "validation.md"
 DPI = 90
 
-BEGIN, END = "<!-- tables: begin -->", "<!-- tables: end -->"
-
 
 def block(found: Comparison) -> str:
     """The tables, what their columns are, and what could not be read."""
@@ -27,18 +26,11 @@ def block(found: Comparison) -> str:
     return "\n".join([*lines, "", *markdown(found), "### Wanted", "", *rows])
 
 
-def page(found: Comparison) -> str:
-    """Text of the page with its tables renewed."""
-    before, _, rest = PAGE.read_text(encoding="utf-8").partition(BEGIN)
-    _, _, after = rest.partition(END)
-    return f"{before}{BEGIN}\n\n{block(found)}\n\n{END}{after}"
-
-
 def main() -> None:
     """Compute, write the page and draw the figures."""
     with count_bar("fits") as progress:
         found = compare(load(), progress=progress)
-    PAGE.write_text(page(found), encoding="utf-8")
+    PAGE.write_text(renewed(PAGE, {"tables": block(found)}), encoding="utf-8")
     save_figures(
         lambda: ((f"validation_{name}", figure) for name, figure in draw_all(found)),
         HERE / "images",

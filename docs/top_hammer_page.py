@@ -7,12 +7,11 @@ Runs every hammer with some numbers of rods, and reports on one string; takes a 
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import matplotlib
 
+from docs.blocks import renewed, table
 from percussion_model import Result, simulate
 from percussion_model.analysis.drill_string import StringReport, string_report
 from percussion_model.interface.plotting import style
@@ -23,8 +22,6 @@ from percussion_model.scene.text import write_text
 HERE = Path(__file__).resolve().parent
 PAGE = HERE / "top_hammer.md"
 DATA = HERE / "data" / "top_hammer.md"
-# What is written into which page, by the names of its marks.
-BLOCKS = {PAGE: ("rock", "shares", "changes"), DATA: ("presets", "stresses", "joints")}
 DPI = 100
 DURATION, SETTLE = 4.0, 1.0  # [s]
 RODS = (1, 2, 4, 6, 8)
@@ -40,12 +37,6 @@ CHANGES: tuple[tuple[str, dict[str, object]], ...] = (
     ("a tenth of the structural loss", {"loss.time": 5e-9}),
     ("softer rock, 0.3 GN/m", {"rock.loading_stiffness": 3e8}),
 )
-
-
-def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """Markdown of a table; all columns but the first are numbers."""
-    lines = ["| " + " | ".join(head) + " |", "|---|" + "---:|" * (len(head) - 1)]
-    return "\n".join([*lines, *("| " + " | ".join(row) + " |" for row in rows)])
 
 
 def run(name: str, rods: int | None, **changes: object) -> Result:
@@ -84,7 +75,7 @@ def presets() -> str:
             )
     head = ["hammer", "rods", "frequency, Hz", "impact, m/s", "blow, J", "efficiency, %"]
     head += ["rate, mm/s", "peak bit force, kN", "speed"]
-    return table(head, rows)
+    return table(head, rows, numbers=True)
 
 
 def shares() -> str:
@@ -96,7 +87,7 @@ def shares() -> str:
         taken = (rock, energy["loss"], energy["joints"], energy["numerical"])
         rows.append([str(rods), *(f"{100 * part / energy['input']:.1f}" for part in taken)])
     head = ["rods", "rock, %", "structural loss, %", "damper, %", "numerical, %"]
-    return table(head, rows)
+    return table(head, rows, numbers=True)
 
 
 def changes() -> str:
@@ -112,7 +103,7 @@ def changes() -> str:
                 f"{1e3 * found['rate_of_penetration']:.0f}",
             ]
         )
-    return table(["", "blow, J", "efficiency, %", "rate, mm/s"], rows)
+    return table(["", "blow, J", "efficiency, %", "rate, mm/s"], rows, numbers=True)
 
 
 def joints(report: StringReport) -> str:
@@ -130,7 +121,7 @@ def joints(report: StringReport) -> str:
         for name, one in report.joints.items()
     ]
     head = ["joint", "came, J", "passed, J", "returned, J", "net, J", "of the first wave, %"]
-    return table([*head, "greatest tension, kN"], rows)
+    return table([*head, "greatest tension, kN"], rows, numbers=True)
 
 
 def stresses(report: StringReport) -> str:
@@ -142,7 +133,7 @@ def stresses(report: StringReport) -> str:
             cells += [f"{sign * 1e-6 * extreme.value:.0f}", f"{extreme.place:.2f}"]
         rows.append(cells)
     head = ["bar", "compression, MPa", "at, m", "tension, MPa", "at, m"]
-    return table(head, rows)
+    return table(head, rows, numbers=True)
 
 
 def at_the_rock(report: StringReport) -> str:
@@ -155,18 +146,6 @@ def at_the_rock(report: StringReport) -> str:
         f"{100 * rock.first_share:.0f} % of it by the first incident wave. "
         f"These are means of {report.blows} blows."
     )
-
-
-def fill(text: str, name: str, content: str) -> str:
-    """Put content between the marks of a name."""
-    marks = f"<!-- {name} -->", f"<!-- end of {name} -->"
-    pattern = f"{re.escape(marks[0])}.*?{re.escape(marks[1])}"
-    filled, count = re.subn(
-        pattern, lambda _: f"{marks[0]}\n{content}\n{marks[1]}", text, flags=re.DOTALL
-    )
-    if count != 1:
-        raise ValueError(f"marks of {name!r} are there {count} times")
-    return filled
 
 
 def main() -> None:
@@ -184,11 +163,8 @@ def main() -> None:
         "presets": presets(),
         "stresses": stresses(report),
     }
-    for path, names in BLOCKS.items():
-        text = path.read_text(encoding="utf-8")
-        for name in names:
-            text = fill(text, name, contents[name])
-        write_text(path, text)
+    for path in (PAGE, DATA):
+        write_text(path, renewed(path, contents))
 
 
 if __name__ == "__main__":
