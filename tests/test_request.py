@@ -176,7 +176,7 @@ def test_plan_lists_what_will_be_run():
         (FREE, "auto", "modal"),
         (FREE, "wave", "wave"),
         ({"loss.time": 1e-8}, "auto", "wave"),
-        ({"loss.time": 1e-4}, "auto", "wave"),
+        ({"loss.time": 1e-4}, "auto", "modal"),
     ],
 )
 def test_modes_answer_where_no_solver_is_named(changes, name, solver):

@@ -16,9 +16,9 @@ FITS = 1e-9
 
 
 def in_delay_lines(index):
-    """A case of waves by delay lines; None where it is another one, or refused in a sentence."""
+    """A case of two bars by delay lines; None where it is another one, or refused."""
     case = draw_case(Generator(SEED, index))
-    if case.scene.solver_name != "wave":
+    if case.scene.solver_name not in ("wave", "modal"):
         return None
     case.scene = case.scene.computed_by("chain")
     try:
