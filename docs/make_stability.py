@@ -36,7 +36,7 @@ def main(file: str | None = None) -> None:
     save_figures(lambda: [("stability", draw_stability(found))], HERE / "images", kinds=("png",))
     text = page(found, "../images/stability.png", "the [guide to hard cases](../stability.md)")
     DATA.write_text(text, encoding="utf-8")
-    GUIDE.write_text(renewed(GUIDE, {"verdict": verdict(found)}), encoding="utf-8")
+    GUIDE.write_text(renewed(GUIDE, {"verdict": verdict(found).rstrip()}), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -10,6 +10,7 @@ from benchmarks.coverage import drawn
 from percussion_model import Scene, Simulation, simulate
 from percussion_model.physics.records import Mode
 from percussion_model.solvers.modal.records import Shape
+from percussion_model.verification.hard_cases import hard_cases
 
 ON_ROCK = 1  # form of the bit alone on K_R
 
@@ -93,6 +94,19 @@ def test_steps_are_cut_where_rock_unloads_on_a_stiff_line():
         for modes in (20, 40)
     )
     assert few.rate_of_penetration == pytest.approx(many.rate_of_penetration, rel=1e-3)
+
+
+@pytest.mark.parametrize("name", ["power_4_stiff", "buttons_1000"])
+def test_steps_are_cut_where_a_curve_gets_stiff(name):
+    """With steps of one length 20 modes found 0.6 and 0.7 of these rates."""
+    scene = hard_cases()[name].scene.computed_by("modal")
+    few, many = (
+        simulate(scene.replace(**{"solver.cells": modes}), error_estimate=False)
+        for modes in (20, 40)
+    )
+    scatter = few.rate_of_penetration_standard_error + many.rate_of_penetration_standard_error
+    off = abs(few.rate_of_penetration - many.rate_of_penetration)
+    assert off < 0.01 * many.rate_of_penetration + scatter
 
 
 def test_a_run_with_half_the_modes_takes_longer_steps_on_rock():

@@ -36,7 +36,13 @@ PANELS = (
     Panel("Numerical dissipation", "numerical", "share of the energy [–]", 1e-7, None),
     Panel("Events", "events_per_second", "events in a simulated second [1/s]", 1.0, "ceiling"),
 )  # fmt: skip
-COLOURS = {"wave": "#0072B2", "fem": "#009E73", "rigid": "#595959", "chain": "#CC79A7"}
+COLOURS = {
+    "wave": "#0072B2",
+    "modal": "#E69F00",
+    "fem": "#009E73",
+    "rigid": "#595959",
+    "chain": "#CC79A7",
+}
 LIMIT_COLOUR = "#D55E00"
 # The dots of a solver fill so much of its column, in the order of their size.
 SPREAD = 0.4
@@ -89,7 +95,7 @@ def _panel(ax: Axes, found: Collection, panel: Panel, solvers: list[str]) -> Non
     ax.set_xlim(-0.6, len(solvers) - 0.4)
     ax.yaxis.set_major_locator(LogLocator(10.0, numticks=8))
     ax.yaxis.set_minor_locator(NullLocator())
-    ax.set_xticks(range(len(solvers)), names, fontsize=7.5)
+    ax.set_xticks(range(len(solvers)), names, fontsize=6.8)
     ax.tick_params(axis="x", length=0)
     ax.grid(visible=False, axis="x")
     style.label(ax, "", panel.axis, panel.title)

@@ -299,6 +299,7 @@ MODAL_STATE = np.dtype(
         ("place_p", "f8"),  # penetration [m], force [N], work [J]
         ("place_force", "f8"),
         ("place_work", "f8"),
+        ("line_stiffness", "f8"),  # of the last line of a step on a curve [N/m]
         ("v_low", "f8"),  # velocity of the rock end [m/s]
         ("f_contact", "f8"),  # mean forces of the last step [N]
         ("f_rock", "f8"),

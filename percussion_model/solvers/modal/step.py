@@ -73,6 +73,8 @@ from percussion_model.solvers.modal.rock_end import (
 CHECKPOINT = 64
 # Lines that are taken for the way of a step on a curve, until they change it by no more than this.
 MOST_TRIES, SETTLED = 8, 1e-6
+# Loading on a curve may bend a step by so many times as much as unloading.
+LOADING = 10.0
 # Openings and closures of one instant; more would be a loop.
 MOST_FLIPS = 2
 
@@ -274,6 +276,13 @@ def load_bodies(par, s, bars, level):
         refresh_loads(s, bars, a_b, a_p)
 
 
+@inlined
+def bends(s, bars, level, K):
+    """Share of its path by which rock of a stiffness bends a step besides the form's spring."""
+    yields = bars.forms.yields[s.form, level, s.active // WIDTH - 1]
+    return abs(K - bars.forms.stiff[s.form]) * yields
+
+
 @merged
 def level_of_step(par, s, bars):
     """Level of the next step of bars that are stepped.
@@ -282,11 +291,12 @@ def level_of_step(par, s, bars):
     """
     if par.effects == 1 or s.closed == 1 or par.rock == RockKind.WALL or follows_form(par, s):
         return STEP
-    if s.mode != Mode.BC:  # the rock changes slower than a front passes
-        return par.asked + 1
-    level, lane = par.asked + 2, s.active // WIDTH - 1
-    rest = abs(stiffness(s) - bars.forms.stiff[s.form])
-    while level > 0 and rest * bars.forms.yields[s.form, level, lane] > par.most_bend:
+    # the rock changes slower than a front passes, slowest where it unloads
+    level, most = par.asked + 1, LOADING * par.most_bend
+    if s.mode == Mode.BC:
+        level, most = par.asked + 2, par.most_bend
+    K = s.line_stiffness if is_curved(par, s) else stiffness(s)
+    while level > 0 and bends(s, bars, level, K) > most:
         level -= 1
     return level
 
@@ -357,6 +367,13 @@ def go_on(par, s, bars, most, near, blows, events):
         bursts = stands and overcomes_barrier(par, s, bit_kinetic(s, bars, bars.rows))
         before, now = ends_of(s, trial)
         ends = passed(par, s, now.p, now.speed, trial.work, trial.last)
+        if level > 0 and is_curved(par, s):
+            s.line_stiffness = trial.rock.line.stiffness
+            if bends(s, bars, level, s.line_stiffness) > 2.0 * LOADING * par.most_bend:
+                level -= 1
+                most = level
+                load_bodies(par, s, bars, level)
+                continue
         if level > STEP:
             ends = ends or turns_between(s, before, now, trial.h) > 0.0
         turns = piston and switches(par, s, s.u_r + trial.way_p - trial.way_b)

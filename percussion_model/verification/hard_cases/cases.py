@@ -16,7 +16,7 @@ from typing import Any
 
 from percussion_model.scene.scene import Scene
 
-SOLVERS = ("wave", "fem", "rigid")
+SOLVERS = ("wave", "modal", "fem", "rigid")
 # With those that some cases alone are for: drill strings.
 ALL_SOLVERS = (*SOLVERS, "chain")
 
