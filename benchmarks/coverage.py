@@ -13,6 +13,7 @@ import json
 import math
 import statistics
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -99,16 +100,16 @@ def truth_by_waves(scene: Scene) -> tuple[float, float]:
     return rates[-1], abs(rates[0] / rates[1] - 1.0)
 
 
-def rates_that_may_be_right(seed: int, is_curved: bool) -> dict[str, float]:
+def rates_that_may_be_right(
+    scene: Scene, witness: Callable[[Scene], tuple[float, float]]
+) -> dict[str, float]:
     """Rates by elements or waves and by many modes, and how far each may be off [m/s]."""
-    scene = curved(seed) if is_curved else drawn(seed)
     fine = min(FINE, most_modes(numbers_of(scene)))
     many = simulate(
         scene.replace(**{"solver.cells": fine}), error_estimate=False, record_events=False
     )
-    rate, unsure = (truth_by_waves if is_curved else truth)(scene)
+    rate, unsure = witness(scene)
     return {
-        "seed": seed,
         "truth": rate,
         "unsure": unsure * abs(rate),
         "many_modes": many.rate_of_penetration,
@@ -181,17 +182,19 @@ def main() -> None:
     """Run what is missing, and print the tables."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--scenes", type=int, default=SCENES)
-    parser.add_argument("--curved", action="store_true")
+    parser.add_argument("--curved", action="store_true", help="rock that loads on a curve")
     words = parser.parse_args()
-    rows = []
-    path = CURVED_TRUTHS if words.curved else TRUTHS
-    known = truths(path)
+    draw, witness, path = drawn, truth, TRUTHS
+    if words.curved:
+        draw, witness, path = curved, truth_by_waves, CURVED_TRUTHS
+    rows, known = [], truths(path)
     for seed in range(words.scenes):
+        scene = draw(seed)
         if seed == len(known):
-            known.append(rates_that_may_be_right(seed, words.curved))
+            known.append({"seed": seed} | rates_that_may_be_right(scene, witness))
             with path.open("a", encoding="utf-8") as out:
                 out.write(json.dumps(known[seed]) + "\n")
-        row = known[seed] | stated(curved(seed) if words.curved else drawn(seed))
+        row = known[seed] | stated(scene)
         rows.append(row)
         print(
             f"{seed}: off by {off(row):.2g} of the stated {row['stated'] / row['rate']:.1e}",

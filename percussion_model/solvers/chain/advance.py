@@ -17,7 +17,7 @@ from percussion_model.solvers.chain.sections import (
     energy_of_bar,
     kinetic_of_bar,
 )
-from percussion_model.solvers.chain.step import LATE, POSITION, step, time_of
+from percussion_model.solvers.chain.step import POSITION, VISCOUS, step, time_of
 
 # Events that one step can make besides the rock's crossings: contact and drive.
 OTHER_EVENTS = 4
@@ -45,10 +45,10 @@ def show_motion(par, s, chain, waves, row, time):
     """Fill in the motion, with the momentum that loss gives beside the waves near contacts."""
     bit = par.bars - 1
     here = waves.bars[POSITION, bit]
-    above = s.late_contact if par.struck == bit else waves.joints[LATE, par.joints - 1]
-    s.v_b += (above - s.late_rock) * chain.bodies[bit, INV_MASS]
+    above = s.viscous_contact if par.struck == bit else waves.joints[VISCOUS, par.joints - 1]
+    s.v_b += (above - s.viscous_rock) * chain.bodies[bit, INV_MASS]
     if par.piston == Piston.ELASTIC:
-        s.v_p -= s.late_contact * chain.bodies[0, INV_MASS]
+        s.v_p -= s.viscous_contact * chain.bodies[0, INV_MASS]
     casing = s.u_c if par.damper == 1 else waves.bars[POSITION, par.struck]
     fill_motion(par, s, row, time, s.u_r - s.u_0 + casing, here)
 

@@ -72,8 +72,8 @@ class Has(IntEnum):
     CAME = 4  # energy that came down to it [J]
     PASSED = 5  # that went on downward
     RETURNED = 6  # that was sent back up
-    STRAIN = 7  # force by the waves alone in its last step [N]
-    LATE = 8  # impulse that loss has given beside the waves [N s]
+    BY_WAVES = 7  # force by the waves alone in its last step [N]
+    VISCOUS = 8  # impulse of loss beside them since the start [N s]
 
 
 class Bar(IntEnum):
@@ -157,8 +157,8 @@ CHAIN_STATE = np.dtype(
         ("u_0", "f8"),  # u_r at the start [m]
         ("g_contact", "f8"),  # force by the waves alone below the piston in the last step [N]
         ("g_rock", "f8"),  # and at the rock
-        ("late_contact", "f8"),  # impulse that loss has given there beside the waves [N s]
-        ("late_rock", "f8"),
+        ("viscous_contact", "f8"),  # impulses of loss beside them since the start [N s]
+        ("viscous_rock", "f8"),
         ("i_came", "f8"),  # energy that came down to the rock [J]
         ("i_returned", "f8"),  # that it sent back
         *COMMON_STATE,

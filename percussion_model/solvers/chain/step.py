@@ -53,7 +53,7 @@ from percussion_model.solvers.wave.rock_end import asks_for_energy, rock_step
 PERFECT, _, LOSSY, THREADED = (float(kind) for kind in Joint)
 VELOCITY, POSITION = int(Bar.VELOCITY), int(Bar.POSITION)
 KIND, YIELD, PRELOAD, STIFFNESS, DAMPING, SECTION, STIFF, ABOVE, BELOW = (int(row) for row in Fit)
-CLOSED, GAP, FORCE, LEAST, CAME, PASSED, RETURNED, STRAIN, LATE = (int(row) for row in Has)
+CLOSED, GAP, FORCE, LEAST, CAME, PASSED, RETURNED, BY_WAVES, VISCOUS = (int(row) for row in Has)
 # A part of a step shorter than this is not worth a step of its own.
 SHORTEST_PART = 1e-3
 # Mean motion is derived anew from waves and gap so often [steps].
@@ -193,20 +193,20 @@ def meet_joints(par, s, chain, waves, tau):
         down, up = came[DOWN, k - 1], came[UP, k]
         v_a = 2.0 * down + half * came[ACCELERATION, above]
         v_b = 2.0 * up + half * came[ACCELERATION, below]
-        before = par.lag * joints[STRAIN, j]
+        before = par.lag * joints[BY_WAVES, j]
         a, y = v_a - v_b - fits[j, YIELD] * before, fits[j, YIELD] / (1.0 + par.viscous)
         if holds(fits, joints, j, a, y):
             force = a * fits[j, STIFF] * (1.0 + par.viscous)
         else:
             force = give_way(s, fits, joints, j, a, y, tau) / tau
-        strain = before + force / (1.0 + par.viscous)
-        joints[STRAIN, j] = strain
-        joints[LATE, j] += (force - strain) * tau
-        v_a, v_b = v_a - strain * fits[j, ABOVE], v_b + strain * fits[j, BELOW]
-        s.e_loss += (force - strain) * (v_b - v_a) * tau
+        by_waves = before + force / (1.0 + par.viscous)
+        joints[BY_WAVES, j] = by_waves
+        joints[VISCOUS, j] += (force - by_waves) * tau
+        v_a, v_b = v_a - by_waves * fits[j, ABOVE], v_b + by_waves * fits[j, BELOW]
+        s.e_loss += (force - by_waves) * (v_b - v_a) * tau
         returned, passed = v_a - down, v_b - up
         came[UP_OUT, k - 1], came[DOWN_OUT, k] = returned, passed
-        came[FROM_BELOW, above] = came[FROM_ABOVE, below] = strain * tau
+        came[FROM_BELOW, above] = came[FROM_ABOVE, below] = by_waves * tau
         joints[FORCE, j] = force
         joints[LEAST, j] = min(joints[LEAST, j], force)
         z_a, z_b = steel[k - 1, IMPEDANCE] * tau, steel[k, IMPEDANCE] * tau
@@ -297,18 +297,18 @@ def meet_piston(par, s, chain, waves, push, tau, time, blows, events):
         z_v, v_v = z_t * more, v_t + before / z_t
         _, _, _, _, d_t, q_t, impulse, _, _ = mass_contact(1, 0.0, v_p, v_v, par.mass_p, z_v, tau)
         s.e_numerical += z_v * (q_t - d_t * d_t / tau)
-    strain = before + impulse / (more * tau)
-    s.g_contact = strain
-    s.late_contact += impulse - strain * tau
-    v_t += strain / z_t
-    s.e_loss += (impulse - strain * tau) * v_t
+    by_waves = before + impulse / (more * tau)
+    s.g_contact = by_waves
+    s.viscous_contact += impulse - by_waves * tau
+    v_t += by_waves / z_t
+    s.e_loss += (impulse - by_waves * tau) * v_t
     if elastic:
-        v_p -= strain / chain.steel[k - 1, IMPEDANCE]
-        s.e_loss -= (impulse - strain * tau) * v_p
+        v_p -= by_waves / chain.steel[k - 1, IMPEDANCE]
+        s.e_loss -= (impulse - by_waves * tau) * v_p
         came[UP_OUT, k - 1] = v_p - came[DOWN, k - 1]
         came[DOWN_OUT, 0] = came[UP, 0] + kick_of(par, waves, 0)
     came[DOWN_OUT, k] = v_t - came[UP, k]
-    came[FROM_ABOVE, struck] = strain * tau
+    came[FROM_ABOVE, struck] = by_waves * tau
     if was == 1 or s.closed == 1:
         peak = force if touches else 0.0
         record_contact(par, s, waves, opened, t_close, approach, peak, time, tau, blows, events)
@@ -327,7 +327,7 @@ def meet_rock(par, s, chain, waves, tau, time, events):
     d, q = rock_step(par, s, energy, v_free, z_v, tau, time, events)
     impulse, up = z_v * (v_free * tau - d), d / tau - down
     s.g_rock = z * (v_whole - d / tau)
-    s.late_rock += impulse - s.g_rock * tau
+    s.viscous_rock += impulse - s.g_rock * tau
     s.e_loss += (s.g_rock - impulse / tau) * d
     waves.came[UP_OUT, k], waves.came[FROM_BELOW, bit] = up, s.g_rock * tau
     s.e_numerical += z_v * (q - d * d / tau)

@@ -1,7 +1,7 @@
 """Weights by which a wave arrives at the far end of a section.
 
 A wave takes the time T = (n + f) dt from end to end, and structural loss spreads it as a normal
-distribution of the variance eta T does, which leans by the third moment 9/4 eta^2 T: exp(-s T /
+distribution of the variance eta T does, with the third moment 9/4 eta^2 T: exp(-s T /
 sqrt(1 + eta s)) of docs/model.md, eq. 2, to the third order in s.
 So it arrives as a sum of what was sent at some steps before, by weights whose sum is one: a
 lasting force passes as it is. The part f dt of a step is Lagrange's cubic between four steps, in
@@ -70,7 +70,7 @@ def weights_of(transit, variance):
         weights = _scaled(_convolved(weights, _normal(rest, reach)))
         if room - reach < 2:
             return delay - reach, weights, rest
-        return delay - reach - 2, _convolved(weights, _lean(transit, rest)), rest
+        return delay - reach - 2, _convolved(weights, _skew(transit, rest)), rest
     rounds = min(math.ceil(0.5 * rest / MOST_SPREAD), room)
     if rounds == 0:
         return delay, weights, 0.0
@@ -79,7 +79,7 @@ def weights_of(transit, variance):
     for _ in range(rounds):
         weights = _convolved(weights, once)
     if room - rounds >= 2:
-        weights, delay = _convolved(weights, _lean(transit, variance)), delay - 2
+        weights, delay = _convolved(weights, _skew(transit, variance)), delay - 2
     first, end = 0, len(weights)
     while abs(weights[first]) <= NOTHING:
         first += 1
@@ -92,7 +92,7 @@ def weights_of(transit, variance):
 
 
 @preparing
-def _lean(transit, variance):
+def _skew(transit, variance):
     """Weights that give a distribution its third moment, and leave all before as they are."""
     c = THIRD * variance * variance / transit / 6.0
     return np.array([-0.5 * c, c, 1.0, -c, 0.5 * c])

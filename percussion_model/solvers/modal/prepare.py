@@ -95,10 +95,11 @@ def fill_modal_parameters(p, numbers):
     elastic = PISTONS[numbers.values.piston_model] == Piston.ELASTIC
     first = bar_transit_time(numbers.piston if elastic else numbers.bit)
     eta, rock = kelvin_voigt_time(numbers), rock_numbers(numbers)
-    dt = first / asked_modes(numbers)
+    modes = asked_modes(numbers)
+    dt = first / modes
     highest = math.pi / dt
     p["ringing"], p["asked"] = RINGING << STEP, STEP
-    p["most_bend"] = MOST_BEND * default_modes(numbers) / asked_modes(numbers)
+    p["most_bend"] = MOST_BEND * default_modes(numbers) / modes
     while dt > first / FEWEST_STEPS:
         dt *= 0.5
         p["ringing"] *= 2

@@ -73,8 +73,9 @@ from percussion_model.solvers.modal.rock_end import (
 CHECKPOINT = 64
 # Lines that are taken for the way of a step on a curve, until they change it by no more than this.
 MOST_TRIES, SETTLED = 8, 1e-6
-# Loading on a curve may bend a step by so many times as much as unloading.
-LOADING = 10.0
+# Loading on a curve may bend a step by so many times as much as unloading; and by so many times
+# that where its stiffness has risen since the step before, which told the length of this one.
+LOADING, RISES = 10.0, 2.0
 # Openings and closures of one instant; more would be a loop.
 MOST_FLIPS = 2
 
@@ -277,7 +278,7 @@ def load_bodies(par, s, bars, level):
 
 
 @inlined
-def bends(s, bars, level, K):
+def bend(s, bars, level, K):
     """Share of its path by which rock of a stiffness bends a step besides the form's spring."""
     yields = bars.forms.yields[s.form, level, s.active // WIDTH - 1]
     return abs(K - bars.forms.stiff[s.form]) * yields
@@ -289,14 +290,16 @@ def level_of_step(par, s, bars):
 
     Steps on rock go with the modes asked for, so that runs with fewer tell what they do to a rate.
     """
-    if par.effects == 1 or s.closed == 1 or par.rock == RockKind.WALL or follows_form(par, s):
+    if par.effects == 1 or par.rock == RockKind.WALL or follows_form(par, s):
         return STEP
     # the rock changes slower than a front passes, slowest where it unloads
     level, most = par.asked + 1, LOADING * par.most_bend
     if s.mode == Mode.BC:
         level, most = par.asked + 2, par.most_bend
+    if s.closed == 1:
+        level = STEP
     K = s.line_stiffness if is_curved(par, s) else stiffness(s)
-    while level > 0 and bends(s, bars, level, K) > most:
+    while level > 0 and bend(s, bars, level, K) > most:
         level -= 1
     return level
 
@@ -358,6 +361,12 @@ def go_on(par, s, bars, most, near, blows, events):
         if piston and s.parked == 1 and trial.gap < 0.0:
             unpark(par, s, bars)
             continue
+        if level > 0 and is_curved(par, s):
+            s.line_stiffness = trial.rock.line.stiffness
+            if bend(s, bars, level, s.line_stiffness) > RISES * LOADING * par.most_bend:
+                most = level = level - 1
+                load_bodies(par, s, bars, level)
+                continue
         flip = False
         if piston and s.parked == 0:
             flip = trial.gap < 0.0
@@ -367,13 +376,6 @@ def go_on(par, s, bars, most, near, blows, events):
         bursts = stands and overcomes_barrier(par, s, bit_kinetic(s, bars, bars.rows))
         before, now = ends_of(s, trial)
         ends = passed(par, s, now.p, now.speed, trial.work, trial.last)
-        if level > 0 and is_curved(par, s):
-            s.line_stiffness = trial.rock.line.stiffness
-            if bends(s, bars, level, s.line_stiffness) > 2.0 * LOADING * par.most_bend:
-                level -= 1
-                most = level
-                load_bodies(par, s, bars, level)
-                continue
         if level > STEP:
             ends = ends or turns_between(s, before, now, trial.h) > 0.0
         turns = piston and switches(par, s, s.u_r + trial.way_p - trial.way_b)
