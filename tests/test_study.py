@@ -325,6 +325,20 @@ def test_ctrl_c_ends_a_study_at_once_and_says_what_is_kept(tmp_path):
             assert "the same command continues" in " ".join(errors.split())
 
 
+def test_ctrl_c_within_compiled_code_is_no_failure_of_a_point(tmp_path, monkeypatch):
+    """It comes out as a `SystemError` where numba loads kernels."""
+
+    def interrupted(*words, **options):
+        try:
+            raise KeyboardInterrupt
+        except KeyboardInterrupt as cause:
+            raise SystemError from cause
+
+    monkeypatch.setattr("percussion_model.analysis.study.response.settled", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        study(SCENE, table({"feed.force": [2500.0]}), tmp_path / "out", processes=1)
+
+
 @pytest.mark.parametrize("error", [KeyboardInterrupt, SystemError])
 def test_ctrl_c_while_the_report_is_written_says_what_is_kept(error, tmp_path, monkeypatch, capsys):
     """It may come out of compiled code as a `SystemError`."""

@@ -26,7 +26,6 @@ from percussion_model.interface.commands.common import (
     exit_code,
     forget_moving,
     heed_termination,
-    is_interruption,
     own_process,
     print_message,
     refusal,
@@ -45,6 +44,7 @@ from percussion_model.interface.messages import usage_text
 from percussion_model.interface.progress import lines
 from percussion_model.interface.streams import end_process
 from percussion_model.scene.writing import remove_abandoned
+from percussion_model.simulation.interruption import is_interruption
 
 app = typer.Typer(
     help="Percussive drilling: elastic piston and bit, and rock, blow by blow.",

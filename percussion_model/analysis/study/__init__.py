@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable
+from contextlib import closing
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -309,11 +310,12 @@ def study(
             if cluster is None
             else on_a_cluster(run_points, tasks, cluster)
         )
-        for number, (rows, failures) in ended:
-            store.keep(parts[number], rows, failures)
-            count += len(parts[number])
-            if progress is not None:
-                progress(count, len(points))
+        with closing(ended):  # an interruption here ends the workers as well
+            for number, (rows, failures) in ended:
+                store.keep(parts[number], rows, failures)
+                count += len(parts[number])
+                if progress is not None:
+                    progress(count, len(points))
     rows, failures, done = store.read(len(points))
     if not done.all():
         raise ResultError(f"{folder}: {int((~done).sum())} points are missing: run it again")

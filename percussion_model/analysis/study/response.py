@@ -10,6 +10,7 @@ import numpy as np
 from percussion_model.analysis.stationary import Settled, settled
 from percussion_model.analysis.study.points import whole_number
 from percussion_model.scene.scene import Scene
+from percussion_model.simulation.interruption import interruptible
 from percussion_model.simulation.means import numbers_over
 from percussion_model.solvers.sources import SOLVING
 
@@ -80,7 +81,8 @@ def run_points(
             changes = {k: whole_number(k, value) for k, value in zip(keys, point, strict=True)}
             try:
                 chosen = scene.replace(**changes)
-                _fill(row, settled(chosen, tolerance, most_blows, scatter=scatter))
+                with interruptible():
+                    _fill(row, settled(chosen, tolerance, most_blows, scatter=scatter))
                 failures.append("")
             except Exception as error:
                 for name in FOUND:

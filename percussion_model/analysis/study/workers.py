@@ -5,10 +5,10 @@ from __future__ import annotations
 import os
 import signal
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from multiprocessing import active_children, current_process, get_context
 from threading import current_thread, main_thread
 from typing import Any
@@ -28,7 +28,7 @@ Task = tuple[Any, ...]
 
 def on_this_machine(
     work: Callable[..., Any], tasks: list[Task], processes: int
-) -> Iterator[tuple[int, Any]]:
+) -> Generator[tuple[int, Any], None, None]:
     """Do the tasks in so many processes; yield number and outcome as they end.
 
     One process is the present one. A worker that dies takes its task with it, which is
@@ -41,9 +41,10 @@ def on_this_machine(
     waiting = dict(enumerate(tasks))
     for _ in range(MOST_RESTARTS + 1):
         try:
-            for number, outcome in _in_a_pool(work, dict(waiting), processes):
-                del waiting[number]
-                yield number, outcome
+            with closing(_in_a_pool(work, dict(waiting), processes)) as ended:
+                for number, outcome in ended:
+                    del waiting[number]
+                    yield number, outcome
             return
         except BrokenProcessPool:
             continue
@@ -61,7 +62,7 @@ def end_if_started_again() -> None:
 
 def _in_a_pool(
     work: Callable[..., Any], tasks: dict[int, Task], processes: int
-) -> Iterator[tuple[int, Any]]:
+) -> Generator[tuple[int, Any], None, None]:
     end_if_started_again()
     others, workers = set(active_children()), set()
     pool = ProcessPoolExecutor(
@@ -95,23 +96,29 @@ def _in_a_pool(
 def _interrupts_left_to_this_process() -> Iterator[None]:
     """Let processes that are started meanwhile ignore Ctrl-C from their first line on.
 
-    What this process does on SIGTERM waits until they are known, so that it can end them.
+    What this process does on Ctrl-C or SIGTERM waits until they are known, so that it can end
+    them.
     """
     if current_thread() is not main_thread():  # others may not touch signals
         yield
         return
     told: list[tuple[Any, ...]] = []
-    before, end = signal.signal(signal.SIGINT, signal.SIG_IGN), signal.getsignal(signal.SIGTERM)
-    if callable(end):
-        signal.signal(signal.SIGTERM, lambda *given: told.append(given))
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    heeded = [number for number, act in before.items() if callable(act)]
+    for number in heeded:  # another thread may hear what this one blocks
+        signal.signal(number, lambda *given: told.append(given))
+    # A new process inherits what its thread blocks, but not what a handler does.
+    mask = getattr(signal, "pthread_sigmask", None)
+    blocked = mask(signal.SIG_BLOCK, {signal.SIGINT}) if mask else set()
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
-        if callable(end):
-            signal.signal(signal.SIGTERM, end)
-            for given in told[:1]:
-                end(*given)
+        for number in heeded:
+            signal.signal(number, before[number])
+        if mask:
+            mask(signal.SIG_SETMASK, blocked)
+        for number, frame in told[:1]:
+            before[number](number, frame)
 
 
 @contextmanager
@@ -131,7 +138,7 @@ def _one_thread_each() -> Iterator[None]:
 
 def on_a_cluster(
     work: Callable[..., Any], tasks: list[Task], address: str
-) -> Iterator[tuple[int, Any]]:
+) -> Generator[tuple[int, Any], None, None]:
     """Do the tasks on a Dask cluster; yield number and outcome as they end.
 
     Parameters

@@ -12,6 +12,7 @@ import typer
 
 from percussion_model.interface.commands import common
 from percussion_model.interface.commands.couple import read_value
+from percussion_model.simulation.interruption import interruptible
 
 if TYPE_CHECKING:
     from percussion_model.coupling.bench import Score
@@ -65,7 +66,7 @@ def bench_controller(
     interrupted = False
 
     try:
-        with common.interruptible(), progress_bar(0.0) as bar:
+        with interruptible(), progress_bar(0.0) as bar:
             bench(
                 system, _load(controller), values, trials or (), scores.append, trust, bar,
                 check_step=step_check, tell=common.print_message,

@@ -20,6 +20,7 @@ import typer
 
 from percussion_model.interface.messages import wrapped
 from percussion_model.interface.streams import end_process
+from percussion_model.simulation.interruption import is_interruption
 
 if TYPE_CHECKING:
     from types import FrameType
@@ -555,37 +556,6 @@ _terminated: list[int] = []
 def ended_by(code: int) -> int:
     """Exit code of an interruption: another one where it was SIGTERM."""
     return TERMINATED if code == INTERRUPTED and _terminated else code
-
-
-def is_interruption(error: BaseException) -> bool:
-    """Whether an error is Ctrl-C, or comes of it.
-
-    Ctrl-C within compiled code that takes no heed of it, as where numba loads kernels, ends in
-    a `SystemError` with the `KeyboardInterrupt` behind it.
-    """
-    if not isinstance(error, SystemError):
-        return isinstance(error, KeyboardInterrupt)
-    looked_at: set[int] = set()
-    behind: list[BaseException | None] = [error]
-    while behind:
-        one = behind.pop()
-        if isinstance(one, KeyboardInterrupt):
-            return True
-        if one is not None and id(one) not in looked_at:
-            looked_at.add(id(one))
-            behind += [one.__cause__, one.__context__]
-    return False
-
-
-@contextmanager
-def interruptible() -> Iterator[None]:
-    """Have all that comes of Ctrl-C be a `KeyboardInterrupt`."""
-    try:
-        yield
-    except SystemError as error:
-        if not is_interruption(error):
-            raise
-        raise KeyboardInterrupt from error
 
 
 def print_message(message: str, code: int = 0, program: str = "percussion") -> int:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from percussion_model.interface.commands import common
+from percussion_model.simulation.interruption import interruptible
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -47,7 +48,7 @@ def paper(
     scene = paper_scene()
     written = _Written(common.claim("paper", out, None, force, scene=scene))
     try:
-        with common.interruptible():
+        with interruptible():
             statements = _compute(scene, processes, written)
     except KeyboardInterrupt:
         if not written.names:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from percussion_model.interface.commands import common
+from percussion_model.simulation.interruption import interruptible
 
 if TYPE_CHECKING:
     from percussion_model.analysis.study import Points, Study
@@ -97,7 +98,7 @@ def study(
     for key, column in zip(points.keys, points.values.T, strict=True):
         common.hint(key, hint_of(key, column.tolist()))
     try:
-        with common.interruptible():
+        with interruptible():
             # one that goes on has told it, and its bar tells what is left
             if len(points) >= MANY and cluster is None and not (out / PLAN).exists():
                 _tell_of_cost(chosen, points, tolerance, scatter, processes)
