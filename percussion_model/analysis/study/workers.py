@@ -103,7 +103,9 @@ def _interrupts_left_to_this_process() -> Iterator[None]:
         yield
         return
     told: list[tuple[Any, ...]] = []
-    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    before: dict[int, Any] = {
+        number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)
+    }
     heeded = [number for number, act in before.items() if callable(act)]
     for number in heeded:  # another thread may hear what this one blocks
         signal.signal(number, lambda *given: told.append(given))
