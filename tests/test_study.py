@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from multiprocessing import active_children
 from pathlib import Path
 
 import numpy as np
@@ -323,6 +324,45 @@ def test_ctrl_c_ends_a_study_at_once_and_says_what_is_kept(tmp_path):
         assert "Traceback" not in errors
         if (tmp_path / f"out{number}" / PARTS).is_dir():
             assert "the same command continues" in " ".join(errors.split())
+
+
+@pytest.mark.skipif(os.name == "nt", reason="no masks of signals there")
+def test_ctrl_c_while_workers_start_waits_until_they_are_known():
+    """New processes inherit that it is blocked, so that they never hear it."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    asks = "import signal; print(signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, []))"
+    told = []
+
+    def start():
+        with workers._interrupts_left_to_this_process():
+            os.kill(os.getpid(), signal.SIGINT)
+            told.append(subprocess.check_output([sys.executable, "-c", asks], text=True).strip())
+
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            start()
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert told == ["True"]
+
+
+def test_ctrl_c_while_a_part_is_kept_ends_the_workers(tmp_path):
+    """What holds its traceback, as the message does, would let them go on."""
+    points = table({"feed.force": list(range(2000, 2400))})
+
+    def interrupt(done, count):
+        if done:
+            raise KeyboardInterrupt
+
+    others = set(active_children())
+    with pytest.raises(KeyboardInterrupt) as held:
+        study(SCENE, points, tmp_path / "out", processes=2, progress=interrupt)
+    left = set(active_children()) - others
+    for worker in left:
+        worker.join(10.0)
+    assert held.tb is not None
+    assert not any(worker.is_alive() for worker in left)
 
 
 def test_ctrl_c_within_compiled_code_is_no_failure_of_a_point(tmp_path, monkeypatch):

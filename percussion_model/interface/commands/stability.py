@@ -19,7 +19,7 @@ def stability(
     ] = None,
     solvers: Annotated[
         str, typer.Option("--solvers", metavar="A,B", help="Solvers that run them.")
-    ] = "wave,fem,rigid,chain",
+    ] = "wave,modal,fem,rigid,chain",
     share: Annotated[
         float, typer.Option("--share", min=0.01, max=1.0, help="Share of each case's duration.")
     ] = 1.0,

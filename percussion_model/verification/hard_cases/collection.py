@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import closing
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -284,10 +285,11 @@ def run_collection(
     processes = (os.cpu_count() or 1) if workers is None else max(workers, 1)
     # the costliest first, so that no long run is left at the end
     jobs.sort(key=lambda job: job[1] != "fem")
-    for _, row in on_this_machine(_row, jobs, processes):
-        rows.append(row)
-        if progress is not None:
-            progress(len(rows), len(jobs))
+    with closing(on_this_machine(_row, jobs, processes)) as ended:
+        for _, row in ended:
+            rows.append(row)
+            if progress is not None:
+                progress(len(rows), len(jobs))
     rows.sort(key=lambda row: order[row["case"], row["solver"]])
     return Collection(rows, share, left_out(chosen, wanted))
 
