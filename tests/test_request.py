@@ -7,6 +7,7 @@ import os
 
 import numpy as np
 import pytest
+from percussion_model.solvers.wave.grid import fitting_cells
 
 from percussion_model import Scene, SceneError, simulate
 from percussion_model.scene.numbers import numbers_of
@@ -14,7 +15,6 @@ from percussion_model.simulation.accuracy_control import planned_cells
 from percussion_model.simulation.result import Result
 from percussion_model.solvers.modal.resolution import modes_for, most_modes
 from percussion_model.solvers.modal.solver import ModalSolver
-from percussion_model.solvers.wave.grid import fitting_cells
 from percussion_model.solvers.wave.resolution import misfits
 
 LONG = os.environ.get("PERCUSSION_LONG") == "1"

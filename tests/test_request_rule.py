@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from percussion_model.solvers.wave.cutting import cut
 
 from percussion_model import Scene, SceneError, simulate
 from percussion_model.analysis.fitting.predictions import bit_alone
@@ -21,7 +22,6 @@ from percussion_model.simulation.error_estimate import (
     estimate_error,
 )
 from percussion_model.simulation.result import Result
-from percussion_model.solvers.wave.cutting import cut
 from percussion_model.solvers.wave.resolution import (
     CALIBRATED,
     FIT_SHARE,

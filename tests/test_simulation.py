@@ -5,15 +5,15 @@ import signal
 
 import numpy as np
 import pytest
+from percussion_model.solvers.wave.grid import choose_time_step
+from percussion_model.solvers.wave.shared import cut_bars
+from percussion_model.solvers.wave.totals import begin
 
 from percussion_model import Scene, SceneError, Simulation, SimulationError, simulate
 from percussion_model.physics.records import SAMPLE_FIELDS
 from percussion_model.scene.numbers import numbers_of
 from percussion_model.simulation.simulate import sampling_times, stop_on_interrupt
 from percussion_model.solvers.wave.advance import run
-from percussion_model.solvers.wave.grid import choose_time_step
-from percussion_model.solvers.wave.shared import cut_bars
-from percussion_model.solvers.wave.totals import begin
 
 RIGID = {"piston.model": "rigid", "bit.model": "rigid"}
 WAVES = Scene().computed_by("wave")

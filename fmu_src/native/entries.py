@@ -54,7 +54,6 @@ from percussion_model.scene.solver_names import BODIES
 from percussion_model.scene.values import SCENE_NUMBERS
 from percussion_model.solvers import plain_code  # noqa: F401  # kernels call functions of scenes
 from percussion_model.solvers.base import MOST_AHEAD
-from percussion_model.solvers.chain.records import CHAIN_STATE
 from percussion_model.solvers.fem.records import FEM_STATE
 from percussion_model.solvers.modal.records import MODAL_STATE
 from percussion_model.solvers.rigid.records import RIGID_STATE
@@ -94,7 +93,7 @@ MOST_BLOWS = 2**31 - 1  # an output is a whole number of FMI
 CLOCK_ROUNDING = 1e-12
 # Records of the solvers by `Kind`, of which the first is none.
 RECORDS = {
-    Kind.MODAL: MODAL_STATE, Kind.WAVE: WAVE_STATE, Kind.CHAIN: CHAIN_STATE, Kind.FEM: FEM_STATE,
+    Kind.MODAL: MODAL_STATE, Kind.WAVE: WAVE_STATE, Kind.FEM: FEM_STATE,
     Kind.RIGID: RIGID_STATE,
 }  # fmt: skip
 

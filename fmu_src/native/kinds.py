@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fmu_src.native import chain, fem, modal, rigid, wave
+from fmu_src.native import fem, modal, rigid, wave
 from fmu_src.native.layout import GaugeBar, Kind, head_records
 from percussion_model.physics.kernel import preparing
 
@@ -23,8 +23,6 @@ def refuse(kind, numbers, facts):
         return modal.refuse(numbers, facts)
     if kind == Kind.WAVE:
         return wave.refuse(numbers, facts)
-    if kind == Kind.CHAIN:
-        return chain.refuse(numbers, facts)
     if kind == Kind.FEM:
         return fem.refuse(numbers, facts)
     return 0
@@ -48,8 +46,6 @@ def create(kind, numbers, bar, place):
         return modal.create(numbers, bar, place)
     if kind == Kind.WAVE:
         return wave.create(numbers, bar, place)
-    if kind == Kind.CHAIN:
-        return chain.create(numbers, bar, place)
     if kind == Kind.FEM:
         return fem.create(numbers, bar, place)
     return rigid.create(numbers)
@@ -63,8 +59,6 @@ def state_time(base, moving):
         return modal.state_time(base, moving)
     if kind == Kind.WAVE:
         return wave.state_time(base, moving)
-    if kind == Kind.CHAIN:
-        return chain.state_time(base, moving)
     if kind == Kind.FEM:
         return fem.state_time(moving)
     return rigid.state_time(moving)
@@ -78,8 +72,6 @@ def grid_point_after(base, t):
         return modal.grid_point_after(base, t)
     if head.kind == Kind.WAVE:
         return wave.grid_point_after(base, t)
-    if head.kind == Kind.CHAIN:
-        return chain.grid_point_after(base, t)
     return max(t, state_time(base, base + head.state_at))
 
 
@@ -91,8 +83,6 @@ def is_quiet(base, t):
         return modal.is_quiet(base, t)
     if kind == Kind.WAVE:
         return wave.is_quiet(base, t)
-    if kind == Kind.CHAIN:
-        return chain.is_quiet(base, t)
     if kind == Kind.RIGID:
         return rigid.is_quiet(base, t)
     return False
@@ -118,9 +108,7 @@ def go(base, task, t, room):
     if kind == Kind.MODAL:
         return modal.go(base, task, t, room)
     if kind == Kind.WAVE:
-        return wave.go(base, task, t, room)
-    if kind == Kind.CHAIN:
-        return chain.go(base, t, room)
+        return wave.go(base, t, room)
     if kind == Kind.FEM:
         return fem.go(base, task, t, room)
     return rigid.go(base, task, t, room)
@@ -141,8 +129,6 @@ def read(base, moving, t, reading, peaks):
         modal.read(base, moving, t, reading, peaks)
     elif kind == Kind.WAVE:
         wave.read(base, moving, t, reading, peaks)
-    elif kind == Kind.CHAIN:
-        chain.read(base, moving, t, reading, peaks)
     elif kind == Kind.FEM:
         fem.read(base, moving, t, reading)
     else:
@@ -159,8 +145,6 @@ def stress(base, moving):
         return modal.stress(base, moving)
     if head.kind == Kind.WAVE:
         return wave.stress(base, moving)
-    if head.kind == Kind.CHAIN:
-        return chain.stress(base, moving)
     return fem.stress(base, moving)
 
 
@@ -171,9 +155,7 @@ def find_fault(base, moving, t, facts):
     if kind == Kind.MODAL:
         return modal.find_fault(base, moving, t, facts)
     if kind == Kind.WAVE:
-        return wave.find_fault(base, moving, t, facts)
-    if kind == Kind.CHAIN:
-        return chain.find_fault(base, moving, facts)
+        return wave.find_fault(base, moving, facts)
     if kind == Kind.FEM:
         return fem.find_fault(base, moving, t, facts)
     return rigid.find_fault(moving, t, facts)

@@ -38,15 +38,13 @@ class Kind(IntEnum):
 
     MODAL = 1
     WAVE = 2
-    CHAIN = 3
-    FEM = 4
-    RIGID = 5
+    FEM = 3
+    RIGID = 4
 
 
 # By the names of solvers.
 KINDS = {
-    "modal": Kind.MODAL, "wave": Kind.WAVE, "chain": Kind.CHAIN, "fem": Kind.FEM,
-    "rigid": Kind.RIGID,
+    "modal": Kind.MODAL, "wave": Kind.WAVE, "fem": Kind.FEM, "rigid": Kind.RIGID,
 }  # fmt: skip
 
 

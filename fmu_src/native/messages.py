@@ -18,15 +18,13 @@ from percussion_model.scene.inputs import INPUTS
 from percussion_model.scene.parameters import find_row
 from percussion_model.scene.scene import SceneError
 from percussion_model.simulation import validity
-from percussion_model.solvers.chain.network import TOO_FINE
-from percussion_model.solvers.chain.records import CHAIN_LIMITS
 from percussion_model.solvers.fem.records import FEM_LIMITS
 from percussion_model.solvers.modal.faults import FAULTS as MODAL_FAULTS
 from percussion_model.solvers.modal.records import MODAL_LIMITS
 from percussion_model.solvers.rigid.records import RIGID_LIMITS
 from percussion_model.solvers.setup import refuse_many
 from percussion_model.solvers.state import WORKSPACE
-from percussion_model.solvers.wave.grid import WORK
+from percussion_model.solvers.wave.network import TOO_FINE
 from percussion_model.solvers.wave.records import WAVE_LIMITS
 
 
@@ -39,22 +37,18 @@ class Fault(IntEnum):
     MODES = 4  # how many, at most
     CELLS = 5
     ELEMENTS = 6
-    WORK = 7  # cells, sub-steps
-    TOO_FINE = 8  # loss time, length of a section, time step
-    NOT_FINITE = 9  # time
-    STOPPED = 10  # time
-    MOTION = 11  # what a communication step keeps
-    WORKSPACE = 12
-    BEHIND = 13  # time of the state, present
-    NEXT_EVENT = 14  # time of the next event, present
-    WAVE_LEAP = 15  # end, step, most steps
-    WAVE_WAKE = 16  # when, step, since when
-    MODAL_FIELD = 17  # word, value, its limits
-    WAVE_FIELD = 18
-    CHAIN_FIELD = 19
-    FEM_FIELD = 20
-    RIGID_FIELD = 21
-    MODAL_STATE = 22  # and the following: as `solvers.modal.faults.FAULTS`
+    TOO_FINE = 7  # loss time, length of a section, time step
+    NOT_FINITE = 8  # time
+    STOPPED = 9  # time
+    MOTION = 10  # what a communication step keeps
+    WORKSPACE = 11
+    BEHIND = 12  # time of the state, present
+    NEXT_EVENT = 13  # time of the next event, present
+    MODAL_FIELD = 14  # word, value, its limits
+    WAVE_FIELD = 15
+    FEM_FIELD = 16
+    RIGID_FIELD = 17
+    MODAL_STATE = 18  # and the following: as `solvers.modal.faults.FAULTS`
 
 
 class Note(IntEnum):
@@ -64,12 +58,12 @@ class Note(IntEnum):
     LEDGER = 2
     GIVES_ENERGY = 3
     TAKES_ENERGY = 4  # and the following: one for each `Kind`
-    LOCKED = 9
-    STORM = 10
-    FLIGHT = 11
-    BUTTON = 12
-    RATE = 13
-    IN_VAIN = 14  # and the following: one for each input
+    LOCKED = 8
+    STORM = 9
+    FLIGHT = 10
+    BUTTON = 11
+    RATE = 12
+    IN_VAIN = 13  # and the following: one for each input
 
 
 class Fact(float):
@@ -132,7 +126,6 @@ def faults(bars: Sequence[str] = ("piston", "bit")) -> tuple[str, ...]:
         Fault.MODES: _too_many("modes", ', or take waves (solver.name = "wave")'),
         Fault.CELLS: _too_many("cells"),
         Fault.ELEMENTS: _too_many("elements"),
-        Fault.WORK: WORK.format(cells="{0:.3g}", parts="{1:.3g}"),
         Fault.TOO_FINE: TOO_FINE.format(eta="{0:.3g}", length="{1:g}", step="{2:.2g}"),
         Fault.NOT_FINITE: "at t = {0:r} s the state is no longer finite: check the scene",
         Fault.STOPPED: "at t = {0:r} s the solver could not continue",
@@ -142,15 +135,8 @@ def faults(bars: Sequence[str] = ("piston", "bit")) -> tuple[str, ...]:
         Fault.NEXT_EVENT: (
             "the saved state has its next event at {0:r} s, at a present of {1:r} s"
         ),
-        Fault.WAVE_LEAP: (
-            "the saved state has leap_end = {0:d}, at step {1:d} with leaps of {2:d} steps at most"
-        ),
-        Fault.WAVE_WAKE: (
-            "the saved state has wake = {0:d}, at step {1:d} of a piston that waits from {2:d} on"
-        ),
         Fault.MODAL_FIELD: _of_field(MODAL_LIMITS.names),
         Fault.WAVE_FIELD: _of_field(WAVE_LIMITS.names),
-        Fault.CHAIN_FIELD: _of_field(CHAIN_LIMITS.names),
         Fault.FEM_FIELD: _of_field(FEM_LIMITS.names),
         Fault.RIGID_FIELD: _of_field(RIGID_LIMITS.names),
     }

@@ -30,7 +30,7 @@ def kind_of(numbers):
     if values.solver_name != AUTO:
         return BY_NAME[values.solver_name]
     if values.effects_string:
-        return Kind.CHAIN.value
+        return Kind.WAVE.value
     if not is_elastic:
         return Kind.RIGID.value
     piston, bit = PISTONS[values.piston_model], bar_transit_time(numbers.bit)

@@ -15,9 +15,9 @@ from percussion_model.scene.bar_groups import Bar
 from percussion_model.scene.inputs import SimulationError
 from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.simulation.simulate import Simulation
-from percussion_model.solvers.chain.records import Has
-from percussion_model.solvers.chain.solver import ChainSolver
 from percussion_model.solvers.state import State
+from percussion_model.solvers.wave.records import Has
+from percussion_model.solvers.wave.solver import WaveSolver
 
 # Whole blows that means need.
 FEWEST_BLOWS = 3
@@ -239,7 +239,7 @@ def string_report(
     Raises
     ------
     SceneError
-        If the scene has no drill string or no piston, or is not computed as a chain.
+        If the scene has no drill string or no piston, or is not computed by waves.
     SimulationError
         If there are too few whole blows, or no such place for a gauge.
     """
@@ -256,8 +256,8 @@ def string_report(
         wait = min(wait, SETTLING_SHARE * duration)
     simulation = Simulation(scene)
     solver = simulation.solver
-    if not isinstance(solver, ChainSolver):
-        raise SceneError(f'solver.name = "{solver.name}": a string report needs "chain"')
+    if not isinstance(solver, WaveSolver):
+        raise SceneError(f'solver.name = "{solver.name}": a string report needs "wave"')
     simulation.advance(min(wait, length))
     simulation.advance_blows(1, length)  # to the start of the first whole blow
     before = simulation.blow_rows
@@ -379,7 +379,7 @@ def _penetrations(simulation: Simulation, blows: np.ndarray, transit: float) -> 
 
 
 def _watched(
-    simulation: Simulation, solver: ChainSolver, start: float, period: float
+    simulation: Simulation, solver: WaveSolver, start: float, period: float
 ) -> WatchedBlow:
     """Watch a blow step by step, from its start on."""
     step, bars = solver.time_step, simulation.scene.bars

@@ -37,7 +37,7 @@ class Rule(IntEnum):
 
 _OF_STRING = (
     " computes piston and bit alone, but the scene has rods (effects.string): set solver.name to "
-    "auto or chain, and solver.fidelity to wave"
+    "auto or wave, and solver.fidelity to wave"
 )
 _OF_RATE = "solver.accuracy = {solver.accuracy!r} is that of the rate of penetration, which "
 _FINER = (
@@ -122,8 +122,8 @@ ELASTIC, RIGID = _place("bit.model", "elastic"), _place("bit.model", "rigid")
 PISTON_ELASTIC, PISTON_ABSENT = (_place("piston.model", word) for word in ("elastic", "absent"))
 NO_DRIVE = _place("effects.drive", "none")
 BILINEAR, POWER = (_place("effects.rock", word) for word in ("bilinear", "power"))
-AUTO, FEM, CHAIN = (_place("solver.name", word) for word in ("auto", "fem", "chain"))
-WAVE = _place("solver.fidelity", "wave")
+AUTO, FEM, WAVE = (_place("solver.name", word) for word in ("auto", "fem", "wave"))
+BY_WAVES = _place("solver.fidelity", "wave")
 
 
 def find_contradiction(v: Any, bodies: int, has_rods: bool, is_barrier_given: bool) -> Rule:
@@ -148,7 +148,7 @@ def find_contradiction(v: Any, bodies: int, has_rods: bool, is_barrier_given: bo
     if bodies == Bodies.RIGID and v.bit_model == ELASTIC:
         return Rule.NEEDS_RIGID
     found = _in_string(v, has_rods)
-    if found == Rule.NOTHING and v.solver_fidelity != WAVE and v.solver_name != AUTO:
+    if found == Rule.NOTHING and v.solver_fidelity != BY_WAVES and v.solver_name != AUTO:
         found = Rule.FIDELITY_AND_NAME
     if found == Rule.NOTHING:
         found = _in_accuracy(v)
@@ -168,9 +168,9 @@ def _in_string(v: Any, has_rods: bool) -> Rule:
         return Rule.NO_RODS
     if v.bit_model == RIGID:
         return Rule.RIGID_BIT_OF_STRING
-    if v.solver_fidelity != WAVE:
+    if v.solver_fidelity != BY_WAVES:
         return Rule.FIDELITY_OF_STRING
-    if v.solver_name != AUTO and v.solver_name != CHAIN:
+    if v.solver_name != AUTO and v.solver_name != WAVE:
         return Rule.SOLVER_OF_STRING
     return Rule.NOTHING
 

@@ -20,7 +20,8 @@ from percussion_model.scene.units import read_value, refuse
 # What must hold, key by key, for a parameter to have any influence.
 HAS_PISTON: Needs = {"piston.model": ("elastic", "rigid")}
 HAS_WAVES: Needs = {"bit.model": ("elastic",)}
-SOLVER_WAVE: Needs = {"solver.name": ("auto", "wave", "modal", "chain"), **HAS_WAVES}
+SOLVER_WAVE: Needs = {"solver.name": ("auto", "wave", "modal"), **HAS_WAVES}
+SOLVER_MODAL: Needs = {"solver.name": ("auto", "modal"), **HAS_WAVES}
 SOLVER_FEM: Needs = {"solver.name": ("fem",)}
 ALL_RIGID: Needs = {"piston.model": ("rigid",), "bit.model": ("rigid",)}
 GRAVITY_ON: Needs = {"effects.gravity": (True,)}

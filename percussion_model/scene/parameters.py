@@ -42,6 +42,7 @@ from percussion_model.scene.group import (
     ROCK_PRESENT,
     ROCK_SPRINGY,
     SOLVER_FEM,
+    SOLVER_MODAL,
     SOLVER_WAVE,
     STRING_ON,
     Parameters,
@@ -305,8 +306,8 @@ class SolverOptions(Parameters):
     name: str = choice(
         "auto",
         SOLVER_NAMES,
-        "solver; auto: modal for an elastic bit, wave where loss is off or slight, the rock "
-        "a wall or one bar far longer; rigid for a rigid bit",
+        "solver; auto: modal for an elastic bit, wave for a drill string and where loss is off "
+        "or slight, the rock a wall or one bar far longer; rigid for a rigid bit",
     )
     fidelity: str = choice(
         "wave",
@@ -323,7 +324,7 @@ class SolverOptions(Parameters):
         ge=1,
         le=100_000,
     )
-    leaps: bool = flag(True, "cross quiet phases in leaps", SOLVER_WAVE)
+    leaps: bool = flag(True, "cross quiet phases in leaps", SOLVER_MODAL)
     accuracy: float | None = quantity(
         None,
         "-",

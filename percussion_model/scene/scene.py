@@ -312,11 +312,11 @@ class Scene:
 
     @property
     def solver_name(self) -> str:
-        """Solver that computes the scene: "wave", "modal", "chain", "fem" or "rigid"."""
+        """Solver that computes the scene: "wave", "modal", "fem" or "rigid"."""
         if self.bit.model == "elastic" and self.solver.fidelity != "wave":
             return str(self.solver.fidelity)
         if self.effects.string and self.solver.name == "auto":
-            return "chain"
+            return "wave"
         if self.solver.name != "auto":
             return str(self.solver.name)
         if self.bit.model == "rigid":

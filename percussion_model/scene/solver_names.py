@@ -6,12 +6,11 @@ from typing import Literal
 
 # The choices of `solver.name`; the parameter table reads this list whenever it is asked.
 # In FMUs they are numbers: new ones come last.
-SOLVER_NAMES = ["auto", "wave", "fem", "rigid", "modal", "chain"]
+SOLVER_NAMES = ["auto", "wave", "fem", "rigid", "modal"]
 # Bodies that a solver computes, where not both kinds.
 BODIES: dict[str, Literal["elastic", "rigid"]] = {
     "wave": "elastic",
     "modal": "elastic",
-    "chain": "elastic",
     "fem": "elastic",
     "rigid": "rigid",
 }

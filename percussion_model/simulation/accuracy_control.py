@@ -24,20 +24,13 @@ from percussion_model.simulation.error_estimate import (
 )
 from percussion_model.simulation.rate import FEWEST_DEPENDENT, LEAST_BLOWS
 from percussion_model.simulation.result import Result
-from percussion_model.solvers.chain.resolution import coarser_steps, steps_for
 from percussion_model.solvers.modal.resolution import (
     REQUESTED,
     coarser_modes,
     modes_for,
     most_modes,
 )
-from percussion_model.solvers.wave.resolution import (
-    FIT_SHARE,
-    cells_for,
-    coarser_cells,
-    finer_cells,
-    largest_misfit,
-)
+from percussion_model.solvers.wave.resolution import coarser_steps, steps_for
 
 # Aperiodic motion runs on for at most this multiple of the duration.
 LONGEST = 100.0
@@ -50,13 +43,10 @@ FAR_BELOW = 0.1
 # With more drilling cycles a blow than this the rate jumps from grid to grid, and
 # grids agree by chance: they must do so within this share of what is wanted.
 MOST_CYCLES, CHATTER_SHARE = 8.0, 0.5
-# More cells in the first bar are not tried: leaps end there, and a run without
-# them takes minutes for a second.
+# More steps or modes in the first bar are not tried: runs with them take minutes for a second.
 FINEST = 256
-# Twice the modes: what is left of an error of first order is the distance to the run before.
-FINER_MODES = 2
-# Share of a wanted error that the misfit of a finer run may make, by what is known of it.
-LEFT_TO_FIT = 0.5
+# Twice as many: what is left of an error of first order is the distance to the run before.
+FINER = 2
 
 # Runs a scene; the second argument: whether for as long as aperiodic motion needs.
 RunOnce = Callable[[Scene, bool], Result]
@@ -69,7 +59,7 @@ class Step:
     Attributes
     ----------
     cells : int
-        Or modes, in the first elastic bar.
+        Steps or modes, in the first elastic bar.
     run : GridRun
     estimate : Estimate
     doubt : float
@@ -136,7 +126,7 @@ def run_to_accuracy(scene: Scene, run_once: RunOnce) -> Result:
     wanted = scene.solver.accuracy
     assert wanted is not None
     if not has_grid(scene):  # rigid bodies move in closed form
-        return _finished(scene, [GridRun.exact(run_once(scene, True))], None)
+        return _finished(scene, [GridRun(run_once(scene, True))], None)
     runs: list[GridRun] = []
     *coarser, cells = _first_grids(scene)
     for count in coarser:
@@ -158,7 +148,7 @@ def run_to_accuracy(scene: Scene, run_once: RunOnce) -> Result:
             break
         if not runs[-1].useful:
             return _finished(scene, runs, None)
-        step = Step(finer, runs[-1], estimate_error(runs[-1], runs[:-1]), doubt=step.estimate.cells)
+        step = Step(finer, runs[-1], estimate_error(runs[-1], runs[:-1]), doubt=step.estimate.grid)
         step = _decided(step, runs[:-1], wanted, run_once)
         # a decision that is close on two grids is so on many
         if step.error <= wanted or (close and step.by_decisions > wanted):
@@ -167,49 +157,44 @@ def run_to_accuracy(scene: Scene, run_once: RunOnce) -> Result:
 
 
 def has_grid(scene: Scene) -> bool:
-    """Whether cells or modes decide how accurate a scene is."""
-    return scene.solver_name in ("wave", "modal", "chain")
+    """Whether steps or modes decide how accurate a scene is."""
+    return scene.solver_name in ("wave", "modal")
 
 
 def planned_cells(scene: Scene) -> list[int]:
-    """Cells, or modes, of the runs of a request: to compare with, by rule, to verify."""
+    """Steps, or modes, of the runs of a request: to compare with, by rule, to verify."""
     wanted = scene.solver.accuracy
     assert wanted is not None
     plan = _first_grids(scene)
     if scene.run.check:
-        finer = _finer_grid(scene, plan[-1], FIT_SHARE * wanted)
+        finer = _finer_grid(scene, plan[-1])
         plan += [] if finer is None else [finer]
     return plan
 
 
 def with_cells(scene: Scene, cells: int) -> Scene:
-    """Return the scene with cells, or modes, in place of a wanted accuracy."""
+    """Return the scene with steps, or modes, in place of a wanted accuracy."""
     changes = {"solver.accuracy": None, "run.check": False, "solver.cells": cells}
     return scene.replace(**changes)
 
 
 def _first_grids(scene: Scene) -> list[int]:
-    """Cells or modes to begin with: of the runs to compare with, and by the rule."""
-    wanted, numbers = scene.solver.accuracy, numbers_of(scene)
+    """Steps or modes to begin with: of the runs to compare with, and by the rule."""
+    wanted = scene.solver.accuracy
     assert wanted is not None
     if scene.solver_name == "modal":
-        modes = modes_for(numbers, wanted)
+        modes = modes_for(numbers_of(scene), wanted)
         return [*coarser_modes(modes, REQUESTED), modes]
-    if scene.solver_name == "chain":
-        steps = steps_for(wanted)
-        return [coarser_steps(steps), steps]
-    cells, _ = cells_for(numbers, wanted)
-    return [*coarser_cells(numbers, cells), cells]
+    steps = steps_for(wanted)
+    return [coarser_steps(steps), steps]
 
 
-def _finer_grid(scene: Scene, cells: int, fit: float) -> int | None:
-    """Cells, with no more misfit than that if possible, or modes of the next run; None: none."""
+def _finer_grid(scene: Scene, cells: int) -> int | None:
+    """Steps or modes of the next run; None where there is none."""
+    most, finer = FINEST, FINER * cells
     if scene.solver_name == "modal":
-        modes = FINER_MODES * cells
-        return modes if modes <= min(FINEST, most_modes(numbers_of(scene))) else None
-    if scene.solver_name == "chain":
-        return 2 * cells if 2 * cells <= FINEST else None
-    return finer_cells(numbers_of(scene), cells, fit, FINEST)
+        most = min(most, most_modes(numbers_of(scene)))
+    return finer if finer <= most else None
 
 
 def _run(scene: Scene, cells: int, run_once: RunOnce, extend: bool = True) -> GridRun:
@@ -228,21 +213,16 @@ def _trusted(step: Step, wanted: float) -> bool:
     """Whether coarser runs give no reason to doubt the one that the rule chose."""
     cycles = step.run.result.summary()["drilling_cycles_per_blow"]
     share = CHATTER_SHARE if cycles > MOST_CYCLES else 1.0
-    by_grid = step.estimate.cells + step.estimate.fit
-    return by_grid <= share * wanted and step.error <= wanted
+    return step.estimate.grid <= share * wanted and step.error <= wanted
 
 
 def _finer(scene: Scene, step: Step, wanted: float) -> int | None:
-    """Cells of the next run; None where a finer one is not tried or would not help."""
+    """Steps or modes of the next run; None where it is not tried or would not help."""
     estimate = step.estimate
-    by_grid = max(estimate.cells + estimate.fit, estimate.floor, step.doubt, step.by_decisions)
+    by_grid = max(estimate.grid, estimate.floor, step.doubt, step.by_decisions)
     if step.error > wanted and by_grid <= CHATTER_SHARE * wanted:
         return None  # scatter is all that is left
-    fit = FIT_SHARE * wanted
-    misfit = largest_misfit(step.run.misfit)
-    if estimate.fit > 0.0:
-        fit = min(LEFT_TO_FIT * wanted / estimate.fit, LEFT_TO_FIT) * misfit
-    return _finer_grid(scene, step.cells, fit)
+    return _finer_grid(scene, step.cells)
 
 
 def _finished(scene: Scene, runs: list[GridRun], step: Step | None) -> Result:
@@ -292,8 +272,6 @@ def _missed(result: Result, step: Step | None, wanted: float, error: float) -> s
         )
     if step.by_decisions > wanted:
         return f"{head}, since a bounce comes close to the barrier"
-    if step.estimate.fit > wanted:
-        return f"{head}, since the lengths fit no common cell"
     return (
         f"{head} with {next(iter(result.cells.values()))} "
         f"{counted(result.solver)}: the rate jumps from grid to grid, since the motion passes "

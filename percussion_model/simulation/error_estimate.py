@@ -1,8 +1,6 @@
 """Estimated errors of the rate and of other means, from runs on grids whose errors differ.
 
-Two things are wrong with a grid: its cells have a size, and lengths that fit no common
-cell let the wave speed take the error, the misfit. Runs that share a misfit agree on the
-same wrong rate, so agreement counts only between grids that do not
+Modes leave a series short, steps of waves average fronts: runs with fewer tell how much is left
 (docs/accuracy.md, section 9).
 """
 
@@ -31,19 +29,12 @@ from percussion_model.simulation.rate import LARGE_ERROR, LEAST_BLOWS, rate_of_b
 from percussion_model.simulation.result import Result
 from percussion_model.simulation.uncertain import in_digits
 from percussion_model.simulation.warnings import least_loss_time
-from percussion_model.solvers.chain.resolution import error_by_pulse, error_by_steps
+from percussion_model.solvers.modal.resolution import elastic_bars, promised_error
 from percussion_model.solvers.setup import kelvin_voigt_time
-from percussion_model.solvers.wave.grid import elastic_bars
-from percussion_model.solvers.wave.resolution import FITS, largest_misfit, misfits, promised_error
+from percussion_model.solvers.wave.resolution import error_by_pulse, error_by_steps
 
 # Two aperiodic runs differ if they do by more than so many standard errors.
 CONFIDENCE = 2.0
-# What a misfit may do to the rate, by that misfit, where no run tells; 43 was seen.
-FIT_EFFECT = 50.0
-# Beyond this misfit it does at least so much: grids on both sides may have missed the motion.
-GROSS_MISFIT, GROSS_EFFECT = 5e-3, 20.0
-# Parts that two coarser grids explain are estimates themselves.
-SAFETY = 2.0
 # Margin on the spread of rates where motions differ: the right one may lie outside of them.
 SPREAD_MARGIN = 1.5
 # What elements lose to discretisation costs about this share of it in the rate: at 1, 2 and
@@ -51,7 +42,7 @@ SPREAD_MARGIN = 1.5
 NUMERICAL_SHARE = 0.4
 # The same where coarser elements have another motion; 2.6 was seen (scenarios/chatter.toml).
 NUMERICAL_SHARE_OF_MOTIONS = 3.0
-# The error is not below this share of what the rule of cells promises; as many modes are surer.
+# The error is not below this share of what the rule of steps promises; modes are surer.
 FLOOR_SHARE = 0.1
 FLOOR_SHARE_OF_MODES = 0.08
 # With modes whose loss time is so many times their time step nothing is expected to be right: at
@@ -66,9 +57,8 @@ FEWEST_BLOWS = 10
 FIRST_ORDER = 2.0
 # What brings the rate of a solver closer.
 REMEDIES = {
-    "wave": "solver.accuracy (--accuracy) takes as many cells as an error needs",
     "modal": "solver.accuracy (--accuracy) takes as many modes as an error needs",
-    "chain": "solver.accuracy (--accuracy) takes as many steps as an error needs",
+    "wave": "solver.accuracy (--accuracy) takes as many steps as an error needs",
     "fem": "more fem.elements and a greater fem.contact_stiffness bring it closer",
 }
 # A run is compared with those that have at least this share of its modes.
@@ -95,23 +85,15 @@ class GridRun:
     Attributes
     ----------
     result : Result
-    misfit : ndarray
-        Relative error of the wave speed in each section, with its sign.
     promised : float
-        Relative error of the rate that the rule of cells expects of the grid.
+        Relative error of the rate that the rule of steps or modes expects; 0 where none does.
     number : tuple of float or None
         What is judged in place of the rate, and its standard error [SI].
     """
 
     result: Result
-    misfit: np.ndarray
-    promised: float
+    promised: float = 0.0
     number: tuple[float, float] | None = None
-
-    @classmethod
-    def exact(cls, result: Result) -> GridRun:
-        """A run without a grid."""
-        return cls(result, np.zeros(0), 0.0)
 
     @cached_property
     def _number(self) -> tuple[float, float]:
@@ -137,17 +119,6 @@ class GridRun:
         return float(np.mean(counted)) if len(counted) else 0.0
 
     @cached_property
-    def largest(self) -> float:
-        """Largest misfit of a section."""
-        return largest_misfit(self.misfit)
-
-    @cached_property
-    def signed(self) -> float | None:
-        """Misfit with its sign; None where more than one section has any."""
-        several = np.count_nonzero(np.abs(self.misfit) > FITS) > 1
-        return None if several else float(np.sum(self.misfit))
-
-    @cached_property
     def apart(self) -> float:
         """Relative distance to the number over blows of one kind, where one of two is rare."""
         kinds = _two_kinds(self.result.counted)
@@ -169,11 +140,11 @@ class GridRun:
         blows = self.result.counted
         scatter, found = scatter_over(blows), {}
         # what is the same for all numbers is found once
-        shared = {name: getattr(self, name) for name in ("cycles", "largest", "signed")}
+        shared = {"cycles": self.cycles}
         of_kinds = [numbers_over(kind) for kind in _two_kinds(blows)]
         for name, value in numbers_over(blows).items():
             number = value, scatter.get(name, math.nan)
-            found[name] = one = GridRun(self.result, self.misfit, self.promised, number)
+            found[name] = one = GridRun(self.result, self.promised, number)
             apart = _apart(value, [numbers[name] for numbers in of_kinds])
             vars(one).update(shared, _number=number, apart=apart)
         return found
@@ -202,33 +173,30 @@ class Estimate:
 
     Attributes
     ----------
-    cells, fit, scatter, floor : float
-        What is left of the size of the cells, of a misfit, of the scatter of aperiodic
-        motion, and what is never gone below.
+    grid, scatter, floor : float
+        What is left of the number of steps or modes, of the scatter of aperiodic motion, and
+        what is never gone below.
     """
 
-    cells: float
-    fit: float
+    grid: float
     scatter: float
     floor: float
 
     @property
     def total(self) -> float:
         """The whole error."""
-        return max(self.scatter, self.cells + self.fit, self.floor)
+        return max(self.scatter, self.grid, self.floor)
 
 
 def grid_run(result: Result) -> GridRun:
-    """A result with what its grid is known for; only waves have a misfit and a rule."""
-    if result.solver == "chain":
-        return GridRun(result, np.zeros(0), error_by_steps(_resolution(result)))
-    if result.solver not in ("wave", "modal"):
-        return GridRun.exact(result)
-    numbers, cells = numbers_of(result.scene), _resolution(result)
-    if result.solver == "modal":  # exact lengths; as many modes are surer than cells
-        promised = max(promised_error(numbers, cells), _by_slight_loss(numbers, cells))
-        return GridRun(result, np.zeros(0), promised)
-    return GridRun(result, misfits(numbers, cells), promised_error(numbers, cells))
+    """A result with what its steps or modes promise."""
+    if result.solver == "wave":
+        return GridRun(result, error_by_steps(_resolution(result)))
+    if result.solver != "modal":
+        return GridRun(result)
+    numbers, modes = numbers_of(result.scene), _resolution(result)
+    promised = max(promised_error(numbers, modes), _by_slight_loss(numbers, modes))
+    return GridRun(result, promised)
 
 
 def _by_slight_loss(numbers: Numbers, modes: int) -> float:
@@ -268,33 +236,14 @@ def estimate_error(run: GridRun, others: Sequence[GridRun]) -> Estimate:
     -------
     Estimate
     """
-    share = FLOOR_SHARE_OF_MODES if run.result.solver == "modal" else FLOOR_SHARE
+    is_modal = run.result.solver == "modal"
+    share = FLOOR_SHARE_OF_MODES if is_modal else FLOOR_SHARE
     scatter, floor = run.scatter / abs(run.value), share * run.promised
-    misfit = run.largest
     others = [other for other in others if other.useful]
     if not others:
-        return Estimate(math.inf, 0.0, scatter, floor)  # nothing is known
-    if run.result.solver == "modal":
-        return Estimate(_by_modes(run, others), 0.0, scatter, floor)
-    if run.result.solver == "chain":
-        return Estimate(FIRST_ORDER * _difference(others[-1], run), 0.0, scatter, floor)
-    fitting = [other for other in others if other.largest <= FITS]
-    if misfit <= FITS and fitting:
-        other = fitting[-1]
-        cells = _difference(other, run)
-        if not _same_motion(run, other):
-            cells = max(SPREAD_MARGIN * cells, run.promised)
-        return Estimate(cells, 0.0, scatter, floor)
-    pair = _around(run, others)
-    if pair is None:
-        cells, fit = _by_one(run, others)
-    elif all(_same_motion(run, other) for other in pair):
-        cells, fit = _by_two(run, pair)
-    else:
-        cells, fit = SPREAD_MARGIN * _spread(run, pair), 0.0
-    if misfit > GROSS_MISFIT:
-        fit = max(fit, GROSS_EFFECT * misfit)
-    return Estimate(cells, fit, scatter, floor)
+        return Estimate(math.inf, scatter, floor)  # nothing is known
+    by_grid = _by_modes(run, others) if is_modal else FIRST_ORDER * _difference(others[-1], run)
+    return Estimate(by_grid, scatter, floor)
 
 
 def _by_modes(run: GridRun, others: Sequence[GridRun]) -> float:
@@ -332,46 +281,6 @@ def _same_motion(run: GridRun, other: GridRun) -> bool:
         return False
     off = abs(run.cycles - other.cycles)
     return off <= max(SAME_MOTION, SAME_SHARE * run.cycles)
-
-
-def _around(run: GridRun, others: Sequence[GridRun]) -> tuple[GridRun, GridRun] | None:
-    """The last runs whose misfits lie on both sides of zero, where one number tells a misfit."""
-    if run.signed is None or any(other.signed is None for other in others):
-        return None
-    below = [other for other in others if (other.signed or 0.0) < -FITS]
-    above = [other for other in others if (other.signed or 0.0) > FITS]
-    return (below[-1], above[-1]) if below and above else None
-
-
-def _by_two(run: GridRun, pair: tuple[GridRun, GridRun]) -> tuple[float, float]:
-    """Errors by cells and by misfit: a straight line through two runs, and the distance to it."""
-    x, y = ([one.signed or 0.0, one.value] for one in pair)
-    slope = (y[1] - x[1]) / (y[0] - x[0])
-    expected = x[1] + slope * ((run.signed or 0.0) - x[0])
-    off = abs(run.value - expected)
-    if off <= CONFIDENCE * math.hypot(run.scatter, *(one.scatter for one in pair)):
-        off = 0.0
-    return SAFETY * off / abs(run.value), SAFETY * abs(slope / run.value) * run.largest
-
-
-def _spread(run: GridRun, pair: tuple[GridRun, GridRun]) -> float:
-    """Relative width of all rates: any of the motions may be the right one."""
-    rates = [run.value, *(one.value for one in pair)]
-    return (max(rates) - min(rates)) / abs(run.value)
-
-
-def _by_one(run: GridRun, others: Sequence[GridRun]) -> tuple[float, float]:
-    """Errors by cells and by misfit from the run whose misfit differs most."""
-    misfit = run.largest
-    apart = [largest_misfit(other.misfit - run.misfit) for other in others]
-    difference = _difference(others[-1], run)
-    if misfit <= FITS:
-        return difference, 0.0
-    best = int(np.argmax(apart))
-    if apart[best] < misfit:
-        return difference, FIT_EFFECT * misfit
-    share = min(SAFETY * misfit / apart[best], 1.0)
-    return difference, share * _difference(others[best], run)
 
 
 def with_error_estimate(
@@ -438,9 +347,8 @@ def otherwise_decided(run: GridRun, others: Sequence[GridRun]) -> list[Scene]:
 
 def _unsure_margin(run: GridRun, others: Sequence[GridRun]) -> float:
     """By how much the margin of the barrier may be off, as runs tell that fit as well."""
-    fitting = [other for other in others if other.largest <= max(run.largest, FITS)]
-    alike = [other for other in fitting if abs(run.cycles - other.cycles) <= SAME_MOTION]
-    if len(alike) < len(fitting):  # their closest decision is another one
+    alike = [other for other in others if abs(run.cycles - other.cycles) <= SAME_MOTION]
+    if len(alike) < len(others):  # their closest decision is another one
         return UNSURE_OTHERWISE
     blows = (run.result.counted, [other.result.counted for other in alike])
     return unsure_margin("barrier_margin", *blows)
@@ -496,25 +404,25 @@ def _estimate(part: GridRun, others: Sequence[GridRun]) -> Estimate:
     """Estimate the error of a number by what is known of the solver's grids."""
     scatter = part.scatter / abs(part.value)
     if not others:
-        return Estimate(0.0, 0.0, scatter, 0.0)
-    if part.result.solver in ("wave", "modal"):
+        return Estimate(0.0, scatter, 0.0)
+    if part.result.solver == "modal":
         return estimate_error(part, others)
     known = [other for other in others if other.useful]
     # each of the others is coarser in another way
     off = sum(_difference(other, part) for other in known) if known else math.inf
-    if part.result.solver == "chain":
+    if part.result.solver == "wave":
         off *= FIRST_ORDER
     same = all(_same_motion(part, other) for other in known)
     share = NUMERICAL_SHARE if same else NUMERICAL_SHARE_OF_MOTIONS
     floor = share * abs(part.result.energy["numerical_relative"])
     # the ledger has no share where only a wave from outside gave energy
-    return Estimate(off, 0.0, scatter, max(FLOOR_SHARE * part.promised, _by_pulse(part), floor))
+    return Estimate(off, scatter, max(FLOOR_SHARE * part.promised, _by_pulse(part), floor))
 
 
 def _by_pulse(run: GridRun) -> float:
     """Error of what a wave from outside does, whose front and end steps spread; 0 without one."""
     string, step = run.result.scene.string, run.result.time_step
-    if run.result.solver != "chain" or len(run.result.blows) or not string.pulse_force or not step:
+    if run.result.solver != "wave" or len(run.result.blows) or not string.pulse_force or not step:
         return 0.0
     return error_by_pulse(string.pulse_duration / step)
 
@@ -525,11 +433,11 @@ def _of_whole(
     """An estimate by a part of a run, with the scatter and the kinds of blows of all of it."""
     scatter = whole.scatter / abs(whole.value)
     scatter = scatter if math.isfinite(scatter) else math.inf
-    cells = 0.0
+    by_grid = 0.0
     if whole.result.cells:
         by_decisions = error_by_decisions(part, whole, decided)
-        cells = max(estimate.cells, SPREAD_MARGIN * whole.apart, by_decisions)
-    return Estimate(cells, estimate.fit, scatter, estimate.floor)
+        by_grid = max(estimate.grid, SPREAD_MARGIN * whole.apart, by_decisions)
+    return Estimate(by_grid, scatter, estimate.floor)
 
 
 def _judged(
@@ -571,7 +479,7 @@ def warnings_of_decisions(
 
 def _large_error(estimate: Estimate, solver: str) -> Iterator[str]:
     """Warn of a rate that is not known well, and of why."""
-    by_grid = max(estimate.cells + estimate.fit, estimate.floor)
+    by_grid = max(estimate.grid, estimate.floor)
     if by_grid > max(LARGE_ERROR, estimate.scatter):
         remedy = REMEDIES.get(solver, REMEDIES["fem"])
         yield (

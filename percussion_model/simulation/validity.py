@@ -47,8 +47,7 @@ def numerical_note(share: float, solver: str) -> Iterator[str]:
     elif share > MOST_NUMERICAL:
         cause, remedy = {
             "fem": ("the time scheme", "set a smaller fem.courant or more fem.elements"),
-            "wave": ("averaging fronts within cells", "set more solver.cells"),
-            "chain": ("averaging fronts within steps", "set more solver.cells"),
+            "wave": ("averaging fronts within steps", "set more solver.cells"),
         }.get(solver, ("the discretisation", "refine it"))
         percent = float(f"{100.0 * share:.2g}")
         yield (

@@ -260,7 +260,6 @@ _HERE = __name__.rpartition(".")[0]
 _REGISTRY = {
     "wave": Entry(f"{_HERE}.wave.solver", "WaveSolver", "run"),
     "modal": Entry(f"{_HERE}.modal.solver", "ModalSolver", "run"),
-    "chain": Entry(f"{_HERE}.chain.solver", "ChainSolver", "run"),
     "fem": Entry(f"{_HERE}.fem.solver", "FemSolver", "run"),
     "rigid": Entry(f"{_HERE}.rigid.solver", "RigidSolver", "advance"),
 }

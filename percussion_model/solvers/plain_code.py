@@ -16,11 +16,8 @@ from percussion_model.components import COMPONENTS
 from percussion_model.physics.kernel import composed
 from percussion_model.scene import bars, contradictions, solver_choice
 from percussion_model.solvers import setup
-from percussion_model.solvers.chain import resolution as chain_resolution
 from percussion_model.solvers.modal import resolution as modal_resolution
 from percussion_model.solvers.rigid import restitution as rigid_restitution
-from percussion_model.solvers.wave import grid as wave_grid
-from percussion_model.solvers.wave import records as wave_records
 from percussion_model.solvers.wave import resolution as wave_resolution
 
 for _function in (
@@ -45,26 +42,14 @@ for _function in (
     setup.fill_start,
     setup.elastic_piston,
     setup.elastic_times,
-    wave_grid.section_count,
-    wave_grid.section_misfit,
-    wave_grid.misfit,
-    wave_grid.fitting_cells,
-    wave_grid.choose_time_step,
-    wave_grid.wish_for,
-    wave_grid.substeps,
-    wave_records.no_operators,
-    wave_resolution.in_first_bar,
-    wave_resolution.cells_by_rule,
-    wave_resolution.cells_to_fit,
-    wave_resolution.cells_that_fit,
-    wave_resolution.asked_cells,
-    wave_resolution.asked_wish,
+    modal_resolution.in_first_bar,
+    modal_resolution.modes_by_rule,
     modal_resolution.asked_modes,
     modal_resolution.default_modes,
     modal_resolution.modes_for,
     rigid_restitution.st_venant_restitution,
     rigid_restitution.restitution,
-    chain_resolution.steps_for,
+    wave_resolution.steps_for,
 ):
     register_jitable(_function)
 

@@ -11,8 +11,8 @@ import pytest
 from percussion_model import Scene, Simulation
 from percussion_model.physics.ledger import complete_ledger, energies
 from percussion_model.physics.records import BLOW, EVENT, READING
-from percussion_model.solvers.chain.records import Has
-from percussion_model.solvers.chain.solver import ChainSolver
+from percussion_model.solvers.wave.records import Has
+from percussion_model.solvers.wave.solver import WaveSolver
 from percussion_model.verification.accuracy.explicit import ExplicitSolver
 from percussion_model.verification.accuracy.explicit_joints import POSITION
 
@@ -81,7 +81,7 @@ def read(solver, state, time, greatest, least):
 
 def seen_by_waves(scene: Scene, times=TIMES) -> list[Seen]:
     """By waves; they keep the force in a joint for one step alone."""
-    solver = ChainSolver(scene.replace(**{"solver.cells": CELLS}))
+    solver = WaveSolver(scene.replace(**{"solver.cells": CELLS}))
     state, blows, events = solver.new_state(), np.zeros(9, BLOW), np.zeros(999, EVENT)
     found, step, greatest, least = [], 0, -math.inf, math.inf
     for time in times:

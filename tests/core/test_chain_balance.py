@@ -7,7 +7,7 @@ import pytest
 
 from percussion_model import Scene, Simulation
 from percussion_model.physics.records import EventKind
-from percussion_model.solvers.chain.records import Bar, Has
+from percussion_model.solvers.wave.records import Bar, Has
 from tests.core.chain_scenes import (
     AREA,
     CELL,

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from percussion_model import Scene
-from percussion_model.solvers.chain.taps import turning, weights_of
+from percussion_model.solvers.wave.taps import turning, weights_of
 from tests.core.chain_scenes import (
     AREA,
     C0,

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from percussion_model.solvers.chain.records import Has
+from percussion_model.solvers.wave.records import Has
 from tests.core.chain_scenes import (
     AREA,
     CELL,

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from percussion_model.solvers.wave.cutting import place_of_closure
 
 from percussion_model import Scene, simulate
-from percussion_model.solvers.wave.cutting import place_of_closure
 
 
 @pytest.mark.parametrize("variance", [1e-3, 0.02, 0.1, 0.5, 3.0])

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-
 from percussion_model.solvers.wave.leaps.lanes import WIDTH
 from percussion_model.solvers.wave.leaps.linear import carry, multiply, quadratic
 

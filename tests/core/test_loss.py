@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from percussion_model.solvers.wave.leaps.step_map import Configuration, loss_of_step, step_map
 
 from percussion_model import Mode, Scene, Section, Simulation
-from percussion_model.solvers.wave.leaps.step_map import Configuration, loss_of_step, step_map
 from percussion_model.solvers.wave.records import Coef
 from percussion_model.solvers.wave.solver import WaveSolver
 

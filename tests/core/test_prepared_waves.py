@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from percussion_model.solvers.wave.grid import Refused
+from percussion_model.solvers.wave.leaps.products import multiply_matrices, solve
 
 from percussion_model import Scene
 from percussion_model.scene.numbers import kernel_numbers
-from percussion_model.solvers.wave.grid import Refused
-from percussion_model.solvers.wave.leaps.products import multiply_matrices, solve
 from percussion_model.solvers.wave.prepare import (
     cut_bars,
     fill_wave_parameters,

@@ -6,8 +6,6 @@ with the energies.
 
 import numpy as np
 import pytest
-
-from percussion_model import Scene
 from percussion_model.solvers.wave.leaps.linear import DIGITS, carry_and_sum
 from percussion_model.solvers.wave.leaps.operators import alone, fill_powers, fill_sums, padded
 from percussion_model.solvers.wave.leaps.step_map import (
@@ -18,6 +16,8 @@ from percussion_model.solvers.wave.leaps.step_map import (
     square_at_end,
     step_map,
 )
+
+from percussion_model import Scene
 from percussion_model.solvers.wave.solver import WaveSolver
 
 LOADS = {"free": (0.0, 0.0), "FC": (7.5e8, 0.0), "SS": (3.75e9, 1e4)}

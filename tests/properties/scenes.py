@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from percussion_model.solvers.wave.grid import choose_time_step, section_count
 
 from percussion_model import Scene
 from percussion_model.scene.inputs import INPUTS, no_effect_reason
 from percussion_model.scene.numbers import numbers_of, section_numbers
 from percussion_model.scene.parameters import find_row
-from percussion_model.solvers.wave.grid import choose_time_step, section_count
 from tests.properties.source import Source, chance, decades
 
 # Bounds of "wide": low and high of the amount, by decades, and what else may come.

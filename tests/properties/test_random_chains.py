@@ -16,8 +16,8 @@ import pytest
 from percussion_model import Scene, SceneError, Simulation
 from percussion_model.physics.records import EventKind
 from percussion_model.solvers.base import make_solver
-from percussion_model.solvers.chain.records import Bar, Body, Fit, Has, Joint, Place, Steel
-from percussion_model.solvers.chain.sections import kept_of
+from percussion_model.solvers.wave.records import Bar, Body, Fit, Has, Joint, Place, Steel
+from percussion_model.solvers.wave.sections import kept_of
 from tests.properties.source import Generator, Source, chance, decades
 from tests.state_bits import run_bits
 

@@ -16,7 +16,8 @@ from percussion_model.scene.scene import Scene
 from percussion_model.simulation.gauge import gauge_force, gauge_stress
 from percussion_model.simulation.simulate import Simulation, simulate
 from percussion_model.solvers.base import Solver, make_solver
-from percussion_model.solvers.wave.resolution import cells_for
+from percussion_model.solvers.modal.resolution import modes_for
+from percussion_model.solvers.wave.resolution import steps_for
 
 # The bit has left the rock for the first time after that many half-periods on its spring.
 HALF_PERIODS = 3.0
@@ -30,11 +31,13 @@ def bit_alone(scene: Scene) -> Scene:
     alone = {"piston.model": "absent", "effects.drive": "none"}
     if wanted is None:
         return scene.replace(**alone)
-    # a bit alone has no rate that an accuracy could be of: it takes the cells that this asks for
+    # a bit alone has no rate that an accuracy could be of: it takes what this asks for
     scene = scene.replace(**alone, **{"solver.accuracy": None, "run.check": False})
-    if scene.solver_name not in ("wave", "modal"):
-        return scene
-    return scene.replace(**{"solver.cells": cells_for(numbers_of(scene), wanted)[0]})
+    if scene.solver_name == "modal":
+        return scene.replace(**{"solver.cells": modes_for(numbers_of(scene), wanted)})
+    if scene.solver_name == "wave":
+        return scene.replace(**{"solver.cells": steps_for(wanted)})
+    return scene
 
 
 def drop_test_signal(

@@ -151,7 +151,7 @@ class Study:
         counts = np.bincount(rows["kind"], minlength=len(KINDS)).tolist()
         motions = [f"{n} {kind}" for n, kind in zip(counts, KINDS, strict=True) if n]
         lines = [("Points", f"{len(self.points)}: {', '.join(motions)}")]
-        if self.scene.solver_name in ("wave", "modal", "chain", "fem"):
+        if self.scene.solver_name in ("wave", "modal", "fem"):
             lines.append(("These motions", OF_ONE_GRID))
         rate, undecided = rows["rate_of_penetration"].copy(), self.undecided
         rate[undecided] = np.nan

@@ -68,7 +68,7 @@ SceneFile = Annotated[
     Path, typer.Argument(metavar="SCENE", help="A scene file (TOML), or a preset, as reference.")
 ]
 SolverName = Annotated[
-    Literal["wave", "modal", "chain", "fem", "rigid"] | None,
+    Literal["wave", "modal", "fem", "rigid"] | None,
     typer.Option("--solver", help="Solver; rigid makes piston and bit rigid."),
 ]
 Cells = Annotated[

@@ -39,7 +39,7 @@ def validate(
     common.check_outputs(out, json_file)
     common.load_numba()
     chosen = load(experiments or ())
-    solvers = {"chain" if one.scene.effects.string else "wave" for one in chosen}
+    solvers = {"wave" if one.scene.effects.string else "modal" for one in chosen}
     claimed = None
     if out is not None:
         claimed = common.claim(

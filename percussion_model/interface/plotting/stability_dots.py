@@ -41,7 +41,6 @@ COLOURS = {
     "modal": "#E69F00",
     "fem": "#009E73",
     "rigid": "#595959",
-    "chain": "#CC79A7",
 }
 LIMIT_COLOUR = "#D55E00"
 # The dots of a solver fill so much of its column, in the order of their size.

@@ -1,13 +1,25 @@
-"""How many modes a scene asks for, itself or by an accuracy."""
+"""How many modes a scene asks for, itself or by an accuracy.
+
+The rule was calibrated (docs/data/stated_errors.md). It only knows the scene: what it cannot know,
+such as chatter, shows in the run.
+"""
 
 from __future__ import annotations
 
 import math
 
+import numpy as np
+
+from percussion_model.physics.elementary import exp, log
+from percussion_model.physics.records import Piston
 from percussion_model.scene.bars import bar_transit_time
 from percussion_model.scene.numbers import Numbers
-from percussion_model.solvers.wave.grid import elastic_bars
-from percussion_model.solvers.wave.resolution import cells_by_rule, in_first_bar
+from percussion_model.solvers.setup import PISTONS, Bit, elastic_times
+
+# Relative error of the rate of penetration, and the modes of the bar with the shortest
+# transit for which it held with a margin of two or more.
+CALIBRATED = ((1e-1, 14), (2e-2, 20), (1e-2, 28), (1e-3, 56), (1e-4, 128))
+LOGARITHMS = tuple((-math.log(error), math.log(modes)) for error, modes in CALIBRATED)
 
 # Modes in the bar with the shortest transit time, where the scene names none.
 DEFAULT_MODES = 20
@@ -22,7 +34,7 @@ SPARE = 32
 
 
 def modes_for(numbers: Numbers, accuracy: float) -> int:
-    """Modes in the first elastic bar for a wanted accuracy: as many as cells that fit.
+    """Modes in the first elastic bar for a wanted accuracy.
 
     Parameters
     ----------
@@ -31,7 +43,7 @@ def modes_for(numbers: Numbers, accuracy: float) -> int:
     accuracy : float
         Wanted relative error of the rate of penetration.
     """
-    return in_first_bar(numbers, cells_by_rule(accuracy))
+    return in_first_bar(numbers, modes_by_rule(accuracy))
 
 
 def most_modes(numbers: Numbers) -> int:
@@ -59,3 +71,36 @@ def coarser_modes(modes: int, shares: tuple[float, ...]) -> list[int]:
     """Modes of the runs that a run is compared with, the fewest first."""
     counts = {math.ceil(share * modes) for share in shares}
     return sorted(count for count in counts if count < modes)
+
+
+def elastic_bars(numbers: Numbers) -> list[np.ndarray]:
+    """Sections of the bars that get modes, the one first whose modes are counted."""
+    if numbers.values.bit_model != Bit.ELASTIC:
+        return []
+    if PISTONS[numbers.values.piston_model] == Piston.ELASTIC:
+        return [numbers.piston, numbers.bit]
+    return [numbers.bit]
+
+
+def in_first_bar(numbers: Numbers, count: float) -> int:
+    """Modes in the first elastic bar where that of the shortest transit has so many."""
+    first, shortest = elastic_times(numbers)
+    return math.ceil(count * first / shortest - 1e-9)
+
+
+def promised_error(numbers: Numbers, modes: int) -> float:
+    """Relative error of the rate that the rule expects of modes in the first elastic bar."""
+    first, shortest = elastic_times(numbers)
+    errors, counts = np.array(LOGARITHMS).T
+    return math.exp(-np.interp(math.log(modes * shortest / first), counts, errors))
+
+
+def modes_by_rule(accuracy: float) -> float:
+    """Modes of the bar with the shortest transit, a power law between calibrated points."""
+    wanted = -log(accuracy)
+    for k in range(len(LOGARITHMS) - 1):
+        (error, count), (next_error, next_count) = LOGARITHMS[k], LOGARITHMS[k + 1]
+        if wanted <= next_error:
+            slope = (next_count - count) / (next_error - error)
+            return exp(slope * max(0.0, wanted - error) + count)
+    return exp(LOGARITHMS[-1][1])

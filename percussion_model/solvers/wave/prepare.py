@@ -1,144 +1,88 @@
-"""Grid, parameters, leap operators and first state of waves, from the numbers of a scene."""
+"""Parameters and first state of waves, from the numbers of a scene and its bars cut."""
 
 from __future__ import annotations
 
 from percussion_model.physics.kernel import preparing
 from percussion_model.physics.records import Piston
+from percussion_model.physics.rock import recoverable
 from percussion_model.solvers import plain_code  # noqa: F401  # kernels call functions of scenes
-from percussion_model.solvers.setup import (
-    MOST_CHANGES,
-    elastic_piston,
-    fill_parameters,
-    fill_start,
-    kelvin_voigt_time,
-    rock_numbers,
-)
-from percussion_model.solvers.wave.cutting import cut_both
-from percussion_model.solvers.wave.grid import (
-    Refused,
-    choose_time_step,
-    wish_for,
-)
-from percussion_model.solvers.wave.leaps.lookahead import LOOKAHEAD
-from percussion_model.solvers.wave.leaps.operators import (
-    LEAPING,
-    LEVELS,
-    bit_in,
-    fill_mode,
-    fill_piston,
-    fill_sizes,
-    free_piston,
-    padded,
-    room_for_operators,
-)
-from percussion_model.solvers.wave.leaps.step_map import step_map
-from percussion_model.solvers.wave.records import Row, no_operators
-from percussion_model.solvers.wave.resolution import asked_cells, asked_wish
-from percussion_model.solvers.wave.totals import begin
+from percussion_model.solvers.setup import MOST_CHANGES, REARM_TRANSITS, fill_parameters, fill_start
+from percussion_model.solvers.wave.advance import stored
+from percussion_model.solvers.wave.network import first_is_piston
+from percussion_model.solvers.wave.records import Bar, Body, Has
+from percussion_model.solvers.wave.sections import RING, SIZE, kept_of
 
-# A bit alone loads and unloads the rock in a few percent of its steps. To make the maps that
-# leap these takes as long as some ten thousand steps, which a run of fewer than so many spares.
-LONG_RUN = 65_536
+# Velocity that body forces may give the waves of a bar before it is written into the rings: waves
+# are kept less this, and lose digits where it is large [m/s]. To write long strings is dear.
+MOST_GIVEN, MOST_GIVEN_IN_STRINGS = 0.02, 1.0
+# Loss spreads fronts by so many steps^2 in a transit where any step before a closure is cut.
+WIDE = 0.12
 
 
 @preparing
-def wanted_grid(numbers):
-    """Transit time of a cell that a scene asks for [s], and the `Wish` that tells of refusals."""
-    wish = asked_wish(numbers)
-    if wish.refused != Refused.NOT:
-        return 0.0, wish
-    time_step = choose_time_step(numbers, asked_cells(numbers))
-    return time_step, wish_for(numbers, time_step)
+def fill_wave_parameters(p, numbers, plan, network):
+    """Fill a WAVE_PAR record."""
+    values, chain = numbers.values, network.chain
+    fill_parameters(p, numbers, True)
+    p.dt, p.most_changes = plan.time_step, MOST_CHANGES
+    p.viscous = 0.5 * plan.eta / plan.time_step
+    p.lag = p.viscous / (1.0 + p.viscous)
+    spread = plan.eta * p.rearm_time / REARM_TRANSITS
+    p.cuts_all = 1 if spread > WIDE * plan.time_step**2 else 0
+    p.mass_b = chain.bodies[-1, Body.MASS]
+    if first_is_piston(numbers):
+        p.mass_p = chain.bodies[0, Body.MASS]
+    p.sections, p.bars = len(chain.places), len(chain.bodies)
+    p.joints, p.struck = len(chain.fits), network.struck
+    p.most_given = MOST_GIVEN
+    if not values.effects_string:
+        return
+    p.most_given = MOST_GIVEN_IN_STRINGS
+    if p.piston == Piston.ABSENT:
+        p.open_top = values.string_top
+        p.pulse, p.pulse_end = values.string_pulse_force, values.string_pulse_duration
+    p.open_bottom = values.string_bottom
+    if values.effects_damper:
+        p.damper = 1
+        p.damper_stiffness, p.damper_damping = values.damper_stiffness, values.damper_damping
+        p.damper_preload, p.casing_mass = values.damper_preload, values.damper_casing_mass
 
 
 @preparing
-def cut_bars(numbers, time_step):
-    """`CutBars` of a scene; its grid must not be refused."""
-    return cut_both(elastic_piston(numbers), numbers.bit, time_step, kelvin_voigt_time(numbers))
+def _send_all(chain, waves, bar, v):
+    """Fill the rings of a bar that moves as one with the velocity `v`."""
+    for k in range(int(chain.bodies[bar, Body.FIRST]), int(chain.bodies[bar, Body.LAST]) + 1):
+        first, count = chain.places[k, RING], 4 * chain.places[k, SIZE]
+        for i in range(first, first + count):
+            waves.rings[0, i] = 0.5 * v
+        for i in range(first + count, first + count + 2):
+            waves.rings[0, i] = kept_of(chain, k) * 0.5 * v
 
 
 @preparing
-def fill_wave_parameters(p, numbers, bars):
-    """Fill a WAVE_PAR record of zeros, without leaps."""
-    bit, piston, rock = bars.bit, bars.piston, rock_numbers(numbers)
-    n, n_p = len(bit.grid.mass), len(piston.grid.mass)
-    fill_parameters(p, numbers, n_p > 0)
-    p.dt, p.loss, p.front = bars.time_step, bars.substeps, bars.front
-    p.most_changes = MOST_CHANGES
-    p.n_b = n
-    p.z_t, p.z_b = bit.grid.impedance[0], bit.grid.impedance[n - 1]
-    p.kappa_t, p.kappa_b = bit.kappa
-    p.bound_t, p.bound_b = bit.bound
-    if n_p > 0:
-        p.n_p = n_p
-        p.z_f, p.z_p = piston.grid.impedance[0], piston.grid.impedance[n_p - 1]
-        p.kappa_f, p.kappa_p = piston.kappa
-        p.bound_p = piston.bound[1]
-    p.ss_stiffness = rock.gamma * rock.k_r
-    many = p.piston != Piston.ABSENT or numbers.values.run_duration > LONG_RUN * p.dt
-    p.ss_loading = rock.k_r if many else 0.0
-    p.ss_damping = rock.c_r
-
-
-@preparing
-def can_leap(p, numbers, bars):
-    """Whether leaps are wanted and their operators not too large; fills the sizes of these."""
-    # forces that change from step to step leave no step a constant map
-    if not numbers.values.solver_leaps or p.effects != 0:
-        return False
-    return fill_sizes(p, bars)
-
-
-@preparing
-def make_operators(par, numbers, bars):
-    """`LeapOperators` of a scene, or stand-ins; fills how many levels there are.
-
-    Parameters
-    ----------
-    par : WAVE_PAR array of length 1
-    numbers : Numbers
-    bars : CutBars
-    """
-    if can_leap(par[0], numbers, bars):
-        ops = room_for_operators(par[0])
-        if par[0].n_p > 0:
-            bar = free_piston(par, bars)
-            by_column, faces = step_map(bar)
-            fill_piston(ops, bar, by_column, faces)
-        rests = True
-        for mode in LEAPING:
-            bar, leaps = bit_in(par, bars, mode)
-            if leaps and rests:
-                by_column, faces = step_map(bar)
-                rests = fill_mode(ops, mode, bar, by_column, faces)
-        if rests:
-            par[0].leaps = LEVELS
-            return ops
-    return no_operators()
-
-
-@preparing
-def scratch_size(p):
-    """Numbers in each row of `Scratch`."""
-    return max(padded(2 * max(p.n_b, p.n_p) + 1), LOOKAHEAD)
-
-
-@preparing
-def fill_wave_start(par, state, bars, numbers):
+def begin(p, s, chain, waves, numbers):
     """Fill record and waves at time zero.
 
     Parameters
     ----------
-    par, state : WAVE_PAR, WAVE_STATE array of length 1
-        The state of zeros.
-    bars : Bars
-        Its waves of zeros.
+    p, s : WAVE_PAR, WAVE_STATE record
+    chain : Chain
+    waves : Waves
+        Of zeros.
     numbers : Numbers
     """
-    s, values = state[0], numbers.values
     fill_start(s, numbers)
-    s.leap_end = -1
-    for row in (Row.DOWN, Row.UP):
-        bars.wb[row, : par[0].n_b] = 0.5 * values.start_bit_velocity
-        bars.wp[row, : par[0].n_p] = 0.5 * values.start_piston_velocity
-    begin(par, state, bars)
+    for bar in range(p.bars):
+        with_piston = bar == 0 and first_is_piston(numbers)
+        v = s.v_p if with_piston else numbers.values.start_bit_velocity
+        waves.bars[Bar.VELOCITY, bar] = v
+        _send_all(chain, waves, bar, v)
+    for k in range(len(numbers.joints)):
+        gap = numbers.joints[k, 3]
+        waves.joints[Has.GAP, k] = gap
+        waves.joints[Has.CLOSED, k] = 1.0 if gap == 0.0 else 0.0
+    s.end_start = s.x_r + s.p
+    if p.piston != Piston.ABSENT:
+        s.u_r = s.u_0 = -s.gap
+    kinetic, elastic = stored(p, s, chain, waves)
+    s.e_start = kinetic + elastic + recoverable(p, s)

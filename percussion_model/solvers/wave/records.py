@@ -1,8 +1,8 @@
-"""Records of the travelling-wave solver: parameters and state, plain data.
+"""Records of the travelling-wave solver: parameters, state and arrays, plain data.
 
-A bar is kept in two arrays. ``w`` (rows of `Row`) holds what changes, ``c``
-(rows of `Coef`) what does not. Cell `i` of a bar lies between its interfaces
-`i` and `i + 1`; interface 0 is the top end, interface `n` the bottom end.
+A section carries a down-going and an up-going velocity wave, d and u, so that v = d + u and
+F = Z (d - u) (docs/model.md, eqs 5-6). What is sent into a section at one end is kept in a ring
+until it arrives at the other. Section `k` lies between its nodes `k` and `k + 1`.
 """
 
 from __future__ import annotations
@@ -12,206 +12,162 @@ from typing import NamedTuple
 
 import numpy as np
 
-from percussion_model.physics.state import COMMON_PARAMETERS, COMMON_STATE, COUNT, FLAG, MOST
+from percussion_model.physics.state import COMMON_PARAMETERS, COMMON_STATE, COUNT
 from percussion_model.solvers.state import Limits
 
 
-class Row(IntEnum):
-    """Rows of the array of a bar that changes, each of length n + 1.
+class Place(IntEnum):
+    """Rows of whole numbers of a section."""
 
-    The two pairs of wave rows take turns: a step reads one pair and writes the
-    other, so that no value is overwritten before it is used.
-    """
-
-    DOWN = 0  # down-going velocity wave of each cell [m/s]
-    UP = 1  # up-going
-    DOWN_OTHER = 2
-    UP_OTHER = 3
-    FACE = 4  # velocity of each interface over the step [m/s]
-    LOSS = 5  # energy lost at each interface so far, divided by the time step [W]
-    SCRATCH = 6
+    BAR = 0  # the bar that it belongs to
+    RING = 1  # where the ring of its down-going wave begins; that of the up-going follows, and q
+    SIZE = 2  # of the ring, a power of two; each holds everything twice
+    DELAY = 3  # whole steps that a wave waits at least before the one in which it arrives
+    TAPS = 4  # how many weights it arrives by
+    WEIGHTS = 5  # where these begin; of a wave that arrives as it is -1, of q its two weights
+    CELLS = 6  # in which it is read
 
 
-class Coef(IntEnum):
-    """Rows of the array of a bar that does not change, each of length n + 1."""
+class Steel(IntEnum):
+    """Rows of numbers of a section."""
 
-    ALPHA = 0  # weight of the down-going wave in an interface's velocity
-    BETA = 1  # weight of the up-going wave
-    INV_Z = 2  # 1 / (Z above + Z below) of an interface [m/(N s)]
-    VISCOUS = 3  # viscous number times Z of a cell, for one sub-step [N s/m]
-    MASS = 4  # mass of a cell [kg]
-    TOP = 5  # weight of a cell's strain in (mean - top end) [s]
-    BOTTOM = 6  # weight of a cell's strain in (bottom end - mean) [s]
-    STATIC = 7  # down-going wave of a cell at rest under unit body acceleration [s]
-    FROM_TOP = 8  # response of interface velocities to a unit viscous force of cell 0
-    FROM_BOTTOM = 9  # the same for the last cell
-    BETWEEN = 10  # viscous number times Z between a cell and the next [N s/m]
-    INV_CELL_Z = 11  # 1 / Z of a cell [m/(N s)]
+    IMPEDANCE = 0  # [N s/m]
+    ALPHA = 1  # weights of the waves in the velocity of its upper end (docs/model.md, eq. 8)
+    BETA = 2
+    CELL_MASS = 3  # [kg]
+    BY_LOSS = 4  # Z dt of what structural loss takes of a wave that arrives [N s2/m]
+    BY_MIXING = 5  # of what fitting its length to steps takes
+
+
+class Joint(IntEnum):
+    """Kinds of joint between two bars."""
+
+    PERFECT = 0
+    CONTACT = 1
+    LOSSY = 2
+    THREADED = 3
+
+
+class Fit(IntEnum):
+    """Rows of numbers of a joint."""
+
+    KIND = 0  # Joint
+    YIELD = 1  # Y = 1/Z above + 1/Z below [m/(N s)]
+    PRELOAD = 2  # [N]
+    STIFFNESS = 3  # of the thread, or of the spring of a lossy joint [N/m]
+    DAMPING = 4  # of a lossy joint [N s/m]
+    SECTION = 5  # the one below it
+    STIFF = 6  # 1 / Y [N s/m]
+    ABOVE = 7  # 1 / Z of the end above [m/(N s)]
+    BELOW = 8
+
+
+class Has(IntEnum):
+    """Rows of what changes at a joint."""
+
+    CLOSED = 0  # 1: its shoulders touch
+    GAP = 1  # between them [m]; shortening of a lossy joint
+    FORCE = 2  # mean over the last step, compression positive [N]
+    LEAST = 3  # least force so far [N]
+    CAME = 4  # energy that came down to it [J]
+    PASSED = 5  # that went on downward
+    RETURNED = 6  # that was sent back up
+    BY_WAVES = 7  # force by the waves alone in its last step [N]
+    VISCOUS = 8  # impulse of loss beside them since the start [N s]
+
+
+class Bar(IntEnum):
+    """Rows of what changes of a bar."""
+
+    VELOCITY = 0  # mean [m/s]
+    POSITION = 1  # mean displacement since the start [m]
+    GIVEN = 2  # velocity that body forces gave its waves since they were written [m/s]
+    BY_LOSS = 3  # mean velocity by the impulses of loss at its ends, beside its waves [m/s]
+
+
+class Body(IntEnum):
+    """Rows of numbers of a bar."""
+
+    MASS = 0  # [kg]
+    FIRST = 1  # section
+    LAST = 2
+    INV_MASS = 3  # 1 / mass [1/kg]
 
 
 class Task(IntEnum):
     """What the kernels are to do with a state."""
 
     ADVANCE = 0
-    COMMIT = 1
-    READ = 2
+    READ = 1
 
 
-class Bars(NamedTuple):
-    """Arrays of piston and bit: rows of `Row`, which change, and rows of `Coef`."""
+class Chain(NamedTuple):
+    """What does not change: rows of `Place`, `Steel`, `Fit`, `Body`; weights of all sections."""
 
-    wp: np.ndarray
-    cp: np.ndarray
-    wb: np.ndarray
-    cb: np.ndarray
-
-
-class Scratch(NamedTuple):
-    """Room for the products of leaps."""
-
-    x: np.ndarray
-    v: np.ndarray
-    y: np.ndarray
+    places: np.ndarray
+    steel: np.ndarray
+    weights: np.ndarray
+    fits: np.ndarray
+    bodies: np.ndarray
 
 
-class LeapKind(IntEnum):
-    """How the bit is carried over a leap."""
+class Waves(NamedTuple):
+    """What changes: all rings in a row; rows of `Bar`, `Has`; what arrives at either end."""
 
-    FLIGHT = 0  # free flight
-    STANDSTILL = 1  # standstill too quiet to end by itself
-    CONTACT = 2  # contact whose every step was looked at beforehand
-
-
-class LeapOperators(NamedTuple):
-    """Powers of the step map, and what can be seen of the next steps.
-
-    Maps are stored column by column and padded with zeros, forms as
-    their upper triangles; `size` is the padded number of waves, with the
-    penetration for the bit.
-
-    Attributes
-    ----------
-    piston : ndarray, shape (powers, size, size)
-        Powers 1, 2, 3, 4, 8, 12, 16, 32, 48, ... of the free piston's step map.
-    bit : ndarray, shape (5, powers, size, size)
-        The same for the bit by `Mode`.
-    lookahead : ndarray, shape (5, size, LOOKAHEAD)
-        By mode: strain offset of the rock end at the end of the next steps in
-        FF, its velocity at their start in DFC, FC, BC and SS.
-    sums : ndarray, shape (5, size)
-        By contact mode: path of the bit's mean motion until it rests.
-    top : ndarray, shape (5, size, LOOKAHEAD)
-        By mode: motion of the bit's top end by the end of the next steps, in
-        FF its strain offset.
-    bottom : ndarray, shape (size, LOOKAHEAD)
-        Strain offset of the piston's bottom end.
-    piston_loss : ndarray, shape (powers, size, size)
-        Structural loss of the free piston over as many steps as the powers are of [J].
-    loss : ndarray, shape (5, powers, size, size)
-        The same of the bit by `Mode`.
-    squares : ndarray, shape (powers, size, size)
-        In standstill, sum over so many steps of the square of the rock end's
-        velocity at the start of each [m2/s2].
-    """
-
-    piston: np.ndarray
-    bit: np.ndarray
-    lookahead: np.ndarray
-    sums: np.ndarray
-    top: np.ndarray
-    bottom: np.ndarray
-    piston_loss: np.ndarray
-    loss: np.ndarray
-    squares: np.ndarray
+    rings: np.ndarray
+    bars: np.ndarray
+    joints: np.ndarray
+    came: np.ndarray
 
 
-def no_operators() -> LeapOperators:
-    """Stand-ins where no leaps are made."""
-    return LeapOperators(
-        np.zeros((1, 1, 1)), np.zeros((1, 1, 1, 1)), np.zeros((1, 1, 1)), np.zeros((1, 1)),
-        np.zeros((1, 1, 1)), np.zeros((1, 1)), np.zeros((1, 1, 1)), np.zeros((1, 1, 1, 1)),
-        np.zeros((1, 1, 1)),
-    )  # fmt: skip
-
-
-# Parameters: what stays fixed during a run.
 WAVE_PAR = np.dtype(
     [
-        ("dt", "f8"),  # time step = transit time of a cell [s]
-        # ends that meet something: piston bottom (p), bit top (t), bit bottom (b)
-        ("z_p", "f8"),  # impedance of the end cell [N s/m]
-        ("z_t", "f8"),
-        ("z_b", "f8"),
-        ("z_f", "f8"),  # free top end of the piston
-        ("kappa_p", "f8"),  # viscous number of the end cell, docs/numerics.md
-        ("kappa_t", "f8"),
-        ("kappa_b", "f8"),
-        ("kappa_f", "f8"),
-        ("front", "f8"),  # share of a step before its closure, docs/numerics.md, eq. 14b
-        ("ss_stiffness", "f8"),  # gamma K_R for which standstill leaps were made [N/m]
-        ("ss_loading", "f8"),  # K_R for which leaps in contact were made, 0: none were
-        ("ss_damping", "f8"),  # C_R for the same
-        ("bound_p", "f8"),  # |S_p| <= bound_p sqrt(2 E): piston strain offset [m/J^0.5]
-        ("bound_t", "f8"),
-        ("bound_b", "f8"),
-        ("n_p", "i8"),  # cells in the piston, 0 when it is rigid or absent
-        ("n_b", "i8"),
-        ("loss", "i8"),  # sub-steps of the loss operator, 0: no loss
-        ("leaps", "i8"),  # levels of the leap operators, four to one: 0: no leaps
+        ("dt", "f8"),  # time step [s]
+        ("viscous", "f8"),  # eta / (2 dt): share of the loss in the force at an end
+        ("lag", "f8"),  # viscous / (1 + viscous)
+        ("most_given", "f8"),  # velocity that body forces may give waves before they are written
+        ("cuts_all", "i8"),  # 1: loss spreads fronts, so that any step before a closure is cut
+        ("sections", "i8"),
+        ("bars", "i8"),
+        ("joints", "i8"),  # but for that of the piston
+        ("struck", "i8"),  # the bar that the piston strikes, or the topmost
         ("most_changes", "i8"),  # of the rock law within a step; more are a loop
-        ("size_p", "i8"),  # padded size of the leap operators: piston
-        ("size_r", "i8"),  # bit on the rock
+        ("open_top", "i8"),  # 1: the top end of a chain without a piston reflects nothing
+        ("open_bottom", "i8"),  # 1: nor does the lower end of the bit
+        ("pulse", "f8"),  # force of a wave that comes down from there [N]
+        ("pulse_end", "f8"),  # [s]
+        ("damper", "i8"),  # 1: there is one
+        ("damper_stiffness", "f8"),
+        ("damper_damping", "f8"),
+        ("damper_preload", "f8"),
+        ("casing_mass", "f8"),
         *COMMON_PARAMETERS,
     ],
     align=True,
 )
 
-# So many steps at most are cut for a closure that the bars put off.
-MOST_CUTS = 2
-
 WAVE_STATE = np.dtype(
     [
         ("step", "i8"),  # number of steps done
-        ("leap_end", "i8"),  # step at which the pending leap ends, or -1
-        ("leap_kind", "i8"),  # LeapKind of it
-        ("no_plan", "i8"),  # do not plan a leap before this step
-        ("dormant", "i8"),  # 1: the piston waits at an earlier step
-        ("piston_step", "i8"),  # the step at which it waits
-        ("piston_parity", "i8"),  # and which pair of its wave rows is the present one
-        ("wake", "i8"),  # step before which it can meet nothing
-        ("no_dormancy", "i8"),  # do not let it wait before this step
-        ("parity", "i8"),  # which pair of wave rows is the present one (0 or 1)
-        ("cuts", "i8"),  # steps cut for a closure that has not come yet
-        ("count_wakes", "i8"),
-        ("count_leaps", "i8"),
-        ("count_leap_steps", "i8"),
-        ("t_base", "f8"),  # time = t_base + step * dt [s]
-        ("moved", "f8"),  # what the bit's mean displacement counts from, piston dormant [m]
-        ("spread_p", "f8"),  # bound of the dormant piston's strain offset [m]
-        ("x_dormant", "f8"),  # datum of p when it began to wait [m]
-        ("u_start", "f8"),  # u_r - u_p + u_b at the start [m]
-        ("offset_start", "f8"),  # (bottom end - mean) of the bit at the start [m]
+        ("cuts", "i8"),  # steps cut since the last closure below the piston
+        ("t_base", "f8"),  # time of step 0 if none had been cut [s]
+        ("v_c", "f8"),  # velocity of the casing [m/s]
+        ("u_c", "f8"),  # its displacement [m]
+        ("x_c", "f8"),  # shortening of the damper since the start [m]
+        ("e_stored", "f8"),  # in joints and damper [J]
+        ("end_start", "f8"),  # position of the bit's lower end at the start [m]
+        ("u_0", "f8"),  # u_r at the start [m]
+        ("g_contact", "f8"),  # force by the waves alone below the piston in the last step [N]
+        ("g_rock", "f8"),  # and at the rock
+        ("viscous_contact", "f8"),  # impulses of loss beside them since the start [N s]
+        ("viscous_rock", "f8"),
+        ("i_came", "f8"),  # energy that came down to the rock [J]
+        ("i_returned", "f8"),  # that it sent back
         *COMMON_STATE,
     ],
     align=True,
 )
 
-WAVE_LIMITS = Limits(
-    WAVE_STATE,
-    {
-        "step": COUNT,
-        "leap_end": (-1, MOST),
-        "leap_kind": (min(LeapKind), max(LeapKind)),
-        "no_plan": (-MOST, MOST),
-        "dormant": FLAG,
-        "piston_step": COUNT,
-        "piston_parity": FLAG,
-        "wake": (-MOST, MOST),
-        "no_dormancy": (-MOST, MOST),
-        "parity": FLAG,
-        "cuts": (0, MOST_CUTS),
-        "count_wakes": COUNT,
-        "count_leaps": COUNT,
-        "count_leap_steps": COUNT,
-    },
-)
+# Steps that are cut at most for a closure to come.
+MOST_CUTS = 2
+WAVE_LIMITS = Limits(WAVE_STATE, {"step": COUNT, "cuts": (0, MOST_CUTS)})

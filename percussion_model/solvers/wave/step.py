@@ -1,119 +1,534 @@
-"""One step of the travelling-wave solver.
-
-The order within a step of one cell's transit time: half of the body forces,
-waves to the ends, contact and rock in closed form, loss, the other half
-(docs/numerics.md, section 1).
-"""
+"""One step of waves: what the ends of the bars meet."""
 
 from __future__ import annotations
 
-from percussion_model.physics.blows import push_checkpoint
+from percussion_model.physics.blows import (
+    close_gap,
+    open_gap,
+    push_checkpoint,
+    standstill_force,
+    start_blow,
+    starts_blow,
+)
 from percussion_model.physics.body import (
-    book_bit_load,
+    book_on_bit,
     book_piston_load,
     hold_components,
+    pass_time,
     piston_acceleration,
 )
 from percussion_model.physics.drive import drive_force
-from percussion_model.physics.kernel import kernel, merged
+from percussion_model.physics.kernel import inlined, kernel, merged
 from percussion_model.physics.records import Mode, Piston
-from percussion_model.solvers.wave.bar import add_velocity
-from percussion_model.solvers.wave.ends import meet, outer_waves
-from percussion_model.solvers.wave.records import Coef
-from percussion_model.solvers.wave.totals import lost_in_faces, resync, time_of
+from percussion_model.solvers.wave.joint import shoulders, yielding
+from percussion_model.solvers.wave.piston import mass_contact, move_piston
+from percussion_model.solvers.wave.records import MOST_CUTS, Bar, Fit, Has, Joint
+from percussion_model.solvers.wave.rock_end import asks_for_energy, rock_step
+from percussion_model.solvers.wave.sections import (
+    ACCELERATION,
+    BAR,
+    DOWN,
+    DOWN_OUT,
+    FIRST,
+    FROM_ABOVE,
+    FROM_BELOW,
+    GIVEN,
+    IMPEDANCE,
+    INV_MASS,
+    LAST,
+    MASS,
+    UP,
+    UP_OUT,
+    kinetic_of_bar,
+    mixing_in_turns,
+    part_of_step,
+    pass_on,
+    send,
+    shortening,
+    write_given,
+)
 
-# Mean motion is derived anew from the waves this often, so that rounding in
-# its running sums can never drift away from the gap [steps].
+PERFECT, _, LOSSY, THREADED = (float(kind) for kind in Joint)
+VELOCITY, POSITION, BY_LOSS = int(Bar.VELOCITY), int(Bar.POSITION), int(Bar.BY_LOSS)
+KIND, YIELD, PRELOAD, STIFFNESS, DAMPING, SECTION, STIFF, ABOVE, BELOW = (int(row) for row in Fit)
+CLOSED, GAP, FORCE, LEAST, CAME, PASSED, RETURNED, BY_WAVES, VISCOUS = (int(row) for row in Has)
+# A part of a step shorter than this is not worth a step of its own.
+SHORTEST_PART = 1e-3
+# Mean motion is derived anew from waves and gap so often [steps].
 RESYNC_STEPS = 256
 # Spacing of the bit force's checkpoints while standing still [steps].
 CHECKPOINT_STEPS = 64
 
 
-@kernel
-def part_of_step(w, c, n, r, share):
-    """Move the waves back to `share` of the step just done.
+@merged
+def time_of(par, s):
+    """Time of a state [s]."""
+    return s.t_base + s.step * par.dt
 
-    A fraction of a cell's transit mixes the waves of neighbouring cells.
 
-    Returns
-    -------
-    float
-        Energy that the mixing dissipates [J].
+@inlined
+def stored_in_joint(fits, joints, j):
+    """Energy of a thread or of a lossy joint [J]."""
+    gap = joints[GAP, j]
+    if fits[j, KIND] == LOSSY or fits[j, KIND] == THREADED:
+        return gap * (fits[j, PRELOAD] + 0.5 * fits[j, STIFFNESS] * gap)
+    return 0.0
+
+
+@inlined
+def damper_force(par, shortened, speed, inv_mass):
+    """Mean force over a step of the damper between casing and bar, which only pushes [N].
+
+    By the trapezoidal rule, which is stable at any stiffness and damping; `speed` is that in the
+    middle of the step without it.
     """
-    q = 2 - r
-    lost = 0.0
-    for i in range(n):
-        for k in range(2):
-            jump = w[q + k, i] - w[r + k, i]
-            w[q + k, i] = w[r + k, i] + share * jump
-            lost += c[Coef.MASS, i] * jump * jump
-    return share * (1.0 - share) * lost
+    k, c, half = par.damper_stiffness, par.damper_damping, 0.5 * par.dt
+    gives = half * (1.0 / par.casing_mass + inv_mass)
+    force = par.damper_preload + k * shortened + (c + half * k) * speed
+    return max(force / (1.0 + gives * (c + half * k)), 0.0)
+
+
+@inlined
+def stored_in_damper(par, shortened):
+    """Energy of its spring, less that at the start; no less than where it has parted [J]."""
+    k, preload = par.damper_stiffness, par.damper_preload
+    if k > 0.0:
+        shortened = max(shortened, -preload / k)
+    return shortened * (preload + 0.5 * k * shortened)
+
+
+@inlined
+def taken_by_damper(par, shortened, way, tau):
+    """What its dashpot took on a way that ends at `shortened`, by its middle; never negative [J].
+
+    Its force less that of its spring, which both only push, has the sign of the way: so it takes
+    all where the spring lets go more slowly than the bar, or where the dashpot alone pushes.
+    """
+    spring = par.damper_preload + par.damper_stiffness * (shortened - 0.5 * way)
+    force = max(spring + par.damper_damping * way / tau, 0.0)
+    return way * (force - max(spring, 0.0))
+
+
+@inlined
+def accelerations(par, s, chain, waves, push):
+    """Acceleration that its body forces give each bar; the force of the damper [N]."""
+    came, bodies, g = waves.came, chain.bodies, par.gravity
+    for i in range(par.bars):
+        came[ACCELERATION, i] = g
+    struck, bit, damper = par.struck, par.bars - 1, 0.0
+    if par.damper == 1:
+        # in the middle of the step but for the damper; impulses are those of the step before
+        given = (came[FROM_ABOVE, struck] - came[FROM_BELOW, struck]) * bodies[struck, INV_MASS]
+        others = ((s.feed - push) / par.casing_mass - g) * par.dt - given
+        speed = s.v_c - waves.bars[VELOCITY, struck] + 0.5 * others
+        damper = damper_force(par, s.x_c, speed, bodies[struck, INV_MASS])
+        came[ACCELERATION, struck] += damper * bodies[struck, INV_MASS]
+    else:
+        came[ACCELERATION, struck] += s.feed * bodies[struck, INV_MASS]
+    if par.effects == 1:
+        came[ACCELERATION, bit] += s.f_on_bit * bodies[bit, INV_MASS]
+    if par.piston == Piston.ELASTIC:
+        came[ACCELERATION, 0] = piston_acceleration(par, push)
+    return damper
+
+
+@inlined
+def kick_of(par, waves, bar):
+    """Mean velocity that body forces give in a step [m/s]."""
+    return 0.5 * par.dt * waves.came[ACCELERATION, bar]
+
+
+@inlined
+def meet_top(par, s, chain, waves, tau, time):
+    """The top end of the topmost bar: free, or without reflection; with a wave from outside."""
+    z, up, kick = chain.steel[0, IMPEDANCE], waves.came[UP, 0], kick_of(par, waves, 0)
+    pulse = 0.0
+    if time < par.pulse_end:
+        pulse = par.pulse * min(1.0, (par.pulse_end - time) / par.dt)
+    if par.open_top == 1:  # as a dashpot Z, which no body force acts on
+        down = pulse / z + 0.5 * kick
+    else:
+        down = up + kick + pulse / z
+    waves.came[DOWN_OUT, 0] = down
+    force = z * (down - kick - up)
+    waves.came[FROM_ABOVE, 0] = force * tau
+    s.e_ends -= force * (down + up) * tau
+
+
+@inlined
+def give_way(s, fits, joints, j, a, y, tau):
+    """A joint that parts, closes or yields within `tau`; its impulse [N s]."""
+    stored = stored_in_joint(fits, joints, j)
+    if fits[j, KIND] == LOSSY:
+        met = yielding(joints[GAP, j], a, y, fits[j, STIFFNESS], fits[j, DAMPING], tau)
+    else:
+        closed = 1 if joints[CLOSED, j] == 1.0 else 0
+        met = shoulders(closed, joints[GAP, j], a, y, fits[j, PRELOAD], fits[j, STIFFNESS], tau)
+    joints[CLOSED, j], joints[GAP, j] = met.closed, met.gap
+    s.e_stored += stored_in_joint(fits, joints, j) - stored
+    s.e_joints += met.taken
+    s.e_numerical += y * (met.square - met.impulse * met.impulse / tau)
+    return met.impulse
+
+
+@inlined
+def holds(fits, joints, j, a, y):
+    """Whether a joint stays closed and rigid for the whole step."""
+    kind = fits[j, KIND]
+    if kind == PERFECT:
+        return True
+    return kind != LOSSY and joints[CLOSED, j] == 1.0 and a + y * fits[j, PRELOAD] > 0
+
+
+@inlined
+def meet_joints(par, s, chain, waves, tau):
+    """All joints below rods."""
+    came, fits, joints = waves.came, chain.fits, waves.joints
+    places, steel, half = chain.places, chain.steel, 0.5 * par.dt
+    for j in range(par.joints):
+        k = int(fits[j, SECTION])
+        above, below = places[k - 1, BAR], places[k, BAR]
+        down, up = came[DOWN, k - 1], came[UP, k]
+        v_a = 2.0 * down + half * came[ACCELERATION, above]
+        v_b = 2.0 * up + half * came[ACCELERATION, below]
+        before = par.lag * joints[BY_WAVES, j]
+        a, y = v_a - v_b - fits[j, YIELD] * before, fits[j, YIELD] / (1.0 + par.viscous)
+        if holds(fits, joints, j, a, y):
+            force = a * fits[j, STIFF] * (1.0 + par.viscous)
+        else:
+            force = give_way(s, fits, joints, j, a, y, tau) / tau
+        by_waves = before + force / (1.0 + par.viscous)
+        joints[BY_WAVES, j] = by_waves
+        joints[VISCOUS, j] += (force - by_waves) * tau
+        v_a, v_b = v_a - by_waves * fits[j, ABOVE], v_b + by_waves * fits[j, BELOW]
+        s.e_loss += (force - by_waves) * (v_b - v_a) * tau
+        returned, passed = v_a - down, v_b - up
+        came[UP_OUT, k - 1], came[DOWN_OUT, k] = returned, passed
+        came[FROM_BELOW, above] = came[FROM_ABOVE, below] = by_waves * tau
+        joints[FORCE, j] = force
+        joints[LEAST, j] = min(joints[LEAST, j], force)
+        z_a, z_b = steel[k - 1, IMPEDANCE] * tau, steel[k, IMPEDANCE] * tau
+        joints[CAME, j] += z_a * down * down
+        joints[PASSED, j] += z_b * passed * passed
+        joints[RETURNED, j] += z_a * returned * returned
+
+
+@kernel
+def record_contact(par, s, waves, opened, t_close, approach, force, time, tau, blows, events):
+    """Book the opening and the closure of the gap below the piston in this step."""
+    if opened == 1:
+        open_gap(s, events, time, approach)
+    if t_close >= 0.0:
+        closure = time + t_close
+        s.cuts = 0
+        if starts_blow(par, s, closure):
+            here = waves.bars[POSITION, par.bars - 1] + s.v_b * t_close
+            speed = s.v_p + piston_acceleration(par, drive_force(par, s)) * t_close
+            impulse = s.i_bit + s.gamma * s.k_r * (s.p - s.p_u) * t_close
+            still = standstill_force(s, closure, impulse)
+            start_blow(par, s, blows, closure, speed, here, still)
+        close_gap(s, events, closure, approach)
+    s.b_peak_contact = max(s.b_peak_contact, force)
+    if time + tau > s.peak_from:
+        s.peak_contact_force = max(s.peak_contact_force, force)
+
+
+@inlined
+def free_ends(par, s, chain, waves, push):
+    """Velocities of piston and struck bar at the contact without it, and how far they yield."""
+    came, struck = waves.came, par.struck
+    k = int(chain.bodies[struck, FIRST])
+    z_t = chain.steel[k, IMPEDANCE]
+    v_t, yields = 2.0 * came[UP, k] + kick_of(par, waves, struck), 1.0 / z_t
+    if par.piston == Piston.ELASTIC:
+        v_p = 2.0 * came[DOWN, k - 1] + kick_of(par, waves, 0)
+        yields += 1.0 / chain.steel[k - 1, IMPEDANCE]
+    else:
+        v_p = s.v_p + 0.5 * par.dt * piston_acceleration(par, push)
+    return v_p, v_t, yields
 
 
 @merged
-def shorten_step(par, s, bars, tau, loss_before, push, dv_p, dv_b):
-    """Turn the step just done into one of duration `tau`, with its ledger.
+def time_to_cut(par, s, chain, waves, push, tau):
+    """Time at which to end the step, so that a closure comes at the start of the next one [s].
 
-    Parameters
-    ----------
-    loss_before : float
-        Loss booked at the interfaces before the step [J].
-    push : float
-        Force of the drive that the piston's waves got [N].
-    dv_p, dv_b : float
-        Change of the mean velocities over `tau`, the piston's under `push` [m/s].
+    A cut mixes the waves of neighbouring steps: rods ring from blow to blow, and are not cut.
     """
-    r = 2 * s.parity
-    share = tau / par.dt
-    rest = 1.0 - share
-    s.e_loss -= rest * (lost_in_faces(par, bars) - loss_before)
-    s.e_numerical += part_of_step(bars.wb, bars.cb, par.n_b, r, share)
-    # the means move by a share of the whole step's path; half of `tau` is booked already
-    further = 0.5 * par.dt * rest
-    book_bit_load(par, s, further * dv_b)
-    if par.piston == Piston.ELASTIC:
-        s.e_numerical += part_of_step(bars.wp, bars.cp, par.n_p, r, share)
-        book_piston_load(par, s, push, further * dv_p, 0.0)
-    s.t_base -= par.dt - tau
+    v_p, v_t, yields = free_ends(par, s, chain, waves, push)
+    approach = v_p - v_t - yields * par.lag * s.g_contact
+    if par.joints > 0 or s.closed == 1 or approach <= 0.0 or s.cuts >= MOST_CUTS:
+        return tau
+    reach = s.gap / approach
+    if reach < SHORTEST_PART * par.dt or reach > (1.0 - SHORTEST_PART) * par.dt:
+        return tau
+    if par.cuts_all == 0 and not starts_blow(par, s, time_of(par, s) + reach):
+        return tau
+    return reach
+
+
+@inlined
+def meet_piston(par, s, chain, waves, push, tau, time, blows, events):
+    """The piston and the bar that it strikes; the impulse between them [N s].
+
+    A closure in the first half of a step counts for waves from its start, one in the second from
+    its end: so fronts stay sharp, of which averaging over the step would take a part, and come
+    early as often as late.
+    """
+    came, struck = waves.came, par.struck
+    k = int(chain.bodies[struck, FIRST])
+    z_t, elastic = chain.steel[k, IMPEDANCE], par.piston == Piston.ELASTIC
+    v_p, v_t, yields = free_ends(par, s, chain, waves, push)
+    before = par.lag * s.g_contact
+    approach, was, opened, t_close = v_p - v_t - yields * before, s.closed, 0, -1.0
+    if was == 1 and approach <= 0.0:
+        s.closed, opened = 0, 1
+    touches = s.closed == 1
+    if s.closed == 0:
+        if approach > 0.0 and s.gap < approach * tau:
+            t_close = s.gap / approach
+            s.closed, touches = 1, t_close < 0.5 * tau
+        s.gap = 0.0 if s.closed == 1 else s.gap - approach * tau
+    impulse, force, more = 0.0, before + approach / yields, 1.0 + par.viscous
+    if touches and elastic:
+        impulse = approach / yields * more * tau
+    elif touches:
+        z_v, v_v = z_t * more, v_t + before / z_t
+        d_t, q_t, impulse = mass_contact(v_p, v_v, par.mass_p, z_v, tau)
+        s.e_numerical += z_v * (q_t - d_t * d_t / tau)
+    by_waves = before + impulse / (more * tau)
+    s.g_contact = by_waves
+    s.viscous_contact += impulse - by_waves * tau
+    v_t += by_waves / z_t
+    s.e_loss += (impulse - by_waves * tau) * v_t
+    if elastic:
+        v_p -= by_waves / chain.steel[k - 1, IMPEDANCE]
+        s.e_loss -= (impulse - by_waves * tau) * v_p
+        came[UP_OUT, k - 1] = v_p - came[DOWN, k - 1]
+        came[DOWN_OUT, 0] = came[UP, 0] + kick_of(par, waves, 0)
+    came[DOWN_OUT, k] = v_t - came[UP, k]
+    came[FROM_ABOVE, struck] = by_waves * tau
+    if was == 1 or s.closed == 1:
+        peak = force if touches else 0.0
+        record_contact(par, s, waves, opened, t_close, approach, peak, time, tau, blows, events)
+    return impulse
+
+
+@merged
+def meet_rock(par, s, chain, waves, tau, time, events):
+    """The bit's lower end on the rock; the impulse on the rock [N s]."""
+    k, bit = par.sections - 1, par.bars - 1
+    z, down = chain.steel[k, IMPEDANCE], waves.came[DOWN, k]
+    v_whole, energy = 2.0 * down + kick_of(par, waves, bit), 0.0
+    v_free, z_v = v_whole - par.lag * s.g_rock / z, z * (1.0 + par.viscous)
+    if asks_for_energy(par, s, v_free, z_v, tau):
+        energy = kinetic_of_bar(chain, waves, s.step, bit)
+    d, q = rock_step(par, s, energy, v_free, z_v, tau, time, events)
+    impulse, up = z_v * (v_free * tau - d), d / tau - down
+    s.g_rock = z * (v_whole - d / tau)
+    s.viscous_rock += impulse - s.g_rock * tau
+    s.e_loss += (s.g_rock - impulse / tau) * d
+    waves.came[UP_OUT, k], waves.came[FROM_BELOW, bit] = up, s.g_rock * tau
+    s.e_numerical += z_v * (q - d * d / tau)
+    s.rock_work += z_v * (v_free * d - q)
+    s.i_bit += impulse
+    s.i_came += z * down * down * tau
+    s.i_returned += z * up * up * tau
+    return impulse
+
+
+@inlined
+def meet_nothing(par, s, chain, waves, tau):
+    """The bit's lower end where it reflects nothing: what comes leaves."""
+    k, bit = par.sections - 1, par.bars - 1
+    z, down, kick = chain.steel[k, IMPEDANCE], waves.came[DOWN, k], kick_of(par, waves, bit)
+    kick *= 0.5
+    force = z * (down + kick)
+    waves.came[UP_OUT, k], waves.came[FROM_BELOW, bit] = kick, force * tau
+    s.e_ends += force * (down + kick) * tau
+    s.i_came += z * down * down * tau
+
+
+@inlined
+def by_loss(par, s, chain, waves, i):
+    """Mean velocity of a bar below the piston by the impulses of loss at its ends [m/s].
+
+    Without it momentum that an end gives a bar would move its mean by about v eta/2 less than its
+    ends.
+    """
+    joints, j, above, below = waves.joints, i - par.struck, s.viscous_contact, s.viscous_rock
+    if j > 0:
+        above = joints[VISCOUS, j - 1]
+    if i < par.bars - 1:
+        below = joints[VISCOUS, j]
+    return (above - below) * chain.bodies[i, INV_MASS]
+
+
+@inlined
+def move_bars(par, s, chain, waves, damper, tau, rest):
+    """Mean motion of bars and casing, and the work of body forces; path of what the drive holds."""
+    came, bars, bodies, g = waves.came, waves.bars, chain.bodies, par.gravity
+    struck, bit, held, lifted = par.struck, par.bars - 1, 0.0, 0.0
+    path = 0.0
+    for i in range(struck, par.bars):
+        v0, w0 = bars[VELOCITY, i], bars[BY_LOSS, i]
+        gained = (came[FROM_ABOVE, i] - came[FROM_BELOW, i]) * bodies[i, INV_MASS]
+        v1, w1 = v0 + came[ACCELERATION, i] * tau + gained, by_loss(par, s, chain, waves, i)
+        path = 0.5 * (tau * (v0 + v1) + rest * (v1 - v0))
+        bars[VELOCITY, i], bars[BY_LOSS, i] = v1, w1
+        bars[POSITION, i] += path + 0.5 * tau * (w0 + w1)
+        lifted += bodies[i, MASS] * path
+        if i == struck:
+            held = path
+    s.e_gravity += g * lifted
+    if par.effects == 1:
+        book_on_bit(par, s, path)
+    s.v_b = waves.bars[VELOCITY, bit]
+    if par.damper == 0:
+        s.e_feed += s.feed * held
+        return held
+    recoil = drive_force(par, s)
+    v1 = s.v_c + (s.feed - damper - recoil) / par.casing_mass * tau
+    path = 0.5 * tau * (s.v_c + v1)
+    before = stored_in_damper(par, s.x_c)
+    s.x_c += path - held
+    stored = stored_in_damper(par, s.x_c) - before
+    taken = taken_by_damper(par, s.x_c, path - held, tau)
+    s.e_stored += stored
+    s.e_joints += taken
+    s.e_numerical += damper * (path - held) - stored - taken
+    s.e_feed += s.feed * path
+    s.e_drive -= recoil * path
+    s.v_c = v1
+    s.u_c += path
+    return path
+
+
+@merged
+def meet(par, s, chain, waves, tau, blows, events):
+    """Let all ends meet what they meet for `tau`, up to a whole step.
+
+    Mean motion, gaps, penetration, modes, impulses and the ledger move on; waves do not.
+
+    Returns
+    -------
+    due : float
+        Velocity that the piston is still to get, where the drive turned [m/s].
+    tau : float
+        Time that has passed [s].
+    """
+    time = time_of(par, s)
+    hold_components(par, s, tau)
+    push = drive_force(par, s)
+    damper = accelerations(par, s, chain, waves, push)
+    lost, mixed = pass_on(par, s, chain, waves)
+    rest, share, g_contact, g_rock = 0.0, 1.0, s.g_contact, s.g_rock
+    if s.live == 1:
+        if par.piston != Piston.ABSENT:
+            tau = time_to_cut(par, s, chain, waves, push, tau)
+            rest = par.dt - tau
+        share = tau / par.dt
+        s.e_loss += share * lost
+        s.e_numerical += share * mixed
+    meet_joints(par, s, chain, waves, tau)
+    impulse = due = 0.0
+    if par.piston == Piston.ABSENT:
+        meet_top(par, s, chain, waves, tau, time)
+    else:
+        impulse = meet_piston(par, s, chain, waves, push, tau, time, blows, events)
+    if par.open_bottom == 1:
+        meet_nothing(par, s, chain, waves, tau)
+    else:
+        meet_rock(par, s, chain, waves, tau, time, events)
+    s.i_contact += impulse
+    bars = waves.bars
+    lossy = -bars[BY_LOSS, par.struck]
+    held = move_bars(par, s, chain, waves, damper, tau, rest)
+    if par.piston != Piston.ABSENT:
+        half, u_before = 0.5 * tau, s.u_r
+        lossy = lossy - bars[BY_LOSS, par.struck] if par.damper == 0 else 0.0
+        if par.piston == Piston.ELASTIC:
+            impulse = s.g_contact * tau
+            lossy += bars[BY_LOSS, 0]
+            bars[BY_LOSS, 0] = -s.viscous_contact / par.mass_p
+            lossy += bars[BY_LOSS, 0]
+        a_p = piston_acceleration(par, push)
+        s.u_r += half * (2.0 * (s.v_p + a_p * half) - impulse / par.mass_p + lossy) - held
+        v_p, given = s.v_p, s.i_drive
+        move_piston(par, s, push, impulse, u_before, time, tau, events)
+        if par.damper == 1:  # recoil of a drive that has turned
+            extra = s.i_drive - given - push * tau
+            s.e_drive -= extra * (s.v_c - 0.5 * extra / par.casing_mass)
+            s.v_c -= extra / par.casing_mass
+        if par.piston == Piston.ELASTIC:
+            bars[VELOCITY, 0] = s.v_p
+            # what its waves get is the force at the start over the whole step
+            due = s.v_p - v_p + impulse / par.mass_p - a_p * tau
+            if rest > 0.0:
+                further = 0.5 * rest * (a_p * tau - impulse / par.mass_p)
+                book_piston_load(par, s, push, further, 0.0)
+    if rest > 0.0:  # as the waves that are mixed
+        s.g_contact = g_contact + share * (s.g_contact - g_contact)
+        s.g_rock = g_rock + share * (s.g_rock - g_rock)
+    pass_time(par, s, tau)
+    return due, tau
 
 
 @kernel
-def step(par, s, bars, dt, blows, events):
-    """Advance the state by one step of the transit time of a cell.
+def resync(par, s, chain, waves):
+    """Derive the mean of the bit from its lower end, and u_r from the gap.
 
-    A copy that is only read (s.live = 0) moves on by `dt` of a step: what its
-    ends meet, not the waves in its bars. Where the step is cut before, it is made.
+    So rounding in the running sums can never drift away from them.
     """
-    r = 2 * s.parity
-    alpha = s.alpha
-    v_p, v_b = s.v_p, s.v_b
-    contact_before = s.i_contact
-    hold_components(par, s, dt)
-    push = drive_force(par, s)
-    top, bottom, top_p, bottom_p, tau = meet(par, s, bars, dt, blows, events)
-    if s.live == 0 and tau == dt:
+    bit = par.bars - 1
+    waves.bars[POSITION, bit] = s.x_r + s.p - s.end_start
+    waves.bars[POSITION, bit] += shortening(par.dt, chain, waves, s.step, bit, 0)
+    if par.piston == Piston.ABSENT:
         return
-    short = tau < par.dt
-    loss_before = 0.0
-    if short:
-        loss_before = lost_in_faces(par, bars)
-    z_t, z_b = par.kappa_t * par.z_t, par.kappa_b * par.z_b
-    outer_waves(par, bars.wb, bars.cb, par.n_b, r, top, bottom, z_t, z_b)
-    if par.piston == Piston.ELASTIC and s.dormant == 0:
-        z_t, z_b = par.kappa_f * par.z_f, par.kappa_p * par.z_p
-        outer_waves(par, bars.wp, bars.cp, par.n_p, r, top_p, bottom_p, z_t, z_b)
-    given = piston_acceleration(par, push) * tau
-    if short:
-        s.cuts += 1
-        shorten_step(par, s, bars, tau, loss_before, push, given, s.v_b - v_b)
-    if alpha != s.alpha and par.piston == Piston.ELASTIC:
-        # what the waves got is the old force over the whole step
-        due = s.v_p - v_p + (s.i_contact - contact_before) / par.mass_p
-        add_velocity(bars.wp, par.n_p, 2 - r, due - given)
-    s.parity = 1 - s.parity
-    s.step += 1
+    s.u_r = shortening(par.dt, chain, waves, s.step, par.struck, 1) - s.gap
+    if par.piston == Piston.ELASTIC:
+        s.u_r += shortening(par.dt, chain, waves, s.step, 0, 0)
+    if par.damper == 1:
+        s.u_r -= s.x_c
+
+
+@kernel
+def step(par, s, chain, waves, tau, blows, events):
+    """Advance the state by one step; a copy that is only read meets what it meets for `tau`."""
+    due, tau = meet(par, s, chain, waves, tau, blows, events)
+    if s.live == 0:
+        return
+    share = tau / par.dt
+    places, rings, came, bodies, bars = (
+        chain.places, waves.rings, waves.came, chain.bodies, waves.bars
+    )  # fmt: skip
+    now, half, rewrite = s.step, 0.5 * par.dt, False
+    for i in range(par.bars):
+        given = bars[GIVEN, i] + half * came[ACCELERATION, i]
+        bars[GIVEN, i] += share * half * came[ACCELERATION, i]
+        came[DOWN_OUT, int(bodies[i, FIRST])] -= given
+        came[UP_OUT, int(bodies[i, LAST])] -= given
+        rewrite = rewrite or abs(given) > par.most_given
+    if share < 1.0:
+        for k in range(par.sections):
+            change = half * came[ACCELERATION, places[k, BAR]]
+            s.e_numerical += mixing_in_turns(par.dt, chain, waves, now, k, share, change)
+    for k in range(par.sections):
+        down, up = came[DOWN_OUT, k], came[UP_OUT, k]
+        send(places, chain.weights, rings, now, k, down, up, share)
+    bars[GIVEN, 0] += 0.5 * due
+    s.step = now + 1
     s.count_steps += 1
-    if short or s.step % RESYNC_STEPS == 0:
-        resync(par, s, bars)
+    if share < 1.0:
+        s.cuts += 1
+        s.t_base -= par.dt - tau
+        for i in range(par.bars):
+            change = half * came[ACCELERATION, i]
+            s.e_numerical += part_of_step(par.dt, chain, waves, s.step, i, share, change)
+    if rewrite:
+        for i in range(par.bars):
+            if abs(bars[GIVEN, i]) > par.most_given:
+                write_given(chain, waves, i)
+    if share < 1.0 or s.step % RESYNC_STEPS == 0:
+        resync(par, s, chain, waves)
     if s.mode == Mode.SS and (s.n_check == 0 or s.step % CHECKPOINT_STEPS == 0):
         push_checkpoint(s, time_of(par, s))

@@ -18,7 +18,7 @@ from percussion_model.simulation.gauge import gauge_stress
 from percussion_model.simulation.rate import rate_of_blows, ratio_of_sums
 from percussion_model.simulation.simulate import Simulation, Snapshot
 from percussion_model.solvers.base import Solver
-from percussion_model.solvers.wave.resolution import in_first_bar
+from percussion_model.solvers.modal.resolution import in_first_bar
 
 RATE = "rate_of_penetration"
 HISTORY = "bit_force_history"
@@ -173,7 +173,7 @@ def quantities(kind: str) -> tuple[str, ...]:
 
 
 def default_solver(scene: Scene) -> str:
-    """Solver that `solver.name = "auto"` takes for elastic bars: "modal", "chain" or "wave"."""
+    """Solver that `solver.name = "auto"` takes for elastic bars: "modal" or "wave"."""
     return scene.computed_by("auto").solver_name
 
 

@@ -1,12 +1,12 @@
-"""Waves in the sections of a chain: arriving, being sent, and the sums over what is under way."""
+"""Waves in the sections of bars: arriving, being sent, and the sums over what is under way."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from percussion_model.physics.kernel import inlined, kernel, preparing
-from percussion_model.solvers.chain.records import Bar, Body, Place, Steel
 from percussion_model.solvers.modal.lanes import WIDTH, load, spread, total, totals
+from percussion_model.solvers.wave.records import Bar, Body, Place, Steel
 
 BAR, RING, SIZE, DELAY, TAPS, WEIGHTS, CELLS = (int(row) for row in Place)
 IMPEDANCE, ALPHA, BETA, CELL_MASS, BY_LOSS, BY_MIXING = (int(row) for row in Steel)
@@ -16,9 +16,6 @@ GIVEN = int(Bar.GIVEN)
 # these, and the impulses on the upper and the lower end of a bar and its acceleration.
 DOWN, UP, DOWN_OUT, UP_OUT, FROM_ABOVE, FROM_BELOW, ACCELERATION = range(7)
 CAME_ROWS = 7
-# Velocity that body forces may give the waves of a bar before it is written into the rings:
-# waves are kept less this, and lose digits where it is large [m/s].
-MOST_GIVEN = 1.0
 
 
 @inlined

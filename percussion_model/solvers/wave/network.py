@@ -1,4 +1,4 @@
-"""A scene's bars as the arrays that the kernels of chains go by."""
+"""A scene's bars as the arrays that the kernels of waves go by."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from percussion_model.scene.bars import (
     section_transit_time,
 )
 from percussion_model.solvers import plain_code  # noqa: F401  # kernels call functions of scenes
-from percussion_model.solvers.chain.records import Body, Chain, Fit, Joint, Place, Steel
-from percussion_model.solvers.chain.resolution import (
+from percussion_model.solvers.modal.lanes import WIDTH
+from percussion_model.solvers.setup import PISTONS, kelvin_voigt_time
+from percussion_model.solvers.wave.records import Body, Chain, Fit, Joint, Place, Steel
+from percussion_model.solvers.wave.resolution import (
     DEFAULT_STEPS,
     PULSE_STEPS,
     STEPS_OF_TWO,
     steps_for,
 )
-from percussion_model.solvers.chain.taps import WHOLE, turning, weights_of
-from percussion_model.solvers.modal.lanes import WIDTH
-from percussion_model.solvers.setup import PISTONS, kelvin_voigt_time
+from percussion_model.solvers.wave.taps import WHOLE, turning, weights_of
 
 # Where steps are shorter than the Kelvin-Voigt time, sections must have this share of their loss.
 LEAST_SPREAD = 0.99

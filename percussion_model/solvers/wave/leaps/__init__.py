@@ -1,1 +1,0 @@
-"""Leaps over quiet phases of the travelling waves."""
