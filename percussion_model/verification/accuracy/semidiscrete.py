@@ -1,7 +1,7 @@
 """The equations of the finite elements as y' = f(t, y), for general integrators.
 
 Mesh, mass, stiffness, penalty and rock law are those of `solver.name = "fem"`
-(docs/numerics.md, eq. 15). Inertia is a dense matrix, inverted once.
+(docs/numerics.md, eq. 8). Inertia is a dense matrix, inverted once.
 """
 
 from __future__ import annotations
