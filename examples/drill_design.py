@@ -1,7 +1,7 @@
 """Length and step of a piston that bring a blow into the rock best.
 
-A single blow of given energy, without a drive, by the wave solver. What counts is what stays in
-the rock once the bit is at rest: crushing and barrier, not what springs back.
+A single blow of given energy, without a drive. What counts is what stays in the rock once
+the bit is at rest: crushing and barrier, not what springs back.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ AT_REST = 20e-3  # when the bit has come to rest [s]
 STIFFNESSES = {2.5e8: GREEN, 7.5e8: BLUE, 2.25e9: ORANGE}  # K_R [N/m]
 REFERENCE = Scene()
 BIT = REFERENCE.bit.sections[0]
-CELLS = 20  # in the bit; the piston gets as many for its length, so that every length fits
+CELLS = 20  # modes of the bit; the piston gets as many for its length
 # The piston that is stepped, by the bit's length; its mass stays, so that the speed does.
 STEPPED_RATIO = 2.0
 SHARES = {"rock": BLUE, "loss": ORANGE, "piston": GREY}  # what takes or keeps energy

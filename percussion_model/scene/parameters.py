@@ -318,7 +318,7 @@ class SolverOptions(Parameters):
     cells: int | None = count(
         None,
         "-",
-        "cells or modes of the piston, or of the bit where no piston is elastic; "
+        "modes of the first elastic bar, or steps in which a wave crosses it; "
         "left out: by the solver",
         SOLVER_WAVE,
         ge=1,

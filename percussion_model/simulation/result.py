@@ -64,7 +64,7 @@ class Result:
     solver : str
         Name of the solver.
     cells : dict of int
-        Cells in each elastic bar.
+        Modes, cells or elements of each elastic bar.
     time_step : float or None
         Of the solver [s].
     wave_speed_error : float

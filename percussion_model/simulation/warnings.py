@@ -96,15 +96,15 @@ def _about_grid(result: Result) -> Iterator[str]:
     error = result.wave_speed_error
     if error > MOST_WAVE_SPEED_ERROR:
         yield (
-            f"the lengths fit no common cell: wave speeds are off by up to "
-            f"{in_digits(100 * error, 2)} %; more solver.cells bring them closer"
+            "a section is shorter than a time step and taken as long as one: its wave speed is "
+            f"off by {in_digits(100 * error, 2)} %; more solver.cells make steps shorter"
         )
     if result.scene.loss_on:
         for bar, count in result.cells.items():
             if count == 1:
                 yield (
-                    f"the {bar} is a single cell: structural loss acts between cells, so it has "
-                    "none; set more solver.cells"
+                    f"the {bar} is a single cell: waves in it are not resolved, nor is their loss; "
+                    "set more solver.cells"
                 )
 
 

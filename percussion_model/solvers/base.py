@@ -51,7 +51,7 @@ class Solver(ABC):
         Distance of grid points [s]; None where there are none. A solver that has it
         counts its steps.
     cells : dict of int
-        Cells in each elastic bar, by its name.
+        Modes, cells or elements of each elastic bar, by its name.
     wave_speed_error : float
         Largest relative error of a section's wave speed.
     operator_bytes : int

@@ -99,7 +99,7 @@ def elastic_piston(numbers: Numbers) -> np.ndarray:
 
 
 def elastic_times(numbers: Numbers) -> tuple[float, float]:
-    """Transit times of the first elastic bar, whose cells are counted, and of the shortest [s].
+    """Transit times of the first elastic bar, whose modes are counted, and of the shortest [s].
 
     Parameters
     ----------

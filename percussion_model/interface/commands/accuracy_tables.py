@@ -164,7 +164,7 @@ def _show_points(found: Study, console: Console) -> None:
         console.print("< Below the bar of the reference, which tells no more.", highlight=False)
     if any(point.fit > FITS for point in found.points):
         console.print(
-            "* Lengths that fit no common cell: the wave speed is off, and the setting is not in "
+            "* A section is shorter than a step: the wave speed is off, and the setting is not in "
             "the order of its method.",
             highlight=False,
         )

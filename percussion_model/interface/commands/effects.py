@@ -81,7 +81,7 @@ NOTE = (
     "are the least of several."
 )
 # Added where it matters.
-OF_LEAPS = "Leaps go over the same cells: the ± of their changes is that of the scatter."
+OF_LEAPS = "Leaps keep the modes: the ± of their changes is that of the scatter."
 
 NOTE_OF_FALL = (
     "± is the numerical error, by the resolution; a depth without it is known to 0.1 %. % "

@@ -237,7 +237,7 @@ def _handles(found: Study) -> list[Any]:
     if found.kind != APERIODIC:
         hollow = Line2D(
             [], [], color=style.RULE_COLOUR, linestyle="", marker="o", markersize=5,
-            markerfacecolor="white", label="hollow: lengths do not fit the cells, or grey is near",
+            markerfacecolor="white", label="hollow: a section is below a step, or grey is near",
         )  # fmt: skip
         bar = Line2D(
             [], [], color=style.SHADE_COLOUR, linewidth=6, label="the reference is known no better"

@@ -1,1 +1,1 @@
-"""Waves in a chain of bars, moved from end to end of a section as they are."""
+"""Travelling waves in two bars or a drill string: each section is a pair of delay lines."""

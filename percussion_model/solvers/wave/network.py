@@ -32,7 +32,7 @@ from percussion_model.solvers.wave.taps import WHOLE, turning, weights_of
 LEAST_SPREAD = 0.99
 # Steps in which a wave crosses any bar at least, where a scene asks for none.
 FEWEST_STEPS = 4
-# Cells in which all bars are cut at most for the sake of a short wave from outside.
+# Steps in which a wave crosses all bars at most, for the sake of a short wave from outside.
 MOST_FOR_PULSE = 1 << 14
 TOO_FINE = (
     "loss.time = {eta} s: too long for a section of {length} m in steps of {step} s: take a "
@@ -154,7 +154,7 @@ def _step_of_pulse(values, sections):
 
 @preparing
 def _time_step(numbers, sections, counts):
-    """Time step of a scene [s]: the transit time of the first elastic bar by its cells."""
+    """Time step of a scene [s]: the transit time of the first elastic bar by its steps."""
     values = numbers.values
     first = bar_transit_time(sections[: counts[0]])
     if not math.isnan(values.solver_cells):

@@ -132,7 +132,7 @@ WAVE_PAR = np.dtype(
         ("joints", "i8"),  # but for that of the piston
         ("struck", "i8"),  # the bar that the piston strikes, or the topmost
         ("most_changes", "i8"),  # of the rock law within a step; more are a loop
-        ("open_top", "i8"),  # 1: the top end of a chain without a piston reflects nothing
+        ("open_top", "i8"),  # 1: the top end of a string without a piston reflects nothing
         ("open_bottom", "i8"),  # 1: nor does the lower end of the bit
         ("pulse", "f8"),  # force of a wave that comes down from there [N]
         ("pulse_end", "f8"),  # [s]
