@@ -133,7 +133,7 @@ def effect_variants(scene: Scene) -> Iterator[Variant]:
     yield from _rock(scene)
     yield from _bars(scene)
     yield from _string(scene)
-    if scene.solver_name in ("wave", "modal"):
+    if scene.solver_name == "modal":
         is_on = scene.solver.leaps
         # Leaps are no effect but an accelerator: a step without them is the same step.
         yield Variant(LEAPS, "off" if is_on else "on", {"solver.leaps": not is_on})

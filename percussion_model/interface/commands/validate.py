@@ -39,7 +39,6 @@ def validate(
     common.check_outputs(out, json_file)
     common.load_numba()
     chosen = load(experiments or ())
-    solvers = {"wave" if one.scene.effects.string else "modal" for one in chosen}
     claimed = None
     if out is not None:
         claimed = common.claim(
@@ -47,7 +46,7 @@ def validate(
             scenes={one.name: one.scene for one in chosen},
             files={name: common.digest(Path(name)) for name in experiments or ()},
         )  # fmt: skip
-    common.tell_of_compiling(*sorted(solvers))
+    common.tell_of_compiling("wave")
     with count_bar("fits") as progress:
         found = compare(chosen, variants, progress)
     common.write_json(json_file, found.to_dict())

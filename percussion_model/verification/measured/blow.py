@@ -75,9 +75,8 @@ def resolved(scene: Scene, step: float = TIME_STEP) -> Scene:
     """The scene by waves, with cells that such a time step crosses [s]."""
     first = next(iter(scene.bars.values()))
     transit = sum(one.length / one.wave_speed for one in first.sections)
-    solver = "wave" if scene.effects.string else "modal"
     cells = max(1, round(transit / step))
-    return scene.replace(**{"solver.name": solver, "solver.cells": cells, "solver.leaps": False})
+    return scene.replace(**{"solver.name": "wave", "solver.cells": cells})
 
 
 def at_speed(scene: Scene, speed: float | None) -> Scene:
