@@ -9,8 +9,8 @@ from typing import Any
 from numba import literal_unroll
 
 from percussion_model.components import COMPONENTS
-from percussion_model.physics.drive import drive_force
 from percussion_model.physics.kernel import composed, merged
+from percussion_model.physics.loads import drive_force
 from percussion_model.physics.records import LEDGER_ENTRIES, PEAK_FIELDS, Piston
 from percussion_model.physics.rock import hole_depth
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 from percussion_model.physics.blows import end_with_blow
-from percussion_model.physics.body import pass_time
 from percussion_model.physics.kernel import inlined, kernel, merged
+from percussion_model.physics.loads import pass_time
 from percussion_model.physics.readings import fill_ledger, fill_motion
 from percussion_model.physics.records import Mode, Piston, Status
 from percussion_model.physics.reference import refer

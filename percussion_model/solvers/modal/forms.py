@@ -8,8 +8,7 @@ from __future__ import annotations
 
 from percussion_model.physics.kernel import inlined, kernel
 from percussion_model.physics.records import Mode, Piston, RockKind
-from percussion_model.physics.rock import is_loading, origin
-from percussion_model.physics.rock_line import is_curved
+from percussion_model.physics.rock import is_curved, is_loading, origin
 from percussion_model.solvers.modal.bar import (
     BIT,
     LOAD,

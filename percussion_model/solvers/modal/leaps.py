@@ -6,8 +6,8 @@ import math
 from typing import NamedTuple
 
 from percussion_model.physics.blows import push_checkpoint
-from percussion_model.physics.drive import room_to_turn
 from percussion_model.physics.kernel import kernel, merged
+from percussion_model.physics.loads import room_to_turn
 from percussion_model.physics.records import Mode, RockKind
 from percussion_model.solvers.modal.change import end_mode
 from percussion_model.solvers.modal.near import book_way, present_look, ready, watch_barrier

@@ -8,14 +8,16 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from percussion_model.physics.blows import push_checkpoint
-from percussion_model.physics.body import (
+from percussion_model.physics.kernel import inlined, kernel, merged
+from percussion_model.physics.loads import (
     bit_acceleration,
     book_bit_load,
     book_piston_load,
+    drive_force,
     piston_acceleration,
+    room_to_turn,
+    switch_drive,
 )
-from percussion_model.physics.drive import drive_force, room_to_turn, switch_drive
-from percussion_model.physics.kernel import inlined, kernel, merged
 from percussion_model.physics.records import Mode, Piston
 from percussion_model.physics.rock import (
     barrier_level,

@@ -11,9 +11,13 @@ from percussion_model.physics.blows import (
     start_blow,
     starts_blow,
 )
-from percussion_model.physics.body import piston_acceleration, time_to_cover
-from percussion_model.physics.drive import drive_force, room_to_turn
 from percussion_model.physics.kernel import inlined, kernel, merged
+from percussion_model.physics.loads import (
+    drive_force,
+    piston_acceleration,
+    room_to_turn,
+    time_to_cover,
+)
 from percussion_model.physics.records import Mode, Piston
 from percussion_model.solvers.modal.bar import (
     LOW,

@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from percussion_model.physics.body import bit_acceleration, time_to_cover
 from percussion_model.physics.kernel import inlined, kernel, merged
+from percussion_model.physics.loads import bit_acceleration, time_to_cover
 from percussion_model.physics.records import Mode, RockKind
 from percussion_model.physics.rock import barrier_off, damping, stiffness
 from percussion_model.solvers.modal.between import (

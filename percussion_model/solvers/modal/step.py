@@ -9,35 +9,34 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from percussion_model.physics.blows import push_checkpoint
-from percussion_model.physics.body import (
+from percussion_model.physics.kernel import inlined, kernel, merged
+from percussion_model.physics.loads import (
     bit_acceleration,
     book_bit_load,
     book_piston_load,
+    drive_force,
     hold_components,
     pass_time,
     piston_acceleration,
+    switch_drive,
 )
-from percussion_model.physics.drive import drive_force, switch_drive
-from percussion_model.physics.kernel import inlined, kernel, merged
 from percussion_model.physics.records import Mode, Piston, RockKind
 from percussion_model.physics.rock import (
+    Line,
+    Place,
     book_crushed,
     book_dashpot,
     crush,
+    crushed_on_line,
     damping,
+    is_curved,
+    line_between,
     origin,
     overcomes_barrier,
+    place_at,
     recoverable,
     recoverable_at,
     stiffness,
-)
-from percussion_model.physics.rock_line import (
-    Line,
-    Place,
-    crushed_on_line,
-    is_curved,
-    line_between,
-    place_at,
 )
 from percussion_model.solvers.modal.bar import (
     Ends,

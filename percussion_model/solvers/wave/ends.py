@@ -13,15 +13,16 @@ from percussion_model.physics.blows import (
     start_blow,
     starts_blow,
 )
-from percussion_model.physics.body import (
+from percussion_model.physics.kernel import inlined, kernel, merged
+from percussion_model.physics.loads import (
     bit_acceleration,
     book_bit_load,
+    drive_force,
     move_to_components,
     pass_time,
     piston_acceleration,
+    switch_drive,
 )
-from percussion_model.physics.drive import drive_force, switch_drive
-from percussion_model.physics.kernel import inlined, kernel, merged
 from percussion_model.physics.records import Piston
 from percussion_model.solvers.wave.bar import (
     face_velocities,

@@ -8,14 +8,14 @@ waves to the ends, contact and rock in closed form, loss, the other half
 from __future__ import annotations
 
 from percussion_model.physics.blows import push_checkpoint
-from percussion_model.physics.body import (
+from percussion_model.physics.kernel import kernel, merged
+from percussion_model.physics.loads import (
     book_bit_load,
     book_piston_load,
+    drive_force,
     hold_components,
     piston_acceleration,
 )
-from percussion_model.physics.drive import drive_force
-from percussion_model.physics.kernel import kernel, merged
 from percussion_model.physics.records import Mode, Piston
 from percussion_model.solvers.wave.bar import add_velocity
 from percussion_model.solvers.wave.ends import meet, outer_waves

@@ -9,14 +9,15 @@ from __future__ import annotations
 
 import math
 
-from percussion_model.physics.body import (
+from percussion_model.physics.kernel import kernel, merged
+from percussion_model.physics.loads import (
     bit_acceleration,
     book_piston_load,
+    drive_force,
     piston_acceleration,
+    room_to_turn,
     time_to_cover,
 )
-from percussion_model.physics.drive import drive_force, room_to_turn
-from percussion_model.physics.kernel import kernel, merged
 from percussion_model.physics.records import Mode, Piston
 from percussion_model.physics.rock import recoverable
 from percussion_model.solvers.wave.bar import (

@@ -11,13 +11,8 @@ from __future__ import annotations
 import math
 
 from percussion_model.physics.blows import push_checkpoint
-from percussion_model.physics.body import (
-    bit_acceleration,
-    bit_load,
-    book_bit_load,
-    time_to_cover,
-)
 from percussion_model.physics.kernel import kernel, merged
+from percussion_model.physics.loads import bit_acceleration, bit_load, book_bit_load, time_to_cover
 from percussion_model.physics.records import Mode, RockKind
 from percussion_model.physics.rock import (
     barrier_level,

@@ -8,10 +8,9 @@ mode ends or the gap closes (docs/numerics.md, section 5).
 
 from __future__ import annotations
 
-from percussion_model.physics.body import bit_acceleration
-from percussion_model.physics.drive import drive_force
 from percussion_model.physics.elementary import expm1
 from percussion_model.physics.kernel import kernel, merged
+from percussion_model.physics.loads import bit_acceleration, drive_force
 from percussion_model.physics.records import Mode, Piston
 from percussion_model.physics.rock import REST_VELOCITY, damping, origin, stiffness
 from percussion_model.solvers.wave.bar import strain_offset
