@@ -9,10 +9,20 @@ import numpy as np
 from percussion_model.physics.kernel import inlined, kernel, merged
 from percussion_model.physics.records import Mode, RockKind
 from percussion_model.physics.rock import book_dashpot, damping
-from percussion_model.solvers.modal.bar import LOAD, SOFT, STIFF, TINY, Q, V, row_sum
-from percussion_model.solvers.modal.forms import follows_form, form_wanted, refresh_loads
+from percussion_model.solvers.modal.bars import (
+    LOAD,
+    SOFT,
+    STIFF,
+    TINY,
+    Q,
+    V,
+    follows_form,
+    form_wanted,
+    refresh_loads,
+    row_sum,
+)
 from percussion_model.solvers.modal.lanes import WIDTH, load, spread, store, total
-from percussion_model.solvers.modal.records import JOINED, End, Go, Shape
+from percussion_model.solvers.modal.records import JOINED, LONGEST_HOP, STEP, End, Go, Shape
 
 # Rows of the pairs in `Bars.w`: about rest, and the load of a rigid one; where a search is, or the
 # pending leap ends. As numbers, not as constants for each of which kernels would be compiled.
@@ -24,13 +34,14 @@ LOW, SPEED, TOP, BIT, BIT_SPEED, SHIFT, YIELDS, PISTON, PISTON_SPEED, PULL, SQUA
 SHAPE_LOW, SHAPE_TOP, SHAPE_BIT, SHAPE_PISTON = (
     int(row) for row in (Shape.LOW, Shape.TOP, Shape.BIT, Shape.PISTON)
 )
-
-
 # Modes that have less than this share of the energy of vibration make no pairs, and pairs are left
 # out that have less than the second together, or could hold less than such a share of the load.
 NO_SHARE, LEAST_SHARE, LEAST_FORCE = 1e-12, 1e-10, 1e-5
 # Steps between two looks at which pairs are needed: the highest die soon.
 FIRST_STRIDE = 4
+# Modes that have less than this share of the energy of vibration together are not looked at; at
+# least so many are. With 1e-6 cycles were missed where the bit just touches the rock.
+SLIGHT_SHARE, FEWEST_MODES = 1e-9, 4
 
 
 class Sums(NamedTuple):
@@ -503,3 +514,41 @@ def take_modes(par, s, bars, n):
 def drop_pairs(par, s, bars):
     """Go back to offsets and velocities of the form's modes; book what was lost."""
     take_modes(par, s, bars, book_losses(s, bars))
+
+
+class Moving(NamedTuple):
+    """What moves of some pairs."""
+
+    energy: float  # of vibration [J]
+    modes: int  # that hold next to all of it
+    level: int  # of a look: two for each period of the highest of them
+
+
+@kernel
+def moving(s, bars, x, first):
+    """Look which of the pairs in two rows of `x` move."""
+    ends, energy = bars.laws.ends[s.law], energy_of_pairs(s, bars, x, first)
+    least, above, modes = 2.0 * SLIGHT_SHARE * energy, 0.0, s.pairs
+    while modes > FEWEST_MODES:
+        if modes % WIDTH == 0 and modes > WIDTH:
+            both = above + total(size_of(ends, x, first, modes - WIDTH))
+            if both <= least:
+                modes, above = modes - WIDTH, both
+                continue
+        q, v = x[first, modes - 1], x[first + 1, modes - 1]
+        above += v * v + ends[SQUARE, modes - 1] * q * q
+        if above > least:
+            break
+        modes -= 1
+    level, n = STEP + 1, bars.laws.sizes[s.law]
+    while level < LONGEST_HOP and 2 * modes <= n:
+        n //= 2
+        level += 1
+    return Moving(energy, modes, level)
+
+
+@kernel
+def taken_so_far(par, s, bars):
+    """What the dashpot has taken of the pairs until where the search is [J]."""
+    left = to_be_taken(bars.laws.taken[s.law], bars.w, AT, s.pairs)
+    return damping(s) * (s.takes - left)

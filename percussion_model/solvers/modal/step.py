@@ -38,38 +38,39 @@ from percussion_model.physics.rock import (
     recoverable_at,
     stiffness,
 )
-from percussion_model.solvers.modal.bar import (
+from percussion_model.solvers.modal.bars import (
     Ends,
     bit_kinetic,
-    end_after,
+    follows_form,
+    free_low_after,
     low_after,
     move_free,
+    refresh_loads,
     take,
     try_move,
 )
-from percussion_model.solvers.modal.between import End, late_force, turns_between
-from percussion_model.solvers.modal.forms import follows_form, refresh_loads
-from percussion_model.solvers.modal.lanes import WIDTH
-from percussion_model.solvers.modal.narrow import beyond, level_below
-from percussion_model.solvers.modal.piston import (
+from percussion_model.solvers.modal.ends import (
+    CHECKPOINT,
+    End,
+    beyond,
     book_contact,
-    flip_contact,
-    has_piston,
-    park,
-    switches,
-    time_of,
-    unpark,
-)
-from percussion_model.solvers.modal.records import STEP
-from percussion_model.solvers.modal.rock_end import (
     change_mode,
     end_standstill,
+    flip_contact,
+    has_piston,
+    late_force,
+    level_below,
     look,
+    park,
     passed,
+    switches,
+    time_of,
+    turns_between,
+    unpark,
 )
+from percussion_model.solvers.modal.lanes import WIDTH
+from percussion_model.solvers.modal.records import STEP
 
-# Steps after which the running force of a standstill is noted.
-CHECKPOINT = 64
 # Lines that are taken for the way of a step on a curve, until they change it by no more than this.
 MOST_TRIES, SETTLED = 8, 1e-6
 # Loading on a curve may bend a step by so many times as much as unloading; and by so many times
@@ -200,7 +201,7 @@ def try_step(par, s, bars, level):
         if s.parked == 0:
             low_p = 0.0
             if par.piston == Piston.ELASTIC:
-                low_p = end_after(bars.wp, bars.shape_p, bars.move_p[level], bars.wp.shape[1])
+                low_p = free_low_after(bars.wp, bars.shape_p, bars.move_p[level], bars.wp.shape[1])
         gap = top - (s.u_p + way_p + low_p)
     work = C * path * path / h
     return Trial(
