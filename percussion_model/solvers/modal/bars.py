@@ -351,16 +351,22 @@ def settle(par, s, bars, low):
     s.v_b = v_b
 
 
+@inlined
+def tip_of(par, s):
+    """Place of the bit's top from its mean [m]."""
+    return s.top - s.at_b / par.mass_b
+
+
 @kernel
 def leave_out(par, s, bars):
     """Leave out modes that have died away."""
     before, n = bar_energy(s, bars), s.active
-    low, tip = s.low, s.top - s.at_b / par.mass_b
+    low, tip = s.low, tip_of(par, s)
     trim(par, s, bars)
     if s.active < n:
         settle(par, s, bars, low)
         s.e_loss += before - bar_energy(s, bars)
-        s.offset += tip - (s.top - s.at_b / par.mass_b)
+        s.offset += tip - tip_of(par, s)
 
 
 @kernel
@@ -391,7 +397,7 @@ def take_form(s, bars, form, n):
 def change_spring(par, s, bars):
     """Go to the form that the present mode wants, with the penetration that it has."""
     form, low = form_wanted(par, s), s.p - origin(s)
-    before, tip = bar_energy(s, bars), s.top - s.at_b / par.mass_b
+    before, tip = bar_energy(s, bars), tip_of(par, s)
     if form == s.form:
         if low != s.low:
             shift(s, bars, low - s.low)
@@ -404,7 +410,7 @@ def change_spring(par, s, bars):
     shift(s, bars, uniform)
     settle(par, s, bars, low)
     s.e_loss += before - bar_energy(s, bars)
-    s.offset += tip - (s.top - s.at_b / par.mass_b)
+    s.offset += tip - tip_of(par, s)
 
 
 @kernel
@@ -473,4 +479,36 @@ def part(par, s, bars):
 @inlined
 def gap_of(par, s):
     """Gap between piston and bit by the places of their ends [m]."""
-    return s.u_b + (s.top - s.at_b / par.mass_b) - (s.u_p + s.low_p) + s.offset
+    return s.u_b + tip_of(par, s) - (s.u_p + s.low_p) + s.offset
+
+
+class Flight(NamedTuple):
+    """Where a piston is that flies alone."""
+
+    way: float  # of its mean [m]
+    low: float  # offset of its low end, or the most that it may be where the piston waits [m]
+    gap: float  # between that end and the bit's top [m]
+
+
+@inlined
+def way_alone(s, h):
+    """How far the mean of a piston that touches nothing goes in `h` [m]."""
+    return h * (s.v_p + 0.5 * h * s.a_p)
+
+
+@inlined
+def flight_of(par, s, bars, level, h, way_b, tip):
+    """Where a piston that touches nothing is `h` later, after a move of 2^level ticks.
+
+    Parameters
+    ----------
+    way_b, tip : float
+        How far the bit's mean has gone, and where its top is from that then [m].
+    """
+    way, low = way_alone(s, h), 0.0
+    top = s.u_b + way_b + tip + s.offset
+    if s.parked == 1:
+        low = s.spread_p
+    elif par.piston == Piston.ELASTIC:
+        low = free_low_after(bars.wp, bars.shape_p, bars.move_p[level], bars.wp.shape[1])
+    return Flight(way, low, top - (s.u_p + way + low))

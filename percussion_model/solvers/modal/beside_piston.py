@@ -19,7 +19,7 @@ from percussion_model.physics.loads import (
 from percussion_model.physics.records import Mode, Piston
 from percussion_model.physics.rock import crush, damping, origin, recoverable, stiffness
 from percussion_model.physics.state import CHECKPOINTS
-from percussion_model.solvers.modal.bars import free_low_after, move_free
+from percussion_model.solvers.modal.bars import flight_of, move_free, way_alone
 from percussion_model.solvers.modal.ends import (
     CHECKPOINT,
     End,
@@ -32,6 +32,7 @@ from percussion_model.solvers.modal.ends import (
     late_peak,
     level_below,
     passed,
+    push_of,
     squared_between,
     switches,
     time_of,
@@ -54,7 +55,7 @@ from percussion_model.solvers.modal.pairs import (
     moving,
     present_sums,
     sum_of,
-    to_be_taken,
+    taken_so_far,
     touch_of,
 )
 from percussion_model.solvers.modal.records import LONGEST_STRIDE, STEP
@@ -139,9 +140,8 @@ def touching(par, s, bars, ticks, h, v_p):
     """
     found = touch_of(s, bars, bars.rows, 0)
     then = found.speed / par.mass_p
-    contact = par.mass_p * (s.a_p + (v_p - then) / h)
     age = s.time + ticks - s.closed_at
-    touch = contact if age < par.ringing else par.mass_p * s.a_p - found.pull
+    contact, touch = push_of(par, s, h, v_p, then, age, found.pull)
     # by the mean as well, since the force may have dipped between looks; not at once
     parts = (touch < 0.0 or contact < 0.0) and (age > 0 or h > par.tick)
     return found.piston, then, contact, touch, parts
@@ -161,14 +161,9 @@ def look_at(par, s, bars, level, ticks, before):
         u_r += (at_p - s.at_p) / par.mass_p
     elif has_piston(par):
         time = par.tick * (ticks + (1 << level))
-        way_p = time * (s.v_p + 0.5 * time * s.a_p)
-        u_r += way_p
-        if s.parked == 1:
-            low_p = s.spread_p
-        elif par.piston == Piston.ELASTIC:
-            low_p = free_low_after(bars.wp, bars.shape_p, bars.move_p[level], bars.wp.shape[1])
-        top = s.u_b + way_b + (sums.top - sums.bit / par.mass_b) + s.offset
-        gap = top - (s.u_p + way_p + low_p)
+        flight = flight_of(par, s, bars, level, time, way_b, sums.top - sums.bit / par.mass_b)
+        u_r += flight.way
+        low_p, gap = flight.low, flight.gap
         flips = gap < 0.0
     return Look(sums, p, force, u_r, low_p, gap, at_p, v_p, contact, flips)
 
@@ -190,7 +185,7 @@ def book_touch(par, s, h, look):
 def book_flight(par, s, h, v_b, look):
     """Book what the piston does alone for `h`, beside a bit that had a velocity."""
     push = drive_force(par, s)
-    way, a = h * (s.v_p + 0.5 * h * s.a_p), s.a_p - (s.v_b - v_b) / h
+    way, a = way_alone(s, h), s.a_p - (s.v_b - v_b) / h
     # the stroke's turning point may lie within
     turn = -(s.v_p - v_b) / a if a != 0.0 else -1.0
     if 0.0 < turn < h and s.v_p < v_b:
@@ -303,7 +298,7 @@ def go_near(par, s, bars, most, blows, events):
     C, taken, sampled, u_before = damping(s), 0.0, 0.0, s.u_r
     cutting, piston = s.mode == Mode.DFC, has_piston(par)
     if cutting and s.stride > FIRST_STRIDE:
-        taken = C * (s.takes - to_be_taken(bars.laws.taken[s.law], bars.w, PQ, s.pairs))
+        taken = taken_so_far(s, bars, PQ)
     meets = ends = turns = False
     aim, same = Aim(ENDS, -1, 0.0, 0.0), 0
     while ticks < most:
@@ -314,8 +309,7 @@ def go_near(par, s, bars, most, blows, events):
         if cutting:
             share = C * squared_between(end_of(last), end_of(look), par.tick * (1 << level))
             if sampled > 0.0 and s.w + taken + UNSURE * (sampled + share) >= s.w_r:
-                left = to_be_taken(bars.laws.taken[s.law], bars.w, PQ, s.pairs)
-                taken, sampled = C * (s.takes - left), 0.0
+                taken, sampled = taken_so_far(s, bars, PQ), 0.0
             work = taken + sampled + share
         meets = look.flips
         if meets and s.parked == 1:

@@ -50,6 +50,7 @@ from percussion_model.solvers.modal.bars import (
     piston_vibration,
     row_sum,
     standing_energy,
+    tip_of,
 )
 from percussion_model.solvers.modal.lanes import WIDTH, load, spread, store, total
 from percussion_model.solvers.modal.pairs import (
@@ -372,6 +373,23 @@ def flip_contact(par, s, bars, approach, blows, events):
 
 
 @inlined
+def push_of(par, s, h, v_p, then, age, pull):
+    """Force of a piston that touches the bit: its mean over `h`, and that at the end [N].
+
+    Parameters
+    ----------
+    v_p, then : float
+        Mean velocities of the piston at the begin and at the end [m/s].
+    age : int
+        Of the contact at the end [ticks]; a young one has but its mean.
+    pull : float
+        What accelerates the piston besides its load, at the end [N].
+    """
+    mean = par.mass_p * (s.a_p + (v_p - then) / h)
+    return mean, mean if age < par.ringing else par.mass_p * s.a_p - pull
+
+
+@inlined
 def book_contact(par, s, contact, h, time):
     """Book what piston and bit did to each other for `h` until a time, by a mean force."""
     s.i_contact += contact * h
@@ -497,7 +515,7 @@ def pass_over(par, s, bars, law, over):
         Place of the table in `Laws.over`.
     """
     w, low, v_b = bars.w, s.p - origin(s), s.v_b
-    tip, energy = s.top - s.at_b / par.mass_b, s.vibrates + besides(s, bars)
+    tip, energy = tip_of(par, s), s.vibrates + besides(s, bars)
     s.pairs = turn_into(par, s, bars, law, over, bars.laws.over[over], PQ, s.pairs)
     keep(bars.rows, 0, w, PQ, s.pairs)
     for k in range(0, s.pairs, WIDTH):
@@ -514,7 +532,7 @@ def pass_over(par, s, bars, law, over):
     ends = bars.laws.ends[law]
     s.v_b = sum_of(ends, BIT_SPEED, w, s.pairs) / par.mass_b
     s.i_bit -= par.mass_b * (s.v_b - v_b)
-    s.offset += tip - (s.top - s.at_b / par.mass_b)
+    s.offset += tip - tip_of(par, s)
     s.vibrates = energy - besides(s, bars)
     s.takes = 0.0
     if law % 2 == 1:

@@ -15,6 +15,7 @@ from percussion_model.physics.kernel import inlined, kernel, merged
 from percussion_model.physics.loads import bit_acceleration, time_to_cover
 from percussion_model.physics.records import Mode, RockKind
 from percussion_model.physics.rock import barrier_off, damping, origin, stiffness
+from percussion_model.solvers.modal.bars import way_alone
 from percussion_model.solvers.modal.ends import (
     WHOLE,
     End,
@@ -456,7 +457,7 @@ def look_through(par, s, bars, law, beside, ticks, level, count, taken, sampled,
                 apart = min(apart, par.mass_p * (s.a_p - (speed_p - touch.speed) / h))
             else:
                 apart += bars.rows[SIDE, kept] + 0.5 * beside.pull * t * t
-                apart -= (since + t) * (s.v_p + 0.5 * (since + t) * s.a_p)
+                apart -= way_alone(s, since + t)
             if apart < 0.0:
                 blocked = True
                 break
@@ -504,7 +505,7 @@ def search(par, s, bars, most, beside):
     taken, sampled, last = 0.0, 0.0, End(s.p, s.v_low, s.f_rock)
     touch = Touching(s.v_p, s.peak_time, s.peak_impulse, 0.0, 0.0)
     if s.mode == Mode.DFC and s.stride > FIRST_STRIDE:
-        taken = taken_so_far(par, s, bars)
+        taken = taken_so_far(s, bars, AT)
     now, stale = moving(s, bars, bars.w, AT), False
     while ticks < most and not ends and not (stands and ticks >= LONGEST_GLANCE):
         rest = most - ticks
@@ -546,7 +547,7 @@ def search(par, s, bars, most, beside):
         if seen.blocked:
             break
         if seen.near and sampled > 0.0:
-            taken, sampled = taken_so_far(par, s, bars), 0.0
+            taken, sampled = taken_so_far(s, bars, AT), 0.0
         elif seen.near and beside.touches:
             break
         elif seen.near or count == 0:

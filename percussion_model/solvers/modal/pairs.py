@@ -19,7 +19,8 @@ from percussion_model.solvers.modal.bars import (
     follows_form,
     form_wanted,
     refresh_loads,
-    row_sum,
+    refresh_sums,
+    tip_of,
 )
 from percussion_model.solvers.modal.lanes import WIDTH, load, spread, store, total
 from percussion_model.solvers.modal.records import JOINED, LONGEST_HOP, STEP, End, Go, Shape
@@ -229,9 +230,9 @@ def shift_pairs(s, bars, way):
 def hold_ends(par, s, bars):
     """Take the sums of fewer pairs, with the rock end and the top of the bit where they were."""
     at_b, at_p, rigid = s.at_b, s.at_p, bars.w[PQ, 0]
-    tip = s.top - at_b / par.mass_b
+    tip = tip_of(par, s)
     hold_low(s, bars, s.low, SHIFT)
-    s.offset += tip - (s.top - s.at_b / par.mass_b)
+    s.offset += tip - tip_of(par, s)
     # the bars did not go this way, so that their loads did no work
     s.vibrates -= s.a_b * (s.at_b - at_b) - bars.w[PLOAD, 0] * (bars.w[PQ, 0] - rigid)
     if s.form >= JOINED:
@@ -330,6 +331,13 @@ def to_be_taken(table, x, first, count):
         q, v = times_table(table, x, first, i + WIDTH, i)
         whole = whole + q * load(x, first, i) + v * load(x, first + 1, i)
     return total(whole)
+
+
+@kernel
+def taken_so_far(s, bars, first):
+    """What the dashpot has taken of the pairs until where they are in two rows of `Bars.w` [J]."""
+    left = to_be_taken(bars.laws.taken[s.law], bars.w, first, s.pairs)
+    return damping(s) * (s.takes - left)
 
 
 @kernel
@@ -504,10 +512,7 @@ def take_modes(par, s, bars, n):
     if s.form > 0 or par.rock == RockKind.WALL:
         n = whole
     s.active, s.law = n, -1
-    s.low = row_sum(shape, SHAPE_LOW, bars.w, Q, n)
-    s.top = row_sum(shape, SHAPE_TOP, bars.w, Q, n)
-    s.at_b = row_sum(shape, SHAPE_BIT, bars.w, Q, n)
-    s.at_p = row_sum(shape, SHAPE_PISTON, bars.w, Q, n)
+    refresh_sums(s, bars)
 
 
 @kernel
@@ -545,10 +550,3 @@ def moving(s, bars, x, first):
         n //= 2
         level += 1
     return Moving(energy, modes, level)
-
-
-@kernel
-def taken_so_far(par, s, bars):
-    """What the dashpot has taken of the pairs until where the search is [J]."""
-    left = to_be_taken(bars.laws.taken[s.law], bars.w, AT, s.pairs)
-    return damping(s) * (s.takes - left)

@@ -41,8 +41,8 @@ from percussion_model.physics.rock import (
 from percussion_model.solvers.modal.bars import (
     Ends,
     bit_kinetic,
+    flight_of,
     follows_form,
-    free_low_after,
     low_after,
     move_free,
     refresh_loads,
@@ -63,6 +63,7 @@ from percussion_model.solvers.modal.ends import (
     look,
     park,
     passed,
+    push_of,
     switches,
     time_of,
     turns_between,
@@ -190,19 +191,11 @@ def try_step(par, s, bars, level):
     way_p = contact = touch = low_p = gap = 0.0
     if joined:
         way_p = (ends.piston - s.at_p) / par.mass_p
-        contact = par.mass_p * (s.a_p + (s.v_p - ends.piston_speed / par.mass_p) / h)
-        touch = contact
-        if s.time - s.closed_at >= par.ringing:
-            touch = par.mass_p * s.a_p - ends.pull
+        then = ends.piston_speed / par.mass_p
+        contact, touch = push_of(par, s, h, s.v_p, then, s.time - s.closed_at, ends.pull)
     elif has_piston(par):
-        way_p = h * (s.v_p + 0.5 * h * s.a_p)
-        top = s.u_b + way_b + (ends.top - ends.bit / par.mass_b) + s.offset
-        low_p = s.spread_p
-        if s.parked == 0:
-            low_p = 0.0
-            if par.piston == Piston.ELASTIC:
-                low_p = free_low_after(bars.wp, bars.shape_p, bars.move_p[level], bars.wp.shape[1])
-        gap = top - (s.u_p + way_p + low_p)
+        flight = flight_of(par, s, bars, level, h, way_b, ends.top - ends.bit / par.mass_b)
+        way_p, low_p, gap = flight.way, flight.low, flight.gap
     work = C * path * path / h
     return Trial(
         h, ends, force, first, last, path, work, rock, contact, touch, way_b, way_p, low_p, gap
