@@ -13,8 +13,8 @@ from percussion_model import Scene, Simulation, simulate
 from percussion_model.physics.kernel import kernel
 from percussion_model.physics.records import EventKind
 from percussion_model.scene.bars import bar_mass, bar_transit_time
-from percussion_model.solvers.modal.bar import carry, try_move
-from percussion_model.solvers.modal.between import falls_below, least_at, parabola
+from percussion_model.solvers.modal.bars import carry, try_move
+from percussion_model.solvers.modal.ends import falls_below, least_at, parabola
 from percussion_model.solvers.modal.laws import MOST_PAIRS
 from percussion_model.solvers.modal.modes import (
     bar_modes,

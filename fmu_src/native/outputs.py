@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fmu_src.hammer.motion import INSTANT, NO_CONTACT
-from fmu_src.hammer.outputs import OF_COMPONENTS, OUTPUTS
+from fmu_src.hammer.outputs import OUTPUTS, OfBlow, Sample
 from fmu_src.native.layout import last_blow, motion_of
 from fmu_src.native.motion import (
     rate_decay,
@@ -31,38 +31,19 @@ _STORED = tuple(_WORD[name] for name in STORED)
 
 AT = {name: k for k, name in enumerate(OUTPUTS)}
 OUTPUT_COUNT = len(AT)
-# Outputs that are a field of what is read, or of the last blow.
-READ = (
-    ("hole_depth", "hole_depth"),
-    ("bit.position", "bit_position"),
-    ("bit.velocity", "bit_velocity"),
-    ("bit.force", "bit_force"),
-    ("bit.force_peak", "peak_bit_force"),
-    ("bit.impulse", "bit_impulse"),
-    ("contact.force", "contact_force"),
-    ("contact.force_peak", "peak_contact_force"),
-    ("contact.impulse", "contact_impulse"),
-    ("piston.position", "piston_position"),
-    ("piston.velocity", "piston_velocity"),
-    ("drilling_mode", "drilling_mode"),
-    *OF_COMPONENTS.items(),
+# Places of outputs that are a field of what is read, or of the last blow; the word, and the sign.
+_SOURCES = {name: one.source for name, one in OUTPUTS.items()}
+_READ = tuple(
+    (AT[name], _WORD[of.field], of.sign) for name, of in _SOURCES.items() if isinstance(of, Sample)
 )
-OF_BLOW = (
-    ("piston.stroke", "stroke"),
-    ("impact_velocity", "impact_velocity"),
-    ("blow_energy", "blow_energy"),
-    ("penetration_per_blow", "hole_advance"),
-    ("blow_time", "time"),
-    ("blow_position", "bit_position"),
+_OF_BLOW = tuple(
+    (AT[name], _BLOW_WORD[of.field]) for name, of in _SOURCES.items() if isinstance(of, OfBlow)
 )
-_READ = tuple((AT[name], _WORD[field]) for name, field in READ)
-_OF_BLOW = tuple((AT[name], _BLOW_WORD[field]) for name, field in OF_BLOW)
 RATE, FREQUENCY, EFFICIENCY = (
     AT[name] for name in ("rate_of_penetration", "blow_frequency", "transfer_efficiency")
 )
 BIT_MEAN, CONTACT_MEAN = AT["bit.force_mean"], AT["contact.force_mean"]
 BIT_PEAK, CONTACT_PEAK = AT["bit.force_peak"], AT["contact.force_peak"]
-CASING, CASING_IMPULSE = AT["casing_force"], AT["casing.impulse"]
 STRESS, RESIDUAL = AT["gauge_stress"], AT["energy_residual"]
 BLOWS, OFF_BOTTOM = AT["blow_count"], AT["off_bottom"]
 
@@ -130,8 +111,8 @@ def fill_outputs(base, flags, out):
     row = reading[0]
     settle_before(base)
     seen, hit = reading.view(np.float64), last_blow(base).view(np.float64)
-    for at, word in _READ:
-        out[at] = defined(seen[word])
+    for at, word, sign in _READ:
+        out[at] = sign * defined(seen[word])
     for at, word in _OF_BLOW:
         out[at] = defined(hit[word])
     share = rate_decay(base)
@@ -142,10 +123,11 @@ def fill_outputs(base, flags, out):
     bit_force, contact_force = defined(row.bit_force), defined(row.contact_force)
     out[BIT_MEAN] = mean_force(motion, row.bit_impulse, motion.before[0], bit_force)
     out[CONTACT_MEAN] = mean_force(motion, row.contact_impulse, motion.before[1], contact_force)
+    out[BIT_PEAK] = defined(row.peak_bit_force)
+    out[CONTACT_PEAK] = defined(row.peak_contact_force)
     if peaks and 0.0 < motion.step_size < INSTANT:
         out[BIT_PEAK] = max(out[BIT_PEAK], bit_force)
         out[CONTACT_PEAK] = max(out[CONTACT_PEAK], contact_force)
-    out[CASING], out[CASING_IMPULSE] = -defined(row.drive_force), -defined(row.drive_impulse)
     if flags & WITH_STRESS:
         out[STRESS] = read_stress(base)
     out[RESIDUAL] = residual(reading)

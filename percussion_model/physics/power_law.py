@@ -1,8 +1,9 @@
 """Loading and unloading of the rock by a power law, with chipping and with cuttings.
 
 Eqs 20b to 20e of docs/model.md. Of the penetration a part loads the rock: all of it, but for
-the step in which the rock chips at a nearly constant force. Cuttings that are left are first
-compressed again, on the line on which rock unloads from there.
+the step in which the rock chips at a nearly constant force. Cuttings that flushing leaves in the
+crater (eqs 24 and 25 of the paper, with units) are first compressed again, on the line on which
+rock unloads from there.
 """
 
 from __future__ import annotations
@@ -21,6 +22,8 @@ CHIPPING_SLOPE = 1e-4
 LEAST_RECOVERED = 1e-4
 # Halvings that find a penetration to rounding.
 MOST_TURNS = 60
+# Depth of a crater of which `rock.removed_share` is removed [m].
+CRATER = 1e-3
 
 
 @kernel
@@ -260,3 +263,20 @@ def penetration_at(par, s, force):
     if way <= par.chipping_penetration:
         return s.chipping_from + way
     return part + (1.0 - CHIPPING_SLOPE) * par.chipping_penetration
+
+
+@kernel
+def left_depth(par, depth):
+    """Depth that is left of a crater when its cuttings have been flushed (docs/model.md, 20d) [m].
+
+    Parameters
+    ----------
+    depth : float
+        Of the crater below the surface of the rock [m].
+    """
+    if par.cuttings == 0 or depth <= 0.0:
+        return 0.0
+    removed = par.removed_share * depth
+    if par.removal_exponent != 1.0:
+        removed *= exp((par.removal_exponent - 1.0) * log(depth / CRATER))
+    return max(depth - removed, 0.0)

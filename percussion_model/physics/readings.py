@@ -8,10 +8,9 @@ from typing import Any
 
 from numba import literal_unroll
 
-from percussion_model.components import COMPONENTS
-from percussion_model.physics.drive import drive_force
 from percussion_model.physics.kernel import composed, merged
-from percussion_model.physics.records import LEDGER_ENTRIES, PEAK_FIELDS, Piston
+from percussion_model.physics.loads import drive_force
+from percussion_model.physics.records import LEDGER_ENTRIES, PEAK_FIELDS, SAMPLE_COLUMNS, Piston
 from percussion_model.physics.rock import hole_depth
 
 # What a reading takes over from a state as it is.
@@ -23,19 +22,20 @@ def _nothing(s: Any, reading: Any) -> None:
     pass
 
 
-def _and_field(before: Callable, field: str) -> Callable:
+def _and_column(before: Callable, name: str, field: str) -> Callable:
     @composed
     def copy(s: Any, reading: Any) -> None:
         before(s, reading)
-        reading[field] = s[field]
+        reading[name] = s[field]
 
     return copy
 
 
-# fill_components(s, reading): write the states of components.
-fill_components = _nothing
-for _field in (field for one in COMPONENTS for field in one.fields):
-    fill_components = _and_field(fill_components, _field)
+# fill_columns(s, reading): write the columns that are fields of a state.
+fill_columns = _nothing
+for _column in SAMPLE_COLUMNS:
+    if _column.of:
+        fill_columns = _and_column(fill_columns, _column.name, _column.of)
 
 
 @merged
@@ -54,20 +54,11 @@ def fill_motion(par, s, reading, time, piston_position, bit_position):
     """
     reading.time = time
     reading.piston_position = piston_position
-    reading.piston_velocity = s.v_p
     reading.bit_position = bit_position
-    reading.bit_velocity = s.v_b
     reading.bit_end_position = s.x_r + s.p
-    reading.gap = s.gap
-    reading.relative_displacement = s.u_r
-    reading.penetration = s.p
     reading.hole_depth = hole_depth(par, s)
     reading.drive_force = drive_force(par, s)
-    reading.drilling_mode = s.mode
-    reading.bit_impulse = s.i_bit
-    reading.contact_impulse = s.i_contact
-    reading.drive_impulse = s.i_drive
-    fill_components(s, reading)
+    fill_columns(s, reading)
     if par.piston == Piston.ABSENT:
         reading.piston_position = math.nan
         reading.piston_velocity = math.nan

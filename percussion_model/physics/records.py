@@ -89,12 +89,15 @@ class Column(NamedTuple):
         For the list of columns.
     kind : str
         Type of its numbers.
+    of : str
+        Field of a state that it is as it stands; empty where a kernel computes it.
     """
 
     name: str
     unit: str
     meaning: str
     kind: str = "f8"
+    of: str = ""
 
 
 # One blow: from the first closure of the piston/bit gap after the downward
@@ -154,25 +157,30 @@ EVENT = np.dtype([(column.name, column.kind) for column in EVENT_COLUMNS], align
 SAMPLE_COLUMNS = (
     Column("time", "s", "time of the sample"),
     Column("piston_position", "m", "mean displacement of the piston since the run began"),
-    Column("piston_velocity", "m/s", "mean velocity of the piston"),
+    Column("piston_velocity", "m/s", "mean velocity of the piston", of="v_p"),
     Column("bit_position", "m", "mean displacement of the bit since the run began"),
-    Column("bit_velocity", "m/s", "mean velocity of the bit"),
+    Column("bit_velocity", "m/s", "mean velocity of the bit", of="v_b"),
     Column("bit_end_position", "m", "displacement of the bit's end at the rock"),
     Column("bit_end_velocity", "m/s", "velocity of the bit's end at the rock"),
-    Column("gap", "m", "distance between the faces of piston and bit"),
-    Column("relative_displacement", "m", "u_r of the pressure law"),
-    Column("penetration", "m", "p of the rock law, in the present drilling cycle"),
+    Column("gap", "m", "distance between the faces of piston and bit", of="gap"),
+    Column("relative_displacement", "m", "u_r of the pressure law", of="u_r"),
+    Column("penetration", "m", "p of the rock law, in the present drilling cycle", of="p"),
     Column("hole_depth", "m", "surface of the rock if the bit were unloaded now"),
     Column("bit_force", "N", "force of the bit on the rock"),
     Column("contact_force", "N", "force of the piston on the bit"),
     Column("drive_force", "N", "force of the drive on the piston, positive down"),
-    Column("drilling_mode", "", "mode of the rock law, by its number"),
+    Column("drilling_mode", "", "mode of the rock law, by its number", of="mode"),
     Column("bit_kinetic_energy", "J", "kinetic energy of the whole bit"),
-    Column("bit_impulse", "N s", "integral of the bit force since the run began"),
-    Column("contact_impulse", "N s", "integral of the contact force since the run began"),
-    Column("drive_impulse", "N s", "integral of the drive force since the run began"),
+    Column("bit_impulse", "N s", "integral of the bit force since the run began", of="i_bit"),
+    Column(
+        "contact_impulse",
+        "N s",
+        "integral of the contact force since the run began",
+        of="i_contact",
+    ),
+    Column("drive_impulse", "N s", "integral of the drive force since the run began", of="i_drive"),
     *(
-        Column(field, unit, text)
+        Column(field, unit, text, of=field)
         for one in COMPONENTS
         for field, (unit, text, _) in zip(one.fields, one.state.values(), strict=True)
     ),

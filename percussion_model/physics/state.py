@@ -1,7 +1,7 @@
 """Fields that the parameters and states of all solvers have in common.
 
 Symbols as in the paper. Modes, inputs, rock law, running sums and the blow under way:
-what `rock`, `drive`, `body` and `blows` read and write, whoever moves the bodies. A solver
+what `rock`, `loads` and `blows` read and write, whoever moves the bodies. A solver
 puts its own fields first: numba takes a record that only has more at its end for the shorter.
 """
 

@@ -66,7 +66,7 @@ def test_every_solver_sees_an_edit_of_a_function_that_its_kernels_call(tmp_path)
     compiled = kernels()
     # kept, so that they could be stale
     assert {"leaps", "fem", "rigid"} <= {path.parent.parent.name for path in compiled}
-    callee = package / "physics" / "drive.py"
+    callee = package / "physics" / "loads.py"
     text = callee.read_text(encoding="utf-8")
     assert "return s.external + " in text
     callee.write_text(text.replace("return s.external + ", "return s.external + 1000.0 + "))

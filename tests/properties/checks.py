@@ -11,7 +11,7 @@ from percussion_model.solvers.wave.ends import WIDE
 
 from percussion_model import Simulation
 from percussion_model.physics.records import SAMPLE_FIELDS, EventKind, Mode
-from percussion_model.solvers.modal.leaps import LONGEST
+from percussion_model.solvers.modal.advance import LONGEST
 from percussion_model.solvers.modal.records import STEP
 from percussion_model.solvers.wave.records import MOST_CUTS
 from tests.properties.scenes import Case

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 from percussion_model.physics.blows import end_of_step_with_blow, push_checkpoint
-from percussion_model.physics.body import hold_components
 from percussion_model.physics.kernel import kernel, merged
+from percussion_model.physics.loads import hold_components
 from percussion_model.physics.readings import fill_ledger, fill_motion
 from percussion_model.physics.records import Mode, Status
 from percussion_model.solvers.fem.bars import (

@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import math
 
-from percussion_model.physics.drive import room_to_turn
 from percussion_model.physics.kernel import inlined, kernel, merged
+from percussion_model.physics.loads import room_to_turn
 from percussion_model.physics.records import Mode, RockKind
 from percussion_model.physics.rock import (
     REST_VELOCITY,

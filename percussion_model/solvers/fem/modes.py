@@ -14,8 +14,8 @@ from percussion_model.physics.blows import (
     start_blow,
     starts_blow,
 )
-from percussion_model.physics.drive import switch_drive
 from percussion_model.physics.kernel import inlined, kernel, merged
+from percussion_model.physics.loads import switch_drive
 from percussion_model.physics.records import Mode, RockKind
 from percussion_model.physics.rock import (
     close_interface,

@@ -8,11 +8,9 @@ the stage accelerations are one complex vector x that solves
 
 from __future__ import annotations
 
-from percussion_model.physics.body import bit_acceleration, piston_acceleration
-from percussion_model.physics.drive import drive_force
 from percussion_model.physics.kernel import inlined, kernel, merged
-from percussion_model.physics.rock import damping
-from percussion_model.physics.rock_line import present_line, take_step_line
+from percussion_model.physics.loads import bit_acceleration, drive_force, piston_acceleration
+from percussion_model.physics.rock import damping, present_line, take_step_line
 from percussion_model.solvers.fem.bars import read_ahead
 from percussion_model.solvers.fem.records import Mesh, Node, Trial
 from percussion_model.solvers.fem.solve import factors, substitute

@@ -7,8 +7,7 @@ towards the contact, where two unknowns are left (docs/numerics.md, section 10).
 from __future__ import annotations
 
 from percussion_model.physics.kernel import inlined, kernel, merged
-from percussion_model.physics.rock import damping
-from percussion_model.physics.rock_line import present_line
+from percussion_model.physics.rock import damping, present_line
 from percussion_model.solvers.fem.records import Factor, Key, Mesh, Trial
 
 ROWS = len(Factor)

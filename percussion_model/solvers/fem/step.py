@@ -6,18 +6,19 @@ is one of a mean and a bend (docs/numerics.md, section 10).
 
 from __future__ import annotations
 
-from percussion_model.physics.body import book_bit_load, book_piston_load, pass_time
-from percussion_model.physics.drive import drive_force
 from percussion_model.physics.kernel import inlined, kernel, merged
+from percussion_model.physics.loads import book_bit_load, book_piston_load, drive_force, pass_time
 from percussion_model.physics.records import Mode
 from percussion_model.physics.rock import (
     book_dashpot,
     crush,
     damping,
+    is_curved,
+    line_work,
+    present_line,
     recoverable,
     spring_force,
 )
-from percussion_model.physics.rock_line import is_curved, line_work, present_line
 from percussion_model.solvers.fem.bars import read_nodes
 from percussion_model.solvers.fem.records import Mesh, Node, Trial
 from percussion_model.solvers.fem.scheme import rate_bend

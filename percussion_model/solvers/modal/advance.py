@@ -1,35 +1,331 @@
-"""Loop of the modal solver, and reading a state without touching it."""
+"""Loop of the modal solver by leaps, looks and steps, and reading a state without touching it."""
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
-from percussion_model.physics.blows import end_with_blow
-from percussion_model.physics.body import pass_time
+from percussion_model.physics.blows import end_with_blow, push_checkpoint
 from percussion_model.physics.kernel import inlined, kernel, merged
+from percussion_model.physics.loads import (
+    bit_acceleration,
+    drive_force,
+    pass_time,
+    piston_acceleration,
+    room_to_turn,
+    time_to_cover,
+)
 from percussion_model.physics.readings import fill_ledger, fill_motion
-from percussion_model.physics.records import Mode, Piston, Status
+from percussion_model.physics.records import Mode, Piston, RockKind, Status
 from percussion_model.physics.reference import refer
-from percussion_model.physics.rock import recoverable
-from percussion_model.solvers.modal.bar import (
+from percussion_model.physics.rock import (
+    barrier_level,
+    ends_standstill,
+    keep_margin,
+    overcomes_barrier,
+    recoverable,
+)
+from percussion_model.solvers.modal.bars import (
     bit_kinetic,
     elastic_of,
+    follows_form,
     kinetic_of,
     piston_vibration,
+    refresh_loads,
     sag,
 )
-from percussion_model.solvers.modal.forms import follows_form
-from percussion_model.solvers.modal.leaps import LONGEST, leap, plan
-from percussion_model.solvers.modal.near import go_near
-from percussion_model.solvers.modal.pairs import FIRST_STRIDE, drop_pairs, law_wanted
-from percussion_model.solvers.modal.piston import WHOLE, has_piston, time_of, unpark
-from percussion_model.solvers.modal.records import Task
+from percussion_model.solvers.modal.beside_piston import beside_of, book_way, go_near, present_look
+from percussion_model.solvers.modal.ends import (
+    QUIET_SHARE,
+    RINGING,
+    WHOLE,
+    at_rest,
+    end_mode,
+    end_standstill,
+    has_piston,
+    level_below,
+    park,
+    time_of,
+    unpark,
+)
+from percussion_model.solvers.modal.next_event import search
+from percussion_model.solvers.modal.pairs import (
+    AT,
+    FIRST_STRIDE,
+    PQ,
+    drop_pairs,
+    drop_tiny,
+    energy_about_rest,
+    keep,
+    law_wanted,
+    leave_out_pairs,
+    move_pairs,
+    spell_out,
+    take_pairs,
+)
+from percussion_model.solvers.modal.records import KEPT, STEP, Known, Task
 from percussion_model.solvers.modal.step import level_of_step, step
 
+# Steps after which kinetic energy that still rises is high enough.
+LONGEST_RISE = 64
+# Most ticks of a leap.
+LONGEST = 65535 * WHOLE
+# In a longer one modes may die away altogether.
+LONG = 512 * WHOLE
+# One that may not be longer because of the piston is not worth a search.
+FEWEST = 4 * WHOLE
 # Events that one step can make: of the barrier, two of the contact, of the drive, of the rock.
 MOST_EVENTS = 6
 # A time this close below a tick is that tick [ticks].
 TICK_ROUNDING = 1e-3
+
+
+@merged
+def until_drive(par, s, v, a, spread):
+    """Time before which the drive cannot turn, for a relative mean motion [s]."""
+    return time_to_cover(room_to_turn(par, s, s.u_r) - spread, s.alpha * v, s.alpha * a)
+
+
+@kernel
+def quiet_time(par, s, v_b, a_b, spread_top, spread_mean):
+    """Times before which the piston can neither meet the bit nor turn the drive [s].
+
+    Parameters
+    ----------
+    v_b, a_b : float
+        Mean motion of the bit [m/s, m/s2].
+    spread_top, spread_mean : float
+        How far its top end and its mean may be from that [m].
+    """
+    if not has_piston(par):
+        return math.inf, math.inf
+    a = piston_acceleration(par, drive_force(par, s)) - a_b
+    v = s.v_p - v_b
+    room = s.u_b - s.u_p - s.spread_p - spread_top - spread_mean
+    return time_to_cover(room, v, a), until_drive(par, s, v, a, spread_mean)
+
+
+@merged
+def take_loads(par, s, bars):
+    """Take the forces on the bodies; pairs under others are given up."""
+    push = drive_force(par, s)
+    a_p = piston_acceleration(par, push) if has_piston(par) else 0.0
+    a_b = bit_acceleration(par, s)
+    if s.law >= 0 and (a_b != s.a_b or (s.closed == 1 and a_p != s.a_p)):
+        drop_pairs(par, s, bars)
+        s.alert = 1
+    if s.law < 0:
+        refresh_loads(s, bars, a_b, a_p)
+    s.a_b, s.a_p = a_b, a_p
+
+
+@merged
+def ready(par, s, bars, law):
+    """Take the pairs that the next looks need."""
+    take_loads(par, s, bars)
+    if s.law < 0:
+        take_pairs(par, s, bars, law)
+    elif s.stride > FIRST_STRIDE:
+        leave_out_pairs(par, s, bars)
+
+
+@kernel
+def kinetic_at(s, bars, x, first):
+    """Kinetic energy of a bit alone, by pairs in two rows of `x` [J]."""
+    return kinetic_of(bars.rows, spell_out(s, bars, x, first))
+
+
+@kernel
+def highest_kinetic(s, bars):
+    """Kinetic energy of a bit at the end of its present rise, if its mode went on [J]."""
+    keep(bars.w, PQ, bars.w, AT, s.pairs)
+    highest = 0.0
+    for _ in range(LONGEST_RISE):
+        move_pairs(s, bars, bars.w, AT, STEP)
+        energy = kinetic_at(s, bars, bars.w, AT)
+        if energy <= highest:
+            break
+        highest = energy
+    return highest
+
+
+@kernel
+def watch_barrier(par, s, bars, most, events):
+    """Leave standstill where the kinetic energy of the bit passes the barrier.
+
+    Returns
+    -------
+    int
+        Ticks that the bit may go, `most` at most, before it is to be watched again; within a step
+        up to the tick in which the barrier is passed.
+    """
+    energy = energy_about_rest(s, bars, spell_out(s, bars, bars.w, PQ))
+    s.alert = 1 if energy > QUIET_SHARE * barrier_level(par, s) else 0
+    if s.alert == 0:
+        return most
+    most = min(most, WHOLE)
+    now = kinetic_of(bars.rows, bars.laws.sizes[s.law])
+    if ends_standstill(par, s, now):
+        drop_pairs(par, s, bars)
+        end_standstill(par, s, bars, events)
+        return most
+    if not overcomes_barrier(par, s, energy):
+        return most
+    ticks, level, passes = 0, level_below(most), False
+    keep(bars.w, PQ, bars.w, AT, s.pairs)
+    while level >= 0:
+        go = 1 << level
+        if ticks + go <= most:
+            keep(bars.w, AT, bars.rows, KEPT, s.pairs)
+            move_pairs(s, bars, bars.w, AT, level)
+            if overcomes_barrier(par, s, kinetic_at(s, bars, bars.w, AT)):
+                most, passes = ticks + go, True
+                keep(bars.rows, KEPT, bars.w, AT, s.pairs)
+            else:
+                ticks += go
+                if ticks == most:
+                    break
+        level -= 1
+    if passes:
+        keep_margin(par, s, highest_kinetic(s, bars))
+    return most
+
+
+class Far(NamedTuple):
+    """Ticks in which nothing can come from the piston."""
+
+    meet: int  # before it can meet the bit
+    turn: int  # before the drive can turn
+
+
+@merged
+def far_touching(par, s):
+    """As `far_ticks` of a piston that touches the bit."""
+    age = s.time - s.closed_at
+    if age < par.ringing or age * par.tick < RINGING * par.window:
+        return Far(0, 0)
+    speed = 1.0 / math.sqrt(par.mass_p) + 1.0 / math.sqrt(par.mass_b)
+    speed *= math.sqrt(max(0.0, 2.0 * s.vibrates))
+    room = room_to_turn(par, s, s.u_r)
+    return Far(0, int(min(max(room, 0.0) / (speed * par.tick + 1e-300), LONGEST)))
+
+
+@merged
+def far_ticks(par, s, bars):
+    """Ticks for which the piston can neither meet the bit nor turn the drive."""
+    if not has_piston(par):
+        return Far(LONGEST, LONGEST)
+    if s.closed == 1:
+        return far_touching(par, s)
+    if s.parked == 0:
+        return Far(0, 0)
+    size, held = math.sqrt(max(0.0, 2.0 * s.vibrates)), bars.forms.stiff[s.form]
+    spread = par.bound_t * size + abs(s.offset)
+    if held == 0.0:
+        meet, turn = quiet_time(par, s, s.v_b, s.a_b, spread, 0.0)
+    else:
+        mean = size * (1.0 / math.sqrt(held) + par.bound_b)
+        off = 2.0 * mean + abs(s.low - s.rest_low)
+        meet, turn = quiet_time(par, s, 0.0, 0.0, spread, off)
+    return Far(
+        int(min(meet / par.tick - 1.0, LONGEST)), int(min(turn / par.tick - 1.0, LONGEST))
+    )  # fmt: skip
+
+
+@kernel
+def plan(par, s, bars, law, most, events):
+    """Decide where the bit leaps to next: s.leap_end, or -1 where the piston is near.
+
+    Returns
+    -------
+    int
+        Ticks that it may go at most.
+
+    Parameters
+    ----------
+    law : int
+        By which it moves.
+    most : int
+        Ticks that it may go at most.
+    """
+    if has_piston(par) and s.parked == 0 and s.closed == 0 and s.time >= s.no_park:
+        park(par, s, bars)
+    ready(par, s, bars, law)
+    if s.mode == Mode.SS and s.alert == 1 and par.rock == RockKind.BILINEAR:
+        most = watch_barrier(par, s, bars, most, events)
+        if s.law < 0:
+            return most
+    most = at_rest(s, most)
+    far = far_ticks(par, s, bars)
+    ahead = min(most, far.turn)
+    if far.meet >= FEWEST:
+        ahead = min(ahead, far.meet)
+    elif ahead < FEWEST or (s.parked == 0 and s.closed == 0):
+        return most
+    # of a copy that is read, all is sought at once
+    s.leap_known = Known.NOT if s.live == 1 else Known.SOUGHT
+    found = search(par, s, bars, ahead, beside_of(par, s, bars, far.meet < FEWEST))
+    s.leap_known = Known.YES if found.known else Known.NOT
+    s.count_steps += found.looks
+    if found.ticks == 0:
+        return min(most, FEWEST)
+    s.leap_end = s.time + found.ticks
+    s.leap_ends = 1 if found.ends else 0
+    s.leap_peak, s.leap_contact = found.peak, found.contact
+    s.late_from, s.late_peak, s.late_contact = s.peak_from, found.late, found.late_contact
+    s.leap_time, s.leap_impulse = found.window, found.impulse
+    s.count_leaps += found.leaps
+    return most
+
+
+@kernel
+def late_peaks(par, s, bars, ticks):
+    """Find the greatest forces of a leap about to be made after s.peak_from."""
+    keep(bars.w, AT, bars.rows, KEPT, s.pairs)
+    far = far_ticks(par, s, bars)
+    s.leap_known = Known.SOUGHT
+    found = search(par, s, bars, ticks, beside_of(par, s, bars, far.meet < FEWEST))
+    keep(bars.rows, KEPT, bars.w, AT, s.pairs)
+    s.late_peak, s.late_contact = found.late, found.late_contact
+
+
+@merged
+def note_peaks(par, s, bars, ticks):
+    """Note the greatest forces of a leap about to be made."""
+    if s.mode == Mode.FF:
+        s.leap_peak = 0.0
+    s.b_peak_bit = max(s.b_peak_bit, s.leap_peak)
+    s.b_peak_contact = max(s.b_peak_contact, s.leap_contact)
+    if not time_of(par, s) + ticks * par.tick > s.peak_from:
+        return
+    if s.leap_known != Known.YES or s.late_from != s.peak_from:
+        late_peaks(par, s, bars, ticks)
+    if s.mode != Mode.FF:
+        s.peak_bit_force = max(s.peak_bit_force, s.late_peak)
+    s.peak_contact_force = max(s.peak_contact_force, s.late_contact)
+
+
+@kernel
+def leap(par, s, bars, events):
+    """Carry bit and mean motion of the piston to s.leap_end in one go."""
+    ticks, ends = s.leap_end - s.time, s.leap_ends == 1
+    s.leap_end = -1
+    if s.mode != Mode.FF or s.closed == 1:
+        note_peaks(par, s, bars, ticks)
+    if s.mode == Mode.SS:
+        push_checkpoint(s, time_of(par, s))
+    keep(bars.w, AT, bars.w, PQ, s.pairs)
+    if ticks > LONG:
+        drop_tiny(s, bars)
+    v_p = s.v_p
+    book_way(par, s, bars, ticks, present_look(par, s, bars))
+    if s.closed == 1:
+        s.i_contact += par.mass_p * (ticks * par.tick * s.a_p - (s.v_p - v_p))
+        s.peak_time, s.peak_impulse = s.leap_time, s.leap_impulse
+    if s.mode == Mode.SS:
+        push_checkpoint(s, time_of(par, s))
+    if ends:
+        end_mode(par, s, bars, events)
 
 
 @merged

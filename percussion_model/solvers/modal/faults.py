@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from percussion_model.physics.kernel import kernel
+from percussion_model.solvers.modal.advance import LONGEST
 from percussion_model.solvers.modal.lanes import WIDTH
-from percussion_model.solvers.modal.leaps import LONGEST
 from percussion_model.solvers.modal.records import JOINED, LONGEST_STRIDE, STEP
 
 # What is said, by number; facts are those that `find_fault` gives.

@@ -9,10 +9,21 @@ import numpy as np
 from percussion_model.physics.kernel import inlined, kernel, merged
 from percussion_model.physics.records import Mode, RockKind
 from percussion_model.physics.rock import book_dashpot, damping
-from percussion_model.solvers.modal.bar import LOAD, SOFT, STIFF, TINY, Q, V, row_sum
-from percussion_model.solvers.modal.forms import follows_form, form_wanted, refresh_loads
+from percussion_model.solvers.modal.bars import (
+    LOAD,
+    SOFT,
+    STIFF,
+    TINY,
+    Q,
+    V,
+    follows_form,
+    form_wanted,
+    refresh_loads,
+    refresh_sums,
+    tip_of,
+)
 from percussion_model.solvers.modal.lanes import WIDTH, load, spread, store, total
-from percussion_model.solvers.modal.records import JOINED, End, Go, Shape
+from percussion_model.solvers.modal.records import JOINED, LONGEST_HOP, STEP, End, Go, Shape
 
 # Rows of the pairs in `Bars.w`: about rest, and the load of a rigid one; where a search is, or the
 # pending leap ends. As numbers, not as constants for each of which kernels would be compiled.
@@ -24,13 +35,14 @@ LOW, SPEED, TOP, BIT, BIT_SPEED, SHIFT, YIELDS, PISTON, PISTON_SPEED, PULL, SQUA
 SHAPE_LOW, SHAPE_TOP, SHAPE_BIT, SHAPE_PISTON = (
     int(row) for row in (Shape.LOW, Shape.TOP, Shape.BIT, Shape.PISTON)
 )
-
-
 # Modes that have less than this share of the energy of vibration make no pairs, and pairs are left
 # out that have less than the second together, or could hold less than such a share of the load.
 NO_SHARE, LEAST_SHARE, LEAST_FORCE = 1e-12, 1e-10, 1e-5
 # Steps between two looks at which pairs are needed: the highest die soon.
 FIRST_STRIDE = 4
+# Modes that have less than this share of the energy of vibration together are not looked at; at
+# least so many are. With 1e-6 cycles were missed where the bit just touches the rock.
+SLIGHT_SHARE, FEWEST_MODES = 1e-9, 4
 
 
 class Sums(NamedTuple):
@@ -218,9 +230,9 @@ def shift_pairs(s, bars, way):
 def hold_ends(par, s, bars):
     """Take the sums of fewer pairs, with the rock end and the top of the bit where they were."""
     at_b, at_p, rigid = s.at_b, s.at_p, bars.w[PQ, 0]
-    tip = s.top - at_b / par.mass_b
+    tip = tip_of(par, s)
     hold_low(s, bars, s.low, SHIFT)
-    s.offset += tip - (s.top - s.at_b / par.mass_b)
+    s.offset += tip - tip_of(par, s)
     # the bars did not go this way, so that their loads did no work
     s.vibrates -= s.a_b * (s.at_b - at_b) - bars.w[PLOAD, 0] * (bars.w[PQ, 0] - rigid)
     if s.form >= JOINED:
@@ -319,6 +331,13 @@ def to_be_taken(table, x, first, count):
         q, v = times_table(table, x, first, i + WIDTH, i)
         whole = whole + q * load(x, first, i) + v * load(x, first + 1, i)
     return total(whole)
+
+
+@kernel
+def taken_so_far(s, bars, first):
+    """What the dashpot has taken of the pairs until where they are in two rows of `Bars.w` [J]."""
+    left = to_be_taken(bars.laws.taken[s.law], bars.w, first, s.pairs)
+    return damping(s) * (s.takes - left)
 
 
 @kernel
@@ -493,13 +512,41 @@ def take_modes(par, s, bars, n):
     if s.form > 0 or par.rock == RockKind.WALL:
         n = whole
     s.active, s.law = n, -1
-    s.low = row_sum(shape, SHAPE_LOW, bars.w, Q, n)
-    s.top = row_sum(shape, SHAPE_TOP, bars.w, Q, n)
-    s.at_b = row_sum(shape, SHAPE_BIT, bars.w, Q, n)
-    s.at_p = row_sum(shape, SHAPE_PISTON, bars.w, Q, n)
+    refresh_sums(s, bars)
 
 
 @kernel
 def drop_pairs(par, s, bars):
     """Go back to offsets and velocities of the form's modes; book what was lost."""
     take_modes(par, s, bars, book_losses(s, bars))
+
+
+class Moving(NamedTuple):
+    """What moves of some pairs."""
+
+    energy: float  # of vibration [J]
+    modes: int  # that hold next to all of it
+    level: int  # of a look: two for each period of the highest of them
+
+
+@kernel
+def moving(s, bars, x, first):
+    """Look which of the pairs in two rows of `x` move."""
+    ends, energy = bars.laws.ends[s.law], energy_of_pairs(s, bars, x, first)
+    least, above, modes = 2.0 * SLIGHT_SHARE * energy, 0.0, s.pairs
+    while modes > FEWEST_MODES:
+        if modes % WIDTH == 0 and modes > WIDTH:
+            both = above + total(size_of(ends, x, first, modes - WIDTH))
+            if both <= least:
+                modes, above = modes - WIDTH, both
+                continue
+        q, v = x[first, modes - 1], x[first + 1, modes - 1]
+        above += v * v + ends[SQUARE, modes - 1] * q * q
+        if above > least:
+            break
+        modes -= 1
+    level, n = STEP + 1, bars.laws.sizes[s.law]
+    while level < LONGEST_HOP and 2 * modes <= n:
+        n //= 2
+        level += 1
+    return Moving(energy, modes, level)

@@ -11,9 +11,9 @@ from percussion_model.physics.kernel import plain
 from percussion_model.physics.records import Piston, RockKind
 from percussion_model.scene.bars import bar_transit_time
 from percussion_model.solvers import plain_code  # noqa: F401  # kernels call functions of scenes
+from percussion_model.solvers.modal.ends import RINGING
 from percussion_model.solvers.modal.laws import laws_of
 from percussion_model.solvers.modal.modes import Modes
-from percussion_model.solvers.modal.piston import RINGING
 from percussion_model.solvers.modal.records import STEP, Forms, Laws
 from percussion_model.solvers.modal.resolution import asked_modes, default_modes
 from percussion_model.solvers.modal.tables import (

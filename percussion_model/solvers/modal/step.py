@@ -9,68 +9,69 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from percussion_model.physics.blows import push_checkpoint
-from percussion_model.physics.body import (
+from percussion_model.physics.kernel import inlined, kernel, merged
+from percussion_model.physics.loads import (
     bit_acceleration,
     book_bit_load,
     book_piston_load,
+    drive_force,
     hold_components,
     pass_time,
     piston_acceleration,
+    switch_drive,
 )
-from percussion_model.physics.drive import drive_force, switch_drive
-from percussion_model.physics.kernel import inlined, kernel, merged
 from percussion_model.physics.records import Mode, Piston, RockKind
 from percussion_model.physics.rock import (
+    Line,
+    Place,
     book_crushed,
     book_dashpot,
     crush,
+    crushed_on_line,
     damping,
+    is_curved,
+    line_between,
     origin,
     overcomes_barrier,
+    place_at,
     recoverable,
     recoverable_at,
     stiffness,
 )
-from percussion_model.physics.rock_line import (
-    Line,
-    Place,
-    crushed_on_line,
-    is_curved,
-    line_between,
-    place_at,
-)
-from percussion_model.solvers.modal.bar import (
+from percussion_model.solvers.modal.bars import (
     Ends,
     bit_kinetic,
-    end_after,
+    flight_of,
+    follows_form,
     low_after,
     move_free,
+    refresh_loads,
     take,
     try_move,
 )
-from percussion_model.solvers.modal.between import End, late_force, turns_between
-from percussion_model.solvers.modal.forms import follows_form, refresh_loads
-from percussion_model.solvers.modal.lanes import WIDTH
-from percussion_model.solvers.modal.narrow import beyond, level_below
-from percussion_model.solvers.modal.piston import (
+from percussion_model.solvers.modal.ends import (
+    CHECKPOINT,
+    End,
+    beyond,
     book_contact,
-    flip_contact,
-    has_piston,
-    park,
-    switches,
-    time_of,
-    unpark,
-)
-from percussion_model.solvers.modal.records import STEP
-from percussion_model.solvers.modal.rock_end import (
     change_mode,
     end_standstill,
+    flip_contact,
+    has_piston,
+    late_force,
+    level_below,
     look,
+    park,
     passed,
+    push_of,
+    switches,
+    time_of,
+    turns_between,
+    unpark,
 )
+from percussion_model.solvers.modal.lanes import WIDTH
+from percussion_model.solvers.modal.records import STEP
 
-# Steps after which the running force of a standstill is noted.
-CHECKPOINT = 64
 # Lines that are taken for the way of a step on a curve, until they change it by no more than this.
 MOST_TRIES, SETTLED = 8, 1e-6
 # Loading on a curve may bend a step by so many times as much as unloading; and by so many times
@@ -190,19 +191,11 @@ def try_step(par, s, bars, level):
     way_p = contact = touch = low_p = gap = 0.0
     if joined:
         way_p = (ends.piston - s.at_p) / par.mass_p
-        contact = par.mass_p * (s.a_p + (s.v_p - ends.piston_speed / par.mass_p) / h)
-        touch = contact
-        if s.time - s.closed_at >= par.ringing:
-            touch = par.mass_p * s.a_p - ends.pull
+        then = ends.piston_speed / par.mass_p
+        contact, touch = push_of(par, s, h, s.v_p, then, s.time - s.closed_at, ends.pull)
     elif has_piston(par):
-        way_p = h * (s.v_p + 0.5 * h * s.a_p)
-        top = s.u_b + way_b + (ends.top - ends.bit / par.mass_b) + s.offset
-        low_p = s.spread_p
-        if s.parked == 0:
-            low_p = 0.0
-            if par.piston == Piston.ELASTIC:
-                low_p = end_after(bars.wp, bars.shape_p, bars.move_p[level], bars.wp.shape[1])
-        gap = top - (s.u_p + way_p + low_p)
+        flight = flight_of(par, s, bars, level, h, way_b, ends.top - ends.bit / par.mass_b)
+        way_p, low_p, gap = flight.way, flight.low, flight.gap
     work = C * path * path / h
     return Trial(
         h, ends, force, first, last, path, work, rock, contact, touch, way_b, way_p, low_p, gap

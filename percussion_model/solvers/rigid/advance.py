@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from percussion_model.physics.body import hold_components
 from percussion_model.physics.kernel import kernel
+from percussion_model.physics.loads import hold_components
 from percussion_model.physics.readings import fill_ledger, fill_motion
 from percussion_model.physics.records import Status
 from percussion_model.physics.rock import recoverable

@@ -11,16 +11,17 @@ from percussion_model.physics.blows import (
     start_blow,
     starts_blow,
 )
-from percussion_model.physics.drive import room_to_turn, turn_drive
 from percussion_model.physics.kernel import kernel
+from percussion_model.physics.loads import room_to_turn, turn_drive
 from percussion_model.physics.records import EventKind, Mode, RockKind
 from percussion_model.physics.rock import (
     close_interface,
     end_loading,
     end_unloading,
+    is_curved,
     resume_cycle,
+    take_line,
 )
-from percussion_model.physics.rock_line import is_curved, take_line
 from percussion_model.solvers.rigid.forces import (
     acceleration,
     acceleration_doubt,

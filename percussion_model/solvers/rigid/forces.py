@@ -5,18 +5,17 @@ from __future__ import annotations
 import math
 
 from percussion_model.physics.blows import LAST_SHARE
-from percussion_model.physics.body import bit_load, piston_acceleration
-from percussion_model.physics.drive import drive_force
 from percussion_model.physics.kernel import kernel
+from percussion_model.physics.loads import bit_load, drive_force, piston_acceleration
 from percussion_model.physics.power_law import loading_force
 from percussion_model.physics.records import Mode, Piston, RockKind
 from percussion_model.physics.rock import (
     damping,
     enter_standstill,
     is_loading,
+    present_line,
     recoverable,
 )
-from percussion_model.physics.rock_line import present_line
 from percussion_model.solvers.rigid.motion import oscillate
 
 # Relative rounding of an acceleration, and of a force that is the difference of two lengths.

@@ -4,22 +4,24 @@ from __future__ import annotations
 
 import math
 
-from percussion_model.physics.body import (
+from percussion_model.physics.kernel import kernel
+from percussion_model.physics.loads import (
     book_bit_load,
     book_piston_load,
+    drive_force,
     pass_time,
     piston_acceleration,
 )
-from percussion_model.physics.drive import drive_force
-from percussion_model.physics.kernel import kernel
 from percussion_model.physics.records import Mode, Piston, RockKind
 from percussion_model.physics.rock import (
     book_dashpot,
     crush,
+    is_curved,
+    line_work,
+    present_line,
     recoverable,
     recoverable_at,
 )
-from percussion_model.physics.rock_line import is_curved, line_work, present_line
 from percussion_model.solvers.rigid.forces import (
     acceleration,
     bit_force,

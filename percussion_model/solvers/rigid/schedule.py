@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 
-from percussion_model.physics.body import hold_components, piston_acceleration
-from percussion_model.physics.drive import drive_force, room_to_turn
 from percussion_model.physics.kernel import kernel
+from percussion_model.physics.loads import (
+    drive_force,
+    hold_components,
+    piston_acceleration,
+    room_to_turn,
+)
 from percussion_model.physics.records import Mode, Piston, RockKind
-from percussion_model.physics.rock import REST_VELOCITY, barrier_level, barrier_off
-from percussion_model.physics.rock_line import is_curved
+from percussion_model.physics.rock import REST_VELOCITY, barrier_level, barrier_off, is_curved
 from percussion_model.solvers.rigid.forces import (
     ROUNDING,
     acceleration,

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
-from percussion_model.physics.body import move_to_components, piston_acceleration
-from percussion_model.physics.drive import drive_force, switch_drive
 from percussion_model.physics.elementary import expm1
 from percussion_model.physics.kernel import inlined, merged
+from percussion_model.physics.loads import (
+    drive_force,
+    move_to_components,
+    piston_acceleration,
+    switch_drive,
+)
 
 
 @inlined

@@ -10,15 +10,15 @@ from percussion_model.physics.blows import (
     start_blow,
     starts_blow,
 )
-from percussion_model.physics.body import (
+from percussion_model.physics.kernel import inlined, kernel, merged
+from percussion_model.physics.loads import (
     book_on_bit,
     book_piston_load,
+    drive_force,
     hold_components,
     pass_time,
     piston_acceleration,
 )
-from percussion_model.physics.drive import drive_force
-from percussion_model.physics.kernel import inlined, kernel, merged
 from percussion_model.physics.records import Mode, Piston
 from percussion_model.solvers.wave.joint import shoulders, yielding
 from percussion_model.solvers.wave.piston import mass_contact, move_piston

@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from percussion_model.physics.blows import close_gap, open_gap, push_event, start_blow, starts_blow
-from percussion_model.physics.drive import switch_drive
 from percussion_model.physics.kernel import compiled, fused, inlined, kernel, merged
+from percussion_model.physics.loads import switch_drive
 from percussion_model.physics.readings import fill_ledger, fill_motion
 from percussion_model.physics.records import DriveKind, Mode, RockKind, Status
 from percussion_model.physics.rock import (

@@ -11,9 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from percussion_model.physics.body import piston_acceleration
-from percussion_model.physics.drive import drive_force
 from percussion_model.physics.kernel import compiled, inlined, kernel, merged
+from percussion_model.physics.loads import drive_force, piston_acceleration
 from percussion_model.physics.rock import recoverable
 from percussion_model.scene.numbers import JOINT_KINDS
 from percussion_model.verification.accuracy.explicit_rock import ride, step_rock_end

@@ -13,9 +13,13 @@ from enum import IntEnum
 import numpy as np
 
 from percussion_model.physics.blows import close_gap, open_gap, start_blow, starts_blow
-from percussion_model.physics.body import bit_acceleration, piston_acceleration
-from percussion_model.physics.drive import drive_force, switch_drive
 from percussion_model.physics.kernel import fused, inlined, kernel, merged
+from percussion_model.physics.loads import (
+    bit_acceleration,
+    drive_force,
+    piston_acceleration,
+    switch_drive,
+)
 from percussion_model.physics.readings import fill_ledger, fill_motion
 from percussion_model.physics.records import Mode, Status
 from percussion_model.physics.rock import overcomes_barrier, recoverable, spring_force, stiffness

@@ -8,91 +8,92 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from percussion_model.physics.blows import push_checkpoint
-from percussion_model.physics.body import (
-    bit_acceleration,
+from percussion_model.physics.kernel import inlined, kernel, merged
+from percussion_model.physics.loads import (
     book_bit_load,
     book_piston_load,
-    piston_acceleration,
+    drive_force,
+    room_to_turn,
+    switch_drive,
 )
-from percussion_model.physics.drive import drive_force, room_to_turn, switch_drive
-from percussion_model.physics.kernel import inlined, kernel, merged
 from percussion_model.physics.records import Mode, Piston
-from percussion_model.physics.rock import (
-    barrier_level,
-    crush,
-    damping,
-    ends_standstill,
-    keep_margin,
-    origin,
-    overcomes_barrier,
-    recoverable,
-    stiffness,
-)
+from percussion_model.physics.rock import crush, damping, origin, recoverable, stiffness
 from percussion_model.physics.state import CHECKPOINTS
-from percussion_model.solvers.modal.bar import end_after, kinetic_of, move_free
-from percussion_model.solvers.modal.between import (
+from percussion_model.solvers.modal.bars import flight_of, move_free, way_alone
+from percussion_model.solvers.modal.ends import (
+    CHECKPOINT,
     End,
+    at_rest,
+    beyond,
+    book_contact,
+    end_mode,
+    flip_contact,
+    has_piston,
     late_peak,
+    level_below,
+    passed,
+    push_of,
     squared_between,
+    switches,
+    time_of,
     top_between,
     turns_between,
+    unpark,
 )
-from percussion_model.solvers.modal.change import end_mode
-from percussion_model.solvers.modal.forms import refresh_loads
-from percussion_model.solvers.modal.narrow import SAME_SIDE, beyond, level_below
+from percussion_model.solvers.modal.next_event import SAME_SIDE, UNSURE
 from percussion_model.solvers.modal.pairs import (
-    AT,
     BIT_SPEED,
     FIRST_STRIDE,
+    PISTON,
+    PLOAD,
     PQ,
+    TOP,
     Sums,
     ahead_of,
     drop_pairs,
-    energy_about_rest,
-    keep,
     keep_ahead,
-    leave_out_pairs,
-    move_pairs,
+    moving,
     present_sums,
-    spell_out,
     sum_of,
-    take_pairs,
-    to_be_taken,
+    taken_so_far,
     touch_of,
 )
-from percussion_model.solvers.modal.piston import (
-    WHOLE,
-    at_rest,
-    book_contact,
-    flip_contact,
-    has_piston,
-    switches,
-    time_of,
-    unpark,
-)
-from percussion_model.solvers.modal.records import (
-    KEPT,
-    LONGEST_STRIDE,
-    STEP,
-    View,
-)
-from percussion_model.solvers.modal.rock_end import (
-    QUIET_SHARE,
-    end_standstill,
-    passed,
-)
-from percussion_model.solvers.modal.search import UNSURE, moving
-
-# Steps after which the running force of a standstill is noted.
-CHECKPOINT = 64
-
-# Steps after which kinetic energy that still rises is high enough.
-LONGEST_RISE = 64
+from percussion_model.solvers.modal.records import LONGEST_STRIDE, STEP
 
 # What a look may pass: piston and bit meet or part, the drive turns, the mode of the rock ends, so
 # also by the work of its dashpot; or nothing at the look, but the rock end turned back before.
 MEETS, TURNS, ENDS, WORK, BACK = range(5)
-LOW_Q, LOW_V, SPEED_Q, SPEED_V = (int(row) for row in View)
+
+
+class Beside(NamedTuple):
+    """What does not change of a piston that touches the bit, or waits near it.
+
+    Attributes
+    ----------
+    near, touches : bool
+        Whether it is near, and whether it touches.
+    room : float
+        Of one that waits: gap to a top of the bit without offset, and bounded vibration [m]. Of
+        one that touches: force on the bit but for what pairs tell [N].
+    pull : float
+        Acceleration of the top by the load on a free bit [m/s2]; of one that touches, of its
+        mass as a whole [N].
+    """
+
+    near: bool
+    touches: bool
+    room: float
+    pull: float
+
+
+@inlined
+def beside_of(par, s, bars, near):
+    """What a search beside a piston goes by."""
+    ends, load_ = bars.laws.ends[s.law], bars.w[PLOAD, 0]
+    if s.closed == 1:
+        return Beside(True, True, par.mass_p * s.a_p - s.rest_pull, ends[PISTON, 0] * load_)
+    room = s.u_b - s.at_b / par.mass_b + s.rest_top + s.offset - (s.u_p + s.spread_p)
+    return Beside(near, False, room, ends[TOP, 0] * load_)
 
 
 class Look(NamedTuple):
@@ -139,9 +140,8 @@ def touching(par, s, bars, ticks, h, v_p):
     """
     found = touch_of(s, bars, bars.rows, 0)
     then = found.speed / par.mass_p
-    contact = par.mass_p * (s.a_p + (v_p - then) / h)
     age = s.time + ticks - s.closed_at
-    touch = contact if age < par.ringing else par.mass_p * s.a_p - found.pull
+    contact, touch = push_of(par, s, h, v_p, then, age, found.pull)
     # by the mean as well, since the force may have dipped between looks; not at once
     parts = (touch < 0.0 or contact < 0.0) and (age > 0 or h > par.tick)
     return found.piston, then, contact, touch, parts
@@ -161,14 +161,9 @@ def look_at(par, s, bars, level, ticks, before):
         u_r += (at_p - s.at_p) / par.mass_p
     elif has_piston(par):
         time = par.tick * (ticks + (1 << level))
-        way_p = time * (s.v_p + 0.5 * time * s.a_p)
-        u_r += way_p
-        if s.parked == 1:
-            low_p = s.spread_p
-        elif par.piston == Piston.ELASTIC:
-            low_p = end_after(bars.wp, bars.shape_p, bars.move_p[level], bars.wp.shape[1])
-        top = s.u_b + way_b + (sums.top - sums.bit / par.mass_b) + s.offset
-        gap = top - (s.u_p + way_p + low_p)
+        flight = flight_of(par, s, bars, level, time, way_b, sums.top - sums.bit / par.mass_b)
+        u_r += flight.way
+        low_p, gap = flight.low, flight.gap
         flips = gap < 0.0
     return Look(sums, p, force, u_r, low_p, gap, at_p, v_p, contact, flips)
 
@@ -190,7 +185,7 @@ def book_touch(par, s, h, look):
 def book_flight(par, s, h, v_b, look):
     """Book what the piston does alone for `h`, beside a bit that had a velocity."""
     push = drive_force(par, s)
-    way, a = h * (s.v_p + 0.5 * h * s.a_p), s.a_p - (s.v_b - v_b) / h
+    way, a = way_alone(s, h), s.a_p - (s.v_b - v_b) / h
     # the stroke's turning point may lie within
     turn = -(s.v_p - v_b) / a if a != 0.0 else -1.0
     if 0.0 < turn < h and s.v_p < v_b:
@@ -232,92 +227,6 @@ def book_way(par, s, bars, ticks, look):
         last = s.check_time[(s.n_check - 1) % CHECKPOINTS]
         if s.n_check == 0 or time_of(par, s) - last >= CHECKPOINT * par.dt:
             push_checkpoint(s, time_of(par, s))
-
-
-@merged
-def take_loads(par, s, bars):
-    """Take the forces on the bodies; pairs under others are given up."""
-    push = drive_force(par, s)
-    a_p = piston_acceleration(par, push) if has_piston(par) else 0.0
-    a_b = bit_acceleration(par, s)
-    if s.law >= 0 and (a_b != s.a_b or (s.closed == 1 and a_p != s.a_p)):
-        drop_pairs(par, s, bars)
-        s.alert = 1
-    if s.law < 0:
-        refresh_loads(s, bars, a_b, a_p)
-    s.a_b, s.a_p = a_b, a_p
-
-
-@merged
-def ready(par, s, bars, law):
-    """Take the pairs that the next looks need."""
-    take_loads(par, s, bars)
-    if s.law < 0:
-        take_pairs(par, s, bars, law)
-    elif s.stride > FIRST_STRIDE:
-        leave_out_pairs(par, s, bars)
-
-
-@kernel
-def kinetic_at(s, bars, x, first):
-    """Kinetic energy of a bit alone, by pairs in two rows of `x` [J]."""
-    return kinetic_of(bars.rows, spell_out(s, bars, x, first))
-
-
-@kernel
-def highest_kinetic(s, bars):
-    """Kinetic energy of a bit at the end of its present rise, if its mode went on [J]."""
-    keep(bars.w, PQ, bars.w, AT, s.pairs)
-    highest = 0.0
-    for _ in range(LONGEST_RISE):
-        move_pairs(s, bars, bars.w, AT, STEP)
-        energy = kinetic_at(s, bars, bars.w, AT)
-        if energy <= highest:
-            break
-        highest = energy
-    return highest
-
-
-@kernel
-def watch_barrier(par, s, bars, most, events):
-    """Leave standstill where the kinetic energy of the bit passes the barrier.
-
-    Returns
-    -------
-    int
-        Ticks that the bit may go, `most` at most, before it is to be watched again; within a step
-        up to the tick in which the barrier is passed.
-    """
-    energy = energy_about_rest(s, bars, spell_out(s, bars, bars.w, PQ))
-    s.alert = 1 if energy > QUIET_SHARE * barrier_level(par, s) else 0
-    if s.alert == 0:
-        return most
-    most = min(most, WHOLE)
-    now = kinetic_of(bars.rows, bars.laws.sizes[s.law])
-    if ends_standstill(par, s, now):
-        drop_pairs(par, s, bars)
-        end_standstill(par, s, bars, events)
-        return most
-    if not overcomes_barrier(par, s, energy):
-        return most
-    ticks, level, passes = 0, level_below(most), False
-    keep(bars.w, PQ, bars.w, AT, s.pairs)
-    while level >= 0:
-        go = 1 << level
-        if ticks + go <= most:
-            keep(bars.w, AT, bars.rows, KEPT, s.pairs)
-            move_pairs(s, bars, bars.w, AT, level)
-            if overcomes_barrier(par, s, kinetic_at(s, bars, bars.w, AT)):
-                most, passes = ticks + go, True
-                keep(bars.rows, KEPT, bars.w, AT, s.pairs)
-            else:
-                ticks += go
-                if ticks == most:
-                    break
-        level -= 1
-    if passes:
-        keep_margin(par, s, highest_kinetic(s, bars))
-    return most
 
 
 @merged
@@ -389,7 +298,7 @@ def go_near(par, s, bars, most, blows, events):
     C, taken, sampled, u_before = damping(s), 0.0, 0.0, s.u_r
     cutting, piston = s.mode == Mode.DFC, has_piston(par)
     if cutting and s.stride > FIRST_STRIDE:
-        taken = C * (s.takes - to_be_taken(bars.laws.taken[s.law], bars.w, PQ, s.pairs))
+        taken = taken_so_far(s, bars, PQ)
     meets = ends = turns = False
     aim, same = Aim(ENDS, -1, 0.0, 0.0), 0
     while ticks < most:
@@ -400,8 +309,7 @@ def go_near(par, s, bars, most, blows, events):
         if cutting:
             share = C * squared_between(end_of(last), end_of(look), par.tick * (1 << level))
             if sampled > 0.0 and s.w + taken + UNSURE * (sampled + share) >= s.w_r:
-                left = to_be_taken(bars.laws.taken[s.law], bars.w, PQ, s.pairs)
-                taken, sampled = C * (s.takes - left), 0.0
+                taken, sampled = taken_so_far(s, bars, PQ), 0.0
             work = taken + sampled + share
         meets = look.flips
         if meets and s.parked == 1:

@@ -1,6 +1,7 @@
-"""When the mode of a bit alone ends: found by looks at the rock end, with pairs in `Bars.rows`.
+"""When the next event of bit and rock comes: found by looks ahead, down to its tick.
 
-The state stays as it is (docs/modal.md, section 4).
+Pairs move in `Bars.w`, in the rows from `AT` on, and looks are kept in `Bars.rows`; the state
+stays as it is (docs/modal.md, section 4).
 """
 
 from __future__ import annotations
@@ -10,45 +11,49 @@ from typing import NamedTuple
 
 import numpy as np
 
-from percussion_model.physics.body import bit_acceleration, time_to_cover
 from percussion_model.physics.kernel import inlined, kernel, merged
+from percussion_model.physics.loads import bit_acceleration, time_to_cover
 from percussion_model.physics.records import Mode, RockKind
-from percussion_model.physics.rock import barrier_off, damping, stiffness
-from percussion_model.solvers.modal.between import (
+from percussion_model.physics.rock import barrier_off, damping, origin, stiffness
+from percussion_model.solvers.modal.bars import way_alone
+from percussion_model.solvers.modal.ends import (
+    WHOLE,
     End,
+    beyond,
     late_peak,
+    level_below,
+    passed,
+    squared_between,
+    time_of,
     top_between,
     turns_between,
 )
 from percussion_model.solvers.modal.lanes import WIDTH, load, lower_of, lowest, spread, store, total
-from percussion_model.solvers.modal.narrow import (
-    end_at,
-    narrow,
-    present_end,
-    present_law,
-)
 from percussion_model.solvers.modal.pairs import (
     AT,
     BIT,
     FIRST_STRIDE,
     LOW,
-    PISTON,
     PLOAD,
     PQ,
     SPEED,
     SQUARE,
-    TOP,
     carry_pairs,
-    energy_of_pairs,
     keep,
     move_pairs,
-    size_of,
-    to_be_taken,
+    moving,
+    part_of,
+    taken_so_far,
 )
-from percussion_model.solvers.modal.piston import WHOLE, time_of
-from percussion_model.solvers.modal.records import LONGEST_HOP, SCAN, STEP, Known
-from percussion_model.solvers.modal.rock_end import passed
+from percussion_model.solvers.modal.records import SCAN, STEP, Known, View
 
+LOW_Q, LOW_V, SPEED_Q, SPEED_V = (int(row) for row in View)
+# Looks within an interval whose work of the dashpot is summed up.
+PIECES = 3
+# Ticks in which the rock end goes straight.
+STRAIGHT = 256
+# An interval is halved where a straight line told so often to stay on one side.
+SAME_SIDE = 4
 # Rows of `Bars.rows` with what a search sees, of the rock end and of the other.
 SEEN, SIDE = 2, 6
 # And with what it saw from the look before on, where no piston is near.
@@ -59,9 +64,6 @@ TIMES = np.arange(1.0, SCAN + 1.0).reshape(1, SCAN)
 SCAN_LEVEL = SCAN.bit_length() - 1
 # Flight shorter than this is looked through.
 FEWEST = 8 * WHOLE
-# Modes that have less than this share of the energy of vibration together are not looked at; at
-# least so many are. With 1e-6 cycles were missed where the bit just touches the rock.
-SLIGHT_SHARE, FEWEST_MODES = 1e-9, 4
 # What the dashpot takes is computed once this many times its sum over looks may be enough.
 UNSURE = 2.0
 # A standstill is not quiet yet where its energy could move the force by so many times that at
@@ -80,6 +82,133 @@ LONGEST_GLANCE = 128 * WHOLE
 LONGEST_LEAP, CALM = 16 * LONGEST_GLANCE, 0.5
 
 
+class Law(NamedTuple):
+    """What does not change while a search goes on."""
+
+    stiffness: float  # of the rock [N/m]
+    damping: float  # [N s/m]
+    origin: float  # [m]
+    pull: float  # acceleration of the rock end by the load on a free bit [m/s2]
+
+
+@inlined
+def present_law(s, bars):
+    """What a search goes by."""
+    pull = bars.laws.ends[s.law][LOW, 0] * bars.w[PLOAD, 0]
+    return Law(stiffness(s), damping(s), origin(s), pull)
+
+
+@inlined
+def end_at(s, law, low, speed, t):
+    """Make out the rock end `t` after where the search is, by what pairs tell of it."""
+    p = s.p + (s.rest_low + low + 0.5 * law.pull * t * t - s.low)
+    speed += law.pull * t
+    return End(p, speed, law.stiffness * (p - law.origin) + law.damping * speed)
+
+
+@inlined
+def present_end(s, bars, law):
+    """Look at the rock end where the search is."""
+    ends, low, speed = bars.laws.ends[s.law], spread(0.0), spread(0.0)
+    for k in range(0, s.pairs, WIDTH):
+        q, v = load(bars.w, AT, k), load(bars.w, AT + 1, k)
+        low = low + part_of(ends, LOW, k, q, v)
+        speed = speed + part_of(ends, SPEED, k, q, v)
+    return end_at(s, law, total(low), total(speed), 0.0)
+
+
+@inlined
+def end_after(par, s, bars, law, level):
+    """Look at the rock end 2^level ticks after where the search is."""
+    view, low, speed = bars.laws.views[s.law, level], spread(0.0), spread(0.0)
+    for k in range(0, s.pairs, WIDTH):
+        q, v = load(bars.w, AT, k), load(bars.w, AT + 1, k)
+        low = low + load(view, LOW_Q, k) * q
+        low = low + load(view, LOW_V, k) * v
+        speed = speed + load(view, SPEED_Q, k) * q
+        speed = speed + load(view, SPEED_V, k) * v
+    return end_at(s, law, total(low), total(speed), par.tick * (1 << level))
+
+
+@inlined
+def squared_speed(par, s, bars, law, level, before, after, fresh):
+    """Integral of the squared velocity of the rock end over 2^level ticks [m2/s].
+
+    Pieces are short at first where a bit has just met the rock (`fresh`): its velocity drops
+    within tenths of a microsecond.
+    """
+    total, ticks, begin = 0.0, 0, before
+    if not fresh:
+        return squared_between(before, after, par.tick * (1 << level))
+    for part in range(STEP - PIECES, level):
+        here = end_after(par, s, bars, law, part)
+        total += squared_between(begin, here, par.tick * ((1 << part) - ticks))
+        ticks, begin = 1 << part, here
+    return total + squared_between(begin, after, par.tick * ((1 << level) - ticks))
+
+
+@kernel
+def narrow(par, s, bars, law, most, work, before, then, fresh):
+    """Go on to the tick in which the mode ends, if it does so within `most`.
+
+    Parameters
+    ----------
+    work : float
+        What the dashpot has taken so far [J].
+    before, then : End
+        The rock end now, and after `most` ticks.
+    fresh : bool
+        Whether the mode has just begun.
+
+    Returns
+    -------
+    ticks : int
+    ends : bool
+    work : float
+        At the end.
+    now : End
+    """
+    ticks, rest, low, high, same = 0, most, beyond(s, before), beyond(s, then), 0
+    turn = most * turns_between(s, before, then, par.tick * most)
+    while rest > 0:
+        if rest <= STRAIGHT and low < 0.0 < high:
+            # a straight line tells when
+            go = min(1 + int(rest * low / (low - high)), rest)
+            carry_pairs(s, bars, bars.w, AT, go)
+            here = present_end(s, bars, law)
+            if s.mode == Mode.DFC:
+                work += law.damping * squared_between(before, here, par.tick * go)
+            ticks, rest, before, low = ticks + go, rest - go, here, beyond(s, here)
+            if passed(par, s, here.p, here.speed, work, here.force):
+                return ticks, True, work, here
+            continue
+        guess = 0.5 * rest
+        if ticks < turn:
+            guess = turn - ticks
+        elif low < 0.0 < high and abs(same) < SAME_SIDE:
+            # so far by a straight line
+            guess = rest * low / (low - high)
+        level = level_below(min(max(guess, 1.0), rest - 1.0))
+        if rest > 4 << level:
+            level += 1  # likely beyond: the line is straighter in between
+        go = 1 << level
+        here, after = end_after(par, s, bars, law, level), work
+        if s.mode == Mode.DFC:
+            after += law.damping * squared_speed(
+                par, s, bars, law, level, before, here, fresh and ticks == 0
+            )
+        passes = passed(par, s, here.p, here.speed, after, here.force)
+        if passes and level > 0:
+            rest, high, same = go, beyond(s, here), max(same, 0) + 1
+            continue
+        move_pairs(s, bars, bars.w, AT, level)
+        ticks, rest = ticks + go, rest - go
+        work, before, low, same = after, here, beyond(s, here), min(same, 0) - 1
+        if passes:
+            return ticks, True, work, before
+    return ticks, False, work, before
+
+
 class Found(NamedTuple):
     """What a search found."""
 
@@ -94,37 +223,6 @@ class Found(NamedTuple):
     impulse: float
     looks: int
     leaps: int  # times that nothing could happen for a while
-
-
-class Beside(NamedTuple):
-    """What does not change of a piston that touches the bit, or waits near it.
-
-    Attributes
-    ----------
-    near, touches : bool
-        Whether it is near, and whether it touches.
-    room : float
-        Of one that waits: gap to a top of the bit without offset, and bounded vibration [m]. Of
-        one that touches: force on the bit but for what pairs tell [N].
-    pull : float
-        Acceleration of the top by the load on a free bit [m/s2]; of one that touches, of its
-        mass as a whole [N].
-    """
-
-    near: bool
-    touches: bool
-    room: float
-    pull: float
-
-
-@inlined
-def beside_of(par, s, bars, near):
-    """What a search beside a piston goes by."""
-    ends, load_ = bars.laws.ends[s.law], bars.w[PLOAD, 0]
-    if s.closed == 1:
-        return Beside(True, True, par.mass_p * s.a_p - s.rest_pull, ends[PISTON, 0] * load_)
-    room = s.u_b - s.at_b / par.mass_b + s.rest_top + s.offset - (s.u_p + s.spread_p)
-    return Beside(near, False, room, ends[TOP, 0] * load_)
 
 
 @inlined
@@ -149,37 +247,6 @@ def scan(bars, view, modes, row):
         other_v = other_v + load(view, 4 * k + 3, 0) * v
     store(bars.rows, row, 0, one + one_v)
     store(bars.rows, row + 1, 0, other + other_v)
-
-
-class Moving(NamedTuple):
-    """What moves of some pairs."""
-
-    energy: float  # of vibration [J]
-    modes: int  # that hold next to all of it
-    level: int  # of a look: two for each period of the highest of them
-
-
-@kernel
-def moving(s, bars, x, first):
-    """Look which of the pairs in two rows of `x` move."""
-    ends, energy = bars.laws.ends[s.law], energy_of_pairs(s, bars, x, first)
-    least, above, modes = 2.0 * SLIGHT_SHARE * energy, 0.0, s.pairs
-    while modes > FEWEST_MODES:
-        if modes % WIDTH == 0 and modes > WIDTH:
-            both = above + total(size_of(ends, x, first, modes - WIDTH))
-            if both <= least:
-                modes, above = modes - WIDTH, both
-                continue
-        q, v = x[first, modes - 1], x[first + 1, modes - 1]
-        above += v * v + ends[SQUARE, modes - 1] * q * q
-        if above > least:
-            break
-        modes -= 1
-    level, n = STEP + 1, bars.laws.sizes[s.law]
-    while level < LONGEST_HOP and 2 * modes <= n:
-        n //= 2
-        level += 1
-    return Moving(energy, modes, level)
 
 
 @kernel
@@ -268,13 +335,6 @@ def quiet_peaks(par, s, bars, law, ticks):
 def may_be_enough(s, work):
     """Whether the barrier may be overcome by so much work of the dashpot since pairs were taken."""
     return s.mode == Mode.DFC and s.w + work >= s.w_r
-
-
-@kernel
-def taken_so_far(par, s, bars):
-    """What the dashpot has taken of the pairs until where the search is [J]."""
-    left = to_be_taken(bars.laws.taken[s.law], bars.w, AT, s.pairs)
-    return damping(s) * (s.takes - left)
 
 
 class Touching(NamedTuple):
@@ -397,7 +457,7 @@ def look_through(par, s, bars, law, beside, ticks, level, count, taken, sampled,
                 apart = min(apart, par.mass_p * (s.a_p - (speed_p - touch.speed) / h))
             else:
                 apart += bars.rows[SIDE, kept] + 0.5 * beside.pull * t * t
-                apart -= (since + t) * (s.v_p + 0.5 * (since + t) * s.a_p)
+                apart -= way_alone(s, since + t)
             if apart < 0.0:
                 blocked = True
                 break
@@ -445,7 +505,7 @@ def search(par, s, bars, most, beside):
     taken, sampled, last = 0.0, 0.0, End(s.p, s.v_low, s.f_rock)
     touch = Touching(s.v_p, s.peak_time, s.peak_impulse, 0.0, 0.0)
     if s.mode == Mode.DFC and s.stride > FIRST_STRIDE:
-        taken = taken_so_far(par, s, bars)
+        taken = taken_so_far(s, bars, AT)
     now, stale = moving(s, bars, bars.w, AT), False
     while ticks < most and not ends and not (stands and ticks >= LONGEST_GLANCE):
         rest = most - ticks
@@ -487,7 +547,7 @@ def search(par, s, bars, most, beside):
         if seen.blocked:
             break
         if seen.near and sampled > 0.0:
-            taken, sampled = taken_so_far(par, s, bars), 0.0
+            taken, sampled = taken_so_far(s, bars, AT), 0.0
         elif seen.near and beside.touches:
             break
         elif seen.near or count == 0:

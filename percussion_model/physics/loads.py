@@ -1,4 +1,7 @@
-"""Forces on the bodies from outside: weight, feed, drive, and those of components."""
+"""Forces on the bodies from outside: weight, feed, drive, and those of components.
+
+The drive is a switching pressure law on the mean relative motion, docs/model.md, eqs 12-13.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,12 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 from percussion_model.components import COMPONENTS, Component
+from percussion_model.physics.blows import push_event
 from percussion_model.physics.kernel import composed, inlined, merged
+from percussion_model.physics.records import DriveKind, EventKind
+
+_ON_BIT = [one for one in COMPONENTS if one.body == "bit"]
+_ON_PISTON = [one for one in COMPONENTS if one.body == "piston"]
 
 
 @composed
@@ -65,14 +73,20 @@ def _joined(start: Callable, add: Callable, components: Iterable[Component]) -> 
     return start
 
 
-_ON_BIT = [one for one in COMPONENTS if one.body == "bit"]
-_ON_PISTON = [one for one in COMPONENTS if one.body == "piston"]
 # hold_...(par, s, h): take the mean force of each component over the next h; their sum [N].
 hold_on_bit = _joined(_no_force, _and_force, _ON_BIT)
+
+
 hold_on_piston = _joined(_no_force, _and_force, _ON_PISTON)
+
+
 # book_...(par, s, path): enter what the held forces take from a body over a path [m].
 book_on_bit = _joined(_nothing, _and_work, _ON_BIT)
+
+
 book_on_piston = _joined(_nothing, _and_work, _ON_PISTON)
+
+
 # pass_own_time(par, s, h): take the states of components on by h [s].
 pass_own_time = _joined(_nothing, _and_time, COMPONENTS)
 
@@ -162,3 +176,62 @@ def time_to_cover(distance, velocity, acceleration):
     if bottom <= 0.0:
         return math.inf
     return 2.0 * distance / bottom
+
+
+@inlined
+def drive_force(par, s):
+    """Force of drive and components on the piston, down positive [N]."""
+    if par.drive == DriveKind.PRESSURE:
+        return s.alpha * s.drive_force + s.f_on_piston
+    if par.drive == DriveKind.EXTERNAL:
+        return s.external + s.f_on_piston
+    return s.f_on_piston
+
+
+@inlined
+def room_to_turn(par, s, u_r):
+    """How far a relative displacement is before that at which the drive turns [m].
+
+    Infinite where it does not turn by itself. The pressure law turns at u_r = 0 while it pushes
+    down, at u_r = -D_1 while it lifts; only one of them is watched at a time.
+    """
+    if par.drive != DriveKind.PRESSURE:
+        return math.inf
+    return -u_r if s.alpha > 0 else u_r + s.reversal
+
+
+@inlined
+def turn_drive(s, events, time, u_r):
+    """Turn the pressure at `time`, where the relative displacement is `u_r` [m]."""
+    s.alpha = -s.alpha
+    kind = EventKind.DRIVE_UP
+    if s.alpha > 0:
+        kind = EventKind.DRIVE_DOWN
+        s.armed = 1
+    push_event(s, events, time, kind, u_r)
+
+
+@inlined
+def switch_drive(par, s, u_before, time, tau, events):
+    """Turn the pressure where the relative motion reaches its threshold, see `room_to_turn`.
+
+    Parameters
+    ----------
+    u_before : float
+        u_r at the start of the step [m]; s.u_r holds it at the end.
+    time, tau : float
+        Start and duration of the step [s].
+
+    Returns
+    -------
+    float
+        Share of the step before the switch, or -1 where there is none.
+    """
+    if room_to_turn(par, s, s.u_r) > 0.0:
+        return -1.0
+    level = 0.0 if s.alpha > 0 else -s.reversal
+    share = 0.0
+    if u_before != s.u_r:
+        share = min(max((level - u_before) / (s.u_r - u_before), 0.0), 1.0)
+    turn_drive(s, events, time + share * tau, level)
+    return share
