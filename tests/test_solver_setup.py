@@ -7,18 +7,16 @@ from numba import njit
 from percussion_model.physics.records import DriveKind, RockKind
 from percussion_model.scene.numbers import SCENE_NUMBERS, Numbers, numbers_of, scene_numbers
 from percussion_model.scene.parameters import find_row
+from percussion_model.scene.rock_law import ROCKS, barrier_on, rock_numbers
 from percussion_model.scene.scene import Scene
 from percussion_model.scene.values import Values
 from percussion_model.solvers.setup import (
     DIRECTIONS,
     DRIVES,
     PISTONS,
-    ROCKS,
     Bit,
     StandstillTension,
-    barrier_on,
     kelvin_voigt_time,
-    rock_numbers,
 )
 
 SCENES = [

@@ -50,6 +50,7 @@ from percussion_model.physics.state import LARGEST, MOST
 from percussion_model.scene.bars import bar_length, bar_mass
 from percussion_model.scene.contradictions import TEXTS, Bodies, Rule, find_contradiction
 from percussion_model.scene.inputs import INPUTS
+from percussion_model.scene.rock_law import POWER, ROCKS, barrier_on, rock_numbers
 from percussion_model.scene.solver_names import BODIES
 from percussion_model.scene.values import SCENE_NUMBERS
 from percussion_model.solvers import plain_code  # noqa: F401  # kernels call functions of scenes
@@ -57,13 +58,7 @@ from percussion_model.solvers.base import MOST_AHEAD
 from percussion_model.solvers.fem.records import FEM_STATE
 from percussion_model.solvers.modal.records import MODAL_STATE
 from percussion_model.solvers.rigid.records import RIGID_STATE
-from percussion_model.solvers.setup import (
-    PISTONS,
-    POWER,
-    ROCKS,
-    barrier_on,
-    rock_numbers,
-)
+from percussion_model.solvers.setup import PISTONS
 from percussion_model.solvers.state import is_bounded, words_of
 from percussion_model.solvers.wave.records import WAVE_STATE
 

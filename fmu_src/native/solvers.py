@@ -5,11 +5,12 @@ from __future__ import annotations
 from fmu_src.native.image import row_of
 from fmu_src.native.layout import KINDS, Kind
 from percussion_model.physics.kernel import preparing
-from percussion_model.physics.records import Piston, RockKind
+from percussion_model.physics.records import Piston
 from percussion_model.scene.bars import bar_transit_time
+from percussion_model.scene.rock_law import is_wall
 from percussion_model.scene.solver_choice import WhyWaves, why_waves
 from percussion_model.solvers import plain_code  # noqa: F401  # kernels call functions of scenes
-from percussion_model.solvers.setup import PISTONS, ROCKS, Bit
+from percussion_model.solvers.setup import PISTONS, Bit
 
 # By the choices of `solver.fidelity` and `solver.name`: 0 for waves, which a name divides, for
 # "auto" and for solvers that others added.
@@ -35,7 +36,6 @@ def kind_of(numbers):
         return Kind.RIGID.value
     piston, bit = PISTONS[values.piston_model], bar_transit_time(numbers.bit)
     top = bar_transit_time(numbers.piston) if piston == Piston.ELASTIC else bit
-    is_wall = ROCKS[values.effects_rock] == RockKind.WALL
     has_loss = values.effects_loss != 0
-    why = why_waves(is_wall, has_loss, values.loss_time, top, bit)
+    why = why_waves(is_wall(values), has_loss, values.loss_time, top, bit)
     return Kind.MODAL.value if why == WhyWaves.NOT else Kind.WAVE.value

@@ -41,9 +41,25 @@ def compiled(**options: Any) -> Callable[[Callable], Any]:
         if FOLDER is not None and hasattr(made, "stats"):
             beside = Path(inspect.getfile(function)).with_name("__pycache__")
             kept_kernels.take_along(Path(made.stats.cache_path), beside)
-        return made
+        return _taking_numbers(made)
 
     return decorate
+
+
+def _taking_numbers(made: Any) -> Any:
+    """Let a kernel take the constants of those that call it as numbers like others.
+
+    Numba would compile it anew for each constant, which takes a sixth of all compiling.
+    """
+    find: Any = getattr(made, "get_call_template", None)  # none where nothing is compiled
+
+    def find_plain(arguments: Any, named: Any) -> Any:
+        named = {name: types.unliteral(kind) for name, kind in named.items()}
+        return find([types.unliteral(kind) for kind in arguments], named)
+
+    if find is not None:
+        made.get_call_template = find_plain
+    return made
 
 
 @functools.cache
@@ -105,20 +121,11 @@ def plain(function: Callable) -> Callable:
 
 
 def preparing(function: Callable) -> Callable:
-    """Compile what is done before a run: it may allocate, and constants are numbers as others.
+    """Compile what is done before a run: it may allocate.
 
-    Ahead of time, the library brings the memory. Numba would compile a function anew for each
-    constant that it is called with; here that takes longer than it spares.
+    Ahead of time, the library brings the memory.
     """
-    made = compiled(error_model="numpy")(function)
-    find: Any = getattr(made, "get_call_template", None)  # none where nothing is compiled
-
-    def find_plain(arguments: Any, named: Any) -> Any:
-        named = {name: types.unliteral(kind) for name, kind in named.items()}
-        return find([types.unliteral(kind) for kind in arguments], named)
-
-    if find is not None:
-        made.get_call_template = find_plain
+    made: Callable = compiled(error_model="numpy")(function)
     return made
 
 

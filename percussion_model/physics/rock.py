@@ -58,6 +58,36 @@ MOST_LINES = 1000
 
 
 @inlined
+def has_rock(par):
+    """Whether there is anything under the bit."""
+    return par.rock != RockKind.NONE
+
+
+@inlined
+def is_rigid_rock(par):
+    """Whether what is under the bit does not yield."""
+    return par.rock == RockKind.WALL
+
+
+@inlined
+def is_elastic_rock(par):
+    """Whether the rock gives everything back, on the line on which it was loaded."""
+    return par.rock == RockKind.SPRING
+
+
+@inlined
+def is_crushable(par):
+    """Whether the rock is crushed in drilling cycles, which the barrier may prevent."""
+    return par.rock == RockKind.BILINEAR
+
+
+@inlined
+def yield_like_a_spring(par):
+    """Take a spring for what is under the bit."""
+    par.rock = RockKind.SPRING
+
+
+@inlined
 def stiffness(s):
     """K of the present mode [N/m], table 1 of docs/model.md."""
     if s.mode == Mode.DFC or s.mode == Mode.FC:

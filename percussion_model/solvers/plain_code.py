@@ -14,7 +14,7 @@ from numba.extending import overload, register_jitable
 
 from percussion_model.components import COMPONENTS
 from percussion_model.physics.kernel import composed
-from percussion_model.scene import bars, contradictions, solver_choice
+from percussion_model.scene import bars, contradictions, rock_law, solver_choice
 from percussion_model.solvers import setup
 from percussion_model.solvers.modal import resolution as modal_resolution
 from percussion_model.solvers.rigid import restitution as rigid_restitution
@@ -30,14 +30,17 @@ for _function in (
     bars.bar_length,
     bars.bar_transit_time,
     solver_choice.why_waves,
+    rock_law.is_wall,
+    rock_law.barrier_on,
+    rock_law.rock_numbers,
+    rock_law.rock_springs,
+    rock_law.fill_cuttings,
+    rock_law.fill_power,
+    rock_law.fill_rock,
     contradictions.find_contradiction,
     contradictions._in_string,
     contradictions._in_accuracy,
-    setup.barrier_on,
     setup.kelvin_voigt_time,
-    setup.rock_numbers,
-    setup.fill_cuttings,
-    setup.fill_power,
     setup.fill_parameters,
     setup.fill_start,
     setup.elastic_piston,

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 from enum import IntEnum
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from percussion_model.components import COMPONENTS
-from percussion_model.physics.records import DRIVES, TURNS, Mode, Piston, RockKind
+from percussion_model.physics.records import DRIVES, TURNS, Mode, Piston
 from percussion_model.scene.bars import bar_mass, bar_transit_time
 from percussion_model.scene.numbers import Numbers
+from percussion_model.scene.rock_law import fill_rock, rock_numbers
 from percussion_model.scene.rows import SceneError
 
 # An open gap of this many transits of the slower bar ends a blow where no
@@ -26,10 +27,6 @@ MOST_CELLS = 1_000_000
 
 # What the choices of the parameter table mean, in their order.
 PISTONS = (Piston.ELASTIC, Piston.RIGID, Piston.ABSENT)
-ROCKS = (
-    RockKind.BILINEAR, RockKind.SPRING, RockKind.WALL, RockKind.NONE, RockKind.BILINEAR,
-)  # fmt: skip
-POWER = 4  # the choice of the power law, which has the modes of the bilinear one
 DIRECTIONS = (1, -1)
 
 
@@ -47,15 +44,6 @@ class StandstillTension(IntEnum):
     PAPER = 1
 
 
-class RockNumbers(NamedTuple):
-    """Rock law as the kernels take it: K_R of all buttons [N/m], gamma, C_R [N s/m], W_R [J]."""
-
-    k_r: float
-    gamma: float
-    c_r: float
-    w_r: float
-
-
 def refuse_many(name: str, count: float, most: int = MOST_CELLS, instead: str = "") -> None:
     """Raise `SceneError` for more cells, elements or modes than can be set up."""
     if not count <= most:
@@ -65,30 +53,9 @@ def refuse_many(name: str, count: float, most: int = MOST_CELLS, instead: str = 
         )
 
 
-def barrier_on(numbers: Numbers) -> bool:
-    """Whether the rock law has an energy barrier (mode DFC)."""
-    values = numbers.values
-    if not values.effects_barrier or ROCKS[values.effects_rock] != RockKind.BILINEAR:
-        return False
-    return bool(values.rock_barrier_energy > 0.0 and values.rock_barrier_damping > 0.0)
-
-
 def kelvin_voigt_time(numbers: Numbers) -> float:
     """Kelvin-Voigt time of elastic bars, 0 without loss [s]."""
     return float(numbers.values.loss_time) if numbers.values.effects_loss else 0.0
-
-
-def rock_numbers(numbers: Numbers) -> RockNumbers:
-    """Numbers of the rock law."""
-    values, barrier = numbers.values, barrier_on(numbers)
-    kind = ROCKS[values.effects_rock]
-    buttons = values.rock_buttons if values.effects_rock == POWER else 1.0
-    return RockNumbers(
-        buttons * values.rock_loading_stiffness if kind != RockKind.NONE else 0.0,
-        values.rock_unloading_ratio if kind == RockKind.BILINEAR else 1.0,
-        values.rock_barrier_damping if barrier else 0.0,
-        values.rock_barrier_energy if barrier else 0.0,
-    )
 
 
 def elastic_piston(numbers: Numbers) -> np.ndarray:
@@ -134,39 +101,9 @@ def fill_parameters(p: Any, numbers: Numbers, with_piston: bool) -> None:
     p["mass_p"] = bar_mass(numbers.piston)
     p["piston"] = PISTONS[values.piston_model]
     p["drive"] = DRIVES[values.effects_drive]
-    p["rock"] = ROCKS[values.effects_rock]
-    p["barrier"] = barrier_on(numbers)
-    p["threshold"] = values.rock_barrier_threshold
-    fill_power(p, values)
+    fill_rock(p, numbers)
     p["release"] = values.effects_standstill_tension == StandstillTension.RELEASE
     fill_components(p, values)
-
-
-def fill_power(p: Any, values: Any) -> None:
-    """Fill the parameters of the power law; with plain exponents it is the bilinear one."""
-    p["exponent"], p["unloading_exponent"], p["reference_penetration"] = 1.0, 0.0, 1e-3
-    p["buttons"], p["chipping_force"], p["chipping_penetration"] = 1.0, 0.0, 0.0
-    if values.effects_rock == POWER:
-        p["exponent"] = values.rock_loading_exponent
-        p["unloading_exponent"] = values.rock_unloading_exponent
-        p["reference_penetration"] = values.rock_reference_penetration
-        p["buttons"] = values.rock_buttons
-        p["chipping_force"] = values.rock_buttons * values.rock_chipping_force
-        p["chipping_penetration"] = values.rock_chipping_penetration
-    curved = p["exponent"] != 1.0 or p["unloading_exponent"] != 0.0
-    p["power"] = curved or p["chipping_penetration"] > 0.0
-    fill_cuttings(p, values)
-
-
-def fill_cuttings(p: Any, values: Any) -> None:
-    """Fill the parameters of cuttings that stay in the crater: with them loading has two lines."""
-    share, exponent = values.rock_removed_share, values.rock_removal_exponent
-    stay = share < 1.0 or exponent != 1.0
-    is_crushed = ROCKS[values.effects_rock] == RockKind.BILINEAR
-    p["cuttings"] = is_crushed and values.effects_cuttings != 0 and stay
-    p["removed_share"], p["removal_exponent"] = share, exponent
-    if p["cuttings"]:
-        p["power"] = 1
 
 
 def fill_components(p: Any, values: Any) -> None:

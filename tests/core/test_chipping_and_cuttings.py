@@ -10,6 +10,7 @@ from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
 
 from percussion_model import Scene, simulate
+from percussion_model.physics.curved_loading import load
 from percussion_model.physics.power_law import (
     CHIPPING_SLOPE,
     loading_force,
@@ -27,7 +28,6 @@ from percussion_model.physics.rock import (
     resume_cycle,
     spring_force,
 )
-from percussion_model.solvers.wave.power_loading import load
 from percussion_model.solvers.wave.records import WAVE_PAR, WAVE_STATE
 
 K, GAMMA, P_0 = 7.5e8, 5.0, 1e-3

@@ -9,6 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from percussion_model import Scene, simulate
+from percussion_model.physics.curved_loading import load, time_to_break
 from percussion_model.physics.power_law import loading_force, loading_work
 from percussion_model.physics.records import Mode, RockKind
 from percussion_model.physics.rock import (
@@ -19,7 +20,6 @@ from percussion_model.physics.rock import (
     resume_cycle,
     spring_force,
 )
-from percussion_model.solvers.wave.power_loading import load, time_to_break
 from percussion_model.solvers.wave.records import WAVE_PAR, WAVE_STATE
 
 K, GAMMA, REFERENCE, Z = 7.5e8, 5.0, 1e-3, 3e5

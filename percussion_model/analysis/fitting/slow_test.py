@@ -11,9 +11,9 @@ from percussion_model.physics.power_law import fresh_force, fresh_recovery, star
 from percussion_model.physics.records import RockKind
 from percussion_model.physics.slow_test import weigh
 from percussion_model.physics.state import COMMON_PARAMETERS, COMMON_STATE
+from percussion_model.scene.rock_law import fill_power
 from percussion_model.scene.scene import Scene
 from percussion_model.scene.values import values_of
-from percussion_model.solvers.setup import fill_power
 
 PARAMETERS, STATE = np.dtype(COMMON_PARAMETERS), np.dtype(COMMON_STATE)
 # Sums that a comparison of forces gives, see `weigh`.

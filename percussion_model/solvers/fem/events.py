@@ -12,11 +12,13 @@ import math
 
 from percussion_model.physics.kernel import inlined, kernel, merged
 from percussion_model.physics.loads import room_to_turn
-from percussion_model.physics.records import Mode, RockKind
+from percussion_model.physics.records import Mode
 from percussion_model.physics.rock import (
     REST_VELOCITY,
     barrier_level,
     damping,
+    has_rock,
+    is_elastic_rock,
     is_loading,
     origin,
     stiffness,
@@ -55,10 +57,10 @@ def drive_value(par, s, u_r):
 def rock_value(par, s, p, v, work):
     """What ends the present mode by position, work or force."""
     if s.mode == Mode.FF:
-        if par.rock == RockKind.NONE:
+        if not has_rock(par):
             return NEVER
         return -v if s.rebounding == 1 else s.p_u - p
-    if par.rock == RockKind.SPRING:
+    if is_elastic_rock(par):
         return p
     if s.mode == Mode.DFC:
         return s.w_r - s.w - work
@@ -72,7 +74,7 @@ def rock_value(par, s, p, v, work):
 @inlined
 def turn_value(par, s, v, energy):
     """What ends the present mode by the sign of the velocity or the bit's energy."""
-    if s.mode == Mode.FF or par.rock == RockKind.SPRING:
+    if s.mode == Mode.FF or is_elastic_rock(par):
         return NEVER
     if s.mode == Mode.SS:
         return barrier_level(par, s) - energy
@@ -142,7 +144,7 @@ def fill_slopes(par, s, c, a, x, end, h, q, column):
     turn = acceleration(par, x, last, end)
     if s.mode == Mode.FF:
         q[Probe.ROCK, column] = -h * (turn if s.rebounding == 1 else v)
-    elif par.rock == RockKind.SPRING or s.mode == Mode.BC:
+    elif is_elastic_rock(par) or s.mode == Mode.BC:
         q[Probe.ROCK, column] = h * v
     elif s.mode == Mode.DFC:
         q[Probe.ROCK, column] = -h * s.c_r * v * v
@@ -251,7 +253,7 @@ def may_cross(par, s, x, q):
         if s.closed == 1 and s.gap_rate > 0.0 and rate < 0.0:
             return True
     v = x[Node.V, par.n_p + par.n_b - 1]
-    if s.mode == Mode.FF and par.rock != RockKind.NONE:
+    if s.mode == Mode.FF and has_rock(par):
         return s.v_end > 0.0 and v < 0.0
     return False
 

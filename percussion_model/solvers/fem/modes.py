@@ -16,11 +16,14 @@ from percussion_model.physics.blows import (
 )
 from percussion_model.physics.kernel import inlined, kernel, merged
 from percussion_model.physics.loads import switch_drive
-from percussion_model.physics.records import Mode, RockKind
+from percussion_model.physics.records import Mode
 from percussion_model.physics.rock import (
     close_interface,
     damping,
     enter_standstill,
+    has_rock,
+    is_crushable,
+    is_elastic_rock,
     leave_by_velocity,
     leave_standstill,
     overcomes_barrier,
@@ -87,7 +90,7 @@ def change_rock(par, s, w, c):
     """Make the change that the present mode asks for; 1 where there is one."""
     v = s.v_end
     energy = 0.0
-    if s.mode != Mode.SS and par.rock == RockKind.BILINEAR:
+    if s.mode != Mode.SS and is_crushable(par):
         energy = kinetic_energy(c, w, par.n_p, par.n_b)
     if s.mode == Mode.FF:
         if s.rebounding == 1 and s.p <= s.p_u:
@@ -99,7 +102,7 @@ def change_rock(par, s, w, c):
             return 0
         close_on_rock(par, s, energy)
         return 1
-    if par.rock == RockKind.SPRING:
+    if is_elastic_rock(par):
         if s.p >= 0.0:
             return 0
         lift_off(par, s)
@@ -164,7 +167,7 @@ def change_modes(par, s, w, c, blows, events):
         if par.n_p > 0:
             changed = change_contact(par, s, w, c, blows, events)
             switch_drive(par, s, s.u_r, s.time, 0.0, events)
-        if par.rock != RockKind.NONE and change_rock(par, s, w, c) == 1:
+        if has_rock(par) and change_rock(par, s, w, c) == 1:
             changed = 1
             move_datum(par, s, w)
             if s.mode == Mode.SS:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 
 from percussion_model.physics.kernel import preparing
-from percussion_model.physics.records import Piston, RockKind
+from percussion_model.physics.records import Piston
+from percussion_model.physics.rock import is_rigid_rock, yield_like_a_spring
+from percussion_model.scene.rock_law import is_wall
 from percussion_model.solvers import plain_code  # noqa: F401  # kernels call functions of scenes
 from percussion_model.solvers.fem.bars import read_all, stored_energy
 from percussion_model.solvers.fem.mesh import critical_frequency, shortest_transit
@@ -14,7 +16,6 @@ from percussion_model.solvers.fem.records import Node
 from percussion_model.solvers.setup import (
     MOST_CHANGES,
     PISTONS,
-    ROCKS,
     fill_parameters,
     fill_start,
     kelvin_voigt_time,
@@ -63,8 +64,8 @@ def fill_fem_parameters(p, numbers, bars):
     p.q_tol, p.t_tol = values.fem_event_tolerance, values.fem_time_tolerance
     p.start_gap = values.start_gap
     p.n_p, p.n_b = bars.piston.nodes, bars.bit.nodes
-    if p.rock == RockKind.WALL:
-        p.rock = RockKind.SPRING  # a wall is met like the piston: by a penalty
+    if is_rigid_rock(p):
+        yield_like_a_spring(p)  # it is met like the piston: by a penalty
     p.most_changes, p.most_events = MOST_CHANGES, MOST_EVENTS
 
 
@@ -90,7 +91,7 @@ def begin(p, s, w, c, numbers):
     """
     values = numbers.values
     fill_start(s, numbers)
-    if ROCKS[values.effects_rock] == RockKind.WALL:
+    if is_wall(values):
         s.k_r = s.next_k_r = values.fem_contact_stiffness
     s.inputs_changed = 1
     for i in range(p.n_p + p.n_b):

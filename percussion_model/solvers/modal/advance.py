@@ -16,11 +16,12 @@ from percussion_model.physics.loads import (
     time_to_cover,
 )
 from percussion_model.physics.readings import fill_ledger, fill_motion
-from percussion_model.physics.records import Mode, Piston, RockKind, Status
+from percussion_model.physics.records import Mode, Piston, Status
 from percussion_model.physics.reference import refer
 from percussion_model.physics.rock import (
     barrier_level,
     ends_standstill,
+    is_crushable,
     keep_margin,
     overcomes_barrier,
     recoverable,
@@ -251,7 +252,7 @@ def plan(par, s, bars, law, most, events):
     if has_piston(par) and s.parked == 0 and s.closed == 0 and s.time >= s.no_park:
         park(par, s, bars)
     ready(par, s, bars, law)
-    if s.mode == Mode.SS and s.alert == 1 and par.rock == RockKind.BILINEAR:
+    if s.mode == Mode.SS and s.alert == 1 and is_crushable(par):
         most = watch_barrier(par, s, bars, most, events)
         if s.law < 0:
             return most

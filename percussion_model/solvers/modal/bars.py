@@ -9,8 +9,17 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from percussion_model.physics.kernel import inlined, kernel
-from percussion_model.physics.records import Mode, Piston, RockKind
-from percussion_model.physics.rock import is_curved, is_loading, origin, stiffness
+from percussion_model.physics.records import Mode, Piston
+from percussion_model.physics.rock import (
+    has_rock,
+    is_crushable,
+    is_curved,
+    is_elastic_rock,
+    is_loading,
+    is_rigid_rock,
+    origin,
+    stiffness,
+)
 from percussion_model.solvers.modal.lanes import WIDTH, load, spread, store, total
 from percussion_model.solvers.modal.records import JOINED, LEVELS, Move, Shape
 
@@ -232,7 +241,7 @@ def piston_vibration(bars):
 def form_wanted(par, s):
     """Form of the present mode: free, or on the spring that comes closest to the rock's."""
     form = JOINED if s.closed == 1 else 0
-    if s.mode == Mode.FF or par.rock == RockKind.NONE or par.rock == RockKind.WALL:
+    if s.mode == Mode.FF or not has_rock(par) or is_rigid_rock(par):
         return form
     if is_loading(s):
         return form + 1
@@ -244,9 +253,9 @@ def follows_form(par, s):
     """Whether the rock is the spring of the form that its mode wants; else its rest is stepped."""
     if s.mode == Mode.FF:
         return True
-    if par.rock == RockKind.SPRING:
+    if is_elastic_rock(par):
         return s.k_r == par.k_r
-    if par.rock != RockKind.BILINEAR or s.k_r != par.k_r:
+    if not is_crushable(par) or s.k_r != par.k_r:
         return False
     return s.gamma == par.gamma and not is_curved(par, s)
 

@@ -20,7 +20,7 @@ from percussion_model.physics.blows import (
 )
 from percussion_model.physics.kernel import inlined, kernel, merged
 from percussion_model.physics.loads import room_to_turn
-from percussion_model.physics.records import Mode, Piston, RockKind
+from percussion_model.physics.records import Mode, Piston
 from percussion_model.physics.rock import (
     REST_VELOCITY,
     barrier_level,
@@ -28,6 +28,10 @@ from percussion_model.physics.rock import (
     damping,
     ends_standstill,
     enter_standstill,
+    has_rock,
+    is_crushable,
+    is_elastic_rock,
+    is_rigid_rock,
     leave_by_velocity,
     leave_standstill,
     origin,
@@ -284,13 +288,13 @@ def passed(par, s, p, v, work, force):
     force : float
         Of the rock on the bit at that time [N].
     """
-    if par.rock == RockKind.NONE:
+    if not has_rock(par):
         return False
     if s.mode == Mode.FF:
         return p > s.p_u and v > 0.0
-    if par.rock == RockKind.SPRING:
+    if is_elastic_rock(par):
         return p < 0.0
-    if par.rock == RockKind.WALL:
+    if is_rigid_rock(par):
         return force < 0.0
     if s.mode == Mode.DFC and s.w + work >= s.w_r:
         return True
@@ -452,12 +456,12 @@ def next_mode(par, s, energy):
     left, before = s.mode, recoverable(par, s)
     s.has_place = 0
     if s.mode == Mode.FF:
-        if par.rock == RockKind.WALL:
+        if is_rigid_rock(par):
             s.e_standstill += before
             s.p_u = s.p
         close_interface(par, s, energy)
-    elif par.rock != RockKind.BILINEAR:
-        if par.rock == RockKind.WALL:
+    elif not is_crushable(par):
+        if is_rigid_rock(par):
             s.p_u = s.p
         s.mode = Mode.FF
     elif s.mode == Mode.DFC and not (s.w < s.w_r and s.v_low < -REST_VELOCITY):
@@ -471,7 +475,7 @@ def next_mode(par, s, energy):
         leave_by_velocity(par, s, s.v_low, energy)
     if s.mode == Mode.FF:
         s.f_rock = 0.0  # not what it was just past the end of contact
-        if par.rock == RockKind.SPRING or left == Mode.BC:
+        if is_elastic_rock(par) or left == Mode.BC:
             s.e_overshoot += before
     return s.mode != left
 

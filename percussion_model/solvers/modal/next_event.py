@@ -13,8 +13,15 @@ import numpy as np
 
 from percussion_model.physics.kernel import inlined, kernel, merged
 from percussion_model.physics.loads import bit_acceleration, time_to_cover
-from percussion_model.physics.records import Mode, RockKind
-from percussion_model.physics.rock import barrier_off, damping, origin, stiffness
+from percussion_model.physics.records import Mode
+from percussion_model.physics.rock import (
+    barrier_off,
+    damping,
+    has_rock,
+    is_crushable,
+    origin,
+    stiffness,
+)
 from percussion_model.solvers.modal.bars import way_alone
 from percussion_model.solvers.modal.ends import (
     WHOLE,
@@ -252,7 +259,7 @@ def scan(bars, view, modes, row):
 @kernel
 def quiet_flight(par, s, bars, energy):
     """Time of free flight, with an energy of vibration [J], before the rock may be met [s]."""
-    if par.rock == RockKind.NONE:
+    if not has_rock(par):
         return math.inf
     ends = bars.laws.ends[s.law]
     # elastic modes of a free bit leave its mean where it is
@@ -280,7 +287,7 @@ def most_swing(s, bars, law):
 @kernel
 def quiet_standstill(par, s, bars, law, energy, most):
     """Ticks in which a standstill goes on by itself, up to `most`; 0 where it is not quiet."""
-    if s.alert == 1 or par.rock != RockKind.BILINEAR or barrier_off(par, s):
+    if s.alert == 1 or not is_crushable(par) or barrier_off(par, s):
         return 0
     if par.release == 0:
         return most

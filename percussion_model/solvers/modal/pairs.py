@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from percussion_model.physics.kernel import inlined, kernel, merged
-from percussion_model.physics.records import Mode, RockKind
-from percussion_model.physics.rock import book_dashpot, damping
+from percussion_model.physics.records import Mode
+from percussion_model.physics.rock import book_dashpot, damping, is_rigid_rock
 from percussion_model.solvers.modal.bars import (
     LOAD,
     SOFT,
@@ -509,7 +509,7 @@ def take_modes(par, s, bars, n):
         store(bars.w, Q, k, load(shape, SOFT, k) * load(bars.w, LOAD, k))
         store(bars.w, V, k, spread(0.0))
     # loads bend a free bit without a piston by nothing; a wall excites all of its modes
-    if s.form > 0 or par.rock == RockKind.WALL:
+    if s.form > 0 or is_rigid_rock(par):
         n = whole
     s.active, s.law = n, -1
     refresh_sums(s, bars)

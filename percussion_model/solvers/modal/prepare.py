@@ -8,8 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from percussion_model.physics.kernel import plain
-from percussion_model.physics.records import Piston, RockKind
+from percussion_model.physics.records import Piston
 from percussion_model.scene.bars import bar_transit_time
+from percussion_model.scene.rock_law import rock_numbers, rock_springs
 from percussion_model.solvers import plain_code  # noqa: F401  # kernels call functions of scenes
 from percussion_model.solvers.modal.ends import RINGING
 from percussion_model.solvers.modal.laws import laws_of
@@ -28,7 +29,6 @@ from percussion_model.solvers.setup import (
     fill_parameters,
     fill_start,
     kelvin_voigt_time,
-    rock_numbers,
 )
 
 # Steps in the transit time of the first bar at least: with fewer a search missed that the rock end
@@ -120,10 +120,7 @@ def fill_modal_parameters(p, numbers):
     p["k_r"], p["gamma"], p["c_r"] = rock.k_r, rock.gamma, rock.c_r
     # forces that change from step to step leave no law that pairs could go by
     p["leaps"] = numbers.values.solver_leaps and p["effects"] == 0
-    bilinear = p["rock"] == RockKind.BILINEAR
-    loading = rock.k_r if bilinear or p["rock"] == RockKind.SPRING else 0.0
-    springs = (loading, rock.gamma * rock.k_r if bilinear else 0.0)
-    return Request(p["mass_p"], springs, rock.c_r, highest, eta, tick)
+    return Request(p["mass_p"], rock_springs(numbers), rock.c_r, highest, eta, tick)
 
 
 @plain

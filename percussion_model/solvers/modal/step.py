@@ -20,7 +20,7 @@ from percussion_model.physics.loads import (
     piston_acceleration,
     switch_drive,
 )
-from percussion_model.physics.records import Mode, Piston, RockKind
+from percussion_model.physics.records import Mode, Piston
 from percussion_model.physics.rock import (
     Line,
     Place,
@@ -29,7 +29,9 @@ from percussion_model.physics.rock import (
     crush,
     crushed_on_line,
     damping,
+    is_crushable,
     is_curved,
+    is_rigid_rock,
     line_between,
     origin,
     overcomes_barrier,
@@ -154,7 +156,7 @@ def answer_of(par, s, bars, level, h):
     held, yields = bars.forms.stiff[s.form], bars.forms.yields[s.form, level, n // WIDTH - 1]
     m = bars.forms.move[s.form, level]
     line, here = Line(stiffness(s), origin(s)), Place(s.p, 0.0, 0.0)
-    if par.rock == RockKind.WALL:
+    if is_rigid_rock(par):
         if s.mode == Mode.FF:
             return Answer(0.0, line, here)
         rest = (low_after(bars.w, shape, m, n) - s.low) / yields
@@ -185,7 +187,7 @@ def try_step(par, s, bars, level):
     C, spring = damping(s), line.stiffness * (s.p - line.origin)
     force = spring + 0.5 * line.stiffness * path + C * path / h
     first, last = spring + C * s.v_low, spring + line.stiffness * path + C * ends.speed
-    if par.rock == RockKind.WALL:
+    if is_rigid_rock(par):
         force = first = last = rest
     way_b = (ends.bit - s.at_b) / par.mass_b
     way_p = contact = touch = low_p = gap = 0.0
@@ -283,7 +285,7 @@ def level_of_step(par, s, bars):
 
     Steps on rock go with the modes asked for, so that runs with fewer tell what they do to a rate.
     """
-    if par.effects == 1 or par.rock == RockKind.WALL or follows_form(par, s):
+    if par.effects == 1 or is_rigid_rock(par) or follows_form(par, s):
         return STEP
     # the rock changes slower than a front passes, slowest where it unloads
     level, most = par.asked + 1, LOADING * par.most_bend
@@ -344,12 +346,12 @@ def go_on(par, s, bars, most, near, blows, events):
     piston = has_piston(par)
     if piston and s.parked == 0 and s.closed == 0 and s.time >= s.no_park:
         park(par, s, bars)
-    if s.mode == Mode.SS and s.alert == 1 and par.rock == RockKind.BILINEAR:
+    if s.mode == Mode.SS and s.alert == 1 and is_crushable(par):
         end_standstill(par, s, bars, events)
     level, flips, longer = most, 0, level_of_step(par, s, bars) > STEP
     load_bodies(par, s, bars, level)
     while True:
-        stands = s.mode == Mode.SS and s.alert == 1 and par.rock == RockKind.BILINEAR
+        stands = s.mode == Mode.SS and s.alert == 1 and is_crushable(par)
         trial = try_step(par, s, bars, level)
         if piston and s.parked == 1 and trial.gap < 0.0:
             unpark(par, s, bars)
@@ -382,7 +384,7 @@ def go_on(par, s, bars, most, near, blows, events):
             flip_contact(par, s, bars, s.v_p - s.v_b, blows, events)
             level, flips = most, flips + 1
             load_bodies(par, s, bars, level)
-        elif ends and s.mode != Mode.FF and par.rock == RockKind.WALL:
+        elif ends and s.mode != Mode.FF and is_rigid_rock(par):
             change_mode(par, s, bars, events)
         else:
             break

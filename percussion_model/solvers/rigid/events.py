@@ -13,12 +13,14 @@ from percussion_model.physics.blows import (
 )
 from percussion_model.physics.kernel import kernel
 from percussion_model.physics.loads import room_to_turn, turn_drive
-from percussion_model.physics.records import EventKind, Mode, RockKind
+from percussion_model.physics.records import EventKind, Mode
 from percussion_model.physics.rock import (
     close_interface,
     end_loading,
     end_unloading,
     is_curved,
+    is_elastic_rock,
+    is_rigid_rock,
     resume_cycle,
     take_line,
 )
@@ -76,7 +78,7 @@ def impact(par, s, blows, events):
     if room_to_turn(par, s, 0.0) <= 0.0:
         turn_drive(s, events, s.time, 0.0)
     # A bit at the wall stays there, even if its feed pulls and it is about to leave.
-    rests = par.rock == RockKind.WALL and s.p >= s.p_u and s.v_b == 0.0
+    rests = is_rigid_rock(par) and s.p >= s.p_u and s.v_b == 0.0
     mass = par.mass_p if rests else par.mass_p * par.mass_b / (par.mass_p + par.mass_b)
     # In a storm they do not rebound; in the worst they stay together, pressed or not.
     e = 0.0 if in_storm(par, s) else par.restitution
@@ -111,7 +113,7 @@ def touch_rock(par, s, events, inside):
     """The bit meets the rock."""
     if not inside:
         s.p = s.p_u
-    if par.rock == RockKind.WALL:
+    if is_rigid_rock(par):
         # The wall stops the bit; a piston that rode on it goes on and hits it.
         impulse = par.mass_b * s.v_b
         s.i_bit += impulse
@@ -140,7 +142,7 @@ def change_mode(par, s, events, kind, moved):
     elif kind == Next.PEAK:
         end_loading(par, s)
     elif kind == Next.LIFT:
-        if moved and (s.mode == Mode.BC or par.rock == RockKind.SPRING):
+        if moved and (s.mode == Mode.BC or is_elastic_rock(par)):
             s.p = s.p_u  # exactly unloaded; else it already was in tension
         lift_off(par, s)
     elif kind == Next.TURN:

@@ -8,11 +8,12 @@ from percussion_model.physics.blows import LAST_SHARE
 from percussion_model.physics.kernel import kernel
 from percussion_model.physics.loads import bit_load, drive_force, piston_acceleration
 from percussion_model.physics.power_law import loading_force
-from percussion_model.physics.records import Mode, Piston, RockKind
+from percussion_model.physics.records import Mode, Piston
 from percussion_model.physics.rock import (
     damping,
     enter_standstill,
-    is_loading,
+    is_curved,
+    is_rigid_rock,
     present_line,
     recoverable,
 )
@@ -44,7 +45,7 @@ def loads(par, s):
 @kernel
 def rock_terms(par, s):
     """Stiffness K, damping C and origin P_R of the present mode; K = 0 off the rock."""
-    if s.mode == Mode.FF or par.rock == RockKind.WALL:
+    if s.mode == Mode.FF or is_rigid_rock(par):
         return 0.0, 0.0, 0.0
     line = present_line(par, s)
     return line.stiffness, damping(s), line.origin
@@ -53,7 +54,7 @@ def rock_terms(par, s):
 @kernel
 def on_wall(par, s):
     """Whether the bit rests on a rigid wall."""
-    return par.rock == RockKind.WALL and s.mode == Mode.SS
+    return is_rigid_rock(par) and s.mode == Mode.SS
 
 
 @kernel
@@ -90,7 +91,7 @@ def bit_force(par, s, p, v):
     if on_wall(par, s):
         F, _ = loads(par, s)
         return F
-    if par.power == 1 and is_loading(s):
+    if is_curved(par, s):
         return loading_force(par, s, p) + damping(s) * v
     K, C, P = rock_terms(par, s)
     return K * (p - P) + C * v

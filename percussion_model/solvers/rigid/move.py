@@ -12,10 +12,11 @@ from percussion_model.physics.loads import (
     pass_time,
     piston_acceleration,
 )
-from percussion_model.physics.records import Mode, Piston, RockKind
+from percussion_model.physics.records import Mode, Piston
 from percussion_model.physics.rock import (
     book_dashpot,
     crush,
+    is_crushable,
     is_curved,
     line_work,
     present_line,
@@ -133,7 +134,7 @@ def greatest_bit_force(par, s, tau, p, v, known):
     most = max(bit_force(par, s, s.p, s.v_b), bit_force(par, s, p, v))
     K, C, P = rock_terms(par, s)
     # In BC the force falls, in FC it rises with the penetration.
-    if K == 0.0 or s.mode == Mode.BC or (s.mode == Mode.FC and par.rock == RockKind.BILINEAR):
+    if K == 0.0 or s.mode == Mode.BC or (s.mode == Mode.FC and is_crushable(par)):
         return most
     F, M = loads(par, s)
     beta = 0.5 * C / M

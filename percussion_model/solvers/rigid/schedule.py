@@ -11,8 +11,15 @@ from percussion_model.physics.loads import (
     piston_acceleration,
     room_to_turn,
 )
-from percussion_model.physics.records import Mode, Piston, RockKind
-from percussion_model.physics.rock import REST_VELOCITY, barrier_level, barrier_off, is_curved
+from percussion_model.physics.records import Mode, Piston
+from percussion_model.physics.rock import (
+    REST_VELOCITY,
+    barrier_level,
+    barrier_off,
+    has_rock,
+    is_curved,
+    is_elastic_rock,
+)
 from percussion_model.solvers.rigid.forces import (
     ROUNDING,
     acceleration,
@@ -38,7 +45,7 @@ SETTLED = 100.0
 @kernel
 def touch_event(par, s):
     """Next contact of a flying bit with the rock."""
-    if par.rock == RockKind.NONE:
+    if not has_rock(par):
         return NEVER, Next.NOTHING
     a = acceleration(par, s)
     v = s.v_b
@@ -232,7 +239,7 @@ def find_next(par, s):
     else:
         y = s.p - P - F / K
         acc = -2.0 * beta * s.v_b - k * y
-        if par.rock == RockKind.SPRING:
+        if is_elastic_rock(par):
             tau, kind = fall_time(y, s.v_b, 0.0, k, -F / K), Next.LIFT
         elif s.mode == Mode.DFC or s.mode == Mode.FC:
             tau, kind = loading_event(s, y, acc, beta, k, M)

@@ -8,16 +8,21 @@ step, so every crossing is a logarithm (docs/model.md, eqs 14-18, table 1).
 from __future__ import annotations
 
 from percussion_model.physics.blows import push_event
+from percussion_model.physics.curved_loading import loading_stretch
 from percussion_model.physics.elementary import expm1, log
 from percussion_model.physics.kernel import inlined, kernel, merged
-from percussion_model.physics.records import Mode, RockKind
+from percussion_model.physics.records import Mode
 from percussion_model.physics.rock import (
     book_dashpot,
     close_interface,
     crush,
     damping,
     enter_standstill,
-    is_loading,
+    has_rock,
+    is_crushable,
+    is_curved,
+    is_elastic_rock,
+    is_rigid_rock,
     leave_by_velocity,
     leave_standstill,
     origin,
@@ -26,7 +31,6 @@ from percussion_model.physics.rock import (
     spring_force,
     stiffness,
 )
-from percussion_model.solvers.wave.power_loading import loading_stretch
 
 
 @merged
@@ -46,7 +50,7 @@ def time_in_mode(par, s, v_free, v, y, rate, y_end, rest):
             t = -0.5 * log(left) / rate
             if t < rest:
                 return max(t, 0.0), Mode.FC
-    elif s.mode == Mode.BC or (s.mode == Mode.FC and par.rock == RockKind.SPRING):
+    elif s.mode == Mode.BC or (s.mode == Mode.FC and is_elastic_rock(par)):
         if v < 0.0 and y_end < 0.0:
             t = -log(-y_end / (y - y_end)) / rate if y > 0.0 else 0.0
             if t < rest:
@@ -130,7 +134,7 @@ def flight_stretch(par, s, v_free, rest):
     before = recoverable(par, s)
     t = rest
     closes = 0
-    if par.rock != RockKind.NONE and v_free > 0.0:
+    if has_rock(par) and v_free > 0.0:
         reach = (s.p_u - s.p) / v_free
         if reach < rest:
             t = max(reach, 0.0)
@@ -148,7 +152,7 @@ def flight_stretch(par, s, v_free, rest):
 def asks_for_energy(par, s, v_free, z, tau):
     """Whether a step may come to where the rock law goes by the kinetic energy of the bit."""
     if s.mode == Mode.SS:
-        return par.rock == RockKind.BILINEAR
+        return is_crushable(par)
     if s.mode == Mode.FF:
         return s.p_u - s.p < v_free * tau
     return s.mode == Mode.BC and z * v_free - spring_force(par, s) > 0.0
@@ -177,7 +181,7 @@ def rock_step(par, s, energy, v_free, z, tau, time, events):
     d, q : float
         Integrals of velocity [m] and of its square [m2/s].
     """
-    if s.mode == Mode.SS and par.rock == RockKind.BILINEAR:
+    if s.mode == Mode.SS and is_crushable(par):
         if overcomes_barrier(par, s, energy):
             force = spring_force(par, s)
             leave_standstill(par, s, (z * v_free - force) / (z + s.c_r))
@@ -200,7 +204,7 @@ def rock_step(par, s, energy, v_free, z, tau, time, events):
                 enter_standstill(s, here + t)
             push_event(s, events, here + t, s.mode, 0.0)
             continue
-        if par.rock == RockKind.WALL:
+        if is_rigid_rock(par):
             if v_free > 0.0:
                 s.b_peak_bit = max(s.b_peak_bit, z * v_free)
                 if here + rest > s.peak_from:
@@ -215,7 +219,7 @@ def rock_step(par, s, energy, v_free, z, tau, time, events):
                 enter_standstill(s, here)
             push_event(s, events, here, s.mode, spring_force(par, s))
             continue
-        if par.power == 1 and is_loading(s):
+        if is_curved(par, s):
             t, step, square, next_mode = loading_stretch(par, s, v_free, z, rest, here)
         else:
             t, step, square, next_mode = contact_stretch(par, s, v_free, z, rest, here)

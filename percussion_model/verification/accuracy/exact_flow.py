@@ -13,15 +13,11 @@ import numpy as np
 from percussion_model.physics.records import DriveKind, Mode
 from percussion_model.scene.inputs import SimulationError
 from percussion_model.scene.numbers import numbers_of
+from percussion_model.scene.rock_law import rock_numbers
 from percussion_model.scene.scene import Scene
 from percussion_model.solvers.fem.mesh import BarMesh, assemble, cut_bar
 from percussion_model.solvers.fem.records import Mesh
-from percussion_model.solvers.setup import (
-    fill_parameters,
-    fill_start,
-    kelvin_voigt_time,
-    rock_numbers,
-)
+from percussion_model.solvers.setup import fill_parameters, fill_start, kelvin_voigt_time
 from percussion_model.solvers.state import State
 from percussion_model.verification.accuracy.exact_flow_step import (
     FINE,
