@@ -236,7 +236,7 @@ def test_kernels_are_looked_for_where_numba_keeps_them(tmp_path):
     assert shown[1:] == ["None"] * 3
 
 
-@pytest.mark.parametrize("name", ["wave", "modal", "chain", "fem", "rigid"])
+@pytest.mark.parametrize("name", ["wave", "modal", "fem", "rigid"])
 def test_the_kernel_of_every_solver_is_looked_for_where_numba_keeps_it(name, monkeypatch, tmp_path):
     assert {*SOLVER_NAMES} - {"auto"} <= set(base._REGISTRY)
     entry = base._REGISTRY[name]

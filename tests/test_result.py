@@ -199,7 +199,7 @@ def test_what_the_discretisation_takes_is_told_beyond_its_limits():
     assert "1 % of the energy" in "".join(numerical_note(0.0101, "wave"))
 
 
-@pytest.mark.parametrize("solver", ["wave", "modal", "chain", "fem", "rigid"])
+@pytest.mark.parametrize("solver", ["wave", "modal", "fem", "rigid"])
 @pytest.mark.parametrize("law", ["bilinear", "power"])
 def test_a_solver_that_makes_energy_is_told(rigid, solver, law):
     """Bounds of docs/model.md, section 8, on any rock."""

@@ -5,15 +5,12 @@ import signal
 
 import numpy as np
 import pytest
-from percussion_model.solvers.wave.grid import choose_time_step
-from percussion_model.solvers.wave.shared import cut_bars
-from percussion_model.solvers.wave.totals import begin
 
 from percussion_model import Scene, SceneError, Simulation, SimulationError, simulate
 from percussion_model.physics.records import SAMPLE_FIELDS
-from percussion_model.scene.numbers import numbers_of
 from percussion_model.simulation.simulate import sampling_times, stop_on_interrupt
 from percussion_model.solvers.wave.advance import run
+from percussion_model.solvers.wave.prepare import begin
 
 RIGID = {"piston.model": "rigid", "bit.model": "rigid"}
 WAVES = Scene().computed_by("wave")
@@ -88,7 +85,6 @@ def test_all_kinds_of_scenes_have_arguments_of_the_same_types(monkeypatch):
     for changes in (
         {"piston.model": "rigid"},
         {"piston.model": "absent", "effects.drive": "none"},
-        {"solver.leaps": False},
         {"effects.loss": False},
         {"solver.cells": 7},
     ):
@@ -96,26 +92,6 @@ def test_all_kinds_of_scenes_have_arguments_of_the_same_types(monkeypatch):
         simulation.observe()
         simulation.energy()
     assert (len(run.overloads), len(begin.overloads)) == before
-
-
-def cells_of(scene):
-    numbers = numbers_of(scene)
-    return cut_bars(numbers, choose_time_step(numbers, 0))
-
-
-def test_scenes_on_the_same_steel_share_their_cells_and_leave_them_alone():
-    scenes = [WAVES.replace(**{"rock.loading_stiffness": k}) for k in (7.5e8, 2e9)]
-    bars = cells_of(scenes[0])
-    assert cells_of(scenes[1]) is bars
-    before = [bar.coefficients.copy() for bar in bars.both]
-    alone = one_go(scenes[0])
-    for scene in (scenes[1], WAVES.replace(**{"loss.time": 3e-7})):
-        one_go(scene, end=0.06)
-    assert cells_of(scene) is not bars
-    assert all(
-        np.array_equal(bar.coefficients, c) for bar, c in zip(bars.both, before, strict=True)
-    )
-    assert bits(one_go(scenes[0])) == bits(alone)
 
 
 def test_reading_does_not_touch(scene):
@@ -153,10 +129,9 @@ def test_a_sample_does_not_depend_on_its_neighbours(scene):
         np.testing.assert_array_equal(alone, together)
 
 
-@pytest.mark.parametrize("leaps", [True, False])
-def test_many_samples_leave_blows_and_settling_as_they_are(leaps):
+def test_many_samples_leave_blows_and_settling_as_they_are():
     """One kernel reads them all; it gives way at blows, and where settling ends."""
-    scene = WAVES.replace(**{"solver.leaps": leaps, "run.duration": END, "run.settle": 0.07})
+    scene = WAVES.replace(**{"run.duration": END, "run.settle": 0.07})
     times = np.linspace(0.0, END, 700)
     sampled, alone = Simulation(scene), Simulation(scene)
     together = sampled.sample_rows(times)

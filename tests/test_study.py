@@ -23,7 +23,6 @@ from percussion_model.interface.cli import INTERRUPTED, _guarded, app
 from percussion_model.simulation.files import ResultError, to_json
 from percussion_model.solvers import sources
 from percussion_model.solvers.modal import solver as modal
-from percussion_model.solvers.wave import shared
 
 SCENE = Scene(title="rigid bodies").computed_by("rigid")
 AXES = {"feed.force": [1500.0, 2500.0, 4000.0], "rock.loading_stiffness": [3e8, 7.5e8]}
@@ -51,8 +50,6 @@ def test_bits_do_not_depend_on_the_threads_of_linear_algebra(solver):
     threadpoolctl = pytest.importorskip("threadpoolctl")
     scene, found = Scene().computed_by(solver), []
     for threads in (1, 2):
-        shared._kept.clear()
-        shared._kept_free.clear()
         modal._kept.clear()
         with threadpoolctl.threadpool_limits(threads):
             rows, _ = run_points(scene, ("solver.cells",), np.array([[40.0]]), 1e-4, 400, 1e-3)

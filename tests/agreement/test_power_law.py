@@ -77,10 +77,3 @@ def test_the_ledger_closes_with_and_without_leaps(solver):
         energy = drill(**law, **solver, **{"solver.leaps": leaps}).energy
         put_in = energy["drive"] + energy["feed"] + energy["gravity"]
         assert abs(energy["residual"]) < 1e-9 * put_in
-
-
-def test_leaps_change_nothing():
-    law = {"effects.rock": "power", "solver.name": "wave"}
-    leaping, stepping = drill(**law), drill(**law, **{"solver.leaps": False})
-    found, wanted = leaping.blows["hole_advance"][:8], stepping.blows["hole_advance"][:8]
-    assert found == pytest.approx(wanted, rel=1e-9)

@@ -202,7 +202,7 @@ def test_two_bars_are_piston_and_bit():
     runs = []
     for scene in (listed, grouped):
         # by the solver of chains, which computes these as well
-        simulation = Simulation(scene.replace(**{"solver.name": "chain"}))
+        simulation = Simulation(scene.replace(**{"solver.name": "wave"}))
         simulation.advance(0.08)
         assert len(simulation.blows) > 0
         runs.append(simulation.blows.tobytes())

@@ -1,4 +1,4 @@
-"""Waves of two bars in delay lines: closed forms at their ends, ledger, and modes beside them."""
+"""Waves of two bars: closed forms at their ends, ledger, and modes beside them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def alone(**changes):
     """A piston above a bit on nothing, at 10 m/s."""
     effects = {"drive": "none", "feed": False, "gravity": False, "rock": "none"}
     scene = Scene(effects={**effects, "barrier": False}, run={"settle": 0.0, "duration": 1e-3})
-    return Simulation(scene.computed_by("chain", **changes))
+    return Simulation(scene.computed_by("wave", **changes))
 
 
 @pytest.mark.parametrize("cells", [7, 16, 40])
@@ -89,7 +89,7 @@ def test_loss_changes_the_impedance_of_an_end(eta, wavelength):
 )
 def test_the_ledger_of_two_bars_closes(changes):
     """Through blows, cut steps, flight and standstill."""
-    scene = Scene(run={"duration": 0.15, "settle": 0.0}).computed_by("chain", **changes)
+    scene = Scene(run={"duration": 0.15, "settle": 0.0}).computed_by("wave", **changes)
     result = simulate(scene)
     assert abs(result.energy["residual_relative"]) < 1e-11
     assert len(result.events) > 0
@@ -102,7 +102,7 @@ def test_the_ledger_closes_where_a_section_turns_waves():
         {"sections": [{"length": k * CELL, "area": k * AREA} for k in (20.6, 1.37)]},
         start={"piston_velocity": 9.0, "gap": 3.3e-5}, drive={"external_force": 3e4},
         effects={"loss": True, "gravity": True, "rock": "spring", "drive": "external"},
-        solver={"name": "chain"},
+        solver={"name": "wave"},
     )  # fmt: skip
     simulation.advance(4000 * DT)
     assert simulation._state.record[0]["t_base"] < 0.0
@@ -115,7 +115,7 @@ def test_the_ledger_closes_where_a_section_turns_waves():
 def test_the_first_elastic_bar_of_two_has_24_steps(model):
     """Those of a rigid piston, or of none, are counted in the bit."""
     drive = {} if model != "absent" else {"effects.drive": "none"}
-    solver = make_solver(Scene().computed_by("chain", **{"piston.model": model, **drive}))
+    solver = make_solver(Scene().computed_by("wave", **{"piston.model": model, **drive}))
     assert next(iter(solver.cells.values())) == 24
 
 
@@ -128,11 +128,11 @@ def test_the_first_elastic_bar_of_two_has_24_steps(model):
         ("hammers/dth5_st_anne", {}, 64, 2e-3),
     ],
 )
-def test_delay_lines_and_modes_agree(name, changes, cells, error):
+def test_waves_and_modes_agree(name, changes, cells, error):
     """The rate of penetration by two methods that share no motion of a bar."""
     path = name if "/" not in name else f"scenarios/{name}.toml"
     scene = Scene.from_toml(path).replace(**{"run.duration": 2.0, "run.settle": 0.5})
     modes = simulate(scene.computed_by("modal", **{**changes, "solver.cells": 40}))
-    waves = simulate(scene.computed_by("chain", **{**changes, "solver.cells": cells}))
+    waves = simulate(scene.computed_by("wave", **{**changes, "solver.cells": cells}))
     expected = modes.rate_of_penetration
     assert waves.rate_of_penetration == pytest.approx(expected, rel=error)

@@ -23,8 +23,7 @@ def measured_order(sizes, errors):
 
 @pytest.mark.parametrize("cells", [1, 7, 20, 40])
 @pytest.mark.parametrize("v", [0.3, 10.0])
-@pytest.mark.parametrize("leaps", [True, False])
-def test_impact_of_equal_sections(cells, v, leaps):
+def test_impact_of_equal_sections(cells, v):
     """Force Z v/2 for 2 L_p/c, then the piston rests and <v_b> = v L_p/L_b."""
     # one cell in the piston needs a bit of whole cells
     bit = bar(2 * L_P if cells == 1 else 23 / 20 * L_P)
@@ -34,7 +33,6 @@ def test_impact_of_equal_sections(cells, v, leaps):
         **{
             "start.piston_velocity": v,
             "solver.cells": cells,
-            "solver.leaps": leaps,
             "bit.sections": bit,
         }
     )

@@ -1,8 +1,9 @@
-"""Random scenes for the ledger of waves: wide ranges of all that a leap's books depend on."""
+"""Random scenes for the ledger of waves: wide ranges of all that its books depend on."""
 
 from __future__ import annotations
 
 from percussion_model import Scene, Section
+from tests.properties.scenes import with_loss_that_fits
 
 DENSITIES = (7850.0, 7200.0)
 
@@ -58,4 +59,4 @@ def random_scene(rng):
     changes["rock.unloading_ratio"] = float(1.0 + 10.0 ** rng.uniform(-1.0, 2.0))
     changes["rock.barrier_damping"] = float(rng.choice([0.0, 10.0 ** rng.uniform(2.0, 7.0)]))
     changes["rock.barrier_energy"] = float(rng.choice([0.0, 10.0 ** rng.uniform(-3.0, 1.0)]))
-    return Scene().replace(**changes)
+    return with_loss_that_fits(Scene().replace(**changes))

@@ -11,7 +11,6 @@ from tests.state_bits import run_bits
 SOLVERS = {
     "wave": {"solver.name": "wave"},
     "modal": {"solver.name": "modal"},
-    "chain": {"solver.name": "chain"},
     "fem": {"solver.name": "fem"},
     "rigid": {"solver.name": "rigid", "piston.model": "rigid", "bit.model": "rigid"},
 }
@@ -74,11 +73,11 @@ LIMITS = {
 }
 
 
-@pytest.mark.parametrize("solver", [*SOLVERS, "wave without leaps"])
+@pytest.mark.parametrize("solver", [*SOLVERS, "modal without leaps"])
 @pytest.mark.parametrize("seed", range(4))
 def test_inputs_at_random_times_leave_the_ledger_closed(seed, solver):
     rng = np.random.default_rng(seed)
-    changes = SOLVERS.get(solver, SOLVERS["wave"] | {"solver.leaps": False})
+    changes = SOLVERS.get(solver, SOLVERS["modal"] | {"solver.leaps": False})
     simulation = Simulation(Scene().replace(**changes))
     end = 0.4
     for t in np.sort(rng.uniform(0.0, end, 60)):

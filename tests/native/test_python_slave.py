@@ -36,7 +36,6 @@ SCENES = {
     "rigid": RIGID.given_values(),
     "waves": {"solver.name": "wave", "solver.cells": 12},
     "elements": {"solver.name": "fem", "fem.elements": 12},
-    "chain": {"solver.name": "chain"},
 }
 
 

@@ -7,7 +7,6 @@ from collections import Counter
 from typing import Any
 
 import numpy as np
-from percussion_model.solvers.wave.ends import WIDE
 
 from percussion_model import Simulation
 from percussion_model.physics.records import SAMPLE_FIELDS, EventKind, Mode
@@ -29,7 +28,7 @@ SHORTEST = 1e-5
 # A penalty that gives way more than this is none [m/N].
 MOST_GIVE = 1e100
 # Events of one step: crossings of the rock, two of the contact, one of the drive, one
-# of the barrier (`percussion_model.solvers.wave.advance.EVENTS_A_STEP`).
+# of the barrier.
 EVENTS_A_STEP = 36
 # Steps of the modal solver are halved down to the tick of an event, or of a call. It searches so
 # many ahead for the next event, and a call leaves it to search again.
@@ -283,13 +282,9 @@ def check_events(events: np.ndarray, scene: Any) -> None:
 
 
 def cuts_of(simulation: Simulation) -> int:
-    """How often steps may be cut: twice before each blow, or each closure (docs/numerics.md, 6)."""
+    """How often steps may be cut: twice before each closure, also one to come."""
     closures = np.count_nonzero(simulation.events["kind"] == EventKind.CONTACT_CLOSED)
-    if simulation.scene.solver_name == "chain":
-        return MOST_CUTS * int(closures + 1)
-    if getattr(simulation.solver, "place_of_closure", 0.0) < WIDE:
-        return MOST_CUTS * len(simulation.blows)
-    return MOST_CUTS * int(closures)
+    return MOST_CUTS * int(closures + 1)
 
 
 def check_effort(counts: dict[str, int], simulation: Simulation, case: Case) -> None:

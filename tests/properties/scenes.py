@@ -7,12 +7,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from percussion_model.solvers.wave.grid import choose_time_step, section_count
 
-from percussion_model import Scene
+from percussion_model import Scene, SceneError
+from percussion_model.scene.bars import bar_transit_time, section_transit_time
 from percussion_model.scene.inputs import INPUTS, no_effect_reason
-from percussion_model.scene.numbers import numbers_of, section_numbers
+from percussion_model.scene.numbers import section_numbers
 from percussion_model.scene.parameters import find_row
+from percussion_model.solvers.base import make_solver
 from tests.properties.source import Source, chance, decades
 
 # Bounds of "wide": low and high of the amount, by decades, and what else may come.
@@ -118,7 +119,6 @@ def sections(source: Source, reach: str, base: float) -> list[dict[str, float]]:
 MOST_CELLS = 48
 MOST_CELL_STEPS = 2e5
 MOST_STEPS = 20_000
-MOST_SUBSTEPS = 20
 
 
 @dataclass
@@ -211,9 +211,22 @@ def with_cells(source: Source, scene: Scene, solver: str) -> Scene:
     wanted = source.pick((1, 2, 3, 4, 5, 5, 8, 10, 20))
     while wanted > 1 and cells_of(scene, wanted) > MOST_CELLS:
         wanted = max(1, wanted // 2)
-    while scene.loss.time > MOST_SUBSTEPS * step_of(scene, wanted) and solver == "wave":
-        scene = scene.replace(**{"loss.time": 0.1 * scene.loss.time})
-    return scene.replace(**{key: wanted})
+    scene = scene.replace(**{key: wanted})
+    return with_loss_that_fits(scene) if solver == "wave" else scene
+
+
+def with_loss_that_fits(scene: Scene) -> Scene:
+    """The scene with a loss time that waves take in its sections."""
+    while scene.effects.loss and scene.loss.time > 0.0:
+        try:
+            make_solver(scene.computed_by("wave"))
+        except SceneError as error:
+            if "loss.time" not in str(error):
+                break
+            scene = scene.replace(**{"loss.time": 0.1 * scene.loss.time})
+        else:
+            break
+    return scene
 
 
 def bars_of(scene: Scene) -> list[Any]:
@@ -222,12 +235,14 @@ def bars_of(scene: Scene) -> list[Any]:
 
 
 def step_of(scene: Scene, wanted: int) -> float:
-    return choose_time_step(numbers_of(scene), wanted)
+    """Time step where a wave crosses the first bar in so many [s]."""
+    return bar_transit_time(bars_of(scene)[0]) / wanted
 
 
 def cells_of(scene: Scene, wanted: int) -> int:
     step = step_of(scene, wanted)
-    return sum(section_count(one, step) for bar in bars_of(scene) for one in bar)
+    sections = [one for bar in bars_of(scene) for one in bar]
+    return sum(max(1, round(section_transit_time(one) / step)) for one in sections)
 
 
 def draw_length(source: Source, scene: Scene) -> float:

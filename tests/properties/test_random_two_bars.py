@@ -1,4 +1,4 @@
-"""Random scenes of two bars, in delay lines: what holds for every solver."""
+"""Random scenes of two bars, by waves: what holds for every solver."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ SEED, COUNT, GROUPS = 47, 75, 4
 FITS = 1e-9
 
 
-def in_delay_lines(index):
-    """A case of two bars by delay lines; None where it is another one, or refused."""
+def by_waves(index):
+    """A case of two bars by waves; None where it is another one, or refused."""
     case = draw_case(Generator(SEED, index))
     if case.scene.solver_name not in ("wave", "modal"):
         return None
-    case.scene = case.scene.computed_by("chain")
+    case.scene = case.scene.computed_by("wave")
     try:
         return case if make_solver(case.scene).wave_speed_error < FITS else None
     except SceneError:  # too much loss for short sections
@@ -29,7 +29,7 @@ def in_delay_lines(index):
 
 @pytest.mark.parametrize("group", range(GROUPS))
 def test_random_scenes_of_two_bars(group):
-    cases = [in_delay_lines(group * COUNT + k) for k in range(COUNT)]
+    cases = [by_waves(group * COUNT + k) for k in range(COUNT)]
     found = [case for case in cases if case is not None]
     assert len(found) > COUNT // 5
     for case in found:
