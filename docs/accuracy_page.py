@@ -11,7 +11,6 @@ import math
 import textwrap
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from statistics import median
 from typing import Any
 
 from docs.blocks import renewed, table
@@ -23,6 +22,7 @@ from percussion_model.interface.commands.accuracy_tables import (
     within_bar,
 )
 from percussion_model.simulation.uncertain import in_digits
+from percussion_model.solvers.wave.resolution import STEPS_OF_TWO
 from percussion_model.verification.accuracy import Study
 from percussion_model.verification.accuracy.advantage import (
     UNDECIDED,
@@ -31,7 +31,7 @@ from percussion_model.verification.accuracy.advantage import (
     contest,
     summary,
 )
-from percussion_model.verification.accuracy.ladders import FITS, LADDERS
+from percussion_model.verification.accuracy.ladders import LADDERS
 from percussion_model.verification.accuracy.orders import Cost
 from percussion_model.verification.accuracy.problems import (
     APERIODIC,
@@ -54,8 +54,8 @@ COMPARED = (
     *("dth4_kuru", "dth5_st_anne", "t38_rods"),
 )
 OTHERS = ("drop_test", "aperiodic")
-# Errors that sentences state, and up to how many cells in the first bar are few.
-STATED, FEW_CELLS = (1e-2, 1e-3), 40
+# Errors that sentences state.
+STATED = (1e-2, 1e-3)
 # Run that sentences with set-up are about [s].
 RUN = 4.0
 # Forces and stress that are compared beside the rate, and at which errors.
@@ -196,11 +196,6 @@ def summary_text(one: Summary) -> str:
     return f"{bounds_text(one.median)} ({ends}; {decided} scenes)"
 
 
-def fits(study: Study) -> bool:
-    """Whether few cells fit the lengths."""
-    return any(p.fit < FITS and p.size >= 1.0 / FEW_CELLS for p in study.ladder("wave"))
-
-
 def lost(names: Sequence[str], found: dict[float, list[Contest]]) -> str:
     """Where a peer is faster, and why."""
     told = [
@@ -230,7 +225,7 @@ def advantage() -> str:
     heads = " | ".join(f"error of {percent(wanted)}" for wanted in STATED)
     text = (
         "Processor time of the best compiled peer, mostly explicit elements with hard contact, "
-        "divided by that of the default solver (modes; in drill strings the chain) for the same "
+        "divided by that of the default solver (modes; in drill strings waves) for the same "
         "error of the rate: median, range and scenes. Below 1 the peer is faster. ≥ and ≤ are "
         "bounds, where no setting was so coarse that it misses the error, or so fine that it "
         f"meets it. {lost(list(studies), contests(every))}"
@@ -243,8 +238,7 @@ def advantage() -> str:
             f"|---|{'---|' * len(STATED)}",
             row("**the default solver**", every),
             row(f"with set-up, runs of {RUN:g} s", every, duration=RUN),
-            row("waves, lengths that fit their cells", [s for s in waved if fits(s)], "wave"),
-            row("waves, other lengths", [s for s in waved if not fits(s)], "wave"),
+            row("waves", waved, "wave"),
         )
     )
 
@@ -292,42 +286,6 @@ def general() -> str:
         f"On the finite elements' own equations the fastest method of scipy's `solve_ivp` "
         f"({title.removeprefix('scipy ')}) needs at least {two(least)} times the time of the "
         "built-in scheme."
-    )
-
-
-# misfit
-
-
-def misfit() -> str:
-    """Error of the rate divided by that of the wave speed, scene by scene."""
-    rows, factors = [], []
-    for name, study in load_studies().items():
-        points = [
-            p for p in study.ladder("wave-misfit") if math.isfinite(p.errors.get(RATE, math.nan))
-        ]
-        if not points:
-            continue
-        worst = max(points, key=lambda point: point.errors[RATE])
-        each = [point.errors[RATE] / point.size for point in points]
-        factors += each
-        rows.append(
-            [
-                name,
-                f"{power(min(p.size for p in points))} to {power(max(p.size for p in points))}",
-                f"{two(100 * worst.errors[RATE])} % ({worst.label.split(',')[0]})",
-                f"{two(median(each))}, {two(max(each))}",
-            ]
-        )
-    head = [
-        "scene",
-        "misfit",
-        "greatest error of the rate",
-        "error divided by misfit: median, greatest",
-    ]
-    text = table(head, rows)
-    return (
-        f"{text}\n\nOver all of these the rate is off by {two(median(factors))} times the misfit "
-        f"at the median, by {two(max(factors))} times at most."
     )
 
 
@@ -380,16 +338,16 @@ def points_map() -> str:
 
 
 def usual() -> str:
-    """What 20 cells are worth where they fit the lengths."""
-    tree = load("map")
-    row = next(row for row in tree["rows"] if row["method"] == "wave, 20 cells")
+    """What the steps that waves take unless told are worth."""
+    tree, label = load("map"), f"{STEPS_OF_TWO} steps"
+    row = next(row for row in tree["rows"] if row["method"] == f"wave, {label}")
     study = load_studies(("reference",))["reference"]
-    point = next(p for p in study.ladder("wave") if p.label == "20 cells")
+    point = next(p for p in study.ladder("wave") if p.label == label)
     return (
-        f"Twenty cells, the default of the waves, are off by {power(point.errors[RATE])} in the "
-        f"reference scene. That is luck: over the {row['points']} points of the map of section 7, "
-        f"whose lengths fit as well, the median is {power(row['median'])}, "
-        f"the greatest {power(row['greatest'])}."
+        f"Waves with {label} in the piston, their default, are off by "
+        f"{power(point.errors[RATE])} in the reference scene; over the {row['points']} points of "
+        f"the map of section 6 the median is {power(row['median'])}, the greatest "
+        f"{power(row['greatest'])}."
     )
 
 
@@ -400,7 +358,7 @@ def closed() -> str:
         [row["name"], *(power(error) for error in (*row["wave"], *row["fem"]))]
         for row in tree["rows"]
     ]
-    head = [f"waves, {count} cells" for count in tree["cells"]]
+    head = [f"waves, {count} steps" for count in tree["steps"]]
     head += [f"elements, {count}" for count in tree["elements"]]
     return table(["motion", *head], rows)
 
@@ -469,7 +427,7 @@ def rungs(study: Study) -> str:
     """Every rung: errors and times."""
     rows = []
     for point in study.points:
-        label = point.label + (" *" if point.fit > FITS else "")
+        label = point.label
         title = LADDERS[point.ladder].title
         if point.note:
             rows.append([title, label, point.note, *[""] * (len(study.quantities) + 1)])
@@ -489,7 +447,7 @@ def scene_page(name: str) -> str:
     study = load_studies((name,))[name]
     made = "; ".join(
         ", ".join(study.reference.made[solver])
-        for solver in ("modal", "chain", "wave", "explicit", "fem")
+        for solver in ("modal", "wave", "explicit", "fem")
         if solver in study.reference.made
     )
     more = QUANTITIES_FIGURE if name == "reference" else ""
@@ -512,8 +470,7 @@ From {made}.
 
 ## All rungs
 
-{what}; * lengths that do not fit the cells; ± half the range of repeated times; "within" the bar
-of the reference, which tells no more.
+{what}; ± half the range of repeated times; "within" the bar of the reference, which tells no more.
 
 {rungs(study)}
 """
@@ -530,7 +487,6 @@ BLOCKS: dict[str, Callable[[], str]] = {
     "contests": contest_table,
     "modes": modes_table,
     "forces": force_table,
-    "misfit": misfit,
     "coupled": coupled,
     "map": points_map,
     "usual": wrapped(usual),

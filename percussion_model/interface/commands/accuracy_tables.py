@@ -19,7 +19,7 @@ from percussion_model.verification.accuracy.advantage import (
     contest,
     summary,
 )
-from percussion_model.verification.accuracy.ladders import FITS, LADDERS
+from percussion_model.verification.accuracy.ladders import LADDERS
 from percussion_model.verification.accuracy.orders import AT_LEAST, AT_MOST, Cost
 from percussion_model.verification.accuracy.problems import (
     APERIODIC,
@@ -149,11 +149,10 @@ def _show_points(found: Study, console: Console) -> None:
     for name in found.names:
         table.add_row(f"[bold]{LADDERS[name].title}[/bold]")
         for point in found.ladder(name):
-            label = point.label + (" *" if point.fit > FITS else "")
             errors = [_error(found, point, key) for key in keys]
             spread = two(100 * point.spread) if isfinite(point.spread) else "-"
             times = [two(1e3 * point.second), spread, two(1e3 * point.setup)]
-            table.add_row(f" {label}", *times, *errors)
+            table.add_row(f" {point.label}", *times, *errors)
     _print(f"{what}; ms to compute a simulated second; ms of set-up", table, console)
     console.print(
         f"A blow takes {found.period:.4g} s; its cost is that part of ms/s. ± is half the range of "
@@ -162,12 +161,6 @@ def _show_points(found: Study, console: Console) -> None:
     )
     if any(found.floor(key) for key in keys):
         console.print("< Below the bar of the reference, which tells no more.", highlight=False)
-    if any(point.fit > FITS for point in found.points):
-        console.print(
-            "* A section is shorter than a step: the wave speed is off, and the setting is not in "
-            "the order of its method.",
-            highlight=False,
-        )
 
 
 def _show_orders(found: Study, console: Console) -> None:
@@ -193,7 +186,7 @@ def _show_orders(found: Study, console: Console) -> None:
 
 def _show_costs(found: Study, console: Console) -> None:
     """Print what errors of the first quantity cost own solvers, and the best of each family."""
-    own = dict.fromkeys((found.own, "wave", "wave-steps"))
+    own = dict.fromkeys((found.own, "wave"))
     ladders = [name for name in own if name in found.names]
     here = {LADDERS[name].family for name in found.names}
     families = {family: title for family, title in FAMILIES.items() if family in here}

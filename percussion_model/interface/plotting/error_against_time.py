@@ -1,4 +1,4 @@
-"""Figures of error: against computing time, and against the misfit of the wave speed."""
+"""Figures of error against computing time."""
 
 from __future__ import annotations
 
@@ -24,14 +24,12 @@ from percussion_model.verification.accuracy.problems import (
 from percussion_model.verification.accuracy.study import Point, Study
 
 # Colour, dashes and marker of each ladder that is drawn; families share a colour. Ladders
-# that refine something else than cells or elements stand in the tables alone.
+# that refine something else than steps or elements stand in the tables alone.
 _MODAL = "#222222"
 _WAVE, _FEM, _SCIPY, _RIGID, _PEER = "#0072B2", "#D55E00", "#009E73", "#595959", "#CC79A7"
 LINES: dict[str, tuple[str, Any, str]] = {
     "modal": (_MODAL, "-", "*"),
-    "chain": (_MODAL, "-", "*"),
     "wave": (_WAVE, "-", "o"),
-    "wave-steps": (_WAVE, (0, (4, 1.5)), "o"),
     "explicit": (_PEER, "-", "v"),
     "exact-flow": (_PEER, (0, (4, 1.5)), "d"),
     "fem": (_FEM, "-", "s"),
@@ -75,51 +73,6 @@ def draw_quantities(found: Study) -> Figure:
     for ax in axes[len(keys) :]:
         ax.set_visible(False)
     _head(fig, f"{_title(found)}: all quantities", found)
-    return fig
-
-
-def draw_misfits(studies: Sequence[Study]) -> Figure:
-    """Draw the error of the waves against the error of their wave speed, scene by scene."""
-    fig = Figure(figsize=(7.6, 6.0), layout="constrained")
-    ax = fig.subplots()
-    colours = (
-        "#0072B2",
-        "#D55E00",
-        "#009E73",
-        "#CC79A7",
-        "#E69F00",
-        "#56B4E9",
-        "#595959",
-        "#222222",
-        "#8C564B",
-    )
-    scale, drawn = [math.inf, 0.0], 0
-    for found in studies:
-        rungs = found.ladder("wave-misfit")
-        pairs = [(point.size, point.errors.get(found.main, math.nan)) for point in rungs]
-        pairs = [pair for pair in pairs if pair[1] > 0]
-        if not pairs:
-            continue
-        x, y = np.array(pairs).T
-        scale = [min(scale[0], x.min()), max(scale[1], x.max())]
-        ax.plot(
-            x, y, color=colours[drawn % 9], marker="os^DvPX*h"[drawn % 9], markersize=5.0,
-            linestyle="", label=found.title,
-        )  # fmt: skip
-        drawn += 1
-    for factor, dashes, words in (
-        (1.0, "-", "as large as the misfit"),
-        (10.0, (0, (4, 1.5)), "10 times the misfit"),
-    ):
-        ax.plot(
-            scale, [factor * value for value in scale], color=style.RULE_COLOUR,
-            linestyle=dashes, linewidth=0.9, zorder=1, label=words,
-        )  # fmt: skip
-    _log_axes(ax)
-    ax.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{100.0 * value:g}"))
-    style.label(ax, "misfit: error of the wave speed [%]", "error of the rate of penetration [%]")
-    style.head(fig, "Waves in lengths that do not fit the cells, about 40 in the piston")
-    fig.legend(loc="outside lower center", ncols=2)
     return fig
 
 
@@ -202,7 +155,7 @@ def _pairs(found: Study, points: Iterable[Point], key: str) -> Iterable[tuple[fl
 
 
 def _ladder(ax: Axes, found: Study, name: str, key: str) -> None:
-    """Line through all points; hollow markers where they are not in the order."""
+    """Line through all points; hollow markers where an order does not count them."""
     colour, dashes, marker = LINES[name]
     x, y = np.array(_points(found, name, key)).T
     is_own = name == found.own
@@ -237,7 +190,7 @@ def _handles(found: Study) -> list[Any]:
     if found.kind != APERIODIC:
         hollow = Line2D(
             [], [], color=style.RULE_COLOUR, linestyle="", marker="o", markersize=5,
-            markerfacecolor="white", label="hollow: a section is below a step, or grey is near",
+            markerfacecolor="white", label="hollow: grey is near",
         )  # fmt: skip
         bar = Line2D(
             [], [], color=style.SHADE_COLOUR, linewidth=6, label="the reference is known no better"

@@ -87,23 +87,23 @@ def closed_forms() -> list[ClosedForm]:
     ]
 
 
-def solver_error(case: ClosedForm, solver: str, cells: int) -> float:
+def solver_error(case: ClosedForm, solver: str, count: int) -> float:
     """Relative error of a solver at a closed form.
 
     Parameters
     ----------
     case : ClosedForm
     solver : {"wave", "fem"}
-    cells : int
-        In the piston, or in the bit where it is alone; of the elements
+    count : int
+        Steps in the piston, or in the bit where it is alone; of the elements
         likewise, at the CFL step and with a stiff penalty.
     """
     if solver == "fem":
-        changes = {"fem.elements": cells, "fem.courant": 0.5, "fem.contact_stiffness": 1e14}
+        changes = {"fem.elements": count, "fem.courant": 0.5, "fem.contact_stiffness": 1e14}
         if case.scene.piston.model == "absent":
             del changes["fem.contact_stiffness"]
     else:
-        changes = {"solver.cells": cells}
+        changes = {"solver.cells": count}
     simulation = Simulation(case.scene.computed_by(solver, **changes), record_events=False)
     simulation.advance(case.time)
     return abs(simulation.observe()[case.column] / case.value - 1.0)

@@ -18,7 +18,6 @@ from percussion_model.solvers.base import Solver
 from percussion_model.solvers.modal.resolution import most_modes
 from percussion_model.solvers.modal.solver import ModalSolver
 from percussion_model.solvers.setup import elastic_times, kelvin_voigt_time
-from percussion_model.solvers.wave.grid import fitting_cells
 from percussion_model.verification.accuracy.exact_flow import ExactFlowSolver
 from percussion_model.verification.accuracy.explicit import COURANT as COURANT_OF_PEER
 from percussion_model.verification.accuracy.explicit import ExplicitSolver, stable_step
@@ -32,16 +31,13 @@ from percussion_model.verification.accuracy.semidiscrete import refuse_general
 
 __all__ = [
     "COMPARED",
-    "FITS",
     "LADDERS",
     "Ladder",
     "Rung",
     "affordable_modes",
-    "best_fitting",
     "chosen_ladders",
     "fem_scene",
     "ladders",
-    "misfit_of",
     "refuse_asked",
 ]
 
@@ -49,23 +45,20 @@ __all__ = [
 # number, so that the error of the penalty falls like that of the mesh.
 STIFFNESS_OF_TEN = 1e12
 PAPER_STIFFNESS = 1e12
-# Lengths fit the cells of the waves if their speed is off by less.
-FITS = 1e-6
-# Near a number of cells, up to this factor off it, the one that fits the lengths best is taken.
-NEAR = 1.25
-# Cells about which a ladder of misfits lies, up to which factor, and how many rungs it has.
-MISFIT_CELLS, MISFIT_NEAR, MISFIT_RUNGS = 40, 1.25, 6
-WAVE_CELLS = (3, 5, 7, 10, 14, 20, 30, 44, 66, 100)
-WAVE_CELLS_FULL = (*WAVE_CELLS, 150, 200)
+# Steps in which a wave crosses the first elastic bar.
+WAVE_STEPS = (6, 10, 16, 24, 40, 60)
+WAVE_STEPS_FULL = (*WAVE_STEPS, 90)
 # Modes in the bar of the shortest transit time. They are computed in eights: of numbers that
 # fill as many eights the largest is taken.
 MODES, MODES_FULL = (2, 4, 6, 8, 14, 20, 28, 40, 56), (2, 4, 6, 8, 14, 20, 28, 40, 56, 80)
 EIGHT = 8
 # Modes of the longer bar: with more, each rung takes half a minute to be prepared.
 MOST_MODES = 400
-# Steps in the piston of a chain of bars, and elements of its peer.
-CHAIN_STEPS, CHAIN_MESHES = (6, 10, 16, 24, 40, 60), (5, 7, 10, 15, 20, 30)
-CHAIN_STEPS_LONG, CHAIN_MESH_LONG = 16, 20
+# Explicit elements in the piston of a drill string.
+STRING_MESHES = (5, 7, 10, 15, 20, 30)
+STRING_MESHES_FULL = (*STRING_MESHES, 45)
+# Steps and elements of aperiodic motion: with rods, and of two bars.
+STRING_STEPS_LONG, STEPS_LONG, MESH_LONG = 16, 20, 20
 MESHES, MESHES_FULL = (10, 20, 30, 50, 70), (10, 20, 30, 50, 70, 100)
 
 # Compiled peers, their meshes, and the most elements in all bars: those of the exact flow
@@ -97,7 +90,7 @@ class Ladder:
         What is refined, and what the order is measured against.
     note : str
         What else there is to know.
-    family : {"modal", "chain", "wave", "fem", "peer", "scipy", "rigid"}
+    family : {"modal", "wave", "fem", "peer", "scipy", "rigid"}
         Methods of a family share a colour; the last has another model.
     """
 
@@ -118,22 +111,7 @@ LADDERS = {
             "modes in the bar of the shorter transit time, the longer has more",
             "modal",
         ),
-        Ladder("chain", "chain", "step", "steps in the piston of a drill string", "chain"),
-        Ladder(
-            "wave",
-            "wave",
-            "cell size",
-            "cells in the piston that fit the lengths better than fewer do",
-            "wave",
-        ),
-        Ladder("wave-steps", "wave, without leaps", "cell size", "every step made", "wave"),
-        Ladder(
-            "wave-misfit",
-            "wave, lengths that do not fit",
-            "error of the wave speed",
-            "about 40 cells in the piston",
-            "wave",
-        ),
+        Ladder("wave", "wave", "step", "steps in which a wave crosses the piston", "wave"),
         Ladder(
             "explicit",
             "explicit elements",
@@ -182,7 +160,7 @@ LADDERS = {
 # What several scenes are compared by, where no methods are asked for.
 COMPARED = "compared"
 QUICK = (
-    *("modal", "chain", "wave"),
+    *("modal", "wave"),
     *("explicit", "exact-flow", "fem", "rigid"),
 )
 
@@ -199,9 +177,9 @@ class Rung:
     ladder : str
         Name of the ladder.
     label : str
-        As in "20 cells".
+        As in "24 steps".
     size : float
-        What the order is measured against: cell or element size by that of
+        What the order is measured against: step or element size by that of
         the piston, CFL number, or tolerance; simulated time where motion is
         aperiodic.
     scene : Scene
@@ -258,10 +236,6 @@ def refuse_asked(scene: Scene, names: Sequence[str]) -> None:
             scene.computed_by(LADDERS[name].family)
         elif name == "modal":
             by_modes(scene, PILOT_MODES)
-        elif name == "chain" and not scene.effects.string:
-            raise SceneError(
-                "--methods: 'chain' computes bars between piston and bit, and there are none"
-            )
         elif name in _GENERAL:
             refuse_general(scene)
 
@@ -297,7 +271,7 @@ def ladders(problem: Problem, full: bool = False) -> list[Rung]:
     if problem.kind == APERIODIC:
         return list(_rising_durations(problem, full))
     if problem.scene.effects.string:
-        return list(_chains(problem, full))
+        return [*_waves(problem, full), *_elements_of_string(problem, full)]
     rungs = [
         *_modes(problem, full),
         *_waves(problem, full),
@@ -309,30 +283,16 @@ def ladders(problem: Problem, full: bool = False) -> list[Rung]:
 
 
 def total_length(scene: Scene) -> float:
-    """Length of all bars in lengths of the one whose cells are counted."""
+    """Length of piston and bit in lengths of the one whose elements are counted."""
     if scene.piston.model == "absent":
         return 1.0
     return 1.0 + scene.bit.transit_time / scene.piston.transit_time
 
 
 def _affordable(scene: Scene, counts: tuple[int, ...], most: float) -> list[int]:
-    """Numbers of cells that do not make more than `most` in all bars."""
+    """Numbers of elements that do not make more than `most` in all bars."""
     chosen = [count for count in counts if count * total_length(scene) <= most]
     return chosen if len(chosen) > 3 else list(FEW)
-
-
-def misfit_of(scene: Scene, cells: int) -> float:
-    """Relative error of the wave speed with so many cells in the first elastic bar."""
-    return fitting_cells(numbers_of(scene), cells, cells, 0.0)[1]
-
-
-def best_fitting(scene: Scene, about: float) -> int:
-    """Number of cells near `about` whose wave speed is off least; of equals the nearest."""
-    counts = range(math.ceil(about / NEAR - 1e-9), math.floor(about * NEAR + 1e-9) + 1)
-    return min(
-        counts or [round(about)],
-        key=lambda count: (max(misfit_of(scene, count), FITS), abs(count - about)),
-    )
 
 
 def _modal(scene: Scene, modes: int) -> Solver:
@@ -365,15 +325,10 @@ def _modes(problem: Problem, full: bool) -> Iterator[Rung]:
         yield Rung("modal", f"{count} modes", 1.0 / count, by_modes(scene, count))
 
 
-def _chains(problem: Problem, full: bool) -> Iterator[Rung]:
-    """Where bars lie between piston and bit: steps of the chain, and explicit elements."""
-    scene = problem.scene
-    for steps in CHAIN_STEPS:
-        chosen = scene.computed_by("chain", **{"solver.cells": steps})
-        yield Rung("chain", f"{steps} steps", 1.0 / steps, chosen)
-    for count in CHAIN_MESHES if not full else (*CHAIN_MESHES, 45):
+def _elements_of_string(problem: Problem, full: bool) -> Iterator[Rung]:
+    for count in STRING_MESHES_FULL if full else STRING_MESHES:
         peer = partial(ExplicitSolver, elements=count)
-        yield Rung("explicit", f"{count} elements", 1.0 / count, scene, peer=peer)
+        yield Rung("explicit", f"{count} elements", 1.0 / count, problem.scene, peer=peer)
 
 
 def even_mesh(scene: Scene, about: int) -> int:
@@ -394,31 +349,9 @@ def even_mesh(scene: Scene, about: int) -> int:
 
 
 def _waves(problem: Problem, full: bool) -> Iterator[Rung]:
-    scene = problem.scene
-    wished = _affordable(scene, WAVE_CELLS_FULL if full else WAVE_CELLS, 450.0 if full else 270.0)
-    counts: list[int] = []
-    for count in sorted({best_fitting(scene, count) for count in wished}):
-        # nobody pays for cells that fit worse than fewer do
-        fits = [max(misfit_of(scene, one), FITS) for one in (count, *counts)]
-        if fits[0] <= min(fits) * (1.0 + 1e-9):
-            counts.append(count)
-    for name, leaps in (("wave", True), ("wave-steps", False)):
-        for cells in counts:
-            changes = {"solver.cells": cells, "solver.leaps": leaps}
-            yield Rung(name, f"{cells} cells", 1.0 / cells, scene.computed_by("wave", **changes))
-    for cells, misfit in _rising_misfits(scene):
-        chosen = scene.computed_by("wave", **{"solver.cells": cells})
-        yield Rung("wave-misfit", f"{cells} cells, {misfit:.1e}", misfit, chosen)
-
-
-def _rising_misfits(scene: Scene) -> list[tuple[int, float]]:
-    """About the same number of cells, and misfits of the wave speed evenly from least to most."""
-    about = min(MISFIT_CELLS, MOST_ELEMENTS / total_length(scene))
-    counts = range(math.ceil(about / MISFIT_NEAR), math.floor(about * MISFIT_NEAR) + 1)
-    pairs = sorted((misfit_of(scene, count), count) for count in counts)
-    pairs = [pair for pair in pairs if pair[0] >= FITS]
-    places = {round(k * (len(pairs) - 1) / (MISFIT_RUNGS - 1)) for k in range(MISFIT_RUNGS)}
-    return [(pairs[place][1], pairs[place][0]) for place in sorted(places) if pairs]
+    for steps in WAVE_STEPS_FULL if full else WAVE_STEPS:
+        chosen = problem.scene.computed_by("wave", **{"solver.cells": steps})
+        yield Rung("wave", f"{steps} steps", 1.0 / steps, chosen)
 
 
 def _elements(problem: Problem, full: bool) -> Iterator[Rung]:
@@ -471,19 +404,20 @@ def _general(problem: Problem) -> Iterator[Rung]:
 def _rising_durations(problem: Problem, full: bool) -> Iterator[Rung]:
     """Aperiodic motion: what costs is the length of the run."""
     scene = problem.scene
-    if scene.effects.string:
-        chain = scene.computed_by("chain", **{"solver.cells": CHAIN_STEPS_LONG})
-        solvers = {"chain": (chain, 1.0), "explicit": (scene, 1.0)}
-    else:
+    steps = STRING_STEPS_LONG if scene.effects.string else STEPS_LONG
+    solvers = {
+        "wave": (scene.computed_by("wave", **{"solver.cells": steps}), 1.0),
+        "explicit": (scene, 1.0),
+    }
+    if not scene.effects.string:
         solvers = {
             "modal": (by_modes(scene, 20), 1.0),
-            "wave": (scene.computed_by("wave", **{"solver.cells": 20}), 1.0),
+            **solvers,
             "fem": (fem_scene(scene, 20, COURANT, stiffness_of(20)), 0.25),
             "rigid": (scene.computed_by("rigid"), 1.0),
-            "explicit": (scene, 1.0),
         }
     for name, (chosen, share) in solvers.items():
-        peer = partial(ExplicitSolver, elements=CHAIN_MESH_LONG) if name == "explicit" else None
+        peer = partial(ExplicitSolver, elements=MESH_LONG) if name == "explicit" else None
         for factor in DURATIONS:
             duration = share * factor / 16.0 * problem.duration * (4.0 if full else 1.0)
             yield Rung(name, f"{duration:g} s", duration, chosen, duration=duration, peer=peer)

@@ -1,10 +1,9 @@
 """References with error bars, made by solvers that share no motion, stored as JSON.
 
-Waves (in strings steps of the chain), explicit and implicit elements are each refined three
-times and extrapolated (Richardson); modes are refined as well. A number is called a reference
-where the two surest limits agree within their bars or nearly so. Its bar covers the distance
-of the two and, since a motion near a threshold is another one on other meshes, all that the
-modes found.
+Waves, explicit and implicit elements are each refined three times and extrapolated
+(Richardson); modes are refined as well. A number is called a reference where the two surest
+limits agree within their bars or nearly so. Its bar covers the distance of the two and, since
+a motion near a threshold is another one on other meshes, all that the modes found.
 """
 
 from __future__ import annotations
@@ -28,11 +27,8 @@ from percussion_model.simulation.files import staged_file
 from percussion_model.solvers.base import Solver
 from percussion_model.verification.accuracy.explicit import ExplicitSolver
 from percussion_model.verification.accuracy.ladders import (
-    FITS,
     affordable_modes,
-    best_fitting,
     fem_scene,
-    misfit_of,
     total_length,
 )
 from percussion_model.verification.accuracy.problems import (
@@ -63,8 +59,8 @@ FORMAT = 2
 DIGITS = 6
 # Orders that extrapolation assumes: about the least that was measured; the mesh of the
 # implicit elements, with a penalty that goes along, is of second order.
-ORDERS = {"wave": 1.0, "chain": 1.0, "explicit": 1.0, "fem": 2.0}
-# Cells in all bars together, coarse to fine; elements likewise.
+ORDERS = {"wave": 1.0, "explicit": 1.0, "fem": 2.0}
+# Steps of waves through piston and bit together, coarse to fine; elements likewise.
 WAVE_LEVELS, WAVE_LEVELS_QUICK = (172.0, 258.0, 430.0), (86.0, 129.0, 172.0)
 EXPLICIT_LEVELS, EXPLICIT_LEVELS_QUICK = (602.0, 860.0, 1204.0), (108.0, 151.0, 215.0)
 FEM_LEVELS, FEM_LEVELS_QUICK = (108.0, 151.0, 215.0), (65.0, 86.0, 108.0)
@@ -77,8 +73,8 @@ NEAR_THRESHOLD = 1e-3
 GROWTH = 3.0
 # A penalty rings: its contact force is no witness.
 RINGING = {"fem": ("peak_contact_force", CONTACT_HISTORY)}
-# Where these do not fit the lengths, cells that do, up to so many in all bars.
-MOST_CELLS = 900
+# Steps in the piston of a drill string, elements likewise.
+STRING_LEVELS = (30, 45, 70)
 # Simulated time of aperiodic references, by the scene's duration.
 LONG = 20.0
 LONG_CELLS = 40
@@ -317,9 +313,7 @@ class Level(NamedTuple):
     name : str
     scene : Scene
     size : float
-        Of a cell or element, by that of the first bar.
-    fits : bool
-        Whether the cells fit the lengths.
+        Of a step or element, by that of the first bar.
     peer : callable or None
         Makes explicit elements; None for the solver that the scene names.
     """
@@ -327,7 +321,6 @@ class Level(NamedTuple):
     name: str
     scene: Scene
     size: float
-    fits: bool = True
     peer: Callable[[Scene], Solver] | None = None
 
 
@@ -342,7 +335,7 @@ def _levels(problem: Problem, quick: bool) -> dict[str, list[Level]]:
     if problem.kind == APERIODIC:
         counts, meshes = [LONG_CELLS], [LONG_CELLS]
     else:
-        counts = wave_levels(scene, waves, 0 if quick else MOST_CELLS)
+        counts = [max(2, round(target / lengths)) for target in waves]
         meshes = [max(3, round(target / lengths)) for target in explicit]
     found = {"wave": [_wave_level(scene, count) for count in counts]}
     if default_solver(scene) == "modal":
@@ -363,33 +356,17 @@ def _levels(problem: Problem, quick: bool) -> dict[str, list[Level]]:
 
 
 def _string_levels(problem: Problem, quick: bool) -> dict[str, list[Level]]:
-    """Levels where bars lie between piston and bit: of the chain, and of explicit elements."""
-    scene = problem.scene
-    counts = [LONG_CELLS] if problem.kind == APERIODIC else [30, 45, 70][: 2 if quick else 3]
-    found = {
-        "chain": [
-            Level(
-                f"chain, {count} steps",
-                scene.computed_by("chain", **{"solver.cells": count}),
-                1.0 / count,
-            )
-            for count in counts
-        ],
-    }
+    """Levels where bars lie between piston and bit: of waves and of explicit elements."""
+    scene, counts = problem.scene, STRING_LEVELS[: 2 if quick else 3]
+    steps, meshes = counts, counts
+    if problem.kind == APERIODIC:
+        steps, meshes = (LONG_CELLS,), (LONG_MESH,)
+    found = {"wave": [_wave_level(scene, count) for count in steps]}
     try:
-        ExplicitSolver(scene, counts[0])
+        ExplicitSolver(scene, meshes[0])
     except SceneError:
         return found
-    found["explicit"] = [
-        Level(
-            f"explicit, {count} elements",
-            scene,
-            1.0 / count,
-            peer=partial(ExplicitSolver, elements=count),
-        )
-        for count in ([LONG_MESH] if problem.kind == APERIODIC else counts)
-    ]
-    return found
+    return found | {"explicit": [_explicit_level(scene, count) for count in meshes]}
 
 
 def _modal_levels(problem: Problem, quick: bool) -> list[Level]:
@@ -406,7 +383,7 @@ def _modal_levels(problem: Problem, quick: bool) -> list[Level]:
 
 def _wave_level(scene: Scene, count: int) -> Level:
     chosen = scene.computed_by("wave", **{"solver.cells": count})
-    return Level(f"wave, {count} cells", chosen, 1.0 / count, misfit_of(scene, count) < FITS)
+    return Level(f"wave, {count} steps", chosen, 1.0 / count)
 
 
 def _explicit_level(scene: Scene, count: int) -> Level:
@@ -417,22 +394,6 @@ def _explicit_level(scene: Scene, count: int) -> Level:
 def _fem_level(scene: Scene, count: int, stiffness: float) -> Level:
     name = f"fem, {count} elements, CFL 1, K_C {stiffness:.3g} N/m"
     return Level(name, fem_scene(scene, count, 1.0, stiffness), 1.0 / count)
-
-
-def wave_levels(scene: Scene, targets: Sequence[float], most: int) -> list[int]:
-    """Cells in the first bar, coarse to fine.
-
-    Such as fit the lengths, where up to `most` in all bars there are three; else those near
-    the targets that fit best and, last, the least that fit.
-    """
-    lengths = total_length(scene)
-    best = [best_fitting(scene, max(2.0, target / lengths)) for target in targets]
-    if max(misfit_of(scene, count) for count in best) < FITS:
-        return best
-    fitting = [n for n in range(2, int(most / lengths) + 1) if misfit_of(scene, n) < FITS]
-    if len(fitting) >= len(targets):
-        return fitting[-len(targets) :]
-    return best + [n for n in fitting if n > best[-1]][:1]
 
 
 def _answer(problem: Problem, level: Level) -> Answer:
@@ -447,17 +408,15 @@ def _limit(
     """Extrapolate the last two levels; the bar is what the last two steps of it changed.
 
     Half the change from the level before to the finest is a bound as well: where answers
-    jump from level to level, extrapolation would promise too much. Levels that do not fit
-    the lengths do not fall in order: then the finest is taken, and its change is the bar. So
-    it is where changes do not fall, and of modes, which have no order, by their finer half.
+    jump from level to level, extrapolation would promise too much. Where changes do not fall
+    the finest is taken, and the greater change is the bar; of modes, which have no order, the
+    finest and the range of their finer half.
     """
     values = [answer.values[key] for answer in answers]
     if order is None:
         finer = values[len(values) // 2 :]
         return values[-1], max(max(finer) - min(finer), abs(values[-1] - values[-2]))
     change = abs(values[-1] - values[-2])
-    if not all(level.fits for level in levels):
-        return values[-1], change
     before = abs(values[-2] - values[-3]) if len(values) > 2 else math.inf
     if change > GROWTH * before:
         return values[-1], max(change, before)

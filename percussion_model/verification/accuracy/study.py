@@ -17,7 +17,6 @@ from percussion_model.solvers.base import place_of_kernels
 from percussion_model.verification.accuracy.integrators import GeneralRun
 from percussion_model.verification.accuracy.ladders import (
     COMPARED,
-    FITS,
     LADDERS,
     Rung,
     chosen_ladders,
@@ -50,7 +49,7 @@ WANTED = (1e-2, 3e-3, 1e-3, 5e-4)
 # Families of ladders that the default solver is compared with: the best of them counts.
 PEERS = ("peer", "fem", "scipy")
 # Ladders of own solvers, and which stands in where the one that "auto" takes was not run.
-OWN = ("modal", "chain", "wave")
+OWN = ("modal", "wave")
 # A general integrator gets so long for a blow [s].
 PATIENCE, PATIENCE_FULL = 25.0, 120.0
 # Errors below this multiple of the reference's bar are not resolved.
@@ -79,8 +78,6 @@ class Point:
     values, errors : dict of float
         By quantity: what was found, and the relative error; None where there
         is no reference.
-    fit : float
-        Error of the wave speed, from lengths that fit no common cell.
     note : str
         Why there is no answer.
     """
@@ -95,7 +92,6 @@ class Point:
     spread: float
     values: dict[str, float]
     errors: dict[str, float]
-    fit: float = 0.0
     note: str = ""
 
 
@@ -166,15 +162,9 @@ class Study:
         return 0.0 if math.isnan(floor) or self.kind == APERIODIC else floor
 
     def fitted(self, name: str, key: str) -> list[Point]:
-        """Points that an order is fitted to: resolved, and with lengths that fit the cells.
-
-        Where lengths fit at no rung, all count.
-        """
+        """Points that an order is fitted to: those that the reference resolves."""
         limit = RESOLVED * self.floor(key)
-        resolved = [point for point in self.ladder(name) if point.errors.get(key, math.nan) > limit]
-        if all(point.fit >= FITS for point in self.ladder(name)):
-            return resolved
-        return [point for point in resolved if point.fit < FITS]
+        return [point for point in self.ladder(name) if point.errors.get(key, math.nan) > limit]
 
     def order(self, name: str, key: str) -> Order | None:
         """Measured order of a ladder in a quantity."""
@@ -268,12 +258,10 @@ class Study:
         """
         # errors of aperiodic motion are those of statistics, without that of the rigid model
         names = [name for name in self.names if self.kind != APERIODIC or name != "rigid"]
-        # the cells of misfits differ too little: they are no finer settings of each other
-        methods = [name for name in names if name != "wave-misfit"]
         floor, share = self.floor(self.main), f"{100 * wanted:g} %"
-        found = [point for name in methods for point in self.good(name, wanted, floor)]
+        found = [point for name in names for point in self.good(name, wanted, floor)]
         if not found:
-            if any(self.good(name, wanted, -floor) for name in methods):
+            if any(self.good(name, wanted, -floor) for name in names):
                 return (
                     f"For {share} the reference does not tell: its bar is "
                     f"{in_digits(100 * floor, 2)} %."
@@ -373,7 +361,7 @@ class Study:
 
 
 def _setting(point: Point, capital: bool = False) -> str:
-    """Method and setting of a point, as in "wave, 20 cells"."""
+    """Method and setting of a point, as in "wave, 24 steps"."""
     title = LADDERS[point.ladder].title
     first = title[0].upper() + title[1:] if capital else title
     return ", ".join(filter(None, (first, point.label)))
@@ -483,7 +471,7 @@ def solvers_of(names: Iterable[str], scene: Scene) -> list[str]:
     default = default_solver(scene)
     needed = {default, *(LADDERS[name].family for name in names)}
     if scene.effects.string:
-        return ["chain"]
+        return ["wave"]
     known = ("wave", "fem", "rigid") if default != "modal" else ("modal", "wave", "fem", "rigid")
     return [name for name in known if name in needed]
 
@@ -520,8 +508,6 @@ def _measured(
     if isinstance(run, GeneralRun):
         cost = run.cost()
         point = replace(point, blow=cost, second=cost / problem.period, repeats=1)
-    else:
-        point = replace(point, fit=run.simulation.solver.wave_speed_error)
     return point, run
 
 
