@@ -283,15 +283,16 @@ class Component:
         self.variables = {one.name: one for one in description.modelVariables}
         self.can_save = bool(description.coSimulation.canGetAndSetFMUstate)
         self.can_vary = bool(description.coSimulation.canHandleVariableCommunicationStepSize)
-        self.messages: list[tuple[int, str]] = []
+        self.messages: list[str] = []
+        self.faults: list[str] = []  # those of them that are errors
         # both have to live as long as the instance
         self._logger = fmi2CallbackLoggerTYPE(self._note)
         self._callbacks = fmi2CallbackFunctions()
         self._callbacks.logger = self._logger
-        self._slave: Any = None
+        self.slave: Any = None
         try:
             with contextlib.chdir("."):  # fmpy stays in the folder of a library that fails
-                self._slave = FMU2Slave(
+                self.slave = FMU2Slave(
                     guid=description.guid,
                     unzipDirectory=folder,
                     modelIdentifier=description.coSimulation.modelIdentifier,
@@ -302,8 +303,8 @@ class Component:
             raise CouplingError(
                 f"{name}: the library of its FMU cannot be loaded: {text}"
             ) from error
-        self._guarded(self._slave.instantiate, callbacks=self._callbacks, loggingOn=True)
-        self.pointer = ctypes.c_void_p(self._slave.component)
+        self._guarded(self.slave.instantiate, callbacks=self._callbacks, loggingOn=True)
+        self.pointer = ctypes.c_void_p(self.slave.component)
         self.stepper = self.function(
             "fmi2DoStep", ctypes.c_void_p, ctypes.c_double, ctypes.c_double, ctypes.c_int
         )
@@ -312,12 +313,14 @@ class Component:
     def function(self, name: str, *types: Any) -> Any:
         """A function of the library that returns a status; without types, by those of ctypes."""
         # an object of its own, since fmpy gives types to that of the library
-        return ctypes.cast(getattr(self._slave.dll, name), ctypes.CFUNCTYPE(ctypes.c_int, *types))
+        return ctypes.cast(getattr(self.slave.dll, name), ctypes.CFUNCTYPE(ctypes.c_int, *types))
 
     def _note(
         self, environment: Any, name: bytes, status: int, category: bytes, text: bytes
     ) -> None:
-        self.messages.append((status, text.decode("utf-8", "replace")))
+        self.messages.append(text.decode("utf-8", "replace"))
+        if status > WARNING:
+            self.faults.append(self.messages[-1])
 
     def find(self, name: str) -> Any:
         """A variable by name; the error suggests another one."""
@@ -342,7 +345,7 @@ class Component:
             if isinstance(value, str):
                 value = number_of_word(self.name, one, value)
             converted = self._converted(one, family, value)
-            setter = getattr(self._slave, f"set{family}")
+            setter = getattr(self.slave, f"set{family}")
             self._guarded(setter, [one.valueReference], [converted])
 
     def _converted(self, one: Any, family: str, value: Any) -> Any:
@@ -371,16 +374,16 @@ class Component:
 
     def begin(self, time: float) -> None:
         """Enter the initialisation."""
-        self._guarded(self._slave.setupExperiment, startTime=time)
-        self._guarded(self._slave.enterInitializationMode)
+        self._guarded(self.slave.setupExperiment, startTime=time)
+        self._guarded(self.slave.enterInitializationMode)
 
     def compilation(self) -> list[str]:
         """What the FMU has logged of kernels that it is going to compile."""
-        return [text for _, text in self.messages if COMPILING in text]
+        return [text for text in self.messages if COMPILING in text]
 
     def end_initialisation(self) -> None:
         """Leave the initialisation."""
-        self._guarded(self._slave.exitInitializationMode)
+        self._guarded(self.slave.exitInitializationMode)
 
     def step(self, time: float, step: float) -> None:
         """One communication step [s]."""
@@ -391,15 +394,15 @@ class Component:
     def save(self) -> Any:
         """State of the instance, to be given back by `drop`."""
         self._no_rollback = 0
-        return self._guarded(self._slave.getFMUstate)
+        return self._guarded(self.slave.getFMUstate)
 
     def restore(self, state: Any) -> None:
         """Go back to a state."""
-        self._guarded(self._slave.setFMUstate, state)
+        self._guarded(self.slave.setFMUstate, state)
 
     def drop(self, state: Any) -> None:
         """Give the memory of a state back."""
-        self._guarded(self._slave.freeFMUstate, state)
+        self._guarded(self.slave.freeFMUstate, state)
 
     def _guarded(self, call: Any, *arguments: Any, **named: Any) -> Any:
         """Call, and put what the FMU logged into the error."""
@@ -420,12 +423,11 @@ class Component:
 
     def _error(self, text: str) -> CouplingError:
         # the line of the FMU itself comes first, that of its export library after it
-        logged = [text for status, text in self.messages if status > WARNING and text.strip()]
-        text = logged[0].removeprefix(f"{self.name}: ") if logged else text
-        return CouplingError(f"{self.name}: {text}")
+        logged = next(filter(str.strip, self.faults), text)
+        return CouplingError(f"{self.name}: {logged.removeprefix(f'{self.name}: ')}")
 
     def free(self) -> None:
         """End the instance."""
-        if self._slave is not None:
-            self._slave.freeInstance()
-            self._slave = None
+        if self.slave is not None:
+            self.slave.freeInstance()
+            self.slave = None
