@@ -178,7 +178,7 @@ class Part(Slave):
 def slave_of(model: type[Model]) -> type[Part]:
     """Slave around a model; FMUs find it in the model's module, by this name."""
     names = {"MODEL": model, "__module__": model.__module__, "__doc__": model.__doc__}
-    return type(Part)(f"{model.__name__}Part", (Part,), names)
+    return type(f"{model.__name__}Part", (Part,), names)
 
 
 @dataclass(frozen=True)

@@ -228,9 +228,9 @@ def _check(plan: SystemPlan, variables: dict[str, dict[str, Any]]) -> None:
                 raise SystemPlanError(f"parameter {component}.{name} = {shown}: must be a number")
 
 
-def _add(parent: Element, space: str, name: str, **attributes: str) -> Element:
+def _add(parent: Element, space: str, word: str, /, **attributes: str) -> Element:
     """Add an element to another one."""
-    return SubElement(parent, tag(space, name), attributes)
+    return SubElement(parent, tag(space, word), attributes)
 
 
 def _text(root: Element) -> bytes:
@@ -252,8 +252,8 @@ def _structure(
     used = [*plan.connections, *plan.connections.values()]
     units: set[str] = set()
     for component, fmu in fmus.items():
-        source = {"type": FMU, "source": f"resources/{fmu.name}"}
-        node = _add(elements, "ssd", "Component", name=component, **source)
+        file = f"resources/{fmu.name}"
+        node = _add(elements, "ssd", "Component", name=component, type=FMU, source=file)
         connectors = _add(node, "ssd", "Connectors")
         for name, one in variables[component].items():
             if f"{component}.{name}" not in used:

@@ -192,6 +192,8 @@ class Exchange:
     ----------
     component : Component
     names : sequence of str
+    kind : str
+        "Get" or "Set".
 
     Attributes
     ----------
@@ -201,54 +203,32 @@ class Exchange:
         Families with what calls them.
     """
 
-    kind = ""  # "Get" or "Set"
-
-    def __init__(self, component: Component, names: Sequence[str]) -> None:
-        found: dict[str, list[str]] = {}
-        for name in names:
-            found.setdefault(component.family(name), []).append(name)
+    def __init__(self, component: Component, names: Sequence[str], kind: str) -> None:
         self.component = component
         self.names: list[str] = []
         self.groups: list[Group] = []
+        families = [component.family(name) for name in names]
         for family in ORDER:
-            if family in found:
-                group = Group(component, family, found[family], self.kind, len(self.names))
-                self.groups.append(group)
-                self.names += found[family]
-
-
-class Reader(Exchange):
-    """Reads variables of an FMU."""
-
-    kind = "Get"
+            own = [name for name, of in zip(names, families, strict=True) if of == family]
+            if own:
+                self.groups.append(Group(component, family, own, kind, len(self.names)))
+                self.names += own
+        self.forget()
 
     def read(self) -> list[Any]:
         """Present values."""
         found: list[Any] = []
         for group in self.groups:
-            status = group.call(*group.arguments)
-            if status > WARNING:
-                self.component.fail(group.name, status)
+            self._call(group)
             found += map(bool, group.found()) if group.family == "Boolean" else group.found()
         return found
 
-
-class Writer(Exchange):
-    """Sets variables of an FMU; a family whose values are as before is left alone."""
-
-    kind = "Set"
-
-    def __init__(self, component: Component, names: Sequence[str]) -> None:
-        super().__init__(component, names)
-        self._last: list[Any] = []
-        self.forget()
-
     def forget(self) -> None:
         """Set all values the next time: the FMU may have others than were set last."""
-        self._last = [None for _ in self.groups]
+        self._last: list[Any] = [None for _ in self.groups]
 
     def write(self, values: Sequence[Any]) -> None:
-        """Set values, in the order of the names."""
+        """Set values, in the order of the names; a family that is as before is left alone."""
         for k, group in enumerate(self.groups):
             chosen = values[group.begin : group.end]
             if chosen == self._last[k]:
@@ -258,10 +238,13 @@ class Writer(Exchange):
             except struct.error:
                 self.component.refuse_large(self.names[group.begin : group.end], chosen)
                 raise
-            status = group.call(*group.arguments)
-            if status > WARNING:
-                self.component.fail(group.name, status)
+            self._call(group)
             self._last[k] = chosen
+
+    def _call(self, group: Group) -> None:
+        status = group.call(*group.arguments)
+        if status > WARNING:
+            self.component.fail(group.name, status)
 
 
 class Component:
@@ -364,13 +347,13 @@ class Component:
             raise CouplingError(f"{self.name}.{one.name} = {value!r}: must be of type {one.type}")
         return converted
 
-    def reader(self, names: Sequence[str]) -> Reader:
+    def reader(self, names: Sequence[str]) -> Exchange:
         """Return a reader of these variables, all at once."""
-        return Reader(self, names)
+        return Exchange(self, names, "Get")
 
-    def writer(self, names: Sequence[str]) -> Writer:
+    def writer(self, names: Sequence[str]) -> Exchange:
         """Return a writer of these variables, all at once."""
-        return Writer(self, names)
+        return Exchange(self, names, "Set")
 
     def begin(self, time: float) -> None:
         """Enter the initialisation."""
