@@ -22,8 +22,8 @@ from percussion_model.simulation.warnings import unused_note
 __all__ = [
     "NOISE",
     "EffectsStudy",
-    "Trial",
     "Variant",
+    "VariantRun",
     "effect_variants",
     "step_costs",
     "study_effects",
@@ -225,7 +225,7 @@ def _not_zero(scene: Scene, keys: tuple[str, ...]) -> dict[str, Any]:
 
 
 @dataclass(frozen=True)
-class Trial:
+class VariantRun:
     """One variant of a scene.
 
     Attributes
@@ -329,16 +329,16 @@ class EffectsStudy:
     Attributes
     ----------
     scene : Scene
-    base : Trial
+    base : VariantRun
         The scene as it is.
-    trials : list of Trial
+    trials : list of VariantRun
     refused : dict of str
         Effects that cannot be changed in this scene, and why.
     """
 
     scene: Scene
-    base: Trial = field(repr=False)
-    trials: list[Trial] = field(repr=False)
+    base: VariantRun = field(repr=False)
+    trials: list[VariantRun] = field(repr=False)
     refused: dict[str, str] = field(repr=False)
 
     @property
@@ -346,7 +346,7 @@ class EffectsStudy:
         """Numbers whose change is shown: `CHANGED`, or `CHANGED_OF_FALL`."""
         return CHANGED_OF_FALL if self.base.falls else CHANGED
 
-    def change(self, trial: Trial, name: str) -> Change:
+    def change(self, trial: VariantRun, name: str) -> Change:
         """Change of a number of `changed` against the scene itself.
 
         Leaps go over the same grid: whatever it puts off is in both runs, and scatter is left.
@@ -357,16 +357,16 @@ class EffectsStudy:
             return replace(found, hidden=True)
         return found
 
-    def changes(self, trial: Trial) -> dict[str, float | None]:
+    def changes(self, trial: VariantRun) -> dict[str, float | None]:
         """Relative change of each number of `changed`; None where there is none that counts."""
         found = {name: self.change(trial, name) for name in self.changed}
         return {name: None if one.hidden else one.value for name, one in found.items()}
 
-    def change_errors(self, trial: Trial) -> dict[str, float | None]:
+    def change_errors(self, trial: VariantRun) -> dict[str, float | None]:
         """Errors of `changes`, by grid and scatter of both runs; None where it is not known."""
         return {name: self.change(trial, name).error for name in self.changed}
 
-    def undecided(self, trial: Trial) -> list[str]:
+    def undecided(self, trial: VariantRun) -> list[str]:
         """Numbers of `changed` whose change is within what is known of its error."""
         return [name for name in self.changed if self.change(trial, name).is_undecided]
 
@@ -391,7 +391,7 @@ class EffectsStudy:
             ]
         return texts
 
-    def is_costlier(self, trial: Trial) -> bool:
+    def is_costlier(self, trial: VariantRun) -> bool:
         """Whether turning an effect off made a step costlier, beyond noise."""
         if not trial.variant.off or trial.step is None or self.base.step is None:
             return False
@@ -469,7 +469,7 @@ def study_effects(
         progress("time steps", len(cases) / (len(cases) + 1))
     steps = step_costs([changed for _, changed in cases])
     trials = [
-        Trial(variant, result, wall, step)
+        VariantRun(variant, result, wall, step)
         for (variant, _), (result, wall), step in zip(cases, found, steps, strict=True)
     ]
     return EffectsStudy(scene, trials[0], trials[1:], refused)
