@@ -180,20 +180,8 @@ def _parameters(scene: Scene) -> Iterator[Variable]:
     )
     carriers = gauge_bars(scene)
     bars = tuple((name, k + 1, f"the {name}") for k, name in enumerate(carriers))
-    yield Variable(
-        name="gauge.bar",
-        reference=reference("gauge.bar", "parameter"),
-        type="Enumeration",
-        causality="parameter",
-        description="bar that carries the gauge",
-        variability="fixed",
-        start=2,
-        row=_choice_row("gauge.bar", carriers),
-        enumeration="Bar",
-        items=bars,
-        lower=1,
-        upper=len(bars),
-    )
+    gauge = _parameter("gauge.bar", _choice_row("gauge.bar", carriers), "bit")
+    yield replace(gauge, key=None, enumeration="Bar", items=bars)
     yield _number(
         "gauge.position",
         reference("gauge.position", "parameter"),

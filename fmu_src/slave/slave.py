@@ -191,11 +191,6 @@ class Slave(Hosted):
                         self.unchecked.append(name)
         self.pending.clear()
 
-    def renew_inputs(self) -> None:
-        """Take all inputs as new in the next step."""
-        self.unchecked = [one.name for one in self.inputs]
-        self.new.update(self.unchecked)
-
     def _reader_of(self, references: list[int], types: tuple[str, ...]) -> Read:
         """What reads these variables; raises ValueError if there is one that is not known."""
         found = [self._variable(reference, types) for reference in references]
@@ -418,7 +413,8 @@ class Slave(Hosted):
         self.values |= values
         self.phase, self.is_set_up = place.phase, place.is_set_up
         self.start_time, self.now = place.start_time, place.now
-        self.renew_inputs()
+        self.unchecked = [one.name for one in self.inputs]  # all are new in the next step
+        self.new.update(self.unchecked)
 
     @staticmethod
     def _fmu_state_to_bytes(state: Any) -> bytes:

@@ -160,7 +160,8 @@ def test_a_signal_is_held_from_the_start_of_each_step(make):
     found = run(make(feed_force=1000.0), 0.19, 0.01, {"feed_force": signal}, ["bit.position"])
     other = make(feed_force=1000.0)
     for k in range(19):
-        other.set({"feed_force": signal(0.01 * k)})
+        other.time = 0.01 * k
+        other.set({"feed_force": signal(other.time)})
         other.step(0.01)
     assert found["bit.position"][-1] == other.get("bit.position")
 
